@@ -1,0 +1,3 @@
+//! JSBSim in process, and the MAVLink shim that plays the flight controller.
+
+pub mod plant;

@@ -1,0 +1,41 @@
+//! Controllers: from what is observed and what is wanted to a command, once every 10 ms.
+
+use crate::physics::{ActuatorState, Command, State, Time};
+
+/// What a controller sees: eq. (27) of \[GSFM26\] with the altitude, which sets the air density.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// Moment of the measurement, vehicle clock.
+    pub time: Time,
+    /// Physical state s^p.
+    pub state: State,
+    /// Observed actuator state z: positions and rates.
+    pub actuators: ActuatorState,
+    /// Altitude above mean sea level, m.
+    pub altitude: f64,
+}
+
+/// What is wanted: the commanded attitude (φ*, θ*) and the airspeed V_a* to hold meanwhile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    /// Commanded roll φ*, rad.
+    pub roll: f64,
+    /// Commanded pitch θ*, rad.
+    pub pitch: f64,
+    /// Airspeed to hold as far as thrust allows, m/s.
+    pub airspeed: f64,
+}
+
+/// A control law, called every 10 ms of vehicle time. It never allocates, blocks or fails:
+/// a controller that cannot be built says so in [`build`].
+pub trait Controller: Send {
+    /// The name that selects it on the command line.
+    fn name(&self) -> &'static str;
+    /// Forgets the past (integrators, warm starts), as before take-off or on re-engagement.
+    ///
+    /// `bumpless` is the command in force, from which the next one should continue where the
+    /// law can.
+    fn reset(&mut self, seed: u64, bumpless: Command);
+    /// The command for this tick.
+    fn command(&mut self, seen: &Observation, target: &Target) -> Command;
+}

@@ -1,0 +1,73 @@
+//! A flight as a table: one sample a row, the columns of the log format.
+
+/// One row of a flight log. SI units, radians, body axes FRD, earth axes NED; a missing value is NaN.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Monotonic sample time, s.
+    pub time_s: f64,
+    /// Roll, pitch, yaw: Euler angles ZYX, rad.
+    pub attitude_rad: [f64; 3],
+    /// p, q, r: body rates, rad/s.
+    pub rates_radps: [f64; 3],
+    /// True airspeed, m/s.
+    pub airspeed_mps: f64,
+    /// Angle of attack, rad.
+    pub alpha_rad: f64,
+    /// Sideslip, rad.
+    pub beta_rad: f64,
+    /// Specific force at the centre of gravity, m/s² (about −9.81 on z in level flight).
+    pub specific_force_mps2: [f64; 3],
+    /// Velocity over ground, NED, m/s.
+    pub velocity_ned_mps: [f64; 3],
+    /// Altitude above mean sea level, m.
+    pub altitude_m: f64,
+    /// Aileron deflection that acts, rad.
+    pub aileron_rad: f64,
+    /// Elevator deflection that acts, rad.
+    pub elevator_rad: f64,
+    /// Throttle position that acts, 0..1.
+    pub throttle: f64,
+    /// Commanded aileron, −1..1.
+    pub aileron_cmd: f64,
+    /// Commanded elevator, −1..1.
+    pub elevator_cmd: f64,
+    /// Commanded throttle, 0..1.
+    pub throttle_cmd: f64,
+    /// Commanded roll φ*, rad (an extra column, `roll_target_rad`).
+    pub roll_target_rad: f64,
+    /// Commanded pitch θ*, rad (an extra column, `pitch_target_rad`).
+    pub pitch_target_rad: f64,
+}
+
+impl Default for Sample {
+    /// A row in which everything is missing.
+    fn default() -> Self {
+        let nan = f64::NAN;
+        Sample {
+            time_s: nan,
+            attitude_rad: [nan; 3],
+            rates_radps: [nan; 3],
+            airspeed_mps: nan,
+            alpha_rad: nan,
+            beta_rad: nan,
+            specific_force_mps2: [nan; 3],
+            velocity_ned_mps: [nan; 3],
+            altitude_m: nan,
+            aileron_rad: nan,
+            elevator_rad: nan,
+            throttle: nan,
+            aileron_cmd: nan,
+            elevator_cmd: nan,
+            throttle_cmd: nan,
+            roll_target_rad: nan,
+            pitch_target_rad: nan,
+        }
+    }
+}
+
+/// A flight: samples in time order.
+#[derive(Clone, Debug, Default)]
+pub struct Flight {
+    /// The rows, in time order.
+    pub samples: Vec<Sample>,
+}

@@ -1,0 +1,98 @@
+//! `Real`: the few operations that an equation of motion may use.
+
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// A scalar that the physics is written over once and read as `f64`, as [`Lanes`](super::Lanes)
+/// of `f32`, or as [`Dual`](super::Dual) numbers.
+///
+/// There is no comparison: lanes cannot branch, so equations use [`min`](Real::min),
+/// [`max`](Real::max), [`abs`](Real::abs) and [`Table`](super::Table).
+pub trait Real:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+{
+    /// The constant `x`, with no derivative, in every lane.
+    fn from_f64(x: f64) -> Self;
+    /// Sine and cosine.
+    fn sin_cos(self) -> (Self, Self);
+    /// The angle of the point (x, y) = (`x`, `self`), in −π..π.
+    fn atan2(self, x: Self) -> Self;
+    /// The square root.
+    fn sqrt(self) -> Self;
+    /// The exponential.
+    fn exp(self) -> Self;
+    /// The magnitude; its derivative at zero is taken as +1.
+    fn abs(self) -> Self;
+    /// The smaller of two numbers.
+    fn min(self, other: Self) -> Self;
+    /// The larger of two numbers.
+    fn max(self, other: Self) -> Self;
+
+    /// Zero.
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::from_f64(0.0)
+    }
+    /// `self` multiplied by a constant.
+    #[inline(always)]
+    fn scale(self, factor: f64) -> Self {
+        self * Self::from_f64(factor)
+    }
+    /// `self` limited to `low..=high`.
+    #[inline(always)]
+    fn clamp(self, low: f64, high: f64) -> Self {
+        self.max(Self::from_f64(low)).min(Self::from_f64(high))
+    }
+    /// The inverse sine, for arguments in −1..1.
+    #[inline(always)]
+    fn asin(self) -> Self {
+        let one = Self::from_f64(1.0);
+        self.atan2(((one - self) * (one + self)).max(Self::zero()).sqrt())
+    }
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn from_f64(x: f64) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        f64::sin_cos(self)
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        f64::atan2(self, x)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        f64::exp(self)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        f64::min(self, other)
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        f64::max(self, other)
+    }
+}
