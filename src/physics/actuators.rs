@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     fn figures() -> ActuatorFigures {
-        ActuatorFigures::tustin(100.0, 0.707, 0.5235, 0.2, 0.01)
+        ActuatorFigures::tustin(100.0, std::f64::consts::FRAC_1_SQRT_2, 0.5235, 0.2, 0.01)
     }
 
     #[test]
