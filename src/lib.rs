@@ -39,3 +39,6 @@ pub mod model;
 pub mod control;
 pub mod link;
 pub mod logs;
+#[cfg(feature = "sitl")]
+pub mod sim;
+pub mod commands;

@@ -1,1 +1,7 @@
-fn main(){}
+//! The program `greylag`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    greylag::commands::main()
+}

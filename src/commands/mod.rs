@@ -1,0 +1,43 @@
+//! Subcommands: arguments, then a few lines of work.
+
+#[cfg(feature = "sitl")]
+mod evaluate;
+mod files;
+#[cfg(feature = "sitl")]
+mod targets;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// A MAVLink offboard autopilot companion for fixed-wing aircraft.
+#[derive(Parser)]
+#[command(name = "greylag", version, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Score controllers on the target file, flown in JSBSim in this process.
+    #[cfg(feature = "sitl")]
+    Evaluate(evaluate::Arguments),
+    /// Write a target file.
+    #[cfg(feature = "sitl")]
+    Targets(targets::Arguments),
+}
+
+/// Runs the subcommand of the command line; what goes wrong is said in one line.
+pub fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        #[cfg(feature = "sitl")]
+        Command::Evaluate(arguments) => evaluate::run(&arguments),
+        #[cfg(feature = "sitl")]
+        Command::Targets(arguments) => targets::run(&arguments),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("greylag: {error:#}");
+        ExitCode::FAILURE
+    })
+}
