@@ -38,3 +38,4 @@ pub mod physics;
 pub mod control;
 pub mod link;
 pub mod logs;
+pub mod report;

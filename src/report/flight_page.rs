@@ -1,0 +1,408 @@
+//! The page of one flight.
+
+use super::flight::{Difficulty, FlightReport, Segment};
+use super::{
+    Align, Band, Figure, Histogram, LoopTiming, Mark, Outcome, Page, Panel, Row, Rule, Scale,
+    Section, Series, Style, Table, TimeFigure, Verdict, XyFigure, XyMark, XySeries,
+};
+use crate::logs::Sample;
+
+/// A pause longer than this breaks the lines, s: the log format splits a flight there.
+const GAP_S: f64 = 0.1;
+/// Events up to this number are marked in the plots; more would hide the lines.
+const MARKED_EVENTS: usize = 40;
+
+pub(super) fn page(report: &FlightReport) -> Page {
+    let mut sections = vec![Section::verdict(verdict(report)), attitude(report)];
+    sections.extend([air_data(report), surfaces(report)]);
+    sections.extend(report.timing.as_ref().map(|t| loop_timing(report, t)));
+    if !report.segments.is_empty() {
+        sections.push(segments(report));
+    }
+    if !report.events.is_empty() {
+        sections.push(events(report));
+    }
+    sections.push(provenance(report));
+    Page { title: report.title.clone(), subtitle: subtitle(report), sections }
+}
+
+fn subtitle(report: &FlightReport) -> String {
+    let samples = &report.flight.samples;
+    let duration = duration_s(samples);
+    let seed = report.seed.map_or(String::new(), |s| format!(", seed {s}"));
+    format!(
+        "Controller {}, model {}{seed}. {duration:.1} s, {} samples.",
+        report.controller,
+        report.model,
+        samples.len()
+    )
+}
+
+fn duration_s(samples: &[Sample]) -> f64 {
+    let times = || samples.iter().map(|s| s.time_s).filter(|t| t.is_finite());
+    match (times().next(), times().next_back()) {
+        (Some(first), Some(last)) => last - first,
+        _ => 0.0,
+    }
+}
+
+fn verdict(report: &FlightReport) -> Verdict {
+    let (tracked, all) = (report.tracked(), report.segments.len());
+    let late = report.timing.as_ref().map(LoopTiming::late);
+    let mut parts = Vec::new();
+    if all == 0 {
+        parts.push(format!("Flew {:.1} s without a target", duration_s(&report.flight.samples)));
+    } else {
+        parts.push(format!("Tracked {tracked} of {all} targets"));
+        parts.extend(settled_by_difficulty(&report.segments));
+    }
+    parts.push(match late {
+        None => "loop timing was not recorded".into(),
+        Some(0) => "no late cycle".into(),
+        Some(1) => "1 late cycle".into(),
+        Some(n) => format!("{n} late cycles"),
+    });
+    let outcome = match (all, late) {
+        _ if tracked < all => Outcome::Missed,
+        (_, Some(1..)) => Outcome::Missed,
+        (0, _) | (_, None) => Outcome::Open,
+        _ => Outcome::Reached,
+    };
+    Verdict { outcome, sentence: format!("{}.", parts.join("; ")), details: details(report) }
+}
+
+fn settled_by_difficulty(segments: &[Segment]) -> Option<String> {
+    let group = |difficulty: Difficulty| {
+        let of = segments.iter().filter(|s| s.difficulty == difficulty);
+        let errors: Vec<f64> =
+            of.map(|s| s.settled_error_rad).filter(|e| e.is_finite()).collect();
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        (!errors.is_empty()).then(|| format!("{} {}", degrees(mean), difficulty.name()))
+    };
+    let groups: Vec<String> =
+        [Difficulty::Easy, Difficulty::Hard].into_iter().filter_map(group).collect();
+    (!groups.is_empty()).then(|| format!("settled error {}", groups.join(", ")))
+}
+
+fn details(report: &FlightReport) -> Vec<String> {
+    let mut details: Vec<String> = report
+        .segments
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| !s.tracked(report.tolerance_rad))
+        .map(|(i, s)| {
+            format!(
+                "Not tracked: target {}, roll {:.0}°, pitch {:.0}°, settled error {}.",
+                i + 1,
+                s.roll_target_rad.to_degrees(),
+                s.pitch_target_rad.to_degrees(),
+                degrees(s.settled_error_rad)
+            )
+        })
+        .collect();
+    if !report.segments.is_empty() {
+        let tolerance = degrees(report.tolerance_rad);
+        details.push(format!(
+            "A target counts as tracked when its settled error is at most {tolerance}."
+        ));
+    }
+    if let Some(timing) = &report.timing {
+        let [p50, p99, p999] = timing.percentiles_us([0.5, 0.99, 0.999]).map(|us| us / 1e3);
+        details.push(format!(
+            "Loop, {}: p50 {p50:.2} ms, p99 {p99:.2} ms, p99.9 {p999:.2} ms of {} ms.",
+            timing.measure,
+            timing.budget_us / 1e3
+        ));
+    }
+    details
+}
+
+/// An error in degrees, with digits enough that a small one is not shown as zero.
+fn degrees(rad: f64) -> String {
+    let deg = rad.to_degrees();
+    match deg.abs() {
+        _ if !deg.is_finite() => "unknown".into(),
+        a if a < 0.0095 && a > 0.0 => format!("{deg:.4}°"),
+        a if a < 9.95 => format!("{deg:.2}°"),
+        _ => format!("{deg:.1}°"),
+    }
+}
+
+fn column(report: &FlightReport, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
+    report.flight.samples.iter().map(value).collect()
+}
+
+/// Panels over the samples of the log, with the events marked.
+fn time_figure(report: &FlightReport, panels: Vec<Panel>) -> TimeFigure {
+    let mut figure = TimeFigure { marks: marks(report), ..TimeFigure::default() };
+    figure.add_track(&column(report, |s| s.time_s), GAP_S, panels);
+    figure
+}
+
+fn marks(report: &FlightReport) -> Vec<Mark> {
+    if report.events.len() > MARKED_EVENTS {
+        return Vec::new();
+    }
+    let timed = report.events.iter().enumerate().filter(|(_, e)| e.time_s.is_finite());
+    timed.map(|(i, e)| Mark { time_s: e.time_s, label: (i + 1).to_string() }).collect()
+}
+
+fn attitude(report: &FlightReport) -> Section {
+    let roll = (column(report, |s| s.attitude_rad[0]), column(report, |s| s.roll_target_rad));
+    let pitch = (column(report, |s| s.attitude_rad[1]), column(report, |s| s.pitch_target_rad));
+    let panels = vec![
+        angle_panel("Roll", report.tolerance_rad, &roll),
+        angle_panel("Pitch", report.tolerance_rad, &pitch),
+        error_panel("Roll error", report.tolerance_rad, &roll),
+        error_panel("Pitch error", report.tolerance_rad, &pitch),
+    ];
+    let tolerance = degrees(report.tolerance_rad);
+    Section::new(
+        "Attitude",
+        &format!(
+            "Attitude against command, and the size of their difference on a scale of decades. \
+             The band and the line mark the tolerance, {tolerance}."
+        ),
+        vec![Figure::Time(time_figure(report, panels))],
+    )
+}
+
+fn to_degrees(rad: &[f64]) -> Vec<f64> {
+    rad.iter().map(|v| v.to_degrees()).collect()
+}
+
+fn angle_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, Vec<f64>)) -> Panel {
+    let series = vec![
+        Series::new("actual", Style::Actual, to_degrees(actual)),
+        Series::new("commanded", Style::Command, to_degrees(command)),
+    ];
+    let band =
+        Band { around: 1, half_width: tolerance_rad.to_degrees(), label: "tolerance".into() };
+    Panel { bands: vec![band], ..Panel::new(title, "°", series) }
+}
+
+fn error_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, Vec<f64>)) -> Panel {
+    let size = |(a, c): (&f64, &f64)| (a - c).to_degrees().abs();
+    let error = actual.iter().zip(command).map(size).collect();
+    let tolerance = tolerance_rad.to_degrees();
+    Panel {
+        // Two decades below the tolerance: what lies under that no longer matters.
+        scale: Scale::Log { floor: positive_or(tolerance / 100.0, 1e-3) },
+        rules: vec![Rule { value: tolerance, label: "tolerance".into() }],
+        ..Panel::new(title, "°", vec![Series::new("error", Style::Actual, error)])
+    }
+}
+
+fn positive_or(value: f64, otherwise: f64) -> f64 {
+    if value.is_finite() && value > 0.0 { value } else { otherwise }
+}
+
+fn air_data(report: &FlightReport) -> Section {
+    let airspeed = Series::new("true airspeed", Style::Actual, column(report, |s| s.airspeed_mps));
+    let alpha = column(report, |s| s.alpha_rad.to_degrees());
+    let beta = column(report, |s| s.beta_rad.to_degrees());
+    let altitude = Series::new("above mean sea level", Style::Actual, column(report, |s| s.altitude_m));
+    let panels = vec![
+        Panel::new("Airspeed", "m/s", vec![airspeed]),
+        Panel::new(
+            "Air angles",
+            "°",
+            vec![
+                Series::new("angle of attack α", Style::Actual, alpha),
+                Series::new("sideslip β", Style::Second, beta),
+            ],
+        ),
+        Panel::new("Altitude", "m", vec![altitude]),
+    ];
+    Section::new("Air data", "", vec![Figure::Time(time_figure(report, panels))])
+}
+
+fn surfaces(report: &FlightReport) -> Section {
+    let pair = |title: &str, unit: &str, acting: Vec<f64>, command: Vec<f64>| {
+        let series = vec![
+            Series::new("acting", Style::Actual, acting),
+            Series::new("commanded", Style::Command, command),
+        ];
+        Panel::new(title, unit, series)
+    };
+    let (aileron, elevator) = (report.travel.aileron_rad, report.travel.elevator_rad);
+    let panels = vec![
+        pair(
+            "Aileron",
+            "°",
+            column(report, |s| s.aileron_rad.to_degrees()),
+            column(report, |s| (s.aileron_cmd * aileron).to_degrees()),
+        ),
+        pair(
+            "Elevator",
+            "°",
+            column(report, |s| s.elevator_rad.to_degrees()),
+            column(report, |s| (s.elevator_cmd * elevator).to_degrees()),
+        ),
+        pair(
+            "Throttle",
+            "%",
+            column(report, |s| 100.0 * s.throttle),
+            column(report, |s| 100.0 * s.throttle_cmd),
+        ),
+    ];
+    let note = format!(
+        "Commands are drawn as the deflection they ask for: full command is {:.1}° of aileron, \
+         {:.1}° of elevator.",
+        aileron.to_degrees(),
+        elevator.to_degrees()
+    );
+    Section::new("Surfaces", &note, vec![Figure::Time(time_figure(report, panels))])
+}
+
+fn loop_timing(report: &FlightReport, timing: &LoopTiming) -> Section {
+    let [p50, p99, p999, most] =
+        timing.percentiles_us([0.5, 0.99, 0.999, 1.0]).map(|us| us / 1e3);
+    let budget = timing.budget_us / 1e3;
+    let durations: Vec<f64> = timing.cycles.iter().map(|c| c.duration_us / 1e3).collect();
+    let times: Vec<f64> = timing.cycles.iter().map(|c| c.time_s).collect();
+    let least = durations.iter().copied().filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
+    let rule = |value, label: &str| Rule { value, label: label.into() };
+    let panel = Panel {
+        scale: Scale::Log { floor: positive_or(least, 1e-3) },
+        rules: vec![rule(budget, "budget")],
+        ..Panel::new(
+            "Cycle duration",
+            "ms",
+            vec![Series::new("duration", Style::Actual, durations.clone())],
+        )
+    };
+    let mut over_time = TimeFigure { marks: marks(report), ..TimeFigure::default() };
+    over_time.add_track(&times, GAP_S, vec![panel]);
+    let quantiles =
+        [rule(p50, "p50"), rule(p99, "p99"), rule(p999, "p99.9"), rule(budget, "budget")];
+    let histogram = Histogram::log(
+        "Cycle durations",
+        "Duration (ms)",
+        "cycles",
+        &durations,
+        quantiles.into_iter().filter(|r| r.value.is_finite()).collect(),
+    );
+    let titles = ["Cycles", "p50 (ms)", "p99 (ms)", "p99.9 (ms)", "Longest (ms)", "Budget (ms)", "Late"];
+    let mut table = Table::new("Loop timing", &titles.map(|t| (t, Align::Right)));
+    let cycles = timing.cycles.len().to_string();
+    let milliseconds = [p50, p99, p999, most, budget].map(|ms| format!("{ms:.3}"));
+    table.push([cycles].into_iter().chain(milliseconds).chain([timing.late().to_string()]));
+    let note = format!("From {}. A cycle over the budget is late.", timing.measure);
+    let figures = vec![Figure::Table(table), Figure::Time(over_time), Figure::Histogram(histogram)];
+    Section::new("Loop timing", &note, figures)
+}
+
+fn segments(report: &FlightReport) -> Section {
+    let mut table = Table::new(
+        "Segments",
+        &[
+            ("Target", Align::Right),
+            ("From (s)", Align::Right),
+            ("To (s)", Align::Right),
+            ("Roll (°)", Align::Right),
+            ("Pitch (°)", Align::Right),
+            ("Group", Align::Left),
+            ("Settled error (°)", Align::Right),
+            ("Tracked", Align::Left),
+        ],
+    );
+    for (i, s) in report.segments.iter().enumerate() {
+        let tracked = if s.tracked(report.tolerance_rad) { "yes" } else { "no" };
+        let error = s.settled_error_rad.to_degrees();
+        table.rows.push(Row {
+            cells: vec![
+                (i + 1).to_string(),
+                format!("{:.2}", s.start_s),
+                format!("{:.2}", s.end_s),
+                signed(s.roll_target_rad),
+                signed(s.pitch_target_rad),
+                s.difficulty.name().into(),
+                if error.is_finite() { format!("{error:.4}") } else { "unknown".into() },
+                tracked.into(),
+            ],
+            span_s: Some([s.start_s, s.end_s]),
+        });
+    }
+    Section::new(
+        "Targets",
+        "Settled error is the mean of the roll and pitch RMS errors over the last fifth of a \
+         segment. Select a target to see its time in every plot.",
+        vec![Figure::Table(table), Figure::Xy(target_plane(report))],
+    )
+}
+
+/// Degrees with a sign, by a true minus.
+fn signed(rad: f64) -> String {
+    format!("{:+.1}", rad.to_degrees()).replace('-', "−")
+}
+
+/// Roll against pitch: the path flown, and the targets by whether they were tracked.
+fn target_plane(report: &FlightReport) -> XyFigure {
+    let targets = |label: &str, style, mark, tracked: bool| {
+        let of = || {
+            report.segments.iter().filter(move |s| s.tracked(report.tolerance_rad) == tracked)
+        };
+        XySeries {
+            label: label.into(),
+            style,
+            mark,
+            x: of().map(|s| s.roll_target_rad.to_degrees()).collect(),
+            y: of().map(|s| s.pitch_target_rad.to_degrees()).collect(),
+        }
+    };
+    let path = XySeries {
+        label: "path flown".into(),
+        style: Style::Actual,
+        mark: XyMark::Path,
+        x: column(report, |s| s.attitude_rad[0].to_degrees()),
+        y: column(report, |s| s.attitude_rad[1].to_degrees()),
+    };
+    let reached = targets("target, tracked", Style::Second, XyMark::Circles, true);
+    let missed = targets("target, not tracked", Style::Command, XyMark::Crosses, false);
+    XyFigure {
+        title: "Roll and pitch plane".into(),
+        x_label: "Roll (°)".into(),
+        y_label: "Pitch (°)".into(),
+        series: [path, reached, missed].into_iter().filter(|s| !s.x.is_empty()).collect(),
+    }
+}
+
+fn events(report: &FlightReport) -> Section {
+    let mut table = Table::new(
+        "Events",
+        &[
+            ("Mark", Align::Right),
+            ("Time (s)", Align::Right),
+            ("Kind", Align::Left),
+            ("What", Align::Left),
+        ],
+    );
+    for (i, e) in report.events.iter().enumerate() {
+        table.push([
+            (i + 1).to_string(),
+            format!("{:.2}", e.time_s),
+            e.kind.name().into(),
+            e.text.clone(),
+        ]);
+    }
+    let note = match report.events.len() {
+        0..=MARKED_EVENTS => "The numbers stand above the plots.",
+        _ => "Too many to mark in the plots.",
+    };
+    Section::new("Events", note, vec![Figure::Table(table)])
+}
+
+fn provenance(report: &FlightReport) -> Section {
+    let mut table = Table::new("Provenance", &[("Item", Align::Left), ("Value", Align::Left)]);
+    let mut push = |item: &str, value: String| table.push([item.to_string(), value]);
+    push("Controller", report.controller.clone());
+    push("Model", report.model.clone());
+    push("Seed", report.seed.map_or("none".into(), |s| s.to_string()));
+    push("Command line", report.command_line.clone());
+    for (program, version) in &report.versions {
+        push(program, version.clone());
+    }
+    push("Plots", "uPlot 1.6.32 (MIT)".into());
+    Section::new("Provenance", "", vec![Figure::Table(table)])
+}
