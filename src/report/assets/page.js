@@ -346,7 +346,7 @@ function timeChart(host, figure, track, panel, last) {
         size: (last ? 2.9 : 0.5) * rem(), values: last ? showTicks : () => [], space: 4.5 * rem(),
         label: last ? "Time (s)" : undefined, labelSize: last ? 1.3 * rem() : 0, labelGap: 0,
       }),
-      sideAxis(log ? { splits: decades, values: (u, s) => s.map(showDecade) } : {}),
+      sideAxis(log ? { splits: decades, values: (u, s) => s.map(showDecade), filter: (u, s) => s } : {}),
     ],
     series: [{}, ...panel.series.map((s) => ({
       label: s.label, stroke: style(s.style), dash: DASH[s.style], width: 1.5,
