@@ -3,7 +3,7 @@
 
     tests/report_screenshot.py REPORT.html FOLDER
 
-Writes FOLDER/{390,1280,2560}-{light,dark}.png and fails on any console message of level
+Writes FOLDER/{390,1280,2560}-{light,dark}.png, and two of a zoomed page, and fails on any console message of level
 error, exception, network request, plot without ink, text wider than the page, or control
 that does not do what it says. Needs Debian's `chromium` (or $CHROMIUM); no Python package.
 """
@@ -194,7 +194,7 @@ READINGS = """[...document.querySelectorAll('.panels figure')]
   .map(f => [f.querySelector('h3').textContent, [...f.querySelectorAll('.legend button output')].map(o => o.textContent)])"""
 
 
-def try_mouse_and_keys(browser):
+def try_mouse_and_keys(browser, zoomed_shot):
     found = []
     whole = browser.value(WINDOW)
     zoomed = window_after(browser, lambda: drag(browser, 0.25, 0.5))
@@ -213,6 +213,8 @@ def try_mouse_and_keys(browser):
     for title, values in browser.value(READINGS):
         if not values or not all(values):
             found.append(f"the linked cursor shows no value in: {title} {values}")
+    shot = browser.call("Page.captureScreenshot", format="png")
+    zoomed_shot.write_bytes(base64.b64decode(shot["data"]))
 
     def double():
         left, top, width, height = over_of(browser, 2)
@@ -283,8 +285,10 @@ def main():
                 name = f"{width}-{theme}"
                 found = open_page(browser, page, width, theme)
                 shoot(browser, folder / f"{name}.png")
-                if theme == "light":
-                    found += (try_touch if width == 390 else try_mouse_and_keys)(browser)
+                if theme == "light" and width == 390:
+                    found += try_touch(browser)
+                elif theme == "light":
+                    found += try_mouse_and_keys(browser, folder / f"{name}-zoomed.png")
                 found += complaints(browser.events)
                 failures += [f"{name}: {what}" for what in found]
         browser.close()

@@ -18,7 +18,10 @@ pub(super) fn verdict(report: &FlightReport) -> Verdict {
     let late = report.timing.as_ref().map(LoopTiming::late);
     let mut parts = Vec::new();
     if all == 0 {
-        parts.push(format!("Flew {:.1} s without a target", duration_s(&report.flight.samples)));
+        parts.push(format!(
+            "Flew {:.1} s without a target",
+            duration_s(&report.flight.samples)
+        ));
     } else {
         parts.push(format!("Tracked {tracked} of {all} targets"));
         parts.extend(settled_by_difficulty(&report.segments));
@@ -35,19 +38,27 @@ pub(super) fn verdict(report: &FlightReport) -> Verdict {
         (0, _) | (_, None) => Outcome::Open,
         _ => Outcome::Reached,
     };
-    Verdict { outcome, sentence: format!("{}.", parts.join("; ")), details: details(report) }
+    Verdict {
+        outcome,
+        sentence: format!("{}.", parts.join("; ")),
+        details: details(report),
+    }
 }
 
 fn settled_by_difficulty(segments: &[Segment]) -> Option<String> {
     let group = |difficulty: Difficulty| {
         let of = segments.iter().filter(|s| s.difficulty == difficulty);
-        let errors: Vec<f64> =
-            of.map(|s| s.settled_error_rad).filter(|e| e.is_finite()).collect();
+        let errors: Vec<f64> = of
+            .map(|s| s.settled_error_rad)
+            .filter(|e| e.is_finite())
+            .collect();
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
         (!errors.is_empty()).then(|| format!("{} {}", degrees(mean), difficulty.name()))
     };
-    let groups: Vec<String> =
-        [Difficulty::Easy, Difficulty::Hard].into_iter().filter_map(group).collect();
+    let groups: Vec<String> = [Difficulty::Easy, Difficulty::Hard]
+        .into_iter()
+        .filter_map(group)
+        .collect();
     (!groups.is_empty()).then(|| format!("settled error {}", groups.join(", ")))
 }
 
@@ -94,4 +105,3 @@ pub(super) fn degrees(rad: f64) -> String {
         _ => format!("{deg:.1}°"),
     }
 }
-

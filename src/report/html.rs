@@ -36,10 +36,7 @@ pub(super) fn compact<S: Serializer>(values: &[f64], serializer: S) -> Result<S:
 }
 
 /// Serialises times to 0.1 ms: six digits would not do after the first 1000 s.
-pub(super) fn compact_time<S: Serializer>(
-    times: &[f64],
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
+pub(super) fn compact_time<S: Serializer>(times: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(times.iter().map(|t| (t * 1e4).round() / 1e4))
 }
 
@@ -49,7 +46,11 @@ fn six_digits(value: f64) -> f32 {
     }
     let unit = 10f64.powi(5 - value.abs().log10().floor() as i32);
     let rounded = (value * unit).round() / unit;
-    if rounded.is_finite() { rounded as f32 } else { value as f32 }
+    if rounded.is_finite() {
+        rounded as f32
+    } else {
+        value as f32
+    }
 }
 
 #[cfg(test)]
@@ -58,7 +59,10 @@ mod tests {
 
     #[test]
     fn escapes_every_special_character() {
-        assert_eq!(escape("<a b='\"&'>\u{7}"), "&lt;a b=&#39;&quot;&amp;&#39;&gt;\u{fffd}");
+        assert_eq!(
+            escape("<a b='\"&'>\u{7}"),
+            "&lt;a b=&#39;&quot;&amp;&#39;&gt;\u{fffd}"
+        );
     }
 
     #[test]
@@ -73,9 +77,18 @@ mod tests {
     fn numbers_keep_six_digits_and_lose_nan() {
         #[derive(Serialize)]
         struct Values(#[serde(serialize_with = "compact")] Vec<f64>);
-        let values =
-            Values(vec![std::f64::consts::PI, -0.000_123_456_78, 1e300, f64::NAN, 0.0, 1e-320]);
+        let values = Values(vec![
+            std::f64::consts::PI,
+            -0.000_123_456_78,
+            1e300,
+            f64::NAN,
+            0.0,
+            1e-320,
+        ]);
         // 1e300 is beyond f32, so it is no number on the page either.
-        assert_eq!(script_json(&values), "[3.14159,-0.000123457,null,null,0.0,0.0]");
+        assert_eq!(
+            script_json(&values),
+            "[3.14159,-0.000123457,null,null,0.0,0.0]"
+        );
     }
 }

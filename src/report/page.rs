@@ -74,15 +74,25 @@ impl Page {
     }
 
     fn contents(&self) -> String {
-        let titled = self.sections.iter().enumerate().filter(|(_, s)| !s.title.is_empty());
-        titled.map(|(i, s)| format!("<a href=\"#s{i}\">{}</a>", escape(&s.title))).collect()
+        let titled = self
+            .sections
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| !s.title.is_empty());
+        titled
+            .map(|(i, s)| format!("<a href=\"#s{i}\">{}</a>", escape(&s.title)))
+            .collect()
     }
 }
 
 impl Section {
     /// A section of figures under a heading and a note, either of which may be empty.
     pub fn new(title: &str, note: &str, figures: Vec<Figure>) -> Self {
-        Section { title: title.into(), note: note.into(), figures }
+        Section {
+            title: title.into(),
+            note: note.into(),
+            figures,
+        }
     }
 
     /// A section that is one verdict, without a heading.
@@ -99,10 +109,11 @@ impl Section {
         if !self.note.is_empty() {
             html.push_str(&format!("<p class=\"note\">{}</p>\n", escape(&self.note)));
         }
+        html.push_str("<div class=\"figures\">\n");
         for figure in &self.figures {
             html.push_str(&figure.html(data));
         }
-        html.push_str("</section>\n");
+        html.push_str("</div>\n</section>\n");
         html
     }
 }

@@ -88,7 +88,11 @@ pub struct Series {
 impl Series {
     /// A line from its values.
     pub fn new(label: &str, style: Style, values: Vec<f64>) -> Self {
-        Series { label: label.into(), style, values }
+        Series {
+            label: label.into(),
+            style,
+            values,
+        }
     }
 
     fn is_missing(&self) -> bool {
@@ -131,7 +135,8 @@ impl TimeFigure {
         let kept = rows.iter().flatten().count();
         if kept < time_s.len() {
             let lost = time_s.len() - kept;
-            self.notes.push(format!("{lost} rows out of time order are not drawn."));
+            self.notes
+                .push(format!("{lost} rows out of time order are not drawn."));
         }
         let mut time = decimate::times_of(&rows, time_s);
         for series in panels.iter_mut().flat_map(|p| &mut p.series) {
@@ -148,7 +153,10 @@ impl TimeFigure {
             }
             time = decimate::pair_times(&time, group);
         }
-        self.tracks.push(Track { time_s: time, panels });
+        self.tracks.push(Track {
+            time_s: time,
+            panels,
+        });
     }
 
     fn without_missing(&mut self, panels: Vec<Panel>) -> Vec<Panel> {
@@ -172,13 +180,19 @@ impl TimeFigure {
             }
         }
         if !missing.is_empty() {
-            self.notes.push(format!("Not in this log: {}.", missing.join(", ")));
+            self.notes
+                .push(format!("Not in this log: {}.", missing.join(", ")));
         }
         kept
     }
 
     pub(super) fn html(&self, index: usize) -> String {
-        let mut html = String::from("<div class=\"panels\">\n");
+        let columns = match self.tracks.iter().map(|t| t.panels.len()).sum::<usize>() {
+            0 | 1 => "one",
+            n if n % 3 == 0 => "three",
+            _ => "two",
+        };
+        let mut html = format!("<div class=\"time\"><div class=\"panels {columns}\">\n");
         for (t, track) in self.tracks.iter().enumerate() {
             for (p, panel) in track.panels.iter().enumerate() {
                 let (title, unit) = (escape(&panel.title), escape(&panel.unit));
@@ -195,6 +209,7 @@ impl TimeFigure {
         for note in &self.notes {
             html.push_str(&format!("<p class=\"note\">{}</p>\n", escape(note)));
         }
+        html.push_str("</div>\n");
         html
     }
 }

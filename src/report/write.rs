@@ -16,7 +16,9 @@ pub enum WriteError {
         path: PathBuf,
     },
     /// The folder or the disk refused.
-    #[error("writing {path}: {source}; check that its folder exists, can be written to and has room")]
+    #[error(
+        "writing {path}: {source}; check that its folder exists, can be written to and has room"
+    )]
     Io {
         /// The file that was asked for.
         path: PathBuf,
@@ -29,20 +31,27 @@ pub enum WriteError {
 /// never sees half of it.
 pub fn write_new(path: &Path, text: &str) -> Result<(), WriteError> {
     let file = written_beside(path, text).map_err(|source| io_error(path, source))?;
-    file.persist_noclobber(path).map(sync).map_err(|e| match e.error.kind() {
-        io::ErrorKind::AlreadyExists => WriteError::Exists { path: path.into() },
-        _ => io_error(path, e.error),
-    })
+    file.persist_noclobber(path)
+        .map(sync)
+        .map_err(|e| match e.error.kind() {
+            io::ErrorKind::AlreadyExists => WriteError::Exists { path: path.into() },
+            _ => io_error(path, e.error),
+        })
 }
 
 /// Writes `text` to `path` in place of any file there. A reader sees the old file or the new one.
 pub fn write_over(path: &Path, text: &str) -> Result<(), WriteError> {
     let file = written_beside(path, text).map_err(|source| io_error(path, source))?;
-    file.persist(path).map(sync).map_err(|e| io_error(path, e.error))
+    file.persist(path)
+        .map(sync)
+        .map_err(|e| io_error(path, e.error))
 }
 
 fn io_error(path: &Path, source: io::Error) -> WriteError {
-    WriteError::Io { path: path.into(), source }
+    WriteError::Io {
+        path: path.into(),
+        source,
+    }
 }
 
 /// The text in a temporary file of the same folder, so that renaming it is atomic.

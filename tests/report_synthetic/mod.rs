@@ -51,7 +51,8 @@ pub fn flight() -> Flight {
         throttle += (throttle_cmd - throttle) * STEP_S / 0.2;
         airspeed += (18.0 + 8.0 * (throttle - 0.2) - 14.0 * angle[1] - airspeed) * STEP_S / 4.0;
         let mut tremble = |size: f64| size * noise.sample(&mut random);
-        let aileron_cmd = (0.02 * acceleration[0] + 0.004 * rate[0] + tremble(0.004)).clamp(-1.0, 1.0);
+        let aileron_cmd =
+            (0.02 * acceleration[0] + 0.004 * rate[0] + tremble(0.004)).clamp(-1.0, 1.0);
         let elevator_cmd = (0.07 - 0.05 * acceleration[1] + tremble(0.004)).clamp(-1.0, 1.0);
         if (23.0..23.3).contains(&time_s) {
             continue;
@@ -93,7 +94,10 @@ pub fn report(flight: &Flight) -> FlightReport<'_> {
         versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
         segments: (0..TARGETS_DEG.len()).map(|i| segment(flight, i)).collect(),
         tolerance_rad: 0.5f64.to_radians(),
-        travel: SurfaceTravel { aileron_rad: 0.5235, elevator_rad: 0.5235 },
+        travel: SurfaceTravel {
+            aileron_rad: 0.5235,
+            elevator_rad: 0.5235,
+        },
         timing: Some(timing(flight)),
         events: events(),
     }
@@ -137,17 +141,28 @@ fn timing(flight: &Flight) -> LoopTiming {
         cycles: flight
             .samples
             .iter()
-            .map(|s| Cycle { time_s: s.time_s, duration_us: duration.sample(&mut random) })
+            .map(|s| Cycle {
+                time_s: s.time_s,
+                duration_us: duration.sample(&mut random),
+            })
             .collect(),
     }
 }
 
 fn events() -> Vec<Event> {
-    let event = |time_s, kind, text: &str| Event { time_s, kind, text: text.into() };
+    let event = |time_s, kind, text: &str| Event {
+        time_s,
+        kind,
+        text: text.into(),
+    };
     vec![
         event(0.0, EventKind::Text, "Armed by system 255"),
         event(0.2, EventKind::Mode, "Hold to Offboard"),
-        event(23.0, EventKind::Failsafe, "No state frame for 0.3 s: last command held"),
+        event(
+            23.0,
+            EventKind::Failsafe,
+            "No state frame for 0.3 s: last command held",
+        ),
         event(23.3, EventKind::Text, "State frames are back"),
         event(59.9, EventKind::Mode, "Offboard to Hold"),
     ]

@@ -20,9 +20,12 @@ function show(v) {
 /** Ticks with as many decimals as their step needs. */
 function showTicks(u, splits) {
   const step = splits.length > 1 ? Math.abs(splits[1] - splits[0]) : 1;
-  const digits = Math.max(0, Math.min(6, Math.ceil(-Math.log10(step) - 1e-9)));
+  let digits = 0;
+  while (digits < 6 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6) digits++;
   return splits.map((v) => (v == null ? "" : signed(v.toFixed(digits))));
 }
+/** A value as it was chosen: 0.5, 10. */
+const showChosen = (v) => signed(String(+v.toPrecision(3)));
 /** A decade as it is spoken: 0.01, 1, 1000. */
 const showDecade = (v) => (v >= 1 ? String(Math.round(v)) : v.toFixed(Math.max(0, Math.round(-Math.log10(v)))));
 
@@ -33,8 +36,6 @@ function padded(low, high) {
   const pad = (high - low) * 0.08 || Math.abs(high) * 0.05 || 1;
   return [low - pad, high + pad];
 }
-const decadeUp = (v) => 10 ** Math.ceil(Math.log10(v) - 1e-9);
-const decadeDown = (v) => 10 ** Math.floor(Math.log10(v) + 1e-9);
 function decades(u, axis, low, high) {
   const found = [];
   for (let k = Math.ceil(Math.log10(low) - 1e-9); k <= Math.log10(high) + 1e-9; k++) found.push(10 ** k);
@@ -47,7 +48,7 @@ function decadesFine(u, axis, low, high) {
     for (const m of Math.log10(high / low) < 3.5 ? [1, 2, 5] : [1]) found.push(m * 10 ** k);
   return found.filter((v) => v >= low * 0.999 && v <= high * 1.001);
 }
-const showFine = (u, splits) => splits.map((v) => (v == null ? "" : String(+v.toPrecision(3))));
+const showFine = (u, splits) => splits.map((v) => (v == null ? "" : showChosen(v)));
 
 function axis(extra) {
   return {
@@ -130,7 +131,7 @@ function drawUprights(u, rules) {
       const x = Math.round(u.valToPos(rule.value, "x", true));
       const ink = rule.label === "budget" ? style("command") : style("ink");
       stroke(ctx, ink, rule.label === "budget" ? [6, 3] : [2, 2], [[x, b.top], [x, b.top + b.height]]);
-      const text = `${rule.label} ${show(rule.value)}`;
+      const text = `${rule.label} ${showChosen(rule.value)}`;
       const left = x + ctx.measureText(text).width + 8 * px() > b.left + b.width;
       ctx.textAlign = left ? "right" : "left";
       halo(ctx, text, x + (left ? -4 : 4) * px(), b.top + (4 + i * 1.25 * rem()) * px(), ink);
@@ -317,12 +318,13 @@ function timeChart(host, figure, track, panel, last) {
   const values = panel.series.map((s) =>
     log ? s.values.map((v) => (v == null ? null : Math.max(v, log.floor))) : s.values);
   const range = (u, low, high) => {
-    if (log) return [decadeDown(log.floor), decadeUp(Math.max(high || log.floor, log.floor * 10, ...level) * 1.05)];
+    // Half a decade of room, so that the highest tick stays clear of the marks.
+    if (log) return [log.floor, 3 * Math.max(high || log.floor, log.floor * 10, ...level)];
     return padded(Math.min(low ?? Infinity, ...level), Math.max(high ?? -Infinity, ...level));
   };
   const outputs = legend(host, [
     ...panel.series.map((s) => ({ label: s.label, style: s.style })),
-    ...panel.bands.map((b) => ({ label: `${b.label} ±${show(b.half_width)}`, shape: "band", fixed: true })),
+    ...panel.bands.map((b) => ({ label: `${b.label} ±${showChosen(b.half_width)}`, shape: "band", fixed: true })),
   ], (i) => {
     u.setSeries(i + 1, { show: !u.series[i + 1].show });
     return u.series[i + 1].show;
@@ -343,13 +345,13 @@ function timeChart(host, figure, track, panel, last) {
     },
     axes: [
       axis({
-        size: (last ? 2.9 : 0.5) * rem(), values: last ? showTicks : () => [], space: 4.5 * rem(),
+        size: (last ? 1.6 : 0.5) * rem(), values: last ? showTicks : () => [], space: 4.5 * rem(),
         label: last ? "Time (s)" : undefined, labelSize: last ? 1.3 * rem() : 0, labelGap: 0,
       }),
       sideAxis(log ? { splits: decades, values: (u, s) => s.map(showDecade), filter: (u, s) => s } : {}),
     ],
     series: [{}, ...panel.series.map((s) => ({
-      label: s.label, stroke: style(s.style), dash: DASH[s.style], width: 1.5,
+      label: s.label, stroke: style(s.style), dash: DASH[s.style], width: Math.max(1.5, 0.1 * rem()),
       points: { show: false }, spanGaps: false,
     }))],
     hooks: {
@@ -390,10 +392,10 @@ function histogramChart(host, data) {
     cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
     scales: {
       x: { time: false, distr: 3, log: 10, range: () => [edges[0], edges[edges.length - 1]] },
-      y: { distr: 3, log: 10, range: () => [0.7, Math.max(1, ...counts) * 1.5] },
+      y: { distr: 3, log: 10, range: () => [0.7, Math.max(1, ...counts) * 12] },
     },
     axes: [
-      axis({ size: 3.1 * rem(), splits: decadesFine, values: showFine, space: 3 * rem(), filter: (u, s) => s, label: data.x_label, labelSize: 1.4 * rem(), labelGap: 0 }),
+      axis({ size: 1.7 * rem(), splits: decadesFine, values: showFine, space: 3 * rem(), filter: (u, s) => s, label: data.x_label, labelSize: 1.4 * rem(), labelGap: 0 }),
       sideAxis({ splits: decades, values: (u, s) => s.map(showDecade), filter: (u, s) => s }),
     ],
     series: [{}, { stroke: style("actual"), paths: () => null, points: { show: false } }],
@@ -469,8 +471,8 @@ function xyChart(host, data) {
       y: { range: (u, a, b) => [a, b] },
     },
     axes: [
-      axis({ size: 3.1 * rem(), values: showTicks, space: 3.5 * rem(), label: data.x_label, labelSize: 1.4 * rem(), labelGap: 0 }),
-      sideAxis({ size: 4.8 * rem(), label: data.y_label, labelSize: 1.4 * rem(), labelGap: 0 }),
+      axis({ size: 1.7 * rem(), values: showTicks, space: 3.5 * rem(), label: data.x_label, labelSize: 1.4 * rem(), labelGap: 0 }),
+      sideAxis({ label: data.y_label, labelSize: 1.4 * rem(), labelGap: 0 }),
     ],
     series: [{}, { paths: () => null, points: { show: false } }],
     hooks: { draw: [draw] },
@@ -495,7 +497,7 @@ function build() {
       const all = [...host.closest(".panels").querySelectorAll(".plot")];
       // Only the lowest panel of each column carries the time axis.
       const last = all.indexOf(host) >= all.length - columns(host);
-      host.style.height = last ? `calc(var(--plot-height) + 2.4rem)` : "";
+      host.style.height = last ? `calc(var(--plot-height) + 2.2rem)` : "";
       charts.push(timeChart(host, data, track, track.panels[host.dataset.panel], last));
     } else charts.push((kind === "xy" ? xyChart : histogramChart)(host, data));
   }
