@@ -153,8 +153,8 @@ def shoot(browser, file):
 
 
 def over_of(browser, index):
-    """Left, top, width, height of the sensitive area of a plot, scrolled into view."""
-    area = f"document.querySelectorAll('.plot .u-over')[{index}]"
+    """Left, top, width, height of the sensitive area of a plot over time, scrolled into view."""
+    area = f"document.querySelectorAll('.panels .u-over')[{index}]"
     browser.value(f"{area}.scrollIntoView({{block: 'center'}})")
     time.sleep(0.1)
     return browser.value(f"(r => [r.left, r.top, r.width, r.height])({area}.getBoundingClientRect())")
@@ -197,6 +197,8 @@ READINGS = """[...document.querySelectorAll('.panels figure')]
 def try_mouse_and_keys(browser, zoomed_shot):
     found = []
     whole = browser.value(WINDOW)
+    if not whole:
+        return ["the page has no plot over time to try"]
     zoomed = window_after(browser, lambda: drag(browser, 0.25, 0.5))
     start, end = (float(t) for t in zoomed.removesuffix(" s").split(" to "))
     all_start, all_end = (float(t) for t in whole.removesuffix(" s").split(" to "))
@@ -217,7 +219,9 @@ def try_mouse_and_keys(browser, zoomed_shot):
     zoomed_shot.write_bytes(base64.b64decode(shot["data"]))
 
     def double():
-        left, top, width, height = over_of(browser, 2)
+        # On another plot than the one that was dragged across.
+        last = browser.value("document.querySelectorAll('.panels .plot').length - 1")
+        left, top, width, height = over_of(browser, last)
         for clicks in (1, 2):
             mouse(browser, "mousePressed", left + width / 2, top + height / 2, clicks)
             mouse(browser, "mouseReleased", left + width / 2, top + height / 2, clicks)
@@ -247,6 +251,8 @@ def try_mouse_and_keys(browser, zoomed_shot):
 
 def try_touch(browser):
     whole = browser.value(WINDOW)
+    if not whole:
+        return ["the page has no plot over time to try"]
 
     def pinch():
         left, top, width, height = over_of(browser, 0)

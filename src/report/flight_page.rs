@@ -1,7 +1,7 @@
 //! The page of one flight.
 
 use super::flight::FlightReport;
-use super::flight_verdict::{degrees, duration_s, verdict};
+use super::flight_verdict::{degrees, duration_s, signed, verdict};
 use super::{
     Align, Band, Figure, Histogram, LoopTiming, Mark, Page, Panel, Row, Rule, Scale, Section,
     Series, Style, Table, TimeFigure, XyFigure, XyMark, XySeries,
@@ -347,11 +347,6 @@ fn segments(report: &FlightReport) -> Section {
          segment. Select a target to see its time in every plot.",
         vec![Figure::Table(table), Figure::Xy(target_plane(report))],
     )
-}
-
-/// Degrees with a sign, by a true minus.
-fn signed(rad: f64) -> String {
-    format!("{:+.1}", rad.to_degrees()).replace('-', "−")
 }
 
 /// Roll against pitch: the path flown, and the targets by whether they were tracked.

@@ -4,6 +4,9 @@ use super::flight::{Difficulty, FlightReport, Segment};
 use super::{LoopTiming, Outcome, Verdict};
 use crate::logs::Sample;
 
+/// Targets that were not tracked up to this number are listed under the sentence.
+const LISTED_TARGETS: usize = 6;
+
 /// From the first time to the last, s.
 pub(super) fn duration_s(samples: &[Sample]) -> f64 {
     let times = || samples.iter().map(|s| s.time_s).filter(|t| t.is_finite());
@@ -63,21 +66,7 @@ fn settled_by_difficulty(segments: &[Segment]) -> Option<String> {
 }
 
 fn details(report: &FlightReport) -> Vec<String> {
-    let mut details: Vec<String> = report
-        .segments
-        .iter()
-        .enumerate()
-        .filter(|(_, s)| !s.tracked(report.tolerance_rad))
-        .map(|(i, s)| {
-            format!(
-                "Not tracked: target {}, roll {:.0}°, pitch {:.0}°, settled error {}.",
-                i + 1,
-                s.roll_target_rad.to_degrees(),
-                s.pitch_target_rad.to_degrees(),
-                degrees(s.settled_error_rad)
-            )
-        })
-        .collect();
+    let mut details = not_tracked(report);
     if !report.segments.is_empty() {
         let tolerance = degrees(report.tolerance_rad);
         details.push(format!(
@@ -93,6 +82,34 @@ fn details(report: &FlightReport) -> Vec<String> {
         ));
     }
     details
+}
+
+/// A line for each target that was not tracked, and one for those beyond the first few.
+fn not_tracked(report: &FlightReport) -> Vec<String> {
+    let missed = || {
+        let numbered = report.segments.iter().zip(1..);
+        numbered.filter(|(s, _): &(&Segment, usize)| !s.tracked(report.tolerance_rad))
+    };
+    let line = |(s, number): (&Segment, usize)| {
+        let (roll, pitch) = (signed(s.roll_target_rad), signed(s.pitch_target_rad));
+        let error = degrees(s.settled_error_rad);
+        format!(
+            "Not tracked: target {number}, roll {roll}°, pitch {pitch}°, settled error {error}."
+        )
+    };
+    let mut lines: Vec<String> = missed().take(LISTED_TARGETS).map(line).collect();
+    let beyond = missed().count().saturating_sub(LISTED_TARGETS);
+    if beyond > 0 {
+        lines.push(format!(
+            "Not tracked either: {beyond} more, in the table of targets."
+        ));
+    }
+    lines
+}
+
+/// Degrees with a sign, by a true minus.
+pub(super) fn signed(rad: f64) -> String {
+    format!("{:+.1}", rad.to_degrees()).replace('-', "−")
 }
 
 /// An error in degrees, with digits enough that a small one is not shown as zero.

@@ -312,6 +312,15 @@ function size(host) {
   return { width: Math.max(120, host.clientWidth), height: Math.max(80, host.clientHeight) };
 }
 
+/** Samples between two gaps, which a line alone would not show. */
+function lonePoints(u, k) {
+  const ys = u.data[k];
+  const lone = [];
+  for (let i = 0; i < ys.length; i++)
+    if (ys[i] != null && ys[i - 1] == null && ys[i + 1] == null) lone.push(i);
+  return lone;
+}
+
 function timeChart(host, figure, track, panel, last) {
   const log = typeof panel.scale === "object" ? panel.scale.log : null;
   const level = panel.rules.map((r) => r.value);
@@ -352,7 +361,7 @@ function timeChart(host, figure, track, panel, last) {
     ],
     series: [{}, ...panel.series.map((s) => ({
       label: s.label, stroke: style(s.style), dash: DASH[s.style], width: Math.max(1.5, 0.1 * rem()),
-      points: { show: false }, spanGaps: false,
+      points: { size: 3, show: true, filter: lonePoints }, spanGaps: false, pxAlign: 0,
     }))],
     hooks: {
       drawAxes: [(u) => { panel.bands.forEach((b) => drawBand(u, b)); drawMarks(u, figure.marks); }],
