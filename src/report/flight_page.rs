@@ -1,10 +1,11 @@
 //! The page of one flight.
 
 use super::flight::FlightReport;
-use super::flight_verdict::{degrees, duration_s, signed, verdict};
+use super::flight_targets;
+use super::flight_verdict::{degrees, duration_s, verdict};
 use super::{
-    Align, Band, Figure, Histogram, LoopTiming, Mark, Page, Panel, Row, Rule, Scale, Section,
-    Series, Style, Table, TimeFigure, XyFigure, XyMark, XySeries,
+    Align, Band, Figure, Histogram, LoopTiming, Mark, Page, Panel, Rule, Scale, Section, Series,
+    Style, Table, TimeFigure,
 };
 use crate::logs::Sample;
 
@@ -13,15 +14,12 @@ const GAP_S: f64 = 0.1;
 /// Events up to this number are marked in the plots; more would hide the lines.
 const MARKED_EVENTS: usize = 40;
 
-/// Samples up to this number are drawn as a path in the roll and pitch plane.
-const PATH_POINTS: usize = 20_000;
-
 pub(super) fn page(report: &FlightReport) -> Page {
     let mut sections = vec![Section::verdict(verdict(report)), attitude(report)];
     sections.extend([air_data(report), surfaces(report)]);
     sections.extend(report.timing.as_ref().map(|t| loop_timing(report, t)));
     if !report.segments.is_empty() {
-        sections.push(segments(report));
+        sections.push(flight_targets::section(report));
     }
     if !report.events.is_empty() {
         sections.push(events(report));
@@ -300,103 +298,6 @@ fn loop_timing(report: &FlightReport, timing: &LoopTiming) -> Section {
         Figure::Table(table),
     ];
     Section::new("Loop timing", &note, figures)
-}
-
-fn segments(report: &FlightReport) -> Section {
-    let mut table = Table::new(
-        "Segments",
-        &[
-            ("Target", Align::Right),
-            ("From (s)", Align::Right),
-            ("To (s)", Align::Right),
-            ("Roll (°)", Align::Right),
-            ("Pitch (°)", Align::Right),
-            ("Group", Align::Left),
-            ("Settled error (°)", Align::Right),
-            ("Tracked", Align::Left),
-        ],
-    );
-    for (i, s) in report.segments.iter().enumerate() {
-        let tracked = if s.tracked(report.tolerance_rad) {
-            "yes"
-        } else {
-            "no"
-        };
-        let error = s.settled_error_rad.to_degrees();
-        table.rows.push(Row {
-            cells: vec![
-                (i + 1).to_string(),
-                format!("{:.2}", s.start_s),
-                format!("{:.2}", s.end_s),
-                signed(s.roll_target_rad),
-                signed(s.pitch_target_rad),
-                s.difficulty.name().into(),
-                if error.is_finite() {
-                    format!("{error:.4}")
-                } else {
-                    "unknown".into()
-                },
-                tracked.into(),
-            ],
-            span_s: Some([s.start_s, s.end_s]),
-        });
-    }
-    Section::new(
-        "Targets",
-        "Settled error is the mean of the roll and pitch RMS errors over the last fifth of a \
-         segment. Select a target to see its time in every plot.",
-        vec![Figure::Table(table), Figure::Xy(target_plane(report))],
-    )
-}
-
-/// Roll against pitch: the path flown, and the targets by whether they were tracked.
-fn target_plane(report: &FlightReport) -> XyFigure {
-    let targets = |label: &str, style, mark, tracked: bool| {
-        let of = || {
-            report
-                .segments
-                .iter()
-                .filter(move |s| s.tracked(report.tolerance_rad) == tracked)
-        };
-        XySeries {
-            label: label.into(),
-            style,
-            mark,
-            x: of().map(|s| s.roll_target_rad.to_degrees()).collect(),
-            y: of().map(|s| s.pitch_target_rad.to_degrees()).collect(),
-        }
-    };
-    let every = report.flight.samples.len().div_ceil(PATH_POINTS).max(1);
-    let angle = |axis: usize| {
-        let drawn = report.flight.samples.iter().step_by(every);
-        drawn.map(|s| s.attitude_rad[axis].to_degrees()).collect()
-    };
-    let path = XySeries {
-        label: match every {
-            1 => "path flown".into(),
-            n => format!("path flown, one sample in {n}"),
-        },
-        style: Style::Actual,
-        mark: XyMark::Path,
-        x: angle(0),
-        y: angle(1),
-    };
-    let reached = targets("target, tracked", Style::Second, XyMark::Circles, true);
-    let missed = targets(
-        "target, not tracked",
-        Style::Command,
-        XyMark::Crosses,
-        false,
-    );
-    XyFigure {
-        title: "Roll and pitch plane".into(),
-        x_label: "Roll (°)".into(),
-        y_label: "Pitch (°)".into(),
-        series: [path, reached, missed]
-            .into_iter()
-            .filter(|s| !s.x.is_empty())
-            .collect(),
-    }
 }
 
 fn events(report: &FlightReport) -> Section {

@@ -11,6 +11,7 @@ mod decimate;
 mod figure;
 mod flight;
 mod flight_page;
+mod flight_targets;
 mod flight_verdict;
 mod histogram;
 mod html;

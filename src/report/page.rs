@@ -9,7 +9,12 @@ const UPLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("assets/uPlot.LICENSE");
 const STYLE: &str = include_str!("assets/page.css");
-const SCRIPT: &str = include_str!("assets/page.js");
+/// Draws the figures, in one scope: each part uses those before it.
+const SCRIPTS: [&str; 3] = [
+    include_str!("assets/draw.js"),
+    include_str!("assets/link.js"),
+    include_str!("assets/page.js"),
+];
 /// Runs before the page is drawn, so that a dark screen does not flash white.
 const THEME_SCRIPT: &str = include_str!("assets/theme.js");
 
@@ -46,6 +51,7 @@ impl Page {
         let title = escape(&self.title);
         let subtitle = escape(&self.subtitle);
         let contents = self.contents();
+        let script = SCRIPTS.concat();
         let data = data.join(",\n");
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\" data-theme=\"light\">\n<head>\n\
@@ -69,7 +75,7 @@ impl Page {
              </footer>\n</main>\n\
              <script type=\"application/json\" id=\"figures\">[\n{data}\n]</script>\n\
              <script>\n/*\n{UPLOT_LICENCE}*/\n{UPLOT_SCRIPT}</script>\n\
-             <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
+             <script>\n(() => {{\n\"use strict\";\n{script}}})();\n</script>\n</body>\n</html>\n"
         )
     }
 

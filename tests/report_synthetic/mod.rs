@@ -95,8 +95,8 @@ pub fn report(flight: &Flight) -> FlightReport<'_> {
         segments: (0..TARGETS_DEG.len()).map(|i| segment(flight, i)).collect(),
         tolerance_rad: 0.5f64.to_radians(),
         travel: SurfaceTravel {
-            aileron_rad: 0.5235,
-            elevator_rad: 0.5235,
+            aileron_rad: 0.52,
+            elevator_rad: 0.52,
         },
         timing: Some(timing(flight)),
         events: events(),
