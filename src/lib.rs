@@ -41,4 +41,5 @@ pub mod link;
 pub mod logs;
 #[cfg(feature = "sitl")]
 pub mod sim;
+pub mod report;
 pub mod commands;
