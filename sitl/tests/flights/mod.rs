@@ -1,4 +1,7 @@
 //! Flights that several tests fly.
+#![allow(dead_code)] // Each test that includes this module uses a part of it.
+
+pub mod golden;
 
 use greylag_sitl::air::Air;
 use greylag_sitl::plant::{DT_S, Inputs, Plant, PlantOptions, Truth};
@@ -32,7 +35,6 @@ pub fn fly(plant: &mut Plant, from: u32, to: u32) -> Vec<Truth> {
 }
 
 /// Flies `steps` with constant `inputs`.
-#[allow(dead_code)] // Each test file that includes this module uses a part of it.
 pub fn hold(plant: &mut Plant, inputs: Inputs, steps: u32) -> Truth {
     for _ in 0..steps {
         plant.step(inputs).expect("a gentle flight stays finite");
