@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use jsbsim::{Error, Fdm, FileResolver, MemoryResolver, Resolver};
 
 use crate::hidden::{self, Hidden, HiddenError};
+use crate::plant::Properties;
 
 /// The files of the aircraft built into the program, by their path in a JSBSim tree.
 const BUILT_IN: [(&str, &str); 3] = [
@@ -77,9 +78,10 @@ pub(crate) fn load(
     fdm: &mut Fdm,
     dir: Option<&Path>,
     name: &str,
+    properties: &Properties,
     effects: &[Hidden],
 ) -> Result<(), AircraftError> {
-    let document = hidden::write_into(&read(dir, name)?, effects)?;
+    let document = hidden::write_into(&read(dir, name)?, properties, effects)?;
     let mut tree = Tree { disk: dir.map(FileResolver::new), memory: MemoryResolver::new() };
     let folder = match dir {
         None => {
