@@ -162,14 +162,42 @@ pub(crate) fn write_into(
     properties: &Properties,
     effects: &[Hidden],
 ) -> Result<String, HiddenError> {
-    let mut document = Document::new(xml, properties);
-    for (i, Hidden { effect, amplitude }) in effects.iter().enumerate() {
+    for (i, Hidden { effect, .. }) in effects.iter().enumerate() {
         if effects[..i].iter().any(|earlier| earlier.effect.id == effect.id) {
             return Err(HiddenError::Twice { id: effect.id });
         }
-        if *amplitude != 0.0 {
-            (effect.write)(&mut document, *amplitude)?;
-        }
+    }
+    let acting: Vec<_> = effects.iter().filter(|hidden| hidden.amplitude != 0.0).collect();
+    if acting.is_empty() {
+        return Ok(xml.to_owned());
+    }
+    let mut document = Document::new(xml, properties);
+    for Hidden { effect, amplitude } in acting {
+        (effect.write)(&mut document, *amplitude)?;
     }
     document.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_hidden_leaves_the_aircraft_as_it_is_to_the_byte() {
+        let plain = crate::aircraft::read(None, crate::aircraft::BUILT_IN_NAME).unwrap();
+        let written = |effects: &[Hidden]| write_into(&plain, &Properties::default(), effects).unwrap();
+        assert_eq!(written(&[]), plain);
+        let zeros: Vec<Hidden> = EFFECTS.iter().map(|e| Hidden::new(e.id, 0.0).unwrap()).collect();
+        assert_eq!(written(&zeros), plain);
+        let one = Hidden::new("pitch_break", 1.0).unwrap();
+        assert_ne!(written(&[one]), plain);
+    }
+
+    #[test]
+    fn ids_are_unique_and_zero_is_always_within_bounds() {
+        for (i, effect) in EFFECTS.iter().enumerate() {
+            assert!(EFFECTS[..i].iter().all(|earlier| earlier.id != effect.id), "{}", effect.id);
+            assert!(effect.bounds.0 <= 0.0 && effect.bounds.1 > 0.0, "{}", effect.id);
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 mod flights;
 
-use flights::{IDLE, busy, fly, plant};
+use flights::{IDLE, assert_same, busy, fly, plant};
 use greylag_sitl::hidden::{EFFECTS, Hidden, HiddenError};
 use greylag_sitl::plant::{DT_S, Inputs, Plant, PlantOptions, Start, Truth};
 
@@ -268,7 +268,7 @@ fn amplitude_zero_changes_nothing_and_any_other_changes_the_flight() {
     let plain = fly(&mut plant(), 0, 300);
     for effect in &EFFECTS {
         let nothing = fly(&mut with(&[&format!("{}=0", effect.id)]), 0, 300);
-        assert_eq!(nothing, plain, "{}", effect.id);
+        assert_same(&nothing, &plain);
         let something = fly(&mut with(&[&format!("{}={}", effect.id, mild(effect.id))]), 0, 300);
         let apart = |a: &Truth, b: &Truth| (a.roll_rad - b.roll_rad).abs().max((a.pitch_rad - b.pitch_rad).abs());
         let most = plain.iter().zip(&something).map(|(a, b)| apart(a, b)).fold(0.0, f64::max);
