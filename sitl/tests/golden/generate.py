@@ -147,6 +147,29 @@ def pid(roll_deg, pitch_deg, airspeed=20.0):
     return at
 
 
+def with_gust(history):
+    """The same history, with a gust that begins with the step at 2 s."""
+
+    def at(fdm, k):
+        if k == 200:
+            velocity = (2.0, -1.0, -3.0)
+            for name, value in {
+                "startup-duration-sec": 0.5,
+                "steady-duration-sec": 0.3,
+                "end-duration-sec": 0.8,
+                "magnitude-ft_sec": math.hypot(*velocity) / FT,
+                "frame": 3,  # north-east-down
+                "X-velocity-ft_sec": velocity[0],
+                "Y-velocity-ft_sec": velocity[1],
+                "Z-velocity-ft_sec": velocity[2],
+                "start": 1,
+            }.items():
+                fdm[f"atmosphere/cosine-gust/{name}"] = value
+        return history(fdm, k)
+
+    return at
+
+
 FLIGHTS = {  # name: (command history, steady wind)
     "white": (white(random.Random(11)), CALM),
     "held": (held(random.Random(12)), CALM),
@@ -155,6 +178,7 @@ FLIGHTS = {  # name: (command history, steady wind)
     "pid_50_20": (pid(50, 20), CALM),
     "pid_m40_m20": (pid(-40, -20), CALM),
     "wind": (pid(20, 5), (5.0, -3.0, 1.0)),
+    "gust": (with_gust(pid(10, 5)), CALM),
 }
 
 
