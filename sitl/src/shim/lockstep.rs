@@ -48,6 +48,7 @@ pub fn fly(
 struct Asking {
     since: Instant,
     next: Instant,
+    sent: Instant,
     sendings: u64,
     paused: bool,
 }
@@ -62,13 +63,13 @@ fn ask(
 ) -> Option<Answer> {
     let since = Instant::now();
     let next = since + faults.lateness();
-    let mut asking = Asking { since, next, sendings: 0, paused: false };
+    let mut asking = Asking { since, next, sent: since, sendings: 0, paused: false };
     while !stop.load(Ordering::Relaxed) {
         send_if_due(session, frame, faults, &mut asking);
         answers.clear();
         session.receive(answers);
         if let Some(answer) = pick(session, frame.time_us, answers) {
-            session.counts.latency.record(asking.since.elapsed());
+            session.counts.latency.record(asking.sent.elapsed());
             if asking.paused {
                 session.tell(Event::Resumed);
             }
@@ -105,6 +106,7 @@ fn send_if_due(
         asking.next = now + REPEAT_LOST;
     } else {
         session.send_frame(&bytes);
+        asking.sent = now;
         asking.next = now + REPEAT;
     }
 }

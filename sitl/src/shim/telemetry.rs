@@ -9,6 +9,8 @@ use super::codec::{
 use crate::plant::Truth;
 
 /// Full surface deflection, rad: what ±1 means in ACTUATOR_OUTPUT_STATUS.
+// The aircraft's limit as its file has it, not π/6.
+#[allow(clippy::approx_constant)]
 pub const FULL_DEFLECTION_RAD: f64 = 0.5235;
 
 /// Simulated time from one frame to the next, µs.
