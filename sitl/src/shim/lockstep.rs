@@ -92,7 +92,8 @@ fn send_if_due(
     asking: &mut Asking,
 ) {
     let now = Instant::now();
-    if now < asking.next && !session.take_newly_reachable() {
+    let reachable = session.take_newly_reachable();
+    if now < asking.next && !reachable {
         return;
     }
     if asking.sendings > 0 {
