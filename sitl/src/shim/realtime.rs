@@ -21,10 +21,11 @@ const LATE: Duration = Duration::from_millis(2);
 const HOPELESS: Duration = Duration::from_millis(100);
 /// An answer older than this is not flown, µs.
 const STALE_US: u64 = 500_000;
-/// The link is looked at this often while an answer is expected, to measure when it comes.
-const LOOK: Duration = Duration::from_micros(100);
-/// An answer is expected for this long; after that the link is looked at once a cycle.
-const EXPECT: Duration = Duration::from_millis(6);
+/// How often the link is looked at while an answer is expected, to measure when it comes: finely
+/// as long as it is punctual, then coarsely.
+const LOOKS: [Duration; 2] = [Duration::from_micros(100), Duration::from_millis(1)];
+/// An answer within this time is punctual.
+const PUNCTUAL: Duration = Duration::from_millis(4);
 /// So many arrivals are taken at one look; a flood waits in the kernel.
 const ARRIVALS: usize = 500;
 /// Sending times that are remembered, frames.
@@ -130,7 +131,7 @@ impl<'s, 'o> Cycle<'s, 'o> {
 
     /// Sends what falls due and takes what arrives until `deadline`.
     fn converse_until(&mut self, deadline: Instant) {
-        let expect_until = deadline - PERIOD + EXPECT;
+        let punctual_until = deadline - PERIOD + PUNCTUAL;
         loop {
             self.send_due();
             self.listen();
@@ -138,10 +139,13 @@ impl<'s, 'o> Cycle<'s, 'o> {
             if now >= deadline {
                 return;
             }
-            let expecting = self.answered_us < self.now_us
-                && self.session.is_alive()
-                && now < expect_until;
-            let mut wake = if expecting { now + LOOK } else { deadline };
+            let mut wake = if self.answered_us >= self.now_us {
+                deadline
+            } else if self.session.is_alive() && now < punctual_until {
+                now + LOOKS[0]
+            } else {
+                now + LOOKS[1]
+            };
             if let Some(&(due, ..)) = self.outbox.front() {
                 wake = wake.min(due);
             }
