@@ -9,7 +9,9 @@ fn vector(name: &str) -> Vec<u8> {
         .lines()
         .find_map(|line| line.strip_prefix(name)?.strip_prefix(' '))
         .unwrap_or_else(|| panic!("no vector {name}"));
-    (0..hex.len() / 2).map(|i| u8::from_str_radix(&hex[2 * i..2 * i + 2], 16).expect(name)).collect()
+    (0..hex.len() / 2)
+        .map(|i| u8::from_str_radix(&hex[2 * i..2 * i + 2], 16).expect(name))
+        .collect()
 }
 
 fn parsed(bytes: &[u8]) -> (Vec<Frame>, Parser) {
@@ -31,14 +33,23 @@ fn agrees<M: Message + PartialEq + std::fmt::Debug>(name: &str, sequence: u8, ou
     let (frames, parser) = parsed(&theirs);
     assert_eq!((frames.len(), parser.bad()), (1, 0), "{name}");
     let frame = &frames[0];
-    assert_eq!((frame.system, frame.component, frame.sequence), (1, 200, sequence), "{name}");
+    assert_eq!(
+        (frame.system, frame.component, frame.sequence),
+        (1, 200, sequence),
+        "{name}"
+    );
     assert_eq!(frame.decode::<M>(), Some(ours), "{name}: values");
 }
 
 fn controls() -> HilActuatorControls {
     let mut controls = [0.0; 16];
     controls[..3].copy_from_slice(&[0.25, -0.5, 0.75]);
-    HilActuatorControls { time_usec: 123_456_789_012_345, flags: 0, controls, mode: 128 }
+    HilActuatorControls {
+        time_usec: 123_456_789_012_345,
+        flags: 0,
+        controls,
+        mode: 128,
+    }
 }
 
 fn imu(id: u8) -> HighresImu {
@@ -153,7 +164,14 @@ fn every_message_agrees_with_pymavlink() {
     agrees(
         "vfr_hud",
         5,
-        VfrHud { airspeed: 16.625, groundspeed: 17.5, alt: 600.5, climb: -0.75, heading: 359, throttle: 100 },
+        VfrHud {
+            airspeed: 16.625,
+            groundspeed: 17.5,
+            alt: 600.5,
+            climb: -0.75,
+            heading: 359,
+            throttle: 100,
+        },
     );
     agrees("hil_actuator_controls", 6, controls());
     agrees("highres_imu", 7, imu(0));
@@ -182,18 +200,36 @@ fn every_message_agrees_with_pymavlink() {
             actuator: std::array::from_fn(|i| 0.125 * i as f32 - 1.0),
         },
     );
-    agrees("aoa_ssa", 11, AoaSsa { time_usec: 40_000, aoa: 2.25, ssa: -1.75 });
+    agrees(
+        "aoa_ssa",
+        11,
+        AoaSsa {
+            time_usec: 40_000,
+            aoa: 2.25,
+            ssa: -1.75,
+        },
+    );
     agrees("all_zero", 12, AoaSsa::default());
 }
 
 #[test]
 fn mavlink_1_and_signed_frames_are_read() {
     let (frames, _) = parsed(&vector("hil_actuator_controls_v1"));
-    assert_eq!((frames.len(), frames[0].version, frames[0].sequence), (1, Version::One, 42));
+    assert_eq!(
+        (frames.len(), frames[0].version, frames[0].sequence),
+        (1, Version::One, 42)
+    );
     assert_eq!(frames[0].decode::<HilActuatorControls>(), Some(controls()));
     let (frames, parser) = parsed(&vector("heartbeat_signed"));
-    assert_eq!((frames.len(), parser.bad()), (1, 0), "13 bytes of signature belong to the frame");
-    assert_eq!(frames[0].decode::<Heartbeat>().map(|m| m.custom_mode), Some(7));
+    assert_eq!(
+        (frames.len(), parser.bad()),
+        (1, 0),
+        "13 bytes of signature belong to the frame"
+    );
+    assert_eq!(
+        frames[0].decode::<Heartbeat>().map(|m| m.custom_mode),
+        Some(7)
+    );
 }
 
 #[test]
@@ -230,7 +266,13 @@ fn every_truncation_is_one_bad_run_and_no_frame() {
 #[test]
 fn a_stream_in_pieces_of_any_size_gives_the_same_frames() {
     let mut stream = Vec::new();
-    for name in ["heartbeat", "highres_imu", "statustext", "heartbeat_signed", "aoa_ssa"] {
+    for name in [
+        "heartbeat",
+        "highres_imu",
+        "statustext",
+        "heartbeat_signed",
+        "aoa_ssa",
+    ] {
         stream.extend(b"noise between");
         stream.extend(vector(name));
     }
@@ -242,7 +284,11 @@ fn a_stream_in_pieces_of_any_size_gives_the_same_frames() {
         // The unknown STATUSTEXT is followed by noise, so nothing vouches for it unless it ends a
         // piece; either way it yields no frame.
         assert_eq!(ids, [0, 105, 0, 11020], "pieces of {size}");
-        assert!((4..=5).contains(&parser.bad()), "pieces of {size}: {} runs of noise", parser.bad());
+        assert!(
+            (4..=5).contains(&parser.bad()),
+            "pieces of {size}: {} runs of noise",
+            parser.bad()
+        );
     }
 }
 

@@ -166,7 +166,10 @@ pub struct ShimOptions {
 impl ShimOptions {
     /// The address at which the companion listens by default.
     pub fn default_link() -> Address {
-        Address { transport: Transport::UdpOut, endpoint: "127.0.0.1:14600".to_owned() }
+        Address {
+            transport: Transport::UdpOut,
+            endpoint: "127.0.0.1:14600".to_owned(),
+        }
     }
 
     /// Real time, perfect sensors, held until armed, towards [`ShimOptions::default_link`].
@@ -191,30 +194,71 @@ impl ShimOptions {
         let faults = &self.faults;
         let mut errors = self.noise.values().to_vec();
         errors.extend([faults.delay_ms, faults.jitter_ms, faults.late_ms]);
-        demand(errors.iter().all(|x| x.is_finite() && *x >= 0.0), "noise and delays must be 0 or more")?;
         demand(
-            [faults.delay_ms, faults.jitter_ms, faults.late_ms].iter().all(|&x| x <= 60_000.0),
+            errors.iter().all(|x| x.is_finite() && *x >= 0.0),
+            "noise and delays must be 0 or more",
+        )?;
+        demand(
+            [faults.delay_ms, faults.jitter_ms, faults.late_ms]
+                .iter()
+                .all(|&x| x <= 60_000.0),
             "a delay may be 60000 ms at most",
         )?;
-        demand((0.0..1.0).contains(&faults.drop_probability), "the drop probability must be 0 or more and below 1")?;
-        demand((0.0..=1.0).contains(&faults.late_probability), "the probability of a late frame must lie in 0..1")?;
+        demand(
+            (0.0..1.0).contains(&faults.drop_probability),
+            "the drop probability must be 0 or more and below 1",
+        )?;
+        demand(
+            (0.0..=1.0).contains(&faults.late_probability),
+            "the probability of a late frame must lie in 0..1",
+        )?;
         let bias = &self.bias;
         let mut biases = vec![bias.alpha_rad, bias.beta_rad, bias.airspeed_scale];
         biases.extend(bias.gyro_radps.iter().chain(&bias.accelerometer_mps2));
-        demand(biases.iter().all(|x| x.is_finite()), "a bias must be a finite number")?;
-        demand(bias.airspeed_scale > 0.0, "the airspeed scale must be positive")?;
-        demand(self.duration_s.is_none_or(|s| s.is_finite() && s > 0.0), "the duration must be positive")?;
+        demand(
+            biases.iter().all(|x| x.is_finite()),
+            "a bias must be a finite number",
+        )?;
+        demand(
+            bias.airspeed_scale > 0.0,
+            "the airspeed scale must be positive",
+        )?;
+        demand(
+            self.duration_s.is_none_or(|s| s.is_finite() && s > 0.0),
+            "the duration must be positive",
+        )?;
         let start = &self.start;
         let state = [
-            start.roll_rad, start.pitch_rad, start.yaw_rad, start.airspeed_mps, start.alpha_rad,
-            start.beta_rad, start.p_radps, start.q_radps, start.r_radps, start.altitude_m,
+            start.roll_rad,
+            start.pitch_rad,
+            start.yaw_rad,
+            start.airspeed_mps,
+            start.alpha_rad,
+            start.beta_rad,
+            start.p_radps,
+            start.q_radps,
+            start.r_radps,
+            start.altitude_m,
         ];
-        demand(state.iter().all(|x| x.is_finite()), "the start must be made of finite numbers")?;
-        demand(start.airspeed_mps > 0.0, "the airspeed at the start must be positive")?;
-        demand(start.altitude_m > 0.0, "the altitude at the start must be positive")
+        demand(
+            state.iter().all(|x| x.is_finite()),
+            "the start must be made of finite numbers",
+        )?;
+        demand(
+            start.airspeed_mps > 0.0,
+            "the airspeed at the start must be positive",
+        )?;
+        demand(
+            start.altitude_m > 0.0,
+            "the altitude at the start must be positive",
+        )
     }
 }
 
 fn demand(holds: bool, rule: &'static str) -> Result<(), ShimError> {
-    if holds { Ok(()) } else { Err(ShimError::Option { rule }) }
+    if holds {
+        Ok(())
+    } else {
+        Err(ShimError::Option { rule })
+    }
 }

@@ -38,7 +38,10 @@ impl fmt::Display for Event {
             Event::Open(link, Some(local)) => write!(f, "link {link} is open, here {local}"),
             Event::Open(link, None) => write!(f, "link {link} is open"),
             Event::Waiting(link) => {
-                write!(f, "waiting for a companion on {link}; start one with `cargo fly`")
+                write!(
+                    f,
+                    "waiting for a companion on {link}; start one with `cargo fly`"
+                )
             }
             Event::Found => write!(f, "companion found"),
             Event::Lost => write!(f, "companion lost"),
@@ -51,7 +54,11 @@ impl fmt::Display for Event {
             ),
             Event::Resumed => write!(f, "answered: simulated time goes on"),
             Event::Skipped(by) => {
-                write!(f, "this machine was {:.0} ms late: the clock is set anew", by.as_secs_f64() * 1e3)
+                write!(
+                    f,
+                    "this machine was {:.0} ms late: the clock is set anew",
+                    by.as_secs_f64() * 1e3
+                )
             }
         }
     }
@@ -76,7 +83,11 @@ pub struct Latency {
 
 impl Default for Latency {
     fn default() -> Self {
-        Latency { bins: vec![0; 2001], count: 0, longest: Duration::ZERO }
+        Latency {
+            bins: vec![0; 2001],
+            count: 0,
+            longest: Duration::ZERO,
+        }
     }
 }
 

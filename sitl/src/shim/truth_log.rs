@@ -35,7 +35,10 @@ impl TruthLog {
             }
             Err(source) => return Err(ShimError::Truth { path, source }),
         };
-        let mut log = TruthLog { path, file: BufWriter::new(file) };
+        let mut log = TruthLog {
+            path,
+            file: BufWriter::new(file),
+        };
         let written = writeln!(log.file, "{HEADER}");
         log.check(written)?;
         Ok(log)
@@ -46,17 +49,35 @@ impl TruthLog {
         let [ax, ay, az] = truth.specific_force_mps2;
         let [vn, ve, vd] = truth.velocity_ned_mps;
         let columns = [
-            truth.roll_rad, truth.pitch_rad, truth.yaw_rad,
-            truth.p_radps, truth.q_radps, truth.r_radps,
-            truth.airspeed_mps, truth.alpha_rad, truth.beta_rad,
-            ax, ay, az, vn, ve, vd,
-            truth.altitude_m, truth.air_density_kgpm3,
-            truth.aileron_rad, truth.elevator_rad, truth.throttle,
-            inputs.aileron, inputs.elevator, inputs.throttle,
+            truth.roll_rad,
+            truth.pitch_rad,
+            truth.yaw_rad,
+            truth.p_radps,
+            truth.q_radps,
+            truth.r_radps,
+            truth.airspeed_mps,
+            truth.alpha_rad,
+            truth.beta_rad,
+            ax,
+            ay,
+            az,
+            vn,
+            ve,
+            vd,
+            truth.altitude_m,
+            truth.air_density_kgpm3,
+            truth.aileron_rad,
+            truth.elevator_rad,
+            truth.throttle,
+            inputs.aileron,
+            inputs.elevator,
+            inputs.throttle,
         ];
         let mut write = || -> io::Result<()> {
             write!(self.file, "{}", time_us as f64 * 1e-6)?;
-            columns.iter().try_for_each(|value| write!(self.file, ",{value}"))?;
+            columns
+                .iter()
+                .try_for_each(|value| write!(self.file, ",{value}"))?;
             writeln!(self.file)
         };
         let written = write();
@@ -70,6 +91,9 @@ impl TruthLog {
     }
 
     fn check(&self, written: io::Result<()>) -> Result<(), ShimError> {
-        written.map_err(|source| ShimError::Truth { path: self.path.clone(), source })
+        written.map_err(|source| ShimError::Truth {
+            path: self.path.clone(),
+            source,
+        })
     }
 }

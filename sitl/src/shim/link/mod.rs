@@ -37,7 +37,9 @@ pub enum LinkError {
         source: io::Error,
     },
     /// The port is taken.
-    #[error("cannot listen on {address}: the port is in use by another program; stop it or choose another port with --link")]
+    #[error(
+        "cannot listen on {address}: the port is in use by another program; stop it or choose another port with --link"
+    )]
     InUse {
         /// The address as written.
         address: Address,

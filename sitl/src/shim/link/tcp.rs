@@ -19,7 +19,10 @@ const CONNECT: Duration = Duration::from_secs(2);
 enum Source {
     Listener(TcpListener),
     /// Connects in a thread of its own, so that a slow network costs no cycle.
-    Connector { to: SocketAddr, attempt: Option<Receiver<io::Result<TcpStream>>> },
+    Connector {
+        to: SocketAddr,
+        attempt: Option<Receiver<io::Result<TcpStream>>>,
+    },
 }
 
 /// At most one stream at a time.
@@ -44,7 +47,10 @@ impl TcpLink {
             Transport::TcpIn => listen(resolved)
                 .map(Source::Listener)
                 .map_err(|source| LinkError::opening(address, source))?,
-            _ => Source::Connector { to: resolved, attempt: None },
+            _ => Source::Connector {
+                to: resolved,
+                attempt: None,
+            },
         };
         Ok(TcpLink {
             source,
@@ -71,7 +77,9 @@ impl TcpLink {
     }
 
     pub(super) fn send(&mut self, bytes: &[u8]) -> bool {
-        let Some(stream) = &mut self.stream else { return false };
+        let Some(stream) = &mut self.stream else {
+            return false;
+        };
         let outcome = flush(stream, &mut self.unsent).and_then(|()| {
             if !self.unsent.is_empty() {
                 return Ok(false);
@@ -174,7 +182,10 @@ fn arrived(
     let Some(running) = attempt else {
         let (sender, receiver) = channel();
         let connect = move || sender.send(TcpStream::connect_timeout(&to, CONNECT));
-        thread::Builder::new().name("connect".into()).spawn(connect).ok()?;
+        thread::Builder::new()
+            .name("connect".into())
+            .spawn(connect)
+            .ok()?;
         *attempt = Some(receiver);
         return None;
     };
