@@ -72,6 +72,7 @@ struct AircraftArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Start", allow_negative_numbers = true)]
 struct StartArgs {
+    /// Right wing down is positive.
     #[arg(
         long,
         value_name = "DEG",
@@ -79,6 +80,7 @@ struct StartArgs {
         allow_negative_numbers = true
     )]
     start_roll_deg: f64,
+    /// Nose up is positive.
     #[arg(
         long,
         value_name = "DEG",
@@ -86,6 +88,7 @@ struct StartArgs {
         allow_negative_numbers = true
     )]
     start_pitch_deg: f64,
+    /// From true north towards east.
     #[arg(
         long,
         value_name = "DEG",
@@ -93,6 +96,7 @@ struct StartArgs {
         allow_negative_numbers = true
     )]
     start_yaw_deg: f64,
+    /// Angle of attack.
     #[arg(
         long,
         value_name = "DEG",
