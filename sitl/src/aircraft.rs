@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use jsbsim::{Error, Fdm, FileResolver, MemoryResolver, Resolver};
 
 use crate::hidden::{self, Hidden, HiddenError};
+use crate::plant::Properties;
 
 /// The files of the aircraft built into the program, by their path in a JSBSim tree.
 const BUILT_IN: [(&str, &str); 3] = [
-    ("aircraft/x8/x8.xml", include_str!("../aircraft/x8/x8.xml")),
-    ("aircraft/x8/Engines/x8_motor.xml", include_str!("../aircraft/x8/Engines/x8_motor.xml")),
-    ("aircraft/x8/Engines/x8_direct.xml", include_str!("../aircraft/x8/Engines/x8_direct.xml")),
+    ("x8/x8.xml", include_str!("../aircraft/x8/x8.xml")),
+    ("x8/Engines/x8_motor.xml", include_str!("../aircraft/x8/Engines/x8_motor.xml")),
+    ("x8/Engines/x8_direct.xml", include_str!("../aircraft/x8/Engines/x8_direct.xml")),
 ];
 
 /// Name of the aircraft built into the program.
@@ -77,25 +78,21 @@ pub(crate) fn load(
     fdm: &mut Fdm,
     dir: Option<&Path>,
     name: &str,
+    properties: &Properties,
     effects: &[Hidden],
 ) -> Result<(), AircraftError> {
-    let document = hidden::write_into(&read(dir, name)?, effects)?;
+    let document = hidden::write_into(&read(dir, name)?, properties, effects)?;
     let mut tree = Tree { disk: dir.map(FileResolver::new), memory: MemoryResolver::new() };
-    let folder = match dir {
-        None => {
-            for (path, text) in BUILT_IN {
-                tree.memory.insert(path, text);
-            }
-            "aircraft"
+    if dir.is_none() {
+        for (path, text) in BUILT_IN {
+            tree.memory.insert(path, text);
         }
-        Some(_) => {
-            fdm.set_engine_path("../engine");
-            fdm.set_systems_path("../systems");
-            "."
-        }
-    };
-    tree.memory.insert(format!("{folder}/{name}/{name}.xml"), document);
-    fdm.load_model(&tree, folder, name)
+    }
+    fdm.set_engine_path("../engine");
+    fdm.set_systems_path("../systems");
+    let path = format!("{name}/{name}.xml");
+    tree.memory.insert(path.clone(), document);
+    fdm.load_model_file(&tree, &path)
         .map_err(|source| AircraftError::Load { name: name.to_owned(), source })
 }
 

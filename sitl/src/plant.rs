@@ -289,7 +289,8 @@ impl Plant {
         options.air = options.air.checked()?;
         let mut fdm = Fdm::new().map_err(jsbsim("starting"))?;
         fdm.set_dt(DT_S);
-        aircraft::load(&mut fdm, options.aircraft_dir.as_deref(), &options.aircraft, &options.hidden)?;
+        let PlantOptions { aircraft_dir, aircraft, properties, hidden, .. } = &options;
+        aircraft::load(&mut fdm, aircraft_dir.as_deref(), aircraft, properties, hidden)?;
         let nodes = Nodes::find(&fdm, &options)?;
         let mut loaded = jsbsim::Snapshot::new();
         fdm.snapshot_into(&mut loaded).map_err(jsbsim("saving the loaded aircraft"))?;

@@ -2,7 +2,7 @@
 
 mod flights;
 
-use flights::{IDLE, busy, fly, hold, plant, plant_in};
+use flights::{IDLE, assert_same, busy, differ, fly, hold, plant, plant_in};
 use greylag_sitl::air::{Air, Gust, Turbulence};
 use greylag_sitl::plant::{DT_S, Inputs, PlantError, Start};
 
@@ -162,7 +162,7 @@ fn snapshot_repeats_a_turbulent_flight_to_the_bit() {
     let first = fly(&mut plant, 50, 250);
     plant.restore(&saved).unwrap();
     assert_eq!(plant.truth().time_s, 0.5);
-    assert_eq!(first, fly(&mut plant, 50, 250));
+    assert_same(&first, &fly(&mut plant, 50, 250));
 }
 
 #[test]
@@ -174,11 +174,12 @@ fn same_seed_same_flight_and_another_seed_another() {
         plant.reset(&Start::NEUTRAL).unwrap();
         let first = fly(&mut plant, 0, 200);
         plant.reset(&Start::NEUTRAL).unwrap();
-        assert_eq!(first, fly(&mut plant, 0, 200), "a reset starts the same flight again");
+        // A reset starts the same flight again.
+        assert_same(&first, &fly(&mut plant, 0, 200));
         first
     };
-    assert_eq!(flight(7), flight(7));
-    assert_ne!(flight(7), flight(8));
+    assert_same(&flight(7), &flight(7));
+    assert!(differ(&flight(7), &flight(8)));
 }
 
 #[test]
@@ -222,7 +223,7 @@ fn a_command_that_is_no_number_steps_nothing() {
     }
     assert_eq!(plant.truth(), before);
     fly(&mut other, 0, 10);
-    assert_eq!(fly(&mut plant, 10, 20), fly(&mut other, 10, 20));
+    assert_same(&fly(&mut plant, 10, 20), &fly(&mut other, 10, 20));
 }
 
 #[test]
@@ -235,7 +236,7 @@ fn a_state_that_is_no_number_is_an_error_and_a_reset_heals_it() {
     assert!(matches!(error, PlantError::NonFinite { .. }), "{error}");
     println!("{error}");
     plant.reset(&Start::NEUTRAL).unwrap();
-    assert_eq!(fly(&mut plant, 0, 10), expected);
+    assert_same(&fly(&mut plant, 0, 10), &expected);
 }
 
 #[test]

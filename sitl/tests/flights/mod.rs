@@ -41,3 +41,16 @@ pub fn hold(plant: &mut Plant, inputs: Inputs, steps: u32) -> Truth {
     }
     plant.truth()
 }
+
+/// Asserts that two flights are the same to the bit, and shows the first step where they are not.
+pub fn assert_same(a: &[Truth], b: &[Truth]) {
+    assert_eq!(a.len(), b.len());
+    if let Some(k) = (0..a.len()).find(|k| a[*k] != b[*k]) {
+        panic!("the flights part at step {k}:\n{:?}\n{:?}", a[k], b[k]);
+    }
+}
+
+/// Whether two flights differ anywhere.
+pub fn differ(a: &[Truth], b: &[Truth]) -> bool {
+    a != b
+}
