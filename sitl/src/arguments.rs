@@ -5,7 +5,6 @@ mod errors;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use anyhow::Context;
 use clap::{Args, Parser};
 use errors::{FaultArgs, SensorArgs};
 use greylag_sitl::air::{Air, Gust, Turbulence};
@@ -63,9 +62,9 @@ struct AircraftArgs {
     /// Name of the aircraft.
     #[arg(long, value_name = "NAME")]
     aircraft: Option<String>,
-    /// Hide an effect in the aircraft (may be repeated).
+    /// Hide an effect in the aircraft (may be repeated); a wrong ID is answered with all that are known.
     #[arg(long, value_name = "ID=AMPLITUDE", allow_hyphen_values = true)]
-    hide: Vec<String>,
+    hide: Vec<Hidden>,
 }
 
 /// The state at the start.
@@ -163,9 +162,9 @@ impl<const N: usize> FromStr for Numbers<N> {
 }
 
 impl Cli {
-    /// What the command line asks for; an error names the option that cannot be read.
-    pub fn options(&self) -> anyhow::Result<ShimOptions> {
-        Ok(ShimOptions {
+    /// What the command line asks for.
+    pub fn options(&self) -> ShimOptions {
+        ShimOptions {
             link: self.link.clone(),
             pace: if self.lockstep {
                 Pace::Lockstep
@@ -179,7 +178,7 @@ impl Cli {
             },
             duration_s: self.duration_s,
             start: self.start.state(),
-            plant: self.plant()?,
+            plant: self.plant(),
             seed: u64::from(self.seed),
             truth: self.truth.clone().map(|path| TruthFile {
                 path,
@@ -192,10 +191,10 @@ impl Cli {
             noise: self.sensors.noise(),
             bias: self.sensors.bias(),
             faults: self.faults.rule(),
-        })
+        }
     }
 
-    fn plant(&self) -> anyhow::Result<PlantOptions> {
+    fn plant(&self) -> PlantOptions {
         let mut plant = PlantOptions {
             seed: self.seed,
             air: self.air.air(),
@@ -205,13 +204,8 @@ impl Cli {
         if let Some(name) = &self.aircraft.aircraft {
             plant.aircraft = name.clone();
         }
-        plant.hidden = self
-            .aircraft
-            .hide
-            .iter()
-            .map(|text| hidden(text))
-            .collect::<Result<_, _>>()?;
-        Ok(plant)
+        plant.hidden = self.aircraft.hide.clone();
+        plant
     }
 }
 
@@ -247,18 +241,4 @@ impl AirArgs {
             gusts: self.gust.iter().map(gust).collect(),
         }
     }
-}
-
-/// Reads an effect to be hidden, written `id=amplitude`.
-fn hidden(text: &str) -> anyhow::Result<Hidden> {
-    let (id, amplitude) = text
-        .split_once('=')
-        .with_context(|| format!("cannot read --hide {text}: write it like id=amplitude"))?;
-    let amplitude: f64 = amplitude
-        .parse()
-        .with_context(|| format!("cannot read the amplitude of --hide {text}: give a number"))?;
-    Ok(Hidden {
-        effect: id.to_owned().leak(),
-        amplitude,
-    })
 }

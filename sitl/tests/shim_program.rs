@@ -52,7 +52,7 @@ fn bad_arguments_are_named() {
     );
     fails(&["--wind-ned-mps", "1,2"], "3 numbers are needed");
     fails(&["--aircraft", "absent"], "absent");
-    fails(&["--hide", "nonsense"], "id=amplitude");
+    fails(&["--hide", "nonsense"], "ID=AMPLITUDE");
     fails(&["--drop", "2"], "drop probability");
     fails(&["--turbulence-severity", "9"], "severity");
 }
@@ -127,6 +127,8 @@ fn all_options_together_fly_in_lockstep() {
         "2",
         "--late",
         "0.05",
+        "--hide",
+        "pitch_break=-3.0",
         "--truth",
         truth.to_str().expect("a name"),
     ];

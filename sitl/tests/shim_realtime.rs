@@ -244,10 +244,10 @@ fn late_frames_hold_up_those_behind_them_and_none_is_lost() {
     }
     let summary = shim.stop();
     // Of 300 frames 6 are late; the chance that none is 0.2 %, and the seed is fixed. A frame that
-    // is 100 ms late, with 5 ms of jitter, leaves a gap of 105 to 115 ms.
+    // is 100 ms late, with 5 ms of jitter, leaves a gap of 105 to 115 ms; a busy machine adds to it.
     let longest = gaps.iter().max().expect("gaps");
     assert!(
-        (Duration::from_millis(95)..Duration::from_millis(150)).contains(longest),
+        (Duration::from_millis(95)..Duration::from_millis(250)).contains(longest),
         "{longest:?}"
     );
     // Frames that were held up come in a burst.
