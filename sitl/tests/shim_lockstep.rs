@@ -162,6 +162,7 @@ fn a_torn_tcp_stream_is_read_and_garbage_in_it_skipped() {
             std::thread::sleep(Duration::from_millis(1));
         }
     }
+    companion.state();
     let summary = shim.stop();
     assert_eq!((summary.answers, summary.bad_frames), (20, 20));
 }
@@ -184,12 +185,16 @@ fn pauses_when_the_companion_dies_and_goes_on_when_it_returns() {
         events.contains(&Event::Lost) && events.contains(&Event::Resumed),
         "{events:?}"
     );
+    companion.state();
     assert_eq!(shim.stop().answers, 100);
 
     let shim = Shim::start(lockstep("tcpin:127.0.0.1:0"));
     let to = shim.address();
     let before = Companion::tcp_out(to).fly(50, |_| NEUTRAL);
-    let after = Companion::tcp_out(to).fly(50, |_| NEUTRAL);
+    let mut companion = Companion::tcp_out(to);
+    let after = companion.fly(50, |_| NEUTRAL);
+    // The next frame proves that the last answer has been flown.
+    companion.state();
     assert_consecutive(&[before, after].concat(), STEP_US);
     assert!(shim.events().contains(&Event::Lost));
     assert_eq!(shim.stop().answers, 100);
@@ -198,7 +203,10 @@ fn pauses_when_the_companion_dies_and_goes_on_when_it_returns() {
     let link = format!("tcpout:{}", listener.local_addr().expect("an address"));
     let shim = Shim::start(lockstep(&link));
     let before = Companion::tcp_in(&listener).fly(50, |_| NEUTRAL);
-    let after = Companion::tcp_in(&listener).fly(50, |_| NEUTRAL);
+    let mut companion = Companion::tcp_in(&listener);
+    let after = companion.fly(50, |_| NEUTRAL);
+    // The next frame proves that the last answer has been flown.
+    companion.state();
     assert_consecutive(&[before, after].concat(), STEP_US);
     assert_eq!(shim.stop().answers, 100);
 }
@@ -224,6 +232,7 @@ fn a_listening_udp_link_takes_the_companion_that_returns_on_another_port() {
     let first = first.expect("the second companion is heard");
     second.answer(first.time_us(), NEUTRAL);
     assert_eq!(first.time_us(), 21 * STEP_US);
+    while second.state().time_us() == first.time_us() {}
     assert_consecutive(&before, STEP_US);
     let summary = shim.stop();
     assert_eq!((summary.answers, summary.foreign_frames > 0), (21, true));
@@ -238,7 +247,9 @@ fn waits_for_a_companion_that_comes_later() {
     let shim = Shim::start(lockstep(&format!("tcpout:{at}")));
     std::thread::sleep(Duration::from_millis(500));
     let listener = TcpListener::bind(at).expect("the same port");
-    let states = Companion::tcp_in(&listener).fly(5, |_| NEUTRAL);
+    let mut companion = Companion::tcp_in(&listener);
+    let states = companion.fly(5, |_| NEUTRAL);
+    companion.state();
     assert_consecutive(&states, STEP_US);
     assert_eq!(shim.stop().answers, 5);
 }
