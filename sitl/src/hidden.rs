@@ -6,13 +6,14 @@
 
 mod document;
 mod effects;
+mod expression;
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::plant::Properties;
-pub(crate) use document::THRUST_PROPERTY;
 use document::Document;
+pub(crate) use document::THRUST_PROPERTY;
 pub use effects::EFFECTS;
 
 /// An effect that can be hidden, under the id it has in the catalogue of effects.
@@ -50,11 +51,20 @@ impl Hidden {
         let effect = EFFECTS
             .iter()
             .find(|effect| effect.id == id)
-            .ok_or_else(|| HiddenError::Unknown { id: id.to_owned(), known: known() })?;
+            .ok_or_else(|| HiddenError::Unknown {
+                id: id.to_owned(),
+                known: known(),
+            })?;
         let (min, max) = effect.bounds;
         if !(min..=max).contains(&amplitude) {
             let Effect { id, unit, .. } = *effect;
-            return Err(HiddenError::Amplitude { id, amplitude, min, max, unit });
+            return Err(HiddenError::Amplitude {
+                id,
+                amplitude,
+                min,
+                max,
+                unit,
+            });
         }
         Ok(Hidden { effect, amplitude })
     }
@@ -93,7 +103,10 @@ impl FromStr for Hidden {
 
     /// Reads `id=amplitude`, such as `pitch_break=-3.0`.
     fn from_str(text: &str) -> Result<Self, HiddenError> {
-        let syntax = || HiddenError::Syntax { text: text.to_owned(), known: known() };
+        let syntax = || HiddenError::Syntax {
+            text: text.to_owned(),
+            known: known(),
+        };
         let (id, amplitude) = text.split_once('=').ok_or_else(syntax)?;
         Hidden::new(id.trim(), amplitude.trim().parse().map_err(|_| syntax())?)
     }
@@ -103,7 +116,9 @@ impl FromStr for Hidden {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum HiddenError {
     /// The text is not an id and a number.
-    #[error("hidden effect '{text}': write ID=AMPLITUDE, such as pitch_break=-3.0; known ids: {known}")]
+    #[error(
+        "hidden effect '{text}': write ID=AMPLITUDE, such as pitch_break=-3.0; known ids: {known}"
+    )]
     Syntax {
         /// The text.
         text: String,
@@ -119,7 +134,9 @@ pub enum HiddenError {
         known: String,
     },
     /// The amplitude is outside what the effect takes.
-    #[error("hidden effect {id}: amplitude {amplitude} {unit} is outside {min} to {max} {unit}; give one within")]
+    #[error(
+        "hidden effect {id}: amplitude {amplitude} {unit} is outside {min} to {max} {unit}; give one within"
+    )]
     Amplitude {
         /// The effect.
         id: &'static str,
@@ -133,7 +150,9 @@ pub enum HiddenError {
         unit: &'static str,
     },
     /// The delay is not a whole number of steps.
-    #[error("hidden effect time_delay: {amplitude} s is not a whole number of steps of 0.01 s; give a multiple")]
+    #[error(
+        "hidden effect time_delay: {amplitude} s is not a whole number of steps of 0.01 s; give a multiple"
+    )]
     Delay {
         /// The delay, s.
         amplitude: f64,
@@ -145,7 +164,9 @@ pub enum HiddenError {
         id: &'static str,
     },
     /// The aircraft's XML has no place for the effect.
-    #[error("a hidden effect needs {place} in the aircraft's XML, which has none; hide another effect or fly another aircraft")]
+    #[error(
+        "a hidden effect needs {place} in the aircraft's XML, which has none; hide another effect or fly another aircraft"
+    )]
     Place {
         /// What was looked for.
         place: String,
@@ -153,7 +174,11 @@ pub enum HiddenError {
 }
 
 fn known() -> String {
-    EFFECTS.iter().map(|effect| effect.id).collect::<Vec<_>>().join(", ")
+    EFFECTS
+        .iter()
+        .map(|effect| effect.id)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// The aircraft document `xml` with `effects` written into it.
@@ -163,11 +188,17 @@ pub(crate) fn write_into(
     effects: &[Hidden],
 ) -> Result<String, HiddenError> {
     for (i, Hidden { effect, .. }) in effects.iter().enumerate() {
-        if effects[..i].iter().any(|earlier| earlier.effect.id == effect.id) {
+        if effects[..i]
+            .iter()
+            .any(|earlier| earlier.effect.id == effect.id)
+        {
             return Err(HiddenError::Twice { id: effect.id });
         }
     }
-    let acting: Vec<_> = effects.iter().filter(|hidden| hidden.amplitude != 0.0).collect();
+    let acting: Vec<_> = effects
+        .iter()
+        .filter(|hidden| hidden.amplitude != 0.0)
+        .collect();
     if acting.is_empty() {
         return Ok(xml.to_owned());
     }
@@ -185,9 +216,13 @@ mod tests {
     #[test]
     fn nothing_hidden_leaves_the_aircraft_as_it_is_to_the_byte() {
         let plain = crate::aircraft::read(None, crate::aircraft::BUILT_IN_NAME).unwrap();
-        let written = |effects: &[Hidden]| write_into(&plain, &Properties::default(), effects).unwrap();
+        let written =
+            |effects: &[Hidden]| write_into(&plain, &Properties::default(), effects).unwrap();
         assert_eq!(written(&[]), plain);
-        let zeros: Vec<Hidden> = EFFECTS.iter().map(|e| Hidden::new(e.id, 0.0).unwrap()).collect();
+        let zeros: Vec<Hidden> = EFFECTS
+            .iter()
+            .map(|e| Hidden::new(e.id, 0.0).unwrap())
+            .collect();
         assert_eq!(written(&zeros), plain);
         let one = Hidden::new("pitch_break", 1.0).unwrap();
         assert_ne!(written(&[one]), plain);
@@ -196,8 +231,16 @@ mod tests {
     #[test]
     fn ids_are_unique_and_zero_is_always_within_bounds() {
         for (i, effect) in EFFECTS.iter().enumerate() {
-            assert!(EFFECTS[..i].iter().all(|earlier| earlier.id != effect.id), "{}", effect.id);
-            assert!(effect.bounds.0 <= 0.0 && effect.bounds.1 > 0.0, "{}", effect.id);
+            assert!(
+                EFFECTS[..i].iter().all(|earlier| earlier.id != effect.id),
+                "{}",
+                effect.id
+            );
+            assert!(
+                effect.bounds.0 <= 0.0 && effect.bounds.1 > 0.0,
+                "{}",
+                effect.id
+            );
         }
     }
 }

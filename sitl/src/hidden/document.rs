@@ -1,6 +1,7 @@
 //! The XML of an aircraft while hidden effects are written into it.
 
 use super::HiddenError;
+use super::expression::{product, property, sum, value};
 use crate::plant::Properties;
 
 /// Property with the thrust that hidden effects add, lbf.
@@ -31,7 +32,11 @@ impl Axis {
 
     /// Property of the length that makes a moment of a force, ft.
     fn length(self) -> &'static str {
-        if self == Axis::Pitch { "metrics/cbarw-ft" } else { "metrics/bw-ft" }
+        if self == Axis::Pitch {
+            "metrics/cbarw-ft"
+        } else {
+            "metrics/bw-ft"
+        }
     }
 }
 
@@ -51,31 +56,6 @@ impl Surface {
             Surface::Elevator => "elevator",
         }
     }
-}
-
-/// The expression `<property>name</property>`.
-pub(super) fn property(name: &str) -> String {
-    format!("<property>{name}</property>")
-}
-
-/// The expression of a constant.
-pub(super) fn value(x: f64) -> String {
-    format!("<value>{x}</value>")
-}
-
-/// The product of expressions.
-pub(super) fn product(terms: &[String]) -> String {
-    format!("<product>{}</product>", terms.concat())
-}
-
-/// The sum of expressions.
-pub(super) fn sum(terms: &[String]) -> String {
-    format!("<sum>{}</sum>", terms.concat())
-}
-
-/// The magnitude of an expression.
-pub(super) fn abs(term: String) -> String {
-    format!("<abs>{term}</abs>")
 }
 
 /// An aircraft's document, and what is still to be written into it.
@@ -126,14 +106,30 @@ impl<'a> Document<'a> {
     }
 
     /// Adds the force ½ρV²S · `amplitude` · `terms`.
-    pub(super) fn force(&mut self, axis: Axis, name: &str, amplitude: f64, terms: &[String]) -> Done {
-        let mut all = vec![property("aero/qbar-psf"), property("metrics/Sw-sqft"), value(amplitude)];
+    pub(super) fn force(
+        &mut self,
+        axis: Axis,
+        name: &str,
+        amplitude: f64,
+        terms: &[String],
+    ) -> Done {
+        let mut all = vec![
+            property("aero/qbar-psf"),
+            property("metrics/Sw-sqft"),
+            value(amplitude),
+        ];
         all.extend_from_slice(terms);
         self.function(axis, name, &product(&all))
     }
 
     /// Adds the moment ½ρV²S · length · `amplitude` · `terms`.
-    pub(super) fn moment(&mut self, axis: Axis, name: &str, amplitude: f64, terms: &[String]) -> Done {
+    pub(super) fn moment(
+        &mut self,
+        axis: Axis,
+        name: &str,
+        amplitude: f64,
+        terms: &[String],
+    ) -> Done {
         let mut all = vec![property(axis.length())];
         all.extend_from_slice(terms);
         self.force(axis, name, amplitude, &all)
@@ -150,8 +146,13 @@ impl<'a> Document<'a> {
     /// Passes both deflections through a flight-control component before they act.
     pub(super) fn pass_deflections(&mut self, component: &str, settings: &str) {
         for surface in SURFACES {
-            let (input, name) = (self.passed_name(surface, self.passed), self.passed_name(surface, self.passed + 1));
-            self.components += &format!("<{component} name=\"{name}\"><input>{input}</input>{settings}</{component}>\n");
+            let (input, name) = (
+                self.passed_name(surface, self.passed),
+                self.passed_name(surface, self.passed + 1),
+            );
+            self.components += &format!(
+                "<{component} name=\"{name}\"><input>{input}</input>{settings}</{component}>\n"
+            );
         }
         self.passed += 1;
     }
@@ -186,7 +187,9 @@ impl<'a> Document<'a> {
 
     /// Moves the centre of gravity aft by `aft`, m.
     pub(super) fn shift_cg(&mut self, aft: f64) -> Done {
-        let place = || HiddenError::Place { place: "<location name=\"CG\"> with an <x>".to_owned() };
+        let place = || HiddenError::Place {
+            place: "<location name=\"CG\"> with an <x>".to_owned(),
+        };
         let at = self.xml.find("name=\"CG\"").ok_or_else(place)?;
         let tag = self.xml[at..].find('>').ok_or_else(place)? + at;
         let unit = self.xml[at..tag].to_owned();
@@ -204,7 +207,9 @@ impl<'a> Document<'a> {
     }
 
     fn change_after(&mut self, from: usize, name: &str, new: impl Fn(f64, &str) -> f64) -> Done {
-        let place = || HiddenError::Place { place: format!("a number in <{name}>") };
+        let place = || HiddenError::Place {
+            place: format!("a number in <{name}>"),
+        };
         let tag = self.find_tag(from, name).ok_or_else(place)?;
         let open = self.xml[tag..].find('>').ok_or_else(place)? + tag + 1;
         let close = self.xml[open..].find('<').ok_or_else(place)? + open;
@@ -226,7 +231,9 @@ impl<'a> Document<'a> {
     /// The inside of an aerodynamic axis.
     fn axis(&self, axis: Axis) -> Result<std::ops::Range<usize>, HiddenError> {
         let name = format!("<axis name=\"{}\"", axis.name());
-        let place = || HiddenError::Place { place: format!("{name}>") };
+        let place = || HiddenError::Place {
+            place: format!("{name}>"),
+        };
         let start = self.xml.find(&name).ok_or_else(place)?;
         let length = self.xml[start..].find("</axis>").ok_or_else(place)?;
         Ok(start..start + length)
@@ -258,8 +265,14 @@ impl<'a> Document<'a> {
             );
             self.insert_before("</fdm_config>", &force)?;
         }
-        let Some(arm) = self.thrust_offset_ft else { return Ok(()) };
-        self.function(Axis::Pitch, "thrust-line-offset", &product(&[value(arm), sum(&whole)]))
+        let Some(arm) = self.thrust_offset_ft else {
+            return Ok(());
+        };
+        self.function(
+            Axis::Pitch,
+            "thrust-line-offset",
+            &product(&[value(arm), sum(&whole)]),
+        )
     }
 
     /// Lets the aerodynamics read what the effects make of a deflection.
@@ -269,14 +282,20 @@ impl<'a> Document<'a> {
         if !self.factors.is_empty() {
             let scaled = format!("hidden/{}-scaled", surface.name());
             let terms = [vec![property(&name)], self.factors.clone()].concat();
-            functions += &format!("<function name=\"{scaled}\">{}</function>\n", product(&terms));
+            functions += &format!(
+                "<function name=\"{scaled}\">{}</function>\n",
+                product(&terms)
+            );
             name = scaled;
         }
         if let Some(cubic) = self.saturation {
             let saturated = format!("hidden/{}-saturated", surface.name());
             let square = product(&[value(cubic), property(&name), property(&name)]);
             let terms = [property(&name), sum(&[value(1.0), square])];
-            functions += &format!("<function name=\"{saturated}\">{}</function>\n", product(&terms));
+            functions += &format!(
+                "<function name=\"{saturated}\">{}</function>\n",
+                product(&terms)
+            );
             for axis in [Axis::Roll, Axis::Pitch] {
                 let range = self.axis(axis)?;
                 self.rename(range, self.position(surface), &saturated);
@@ -290,10 +309,15 @@ impl<'a> Document<'a> {
 
     /// Where the inside of `<aerodynamics>` begins and ends.
     fn aerodynamics(&self) -> Result<(usize, usize), HiddenError> {
-        let place = || HiddenError::Place { place: "<aerodynamics>".to_owned() };
+        let place = || HiddenError::Place {
+            place: "<aerodynamics>".to_owned(),
+        };
         let tag = self.find_tag(0, "aerodynamics").ok_or_else(place)?;
         let start = self.xml[tag..].find('>').ok_or_else(place)? + tag + 1;
-        let end = self.xml[start..].find("</aerodynamics>").ok_or_else(place)? + start;
+        let end = self.xml[start..]
+            .find("</aerodynamics>")
+            .ok_or_else(place)?
+            + start;
         Ok((start, end))
     }
 
@@ -315,7 +339,9 @@ impl<'a> Document<'a> {
     }
 
     fn insert_before(&mut self, tag: &str, text: &str) -> Done {
-        let place = || HiddenError::Place { place: tag.to_owned() };
+        let place = || HiddenError::Place {
+            place: tag.to_owned(),
+        };
         let at = self.xml.rfind(tag).ok_or_else(place)?;
         self.xml.insert_str(at, text);
         Ok(())

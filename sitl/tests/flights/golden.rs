@@ -5,8 +5,14 @@ use std::path::{Path, PathBuf};
 use greylag_sitl::plant::{Inputs, Truth};
 
 /// The command histories, by the names of their files.
-pub const HISTORIES: [&str; 6] =
-    ["white", "held", "ornstein_uhlenbeck", "pid_30_5", "pid_50_20", "pid_m40_m20"];
+pub const HISTORIES: [&str; 6] = [
+    "white",
+    "held",
+    "ornstein_uhlenbeck",
+    "pid_30_5",
+    "pid_50_20",
+    "pid_m40_m20",
+];
 
 /// Columns of state and actuators.
 pub const COLUMNS: [&str; 14] = [
@@ -64,18 +70,30 @@ impl Golden {
     /// Reads `folder/name.csv`.
     pub fn read(folder: &Path, name: &str) -> Golden {
         let path = folder.join(format!("{name}.csv"));
-        let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let text =
+            std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         let mut lines = text.lines();
         let header = format!("aileron,elevator,throttle,{}", COLUMNS.join(","));
         assert_eq!(lines.next(), Some(header.as_str()), "{}", path.display());
-        let number = |cell: &str| cell.parse::<f64>().unwrap_or_else(|_| panic!("{name}: {cell}"));
+        let number = |cell: &str| {
+            cell.parse::<f64>()
+                .unwrap_or_else(|_| panic!("{name}: {cell}"))
+        };
         let steps = lines
             .map(|line| {
                 let cells: Vec<&str> = line.split(',').collect();
                 assert_eq!(cells.len(), 3 + COLUMNS.len(), "{name}: {line}");
                 let [aileron, elevator, throttle] = [0, 1, 2].map(|i| number(cells[i]));
-                let state = (!cells[3].is_empty()).then(|| std::array::from_fn(|i| number(cells[3 + i])));
-                (Inputs { aileron, elevator, throttle }, state)
+                let state =
+                    (!cells[3].is_empty()).then(|| std::array::from_fn(|i| number(cells[3 + i])));
+                (
+                    Inputs {
+                        aileron,
+                        elevator,
+                        throttle,
+                    },
+                    state,
+                )
             })
             .collect();
         Golden { steps }
@@ -104,5 +122,9 @@ impl Golden {
 fn difference(column: usize, a: f64, b: f64) -> f64 {
     let turn = std::f64::consts::TAU;
     let plain = (a - b).abs();
-    if column == 2 { plain.min((plain - turn).abs()) } else { plain }
+    if column == 2 {
+        plain.min((plain - turn).abs())
+    } else {
+        plain
+    }
 }

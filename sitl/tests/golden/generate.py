@@ -147,6 +147,29 @@ def pid(roll_deg, pitch_deg, airspeed=20.0):
     return at
 
 
+def with_gust(history):
+    """The same history, with a gust that begins with the step at 2 s."""
+
+    def at(fdm, k):
+        if k == 200:
+            velocity = (2.0, -1.0, -3.0)
+            for name, value in {
+                "startup-duration-sec": 0.5,
+                "steady-duration-sec": 0.3,
+                "end-duration-sec": 0.8,
+                "magnitude-ft_sec": math.hypot(*velocity) / FT,
+                "frame": 3,  # north-east-down
+                "X-velocity-ft_sec": velocity[0],
+                "Y-velocity-ft_sec": velocity[1],
+                "Z-velocity-ft_sec": velocity[2],
+                "start": 1,
+            }.items():
+                fdm[f"atmosphere/cosine-gust/{name}"] = value
+        return history(fdm, k)
+
+    return at
+
+
 FLIGHTS = {  # name: (command history, steady wind)
     "white": (white(random.Random(11)), CALM),
     "held": (held(random.Random(12)), CALM),
@@ -155,6 +178,7 @@ FLIGHTS = {  # name: (command history, steady wind)
     "pid_50_20": (pid(50, 20), CALM),
     "pid_m40_m20": (pid(-40, -20), CALM),
     "wind": (pid(20, 5), (5.0, -3.0, 1.0)),
+    "gust": (with_gust(pid(10, 5)), CALM),
 }
 
 
@@ -184,7 +208,7 @@ def write_flights(out):
 
 # Turbulence: wings level at 20 m/s and 400 m, where intensity depends on both the wind at 20 ft and
 # the severity. The first 20 s of every flight are left out.
-EPISODES, SKIPPED, KEPT = 150, 2000, 6000
+EPISODES, SKIPPED, KEPT = 400, 2000, 6000
 WIND_20FT, SEVERITY = 7.6, 3
 BANDS_HZ = (0.05, 0.2, 0.8, 3.0, 12.0)
 BINS = 5  # neighbouring frequencies of 1/60 Hz that are averaged into a band
@@ -220,6 +244,11 @@ def turbulent_flight(seed):
     return signals
 
 
+def seed(episode):
+    """Seeds far apart: JSBSim's generator is congruential, and nearby seeds give similar numbers."""
+    return (episode * 1_103_515_245 + 12_345) % 2**31
+
+
 def power(signals):
     """Mean square of each signal, then its periodogram averaged over each band."""
     spectrum = np.abs(np.fft.rfft(signals, axis=0)) ** 2 * DT / KEPT
@@ -231,7 +260,7 @@ def power(signals):
 
 
 def write_turbulence(out):
-    powers = np.array([power(turbulent_flight(seed)) for seed in range(1, EPISODES + 1)])
+    powers = np.array([power(turbulent_flight(seed(k))) for k in range(EPISODES)])
     mean = powers.mean(axis=0)
     error = powers.std(axis=0, ddof=1) / math.sqrt(EPISODES)
     rows = ["mean_square", *(f"psd_{band}_hz" for band in BANDS_HZ)]
