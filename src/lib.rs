@@ -38,3 +38,5 @@ pub mod physics;
 pub mod control;
 pub mod link;
 pub mod logs;
+pub mod flight;
+pub mod commands;
