@@ -35,6 +35,7 @@
 
 pub mod num;
 pub mod physics;
+pub mod model;
 pub mod control;
 pub mod link;
 pub mod logs;

@@ -1,3 +1,6 @@
 //! JSBSim in process, and the MAVLink shim that plays the flight controller.
 
+pub mod air;
+mod aircraft;
+pub mod hidden;
 pub mod plant;

@@ -1,5 +1,13 @@
 //! Controllers: from what is observed and what is wanted to a command, once every 10 ms.
 
+pub mod cem;
+pub mod lqi;
+pub mod pid;
+pub mod task;
+mod registry;
+
+pub use registry::{Kind, SetupError, build};
+
 use crate::physics::{ActuatorState, Command, State, Time};
 
 /// What a controller sees: eq. (27) of \[GSFM26\] with the altitude, which sets the air density.
@@ -13,6 +21,9 @@ pub struct Observation {
     pub actuators: ActuatorState,
     /// Altitude above mean sea level, m.
     pub altitude: f64,
+    /// The commands in force at the last two ticks, newest first: with `actuators` they fix the
+    /// actuator filters.
+    pub previous: [Command; 2],
 }
 
 /// What is wanted: the commanded attitude (φ*, θ*) and the airspeed V_a* to hold meanwhile.

@@ -6,8 +6,8 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 /// A scalar that the physics is written over once and read as `f64`, as [`Lanes`](super::Lanes)
 /// of `f32`, or as [`Dual`](super::Dual) numbers.
 ///
-/// There is no comparison: lanes cannot branch, so equations use [`min`](Real::min),
-/// [`max`](Real::max), [`abs`](Real::abs) and [`Table`](super::Table).
+/// There is no `<`: lanes cannot branch, so equations use [`where_less`](Real::where_less),
+/// [`min`](Real::min), [`max`](Real::max), [`abs`](Real::abs) and [`Table`](super::Table).
 pub trait Real:
     Copy
     + Debug
@@ -32,13 +32,24 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// The exponential.
     fn exp(self) -> Self;
-    /// The magnitude; its derivative at zero is taken as +1.
-    fn abs(self) -> Self;
-    /// The smaller of two numbers.
-    fn min(self, other: Self) -> Self;
-    /// The larger of two numbers.
-    fn max(self, other: Self) -> Self;
+    /// `then` where `a < b`, else `otherwise`; both are computed.
+    fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
 
+    /// The magnitude.
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self::where_less(self, Self::zero(), -self, self)
+    }
+    /// The smaller of two numbers.
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self::where_less(self, other, self, other)
+    }
+    /// The larger of two numbers.
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self::where_less(other, self, self, other)
+    }
     /// Zero.
     #[inline(always)]
     fn zero() -> Self {
@@ -84,15 +95,7 @@ impl Real for f64 {
         f64::exp(self)
     }
     #[inline(always)]
-    fn abs(self) -> Self {
-        f64::abs(self)
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        f64::min(self, other)
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        f64::max(self, other)
+    fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
+        if a < b { then } else { otherwise }
     }
 }

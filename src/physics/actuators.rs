@@ -3,6 +3,9 @@
 //! JSBSim discretises each filter with the bilinear (Tustin) rule at the simulation step, so a
 //! recurrence with the same coefficients reproduces it to rounding.
 
+use crate::num::Real;
+use crate::physics::airframe::ActuatorFigures;
+
 /// A command, the action of eq. (29) of \[GSFM26\] with throttle = (a_thr + 1)/2.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Command<R = f64> {
@@ -64,5 +67,173 @@ impl<R: Copy> ActuatorState<R> {
     #[inline(always)]
     pub fn controls(&self) -> Controls<R> {
         Controls { aileron: self.aileron, elevator: self.elevator, throttle: self.throttle }
+    }
+}
+
+/// A second-order surface filter with its own memory, clipped after the filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceFilter<R = f64> {
+    /// The two last commanded deflections, rad, newest first.
+    input: [R; 2],
+    /// The two last filtered deflections before clipping, rad, newest first.
+    output: [R; 2],
+    /// The two last clipped deflections, rad, newest first.
+    clipped: [R; 2],
+}
+
+/// The filters of all three actuators.
+///
+/// The observed five numbers ([`ActuatorState`]) are not quite a Markov state; this is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Actuators<R = f64> {
+    aileron: SurfaceFilter<R>,
+    elevator: SurfaceFilter<R>,
+    throttle_input: R,
+    throttle: R,
+}
+
+impl<R: Real> SurfaceFilter<R> {
+    fn at(position: R) -> Self {
+        SurfaceFilter { input: [position; 2], output: [position; 2], clipped: [position; 2] }
+    }
+
+    #[inline(always)]
+    fn step(&mut self, command: R, figures: &ActuatorFigures) {
+        let [b, a1, a2] = figures.surface;
+        let input = command.scale(figures.deflection_max);
+        let y = (input + self.input[0].scale(2.0) + self.input[1]).scale(b)
+            - self.output[0].scale(a1)
+            - self.output[1].scale(a2);
+        self.input = [input, self.input[0]];
+        self.output = [y, self.output[0]];
+        let limit = figures.deflection_max;
+        self.clipped = [y.clamp(-limit, limit), self.clipped[0]];
+    }
+
+    #[inline(always)]
+    fn rate(&self, figures: &ActuatorFigures) -> R {
+        (self.clipped[0] - self.clipped[1]).scale(1.0 / figures.step)
+    }
+}
+
+impl<R: Real> Actuators<R> {
+    /// Actuators at rest at `controls`, commanded to stay there.
+    pub fn at_rest(controls: &Controls<R>) -> Self {
+        Actuators {
+            aileron: SurfaceFilter::at(controls.aileron),
+            elevator: SurfaceFilter::at(controls.elevator),
+            throttle_input: controls.throttle,
+            throttle: controls.throttle,
+        }
+    }
+
+    /// The filters that explain an observed `state` after the commands `previous` (newest first).
+    ///
+    /// Exact unless a surface is at its stop, where the filter's own output is not observed.
+    pub fn from_observed(
+        state: &ActuatorState<R>,
+        previous: &[Command<R>; 2],
+        figures: &ActuatorFigures,
+    ) -> Self {
+        let surface = |position: R, rate: R, commands: [R; 2]| {
+            let trace = [position, position - rate.scale(figures.step)];
+            let input = commands.map(|c| c.scale(figures.deflection_max));
+            SurfaceFilter { input, output: trace, clipped: trace }
+        };
+        let [new, old] = previous;
+        Actuators {
+            aileron: surface(state.aileron, state.aileron_rate, [new.aileron, old.aileron]),
+            elevator: surface(state.elevator, state.elevator_rate, [new.elevator, old.elevator]),
+            throttle_input: new.throttle,
+            throttle: state.throttle,
+        }
+    }
+
+    /// Advances by one step of 0.01 s under `command`.
+    #[inline(always)]
+    pub fn step(&mut self, command: &Command<R>, figures: &ActuatorFigures) {
+        self.aileron.step(command.aileron, figures);
+        self.elevator.step(command.elevator, figures);
+        let [b, a] = figures.throttle;
+        self.throttle =
+            (command.throttle + self.throttle_input).scale(b) + self.throttle.scale(a);
+        self.throttle_input = command.throttle;
+    }
+
+    /// What acts on the airframe now.
+    #[inline(always)]
+    pub fn controls(&self) -> Controls<R> {
+        Controls {
+            aileron: self.aileron.clipped[0],
+            elevator: self.elevator.clipped[0],
+            throttle: self.throttle,
+        }
+    }
+
+    /// What is observed now: positions, with rates as differences over the last step.
+    #[inline(always)]
+    pub fn observed(&self, figures: &ActuatorFigures) -> ActuatorState<R> {
+        ActuatorState {
+            aileron: self.aileron.clipped[0],
+            aileron_rate: self.aileron.rate(figures),
+            elevator: self.elevator.clipped[0],
+            elevator_rate: self.elevator.rate(figures),
+            throttle: self.throttle,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures() -> ActuatorFigures {
+        ActuatorFigures::tustin(100.0, std::f64::consts::FRAC_1_SQRT_2, 0.5235, 0.2, 0.01)
+    }
+
+    #[test]
+    fn recurrences_are_those_measured_in_the_simulator() {
+        let f = figures();
+        // printed with five decimals
+        for (ours, printed) in
+            [(f.surface[0], 0.12774), (-f.surface[1], 0.76644), (-f.surface[2], -0.27740)]
+        {
+            assert!((ours - printed).abs() < 6e-6, "{ours} {printed}");
+        }
+        assert!((f.throttle[0] - 0.024390).abs() < 5e-7 && (f.throttle[1] - 0.951220).abs() < 5e-7);
+    }
+
+    #[test]
+    fn observation_and_two_commands_give_the_filters_back() {
+        let f = figures();
+        let mut actuators = Actuators::at_rest(&Controls::default());
+        let mut previous = [Command::IDLE; 2];
+        for k in 0..50 {
+            let x = (k as f64 * 0.7).sin() * 0.6;
+            let command = Command { aileron: x, elevator: -0.5 * x, throttle: 0.5 + 0.4 * x };
+            actuators.step(&command, &f);
+            previous = [command, previous[0]];
+        }
+        let mut rebuilt = Actuators::from_observed(&actuators.observed(&f), &previous, &f);
+        for _ in 0..5 {
+            actuators.step(&Command::IDLE, &f);
+            rebuilt.step(&Command::IDLE, &f);
+            let (a, b) = (actuators.controls(), rebuilt.controls());
+            // equal up to rounding of the difference quotient
+            assert!((a.aileron - b.aileron).abs() < 1e-14 && (a.elevator - b.elevator).abs() < 1e-14);
+            assert_eq!(a.throttle, b.throttle);
+        }
+    }
+
+    #[test]
+    fn surfaces_stop_at_their_limits() {
+        let f = figures();
+        let mut actuators = Actuators::at_rest(&Controls::default());
+        let mut largest = 0.0_f64;
+        for _ in 0..100 {
+            actuators.step(&Command { aileron: 1.0, elevator: 0.0, throttle: 0.0 }, &f);
+            largest = largest.max(actuators.controls().aileron);
+        }
+        assert_eq!(largest, 0.5235);
     }
 }

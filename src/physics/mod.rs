@@ -3,9 +3,18 @@
 //! Units are SI and radians; body axes are forward-right-down (FRD), earth axes north-east-down.
 
 pub mod actuators;
+pub mod airframe;
+pub mod atmosphere;
+pub mod effects;
+mod point;
+pub mod rigid_body;
 mod state;
 mod time;
+mod wrench;
 
 pub use actuators::{ActuatorState, Command, Controls};
+pub use airframe::Airframe;
+pub use point::{AirData, Point};
 pub use state::State;
 pub use time::Time;
+pub use wrench::{Channel, Wrench};

@@ -1,0 +1,112 @@
+//! The aircraft files that JSBSim loads: the X8 built into the program, or a folder on disk.
+
+use std::path::{Path, PathBuf};
+
+use jsbsim::{Error, Fdm, FileResolver, MemoryResolver, Resolver};
+
+use crate::hidden::{self, Hidden, HiddenError};
+
+/// The files of the aircraft built into the program, by their path in a JSBSim tree.
+const BUILT_IN: [(&str, &str); 3] = [
+    ("aircraft/x8/x8.xml", include_str!("../aircraft/x8/x8.xml")),
+    ("aircraft/x8/Engines/x8_motor.xml", include_str!("../aircraft/x8/Engines/x8_motor.xml")),
+    ("aircraft/x8/Engines/x8_direct.xml", include_str!("../aircraft/x8/Engines/x8_direct.xml")),
+];
+
+/// Name of the aircraft built into the program.
+pub(crate) const BUILT_IN_NAME: &str = "x8";
+
+/// Why an aircraft could not be loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum AircraftError {
+    /// The name is not that of the built-in aircraft, and no folder was given.
+    #[error(
+        "no aircraft '{name}' is built in (only '{BUILT_IN_NAME}'); give the folder that holds \
+         {name}/{name}.xml with --aircraft-dir"
+    )]
+    NotBuiltIn {
+        /// The name asked for.
+        name: String,
+    },
+    /// The aircraft's file does not exist or cannot be read.
+    #[error("cannot read the aircraft file {}: {source}; check --aircraft-dir and --aircraft", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// JSBSim refused the aircraft.
+    #[error("JSBSim cannot load the aircraft '{name}': {source}; correct its XML")]
+    Load {
+        /// The aircraft's name.
+        name: String,
+        /// What JSBSim said.
+        source: Error,
+    },
+    /// A hidden effect could not be written into the aircraft.
+    #[error(transparent)]
+    Hidden(#[from] HiddenError),
+}
+
+/// A JSBSim tree on disk or in memory with one document replaced.
+struct Tree {
+    disk: Option<FileResolver>,
+    memory: MemoryResolver,
+}
+
+impl Resolver for Tree {
+    fn resolve(&self, path: &str) -> Result<Vec<u8>, Error> {
+        match (self.memory.resolve(path), &self.disk) {
+            (Ok(bytes), _) => Ok(bytes),
+            (Err(_), Some(disk)) => disk.resolve(path),
+            (Err(missing), None) => Err(missing),
+        }
+    }
+
+    fn exists(&self, path: &str) -> bool {
+        self.memory.exists(path) || self.disk.as_ref().is_some_and(|disk| disk.exists(path))
+    }
+}
+
+/// Loads `name` into `fdm`, with `effects` written into its XML.
+///
+/// With `dir`, the file is `dir/NAME/NAME.xml`, its own `Engines` folder is searched first and then
+/// `dir/../engine`, as in a JSBSim tree. The time step must be set before: filters freeze theirs.
+pub(crate) fn load(
+    fdm: &mut Fdm,
+    dir: Option<&Path>,
+    name: &str,
+    effects: &[Hidden],
+) -> Result<(), AircraftError> {
+    let document = hidden::write_into(&read(dir, name)?, effects)?;
+    let mut tree = Tree { disk: dir.map(FileResolver::new), memory: MemoryResolver::new() };
+    let folder = match dir {
+        None => {
+            for (path, text) in BUILT_IN {
+                tree.memory.insert(path, text);
+            }
+            "aircraft"
+        }
+        Some(_) => {
+            fdm.set_engine_path("../engine");
+            fdm.set_systems_path("../systems");
+            "."
+        }
+    };
+    tree.memory.insert(format!("{folder}/{name}/{name}.xml"), document);
+    fdm.load_model(&tree, folder, name)
+        .map_err(|source| AircraftError::Load { name: name.to_owned(), source })
+}
+
+/// The text of the aircraft's main document.
+pub(crate) fn read(dir: Option<&Path>, name: &str) -> Result<String, AircraftError> {
+    match dir {
+        None if name == BUILT_IN_NAME => Ok(BUILT_IN[0].1.to_owned()),
+        None => Err(AircraftError::NotBuiltIn { name: name.to_owned() }),
+        Some(dir) => {
+            let path = dir.join(name).join(format!("{name}.xml"));
+            std::fs::read_to_string(&path).map_err(|source| AircraftError::Read { path, source })
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! JSBSim's property nodes, looked up once, read in SI units.
+
+use jsbsim::{Error, Fdm, NodeId};
+
+use super::{DT_S, Inputs, PlantError, PlantOptions, Start, Truth};
+use crate::air::Gust;
+
+/// Metres per foot (exact).
+const FT: f64 = 0.3048;
+/// Newtons per pound of force.
+const LBF: f64 = 4.448_221_615_260_5;
+/// Kilograms per slug.
+const SLUG: f64 = LBF / FT;
+/// Pascals per pound per square foot.
+const PSF: f64 = LBF / (FT * FT);
+
+/// A step too short to move anything, s, with which derivatives are evaluated anew.
+const STILL_S: f64 = 1e-12;
+
+/// Nodes of everything that is read or written in a step.
+pub(super) struct Nodes {
+    commands: [NodeId; 3],
+    positions: [NodeId; 3],
+    attitude: [NodeId; 3],
+    rates: [NodeId; 3],
+    airspeed: NodeId,
+    alpha: NodeId,
+    beta: NodeId,
+    force: [NodeId; 3],
+    mass: NodeId,
+    velocity: [NodeId; 3],
+    wind: [NodeId; 3],
+    place: [NodeId; 3],
+    density: NodeId,
+    pressure: NodeId,
+    thrust: NodeId,
+    hidden_thrust: Option<NodeId>,
+}
+
+impl Nodes {
+    /// Looks every property up on a loaded aircraft.
+    pub(super) fn find(fdm: &Fdm, options: &PlantOptions) -> Result<Self, PlantError> {
+        let look = |name: &str| fdm.node(name).ok().flatten();
+        let node = |name: &str| {
+            look(name).ok_or_else(|| PlantError::Property {
+                aircraft: options.aircraft.clone(),
+                property: name.to_owned(),
+            })
+        };
+        let three = |before: &str, names: [&str; 3], after: &str| -> Result<[NodeId; 3], PlantError> {
+            let [a, b, c] = names.map(|name| node(&format!("{before}{name}{after}")));
+            Ok([a?, b?, c?])
+        };
+        let p = &options.properties;
+        Ok(Nodes {
+            commands: [node(&p.aileron_command)?, node(&p.elevator_command)?, node(&p.throttle_command)?],
+            positions: [node(&p.aileron_position)?, node(&p.elevator_position)?, node(&p.throttle_position)?],
+            attitude: three("attitude/", ["phi", "theta", "psi"], "-rad")?,
+            rates: three("velocities/", ["p", "q", "r"], "-rad_sec")?,
+            airspeed: node("velocities/vt-fps")?,
+            alpha: node("aero/alpha-rad")?,
+            beta: node("aero/beta-rad")?,
+            force: three("forces/fb", ["x", "y", "z"], "-total-lbs")?,
+            mass: node("inertia/mass-slugs")?,
+            velocity: three("velocities/v-", ["north", "east", "down"], "-fps")?,
+            wind: three("atmosphere/total-wind-", ["north", "east", "down"], "-fps")?,
+            place: three("position/", ["lat-geod-deg", "long-gc-deg", "h-sl-ft"], "")?,
+            density: node("atmosphere/rho-slugs_ft3")?,
+            pressure: node("atmosphere/P-psf")?,
+            thrust: node("propulsion/engine/thrust-lbs")?,
+            hidden_thrust: look(crate::hidden::THRUST_PROPERTY),
+        })
+    }
+
+    /// Writes the commands.
+    pub(super) fn command(&self, fdm: &mut Fdm, inputs: &Inputs) -> Result<(), Error> {
+        let [aileron, elevator, throttle] = self.commands;
+        fdm.write_node(aileron, inputs.aileron)?;
+        fdm.write_node(elevator, inputs.elevator)?;
+        fdm.write_node(throttle, inputs.throttle)?;
+        Ok(())
+    }
+
+    /// Starts `gust` with the next frame.
+    pub(super) fn gust(&self, fdm: &mut Fdm, gust: &Gust) -> Result<(), Error> {
+        /// The gust's direction is given north-east-down (JSBSim `gfLocal`).
+        const LOCAL: f64 = 3.0;
+        let [north, east, down] = gust.velocity_ned_mps;
+        for (name, value) in [
+            ("startup-duration-sec", gust.rise_s),
+            ("steady-duration-sec", gust.hold_s),
+            ("end-duration-sec", gust.fall_s),
+            ("magnitude-ft_sec", north.hypot(east).hypot(down) / FT),
+            ("frame", LOCAL),
+            ("X-velocity-ft_sec", north),
+            ("Y-velocity-ft_sec", east),
+            ("Z-velocity-ft_sec", down),
+            ("start", 1.0),
+        ] {
+            fdm.set_property(&format!("atmosphere/cosine-gust/{name}"), value)?;
+        }
+        Ok(())
+    }
+
+    /// Puts a freshly loaded aircraft at `start` in the air of `options`.
+    pub(super) fn start(&self, fdm: &mut Fdm, start: &Start, options: &PlantOptions) -> Result<(), Error> {
+        let wind = options.air.wind_ned_mps;
+        let [u, v, w] = start.ground_velocity(wind);
+        for (name, value) in [
+            ("lat-geod-deg", options.latitude_deg),
+            ("long-gc-deg", options.longitude_deg),
+            ("h-sl-ft", start.altitude_m / FT),
+            ("psi-true-rad", start.yaw_rad),
+            ("theta-rad", start.pitch_rad),
+            ("phi-rad", start.roll_rad),
+            ("u-fps", u / FT),
+            ("v-fps", v / FT),
+            ("w-fps", w / FT),
+            ("p-rad_sec", start.p_radps),
+            ("q-rad_sec", start.q_radps),
+            ("r-rad_sec", start.r_radps),
+        ] {
+            fdm.set_property(&format!("ic/{name}"), value)?;
+        }
+        fdm.run_ic()?;
+        self.blow(fdm, options)
+    }
+
+    /// Sets wind and turbulence once the aircraft is at its start.
+    fn blow(&self, fdm: &mut Fdm, options: &PlantOptions) -> Result<(), Error> {
+        let wind = options.air.wind_ned_mps;
+        for (name, speed) in ["north", "east", "down"].into_iter().zip(wind) {
+            fdm.set_property(&format!("atmosphere/wind-{name}-fps"), speed / FT)?;
+        }
+        if wind == [0.0; 3] {
+            // The initial condition leaves rounding in the wind, and a direction with it.
+            fdm.set_property("atmosphere/psiw-rad", 0.0)?;
+        } else {
+            settle(fdm)?;
+        }
+        fdm.set_property("atmosphere/randomseed", f64::from(options.seed as i32))?;
+        if let Some(turbulence) = options.air.turbulence {
+            let path = "atmosphere/turbulence/milspec/";
+            let w20 = turbulence.wind_20ft_mps / FT;
+            fdm.set_property(&format!("{path}windspeed_at_20ft_AGL-fps"), w20)?;
+            fdm.set_property(&format!("{path}severity"), f64::from(turbulence.severity))?;
+        }
+        Ok(())
+    }
+
+    /// Reads everything but time and actuator rates.
+    pub(super) fn truth(&self, fdm: &mut Fdm) -> Result<Truth, Error> {
+        let [roll_rad, pitch_rad, yaw_rad] = read3(fdm, &self.attitude, 1.0)?;
+        let [p_radps, q_radps, r_radps] = read3(fdm, &self.rates, 1.0)?;
+        let [aileron_rad, elevator_rad, throttle] = read3(fdm, &self.positions, 1.0)?;
+        let [latitude_deg, longitude_deg, altitude_ft] = read3(fdm, &self.place, 1.0)?;
+        Ok(Truth {
+            roll_rad,
+            pitch_rad,
+            yaw_rad,
+            p_radps,
+            q_radps,
+            r_radps,
+            airspeed_mps: fdm.read_node(self.airspeed)? * FT,
+            alpha_rad: fdm.read_node(self.alpha)?,
+            beta_rad: fdm.read_node(self.beta)?,
+            specific_force_mps2: self.specific_force(fdm)?,
+            velocity_ned_mps: read3(fdm, &self.velocity, FT)?,
+            wind_ned_mps: read3(fdm, &self.wind, FT)?,
+            latitude_deg,
+            longitude_deg,
+            altitude_m: altitude_ft * FT,
+            air_density_kgpm3: fdm.read_node(self.density)? * SLUG / (FT * FT * FT),
+            static_pressure_pa: fdm.read_node(self.pressure)? * PSF,
+            aileron_rad,
+            elevator_rad,
+            throttle,
+            thrust_n: self.thrust(fdm)?,
+            ..Truth::default()
+        })
+    }
+
+    /// Total force, which JSBSim sums without the weight, by the mass.
+    fn specific_force(&self, fdm: &mut Fdm) -> Result<[f64; 3], Error> {
+        let mass = fdm.read_node(self.mass)?;
+        read3(fdm, &self.force, FT / mass)
+    }
+
+    fn thrust(&self, fdm: &mut Fdm) -> Result<f64, Error> {
+        let hidden = self.hidden_thrust.map_or(Ok(0.0), |node| fdm.read_node(node))?;
+        Ok((fdm.read_node(self.thrust)? + hidden) * LBF)
+    }
+}
+
+impl Start {
+    /// Velocity over the ground, body axes, m/s, in `wind_ned`, m/s.
+    fn ground_velocity(&self, wind_ned: [f64; 3]) -> [f64; 3] {
+        let (sin_alpha, cos_alpha) = self.alpha_rad.sin_cos();
+        let (sin_beta, cos_beta) = self.beta_rad.sin_cos();
+        let air = [cos_alpha * cos_beta, sin_beta, sin_alpha * cos_beta];
+        let wind = self.to_body(wind_ned);
+        std::array::from_fn(|i| self.airspeed_mps * air[i] + wind[i])
+    }
+
+    /// Turns a vector from north-east-down to forward-right-down.
+    fn to_body(self, [north, east, down]: [f64; 3]) -> [f64; 3] {
+        let (sin_roll, cos_roll) = self.roll_rad.sin_cos();
+        let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
+        let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
+        let (ahead, right) = (north * cos_yaw + east * sin_yaw, east * cos_yaw - north * sin_yaw);
+        let (x, below) = (ahead * cos_pitch - down * sin_pitch, ahead * sin_pitch + down * cos_pitch);
+        [x, right * cos_roll + below * sin_roll, below * cos_roll - right * sin_roll]
+    }
+}
+
+/// Evaluates derivatives in the air as it now is, and fills the integrators' histories with them.
+///
+/// JSBSim's initial condition takes no vertical wind, so the wind is set after it; five frames
+/// fill the longest history (Adams-Bashforth 3 needs three of them).
+fn settle(fdm: &mut Fdm) -> Result<(), Error> {
+    fdm.set_dt(STILL_S);
+    for _ in 0..5 {
+        fdm.run()?;
+    }
+    fdm.set_dt(DT_S);
+    Ok(())
+}
+
+fn read3(fdm: &mut Fdm, nodes: &[NodeId; 3], scale: f64) -> Result<[f64; 3], Error> {
+    let mut values = [0.0; 3];
+    for (value, node) in values.iter_mut().zip(nodes) {
+        *value = fdm.read_node(*node)? * scale;
+    }
+    Ok(values)
+}

@@ -1,0 +1,118 @@
+//! PID: three independent loops, roll by aileron, pitch by elevator, airspeed by throttle.
+
+use crate::control::{Controller, Observation, Target};
+use crate::model::STEP;
+use crate::physics::Command;
+
+/// Gains of one loop: command = trim + kp·e + ki·∫e − kd·rate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// On the error.
+    pub kp: f64,
+    /// On its integral, 1/s.
+    pub ki: f64,
+    /// On the measured rate, s.
+    pub kd: f64,
+}
+
+/// A set of gains with what belongs to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tuning {
+    /// The name that selects it.
+    pub name: &'static str,
+    /// Roll error (rad) to aileron (rad).
+    pub roll: Gains,
+    /// Pitch error (rad) to elevator (rad).
+    pub pitch: Gains,
+    /// Airspeed error (m/s) to throttle.
+    pub airspeed: Gains,
+    /// Throttle when the airspeed is right.
+    pub throttle_trim: f64,
+    /// Deflection at full command, rad.
+    pub deflection: f64,
+    /// Airspeed to hold instead of the target's, m/s.
+    pub airspeed_override: Option<f64>,
+    /// Whether an integrator stops while its output is at the stop.
+    pub windup: Windup,
+}
+
+/// What an integrator does while its loop's output is at a stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Windup {
+    /// It goes on integrating, as the public controller does.
+    Free,
+    /// It stops where it would push further into the stop.
+    Clamped,
+}
+
+/// The gains published with the simulator FW-JSBGym (`pid_eval.py`, read 2026): the yardstick.
+pub const PUBLIC: Tuning = Tuning {
+    name: "pid",
+    roll: Gains { kp: 1.0, ki: 0.0, kd: 0.5 },
+    pitch: Gains { kp: -4.0, ki: -0.75, kd: -0.1 },
+    airspeed: Gains { kp: 0.5, ki: 0.1, kd: 0.0 },
+    throttle_trim: 0.129_514,
+    // 30 degrees
+    deflection: 0.523_598_775_598_298_8,
+    airspeed_override: None,
+    windup: Windup::Free,
+};
+
+/// Gains retuned on the `jsbsim` model, at an airspeed that leaves a margin before the stall.
+pub const RETUNED: Tuning = Tuning {
+    name: "pid-retuned",
+    roll: Gains { kp: 1.2, ki: 0.6, kd: 0.1 },
+    pitch: Gains { kp: -2.5, ki: -3.0, kd: -0.25 },
+    airspeed: Gains { kp: 0.5, ki: 0.1, kd: 0.0 },
+    throttle_trim: 0.2,
+    deflection: 0.5235,
+    airspeed_override: Some(22.0),
+    windup: Windup::Clamped,
+};
+
+/// The PID controller.
+#[derive(Clone, Debug)]
+pub struct Pid {
+    tuning: Tuning,
+    integrals: [f64; 3],
+}
+
+impl Pid {
+    /// A controller with these gains.
+    pub fn new(tuning: Tuning) -> Pid {
+        Pid { tuning, integrals: [0.0; 3] }
+    }
+
+    /// One loop; `stops` are the limits of its output.
+    fn step(&mut self, axis: usize, gains: Gains, error: f64, rate: f64, bias: f64, stops: (f64, f64)) -> f64 {
+        let grown = self.integrals[axis] + error * STEP;
+        let output = |integral: f64| bias + gains.kp * error + gains.ki * integral - gains.kd * rate;
+        let raw = output(grown);
+        let outward = (raw > stops.1 && gains.ki * error > 0.0) || (raw < stops.0 && gains.ki * error < 0.0);
+        if self.tuning.windup == Windup::Free || !outward {
+            self.integrals[axis] = grown;
+        }
+        output(self.integrals[axis]).clamp(stops.0, stops.1)
+    }
+}
+
+impl Controller for Pid {
+    fn name(&self) -> &'static str {
+        self.tuning.name
+    }
+
+    fn reset(&mut self, _seed: u64, _bumpless: Command) {
+        self.integrals = [0.0; 3];
+    }
+
+    fn command(&mut self, seen: &Observation, target: &Target) -> Command {
+        let t = self.tuning;
+        let s = &seen.state;
+        let stops = (-t.deflection, t.deflection);
+        let airspeed = t.airspeed_override.unwrap_or(target.airspeed);
+        let aileron = self.step(0, t.roll, target.roll - s.roll, s.p, 0.0, stops);
+        let elevator = self.step(1, t.pitch, target.pitch - s.pitch, s.q, 0.0, stops);
+        let throttle = self.step(2, t.airspeed, airspeed - s.airspeed, 0.0, t.throttle_trim, (0.0, 1.0));
+        Command { aileron: aileron / t.deflection, elevator: elevator / t.deflection, throttle }
+    }
+}

@@ -1,0 +1,89 @@
+//! The controllers there are, by name.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::control::{Controller, cem, lqi, pid};
+use crate::model::GreyBox;
+
+/// Why a controller cannot be built.
+#[derive(Debug, thiserror::Error)]
+pub enum SetupError {
+    /// No such controller.
+    #[error("there is no controller {name:?}; there are {}", Kind::names())]
+    Unknown {
+        /// What was asked for.
+        name: String,
+    },
+    /// The model cannot be controlled.
+    #[error(
+        "cannot design an LQI from model {model}: it has no steady flight that can be stabilised at \
+         roll {roll_deg:.0}°, pitch {pitch_deg:.0}° at any airspeed; use a better model (--model)"
+    )]
+    Design {
+        /// The model's name.
+        model: String,
+        /// Where it fails.
+        roll_deg: f64,
+        /// Where it fails.
+        pitch_deg: f64,
+    },
+}
+
+macro_rules! controllers {
+    ($($kind:ident $name:literal $about:literal => |$model:ident| $build:expr),* $(,)?) => {
+        /// A controller by name.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Kind { $(#[doc = $about] $kind,)* }
+
+        impl Kind {
+            /// Every controller there is.
+            pub const ALL: &'static [Kind] = &[$(Kind::$kind),*];
+
+            /// The name that selects it.
+            pub const fn name(self) -> &'static str {
+                match self { $(Kind::$kind => $name,)* }
+            }
+        }
+
+        /// Builds a controller; `model` is what it is designed from or plans with.
+        ///
+        /// # Errors
+        /// If the model does not allow the design.
+        pub fn build(kind: Kind, model: &GreyBox) -> Result<Box<dyn Controller>, SetupError> {
+            match kind { $(Kind::$kind => { let $model = model; Ok(Box::new($build)) })* }
+        }
+    };
+}
+
+controllers! {
+    Pid "pid" "PID with the gains published with the simulator." => |_model| pid::Pid::new(pid::PUBLIC),
+    PidRetuned "pid-retuned" "PID retuned, at a safer airspeed." => |_model| pid::Pid::new(pid::RETUNED),
+    Lqi "lqi" "Gain-scheduled LQI designed from the model." => |model| lqi::Lqi::new(model)?,
+    Cem "cem" "CEM-MPC over five steps of the model." => |model| cem::Cem::new(model, cem::Settings::PAPER),
+}
+
+impl Kind {
+    /// Whether it plans, and so may miss the deadline: it then runs on a thread of its own.
+    pub fn is_planner(self) -> bool {
+        self == Kind::Cem
+    }
+
+    fn names() -> String {
+        Kind::ALL.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl FromStr for Kind {
+    type Err = SetupError;
+    fn from_str(name: &str) -> Result<Kind, SetupError> {
+        let found = Kind::ALL.iter().find(|k| k.name() == name);
+        found.copied().ok_or_else(|| SetupError::Unknown { name: name.into() })
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}

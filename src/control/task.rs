@@ -1,0 +1,65 @@
+//! The task: what an attitude reached is worth, eq. (30) of \[GSFM26\].
+
+use crate::control::Target;
+use crate::num::Real;
+use crate::physics::State;
+
+/// The constants of the reward.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Task {
+    /// Scale of the roll error c_φ, rad.
+    pub roll_scale: f64,
+    /// Cap of the roll term κ_φ.
+    pub roll_cap: f64,
+    /// Scale of the pitch error c_θ, rad.
+    pub pitch_scale: f64,
+    /// Cap of the pitch term κ_θ.
+    pub pitch_cap: f64,
+    /// Scale of the airspeed error c_v, m/s.
+    pub airspeed_scale: f64,
+    /// Cap of the airspeed term κ_v.
+    pub airspeed_cap: f64,
+    /// Discount γ per step (Table VII).
+    pub discount: f64,
+}
+
+impl Task {
+    /// The constants of section V-A and Table VII of \[GSFM26\].
+    pub const PAPER: Task = Task {
+        roll_scale: 3.3,
+        roll_cap: 0.5,
+        pitch_scale: 2.25,
+        pitch_cap: 0.5,
+        airspeed_scale: 48.0,
+        airspeed_cap: 0.1,
+        discount: 0.99,
+    };
+
+    /// The reward of being in `state` when `target` is wanted: 0 at best.
+    #[inline(always)]
+    pub fn reward<R: Real>(&self, state: &State<R>, target: &Target) -> R {
+        let term = |x: R, wanted: f64, scale: f64, cap: f64| {
+            (x - R::from_f64(wanted)).abs().scale(1.0 / scale).min(R::from_f64(cap))
+        };
+        -(term(state.roll, target.roll, self.roll_scale, self.roll_cap)
+            + term(state.pitch, target.pitch, self.pitch_scale, self.pitch_cap)
+            + term(state.airspeed, target.airspeed, self.airspeed_scale, self.airspeed_cap))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reward_is_zero_on_target_and_capped_far_away() {
+        let target = Target { roll: 0.5, pitch: -0.2, airspeed: 16.67 };
+        let on = State { roll: 0.5, pitch: -0.2, ..State::NEUTRAL };
+        assert_eq!(Task::PAPER.reward(&on, &target), 0.0);
+        let off = State { roll: 0.5 - 0.33, pitch: -0.2 + 0.225, airspeed: 16.67 + 2.4, ..on };
+        // 0.33/3.3 + 0.225/2.25 + 2.4/48
+        assert!((Task::PAPER.reward(&off, &target) + 0.25).abs() < 1e-12);
+        let far = State { roll: -3.0, pitch: 1.5, airspeed: 99.0, ..on };
+        assert!((Task::PAPER.reward(&far, &target) + 1.1).abs() < 1e-12);
+    }
+}

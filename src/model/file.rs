@@ -1,0 +1,193 @@
+//! Model files: TOML that names the effects and gives every number with its source.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::grey_box::Term;
+use super::{GreyBox, Integrator, Named};
+use crate::num::Table;
+use crate::physics::Airframe;
+use crate::physics::airframe::{FileError, Sourced, check_schema, positive, toml_error};
+use crate::physics::atmosphere::{Atmosphere, Density};
+use crate::physics::effects::{Description, Kind};
+use crate::physics::rigid_body::{ForceAxes, RigidBody};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    schema: u32,
+    name: String,
+    #[serde(rename = "description")]
+    _description: String,
+    airframe: String,
+    integrator: Integrator,
+    force_axes: ForceAxes,
+    rigid_body: BodyFile,
+    air: AirFile,
+    effects: toml::Table,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BodyFile {
+    mass_kg: Sourced,
+    jx_kgm2: Sourced,
+    jy_kgm2: Sourced,
+    jz_kgm2: Sourced,
+    jxz_kgm2: Sourced,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AirFile {
+    gravity_mps2: Sourced,
+    density: DensityFile,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum DensityFile {
+    Constant {
+        kgpm3: Sourced,
+    },
+    Law(String),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TableFile {
+    alpha_rad: Vec<f64>,
+    value: Vec<f64>,
+    #[serde(rename = "source")]
+    _source: String,
+}
+
+impl GreyBox {
+    /// Reads a model file (`schema = 1`) and the airframe file it names, relative to itself.
+    ///
+    /// # Errors
+    /// If a file cannot be read, is no such TOML, names an unknown effect or coefficient, lacks
+    /// one, or holds a number that is not physical.
+    pub fn load(path: &Path) -> Result<GreyBox, FileError> {
+        let what = "model file";
+        let text = std::fs::read_to_string(path).map_err(|why| FileError::Read {
+            what,
+            path: path.into(),
+            why,
+            example: "prior.toml",
+        })?;
+        let content = |why| FileError::Content { what, path: path.into(), why };
+        let file: File = toml::from_str(&text).map_err(|e| content(toml_error(&e)))?;
+        check_schema(file.schema).map_err(content)?;
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let airframe = Airframe::load(&folder.join(&file.airframe))?;
+        file.into_model(airframe).map_err(content)
+    }
+}
+
+impl File {
+    fn into_model(self, airframe: Airframe) -> Result<GreyBox, String> {
+        let mut terms = Vec::new();
+        let mut coefficients = Vec::new();
+        for (id, content) in &self.effects {
+            let kind = Kind::from_id(id).ok_or_else(|| unknown_effect(id))?;
+            let first = coefficients.len();
+            let (named, table) = effect(&kind.describe(), content)?;
+            coefficients.extend(named);
+            terms.push(Term { kind, first, table });
+        }
+        if terms.is_empty() {
+            return Err("it names no effect, so nothing would hold the aircraft up; add [effects.…]".into());
+        }
+        Ok(GreyBox {
+            name: self.name,
+            airframe,
+            body: self.rigid_body.checked()?,
+            atmosphere: self.air.checked()?,
+            axes: self.force_axes,
+            integrator: self.integrator,
+            terms,
+            coefficients,
+        })
+    }
+}
+
+impl BodyFile {
+    fn checked(&self) -> Result<RigidBody, String> {
+        let body = RigidBody {
+            mass: positive("rigid_body.mass_kg", &self.mass_kg)?,
+            jx: positive("rigid_body.jx_kgm2", &self.jx_kgm2)?,
+            jy: positive("rigid_body.jy_kgm2", &self.jy_kgm2)?,
+            jz: positive("rigid_body.jz_kgm2", &self.jz_kgm2)?,
+            jxz: self.jxz_kgm2.value,
+        };
+        if body.jx * body.jz > body.jxz * body.jxz {
+            return Ok(body);
+        }
+        Err(format!(
+            "rigid_body.jxz_kgm2 = {} is not physical: jx·jz = {} must exceed its square",
+            body.jxz,
+            body.jx * body.jz
+        ))
+    }
+}
+
+impl AirFile {
+    fn checked(&self) -> Result<Atmosphere, String> {
+        let density = match &self.density {
+            DensityFile::Constant { kgpm3 } => Density::Constant(positive("air.density.kgpm3", kgpm3)?),
+            DensityFile::Law(law) if law == "standard" => Density::Standard,
+            DensityFile::Law(law) => {
+                return Err(format!(
+                    "air.density = {law:?} is unknown; write \"standard\" or {{ kgpm3 = {{ value = …, source = … }} }}"
+                ));
+            }
+        };
+        Ok(Atmosphere { density, gravity: positive("air.gravity_mps2", &self.gravity_mps2)? })
+    }
+}
+
+/// One effect's coefficients and table out of its TOML table.
+fn effect(about: &Description, content: &toml::Value) -> Result<(Vec<Named>, Option<Table>), String> {
+    let id = about.id;
+    let entries =
+        content.as_table().ok_or_else(|| format!("effects.{id} must be a table of coefficients"))?;
+    let known = |key: &str| about.table == Some(key) || about.coefficients.iter().any(|c| c.name == key);
+    if let Some(key) = entries.keys().find(|key| !known(key)) {
+        let names: Vec<_> = about.coefficients.iter().map(|c| c.name).chain(about.table).collect();
+        return Err(format!("effects.{id}.{key} is unknown; {id} has {}", names.join(", ")));
+    }
+    let get = |key: &str| {
+        entries.get(key).cloned().ok_or_else(|| format!("effects.{id}.{key} is missing; add it"))
+    };
+    let mut named = Vec::new();
+    for c in about.coefficients {
+        let number: Sourced =
+            get(c.name)?.try_into().map_err(|e| format!("effects.{id}.{}: {}", c.name, toml_error(&e)))?;
+        let (low, high) = c.bounds;
+        if !(low..=high).contains(&number.value) {
+            return Err(format!(
+                "effects.{id}.{} = {} is not physical: {} lies in {low}..{high}",
+                c.name, number.value, c.meaning
+            ));
+        }
+        if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
+            return Err(format!("effects.{id}.{}.sd must be a positive number", c.name));
+        }
+        named.push(Named { name: format!("{id}.{}", c.name), value: number.value, sd: number.sd });
+    }
+    let table = about.table.map(|key| table(id, key, get(key)?)).transpose()?;
+    Ok((named, table))
+}
+
+fn table(id: &str, key: &str, content: toml::Value) -> Result<Table, String> {
+    let at = |why: String| format!("effects.{id}.{key}: {why}");
+    let points: TableFile = content.try_into().map_err(|e| at(toml_error(&e)))?;
+    Table::new(&points.alpha_rad, &points.value).map_err(|e| at(e.to_string()))
+}
+
+fn unknown_effect(id: &str) -> String {
+    let ids: Vec<_> = Kind::ALL.iter().map(|k| k.describe().id).collect();
+    format!("effects.{id} is unknown to this program; it knows {}", ids.join(", "))
+}

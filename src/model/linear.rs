@@ -1,0 +1,32 @@
+//! The linear model about a flight condition, with exact derivatives.
+
+use nalgebra::SMatrix;
+
+use super::{GreyBox, Memory, Trim};
+use crate::num::Dual;
+use crate::physics::{Controls, State};
+
+/// One step of 0.01 s, linear about a condition: δs₊ = a δs + b δz, z = (δa, δe, δt).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Linear {
+    /// ∂s₊/∂s, states in the order of eq. (4).
+    pub a: SMatrix<f64, 8, 8>,
+    /// ∂s₊/∂(δa, δe, δt).
+    pub b: SMatrix<f64, 8, 3>,
+}
+
+/// Linearises one step of `model` about `trim` at `altitude` (m).
+///
+/// The integrator's memory is taken as settled: its last acceleration equals the present one.
+pub fn linearise(model: &GreyBox, trim: &Trim, altitude: f64) -> Linear {
+    let x = trim.state.to_array();
+    let z = [trim.controls.aileron, trim.controls.elevator, trim.controls.throttle];
+    let state = State::from_array(std::array::from_fn(|i| Dual::<11>::variable(x[i], i)));
+    let [aileron, elevator, throttle] = std::array::from_fn(|i| Dual::variable(z[i], 8 + i));
+    let controls = Controls { aileron, elevator, throttle };
+    let next = model.step(&state, &controls, altitude, &mut Memory::default()).to_array();
+    Linear {
+        a: SMatrix::from_fn(|i, j| next[i].gradient[j]),
+        b: SMatrix::from_fn(|i, j| next[i].gradient[8 + j]),
+    }
+}

@@ -1,0 +1,13 @@
+//! The grey box: a prior made of physical effects, its integrators, trim and linearisation.
+
+mod file;
+mod grey_box;
+mod integrator;
+mod linear;
+mod newton;
+mod trim;
+
+pub use grey_box::{GreyBox, Named};
+pub use integrator::{Integrator, Memory, STEP, Twin};
+pub use linear::{Linear, linearise};
+pub use trim::{Trim, TrimError};

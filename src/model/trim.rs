@@ -1,0 +1,143 @@
+//! Trim: the deflections that hold a flight condition.
+
+use super::GreyBox;
+use super::newton;
+use crate::num::{Dual, Real};
+use crate::physics::{Controls, State};
+
+/// A steady flight condition with the controls that hold it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trim {
+    /// The state, whose rates vanish (see [`Trim::attitude`] for airspeed).
+    pub state: State,
+    /// The controls.
+    pub controls: Controls,
+    /// What is left of V̇ where the throttle is at its stop, m/s²; else zero.
+    pub acceleration: f64,
+}
+
+/// Why a condition has no trim.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "model {model} has no trim at roll {roll_deg:.1}°, pitch {pitch_deg:.1}°, {airspeed_mps:.1} m/s: \
+     the aircraft cannot hold it there; ask for less bank or pitch, or for more airspeed"
+)]
+pub struct TrimError {
+    /// The model's name.
+    pub model: String,
+    /// Roll asked for.
+    pub roll_deg: f64,
+    /// Pitch asked for.
+    pub pitch_deg: f64,
+    /// Airspeed asked for.
+    pub airspeed_mps: f64,
+}
+
+impl Trim {
+    /// Straight and level at `airspeed` (m/s) and `altitude` (m): γ = 0, so θ = α.
+    ///
+    /// # Errors
+    /// If the model cannot fly level at that airspeed.
+    pub fn level(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Trim, TrimError> {
+        let condition = |x: [Dual<3>; 3]| level_condition(x, airspeed);
+        newton::solve([0.03, 0.0, 0.2], [0.1, 0.2, 0.5], |x| {
+            let (state, controls) = condition(x);
+            let rate = model.rate(&state, &controls, altitude);
+            [rate.airspeed, rate.q, rate.alpha]
+        })
+        .map(|x| {
+            let (state, controls) = level_condition(x, airspeed);
+            Trim { state, controls, acceleration: 0.0 }
+        })
+        .ok_or_else(|| failure(model, 0.0, 0.0, airspeed))
+    }
+
+    /// A steady turn that holds roll and pitch (rad) at `airspeed` (m/s) and `altitude` (m).
+    ///
+    /// Where the throttle that would hold the airspeed lies beyond its stops it is left at the
+    /// stop, and the airspeed drifts with [`acceleration`](Trim::acceleration).
+    ///
+    /// # Errors
+    /// If no deflection holds that attitude.
+    pub fn attitude(
+        model: &GreyBox,
+        roll: f64,
+        pitch: f64,
+        airspeed: f64,
+        altitude: f64,
+    ) -> Result<Trim, TrimError> {
+        let fail = || failure(model, roll, pitch, airspeed);
+        let free = solve_attitude(model, roll, pitch, airspeed, altitude, None).ok_or_else(fail)?;
+        if (0.0..=1.0).contains(&free.controls.throttle) {
+            return Ok(free);
+        }
+        let stop = free.controls.throttle.clamp(0.0, 1.0);
+        let mut held = solve_attitude(model, roll, pitch, airspeed, altitude, Some(stop)).ok_or_else(fail)?;
+        held.acceleration = model.rate(&held.state, &held.controls, altitude).airspeed;
+        Ok(held)
+    }
+}
+
+fn level_condition<R: Real>([alpha, elevator, throttle]: [R; 3], airspeed: f64) -> (State<R>, Controls<R>) {
+    let zero = R::zero();
+    let state = State {
+        roll: zero,
+        pitch: alpha,
+        airspeed: R::from_f64(airspeed),
+        p: zero,
+        q: zero,
+        r: zero,
+        alpha,
+        beta: zero,
+    };
+    (state, Controls { aileron: zero, elevator, throttle })
+}
+
+/// Unknowns: α, β, p, q, r, δa, δe, δt. With `throttle` given, δt = throttle replaces V̇ = 0.
+fn solve_attitude(
+    model: &GreyBox,
+    roll: f64,
+    pitch: f64,
+    airspeed: f64,
+    altitude: f64,
+    throttle: Option<f64>,
+) -> Option<Trim> {
+    // the coordinated turn of a point mass starts the search close by
+    let turn = model.atmosphere.gravity / airspeed * roll.tan();
+    let start = [
+        0.05,
+        0.0,
+        -turn * pitch.sin(),
+        turn * pitch.cos() * roll.sin(),
+        turn * pitch.cos() * roll.cos(),
+        0.0,
+        0.0,
+        0.3,
+    ];
+    let x = newton::solve(start, [0.1, 0.1, 0.5, 0.5, 0.5, 0.2, 0.2, 0.5], |x| {
+        let (state, controls) = attitude_condition(x, roll, pitch, airspeed);
+        let rate = model.rate(&state, &controls, altitude);
+        let along = match throttle {
+            Some(t) => x[7] - Dual::from_f64(t),
+            None => rate.airspeed,
+        };
+        [rate.roll, rate.pitch, rate.p, rate.q, rate.r, rate.alpha, rate.beta, along]
+    })?;
+    let (state, controls) = attitude_condition(x, roll, pitch, airspeed);
+    Some(Trim { state, controls, acceleration: 0.0 })
+}
+
+fn attitude_condition<R: Real>(x: [R; 8], roll: f64, pitch: f64, airspeed: f64) -> (State<R>, Controls<R>) {
+    let [alpha, beta, p, q, r, aileron, elevator, throttle] = x;
+    let [roll, pitch, airspeed] = [roll, pitch, airspeed].map(R::from_f64);
+    (State { roll, pitch, airspeed, p, q, r, alpha, beta }, Controls { aileron, elevator, throttle })
+}
+
+fn failure(model: &GreyBox, roll: f64, pitch: f64, airspeed: f64) -> TrimError {
+    TrimError {
+        model: model.name.clone(),
+        roll_deg: roll.to_degrees(),
+        pitch_deg: pitch.to_degrees(),
+        airspeed_mps: airspeed,
+    }
+}

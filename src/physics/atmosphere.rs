@@ -1,0 +1,57 @@
+//! The air the aircraft flies in, together with the gravity it flies under.
+
+/// Where the air density comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Density {
+    /// The same everywhere, kg/m³.
+    Constant(f64),
+    /// The troposphere of the standard atmosphere (ISO 2533), by altitude.
+    Standard,
+}
+
+/// Air and gravity as a model assumes them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Atmosphere {
+    /// The density law.
+    pub density: Density,
+    /// Effective gravity (gravitation less the Earth's rotation), m/s².
+    pub gravity: f64,
+}
+
+impl Atmosphere {
+    /// The density at `altitude` (m above mean sea level), kg/m³.
+    #[inline(always)]
+    pub fn density_at(&self, altitude: f64) -> f64 {
+        match self.density {
+            Density::Constant(rho) => rho,
+            Density::Standard => standard_density(altitude),
+        }
+    }
+}
+
+/// Density of the standard atmosphere below 11 km, kg/m³, at geometric `altitude` (m).
+fn standard_density(altitude: f64) -> f64 {
+    const RADIUS: f64 = 6_356_766.0;
+    const LAPSE: f64 = 0.0065;
+    const SEA_TEMPERATURE: f64 = 288.15;
+    const SEA_DENSITY: f64 = 1.225;
+    // g / (R · lapse) − 1 with g = 9.80665 m/s² and R = 287.053 J/(kg K)
+    const EXPONENT: f64 = 9.80665 / (287.052_87 * LAPSE) - 1.0;
+    let geopotential = RADIUS * altitude / (RADIUS + altitude);
+    let ratio = 1.0 - LAPSE * geopotential / SEA_TEMPERATURE;
+    SEA_DENSITY * ratio.max(0.0).powf(EXPONENT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn standard_atmosphere_at_tabulated_altitudes() {
+        // ISO 2533 tables give five figures
+        for (altitude, density) in [(0.0, 1.2250), (600.0, 1.1560), (2000.0, 1.0066), (5000.0, 0.73643)] {
+            let ours = standard_density(altitude);
+            assert!((ours / density - 1.0).abs() < 5e-5, "{altitude} m: {ours}");
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! Drag of flying sideways.
+
+use super::{Coefficient, Effect, coefficient};
+use crate::num::{Real, Table};
+use crate::physics::{Channel, Point};
+
+/// Drag due to sideslip, by its magnitude and its square.
+pub struct DragBeta2;
+
+impl Effect for DragBeta2 {
+    const ID: &'static str = "drag_beta2";
+    const DESCRIPTION: &'static str = "Drag due to sideslip, by its magnitude and its square.";
+    const FORMULA: &'static str = "D = Q (CDβ |β| + CDβ² β²)";
+    const SOURCE: &'static str = "Gryte18; JSBSim reading in x8_facts";
+    const COEFFICIENTS: &'static [Coefficient] = &[
+        coefficient("CDbeta", "drag due to the magnitude of sideslip, 1/rad", (-0.5, 0.5)),
+        coefficient("CDbeta2", "drag due to the square of sideslip, 1/rad²", (0.0, 5.0)),
+    ];
+
+    #[inline(always)]
+    fn basis<R: Real>(
+        at: &Point<R>,
+        _: Option<&Table>,
+        mut term: impl FnMut(usize, Channel, R),
+    ) {
+        let q = at.air.q_s;
+        term(0, Channel::Drag, q * at.state.beta.abs());
+        term(1, Channel::Drag, q * at.state.beta * at.state.beta);
+    }
+}

@@ -1,0 +1,28 @@
+//! Drag of a deflected elevator, up or down alike.
+
+use super::{Coefficient, Effect, coefficient};
+use crate::num::{Real, Table};
+use crate::physics::{Channel, Point};
+
+/// Drag due to the magnitude of the elevator deflection.
+pub struct DragElevatorAbs;
+
+impl Effect for DragElevatorAbs {
+    const ID: &'static str = "drag_elevator_abs";
+    const DESCRIPTION: &'static str = "Drag due to the magnitude of the elevator deflection.";
+    const FORMULA: &'static str = "D = Q CD|δe| |δe|";
+    const SOURCE: &'static str = "JSBSim reading in x8_facts";
+    const COEFFICIENTS: &'static [Coefficient] = &[
+        coefficient("CDde", "drag due to the magnitude of elevator, 1/rad", (0.0, 0.5)),
+    ];
+
+    #[inline(always)]
+    fn basis<R: Real>(
+        at: &Point<R>,
+        _: Option<&Table>,
+        mut term: impl FnMut(usize, Channel, R),
+    ) {
+        let q = at.air.q_s;
+        term(0, Channel::Drag, q * at.controls.elevator.abs());
+    }
+}

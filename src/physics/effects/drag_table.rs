@@ -1,0 +1,29 @@
+//! Drag from a table over incidence.
+
+use super::{Coefficient, Effect, coefficient};
+use crate::num::{Real, Table};
+use crate::physics::{Channel, Point};
+
+/// Drag as a table over angle of attack.
+pub struct DragTable;
+
+impl Effect for DragTable {
+    const ID: &'static str = "drag_table";
+    const DESCRIPTION: &'static str = "Drag as a table over angle of attack.";
+    const FORMULA: &'static str = "D = Q k CD(α)";
+    const SOURCE: &'static str = "JSBSim table reading in x8_facts";
+    const COEFFICIENTS: &'static [Coefficient] =
+        &[coefficient("k", "factor on the whole table", (0.0, 10.0))];
+    const TABLE: Option<&'static str> = Some("CD");
+
+    #[inline(always)]
+    fn basis<R: Real>(
+        at: &Point<R>,
+        table: Option<&Table>,
+        mut term: impl FnMut(usize, Channel, R),
+    ) {
+        if let Some(table) = table {
+            term(0, Channel::Drag, at.air.q_s * table.at(at.state.alpha));
+        }
+    }
+}

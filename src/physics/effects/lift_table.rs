@@ -1,0 +1,29 @@
+//! Lift from a table over incidence, stall included.
+
+use super::{Coefficient, Effect, coefficient};
+use crate::num::{Real, Table};
+use crate::physics::{Channel, Point};
+
+/// Lift as a table over angle of attack, stall included.
+pub struct LiftTable;
+
+impl Effect for LiftTable {
+    const ID: &'static str = "lift_table";
+    const DESCRIPTION: &'static str = "Lift as a table over angle of attack, stall included.";
+    const FORMULA: &'static str = "L = Q k CL(α)";
+    const SOURCE: &'static str = "JSBSim table reading in x8_facts";
+    const COEFFICIENTS: &'static [Coefficient] =
+        &[coefficient("k", "factor on the whole table", (0.0, 10.0))];
+    const TABLE: Option<&'static str> = Some("CL");
+
+    #[inline(always)]
+    fn basis<R: Real>(
+        at: &Point<R>,
+        table: Option<&Table>,
+        mut term: impl FnMut(usize, Channel, R),
+    ) {
+        if let Some(table) = table {
+            term(0, Channel::Lift, at.air.q_s * table.at(at.state.alpha));
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! Thrust that is proportional to throttle, whatever the airspeed.
+
+use super::{Coefficient, Effect, coefficient};
+use crate::num::{Real, Table};
+use crate::physics::{Channel, Point};
+
+/// Thrust along body x, proportional to throttle.
+pub struct ThrustLinear;
+
+impl Effect for ThrustLinear {
+    const ID: &'static str = "thrust_linear";
+    const DESCRIPTION: &'static str = "Thrust along body x, proportional to throttle.";
+    const FORMULA: &'static str = "T = Cp δt";
+    const SOURCE: &'static str = "GSFM26 eq. (38)";
+    const COEFFICIENTS: &'static [Coefficient] =
+        &[coefficient("Cp_n", "thrust at full throttle, N", (0.0, 10_000.0))];
+
+    #[inline(always)]
+    fn basis<R: Real>(
+        at: &Point<R>,
+        _: Option<&Table>,
+        mut term: impl FnMut(usize, Channel, R),
+    ) {
+        term(0, Channel::BodyX, at.controls.throttle);
+    }
+}

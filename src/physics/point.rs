@@ -1,0 +1,60 @@
+//! The point of the flight envelope at which forces are asked for.
+
+use crate::num::Real;
+use crate::physics::airframe::Geometry;
+use crate::physics::{Controls, State};
+
+/// What the airflow is, worked out once for all effects.
+#[derive(Clone, Copy, Debug)]
+pub struct AirData<R = f64> {
+    /// Q = ½ρV²S, the dynamic pressure times the wing area, N.
+    pub q_s: R,
+    /// Sine of the angle of attack.
+    pub sin_alpha: R,
+    /// Cosine of the angle of attack.
+    pub cos_alpha: R,
+    /// Sine of the sideslip angle.
+    pub sin_beta: R,
+    /// Cosine of the sideslip angle.
+    pub cos_beta: R,
+    /// p̂ = bp/2V.
+    pub p_hat: R,
+    /// q̂ = cq/2V.
+    pub q_hat: R,
+    /// r̂ = br/2V.
+    pub r_hat: R,
+}
+
+impl<R: Real> AirData<R> {
+    /// The airflow at `state` in air of `density` (kg/m³).
+    #[inline(always)]
+    pub fn new(state: &State<R>, density: R, geometry: &Geometry) -> Self {
+        let (sin_alpha, cos_alpha) = state.alpha.sin_cos();
+        let (sin_beta, cos_beta) = state.beta.sin_cos();
+        let per_2v = R::from_f64(0.5) / state.airspeed;
+        let (per_span, per_chord) = (per_2v.scale(geometry.span), per_2v.scale(geometry.chord));
+        AirData {
+            q_s: (density * state.airspeed * state.airspeed).scale(0.5 * geometry.area),
+            sin_alpha,
+            cos_alpha,
+            sin_beta,
+            cos_beta,
+            p_hat: state.p * per_span,
+            q_hat: state.q * per_chord,
+            r_hat: state.r * per_span,
+        }
+    }
+}
+
+/// Everything a static effect may depend on.
+#[derive(Clone, Copy, Debug)]
+pub struct Point<'a, R = f64> {
+    /// The physical state.
+    pub state: &'a State<R>,
+    /// The controls that act.
+    pub controls: &'a Controls<R>,
+    /// The airflow.
+    pub air: &'a AirData<R>,
+    /// Wing area, span and chord.
+    pub geometry: &'a Geometry,
+}

@@ -1,0 +1,221 @@
+//! The rigid body: from forces to the rates of the state, eqs. (7)–(12) and (35) of \[GSFM26\].
+
+use crate::num::Real;
+use crate::physics::wrench::Channel;
+use crate::physics::{AirData, State, Wrench};
+
+/// Mass in kg, moments of inertia in kg m², axes FRD through the centre of gravity.
+///
+/// `jxz` follows \[BM12\]: the product of inertia enters the inertia matrix as −Jxz.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigidBody<R = f64> {
+    /// Mass.
+    pub mass: R,
+    /// Roll inertia.
+    pub jx: R,
+    /// Pitch inertia.
+    pub jy: R,
+    /// Yaw inertia.
+    pub jz: R,
+    /// Product of inertia.
+    pub jxz: R,
+}
+
+impl<R: Copy> RigidBody<R> {
+    /// Applies `f` to every figure.
+    #[inline(always)]
+    pub fn map<S>(&self, f: impl Fn(R) -> S) -> RigidBody<S> {
+        RigidBody {
+            mass: f(self.mass),
+            jx: f(self.jx),
+            jy: f(self.jy),
+            jz: f(self.jz),
+            jxz: f(self.jxz),
+        }
+    }
+}
+
+/// In which axes the aerodynamic forces of a model act.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ForceAxes {
+    /// Lift and drag turned by α only, side force along body y: eqs. (39), (43) of \[GSFM26\].
+    Stability,
+    /// All three turned by α and β, as JSBSim's DRAG, SIDE and LIFT axes are.
+    Wind,
+}
+
+/// A vector in body axes, FRD.
+pub type Vector<R> = [R; 3];
+
+/// Forces other than gravity in body axes, N (eq. 36 less eq. 37).
+#[inline(always)]
+pub fn body_force<R: Real>(wrench: &Wrench<R>, air: &AirData<R>, axes: ForceAxes) -> Vector<R> {
+    let (drag, side, lift) =
+        (wrench.get(Channel::Drag), wrench.get(Channel::Side), wrench.get(Channel::Lift));
+    let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
+    let (along, across) = match axes {
+        ForceAxes::Stability => (-drag, side),
+        ForceAxes::Wind => (-drag * cos_beta - side * sin_beta, side * cos_beta - drag * sin_beta),
+    };
+    [
+        along * cos_alpha + lift * sin_alpha + wrench.get(Channel::BodyX),
+        across,
+        along * sin_alpha - lift * cos_alpha,
+    ]
+}
+
+/// Gravity in body axes, m/s² (eq. 37).
+#[inline(always)]
+pub fn gravity_in_body<R: Real>(state: &State<R>, gravity: f64) -> Vector<R> {
+    let (sin_roll, cos_roll) = state.roll.sin_cos();
+    let (sin_pitch, cos_pitch) = state.pitch.sin_cos();
+    [-sin_pitch, cos_pitch * sin_roll, cos_pitch * cos_roll].map(|x| x.scale(gravity))
+}
+
+/// Angular acceleration, rad/s² (eq. 10 with the Γ terms of \[BM12\] section 3.3).
+#[inline(always)]
+pub fn angular_acceleration<R: Real>(
+    body: &RigidBody<R>,
+    state: &State<R>,
+    moment: Vector<R>,
+) -> Vector<R> {
+    let RigidBody { jx, jy, jz, jxz, .. } = *body;
+    let (p, q, r) = (state.p, state.q, state.r);
+    let gamma = jx * jz - jxz * jxz;
+    // moments left after the gyroscopic terms, then the inverse of the inertia matrix
+    let roll = moment[0] + jxz * p * q - (jz - jy) * q * r;
+    let pitch = moment[1] + (jz - jx) * p * r - jxz * (p * p - r * r);
+    let yaw = moment[2] - jxz * q * r + (jx - jy) * p * q;
+    [(jz * roll + jxz * yaw) / gamma, pitch / jy, (jxz * roll + jx * yaw) / gamma]
+}
+
+/// Rates of the Euler angles (φ̇, θ̇, ψ̇), rad/s (eqs. 7, 8).
+#[inline(always)]
+pub fn attitude_rate<R: Real>(state: &State<R>) -> Vector<R> {
+    let (sin_roll, cos_roll) = state.roll.sin_cos();
+    let (sin_pitch, cos_pitch) = state.pitch.sin_cos();
+    let turn = (sin_roll * state.q + cos_roll * state.r) / cos_pitch;
+    [state.p + sin_pitch * turn, cos_roll * state.q - sin_roll * state.r, turn]
+}
+
+/// Velocity relative to the air in body axes (u, v, w), m/s (eqs. 32–34).
+#[inline(always)]
+pub fn air_velocity<R: Real>(state: &State<R>, air: &AirData<R>) -> Vector<R> {
+    let forward = state.airspeed * air.cos_beta;
+    [forward * air.cos_alpha, state.airspeed * air.sin_beta, forward * air.sin_alpha]
+}
+
+/// The state's rate of change from `acceleration` (specific force plus gravity, body axes, m/s²)
+/// and angular acceleration (rad/s²): eqs. (7)–(12).
+#[inline(always)]
+pub fn state_rate<R: Real>(
+    state: &State<R>,
+    air: &AirData<R>,
+    acceleration: Vector<R>,
+    spin: Vector<R>,
+) -> State<R> {
+    let [gx, gy, gz] = acceleration;
+    let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
+    let (p, q, r, v) = (state.p, state.q, state.r, state.airspeed);
+    let [roll, pitch, _] = attitude_rate(state);
+    // eqs. (9), (11), (12) with u, v, w written out and the Coriolis terms collected
+    let forward = gx * cos_alpha + gz * sin_alpha;
+    let downward = gz * cos_alpha - gx * sin_alpha;
+    let airspeed = forward * cos_beta + gy * sin_beta;
+    let per_vcb = R::from_f64(1.0) / (v * cos_beta);
+    let alpha = q + (downward - sin_beta * v * (p * cos_alpha + r * sin_alpha)) * per_vcb;
+    let beta = p * sin_alpha - r * cos_alpha + (gy * cos_beta - sin_beta * forward) / v;
+    State { roll, pitch, airspeed, p: spin[0], q: spin[1], r: spin[2], alpha, beta }
+}
+
+/// Rotates a vector from body axes to the local horizon turned with the heading (ψ = 0).
+#[inline(always)]
+pub fn body_to_horizon<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
+    let (sin_roll, cos_roll) = state.roll.sin_cos();
+    let (sin_pitch, cos_pitch) = state.pitch.sin_cos();
+    let [x, y, z] = v;
+    let turned = y * sin_roll + z * cos_roll;
+    [x * cos_pitch + turned * sin_pitch, y * cos_roll - z * sin_roll, turned * cos_pitch - x * sin_pitch]
+}
+
+/// The inverse of [`body_to_horizon`].
+#[inline(always)]
+pub fn horizon_to_body<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
+    let (sin_roll, cos_roll) = state.roll.sin_cos();
+    let (sin_pitch, cos_pitch) = state.pitch.sin_cos();
+    let [n, e, d] = v;
+    let turned = n * sin_pitch + d * cos_pitch;
+    [n * cos_pitch - d * sin_pitch, e * cos_roll + turned * sin_roll, turned * cos_roll - e * sin_roll]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::airframe::Geometry;
+
+    const STATE: State = State {
+        roll: 0.4, pitch: -0.3, airspeed: 19.0, p: 1.1, q: -0.7, r: 0.5, alpha: 0.12, beta: -0.08,
+    };
+    const GEOMETRY: Geometry = Geometry { area: 0.75, span: 2.1, chord: 0.3571 };
+
+    /// Eqs. (9), (11), (12) as printed, from the body velocities.
+    #[test]
+    fn collected_rates_equal_the_printed_equations() {
+        let air = AirData::new(&STATE, 1.156, &GEOMETRY);
+        let acceleration = [1.5, -2.0, -7.0];
+        let [u, v, w] = air_velocity(&STATE, &air);
+        let (p, q, r) = (STATE.p, STATE.q, STATE.r);
+        let du = r * v - q * w + acceleration[0];
+        let dv = p * w - r * u + acceleration[1];
+        let dw = q * u - p * v + acceleration[2];
+        let va = STATE.airspeed;
+        let dva = (u * du + v * dv + w * dw) / va;
+        let rate = state_rate(&STATE, &air, acceleration, [0.0; 3]);
+        // the two forms differ by rounding only
+        assert!((rate.airspeed - dva).abs() < 1e-12);
+        assert!((rate.alpha - (u * dw - w * du) / (u * u + w * w)).abs() < 1e-12);
+        assert!((rate.beta - (va * dv - v * dva) / (va * (va * va - v * v).sqrt())).abs() < 1e-12);
+    }
+
+    /// Euler's equations J ω̇ + ω × Jω = M with the inertia matrix written out.
+    #[test]
+    fn angular_acceleration_satisfies_eulers_equations() {
+        let body = RigidBody { mass: 3.364, jx: 1.2290, jy: 0.1702, jz: 0.8808, jxz: -0.9343 };
+        let moment = [0.3, -0.2, 0.1];
+        let [dp, dq, dr] = angular_acceleration(&body, &STATE, moment);
+        let inertia = |w: [f64; 3]| {
+            [body.jx * w[0] - body.jxz * w[2], body.jy * w[1], body.jz * w[2] - body.jxz * w[0]]
+        };
+        let (w, h) = ([STATE.p, STATE.q, STATE.r], inertia([STATE.p, STATE.q, STATE.r]));
+        let cross = [w[1] * h[2] - w[2] * h[1], w[2] * h[0] - w[0] * h[2], w[0] * h[1] - w[1] * h[0]];
+        let jw = inertia([dp, dq, dr]);
+        for i in 0..3 {
+            assert!((jw[i] + cross[i] - moment[i]).abs() < 1e-12, "axis {i}");
+        }
+    }
+
+    #[test]
+    fn rotations_undo_each_other() {
+        let v = [3.0, -2.0, 1.0];
+        let back = horizon_to_body(&STATE, body_to_horizon(&STATE, v));
+        for i in 0..3 {
+            assert!((back[i] - v[i]).abs() < 1e-14);
+        }
+        // gravity points straight down in the horizon frame
+        let down = body_to_horizon(&STATE, gravity_in_body(&STATE, 9.806));
+        assert!(down[0].abs() < 1e-14 && down[1].abs() < 1e-14 && (down[2] - 9.806).abs() < 1e-14);
+    }
+
+    #[test]
+    fn wind_axes_keep_drag_along_the_airflow() {
+        let air = AirData::new(&STATE, 1.156, &GEOMETRY);
+        let mut wrench = Wrench::zero();
+        wrench.add(Channel::Drag, 2.0);
+        let force = body_force(&wrench, &air, ForceAxes::Wind);
+        let [u, v, w] = air_velocity(&STATE, &air);
+        for (f, x) in force.iter().zip([u, v, w]) {
+            assert!((f + 2.0 * x / STATE.airspeed).abs() < 1e-14);
+        }
+    }
+}

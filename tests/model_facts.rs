@@ -1,0 +1,53 @@
+//! The facts of the X8 that the model must reproduce (`params/x8`, shared `x8_facts`).
+
+use std::path::Path;
+
+use greylag::model::{GreyBox, Trim};
+use greylag::physics::{Controls, State};
+
+fn model(name: &str) -> GreyBox {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+    GreyBox::load(&folder.join(format!("{name}.toml"))).unwrap()
+}
+
+/// At 600 m, the start of an episode.
+const ALTITUDE: f64 = 600.0;
+
+#[test]
+fn pitch_acceleration_at_the_start() {
+    for name in ["prior", "jsbsim"] {
+        let rate = model(name).rate(&State::NEUTRAL, &Controls::default(), ALTITUDE);
+        println!("{name}: q-dot at the start {:+.4} rad/s^2 (simulator +5.74)", rate.q);
+        // the simulator's figure is given with three digits
+        assert!((rate.q - 5.74).abs() < 5e-3);
+    }
+}
+
+#[test]
+fn level_trim_at_three_airspeeds() {
+    let model = model("jsbsim");
+    // rows of the facts: V, α in degrees, δe in rad, throttle; each given to its last digit
+    for (v, alpha, elevator, throttle) in
+        [(16.67, 2.283, 0.01855, 0.118), (20.0, 0.858, 0.0688, 0.185), (25.0, -0.30, 0.1096, 0.308)]
+    {
+        let trim = Trim::level(&model, v, ALTITUDE).unwrap();
+        let found = (trim.state.alpha.to_degrees(), trim.controls.elevator, trim.controls.throttle);
+        println!("{v:5.2} m/s: alpha {:.3} deg, elevator {:.5} rad, throttle {:.4}", found.0, found.1, found.2);
+        assert!((found.0 - alpha).abs() < 6e-3, "alpha {}", found.0);
+        assert!((found.1 - elevator).abs() < 6e-5, "elevator {}", found.1);
+        assert!((found.2 - throttle).abs() < 6e-4, "throttle {}", found.2);
+    }
+}
+
+#[test]
+fn trimmed_turns_are_steady() {
+    let model = model("jsbsim");
+    for (roll, pitch) in [(60.0_f64, 20.0_f64), (-45.0, -10.0), (20.0, 5.0)] {
+        let trim = Trim::attitude(&model, roll.to_radians(), pitch.to_radians(), 22.0, ALTITUDE).unwrap();
+        let rate = model.rate(&trim.state, &trim.controls, ALTITUDE);
+        for (i, x) in rate.to_array().into_iter().enumerate().filter(|(i, _)| *i != 2) {
+            // the solver settles at 1e-10
+            assert!(x.abs() < 1e-9, "roll {roll} pitch {pitch}: component {i} is {x}");
+        }
+    }
+}
