@@ -1,11 +1,12 @@
 //! The pilot's rules, each with the reason for its number.
 
+use std::path::Path;
 use std::time::Duration;
 
 use greylag::control::{Controller, Observation, Target};
-use greylag::flight::pilot::{Config, Decision, Pilot, Plan, Source, Telemetry};
+use greylag::flight::pilot::{Config, Decision, Pilot, Plan, Source, Telemetry, TrimPoint};
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, ParameterValue, Sticks, Verdict};
-use greylag::physics::{ActuatorState, Command, State, Time};
+use greylag::physics::{ActuatorState, Airframe, Command, State, Time};
 
 /// A proportional law, enough to see who flies and for what target.
 struct Proportional;
@@ -22,6 +23,12 @@ impl Controller for Proportional {
             throttle: 0.1 * (target.airspeed - seen.state.airspeed),
         }
     }
+}
+
+fn x8() -> Config {
+    let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
+    let row = |airspeed_mps, pitch_deg, elevator, throttle| TrimPoint { airspeed_mps, pitch_deg, elevator, throttle };
+    Config::new(airframe.envelope, vec![row(16.67, 2.283, 0.0354, 0.118), row(20.0, 0.858, 0.1314, 0.185)])
 }
 
 /// A law that never gives a number.
@@ -41,7 +48,7 @@ fn frame(time: Time) -> Telemetry {
     // A breath of turbulence, so that the state is not frozen.
     let ripple = (time.as_micros() % 1000 + time.as_micros() / 10_000) as f64 * 1e-6;
     Telemetry {
-        state: State { p: ripple, airspeed: 22.0, ..State::NEUTRAL },
+        state: State { p: ripple, airspeed: 20.0, ..State::NEUTRAL },
         yaw: 0.0,
         actuators: ActuatorState::default(),
         specific_force: [0.0, 0.0, -9.81],
@@ -64,11 +71,11 @@ const TICK: Duration = Duration::from_millis(10);
 
 impl Flight {
     fn new() -> Self {
-        Flight::with(Config::default(), Box::new(Proportional))
+        Flight::with(Box::new(Proportional))
     }
 
-    fn with(config: Config, fallback: Box<dyn Controller>) -> Self {
-        let pilot = Pilot::new(config, fallback).unwrap();
+    fn with(fallback: Box<dyn Controller>) -> Self {
+        let pilot = Pilot::new(x8(), fallback).unwrap();
         Flight { pilot, now: Time::from_micros(1_000_000), last: None, plan: Plan::Ready(RIGHT) }
     }
 
@@ -174,7 +181,7 @@ fn arming_is_refused_at_an_absurd_airspeed_or_attitude() {
 fn disarming_in_the_air_needs_force() {
     let mut flight = Flight::armed();
     let Verdict::Rejected(words) = flight.pilot.disarm(flight.now, false) else { panic!() };
-    assert!(words.contains("22.0 m/s"), "{words}");
+    assert!(words.contains("20.0 m/s"), "{words}");
     assert_eq!(flight.pilot.disarm(flight.now, true), Verdict::Accepted);
     assert_eq!(flight.tick().command, Command::IDLE);
 }
@@ -236,9 +243,9 @@ fn the_loss_time_is_a_parameter() {
 #[test]
 fn hold_is_wings_level_at_cruise_airspeed_and_its_trim_pitch() {
     let target = Flight::armed().tick().target;
-    // Trim pitch at 22 m/s lies two fifths of the way from 0.858° to -0.30°.
-    assert!((target.pitch.to_degrees() - (0.858 - 0.4 * 1.158)).abs() < 1e-9);
-    assert_eq!((target.roll, target.airspeed), (0.0, 22.0));
+    // The X8's cruise airspeed is 20 m/s, where it trims at 0.858° in JSBSim.
+    assert!((target.pitch.to_degrees() - 0.858).abs() < 1e-9);
+    assert_eq!((target.roll, target.airspeed), (0.0, 20.0));
 }
 
 #[test]
@@ -291,7 +298,7 @@ fn without_a_usable_state_the_command_is_held_for_50_ms_then_surfaces_go_to_trim
         }
         assert_eq!(decision.mode, if i <= 50 { Mode::Offboard } else { Mode::Hold }, "tick {i}");
     }
-    let trim = flight.pilot.config().trim_at(22.0);
+    let trim = flight.pilot.config().trim_at(20.0);
     let level = Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle };
     assert_eq!(flight.last.unwrap().command, level);
     let said = flight.texts();
@@ -322,13 +329,13 @@ fn a_plan_that_is_no_number_is_replaced_and_told_once_in_five_seconds() {
 
 #[test]
 fn a_fallback_that_is_no_number_either_ends_level_at_trim() {
-    let mut flight = Flight::with(Config::default(), Box::new(Broken));
+    let mut flight = Flight::with(Box::new(Broken));
     flight.fly(5);
     flight.pilot.arm(flight.now, false);
     flight.plan = Plan::None;
     let decision = flight.fly(50);
     assert_eq!((decision.source, decision.command.aileron), (Source::Level, 0.0));
-    assert!((decision.command.throttle - flight.pilot.config().trim_at(22.0).throttle).abs() < 1e-12);
+    assert!((decision.command.throttle - flight.pilot.config().trim_at(20.0).throttle).abs() < 1e-12);
     assert!(flight.texts().contains("level at trim"));
 }
 
@@ -482,7 +489,7 @@ fn storm_request(dice: &mut Dice, pilot: &mut Pilot, now: Time) {
         9..=10 => pilot.sticks(now, Sticks { roll: dice.number(), pitch: dice.number(), throttle: dice.number() }),
         _ => {
             // The two slew limits stay, since the test measures by them.
-            let index = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12, 13][dice.below(12) as usize];
+            let index = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 13][dice.below(12) as usize];
             let value = match pilot.parameters()[index].value {
                 ParameterValue::Int(_) => ParameterValue::Int(dice.below(4) as i32 - 1),
                 ParameterValue::Real(_) => ParameterValue::Real(dice.number() as f32 * 30.0),
@@ -494,7 +501,7 @@ fn storm_request(dice: &mut Dice, pilot: &mut Pilot, now: Time) {
 
 fn storm(seed: u64) -> (Vec<Command>, [usize; 7]) {
     let mut dice = Dice(seed);
-    let mut pilot = Pilot::new(Config::default(), Box::new(Wild(Dice(seed ^ 1)))).unwrap();
+    let mut pilot = Pilot::new(x8(), Box::new(Wild(Dice(seed ^ 1)))).unwrap();
     let mut now = Time::from_micros(1_000_000);
     let mut last: Option<Decision> = None;
     let (mut commands, mut seen) = (Vec::new(), [0; 7]);

@@ -1,36 +1,25 @@
-//! The numbers a pilot flies by, as a TOML table writes them.
+//! The numbers a pilot flies by: the airframe's envelope, times, slew limits, level trim.
 
-use serde::{Deserialize, Serialize};
+use crate::model::{GreyBox, Trim, TrimError};
+use crate::physics::airframe::Envelope;
 
-/// The pilot's settings: what the airframe file may hold in its `[pilot]` table, and what the
-/// parameters change. Units are in the names. Defaults are those of the X8.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+/// Airspeed between two rows of the trim table, m/s: pitch errs by less than 0.1° between them.
+const TRIM_SPACING: f64 = 1.0;
+/// Altitude at which the trim table is made, m: that of the simulator's start. Trim depends on
+/// equivalent airspeed, which differs by 5 % from true airspeed a thousand metres away.
+const TRIM_ALTITUDE: f64 = 600.0;
+
+/// The pilot's settings. Units are in the names, since parameters and files show them as they are.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// Age of the last setpoint at which OFFBOARD is left, s.
+    /// The airframe's envelope.
+    pub envelope: Envelope,
+    /// Age of the last setpoint (or stick input) at which its mode is left, s.
     pub offboard_loss_s: f64,
     /// Age of the last fresh state at which the vehicle link counts as lost, s.
     pub vehicle_loss_s: f64,
     /// Gap in usable state over which the command in force is continued, s.
     pub state_hold_s: f64,
-    /// Largest commanded bank, degrees.
-    pub bank_max_deg: f64,
-    /// Largest commanded pitch, degrees.
-    pub pitch_max_deg: f64,
-    /// Smallest commanded pitch, degrees.
-    pub pitch_min_deg: f64,
-    /// Airspeed held when nobody says otherwise, m/s.
-    pub cruise_mps: f64,
-    /// Airspeed below which the throttle opens and the nose goes down, m/s.
-    pub airspeed_min_mps: f64,
-    /// Airspeed above which the throttle closes and the nose comes up, m/s.
-    pub airspeed_max_mps: f64,
-    /// Stall speed in level flight, m/s; it bounds the bank through the load factor.
-    pub stall_mps: f64,
-    /// Largest load factor of a level turn.
-    pub load_max: f64,
-    /// Fastest change of a surface command, in units of −1..1 per second.
-    pub surface_slew_per_s: f64,
     /// Fastest change of the throttle command, in units of 0..1 per second.
     pub throttle_slew_per_s: f64,
     /// Where OFFBOARD takes its throttle from.
@@ -44,8 +33,7 @@ pub struct Config {
 }
 
 /// Where OFFBOARD takes its throttle from (parameter GL_THRUST_SRC).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ThrustSource {
     /// The controller holds the cruise airspeed.
     Cruise,
@@ -54,8 +42,7 @@ pub enum ThrustSource {
 }
 
 /// One row of the level trim table.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrimPoint {
     /// True airspeed, m/s.
     pub airspeed_mps: f64,
@@ -67,40 +54,51 @@ pub struct TrimPoint {
     pub throttle: f64,
 }
 
-impl Default for Config {
-    fn default() -> Self {
-        // Elevator commands are deflections over the 0.5235 rad of full travel.
-        let row = |airspeed_mps, pitch_deg, deflection: f64, throttle| TrimPoint {
-            airspeed_mps,
-            pitch_deg,
-            elevator: deflection / 0.5235,
-            throttle,
-        };
+impl Config {
+    /// Settings for the aircraft that `model` describes: its envelope, its level trim.
+    ///
+    /// # Errors
+    /// If the model cannot fly level at the cruise airspeed, or what [`Config::check`] finds.
+    pub fn for_model(model: &GreyBox) -> Result<Self, ConfigError> {
+        let envelope = model.airframe.envelope;
+        let row = |airspeed: f64| trim_row(model, airspeed);
+        row(envelope.airspeed_cruise_mps)?;
+        let count = ((envelope.airspeed_max_mps - envelope.airspeed_min_mps) / TRIM_SPACING) as usize;
+        // Airspeeds at which the model has no level trim are left to their neighbours.
+        let speeds = (0..=count).map(|i| envelope.airspeed_min_mps + i as f64 * TRIM_SPACING);
+        let config = Config::new(envelope, speeds.filter_map(|v| row(v).ok()).collect());
+        config.check()?;
+        Ok(config)
+    }
+
+    /// The default settings with an envelope, with the rows of a trim table.
+    pub fn new(envelope: Envelope, trim: Vec<TrimPoint>) -> Self {
         Config {
+            envelope,
             offboard_loss_s: 1.0,
             vehicle_loss_s: 0.5,
-            // Five frames; longer than any jitter, shorter than a roll mode of 33 1/s needs to
-            // carry a wrong aileron far.
+            // Five frames: longer than the jitter of a link, shorter than a wrong aileron needs
+            // to roll the aircraft far.
             state_hold_s: 0.05,
-            bank_max_deg: 60.0,
-            pitch_max_deg: 30.0,
-            pitch_min_deg: -30.0,
-            cruise_mps: 22.0,
-            airspeed_min_mps: 13.0,
-            airspeed_max_mps: 45.0,
-            // sqrt(2 m g / (rho S CLmax)) with 3.364 kg, 1.156 kg/m3, 0.75 m2, CLmax 0.896.
-            stall_mps: 9.2,
-            load_max: 2.5,
-            // Full travel in 0.1 s.
-            surface_slew_per_s: 20.0,
             // Full travel in 0.2 s, the lag of the motor: faster would not show in the thrust.
             throttle_slew_per_s: 5.0,
             thrust_source: ThrustSource::Cruise,
             arm_tilt_max_deg: 60.0,
+            // Below every airspeed at which a fixed-wing aircraft of this class flies.
             disarm_airspeed_max_mps: 8.0,
-            trim: vec![row(16.67, 2.283, 0.01855, 0.118), row(20.0, 0.858, 0.0688, 0.185), row(25.0, -0.30, 0.1096, 0.308)],
+            trim,
         }
     }
+}
+
+fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
+    let trim = Trim::level(model, airspeed, TRIM_ALTITUDE)?;
+    Ok(TrimPoint {
+        airspeed_mps: airspeed,
+        pitch_deg: trim.state.pitch.to_degrees(),
+        elevator: (trim.controls.elevator / model.airframe.actuators.deflection_max).clamp(-1.0, 1.0),
+        throttle: trim.controls.throttle.clamp(0.0, 1.0),
+    })
 }
 
 /// A setting that cannot be flown with.
@@ -129,6 +127,9 @@ pub enum ConfigError {
     /// The trim table cannot be interpolated.
     #[error("pilot table `trim` needs at least one row, finite numbers, and rising airspeeds: correct the rows")]
     Trim,
+    /// The model has no level flight at the cruise airspeed.
+    #[error("the pilot needs level trim at the cruise airspeed: {0}")]
+    NoTrim(#[from] TrimError),
 }
 
 impl Config {
@@ -142,11 +143,11 @@ impl Config {
                 return Err(ConfigError::Range { name, value, low, high });
             }
         }
+        let e = &self.envelope;
         let ordered = [
-            ("pitch_min_deg", self.pitch_min_deg, "pitch_max_deg", self.pitch_max_deg),
-            ("stall_mps", self.stall_mps, "airspeed_min_mps", self.airspeed_min_mps),
-            ("airspeed_min_mps", self.airspeed_min_mps, "cruise_mps", self.cruise_mps),
-            ("cruise_mps", self.cruise_mps, "airspeed_max_mps", self.airspeed_max_mps),
+            ("pitch_min_deg", e.pitch_min_deg, "pitch_max_deg", e.pitch_max_deg),
+            ("airspeed_min_mps", e.airspeed_min_mps, "airspeed_cruise_mps", e.airspeed_cruise_mps),
+            ("airspeed_cruise_mps", e.airspeed_cruise_mps, "airspeed_max_mps", e.airspeed_max_mps),
         ];
         for (smaller, low, larger, high) in ordered {
             if low >= high {
@@ -164,20 +165,20 @@ impl Config {
         if self.trim.is_empty() || !rising || !self.trim.iter().all(finite) { Err(ConfigError::Trim) } else { Ok(()) }
     }
 
-    fn ranges(&self) -> [(&'static str, f64, f64, f64); 15] {
+    fn ranges(&self) -> [(&'static str, f64, f64, f64); 14] {
+        let e = &self.envelope;
         [
             ("offboard_loss_s", self.offboard_loss_s, 0.1, 60.0),
             ("vehicle_loss_s", self.vehicle_loss_s, 0.05, 5.0),
             ("state_hold_s", self.state_hold_s, 0.0, 0.5),
-            ("bank_max_deg", self.bank_max_deg, 5.0, 80.0),
-            ("pitch_max_deg", self.pitch_max_deg, 5.0, 60.0),
-            ("pitch_min_deg", self.pitch_min_deg, -60.0, -5.0),
-            ("cruise_mps", self.cruise_mps, 1.0, 100.0),
-            ("airspeed_min_mps", self.airspeed_min_mps, 1.0, 100.0),
-            ("airspeed_max_mps", self.airspeed_max_mps, 1.0, 110.0),
-            ("stall_mps", self.stall_mps, 0.5, 100.0),
-            ("load_max", self.load_max, 1.1, 10.0),
-            ("surface_slew_per_s", self.surface_slew_per_s, 1.0, 200.0),
+            ("bank_max_deg", e.bank_max_deg, 5.0, 80.0),
+            ("pitch_max_deg", e.pitch_max_deg, 5.0, 60.0),
+            ("pitch_min_deg", e.pitch_min_deg, -60.0, -5.0),
+            ("airspeed_cruise_mps", e.airspeed_cruise_mps, 1.0, 100.0),
+            ("airspeed_min_mps", e.airspeed_min_mps, 1.0, 100.0),
+            ("airspeed_max_mps", e.airspeed_max_mps, 1.0, 110.0),
+            ("load_factor_max", e.load_factor_max, 1.1, 10.0),
+            ("surface_slew_per_s", e.surface_slew_per_s, 1.0, 200.0),
             ("throttle_slew_per_s", self.throttle_slew_per_s, 0.5, 100.0),
             ("arm_tilt_max_deg", self.arm_tilt_max_deg, 5.0, 180.0),
             ("disarm_airspeed_max_mps", self.disarm_airspeed_max_mps, 0.0, 100.0),
@@ -213,43 +214,49 @@ fn between(a: &TrimPoint, b: &TrimPoint, airspeed_mps: f64) -> TrimPoint {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
-    #[test]
-    fn the_defaults_can_be_flown() {
-        assert_eq!(Config::default().check(), Ok(()));
+    fn x8() -> Config {
+        Config::for_model(&GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap()).unwrap()
     }
 
     #[test]
-    fn a_table_may_name_a_few_settings_only() {
-        let config: Config = toml::from_str("bank_max_deg = 45.0\nthrust_source = \"setpoint\"").unwrap();
-        assert_eq!(config.bank_max_deg, 45.0);
-        assert_eq!(config.thrust_source, ThrustSource::Setpoint);
-        assert_eq!(config.cruise_mps, Config::default().cruise_mps);
+    fn every_model_of_the_x8_gives_settings_that_can_be_flown() {
+        for name in ["jsbsim", "prior", "prior-mild", "prior-severe"] {
+            let model = GreyBox::load(Path::new(&format!("params/x8/{name}.toml"))).unwrap();
+            assert_eq!(Config::for_model(&model).unwrap().check(), Ok(()), "{name}");
+        }
     }
 
     #[test]
-    fn an_unknown_setting_is_refused_by_name() {
-        let error = toml::from_str::<Config>("bank_maximum_deg = 45.0").unwrap_err();
-        assert!(error.to_string().contains("bank_maximum_deg"), "{error}");
-    }
-
-    #[test]
-    fn a_contradiction_names_both_sides() {
-        let config = Config { airspeed_min_mps: 30.0, ..Config::default() };
-        let words = config.check().unwrap_err().to_string();
-        assert!(words.contains("airspeed_min_mps") && words.contains("cruise_mps"), "{words}");
-        assert!(Config { load_max: f64::NAN, ..Config::default() }.check().is_err());
-        assert!(Config { trim: vec![], ..Config::default() }.check().is_err());
+    fn trim_is_that_of_the_simulator() {
+        // The three rows measured in JSBSim; 0.01° is a tenth of the table's spacing error.
+        for (airspeed, pitch, deflection, throttle) in
+            [(16.67, 2.283, 0.01855, 0.118), (20.0, 0.858, 0.0688, 0.185), (25.0, -0.30, 0.1096, 0.308)]
+        {
+            let row = x8().trim_at(airspeed);
+            assert!((row.pitch_deg - pitch).abs() < 0.05, "{row:?}");
+            assert!((row.elevator - deflection / 0.5235).abs() < 0.005, "{row:?}");
+            assert!((row.throttle - throttle).abs() < 0.002, "{row:?}");
+        }
     }
 
     #[test]
     fn trim_is_linear_between_rows_and_constant_beyond() {
-        let config = Config::default();
-        // Half way between 20 and 25 m/s: (0.858 - 0.30) / 2 and (0.185 + 0.308) / 2.
-        let middle = config.trim_at(22.5);
-        assert!((middle.pitch_deg - 0.279).abs() < 1e-12);
-        assert!((middle.throttle - 0.2465).abs() < 1e-12);
+        let row = |airspeed_mps, pitch_deg| TrimPoint { airspeed_mps, pitch_deg, elevator: 0.0, throttle: 0.2 };
+        let config = Config { trim: vec![row(20.0, 2.0), row(25.0, 1.0)], ..x8() };
+        assert_eq!(config.trim_at(22.5), row(22.5, 1.5));
         assert_eq!(config.trim_at(5.0), config.trim[0]);
-        assert_eq!(config.trim_at(80.0), config.trim[2]);
+        assert_eq!(config.trim_at(80.0), config.trim[1]);
+    }
+
+    #[test]
+    fn a_contradiction_names_both_sides() {
+        let mut config = x8();
+        config.envelope.airspeed_min_mps = 30.0;
+        let words = config.check().unwrap_err().to_string();
+        assert!(words.contains("airspeed_min_mps") && words.contains("airspeed_cruise_mps"), "{words}");
+        assert!(Config { throttle_slew_per_s: f64::NAN, ..x8() }.check().is_err());
+        assert!(Config { trim: vec![], ..x8() }.check().is_err());
     }
 }

@@ -11,8 +11,9 @@
 
 mod config;
 mod decision;
-mod envelope;
+
 mod estimate;
+mod limits;
 mod modes;
 mod parameters;
 mod telemetry;
@@ -20,7 +21,7 @@ mod texts;
 
 pub use config::{Config, ConfigError, ThrustSource, TrimPoint};
 pub use decision::{Decision, Plan, Request, Source};
-pub use envelope::{Envelope, TICK_S};
+pub use limits::{Limits, TICK_S};
 pub use modes::mode_name;
 pub use telemetry::Telemetry;
 
@@ -36,7 +37,7 @@ const COMPLAINT_INTERVAL_S: f64 = 5.0;
 /// The pilot of one aircraft.
 pub struct Pilot {
     config: Config,
-    envelope: Envelope,
+    limits: Limits,
     parameters: Vec<Parameter>,
     fallback: Box<dyn Controller>,
     estimate: Estimate,
@@ -50,6 +51,7 @@ pub struct Pilot {
     setpoint_lost: bool,
     vehicle_lost: bool,
     in_force: Command,
+    before: Command,
     source: Source,
     target: Target,
     pending: Pending,
@@ -84,9 +86,9 @@ impl Pilot {
     /// What [`Config::check`] finds.
     pub fn new(config: Config, fallback: Box<dyn Controller>) -> Result<Self, ConfigError> {
         config.check()?;
-        let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: config.cruise_mps };
+        let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: config.envelope.airspeed_cruise_mps };
         Ok(Pilot {
-            envelope: Envelope::from(&config),
+            limits: Limits::from(&config),
             parameters: parameters::table(&config),
             config,
             fallback,
@@ -101,6 +103,7 @@ impl Pilot {
             setpoint_lost: false,
             vehicle_lost: false,
             in_force: Command::IDLE,
+            before: Command::IDLE,
             source: Source::Disarmed,
             target: nobody,
             pending: Pending::Disarmed,
@@ -163,7 +166,10 @@ impl Pilot {
             Pending::Fly { seen, throttle } => self.with_state(plan, &seen, throttle),
         };
         self.source = source;
-        self.in_force = if self.armed { self.envelope.slew(self.in_force, wanted) } else { Command::IDLE };
+        if !matches!(self.pending, Pending::Repeated) {
+            self.before = self.in_force;
+        }
+        self.in_force = if self.armed { self.limits.slew(self.in_force, wanted) } else { Command::IDLE };
         self.decision()
     }
 
@@ -178,7 +184,7 @@ impl Pilot {
     }
 
     fn configure(&mut self, config: Config) {
-        self.envelope = Envelope::from(&config);
+        self.limits = Limits::from(&config);
         self.parameters = parameters::table(&config);
         self.config = config;
     }
@@ -206,7 +212,7 @@ impl Pilot {
     }
 
     fn assess(&mut self, quality: Frame) -> Pending {
-        let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: self.config.cruise_mps };
+        let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: self.config.envelope.airspeed_cruise_mps };
         if quality == Frame::Repeated {
             return if self.armed { Pending::Repeated } else { Pending::Disarmed };
         }
@@ -226,14 +232,14 @@ impl Pilot {
             return Pending::Unusable;
         };
         let (wish, throttle) = self.wish();
-        self.target = self.envelope.limit(wish, frame.state.airspeed);
+        self.target = self.limits.limit(wish, frame.state.airspeed);
         let Telemetry { time, state, actuators, altitude, .. } = frame;
-        Pending::Fly { seen: Observation { time, state, actuators, altitude }, throttle }
+        Pending::Fly { seen: Observation { time, state, actuators, altitude, previous: [self.in_force, self.before] }, throttle }
     }
 
     /// The target of the mode, before the envelope, with the throttle if the mode sets it itself.
     fn wish(&self) -> (Target, Option<f64>) {
-        let airspeed = self.config.cruise_mps;
+        let airspeed = self.config.envelope.airspeed_cruise_mps;
         match (self.mode, self.setpoint, self.sticks) {
             (Mode::Offboard, Some((_, s)), _) => {
                 let throttle = s.thrust.filter(|_| self.config.thrust_source == ThrustSource::Setpoint);
@@ -241,15 +247,15 @@ impl Pilot {
             }
             (Mode::Stabilized, _, Some((_, s))) => {
                 // A stick forward is nose down; each half of its travel reaches its own limit.
-                let pitch = if s.pitch > 0.0 { s.pitch * self.envelope.pitch_min } else { -s.pitch * self.envelope.pitch_max };
-                (Target { roll: s.roll * self.envelope.bank_max, pitch, airspeed }, Some(s.throttle))
+                let pitch = if s.pitch > 0.0 { s.pitch * self.limits.pitch_min } else { -s.pitch * self.limits.pitch_max };
+                (Target { roll: s.roll * self.limits.bank_max, pitch, airspeed }, Some(s.throttle))
             }
             _ => (self.level_target(), None),
         }
     }
 
     fn level_target(&self) -> Target {
-        let airspeed = self.config.cruise_mps;
+        let airspeed = self.config.envelope.airspeed_cruise_mps;
         Target { roll: 0.0, pitch: self.config.trim_at(airspeed).pitch_deg.to_radians(), airspeed }
     }
 
@@ -269,7 +275,7 @@ impl Pilot {
             Plan::Late => self.fall_back(seen, Source::Late),
             Plan::None => self.fall_back(seen, Source::Fallback),
         };
-        command.throttle = self.envelope.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
+        command.throttle = self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
         (command, source)
     }
 
@@ -296,7 +302,7 @@ impl Pilot {
     }
 
     fn level_command(&self) -> Command {
-        let trim = self.config.trim_at(self.config.cruise_mps);
+        let trim = self.config.trim_at(self.config.envelope.airspeed_cruise_mps);
         Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle }
     }
 

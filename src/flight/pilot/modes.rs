@@ -33,7 +33,7 @@ impl Pilot {
         if state.roll.abs() > tilt || state.pitch.abs() > tilt {
             return Some(format!("tilted beyond {:.0} degrees", self.config.arm_tilt_max_deg));
         }
-        if state.airspeed > self.config.airspeed_max_mps {
+        if state.airspeed > self.config.envelope.airspeed_max_mps {
             return Some(format!("airspeed {:.1} m/s is above the maximum", state.airspeed));
         }
         if matches!(self.mode, Mode::Manual | Mode::Stabilized) && !self.sticks_fresh() {

@@ -7,18 +7,17 @@ use crate::link::autopilot::{Parameter, ParameterValue, Verdict};
 type Real = (&'static str, fn(&Config) -> f64, fn(&mut Config, f64));
 
 /// The real parameters, in the order of their index. Names have at most 16 characters.
-const REALS: [Real; 13] = [
+const REALS: [Real; 12] = [
     ("GL_OFFB_LOSS_S", |c| c.offboard_loss_s, |c, x| c.offboard_loss_s = x),
     ("GL_VEH_LOSS_S", |c| c.vehicle_loss_s, |c, x| c.vehicle_loss_s = x),
-    ("GL_BANK_MAX_DEG", |c| c.bank_max_deg, |c, x| c.bank_max_deg = x),
-    ("GL_PITCH_MAX_DEG", |c| c.pitch_max_deg, |c, x| c.pitch_max_deg = x),
-    ("GL_PITCH_MIN_DEG", |c| c.pitch_min_deg, |c, x| c.pitch_min_deg = x),
-    ("GL_CRUISE_MPS", |c| c.cruise_mps, |c, x| c.cruise_mps = x),
-    ("GL_AIRSPD_MIN", |c| c.airspeed_min_mps, |c, x| c.airspeed_min_mps = x),
-    ("GL_AIRSPD_MAX", |c| c.airspeed_max_mps, |c, x| c.airspeed_max_mps = x),
-    ("GL_STALL_MPS", |c| c.stall_mps, |c, x| c.stall_mps = x),
-    ("GL_LOAD_MAX", |c| c.load_max, |c, x| c.load_max = x),
-    ("GL_SLEW_SURF", |c| c.surface_slew_per_s, |c, x| c.surface_slew_per_s = x),
+    ("GL_BANK_MAX_DEG", |c| c.envelope.bank_max_deg, |c, x| c.envelope.bank_max_deg = x),
+    ("GL_PITCH_MAX_DEG", |c| c.envelope.pitch_max_deg, |c, x| c.envelope.pitch_max_deg = x),
+    ("GL_PITCH_MIN_DEG", |c| c.envelope.pitch_min_deg, |c, x| c.envelope.pitch_min_deg = x),
+    ("GL_CRUISE_MPS", |c| c.envelope.airspeed_cruise_mps, |c, x| c.envelope.airspeed_cruise_mps = x),
+    ("GL_AIRSPD_MIN", |c| c.envelope.airspeed_min_mps, |c, x| c.envelope.airspeed_min_mps = x),
+    ("GL_AIRSPD_MAX", |c| c.envelope.airspeed_max_mps, |c, x| c.envelope.airspeed_max_mps = x),
+    ("GL_LOAD_MAX", |c| c.envelope.load_factor_max, |c, x| c.envelope.load_factor_max = x),
+    ("GL_SLEW_SURF", |c| c.envelope.surface_slew_per_s, |c, x| c.envelope.surface_slew_per_s = x),
     ("GL_SLEW_THR", |c| c.throttle_slew_per_s, |c, x| c.throttle_slew_per_s = x),
     ("GL_DISARM_MPS", |c| c.disarm_airspeed_max_mps, |c, x| c.disarm_airspeed_max_mps = x),
 ];
@@ -76,10 +75,19 @@ fn denied(words: String) -> Result<Config, Verdict> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flight::pilot::TrimPoint;
+    use crate::physics::Airframe;
+    use std::path::Path;
+
+    fn x8() -> Config {
+        let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
+        let row = TrimPoint { airspeed_mps: 20.0, pitch_deg: 0.858, elevator: 0.13, throttle: 0.185 };
+        Config::new(airframe.envelope, vec![row])
+    }
 
     #[test]
     fn names_fit_the_field_of_param_value_and_differ() {
-        let table = table(&Config::default());
+        let table = table(&x8());
         for p in &table {
             assert!(p.name.is_ascii() && p.name.len() <= 16, "{}", p.name);
         }
@@ -91,7 +99,7 @@ mod tests {
 
     #[test]
     fn every_entry_takes_back_its_own_value() {
-        let config = Config::default();
+        let config = x8();
         for (i, p) in table(&config).iter().enumerate() {
             let after = changed(&config, i, p.value).unwrap();
             assert_eq!(table(&after)[i], *p);
@@ -100,7 +108,7 @@ mod tests {
 
     #[test]
     fn a_refusal_says_what_would_be_accepted() {
-        let config = Config::default();
+        let config = x8();
         let Err(Verdict::Denied(words)) = changed(&config, 2, ParameterValue::Real(90.0)) else { panic!() };
         assert!(words.contains("GL_BANK_MAX_DEG") && words.contains("80"), "{words}");
         for bad in [f32::NAN, f32::INFINITY, -1e30] {

@@ -1,4 +1,4 @@
-//! The envelope: what may be commanded at an airspeed, and how fast a command may change.
+//! The limits: what may be commanded at an airspeed, and how fast a command may change.
 
 use super::config::Config;
 use crate::control::Target;
@@ -12,13 +12,15 @@ const PROTECTION_BAND: f64 = 2.0;
 const RECOVERY_PITCH: f64 = -5.0 * DEGREE;
 /// Pitch required at least above the maximum airspeed, rad: clearly nose up, not a climb.
 const ARREST_PITCH: f64 = 5.0 * DEGREE;
-/// Airspeed kept above the stall in a turn, as a factor on the stall speed.
-const STALL_MARGIN: f64 = 1.2;
+/// Load factor that lift still allows at the minimum airspeed. An envelope sets that airspeed near
+/// 1.41 times the stall speed (13 to 9.2 m/s for the X8), where lift allows 2; keeping 1.2 times
+/// the stall speed in a turn leaves 2 / 1.2².
+const LOAD_AT_MINIMUM: f64 = 2.0 / 1.44;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// The limits in force. SI units, radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Envelope {
+pub struct Limits {
     /// Largest bank, rad.
     pub bank_max: f64,
     /// Largest pitch, rad.
@@ -29,8 +31,6 @@ pub struct Envelope {
     pub airspeed_min: f64,
     /// Largest airspeed, m/s.
     pub airspeed_max: f64,
-    /// Stall speed in level flight, m/s.
-    pub stall: f64,
     /// Largest load factor of a level turn.
     pub load_max: f64,
     /// Largest change of a surface command in a tick.
@@ -39,27 +39,27 @@ pub struct Envelope {
     pub throttle_step: f64,
 }
 
-impl From<&Config> for Envelope {
+impl From<&Config> for Limits {
     fn from(config: &Config) -> Self {
-        Envelope {
-            bank_max: config.bank_max_deg.to_radians(),
-            pitch_max: config.pitch_max_deg.to_radians(),
-            pitch_min: config.pitch_min_deg.to_radians(),
-            airspeed_min: config.airspeed_min_mps,
-            airspeed_max: config.airspeed_max_mps,
-            stall: config.stall_mps,
-            load_max: config.load_max,
-            surface_step: config.surface_slew_per_s * TICK_S,
+        let e = &config.envelope;
+        Limits {
+            bank_max: e.bank_max_deg.to_radians(),
+            pitch_max: e.pitch_max_deg.to_radians(),
+            pitch_min: e.pitch_min_deg.to_radians(),
+            airspeed_min: e.airspeed_min_mps,
+            airspeed_max: e.airspeed_max_mps,
+            load_max: e.load_factor_max,
+            surface_step: e.surface_slew_per_s * TICK_S,
             throttle_step: config.throttle_slew_per_s * TICK_S,
         }
     }
 }
 
-impl Envelope {
+impl Limits {
     /// The bank that a level turn may have at `airspeed` (m/s), rad: the load factor 1/cos φ stays
-    /// below both the limit and what lift allows a margin above the stall, (V / 1.2 V_s)².
+    /// below both the limit and what lift allows, which grows as V².
     pub fn bank_limit(&self, airspeed: f64) -> f64 {
-        let lift = (airspeed / (STALL_MARGIN * self.stall)).powi(2);
+        let lift = LOAD_AT_MINIMUM * (airspeed / self.airspeed_min).powi(2);
         let load = lift.min(self.load_max).max(1.0);
         (1.0 / load).acos().min(self.bank_max)
     }
@@ -111,9 +111,12 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::physics::Airframe;
+    use std::path::Path;
 
-    fn x8() -> Envelope {
-        Envelope::from(&Config::default())
+    fn x8() -> Limits {
+        let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
+        Limits::from(&Config::new(airframe.envelope, vec![]))
     }
 
     fn wish(roll_deg: f64, pitch_deg: f64) -> Target {
@@ -122,7 +125,7 @@ mod tests {
 
     #[test]
     fn the_hardest_target_of_the_paper_passes_unchanged_at_the_start_airspeed() {
-        // 60° and 30° at 16.67 m/s: load 2.0 needed, (16.67 / 11.04)² = 2.28 available.
+        // 60° and 30° at 16.67 m/s: load 2.0 needed, 1.389 (16.67 / 13)² = 2.28 available.
         assert_eq!(x8().limit(wish(60.0, 30.0), 16.67), wish(60.0, 30.0));
     }
 
@@ -135,17 +138,17 @@ mod tests {
 
     #[test]
     fn bank_shrinks_with_the_lift_that_is_left() {
-        // At 13 m/s the load may be (13 / 11.04)² = 1.3866: acos(1 / 1.3866) = 43.85°.
-        assert!((x8().bank_limit(13.0).to_degrees() - 43.85).abs() < 0.01);
-        // At or below 1.2 times the stall speed there is lift for level flight only.
+        // At 13 m/s the load may be 1.389: acos(1 / 1.389) = 43.95°.
+        assert!((x8().bank_limit(13.0).to_degrees() - 43.95).abs() < 0.01);
+        // Below 13 / sqrt(1.389) = 11.03 m/s there is lift for level flight only.
         assert_eq!(x8().bank_limit(11.0), 0.0);
     }
 
     #[test]
     fn the_load_limit_binds_where_the_bank_limit_is_wide() {
-        // 1 / cos 80° is 5.8; a load of 2.5 allows acos(0.4) = 66.42°.
-        let envelope = Envelope { bank_max: 80f64.to_radians(), ..x8() };
-        assert!((envelope.bank_limit(40.0).to_degrees() - 66.42).abs() < 0.01);
+        // 1 / cos 80° is 5.8; a load of 2.2 allows acos(1 / 2.2) = 62.96°.
+        let envelope = Limits { bank_max: 80f64.to_radians(), ..x8() };
+        assert!((envelope.bank_limit(40.0).to_degrees() - 62.96).abs() < 0.01);
     }
 
     #[test]
