@@ -4,8 +4,9 @@ use std::path::Path;
 use std::time::Duration;
 
 use greylag::control::{Controller, Observation, Target};
-use greylag::flight::pilot::{Config, Decision, Pilot, Plan, Source, Telemetry, TrimPoint};
+use greylag::flight::pilot::{Config, Decision, Pilot, Plan, Source, TrimPoint};
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, ParameterValue, Sticks, Verdict};
+use greylag::link::vehicle::{Faults, Order, Telemetry};
 use greylag::physics::{ActuatorState, Airframe, Command, State, Time};
 
 /// A proportional law, enough to see who flies and for what target.
@@ -49,11 +50,16 @@ fn frame(time: Time) -> Telemetry {
     let ripple = (time.as_micros() % 1000 + time.as_micros() / 10_000) as f64 * 1e-6;
     Telemetry {
         state: State { p: ripple, airspeed: 20.0, ..State::NEUTRAL },
+        time,
+        order: Order::Next { lost: 0 },
+        faults: Faults::NONE,
         yaw: 0.0,
         actuators: ActuatorState::default(),
         specific_force: [0.0, 0.0, -9.81],
         altitude: 600.0,
-        ..Telemetry::unknown(time)
+        position: [f64::NAN; 2],
+        velocity: [f64::NAN; 3],
+        wind: [f64::NAN; 3],
     }
 }
 

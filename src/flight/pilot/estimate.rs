@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use super::telemetry::Telemetry;
+use super::telemetry::{defect, repeats};
+use crate::link::vehicle::Telemetry;
 use crate::physics::Time;
 
 /// How far vehicle time may run backwards before the vehicle counts as restarted. Frames that
 /// overtake one another do so by one or two cycles.
-pub(super) const RESTART: Duration = Duration::from_millis(500);
+pub(super) const RESTART: Duration = Duration::from_secs(1);
 
 /// What a frame is worth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,10 +39,10 @@ impl Estimate {
             return Frame::Repeated;
         }
         self.newest = Some(frame.time);
-        if let Some(reason) = frame.defect() {
+        if let Some(reason) = defect(frame) {
             return Frame::Defective(reason);
         }
-        let frozen = self.last.is_some_and(|last| frame.repeats(&last));
+        let frozen = self.last.is_some_and(|last| repeats(frame, &last));
         self.last = Some(*frame);
         self.usable_at = Some(now);
         if frozen {

@@ -23,10 +23,10 @@ pub use config::{Config, ConfigError, ThrustSource, TrimPoint};
 pub use decision::{Decision, Plan, Request, Source};
 pub use limits::{Limits, TICK_S};
 pub use modes::mode_name;
-pub use telemetry::Telemetry;
 
 use crate::control::{Controller, Observation, Target};
 use crate::link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
+use crate::link::vehicle::Telemetry;
 use crate::physics::{Command, Time};
 use estimate::{Estimate, Frame, RESTART, within};
 use texts::Texts;
@@ -178,6 +178,11 @@ impl Pilot {
         self.load = load;
     }
 
+    /// Passes on a line from outside to the ground stations.
+    pub fn tell(&mut self, severity: Severity, words: &str) {
+        self.texts.say(severity, words);
+    }
+
     /// The settings in force.
     pub fn config(&self) -> &Config {
         &self.config
@@ -233,7 +238,9 @@ impl Pilot {
         };
         let (wish, throttle) = self.wish();
         self.target = self.limits.limit(wish, frame.state.airspeed);
-        let Telemetry { time, state, actuators, altitude, .. } = frame;
+        let Telemetry { time, mut state, actuators, altitude, .. } = frame;
+        // Noise of a sensor at rest.
+        state.airspeed = state.airspeed.max(0.0);
         Pending::Fly { seen: Observation { time, state, actuators, altitude, previous: [self.in_force, self.before] }, throttle }
     }
 
