@@ -3,7 +3,7 @@
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, FILE_TRANSFER_PROTOCOL_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA,
     MavMessage, MavParamError, MavParamType, MavProtocolCapability, MavSeverity, PARAM_ERROR_DATA,
-    PARAM_VALUE_DATA, PING_DATA, PROTOCOL_VERSION_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
+    PARAM_VALUE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
 };
 use mavlink::types::CharArray;
 
@@ -132,12 +132,11 @@ fn software_version(text: &str) -> u32 {
 
 /// PROTOCOL_VERSION: MAVLink 1 and 2, 2 preferred.
 pub fn protocol_version() -> Message {
-    Message::coded(MavMessage::PROTOCOL_VERSION(PROTOCOL_VERSION_DATA {
-        version: 200,
-        min_version: 100,
-        max_version: 200,
-        ..PROTOCOL_VERSION_DATA::DEFAULT
-    }))
+    let mut payload = vec![0; 22];
+    for (field, version) in payload.chunks_mut(2).zip([200u16, 100, 200]) {
+        field.copy_from_slice(&version.to_le_bytes());
+    }
+    Message::raw(300, payload, 22)
 }
 
 /// MESSAGE_INTERVAL: µs between messages, −1 when off, 0 when the message is not sent here.
@@ -209,12 +208,10 @@ pub fn time_sync(theirs: i64, now: Time, to: Source) -> Message {
 
 /// PING answer: the request's numbers, addressed to its sender.
 pub fn ping(time_usec: u64, sequence: u32, to: Source) -> Message {
-    Message::coded(MavMessage::PING(PING_DATA {
-        time_usec,
-        seq: sequence,
-        target_system: to.system,
-        target_component: to.component,
-    }))
+    let mut payload = time_usec.to_le_bytes().to_vec();
+    payload.extend(sequence.to_le_bytes());
+    payload.extend([to.system, to.component]);
+    Message::raw(4, payload, 14)
 }
 
 #[cfg(test)]

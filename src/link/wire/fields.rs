@@ -17,13 +17,13 @@ impl Fields<'_> {
     pub fn u16(self, offset: usize) -> u16 {
         u16::from_le_bytes(self.bytes(offset))
     }
-    /// A little-endian signed 16-bit number.
-    pub fn i16(self, offset: usize) -> i16 {
-        i16::from_le_bytes(self.bytes(offset))
-    }
     /// A little-endian 32-bit number.
     pub fn u32(self, offset: usize) -> u32 {
         u32::from_le_bytes(self.bytes(offset))
+    }
+    /// A little-endian 64-bit number.
+    pub fn u64(self, offset: usize) -> u64 {
+        u64::from_le_bytes(self.bytes(offset))
     }
     /// A little-endian signed 32-bit number.
     pub fn i32(self, offset: usize) -> i32 {

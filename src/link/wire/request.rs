@@ -98,6 +98,14 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
     let found = match frame.id {
         76 => (at(30), Request::Command(command_long(fields))),
         75 => (at(30), Request::Command(command_int(fields))),
+        11 => {
+            let to = Recipient { system: fields.u8(4), component: 0 };
+            (to, Request::SetMode { base: fields.u8(5), custom: fields.u32(0) })
+        }
+        // A request is for everybody (0/0), a reply for one.
+        4 if fields.bytes(12) == [0, 0] => {
+            (at(12), Request::Ping { time_usec: fields.u64(0), sequence: fields.u32(8) })
+        }
         23 => (at(4), parameter_set(fields)),
         66 => (at(2), data_stream(fields)),
         43 => (at(0), mission(MissionStep::List, fields.u8(2))),
@@ -119,9 +127,6 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
 fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
     let to = |system: u8, component: u8| Recipient { system, component };
     Some(match message {
-        MavMessage::SET_MODE(m) => {
-            (to(m.target_system, 0), Request::SetMode { base: m.base_mode.bits(), custom: m.custom_mode })
-        }
         MavMessage::SET_ATTITUDE_TARGET(m) => {
             (to(m.target_system, m.target_component), Request::Attitude(setpoint::attitude(&m)))
         }
@@ -142,10 +147,6 @@ fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
         // A reply carries a time in tc1, a request zero.
         MavMessage::TIMESYNC(m) if m.tc1 == 0 => {
             (to(m.target_system, m.target_component), Request::TimeSync { theirs: m.ts1 })
-        }
-        // A request is for everybody (0/0), a reply for one.
-        MavMessage::PING(m) if (m.target_system, m.target_component) == (0, 0) => {
-            (to(0, 0), Request::Ping { time_usec: m.time_usec, sequence: m.seq })
         }
         _ => return None,
     })
