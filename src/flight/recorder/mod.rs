@@ -206,3 +206,131 @@ impl<C: Write, T: Write> Files<C, T> {
         self.tlog.attempt(BufWriter::flush);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::Target;
+    use crate::flight::pilot::{Decision, Source};
+    use crate::link::autopilot::Mode;
+    use crate::logs::Sample;
+    use crate::logs::csv::{self, Tolerance};
+    use crate::physics::{Command, Time};
+
+    fn row(i: u64) -> Row {
+        let sample = Sample {
+            time_s: i as f64 * 0.01,
+            attitude_rad: [0.1, 0.2, 0.3],
+            rates_radps: [0.0; 3],
+            airspeed_mps: 20.0,
+            aileron_cmd: 0.1,
+            elevator_cmd: 0.1,
+            throttle_cmd: 0.1,
+            ..Sample::default()
+        };
+        let decision = Decision {
+            time: Time::default(),
+            command: Command::IDLE,
+            source: Source::Planned,
+            armed: true,
+            mode: Mode::Offboard,
+            target: Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 },
+            failsafe: false,
+        };
+        Row { sample, decision, latency_us: 123.4 }
+    }
+
+    /// A heartbeat of system 1, component 1 in MAVLink 2, written by rust-mavlink.
+    fn frame() -> Vec<u8> {
+        use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavMessage};
+        let header = mavlink::MavHeader { system_id: 1, component_id: 1, sequence: 0 };
+        let mut bytes = Vec::new();
+        mavlink::write_v2_msg(&mut bytes, header, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default())).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn a_recording_reads_back_with_its_extra_columns_and_whole_frames() {
+        let root = tempfile::tempdir().unwrap();
+        let recorder = Recorder::start(&Place::Numbered(root.path().to_owned())).unwrap();
+        (0..300).for_each(|i| recorder.row(row(i)));
+        let two = [frame(), frame()].concat();
+        recorder.bytes(0x0001_0203_0405_0607, &two);
+        let folder = recorder.folder().to_owned();
+        assert!(folder.ends_with("0001"));
+        assert_eq!(recorder.finish(), Written { rows: 300, frames: 2, dropped: 0 });
+        let reading = csv::load(&folder.join("flight.csv"), Tolerance::Strict).unwrap();
+        assert_eq!(reading.flight.samples.len(), 300);
+        assert_eq!(reading.unknown_columns, Row::EXTRA);
+        let text = std::fs::read_to_string(folder.join("flight.csv")).unwrap();
+        assert!(text.lines().nth(1).unwrap().ends_with(",20,OFFBOARD,1,planned,0,123.4"), "{text}");
+        let record = [&[0, 1, 2, 3, 4, 5, 6, 7][..], &frame()].concat();
+        assert_eq!(std::fs::read(folder.join("flight.tlog")).unwrap(), [record.clone(), record].concat());
+    }
+
+    #[test]
+    fn what_is_recorded_is_on_the_disk_within_a_second() {
+        let root = tempfile::tempdir().unwrap();
+        let recorder = Recorder::start(&Place::Exactly(root.path().join("flight"))).unwrap();
+        recorder.row(row(1));
+        std::thread::sleep(Duration::from_secs(1));
+        let text = std::fs::read_to_string(recorder.folder().join("flight.csv")).unwrap();
+        assert_eq!(text.lines().count(), 2);
+    }
+
+    #[test]
+    fn nothing_is_overwritten() {
+        let root = tempfile::tempdir().unwrap();
+        let numbered = Place::Numbered(root.path().join("flights"));
+        let folders: Vec<_> = (0..3).map(|_| Recorder::start(&numbered).unwrap().folder().to_owned()).collect();
+        assert!(folders[2].ends_with("0003"));
+        let error = Recorder::start(&Place::Exactly(folders[0].clone())).unwrap_err();
+        assert!(matches!(error, RecordError::Exists { .. }), "{error}");
+        std::fs::write(root.path().join("file"), "").unwrap();
+        assert!(Recorder::start(&Place::Numbered(root.path().join("file"))).is_err());
+    }
+
+    #[test]
+    fn a_full_disk_is_told_once_and_control_is_not_disturbed() {
+        // /dev/full refuses every write as a full disk does.
+        let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let recorder = Recorder::over(PathBuf::from("nowhere"), full(), full()).unwrap();
+        for i in 0..1000 {
+            recorder.row(row(i));
+            recorder.bytes(0, &frame());
+        }
+        std::thread::sleep(Duration::from_secs(1));
+        let told: Vec<_> = std::iter::from_fn(|| recorder.trouble()).collect();
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert!(told.iter().any(|t| t.contains("flight.csv")) && told.iter().any(|t| t.contains("flight.tlog")));
+        recorder.row(row(2000));
+        assert!(recorder.trouble().is_none());
+        assert!(recorder.finish().dropped > 0);
+    }
+
+    /// A disk that hangs at its first write.
+    struct Stuck {
+        hangs: Duration,
+    }
+
+    impl Write for Stuck {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            std::thread::sleep(std::mem::take(&mut self.hangs));
+            Ok(bytes.len())
+        }
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_slow_disk_costs_rows_that_are_counted_and_no_time() {
+        let stuck = || Stuck { hangs: Duration::from_secs(1) };
+        let recorder = Recorder::over(PathBuf::from("nowhere"), stuck(), stuck()).unwrap();
+        let before = Instant::now();
+        // Twice the queue: nearly the half cannot be taken while the disk sleeps.
+        (0..2 * QUEUE as u64).for_each(|i| recorder.row(row(i)));
+        assert!(before.elapsed() < Duration::from_millis(500), "{:?}", before.elapsed());
+        assert!(recorder.dropped() > QUEUE as u64 / 2, "{}", recorder.dropped());
+    }
+}

@@ -18,7 +18,7 @@ use crate::link::autopilot::Severity;
 use crate::link::client::{Clients, Now};
 use crate::link::framing::Source;
 use crate::link::transport::{Arrival, Packet};
-use crate::link::vehicle::{Order, Outputs, Sitl, Telemetry, Vehicle};
+use crate::link::vehicle::{Faults, Order, Outputs, Sitl, Telemetry, Vehicle};
 use crate::logs::Sample;
 
 /// Between two looks at what is due: heartbeats, streams, lost links.
@@ -259,19 +259,21 @@ fn unix_us() -> u64 {
 
 fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let (s, z, c) = (&state.state, &state.actuators, &decision.command);
+    // A part with a fault still holds its last good value; in a log it is missing.
+    let known = |fault: Faults, x: f64| if state.faults.contains(fault) { f64::NAN } else { x };
     Sample {
         time_s: state.time.as_secs_f64(),
-        attitude_rad: [s.roll, s.pitch, state.yaw],
-        rates_radps: [s.p, s.q, s.r],
-        airspeed_mps: s.airspeed,
-        alpha_rad: s.alpha,
-        beta_rad: s.beta,
-        specific_force_mps2: state.specific_force,
+        attitude_rad: [s.roll, s.pitch, state.yaw].map(|x| known(Faults::ATTITUDE, x)),
+        rates_radps: [s.p, s.q, s.r].map(|x| known(Faults::RATES, x)),
+        airspeed_mps: known(Faults::AIR, s.airspeed),
+        alpha_rad: known(Faults::INCIDENCE, s.alpha),
+        beta_rad: known(Faults::INCIDENCE, s.beta),
+        specific_force_mps2: state.specific_force.map(|x| known(Faults::SPECIFIC_FORCE, x)),
         velocity_ned_mps: state.velocity,
-        altitude_m: state.altitude,
-        aileron_rad: z.aileron,
-        elevator_rad: z.elevator,
-        throttle: z.throttle,
+        altitude_m: known(Faults::AIR, state.altitude),
+        aileron_rad: known(Faults::ACTUATORS, z.aileron),
+        elevator_rad: known(Faults::ACTUATORS, z.elevator),
+        throttle: known(Faults::ACTUATORS, z.throttle),
         aileron_cmd: c.aileron,
         elevator_cmd: c.elevator,
         throttle_cmd: c.throttle,

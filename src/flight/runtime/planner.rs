@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 use super::Pace;
-use crate::control::{Controller, Observation, Target};
+use crate::control::Controller;
 use crate::flight::pilot::{Plan, Request};
 use crate::physics::Command;
 
@@ -110,26 +110,23 @@ impl Drop for Threaded {
     }
 }
 
-/// Something to plan for, of no interest beside its being there.
 #[cfg(test)]
-fn any_request(engage: Option<Command>) -> Request {
+mod tests {
+    use super::*;
+    use crate::control::{Observation, Target};
     use crate::physics::{ActuatorState, State, Time};
-    Request {
-        observation: Observation {
+
+    /// Something to plan for, of no interest beside its being there.
+    fn any_request(engage: Option<Command>) -> Request {
+        let observation = Observation {
             time: Time::default(),
             state: State::NEUTRAL,
             actuators: ActuatorState::default(),
             altitude: 600.0,
             previous: [Command::IDLE; 2],
-        },
-        target: Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 },
-        engage,
+        };
+        Request { observation, target: Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 }, engage }
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
 
     /// A controller that takes its time, whose throttle counts its engagements.
     struct Slow {

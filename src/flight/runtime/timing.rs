@@ -22,10 +22,10 @@ impl Default for Histogram {
 impl Histogram {
     /// Counts a duration.
     pub fn note(&mut self, duration: Duration) {
-        let us = duration.as_secs_f64() * 1e6;
-        self.buckets[(us as usize).min(RESOLVED_US)] += 1;
+        let us = usize::try_from(duration.as_micros()).unwrap_or(RESOLVED_US);
+        self.buckets[us.min(RESOLVED_US)] += 1;
         self.count += 1;
-        self.max_us = self.max_us.max(us);
+        self.max_us = self.max_us.max(duration.as_nanos() as f64 / 1000.0);
     }
 
     /// How many were counted.
