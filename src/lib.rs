@@ -40,4 +40,7 @@ pub mod control;
 pub mod link;
 pub mod logs;
 pub mod flight;
+#[cfg(feature = "sitl")]
+pub mod sim;
+pub mod report;
 pub mod commands;

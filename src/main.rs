@@ -1,4 +1,4 @@
-//! The program `greylag`: reads its arguments, does what its subcommand says.
+//! The program `greylag`.
 
 use std::process::ExitCode;
 

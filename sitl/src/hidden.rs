@@ -1,22 +1,246 @@
-//! Effects hidden in the aircraft: terms that JSBSim flies and that no one is told of.
+//! Effects hidden in the aircraft: terms that JSBSim flies while no one is told of them.
+//!
+//! An effect is written into the aircraft's XML before JSBSim loads it, as further aerodynamic
+//! functions, flight-control components, external forces, or changed mass figures. With no effect,
+//! or with amplitude 0, the XML is the aircraft's own to the byte.
 
-/// One hidden effect.
-#[derive(Clone, Copy, Debug, PartialEq)]
+mod document;
+mod effects;
+mod expression;
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::plant::Properties;
+use document::Document;
+pub(crate) use document::THRUST_PROPERTY;
+pub use effects::EFFECTS;
+
+/// An effect that can be hidden, under the id it has in the catalogue of effects.
+pub struct Effect {
+    /// Stable id.
+    pub id: &'static str,
+    /// What an amplitude a adds, with Q = ½ρV²S; δ are deflections in rad, δt the throttle position.
+    pub formula: &'static str,
+    /// Unit of the amplitude; empty without one.
+    pub unit: &'static str,
+    /// Smallest and largest amplitude taken.
+    pub bounds: (f64, f64),
+    write: fn(&mut Document, f64) -> Result<(), HiddenError>,
+}
+
+impl fmt::Debug for Effect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Effect({})", self.id)
+    }
+}
+
+/// One hidden effect, written `id=amplitude`.
+#[derive(Clone, Copy)]
 pub struct Hidden {
-    /// Id of the effect in the catalogue.
-    pub effect: &'static str,
-    /// Its amplitude.
-    pub amplitude: f64,
+    effect: &'static Effect,
+    amplitude: f64,
+}
+
+impl Hidden {
+    /// The effect `id` with `amplitude`, in the effect's unit; 0 hides nothing.
+    ///
+    /// # Errors
+    /// [`HiddenError::Unknown`] and [`HiddenError::Amplitude`].
+    pub fn new(id: &str, amplitude: f64) -> Result<Self, HiddenError> {
+        let effect = EFFECTS
+            .iter()
+            .find(|effect| effect.id == id)
+            .ok_or_else(|| HiddenError::Unknown {
+                id: id.to_owned(),
+                known: known(),
+            })?;
+        let (min, max) = effect.bounds;
+        if !(min..=max).contains(&amplitude) {
+            let Effect { id, unit, .. } = *effect;
+            return Err(HiddenError::Amplitude {
+                id,
+                amplitude,
+                min,
+                max,
+                unit,
+            });
+        }
+        Ok(Hidden { effect, amplitude })
+    }
+
+    /// The effect.
+    pub fn effect(&self) -> &'static Effect {
+        self.effect
+    }
+
+    /// The amplitude, in the effect's unit.
+    pub fn amplitude(&self) -> f64 {
+        self.amplitude
+    }
+}
+
+impl PartialEq for Hidden {
+    fn eq(&self, other: &Self) -> bool {
+        self.effect.id == other.effect.id && self.amplitude == other.amplitude
+    }
+}
+
+impl fmt::Display for Hidden {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.effect.id, self.amplitude)
+    }
+}
+
+impl fmt::Debug for Hidden {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Hidden({self})")
+    }
+}
+
+impl FromStr for Hidden {
+    type Err = HiddenError;
+
+    /// Reads `id=amplitude`, such as `pitch_break=-3.0`.
+    fn from_str(text: &str) -> Result<Self, HiddenError> {
+        let syntax = || HiddenError::Syntax {
+            text: text.to_owned(),
+            known: known(),
+        };
+        let (id, amplitude) = text.split_once('=').ok_or_else(syntax)?;
+        Hidden::new(id.trim(), amplitude.trim().parse().map_err(|_| syntax())?)
+    }
 }
 
 /// Why an effect cannot be hidden.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum HiddenError {}
-
-/// The aircraft document `xml` with `effects` written into it.
-pub(crate) fn write_into(xml: &str, _effects: &[Hidden]) -> Result<String, HiddenError> {
-    Ok(xml.to_owned())
+pub enum HiddenError {
+    /// The text is not an id and a number.
+    #[error(
+        "hidden effect '{text}': write ID=AMPLITUDE, such as pitch_break=-3.0; known ids: {known}"
+    )]
+    Syntax {
+        /// The text.
+        text: String,
+        /// The known ids.
+        known: String,
+    },
+    /// No effect has that id.
+    #[error("hidden effect '{id}' is not known; known ids: {known}")]
+    Unknown {
+        /// The id asked for.
+        id: String,
+        /// The known ids.
+        known: String,
+    },
+    /// The amplitude is outside what the effect takes.
+    #[error(
+        "hidden effect {id}: amplitude {amplitude} {unit} is outside {min} to {max} {unit}; give one within"
+    )]
+    Amplitude {
+        /// The effect.
+        id: &'static str,
+        /// The amplitude.
+        amplitude: f64,
+        /// Smallest amplitude taken.
+        min: f64,
+        /// Largest amplitude taken.
+        max: f64,
+        /// Unit of the three.
+        unit: &'static str,
+    },
+    /// The delay is not a whole number of steps.
+    #[error(
+        "hidden effect time_delay: {amplitude} s is not a whole number of steps of 0.01 s; give a multiple"
+    )]
+    Delay {
+        /// The delay, s.
+        amplitude: f64,
+    },
+    /// An effect is asked for twice.
+    #[error("hidden effect {id} is given twice; give it once, with the sum")]
+    Twice {
+        /// The effect.
+        id: &'static str,
+    },
+    /// The aircraft's XML has no place for the effect.
+    #[error(
+        "a hidden effect needs {place} in the aircraft's XML, which has none; hide another effect or fly another aircraft"
+    )]
+    Place {
+        /// What was looked for.
+        place: String,
+    },
 }
 
-/// Property with the thrust that hidden effects add, lbf.
-pub(crate) const THRUST_PROPERTY: &str = "greylag/hidden-thrust-lbs";
+fn known() -> String {
+    EFFECTS
+        .iter()
+        .map(|effect| effect.id)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// The aircraft document `xml` with `effects` written into it.
+pub(crate) fn write_into(
+    xml: &str,
+    properties: &Properties,
+    effects: &[Hidden],
+) -> Result<String, HiddenError> {
+    for (i, Hidden { effect, .. }) in effects.iter().enumerate() {
+        if effects[..i]
+            .iter()
+            .any(|earlier| earlier.effect.id == effect.id)
+        {
+            return Err(HiddenError::Twice { id: effect.id });
+        }
+    }
+    let acting: Vec<_> = effects
+        .iter()
+        .filter(|hidden| hidden.amplitude != 0.0)
+        .collect();
+    if acting.is_empty() {
+        return Ok(xml.to_owned());
+    }
+    let mut document = Document::new(xml, properties);
+    for Hidden { effect, amplitude } in acting {
+        (effect.write)(&mut document, *amplitude)?;
+    }
+    document.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_hidden_leaves_the_aircraft_as_it_is_to_the_byte() {
+        let plain = crate::aircraft::read(None, crate::aircraft::BUILT_IN_NAME).unwrap();
+        let written =
+            |effects: &[Hidden]| write_into(&plain, &Properties::default(), effects).unwrap();
+        assert_eq!(written(&[]), plain);
+        let zeros: Vec<Hidden> = EFFECTS
+            .iter()
+            .map(|e| Hidden::new(e.id, 0.0).unwrap())
+            .collect();
+        assert_eq!(written(&zeros), plain);
+        let one = Hidden::new("pitch_break", 1.0).unwrap();
+        assert_ne!(written(&[one]), plain);
+    }
+
+    #[test]
+    fn ids_are_unique_and_zero_is_always_within_bounds() {
+        for (i, effect) in EFFECTS.iter().enumerate() {
+            assert!(
+                EFFECTS[..i].iter().all(|earlier| earlier.id != effect.id),
+                "{}",
+                effect.id
+            );
+            assert!(
+                effect.bounds.0 <= 0.0 && effect.bounds.1 > 0.0,
+                "{}",
+                effect.id
+            );
+        }
+    }
+}

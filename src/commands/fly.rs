@@ -10,6 +10,7 @@ use anyhow::Context;
 use clap::Args;
 use crossbeam_channel::RecvTimeoutError;
 
+use crate::commands::files::shipped;
 use crate::control::{Controller, Kind, build};
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
@@ -66,15 +67,15 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// # Errors
 /// If a file cannot be used, a link cannot be opened or a recording cannot be created; nothing
 /// has been started then.
-pub fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let model = model(&arguments.model, arguments.airframe.as_deref())?;
     let crew = crew(arguments.controller, &model)?;
-    let options = options(&arguments, &model);
+    let options = options(arguments, &model);
     let stop = Arc::new(AtomicBool::new(false));
     let told = stop.clone();
     ctrlc::set_handler(move || told.store(true, Ordering::Relaxed)).context("setting the handler of Ctrl-C")?;
     let flight = Flight::start(&options, crew, stop)?;
-    announce(&arguments, &flight);
+    announce(arguments, &flight);
     show_events(&flight, &arguments.vehicle);
     let summary = flight.join().context("the control thread has died; the recording holds all up to then")?;
     println!("{summary}");
@@ -104,16 +105,11 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Options {
 /// # Errors
 /// If a file cannot be used.
 pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
-    let mut model = GreyBox::load(&located(path))?;
+    let mut model = GreyBox::load(&shipped(path))?;
     if let Some(path) = airframe {
-        model.airframe = Airframe::load(&located(path))?;
+        model.airframe = Airframe::load(&shipped(path))?;
     }
     Ok(model)
-}
-
-fn located(path: &Path) -> PathBuf {
-    let at_home = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
-    if !path.exists() && at_home.exists() { at_home } else { path.to_owned() }
 }
 
 /// A pilot with its controllers: `kind` flies, an LQI of the same model is the fallback.

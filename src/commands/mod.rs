@@ -1,46 +1,50 @@
-//! The subcommands of the program: arguments, then a few lines of work.
+//! Subcommands: arguments, then a few lines of work.
+
+#[cfg(feature = "sitl")]
+mod evaluate;
+mod files;
+pub mod fly;
+#[cfg(feature = "sitl")]
+mod targets;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-/// Names the subcommands: each is a module with `Arguments` and `run(Arguments)`.
-macro_rules! subcommands {
-    ($($(#[$about:meta])* $name:ident => $module:ident,)*) => {
-        $($(#[$about])* pub mod $module;)*
-
-        #[derive(Subcommand)]
-        enum Task { $($(#[$about])* $name($module::Arguments),)* }
-
-        fn run(task: Task) -> anyhow::Result<ExitCode> {
-            match task { $(Task::$name(arguments) => $module::run(arguments),)* }
-        }
-    };
-}
-
-subcommands! {
-    /// Flies a vehicle and serves ground stations and offboard programs.
-    Fly => fly,
-}
-
 /// A MAVLink offboard autopilot companion for fixed-wing aircraft.
 #[derive(Parser)]
-#[command(version)]
-struct CommandLine {
+#[command(name = "greylag", version, max_term_width = 100)]
+struct Arguments {
     #[command(subcommand)]
-    task: Task,
+    command: Command,
 }
 
-/// Reads the command line and does what it says; an error is one line on standard error.
+#[derive(Subcommand)]
+enum Command {
+    /// Score controllers on the target file, flown in JSBSim in this process.
+    #[cfg(feature = "sitl")]
+    Evaluate(evaluate::Arguments),
+    /// Fly a vehicle, serving ground stations and offboard programs.
+    Fly(fly::Arguments),
+    /// Write a target file.
+    #[cfg(feature = "sitl")]
+    Targets(targets::Arguments),
+}
+
+/// Runs the subcommand of the command line; what goes wrong is said in one line.
 pub fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
-    match run(CommandLine::parse().task) {
-        Ok(code) => code,
-        Err(error) => {
-            eprintln!("greylag: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    let result = match Arguments::parse().command {
+        #[cfg(feature = "sitl")]
+        Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Fly(arguments) => fly::run(&arguments),
+        #[cfg(feature = "sitl")]
+        Command::Targets(arguments) => targets::run(&arguments),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("greylag: {error:#}");
+        ExitCode::FAILURE
+    })
 }

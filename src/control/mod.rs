@@ -39,7 +39,7 @@ pub struct Target {
 
 /// A control law, called every 10 ms of vehicle time. It never allocates, blocks or fails:
 /// a controller that cannot be built says so in [`build`].
-pub trait Controller: Send {
+pub trait Controller: Send + Sync {
     /// The name that selects it on the command line.
     fn name(&self) -> &'static str;
     /// Forgets the past (integrators, warm starts), as before take-off or on re-engagement.
@@ -49,4 +49,6 @@ pub trait Controller: Send {
     fn reset(&mut self, seed: u64, bumpless: Command);
     /// The command for this tick.
     fn command(&mut self, seen: &Observation, target: &Target) -> Command;
+    /// Another controller like this one, for another core; the design is not made again.
+    fn boxed_clone(&self) -> Box<dyn Controller>;
 }

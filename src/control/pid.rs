@@ -45,11 +45,12 @@ pub enum Windup {
     Clamped,
 }
 
-/// The gains published with the simulator FW-JSBGym (`pid_eval.py`, read 2026): the yardstick.
+/// The gains published with the simulator FW-JSBGym (its latest `pid_eval`, read 2026; an earlier
+/// version had 1.0, 0, 0.5 for roll and −4, −0.75, −0.1 for pitch): the yardstick.
 pub const PUBLIC: Tuning = Tuning {
     name: "pid",
-    roll: Gains { kp: 1.0, ki: 0.0, kd: 0.5 },
-    pitch: Gains { kp: -4.0, ki: -0.75, kd: -0.1 },
+    roll: Gains { kp: 1.5, ki: 0.1, kd: 0.1 },
+    pitch: Gains { kp: -2.0, ki: -0.3, kd: -0.1 },
     airspeed: Gains { kp: 0.5, ki: 0.1, kd: 0.0 },
     throttle_trim: 0.129_514,
     // 30 degrees
@@ -58,12 +59,13 @@ pub const PUBLIC: Tuning = Tuning {
     windup: Windup::Free,
 };
 
-/// Gains retuned on the `jsbsim` model, at an airspeed that leaves a margin before the stall.
+/// Gains retuned in the simulator (random search over the shipped targets, 240 trials), at an
+/// airspeed that leaves a margin before the stall.
 pub const RETUNED: Tuning = Tuning {
     name: "pid-retuned",
-    roll: Gains { kp: 1.2, ki: 0.6, kd: 0.1 },
-    pitch: Gains { kp: -2.5, ki: -3.0, kd: -0.25 },
-    airspeed: Gains { kp: 0.5, ki: 0.1, kd: 0.0 },
+    roll: Gains { kp: 2.54, ki: 0.59, kd: 0.047 },
+    pitch: Gains { kp: -0.48, ki: -0.52, kd: -0.06 },
+    airspeed: Gains { kp: 0.21, ki: 0.11, kd: 0.0 },
     throttle_trim: 0.2,
     deflection: 0.5235,
     airspeed_override: Some(22.0),
@@ -99,6 +101,10 @@ impl Pid {
 impl Controller for Pid {
     fn name(&self) -> &'static str {
         self.tuning.name
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
     }
 
     fn reset(&mut self, _seed: u64, _bumpless: Command) {

@@ -47,14 +47,23 @@ impl Nodes {
                 property: name.to_owned(),
             })
         };
-        let three = |before: &str, names: [&str; 3], after: &str| -> Result<[NodeId; 3], PlantError> {
-            let [a, b, c] = names.map(|name| node(&format!("{before}{name}{after}")));
-            Ok([a?, b?, c?])
-        };
+        let three =
+            |before: &str, names: [&str; 3], after: &str| -> Result<[NodeId; 3], PlantError> {
+                let [a, b, c] = names.map(|name| node(&format!("{before}{name}{after}")));
+                Ok([a?, b?, c?])
+            };
         let p = &options.properties;
         Ok(Nodes {
-            commands: [node(&p.aileron_command)?, node(&p.elevator_command)?, node(&p.throttle_command)?],
-            positions: [node(&p.aileron_position)?, node(&p.elevator_position)?, node(&p.throttle_position)?],
+            commands: [
+                node(&p.aileron_command)?,
+                node(&p.elevator_command)?,
+                node(&p.throttle_command)?,
+            ],
+            positions: [
+                node(&p.aileron_position)?,
+                node(&p.elevator_position)?,
+                node(&p.throttle_position)?,
+            ],
             attitude: three("attitude/", ["phi", "theta", "psi"], "-rad")?,
             rates: three("velocities/", ["p", "q", "r"], "-rad_sec")?,
             airspeed: node("velocities/vt-fps")?,
@@ -103,7 +112,12 @@ impl Nodes {
     }
 
     /// Puts a freshly loaded aircraft at `start` in the air of `options`.
-    pub(super) fn start(&self, fdm: &mut Fdm, start: &Start, options: &PlantOptions) -> Result<(), Error> {
+    pub(super) fn start(
+        &self,
+        fdm: &mut Fdm,
+        start: &Start,
+        options: &PlantOptions,
+    ) -> Result<(), Error> {
         let wind = options.air.wind_ned_mps;
         let [u, v, w] = start.ground_velocity(wind);
         for (name, value) in [
@@ -187,7 +201,9 @@ impl Nodes {
     }
 
     fn thrust(&self, fdm: &mut Fdm) -> Result<f64, Error> {
-        let hidden = self.hidden_thrust.map_or(Ok(0.0), |node| fdm.read_node(node))?;
+        let hidden = self
+            .hidden_thrust
+            .map_or(Ok(0.0), |node| fdm.read_node(node))?;
         Ok((fdm.read_node(self.thrust)? + hidden) * LBF)
     }
 }
@@ -207,9 +223,19 @@ impl Start {
         let (sin_roll, cos_roll) = self.roll_rad.sin_cos();
         let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
         let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
-        let (ahead, right) = (north * cos_yaw + east * sin_yaw, east * cos_yaw - north * sin_yaw);
-        let (x, below) = (ahead * cos_pitch - down * sin_pitch, ahead * sin_pitch + down * cos_pitch);
-        [x, right * cos_roll + below * sin_roll, below * cos_roll - right * sin_roll]
+        let (ahead, right) = (
+            north * cos_yaw + east * sin_yaw,
+            east * cos_yaw - north * sin_yaw,
+        );
+        let (x, below) = (
+            ahead * cos_pitch - down * sin_pitch,
+            ahead * sin_pitch + down * cos_pitch,
+        );
+        [
+            x,
+            right * cos_roll + below * sin_roll,
+            below * cos_roll - right * sin_roll,
+        ]
     }
 }
 

@@ -113,6 +113,10 @@ impl Controller for Cem {
         "cem"
     }
 
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
+    }
+
     fn reset(&mut self, seed: u64, _bumpless: Command) {
         (self.seed, self.tick) = (seed, 0);
     }

@@ -14,12 +14,15 @@ use schedule::Schedule;
 
 /// Largest rates of the reference, rad/s: commanded steps become ramps that the surfaces can
 /// follow, so the integrators never see a large error.
-const ROLL_RATE: f64 = 1.6;
+const ROLL_RATE: f64 = 0.8;
 const PITCH_RATE: f64 = 0.5;
 /// Time constant that rounds the ramps' ends, s.
-const ROUNDING: f64 = 0.25;
+const ROUNDING: f64 = 0.35;
+/// Incidence (rad, 9.2°) beyond which the nose is pushed down, and by how much elevator (rad) a rad.
+const STALL_ALPHA: f64 = 0.16;
+const STALL_GAIN: f64 = 3.0;
 /// Airspeed loop: per m/s, and per m.
-const AIRSPEED_KP: f64 = 0.15;
+const AIRSPEED_KP: f64 = 0.3;
 const AIRSPEED_KI: f64 = 0.05;
 
 /// The gain-scheduled LQI, designed from any model.
@@ -50,8 +53,10 @@ impl Lqi {
     /// Moves the reference towards the target, and returns it.
     fn follow(&mut self, seen: &Observation, target: &Target) -> [f64; 2] {
         let mut reference = self.reference.unwrap_or([seen.state.roll, seen.state.pitch]);
-        for ((x, wanted), rate) in
-            reference.iter_mut().zip([target.roll, target.pitch]).zip([ROLL_RATE, PITCH_RATE])
+        // too slow for the bank asked for: bank as far as the airspeed allows, and more with it
+        let part = self.schedule.tolerable_part(seen.state.airspeed, target.roll, target.pitch);
+        let wanted = [part * target.roll, target.pitch];
+        for ((x, wanted), rate) in reference.iter_mut().zip(wanted).zip([ROLL_RATE, PITCH_RATE])
         {
             *x += ((wanted - *x) / ROUNDING).clamp(-rate, rate) * STEP;
         }
@@ -74,6 +79,10 @@ impl Lqi {
 impl Controller for Lqi {
     fn name(&self) -> &'static str {
         "lqi"
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
     }
 
     fn reset(&mut self, _seed: u64, _bumpless: Command) {
@@ -110,7 +119,8 @@ impl Controller for Lqi {
             self.integral[0],
             self.integral[1],
         ]);
-        let u = -(entry.gain * x);
+        let mut u = -(entry.gain * x);
+        u[1] += STALL_GAIN * (s.alpha - STALL_ALPHA).max(0.0);
         let raw = [(aileron + u[0]) / self.deflection, (elevator + u[1]) / self.deflection];
         // conditional integration: an axis whose surface is at its stop does not wind up
         for axis in 0..2 {

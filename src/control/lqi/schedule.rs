@@ -10,8 +10,12 @@ use crate::physics::State;
 /// Altitude of the designs, m: the start of an episode.
 const ALTITUDE: f64 = 600.0;
 
-/// Incidence that steady flight should not exceed, rad: half of the stall's 12.3°.
-const COMFORT: f64 = 0.105;
+/// Incidence that steady flight should not exceed, rad (2.9°): a quarter of the stall's 12.3°,
+/// which at 60° of bank asks for 24 m/s.
+const COMFORT: f64 = 0.05;
+
+/// Incidence that no commanded attitude may need, rad (5.2°): the rest is for the transient.
+const TOLERABLE: f64 = 0.09;
 
 /// Equally spaced values of one scheduling variable.
 #[derive(Clone, Copy, Debug)]
@@ -39,11 +43,14 @@ pub(super) struct Entry {
     pub gain: Gain,
 }
 
-/// Entries over the grid, airspeed slowest, with the smallest comfortable airspeed per attitude.
+/// Entries over the grid, airspeed slowest, with the smallest airspeeds per attitude.
 #[derive(Clone, Debug)]
 pub(super) struct Schedule {
     entries: Vec<Entry>,
+    /// Airspeed (m/s) from which on each attitude can be held with a margin before the stall.
     comfortable: Vec<f64>,
+    /// Airspeed (m/s) from which on it can be held at all.
+    tolerable: Vec<f64>,
 }
 
 impl Axis {
@@ -66,26 +73,20 @@ impl Schedule {
     pub(super) fn new(model: &GreyBox) -> Result<Schedule, SetupError> {
         let attitudes = ROLL.count * PITCH.count;
         let columns: Vec<_> = (0..attitudes).into_par_iter().map(|i| column(model, i)).collect();
-        let mut comfortable = Vec::with_capacity(attitudes);
-        for (i, column) in columns.iter().enumerate() {
-            let usable = column.iter().flatten().find(|e| e.steady[5] <= COMFORT);
-            let last = AIRSPEED.value(AIRSPEED.count - 1);
-            let place = column.iter().position(|e| e.is_some_and(|e| e.steady[5] <= COMFORT));
-            comfortable.push(place.map_or(last, |k| AIRSPEED.value(k)));
-            if usable.is_none() {
-                let (roll, pitch) = attitude(i);
-                return Err(SetupError::Design {
-                    model: model.name.clone(),
-                    roll_deg: roll.to_degrees(),
-                    pitch_deg: pitch.to_degrees(),
-                });
-            }
+        if let Some(i) = columns.iter().position(|column| column.iter().all(Option::is_none)) {
+            let (roll, pitch) = attitude(i);
+            return Err(SetupError::Design {
+                model: model.name.clone(),
+                roll_deg: roll.to_degrees(),
+                pitch_deg: pitch.to_degrees(),
+            });
         }
+        let slowest = |alpha| columns.iter().map(|column| slowest(column, alpha)).collect();
         let entries = (0..AIRSPEED.count)
             .flat_map(|k| columns.iter().map(move |column| nearest(column, k)))
             .collect::<Option<Vec<_>>>()
             .unwrap_or_default();
-        Ok(Schedule { entries, comfortable })
+        Ok(Schedule { entries, comfortable: slowest(COMFORT), tolerable: slowest(TOLERABLE) })
     }
 
     /// The entry at `airspeed` (m/s), `roll` and `pitch` (rad), linear between grid points.
@@ -120,10 +121,42 @@ impl Schedule {
 
     /// The airspeed (m/s) from which on the attitude can be held with a margin before the stall.
     pub(super) fn comfortable_airspeed(&self, roll: f64, pitch: f64) -> f64 {
-        let ((i, x), (j, y)) = (ROLL.place(roll), PITCH.place(pitch));
-        let at = |i: usize, j: usize| self.comfortable[i * PITCH.count + j];
-        (at(i, j) * (1.0 - y) + at(i, j + 1) * y) * (1.0 - x)
-            + (at(i + 1, j) * (1.0 - y) + at(i + 1, j + 1) * y) * x
+        over_attitude(&self.comfortable, roll, pitch)
+    }
+
+    /// The part (0..=1) of `roll` that `airspeed` (m/s) allows at `pitch`.
+    pub(super) fn tolerable_part(&self, airspeed: f64, roll: f64, pitch: f64) -> f64 {
+        let allowed = |part: f64| over_attitude(&self.tolerable, part * roll, pitch) <= airspeed;
+        if allowed(1.0) {
+            return 1.0;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..8 {
+            let middle = 0.5 * (low + high);
+            if allowed(middle) { low = middle } else { high = middle }
+        }
+        low
+    }
+}
+
+/// Bilinear interpolation of one number per attitude.
+fn over_attitude(values: &[f64], roll: f64, pitch: f64) -> f64 {
+    let ((i, x), (j, y)) = (ROLL.place(roll), PITCH.place(pitch));
+    let at = |i: usize, j: usize| values[i * PITCH.count + j];
+    (at(i, j) * (1.0 - y) + at(i, j + 1) * y) * (1.0 - x)
+        + (at(i + 1, j) * (1.0 - y) + at(i + 1, j + 1) * y) * x
+}
+
+/// The lowest airspeed (m/s) of a column that needs no more incidence than `alpha` (rad), linear
+/// between designs; the highest of the grid if none does.
+fn slowest(column: &[Option<Entry>], alpha: f64) -> f64 {
+    let needs = |k: usize| column[k].map(|entry| entry.steady[5]);
+    let Some(k) = (0..column.len()).find(|&k| needs(k).is_some_and(|a| a <= alpha)) else {
+        return AIRSPEED.value(AIRSPEED.count - 1);
+    };
+    match k.checked_sub(1).and_then(needs).zip(needs(k)) {
+        Some((slower, here)) => AIRSPEED.value(k) - AIRSPEED.step * (alpha - here) / (slower - here),
+        None => AIRSPEED.value(k),
     }
 }
 

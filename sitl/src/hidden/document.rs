@@ -1,0 +1,352 @@
+//! The XML of an aircraft while hidden effects are written into it.
+
+use super::HiddenError;
+use super::expression::{product, property, sum, value};
+use crate::plant::Properties;
+
+/// Property with the thrust that hidden effects add, lbf.
+pub(crate) const THRUST_PROPERTY: &str = "hidden/thrust-lbs";
+
+/// An axis of JSBSim's aerodynamics.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Axis {
+    Drag,
+    Side,
+    Lift,
+    Roll,
+    Pitch,
+    Yaw,
+}
+
+impl Axis {
+    fn name(self) -> &'static str {
+        match self {
+            Axis::Drag => "DRAG",
+            Axis::Side => "SIDE",
+            Axis::Lift => "LIFT",
+            Axis::Roll => "ROLL",
+            Axis::Pitch => "PITCH",
+            Axis::Yaw => "YAW",
+        }
+    }
+
+    /// Property of the length that makes a moment of a force, ft.
+    fn length(self) -> &'static str {
+        if self == Axis::Pitch {
+            "metrics/cbarw-ft"
+        } else {
+            "metrics/bw-ft"
+        }
+    }
+}
+
+/// A control surface.
+#[derive(Clone, Copy)]
+pub(super) enum Surface {
+    Aileron,
+    Elevator,
+}
+
+const SURFACES: [Surface; 2] = [Surface::Aileron, Surface::Elevator];
+
+impl Surface {
+    fn name(self) -> &'static str {
+        match self {
+            Surface::Aileron => "aileron",
+            Surface::Elevator => "elevator",
+        }
+    }
+}
+
+/// An aircraft's document, and what is still to be written into it.
+pub(super) struct Document<'a> {
+    xml: String,
+    properties: &'a Properties,
+    components: String,
+    passed: usize,
+    factors: Vec<String>,
+    saturation: Option<f64>,
+    thrust: Vec<String>,
+    thrust_offset_ft: Option<f64>,
+}
+
+impl<'a> Document<'a> {
+    pub(super) fn new(xml: &str, properties: &'a Properties) -> Self {
+        Document {
+            xml: xml.to_owned(),
+            properties,
+            components: String::new(),
+            passed: 0,
+            factors: Vec::new(),
+            saturation: None,
+            thrust: Vec::new(),
+            thrust_offset_ft: None,
+        }
+    }
+
+    /// The throttle position.
+    pub(super) fn throttle(&self) -> String {
+        property(&self.properties.throttle_position)
+    }
+
+    /// The deflection of `surface`, rad, as it acts in the end.
+    pub(super) fn deflection(&self, surface: Surface) -> String {
+        property(self.position(surface))
+    }
+
+    fn position(&self, surface: Surface) -> &'a str {
+        match surface {
+            Surface::Aileron => &self.properties.aileron_position,
+            Surface::Elevator => &self.properties.elevator_position,
+        }
+    }
+
+    pub(super) fn has(&self, text: &str) -> bool {
+        self.xml.contains(text)
+    }
+
+    /// Adds the force ½ρV²S · `amplitude` · `terms`.
+    pub(super) fn force(
+        &mut self,
+        axis: Axis,
+        name: &str,
+        amplitude: f64,
+        terms: &[String],
+    ) -> Done {
+        let mut all = vec![
+            property("aero/qbar-psf"),
+            property("metrics/Sw-sqft"),
+            value(amplitude),
+        ];
+        all.extend_from_slice(terms);
+        self.function(axis, name, &product(&all))
+    }
+
+    /// Adds the moment ½ρV²S · length · `amplitude` · `terms`.
+    pub(super) fn moment(
+        &mut self,
+        axis: Axis,
+        name: &str,
+        amplitude: f64,
+        terms: &[String],
+    ) -> Done {
+        let mut all = vec![property(axis.length())];
+        all.extend_from_slice(terms);
+        self.force(axis, name, amplitude, &all)
+    }
+
+    /// Adds a function to an axis, in lbf or lbf ft.
+    pub(super) fn function(&mut self, axis: Axis, name: &str, expression: &str) -> Done {
+        let end = self.axis(axis)?.end;
+        let function = format!("<function name=\"hidden/{name}\">{expression}</function>\n");
+        self.xml.insert_str(end, &function);
+        Ok(())
+    }
+
+    /// Passes both deflections through a flight-control component before they act.
+    pub(super) fn pass_deflections(&mut self, component: &str, settings: &str) {
+        for surface in SURFACES {
+            let (input, name) = (
+                self.passed_name(surface, self.passed),
+                self.passed_name(surface, self.passed + 1),
+            );
+            self.components += &format!(
+                "<{component} name=\"{name}\"><input>{input}</input>{settings}</{component}>\n"
+            );
+        }
+        self.passed += 1;
+    }
+
+    /// The property of a deflection behind `passed` components.
+    fn passed_name(&self, surface: Surface, passed: usize) -> String {
+        match passed {
+            0 => self.position(surface).to_owned(),
+            _ => format!("hidden/{}-{passed}", surface.name()),
+        }
+    }
+
+    /// Multiplies both deflections by `factor` where they act.
+    pub(super) fn scale_deflections(&mut self, factor: String) {
+        self.factors.push(factor);
+    }
+
+    /// Makes deflections act as δ (1 + `cubic` δ²) in roll and in pitch.
+    pub(super) fn saturate(&mut self, cubic: f64) {
+        self.saturation = Some(cubic);
+    }
+
+    /// Adds a force along the thrust, lbf.
+    pub(super) fn add_thrust(&mut self, expression: String) {
+        self.thrust.push(expression);
+    }
+
+    /// Lets the whole thrust act `arm_ft` below the centre of gravity.
+    pub(super) fn offset_thrust(&mut self, arm_ft: f64) {
+        self.thrust_offset_ft = Some(arm_ft);
+    }
+
+    /// Moves the centre of gravity aft by `aft`, m.
+    pub(super) fn shift_cg(&mut self, aft: f64) -> Done {
+        let place = || HiddenError::Place {
+            place: "<location name=\"CG\"> with an <x>".to_owned(),
+        };
+        let at = self.xml.find("name=\"CG\"").ok_or_else(place)?;
+        let tag = self.xml[at..].find('>').ok_or_else(place)? + at;
+        let unit = self.xml[at..tag].to_owned();
+        let per_metre = match () {
+            () if unit.contains("\"M\"") => 1.0,
+            () if unit.contains("\"FT\"") => 1.0 / 0.3048,
+            () => 1.0 / 0.0254,
+        };
+        self.change_after(tag, "x", |x, _| x + aft * per_metre)
+    }
+
+    /// Replaces the number in the first element `name`, given the number and the opening tag.
+    pub(super) fn change(&mut self, name: &str, new: impl Fn(f64, &str) -> f64) -> Done {
+        self.change_after(0, name, new)
+    }
+
+    fn change_after(&mut self, from: usize, name: &str, new: impl Fn(f64, &str) -> f64) -> Done {
+        let place = || HiddenError::Place {
+            place: format!("a number in <{name}>"),
+        };
+        let tag = self.find_tag(from, name).ok_or_else(place)?;
+        let open = self.xml[tag..].find('>').ok_or_else(place)? + tag + 1;
+        let close = self.xml[open..].find('<').ok_or_else(place)? + open;
+        let number: f64 = self.xml[open..close].trim().parse().map_err(|_| place())?;
+        let changed = new(number, &self.xml[tag..open]);
+        self.xml.replace_range(open..close, &format!(" {changed} "));
+        Ok(())
+    }
+
+    /// Where the tag `<name` begins.
+    fn find_tag(&self, from: usize, name: &str) -> Option<usize> {
+        let tag = format!("<{name}");
+        self.xml[from..]
+            .match_indices(&tag)
+            .map(|(at, _)| at + from)
+            .find(|at| self.xml[at + tag.len()..].starts_with([' ', '>', '\t', '\n', '\r']))
+    }
+
+    /// The inside of an aerodynamic axis.
+    fn axis(&self, axis: Axis) -> Result<std::ops::Range<usize>, HiddenError> {
+        let name = format!("<axis name=\"{}\"", axis.name());
+        let place = || HiddenError::Place {
+            place: format!("{name}>"),
+        };
+        let start = self.xml.find(&name).ok_or_else(place)?;
+        let length = self.xml[start..].find("</axis>").ok_or_else(place)?;
+        Ok(start..start + length)
+    }
+
+    /// The document with everything written into it.
+    pub(super) fn finish(mut self) -> Result<String, HiddenError> {
+        self.write_thrust()?;
+        if self.passed > 0 {
+            let channel = format!("<channel name=\"hidden\">\n{}</channel>\n", self.components);
+            self.insert_before("</flight_control>", &channel)?;
+        }
+        for surface in SURFACES {
+            self.write_deflection(surface)?;
+        }
+        Ok(self.xml)
+    }
+
+    fn write_thrust(&mut self) -> Done {
+        let mut whole = vec![property("propulsion/engine/thrust-lbs")];
+        if !self.thrust.is_empty() {
+            whole.push(property(THRUST_PROPERTY));
+            let force = format!(
+                "<external_reactions><force name=\"hidden_thrust\" frame=\"BODY\">\
+                 <function name=\"{THRUST_PROPERTY}\">{}</function>\
+                 <location unit=\"IN\"><x>0</x><y>0</y><z>0</z></location>\
+                 <direction><x>1</x><y>0</y><z>0</z></direction></force></external_reactions>\n",
+                sum(&self.thrust)
+            );
+            self.insert_before("</fdm_config>", &force)?;
+        }
+        let Some(arm) = self.thrust_offset_ft else {
+            return Ok(());
+        };
+        self.function(
+            Axis::Pitch,
+            "thrust-line-offset",
+            &product(&[value(arm), sum(&whole)]),
+        )
+    }
+
+    /// Lets the aerodynamics read what the effects make of a deflection.
+    fn write_deflection(&mut self, surface: Surface) -> Done {
+        let mut name = self.passed_name(surface, self.passed);
+        let mut functions = String::new();
+        if !self.factors.is_empty() {
+            let scaled = format!("hidden/{}-scaled", surface.name());
+            let terms = [vec![property(&name)], self.factors.clone()].concat();
+            functions += &format!(
+                "<function name=\"{scaled}\">{}</function>\n",
+                product(&terms)
+            );
+            name = scaled;
+        }
+        if let Some(cubic) = self.saturation {
+            let saturated = format!("hidden/{}-saturated", surface.name());
+            let square = product(&[value(cubic), property(&name), property(&name)]);
+            let terms = [property(&name), sum(&[value(1.0), square])];
+            functions += &format!(
+                "<function name=\"{saturated}\">{}</function>\n",
+                product(&terms)
+            );
+            for axis in [Axis::Roll, Axis::Pitch] {
+                let range = self.axis(axis)?;
+                self.rename(range, self.position(surface), &saturated);
+            }
+        }
+        let (start, end) = self.aerodynamics()?;
+        self.rename(start..end, self.position(surface), &name);
+        self.xml.insert_str(start, &functions);
+        Ok(())
+    }
+
+    /// Where the inside of `<aerodynamics>` begins and ends.
+    fn aerodynamics(&self) -> Result<(usize, usize), HiddenError> {
+        let place = || HiddenError::Place {
+            place: "<aerodynamics>".to_owned(),
+        };
+        let tag = self.find_tag(0, "aerodynamics").ok_or_else(place)?;
+        let start = self.xml[tag..].find('>').ok_or_else(place)? + tag + 1;
+        let end = self.xml[start..]
+            .find("</aerodynamics>")
+            .ok_or_else(place)?
+            + start;
+        Ok((start, end))
+    }
+
+    /// Renames a property within `range`, where it stands alone.
+    fn rename(&mut self, range: std::ops::Range<usize>, from: &str, to: &str) {
+        let part = |c: char| c.is_ascii_alphanumeric() || "_-/[]".contains(c);
+        let old = &self.xml[range.clone()];
+        let mut new = String::with_capacity(old.len());
+        let mut rest = old;
+        while let Some(at) = rest.find(from) {
+            let (before, after) = (&rest[..at], &rest[at + from.len()..]);
+            let alone = !before.ends_with(part) && !after.starts_with(part);
+            new += before;
+            new += if alone { to } else { from };
+            rest = after;
+        }
+        new += rest;
+        self.xml.replace_range(range, &new);
+    }
+
+    fn insert_before(&mut self, tag: &str, text: &str) -> Done {
+        let place = || HiddenError::Place {
+            place: tag.to_owned(),
+        };
+        let at = self.xml.rfind(tag).ok_or_else(place)?;
+        self.xml.insert_str(at, text);
+        Ok(())
+    }
+}
+
+/// The result of an edit.
+type Done = Result<(), HiddenError>;

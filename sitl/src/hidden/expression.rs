@@ -1,0 +1,26 @@
+//! Expressions of JSBSim's functions, as XML.
+
+/// The expression `<property>name</property>`.
+pub(super) fn property(name: &str) -> String {
+    format!("<property>{name}</property>")
+}
+
+/// The expression of a constant.
+pub(super) fn value(x: f64) -> String {
+    format!("<value>{x}</value>")
+}
+
+/// The product of expressions.
+pub(super) fn product(terms: &[String]) -> String {
+    format!("<product>{}</product>", terms.concat())
+}
+
+/// The sum of expressions.
+pub(super) fn sum(terms: &[String]) -> String {
+    format!("<sum>{}</sum>", terms.concat())
+}
+
+/// The magnitude of an expression.
+pub(super) fn abs(term: String) -> String {
+    format!("<abs>{term}</abs>")
+}

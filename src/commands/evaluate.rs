@@ -1,0 +1,164 @@
+//! `greylag evaluate`: score controllers on the target file.
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use comfy_table::Table;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use greylag_sitl::plant::PlantOptions;
+
+use crate::commands::files::{self, shipped};
+use crate::control::{self, Kind};
+use crate::model::GreyBox;
+use crate::sim::evaluation::{Evaluation, evaluate};
+use crate::sim::{Group, TargetFile};
+
+/// Options of `greylag evaluate`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Controllers to score: pid, pid-retuned, lqi, cem.
+    #[arg(long = "controller", num_args = 1.., required = true, value_parser = parse_kind)]
+    controllers: Vec<Kind>,
+    /// Models that the controllers are designed from or plan with.
+    #[arg(long = "model", num_args = 1.., default_values_os_t = [PathBuf::from("params/x8/jsbsim.toml")])]
+    models: Vec<PathBuf>,
+    /// Targets to fly.
+    #[arg(long, default_value = "params/targets.csv")]
+    targets: PathBuf,
+    /// Only these groups of targets.
+    #[arg(long = "group", num_args = 1.., value_parser = parse_group)]
+    groups: Vec<Group>,
+    /// Seed of the controllers' own randomness.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder of another JSBSim aircraft; it holds NAME/NAME.xml.
+    #[arg(long, requires = "aircraft")]
+    aircraft_dir: Option<PathBuf>,
+    /// Its name.
+    #[arg(long, requires = "aircraft_dir")]
+    aircraft: Option<String>,
+    /// Write the scores as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Replace the JSON file if it exists.
+    #[arg(long)]
+    force: bool,
+}
+
+/// The JSON document.
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'static str,
+    program: &'static str,
+    seed: u64,
+    targets: String,
+    aircraft: &'a str,
+    controllers: &'a [Evaluation],
+}
+
+fn parse_kind(name: &str) -> Result<Kind, String> {
+    name.parse().map_err(|e: control::SetupError| e.to_string())
+}
+
+fn parse_group(name: &str) -> Result<Group, String> {
+    let found = Group::ALL.into_iter().find(|g| g.name() == name);
+    found.ok_or_else(|| format!("the groups are {}", Group::ALL.map(Group::name).join(", ")))
+}
+
+/// Flies, prints the table, writes the JSON.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let overwrite = arguments.force.into();
+    if let Some(path) = &arguments.json {
+        files::writable(path, overwrite)?;
+    }
+    let mut targets = TargetFile::load(&shipped(&arguments.targets))?;
+    if !arguments.groups.is_empty() {
+        targets.rows.retain(|row| arguments.groups.contains(&row.group));
+    }
+    let plant = plant(arguments);
+    let models = arguments
+        .models
+        .iter()
+        .map(|path| GreyBox::load(&shipped(path)).map_err(Into::into))
+        .collect::<Result<Vec<_>>>()?;
+    let mut evaluations = Vec::new();
+    for kind in &arguments.controllers {
+        for model in &models {
+            evaluations.push(one(arguments, *kind, model, &targets, &plant)?);
+        }
+    }
+    println!("{}", table(&evaluations));
+    if let Some(path) = &arguments.json {
+        let document = Document {
+            schema: "greylag.evaluation/1",
+            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+            seed: arguments.seed,
+            targets: arguments.targets.display().to_string(),
+            aircraft: &plant.aircraft,
+            controllers: &evaluations,
+        };
+        files::write(path, &(serde_json::to_string_pretty(&document)? + "\n"), overwrite)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn plant(arguments: &Arguments) -> PlantOptions {
+    let default = PlantOptions::default();
+    PlantOptions {
+        aircraft_dir: arguments.aircraft_dir.clone(),
+        aircraft: arguments.aircraft.clone().unwrap_or(default.aircraft.clone()),
+        ..default
+    }
+}
+
+fn one(
+    arguments: &Arguments,
+    kind: Kind,
+    model: &GreyBox,
+    targets: &TargetFile,
+    plant: &PlantOptions,
+) -> Result<Evaluation> {
+    let controller = control::build(kind, model)?;
+    let make = || controller.boxed_clone();
+    let progress = progress(targets.rows.len() as u64, &format!("{kind} on {}", model.name));
+    let outcomes = evaluate(plant, &make, &targets.rows, arguments.seed, &|| progress.inc(1))
+        .with_context(|| format!("cannot fly aircraft {}", plant.aircraft))?;
+    progress.finish_and_clear();
+    Ok(Evaluation::new(kind.name(), &model.name, &targets.rows, &outcomes))
+}
+
+/// A bar on a terminal, one plain line elsewhere.
+fn progress(length: u64, what: &str) -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        eprintln!("flying {length} targets with {what}");
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(length).with_message(what.to_owned());
+    match ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta} left") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+fn table(evaluations: &[Evaluation]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header([
+        "controller", "model", "targets", "n", "mean °", "median °", "IQM °", "max °", "diverged %", "ms/step p50", "p99", "p99.9",
+    ]);
+    for e in evaluations {
+        for s in &e.groups {
+            let cost = [e.ms_per_step.p50, e.ms_per_step.p99, e.ms_per_step.p999];
+            let mut row = vec![e.controller.clone(), e.model.clone(), s.targets.clone(), s.count.to_string()];
+            row.extend([s.mean_deg, s.median_deg, s.iqm_deg, s.max_deg].map(|x| format!("{x:.3}")));
+            row.push(format!("{:.1}", 100.0 * s.divergence_rate));
+            row.extend(cost.map(|x| format!("{x:.4}")));
+            table.add_row(row);
+        }
+    }
+    table
+}

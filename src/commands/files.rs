@@ -1,0 +1,55 @@
+//! Finding the shipped files, and writing new ones without overwriting.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+/// A path as given, or, if there is no such file below the working folder, the one of that name in
+/// the source tree that the program was built from.
+pub fn shipped(path: &Path) -> PathBuf {
+    let built = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    if !path.exists() && built.exists() { built } else { path.into() }
+}
+
+/// Whether an existing file may be replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overwrite {
+    /// Keep it and say so.
+    Never,
+    /// Replace it (`--force`).
+    Force,
+}
+
+impl From<bool> for Overwrite {
+    fn from(force: bool) -> Self {
+        if force { Overwrite::Force } else { Overwrite::Never }
+    }
+}
+
+/// Fails at once if `path` may not be written later, so that no long work is lost to it.
+pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
+    if overwrite == Overwrite::Never && path.exists() {
+        bail!("{} exists; name another file, or give --force to replace it", path.display());
+    }
+    Ok(())
+}
+
+/// Writes a whole file at once: it is there complete, or not at all.
+pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
+    writable(path, overwrite)?;
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let save = || -> Result<()> {
+        let mut file = tempfile::NamedTempFile::new_in(folder)?;
+        file.write_all(content.as_bytes())?;
+        match overwrite {
+            Overwrite::Never => file.persist_noclobber(path)?,
+            Overwrite::Force => file.persist(path)?,
+        };
+        Ok(())
+    };
+    save().with_context(|| format!("cannot write {}", path.display()))
+}

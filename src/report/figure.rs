@@ -1,0 +1,90 @@
+//! The kinds of figure a section may hold.
+
+use serde::Serialize;
+
+use super::html::escape;
+use super::{Histogram, Table, TimeFigure, XyFigure};
+
+/// One figure of a section.
+#[derive(Clone, Debug)]
+pub enum Figure {
+    /// A sentence that says how it went.
+    Verdict(Verdict),
+    /// Panels over time.
+    Time(TimeFigure),
+    /// Points or paths of one quantity against another.
+    Xy(XyFigure),
+    /// Counts of one quantity.
+    Histogram(Histogram),
+    /// Rows and columns of text.
+    Table(Table),
+}
+
+/// How a verdict came out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// What was asked for was reached.
+    Reached,
+    /// Something that was asked for was missed.
+    Missed,
+    /// Nothing was asked for, or it cannot be told.
+    Open,
+}
+
+/// A sentence that says how it went, with the details that bear it out.
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// How it came out; shown as a word as well as a colour.
+    pub outcome: Outcome,
+    /// The sentence.
+    pub sentence: String,
+    /// Shorter lines under it, in order.
+    pub details: Vec<String>,
+}
+
+impl Verdict {
+    pub(super) fn html(&self) -> String {
+        let (class, word) = match self.outcome {
+            Outcome::Reached => ("reached", "Reached"),
+            Outcome::Missed => ("missed", "Missed"),
+            Outcome::Open => ("open", "Open"),
+        };
+        let details: String = self
+            .details
+            .iter()
+            .map(|d| format!("<li>{}</li>", escape(d)))
+            .collect();
+        let list = if details.is_empty() {
+            details
+        } else {
+            format!("<ul>{details}</ul>")
+        };
+        format!(
+            "<div class=\"verdict {class}\"><span class=\"outcome\">{word}</span><p>{}</p>{list}</div>\n",
+            escape(&self.sentence)
+        )
+    }
+}
+
+/// What a line or a point stands for; each has a colour that a colour-blind reader can tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Style {
+    /// What was asked for: orange, dashed.
+    Command,
+    /// What happened: blue.
+    Actual,
+    /// A second thing that happened: green.
+    Second,
+    /// A third thing that happened: purple.
+    Third,
+}
+
+/// A straight line at one value, such as a budget or a percentile.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rule {
+    /// Where, in the unit of the axis.
+    pub value: f64,
+    /// What it is, a word or two.
+    pub label: String,
+}

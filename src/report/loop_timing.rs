@@ -1,0 +1,83 @@
+//! How long each cycle of the control loop took.
+
+/// One cycle of the control loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cycle {
+    /// When it ended, s, on the flight's clock.
+    pub time_s: f64,
+    /// How long it took, µs.
+    pub duration_us: f64,
+}
+
+/// How long each cycle of the control loop took.
+#[derive(Clone, Debug)]
+pub struct LoopTiming {
+    /// What was timed, such as "state frame to actuator command".
+    pub measure: String,
+    /// What a cycle may take, µs; a cycle that takes longer is late.
+    pub budget_us: f64,
+    /// The cycles, in time order.
+    pub cycles: Vec<Cycle>,
+}
+
+impl LoopTiming {
+    /// Number of cycles that took longer than the budget.
+    pub fn late(&self) -> usize {
+        self.cycles
+            .iter()
+            .filter(|c| c.duration_us > self.budget_us)
+            .count()
+    }
+
+    /// The duration, µs, that each share (0..1) of the cycles did not exceed, by nearest rank; NaN
+    /// without cycles.
+    pub fn percentiles_us<const N: usize>(&self, shares: [f64; N]) -> [f64; N] {
+        let mut sorted: Vec<f64> = self
+            .cycles
+            .iter()
+            .map(|c| c.duration_us)
+            .filter(|d| d.is_finite())
+            .collect();
+        sorted.sort_by(f64::total_cmp);
+        shares.map(|share| {
+            let rank = (share * sorted.len() as f64).ceil() as usize;
+            sorted
+                .get(rank.saturating_sub(1))
+                .copied()
+                .unwrap_or(f64::NAN)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn timing(durations_us: impl IntoIterator<Item = f64>) -> LoopTiming {
+        let cycle = |duration_us| Cycle {
+            time_s: 0.0,
+            duration_us,
+        };
+        LoopTiming {
+            measure: "test".into(),
+            budget_us: 990.0,
+            cycles: durations_us.into_iter().map(cycle).collect(),
+        }
+    }
+
+    #[test]
+    fn percentiles_are_nearest_ranks() {
+        // 1..=1000: the value is its own rank, so each percentile can be read off.
+        let timing = timing((1..=1000).rev().map(f64::from));
+        assert_eq!(
+            timing.percentiles_us([0.5, 0.99, 0.999, 1.0]),
+            [500.0, 990.0, 999.0, 1000.0]
+        );
+        assert_eq!(timing.late(), 10);
+    }
+
+    #[test]
+    fn no_cycle_has_no_percentile() {
+        assert!(timing([]).percentiles_us([0.5])[0].is_nan());
+    }
+}

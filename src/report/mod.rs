@@ -1,0 +1,33 @@
+//! The report: figures and tables of a flight as one HTML file that needs no network.
+//!
+//! A [`Page`] is a title over [`Section`]s, a section holds [`Figure`]s in order, and
+//! [`Page::render`] turns them into one string with style, script and data inside.
+//! [`FlightReport`] is the page of one flight. The plots are drawn in the reader's browser by
+//! uPlot 1.6.32 (MIT, `assets/uPlot.LICENSE`), which is embedded.
+//!
+//! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
+
+mod decimate;
+mod figure;
+mod flight;
+mod flight_page;
+mod flight_targets;
+mod flight_verdict;
+mod histogram;
+mod html;
+mod loop_timing;
+mod page;
+mod table;
+mod time_figure;
+mod write;
+mod xy;
+
+pub use figure::{Figure, Outcome, Rule, Style, Verdict};
+pub use flight::{Difficulty, Event, EventKind, FlightReport, Segment, SurfaceTravel};
+pub use histogram::Histogram;
+pub use loop_timing::{Cycle, LoopTiming};
+pub use page::{Page, Section};
+pub use table::{Align, Column, Row, Table};
+pub use time_figure::{Band, Mark, Panel, Scale, Series, TimeFigure, Track};
+pub use write::{WriteError, write_new, write_over};
+pub use xy::{XyFigure, XyMark, XySeries};

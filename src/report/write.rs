@@ -1,0 +1,80 @@
+//! Files written whole or not at all.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::{Builder, NamedTempFile};
+
+/// Why a file was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// A file of that name stands there.
+    #[error("{path} is already there, and was left as it is: choose another name, or move it away")]
+    Exists {
+        /// The file that was asked for.
+        path: PathBuf,
+    },
+    /// The folder or the disk refused.
+    #[error(
+        "writing {path}: {source}; check that its folder exists, can be written to and has room"
+    )]
+    Io {
+        /// The file that was asked for.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// Writes `text` to `path`, which must not exist yet: [`WriteError::Exists`] otherwise. A reader
+/// never sees half of it.
+pub fn write_new(path: &Path, text: &str) -> Result<(), WriteError> {
+    let file = written_beside(path, text).map_err(|source| io_error(path, source))?;
+    file.persist_noclobber(path)
+        .map(sync)
+        .map_err(|e| match e.error.kind() {
+            io::ErrorKind::AlreadyExists => WriteError::Exists { path: path.into() },
+            _ => io_error(path, e.error),
+        })
+}
+
+/// Writes `text` to `path` in place of any file there. A reader sees the old file or the new one.
+pub fn write_over(path: &Path, text: &str) -> Result<(), WriteError> {
+    let file = written_beside(path, text).map_err(|source| io_error(path, source))?;
+    file.persist(path)
+        .map(sync)
+        .map_err(|e| io_error(path, e.error))
+}
+
+fn io_error(path: &Path, source: io::Error) -> WriteError {
+    WriteError::Io {
+        path: path.into(),
+        source,
+    }
+}
+
+/// The text in a temporary file of the same folder, so that renaming it is atomic.
+fn written_beside(path: &Path, text: &str) -> io::Result<NamedTempFile> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = Builder::new();
+    builder.prefix(".greylag-").suffix(".part");
+    // A temporary file is private by default; a report is as readable as the umask lets it be.
+    #[cfg(unix)]
+    let everyone: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+    #[cfg(unix)]
+    builder.permissions(everyone);
+    let mut file = builder.tempfile_in(folder)?;
+    file.write_all(text.as_bytes())?;
+    Ok(file)
+}
+
+/// Asks the disk to keep the file; a disk that cannot is no reason to call the report unwritten.
+fn sync(file: File) {
+    if let Err(error) = file.sync_all() {
+        tracing::warn!("a written file could not be synced to disk: {error}");
+    }
+}

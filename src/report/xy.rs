@@ -1,0 +1,60 @@
+//! One quantity against another, as points or as a path.
+
+use serde::Serialize;
+
+use super::Style;
+use super::html::{compact, escape};
+
+/// A pair of axes with points or paths.
+#[derive(Clone, Debug, Serialize)]
+pub struct XyFigure {
+    /// What is shown.
+    #[serde(skip)]
+    pub title: String,
+    /// Name of the horizontal axis, with its unit.
+    pub x_label: String,
+    /// Name of the vertical axis, with its unit.
+    pub y_label: String,
+    /// What is drawn, in drawing order.
+    pub series: Vec<XySeries>,
+}
+
+/// Points of one kind.
+#[derive(Clone, Debug, Serialize)]
+pub struct XySeries {
+    /// Its name in the legend.
+    pub label: String,
+    /// What it stands for.
+    pub style: Style,
+    /// How it is drawn.
+    pub mark: XyMark,
+    /// Horizontal values; a pair with a value that is not finite breaks a path.
+    #[serde(serialize_with = "compact")]
+    pub x: Vec<f64>,
+    /// Vertical values, as many as horizontal ones.
+    #[serde(serialize_with = "compact")]
+    pub y: Vec<f64>,
+}
+
+/// How points are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum XyMark {
+    /// A thin line through them.
+    Path,
+    /// Open circles.
+    Circles,
+    /// Crosses.
+    Crosses,
+}
+
+impl XyFigure {
+    pub(super) fn html(&self, index: usize) -> String {
+        let title = escape(&self.title);
+        format!(
+            "<figure class=\"panel xy\"><figcaption><h3>{title}</h3></figcaption>\
+             <div class=\"plot\" data-figure=\"{index}\" tabindex=\"0\" role=\"img\" \
+             aria-label=\"{title}\"></div></figure>\n"
+        )
+    }
+}

@@ -1,0 +1,140 @@
+//! Many episodes on all cores, summed up by group of targets.
+
+use std::time::Duration;
+
+use greylag_sitl::plant::PlantOptions;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::control::{Controller, Target};
+use crate::num::statistics::{interquartile_mean, mean, quantile};
+use crate::physics::State;
+use crate::sim::episode::DIVERGED_DEG;
+use crate::sim::targets::Row;
+use crate::sim::{Episode, Group, Outcome, Simulator, Trouble};
+
+/// What a controller reached on the targets.
+#[derive(Clone, Debug, Serialize)]
+pub struct Evaluation {
+    /// The controller's name.
+    pub controller: String,
+    /// The model it was designed from or plans with.
+    pub model: String,
+    /// Scores by group; `all` is easy with the hard corners, the 240 of the paper's Table II.
+    pub groups: Vec<Score>,
+    /// Time per step.
+    pub ms_per_step: Cost,
+}
+
+/// The score of one group of targets.
+#[derive(Clone, Debug, Serialize)]
+pub struct Score {
+    /// The group's name.
+    pub targets: String,
+    /// Number of targets.
+    pub count: usize,
+    /// Mean settled error, degrees.
+    pub mean_deg: f64,
+    /// Median settled error, degrees.
+    pub median_deg: f64,
+    /// Interquartile mean of the settled error, degrees.
+    pub iqm_deg: f64,
+    /// Largest settled error, degrees.
+    pub max_deg: f64,
+    /// Share of targets with more than 10° of settled error.
+    pub divergence_rate: f64,
+}
+
+/// Quantiles of the time a controller needs for one step, ms.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Cost {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// 99.9th percentile.
+    pub p999: f64,
+}
+
+/// Flies `rows` in JSBSim with clones of a controller, on all cores; `done` is called after each.
+///
+/// # Errors
+/// If the plant cannot be built or reset.
+pub fn evaluate(
+    plant: &PlantOptions,
+    make: &(dyn Fn() -> Box<dyn Controller> + Sync),
+    rows: &[Row],
+    seed: u64,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Outcome>, Trouble> {
+    rows.par_iter()
+        .enumerate()
+        .map_init(
+            || Simulator::new(plant).map(|simulator| (simulator, make())),
+            |worker, (index, row)| {
+                let (environment, controller) = match worker {
+                    Ok(worker) => worker,
+                    Err(_) => return Err(Simulator::new(plant).map(|_| ()).unwrap_err()),
+                };
+                let target = Target {
+                    roll: row.roll_deg.to_radians(),
+                    pitch: row.pitch_deg.to_radians(),
+                    airspeed: State::NEUTRAL.airspeed,
+                };
+                let seed = seed.wrapping_add(index as u64);
+                let episode = Episode { environment, controller: controller.as_mut(), seed };
+                let outcome = episode.fly(&target, |_, _| ())?;
+                done();
+                Ok(outcome)
+            },
+        )
+        .collect()
+}
+
+impl Evaluation {
+    /// Sums up `outcomes` of `rows`.
+    pub fn new(controller: &str, model: &str, rows: &[Row], outcomes: &[Outcome]) -> Evaluation {
+        let of = |wanted: &dyn Fn(Group) -> bool| -> Vec<f64> {
+            let pairs = rows.iter().zip(outcomes).filter(|(row, _)| wanted(row.group));
+            pairs.map(|(_, outcome)| outcome.settled_deg).collect()
+        };
+        let mut groups: Vec<Score> = Group::ALL
+            .into_iter()
+            .map(|group| Score::new(group.name(), &of(&|g| g == group)))
+            .collect();
+        groups.push(Score::new("all", &of(&|g| g != Group::HardOutside)));
+        groups.retain(|score| score.count > 0);
+        let cost: Vec<f64> =
+            outcomes.iter().flat_map(|o| &o.cost).map(|d: &Duration| d.as_secs_f64() * 1e3).collect();
+        Evaluation {
+            controller: controller.into(),
+            model: model.into(),
+            groups,
+            ms_per_step: Cost {
+                p50: quantile(&cost, 0.5),
+                p99: quantile(&cost, 0.99),
+                p999: quantile(&cost, 0.999),
+            },
+        }
+    }
+
+    /// The score of the group of that name.
+    pub fn score(&self, targets: &str) -> Option<&Score> {
+        self.groups.iter().find(|score| score.targets == targets)
+    }
+}
+
+impl Score {
+    fn new(targets: &str, errors: &[f64]) -> Score {
+        let diverged = errors.iter().filter(|e| **e > DIVERGED_DEG).count();
+        Score {
+            targets: targets.into(),
+            count: errors.len(),
+            mean_deg: mean(errors),
+            median_deg: quantile(errors, 0.5),
+            iqm_deg: interquartile_mean(errors),
+            max_deg: quantile(errors, 1.0),
+            divergence_rate: diverged as f64 / errors.len() as f64,
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The targets that controllers are scored on: a fixed, seeded file.
+
+use std::path::Path;
+
+use rand::RngExt;
+use serde::{Deserialize, Serialize};
+
+use crate::num::stream;
+
+/// How hard a target is, Table II of \[GSFM26\] in both its readings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Group {
+    /// |roll| < 45° with |pitch| < 25°.
+    Easy,
+    /// |roll| in 45..60° with |pitch| in 25..30°: all four corners.
+    HardCorners,
+    /// Within 60° and 30°, anywhere outside the easy box.
+    HardOutside,
+}
+
+/// A commanded attitude to score.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Which group it belongs to.
+    pub group: Group,
+    /// Commanded roll, degrees.
+    pub roll_deg: f64,
+    /// Commanded pitch, degrees.
+    pub pitch_deg: f64,
+}
+
+/// The target file: 140 easy, 100 hard in the corners, 100 hard outside the easy box.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TargetFile {
+    /// The targets, in the file's order.
+    pub rows: Vec<Row>,
+}
+
+/// Why a target file could not be read.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot read the target file {path}: {why}. It needs the columns group,roll_deg,pitch_deg; `greylag targets` writes one")]
+pub struct TargetError {
+    path: String,
+    why: String,
+}
+
+impl Group {
+    /// Every group.
+    pub const ALL: [Group; 3] = [Group::Easy, Group::HardCorners, Group::HardOutside];
+
+    /// Its name in tables and JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Group::Easy => "easy",
+            Group::HardCorners => "hard_corners",
+            Group::HardOutside => "hard_outside",
+        }
+    }
+}
+
+impl TargetFile {
+    /// The file of `seed`: rounded to 0.01°, stratified in a 14 × 10 grid for the easy ones.
+    pub fn generate(seed: u64) -> TargetFile {
+        let mut rng = stream::stream(seed, &[240]);
+        let mut rows = Vec::new();
+        let round = |x: f64| (x * 100.0).round() / 100.0;
+        let mut push = |group, roll: f64, pitch: f64| {
+            rows.push(Row { group, roll_deg: round(roll), pitch_deg: round(pitch) });
+        };
+        for i in 0..140 {
+            let cell = |k: usize, count: usize, x: f64| (k as f64 + x) / count as f64;
+            let roll = -45.0 + 90.0 * cell(i % 14, 14, rng.random_range(0.0..1.0));
+            let pitch = -25.0 + 50.0 * cell(i / 14, 10, rng.random_range(0.0..1.0));
+            push(Group::Easy, roll.clamp(-44.99, 44.99), pitch.clamp(-24.99, 24.99));
+        }
+        for i in 0..100 {
+            let (right, up) = (if i % 2 == 0 { 1.0 } else { -1.0 }, if i / 2 % 2 == 0 { 1.0 } else { -1.0 });
+            let (roll, pitch) = (rng.random_range(45.01..60.0), rng.random_range(25.01..30.0));
+            push(Group::HardCorners, right * roll, up * pitch);
+        }
+        for _ in 0..100 {
+            let (roll, pitch) = loop {
+                let (roll, pitch): (f64, f64) =
+                    (rng.random_range(-60.0..60.0), rng.random_range(-30.0..30.0));
+                if roll.abs() > 45.01 || pitch.abs() > 25.01 {
+                    break (roll, pitch);
+                }
+            };
+            push(Group::HardOutside, roll, pitch);
+        }
+        TargetFile { rows }
+    }
+
+    /// Reads a file with the columns `group,roll_deg,pitch_deg`.
+    ///
+    /// # Errors
+    /// If it cannot be read, is no such table, is empty, or commands more than ±89°.
+    pub fn load(path: &Path) -> Result<TargetFile, TargetError> {
+        let fail = |why: String| TargetError { path: path.display().to_string(), why };
+        let mut reader = csv::Reader::from_path(path).map_err(|e| fail(e.to_string()))?;
+        let rows: Vec<Row> =
+            reader.deserialize().collect::<Result<_, _>>().map_err(|e| fail(e.to_string()))?;
+        if rows.is_empty() {
+            return Err(fail("it has no rows".into()));
+        }
+        let flyable = |r: &Row| r.roll_deg.abs() < 89.0 && r.pitch_deg.abs() < 89.0;
+        match rows.iter().position(|r| !flyable(r)) {
+            Some(i) => Err(fail(format!("row {} commands 89° or more", i + 1))),
+            None => Ok(TargetFile { rows }),
+        }
+    }
+
+    /// The file as CSV.
+    pub fn to_csv(&self) -> String {
+        let row = |r: &Row| format!("{},{:.2},{:.2}\n", r.group.name(), r.roll_deg, r.pitch_deg);
+        std::iter::once("group,roll_deg,pitch_deg\n".to_owned()).chain(self.rows.iter().map(row)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_file_is_the_one_of_seed_1() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/targets.csv");
+        assert_eq!(TargetFile::load(&path).unwrap(), TargetFile::generate(1));
+    }
+
+    #[test]
+    fn groups_lie_where_their_names_say() {
+        let file = TargetFile::generate(7);
+        let count = |g| file.rows.iter().filter(|r| r.group == g).count();
+        assert_eq!(Group::ALL.map(count), [140, 100, 100]);
+        for r in &file.rows {
+            let (roll, pitch) = (r.roll_deg.abs(), r.pitch_deg.abs());
+            let easy = roll < 45.0 && pitch < 25.0;
+            let corner = roll > 45.0 && pitch > 25.0;
+            assert!(roll <= 60.0 && pitch <= 30.0);
+            match r.group {
+                Group::Easy => assert!(easy),
+                Group::HardCorners => assert!(corner),
+                Group::HardOutside => assert!(!easy),
+            }
+        }
+    }
+}
