@@ -11,7 +11,7 @@ use greylag::link::client::{Clients, Now};
 use greylag::link::framing::Source;
 use greylag::link::peer::{LinkId, PeerId};
 use greylag::physics::{ActuatorState, Command, Time};
-use mavlink::dialects::ardupilotmega::MavMessage;
+use mavlink::dialects::ardupilotmega::*;
 use mavlink::{MAVLinkV1MessageRaw, MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
 
 /// Who the companion is.
@@ -242,4 +242,58 @@ pub fn texts(seen: &[Seen]) -> Vec<String> {
             _ => None,
         })
         .collect()
+}
+
+/// A frame from the shim.
+pub fn shim(message: MavMessage) -> Vec<u8> {
+    frame_from(MavlinkVersion::V2, 1, 200, &message)
+}
+
+/// A state that no two fields share a value in.
+pub struct Shown {
+    pub imu: HIGHRES_IMU_DATA,
+    pub air: VFR_HUD_DATA,
+    pub incidence: AOA_SSA_DATA,
+    pub actuators: ACTUATOR_OUTPUT_STATUS_DATA,
+    pub attitude: ATTITUDE_QUATERNION_DATA,
+}
+
+impl Shown {
+    pub fn at(time_us: u64) -> Self {
+        let mut actuator = [0.0; 32];
+        actuator[..5].copy_from_slice(&[0.5, -0.25, 0.6, 2.0, -4.0]);
+        // Half of 20° of roll about x.
+        let (sin, cos) = 10f32.to_radians().sin_cos();
+        Shown {
+            imu: HIGHRES_IMU_DATA { time_usec: time_us, xacc: 0.1, yacc: 0.2, zacc: -9.7, ..Default::default() },
+            air: VFR_HUD_DATA { airspeed: 16.5, alt: 301.0, ..Default::default() },
+            incidence: AOA_SSA_DATA { time_usec: time_us, AOA: 3.0, SSA: -1.5 },
+            actuators: ACTUATOR_OUTPUT_STATUS_DATA { time_usec: time_us, active: 5, actuator },
+            attitude: ATTITUDE_QUATERNION_DATA {
+                time_boot_ms: (time_us / 1000) as u32,
+                q1: cos,
+                q2: sin,
+                rollspeed: 0.01,
+                pitchspeed: 0.02,
+                yawspeed: 0.03,
+                ..Default::default()
+            },
+        }
+    }
+
+    /// The five frames, in order.
+    pub fn frames(self) -> [Vec<u8>; 5] {
+        [
+            shim(MavMessage::HIGHRES_IMU(self.imu)),
+            shim(MavMessage::VFR_HUD(self.air)),
+            shim(MavMessage::AOA_SSA(self.incidence)),
+            shim(MavMessage::ACTUATOR_OUTPUT_STATUS(self.actuators)),
+            shim(MavMessage::ATTITUDE_QUATERNION(self.attitude)),
+        ]
+    }
+
+    /// The state frame's bytes.
+    pub fn bytes(self) -> Vec<u8> {
+        self.frames().concat()
+    }
 }

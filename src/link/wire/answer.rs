@@ -2,8 +2,8 @@
 
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, FILE_TRANSFER_PROTOCOL_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA,
-    MavMessage, MavParamError, MavParamType, MavProtocolCapability, MavSeverity, PARAM_ERROR_DATA,
-    PARAM_VALUE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
+    MavMessage, MavParamError, MavProtocolCapability, MavSeverity, PARAM_ERROR_DATA,
+    STATUSTEXT_DATA, TIMESYNC_DATA,
 };
 use mavlink::types::CharArray;
 
@@ -38,17 +38,18 @@ pub fn command_ack(number: u16, result: CommandResult, to: Source) -> Message {
 
 /// PARAM_VALUE of one table entry.
 pub fn parameter_value(parameter: &Parameter, index: usize, count: usize) -> Message {
+    // MAV_PARAM_TYPE: 6 is INT32, 9 is REAL32. By hand, so that no bit pattern passes through a
+    // float on its way.
     let (value, kind) = match parameter.value {
-        ParameterValue::Real(x) => (x, MavParamType::MAV_PARAM_TYPE_REAL32),
-        ParameterValue::Int(n) => (f32::from_bits(n as u32), MavParamType::MAV_PARAM_TYPE_INT32),
+        ParameterValue::Real(x) => (x.to_le_bytes(), 9),
+        ParameterValue::Int(n) => (n.to_le_bytes(), 6),
     };
-    Message::coded(MavMessage::PARAM_VALUE(PARAM_VALUE_DATA {
-        param_value: value,
-        param_count: count as u16,
-        param_index: index as u16,
-        param_id: CharArray::from(parameter.name),
-        param_type: kind,
-    }))
+    let mut payload = value.to_vec();
+    payload.extend((count as u16).to_le_bytes());
+    payload.extend((index as u16).to_le_bytes());
+    payload.extend((0..16).map(|i| parameter.name.as_bytes().get(i).copied().unwrap_or(0)));
+    payload.push(kind);
+    Message::raw(22, payload, 25)
 }
 
 /// Why a parameter request failed.
