@@ -5,27 +5,31 @@
 //! whatever arrives.
 
 mod commands;
+mod counts;
+mod due;
 mod helm;
 mod outbox;
 mod parameters;
 mod session;
+mod setpoints;
 mod streams;
 
 use std::time::Duration;
 
-use super::autopilot::{Autopilot, Severity, Status, Verdict};
+use super::autopilot::{Autopilot, Severity, Verdict};
 use super::framing::{Frame, FrameCounts, Frames, Source};
 use super::peer::PeerId;
+use super::wire::Message;
 use super::wire::answer::{self, MissionResult};
 use super::wire::mode::{self, ModeRequest, Pulse};
 use super::wire::request::{self, MissionStep, Recipient, Request};
-use super::wire::setpoint::SetpointFault;
-use super::wire::telemetry::{self, STREAMS, Scene};
-use super::wire::Message;
+use super::wire::telemetry::Home;
 use crate::physics::Time;
+pub use counts::ClientCounts;
 use helm::Helm;
 use outbox::Outbox;
 use session::{Session, Stay};
+use setpoints::OTHER_SETPOINT;
 
 /// Sessions at most.
 pub const MAX_SESSIONS: usize = 32;
@@ -33,10 +37,6 @@ pub const MAX_SESSIONS: usize = 32;
 const DISPLACEABLE: Duration = Duration::from_secs(3);
 /// A datagram peer that was silent for this long is forgotten.
 const FORGOTTEN: Duration = Duration::from_secs(60);
-/// Between heartbeats.
-const HEARTBEAT: Duration = Duration::from_secs(1);
-/// Between lines in the program's own log about what could not be used.
-const SUMMARY: Duration = Duration::from_secs(10);
 /// Lines for the ground stations taken from the autopilot in one call.
 const TEXTS_PER_POLL: usize = 8;
 /// Letters of a line that are sent: eight chunks.
@@ -54,27 +54,6 @@ pub struct Now {
     pub vehicle: Time,
 }
 
-/// What clients sent, counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ClientCounts {
-    /// Frames of MAVLink.
-    pub frames: FrameCounts,
-    /// Frames that carried our own ids.
-    pub echoes: u64,
-    /// Requests for another system or component.
-    pub for_others: u64,
-    /// Frames from new peers while all sessions were taken.
-    pub turned_away: u64,
-    /// Setpoints and stick positions that were garbage or of a kind that is not flown.
-    pub refused_setpoints: u64,
-    /// Setpoints and stick positions from a peer while another one has the helm.
-    pub contested_setpoints: u64,
-    /// Commands with a number that is not known here.
-    pub unknown_commands: u64,
-    /// Messages dropped because nobody fetched them.
-    pub dropped: u64,
-}
-
 /// All clients, with what each has asked for.
 #[derive(Debug)]
 pub struct Clients {
@@ -83,7 +62,7 @@ pub struct Clients {
     outbox: Outbox,
     pulse: Option<Pulse>,
     next_heartbeat: Duration,
-    home: Option<([f64; 2], f64)>,
+    home: Option<Home>,
     was_armed: bool,
     text_id: u16,
     setpoint_helm: Helm,
@@ -108,7 +87,7 @@ impl Clients {
             setpoint_helm: Helm::default(),
             stick_helm: Helm::default(),
             counts: ClientCounts::default(),
-            next_summary: SUMMARY,
+            next_summary: Duration::ZERO,
             bad_at_summary: 0,
         }
     }
@@ -143,7 +122,9 @@ impl Clients {
     /// Sends what is due: heartbeats, streams, parameters and lines of text. To be called from
     /// the control task itself, about every 10 ms.
     pub fn poll(&mut self, now: Now, autopilot: &mut dyn Autopilot) {
-        self.sessions.retain(|s| s.stay == Stay::UntilForgotten || now.host.saturating_sub(s.heard) < FORGOTTEN);
+        self.sessions.retain(|s| {
+            s.stay == Stay::UntilForgotten || now.host.saturating_sub(s.heard) < FORGOTTEN
+        });
         let status = autopilot.status();
         self.note_home(&status);
         self.beat(now, &status);
@@ -162,7 +143,10 @@ impl Clients {
 
     /// What was received so far.
     pub fn counts(&self) -> ClientCounts {
-        ClientCounts { dropped: self.outbox.dropped(), ..self.counts }
+        ClientCounts {
+            dropped: self.outbox.dropped(),
+            ..self.counts
+        }
     }
 
     /// How many peers are served.
@@ -210,107 +194,69 @@ impl Clients {
             && (to.component == 0 || to.component == self.identity.component)
     }
 
-    fn serve(&mut self, now: Now, at: usize, from: Source, request: Request, autopilot: &mut dyn Autopilot) {
+    fn serve(
+        &mut self,
+        now: Now,
+        at: usize,
+        from: Source,
+        request: Request,
+        autopilot: &mut dyn Autopilot,
+    ) {
         match request {
             Request::Command(command) => self.command(now, at, from, command, autopilot),
             Request::SetMode { base, custom } => self.set_mode(now, at, base, custom, autopilot),
-            Request::Attitude(setpoint) => match setpoint {
-                Ok(setpoint) if self.setpoint_helm.takes(self.sessions[at].peer, now.host) => {
-                    autopilot.attitude_setpoint(now.vehicle, setpoint);
-                }
-                Ok(_) => self.contested(now, at),
-                Err(fault) => self.refuse_setpoint(now, at, refusal(fault)),
-            },
-            Request::OtherSetpoint => {
-                self.refuse_setpoint(now, at, "Setpoint refused: only attitudes (SET_ATTITUDE_TARGET) are flown");
-            }
-            Request::Sticks(Some(sticks)) => match self.stick_helm.takes(self.sessions[at].peer, now.host) {
-                true => autopilot.sticks(now.vehicle, sticks),
-                false => self.contested(now, at),
-            },
-            Request::Sticks(None) => self.counts.refused_setpoints += 1,
+            Request::Attitude(setpoint) => self.attitude(now, at, setpoint, autopilot),
+            Request::Sticks(sticks) => self.sticks(now, at, sticks, autopilot),
+            Request::OtherSetpoint => self.refuse_setpoint(now, at, OTHER_SETPOINT),
             Request::ParameterList => self.sessions[at].list_parameters(),
-            Request::ParameterRead(key) => self.read_parameter(at, from, key, autopilot.parameters()),
-            Request::ParameterSet { name, value } => self.set_parameter(now, at, from, name, value, autopilot),
+            Request::ParameterRead(key) => {
+                self.read_parameter(at, from, key, autopilot.parameters())
+            }
+            Request::ParameterSet { name, value } => {
+                self.set_parameter(now, at, from, name, value, autopilot)
+            }
             Request::Mission { step, kind } => self.reply(at, &mission(step, kind, from)),
             // An answer of the other side is not to be answered: 128 is ACK, 129 NAK.
-            Request::File { opcode: 128 | 129, .. } => {}
-            Request::File { sequence, session, opcode } => {
+            Request::File {
+                opcode: 128 | 129, ..
+            } => {}
+            Request::File {
+                sequence,
+                session,
+                opcode,
+            } => {
                 self.reply(at, &answer::file_nak(sequence, session, opcode, from));
             }
-            Request::TimeSync { theirs } => self.reply(at, &answer::time_sync(theirs, now.vehicle, from)),
-            Request::Ping { time_usec, sequence } => self.reply(at, &answer::ping(time_usec, sequence, from)),
-            Request::DataStream { group, rate } => self.sessions[at].streams.set_group(group, rate, now.host),
+            Request::TimeSync { theirs } => {
+                self.reply(at, &answer::time_sync(theirs, now.vehicle, from))
+            }
+            Request::Ping {
+                time_usec,
+                sequence,
+            } => self.reply(at, &answer::ping(time_usec, sequence, from)),
+            Request::DataStream { group, rate } => {
+                self.sessions[at].streams.set_group(group, rate, now.host)
+            }
         }
     }
 
     /// SET_MODE has no acknowledgement: the heartbeat tells, and a refusal is said in words.
-    fn set_mode(&mut self, now: Now, at: usize, base: u8, custom: u32, autopilot: &mut dyn Autopilot) {
+    fn set_mode(
+        &mut self,
+        now: Now,
+        at: usize,
+        base: u8,
+        custom: u32,
+        autopilot: &mut dyn Autopilot,
+    ) {
         let verdict = match mode::from_set_mode(base, custom) {
             ModeRequest::Known(mode) => autopilot.set_mode(now.vehicle, mode),
-            ModeRequest::Unknown => Verdict::Denied("Mode refused: not a mode of this autopilot".into()),
+            ModeRequest::Unknown => {
+                Verdict::Denied("Mode refused: not a mode of this autopilot".into())
+            }
         };
         if let Verdict::Rejected(reason) | Verdict::Denied(reason) = verdict {
             self.complain(now, at, &reason);
-        }
-    }
-
-    fn refuse_setpoint(&mut self, now: Now, at: usize, words: &str) {
-        self.counts.refused_setpoints += 1;
-        self.complain(now, at, words);
-    }
-
-    fn contested(&mut self, now: Now, at: usize) {
-        self.counts.contested_setpoints += 1;
-        self.complain(now, at, "Setpoint ignored: another client is sending them");
-    }
-
-    /// The home position is where the vehicle was first seen, then where it was armed.
-    fn note_home(&mut self, status: &Status) {
-        let armed_now = status.armed && !self.was_armed;
-        let known = status.position.iter().chain([&status.altitude]).all(|x| x.is_finite());
-        if known && (self.home.is_none() || armed_now) {
-            self.home = Some((status.position, status.altitude));
-        }
-        self.was_armed = status.armed;
-    }
-
-    /// A heartbeat every second, one to everybody when it says something new, and one to each
-    /// newcomer.
-    fn beat(&mut self, now: Now, status: &Status) {
-        let pulse = Some(Pulse::of(status));
-        let everybody = now.host >= self.next_heartbeat || self.pulse != pulse;
-        if everybody {
-            self.next_heartbeat = now.host + HEARTBEAT;
-            self.pulse = pulse;
-        }
-        let message = mode::heartbeat(status);
-        for session in &mut self.sessions {
-            if everybody || !session.greeted {
-                session.greeted = true;
-                session.send(&message, self.identity, &mut self.outbox);
-            }
-        }
-    }
-
-    fn stream(&mut self, now: Now, status: &Status) {
-        let scene = self.scene(now);
-        for session in &mut self.sessions {
-            for (at, stream) in STREAMS.iter().enumerate() {
-                if session.streams.is_due(at, now.host)
-                    && let Some(message) = telemetry::message(stream.id, status, &scene)
-                {
-                    session.send(&message, self.identity, &mut self.outbox);
-                }
-            }
-        }
-    }
-
-    fn scene(&self, now: Now) -> Scene {
-        Scene {
-            now: now.vehicle,
-            home_altitude: self.home.map_or(f64::NAN, |(_, altitude)| altitude),
-            bad_frames: self.counts.frames.bad(),
         }
     }
 
@@ -321,8 +267,17 @@ impl Clients {
     /// A line for one client.
     fn say(&mut self, at: usize, severity: Severity, words: &str) {
         self.text_id = self.text_id.checked_add(1).unwrap_or(1);
-        let words = words.char_indices().nth(TEXT_LENGTH).map_or(words, |(end, _)| &words[..end]);
-        self.sessions[at].say(severity, words, self.text_id, self.identity, &mut self.outbox);
+        let words = words
+            .char_indices()
+            .nth(TEXT_LENGTH)
+            .map_or(words, |(end, _)| &words[..end]);
+        self.sessions[at].say(
+            severity,
+            words,
+            self.text_id,
+            self.identity,
+            &mut self.outbox,
+        );
     }
 
     /// A warning for one client, unless it has had too many lately.
@@ -332,33 +287,6 @@ impl Clients {
         }
     }
 
-    /// One line in the program's log when something could not be used, at a bounded rate.
-    fn summarise(&mut self, now: Now) {
-        let c = self.counts;
-        let bad = c.frames.bad() + c.refused_setpoints + c.contested_setpoints + c.turned_away;
-        if now.host < self.next_summary || bad == self.bad_at_summary {
-            return;
-        }
-        (self.next_summary, self.bad_at_summary) = (now.host + SUMMARY, bad);
-        tracing::warn!(
-            bad_crc = c.frames.bad_crc,
-            truncated = c.frames.truncated,
-            unknown_messages = c.frames.unknown,
-            refused_frames = c.frames.refused,
-            refused_setpoints = c.refused_setpoints,
-            contested_setpoints = c.contested_setpoints,
-            turned_away = c.turned_away,
-            "input from clients that could not be used, since the start"
-        );
-    }
-}
-
-fn refusal(fault: SetpointFault) -> &'static str {
-    match fault {
-        SetpointFault::NotFinite => "Setpoint refused: a number is NaN, infinite or absurd",
-        SetpointFault::NoAttitude => "Setpoint refused: the quaternion is zero",
-        SetpointFault::AttitudeMasked => "Setpoint refused: it has no attitude, rates are not flown",
-    }
 }
 
 /// There are no missions here: nothing to list, nothing to clear, no room for any.

@@ -124,12 +124,19 @@ fn examine(bytes: &[u8]) -> Candidate<'_> {
     let len = end + CHECKSUM + if signed { SIGNATURE } else { 0 };
     let (sequence, system, component, id) = match v1 {
         true => (bytes[2], bytes[3], bytes[4], bytes[5] as u32),
-        false => (bytes[4], bytes[5], bytes[6], u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0])),
+        false => (
+            bytes[4],
+            bytes[5],
+            bytes[6],
+            u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]),
+        ),
     };
     if bytes.len() < len {
         return Candidate::Incomplete;
     }
-    let Some(extra) = crc_extra(id) else { return Candidate::Unknown { len } };
+    let Some(extra) = crc_extra(id) else {
+        return Candidate::Unknown { len };
+    };
     if calculate_crc(&bytes[1..end], extra).to_le_bytes() != bytes[end..end + CHECKSUM] {
         return Candidate::BadCrc;
     }
@@ -157,7 +164,13 @@ pub struct Frames<'a, 'c> {
 impl<'a, 'c> Frames<'a, 'c> {
     /// Cuts a whole datagram, counting what is found.
     pub fn new(datagram: &'a [u8], counts: &'c mut FrameCounts) -> Self {
-        Frames { rest: datagram, counts, frames_left: MAX_FRAMES, starts_left: MAX_FALSE_STARTS, waits: false }
+        Frames {
+            rest: datagram,
+            counts,
+            frames_left: MAX_FRAMES,
+            starts_left: MAX_FALSE_STARTS,
+            waits: false,
+        }
     }
 
     /// Spends one false start: on to the byte after the marker, or to the end when there have
@@ -182,7 +195,9 @@ impl<'a, 'c> Frames<'a, 'c> {
 /// the bytes, or in front of another start marker. Anything else is noise in a frame's clothes,
 /// and skipping its length would swallow good frames.
 fn ends_well(bytes: &[u8], len: usize) -> bool {
-    bytes.get(len).is_none_or(|next| matches!(*next, STX_V1 | STX_V2))
+    bytes
+        .get(len)
+        .is_none_or(|next| matches!(*next, STX_V1 | STX_V2))
 }
 
 impl<'a> Iterator for Frames<'a, '_> {
@@ -256,7 +271,10 @@ impl StreamCutter {
     }
 
     fn cut(&mut self, waits: bool, deliver: impl FnMut(Frame<'_>)) {
-        let mut frames = Frames { waits, ..Frames::new(&self.pending, &mut self.counts) };
+        let mut frames = Frames {
+            waits,
+            ..Frames::new(&self.pending, &mut self.counts)
+        };
         frames.by_ref().for_each(deliver);
         let left = frames.rest.len();
         self.pending.drain(..self.pending.len() - left);
@@ -265,20 +283,48 @@ impl StreamCutter {
 
 /// Writes one frame. MAVLink 2 cuts the payload's trailing zeros; MAVLink 1 has no room for
 /// messages above 255, which give `None`, as does a message that the dialect does not know.
-pub fn write(version: Version, sequence: u8, source: Source, id: u32, payload: &[u8]) -> Option<Vec<u8>> {
+pub fn write(
+    version: Version,
+    sequence: u8,
+    source: Source,
+    id: u32,
+    payload: &[u8],
+) -> Option<Vec<u8>> {
     let extra = crc_extra(id)?;
     let payload = payload.get(..255).unwrap_or(payload);
     let mut bytes = Vec::with_capacity(HEADER_V2 + payload.len() + CHECKSUM);
     match version {
         Version::V1 => {
             let id = u8::try_from(id).ok()?;
-            bytes.extend([STX_V1, payload.len() as u8, sequence, source.system, source.component, id]);
+            bytes.extend([
+                STX_V1,
+                payload.len() as u8,
+                sequence,
+                source.system,
+                source.component,
+                id,
+            ]);
             bytes.extend_from_slice(payload);
         }
         Version::V2 => {
-            let len = payload.iter().rposition(|b| *b != 0).map_or(1, |last| last + 1).min(payload.len());
+            let len = payload
+                .iter()
+                .rposition(|b| *b != 0)
+                .map_or(1, |last| last + 1)
+                .min(payload.len());
             let [a, b, c, _] = id.to_le_bytes();
-            bytes.extend([STX_V2, len as u8, 0, 0, sequence, source.system, source.component, a, b, c]);
+            bytes.extend([
+                STX_V2,
+                len as u8,
+                0,
+                0,
+                sequence,
+                source.system,
+                source.component,
+                a,
+                b,
+                c,
+            ]);
             bytes.extend_from_slice(&payload[..len]);
         }
     }

@@ -70,7 +70,13 @@ pub enum Vehicle {
 impl Vehicle {
     /// Takes bytes from the link and delivers each state that they complete. `host` is the time
     /// since the program's start.
-    pub fn handle(&mut self, host: Duration, peer: PeerId, bytes: &[u8], deliver: impl FnMut(Telemetry)) {
+    pub fn handle(
+        &mut self,
+        host: Duration,
+        peer: PeerId,
+        bytes: &[u8],
+        deliver: impl FnMut(Telemetry),
+    ) {
         match self {
             Vehicle::Sitl(sitl) => sitl.handle(host, peer, bytes, deliver),
         }

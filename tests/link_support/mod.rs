@@ -11,11 +11,14 @@ use greylag::link::client::{Clients, Now};
 use greylag::link::framing::Source;
 use greylag::link::peer::{LinkId, PeerId};
 use greylag::physics::{ActuatorState, Command, Time};
-use mavlink::dialects::ardupilotmega::MavMessage;
+use mavlink::dialects::ardupilotmega::*;
 use mavlink::{MAVLinkV1MessageRaw, MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
 
 /// Who the companion is.
-pub const US: Source = Source { system: 1, component: 1 };
+pub const US: Source = Source {
+    system: 1,
+    component: 1,
+};
 
 /// An autopilot that obeys and remembers.
 pub struct Double {
@@ -44,7 +47,11 @@ impl Double {
                 position: [45.0, 7.5],
                 velocity: [10.0, 12.0, -0.5],
                 target: [0.2, 0.0],
-                command: Command { aileron: 0.25, elevator: -0.5, throttle: 0.6 },
+                command: Command {
+                    aileron: 0.25,
+                    elevator: -0.5,
+                    throttle: 0.6,
+                },
                 actuators: ActuatorState::default(),
                 load: 0.2,
             },
@@ -112,12 +119,18 @@ impl Autopilot for Double {
 
 /// A moment `ms` after the start, both clocks alike.
 pub fn at_ms(ms: u64) -> Now {
-    Now { host: Duration::from_millis(ms), vehicle: Time::from_micros(ms * 1000) }
+    Now {
+        host: Duration::from_millis(ms),
+        vehicle: Time::from_micros(ms * 1000),
+    }
 }
 
 /// The peer at local port `port`.
 pub fn peer(port: u16) -> PeerId {
-    PeerId { link: LinkId(0), address: SocketAddr::from(([127, 0, 0, 1], port)) }
+    PeerId {
+        link: LinkId(0),
+        address: SocketAddr::from(([127, 0, 0, 1], port)),
+    }
 }
 
 /// A frame from system 255, component 190 (a ground station), written by rust-mavlink.
@@ -126,8 +139,17 @@ pub fn frame(version: MavlinkVersion, message: &MavMessage) -> Vec<u8> {
 }
 
 /// A frame from any sender.
-pub fn frame_from(version: MavlinkVersion, system: u8, component: u8, message: &MavMessage) -> Vec<u8> {
-    let header = MavHeader { system_id: system.into(), component_id: component, sequence: 42 };
+pub fn frame_from(
+    version: MavlinkVersion,
+    system: u8,
+    component: u8,
+    message: &MavMessage,
+) -> Vec<u8> {
+    let header = MavHeader {
+        system_id: system.into(),
+        component_id: component,
+        sequence: 42,
+    };
     match version {
         MavlinkVersion::V1 => {
             let mut raw = MAVLinkV1MessageRaw::new();
@@ -154,7 +176,13 @@ pub fn raw_frame(id: u32, payload: &[u8]) -> Vec<u8> {
 }
 
 /// The payload of COMMAND_LONG with any command number.
-pub fn command_payload(number: u16, params: [f32; 7], system: u8, component: u8, confirmation: u8) -> Vec<u8> {
+pub fn command_payload(
+    number: u16,
+    params: [f32; 7],
+    system: u8,
+    component: u8,
+    confirmation: u8,
+) -> Vec<u8> {
     let mut payload: Vec<u8> = params.iter().flat_map(|p| p.to_le_bytes()).collect();
     payload.extend(number.to_le_bytes());
     payload.extend([system, component, confirmation]);
@@ -194,14 +222,23 @@ pub fn dissect(peer: PeerId, bytes: &[u8]) -> Seen {
     assert_eq!(bytes.len(), header + len + 2);
     let (sequence, system, component, id) = match v1 {
         true => (bytes[2], bytes[3], bytes[4], u32::from(bytes[5])),
-        false => (bytes[4], bytes[5], bytes[6], u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0])),
+        false => (
+            bytes[4],
+            bytes[5],
+            bytes[6],
+            u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]),
+        ),
     };
     assert_eq!((system, component), (US.system, US.component));
     let crc = mavlink::calculate_crc(&bytes[1..header + len], MavMessage::extra_crc(id));
     assert_eq!(crc.to_le_bytes(), bytes[header + len..]);
     Seen {
         peer,
-        version: if v1 { MavlinkVersion::V1 } else { MavlinkVersion::V2 },
+        version: if v1 {
+            MavlinkVersion::V1
+        } else {
+            MavlinkVersion::V2
+        },
         sequence,
         id,
         payload: bytes[header..header + len].to_vec(),
@@ -211,11 +248,20 @@ pub fn dissect(peer: PeerId, bytes: &[u8]) -> Seen {
 
 /// Everything in the outbox.
 pub fn sent(clients: &mut Clients) -> Vec<Seen> {
-    clients.drain().map(|(peer, bytes)| dissect(peer, &bytes)).collect()
+    clients
+        .drain()
+        .map(|(peer, bytes)| dissect(peer, &bytes))
+        .collect()
 }
 
 /// Handles one datagram and gives what is sent in answer.
-pub fn ask(clients: &mut Clients, double: &mut Double, now: Now, port: u16, bytes: &[u8]) -> Vec<Seen> {
+pub fn ask(
+    clients: &mut Clients,
+    double: &mut Double,
+    now: Now,
+    port: u16,
+    bytes: &[u8],
+) -> Vec<Seen> {
     clients.handle(now, peer(port), bytes, double);
     sent(clients)
 }
@@ -242,4 +288,76 @@ pub fn texts(seen: &[Seen]) -> Vec<String> {
             _ => None,
         })
         .collect()
+}
+
+/// A frame from the shim.
+pub fn shim(message: MavMessage) -> Vec<u8> {
+    frame_from(MavlinkVersion::V2, 1, 200, &message)
+}
+
+/// A state that no two fields share a value in.
+pub struct Shown {
+    pub imu: HIGHRES_IMU_DATA,
+    pub air: VFR_HUD_DATA,
+    pub incidence: AOA_SSA_DATA,
+    pub actuators: ACTUATOR_OUTPUT_STATUS_DATA,
+    pub attitude: ATTITUDE_QUATERNION_DATA,
+}
+
+impl Shown {
+    pub fn at(time_us: u64) -> Self {
+        let mut actuator = [0.0; 32];
+        actuator[..5].copy_from_slice(&[0.5, -0.25, 0.6, 2.0, -4.0]);
+        // Half of 20° of roll about x.
+        let (sin, cos) = 10f32.to_radians().sin_cos();
+        Shown {
+            imu: HIGHRES_IMU_DATA {
+                time_usec: time_us,
+                xacc: 0.1,
+                yacc: 0.2,
+                zacc: -9.7,
+                ..Default::default()
+            },
+            air: VFR_HUD_DATA {
+                airspeed: 16.5,
+                alt: 301.0,
+                ..Default::default()
+            },
+            incidence: AOA_SSA_DATA {
+                time_usec: time_us,
+                AOA: 3.0,
+                SSA: -1.5,
+            },
+            actuators: ACTUATOR_OUTPUT_STATUS_DATA {
+                time_usec: time_us,
+                active: 5,
+                actuator,
+            },
+            attitude: ATTITUDE_QUATERNION_DATA {
+                time_boot_ms: (time_us / 1000) as u32,
+                q1: cos,
+                q2: sin,
+                rollspeed: 0.01,
+                pitchspeed: 0.02,
+                yawspeed: 0.03,
+                ..Default::default()
+            },
+        }
+    }
+
+    /// The five frames, in order.
+    pub fn frames(self) -> [Vec<u8>; 5] {
+        [
+            shim(MavMessage::HIGHRES_IMU(self.imu)),
+            shim(MavMessage::VFR_HUD(self.air)),
+            shim(MavMessage::AOA_SSA(self.incidence)),
+            shim(MavMessage::ACTUATOR_OUTPUT_STATUS(self.actuators)),
+            shim(MavMessage::ATTITUDE_QUATERNION(self.attitude)),
+        ]
+    }
+
+    /// The state frame's bytes.
+    pub fn bytes(self) -> Vec<u8> {
+        self.frames().concat()
+    }
 }

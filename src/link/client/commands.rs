@@ -26,7 +26,11 @@ struct Outcome {
 
 impl From<CommandResult> for Outcome {
     fn from(result: CommandResult) -> Self {
-        Outcome { result, message: None, reason: None }
+        Outcome {
+            result,
+            message: None,
+            reason: None,
+        }
     }
 }
 
@@ -34,17 +38,27 @@ impl From<Verdict> for Outcome {
     fn from(verdict: Verdict) -> Self {
         match verdict {
             Verdict::Accepted => CommandResult::Accepted.into(),
-            Verdict::Rejected(why) => {
-                Outcome { result: CommandResult::TemporarilyRejected, message: None, reason: Some(why) }
-            }
-            Verdict::Denied(why) => Outcome { result: CommandResult::Denied, message: None, reason: Some(why) },
+            Verdict::Rejected(why) => Outcome {
+                result: CommandResult::TemporarilyRejected,
+                message: None,
+                reason: Some(why),
+            },
+            Verdict::Denied(why) => Outcome {
+                result: CommandResult::Denied,
+                message: None,
+                reason: Some(why),
+            },
         }
     }
 }
 
 impl Outcome {
     fn with(message: Message) -> Self {
-        Outcome { result: CommandResult::Accepted, message: Some(message), reason: None }
+        Outcome {
+            result: CommandResult::Accepted,
+            message: Some(message),
+            reason: None,
+        }
     }
 
     fn denied(reason: &str) -> Self {
@@ -54,7 +68,8 @@ impl Outcome {
 
 /// A message number in a float parameter.
 fn message_number(parameter: f64) -> Option<u32> {
-    (parameter.fract() == 0.0 && (0.0..16_777_216.0).contains(&parameter)).then_some(parameter as u32)
+    (parameter.fract() == 0.0 && (0.0..16_777_216.0).contains(&parameter))
+        .then_some(parameter as u32)
 }
 
 impl Clients {
@@ -74,7 +89,10 @@ impl Clients {
         }
         let outcome = self.carry_out(now, at, &command, autopilot);
         self.sessions[at].remember(now.host, command, outcome.result);
-        self.reply(at, &answer::command_ack(command.number, outcome.result, from));
+        self.reply(
+            at,
+            &answer::command_ack(command.number, outcome.result, from),
+        );
         if let Some(message) = outcome.message {
             self.send_requested(at, &message);
         }
@@ -87,7 +105,9 @@ impl Clients {
     /// is how it learns that it may speak 2.
     fn send_requested(&mut self, at: usize, message: &Message) {
         match message.id() {
-            PROTOCOL_VERSION => self.sessions[at].send_as(Version::V2, message, self.identity, &mut self.outbox),
+            PROTOCOL_VERSION => {
+                self.sessions[at].send_as(Version::V2, message, self.identity, &mut self.outbox)
+            }
             _ => self.reply(at, message),
         }
     }
@@ -108,7 +128,9 @@ impl Clients {
             // DO_SET_MODE
             176 => match mode::from_do_set_mode(first, second, third) {
                 ModeRequest::Known(mode) => autopilot.set_mode(now.vehicle, mode).into(),
-                ModeRequest::Unknown => Outcome::denied("Mode refused: not a mode of this autopilot"),
+                ModeRequest::Unknown => {
+                    Outcome::denied("Mode refused: not a mode of this autopilot")
+                }
             },
             // COMPONENT_ARM_DISARM
             400 if first == 1.0 => autopilot.arm(now.vehicle, second == FORCE).into(),
@@ -133,24 +155,28 @@ impl Clients {
         }
     }
 
-    fn requested(&mut self, now: Now, at: usize, id: u32, index: f64, autopilot: &mut dyn Autopilot) -> Outcome {
+    fn requested(
+        &mut self,
+        now: Now,
+        at: usize,
+        id: u32,
+        index: f64,
+        autopilot: &mut dyn Autopilot,
+    ) -> Outcome {
         match id {
             HEARTBEAT => Outcome::with(mode::heartbeat(&autopilot.status())),
             AUTOPILOT_VERSION => Outcome::with(answer::autopilot_version()),
             PROTOCOL_VERSION => Outcome::with(answer::protocol_version()),
-            MESSAGE_INTERVAL => match message_number(index).filter(|id| *id <= u32::from(u16::MAX)) {
+            MESSAGE_INTERVAL => match message_number(index).filter(|id| *id <= u32::from(u16::MAX))
+            {
                 Some(id) => Outcome::with(answer::message_interval(id, self.interval_us(at, id))),
                 None => CommandResult::Denied.into(),
             },
-            HOME_POSITION => match self.home {
-                Some((position, altitude)) => {
-                    Outcome::with(answer::home_position(position, altitude, now.vehicle))
-                }
-                None => Verdict::Rejected("Home position not known yet".into()).into(),
-            },
             _ => match telemetry::message(id, &autopilot.status(), &self.scene(now)) {
                 Some(message) => Outcome::with(message),
-                None if telemetry::position(id).is_some() => CommandResult::TemporarilyRejected.into(),
+                None if telemetry::position(id).is_some() => {
+                    CommandResult::TemporarilyRejected.into()
+                }
                 None => CommandResult::Unsupported.into(),
             },
         }
@@ -167,7 +193,11 @@ impl Clients {
 
     fn set_message_interval(&mut self, now: Now, at: usize, id: f64, interval_us: f64) -> Outcome {
         let row = message_number(id).and_then(telemetry::position);
-        let set = row.ok_or(()).and_then(|row| self.sessions[at].streams.set_interval(row, interval_us, now.host));
+        let set = row.ok_or(()).and_then(|row| {
+            self.sessions[at]
+                .streams
+                .set_interval(row, interval_us, now.host)
+        });
         match set {
             Ok(()) => CommandResult::Accepted.into(),
             Err(()) => CommandResult::Denied.into(),

@@ -18,7 +18,9 @@ impl Helm {
     /// Whether a setpoint from `peer` is to be followed; if so it has the helm from now on.
     pub fn takes(&mut self, peer: PeerId, host: Duration) -> bool {
         match self.holder {
-            Some((holder, heard)) if holder != peer && host.saturating_sub(heard) < RELEASE => false,
+            Some((holder, heard)) if holder != peer && host.saturating_sub(heard) < RELEASE => {
+                false
+            }
             _ => {
                 self.holder = Some((peer, host));
                 true

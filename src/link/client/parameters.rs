@@ -10,7 +10,9 @@ use crate::link::wire::request::{ParameterKey, ParameterName};
 const EXACT: f32 = 16_777_216.0;
 
 fn find(table: &[Parameter], name: ParameterName) -> Option<usize> {
-    table.iter().position(|parameter| parameter.name.as_bytes() == name.bytes())
+    table
+        .iter()
+        .position(|parameter| parameter.name.as_bytes() == name.bytes())
 }
 
 /// The value in the table's type. A whole number sent as REAL32 is taken for an INT32, because
@@ -19,7 +21,9 @@ fn matched(table: ParameterValue, sent: Option<ParameterValue>) -> Option<Parame
     match (table, sent?) {
         (ParameterValue::Real(_), value @ ParameterValue::Real(_)) => Some(value),
         (ParameterValue::Int(_), value @ ParameterValue::Int(_)) => Some(value),
-        (ParameterValue::Int(_), ParameterValue::Real(x)) if x.fract() == 0.0 && x.abs() <= EXACT => {
+        (ParameterValue::Int(_), ParameterValue::Real(x))
+            if x.fract() == 0.0 && x.abs() <= EXACT =>
+        {
             Some(ParameterValue::Int(x as i32))
         }
         _ => None,
@@ -38,7 +42,13 @@ impl Clients {
         }
     }
 
-    pub(super) fn read_parameter(&mut self, at: usize, from: Source, key: ParameterKey, table: &[Parameter]) {
+    pub(super) fn read_parameter(
+        &mut self,
+        at: usize,
+        from: Source,
+        key: ParameterKey,
+        table: &[Parameter],
+    ) {
         let found = match key {
             ParameterKey::Index(index) => (index < table.len()).then_some(index),
             ParameterKey::Name(name) => find(table, name),
@@ -47,7 +57,12 @@ impl Clients {
             (Some(index), _) => answer::parameter_value(&table[index], index, table.len()),
             (None, ParameterKey::Index(index)) => {
                 let index = i16::try_from(index).unwrap_or(i16::MAX);
-                answer::parameter_error(ParameterName([0; 16]), index, ParameterFault::DoesNotExist, from)
+                answer::parameter_error(
+                    ParameterName([0; 16]),
+                    index,
+                    ParameterFault::DoesNotExist,
+                    from,
+                )
             }
             (None, ParameterKey::Name(name)) => {
                 answer::parameter_error(name, -1, ParameterFault::DoesNotExist, from)
@@ -69,15 +84,27 @@ impl Clients {
     ) {
         let shown = String::from_utf8_lossy(name.bytes()).into_owned();
         let Some(index) = find(autopilot.parameters(), name) else {
-            self.reply(at, &answer::parameter_error(name, -1, ParameterFault::DoesNotExist, from));
-            self.complain(now, at, &format!("Parameter {shown} refused: there is none of that name"));
+            self.reply(
+                at,
+                &answer::parameter_error(name, -1, ParameterFault::DoesNotExist, from),
+            );
+            self.complain(
+                now,
+                at,
+                &format!("Parameter {shown} refused: there is none of that name"),
+            );
             return;
         };
         let refusal = match matched(autopilot.parameters()[index].value, value) {
-            None => Some((ParameterFault::TypeMismatch, "its type is not the table's".to_owned())),
+            None => Some((
+                ParameterFault::TypeMismatch,
+                "its type is not the table's".to_owned(),
+            )),
             Some(value) => match autopilot.set_parameter(index, value) {
                 Verdict::Accepted => None,
-                Verdict::Rejected(reason) | Verdict::Denied(reason) => Some((ParameterFault::OutOfRange, reason)),
+                Verdict::Rejected(reason) | Verdict::Denied(reason) => {
+                    Some((ParameterFault::OutOfRange, reason))
+                }
             },
         };
         let table = autopilot.parameters();

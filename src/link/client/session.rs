@@ -7,9 +7,9 @@ use super::streams::StreamTable;
 use crate::link::autopilot::Severity;
 use crate::link::framing::{Frame, Source, Version};
 use crate::link::peer::PeerId;
+use crate::link::wire::Message;
 use crate::link::wire::answer::{self, CommandResult, TEXT_CHUNK};
 use crate::link::wire::request::CommandRequest;
-use crate::link::wire::Message;
 
 /// After this silence a peer may have been replaced by one that speaks the other version.
 const VERSION_MEMORY: Duration = Duration::from_secs(5);
@@ -92,7 +92,13 @@ impl Session {
     }
 
     /// Sends a message in a given version: the handshake to MAVLink 2 needs it.
-    pub fn send_as(&mut self, version: Version, message: &Message, from: Source, outbox: &mut Outbox) {
+    pub fn send_as(
+        &mut self,
+        version: Version,
+        message: &Message,
+        from: Source,
+        outbox: &mut Outbox,
+    ) {
         if let Some(frame) = message.encode(version, self.sequence, from) {
             self.sequence = self.sequence.wrapping_add(1);
             outbox.push(self.peer, frame);
@@ -100,12 +106,20 @@ impl Session {
     }
 
     /// Sends a line of any length: in chunks that MAVLink 2 joins, or as lines of their own.
-    pub fn say(&mut self, severity: Severity, words: &str, id: u16, from: Source, outbox: &mut Outbox) {
+    pub fn say(
+        &mut self,
+        severity: Severity,
+        words: &str,
+        id: u16,
+        from: Source,
+        outbox: &mut Outbox,
+    ) {
         let lines = match self.version {
             Version::V2 => answer::texts(severity, words, id),
             Version::V1 => {
                 let letters: Vec<char> = words.chars().collect();
-                let line = |part: &[char]| answer::texts(severity, &part.iter().collect::<String>(), 0);
+                let line =
+                    |part: &[char]| answer::texts(severity, &part.iter().collect::<String>(), 0);
                 letters.chunks(TEXT_CHUNK).flat_map(line).collect()
             }
         };
@@ -114,9 +128,13 @@ impl Session {
 
     /// Whether one more warning may be sent now.
     pub fn may_complain(&mut self, host: Duration) -> bool {
-        let earned = host.saturating_sub(self.next_complaint).as_millis() / COMPLAINT_EVERY.as_millis();
+        let earned =
+            host.saturating_sub(self.next_complaint).as_millis() / COMPLAINT_EVERY.as_millis();
         if earned > 0 {
-            self.complaints = COMPLAINTS.min(self.complaints.saturating_add(earned.min(u128::from(COMPLAINTS)) as u32));
+            self.complaints = COMPLAINTS.min(
+                self.complaints
+                    .saturating_add(earned.min(u128::from(COMPLAINTS)) as u32),
+            );
             self.next_complaint = host;
         }
         let allowed = self.complaints > 0;
@@ -144,7 +162,9 @@ impl Session {
 
     /// The indices of the parameters that are due now, of a table of `count`.
     pub fn parameters_due(&mut self, host: Duration, count: usize) -> std::ops::Range<usize> {
-        let Some(next) = self.listing.filter(|_| host >= self.next_parameters) else { return 0..0 };
+        let Some(next) = self.listing.filter(|_| host >= self.next_parameters) else {
+            return 0..0;
+        };
         let end = count.min(next + PARAMETERS_AT_ONCE);
         self.listing = (end < count).then_some(end);
         self.next_parameters = host + PARAMETERS_EVERY;

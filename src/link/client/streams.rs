@@ -24,14 +24,21 @@ struct Row {
 impl StreamTable {
     /// The default rates.
     pub fn new(host: Duration) -> Self {
-        StreamTable { rows: STREAMS.map(|stream| Row { interval: default_interval(stream.default_hz), due: host }) }
+        StreamTable {
+            rows: STREAMS.map(|stream| Row {
+                interval: default_interval(stream.default_hz),
+                due: host,
+            }),
+        }
     }
 
     /// Whether row `at` is to be sent now; the next one is then due an interval later. A caller
     /// that was late is not made to catch up.
     pub fn is_due(&mut self, at: usize, host: Duration) -> bool {
         let row = &mut self.rows[at];
-        let Some(interval) = row.interval.filter(|_| host >= row.due) else { return false };
+        let Some(interval) = row.interval.filter(|_| host >= row.due) else {
+            return false;
+        };
         row.due += interval;
         if row.due <= host {
             row.due = host + interval;
@@ -41,7 +48,9 @@ impl StreamTable {
 
     /// The interval of row `at` in µs; −1 when off.
     pub fn interval_us(&self, at: usize) -> i32 {
-        self.rows[at].interval.map_or(-1, |interval| interval.as_micros() as i32)
+        self.rows[at]
+            .interval
+            .map_or(-1, |interval| interval.as_micros() as i32)
     }
 
     /// Sets row `at` as SET_MESSAGE_INTERVAL means it: µs, 0 for the default, −1 for off. What is
@@ -53,7 +62,10 @@ impl StreamTable {
             us if us > 0.0 => Some(limited(us * 1e-6)),
             _ => return Err(()),
         };
-        self.rows[at] = Row { interval, due: host };
+        self.rows[at] = Row {
+            interval,
+            due: host,
+        };
         Ok(())
     }
 
@@ -68,7 +80,10 @@ impl StreamTable {
                     Some(0) => default_interval(stream.default_hz),
                     Some(hz) => Some(limited(1.0 / f64::from(hz))),
                 };
-                *row = Row { interval, due: host };
+                *row = Row {
+                    interval,
+                    due: host,
+                };
             }
         }
     }

@@ -19,12 +19,20 @@ const MAX_DATAGRAM: usize = 9000;
 const PAUSE: Duration = Duration::from_millis(5);
 
 /// Listens at an address and answers from it; gives the address it is bound to.
-pub(super) fn listen(port: Port, at: SocketAddr, outgoing: Receiver<(SocketAddr, Vec<u8>)>) -> io::Result<SocketAddr> {
+pub(super) fn listen(
+    port: Port,
+    at: SocketAddr,
+    outgoing: Receiver<(SocketAddr, Vec<u8>)>,
+) -> io::Result<SocketAddr> {
     serve(port, std::net::UdpSocket::bind(at)?, outgoing)
 }
 
 /// Opens a socket from which `to` can be reached.
-pub(super) fn reach(port: Port, to: SocketAddr, outgoing: Receiver<(SocketAddr, Vec<u8>)>) -> io::Result<SocketAddr> {
+pub(super) fn reach(
+    port: Port,
+    to: SocketAddr,
+    outgoing: Receiver<(SocketAddr, Vec<u8>)>,
+) -> io::Result<SocketAddr> {
     // To this machine only from this machine, so that no stranger finds the port.
     let from: SocketAddr = match (to, to.ip().is_loopback()) {
         (SocketAddr::V4(_), true) => (Ipv4Addr::LOCALHOST, 0).into(),

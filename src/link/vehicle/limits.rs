@@ -50,7 +50,11 @@ impl Faults {
 
 impl fmt::Display for Faults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let names: Vec<_> = Faults::NAMES.iter().filter(|(fault, _)| self.contains(*fault)).map(|(_, n)| *n).collect();
+        let names: Vec<_> = Faults::NAMES
+            .iter()
+            .filter(|(fault, _)| self.contains(*fault))
+            .map(|(_, n)| *n)
+            .collect();
         f.write_str(&names.join(", "))
     }
 }
@@ -62,7 +66,7 @@ const AIRSPEED: RangeInclusive<f64> = -5.0..=150.0;
 /// m AMSL.
 const ALTITUDE: RangeInclusive<f64> = -1000.0..=20_000.0;
 /// rad: half a turn with room for rounding.
-const INCIDENCE: RangeInclusive<f64> = -3.1416..=3.1416;
+const INCIDENCE: RangeInclusive<f64> = -3.15..=3.15;
 /// m/s²: 50 g.
 const FORCE: RangeInclusive<f64> = -500.0..=500.0;
 /// Normalised deflection, with room for noise.

@@ -104,7 +104,13 @@ impl Sitl {
     }
 
     /// See [`super::Vehicle::handle`].
-    pub fn handle(&mut self, host: Duration, peer: PeerId, bytes: &[u8], mut deliver: impl FnMut(Telemetry)) {
+    pub fn handle(
+        &mut self,
+        host: Duration,
+        peer: PeerId,
+        bytes: &[u8],
+        mut deliver: impl FnMut(Telemetry),
+    ) {
         let mut counts = FrameCounts::default();
         for frame in Frames::new(bytes, &mut counts) {
             if !self.is_vehicle(host, peer, &frame) {
@@ -121,7 +127,12 @@ impl Sitl {
     /// Whether the frame comes from the vehicle: the right ids, on the peer that the link belongs
     /// to. Two shims at once would otherwise mix their states.
     fn is_vehicle(&mut self, host: Duration, peer: PeerId, frame: &Frame<'_>) -> bool {
-        if frame.source != (Source { system: self.system, component: SHIM }) {
+        if frame.source
+            != (Source {
+                system: self.system,
+                component: SHIM,
+            })
+        {
             return false;
         }
         match self.peer {
@@ -135,28 +146,54 @@ impl Sitl {
 
     fn take(&mut self, message: VehicleMessage) -> Option<Telemetry> {
         match message {
-            VehicleMessage::Imu { time, specific_force } => self.parts.imu = Some((time, specific_force)),
-            VehicleMessage::Air { airspeed, altitude } => self.parts.air = Some((airspeed, altitude)),
-            VehicleMessage::Incidence { time, alpha, beta } => self.parts.incidence = Some((time, alpha, beta)),
-            VehicleMessage::Actuators { time, active, outputs } => {
+            VehicleMessage::Imu {
+                time,
+                specific_force,
+            } => self.parts.imu = Some((time, specific_force)),
+            VehicleMessage::Air { airspeed, altitude } => {
+                self.parts.air = Some((airspeed, altitude))
+            }
+            VehicleMessage::Incidence { time, alpha, beta } => {
+                self.parts.incidence = Some((time, alpha, beta))
+            }
+            VehicleMessage::Actuators {
+                time,
+                active,
+                outputs,
+            } => {
                 self.parts.actuators = (active >= 5).then_some((time, outputs));
             }
             VehicleMessage::Position { position, velocity } if limits::position(position) => {
                 (self.last.position, self.last.velocity) = (position, velocity);
             }
             VehicleMessage::Wind(wind) if limits::wind(wind) => self.last.wind = wind,
-            VehicleMessage::Attitude { boot_ms, quaternion, rates } => {
+            VehicleMessage::Attitude {
+                boot_ms,
+                quaternion,
+                rates,
+            } => {
                 let parts = std::mem::take(&mut self.parts);
                 return self.complete(parts, boot_ms, quaternion, rates);
             }
-            VehicleMessage::Position { .. } | VehicleMessage::Wind(_) | VehicleMessage::Heartbeat => {}
+            VehicleMessage::Position { .. }
+            | VehicleMessage::Wind(_)
+            | VehicleMessage::Heartbeat => {}
         }
         None
     }
 
     /// Puts a frame together; nothing when its messages are missing or of different times.
-    fn complete(&mut self, parts: Parts, boot_ms: u32, q: [f64; 4], rates: [f64; 3]) -> Option<Telemetry> {
-        let whole = parts.imu.zip(parts.air).zip(parts.incidence.zip(parts.actuators));
+    fn complete(
+        &mut self,
+        parts: Parts,
+        boot_ms: u32,
+        q: [f64; 4],
+        rates: [f64; 3],
+    ) -> Option<Telemetry> {
+        let whole = parts
+            .imu
+            .zip(parts.air)
+            .zip(parts.incidence.zip(parts.actuators));
         let Some((((time, force), air), ((time_b, alpha, beta), (time_c, outputs)))) = whole else {
             self.counts.incomplete += 1;
             return None;
@@ -168,7 +205,12 @@ impl Sitl {
             return None;
         }
         let order = self.order(time);
-        let mut next = Telemetry { time, order, faults: Faults::NONE, ..self.last };
+        let mut next = Telemetry {
+            time,
+            order,
+            faults: Faults::NONE,
+            ..self.last
+        };
         fill_motion(&mut next, q, rates);
         fill_air(&mut next, air, [alpha, beta], force);
         fill_actuators(&mut next, outputs, self.deflection);
@@ -246,15 +288,22 @@ impl Sitl {
     }
 
     fn write(&mut self, message: &Message) -> Vec<u8> {
-        let source = Source { system: self.system, component: COMPANION };
+        let source = Source {
+            system: self.system,
+            component: COMPANION,
+        };
         self.sequence = self.sequence.wrapping_add(1);
-        message.encode(Version::V2, self.sequence, source).unwrap_or_default()
+        message
+            .encode(Version::V2, self.sequence, source)
+            .unwrap_or_default()
     }
 }
 
 fn fill_motion(next: &mut Telemetry, quaternion: [f64; 4], rates: [f64; 3]) {
     match euler(quaternion) {
-        Ok((roll, pitch, yaw)) => (next.state.roll, next.state.pitch, next.yaw) = (roll, pitch, yaw),
+        Ok((roll, pitch, yaw)) => {
+            (next.state.roll, next.state.pitch, next.yaw) = (roll, pitch, yaw)
+        }
         Err(_) => next.faults.insert(Faults::ATTITUDE),
     }
     match limits::rates(rates) {
@@ -263,7 +312,12 @@ fn fill_motion(next: &mut Telemetry, quaternion: [f64; 4], rates: [f64; 3]) {
     }
 }
 
-fn fill_air(next: &mut Telemetry, (airspeed, altitude): (f64, f64), [alpha, beta]: [f64; 2], force: [f64; 3]) {
+fn fill_air(
+    next: &mut Telemetry,
+    (airspeed, altitude): (f64, f64),
+    [alpha, beta]: [f64; 2],
+    force: [f64; 3],
+) {
     match limits::air(airspeed, altitude) {
         true => (next.state.airspeed, next.altitude) = (airspeed, altitude),
         false => next.faults.insert(Faults::AIR),

@@ -2,13 +2,14 @@
 
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, FILE_TRANSFER_PROTOCOL_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA,
-    MavMessage, MavParamError, MavParamType, MavProtocolCapability, MavSeverity, PARAM_ERROR_DATA,
-    PARAM_VALUE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
+    MavMessage, MavParamError, MavProtocolCapability, MavSeverity, PARAM_ERROR_DATA,
+    STATUSTEXT_DATA, TIMESYNC_DATA,
 };
 use mavlink::types::CharArray;
 
 use super::Message;
 use super::request::ParameterName;
+use super::telemetry::Home;
 use crate::link::autopilot::{Parameter, ParameterValue, Severity};
 use crate::link::framing::Source;
 use crate::physics::Time;
@@ -33,22 +34,38 @@ pub enum CommandResult {
 pub fn command_ack(number: u16, result: CommandResult, to: Source) -> Message {
     let [low, high] = number.to_le_bytes();
     // command, result, then the extensions: progress, result_param2, target system and component.
-    Message::raw(77, vec![low, high, result as u8, 0, 0, 0, 0, 0, to.system, to.component], 3)
+    Message::raw(
+        77,
+        vec![
+            low,
+            high,
+            result as u8,
+            0,
+            0,
+            0,
+            0,
+            0,
+            to.system,
+            to.component,
+        ],
+        3,
+    )
 }
 
 /// PARAM_VALUE of one table entry.
 pub fn parameter_value(parameter: &Parameter, index: usize, count: usize) -> Message {
+    // MAV_PARAM_TYPE: 6 is INT32, 9 is REAL32. By hand, so that no bit pattern passes through a
+    // float on its way.
     let (value, kind) = match parameter.value {
-        ParameterValue::Real(x) => (x, MavParamType::MAV_PARAM_TYPE_REAL32),
-        ParameterValue::Int(n) => (f32::from_bits(n as u32), MavParamType::MAV_PARAM_TYPE_INT32),
+        ParameterValue::Real(x) => (x.to_le_bytes(), 9),
+        ParameterValue::Int(n) => (n.to_le_bytes(), 6),
     };
-    Message::coded(MavMessage::PARAM_VALUE(PARAM_VALUE_DATA {
-        param_value: value,
-        param_count: count as u16,
-        param_index: index as u16,
-        param_id: CharArray::from(parameter.name),
-        param_type: kind,
-    }))
+    let mut payload = value.to_vec();
+    payload.extend((count as u16).to_le_bytes());
+    payload.extend((index as u16).to_le_bytes());
+    payload.extend((0..16).map(|i| parameter.name.as_bytes().get(i).copied().unwrap_or(0)));
+    payload.push(kind);
+    Message::raw(22, payload, 25)
 }
 
 /// Why a parameter request failed.
@@ -63,7 +80,12 @@ pub enum ParameterFault {
 }
 
 /// PARAM_ERROR about a parameter, by name or by index (−1 when by name).
-pub fn parameter_error(name: ParameterName, index: i16, fault: ParameterFault, to: Source) -> Message {
+pub fn parameter_error(
+    name: ParameterName,
+    index: i16,
+    fault: ParameterFault,
+    to: Source,
+) -> Message {
     let error = match fault {
         ParameterFault::DoesNotExist => MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
         ParameterFault::OutOfRange => MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
@@ -83,7 +105,16 @@ pub fn parameter_error(name: ParameterName, index: i16, fault: ParameterFault, t
 /// MAVLink 1 has no field for chunks, so `chunks` there are texts of their own. Letters outside
 /// ASCII become `?`: receivers disagree about them.
 pub fn texts(severity: Severity, words: &str, id: u16) -> Vec<Message> {
-    let bytes: Vec<u8> = words.chars().map(|c| if c.is_ascii() && c != '\0' { c as u8 } else { b'?' }).collect();
+    let bytes: Vec<u8> = words
+        .chars()
+        .map(|c| {
+            if c.is_ascii() && c != '\0' {
+                c as u8
+            } else {
+                b'?'
+            }
+        })
+        .collect();
     if bytes.len() <= TEXT_CHUNK {
         return vec![text(severity, &bytes, 0, 0)];
     }
@@ -108,7 +139,12 @@ fn text(severity: Severity, chunk: &[u8], id: u16, chunk_seq: u8) -> Message {
         Severity::Notice => MavSeverity::MAV_SEVERITY_NOTICE,
         Severity::Info => MavSeverity::MAV_SEVERITY_INFO,
     };
-    Message::coded(MavMessage::STATUSTEXT(STATUSTEXT_DATA { severity, text: CharArray::new(field), id, chunk_seq }))
+    Message::coded(MavMessage::STATUSTEXT(STATUSTEXT_DATA {
+        severity,
+        text: CharArray::new(field),
+        id,
+        chunk_seq,
+    }))
 }
 
 /// AUTOPILOT_VERSION: what this program can do.
@@ -127,7 +163,11 @@ pub fn autopilot_version() -> Message {
 /// Major, minor and patch in the upper three bytes; the lowest, 0, marks a development version.
 fn software_version(text: &str) -> u32 {
     let part = |part: &str| part.parse::<u8>().map_or(0, u32::from);
-    text.split(['.', '-']).take(3).map(part).fold(0, |sum, p| sum << 8 | p) << 8
+    text.split(['.', '-'])
+        .take(3)
+        .map(part)
+        .fold(0, |sum, p| sum << 8 | p)
+        << 8
 }
 
 /// PROTOCOL_VERSION: MAVLink 1 and 2, 2 preferred.
@@ -141,15 +181,18 @@ pub fn protocol_version() -> Message {
 
 /// MESSAGE_INTERVAL: µs between messages, −1 when off, 0 when the message is not sent here.
 pub fn message_interval(id: u32, interval_us: i32) -> Message {
-    Message::coded(MavMessage::MESSAGE_INTERVAL(MESSAGE_INTERVAL_DATA { interval_us, message_id: id as u16 }))
+    Message::coded(MavMessage::MESSAGE_INTERVAL(MESSAGE_INTERVAL_DATA {
+        interval_us,
+        message_id: id as u16,
+    }))
 }
 
-/// HOME_POSITION at latitude and longitude in degrees, altitude in m AMSL.
-pub fn home_position(position_deg: [f64; 2], altitude: f64, now: Time) -> Message {
+/// HOME_POSITION.
+pub fn home_position(home: Home, now: Time) -> Message {
     Message::coded(MavMessage::HOME_POSITION(HOME_POSITION_DATA {
-        latitude: (position_deg[0] * 1e7).round() as i32,
-        longitude: (position_deg[1] * 1e7).round() as i32,
-        altitude: (altitude * 1e3).round() as i32,
+        latitude: (home.position[0] * 1e7).round() as i32,
+        longitude: (home.position[1] * 1e7).round() as i32,
+        altitude: (home.altitude * 1e3).round() as i32,
         q: [1.0, 0.0, 0.0, 0.0],
         time_usec: now.as_micros(),
         ..HOME_POSITION_DATA::DEFAULT
@@ -174,7 +217,11 @@ pub enum MissionResult {
 
 /// MISSION_ACK for a mission type.
 pub fn mission_ack(result: MissionResult, kind: u8, to: Source) -> Message {
-    Message::raw(47, vec![to.system, to.component, result as u8, kind, 0, 0, 0, 0], 3)
+    Message::raw(
+        47,
+        vec![to.system, to.component, result as u8, kind, 0, 0, 0, 0],
+        3,
+    )
 }
 
 /// FTP refusal: NAK with "unknown command", as there are no files.
@@ -186,18 +233,22 @@ pub fn file_nak(sequence: u16, session: u8, opcode: u8, to: Source) -> Message {
     // session, opcode, size, the request's opcode; the data start at 12.
     payload[2..6].copy_from_slice(&[session, NAK, 1, opcode]);
     payload[12] = UNKNOWN_COMMAND;
-    Message::coded(MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
-        target_network: 0,
-        target_system: to.system,
-        target_component: to.component,
-        payload,
-    }))
+    Message::coded(MavMessage::FILE_TRANSFER_PROTOCOL(
+        FILE_TRANSFER_PROTOCOL_DATA {
+            target_network: 0,
+            target_system: to.system,
+            target_component: to.component,
+            payload,
+        },
+    ))
 }
 
 /// TIMESYNC answer: our time in ns beside theirs.
 pub fn time_sync(theirs: i64, now: Time, to: Source) -> Message {
     // Zero would read as a request.
-    let ours = i64::try_from(now.as_micros().saturating_mul(1000)).unwrap_or(i64::MAX).max(1);
+    let ours = i64::try_from(now.as_micros().saturating_mul(1000))
+        .unwrap_or(i64::MAX)
+        .max(1);
     Message::coded(MavMessage::TIMESYNC(TIMESYNC_DATA {
         tc1: ours,
         ts1: theirs,

@@ -37,7 +37,11 @@ pub(super) fn attitude(data: &SET_ATTITUDE_TARGET_DATA) -> Result<AttitudeSetpoi
         _ => None,
     };
     let (roll, pitch, _) = euler(data.q.map(f64::from))?;
-    Ok(AttitudeSetpoint { roll, pitch, thrust })
+    Ok(AttitudeSetpoint {
+        roll,
+        pitch,
+        thrust,
+    })
 }
 
 fn thrust(sent: f32) -> Result<f64, SetpointFault> {
@@ -69,8 +73,11 @@ pub fn euler(q: [f64; 4]) -> Result<(f64, f64, f64), SetpointFault> {
 
 /// The quaternion NED→FRD, w first, of Euler angles in rad.
 pub fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
-    let ((sr, cr), (sp, cp), (sy, cy)) =
-        ((roll / 2.0).sin_cos(), (pitch / 2.0).sin_cos(), (yaw / 2.0).sin_cos());
+    let ((sr, cr), (sp, cp), (sy, cy)) = (
+        (roll / 2.0).sin_cos(),
+        (pitch / 2.0).sin_cos(),
+        (yaw / 2.0).sin_cos(),
+    );
     [
         cr * cp * cy + sr * sp * sy,
         sr * cp * cy - cr * sp * sy,
@@ -85,7 +92,11 @@ pub(super) fn sticks(data: &MANUAL_CONTROL_DATA) -> Option<Sticks> {
         return None;
     }
     let axis = |sent: i16, low: f64| (f64::from(sent) / 1000.0).clamp(low, 1.0);
-    Some(Sticks { roll: axis(data.y, -1.0), pitch: axis(data.x, -1.0), throttle: axis(data.z, 0.0) })
+    Some(Sticks {
+        roll: axis(data.y, -1.0),
+        pitch: axis(data.x, -1.0),
+        throttle: axis(data.z, 0.0),
+    })
 }
 
 #[cfg(test)]
@@ -109,7 +120,10 @@ mod tests {
     fn garbage_is_no_attitude() {
         assert_eq!(euler([0.0; 4]), Err(SetpointFault::NoAttitude));
         assert_eq!(euler([1e30, 0.0, 0.0, 0.0]), Err(SetpointFault::NotFinite));
-        assert_eq!(euler([f64::NAN, 0.0, 0.0, 1.0]), Err(SetpointFault::NotFinite));
+        assert_eq!(
+            euler([f64::NAN, 0.0, 0.0, 1.0]),
+            Err(SetpointFault::NotFinite)
+        );
         assert_eq!(thrust(1e30), Err(SetpointFault::NotFinite));
         assert_eq!(thrust(f32::NAN), Err(SetpointFault::NotFinite));
         assert_eq!(thrust(-0.5), Ok(0.0));

@@ -2,12 +2,12 @@
 
 use mavlink::dialects::ardupilotmega::{
     ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, ATTITUDE_TARGET_DATA, AttitudeTargetTypemask,
-    BATTERY_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, GpsFixType,
-    MavLandedState, MavMessage, MavSysStatusSensor, SERVO_OUTPUT_RAW_DATA, SYS_STATUS_DATA, SYSTEM_TIME_DATA,
-    VFR_HUD_DATA,
+    BATTERY_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA,
+    GpsFixType, MavLandedState, MavMessage, MavSysStatusSensor, SERVO_OUTPUT_RAW_DATA,
+    SYS_STATUS_DATA, SYSTEM_TIME_DATA, VFR_HUD_DATA,
 };
 
-use super::{Message, mode, setpoint};
+use super::{Message, answer, mode, setpoint};
 use crate::link::autopilot::Status;
 use crate::physics::Time;
 
@@ -23,11 +23,15 @@ pub struct Stream {
 }
 
 const fn stream(id: u32, default_hz: f64, group: u8) -> Stream {
-    Stream { id, default_hz, group }
+    Stream {
+        id,
+        default_hz,
+        group,
+    }
 }
 
 /// Every stream, with its default rate.
-pub const STREAMS: [Stream; 12] = [
+pub const STREAMS: [Stream; 13] = [
     stream(30, 10.0, 10), // ATTITUDE
     stream(31, 10.0, 10), // ATTITUDE_QUATERNION
     stream(83, 5.0, 4),   // ATTITUDE_TARGET
@@ -38,6 +42,7 @@ pub const STREAMS: [Stream; 12] = [
     stream(245, 1.0, 2),  // EXTENDED_SYS_STATE
     stream(24, 1.0, 2),   // GPS_RAW_INT
     stream(147, 1.0, 2),  // BATTERY_STATUS
+    stream(242, 0.5, 2),  // HOME_POSITION (MAVSDK waits for it rather than asks)
     stream(2, 0.0, 12),   // SYSTEM_TIME
     stream(436, 0.0, 12), // CURRENT_MODE
 ];
@@ -47,13 +52,22 @@ pub fn position(id: u32) -> Option<usize> {
     STREAMS.iter().position(|stream| stream.id == id)
 }
 
+/// A home position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Home {
+    /// Latitude and longitude, degrees.
+    pub position: [f64; 2],
+    /// Altitude, m AMSL.
+    pub altitude: f64,
+}
+
 /// What the streams need besides the status.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scene {
     /// Vehicle time.
     pub now: Time,
-    /// Altitude of the home position, m AMSL; NaN when unknown.
-    pub home_altitude: f64,
+    /// The home position, once known.
+    pub home: Option<Home>,
     /// Frames from clients that could not be used, counted.
     pub bad_frames: u64,
 }
@@ -62,7 +76,10 @@ pub struct Scene {
 pub fn message(id: u32, status: &Status, scene: &Scene) -> Option<Message> {
     let built = match id {
         1 => sys_status(status, scene),
-        2 => MavMessage::SYSTEM_TIME(SYSTEM_TIME_DATA { time_unix_usec: 0, time_boot_ms: boot_ms(scene.now) }),
+        2 => MavMessage::SYSTEM_TIME(SYSTEM_TIME_DATA {
+            time_unix_usec: 0,
+            time_boot_ms: boot_ms(scene.now),
+        }),
         24 => gps_raw(status, scene),
         30 => attitude(status, scene)?,
         31 => attitude_quaternion(status, scene)?,
@@ -75,6 +92,11 @@ pub fn message(id: u32, status: &Status, scene: &Scene) -> Option<Message> {
             landed_state: landed(status),
             ..EXTENDED_SYS_STATE_DATA::DEFAULT
         }),
+        242 => {
+            return scene
+                .home
+                .map(|home| answer::home_position(home, scene.now));
+        }
         436 => return Some(mode::current_mode(status)),
         _ => return None,
     };
@@ -121,7 +143,11 @@ fn attitude_quaternion(status: &Status, scene: &Scene) -> Option<MavMessage> {
 
 fn attitude_target(status: &Status, scene: &Scene) -> Option<MavMessage> {
     let [roll, pitch] = finite(status.target)?;
-    let yaw = if status.attitude[2].is_finite() { status.attitude[2] } else { 0.0 };
+    let yaw = if status.attitude[2].is_finite() {
+        status.attitude[2]
+    } else {
+        0.0
+    };
     Some(MavMessage::ATTITUDE_TARGET(ATTITUDE_TARGET_DATA {
         time_boot_ms: boot_ms(scene.now),
         q: setpoint::quaternion([roll, pitch, yaw]).map(|x| x as f32),
@@ -145,7 +171,9 @@ fn vfr_hud(status: &Status) -> MavMessage {
 
 fn global_position(status: &Status, scene: &Scene) -> Option<MavMessage> {
     let [latitude, longitude] = finite(status.position)?;
-    let height = status.altitude - scene.home_altitude;
+    let height = scene
+        .home
+        .map_or(0.0, |home| status.altitude - home.altitude);
     let [vx, vy, vz] = status.velocity.map(|v| (v * 100.0).round() as i16);
     Some(MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
         time_boot_ms: boot_ms(scene.now),
@@ -208,8 +236,11 @@ fn servo_output(status: &Status, scene: &Scene) -> MavMessage {
 
 fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
     type S = MavSysStatusSensor;
+    // What stands behind the vehicle's own estimate, all or nothing. The compass is among them:
+    // MAVSDK's `health_all_ok` waits for it.
     let sensors = S::MAV_SYS_STATUS_SENSOR_3D_GYRO
         | S::MAV_SYS_STATUS_SENSOR_3D_ACCEL
+        | S::MAV_SYS_STATUS_SENSOR_3D_MAG
         | S::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
         | S::MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE
         | S::MAV_SYS_STATUS_SENSOR_GPS
@@ -221,7 +252,11 @@ fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         onboard_control_sensors_present: sensors,
         onboard_control_sensors_enabled: sensors,
-        onboard_control_sensors_health: if status.vehicle_alive { sensors } else { S::empty() },
+        onboard_control_sensors_health: if status.vehicle_alive {
+            sensors
+        } else {
+            S::empty()
+        },
         load: (status.load * 1000.0).round() as u16,
         errors_comm: scene.bad_frames.min(u64::from(u16::MAX)) as u16,
         voltage_battery: u16::MAX,
