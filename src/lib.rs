@@ -39,6 +39,7 @@ pub mod model;
 pub mod control;
 pub mod link;
 pub mod logs;
+pub mod flight;
 #[cfg(feature = "sitl")]
 pub mod sim;
 pub mod report;

@@ -3,12 +3,14 @@
 #[cfg(feature = "sitl")]
 mod evaluate;
 mod files;
+pub mod fly;
 #[cfg(feature = "sitl")]
 mod targets;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
 
 /// A MAVLink offboard autopilot companion for fixed-wing aircraft.
 #[derive(Parser)]
@@ -23,6 +25,8 @@ enum Command {
     /// Score controllers on the target file, flown in JSBSim in this process.
     #[cfg(feature = "sitl")]
     Evaluate(evaluate::Arguments),
+    /// Fly a vehicle, serving ground stations and offboard programs.
+    Fly(fly::Arguments),
     /// Write a target file.
     #[cfg(feature = "sitl")]
     Targets(targets::Arguments),
@@ -30,9 +34,12 @@ enum Command {
 
 /// Runs the subcommand of the command line; what goes wrong is said in one line.
 pub fn main() -> ExitCode {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let result = match Arguments::parse().command {
         #[cfg(feature = "sitl")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Fly(arguments) => fly::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Targets(arguments) => targets::run(&arguments),
     };

@@ -1,0 +1,177 @@
+//! `greylag fly`: the companion on a real or simulated vehicle.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use anyhow::Context;
+use clap::Args;
+use crossbeam_channel::RecvTimeoutError;
+
+use crate::commands::files::shipped;
+use crate::control::{Controller, Kind, build};
+use crate::flight::pilot::{Config, Pilot};
+use crate::flight::recorder::Place;
+use crate::flight::runtime::{Crew, Event, Flight, Options, Pace, Seat};
+use crate::link::address::Address;
+use crate::link::autopilot::Severity;
+use crate::model::GreyBox;
+use crate::physics::Airframe;
+
+/// The arguments of `greylag fly`.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// Link to the vehicle: udpin:, udpout:, tcpin: or tcpout:HOST:PORT.
+    #[arg(long, value_name = "ADDRESS", default_value = "udpin:127.0.0.1:14600")]
+    vehicle: Address,
+    /// Link to clients; may be given several times.
+    #[arg(long = "client", value_name = "ADDRESS", default_values = ["udpin:0.0.0.0:14550", "udpout:127.0.0.1:14540"])]
+    clients: Vec<Address>,
+    /// Controller: pid, pid-retuned, lqi or cem.
+    #[arg(long, value_name = "NAME", default_value = "lqi")]
+    controller: Kind,
+    /// Model that the controller is designed from or plans with.
+    #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
+    model: PathBuf,
+    /// Airframe file in place of the one that the model names.
+    #[arg(long, value_name = "FILE")]
+    airframe: Option<PathBuf>,
+    /// New folder for the recording [default: the next number under flights/].
+    #[arg(long, value_name = "DIR", conflicts_with = "no_record")]
+    record: Option<PathBuf>,
+    /// Record nothing.
+    #[arg(long)]
+    no_record: bool,
+    /// Wait for every plan, for a simulator that waits for every answer.
+    #[arg(long)]
+    lockstep: bool,
+    /// Time after a state frame at which a plan is late, in milliseconds.
+    #[arg(long, value_name = "MS", default_value_t = Options::PLAN_DEADLINE.as_millis() as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    plan_deadline_ms: u64,
+    /// End after this many seconds instead of at Ctrl-C.
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    duration_s: Option<Duration>,
+}
+
+/// Reads a positive number of seconds.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let number = text.parse::<f64>().map_err(|e| e.to_string())?;
+    let duration = Duration::try_from_secs_f64(number).map_err(|e| e.to_string())?;
+    if duration.is_zero() { Err("give a time above zero".into()) } else { Ok(duration) }
+}
+
+/// Flies until Ctrl-C or the end of the duration.
+///
+/// # Errors
+/// If a file cannot be used, a link cannot be opened or a recording cannot be created; nothing
+/// has been started then.
+pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let model = model(&arguments.model, arguments.airframe.as_deref())?;
+    let crew = crew(arguments.controller, &model)?;
+    let options = options(arguments, &model);
+    let stop = Arc::new(AtomicBool::new(false));
+    let told = stop.clone();
+    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed)).context("setting the handler of Ctrl-C")?;
+    let flight = Flight::start(&options, crew, stop)?;
+    announce(arguments, &flight);
+    show_events(&flight, &arguments.vehicle);
+    let summary = flight.join().context("the control thread has died; the recording holds all up to then")?;
+    println!("{summary}");
+    Ok(ExitCode::SUCCESS)
+}
+
+fn options(arguments: &Arguments, model: &GreyBox) -> Options {
+    let record = match (&arguments.record, arguments.no_record) {
+        (_, true) => None,
+        (Some(folder), _) => Some(Place::Exactly(folder.clone())),
+        (None, _) => Some(Place::Numbered("flights".into())),
+    };
+    Options {
+        vehicle: arguments.vehicle.clone(),
+        clients: arguments.clients.clone(),
+        record,
+        pace: if arguments.lockstep { Pace::Lockstep } else { Pace::RealTime },
+        duration: arguments.duration_s,
+        plan_deadline: Duration::from_millis(arguments.plan_deadline_ms),
+        deflection: model.airframe.actuators.deflection_max,
+    }
+}
+
+/// A model file, with another airframe if one is given. Paths are looked for in the working
+/// folder, then in the program's source folder.
+///
+/// # Errors
+/// If a file cannot be used.
+pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
+    let mut model = GreyBox::load(&shipped(path))?;
+    if let Some(path) = airframe {
+        model.airframe = Airframe::load(&shipped(path))?;
+    }
+    Ok(model)
+}
+
+/// A pilot with its controllers: `kind` flies, an LQI of the same model is the fallback.
+///
+/// # Errors
+/// If the model does not allow a controller, or has no level flight.
+pub fn crew(kind: Kind, model: &GreyBox) -> anyhow::Result<Crew> {
+    let controller = build(kind, model)?;
+    let pilot = Pilot::new(Config::for_model(model)?, fallback(model)?)?;
+    let seat = if kind.is_planner() { Seat::Thread } else { Seat::Loop };
+    Ok(Crew { pilot, controller, seat })
+}
+
+fn fallback(model: &GreyBox) -> anyhow::Result<Box<dyn Controller>> {
+    match build(Kind::Lqi, model) {
+        Ok(lqi) => Ok(lqi),
+        Err(error) => {
+            eprintln!("greylag: {error}; the fallback is {} instead", Kind::PidRetuned);
+            Ok(build(Kind::PidRetuned, model)?)
+        }
+    }
+}
+
+fn announce(arguments: &Arguments, flight: &Flight) {
+    println!("controller {}, model {}", arguments.controller, arguments.model.display());
+    println!("vehicle    {}", arguments.vehicle);
+    for client in &arguments.clients {
+        println!("clients    {client}");
+    }
+    match &flight.recording {
+        Some(folder) => println!("recording  {}", folder.display()),
+        None => println!("recording  none"),
+    }
+    println!("waiting for a vehicle; Ctrl-C ends");
+}
+
+/// Prints what happens until the flight is over.
+fn show_events(flight: &Flight, vehicle: &Address) {
+    while flight.is_flying() {
+        match flight.events.recv_timeout(Duration::from_millis(50)) {
+            Ok(event) => println!("{}", line(&event, vehicle)),
+            Err(RecvTimeoutError::Timeout) => {}
+            // The control thread is about to end.
+            Err(RecvTimeoutError::Disconnected) => return,
+        }
+    }
+}
+
+fn line(event: &Event, vehicle: &Address) -> String {
+    match event {
+        Event::Text(text) => format!("[{}] {}", severity(text.severity), text.words),
+        Event::VehicleFound(peer) => format!("vehicle found at {}", peer.address),
+        Event::NoVehicle => format!("no vehicle yet on {vehicle}; start one with `cargo sitl`"),
+    }
+}
+
+fn severity(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Critical => "critical",
+        Severity::Error => "error",
+        Severity::Warning => "warning",
+        Severity::Notice => "notice",
+        Severity::Info => "info",
+    }
+}

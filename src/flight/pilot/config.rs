@@ -1,0 +1,262 @@
+//! The numbers a pilot flies by: the airframe's envelope, times, slew limits, level trim.
+
+use crate::model::{GreyBox, Trim, TrimError};
+use crate::physics::airframe::Envelope;
+
+/// Airspeed between two rows of the trim table, m/s: pitch errs by less than 0.1° between them.
+const TRIM_SPACING: f64 = 1.0;
+/// Altitude at which the trim table is made, m: that of the simulator's start. Trim depends on
+/// equivalent airspeed, which differs by 5 % from true airspeed a thousand metres away.
+const TRIM_ALTITUDE: f64 = 600.0;
+
+/// The pilot's settings. Units are in the names, since parameters and files show them as they are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// The airframe's envelope.
+    pub envelope: Envelope,
+    /// Age of the last setpoint (or stick input) at which its mode is left, s.
+    pub offboard_loss_s: f64,
+    /// Age of the last fresh state at which the vehicle link counts as lost, s.
+    pub vehicle_loss_s: f64,
+    /// Gap in usable state over which the command in force is continued, s.
+    pub state_hold_s: f64,
+    /// Fastest change of the throttle command, in units of 0..1 per second.
+    pub throttle_slew_per_s: f64,
+    /// Where OFFBOARD takes its throttle from.
+    pub thrust_source: ThrustSource,
+    /// Largest bank and pitch at which arming is allowed, degrees.
+    pub arm_tilt_max_deg: f64,
+    /// Airspeed above which disarming needs force, m/s.
+    pub disarm_airspeed_max_mps: f64,
+    /// Level trim, by rising airspeed.
+    pub trim: Vec<TrimPoint>,
+}
+
+/// Where OFFBOARD takes its throttle from (parameter GL_THRUST_SRC).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ThrustSource {
+    /// The controller holds the cruise airspeed.
+    Cruise,
+    /// The setpoint's thrust is the throttle, where it gives one.
+    Setpoint,
+}
+
+/// One row of the level trim table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrimPoint {
+    /// True airspeed, m/s.
+    pub airspeed_mps: f64,
+    /// Pitch, which is the angle of attack in level flight, degrees.
+    pub pitch_deg: f64,
+    /// Elevator command, −1..1.
+    pub elevator: f64,
+    /// Throttle command, 0..1.
+    pub throttle: f64,
+}
+
+impl Config {
+    /// Settings for the aircraft that `model` describes: its envelope, its level trim.
+    ///
+    /// # Errors
+    /// If the model cannot fly level at the cruise airspeed, or what [`Config::check`] finds.
+    pub fn for_model(model: &GreyBox) -> Result<Self, ConfigError> {
+        let envelope = model.airframe.envelope;
+        let row = |airspeed: f64| trim_row(model, airspeed);
+        row(envelope.airspeed_cruise_mps)?;
+        let count = ((envelope.airspeed_max_mps - envelope.airspeed_min_mps) / TRIM_SPACING) as usize;
+        // Airspeeds at which the model has no level trim are left to their neighbours.
+        let speeds = (0..=count).map(|i| envelope.airspeed_min_mps + i as f64 * TRIM_SPACING);
+        let config = Config::new(envelope, speeds.filter_map(|v| row(v).ok()).collect());
+        config.check()?;
+        Ok(config)
+    }
+
+    /// The default settings with an envelope, with the rows of a trim table.
+    pub fn new(envelope: Envelope, trim: Vec<TrimPoint>) -> Self {
+        Config {
+            envelope,
+            offboard_loss_s: 1.0,
+            vehicle_loss_s: 0.5,
+            // Five frames: longer than the jitter of a link, shorter than a wrong aileron needs
+            // to roll the aircraft far.
+            state_hold_s: 0.05,
+            // Full travel in 0.2 s, the lag of the motor: faster would not show in the thrust.
+            throttle_slew_per_s: 5.0,
+            thrust_source: ThrustSource::Cruise,
+            arm_tilt_max_deg: 60.0,
+            // Below every airspeed at which a fixed-wing aircraft of this class flies.
+            disarm_airspeed_max_mps: 8.0,
+            trim,
+        }
+    }
+}
+
+fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
+    let trim = Trim::level(model, airspeed, TRIM_ALTITUDE)?;
+    Ok(TrimPoint {
+        airspeed_mps: airspeed,
+        pitch_deg: trim.state.pitch.to_degrees(),
+        elevator: (trim.controls.elevator / model.airframe.actuators.deflection_max).clamp(-1.0, 1.0),
+        throttle: trim.controls.throttle.clamp(0.0, 1.0),
+    })
+}
+
+/// A setting that cannot be flown with.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ConfigError {
+    /// A number is outside its range.
+    #[error("pilot setting `{name}` is {value}: give a number from {low} to {high}")]
+    Range {
+        /// The setting.
+        name: &'static str,
+        /// What it is.
+        value: f64,
+        /// The least allowed.
+        low: f64,
+        /// The most allowed.
+        high: f64,
+    },
+    /// Two settings contradict each other.
+    #[error("pilot setting `{smaller}` must lie below `{larger}`: correct one of them")]
+    Order {
+        /// The one that must be smaller.
+        smaller: &'static str,
+        /// The one that must be larger.
+        larger: &'static str,
+    },
+    /// The trim table cannot be interpolated.
+    #[error("pilot table `trim` needs at least one row, finite numbers, and rising airspeeds: correct the rows")]
+    Trim,
+    /// The model has no level flight at the cruise airspeed.
+    #[error("the pilot needs level trim at the cruise airspeed: {0}")]
+    NoTrim(#[from] TrimError),
+}
+
+impl Config {
+    /// Checks ranges and order.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range, or the first pair that contradicts itself.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        for (name, value, low, high) in self.ranges() {
+            if !(value >= low && value <= high) {
+                return Err(ConfigError::Range { name, value, low, high });
+            }
+        }
+        let e = &self.envelope;
+        let ordered = [
+            ("pitch_min_deg", e.pitch_min_deg, "pitch_max_deg", e.pitch_max_deg),
+            ("airspeed_min_mps", e.airspeed_min_mps, "airspeed_cruise_mps", e.airspeed_cruise_mps),
+            ("airspeed_cruise_mps", e.airspeed_cruise_mps, "airspeed_max_mps", e.airspeed_max_mps),
+        ];
+        for (smaller, low, larger, high) in ordered {
+            if low >= high {
+                return Err(ConfigError::Order { smaller, larger });
+            }
+        }
+        self.check_trim()
+    }
+
+    fn check_trim(&self) -> Result<(), ConfigError> {
+        let finite = |t: &TrimPoint| {
+            t.airspeed_mps > 0.0 && t.pitch_deg.abs() <= 30.0 && t.elevator.abs() <= 1.0 && (0.0..=1.0).contains(&t.throttle)
+        };
+        let rising = self.trim.windows(2).all(|w| w[0].airspeed_mps < w[1].airspeed_mps);
+        if self.trim.is_empty() || !rising || !self.trim.iter().all(finite) { Err(ConfigError::Trim) } else { Ok(()) }
+    }
+
+    fn ranges(&self) -> [(&'static str, f64, f64, f64); 14] {
+        let e = &self.envelope;
+        [
+            ("offboard_loss_s", self.offboard_loss_s, 0.1, 60.0),
+            ("vehicle_loss_s", self.vehicle_loss_s, 0.05, 5.0),
+            ("state_hold_s", self.state_hold_s, 0.0, 0.5),
+            ("bank_max_deg", e.bank_max_deg, 5.0, 80.0),
+            ("pitch_max_deg", e.pitch_max_deg, 5.0, 60.0),
+            ("pitch_min_deg", e.pitch_min_deg, -60.0, -5.0),
+            ("airspeed_cruise_mps", e.airspeed_cruise_mps, 1.0, 100.0),
+            ("airspeed_min_mps", e.airspeed_min_mps, 1.0, 100.0),
+            ("airspeed_max_mps", e.airspeed_max_mps, 1.0, 110.0),
+            ("load_factor_max", e.load_factor_max, 1.1, 10.0),
+            ("surface_slew_per_s", e.surface_slew_per_s, 1.0, 200.0),
+            ("throttle_slew_per_s", self.throttle_slew_per_s, 0.5, 100.0),
+            ("arm_tilt_max_deg", self.arm_tilt_max_deg, 5.0, 180.0),
+            ("disarm_airspeed_max_mps", self.disarm_airspeed_max_mps, 0.0, 100.0),
+        ]
+    }
+
+    /// Level trim at an airspeed (m/s): linear between the rows, constant beyond the ends.
+    pub fn trim_at(&self, airspeed_mps: f64) -> TrimPoint {
+        let (first, last) = (self.trim[0], self.trim[self.trim.len() - 1]);
+        if airspeed_mps <= first.airspeed_mps {
+            return first;
+        }
+        for pair in self.trim.windows(2) {
+            if airspeed_mps <= pair[1].airspeed_mps {
+                return between(&pair[0], &pair[1], airspeed_mps);
+            }
+        }
+        last
+    }
+}
+
+fn between(a: &TrimPoint, b: &TrimPoint, airspeed_mps: f64) -> TrimPoint {
+    let share = (airspeed_mps - a.airspeed_mps) / (b.airspeed_mps - a.airspeed_mps);
+    let mix = |x: f64, y: f64| x + share * (y - x);
+    TrimPoint {
+        airspeed_mps,
+        pitch_deg: mix(a.pitch_deg, b.pitch_deg),
+        elevator: mix(a.elevator, b.elevator),
+        throttle: mix(a.throttle, b.throttle),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn x8() -> Config {
+        Config::for_model(&GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn every_model_of_the_x8_gives_settings_that_can_be_flown() {
+        for name in ["jsbsim", "prior", "prior-mild", "prior-severe"] {
+            let model = GreyBox::load(Path::new(&format!("params/x8/{name}.toml"))).unwrap();
+            assert_eq!(Config::for_model(&model).unwrap().check(), Ok(()), "{name}");
+        }
+    }
+
+    #[test]
+    fn trim_is_that_of_the_simulator() {
+        // The three rows measured in JSBSim; 0.01° is a tenth of the table's spacing error.
+        for (airspeed, pitch, deflection, throttle) in
+            [(16.67, 2.283, 0.01855, 0.118), (20.0, 0.858, 0.0688, 0.185), (25.0, -0.30, 0.1096, 0.308)]
+        {
+            let row = x8().trim_at(airspeed);
+            assert!((row.pitch_deg - pitch).abs() < 0.05, "{row:?}");
+            assert!((row.elevator - deflection / 0.5235).abs() < 0.005, "{row:?}");
+            assert!((row.throttle - throttle).abs() < 0.002, "{row:?}");
+        }
+    }
+
+    #[test]
+    fn trim_is_linear_between_rows_and_constant_beyond() {
+        let row = |airspeed_mps, pitch_deg| TrimPoint { airspeed_mps, pitch_deg, elevator: 0.0, throttle: 0.2 };
+        let config = Config { trim: vec![row(20.0, 2.0), row(25.0, 1.0)], ..x8() };
+        assert_eq!(config.trim_at(22.5), row(22.5, 1.5));
+        assert_eq!(config.trim_at(5.0), config.trim[0]);
+        assert_eq!(config.trim_at(80.0), config.trim[1]);
+    }
+
+    #[test]
+    fn a_contradiction_names_both_sides() {
+        let mut config = x8();
+        config.envelope.airspeed_min_mps = 30.0;
+        let words = config.check().unwrap_err().to_string();
+        assert!(words.contains("airspeed_min_mps") && words.contains("airspeed_cruise_mps"), "{words}");
+        assert!(Config { throttle_slew_per_s: f64::NAN, ..x8() }.check().is_err());
+        assert!(Config { trim: vec![], ..x8() }.check().is_err());
+    }
+}

@@ -1,0 +1,81 @@
+//! What the pilot asks of a planner, and what it answers to the vehicle.
+
+use crate::control::{Observation, Target};
+use crate::link::autopilot::Mode;
+use crate::physics::{Command, Time};
+
+/// What a planner is asked for at a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// What is seen.
+    pub observation: Observation,
+    /// What is wanted, already inside the envelope.
+    pub target: Target,
+    /// Set when the planner takes over from something else: it must forget its past and
+    /// continue from this command.
+    pub engage: Option<Command>,
+}
+
+/// What became of the request.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Plan {
+    /// The planner's command, in time; it need not be finite or in range.
+    Ready(Command),
+    /// A planner exists, but its command did not come in time.
+    Late,
+    /// No planner was asked.
+    None,
+}
+
+/// Who flew this tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Source {
+    /// The planner's command.
+    Planned,
+    /// The fallback controller's, because the plan was late.
+    Late,
+    /// The fallback controller's, because there was no plan, or none of finite numbers.
+    Fallback,
+    /// The command in force, continued over a short gap in the state.
+    Held,
+    /// Surfaces and throttle at the constants of level trim, because the state cannot be used.
+    Level,
+    /// The sticks'.
+    Sticks,
+    /// Nobody: disarmed, all outputs zero.
+    Disarmed,
+}
+
+impl Source {
+    /// The word for it in the recording.
+    pub fn name(self) -> &'static str {
+        match self {
+            Source::Planned => "planned",
+            Source::Late => "late",
+            Source::Fallback => "fallback",
+            Source::Held => "held",
+            Source::Level => "level",
+            Source::Sticks => "sticks",
+            Source::Disarmed => "disarmed",
+        }
+    }
+}
+
+/// The outcome of a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Decision {
+    /// Time of the state frame that is answered, vehicle clock.
+    pub time: Time,
+    /// What the actuators shall do: finite, in range, within the slew limit of the last one.
+    pub command: Command,
+    /// Who decided it.
+    pub source: Source,
+    /// Whether the outputs are live.
+    pub armed: bool,
+    /// The mode in force.
+    pub mode: Mode,
+    /// The target in force, after the envelope; roll and pitch are NaN when sticks or nobody fly.
+    pub target: Target,
+    /// Whether a failsafe is in force.
+    pub failsafe: bool,
+}

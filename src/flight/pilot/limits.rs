@@ -1,0 +1,187 @@
+//! The limits: what may be commanded at an airspeed, and how fast a command may change.
+
+use super::config::Config;
+use crate::control::Target;
+use crate::physics::Command;
+
+/// Time between two ticks of the control loop, s.
+pub const TICK_S: f64 = 0.01;
+/// Airspeed margin over which pitch protection fades in, m/s.
+const PROTECTION_BAND: f64 = 2.0;
+/// Pitch allowed at most below the minimum airspeed, rad: clearly nose down, not a dive.
+const RECOVERY_PITCH: f64 = -5.0 * DEGREE;
+/// Pitch required at least above the maximum airspeed, rad: clearly nose up, not a climb.
+const ARREST_PITCH: f64 = 5.0 * DEGREE;
+/// Load factor that lift still allows at the minimum airspeed. An envelope sets that airspeed near
+/// 1.41 times the stall speed (13 to 9.2 m/s for the X8), where lift allows 2; keeping 1.2 times
+/// the stall speed in a turn leaves 2 / 1.2².
+const LOAD_AT_MINIMUM: f64 = 2.0 / 1.44;
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// The limits in force. SI units, radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Largest bank, rad.
+    pub bank_max: f64,
+    /// Largest pitch, rad.
+    pub pitch_max: f64,
+    /// Smallest pitch, rad.
+    pub pitch_min: f64,
+    /// Smallest airspeed, m/s.
+    pub airspeed_min: f64,
+    /// Largest airspeed, m/s.
+    pub airspeed_max: f64,
+    /// Largest load factor of a level turn.
+    pub load_max: f64,
+    /// Largest change of a surface command in a tick.
+    pub surface_step: f64,
+    /// Largest change of the throttle command in a tick.
+    pub throttle_step: f64,
+}
+
+impl From<&Config> for Limits {
+    fn from(config: &Config) -> Self {
+        let e = &config.envelope;
+        Limits {
+            bank_max: e.bank_max_deg.to_radians(),
+            pitch_max: e.pitch_max_deg.to_radians(),
+            pitch_min: e.pitch_min_deg.to_radians(),
+            airspeed_min: e.airspeed_min_mps,
+            airspeed_max: e.airspeed_max_mps,
+            load_max: e.load_factor_max,
+            surface_step: e.surface_slew_per_s * TICK_S,
+            throttle_step: config.throttle_slew_per_s * TICK_S,
+        }
+    }
+}
+
+impl Limits {
+    /// The bank that a level turn may have at `airspeed` (m/s), rad: the load factor 1/cos φ stays
+    /// below both the limit and what lift allows, which grows as V².
+    pub fn bank_limit(&self, airspeed: f64) -> f64 {
+        let lift = LOAD_AT_MINIMUM * (airspeed / self.airspeed_min).powi(2);
+        let load = lift.min(self.load_max).max(1.0);
+        (1.0 / load).acos().min(self.bank_max)
+    }
+
+    /// The pitch that may be commanded at `airspeed` (m/s), least and most, rad.
+    pub fn pitch_limits(&self, airspeed: f64) -> (f64, f64) {
+        let slow = ((airspeed - self.airspeed_min) / PROTECTION_BAND).clamp(0.0, 1.0);
+        let fast = ((self.airspeed_max - airspeed) / PROTECTION_BAND).clamp(0.0, 1.0);
+        let most = RECOVERY_PITCH + slow * (self.pitch_max - RECOVERY_PITCH);
+        let least = ARREST_PITCH + fast * (self.pitch_min - ARREST_PITCH);
+        (least, most)
+    }
+
+    /// `target` brought inside the envelope at `airspeed` (m/s).
+    pub fn limit(&self, target: Target, airspeed: f64) -> Target {
+        let bank = self.bank_limit(airspeed);
+        let (least, most) = self.pitch_limits(airspeed);
+        Target {
+            roll: target.roll.clamp(-bank, bank),
+            pitch: target.pitch.max(least).min(most),
+            airspeed: target.airspeed.clamp(self.airspeed_min, self.airspeed_max),
+        }
+    }
+
+    /// The throttle after airspeed protection.
+    pub fn protect(&self, throttle: f64, airspeed: f64) -> f64 {
+        if airspeed < self.airspeed_min {
+            1.0
+        } else if airspeed > self.airspeed_max {
+            0.0
+        } else {
+            throttle
+        }
+    }
+
+    /// `wanted` in range, and no further from `last` than one tick allows.
+    pub fn slew(&self, last: Command, wanted: Command) -> Command {
+        let wanted = wanted.clamped();
+        let near = |from: f64, to: f64, step: f64| to.clamp(from - step, from + step);
+        Command {
+            aileron: near(last.aileron, wanted.aileron, self.surface_step),
+            elevator: near(last.elevator, wanted.elevator, self.surface_step),
+            throttle: near(last.throttle, wanted.throttle, self.throttle_step),
+        }
+        .clamped()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::Airframe;
+    use std::path::Path;
+
+    fn x8() -> Limits {
+        let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
+        Limits::from(&Config::new(airframe.envelope, vec![]))
+    }
+
+    fn wish(roll_deg: f64, pitch_deg: f64) -> Target {
+        Target { roll: roll_deg.to_radians(), pitch: pitch_deg.to_radians(), airspeed: 22.0 }
+    }
+
+    #[test]
+    fn the_hardest_target_of_the_paper_passes_unchanged_at_the_start_airspeed() {
+        // 60° and 30° at 16.67 m/s: load 2.0 needed, 1.389 (16.67 / 13)² = 2.28 available.
+        assert_eq!(x8().limit(wish(60.0, 30.0), 16.67), wish(60.0, 30.0));
+    }
+
+    #[test]
+    fn more_than_the_limits_is_cut_to_them() {
+        let cut = x8().limit(wish(-170.0, -89.0), 22.0);
+        assert!((cut.roll.to_degrees() + 60.0).abs() < 1e-12);
+        assert!((cut.pitch.to_degrees() + 30.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn bank_shrinks_with_the_lift_that_is_left() {
+        // At 13 m/s the load may be 1.389: acos(1 / 1.389) = 43.95°.
+        assert!((x8().bank_limit(13.0).to_degrees() - 43.95).abs() < 0.01);
+        // Below 13 / sqrt(1.389) = 11.03 m/s there is lift for level flight only.
+        assert_eq!(x8().bank_limit(11.0), 0.0);
+    }
+
+    #[test]
+    fn the_load_limit_binds_where_the_bank_limit_is_wide() {
+        // 1 / cos 80° is 5.8; a load of 2.2 allows acos(1 / 2.2) = 62.96°.
+        let envelope = Limits { bank_max: 80f64.to_radians(), ..x8() };
+        assert!((envelope.bank_limit(40.0).to_degrees() - 62.96).abs() < 0.01);
+    }
+
+    #[test]
+    fn slow_flight_puts_the_nose_down_and_opens_the_throttle() {
+        let e = x8();
+        assert!((e.limit(wish(0.0, 20.0), 12.9).pitch.to_degrees() + 5.0).abs() < 1e-9);
+        assert_eq!(e.protect(0.2, 12.9), 1.0);
+        // Protection has faded out 2 m/s above the minimum, so that flight at 15 m/s is free.
+        assert_eq!(e.limit(wish(0.0, 30.0), 15.0).pitch, 30f64.to_radians());
+        assert_eq!(e.protect(0.2, 13.1), 0.2);
+    }
+
+    #[test]
+    fn fast_flight_brings_the_nose_up_and_closes_the_throttle() {
+        let e = x8();
+        assert!((e.limit(wish(0.0, -30.0), 45.1).pitch.to_degrees() - 5.0).abs() < 1e-9);
+        assert_eq!(e.protect(0.7, 45.1), 0.0);
+        assert_eq!(e.limit(wish(0.0, -30.0), 42.9).pitch, -30f64.to_radians());
+    }
+
+    #[test]
+    fn full_travel_takes_ten_ticks() {
+        // 2.0 of travel in 0.1 s is 0.2 a tick.
+        let e = x8();
+        let mut now = Command { aileron: -1.0, elevator: 1.0, throttle: 0.0 };
+        let wanted = Command { aileron: 1e30, elevator: -5.0, throttle: 2.0 };
+        for _ in 0..9 {
+            now = e.slew(now, wanted);
+            assert!(now.aileron < 1.0 - 1e-9);
+        }
+        now = e.slew(now, wanted);
+        assert!((now.aileron - 1.0).abs() < 1e-9 && (now.elevator + 1.0).abs() < 1e-9);
+        // The throttle takes 20 ticks: 0.5 after ten.
+        assert!((now.throttle - 0.5).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,379 @@
+//! The pilot: from telemetry, time, requests to one command a tick.
+//!
+//! No socket, clock, lock or `Result` inside a tick, so that a recording is an input: the same
+//! calls give the same commands to the bit. A tick has two phases, so that a planner can run
+//! between them: [`Pilot::observe`] says what is wanted, [`Pilot::decide`] what shall be done.
+//!
+//! ```text
+//! planned command ─► fallback controller ─► command held 50 ms ─► wings level at trim constants
+//!    late, or not finite         no usable state         still none
+//! ```
+
+mod config;
+mod decision;
+
+mod estimate;
+mod limits;
+mod modes;
+mod parameters;
+mod telemetry;
+mod texts;
+
+pub use config::{Config, ConfigError, ThrustSource, TrimPoint};
+pub use decision::{Decision, Plan, Request, Source};
+pub use limits::{Limits, TICK_S};
+pub use modes::mode_name;
+
+use crate::control::{Controller, Observation, Target};
+use crate::link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
+use crate::link::vehicle::Telemetry;
+use crate::physics::{Command, Time};
+use estimate::{Estimate, Frame, RESTART, within};
+use texts::Texts;
+
+/// Least time between two lines about the same kind of trouble, s.
+const COMPLAINT_INTERVAL_S: f64 = 5.0;
+
+/// The pilot of one aircraft.
+pub struct Pilot {
+    config: Config,
+    limits: Limits,
+    parameters: Vec<Parameter>,
+    fallback: Box<dyn Controller>,
+    estimate: Estimate,
+    texts: Texts,
+    clock: Time,
+    answering: Time,
+    armed: bool,
+    mode: Mode,
+    setpoint: Option<(Time, AttitudeSetpoint)>,
+    sticks: Option<(Time, Sticks)>,
+    setpoint_lost: bool,
+    vehicle_lost: bool,
+    in_force: Command,
+    before: Command,
+    source: Source,
+    target: Target,
+    pending: Pending,
+    planner_engaged: bool,
+    fallback_engaged: bool,
+    complaints: Complaints,
+    load: f64,
+}
+
+/// What `observe` found, for `decide`.
+#[derive(Clone, Copy, Debug)]
+enum Pending {
+    Disarmed,
+    Repeated,
+    Unusable,
+    Sticks(Sticks),
+    Fly { seen: Observation, throttle: Option<f64> },
+}
+
+/// When each kind of trouble was last told.
+#[derive(Debug, Default)]
+struct Complaints {
+    defect: Option<Time>,
+    plan: Option<Time>,
+    fallback: Option<Time>,
+}
+
+impl Pilot {
+    /// A pilot, disarmed and in HOLD, that flies by `config` and falls back on `fallback`.
+    ///
+    /// # Errors
+    /// What [`Config::check`] finds.
+    pub fn new(config: Config, fallback: Box<dyn Controller>) -> Result<Self, ConfigError> {
+        config.check()?;
+        let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: config.envelope.airspeed_cruise_mps };
+        Ok(Pilot {
+            limits: Limits::from(&config),
+            parameters: parameters::table(&config),
+            config,
+            fallback,
+            estimate: Estimate::default(),
+            texts: Texts::default(),
+            clock: Time::default(),
+            answering: Time::default(),
+            armed: false,
+            mode: Mode::Hold,
+            setpoint: None,
+            sticks: None,
+            setpoint_lost: false,
+            vehicle_lost: false,
+            in_force: Command::IDLE,
+            before: Command::IDLE,
+            source: Source::Disarmed,
+            target: nobody,
+            pending: Pending::Disarmed,
+            planner_engaged: false,
+            fallback_engaged: false,
+            complaints: Complaints::default(),
+            load: 0.0,
+        })
+    }
+
+    /// Lets time pass to `now`: finds lost setpoints, lost sticks, a lost vehicle. To be called
+    /// also while no frames come. A clock that jumps back is a vehicle that has restarted.
+    pub fn advance(&mut self, now: Time) {
+        if self.clock.since(now) > RESTART {
+            self.restart();
+        }
+        self.clock = now;
+        self.watch_vehicle();
+        self.watch_client();
+    }
+
+    /// First phase of a tick: takes in a state frame that came at `now`, and says what a planner
+    /// should plan, if anything.
+    pub fn observe(&mut self, now: Time, frame: &Telemetry) -> Option<Request> {
+        if self.estimate.restarted(frame) {
+            self.restart();
+        }
+        self.advance(now);
+        let quality = self.estimate.take(now, frame);
+        if quality == Frame::Frozen && !self.armed {
+            // A vehicle that waits for its launch stands still with a reason.
+            self.estimate.refresh(now);
+        }
+        self.answering = frame.time;
+        self.watch_return();
+        self.pending = self.assess(quality);
+        match self.pending {
+            Pending::Fly { seen, .. } => {
+                let engage = (!self.planner_engaged).then_some(self.in_force);
+                self.planner_engaged = true;
+                Some(Request { observation: seen, target: self.target, engage })
+            }
+            Pending::Repeated => None,
+            _ => {
+                self.forget_controllers();
+                None
+            }
+        }
+    }
+
+    /// Second phase of a tick: the answer to the frame last observed.
+    pub fn decide(&mut self, plan: Plan) -> Decision {
+        let (wanted, source) = match self.pending {
+            Pending::Disarmed => (Command::IDLE, Source::Disarmed),
+            Pending::Repeated => (self.in_force, self.source),
+            Pending::Unusable => self.without_state(),
+            Pending::Sticks(s) => {
+                (Command { aileron: s.roll, elevator: s.pitch, throttle: s.throttle }, Source::Sticks)
+            }
+            Pending::Fly { seen, throttle } => self.with_state(plan, &seen, throttle),
+        };
+        self.source = source;
+        if !matches!(self.pending, Pending::Repeated) {
+            self.before = self.in_force;
+        }
+        self.in_force = if self.armed { self.limits.slew(self.in_force, wanted) } else { Command::IDLE };
+        self.decision()
+    }
+
+    /// Notes which share of the cycle the control task needed lately, 0..1, for the status.
+    pub fn note_load(&mut self, load: f64) {
+        self.load = load;
+    }
+
+    /// Passes on a line from outside to the ground stations.
+    pub fn tell(&mut self, severity: Severity, words: &str) {
+        self.texts.say(severity, words);
+    }
+
+    /// The settings in force.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    fn configure(&mut self, config: Config) {
+        self.limits = Limits::from(&config);
+        self.parameters = parameters::table(&config);
+        self.config = config;
+    }
+
+    fn failsafe(&self) -> bool {
+        self.armed && (self.setpoint_lost || self.vehicle_lost)
+    }
+
+    fn decision(&self) -> Decision {
+        Decision {
+            time: self.answering,
+            command: self.in_force,
+            source: self.source,
+            armed: self.armed,
+            mode: self.mode,
+            target: self.target,
+            failsafe: self.failsafe(),
+        }
+    }
+
+    /// Whoever flies next starts afresh from the command in force.
+    fn forget_controllers(&mut self) {
+        self.planner_engaged = false;
+        self.fallback_engaged = false;
+    }
+
+    fn assess(&mut self, quality: Frame) -> Pending {
+        let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: self.config.envelope.airspeed_cruise_mps };
+        if quality == Frame::Repeated {
+            return if self.armed { Pending::Repeated } else { Pending::Disarmed };
+        }
+        if let Frame::Defective(reason) = quality {
+            self.complain_of_state(reason);
+        }
+        self.target = nobody;
+        if !self.armed {
+            return Pending::Disarmed;
+        }
+        if let (Mode::Manual, Some((_, sticks))) = (self.mode, self.sticks) {
+            return Pending::Sticks(sticks);
+        }
+        let usable = matches!(quality, Frame::Usable | Frame::Frozen) && !self.vehicle_lost;
+        let Some(frame) = self.estimate.last().copied().filter(|_| usable) else {
+            self.target = self.level_target();
+            return Pending::Unusable;
+        };
+        let (wish, throttle) = self.wish();
+        self.target = self.limits.limit(wish, frame.state.airspeed);
+        let Telemetry { time, mut state, actuators, altitude, .. } = frame;
+        // Noise of a sensor at rest.
+        state.airspeed = state.airspeed.max(0.0);
+        Pending::Fly { seen: Observation { time, state, actuators, altitude, previous: [self.in_force, self.before] }, throttle }
+    }
+
+    /// The target of the mode, before the envelope, with the throttle if the mode sets it itself.
+    fn wish(&self) -> (Target, Option<f64>) {
+        let airspeed = self.config.envelope.airspeed_cruise_mps;
+        match (self.mode, self.setpoint, self.sticks) {
+            (Mode::Offboard, Some((_, s)), _) => {
+                let throttle = s.thrust.filter(|_| self.config.thrust_source == ThrustSource::Setpoint);
+                (Target { roll: s.roll, pitch: s.pitch, airspeed }, throttle)
+            }
+            (Mode::Stabilized, _, Some((_, s))) => {
+                // A stick forward is nose down; each half of its travel reaches its own limit.
+                let pitch = if s.pitch > 0.0 { s.pitch * self.limits.pitch_min } else { -s.pitch * self.limits.pitch_max };
+                (Target { roll: s.roll * self.limits.bank_max, pitch, airspeed }, Some(s.throttle))
+            }
+            _ => (self.level_target(), None),
+        }
+    }
+
+    fn level_target(&self) -> Target {
+        let airspeed = self.config.envelope.airspeed_cruise_mps;
+        Target { roll: 0.0, pitch: self.config.trim_at(airspeed).pitch_deg.to_radians(), airspeed }
+    }
+
+    fn with_state(&mut self, plan: Plan, seen: &Observation, throttle: Option<f64>) -> (Command, Source) {
+        let (mut command, source) = match plan {
+            Plan::Ready(command) if command.is_finite() => {
+                self.fallback_engaged = false;
+                (command, Source::Planned)
+            }
+            Plan::Ready(_) => {
+                self.planner_engaged = false;
+                if due(&mut self.complaints.plan, self.clock) {
+                    self.texts.say(Severity::Error, "controller gave no finite command: fallback flies");
+                }
+                self.fall_back(seen, Source::Fallback)
+            }
+            Plan::Late => self.fall_back(seen, Source::Late),
+            Plan::None => self.fall_back(seen, Source::Fallback),
+        };
+        command.throttle = self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
+        (command, source)
+    }
+
+    fn fall_back(&mut self, seen: &Observation, source: Source) -> (Command, Source) {
+        if !self.fallback_engaged {
+            self.fallback.reset(0, self.in_force);
+            self.fallback_engaged = true;
+        }
+        let command = self.fallback.command(seen, &self.target);
+        if command.is_finite() {
+            return (command, source);
+        }
+        self.fallback_engaged = false;
+        if due(&mut self.complaints.fallback, self.clock) {
+            self.texts.say(Severity::Critical, "fallback gave no finite command: level at trim");
+        }
+        (self.level_command(), Source::Level)
+    }
+
+    /// The command while the state cannot be used.
+    fn without_state(&self) -> (Command, Source) {
+        let short = self.estimate.usable_within(self.clock, self.config.state_hold_s);
+        if short && !self.vehicle_lost { (self.in_force, Source::Held) } else { (self.level_command(), Source::Level) }
+    }
+
+    fn level_command(&self) -> Command {
+        let trim = self.config.trim_at(self.config.envelope.airspeed_cruise_mps);
+        Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle }
+    }
+
+    fn watch_vehicle(&mut self) {
+        let fresh = self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s);
+        if fresh != Some(false) || self.vehicle_lost {
+            return;
+        }
+        self.vehicle_lost = true;
+        if self.armed {
+            self.texts.say(Severity::Critical, "vehicle link lost: level, HOLD");
+            self.mode = Mode::Hold;
+        } else {
+            self.texts.say(Severity::Warning, "vehicle link lost");
+        }
+    }
+
+    fn watch_return(&mut self) {
+        if self.vehicle_lost && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true) {
+            self.vehicle_lost = false;
+            let words = if self.armed { "vehicle link back: flying in HOLD" } else { "vehicle link back" };
+            self.texts.say(Severity::Notice, words);
+        }
+    }
+
+    fn watch_client(&mut self) {
+        let (lost, what) = match self.mode {
+            Mode::Offboard => (!self.setpoint_fresh(), "setpoints"),
+            Mode::Manual | Mode::Stabilized => (self.armed && !self.sticks_fresh(), "sticks"),
+            Mode::Hold | Mode::Return => return,
+        };
+        if lost {
+            let words = format!("{} lost for {:.1} s: HOLD", what, self.config.offboard_loss_s);
+            self.texts.say(Severity::Critical, words);
+            self.mode = Mode::Hold;
+            self.setpoint_lost = true;
+        }
+    }
+
+    /// The vehicle's clock has started again: all that was known is of another life.
+    fn restart(&mut self) {
+        if self.estimate.last().is_some() {
+            self.texts.say(Severity::Warning, "vehicle clock went back: vehicle restarted?");
+        }
+        self.estimate = Estimate::default();
+        self.setpoint = None;
+        self.sticks = None;
+        self.vehicle_lost = false;
+        self.complaints = Complaints::default();
+        self.forget_controllers();
+    }
+
+    fn complain_of_state(&mut self, reason: &'static str) {
+        if due(&mut self.complaints.defect, self.clock) {
+            self.texts.say(Severity::Error, format!("vehicle state refused: {reason}"));
+        }
+    }
+}
+
+/// Whether a complaint may be made again at `now`; notes it if so.
+fn due(last: &mut Option<Time>, now: Time) -> bool {
+    let silent = within(*last, now, COMPLAINT_INTERVAL_S);
+    if !silent {
+        *last = Some(now);
+    }
+    !silent
+}

@@ -1,0 +1,116 @@
+//! Whether a state frame of the vehicle can be believed.
+
+use crate::link::vehicle::limits;
+use crate::link::vehicle::{Faults, Telemetry};
+
+/// The faults that make a state unusable. Specific force is recorded, not flown on.
+const STATE_FAULTS: [(Faults, &str); 5] = [
+    (Faults::ATTITUDE, "attitude"),
+    (Faults::RATES, "body rates"),
+    (Faults::AIR, "airspeed or altitude"),
+    (Faults::INCIDENCE, "incidence"),
+    (Faults::ACTUATORS, "actuators"),
+];
+
+/// What of this frame cannot be flown on, if anything: what the link has found, and what is not
+/// finite or beyond any aircraft all the same.
+pub(super) fn defect(frame: &Telemetry) -> Option<&'static str> {
+    let found = STATE_FAULTS.iter().find(|(fault, _)| frame.faults.contains(*fault));
+    found.map(|(_, name)| *name).or_else(|| implausible(frame))
+}
+
+fn implausible(frame: &Telemetry) -> Option<&'static str> {
+    let (s, z) = (&frame.state, &frame.actuators);
+    let actuators = [z.aileron, z.aileron_rate, z.elevator, z.elevator_rate, z.throttle];
+    // Comparisons with NaN are false, so these also refuse what is not finite.
+    if !(s.roll.abs() <= HALF_TURN && s.pitch.abs() <= HALF_TURN / 2.0) {
+        Some("attitude")
+    } else if !limits::rates([s.p, s.q, s.r]) {
+        Some("body rates")
+    } else if !limits::air(s.airspeed, frame.altitude) {
+        Some("airspeed or altitude")
+    } else if !limits::incidence(s.alpha, s.beta) {
+        Some("incidence")
+    } else if !actuators.iter().all(|x| x.is_finite()) {
+        Some("actuators")
+    } else {
+        None
+    }
+}
+
+/// Whether every measured value equals that of `earlier` to the bit: a sensor that has stopped.
+pub(super) fn repeats(frame: &Telemetry, earlier: &Telemetry) -> bool {
+    let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
+    same(&frame.state.to_array(), &earlier.state.to_array())
+        && same(&[frame.altitude], &[earlier.altitude])
+        && same(&frame.specific_force, &earlier.specific_force)
+}
+
+/// π with the rounding of a 32-bit quaternion, rad.
+const HALF_TURN: f64 = std::f64::consts::PI + 1e-3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::vehicle::Order;
+    use crate::physics::{ActuatorState, State, Time};
+
+    fn good() -> Telemetry {
+        Telemetry {
+            time: Time::default(),
+            order: Order::First,
+            faults: Faults::NONE,
+            state: State::NEUTRAL,
+            yaw: 0.0,
+            specific_force: [0.0, 0.0, -9.81],
+            actuators: ActuatorState::default(),
+            altitude: 600.0,
+            position: [f64::NAN; 2],
+            velocity: [f64::NAN; 3],
+            wind: [f64::NAN; 3],
+        }
+    }
+
+    #[test]
+    fn a_frame_without_position_can_be_flown_on() {
+        assert_eq!(defect(&good()), None);
+    }
+
+    #[test]
+    fn a_fault_of_the_accelerometer_alone_does_not_stop_control() {
+        let mut frame = good();
+        frame.faults.insert(Faults::SPECIFIC_FORCE);
+        assert_eq!(defect(&frame), None);
+        frame.faults.insert(Faults::RATES);
+        assert_eq!(defect(&frame), Some("body rates"));
+    }
+
+    #[test]
+    fn each_value_that_is_not_finite_or_absurd_is_a_defect() {
+        for bad in [f64::NAN, f64::INFINITY, -1e30] {
+            for i in 0..8 {
+                let mut frame = good();
+                let mut x = frame.state.to_array();
+                x[i] = bad;
+                frame.state = State::from_array(x);
+                assert!(defect(&frame).is_some(), "state component {i} = {bad}");
+            }
+            assert!(defect(&Telemetry { altitude: bad, ..good() }).is_some());
+        }
+        for i in 0..5 {
+            let mut z = ActuatorState::default();
+            *[&mut z.aileron, &mut z.aileron_rate, &mut z.elevator, &mut z.elevator_rate, &mut z.throttle][i] = f64::NAN;
+            assert!(defect(&Telemetry { actuators: z, ..good() }).is_some(), "actuator component {i}");
+        }
+    }
+
+    #[test]
+    fn the_edge_of_the_plausible_is_still_flown() {
+        // Inverted in a spin near a gyroscope's full scale: real, and when the pilot is needed most.
+        let mut frame = good();
+        frame.state.roll = -std::f64::consts::PI;
+        frame.state.p = 34.9;
+        frame.state.airspeed = 0.0;
+        assert_eq!(defect(&frame), None);
+    }
+}

@@ -1,0 +1,79 @@
+//! Where a recording goes, without overwriting another.
+
+use std::fs::{self, File};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// Where to record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A new folder under this one, numbered after the highest there: `0001`, `0002` …
+    Numbered(PathBuf),
+    /// Exactly this folder, which must not exist yet.
+    Exactly(PathBuf),
+}
+
+/// Why a recording cannot begin.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The folder is there already.
+    #[error("cannot record to {}: it exists already; name a new folder (--record) or move the old one away", path.display())]
+    Exists {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Something cannot be created.
+    #[error("cannot create recording {}: {source}; name a folder that can be written (--record), or fly with --no-record", path.display())]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+impl Place {
+    /// Makes the folder.
+    pub(super) fn create(&self) -> Result<PathBuf, RecordError> {
+        match self {
+            Place::Numbered(root) => numbered(root),
+            Place::Exactly(path) => {
+                if let Some(parent) = path.parent() {
+                    fs::create_dir_all(parent).map_err(|source| failure(parent, source))?;
+                }
+                fs::create_dir(path).map_err(|source| match source.kind() {
+                    ErrorKind::AlreadyExists => RecordError::Exists { path: path.clone() },
+                    _ => failure(path, source),
+                })?;
+                Ok(path.clone())
+            }
+        }
+    }
+}
+
+fn failure(path: &Path, source: std::io::Error) -> RecordError {
+    RecordError::File { path: path.to_owned(), source }
+}
+
+fn numbered(root: &Path) -> Result<PathBuf, RecordError> {
+    fs::create_dir_all(root).map_err(|source| failure(root, source))?;
+    let entries = fs::read_dir(root).map_err(|source| failure(root, source))?;
+    let number = |name: std::ffi::OsString| name.to_str().and_then(|n| n.parse::<u32>().ok());
+    let mut next = entries.flatten().filter_map(|e| number(e.file_name())).max().unwrap_or(0);
+    loop {
+        next = next.saturating_add(1);
+        let path = root.join(format!("{next:04}"));
+        match fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            // Another program took the number meanwhile.
+            Err(error) if error.kind() == ErrorKind::AlreadyExists && next < u32::MAX => {}
+            Err(error) => return Err(failure(&path, error)),
+        }
+    }
+}
+
+/// Creates a new file in the folder.
+pub(super) fn create(folder: &Path, name: &str) -> Result<File, RecordError> {
+    let path = folder.join(name);
+    File::create_new(&path).map_err(|source| failure(&path, source))
+}

@@ -1,0 +1,336 @@
+//! The recorder: a thread of its own that writes `flight.csv` with `flight.tlog`.
+//!
+//! Control hands entries over a bounded queue and never waits: what does not fit is dropped, with
+//! a count. A disk that fails ends the file, is told once, and the flight goes on.
+
+mod folder;
+mod row;
+
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+
+pub use folder::{Place, RecordError};
+pub use row::Row;
+
+use crate::link::framing::{FrameCounts, Frames};
+use crate::logs::csv::Rows;
+
+/// Entries that may wait: four seconds of a 100 Hz loop with its traffic.
+const QUEUE: usize = 4096;
+/// Longest time that a written entry stays in memory.
+const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
+
+/// One thing to be recorded.
+#[derive(Debug)]
+enum Entry {
+    Row(Box<Row>),
+    Bytes { unix_us: u64, bytes: Box<[u8]> },
+}
+
+/// The handle that control holds.
+#[derive(Debug)]
+pub struct Recorder {
+    queue: Option<Sender<Entry>>,
+    dropped: Arc<AtomicU64>,
+    troubles: Receiver<String>,
+    thread: Option<JoinHandle<Written>>,
+    folder: PathBuf,
+}
+
+/// What a recording came to.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// Rows of `flight.csv`.
+    pub rows: u64,
+    /// Frames of `flight.tlog`.
+    pub frames: u64,
+    /// Rows or datagrams that did not fit the queue, or came after the disk had failed.
+    pub dropped: u64,
+}
+
+impl Recorder {
+    /// Makes the folder, creates both files, starts the thread.
+    ///
+    /// # Errors
+    /// If the folder exists already, or something cannot be created.
+    pub fn start(place: &Place) -> Result<Self, RecordError> {
+        let folder = place.create()?;
+        let csv = folder::create(&folder, "flight.csv")?;
+        let tlog = folder::create(&folder, "flight.tlog")?;
+        Recorder::over(folder.clone(), csv, tlog).map_err(|source| RecordError::File { path: folder, source })
+    }
+
+    /// A recorder over any two writers.
+    fn over(folder: PathBuf, csv: impl Write + Send + 'static, tlog: impl Write + Send + 'static) -> std::io::Result<Self> {
+        let (queue, entries) = bounded(QUEUE);
+        let (trouble, troubles) = bounded(2);
+        let dropped = Arc::new(AtomicU64::new(0));
+        let mut files = Files::new(csv, tlog, trouble);
+        let work = move || files.run(&entries);
+        let thread = std::thread::Builder::new().name("recorder".into()).spawn(work)?;
+        Ok(Recorder { queue: Some(queue), dropped, troubles, thread: Some(thread), folder })
+    }
+
+    /// Where the files lie.
+    pub fn folder(&self) -> &std::path::Path {
+        &self.folder
+    }
+
+    /// Records a tick.
+    pub fn row(&self, row: Row) {
+        self.hand_over(Entry::Row(Box::new(row)));
+    }
+
+    /// Records a datagram, or whole frames of a stream, sent or received at `unix_us` (µs since 1970).
+    pub fn bytes(&self, unix_us: u64, bytes: &[u8]) {
+        self.hand_over(Entry::Bytes { unix_us, bytes: bytes.into() });
+    }
+
+    /// What has gone wrong since the last call; each file fails at most once.
+    pub fn trouble(&self) -> Option<String> {
+        self.troubles.try_recv().ok()
+    }
+
+    /// Entries dropped so far because the queue was full.
+    pub fn dropped(&self) -> u64 {
+        self.dropped.load(Ordering::Relaxed)
+    }
+
+    /// Writes what is waiting, closes the files, says what they came to.
+    pub fn finish(mut self) -> Written {
+        self.close()
+    }
+
+    fn hand_over(&self, entry: Entry) {
+        let full = self.queue.as_ref().is_none_or(|queue| queue.try_send(entry).is_err());
+        if full {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    fn close(&mut self) -> Written {
+        self.queue = None;
+        let written = self.thread.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        Written { dropped: written.dropped + self.dropped(), ..written }
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// A file that ends at its first failure.
+struct File<W> {
+    name: &'static str,
+    out: Option<W>,
+    trouble: Sender<String>,
+}
+
+impl<W> File<W> {
+    /// Does `work` on the file; `false` if it has failed, now or before.
+    fn attempt(&mut self, work: impl FnOnce(&mut W) -> std::io::Result<()>) -> bool {
+        let Some(out) = &mut self.out else { return false };
+        if let Err(error) = work(out) {
+            self.out = None;
+            let _ = self.trouble.try_send(format!("recording of {} ended: {error}", self.name));
+        }
+        self.out.is_some()
+    }
+}
+
+/// The recorder's thread: both files and what they came to.
+struct Files<C: Write, T: Write> {
+    csv: File<Rows<BufWriter<C>>>,
+    tlog: File<BufWriter<T>>,
+    written: Written,
+}
+
+impl<C: Write, T: Write> Files<C, T> {
+    fn new(csv: C, tlog: T, trouble: Sender<String>) -> Self {
+        let mut text = File { name: "flight.csv", out: None, trouble: trouble.clone() };
+        match Rows::new(BufWriter::new(csv), &Row::EXTRA) {
+            Ok(rows) => text.out = Some(rows),
+            Err(error) => drop(text.trouble.try_send(format!("recording of flight.csv ended: {error}"))),
+        }
+        let tlog = File { name: "flight.tlog", out: Some(BufWriter::new(tlog)), trouble };
+        Files { csv: text, tlog, written: Written::default() }
+    }
+
+    fn run(&mut self, entries: &Receiver<Entry>) -> Written {
+        let mut flushed = Instant::now();
+        loop {
+            match entries.recv_timeout(FLUSH_INTERVAL) {
+                Ok(entry) => self.write(&entry),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            if flushed.elapsed() >= FLUSH_INTERVAL {
+                self.flush();
+                flushed = Instant::now();
+            }
+        }
+        self.flush();
+        self.written.clone()
+    }
+
+    fn write(&mut self, entry: &Entry) {
+        match entry {
+            Entry::Row(row) => {
+                let done = self.csv.attempt(|out| row.write(out));
+                self.written.rows += u64::from(done);
+                self.written.dropped += u64::from(!done);
+            }
+            Entry::Bytes { unix_us, bytes } => {
+                for frame in Frames::new(bytes, &mut FrameCounts::default()) {
+                    let done = self.tlog.attempt(|out| {
+                        out.write_all(&unix_us.to_be_bytes())?;
+                        out.write_all(frame.bytes)
+                    });
+                    self.written.frames += u64::from(done);
+                    self.written.dropped += u64::from(!done);
+                }
+            }
+        }
+    }
+
+    fn flush(&mut self) {
+        self.csv.attempt(Rows::flush);
+        self.tlog.attempt(BufWriter::flush);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::Target;
+    use crate::flight::pilot::{Decision, Source};
+    use crate::link::autopilot::Mode;
+    use crate::logs::Sample;
+    use crate::logs::csv::{self, Tolerance};
+    use crate::physics::{Command, Time};
+
+    fn row(i: u64) -> Row {
+        let sample = Sample {
+            time_s: i as f64 * 0.01,
+            attitude_rad: [0.1, 0.2, 0.3],
+            rates_radps: [0.0; 3],
+            airspeed_mps: 20.0,
+            aileron_cmd: 0.1,
+            elevator_cmd: 0.1,
+            throttle_cmd: 0.1,
+            ..Sample::default()
+        };
+        let decision = Decision {
+            time: Time::default(),
+            command: Command::IDLE,
+            source: Source::Planned,
+            armed: true,
+            mode: Mode::Offboard,
+            target: Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 },
+            failsafe: false,
+        };
+        Row { sample, decision, latency_us: 123.4 }
+    }
+
+    /// A heartbeat of system 1, component 1 in MAVLink 2, written by rust-mavlink.
+    fn frame() -> Vec<u8> {
+        use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavMessage};
+        let header = mavlink::MavHeader { system_id: 1, component_id: 1, sequence: 0 };
+        let mut bytes = Vec::new();
+        mavlink::write_v2_msg(&mut bytes, header, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default())).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn a_recording_reads_back_with_its_extra_columns_and_whole_frames() {
+        let root = tempfile::tempdir().unwrap();
+        let recorder = Recorder::start(&Place::Numbered(root.path().to_owned())).unwrap();
+        (0..300).for_each(|i| recorder.row(row(i)));
+        let two = [frame(), frame()].concat();
+        recorder.bytes(0x0001_0203_0405_0607, &two);
+        let folder = recorder.folder().to_owned();
+        assert!(folder.ends_with("0001"));
+        assert_eq!(recorder.finish(), Written { rows: 300, frames: 2, dropped: 0 });
+        let reading = csv::load(&folder.join("flight.csv"), Tolerance::Strict).unwrap();
+        assert_eq!(reading.flight.samples.len(), 300);
+        assert_eq!(reading.unknown_columns, Row::EXTRA);
+        let text = std::fs::read_to_string(folder.join("flight.csv")).unwrap();
+        assert!(text.lines().nth(1).unwrap().ends_with(",20,OFFBOARD,1,planned,0,123.4"), "{text}");
+        let record = [&[0, 1, 2, 3, 4, 5, 6, 7][..], &frame()].concat();
+        assert_eq!(std::fs::read(folder.join("flight.tlog")).unwrap(), [record.clone(), record].concat());
+    }
+
+    #[test]
+    fn what_is_recorded_is_on_the_disk_within_a_second() {
+        let root = tempfile::tempdir().unwrap();
+        let recorder = Recorder::start(&Place::Exactly(root.path().join("flight"))).unwrap();
+        recorder.row(row(1));
+        std::thread::sleep(Duration::from_secs(1));
+        let text = std::fs::read_to_string(recorder.folder().join("flight.csv")).unwrap();
+        assert_eq!(text.lines().count(), 2);
+    }
+
+    #[test]
+    fn nothing_is_overwritten() {
+        let root = tempfile::tempdir().unwrap();
+        let numbered = Place::Numbered(root.path().join("flights"));
+        let folders: Vec<_> = (0..3).map(|_| Recorder::start(&numbered).unwrap().folder().to_owned()).collect();
+        assert!(folders[2].ends_with("0003"));
+        let error = Recorder::start(&Place::Exactly(folders[0].clone())).unwrap_err();
+        assert!(matches!(error, RecordError::Exists { .. }), "{error}");
+        std::fs::write(root.path().join("file"), "").unwrap();
+        assert!(Recorder::start(&Place::Numbered(root.path().join("file"))).is_err());
+    }
+
+    #[test]
+    fn a_full_disk_is_told_once_and_control_is_not_disturbed() {
+        // /dev/full refuses every write as a full disk does.
+        let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let recorder = Recorder::over(PathBuf::from("nowhere"), full(), full()).unwrap();
+        for i in 0..1000 {
+            recorder.row(row(i));
+            recorder.bytes(0, &frame());
+        }
+        std::thread::sleep(Duration::from_secs(1));
+        let told: Vec<_> = std::iter::from_fn(|| recorder.trouble()).collect();
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert!(told.iter().any(|t| t.contains("flight.csv")) && told.iter().any(|t| t.contains("flight.tlog")));
+        recorder.row(row(2000));
+        assert!(recorder.trouble().is_none());
+        assert!(recorder.finish().dropped > 0);
+    }
+
+    /// A disk that hangs at its first write.
+    struct Stuck {
+        hangs: Duration,
+    }
+
+    impl Write for Stuck {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            std::thread::sleep(std::mem::take(&mut self.hangs));
+            Ok(bytes.len())
+        }
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_slow_disk_costs_rows_that_are_counted_and_no_time() {
+        let stuck = || Stuck { hangs: Duration::from_secs(1) };
+        let recorder = Recorder::over(PathBuf::from("nowhere"), stuck(), stuck()).unwrap();
+        let before = Instant::now();
+        // Twice the queue: nearly the half cannot be taken while the disk sleeps.
+        (0..2 * QUEUE as u64).for_each(|i| recorder.row(row(i)));
+        assert!(before.elapsed() < Duration::from_millis(500), "{:?}", before.elapsed());
+        assert!(recorder.dropped() > QUEUE as u64 / 2, "{}", recorder.dropped());
+    }
+}

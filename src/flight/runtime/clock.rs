@@ -1,0 +1,69 @@
+//! Vehicle time between two state frames, by the host's monotonic clock.
+
+use std::time::{Duration, Instant};
+
+use crate::physics::Time;
+
+/// How the vehicle's time passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// As on the wall: between frames it goes on with the host's clock.
+    RealTime,
+    /// In steps of the answers: it stands between frames, until the vehicle has been silent for
+    /// [`PATIENCE`]. So a flight does not depend on the speed of the machine.
+    Lockstep,
+}
+
+/// Silence after which a vehicle in lockstep is no longer taken to be computing: the shim repeats
+/// an unanswered frame after one second.
+pub const PATIENCE: Duration = Duration::from_millis(1200);
+
+/// Maps the host's clock to the vehicle's.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clock {
+    pace: Pace,
+    anchor: Option<(Instant, Time)>,
+}
+
+impl Clock {
+    pub(super) fn new(pace: Pace) -> Self {
+        Clock { pace, anchor: None }
+    }
+
+    /// A state of vehicle time `time` arrived at `arrived`.
+    pub(super) fn set(&mut self, arrived: Instant, time: Time) {
+        self.anchor = Some((arrived, time));
+    }
+
+    /// Vehicle time at `host`; zero before the first state.
+    pub(super) fn at(&self, host: Instant) -> Time {
+        let Some((arrived, time)) = self.anchor else { return Time::default() };
+        let silence = host.saturating_duration_since(arrived);
+        match self.pace {
+            Pace::RealTime => time.plus(silence),
+            Pace::Lockstep => time.plus(silence.saturating_sub(PATIENCE)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vehicle_time_goes_on_with_the_host_or_stands_in_lockstep() {
+        let start = Instant::now();
+        let time = |ms: u64| Time::from_micros(1000 * ms);
+        let later = |ms: u64| start + Duration::from_millis(ms);
+        for (pace, after_a_second) in [(Pace::RealTime, 6000), (Pace::Lockstep, 5000)] {
+            let mut clock = Clock::new(pace);
+            assert_eq!(clock.at(later(1)), time(0));
+            clock.set(start, time(5000));
+            assert_eq!(clock.at(later(1000)), time(after_a_second));
+        }
+        let mut clock = Clock::new(Pace::Lockstep);
+        clock.set(start, time(5000));
+        // Half a second beyond the patience the pilot finds the link lost.
+        assert_eq!(clock.at(later(1700)), time(5500));
+    }
+}

@@ -1,0 +1,283 @@
+//! The control thread: one loop that answers state frames, then serves clients.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+use crossbeam_channel::{Sender, select_biased};
+
+use super::clock::Clock;
+use super::planner::Planner;
+use super::ports::Ports;
+use super::summary::Summary;
+use super::timing::Timing;
+use super::witness::Witness;
+use super::{Event, Options};
+use crate::flight::pilot::{Decision, Pilot, Plan};
+use crate::flight::recorder::{Recorder, Row};
+use crate::link::autopilot::Severity;
+use crate::link::client::{Clients, Now};
+use crate::link::framing::Source;
+use crate::link::transport::{Arrival, Packet};
+use crate::link::vehicle::{Faults, Order, Outputs, Sitl, Telemetry, Vehicle};
+use crate::logs::Sample;
+
+/// Between two looks at what is due: heartbeats, streams, lost links.
+const POLL: Duration = Duration::from_millis(10);
+/// A cycle of the control loop.
+const CYCLE: Duration = Duration::from_millis(10);
+/// Silence at the start after which it is said that there is no vehicle.
+const NO_VEHICLE: Duration = Duration::from_secs(2);
+/// Weight of the newest tick in the load that the status shows.
+const LOAD_WEIGHT: f64 = 0.02;
+/// The autopilot identity.
+const AUTOPILOT: Source = Source { system: 1, component: 1 };
+
+/// All that the control thread owns.
+pub(super) struct Control {
+    pilot: Pilot,
+    planner: Planner,
+    vehicle: Vehicle,
+    clients: Clients,
+    ports: Ports,
+    recorder: Option<Recorder>,
+    events: Sender<Event>,
+    clock: Clock,
+    timing: Timing,
+    started: Instant,
+    duration: Option<Duration>,
+    last_arrival: Option<Instant>,
+    outputs: Outputs,
+    load: f64,
+    told_no_vehicle: bool,
+}
+
+impl Control {
+    pub(super) fn new(
+        options: &Options,
+        pilot: Pilot,
+        planner: Planner,
+        ports: Ports,
+        recorder: Option<Recorder>,
+        events: Sender<Event>,
+    ) -> Self {
+        Control {
+            pilot,
+            planner,
+            vehicle: Vehicle::Sitl(Sitl::new(AUTOPILOT.system, options.deflection)),
+            clients: Clients::new(AUTOPILOT),
+            ports,
+            recorder,
+            events,
+            clock: Clock::new(options.pace),
+            timing: Timing::default(),
+            started: Instant::now(),
+            duration: options.duration,
+            last_arrival: None,
+            outputs: Outputs::Disarmed,
+            load: 0.0,
+            told_no_vehicle: false,
+        }
+    }
+
+    pub(super) fn run(mut self, stop: &AtomicBool) -> Summary {
+        self.welcome_targets();
+        let mut next_poll = self.started;
+        while !stop.load(Ordering::Relaxed) && !self.is_over() {
+            self.take_one(next_poll);
+            let host = Instant::now();
+            if host >= next_poll {
+                self.poll(host);
+                // After a stall the beats that were missed stay missed.
+                next_poll = (next_poll + POLL).max(host);
+            }
+        }
+        self.finish()
+    }
+
+    fn is_over(&self) -> bool {
+        self.duration.is_some_and(|duration| self.started.elapsed() >= duration)
+    }
+
+    /// Takes one arrival, the vehicle's before a client's, or waits until `until`.
+    fn take_one(&mut self, until: Instant) {
+        let wait = until.saturating_duration_since(Instant::now());
+        select_biased! {
+            recv(self.ports.from_vehicle) -> arrival => if let Ok(arrival) = arrival { self.from_vehicle(arrival) },
+            recv(self.ports.from_clients) -> arrival => if let Ok(arrival) = arrival { self.from_client(arrival) },
+            default(wait) => {}
+        }
+    }
+
+    fn from_vehicle(&mut self, arrival: Arrival) {
+        let Arrival::Packet(packet) = arrival else { return };
+        // The vehicle is taken out for the time of the call, since each tick answers through it.
+        let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
+        let mut places = states.iter_mut();
+        self.vehicle.handle(packet.arrived.saturating_duration_since(self.started), packet.peer, &packet.bytes, |state| {
+            if let Some(place) = places.next() {
+                *place = Some(state);
+            }
+        });
+        for state in states.iter().flatten() {
+            self.tick(state, &packet);
+        }
+        self.record(&packet.bytes);
+    }
+
+    fn tick(&mut self, state: &Telemetry, packet: &Packet) {
+        if state.order == Order::Late {
+            return;
+        }
+        self.clock.set(packet.arrived, state.time);
+        let request = self.pilot.observe(state.time, state);
+        let plan = request.map_or(Plan::None, |request| self.planner.plan(&request, packet.arrived));
+        let decision = self.pilot.decide(plan);
+        self.outputs = if decision.armed { Outputs::Armed(decision.command) } else { Outputs::Disarmed };
+        let frame = self.vehicle.command(state.time, self.outputs);
+        let copy = self.recorder.is_some().then(|| frame.clone());
+        self.ports.vehicle.send(packet.peer, frame);
+        let latency = packet.arrived.elapsed();
+        if let Some(frame) = copy {
+            self.record(&frame);
+        }
+        self.account(state, &decision, plan, packet, latency);
+    }
+
+    /// Notes timing and the row of a tick, after its command is out.
+    fn account(&mut self, state: &Telemetry, decision: &Decision, plan: Plan, packet: &Packet, latency: Duration) {
+        if self.last_arrival.is_none() {
+            self.say(Event::VehicleFound(packet.peer));
+        }
+        if let Some(last) = self.last_arrival.replace(packet.arrived) {
+            self.timing.interval.note(packet.arrived.saturating_duration_since(last));
+        }
+        self.timing.latency.note(latency);
+        self.timing.missed += u64::from(latency > CYCLE);
+        self.timing.late_plans += u64::from(plan == Plan::Late);
+        let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
+        self.load += LOAD_WEIGHT * (share - self.load);
+        if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {
+            let latency_us = latency.as_secs_f64() * 1e6;
+            recorder.row(Row { sample: sample(state, decision), decision: *decision, latency_us });
+        }
+    }
+
+    fn from_client(&mut self, arrival: Arrival) {
+        let host = Instant::now();
+        let now = self.now(host);
+        match arrival {
+            Arrival::Packet(packet) => {
+                let mut pilot = Witness { pilot: &mut self.pilot, hear: |event| drop(self.events.try_send(event)) };
+                self.clients.handle(now, packet.peer, &packet.bytes, &mut pilot);
+                self.record(&packet.bytes);
+            }
+            Arrival::Opened(peer) => self.clients.welcome(now, peer),
+            Arrival::Closed(peer) => self.clients.forget(peer),
+        }
+        self.send_to_clients();
+    }
+
+    /// Does what is due at `host`.
+    fn poll(&mut self, host: Instant) {
+        let now = self.now(host);
+        self.pilot.advance(now.vehicle);
+        self.pilot.note_load(self.load);
+        if let Some(trouble) = self.recorder.as_ref().and_then(Recorder::trouble) {
+            self.pilot.tell(Severity::Warning, &trouble);
+        }
+        let mut pilot = Witness { pilot: &mut self.pilot, hear: |event| drop(self.events.try_send(event)) };
+        self.clients.poll(now, &mut pilot);
+        self.send_to_clients();
+        self.greet_vehicle(now.host);
+        if self.last_arrival.is_none() && now.host > NO_VEHICLE && !self.told_no_vehicle {
+            self.told_no_vehicle = true;
+            self.say(Event::NoVehicle);
+        }
+    }
+
+    /// Sends the heartbeat of the vehicle's link, when due and when there is somebody to hear it.
+    fn greet_vehicle(&mut self, host: Duration) {
+        let Some(peer) = self.vehicle.peer().or(self.ports.vehicle.target()) else { return };
+        if let Some(frame) = self.vehicle.heartbeat(host, self.outputs) {
+            self.record(&frame);
+            self.ports.vehicle.send(peer, frame);
+        }
+    }
+
+    fn welcome_targets(&mut self) {
+        let now = self.now(self.started);
+        let targets = self.ports.clients.iter().filter_map(|link| link.target());
+        for peer in targets.collect::<Vec<_>>() {
+            self.clients.welcome(now, peer);
+        }
+    }
+
+    fn send_to_clients(&mut self) {
+        let unix_us = unix_us();
+        for (peer, frame) in self.clients.drain() {
+            if let Some(recorder) = &self.recorder {
+                recorder.bytes(unix_us, &frame);
+            }
+            self.ports.send_to_client(peer, frame);
+        }
+    }
+
+    fn record(&self, bytes: &[u8]) {
+        if let Some(recorder) = &self.recorder {
+            recorder.bytes(unix_us(), bytes);
+        }
+    }
+
+    fn say(&self, event: Event) {
+        // Nobody may be listening; control does not wait to be heard.
+        let _ = self.events.try_send(event);
+    }
+
+    fn now(&self, host: Instant) -> Now {
+        Now { host: host.saturating_duration_since(self.started), vehicle: self.clock.at(host) }
+    }
+
+    fn finish(self) -> Summary {
+        let recording = self.recorder.map(|recorder| (recorder.folder().to_owned(), recorder.finish()));
+        Summary {
+            duration_s: self.started.elapsed().as_secs_f64(),
+            vehicle: self.vehicle.counts(),
+            clients: self.clients.counts(),
+            timing: self.timing,
+            recording,
+        }
+    }
+}
+
+/// States in one packet at most: a TCP chunk of 1024 bytes holds four.
+const STATES_PER_PACKET: usize = 8;
+
+/// Microseconds since 1970, as `.tlog` counts them.
+fn unix_us() -> u64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64)
+}
+
+fn sample(state: &Telemetry, decision: &Decision) -> Sample {
+    let (s, z, c) = (&state.state, &state.actuators, &decision.command);
+    // A part with a fault still holds its last good value; in a log it is missing.
+    let known = |fault: Faults, x: f64| if state.faults.contains(fault) { f64::NAN } else { x };
+    Sample {
+        time_s: state.time.as_secs_f64(),
+        attitude_rad: [s.roll, s.pitch, state.yaw].map(|x| known(Faults::ATTITUDE, x)),
+        rates_radps: [s.p, s.q, s.r].map(|x| known(Faults::RATES, x)),
+        airspeed_mps: known(Faults::AIR, s.airspeed),
+        alpha_rad: known(Faults::INCIDENCE, s.alpha),
+        beta_rad: known(Faults::INCIDENCE, s.beta),
+        specific_force_mps2: state.specific_force.map(|x| known(Faults::SPECIFIC_FORCE, x)),
+        velocity_ned_mps: state.velocity,
+        altitude_m: known(Faults::AIR, state.altitude),
+        aileron_rad: known(Faults::ACTUATORS, z.aileron),
+        elevator_rad: known(Faults::ACTUATORS, z.elevator),
+        throttle: known(Faults::ACTUATORS, z.throttle),
+        aileron_cmd: c.aileron,
+        elevator_cmd: c.elevator,
+        throttle_cmd: c.throttle,
+        roll_target_rad: decision.target.roll,
+        pitch_target_rad: decision.target.pitch,
+    }
+}

@@ -1,0 +1,67 @@
+//! What a flight came to, in a few lines.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use super::timing::Timing;
+use crate::flight::recorder::Written;
+use crate::link::client::ClientCounts;
+use crate::link::vehicle::VehicleCounts;
+
+/// The end of a flight.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// Seconds that the program flew, by the host's clock.
+    pub duration_s: f64,
+    /// What came over the vehicle link.
+    pub vehicle: VehicleCounts,
+    /// What clients sent.
+    pub clients: ClientCounts,
+    /// Loop timing.
+    pub timing: Timing,
+    /// Where the recording lies, with what it holds.
+    pub recording: Option<(PathBuf, Written)>,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (v, c, t) = (&self.vehicle, &self.clients, &self.timing);
+        writeln!(f, "flew {:.1} s: {} states, {} lost, {} with faults", self.duration_s, v.states, v.lost, v.faulty)?;
+        if t.latency.count() > 0 {
+            writeln!(
+                f,
+                "state to command: p50 {:.0}, p99 {:.0}, p99.9 {:.0}, longest {:.0} microseconds; {} beyond 10 ms",
+                t.latency.quantile_us(0.5),
+                t.latency.quantile_us(0.99),
+                t.latency.quantile_us(0.999),
+                t.latency.max_us(),
+                t.missed
+            )?;
+        }
+        if t.interval.count() > 0 {
+            writeln!(
+                f,
+                "between states: p50 {:.2}, p99 {:.2}, longest {:.2} ms; {} plans late",
+                t.interval.quantile_us(0.5) / 1000.0,
+                t.interval.quantile_us(0.99) / 1000.0,
+                t.interval.max_us() / 1000.0,
+                t.late_plans
+            )?;
+        }
+        write!(
+            f,
+            "clients: {} frames, {} bad, {} setpoints refused, {} for others",
+            c.frames.good,
+            c.frames.bad(),
+            c.refused_setpoints,
+            c.for_others
+        )?;
+        if let Some((folder, w)) = &self.recording {
+            write!(f, "\nrecorded {} rows, {} frames in {}", w.rows, w.frames, folder.display())?;
+            if w.dropped > 0 {
+                write!(f, "; {} dropped", w.dropped)?;
+            }
+        }
+        Ok(())
+    }
+}

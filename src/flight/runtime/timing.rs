@@ -1,0 +1,94 @@
+//! Loop timing: how long each answer took, how far apart the frames came.
+
+use std::time::Duration;
+
+/// Durations up to this many microseconds are kept to the microsecond.
+const RESOLVED_US: usize = 50_000;
+
+/// A histogram of durations, of fixed size.
+#[derive(Clone, Debug)]
+pub struct Histogram {
+    buckets: Box<[u32]>,
+    count: u64,
+    max_us: f64,
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Histogram { buckets: vec![0; RESOLVED_US + 1].into(), count: 0, max_us: 0.0 }
+    }
+}
+
+impl Histogram {
+    /// Counts a duration.
+    pub fn note(&mut self, duration: Duration) {
+        let us = usize::try_from(duration.as_micros()).unwrap_or(RESOLVED_US);
+        self.buckets[us.min(RESOLVED_US)] += 1;
+        self.count += 1;
+        self.max_us = self.max_us.max(duration.as_nanos() as f64 / 1000.0);
+    }
+
+    /// How many were counted.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The longest, µs.
+    pub fn max_us(&self) -> f64 {
+        self.max_us
+    }
+
+    /// The duration that a share (0..1) of all do not exceed, µs, rounded up to the microsecond;
+    /// NaN when nothing was counted.
+    pub fn quantile_us(&self, share: f64) -> f64 {
+        let rank = ((share * self.count as f64).ceil() as u64).max(1);
+        let mut seen = 0;
+        for (us, n) in self.buckets.iter().enumerate() {
+            seen += u64::from(*n);
+            if seen >= rank {
+                return ((us + 1) as f64).min(self.max_us);
+            }
+        }
+        f64::NAN
+    }
+}
+
+/// The timing of a flight.
+#[derive(Clone, Debug, Default)]
+pub struct Timing {
+    /// From the arrival of a state frame to the sending of its command.
+    pub latency: Histogram,
+    /// Between the arrivals of two state frames.
+    pub interval: Histogram,
+    /// Answers that took longer than a cycle of 10 ms.
+    pub missed: u64,
+    /// Plans that came after their deadline.
+    pub late_plans: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_of_a_thousand_known_durations() {
+        let mut histogram = Histogram::default();
+        for us in 0..1000 {
+            histogram.note(Duration::from_micros(us));
+        }
+        // Of 0, 1 … 999 µs a half do not exceed 499 µs: told as the bucket's end.
+        assert_eq!(histogram.quantile_us(0.5), 500.0);
+        assert_eq!(histogram.quantile_us(0.99), 990.0);
+        assert_eq!(histogram.quantile_us(1.0), 999.0);
+        assert_eq!(histogram.max_us(), 999.0);
+    }
+
+    #[test]
+    fn a_stall_is_kept_as_the_maximum() {
+        let mut histogram = Histogram::default();
+        histogram.note(Duration::from_secs(3));
+        assert_eq!(histogram.max_us(), 3e6);
+        assert_eq!(histogram.quantile_us(0.5), 50_001.0);
+        assert!(Histogram::default().quantile_us(0.5).is_nan());
+    }
+}

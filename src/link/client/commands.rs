@@ -1,0 +1,206 @@
+//! The command protocol: every command addressed to us is answered, known or not.
+
+use super::{Clients, Now};
+use crate::link::autopilot::{Autopilot, Mode, Verdict};
+use crate::link::framing::{Source, Version};
+use crate::link::wire::Message;
+use crate::link::wire::answer::{self, CommandResult};
+use crate::link::wire::mode::{self, ModeRequest};
+use crate::link::wire::request::CommandRequest;
+use crate::link::wire::telemetry;
+
+/// The number in param2 of an arming command that skips the checks.
+const FORCE: f64 = 21196.0;
+const HEARTBEAT: u32 = 0;
+const AUTOPILOT_VERSION: u32 = 148;
+const HOME_POSITION: u32 = 242;
+const MESSAGE_INTERVAL: u32 = 244;
+const PROTOCOL_VERSION: u32 = 300;
+
+/// What a command comes to: the acknowledgement, then perhaps a message, then perhaps a reason.
+struct Outcome {
+    result: CommandResult,
+    message: Option<Message>,
+    reason: Option<String>,
+}
+
+impl From<CommandResult> for Outcome {
+    fn from(result: CommandResult) -> Self {
+        Outcome {
+            result,
+            message: None,
+            reason: None,
+        }
+    }
+}
+
+impl From<Verdict> for Outcome {
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::Accepted => CommandResult::Accepted.into(),
+            Verdict::Rejected(why) => Outcome {
+                result: CommandResult::TemporarilyRejected,
+                message: None,
+                reason: Some(why),
+            },
+            Verdict::Denied(why) => Outcome {
+                result: CommandResult::Denied,
+                message: None,
+                reason: Some(why),
+            },
+        }
+    }
+}
+
+impl Outcome {
+    fn with(message: Message) -> Self {
+        Outcome {
+            result: CommandResult::Accepted,
+            message: Some(message),
+            reason: None,
+        }
+    }
+
+    fn denied(reason: &str) -> Self {
+        Verdict::Denied(reason.into()).into()
+    }
+}
+
+/// A message number in a float parameter.
+fn message_number(parameter: f64) -> Option<u32> {
+    (parameter.fract() == 0.0 && (0.0..16_777_216.0).contains(&parameter))
+        .then_some(parameter as u32)
+}
+
+impl Clients {
+    /// Answers a command. One that is sent again (its confirmation counts up) because our answer
+    /// was lost gets the same answer and is not carried out twice.
+    pub(super) fn command(
+        &mut self,
+        now: Now,
+        at: usize,
+        from: Source,
+        command: CommandRequest,
+        autopilot: &mut dyn Autopilot,
+    ) {
+        if let Some(result) = self.sessions[at].answered(now.host, &command) {
+            self.reply(at, &answer::command_ack(command.number, result, from));
+            return;
+        }
+        let outcome = self.carry_out(now, at, &command, autopilot);
+        self.sessions[at].remember(now.host, command, outcome.result);
+        self.reply(
+            at,
+            &answer::command_ack(command.number, outcome.result, from),
+        );
+        if let Some(message) = outcome.message {
+            self.send_requested(at, &message);
+        }
+        if let Some(reason) = outcome.reason {
+            self.complain(now, at, &reason);
+        }
+    }
+
+    /// PROTOCOL_VERSION goes out in MAVLink 2 even to a peer that has only shown MAVLink 1: that
+    /// is how it learns that it may speak 2.
+    fn send_requested(&mut self, at: usize, message: &Message) {
+        match message.id() {
+            PROTOCOL_VERSION => {
+                self.sessions[at].send_as(Version::V2, message, self.identity, &mut self.outbox)
+            }
+            _ => self.reply(at, message),
+        }
+    }
+
+    /// Only the parameters that a command uses are looked at: the others are often NaN.
+    fn carry_out(
+        &mut self,
+        now: Now,
+        at: usize,
+        command: &CommandRequest,
+        autopilot: &mut dyn Autopilot,
+    ) -> Outcome {
+        let [first, second, third, ..] = command.params;
+        match command.number {
+            // NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH
+            17 => autopilot.set_mode(now.vehicle, Mode::Hold).into(),
+            20 => autopilot.set_mode(now.vehicle, Mode::Return).into(),
+            // DO_SET_MODE
+            176 => match mode::from_do_set_mode(first, second, third) {
+                ModeRequest::Known(mode) => autopilot.set_mode(now.vehicle, mode).into(),
+                ModeRequest::Unknown => {
+                    Outcome::denied("Mode refused: not a mode of this autopilot")
+                }
+            },
+            // COMPONENT_ARM_DISARM
+            400 if first == 1.0 => autopilot.arm(now.vehicle, second == FORCE).into(),
+            400 if first == 0.0 => autopilot.disarm(now.vehicle, second == FORCE).into(),
+            400 => Outcome::denied("Arming refused: the first parameter is neither 0 nor 1"),
+            // GET_HOME_POSITION, GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE
+            410 => self.requested(now, at, HOME_POSITION, f64::NAN, autopilot),
+            510 => self.requested(now, at, MESSAGE_INTERVAL, first, autopilot),
+            511 => self.set_message_interval(now, at, first, second),
+            512 => match message_number(first) {
+                Some(id) => self.requested(now, at, id, second, autopilot),
+                None => CommandResult::Denied.into(),
+            },
+            // REQUEST_PROTOCOL_VERSION, REQUEST_AUTOPILOT_CAPABILITIES
+            519 => Outcome::with(answer::protocol_version()),
+            520 if first == 1.0 => Outcome::with(answer::autopilot_version()),
+            520 => CommandResult::Denied.into(),
+            _ => {
+                self.counts.unknown_commands += 1;
+                CommandResult::Unsupported.into()
+            }
+        }
+    }
+
+    fn requested(
+        &mut self,
+        now: Now,
+        at: usize,
+        id: u32,
+        index: f64,
+        autopilot: &mut dyn Autopilot,
+    ) -> Outcome {
+        match id {
+            HEARTBEAT => Outcome::with(mode::heartbeat(&autopilot.status())),
+            AUTOPILOT_VERSION => Outcome::with(answer::autopilot_version()),
+            PROTOCOL_VERSION => Outcome::with(answer::protocol_version()),
+            MESSAGE_INTERVAL => match message_number(index).filter(|id| *id <= u32::from(u16::MAX))
+            {
+                Some(id) => Outcome::with(answer::message_interval(id, self.interval_us(at, id))),
+                None => CommandResult::Denied.into(),
+            },
+            _ => match telemetry::message(id, &autopilot.status(), &self.scene(now)) {
+                Some(message) => Outcome::with(message),
+                None if telemetry::position(id).is_some() => {
+                    CommandResult::TemporarilyRejected.into()
+                }
+                None => CommandResult::Unsupported.into(),
+            },
+        }
+    }
+
+    /// µs between messages; −1 when off, 0 when the message is not sent here.
+    fn interval_us(&self, at: usize, id: u32) -> i32 {
+        match (id, telemetry::position(id)) {
+            (HEARTBEAT, _) => 1_000_000,
+            (_, Some(row)) => self.sessions[at].streams.interval_us(row),
+            (_, None) => 0,
+        }
+    }
+
+    fn set_message_interval(&mut self, now: Now, at: usize, id: f64, interval_us: f64) -> Outcome {
+        let row = message_number(id).and_then(telemetry::position);
+        let set = row.ok_or(()).and_then(|row| {
+            self.sessions[at]
+                .streams
+                .set_interval(row, interval_us, now.host)
+        });
+        match set {
+            Ok(()) => CommandResult::Accepted.into(),
+            Err(()) => CommandResult::Denied.into(),
+        }
+    }
+}

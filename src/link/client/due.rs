@@ -1,0 +1,69 @@
+//! What is sent without being asked: heartbeats and streams.
+
+use std::time::Duration;
+
+use super::{Clients, Now};
+use crate::link::autopilot::Status;
+use crate::link::wire::mode::{self, Pulse};
+use crate::link::wire::telemetry::{self, Home, STREAMS, Scene};
+
+/// Between heartbeats.
+const HEARTBEAT: Duration = Duration::from_secs(1);
+
+impl Clients {
+    /// The home position is where the vehicle was first seen, then where it was armed.
+    pub(super) fn note_home(&mut self, status: &Status) {
+        let armed_now = status.armed && !self.was_armed;
+        let known = status
+            .position
+            .iter()
+            .chain([&status.altitude])
+            .all(|x| x.is_finite());
+        if known && (self.home.is_none() || armed_now) {
+            self.home = Some(Home {
+                position: status.position,
+                altitude: status.altitude,
+            });
+        }
+        self.was_armed = status.armed;
+    }
+
+    /// A heartbeat every second, one to everybody when it says something new, and one to each
+    /// newcomer.
+    pub(super) fn beat(&mut self, now: Now, status: &Status) {
+        let pulse = Some(Pulse::of(status));
+        let everybody = now.host >= self.next_heartbeat || self.pulse != pulse;
+        if everybody {
+            self.next_heartbeat = now.host + HEARTBEAT;
+            self.pulse = pulse;
+        }
+        let message = mode::heartbeat(status);
+        for session in &mut self.sessions {
+            if everybody || !session.greeted {
+                session.greeted = true;
+                session.send(&message, self.identity, &mut self.outbox);
+            }
+        }
+    }
+
+    pub(super) fn stream(&mut self, now: Now, status: &Status) {
+        let scene = self.scene(now);
+        for session in &mut self.sessions {
+            for (at, stream) in STREAMS.iter().enumerate() {
+                if session.streams.is_due(at, now.host)
+                    && let Some(message) = telemetry::message(stream.id, status, &scene)
+                {
+                    session.send(&message, self.identity, &mut self.outbox);
+                }
+            }
+        }
+    }
+
+    pub(super) fn scene(&self, now: Now) -> Scene {
+        Scene {
+            now: now.vehicle,
+            home: self.home,
+            bad_frames: self.counts.frames.bad(),
+        }
+    }
+}

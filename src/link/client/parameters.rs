@@ -1,0 +1,121 @@
+//! The parameter protocol.
+
+use super::{Clients, Now};
+use crate::link::autopilot::{Autopilot, Parameter, ParameterValue, Verdict};
+use crate::link::framing::Source;
+use crate::link::wire::answer::{self, ParameterFault};
+use crate::link::wire::request::{ParameterKey, ParameterName};
+
+/// The greatest whole number below which every other one is exact in a float.
+const EXACT: f32 = 16_777_216.0;
+
+fn find(table: &[Parameter], name: ParameterName) -> Option<usize> {
+    table
+        .iter()
+        .position(|parameter| parameter.name.as_bytes() == name.bytes())
+}
+
+/// The value in the table's type. A whole number sent as REAL32 is taken for an INT32, because
+/// pymavlink's `param_set_send` sends everything so unless told otherwise.
+fn matched(table: ParameterValue, sent: Option<ParameterValue>) -> Option<ParameterValue> {
+    match (table, sent?) {
+        (ParameterValue::Real(_), value @ ParameterValue::Real(_)) => Some(value),
+        (ParameterValue::Int(_), value @ ParameterValue::Int(_)) => Some(value),
+        (ParameterValue::Int(_), ParameterValue::Real(x))
+            if x.fract() == 0.0 && x.abs() <= EXACT =>
+        {
+            Some(ParameterValue::Int(x as i32))
+        }
+        _ => None,
+    }
+}
+
+impl Clients {
+    /// Sends the next parameters to everyone who asked for the list: a few at a time, so that a
+    /// slow link does not drop the rest.
+    pub(super) fn list_parameters(&mut self, now: Now, table: &[Parameter]) {
+        for session in &mut self.sessions {
+            for index in session.parameters_due(now.host, table.len()) {
+                let message = answer::parameter_value(&table[index], index, table.len());
+                session.send(&message, self.identity, &mut self.outbox);
+            }
+        }
+    }
+
+    pub(super) fn read_parameter(
+        &mut self,
+        at: usize,
+        from: Source,
+        key: ParameterKey,
+        table: &[Parameter],
+    ) {
+        let found = match key {
+            ParameterKey::Index(index) => (index < table.len()).then_some(index),
+            ParameterKey::Name(name) => find(table, name),
+        };
+        let message = match (found, key) {
+            (Some(index), _) => answer::parameter_value(&table[index], index, table.len()),
+            (None, ParameterKey::Index(index)) => {
+                let index = i16::try_from(index).unwrap_or(i16::MAX);
+                answer::parameter_error(
+                    ParameterName([0; 16]),
+                    index,
+                    ParameterFault::DoesNotExist,
+                    from,
+                )
+            }
+            (None, ParameterKey::Name(name)) => {
+                answer::parameter_error(name, -1, ParameterFault::DoesNotExist, from)
+            }
+        };
+        self.reply(at, &message);
+    }
+
+    /// Sets a parameter. Whatever comes of it, the value in force is echoed, to everybody when it
+    /// has changed; a refusal comes with PARAM_ERROR for those who know it, and in words.
+    pub(super) fn set_parameter(
+        &mut self,
+        now: Now,
+        at: usize,
+        from: Source,
+        name: ParameterName,
+        value: Option<ParameterValue>,
+        autopilot: &mut dyn Autopilot,
+    ) {
+        let shown = String::from_utf8_lossy(name.bytes()).into_owned();
+        let Some(index) = find(autopilot.parameters(), name) else {
+            self.reply(
+                at,
+                &answer::parameter_error(name, -1, ParameterFault::DoesNotExist, from),
+            );
+            self.complain(
+                now,
+                at,
+                &format!("Parameter {shown} refused: there is none of that name"),
+            );
+            return;
+        };
+        let refusal = match matched(autopilot.parameters()[index].value, value) {
+            None => Some((
+                ParameterFault::TypeMismatch,
+                "its type is not the table's".to_owned(),
+            )),
+            Some(value) => match autopilot.set_parameter(index, value) {
+                Verdict::Accepted => None,
+                Verdict::Rejected(reason) | Verdict::Denied(reason) => {
+                    Some((ParameterFault::OutOfRange, reason))
+                }
+            },
+        };
+        let table = autopilot.parameters();
+        let echo = answer::parameter_value(&table[index], index, table.len());
+        match refusal {
+            None => (0..self.sessions.len()).for_each(|everybody| self.reply(everybody, &echo)),
+            Some((fault, reason)) => {
+                self.reply(at, &answer::parameter_error(name, -1, fault, from));
+                self.reply(at, &echo);
+                self.complain(now, at, &format!("Parameter {shown} refused: {reason}"));
+            }
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Setpoints: followed, refused or contested.
+
+use super::{Clients, Now};
+use crate::link::autopilot::{AttitudeSetpoint, Autopilot, Sticks};
+use crate::link::wire::setpoint::SetpointFault;
+
+/// What a client hears that sends positions, velocities or raw actuators.
+pub const OTHER_SETPOINT: &str = "Setpoint refused: only attitudes (SET_ATTITUDE_TARGET) are flown";
+
+fn refusal(fault: SetpointFault) -> &'static str {
+    match fault {
+        SetpointFault::NotFinite => "Setpoint refused: a number is NaN, infinite or absurd",
+        SetpointFault::NoAttitude => "Setpoint refused: the quaternion is zero",
+        SetpointFault::AttitudeMasked => {
+            "Setpoint refused: it has no attitude, rates are not flown"
+        }
+    }
+}
+
+impl Clients {
+    /// A setpoint that is refused does not reach the autopilot, so it does not count as a sign of
+    /// life either.
+    pub(super) fn attitude(
+        &mut self,
+        now: Now,
+        at: usize,
+        setpoint: Result<AttitudeSetpoint, SetpointFault>,
+        autopilot: &mut dyn Autopilot,
+    ) {
+        match setpoint {
+            Err(fault) => self.refuse_setpoint(now, at, refusal(fault)),
+            Ok(setpoint) if self.setpoint_helm.takes(self.sessions[at].peer, now.host) => {
+                autopilot.attitude_setpoint(now.vehicle, setpoint);
+            }
+            Ok(_) => self.contested(now, at),
+        }
+    }
+
+    pub(super) fn sticks(
+        &mut self,
+        now: Now,
+        at: usize,
+        sticks: Option<Sticks>,
+        autopilot: &mut dyn Autopilot,
+    ) {
+        match sticks {
+            None => self.counts.refused_setpoints += 1,
+            Some(sticks) if self.stick_helm.takes(self.sessions[at].peer, now.host) => {
+                autopilot.sticks(now.vehicle, sticks);
+            }
+            Some(_) => self.contested(now, at),
+        }
+    }
+
+    pub(super) fn refuse_setpoint(&mut self, now: Now, at: usize, words: &str) {
+        self.counts.refused_setpoints += 1;
+        self.complain(now, at, words);
+    }
+
+    fn contested(&mut self, now: Now, at: usize) {
+        self.counts.contested_setpoints += 1;
+        self.complain(now, at, "Setpoint ignored: another client is sending them");
+    }
+}

@@ -1,0 +1,131 @@
+//! How often a client gets each message by itself.
+
+use std::time::Duration;
+
+use crate::link::wire::telemetry::STREAMS;
+
+/// The fastest stream: one message per control cycle.
+const SHORTEST: Duration = Duration::from_millis(10);
+/// The slowest stream.
+const LONGEST: Duration = Duration::from_secs(60);
+
+/// One row per entry of [`STREAMS`].
+#[derive(Clone, Debug)]
+pub struct StreamTable {
+    rows: [Row; STREAMS.len()],
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    interval: Option<Duration>,
+    due: Duration,
+}
+
+impl StreamTable {
+    /// The default rates.
+    pub fn new(host: Duration) -> Self {
+        StreamTable {
+            rows: STREAMS.map(|stream| Row {
+                interval: default_interval(stream.default_hz),
+                due: host,
+            }),
+        }
+    }
+
+    /// Whether row `at` is to be sent now; the next one is then due an interval later. A caller
+    /// that was late is not made to catch up.
+    pub fn is_due(&mut self, at: usize, host: Duration) -> bool {
+        let row = &mut self.rows[at];
+        let Some(interval) = row.interval.filter(|_| host >= row.due) else {
+            return false;
+        };
+        row.due += interval;
+        if row.due <= host {
+            row.due = host + interval;
+        }
+        true
+    }
+
+    /// The interval of row `at` in µs; −1 when off.
+    pub fn interval_us(&self, at: usize) -> i32 {
+        self.rows[at]
+            .interval
+            .map_or(-1, |interval| interval.as_micros() as i32)
+    }
+
+    /// Sets row `at` as SET_MESSAGE_INTERVAL means it: µs, 0 for the default, −1 for off. What is
+    /// too fast or too slow is limited. `Err` when the number means nothing.
+    pub fn set_interval(&mut self, at: usize, us: f64, host: Duration) -> Result<(), ()> {
+        let interval = match us {
+            -1.0 => None,
+            0.0 => default_interval(STREAMS[at].default_hz),
+            us if us > 0.0 => Some(limited(us * 1e-6)),
+            _ => return Err(()),
+        };
+        self.rows[at] = Row {
+            interval,
+            due: host,
+        };
+        Ok(())
+    }
+
+    /// Sets a group of REQUEST_DATA_STREAM (0 is every stream that is on by default) to a rate in
+    /// Hz, or off.
+    pub fn set_group(&mut self, group: u8, rate: Option<u16>, host: Duration) {
+        for (row, stream) in self.rows.iter_mut().zip(STREAMS) {
+            let meant = stream.group == group || (group == 0 && stream.default_hz > 0.0);
+            if meant {
+                let interval = match rate {
+                    None => None,
+                    Some(0) => default_interval(stream.default_hz),
+                    Some(hz) => Some(limited(1.0 / f64::from(hz))),
+                };
+                *row = Row {
+                    interval,
+                    due: host,
+                };
+            }
+        }
+    }
+}
+
+fn default_interval(hz: f64) -> Option<Duration> {
+    (hz > 0.0).then(|| limited(1.0 / hz))
+}
+
+fn limited(seconds: f64) -> Duration {
+    Duration::from_secs_f64(seconds.clamp(SHORTEST.as_secs_f64(), LONGEST.as_secs_f64()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_limited_and_garbage_is_refused() {
+        let mut table = StreamTable::new(Duration::ZERO);
+        // 1 µs would be a million messages a second.
+        table.set_interval(0, 1.0, Duration::ZERO).unwrap();
+        assert_eq!(table.interval_us(0), 10_000);
+        table.set_interval(0, 1e30, Duration::ZERO).unwrap();
+        assert_eq!(table.interval_us(0), 60_000_000);
+        table.set_interval(0, -1.0, Duration::ZERO).unwrap();
+        assert_eq!(table.interval_us(0), -1);
+        table.set_interval(0, 0.0, Duration::ZERO).unwrap();
+        assert_eq!(table.interval_us(0), 100_000);
+        for garbage in [f64::NAN, -2.0, f64::NEG_INFINITY] {
+            assert!(table.set_interval(0, garbage, Duration::ZERO).is_err());
+        }
+    }
+
+    #[test]
+    fn a_pause_is_not_caught_up() {
+        let mut table = StreamTable::new(Duration::ZERO);
+        assert!(table.is_due(0, Duration::ZERO));
+        // 10 Hz: after 5 s of silence one message, then the next 100 ms later.
+        let late = Duration::from_secs(5);
+        assert!(table.is_due(0, late));
+        assert!(!table.is_due(0, late + Duration::from_millis(99)));
+        assert!(table.is_due(0, late + Duration::from_millis(100)));
+    }
+}

@@ -1,0 +1,334 @@
+//! MAVLink frames cut out of bytes.
+//!
+//! A datagram is cut by [`Frames`], a byte stream by [`StreamCutter`]. Both take MAVLink 1 and 2,
+//! check the CRC, and look for the next start marker after anything that is not a frame. Signed
+//! frames (incompatibility flag 0x01) count as frames, their signature unchecked: whether to
+//! trust them is decided elsewhere, once signing exists. Any other incompatibility flag is
+//! refused, as the MAVLink guide asks.
+
+use mavlink::calculate_crc;
+
+use super::wire::crc_extra;
+
+/// Start marker of MAVLink 1.
+const STX_V1: u8 = 0xFE;
+/// Start marker of MAVLink 2.
+const STX_V2: u8 = 0xFD;
+/// Bytes before the payload, MAVLink 1 and 2.
+const HEADER_V1: usize = 6;
+const HEADER_V2: usize = 10;
+const CHECKSUM: usize = 2;
+const SIGNATURE: usize = 13;
+const FLAG_SIGNED: u8 = 0x01;
+/// The longest frame: MAVLink 2, full payload, signed.
+pub const MAX_FRAME: usize = HEADER_V2 + 255 + CHECKSUM + SIGNATURE;
+/// False starts that one datagram or chunk may cost before the rest of it is dropped: each costs
+/// a CRC over up to 267 bytes, so noise cannot buy more than a few microseconds.
+const MAX_FALSE_STARTS: u32 = 32;
+/// Frames taken from one datagram or chunk; senders pack to an MTU, which holds fewer.
+const MAX_FRAMES: u32 = 128;
+
+/// The version of MAVLink that a frame is written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Version {
+    /// Start marker 0xFE, message numbers to 255.
+    V1,
+    /// Start marker 0xFD, message numbers to 2²⁴ − 1, trailing zeros of the payload cut off.
+    V2,
+}
+
+/// Who wrote a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Source {
+    /// System id.
+    pub system: u8,
+    /// Component id.
+    pub component: u8,
+}
+
+/// A whole frame whose CRC is right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame<'a> {
+    /// The version it is written in.
+    pub version: Version,
+    /// The sender's running number.
+    pub sequence: u8,
+    /// The sender.
+    pub source: Source,
+    /// The message's number.
+    pub id: u32,
+    /// The payload as sent: MAVLink 2 has cut its trailing zeros.
+    pub payload: &'a [u8],
+    /// Whether it carries a signature (which nobody has checked).
+    pub signed: bool,
+    /// The frame from its start marker to its last byte, for logs and routing.
+    pub bytes: &'a [u8],
+}
+
+/// What became of the bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameCounts {
+    /// Whole frames with the right CRC.
+    pub good: u64,
+    /// Candidates with a wrong CRC.
+    pub bad_crc: u64,
+    /// Plausible frames of a message that the dialect does not know, so that its CRC cannot be
+    /// checked.
+    pub unknown: u64,
+    /// Candidates that end beyond the datagram.
+    pub truncated: u64,
+    /// Candidates with an incompatibility flag that we do not understand.
+    pub refused: u64,
+    /// Bytes dropped because a datagram held too many frames or false starts.
+    pub dropped_bytes: u64,
+}
+
+impl FrameCounts {
+    /// Adds another count to this one.
+    pub fn add(&mut self, other: FrameCounts) {
+        self.good += other.good;
+        self.bad_crc += other.bad_crc;
+        self.unknown += other.unknown;
+        self.truncated += other.truncated;
+        self.refused += other.refused;
+        self.dropped_bytes += other.dropped_bytes;
+    }
+
+    /// Everything that was not a good frame of a known message.
+    pub fn bad(&self) -> u64 {
+        self.bad_crc + self.unknown + self.truncated + self.refused
+    }
+}
+
+/// What stands at a start marker.
+enum Candidate<'a> {
+    Frame(Frame<'a>),
+    BadCrc,
+    Refused,
+    Unknown { len: usize },
+    Incomplete,
+}
+
+/// Examines the bytes from a start marker on.
+fn examine(bytes: &[u8]) -> Candidate<'_> {
+    let v1 = bytes[0] == STX_V1;
+    let header = if v1 { HEADER_V1 } else { HEADER_V2 };
+    if !v1 && bytes.len() > 2 && bytes[2] & !FLAG_SIGNED != 0 {
+        return Candidate::Refused;
+    }
+    if bytes.len() < header {
+        return Candidate::Incomplete;
+    }
+    let signed = !v1 && bytes[2] & FLAG_SIGNED != 0;
+    let end = header + bytes[1] as usize;
+    let len = end + CHECKSUM + if signed { SIGNATURE } else { 0 };
+    let (sequence, system, component, id) = match v1 {
+        true => (bytes[2], bytes[3], bytes[4], bytes[5] as u32),
+        false => (
+            bytes[4],
+            bytes[5],
+            bytes[6],
+            u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]),
+        ),
+    };
+    if bytes.len() < len {
+        return Candidate::Incomplete;
+    }
+    let Some(extra) = crc_extra(id) else {
+        return Candidate::Unknown { len };
+    };
+    if calculate_crc(&bytes[1..end], extra).to_le_bytes() != bytes[end..end + CHECKSUM] {
+        return Candidate::BadCrc;
+    }
+    Candidate::Frame(Frame {
+        version: if v1 { Version::V1 } else { Version::V2 },
+        sequence,
+        source: Source { system, component },
+        id,
+        payload: &bytes[header..end],
+        signed,
+        bytes: &bytes[..len],
+    })
+}
+
+/// The frames of one datagram, in order.
+pub struct Frames<'a, 'c> {
+    rest: &'a [u8],
+    counts: &'c mut FrameCounts,
+    frames_left: u32,
+    starts_left: u32,
+    /// Whether more bytes may follow, so that an unfinished candidate is to be waited for.
+    waits: bool,
+}
+
+impl<'a, 'c> Frames<'a, 'c> {
+    /// Cuts a whole datagram, counting what is found.
+    pub fn new(datagram: &'a [u8], counts: &'c mut FrameCounts) -> Self {
+        Frames {
+            rest: datagram,
+            counts,
+            frames_left: MAX_FRAMES,
+            starts_left: MAX_FALSE_STARTS,
+            waits: false,
+        }
+    }
+
+    /// Spends one false start: on to the byte after the marker, or to the end when there have
+    /// been too many.
+    fn false_start(&mut self) {
+        match self.starts_left.checked_sub(1) {
+            Some(left) => {
+                self.starts_left = left;
+                self.rest = &self.rest[1..];
+            }
+            None => self.drop_rest(),
+        }
+    }
+
+    fn drop_rest(&mut self) {
+        self.counts.dropped_bytes += self.rest.len() as u64;
+        self.rest = &[];
+    }
+}
+
+/// Whether an unknown message's frame of `len` bytes ends where a frame may end: at the end of
+/// the bytes, or in front of another start marker. Anything else is noise in a frame's clothes,
+/// and skipping its length would swallow good frames.
+fn ends_well(bytes: &[u8], len: usize) -> bool {
+    bytes
+        .get(len)
+        .is_none_or(|next| matches!(*next, STX_V1 | STX_V2))
+}
+
+impl<'a> Iterator for Frames<'a, '_> {
+    type Item = Frame<'a>;
+
+    fn next(&mut self) -> Option<Frame<'a>> {
+        loop {
+            let start = self.rest.iter().position(|b| matches!(*b, STX_V1 | STX_V2));
+            self.rest = &self.rest[start.unwrap_or(self.rest.len())..];
+            if self.rest.is_empty() {
+                return None;
+            }
+            if self.frames_left == 0 {
+                self.drop_rest();
+                return None;
+            }
+            match examine(self.rest) {
+                Candidate::Frame(frame) => {
+                    self.counts.good += 1;
+                    self.frames_left -= 1;
+                    self.rest = &self.rest[frame.bytes.len()..];
+                    return Some(frame);
+                }
+                Candidate::Unknown { len } if ends_well(self.rest, len) => {
+                    self.counts.unknown += 1;
+                    self.frames_left -= 1;
+                    self.rest = &self.rest[len..];
+                }
+                Candidate::Incomplete if self.waits => return None,
+                Candidate::Incomplete => {
+                    self.counts.truncated += 1;
+                    self.false_start();
+                }
+                Candidate::Refused => {
+                    self.counts.refused += 1;
+                    self.false_start();
+                }
+                Candidate::BadCrc | Candidate::Unknown { .. } => {
+                    self.counts.bad_crc += 1;
+                    self.false_start();
+                }
+            }
+        }
+    }
+}
+
+/// Cuts frames out of a byte stream, holding less than one frame between chunks.
+#[derive(Clone, Debug, Default)]
+pub struct StreamCutter {
+    pending: Vec<u8>,
+    /// What was found so far.
+    pub counts: FrameCounts,
+}
+
+impl StreamCutter {
+    /// Takes the next chunk and delivers the frames that are whole by now.
+    pub fn push(&mut self, chunk: &[u8], deliver: impl FnMut(Frame<'_>)) {
+        self.pending.extend_from_slice(chunk);
+        self.cut(true, deliver);
+    }
+
+    /// Gives up on an unfinished candidate, as after a pause in the stream: a marker that was
+    /// noise must not hold back the frames behind it.
+    pub fn flush(&mut self, deliver: impl FnMut(Frame<'_>)) {
+        self.cut(false, deliver);
+    }
+
+    /// Whether bytes wait for the rest of their frame.
+    pub fn is_waiting(&self) -> bool {
+        !self.pending.is_empty()
+    }
+
+    fn cut(&mut self, waits: bool, deliver: impl FnMut(Frame<'_>)) {
+        let mut frames = Frames {
+            waits,
+            ..Frames::new(&self.pending, &mut self.counts)
+        };
+        frames.by_ref().for_each(deliver);
+        let left = frames.rest.len();
+        self.pending.drain(..self.pending.len() - left);
+    }
+}
+
+/// Writes one frame. MAVLink 2 cuts the payload's trailing zeros; MAVLink 1 has no room for
+/// messages above 255, which give `None`, as does a message that the dialect does not know.
+pub fn write(
+    version: Version,
+    sequence: u8,
+    source: Source,
+    id: u32,
+    payload: &[u8],
+) -> Option<Vec<u8>> {
+    let extra = crc_extra(id)?;
+    let payload = payload.get(..255).unwrap_or(payload);
+    let mut bytes = Vec::with_capacity(HEADER_V2 + payload.len() + CHECKSUM);
+    match version {
+        Version::V1 => {
+            let id = u8::try_from(id).ok()?;
+            bytes.extend([
+                STX_V1,
+                payload.len() as u8,
+                sequence,
+                source.system,
+                source.component,
+                id,
+            ]);
+            bytes.extend_from_slice(payload);
+        }
+        Version::V2 => {
+            let len = payload
+                .iter()
+                .rposition(|b| *b != 0)
+                .map_or(1, |last| last + 1)
+                .min(payload.len());
+            let [a, b, c, _] = id.to_le_bytes();
+            bytes.extend([
+                STX_V2,
+                len as u8,
+                0,
+                0,
+                sequence,
+                source.system,
+                source.component,
+                a,
+                b,
+                c,
+            ]);
+            bytes.extend_from_slice(&payload[..len]);
+        }
+    }
+    let crc = calculate_crc(&bytes[1..], extra);
+    bytes.extend(crc.to_le_bytes());
+    Some(bytes)
+}

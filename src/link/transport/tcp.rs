@@ -1,0 +1,165 @@
+//! TCP links: listening for several peers, or connecting to one again and again.
+
+use std::collections::HashMap;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::mpsc::{Receiver, Sender, channel};
+use tokio::time::{sleep, timeout};
+
+use super::{Arrival, Port, count};
+use crate::link::framing::StreamCutter;
+
+/// Connections on one listening link.
+const MAX_CONNECTIONS: usize = 16;
+/// Frames that may wait for one connection: one that reads slower loses frames, whole ones.
+const QUEUE: usize = 256;
+/// Bytes read at once: their frames make one packet.
+const CHUNK: usize = 1024;
+/// A frame that is not whole after this pause is given up.
+const PAUSE: Duration = Duration::from_millis(100);
+/// A peer that takes no byte for this long is dead.
+const STALLED: Duration = Duration::from_secs(5);
+/// Between attempts to connect, doubling from the first to the second.
+const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(4));
+
+/// The connections that are up, by the peer's address.
+type Connections = Arc<Mutex<HashMap<SocketAddr, Sender<Vec<u8>>>>>;
+
+/// Listens for peers; gives the address it is bound to.
+pub(super) fn listen(
+    port: Port,
+    at: SocketAddr,
+    outgoing: Receiver<(SocketAddr, Vec<u8>)>,
+) -> io::Result<SocketAddr> {
+    let listener = std::net::TcpListener::bind(at)?;
+    listener.set_nonblocking(true)?;
+    let listener = TcpListener::from_std(listener)?;
+    let local = listener.local_addr()?;
+    let connections = Connections::default();
+    tokio::spawn(dispatch(port.clone(), connections.clone(), outgoing));
+    tokio::spawn(accept(port, connections, listener));
+    Ok(local)
+}
+
+/// Connects, and again with a growing pause whenever the connection is lost.
+pub(super) fn connect(port: Port, to: SocketAddr, outgoing: Receiver<(SocketAddr, Vec<u8>)>) {
+    let connections = Connections::default();
+    tokio::spawn(dispatch(port.clone(), connections.clone(), outgoing));
+    tokio::spawn(async move {
+        let mut pause = BACK_OFF.0;
+        loop {
+            if let Ok(Ok(stream)) = timeout(STALLED, TcpStream::connect(to)).await {
+                pause = BACK_OFF.0;
+                serve(port.clone(), connections.clone(), stream, to).await;
+            }
+            sleep(pause).await;
+            pause = (pause * 2).min(BACK_OFF.1);
+        }
+    });
+}
+
+async fn accept(port: Port, connections: Connections, listener: TcpListener) {
+    loop {
+        match listener.accept().await {
+            // One too many is closed at once, which tells it.
+            Ok(_) if count_of(&connections) >= MAX_CONNECTIONS => {}
+            Ok((stream, from)) => {
+                tokio::spawn(serve(port.clone(), connections.clone(), stream, from));
+            }
+            // Out of file descriptors, say: wait for some to be freed.
+            Err(_) => sleep(PAUSE).await,
+        }
+    }
+}
+
+fn count_of(connections: &Connections) -> usize {
+    connections
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .len()
+}
+
+/// Serves one connection until it ends, either way.
+async fn serve(port: Port, connections: Connections, stream: TcpStream, peer: SocketAddr) {
+    // A command must not wait for more bytes to fill a segment; without this it is only slower.
+    let _ = stream.set_nodelay(true);
+    let (reading, writing) = stream.into_split();
+    let (queue, frames) = channel(QUEUE);
+    connections
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .insert(peer, queue);
+    port.announce(Arrival::Opened(port.peer(peer))).await;
+    tokio::select! {
+        () = read(&port, reading, peer) => {}
+        () = write(&port, writing, frames) => {}
+    }
+    connections
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .remove(&peer);
+    port.announce(Arrival::Closed(port.peer(peer))).await;
+}
+
+/// Reads chunks and passes on the whole frames in each.
+async fn read(port: &Port, mut stream: OwnedReadHalf, peer: SocketAddr) {
+    let mut cutter = StreamCutter::default();
+    let mut chunk = [0; CHUNK];
+    loop {
+        let mut whole = Vec::new();
+        let len = match cutter.is_waiting() {
+            true => timeout(PAUSE, stream.read(&mut chunk))
+                .await
+                .unwrap_or_else(|_| {
+                    cutter.flush(|frame| whole.extend_from_slice(frame.bytes));
+                    Err(io::ErrorKind::TimedOut.into())
+                }),
+            false => stream.read(&mut chunk).await,
+        };
+        match len {
+            Ok(0) => return,
+            Ok(len) => cutter.push(&chunk[..len], |frame| whole.extend_from_slice(frame.bytes)),
+            Err(e) if e.kind() == io::ErrorKind::TimedOut => {}
+            Err(_) => return,
+        }
+        if !whole.is_empty() {
+            port.deliver(peer, whole);
+        }
+    }
+}
+
+/// Writes frames as they come; ends when the peer takes none any more.
+async fn write(port: &Port, mut stream: OwnedWriteHalf, mut frames: Receiver<Vec<u8>>) {
+    while let Some(frame) = frames.recv().await {
+        match timeout(STALLED, stream.write_all(&frame)).await {
+            Ok(Ok(())) => count(&port.counters.sent),
+            Ok(Err(_)) | Err(_) => return count(&port.counters.send_failed),
+        }
+    }
+}
+
+/// Hands each frame to its connection. Ends when the link's last sender is gone.
+async fn dispatch(
+    port: Port,
+    connections: Connections,
+    mut outgoing: Receiver<(SocketAddr, Vec<u8>)>,
+) {
+    while let Some((to, frame)) = outgoing.recv().await {
+        let queue = connections
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get(&to)
+            .cloned();
+        match queue.map(|queue| queue.try_send(frame)) {
+            Some(Ok(())) => {}
+            Some(Err(_)) => count(&port.counters.outbox_full),
+            None => count(&port.counters.send_failed),
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! UDP links: one socket, any number of peers.
+//!
+//! The socket is never connected, so a peer that is gone (ICMP port unreachable) disturbs nobody
+//! else, and a peer may answer from another port than the one it is reached at.
+
+use std::io;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::net::UdpSocket;
+use tokio::sync::mpsc::Receiver;
+
+use super::{Port, count};
+
+/// MAVLink senders stay within an Ethernet frame; this leaves room for jumbo frames.
+const MAX_DATAGRAM: usize = 9000;
+/// After an error of the socket, so that a lasting one does not spin.
+const PAUSE: Duration = Duration::from_millis(5);
+
+/// Listens at an address and answers from it; gives the address it is bound to.
+pub(super) fn listen(
+    port: Port,
+    at: SocketAddr,
+    outgoing: Receiver<(SocketAddr, Vec<u8>)>,
+) -> io::Result<SocketAddr> {
+    serve(port, std::net::UdpSocket::bind(at)?, outgoing)
+}
+
+/// Opens a socket from which `to` can be reached.
+pub(super) fn reach(
+    port: Port,
+    to: SocketAddr,
+    outgoing: Receiver<(SocketAddr, Vec<u8>)>,
+) -> io::Result<SocketAddr> {
+    // To this machine only from this machine, so that no stranger finds the port.
+    let from: SocketAddr = match (to, to.ip().is_loopback()) {
+        (SocketAddr::V4(_), true) => (Ipv4Addr::LOCALHOST, 0).into(),
+        (SocketAddr::V4(_), false) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+        (SocketAddr::V6(_), true) => (Ipv6Addr::LOCALHOST, 0).into(),
+        (SocketAddr::V6(_), false) => (Ipv6Addr::UNSPECIFIED, 0).into(),
+    };
+    let socket = std::net::UdpSocket::bind(from)?;
+    socket.set_broadcast(true)?;
+    serve(port, socket, outgoing)
+}
+
+fn serve(
+    port: Port,
+    socket: std::net::UdpSocket,
+    outgoing: Receiver<(SocketAddr, Vec<u8>)>,
+) -> io::Result<SocketAddr> {
+    socket.set_nonblocking(true)?;
+    let socket = Arc::new(UdpSocket::from_std(socket)?);
+    let local = socket.local_addr()?;
+    tokio::spawn(send(port.clone(), socket.clone(), outgoing));
+    tokio::spawn(receive(port, socket));
+    Ok(local)
+}
+
+async fn receive(port: Port, socket: Arc<UdpSocket>) {
+    // One byte more than the longest that is taken, to tell a longer one.
+    let mut buffer = vec![0; MAX_DATAGRAM + 1];
+    loop {
+        match socket.recv_from(&mut buffer).await {
+            Ok((len, _)) if len > MAX_DATAGRAM => count(&port.counters.oversize),
+            Ok((len, from)) => port.deliver(from, buffer[..len].to_vec()),
+            Err(_) => tokio::time::sleep(PAUSE).await,
+        }
+    }
+}
+
+/// Ends when the link's last sender is gone.
+async fn send(port: Port, socket: Arc<UdpSocket>, mut outgoing: Receiver<(SocketAddr, Vec<u8>)>) {
+    while let Some((to, frame)) = outgoing.recv().await {
+        match socket.send_to(&frame, to).await {
+            Ok(_) => count(&port.counters.sent),
+            Err(_) => count(&port.counters.send_failed),
+        }
+    }
+}

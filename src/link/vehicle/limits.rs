@@ -1,0 +1,112 @@
+//! What a vehicle can plausibly report: everything beyond is a fault of a sensor or of the link.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+
+/// Parts of a state frame that were not believable, as a set.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Faults(u8);
+
+impl Faults {
+    /// Nothing is wrong.
+    pub const NONE: Faults = Faults(0);
+    /// The attitude.
+    pub const ATTITUDE: Faults = Faults(1);
+    /// The body rates.
+    pub const RATES: Faults = Faults(2);
+    /// The airspeed or the altitude.
+    pub const AIR: Faults = Faults(4);
+    /// The angle of attack or the sideslip.
+    pub const INCIDENCE: Faults = Faults(8);
+    /// The specific force.
+    pub const SPECIFIC_FORCE: Faults = Faults(16);
+    /// The actuators.
+    pub const ACTUATORS: Faults = Faults(32);
+
+    const NAMES: [(Faults, &'static str); 6] = [
+        (Faults::ATTITUDE, "attitude"),
+        (Faults::RATES, "body rates"),
+        (Faults::AIR, "airspeed or altitude"),
+        (Faults::INCIDENCE, "incidence"),
+        (Faults::SPECIFIC_FORCE, "specific force"),
+        (Faults::ACTUATORS, "actuators"),
+    ];
+
+    /// Whether nothing is wrong.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether one of `other` is among them.
+    pub fn contains(self, other: Faults) -> bool {
+        self.0 & other.0 != 0
+    }
+
+    /// Adds faults.
+    pub fn insert(&mut self, other: Faults) {
+        self.0 |= other.0;
+    }
+}
+
+impl fmt::Display for Faults {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names: Vec<_> = Faults::NAMES
+            .iter()
+            .filter(|(fault, _)| self.contains(*fault))
+            .map(|(_, n)| *n)
+            .collect();
+        f.write_str(&names.join(", "))
+    }
+}
+
+/// rad/s: 2000 °/s, the full scale of common gyroscopes, is 35.
+const RATE: RangeInclusive<f64> = -40.0..=40.0;
+/// m/s: an aircraft of this kind never reaches 150; a little below zero is sensor noise.
+const AIRSPEED: RangeInclusive<f64> = -5.0..=150.0;
+/// m AMSL.
+const ALTITUDE: RangeInclusive<f64> = -1000.0..=20_000.0;
+/// rad: half a turn with room for rounding.
+const INCIDENCE: RangeInclusive<f64> = -3.15..=3.15;
+/// m/s²: 50 g.
+const FORCE: RangeInclusive<f64> = -500.0..=500.0;
+/// Normalised deflection, with room for noise.
+const DEFLECTION: RangeInclusive<f64> = -1.5..=1.5;
+/// Throttle position, with room for noise.
+const THROTTLE: RangeInclusive<f64> = -0.25..=1.25;
+/// Normalised deflection rate, 1/s: the actuator's own limit is far below.
+const DEFLECTION_RATE: RangeInclusive<f64> = -1000.0..=1000.0;
+
+// A range contains no NaN, so each of these is false for one.
+
+/// Whether body rates, rad/s, are believable.
+pub fn rates(values: [f64; 3]) -> bool {
+    values.iter().all(|x| RATE.contains(x))
+}
+/// Whether airspeed, m/s, and altitude, m, are believable.
+pub fn air(airspeed: f64, altitude: f64) -> bool {
+    AIRSPEED.contains(&airspeed) && ALTITUDE.contains(&altitude)
+}
+/// Whether α and β, rad, are believable.
+pub fn incidence(alpha: f64, beta: f64) -> bool {
+    INCIDENCE.contains(&alpha) && INCIDENCE.contains(&beta)
+}
+/// Whether specific force, m/s², is believable.
+pub fn specific_force(values: [f64; 3]) -> bool {
+    values.iter().all(|x| FORCE.contains(x))
+}
+/// Whether normalised aileron, elevator, throttle, aileron rate, elevator rate are believable.
+pub fn actuators([aileron, elevator, throttle, aileron_rate, elevator_rate]: [f64; 5]) -> bool {
+    DEFLECTION.contains(&aileron)
+        && DEFLECTION.contains(&elevator)
+        && THROTTLE.contains(&throttle)
+        && DEFLECTION_RATE.contains(&aileron_rate)
+        && DEFLECTION_RATE.contains(&elevator_rate)
+}
+/// Whether latitude and longitude, degrees, are believable.
+pub fn position([latitude, longitude]: [f64; 2]) -> bool {
+    latitude.abs() <= 90.0 && longitude.abs() <= 180.0
+}
+/// Whether a wind, m/s, is believable.
+pub fn wind(values: [f64; 3]) -> bool {
+    values.iter().all(|x| x.abs() <= 100.0)
+}

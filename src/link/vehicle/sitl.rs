@@ -1,0 +1,349 @@
+//! The `sitl` profile: five messages make a state frame, one answers it.
+
+use std::time::Duration;
+
+use super::{Faults, Order, Outputs, Telemetry, limits};
+use crate::link::framing::{Frame, FrameCounts, Frames, Source, Version};
+use crate::link::peer::PeerId;
+use crate::link::wire::Message;
+use crate::link::wire::setpoint::euler;
+use crate::link::wire::sitl::{self as wire, VehicleMessage};
+use crate::physics::{ActuatorState, Command, State, Time};
+
+/// The shim's component id.
+const SHIM: u8 = 200;
+/// The companion's component id.
+const COMPANION: u8 = 1;
+/// Time between state frames, µs.
+const PERIOD_US: u64 = 10_000;
+/// A clock that falls back by more than this has started anew, µs; less is a late datagram.
+const RESTART_US: u64 = 1_000_000;
+/// After this silence another peer may take the link over.
+const TAKEOVER: Duration = Duration::from_secs(1);
+const HEARTBEAT: Duration = Duration::from_secs(1);
+
+/// What came over the vehicle link.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct VehicleCounts {
+    /// Frames of MAVLink.
+    pub frames: FrameCounts,
+    /// State frames delivered as new.
+    pub states: u64,
+    /// State frames that never came, by the gaps in their times.
+    pub lost: u64,
+    /// State frames that came again.
+    pub repeated: u64,
+    /// State frames that came after a newer one.
+    pub late: u64,
+    /// State frames of which a message was missing.
+    pub incomplete: u64,
+    /// State frames with at least one fault.
+    pub faulty: u64,
+    /// Starts of the vehicle's clock, the first included.
+    pub starts: u64,
+    /// MAVLink frames from anyone else than the vehicle.
+    pub foreign: u64,
+    /// Commands that were not finite, sent as the last finite one.
+    pub bad_commands: u64,
+}
+
+/// The messages of the state frame that is being received.
+#[derive(Clone, Copy, Debug, Default)]
+struct Parts {
+    imu: Option<(Time, [f64; 3])>,
+    air: Option<(f64, f64)>,
+    incidence: Option<(Time, f64, f64)>,
+    actuators: Option<(Time, [f64; 5])>,
+}
+
+/// The vehicle side of the `sitl` profile.
+#[derive(Clone, Debug)]
+pub struct Sitl {
+    system: u8,
+    /// Deflection at normalised 1, rad.
+    deflection: f64,
+    parts: Parts,
+    /// The last state delivered; faulty parts of the next one keep its values.
+    last: Telemetry,
+    peer: Option<(PeerId, Duration)>,
+    last_command: Command,
+    sequence: u8,
+    next_heartbeat: Duration,
+    counts: VehicleCounts,
+}
+
+impl Sitl {
+    /// A vehicle of system id `system` whose surfaces deflect by `deflection` rad at normalised 1
+    /// (0.5235 for the X8).
+    pub fn new(system: u8, deflection: f64) -> Self {
+        let nan = f64::NAN;
+        let nothing = Telemetry {
+            time: Time::default(),
+            order: Order::First,
+            faults: Faults::NONE,
+            state: State::NEUTRAL,
+            yaw: 0.0,
+            specific_force: [0.0, 0.0, -9.81],
+            actuators: ActuatorState::default(),
+            altitude: 0.0,
+            position: [nan; 2],
+            velocity: [nan; 3],
+            wind: [nan; 3],
+        };
+        Sitl {
+            system,
+            deflection,
+            parts: Parts::default(),
+            last: nothing,
+            peer: None,
+            last_command: Command::IDLE,
+            sequence: 0,
+            next_heartbeat: Duration::ZERO,
+            counts: VehicleCounts::default(),
+        }
+    }
+
+    /// See [`super::Vehicle::handle`].
+    pub fn handle(
+        &mut self,
+        host: Duration,
+        peer: PeerId,
+        bytes: &[u8],
+        mut deliver: impl FnMut(Telemetry),
+    ) {
+        let mut counts = FrameCounts::default();
+        for frame in Frames::new(bytes, &mut counts) {
+            if !self.is_vehicle(host, peer, &frame) {
+                self.counts.foreign += 1;
+            } else if let Some(message) = wire::read(&frame)
+                && let Some(telemetry) = self.take(message)
+            {
+                deliver(telemetry);
+            }
+        }
+        self.counts.frames.add(counts);
+    }
+
+    /// Whether the frame comes from the vehicle: the right ids, on the peer that the link belongs
+    /// to. Two shims at once would otherwise mix their states.
+    fn is_vehicle(&mut self, host: Duration, peer: PeerId, frame: &Frame<'_>) -> bool {
+        if frame.source
+            != (Source {
+                system: self.system,
+                component: SHIM,
+            })
+        {
+            return false;
+        }
+        match self.peer {
+            Some((owner, heard)) if owner != peer && host.saturating_sub(heard) < TAKEOVER => false,
+            _ => {
+                self.peer = Some((peer, host));
+                true
+            }
+        }
+    }
+
+    fn take(&mut self, message: VehicleMessage) -> Option<Telemetry> {
+        match message {
+            VehicleMessage::Imu {
+                time,
+                specific_force,
+            } => self.parts.imu = Some((time, specific_force)),
+            VehicleMessage::Air { airspeed, altitude } => {
+                self.parts.air = Some((airspeed, altitude))
+            }
+            VehicleMessage::Incidence { time, alpha, beta } => {
+                self.parts.incidence = Some((time, alpha, beta))
+            }
+            VehicleMessage::Actuators {
+                time,
+                active,
+                outputs,
+            } => {
+                self.parts.actuators = (active >= 5).then_some((time, outputs));
+            }
+            VehicleMessage::Position { position, velocity } if limits::position(position) => {
+                (self.last.position, self.last.velocity) = (position, velocity);
+            }
+            VehicleMessage::Wind(wind) if limits::wind(wind) => self.last.wind = wind,
+            VehicleMessage::Attitude {
+                boot_ms,
+                quaternion,
+                rates,
+            } => {
+                let parts = std::mem::take(&mut self.parts);
+                return self.complete(parts, boot_ms, quaternion, rates);
+            }
+            VehicleMessage::Position { .. }
+            | VehicleMessage::Wind(_)
+            | VehicleMessage::Heartbeat => {}
+        }
+        None
+    }
+
+    /// Puts a frame together; nothing when its messages are missing or of different times.
+    fn complete(
+        &mut self,
+        parts: Parts,
+        boot_ms: u32,
+        q: [f64; 4],
+        rates: [f64; 3],
+    ) -> Option<Telemetry> {
+        let whole = parts
+            .imu
+            .zip(parts.air)
+            .zip(parts.incidence.zip(parts.actuators));
+        let Some((((time, force), air), ((time_b, alpha, beta), (time_c, outputs)))) = whole else {
+            self.counts.incomplete += 1;
+            return None;
+        };
+        // Rounded to a millisecond either way.
+        let off_ms = boot_ms.wrapping_sub((time.as_micros() / 1000) as u32);
+        if time_b != time || time_c != time || !matches!(off_ms, 0 | 1 | u32::MAX) {
+            self.counts.incomplete += 1;
+            return None;
+        }
+        let order = self.order(time);
+        let mut next = Telemetry {
+            time,
+            order,
+            faults: Faults::NONE,
+            ..self.last
+        };
+        fill_motion(&mut next, q, rates);
+        fill_air(&mut next, air, [alpha, beta], force);
+        fill_actuators(&mut next, outputs, self.deflection);
+        self.counts.faulty += u64::from(!next.faults.is_empty());
+        if order != Order::Late {
+            self.last = next;
+        }
+        Some(next)
+    }
+
+    /// Counts a frame by its time.
+    fn order(&mut self, time: Time) -> Order {
+        let (now, before) = (time.as_micros(), self.last.time.as_micros());
+        if self.counts.starts == 0 || now.saturating_add(RESTART_US) < before {
+            self.counts.starts += 1;
+            self.counts.states += 1;
+            return Order::First;
+        }
+        match now.cmp(&before) {
+            std::cmp::Ordering::Less => {
+                self.counts.late += 1;
+                Order::Late
+            }
+            std::cmp::Ordering::Equal => {
+                self.counts.repeated += 1;
+                Order::Repeated
+            }
+            std::cmp::Ordering::Greater => {
+                let periods = (now - before + PERIOD_US / 2) / PERIOD_US;
+                let lost = u32::try_from(periods.saturating_sub(1)).unwrap_or(u32::MAX);
+                self.counts.lost = self.counts.lost.saturating_add(lost.into());
+                self.counts.states += 1;
+                Order::Next { lost }
+            }
+        }
+    }
+
+    /// See [`super::Vehicle::command`]. A command that is not finite never leaves: the last finite
+    /// one does.
+    pub fn command(&mut self, time: Time, outputs: Outputs) -> Vec<u8> {
+        let outputs = match outputs {
+            Outputs::Armed(command) if !command.is_finite() => {
+                self.counts.bad_commands += 1;
+                Outputs::Armed(self.last_command)
+            }
+            Outputs::Armed(command) => {
+                self.last_command = command;
+                outputs
+            }
+            Outputs::Disarmed => {
+                self.last_command = Command::IDLE;
+                outputs
+            }
+        };
+        self.write(&wire::actuator_controls(time, outputs))
+    }
+
+    /// See [`super::Vehicle::heartbeat`].
+    pub fn heartbeat(&mut self, host: Duration, outputs: Outputs) -> Option<Vec<u8>> {
+        if host < self.next_heartbeat {
+            return None;
+        }
+        self.next_heartbeat = host + HEARTBEAT;
+        Some(self.write(&wire::heartbeat(outputs)))
+    }
+
+    /// See [`super::Vehicle::peer`].
+    pub fn peer(&self) -> Option<PeerId> {
+        self.peer.map(|(peer, _)| peer)
+    }
+
+    /// See [`super::Vehicle::counts`].
+    pub fn counts(&self) -> VehicleCounts {
+        self.counts
+    }
+
+    fn write(&mut self, message: &Message) -> Vec<u8> {
+        let source = Source {
+            system: self.system,
+            component: COMPANION,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        message
+            .encode(Version::V2, self.sequence, source)
+            .unwrap_or_default()
+    }
+}
+
+fn fill_motion(next: &mut Telemetry, quaternion: [f64; 4], rates: [f64; 3]) {
+    match euler(quaternion) {
+        Ok((roll, pitch, yaw)) => {
+            (next.state.roll, next.state.pitch, next.yaw) = (roll, pitch, yaw)
+        }
+        Err(_) => next.faults.insert(Faults::ATTITUDE),
+    }
+    match limits::rates(rates) {
+        true => [next.state.p, next.state.q, next.state.r] = rates,
+        false => next.faults.insert(Faults::RATES),
+    }
+}
+
+fn fill_air(
+    next: &mut Telemetry,
+    (airspeed, altitude): (f64, f64),
+    [alpha, beta]: [f64; 2],
+    force: [f64; 3],
+) {
+    match limits::air(airspeed, altitude) {
+        true => (next.state.airspeed, next.altitude) = (airspeed, altitude),
+        false => next.faults.insert(Faults::AIR),
+    }
+    match limits::incidence(alpha, beta) {
+        true => (next.state.alpha, next.state.beta) = (alpha, beta),
+        false => next.faults.insert(Faults::INCIDENCE),
+    }
+    match limits::specific_force(force) {
+        true => next.specific_force = force,
+        false => next.faults.insert(Faults::SPECIFIC_FORCE),
+    }
+}
+
+fn fill_actuators(next: &mut Telemetry, outputs: [f64; 5], deflection: f64) {
+    let [aileron, elevator, throttle, aileron_rate, elevator_rate] = outputs;
+    match limits::actuators(outputs) {
+        true => {
+            next.actuators = ActuatorState {
+                aileron: aileron * deflection,
+                aileron_rate: aileron_rate * deflection,
+                elevator: elevator * deflection,
+                elevator_rate: elevator_rate * deflection,
+                throttle,
+            }
+        }
+        false => next.faults.insert(Faults::ACTUATORS),
+    }
+}

@@ -1,0 +1,285 @@
+//! Answers to what clients ask.
+
+use mavlink::dialects::ardupilotmega::{
+    AUTOPILOT_VERSION_DATA, FILE_TRANSFER_PROTOCOL_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA,
+    MavMessage, MavParamError, MavProtocolCapability, MavSeverity, PARAM_ERROR_DATA,
+    STATUSTEXT_DATA, TIMESYNC_DATA,
+};
+use mavlink::types::CharArray;
+
+use super::Message;
+use super::request::ParameterName;
+use super::telemetry::Home;
+use crate::link::autopilot::{Parameter, ParameterValue, Severity};
+use crate::link::framing::Source;
+use crate::physics::Time;
+
+/// The length of one STATUSTEXT.
+pub const TEXT_CHUNK: usize = 50;
+
+/// The result of a command, MAV_RESULT.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CommandResult {
+    /// Done.
+    Accepted = 0,
+    /// Not now.
+    TemporarilyRejected = 1,
+    /// Never like this.
+    Denied = 2,
+    /// Not known here.
+    Unsupported = 3,
+}
+
+/// COMMAND_ACK to the sender of a command; written by hand since `number` may be unknown.
+pub fn command_ack(number: u16, result: CommandResult, to: Source) -> Message {
+    let [low, high] = number.to_le_bytes();
+    // command, result, then the extensions: progress, result_param2, target system and component.
+    Message::raw(
+        77,
+        vec![
+            low,
+            high,
+            result as u8,
+            0,
+            0,
+            0,
+            0,
+            0,
+            to.system,
+            to.component,
+        ],
+        3,
+    )
+}
+
+/// PARAM_VALUE of one table entry.
+pub fn parameter_value(parameter: &Parameter, index: usize, count: usize) -> Message {
+    // MAV_PARAM_TYPE: 6 is INT32, 9 is REAL32. By hand, so that no bit pattern passes through a
+    // float on its way.
+    let (value, kind) = match parameter.value {
+        ParameterValue::Real(x) => (x.to_le_bytes(), 9),
+        ParameterValue::Int(n) => (n.to_le_bytes(), 6),
+    };
+    let mut payload = value.to_vec();
+    payload.extend((count as u16).to_le_bytes());
+    payload.extend((index as u16).to_le_bytes());
+    payload.extend((0..16).map(|i| parameter.name.as_bytes().get(i).copied().unwrap_or(0)));
+    payload.push(kind);
+    Message::raw(22, payload, 25)
+}
+
+/// Why a parameter request failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParameterFault {
+    /// No such name or index.
+    DoesNotExist,
+    /// The value is refused.
+    OutOfRange,
+    /// The type is not the table's.
+    TypeMismatch,
+}
+
+/// PARAM_ERROR about a parameter, by name or by index (−1 when by name).
+pub fn parameter_error(
+    name: ParameterName,
+    index: i16,
+    fault: ParameterFault,
+    to: Source,
+) -> Message {
+    let error = match fault {
+        ParameterFault::DoesNotExist => MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
+        ParameterFault::OutOfRange => MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
+        ParameterFault::TypeMismatch => MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH,
+    };
+    Message::coded(MavMessage::PARAM_ERROR(PARAM_ERROR_DATA {
+        param_index: index,
+        target_system: to.system,
+        target_component: to.component,
+        param_id: CharArray::new(name.0),
+        error,
+    }))
+}
+
+/// STATUSTEXT messages that together carry `words`, in chunks that share `id`.
+///
+/// MAVLink 1 has no field for chunks, so `chunks` there are texts of their own. Letters outside
+/// ASCII become `?`: receivers disagree about them.
+pub fn texts(severity: Severity, words: &str, id: u16) -> Vec<Message> {
+    let bytes: Vec<u8> = words
+        .chars()
+        .map(|c| {
+            if c.is_ascii() && c != '\0' {
+                c as u8
+            } else {
+                b'?'
+            }
+        })
+        .collect();
+    if bytes.len() <= TEXT_CHUNK {
+        return vec![text(severity, &bytes, 0, 0)];
+    }
+    // A chunk shorter than the field ends the text, hence an empty one after an exact multiple.
+    let ender = bytes.len().is_multiple_of(TEXT_CHUNK).then_some(&[][..]);
+    bytes
+        .chunks(TEXT_CHUNK)
+        .chain(ender)
+        .take(256)
+        .enumerate()
+        .map(|(seq, chunk)| text(severity, chunk, id, seq as u8))
+        .collect()
+}
+
+fn text(severity: Severity, chunk: &[u8], id: u16, chunk_seq: u8) -> Message {
+    let mut field = [0; TEXT_CHUNK];
+    field[..chunk.len()].copy_from_slice(chunk);
+    let severity = match severity {
+        Severity::Critical => MavSeverity::MAV_SEVERITY_CRITICAL,
+        Severity::Error => MavSeverity::MAV_SEVERITY_ERROR,
+        Severity::Warning => MavSeverity::MAV_SEVERITY_WARNING,
+        Severity::Notice => MavSeverity::MAV_SEVERITY_NOTICE,
+        Severity::Info => MavSeverity::MAV_SEVERITY_INFO,
+    };
+    Message::coded(MavMessage::STATUSTEXT(STATUSTEXT_DATA {
+        severity,
+        text: CharArray::new(field),
+        id,
+        chunk_seq,
+    }))
+}
+
+/// AUTOPILOT_VERSION: what this program can do.
+pub fn autopilot_version() -> Message {
+    Message::coded(MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
+        capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE,
+        uid: 1,
+        flight_sw_version: software_version(env!("CARGO_PKG_VERSION")),
+        ..AUTOPILOT_VERSION_DATA::DEFAULT
+    }))
+}
+
+/// Major, minor and patch in the upper three bytes; the lowest, 0, marks a development version.
+fn software_version(text: &str) -> u32 {
+    let part = |part: &str| part.parse::<u8>().map_or(0, u32::from);
+    text.split(['.', '-'])
+        .take(3)
+        .map(part)
+        .fold(0, |sum, p| sum << 8 | p)
+        << 8
+}
+
+/// PROTOCOL_VERSION: MAVLink 1 and 2, 2 preferred.
+pub fn protocol_version() -> Message {
+    let mut payload = vec![0; 22];
+    for (field, version) in payload.chunks_mut(2).zip([200u16, 100, 200]) {
+        field.copy_from_slice(&version.to_le_bytes());
+    }
+    Message::raw(300, payload, 22)
+}
+
+/// MESSAGE_INTERVAL: µs between messages, −1 when off, 0 when the message is not sent here.
+pub fn message_interval(id: u32, interval_us: i32) -> Message {
+    Message::coded(MavMessage::MESSAGE_INTERVAL(MESSAGE_INTERVAL_DATA {
+        interval_us,
+        message_id: id as u16,
+    }))
+}
+
+/// HOME_POSITION.
+pub fn home_position(home: Home, now: Time) -> Message {
+    Message::coded(MavMessage::HOME_POSITION(HOME_POSITION_DATA {
+        latitude: (home.position[0] * 1e7).round() as i32,
+        longitude: (home.position[1] * 1e7).round() as i32,
+        altitude: (home.altitude * 1e3).round() as i32,
+        q: [1.0, 0.0, 0.0, 0.0],
+        time_usec: now.as_micros(),
+        ..HOME_POSITION_DATA::DEFAULT
+    }))
+}
+
+/// MISSION_COUNT 0 for a mission type.
+pub fn empty_mission(kind: u8, to: Source) -> Message {
+    Message::raw(44, vec![0, 0, to.system, to.component, kind, 0, 0, 0, 0], 4)
+}
+
+/// The result of a mission step, MAV_MISSION_RESULT.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MissionResult {
+    /// Done.
+    Accepted = 0,
+    /// Missions are not flown here.
+    Unsupported = 3,
+    /// There is no such item.
+    InvalidSequence = 13,
+}
+
+/// MISSION_ACK for a mission type.
+pub fn mission_ack(result: MissionResult, kind: u8, to: Source) -> Message {
+    Message::raw(
+        47,
+        vec![to.system, to.component, result as u8, kind, 0, 0, 0, 0],
+        3,
+    )
+}
+
+/// FTP refusal: NAK with "unknown command", as there are no files.
+pub fn file_nak(sequence: u16, session: u8, opcode: u8, to: Source) -> Message {
+    const NAK: u8 = 129;
+    const UNKNOWN_COMMAND: u8 = 7;
+    let mut payload = [0; 251];
+    payload[..2].copy_from_slice(&sequence.wrapping_add(1).to_le_bytes());
+    // session, opcode, size, the request's opcode; the data start at 12.
+    payload[2..6].copy_from_slice(&[session, NAK, 1, opcode]);
+    payload[12] = UNKNOWN_COMMAND;
+    Message::coded(MavMessage::FILE_TRANSFER_PROTOCOL(
+        FILE_TRANSFER_PROTOCOL_DATA {
+            target_network: 0,
+            target_system: to.system,
+            target_component: to.component,
+            payload,
+        },
+    ))
+}
+
+/// TIMESYNC answer: our time in ns beside theirs.
+pub fn time_sync(theirs: i64, now: Time, to: Source) -> Message {
+    // Zero would read as a request.
+    let ours = i64::try_from(now.as_micros().saturating_mul(1000))
+        .unwrap_or(i64::MAX)
+        .max(1);
+    Message::coded(MavMessage::TIMESYNC(TIMESYNC_DATA {
+        tc1: ours,
+        ts1: theirs,
+        target_system: to.system,
+        target_component: to.component,
+    }))
+}
+
+/// PING answer: the request's numbers, addressed to its sender.
+pub fn ping(time_usec: u64, sequence: u32, to: Source) -> Message {
+    let mut payload = time_usec.to_le_bytes().to_vec();
+    payload.extend(sequence.to_le_bytes());
+    payload.extend([to.system, to.component]);
+    Message::raw(4, payload, 14)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_version_is_packed_as_the_field_says() {
+        // FLIGHT_SW_VERSION: (major << 24) | (minor << 16) | (patch << 8) | type.
+        assert_eq!(software_version("1.2.3"), 0x0102_0300);
+        assert_eq!(software_version("0.1.0"), 0x0001_0000);
+    }
+
+    #[test]
+    fn a_text_of_exactly_two_chunks_is_closed_by_an_empty_one() {
+        assert_eq!(texts(Severity::Info, &"x".repeat(50), 1).len(), 1);
+        assert_eq!(texts(Severity::Info, &"x".repeat(51), 1).len(), 2);
+        assert_eq!(texts(Severity::Info, &"x".repeat(100), 1).len(), 3);
+    }
+}

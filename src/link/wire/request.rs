@@ -1,0 +1,239 @@
+//! What a client can ask for, decoded from a frame.
+
+use mavlink::dialects::ardupilotmega::MavMessage;
+
+use super::fields::Fields;
+use super::setpoint::{self, SetpointFault};
+use super::{Frame, decode};
+use crate::link::autopilot::{AttitudeSetpoint, ParameterValue, Sticks};
+
+/// Whom a message is for; 0 stands for everybody.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Recipient {
+    /// System id, 0 for all.
+    pub system: u8,
+    /// Component id, 0 for all.
+    pub component: u8,
+}
+
+/// A parameter's name as sent: up to 16 bytes, ended by a zero if shorter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParameterName(pub [u8; 16]);
+
+impl ParameterName {
+    /// The bytes before the first zero.
+    pub fn bytes(&self) -> &[u8] {
+        self.0.split(|b| *b == 0).next().unwrap_or(&[])
+    }
+}
+
+/// Which parameter is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParameterKey {
+    /// By its place in the table (which may not exist).
+    Index(usize),
+    /// By its name.
+    Name(ParameterName),
+}
+
+/// A command, from COMMAND_LONG or COMMAND_INT; the number may be one that nobody knows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CommandRequest {
+    /// MAV_CMD.
+    pub number: u16,
+    /// Parameters 1 to 7; those a command does not use are often NaN.
+    pub params: [f64; 7],
+    /// 0 when sent for the first time, then counting.
+    pub confirmation: u8,
+}
+
+/// Steps of the mission protocol, as far as refusing it needs them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MissionStep {
+    /// The client asks how many items there are.
+    List,
+    /// The client asks for an item.
+    Item,
+    /// The client offers items.
+    Upload,
+    /// The client asks to forget all items.
+    Clear,
+}
+
+/// A decoded request.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Request {
+    /// A command.
+    Command(CommandRequest),
+    /// SET_MODE: base mode and custom mode.
+    SetMode { base: u8, custom: u32 },
+    /// SET_ATTITUDE_TARGET.
+    Attitude(Result<AttitudeSetpoint, SetpointFault>),
+    /// A setpoint of a kind that is not flown (positions, velocities, raw actuators).
+    OtherSetpoint,
+    /// MANUAL_CONTROL; `None` when an axis is missing.
+    Sticks(Option<Sticks>),
+    /// PARAM_REQUEST_LIST.
+    ParameterList,
+    /// PARAM_REQUEST_READ.
+    ParameterRead(ParameterKey),
+    /// PARAM_SET; the value is `None` for a type that is not in the table (8 or 16 bits, …).
+    ParameterSet {
+        name: ParameterName,
+        value: Option<ParameterValue>,
+    },
+    /// A mission message with its MAV_MISSION_TYPE.
+    Mission { step: MissionStep, kind: u8 },
+    /// FILE_TRANSFER_PROTOCOL: sequence number, session and opcode.
+    File {
+        sequence: u16,
+        session: u8,
+        opcode: u8,
+    },
+    /// TIMESYNC request with the client's time, ns.
+    TimeSync { theirs: i64 },
+    /// PING request.
+    Ping { time_usec: u64, sequence: u32 },
+    /// REQUEST_DATA_STREAM: the group, and its rate in Hz or `None` to stop it.
+    DataStream { group: u8, rate: Option<u16> },
+}
+
+/// Decodes a frame into whom it is for and what it asks; `None` for everything else.
+pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
+    let fields = Fields(frame.payload);
+    let at = |offset: usize| Recipient {
+        system: fields.u8(offset),
+        component: fields.u8(offset + 1),
+    };
+    let found = match frame.id {
+        76 => (at(30), Request::Command(command_long(fields))),
+        75 => (at(30), Request::Command(command_int(fields))),
+        11 => {
+            let to = Recipient {
+                system: fields.u8(4),
+                component: 0,
+            };
+            (
+                to,
+                Request::SetMode {
+                    base: fields.u8(5),
+                    custom: fields.u32(0),
+                },
+            )
+        }
+        // A request is for everybody (0/0), a reply for one.
+        4 if fields.bytes(12) == [0, 0] => (
+            at(12),
+            Request::Ping {
+                time_usec: fields.u64(0),
+                sequence: fields.u32(8),
+            },
+        ),
+        23 => (at(4), parameter_set(fields)),
+        66 => (at(2), data_stream(fields)),
+        43 => (at(0), mission(MissionStep::List, fields.u8(2))),
+        44 => (at(2), mission(MissionStep::Upload, fields.u8(4))),
+        45 => (at(0), mission(MissionStep::Clear, fields.u8(2))),
+        40 | 51 => (at(2), mission(MissionStep::Item, fields.u8(4))),
+        38 => (at(4), mission(MissionStep::Upload, fields.u8(6))),
+        39 | 73 => (at(32), mission(MissionStep::Upload, fields.u8(37))),
+        // SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT, SET_ACTUATOR_CONTROL_TARGET.
+        84 => (at(50), Request::OtherSetpoint),
+        86 => (at(50), Request::OtherSetpoint),
+        139 => (at(41), Request::OtherSetpoint),
+        _ => return coded(decode(frame)?),
+    };
+    Some(found)
+}
+
+/// The messages that hold no enumeration, so that the codec never rejects them.
+fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
+    let to = |system: u8, component: u8| Recipient { system, component };
+    Some(match message {
+        MavMessage::SET_ATTITUDE_TARGET(m) => (
+            to(m.target_system, m.target_component),
+            Request::Attitude(setpoint::attitude(&m)),
+        ),
+        MavMessage::MANUAL_CONTROL(m) => (to(m.target, 0), Request::Sticks(setpoint::sticks(&m))),
+        MavMessage::PARAM_REQUEST_LIST(m) => (
+            to(m.target_system, m.target_component),
+            Request::ParameterList,
+        ),
+        MavMessage::PARAM_REQUEST_READ(m) => {
+            let key = match usize::try_from(m.param_index) {
+                Ok(index) => ParameterKey::Index(index),
+                Err(_) => ParameterKey::Name(ParameterName(*m.param_id)),
+            };
+            (
+                to(m.target_system, m.target_component),
+                Request::ParameterRead(key),
+            )
+        }
+        MavMessage::FILE_TRANSFER_PROTOCOL(m) => {
+            let body = Fields(&m.payload);
+            let file = Request::File {
+                sequence: body.u16(0),
+                session: body.u8(2),
+                opcode: body.u8(3),
+            };
+            (to(m.target_system, m.target_component), file)
+        }
+        // A reply carries a time in tc1, a request zero.
+        MavMessage::TIMESYNC(m) if m.tc1 == 0 => (
+            to(m.target_system, m.target_component),
+            Request::TimeSync { theirs: m.ts1 },
+        ),
+        _ => return None,
+    })
+}
+
+fn command_long(fields: Fields<'_>) -> CommandRequest {
+    CommandRequest {
+        number: fields.u16(28),
+        params: std::array::from_fn(|i| f64::from(fields.f32(4 * i))),
+        confirmation: fields.u8(32),
+    }
+}
+
+fn command_int(fields: Fields<'_>) -> CommandRequest {
+    let real = |offset: usize| f64::from(fields.f32(offset));
+    let whole = |offset: usize| f64::from(fields.i32(offset));
+    CommandRequest {
+        number: fields.u16(28),
+        params: [
+            real(0),
+            real(4),
+            real(8),
+            real(12),
+            whole(16),
+            whole(20),
+            real(24),
+        ],
+        confirmation: 0,
+    }
+}
+
+fn parameter_set(fields: Fields<'_>) -> Request {
+    // MAV_PARAM_TYPE: 6 is INT32, sent bytewise in the float field; 9 is REAL32.
+    let value = match fields.u8(22) {
+        6 => Some(ParameterValue::Int(fields.i32(0))),
+        9 => Some(ParameterValue::Real(fields.f32(0))),
+        _ => None,
+    };
+    Request::ParameterSet {
+        name: ParameterName(fields.bytes(6)),
+        value,
+    }
+}
+
+fn data_stream(fields: Fields<'_>) -> Request {
+    let rate = (fields.u8(5) != 0).then_some(fields.u16(0));
+    Request::DataStream {
+        group: fields.u8(4),
+        rate,
+    }
+}
+
+fn mission(step: MissionStep, kind: u8) -> Request {
+    Request::Mission { step, kind }
+}

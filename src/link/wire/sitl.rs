@@ -1,0 +1,153 @@
+//! The messages of the `sitl` profile's vehicle link.
+
+use mavlink::dialects::ardupilotmega::{
+    HEARTBEAT_DATA, HIL_ACTUATOR_CONTROLS_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState,
+    MavType,
+};
+
+use super::{Frame, Message, decode};
+use crate::physics::{Command, Time};
+
+/// MAV_MODE_FLAG_SAFETY_ARMED.
+const ARMED: u8 = 128;
+
+/// A message from the vehicle, in SI units but for the normalised actuators.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum VehicleMessage {
+    /// HIGHRES_IMU: the frame's time and the specific force, m/s², FRD.
+    Imu {
+        /// The frame's time.
+        time: Time,
+        /// Specific force, m/s², FRD.
+        specific_force: [f64; 3],
+    },
+    /// VFR_HUD.
+    Air {
+        /// True airspeed, m/s.
+        airspeed: f64,
+        /// Altitude, m AMSL.
+        altitude: f64,
+    },
+    /// AOA_SSA.
+    Incidence {
+        /// The frame's time.
+        time: Time,
+        /// Angle of attack, rad.
+        alpha: f64,
+        /// Sideslip, rad.
+        beta: f64,
+    },
+    /// ACTUATOR_OUTPUT_STATUS: aileron, elevator and throttle positions, aileron and elevator
+    /// rates in 1/s, surfaces normalised to −1..1.
+    Actuators {
+        /// The frame's time.
+        time: Time,
+        /// How many outputs the message says are in use.
+        active: u32,
+        /// The five outputs.
+        outputs: [f64; 5],
+    },
+    /// ATTITUDE_QUATERNION, which completes a state frame.
+    Attitude {
+        /// The frame's time in whole ms, modulo 2³².
+        boot_ms: u32,
+        /// NED→FRD, w first.
+        quaternion: [f64; 4],
+        /// p, q, r, rad/s.
+        rates: [f64; 3],
+    },
+    /// GLOBAL_POSITION_INT.
+    Position {
+        /// Latitude and longitude, degrees.
+        position: [f64; 2],
+        /// Velocity over ground, NED, m/s.
+        velocity: [f64; 3],
+    },
+    /// WIND_COV: the air's velocity, NED, m/s.
+    Wind([f64; 3]),
+    /// HEARTBEAT.
+    Heartbeat,
+}
+
+/// Decodes a frame from the vehicle; `None` for messages that the profile does not use.
+pub fn read(frame: &Frame<'_>) -> Option<VehicleMessage> {
+    let wide = f64::from;
+    Some(match decode(frame)? {
+        MavMessage::HIGHRES_IMU(m) => VehicleMessage::Imu {
+            time: Time::from_micros(m.time_usec),
+            specific_force: [m.xacc, m.yacc, m.zacc].map(wide),
+        },
+        MavMessage::VFR_HUD(m) => VehicleMessage::Air {
+            airspeed: wide(m.airspeed),
+            altitude: wide(m.alt),
+        },
+        MavMessage::AOA_SSA(m) => VehicleMessage::Incidence {
+            time: Time::from_micros(m.time_usec),
+            alpha: wide(m.AOA).to_radians(),
+            beta: wide(m.SSA).to_radians(),
+        },
+        MavMessage::ACTUATOR_OUTPUT_STATUS(m) => VehicleMessage::Actuators {
+            time: Time::from_micros(m.time_usec),
+            active: m.active,
+            outputs: std::array::from_fn(|i| wide(m.actuator[i])),
+        },
+        MavMessage::ATTITUDE_QUATERNION(m) => VehicleMessage::Attitude {
+            boot_ms: m.time_boot_ms,
+            quaternion: [m.q1, m.q2, m.q3, m.q4].map(wide),
+            rates: [m.rollspeed, m.pitchspeed, m.yawspeed].map(wide),
+        },
+        MavMessage::GLOBAL_POSITION_INT(m) => VehicleMessage::Position {
+            position: [m.lat, m.lon].map(|x| f64::from(x) * 1e-7),
+            velocity: [m.vx, m.vy, m.vz].map(|x| f64::from(x) * 1e-2),
+        },
+        MavMessage::WIND_COV(m) => VehicleMessage::Wind([m.wind_x, m.wind_y, m.wind_z].map(wide)),
+        MavMessage::HEARTBEAT(_) => VehicleMessage::Heartbeat,
+        _ => return None,
+    })
+}
+
+/// What goes to the actuators.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outputs {
+    /// All zero.
+    Disarmed,
+    /// This command.
+    Armed(Command),
+}
+
+/// HIL_ACTUATOR_CONTROLS in answer to the state frame of `time`.
+pub fn actuator_controls(time: Time, outputs: Outputs) -> Message {
+    let mut controls = [0.0; 16];
+    let mut mode = 0;
+    if let Outputs::Armed(command) = outputs {
+        let command = command.clamped();
+        controls[0] = command.aileron as f32;
+        controls[1] = command.elevator as f32;
+        controls[2] = command.throttle as f32;
+        mode = ARMED;
+    }
+    Message::coded(MavMessage::HIL_ACTUATOR_CONTROLS(
+        HIL_ACTUATOR_CONTROLS_DATA {
+            time_usec: time.as_micros(),
+            controls,
+            mode: MavModeFlag::from_bits_retain(mode),
+            ..HIL_ACTUATOR_CONTROLS_DATA::DEFAULT
+        },
+    ))
+}
+
+/// HEARTBEAT of the companion on the vehicle link.
+pub fn heartbeat(outputs: Outputs) -> Message {
+    let (mode, state) = match outputs {
+        Outputs::Disarmed => (0, MavState::MAV_STATE_STANDBY),
+        Outputs::Armed(_) => (ARMED, MavState::MAV_STATE_ACTIVE),
+    };
+    Message::coded(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        custom_mode: 0,
+        mavtype: MavType::MAV_TYPE_FIXED_WING,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+        base_mode: MavModeFlag::from_bits_retain(mode),
+        system_status: state,
+        mavlink_version: 3,
+    }))
+}

@@ -1,0 +1,398 @@
+//! The CSV form of a flight log: one row a sample, a header row, SI units.
+
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+use super::{Flight, Sample};
+
+/// Reads a place in a sample.
+type Get = fn(&Sample) -> f64;
+/// Gives access to a place in a sample.
+type Place = fn(&mut Sample) -> &mut f64;
+
+/// The columns of the format in the order they are written: name, value, place.
+const COLUMNS: [(&str, Get, Place); 25] = [
+    ("time_s", |s| s.time_s, |s| &mut s.time_s),
+    ("roll_rad", |s| s.attitude_rad[0], |s| &mut s.attitude_rad[0]),
+    ("pitch_rad", |s| s.attitude_rad[1], |s| &mut s.attitude_rad[1]),
+    ("yaw_rad", |s| s.attitude_rad[2], |s| &mut s.attitude_rad[2]),
+    ("p_radps", |s| s.rates_radps[0], |s| &mut s.rates_radps[0]),
+    ("q_radps", |s| s.rates_radps[1], |s| &mut s.rates_radps[1]),
+    ("r_radps", |s| s.rates_radps[2], |s| &mut s.rates_radps[2]),
+    ("airspeed_mps", |s| s.airspeed_mps, |s| &mut s.airspeed_mps),
+    ("alpha_rad", |s| s.alpha_rad, |s| &mut s.alpha_rad),
+    ("beta_rad", |s| s.beta_rad, |s| &mut s.beta_rad),
+    ("ax_mps2", |s| s.specific_force_mps2[0], |s| &mut s.specific_force_mps2[0]),
+    ("ay_mps2", |s| s.specific_force_mps2[1], |s| &mut s.specific_force_mps2[1]),
+    ("az_mps2", |s| s.specific_force_mps2[2], |s| &mut s.specific_force_mps2[2]),
+    ("vn_mps", |s| s.velocity_ned_mps[0], |s| &mut s.velocity_ned_mps[0]),
+    ("ve_mps", |s| s.velocity_ned_mps[1], |s| &mut s.velocity_ned_mps[1]),
+    ("vd_mps", |s| s.velocity_ned_mps[2], |s| &mut s.velocity_ned_mps[2]),
+    ("altitude_m", |s| s.altitude_m, |s| &mut s.altitude_m),
+    ("aileron_rad", |s| s.aileron_rad, |s| &mut s.aileron_rad),
+    ("elevator_rad", |s| s.elevator_rad, |s| &mut s.elevator_rad),
+    ("throttle", |s| s.throttle, |s| &mut s.throttle),
+    ("aileron_cmd", |s| s.aileron_cmd, |s| &mut s.aileron_cmd),
+    ("elevator_cmd", |s| s.elevator_cmd, |s| &mut s.elevator_cmd),
+    ("throttle_cmd", |s| s.throttle_cmd, |s| &mut s.throttle_cmd),
+    ("roll_target_rad", |s| s.roll_target_rad, |s| &mut s.roll_target_rad),
+    ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
+];
+/// Columns without which a file is no flight log.
+const NEEDED: [&str; 7] = ["time_s", "roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"];
+/// For each actuator the command or the position must be there.
+const EITHER: [(&str, &str); 3] =
+    [("aileron_cmd", "aileron_rad"), ("elevator_cmd", "elevator_rad"), ("throttle_cmd", "throttle")];
+/// Share of unusable rows above which a log is refused.
+const REFUSED_SHARE: f64 = 0.05;
+/// Row numbers kept in the report of unusable rows.
+const ROWS_NAMED: usize = 20;
+
+/// Why a CSV flight log cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum CsvError {
+    /// The file cannot be opened, read or written.
+    #[error("cannot {doing} flight log {path}: {source}: check the path and its permissions")]
+    File {
+        /// What was being done.
+        doing: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The text is no CSV.
+    #[error("flight log {path}: {source}: correct the row or cut the file before it")]
+    Text {
+        /// The file.
+        path: PathBuf,
+        /// What the CSV reader said.
+        source: ::csv::Error,
+    },
+    /// A needed column is missing.
+    #[error("flight log {path} has no column `{column}`: {remedy}")]
+    Column {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: &'static str,
+        /// What would satisfy it.
+        remedy: String,
+    },
+    /// Too many rows cannot be used.
+    #[error(
+        "flight log {path}: {dropped} of {rows} rows are unusable (first: row {first}), above 5 %: repair it or read it leniently"
+    )]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// Rows dropped.
+        dropped: usize,
+        /// Rows read.
+        rows: usize,
+        /// The first of those dropped, the header being row 1.
+        first: usize,
+    },
+}
+
+/// Whether a log with many unusable rows is read all the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tolerance {
+    /// More than 5 % of unusable rows refuse the log.
+    Strict,
+    /// Unusable rows are dropped, however many.
+    Lenient,
+}
+
+/// A flight read from a file, with what was odd about it.
+#[derive(Clone, Debug, Default)]
+pub struct Reading {
+    /// The flight.
+    pub flight: Flight,
+    /// Columns that the format does not name.
+    pub unknown_columns: Vec<String>,
+    /// Rows dropped as out of order, repeated, non-finite where needed, or impossible.
+    pub dropped: usize,
+    /// The numbers of the first of them, the header being row 1.
+    pub dropped_rows: Vec<usize>,
+    /// Whether the file ends in the middle of a row, which is left out.
+    pub cut_short: bool,
+}
+
+/// Writes `flight` to `out`. Missing values become empty fields; numbers are written so that they
+/// read back to the bit.
+///
+/// # Errors
+/// What the writer says.
+pub fn write(flight: &Flight, out: impl Write) -> std::io::Result<()> {
+    let mut rows = Rows::new(out, &[])?;
+    flight.samples.iter().try_for_each(|sample| rows.row(sample, &[]))?;
+    rows.flush()
+}
+
+/// Writes `flight` to a new file.
+///
+/// # Errors
+/// The file exists, or cannot be written.
+pub fn save(flight: &Flight, path: &Path) -> Result<(), CsvError> {
+    let fail = |doing| move |source| CsvError::File { doing, path: path.to_owned(), source };
+    let file = std::fs::File::create_new(path).map_err(fail("create"))?;
+    write(flight, std::io::BufWriter::new(file)).map_err(fail("write"))
+}
+
+/// Writes rows as they come.
+#[derive(Debug)]
+pub struct Rows<W: Write> {
+    out: W,
+    line: String,
+}
+
+impl<W: Write> Rows<W> {
+    /// Writes the header: the columns of the format, then `extra`.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn new(mut out: W, extra: &[&str]) -> std::io::Result<Self> {
+        let names: Vec<&str> = COLUMNS.iter().map(|c| c.0).chain(extra.iter().copied()).collect();
+        writeln!(out, "{}", names.join(","))?;
+        Ok(Rows { out, line: String::with_capacity(512) })
+    }
+
+    /// Writes a sample, then the extra fields (free of commas and quotes) in the header's order.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn row(&mut self, sample: &Sample, extra: &[&str]) -> std::io::Result<()> {
+        use std::fmt::Write as _;
+        self.line.clear();
+        for (i, (_, get, _)) in COLUMNS.iter().enumerate() {
+            if i > 0 {
+                self.line.push(',');
+            }
+            let x = get(sample);
+            if x.is_finite() {
+                let _ = write!(self.line, "{x}");
+            }
+        }
+        for field in extra {
+            self.line.push(',');
+            self.line.push_str(field);
+        }
+        self.line.push('\n');
+        self.out.write_all(self.line.as_bytes())
+    }
+
+    /// Hands everything on to the file.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn flush(&mut self) -> std::io::Result<()> {
+        self.out.flush()
+    }
+}
+
+/// Reads a flight log from a file.
+///
+/// # Errors
+/// The file cannot be read, a needed column is missing, or too many rows are unusable.
+pub fn load(path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
+    let fail = |source| CsvError::File { doing: "read", path: path.to_owned(), source };
+    let mut bytes = Vec::new();
+    std::fs::File::open(path).map_err(fail)?.read_to_end(&mut bytes).map_err(fail)?;
+    parse(&bytes, path, tolerance)
+}
+
+/// Reads a flight log from bytes; `path` is what errors call it.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
+    let text = |source| CsvError::Text { path: path.to_owned(), source };
+    // A row without its line end may miss digits: it is left out.
+    let end = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
+    let mut reader = ::csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..end]);
+    let header = reader.byte_headers().map_err(text)?.clone();
+    let names: Vec<String> = header.iter().map(|h| String::from_utf8_lossy(h).trim().to_owned()).collect();
+    check_columns(&names, path)?;
+    let places: Vec<Option<Place>> =
+        names.iter().map(|name| COLUMNS.iter().find(|c| c.0 == name).map(|c| c.2)).collect();
+    let mut reading = Reading { cut_short: end < bytes.len(), ..Reading::default() };
+    reading.unknown_columns =
+        names.iter().zip(&places).filter(|(_, place)| place.is_none()).map(|(name, _)| name.clone()).collect();
+    let mut rows = 0;
+    for (i, record) in reader.byte_records().enumerate() {
+        let record = record.map_err(text)?;
+        rows += 1;
+        match sample(&record, &places).filter(|s| usable(s, reading.flight.samples.last())) {
+            Some(sample) => reading.flight.samples.push(sample),
+            None => {
+                reading.dropped += 1;
+                if reading.dropped_rows.len() < ROWS_NAMED {
+                    reading.dropped_rows.push(i + 2);
+                }
+            }
+        }
+    }
+    refuse_if_poor(&reading, rows, path, tolerance)?;
+    Ok(reading)
+}
+
+fn check_columns(names: &[String], path: &Path) -> Result<(), CsvError> {
+    let has = |column: &str| names.iter().any(|n| n == column);
+    let missing = |column, remedy| CsvError::Column { path: path.to_owned(), column, remedy };
+    for column in NEEDED {
+        if !has(column) {
+            return Err(missing(column, "add it, in the unit its name ends with".into()));
+        }
+    }
+    for (command, position) in EITHER {
+        if !has(command) && !has(position) {
+            return Err(missing(command, format!("add it, or the position `{position}`")));
+        }
+    }
+    Ok(())
+}
+
+/// The sample of a record; `None` when a field is no number.
+fn sample(record: &::csv::ByteRecord, places: &[Option<Place>]) -> Option<Sample> {
+    let mut sample = Sample::default();
+    for (field, place) in record.iter().zip(places) {
+        let Some(place) = place else { continue };
+        let field = std::str::from_utf8(field).ok()?.trim();
+        if !field.is_empty() {
+            *place(&mut sample) = field.parse().ok()?;
+        }
+    }
+    Some(sample)
+}
+
+/// Whether a sample is later than the last one, has what is needed, and is possible.
+fn usable(s: &Sample, last: Option<&Sample>) -> bool {
+    let needed = [s.time_s, s.attitude_rad[0], s.attitude_rad[1], s.airspeed_mps];
+    let pi = std::f64::consts::PI + 1e-6;
+    needed.iter().chain(&s.rates_radps).all(|x| x.is_finite())
+        && COLUMNS.iter().all(|c| !c.1(s).is_infinite())
+        && s.attitude_rad[0].abs() <= pi
+        && s.attitude_rad[1].abs() <= pi / 2.0
+        && s.airspeed_mps >= 0.0
+        && last.is_none_or(|last| s.time_s > last.time_s)
+}
+
+fn refuse_if_poor(reading: &Reading, rows: usize, path: &Path, tolerance: Tolerance) -> Result<(), CsvError> {
+    let poor = reading.dropped as f64 > REFUSED_SHARE * rows as f64;
+    match (tolerance, reading.dropped_rows.first()) {
+        (Tolerance::Strict, Some(&first)) if poor => {
+            Err(CsvError::Unusable { path: path.to_owned(), dropped: reading.dropped, rows, first })
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flown(rows: usize) -> Flight {
+        let sample = |i: usize| {
+            let mut sample = Sample { time_s: i as f64 * 0.01, ..Sample::default() };
+            // Every column a number of its own that no decimal fraction writes exactly.
+            for (k, column) in COLUMNS.iter().enumerate().skip(1) {
+                *column.2(&mut sample) = ((i + k) as f64).sin().abs() / 3.0;
+            }
+            sample
+        };
+        Flight { samples: (0..rows).map(sample).collect() }
+    }
+
+    fn text(flight: &Flight) -> Vec<u8> {
+        let mut out = Vec::new();
+        write(flight, &mut out).unwrap();
+        out
+    }
+
+    fn read(bytes: &[u8]) -> Result<Reading, CsvError> {
+        parse(bytes, Path::new("flight.csv"), Tolerance::Strict)
+    }
+
+    #[test]
+    fn what_is_written_reads_back_to_the_bit() {
+        let mut flight = flown(50);
+        let reading = read(&text(&flight)).unwrap();
+        assert_eq!(reading.flight.samples, flight.samples);
+        assert_eq!((reading.dropped, reading.cut_short), (0, false));
+        // A missing value is an empty field, which comes back as missing.
+        flight.samples[3].alpha_rad = f64::NAN;
+        let back = read(&text(&flight)).unwrap().flight.samples;
+        assert!(back[3].alpha_rad.is_nan() && back[3].beta_rad == flight.samples[3].beta_rad);
+    }
+
+    #[test]
+    fn a_file_cut_at_any_byte_is_read_up_to_the_last_whole_row() {
+        let whole = text(&flown(3));
+        let header = whole.iter().position(|b| *b == b'\n').unwrap() + 1;
+        for end in header..whole.len() {
+            let reading = read(&whole[..end]).unwrap();
+            let rows = whole[header..end].iter().filter(|b| **b == b'\n').count();
+            assert_eq!(reading.flight.samples.len(), rows);
+        }
+        for end in 0..header {
+            assert!(matches!(read(&whole[..end]), Err(CsvError::Column { .. })), "{end}");
+        }
+    }
+
+    #[test]
+    fn bad_rows_are_dropped_by_number_and_refused_above_five_in_a_hundred() {
+        let mut flight = flown(100);
+        flight.samples[10].time_s = flight.samples[9].time_s;
+        flight.samples[20].airspeed_mps = -1.0;
+        flight.samples[30].attitude_rad[0] = 4.0;
+        let reading = read(&text(&flight)).unwrap();
+        // Row 1 is the header, so sample 10 stands in row 12.
+        assert_eq!(reading.dropped_rows, vec![12, 22, 32]);
+        assert_eq!(reading.flight.samples.len(), 97);
+        for i in 40..43 {
+            flight.samples[i].rates_radps[1] = f64::NAN;
+        }
+        let error = read(&text(&flight)).unwrap_err().to_string();
+        assert!(error.contains("6 of 100") && error.contains("row 12"), "{error}");
+        let lenient = parse(&text(&flight), Path::new("flight.csv"), Tolerance::Lenient).unwrap();
+        assert_eq!(lenient.flight.samples.len(), 94);
+    }
+
+    #[test]
+    fn a_missing_column_is_named_with_what_would_satisfy_it() {
+        let error = read(b"time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps\n").unwrap_err().to_string();
+        assert!(error.contains("`airspeed_mps`") && error.contains("flight.csv"), "{error}");
+        let error = read(b"time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps,airspeed_mps\n").unwrap_err();
+        assert!(error.to_string().contains("`aileron_rad`"), "{error}");
+    }
+
+    #[test]
+    fn an_unknown_column_is_reported_once_and_disturbs_nothing() {
+        let mut out = Vec::new();
+        let mut rows = Rows::new(&mut out, &["mode"]).unwrap();
+        let flight = flown(5);
+        for sample in &flight.samples {
+            rows.row(sample, &["HOLD"]).unwrap();
+        }
+        let reading = read(&out).unwrap();
+        assert_eq!(reading.unknown_columns, vec!["mode"]);
+        assert_eq!(reading.flight.samples, flight.samples);
+    }
+
+    #[test]
+    fn garbage_is_an_error_or_an_empty_flight_but_no_panic() {
+        for bytes in [&b""[..], b"\n\n", b"\xff\xfe\x00\n1,2\n", b"time_s\n\"", &[0u8; 300]] {
+            assert!(read(bytes).is_err());
+        }
+    }
+
+    #[test]
+    fn an_existing_file_is_not_overwritten() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("flight.csv");
+        save(&flown(2), &path).unwrap();
+        assert!(matches!(save(&flown(9), &path), Err(CsvError::File { .. })));
+        assert_eq!(load(&path, Tolerance::Strict).unwrap().flight.samples.len(), 2);
+    }
+}

@@ -1,0 +1,249 @@
+//! The `sitl` profile's vehicle side, in bytes.
+
+mod link_support;
+
+use std::time::Duration;
+
+use greylag::link::vehicle::{Faults, Order, Outputs, Sitl, Telemetry};
+use greylag::physics::{Command, Time};
+use link_support::{Shown, dissect, frame_from, peer, shim};
+use mavlink::MavlinkVersion::V2;
+use mavlink::dialects::ardupilotmega::*;
+
+/// An airframe of its own, so that nothing hides the number of the X8.
+const DEFLECTION: f64 = 0.4;
+
+fn take(sitl: &mut Sitl, bytes: &[u8]) -> Vec<Telemetry> {
+    let mut states = vec![];
+    sitl.handle(Duration::ZERO, peer(1), bytes, |state| states.push(state));
+    states
+}
+
+fn close(got: f64, want: f64) {
+    // Floats on the wire: 24 bits.
+    assert!(
+        (got - want).abs() <= 1e-6 * want.abs().max(1.0),
+        "{got} for {want}"
+    );
+}
+
+#[test]
+fn a_state_frame_is_converted_to_si() {
+    let mut sitl = Sitl::new(1, DEFLECTION);
+    let position = MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+        lat: 450_000_000,
+        lon: 75_000_000,
+        vx: 1000,
+        vy: -200,
+        vz: 50,
+        ..Default::default()
+    });
+    let wind = MavMessage::WIND_COV(WIND_COV_DATA {
+        wind_x: 3.0,
+        wind_y: -2.0,
+        ..Default::default()
+    });
+    let mut bytes = [shim(position), shim(wind)].concat();
+    bytes.extend(Shown::at(20_000).bytes());
+    let states = take(&mut sitl, &bytes);
+    assert_eq!(states.len(), 1);
+    let t = states[0];
+    assert_eq!(
+        (t.time, t.order, t.faults),
+        (Time::from_micros(20_000), Order::First, Faults::NONE)
+    );
+    close(t.state.roll, 20f64.to_radians());
+    close(t.state.pitch, 0.0);
+    close(t.yaw, 0.0);
+    close(t.state.airspeed, 16.5);
+    close(t.state.alpha, 3f64.to_radians());
+    close(t.state.beta, -1.5f64.to_radians());
+    for (got, want) in [(t.state.p, 0.01), (t.state.q, 0.02), (t.state.r, 0.03)] {
+        close(got, want);
+    }
+    for (got, want) in t.specific_force.into_iter().zip([0.1, 0.2, -9.7]) {
+        close(got, want);
+    }
+    close(t.altitude, 301.0);
+    close(t.actuators.aileron, 0.5 * DEFLECTION);
+    close(t.actuators.elevator, -0.25 * DEFLECTION);
+    close(t.actuators.throttle, 0.6);
+    close(t.actuators.aileron_rate, 2.0 * DEFLECTION);
+    close(t.actuators.elevator_rate, -4.0 * DEFLECTION);
+    assert_eq!(
+        (t.position, t.velocity, t.wind),
+        ([45.0, 7.5], [10.0, -2.0, 0.5], [3.0, -2.0, 0.0])
+    );
+}
+
+#[test]
+fn what_was_never_heard_is_not_a_number() {
+    let mut sitl = Sitl::new(1, DEFLECTION);
+    let t = take(&mut sitl, &Shown::at(0).bytes())[0];
+    assert!(t.position[0].is_nan() && t.velocity[0].is_nan() && t.wind[0].is_nan());
+}
+
+#[test]
+fn garbage_is_flagged_and_the_last_good_value_stands() {
+    type Spoil = fn(&mut Shown);
+    let cases: [(Spoil, Faults); 9] = [
+        (|s| s.attitude.q1 = f32::NAN, Faults::ATTITUDE),
+        (
+            |s| (s.attitude.q1, s.attitude.q2) = (0.0, 0.0),
+            Faults::ATTITUDE,
+        ),
+        (|s| s.attitude.rollspeed = 1e30, Faults::RATES),
+        (|s| s.air.airspeed = f32::INFINITY, Faults::AIR),
+        (|s| s.air.alt = f32::NAN, Faults::AIR),
+        (|s| s.incidence.AOA = 1e30, Faults::INCIDENCE),
+        (|s| s.imu.zacc = f32::NAN, Faults::SPECIFIC_FORCE),
+        (|s| s.actuators.actuator[0] = 7.0, Faults::ACTUATORS),
+        (|s| s.actuators.actuator[4] = f32::NAN, Faults::ACTUATORS),
+    ];
+    let mut sitl = Sitl::new(1, DEFLECTION);
+    let good = take(&mut sitl, &Shown::at(0).bytes())[0];
+    for (at, (spoil, fault)) in cases.into_iter().enumerate() {
+        let mut shown = Shown::at(10_000 * (at as u64 + 1));
+        spoil(&mut shown);
+        let t = take(&mut sitl, &shown.bytes())[0];
+        assert_eq!(t.faults, fault, "case {at}");
+        assert_eq!(
+            (t.state, t.actuators, t.altitude),
+            (good.state, good.actuators, good.altitude),
+            "case {at}"
+        );
+        assert!(!t.faults.to_string().is_empty());
+    }
+    assert_eq!(sitl.counts().faulty, 9);
+    // Position and wind that cannot be are left out.
+    let lost = MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+        lat: 2_000_000_000,
+        ..Default::default()
+    });
+    let mut bytes = shim(lost);
+    bytes.extend(Shown::at(200_000).bytes());
+    assert!(take(&mut sitl, &bytes)[0].position[0].is_nan());
+}
+
+#[test]
+fn loss_repetition_lateness_and_restart_are_told_apart() {
+    let mut sitl = Sitl::new(1, DEFLECTION);
+    let mut order = |us| take(&mut sitl, &Shown::at(us).bytes())[0].order;
+    assert_eq!(order(5_000_000), Order::First);
+    assert_eq!(order(5_010_000), Order::Next { lost: 0 });
+    assert_eq!(order(5_010_000), Order::Repeated);
+    assert_eq!(order(5_040_000), Order::Next { lost: 2 });
+    assert_eq!(order(5_020_000), Order::Late);
+    // Jitter of 3 ms is no loss.
+    assert_eq!(order(5_053_000), Order::Next { lost: 0 });
+    assert_eq!(order(0), Order::First);
+    let counts = sitl.counts();
+    assert_eq!(
+        (
+            counts.states,
+            counts.lost,
+            counts.repeated,
+            counts.late,
+            counts.starts
+        ),
+        (5, 2, 1, 1, 2)
+    );
+}
+
+#[test]
+fn a_frame_with_a_missing_or_foreign_part_is_incomplete() {
+    let mut sitl = Sitl::new(1, DEFLECTION);
+    let whole = Shown::at(0).bytes();
+    let imu = shim(MavMessage::HIGHRES_IMU(Shown::at(0).imu)).len();
+    assert!(take(&mut sitl, &whole[imu..]).is_empty());
+    let mut mixed = Shown::at(10_000);
+    mixed.incidence.time_usec = 0;
+    assert!(take(&mut sitl, &mixed.bytes()).is_empty());
+    let mut mixed = Shown::at(20_000);
+    mixed.attitude.time_boot_ms = 10;
+    assert!(take(&mut sitl, &mixed.bytes()).is_empty());
+    let mut few = Shown::at(30_000);
+    few.actuators.active = 3;
+    assert!(take(&mut sitl, &few.bytes()).is_empty());
+    assert_eq!(sitl.counts().incomplete, 4);
+    assert_eq!(take(&mut sitl, &Shown::at(40_000).bytes()).len(), 1);
+    // Split anywhere, as TCP may: the frame is complete when its last byte has come.
+    let bytes = Shown::at(50_000).bytes();
+    assert!(take(&mut sitl, &bytes[..imu]).is_empty());
+    assert_eq!(take(&mut sitl, &bytes[imu..]).len(), 1);
+}
+
+#[test]
+fn only_the_vehicle_is_listened_to() {
+    let mut sitl = Sitl::new(1, DEFLECTION);
+    let stranger = frame_from(V2, 255, 190, &MavMessage::HIGHRES_IMU(Shown::at(0).imu));
+    assert!(take(&mut sitl, &stranger).is_empty());
+    assert_eq!((sitl.counts().foreign, sitl.peer()), (1, None));
+    assert_eq!(take(&mut sitl, &Shown::at(0).bytes()).len(), 1);
+    assert_eq!(sitl.peer(), Some(peer(1)));
+    // A second shim is ignored until the first has been silent for a second.
+    let ms = Duration::from_millis;
+    sitl.handle(ms(999), peer(2), &Shown::at(10_000).bytes(), |_| {
+        panic!("two vehicles at once")
+    });
+    let mut taken = 0;
+    sitl.handle(ms(1000), peer(2), &Shown::at(10_000).bytes(), |_| {
+        taken += 1
+    });
+    assert_eq!((taken, sitl.peer()), (1, Some(peer(2))));
+}
+
+fn controls(bytes: &[u8]) -> HIL_ACTUATOR_CONTROLS_DATA {
+    match dissect(peer(1), bytes).message() {
+        MavMessage::HIL_ACTUATOR_CONTROLS(m) => m,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn the_answer_echoes_the_time_and_is_zero_when_disarmed() {
+    let mut sitl = Sitl::new(1, DEFLECTION);
+    let time = Time::from_micros(123_456);
+    let command = Command {
+        aileron: 0.5,
+        elevator: -3.0,
+        throttle: 0.7,
+    };
+    let armed = controls(&sitl.command(time, Outputs::Armed(command)));
+    assert_eq!((armed.time_usec, armed.mode.bits()), (123_456, 128));
+    // Beyond its range a command is limited.
+    assert_eq!(armed.controls[..4], [0.5, -1.0, 0.7, 0.0]);
+    let disarmed = controls(&sitl.command(time, Outputs::Disarmed));
+    assert_eq!((disarmed.controls, disarmed.mode.bits()), ([0.0; 16], 0));
+}
+
+#[test]
+fn a_command_that_is_not_finite_never_leaves() {
+    let mut sitl = Sitl::new(1, DEFLECTION);
+    let bad = Command {
+        aileron: f64::NAN,
+        elevator: 0.0,
+        throttle: f64::INFINITY,
+    };
+    let first = controls(&sitl.command(Time::default(), Outputs::Armed(bad)));
+    assert_eq!(first.controls, [0.0; 16]);
+    let good = Command {
+        aileron: 0.25,
+        elevator: 0.5,
+        throttle: 0.75,
+    };
+    sitl.command(Time::default(), Outputs::Armed(good));
+    let after = controls(&sitl.command(Time::default(), Outputs::Armed(bad)));
+    assert_eq!(after.controls[..3], [0.25, 0.5, 0.75]);
+    assert_eq!(sitl.counts().bad_commands, 2);
+}
+
+#[test]
+fn the_heartbeat_beats_once_a_second() {
+    let mut sitl = Sitl::new(1, DEFLECTION);
+    let beats = (0..500).filter(|i| {
+        sitl.heartbeat(Duration::from_millis(10 * i), Outputs::Disarmed)
+            .is_some()
+    });
+    assert_eq!(beats.count(), 5);
+}
