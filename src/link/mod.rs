@@ -9,6 +9,7 @@ pub mod address;
 pub mod autopilot;
 pub mod client;
 pub mod framing;
+pub mod offboard;
 pub mod peer;
 pub mod transport;
 pub mod vehicle;
