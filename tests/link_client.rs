@@ -175,11 +175,17 @@ fn a_mavlink_1_client_is_answered_in_mavlink_1_until_it_shows_2() {
     // The handshake: PROTOCOL_VERSION itself is in MAVLink 2.
     assert_eq!((seen[1].version, seen[1].id), (V2, 300));
     clients.handle(at_ms(1000), peer(1), &hello(V2), &mut double);
+    // A stray MAVLink 1 frame later changes nothing; one after 5 s of silence may be a new program.
+    clients.handle(at_ms(1000), peer(1), &hello(V1), &mut double);
     assert!(
         run(&mut clients, &mut double, 1000, 2000)
             .iter()
             .all(|s| s.version == V2)
     );
+    clients.handle(at_ms(6001), peer(1), &hello(V1), &mut double);
+    let seen = run(&mut clients, &mut double, 6010, 7010);
+    assert!(seen.iter().any(|s| s.peer == peer(1)));
+    assert!(seen.iter().all(|s| s.peer != peer(1) || s.version == V1));
 }
 
 #[test]
