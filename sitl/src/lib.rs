@@ -4,3 +4,4 @@ pub mod air;
 mod aircraft;
 pub mod hidden;
 pub mod plant;
+pub mod shim;

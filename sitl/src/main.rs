@@ -1,1 +1,58 @@
-fn main(){}
+//! The program `greylag-sitl`: a flight controller with an aircraft, played to a companion.
+
+mod arguments;
+
+use std::io::Write;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use arguments::Cli;
+use clap::Parser;
+use greylag_sitl::shim::{self, Launch, Pace, ShimOptions};
+
+fn main() -> ExitCode {
+    match fly(&Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("greylag-sitl: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn fly(cli: &Cli) -> anyhow::Result<()> {
+    let options = cli.options();
+    let stop = Arc::new(AtomicBool::new(false));
+    let handler = Arc::clone(&stop);
+    ctrlc::set_handler(move || handler.store(true, Ordering::Relaxed))
+        .context("cannot listen for Ctrl-C")?;
+    say(format_args!("greylag-sitl: {}", intent(&options)));
+    let mut tell =
+        |notice: shim::Notice| say(format_args!("{:9.2} s  {}", notice.time_s, notice.event));
+    let summary = shim::run(&options, &stop, &mut tell)?;
+    say(format_args!("\n{summary}"));
+    Ok(())
+}
+
+/// Prints a line; a reader that has gone away does not end the flight.
+fn say(line: std::fmt::Arguments<'_>) {
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+/// What is about to happen, in one line.
+fn intent(options: &ShimOptions) -> String {
+    let pace = match options.pace {
+        Pace::RealTime => "in real time, 100 frames a second",
+        Pace::Lockstep => "in lockstep, as fast as the companion answers",
+    };
+    let launch = match options.launch {
+        Launch::WhenArmed => "held at the start until the companion arms",
+        Launch::Immediate => "flying at once",
+    };
+    format!(
+        "{} {pace}, {launch}; Ctrl-C ends it",
+        options.plant.aircraft
+    )
+}

@@ -4,7 +4,7 @@ mod flights;
 
 use flights::{fly, plant, plant_in};
 use greylag_sitl::air::{Air, Gust, Turbulence};
-use greylag_sitl::plant::{Plant, PlantOptions, Start};
+use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start};
 
 #[test]
 fn wind_moves_the_ground_and_not_the_air() {
@@ -158,4 +158,41 @@ fn air_that_cannot_blow_is_refused() {
         })
         .contains("overlap")
     );
+}
+
+#[test]
+fn the_wildest_flight_never_panics() {
+    let turbulence = Some(Turbulence {
+        wind_20ft_mps: 30.0,
+        severity: 7,
+    });
+    let mut plant = plant_in(Air {
+        turbulence,
+        wind_ned_mps: [-20.0, 5.0, 3.0],
+        ..Air::default()
+    });
+    let mut failed = 0;
+    for seed in 0..10 {
+        plant.reseed(seed);
+        plant.reset(&Start::NEUTRAL).unwrap();
+        let mut x = u64::from(seed);
+        for _ in 0..3000 {
+            // Bang-bang commands from a linear congruential generator (Knuth's MMIX constants).
+            x = x
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let bang = |bit: u32| if x >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            let inputs = Inputs {
+                aileron: bang(60),
+                elevator: bang(61),
+                throttle: bang(62),
+            };
+            if plant.step(inputs).is_err() {
+                failed += 1;
+                break;
+            }
+        }
+    }
+    println!("{failed} of 10 wild flights of 30 s left the numbers");
+    assert!(failed < 10, "none flew to its end");
 }

@@ -300,3 +300,46 @@ fn a_start_that_cannot_be_flown_from_is_refused() {
         );
     }
 }
+
+/// A level trim of the X8 in JSBSim: airspeed m/s, α deg, elevator rad, throttle.
+const TRIMS: [(f64, f64, f64, f64); 3] = [
+    (16.67, 2.283, 0.01855, 0.118),
+    (20.0, 0.858, 0.0688, 0.185),
+    (25.0, -0.30, 0.1096, 0.308),
+];
+
+#[test]
+fn three_level_trims_balance() {
+    const LBF: f64 = 4.448_221_615_260_5;
+    for (airspeed_mps, alpha_deg, elevator, throttle) in TRIMS {
+        let mut plant = plant();
+        let alpha = f64::to_radians(alpha_deg);
+        let start = Start {
+            airspeed_mps,
+            pitch_rad: alpha,
+            alpha_rad: alpha,
+            ..Start::NEUTRAL
+        };
+        let truth = plant.reset(&start).unwrap();
+        let mut read = |name: &str| plant.property(name).unwrap() * LBF;
+        let (drag, lift) = (read("forces/fwx-aero-lbs"), read("forces/fwz-aero-lbs"));
+        let moment = read("moments/m-total-lbsft") * 0.3048;
+        // The elevator starts centred: what it adds is CLδe, CDδe and Cmδe of the X8.
+        let area = 0.5 * truth.air_density_kgpm3 * airspeed_mps.powi(2) * 0.75;
+        let balancing = moment / (area * 0.3571 * 0.2292);
+        let needed = (drag + area * 0.0633 * elevator.abs()) / alpha.cos() / 26.246;
+        let upward = lift + area * 0.2781 * elevator + throttle * 26.246 * alpha.sin();
+        println!("trim at {airspeed_mps} m/s: elevator {balancing:.5} rad, throttle {needed:.4}");
+        // Half a unit of the last printed digit, and what half a unit of α's makes.
+        assert!(
+            (balancing - elevator).abs() < 2.5e-4,
+            "{balancing} for {elevator}"
+        );
+        assert!((needed - throttle).abs() < 6e-4, "{needed} for {throttle}");
+        let weight = 3.364 * 9.806;
+        assert!(
+            (upward / weight - 1.0).abs() < 5e-3,
+            "{upward} N for {weight} N"
+        );
+    }
+}

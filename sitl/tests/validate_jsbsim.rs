@@ -183,14 +183,19 @@ impl Statistics {
     }
 }
 
-// The flights of the turbulence statistics, as in generate.py.
-const EPISODES: u32 = 150;
+// The flights of the turbulence statistics, as in generate.py but for their number.
+const EPISODES: u32 = 200;
 const SKIPPED: usize = 2000;
 const KEPT: usize = 6000;
 const DT_S: f64 = 0.01;
 const BANDS_HZ: [&str; 5] = ["0.05", "0.2", "0.8", "3.0", "12.0"];
 const BINS: usize = 5;
 const SIGNALS: [&str; 6] = ["north", "east", "down", "p", "q", "r"];
+const RATES: [&str; 3] = [
+    "atmosphere/p-turb-rad_sec",
+    "atmosphere/q-turb-rad_sec",
+    "atmosphere/r-turb-rad_sec",
+];
 
 /// The six turbulence signals of one flight, held wings level at 20 m/s.
 fn turbulent_flight(plant: &mut Plant, seed: u32) -> [Vec<f64>; 6] {
@@ -217,12 +222,11 @@ fn turbulent_flight(plant: &mut Plant, seed: u32) -> [Vec<f64>; 6] {
             })
             .unwrap();
         if k >= SKIPPED {
-            for (i, name) in SIGNALS.into_iter().enumerate() {
-                let (property, scale) = match i {
-                    0..3 => (format!("atmosphere/turb-{name}-fps"), 0.3048),
-                    _ => (format!("atmosphere/{name}-turb-rad_sec"), 1.0),
-                };
-                signals[i].push(plant.property(&property).unwrap() * scale);
+            // In calm air the wind is the turbulence alone.
+            let [north, east, down] = truth.wind_ned_mps;
+            let [p, q, r] = RATES.map(|name| plant.property(name).unwrap());
+            for (signal, value) in signals.iter_mut().zip([north, east, down, p, q, r]) {
+                signal.push(value);
             }
         }
     }
@@ -265,9 +269,9 @@ fn validate_jsbsim_turbulence_has_the_official_variance_and_spectrum() {
         turbulence,
         ..Air::default()
     });
-    let flights: Vec<Vec<Vec<f64>>> = (1..=EPISODES)
-        .map(|seed| {
-            turbulent_flight(&mut plant, seed)
+    let flights: Vec<Vec<Vec<f64>>> = (0..EPISODES)
+        .map(|k| {
+            turbulent_flight(&mut plant, k)
                 .iter()
                 .map(|x| power(x))
                 .collect()

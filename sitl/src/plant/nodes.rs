@@ -152,7 +152,7 @@ impl Nodes {
         } else {
             settle(fdm)?;
         }
-        fdm.set_property("atmosphere/randomseed", f64::from(options.seed as i32))?;
+        fdm.set_property("atmosphere/randomseed", scattered(options.seed))?;
         if let Some(turbulence) = options.air.turbulence {
             let path = "atmosphere/turbulence/milspec/";
             let w20 = turbulence.wind_20ft_mps / FT;
@@ -237,6 +237,17 @@ impl Start {
             below * cos_roll - right * sin_roll,
         ]
     }
+}
+
+/// A seed for JSBSim, 0 to 2³¹ − 2, far from those of neighbouring seeds.
+///
+/// JSBSim's generator is multiplicative: small seeds draw multiples of one another's numbers, and
+/// their turbulence is alike. The mixing is that of SplitMix64 (Steele, Lea, Flood 2014).
+fn scattered(seed: u32) -> f64 {
+    let mut z = (u64::from(seed) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) % 0x7fff_ffff) as f64
 }
 
 /// Evaluates derivatives in the air as it now is, and fills the integrators' histories with them.

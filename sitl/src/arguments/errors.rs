@@ -1,0 +1,143 @@
+//! The part of the command line that says what goes wrong on the way to the companion.
+
+use clap::{Args, ValueEnum};
+use greylag_sitl::shim::{Bias, FrameFaults, Noise};
+
+use super::Numbers;
+
+/// A preset of sensor noise.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Preset {
+    /// Perfect sensors.
+    None,
+    /// The order of a small autopilot with its motor running.
+    Realistic,
+}
+
+/// Sensor errors.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Sensors (standard deviations replace those of the preset)")]
+pub struct SensorArgs {
+    /// Preset of white noise.
+    #[arg(long, value_name = "PRESET", default_value = "none")]
+    noise: Preset,
+    /// Rate gyros.
+    #[arg(long, value_name = "RADPS")]
+    noise_gyro_radps: Option<f64>,
+    /// Accelerometers.
+    #[arg(long, value_name = "MPS2")]
+    noise_accelerometer_mps2: Option<f64>,
+    /// Each Euler angle.
+    #[arg(long, value_name = "DEG")]
+    noise_attitude_deg: Option<f64>,
+    /// True airspeed.
+    #[arg(long, value_name = "MPS")]
+    noise_airspeed_mps: Option<f64>,
+    /// Angle of attack and sideslip.
+    #[arg(long, value_name = "DEG")]
+    noise_vane_deg: Option<f64>,
+    /// Altitude.
+    #[arg(long, value_name = "M")]
+    noise_altitude_m: Option<f64>,
+    /// Constant error of the rate gyros.
+    #[arg(
+        long,
+        value_name = "P,Q,R",
+        default_value = "0,0,0",
+        allow_hyphen_values = true
+    )]
+    bias_gyro_radps: Numbers<3>,
+    /// Constant error of the accelerometers.
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        default_value = "0,0,0",
+        allow_hyphen_values = true
+    )]
+    bias_accelerometer_mps2: Numbers<3>,
+    /// Constant error of the angle of attack.
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    bias_alpha_deg: f64,
+    /// Constant error of the sideslip.
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    bias_beta_deg: f64,
+    /// The airspeed shown is this times the true one.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    airspeed_scale: f64,
+}
+
+/// What befalls state frames.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Frames")]
+pub struct FaultArgs {
+    /// Every state frame comes this much late (in lockstep rounded up to whole 10 ms).
+    #[arg(long, value_name = "MS", default_value_t = 0.0)]
+    delay_ms: f64,
+    /// A state frame is lost with this probability.
+    #[arg(long, value_name = "0..1", default_value_t = 0.0)]
+    drop: f64,
+    /// Each state frame comes late by a further uniform 0..MS of wall time.
+    #[arg(long, value_name = "MS", default_value_t = 0.0)]
+    jitter_ms: f64,
+    /// A state frame comes late by --late-ms with this probability.
+    #[arg(long, value_name = "0..1", default_value_t = 0.0)]
+    late: f64,
+    /// How late such a frame is, in wall time.
+    #[arg(long, value_name = "MS", default_value_t = 30.0)]
+    late_ms: f64,
+}
+
+impl SensorArgs {
+    /// White noise: the preset with what replaces it.
+    pub fn noise(&self) -> Noise {
+        let preset = match self.noise {
+            Preset::None => Noise::NONE,
+            Preset::Realistic => Noise::REALISTIC,
+        };
+        let radians = |degrees: Option<f64>| degrees.map(f64::to_radians);
+        Noise {
+            gyro_radps: self.noise_gyro_radps.unwrap_or(preset.gyro_radps),
+            accelerometer_mps2: self
+                .noise_accelerometer_mps2
+                .unwrap_or(preset.accelerometer_mps2),
+            attitude_rad: radians(self.noise_attitude_deg).unwrap_or(preset.attitude_rad),
+            airspeed_mps: self.noise_airspeed_mps.unwrap_or(preset.airspeed_mps),
+            vane_rad: radians(self.noise_vane_deg).unwrap_or(preset.vane_rad),
+            altitude_m: self.noise_altitude_m.unwrap_or(preset.altitude_m),
+        }
+    }
+
+    /// Constant errors.
+    pub fn bias(&self) -> Bias {
+        Bias {
+            gyro_radps: self.bias_gyro_radps.0,
+            accelerometer_mps2: self.bias_accelerometer_mps2.0,
+            alpha_rad: self.bias_alpha_deg.to_radians(),
+            beta_rad: self.bias_beta_deg.to_radians(),
+            airspeed_scale: self.airspeed_scale,
+        }
+    }
+}
+
+impl FaultArgs {
+    /// What befalls state frames.
+    pub fn rule(&self) -> FrameFaults {
+        FrameFaults {
+            delay_ms: self.delay_ms,
+            drop_probability: self.drop,
+            jitter_ms: self.jitter_ms,
+            late_probability: self.late,
+            late_ms: self.late_ms,
+        }
+    }
+}

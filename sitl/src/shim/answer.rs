@@ -1,0 +1,94 @@
+//! The companion's answer, made safe for the plant.
+
+use super::codec::HilActuatorControls;
+use crate::plant::Inputs;
+
+/// MAV_MODE_FLAG_SAFETY_ARMED.
+pub const ARMED: u8 = 128;
+
+/// An answer that can be flown: finite, within the actuators' ranges, zero when disarmed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer {
+    /// The time of the frame that is answered, µs.
+    pub echo_us: u64,
+    /// Whether the companion is armed.
+    pub armed: bool,
+    /// What the actuators are told.
+    pub inputs: Inputs,
+    /// Whether a control lay outside its range and was limited.
+    pub limited: bool,
+}
+
+impl Answer {
+    /// Reads an answer; `None` when a control that is used is not a finite number.
+    pub fn read(message: &HilActuatorControls) -> Option<Self> {
+        let [aileron, elevator, throttle, ..] = message.controls;
+        if ![aileron, elevator, throttle]
+            .iter()
+            .all(|control| control.is_finite())
+        {
+            return None;
+        }
+        let told = Inputs {
+            aileron: f64::from(aileron),
+            elevator: f64::from(elevator),
+            throttle: f64::from(throttle),
+        };
+        let flown = Inputs {
+            aileron: told.aileron.clamp(-1.0, 1.0),
+            elevator: told.elevator.clamp(-1.0, 1.0),
+            throttle: told.throttle.clamp(0.0, 1.0),
+        };
+        let armed = message.mode & ARMED != 0;
+        Some(Answer {
+            echo_us: message.time_usec,
+            armed,
+            inputs: if armed { flown } else { Inputs::default() },
+            limited: flown != told,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(aileron: f32, throttle: f32, mode: u8) -> HilActuatorControls {
+        let mut controls = [0.0; 16];
+        (controls[0], controls[2]) = (aileron, throttle);
+        HilActuatorControls {
+            time_usec: 7,
+            controls,
+            mode,
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn limits_what_is_too_large_and_says_so() {
+        let answer = Answer::read(&message(1e30, -0.1, ARMED)).expect("finite");
+        assert_eq!(
+            (
+                answer.inputs.aileron,
+                answer.inputs.throttle,
+                answer.limited
+            ),
+            (1.0, 0.0, true)
+        );
+    }
+
+    #[test]
+    fn a_disarmed_answer_moves_nothing() {
+        let answer = Answer::read(&message(0.5, 0.5, 64)).expect("finite");
+        assert_eq!((answer.inputs, answer.armed), (Inputs::default(), false));
+    }
+
+    #[test]
+    fn refuses_what_is_not_a_number_but_only_where_it_is_used() {
+        assert_eq!(Answer::read(&message(f32::NAN, 0.0, ARMED)), None);
+        assert_eq!(Answer::read(&message(0.0, f32::INFINITY, ARMED)), None);
+        let mut unused = message(0.0, 0.0, ARMED);
+        unused.controls[5] = f32::NAN;
+        assert!(Answer::read(&unused).is_some());
+    }
+}

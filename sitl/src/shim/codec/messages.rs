@@ -1,0 +1,299 @@
+//! The messages of this link, each with its fields in wire order.
+//!
+//! Wire order is by falling size of the field's type, declaration order within a size, extension
+//! fields last. Identifiers, CRC_EXTRA and orders were read off pymavlink 2.4.50
+//! (`ardupilotmega`, MAVLink 2) and are held by `tests/shim_codec.rs`.
+
+use super::field::{Field, Reader, Writer};
+
+/// A MAVLink message that this link knows.
+pub trait Message: Sized {
+    /// Message identifier, 24 bits.
+    const ID: u32;
+    /// Seed that ties the checksum to the message's definition.
+    const CRC_EXTRA: u8;
+    /// Payload length in bytes with all extension fields.
+    const LENGTH: usize;
+    /// Appends every field in wire order.
+    fn write(&self, writer: &mut Writer);
+    /// Takes every field in wire order; missing bytes read as zero.
+    fn read(reader: &mut Reader<'_>) -> Self;
+}
+
+macro_rules! messages {
+    ($(
+        $(#[$about:meta])*
+        $name:ident = $id:literal, crc_extra $crc:literal {
+            $( $(#[$field_about:meta])* $field:ident: $kind:ty, )*
+        }
+    )*) => {
+        $(
+            $(#[$about])*
+            #[derive(Clone, Copy, Debug, Default, PartialEq)]
+            pub struct $name {
+                $( $(#[$field_about])* pub $field: $kind, )*
+            }
+
+            impl Message for $name {
+                const ID: u32 = $id;
+                const CRC_EXTRA: u8 = $crc;
+                const LENGTH: usize = 0 $( + <$kind as Field>::SIZE )*;
+                fn write(&self, writer: &mut Writer) {
+                    $( self.$field.put(writer); )*
+                }
+                fn read(reader: &mut Reader<'_>) -> Self {
+                    $( let $field = <$kind as Field>::take(reader); )*
+                    $name { $( $field ),* }
+                }
+            }
+        )*
+
+        /// The CRC_EXTRA of a message that this link knows; `None` for all others.
+        pub fn crc_extra(id: u32) -> Option<u8> {
+            match id {
+                $( $id => Some($crc), )*
+                _ => None,
+            }
+        }
+    };
+}
+
+messages! {
+    /// HEARTBEAT: who is there.
+    Heartbeat = 0, crc_extra 50 {
+        /// Autopilot-specific mode.
+        custom_mode: u32,
+        /// MAV_TYPE.
+        kind: u8,
+        /// MAV_AUTOPILOT.
+        autopilot: u8,
+        /// MAV_MODE_FLAG bits.
+        base_mode: u8,
+        /// MAV_STATE.
+        system_status: u8,
+        /// Always 3.
+        mavlink_version: u8,
+    }
+
+    /// SYS_STATUS: sensors and battery.
+    SysStatus = 1, crc_extra 124 {
+        /// MAV_SYS_STATUS_SENSOR bits of what is fitted.
+        onboard_control_sensors_present: u32,
+        /// Bits of what is switched on.
+        onboard_control_sensors_enabled: u32,
+        /// Bits of what is healthy.
+        onboard_control_sensors_health: u32,
+        /// Processor load, per mille.
+        load: u16,
+        /// Battery voltage, mV.
+        voltage_battery: u16,
+        /// Battery current, cA; −1 is unknown.
+        current_battery: i16,
+        /// Communication drop rate, c%.
+        drop_rate_comm: u16,
+        /// Communication errors.
+        errors_comm: u16,
+        /// Autopilot-specific errors, first count.
+        errors_count1: u16,
+        /// Autopilot-specific errors, second count.
+        errors_count2: u16,
+        /// Autopilot-specific errors, third count.
+        errors_count3: u16,
+        /// Autopilot-specific errors, fourth count.
+        errors_count4: u16,
+        /// Battery remaining, %; −1 is unknown.
+        battery_remaining: i8,
+        /// Further bits of what is fitted (extension).
+        onboard_control_sensors_present_extended: u32,
+        /// Further bits of what is switched on (extension).
+        onboard_control_sensors_enabled_extended: u32,
+        /// Further bits of what is healthy (extension).
+        onboard_control_sensors_health_extended: u32,
+    }
+
+    /// GPS_RAW_INT: what the receiver says.
+    GpsRawInt = 24, crc_extra 24 {
+        /// Simulated time, µs.
+        time_usec: u64,
+        /// Latitude, 1e-7 degrees.
+        lat: i32,
+        /// Longitude, 1e-7 degrees.
+        lon: i32,
+        /// Altitude above mean sea level, mm.
+        alt: i32,
+        /// Horizontal dilution of precision × 100.
+        eph: u16,
+        /// Vertical dilution of precision × 100.
+        epv: u16,
+        /// Ground speed, cm/s.
+        vel: u16,
+        /// Course over ground, cdeg, 0..35999.
+        cog: u16,
+        /// GPS_FIX_TYPE.
+        fix_type: u8,
+        /// Satellites.
+        satellites_visible: u8,
+        /// Altitude above the ellipsoid, mm (extension).
+        alt_ellipsoid: i32,
+        /// Position uncertainty, mm (extension).
+        h_acc: u32,
+        /// Altitude uncertainty, mm (extension).
+        v_acc: u32,
+        /// Speed uncertainty, mm/s (extension).
+        vel_acc: u32,
+        /// Heading uncertainty, 1e-5 degrees (extension).
+        hdg_acc: u32,
+        /// Yaw, cdeg; 0 is not available (extension).
+        yaw: u16,
+    }
+
+    /// ATTITUDE_QUATERNION: attitude with body rates.
+    AttitudeQuaternion = 31, crc_extra 246 {
+        /// Simulated time, ms.
+        time_boot_ms: u32,
+        /// w of the rotation NED→FRD.
+        q1: f32,
+        /// x.
+        q2: f32,
+        /// y.
+        q3: f32,
+        /// z.
+        q4: f32,
+        /// p, rad/s.
+        rollspeed: f32,
+        /// q, rad/s.
+        pitchspeed: f32,
+        /// r, rad/s.
+        yawspeed: f32,
+        /// Rotation offset for display; all zero is none (extension).
+        repr_offset_q: [f32; 4],
+    }
+
+    /// GLOBAL_POSITION_INT: fused position.
+    GlobalPositionInt = 33, crc_extra 104 {
+        /// Simulated time, ms.
+        time_boot_ms: u32,
+        /// Latitude, 1e-7 degrees.
+        lat: i32,
+        /// Longitude, 1e-7 degrees.
+        lon: i32,
+        /// Altitude above mean sea level, mm.
+        alt: i32,
+        /// Altitude above home, mm.
+        relative_alt: i32,
+        /// North, cm/s.
+        vx: i16,
+        /// East, cm/s.
+        vy: i16,
+        /// Down, cm/s.
+        vz: i16,
+        /// Heading, cdeg, 0..35999.
+        hdg: u16,
+    }
+
+    /// VFR_HUD: what a pilot's display shows.
+    VfrHud = 74, crc_extra 20 {
+        /// True airspeed on this link, m/s.
+        airspeed: f32,
+        /// Ground speed, m/s.
+        groundspeed: f32,
+        /// Altitude above mean sea level, m.
+        alt: f32,
+        /// Climb rate, m/s.
+        climb: f32,
+        /// Heading, degrees, 0..359.
+        heading: i16,
+        /// Throttle, %.
+        throttle: u16,
+    }
+
+    /// HIL_ACTUATOR_CONTROLS: the companion's answer to a state frame.
+    HilActuatorControls = 93, crc_extra 47 {
+        /// The time of the frame that is answered, µs.
+        time_usec: u64,
+        /// Flags; unused here.
+        flags: u64,
+        /// Aileron, elevator, throttle, then unused.
+        controls: [f32; 16],
+        /// MAV_MODE_FLAG bits; 128 is armed.
+        mode: u8,
+    }
+
+    /// HIGHRES_IMU: inertial and air-pressure sensors.
+    HighresImu = 105, crc_extra 93 {
+        /// Simulated time of the frame, µs.
+        time_usec: u64,
+        /// Specific force along body x, m/s².
+        xacc: f32,
+        /// Specific force along body y, m/s².
+        yacc: f32,
+        /// Specific force along body z, m/s².
+        zacc: f32,
+        /// p, rad/s.
+        xgyro: f32,
+        /// q, rad/s.
+        ygyro: f32,
+        /// r, rad/s.
+        zgyro: f32,
+        /// Magnetic field along body x, gauss; unused here.
+        xmag: f32,
+        /// Magnetic field along body y, gauss; unused here.
+        ymag: f32,
+        /// Magnetic field along body z, gauss; unused here.
+        zmag: f32,
+        /// Static pressure, hPa.
+        abs_pressure: f32,
+        /// Dynamic pressure, hPa; unused here.
+        diff_pressure: f32,
+        /// Pressure altitude, m.
+        pressure_alt: f32,
+        /// Air temperature, °C.
+        temperature: f32,
+        /// HIGHRES_IMU_UPDATED bits of the fields that are valid.
+        fields_updated: u16,
+        /// Number of the sensor (extension).
+        id: u8,
+    }
+
+    /// WIND_COV: wind.
+    WindCov = 231, crc_extra 105 {
+        /// Simulated time, µs.
+        time_usec: u64,
+        /// Velocity of the air, north, m/s.
+        wind_x: f32,
+        /// Velocity of the air, east, m/s.
+        wind_y: f32,
+        /// Velocity of the air, down, m/s.
+        wind_z: f32,
+        /// Horizontal variability, m/s.
+        var_horiz: f32,
+        /// Vertical variability, m/s.
+        var_vert: f32,
+        /// Altitude of the measurement above mean sea level, m.
+        wind_alt: f32,
+        /// Horizontal accuracy, m/s.
+        horiz_accuracy: f32,
+        /// Vertical accuracy, m/s.
+        vert_accuracy: f32,
+    }
+
+    /// ACTUATOR_OUTPUT_STATUS: where the actuators stand.
+    ActuatorOutputStatus = 375, crc_extra 251 {
+        /// Simulated time, µs.
+        time_usec: u64,
+        /// Number of valid outputs.
+        active: u32,
+        /// Positions and rates, normalised.
+        actuator: [f32; 32],
+    }
+
+    /// AOA_SSA: angle of attack and of sideslip.
+    AoaSsa = 11020, crc_extra 205 {
+        /// Simulated time, µs.
+        time_usec: u64,
+        /// Angle of attack, degrees.
+        aoa: f32,
+        /// Angle of sideslip, degrees.
+        ssa: f32,
+    }
+}

@@ -1,0 +1,38 @@
+//! Why a run of the shim could not begin or had to end.
+
+use std::io;
+use std::path::PathBuf;
+
+use super::link::LinkError;
+use crate::plant::PlantError;
+
+/// Why a run of the shim could not begin or had to end.
+#[derive(Debug, thiserror::Error)]
+pub enum ShimError {
+    /// An option has a value that means nothing.
+    #[error("cannot start the shim: {rule}; correct the option")]
+    Option {
+        /// The rule that is broken.
+        rule: &'static str,
+    },
+    /// The plant could not be built, or could not go on.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// The link could not be opened.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The truth file is there already.
+    #[error("the truth file {} exists; choose another name with --truth, or allow overwriting with --force", path.display())]
+    TruthExists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The truth file could not be written.
+    #[error("cannot write the truth file {}: {source}; check the folder and the free space", path.display())]
+    Truth {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}

@@ -1,0 +1,146 @@
+//! The road to the companion: bytes out, bytes in, whatever happens to the peer.
+
+mod address;
+mod tcp;
+mod udp;
+
+pub use address::{Address, AddressError, Transport};
+
+use std::io;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use tcp::TcpLink;
+use udp::UdpLink;
+
+/// How long a patient receive waits. The kernel rounds it up to its tick, some milliseconds.
+const PATIENCE: Duration = Duration::from_millis(10);
+
+/// Whether `receive` waits for bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wait {
+    /// Up to some ten milliseconds: lockstep, where nothing else is to be done.
+    Patient,
+    /// Not at all: real time, where the clock must not slip.
+    Never,
+}
+
+/// Why an address could not be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkError {
+    /// The name does not lead to an address.
+    #[error("cannot resolve {address}: {source}; give a numeric address such as 127.0.0.1:14600")]
+    Resolve {
+        /// The address as written.
+        address: Address,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The port is taken.
+    #[error(
+        "cannot listen on {address}: the port is in use by another program; stop it or choose another port with --link"
+    )]
+    InUse {
+        /// The address as written.
+        address: Address,
+    },
+    /// Anything else.
+    #[error("cannot open {address}: {source}; check the address given with --link")]
+    Open {
+        /// The address as written.
+        address: Address,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+impl LinkError {
+    fn opening(address: &Address, source: io::Error) -> Self {
+        let address = address.clone();
+        match source.kind() {
+            io::ErrorKind::AddrInUse => LinkError::InUse { address },
+            _ => LinkError::Open { address, source },
+        }
+    }
+}
+
+/// Something that arrived, or a change of the road itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arrival<'a> {
+    /// Nothing within the wait.
+    Nothing,
+    /// One datagram from this sender.
+    Datagram(&'a [u8], SocketAddr),
+    /// Some bytes of the stream.
+    Bytes(&'a [u8]),
+    /// A stream has been set up.
+    Connected(SocketAddr),
+    /// The stream has ended.
+    Closed,
+}
+
+/// An open link.
+#[derive(Debug)]
+pub enum Link {
+    /// Datagrams.
+    Udp(UdpLink),
+    /// A stream.
+    Tcp(TcpLink),
+}
+
+impl Link {
+    /// Opens `address`. A peer that is not there yet is no error; a port that cannot be had is one.
+    pub fn open(address: &Address, wait: Wait) -> Result<Self, LinkError> {
+        Ok(match address.transport {
+            Transport::UdpIn | Transport::UdpOut => Link::Udp(UdpLink::open(address, wait)?),
+            Transport::TcpIn | Transport::TcpOut => Link::Tcp(TcpLink::open(address, wait)?),
+        })
+    }
+
+    /// Where this side listens or sends from; `None` for a stream that is not set up.
+    pub fn local(&self) -> Option<SocketAddr> {
+        match self {
+            Link::Udp(link) => link.local(),
+            Link::Tcp(link) => link.local(),
+        }
+    }
+
+    /// The only sender of datagrams that is listened to, once there is one.
+    pub fn peer(&self) -> Option<SocketAddr> {
+        match self {
+            Link::Udp(link) => link.peer(),
+            Link::Tcp(_) => None,
+        }
+    }
+
+    /// Sends one batch of whole frames; `false` when there is nobody or no room for it.
+    pub fn send(&mut self, bytes: &[u8]) -> bool {
+        match self {
+            Link::Udp(link) => link.send(bytes),
+            Link::Tcp(link) => link.send(bytes),
+        }
+    }
+
+    /// Takes what has arrived.
+    pub fn receive(&mut self) -> Arrival<'_> {
+        match self {
+            Link::Udp(link) => link.receive(),
+            Link::Tcp(link) => link.receive(),
+        }
+    }
+
+    /// The companion was heard from `sender`: a listening UDP link answers there from now on.
+    pub fn adopt(&mut self, sender: SocketAddr) {
+        if let Link::Udp(link) = self {
+            link.adopt(sender);
+        }
+    }
+
+    /// The companion has fallen silent: a listening link takes another.
+    pub fn abandon(&mut self) {
+        match self {
+            Link::Udp(link) => link.abandon(),
+            Link::Tcp(link) => link.abandon(),
+        }
+    }
+}

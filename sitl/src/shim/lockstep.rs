@@ -1,0 +1,135 @@
+//! Lockstep: a step is made on the companion's answer and never without.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::answer::Answer;
+use super::error::ShimError;
+use super::faults::Faults;
+use super::flight::{Flight, Over};
+use super::session::Session;
+use super::summary::Event;
+use super::telemetry::{FRAME_US, StateFrame, encode_slow};
+
+/// A frame without an answer is repeated after this time.
+const REPEAT: Duration = Duration::from_secs(1);
+/// A frame that was lost on purpose is repeated after this time.
+const REPEAT_LOST: Duration = Duration::from_millis(20);
+
+/// Flies until told to stop or until the flight is over.
+pub fn fly(
+    session: &mut Session<'_>,
+    flight: &mut Flight,
+    faults: &mut Faults,
+    stop: &AtomicBool,
+) -> Result<Option<Over>, ShimError> {
+    let mut answers = Vec::new();
+    loop {
+        let (frame, measured) = flight.measure();
+        session.time_us = frame.time_us;
+        session.counts.frames += 1;
+        let home = flight.home_m();
+        session.send_slow(|encoder, out| encode_slow(frame.time_us, &measured, home, encoder, out));
+        let Some(answer) = ask(session, &frame, faults, stop, &mut answers) else {
+            return Ok(None);
+        };
+        session.use_answer(&answer);
+        if answer.armed && !flight.is_launched() {
+            flight.launch();
+            session.tell(Event::Launched);
+        }
+        if let Some(over) = flight.advance(answer.inputs)? {
+            return Ok(Some(over));
+        }
+    }
+}
+
+/// When a frame is to be sent, and what has come of it so far.
+struct Asking {
+    since: Instant,
+    next: Instant,
+    sent: Instant,
+    sendings: u64,
+    paused: bool,
+}
+
+/// Sends `frame` until it is answered; `None` when told to stop.
+fn ask(
+    session: &mut Session<'_>,
+    frame: &StateFrame,
+    faults: &mut Faults,
+    stop: &AtomicBool,
+    answers: &mut Vec<Answer>,
+) -> Option<Answer> {
+    let since = Instant::now();
+    let next = since + faults.lateness();
+    let mut asking = Asking {
+        since,
+        next,
+        sent: since,
+        sendings: 0,
+        paused: false,
+    };
+    while !stop.load(Ordering::Relaxed) {
+        send_if_due(session, frame, faults, &mut asking);
+        answers.clear();
+        session.receive(answers);
+        if let Some(answer) = pick(session, frame.time_us, answers) {
+            session.counts.latency.record(asking.sent.elapsed());
+            if asking.paused {
+                session.tell(Event::Resumed);
+            }
+            return Some(answer);
+        }
+        let now = Instant::now();
+        session.watch(now);
+        if !asking.paused && session.is_alive() && now - asking.since >= REPEAT {
+            asking.paused = true;
+            session.tell(Event::Paused);
+        }
+    }
+    None
+}
+
+fn send_if_due(
+    session: &mut Session<'_>,
+    frame: &StateFrame,
+    faults: &mut Faults,
+    asking: &mut Asking,
+) {
+    let now = Instant::now();
+    let reachable = session.take_newly_reachable();
+    if now < asking.next && !reachable {
+        return;
+    }
+    if asking.sendings > 0 {
+        session.counts.repeated_frames += 1;
+        session.send_heartbeat();
+    }
+    asking.sendings += 1;
+    let bytes = session.encode(frame);
+    if faults.drops() {
+        session.counts.dropped_frames += 1;
+        asking.next = now + REPEAT_LOST;
+    } else {
+        session.send_frame(&bytes);
+        asking.sent = now;
+        asking.next = now + REPEAT;
+    }
+}
+
+/// The answer to the frame of `time_us`; counts all others.
+fn pick(session: &mut Session<'_>, time_us: u64, answers: &[Answer]) -> Option<Answer> {
+    let mut picked = None;
+    for answer in answers {
+        let echo = answer.echo_us;
+        if echo == time_us && picked.is_none() {
+            picked = Some(*answer);
+        } else if echo <= time_us && echo > 0 && echo.is_multiple_of(FRAME_US) {
+            session.counts.repeated_answers += 1;
+        } else {
+            session.counts.wrong_answers += 1;
+        }
+    }
+    picked
+}

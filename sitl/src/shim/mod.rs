@@ -1,0 +1,79 @@
+//! The shim: plays the flight controller to a companion, over MAVLink.
+//!
+//! `sitl/PROTOCOL.md` is the contract. The shim flies the plant, shows it as sensors would through
+//! state frames, and steps it with the companion's answers, in [`Pace::Lockstep`] or in
+//! [`Pace::RealTime`]. It shares no MAVLink code with the companion.
+//!
+//! ```text
+//! Flight ─ Truth ─► Sensors ─► StateFrame ─► codec ─► Link ─► companion
+//!    ▲                                                           │
+//!    └──────────── Inputs ◄── Answer ◄── codec ◄── Link ◄────────┘
+//! ```
+
+mod answer;
+pub mod codec;
+mod error;
+mod faults;
+mod flight;
+mod link;
+mod lockstep;
+mod options;
+mod realtime;
+mod sensors;
+mod session;
+mod summary;
+mod telemetry;
+mod truth_log;
+
+pub use error::ShimError;
+pub use flight::Over;
+pub use link::{Address, AddressError, LinkError, Transport};
+pub use options::{Bias, Existing, FrameFaults, Launch, Noise, Pace, ShimOptions, TruthFile};
+pub use session::{COMPANION, SHIM};
+pub use summary::{Event, Latency, Notice, Summary};
+pub use telemetry::FULL_DEFLECTION_RAD;
+
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use faults::Faults;
+use flight::Flight;
+use link::{Link, Wait};
+use session::Session;
+
+/// Flies until `stop` is set (seen within some 20 ms), the flight is over, or the plant fails;
+/// tells `observer` every change of state. Blocks the calling thread.
+///
+/// Options are checked and the link is opened before the truth file is made, so that a run that
+/// cannot begin leaves nothing behind.
+pub fn run(
+    options: &ShimOptions,
+    stop: &AtomicBool,
+    observer: &mut dyn FnMut(Notice),
+) -> Result<Summary, ShimError> {
+    options.check()?;
+    let wait = match options.pace {
+        Pace::Lockstep => Wait::Patient,
+        Pace::RealTime => Wait::Never,
+    };
+    let link = Link::open(&options.link, wait)?;
+    let mut flight = Flight::new(options)?;
+    let mut faults = Faults::new(options.faults, options.seed);
+    let mut session = Session::new(link, options.link.clone(), observer);
+    let begun = Instant::now();
+    let first_us = flight.shown_us();
+    let over = match options.pace {
+        Pace::Lockstep => lockstep::fly(&mut session, &mut flight, &mut faults, stop),
+        Pace::RealTime => {
+            let delay = options.faults.delay_ms;
+            realtime::fly(&mut session, &mut flight, &mut faults, delay, stop)
+        }
+    };
+    flight.finish()?;
+    let mut summary = session.finish();
+    summary.over = over?;
+    summary.simulated_s = (flight.shown_us() - first_us) as f64 * 1e-6;
+    summary.flown_s = flight.flown_s();
+    summary.wall_s = begun.elapsed().as_secs_f64();
+    Ok(summary)
+}

@@ -1,0 +1,264 @@
+//! What a run of the shim is asked to do.
+
+use std::path::PathBuf;
+
+use super::error::ShimError;
+use super::link::{Address, Transport};
+use crate::plant::{PlantOptions, Start};
+
+/// What the shim's clock follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// The wall clock: one frame every 10 ms whatever the companion does.
+    RealTime,
+    /// The companion: a step is made on its answer and never without.
+    Lockstep,
+}
+
+/// When the aircraft begins to fly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Launch {
+    /// At the first armed answer; until then it stays at its start while time runs.
+    WhenArmed,
+    /// At once.
+    Immediate,
+}
+
+/// What to do with a truth file that exists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Existing {
+    /// Refuse to start.
+    Keep,
+    /// Write over it.
+    Replace,
+}
+
+/// Where the plant's truth goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TruthFile {
+    /// A CSV file in the columns of the flight-log format.
+    pub path: PathBuf,
+    /// What to do when it exists.
+    pub existing: Existing,
+}
+
+/// Standard deviations of white sensor noise, one draw a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Noise {
+    /// Rate gyros, each axis, rad/s.
+    pub gyro_radps: f64,
+    /// Accelerometers, each axis, m/s².
+    pub accelerometer_mps2: f64,
+    /// Attitude, each Euler angle, rad.
+    pub attitude_rad: f64,
+    /// True airspeed, m/s.
+    pub airspeed_mps: f64,
+    /// Angle-of-attack and sideslip vanes, rad.
+    pub vane_rad: f64,
+    /// Altitude (barometric and fused), m.
+    pub altitude_m: f64,
+}
+
+impl Noise {
+    /// No noise.
+    pub const NONE: Noise = Noise {
+        gyro_radps: 0.0,
+        accelerometer_mps2: 0.0,
+        attitude_rad: 0.0,
+        airspeed_mps: 0.0,
+        vane_rad: 0.0,
+        altitude_m: 0.0,
+    };
+
+    /// The order of what a small autopilot shows in flight with the motor running: an assumption,
+    /// not a measurement of one product (0.3 °/s, 0.3 m/s², 0.2°, 0.3 m/s, 0.3°, 0.2 m).
+    pub const REALISTIC: Noise = Noise {
+        gyro_radps: 0.0052,
+        accelerometer_mps2: 0.3,
+        attitude_rad: 0.0035,
+        airspeed_mps: 0.3,
+        vane_rad: 0.0052,
+        altitude_m: 0.2,
+    };
+
+    fn values(&self) -> [f64; 6] {
+        [
+            self.gyro_radps,
+            self.accelerometer_mps2,
+            self.attitude_rad,
+            self.airspeed_mps,
+            self.vane_rad,
+            self.altitude_m,
+        ]
+    }
+}
+
+/// Constant sensor errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bias {
+    /// Added to p, q, r, rad/s.
+    pub gyro_radps: [f64; 3],
+    /// Added to the specific force, body axes, m/s².
+    pub accelerometer_mps2: [f64; 3],
+    /// Added to the angle of attack, rad.
+    pub alpha_rad: f64,
+    /// Added to the sideslip, rad.
+    pub beta_rad: f64,
+    /// The airspeed shown is this times the true one; 1 is right.
+    pub airspeed_scale: f64,
+}
+
+impl Default for Bias {
+    fn default() -> Self {
+        Bias {
+            gyro_radps: [0.0; 3],
+            accelerometer_mps2: [0.0; 3],
+            alpha_rad: 0.0,
+            beta_rad: 0.0,
+            airspeed_scale: 1.0,
+        }
+    }
+}
+
+/// What befalls state frames on their way.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct FrameFaults {
+    /// Every frame comes this much late, ms. In lockstep, where only simulated time exists, it is
+    /// rounded up to whole steps and the plant runs ahead of the frames.
+    pub delay_ms: f64,
+    /// A frame is lost with this probability, 0..1.
+    pub drop_probability: f64,
+    /// Each frame comes late by a further uniform 0..this, ms of wall time.
+    pub jitter_ms: f64,
+    /// A frame comes late by `late_ms` more with this probability, 0..1.
+    pub late_probability: f64,
+    /// How late such a frame is, ms of wall time.
+    pub late_ms: f64,
+}
+
+/// Everything a run needs.
+#[derive(Clone, Debug)]
+pub struct ShimOptions {
+    /// Where the companion is met.
+    pub link: Address,
+    /// What the clock follows.
+    pub pace: Pace,
+    /// When the aircraft begins to fly.
+    pub launch: Launch,
+    /// Ends the run after so much simulated flight, s, not counting the time held at the start.
+    pub duration_s: Option<f64>,
+    /// The state at the start.
+    pub start: Start,
+    /// The aircraft, its air, what is hidden in it.
+    pub plant: PlantOptions,
+    /// Seed of sensor noise and frame faults.
+    pub seed: u64,
+    /// Where the truth goes, if anywhere.
+    pub truth: Option<TruthFile>,
+    /// White sensor noise.
+    pub noise: Noise,
+    /// Constant sensor errors.
+    pub bias: Bias,
+    /// What befalls state frames.
+    pub faults: FrameFaults,
+}
+
+impl ShimOptions {
+    /// The address at which the companion listens by default.
+    pub fn default_link() -> Address {
+        Address {
+            transport: Transport::UdpOut,
+            endpoint: "127.0.0.1:14600".to_owned(),
+        }
+    }
+
+    /// Real time, perfect sensors, held until armed, towards [`ShimOptions::default_link`].
+    pub fn new(plant: PlantOptions, start: Start) -> Self {
+        ShimOptions {
+            link: Self::default_link(),
+            pace: Pace::RealTime,
+            launch: Launch::WhenArmed,
+            duration_s: None,
+            start,
+            plant,
+            seed: 0,
+            truth: None,
+            noise: Noise::NONE,
+            bias: Bias::default(),
+            faults: FrameFaults::default(),
+        }
+    }
+
+    /// Refuses numbers that mean nothing, before anything is opened.
+    pub(super) fn check(&self) -> Result<(), ShimError> {
+        let faults = &self.faults;
+        let mut errors = self.noise.values().to_vec();
+        errors.extend([faults.delay_ms, faults.jitter_ms, faults.late_ms]);
+        demand(
+            errors.iter().all(|x| x.is_finite() && *x >= 0.0),
+            "noise and delays must be 0 or more",
+        )?;
+        demand(
+            [faults.delay_ms, faults.jitter_ms, faults.late_ms]
+                .iter()
+                .all(|&x| x <= 60_000.0),
+            "a delay may be 60000 ms at most",
+        )?;
+        demand(
+            (0.0..1.0).contains(&faults.drop_probability),
+            "the drop probability must be 0 or more and below 1",
+        )?;
+        demand(
+            (0.0..=1.0).contains(&faults.late_probability),
+            "the probability of a late frame must lie in 0..1",
+        )?;
+        let bias = &self.bias;
+        let mut biases = vec![bias.alpha_rad, bias.beta_rad, bias.airspeed_scale];
+        biases.extend(bias.gyro_radps.iter().chain(&bias.accelerometer_mps2));
+        demand(
+            biases.iter().all(|x| x.is_finite()),
+            "a bias must be a finite number",
+        )?;
+        demand(
+            bias.airspeed_scale > 0.0,
+            "the airspeed scale must be positive",
+        )?;
+        demand(
+            self.duration_s.is_none_or(|s| s.is_finite() && s > 0.0),
+            "the duration must be positive",
+        )?;
+        let start = &self.start;
+        let state = [
+            start.roll_rad,
+            start.pitch_rad,
+            start.yaw_rad,
+            start.airspeed_mps,
+            start.alpha_rad,
+            start.beta_rad,
+            start.p_radps,
+            start.q_radps,
+            start.r_radps,
+            start.altitude_m,
+        ];
+        demand(
+            state.iter().all(|x| x.is_finite()),
+            "the start must be made of finite numbers",
+        )?;
+        demand(
+            start.airspeed_mps > 0.0,
+            "the airspeed at the start must be positive",
+        )?;
+        demand(
+            start.altitude_m > 0.0,
+            "the altitude at the start must be positive",
+        )
+    }
+}
+
+fn demand(holds: bool, rule: &'static str) -> Result<(), ShimError> {
+    if holds {
+        Ok(())
+    } else {
+        Err(ShimError::Option { rule })
+    }
+}

@@ -1,0 +1,208 @@
+//! Real time: one frame every 10 ms of the wall clock, whatever the companion does.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::answer::Answer;
+use super::error::ShimError;
+use super::faults::{Faults, milliseconds};
+use super::flight::{Flight, Over};
+use super::session::{Heard, Session};
+use super::summary::Event;
+use super::telemetry::{FRAME_US, encode_slow};
+use crate::plant::Inputs;
+
+const PERIOD: Duration = Duration::from_micros(FRAME_US);
+/// A cycle that begins later than this is late.
+const LATE: Duration = Duration::from_millis(2);
+/// A clock that is further behind than this is set anew: no burst of frames makes up for it.
+const HOPELESS: Duration = Duration::from_millis(100);
+/// An answer older than this is not flown, µs.
+const STALE_US: u64 = 500_000;
+/// How often the link is looked at while an answer is expected, to measure when it comes: finely
+/// as long as it is punctual, then coarsely.
+const LOOKS: [Duration; 2] = [Duration::from_micros(100), Duration::from_millis(1)];
+/// An answer within this time is punctual.
+const PUNCTUAL: Duration = Duration::from_millis(4);
+/// So many arrivals are taken at one look; a flood waits in the kernel.
+const ARRIVALS: usize = 500;
+/// Sending times that are remembered, frames.
+const SENT: usize = 64;
+
+/// The running state of the real-time loop.
+struct Cycle<'s, 'o> {
+    session: &'s mut Session<'o>,
+    /// Frames under way to the companion: when to send, time of the frame, bytes.
+    outbox: VecDeque<(Instant, u64, Vec<u8>)>,
+    /// When the latest frames were sent, by frame number.
+    sent: [Option<(u64, Instant)>; SENT],
+    answers: Vec<Answer>,
+    /// The newest answer since the last step.
+    newest: Option<Answer>,
+    /// Time of the newest answered frame, µs.
+    answered_us: u64,
+    first_us: u64,
+    now_us: u64,
+}
+
+/// Flies until told to stop or until the flight is over.
+pub fn fly(
+    session: &mut Session<'_>,
+    flight: &mut Flight,
+    faults: &mut Faults,
+    delay_ms: f64,
+    stop: &AtomicBool,
+) -> Result<Option<Over>, ShimError> {
+    let mut cycle = Cycle::new(session, flight.shown_us());
+    let mut inputs = Inputs::default();
+    let mut deadline = Instant::now();
+    while !stop.load(Ordering::Relaxed) {
+        deadline = cycle.begin(deadline);
+        let due = Instant::now() + milliseconds(delay_ms) + faults.lateness();
+        cycle.show(flight, faults, due);
+        deadline += PERIOD;
+        cycle.converse_until(deadline);
+        match cycle.newest.take() {
+            Some(answer) => {
+                cycle.session.use_answer(&answer);
+                inputs = answer.inputs;
+                if answer.armed && !flight.is_launched() {
+                    flight.launch();
+                    cycle.session.tell(Event::Launched);
+                }
+            }
+            None => cycle.session.counts.unanswered_steps += u64::from(flight.is_launched()),
+        }
+        if let Some(over) = flight.advance(inputs)? {
+            return Ok(Some(over));
+        }
+    }
+    Ok(None)
+}
+
+impl<'s, 'o> Cycle<'s, 'o> {
+    fn new(session: &'s mut Session<'o>, first_us: u64) -> Self {
+        Cycle {
+            session,
+            outbox: VecDeque::new(),
+            sent: [None; SENT],
+            answers: Vec::new(),
+            newest: None,
+            answered_us: 0,
+            first_us,
+            now_us: first_us,
+        }
+    }
+
+    /// Judges how punctual this cycle is; returns the deadline it counts from.
+    fn begin(&mut self, deadline: Instant) -> Instant {
+        let now = Instant::now();
+        let late = now.saturating_duration_since(deadline);
+        self.session.counts.latest_cycle = self.session.counts.latest_cycle.max(late);
+        self.session.counts.late_cycles += u64::from(late > LATE);
+        self.session.watch(now);
+        if late > HOPELESS {
+            self.session.tell(Event::Skipped(late));
+            return now;
+        }
+        deadline
+    }
+
+    /// Measures, and puts the frame on its way.
+    fn show(&mut self, flight: &mut Flight, faults: &mut Faults, due: Instant) {
+        let (frame, measured) = flight.measure();
+        self.now_us = frame.time_us;
+        self.session.time_us = frame.time_us;
+        self.session.counts.frames += 1;
+        let home = flight.home_m();
+        self.session
+            .send_slow(|encoder, out| encode_slow(frame.time_us, &measured, home, encoder, out));
+        let bytes = self.session.encode(&frame);
+        if faults.drops() {
+            self.session.counts.dropped_frames += 1;
+            return;
+        }
+        // Frames keep their order: one that is late holds up those behind it.
+        let due = self
+            .outbox
+            .back()
+            .map_or(due, |&(before, ..)| due.max(before));
+        self.outbox.push_back((due, frame.time_us, bytes));
+    }
+
+    /// Sends what falls due and takes what arrives until `deadline`.
+    fn converse_until(&mut self, deadline: Instant) {
+        let punctual_until = deadline - PERIOD + PUNCTUAL;
+        loop {
+            self.send_due();
+            self.listen();
+            let now = Instant::now();
+            if now >= deadline {
+                return;
+            }
+            let mut wake = if self.answered_us >= self.now_us {
+                deadline
+            } else if self.session.is_alive() && now < punctual_until {
+                now + LOOKS[0]
+            } else {
+                now + LOOKS[1]
+            };
+            if let Some(&(due, ..)) = self.outbox.front() {
+                wake = wake.min(due);
+            }
+            thread::sleep(wake.min(deadline).saturating_duration_since(now));
+        }
+    }
+
+    fn send_due(&mut self) {
+        let now = Instant::now();
+        while let Some((due, time_us, bytes)) = self.outbox.pop_front() {
+            if due > now {
+                self.outbox.push_front((due, time_us, bytes));
+                return;
+            }
+            self.sent[slot(time_us)] = Some((time_us, Instant::now()));
+            self.session.send_frame(&bytes);
+        }
+    }
+
+    fn listen(&mut self) {
+        for _ in 0..ARRIVALS {
+            self.answers.clear();
+            let heard = self.session.receive(&mut self.answers);
+            for i in 0..self.answers.len() {
+                self.judge(self.answers[i]);
+            }
+            if heard == Heard::Nothing {
+                return;
+            }
+        }
+    }
+
+    /// Keeps the newest answer that may be flown; counts the others.
+    fn judge(&mut self, answer: Answer) {
+        let echo = answer.echo_us;
+        let counts = &mut self.session.counts;
+        if echo < self.first_us || echo > self.now_us || !echo.is_multiple_of(FRAME_US) {
+            counts.wrong_answers += 1;
+        } else if echo <= self.answered_us {
+            counts.repeated_answers += 1;
+        } else if self.now_us - echo > STALE_US {
+            counts.stale_answers += 1;
+        } else {
+            self.answered_us = echo;
+            if let Some((time_us, sent)) = self.sent[slot(echo)]
+                && time_us == echo
+            {
+                counts.latency.record(sent.elapsed());
+            }
+            self.newest = Some(answer);
+        }
+    }
+}
+
+fn slot(time_us: u64) -> usize {
+    (time_us / FRAME_US) as usize % SENT
+}

@@ -1,0 +1,209 @@
+//! What a run tells: its events while it goes on, its counts at the end.
+
+use std::fmt;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use super::flight::Over;
+use super::link::Address;
+
+/// A change of state, told to the observer of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// The link is open; this side's own address where there is one.
+    Open(Address, Option<SocketAddr>),
+    /// Nobody has been heard yet, or not any more.
+    Waiting(Address),
+    /// The companion has been heard.
+    Found,
+    /// The companion has not been heard for two seconds, or has closed its stream.
+    Lost,
+    /// The first armed answer has come: the aircraft flies.
+    Launched,
+    /// The companion is armed.
+    Armed,
+    /// The companion is disarmed.
+    Disarmed,
+    /// Lockstep: no answer to the present frame for a second; nothing moves until one comes.
+    Paused,
+    /// Lockstep: the answer has come after all.
+    Resumed,
+    /// The clock was so late that it was set anew, by so much.
+    Skipped(Duration),
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Event::Open(link, Some(local)) => write!(f, "link {link} is open, here {local}"),
+            Event::Open(link, None) => write!(f, "link {link} is open"),
+            Event::Waiting(link) => {
+                write!(
+                    f,
+                    "waiting for a companion on {link}; start one with `cargo fly`"
+                )
+            }
+            Event::Found => write!(f, "companion found"),
+            Event::Lost => write!(f, "companion lost"),
+            Event::Launched => write!(f, "launched"),
+            Event::Armed => write!(f, "armed"),
+            Event::Disarmed => write!(f, "disarmed: surfaces centred, motor off"),
+            Event::Paused => write!(
+                f,
+                "no answer for 1 s: simulated time stands still; the frame is repeated every second"
+            ),
+            Event::Resumed => write!(f, "answered: simulated time goes on"),
+            Event::Skipped(by) => {
+                write!(
+                    f,
+                    "this machine was {:.0} ms late: the clock is set anew",
+                    by.as_secs_f64() * 1e3
+                )
+            }
+        }
+    }
+}
+
+/// An event with the simulated time at which it happened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Notice {
+    /// Simulated time, s.
+    pub time_s: f64,
+    /// What happened.
+    pub event: Event,
+}
+
+/// Time from sending a frame to receiving its answer, in bins of 10 µs up to 20 ms.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Latency {
+    bins: Vec<u64>,
+    count: u64,
+    longest: Duration,
+}
+
+impl Default for Latency {
+    fn default() -> Self {
+        Latency {
+            bins: vec![0; 2001],
+            count: 0,
+            longest: Duration::ZERO,
+        }
+    }
+}
+
+impl Latency {
+    pub(super) fn record(&mut self, taken: Duration) {
+        let bin = (taken.as_micros() / 10).min(2000) as usize;
+        self.bins[bin] += 1;
+        self.count += 1;
+        self.longest = self.longest.max(taken);
+    }
+
+    /// Answers measured.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The longest.
+    pub fn longest(&self) -> Duration {
+        self.longest
+    }
+
+    /// The time that this share (0..1) of the answers stayed within, to the bin; zero without answers.
+    pub fn quantile(&self, share: f64) -> Duration {
+        let wanted = (share * self.count as f64).ceil() as u64;
+        let mut seen = 0;
+        for (bin, &answers) in self.bins.iter().enumerate().take(2000) {
+            seen += answers;
+            if seen >= wanted.max(1) {
+                return Duration::from_micros(10 * (bin as u64 + 1)).min(self.longest);
+            }
+        }
+        self.longest
+    }
+}
+
+/// The counts of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// State frames made, repetitions not counted.
+    pub frames: u64,
+    /// State frames that were sent again because no answer came.
+    pub repeated_frames: u64,
+    /// State frames lost on purpose.
+    pub dropped_frames: u64,
+    /// State frames that could not be sent: nobody there, or no room.
+    pub unsent_frames: u64,
+    /// Answers that were flown (or, before the launch, would have been).
+    pub answers: u64,
+    /// Answers to a frame that was answered already.
+    pub repeated_answers: u64,
+    /// Answers older than 0.5 s; not flown.
+    pub stale_answers: u64,
+    /// Answers that echo a time no frame had; not flown.
+    pub wrong_answers: u64,
+    /// Answers with a control that is not a finite number; not flown.
+    pub unusable_answers: u64,
+    /// Answers with a control outside its range, limited to it.
+    pub limited_answers: u64,
+    /// Real time: steps made without a new answer to fly since the launch.
+    pub unanswered_steps: u64,
+    /// Real time: cycles that began more than 2 ms late.
+    pub late_cycles: u64,
+    /// Real time: the latest beginning of a cycle.
+    pub latest_cycle: Duration,
+    /// Runs of bytes that were no frame.
+    pub bad_frames: u64,
+    /// Good frames of others than the companion, with messages unknown here.
+    pub foreign_frames: u64,
+    /// Simulated time that was shown, s.
+    pub simulated_s: f64,
+    /// Simulated time since the launch, s.
+    pub flown_s: f64,
+    /// Wall time, s.
+    pub wall_s: f64,
+    /// From sending a frame to receiving its answer.
+    pub latency: Latency,
+    /// Why the run ended; `None` when it was told to stop.
+    pub over: Option<Over>,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let reason = match self.over {
+            None => "Stopped",
+            Some(Over::Duration) => "The asked time has been flown",
+            Some(Over::Ground) => "The aircraft has come down to sea level",
+        };
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        write!(
+            f,
+            "{reason} after {:.2} s of simulated time ({:.2} s flown) in {:.2} s. \
+             Frames: {} ({} repeated, {} dropped on purpose, {} without anybody to send to). \
+             Answers: {} ({} stale, {} repeated, {} with a wrong time, {} unusable, {} limited; \
+             {} steps without a new one). Frame to answer: {:.2} ms median, {:.2} ms p99, {:.2} ms \
+             at most. Late cycles: {} (at most {:.2} ms late). Bad frames: {}, foreign: {}.",
+            self.simulated_s,
+            self.flown_s,
+            self.wall_s,
+            self.frames,
+            self.repeated_frames,
+            self.dropped_frames,
+            self.unsent_frames,
+            self.answers,
+            self.stale_answers,
+            self.repeated_answers,
+            self.wrong_answers,
+            self.unusable_answers,
+            self.limited_answers,
+            self.unanswered_steps,
+            ms(self.latency.quantile(0.5)),
+            ms(self.latency.quantile(0.99)),
+            ms(self.latency.longest()),
+            self.late_cycles,
+            ms(self.latest_cycle),
+            self.bad_frames,
+            self.foreign_frames,
+        )
+    }
+}

@@ -1,0 +1,302 @@
+//! A companion for tests: the far end of the link, over real sockets, told what to answer.
+#![allow(dead_code)]
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use greylag_sitl::plant::{PlantOptions, Start};
+use greylag_sitl::shim::codec::*;
+use greylag_sitl::shim::{self, Event, Notice, Pace, ShimError, ShimOptions, Summary};
+
+/// Longer than anything a test waits for on purpose.
+pub const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Options of a lockstep run towards `link`.
+pub fn lockstep(link: &str) -> ShimOptions {
+    ShimOptions {
+        pace: Pace::Lockstep,
+        ..real_time(link)
+    }
+}
+
+/// Options of a real-time run towards `link`.
+pub fn real_time(link: &str) -> ShimOptions {
+    let mut options = ShimOptions::new(PlantOptions::default(), Start::NEUTRAL);
+    options.link = link.parse().expect(link);
+    options
+}
+
+/// A shim that runs in a thread.
+pub struct Shim {
+    pub notices: Receiver<Notice>,
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<Result<Summary, ShimError>>,
+}
+
+impl Shim {
+    pub fn start(options: ShimOptions) -> Self {
+        let (sender, notices) = channel();
+        let stop = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || {
+            shim::run(&options, &seen, &mut |notice| drop(sender.send(notice)))
+        });
+        Shim {
+            notices,
+            stop,
+            thread,
+        }
+    }
+
+    /// Where a listening shim listens.
+    pub fn address(&self) -> SocketAddr {
+        match self.notices.recv_timeout(PATIENCE).expect("an event").event {
+            Event::Open(_, Some(address)) => address,
+            other => panic!("{other:?} instead of the open link"),
+        }
+    }
+
+    /// The events so far.
+    pub fn events(&self) -> Vec<Event> {
+        self.notices.try_iter().map(|notice| notice.event).collect()
+    }
+
+    pub fn stop(self) -> Summary {
+        self.stop.store(true, Ordering::Relaxed);
+        self.end()
+    }
+
+    pub fn end(self) -> Summary {
+        self.thread
+            .join()
+            .expect("the shim does not panic")
+            .expect("the shim ends well")
+    }
+}
+
+/// A whole state frame as received.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct State {
+    pub imu: HighresImu,
+    pub hud: VfrHud,
+    pub vanes: AoaSsa,
+    pub actuators: ActuatorOutputStatus,
+    pub attitude: AttitudeQuaternion,
+}
+
+impl State {
+    pub fn time_us(&self) -> u64 {
+        self.imu.time_usec
+    }
+
+    /// Roll, pitch, yaw, rad.
+    pub fn euler(&self) -> [f64; 3] {
+        let a = &self.attitude;
+        let [w, x, y, z] = [a.q1, a.q2, a.q3, a.q4].map(f64::from);
+        [
+            (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
+            (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
+            (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+        ]
+    }
+}
+
+enum Road {
+    Udp(UdpSocket, Option<SocketAddr>),
+    Tcp(TcpStream),
+}
+
+/// The companion's end.
+pub struct Companion {
+    road: Road,
+    parser: Parser,
+    encoder: Encoder,
+    waiting: Vec<Frame>,
+    /// All frames of the slower messages so far.
+    pub slow: Vec<Frame>,
+    partial: State,
+}
+
+impl Companion {
+    fn on(road: Road) -> Self {
+        Companion {
+            road,
+            parser: Parser::default(),
+            encoder: Encoder::new(1, 1),
+            waiting: Vec::new(),
+            slow: Vec::new(),
+            partial: State::default(),
+        }
+    }
+
+    /// Listens for datagrams; answers whom it hears.
+    pub fn udp_in(at: &str) -> Self {
+        Self::on(Road::Udp(UdpSocket::bind(at).expect(at), None))
+    }
+
+    /// Sends datagrams to `to`.
+    pub fn udp_out(to: SocketAddr) -> Self {
+        Self::on(Road::Udp(
+            UdpSocket::bind("127.0.0.1:0").expect("any port"),
+            Some(to),
+        ))
+    }
+
+    pub fn tcp_in(listener: &TcpListener) -> Self {
+        let stream = listener.accept().expect("the shim connects").0;
+        stream.set_nodelay(true).expect("nodelay");
+        Self::on(Road::Tcp(stream))
+    }
+
+    pub fn tcp_out(to: SocketAddr) -> Self {
+        let stream = TcpStream::connect(to).expect("the shim listens");
+        stream.set_nodelay(true).expect("nodelay");
+        Self::on(Road::Tcp(stream))
+    }
+
+    /// This side's own address.
+    pub fn address(&self) -> SocketAddr {
+        match &self.road {
+            Road::Udp(socket, _) => socket.local_addr(),
+            Road::Tcp(stream) => stream.local_addr(),
+        }
+        .expect("an address")
+    }
+
+    pub fn send_bytes(&mut self, bytes: &[u8]) {
+        match &mut self.road {
+            Road::Udp(socket, peer) => {
+                socket.send_to(bytes, peer.expect("a peer")).expect("sent");
+            }
+            Road::Tcp(stream) => stream.write_all(bytes).expect("sent"),
+        }
+    }
+
+    pub fn send<M: Message>(&mut self, message: &M) {
+        let mut bytes = Vec::new();
+        self.encoder.encode(message, &mut bytes);
+        self.send_bytes(&bytes);
+    }
+
+    pub fn heartbeat(&mut self) {
+        self.send(&Heartbeat {
+            kind: 1,
+            mavlink_version: 3,
+            ..Heartbeat::default()
+        });
+    }
+
+    /// Answers the frame of `time_us`, armed.
+    pub fn answer(&mut self, time_us: u64, command: [f32; 3]) {
+        self.send(&answer(time_us, command, 128));
+    }
+
+    /// Answers the frame of `time_us`, disarmed.
+    pub fn answer_disarmed(&mut self, time_us: u64) {
+        self.send(&answer(time_us, [0.0; 3], 0));
+    }
+
+    /// The next state frame, within `patience`.
+    pub fn state_within(&mut self, patience: Duration) -> Option<State> {
+        let until = Instant::now() + patience;
+        loop {
+            for frame in std::mem::take(&mut self.waiting) {
+                // A frame that completes leaves the rest of its batch for the next call.
+                if let Some(state) = self.place(&frame) {
+                    return Some(state);
+                }
+            }
+            let left = until.checked_duration_since(Instant::now())?;
+            self.read(left.max(Duration::from_millis(1)))?;
+        }
+    }
+
+    /// The next state frame.
+    pub fn state(&mut self) -> State {
+        self.state_within(PATIENCE).expect("a state frame")
+    }
+
+    fn place(&mut self, frame: &Frame) -> Option<State> {
+        assert_eq!((frame.system, frame.component), (1, 200));
+        let partial = &mut self.partial;
+        match frame.id {
+            HighresImu::ID => partial.imu = frame.decode()?,
+            VfrHud::ID => partial.hud = frame.decode()?,
+            AoaSsa::ID => partial.vanes = frame.decode()?,
+            ActuatorOutputStatus::ID => partial.actuators = frame.decode()?,
+            AttitudeQuaternion::ID => {
+                partial.attitude = frame.decode()?;
+                return Some(self.partial);
+            }
+            _ => self.slow.push(*frame),
+        }
+        None
+    }
+
+    fn read(&mut self, patience: Duration) -> Option<()> {
+        let mut buffer = [0; 4096];
+        let waiting = &mut self.waiting;
+        match &mut self.road {
+            Road::Udp(socket, peer) => {
+                socket.set_read_timeout(Some(patience)).expect("a timeout");
+                let (length, from) = socket.recv_from(&mut buffer).ok()?;
+                peer.get_or_insert(from);
+                self.parser
+                    .datagram(&buffer[..length], &mut |frame| waiting.push(frame));
+            }
+            Road::Tcp(stream) => {
+                stream.set_read_timeout(Some(patience)).expect("a timeout");
+                // One frame's worth at a time, so that no batch holds two.
+                let length = stream.read(&mut buffer[..64]).ok().filter(|&n| n > 0)?;
+                self.parser
+                    .stream(&buffer[..length], &mut |frame| waiting.push(frame));
+            }
+        }
+        Some(())
+    }
+
+    /// Runs of received bytes that were no frame.
+    pub fn bad(&self) -> u64 {
+        self.parser.bad()
+    }
+
+    /// Flies `frames` frames, answering each with `command` of it.
+    pub fn fly(
+        &mut self,
+        frames: usize,
+        mut command: impl FnMut(&State) -> [f32; 3],
+    ) -> Vec<State> {
+        (0..frames)
+            .map(|_| {
+                let state = self.state();
+                let command = command(&state);
+                self.answer(state.time_us(), command);
+                state
+            })
+            .collect()
+    }
+}
+
+/// An answer message.
+pub fn answer(time_us: u64, command: [f32; 3], mode: u8) -> HilActuatorControls {
+    let mut controls = [0.0; 16];
+    controls[..3].copy_from_slice(&command);
+    HilActuatorControls {
+        time_usec: time_us,
+        flags: 0,
+        controls,
+        mode,
+    }
+}
+
+/// A companion that listens on a port of its own, with the `udpout:` address for the shim.
+pub fn listening() -> (Companion, String) {
+    let companion = Companion::udp_in("127.0.0.1:0");
+    let link = format!("udpout:{}", companion.address());
+    (companion, link)
+}

@@ -1,0 +1,33 @@
+//! How fast lockstep goes through the sockets with a companion that only echoes.
+
+mod shim_companion;
+
+use std::net::TcpListener;
+use std::time::Instant;
+
+use shim_companion::*;
+
+/// Frames measured: 20 s of flight.
+const FRAMES: usize = 2000;
+
+fn frames_per_second(mut companion: Companion, shim: Shim) -> f64 {
+    companion.fly(100, |_| [0.0, 0.05, 0.2]);
+    let begun = Instant::now();
+    companion.fly(FRAMES, |_| [0.0, 0.05, 0.2]);
+    let rate = FRAMES as f64 / begun.elapsed().as_secs_f64();
+    println!("{}", shim.stop());
+    rate
+}
+
+#[test]
+fn lockstep_is_at_least_twenty_times_real_time() {
+    let (companion, link) = listening();
+    let udp = frames_per_second(companion, Shim::start(lockstep(&link)));
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let link = format!("tcpout:{}", listener.local_addr().expect("an address"));
+    let shim = Shim::start(lockstep(&link));
+    let tcp = frames_per_second(Companion::tcp_in(&listener), shim);
+    println!("lockstep: {udp:.0} frames/s over UDP, {tcp:.0} over TCP (real time is 100)");
+    // The demand of the issue, 20 times real time, for the shim's part over UDP.
+    assert!(udp >= 2000.0, "{udp:.0} frames/s over UDP");
+}
