@@ -54,7 +54,11 @@ fn an_attitude_is_flown_and_setpoint_loss_ends_level_in_hold() {
     let settled = |m: &&MavMessage| matches!(m, MavMessage::ATTITUDE(a) if (a.roll.to_degrees() - 20.0).abs() < 0.5 && (a.pitch.to_degrees() - 5.0).abs() < 0.5);
     assert!(client.log.iter().filter(settled).count() > 10);
     let vehicle = land(companion, vehicle);
-    assert!(vehicle.state().roll.to_degrees().abs() < 0.5, "{:?}", vehicle.state());
+    assert!(
+        vehicle.state().roll.to_degrees().abs() < 0.5,
+        "{:?}",
+        vehicle.state()
+    );
 }
 
 #[test]
@@ -69,7 +73,11 @@ fn a_lost_vehicle_is_told_and_flown_in_hold_when_it_is_back() {
     client.steer(20.0, 5.0, 4.0);
     let vehicle = land(companion, vehicle);
     // Never back in OFFBOARD by itself: level, although setpoints of 20° kept coming.
-    assert!(vehicle.state().roll.to_degrees().abs() < 1.0, "{:?}", vehicle.state());
+    assert!(
+        vehicle.state().roll.to_degrees().abs() < 1.0,
+        "{:?}",
+        vehicle.state()
+    );
 }
 
 #[test]
@@ -84,7 +92,10 @@ fn a_vehicle_whose_rates_are_not_numbers_is_held_level_and_told() {
     // Trim of the X8 at 20 m/s: elevator 0.0688 / 0.5235, throttle 0.185.
     let last = vehicle.answers.last().unwrap();
     assert_eq!(last.aileron, 0.0);
-    assert!((last.elevator - 0.1314).abs() < 0.005 && (last.throttle - 0.185).abs() < 0.005, "{last:?}");
+    assert!(
+        (last.elevator - 0.1314).abs() < 0.005 && (last.throttle - 0.185).abs() < 0.005,
+        "{last:?}"
+    );
 }
 
 #[test]
@@ -93,13 +104,26 @@ fn setpoints_of_garbage_move_nothing_and_do_not_keep_offboard_alive() {
     client.steer(20.0, 5.0, 3.0);
     let nan = f64::NAN;
     for i in 0..40 {
-        let q = [[nan; 4], [1e30, 0.0, 0.0, 0.0], [0.0; 4], [f64::INFINITY, 0.0, 0.0, 1.0], [1.0, nan, 0.0, 0.0]][i % 5];
+        let q = [
+            [nan; 4],
+            [1e30, 0.0, 0.0, 0.0],
+            [0.0; 4],
+            [f64::INFINITY, 0.0, 0.0, 1.0],
+            [1.0, nan, 0.0, 0.0],
+        ][i % 5];
         client.send(&raw_setpoint(q));
         std::thread::sleep(Duration::from_millis(50));
     }
     client.wait_for_text("setpoints lost");
     client.wait_for_mode(HOLD);
-    assert!(client.texts().iter().any(|t| t.contains("Setpoint refused")), "{:?}", client.texts());
+    assert!(
+        client
+            .texts()
+            .iter()
+            .any(|t| t.contains("Setpoint refused")),
+        "{:?}",
+        client.texts()
+    );
     land(companion, vehicle);
 }
 
@@ -118,7 +142,11 @@ fn garbage_and_a_flood_from_both_sides_delay_no_answer_and_move_no_surface() {
         client.send_bytes(&good[..i % good.len()]);
         client.send_bytes(&frame(1, 1, &setpoint(-60.0, 30.0)));
         client.send_bytes(&vec![i as u8; i % 2000]);
-        let stranger = COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, target_system: 7, ..Default::default() };
+        let stranger = COMMAND_LONG_DATA {
+            command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            target_system: 7,
+            ..Default::default()
+        };
         client.send(&MavMessage::COMMAND_LONG(stranger));
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -126,18 +154,31 @@ fn garbage_and_a_flood_from_both_sides_delay_no_answer_and_move_no_surface() {
     let summary = companion.end();
     println!("{summary}");
     check_surfaces(&vehicle.answers);
-    assert!(summary.clients.frames.bad() > 500 && summary.clients.echoes > 300, "{summary:?}");
-    assert!(summary.vehicle.frames.bad() > 100 && summary.vehicle.foreign > 100, "{summary:?}");
+    assert!(
+        summary.clients.frames.bad() > 500 && summary.clients.echoes > 300,
+        "{summary:?}"
+    );
+    assert!(
+        summary.vehicle.frames.bad() > 100 && summary.vehicle.foreign > 100,
+        "{summary:?}"
+    );
     let state = vehicle.state();
     // One flipped frame in a thousand may carry the vehicle's ids with a good CRC: none did.
-    assert!((state.roll.to_degrees() - 20.0).abs() < 1.0 && (state.pitch.to_degrees() - 5.0).abs() < 1.0, "{state:?}");
+    assert!(
+        (state.roll.to_degrees() - 20.0).abs() < 1.0
+            && (state.pitch.to_degrees() - 5.0).abs() < 1.0,
+        "{state:?}"
+    );
 }
 
 #[test]
 fn a_second_client_watches_and_a_restarted_one_takes_over() {
     let (companion, vehicle, client) = in_offboard();
     let mut second = Client::new(companion.client(0));
-    second.wait("heartbeat", |m| matches!(m, MavMessage::HEARTBEAT(h) if h.custom_mode == OFFBOARD));
+    second.wait(
+        "heartbeat",
+        |m| matches!(m, MavMessage::HEARTBEAT(h) if h.custom_mode == OFFBOARD),
+    );
     for _ in 0..40 {
         client.setpoint(20.0, 5.0);
         second.setpoint(-50.0, 0.0);
@@ -163,8 +204,15 @@ fn a_client_over_tcp_is_served_like_any_other() {
     vehicle.step(Trouble::None, PATIENCE).unwrap();
     let mut stream = TcpStream::connect(companion.client(1)).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
-    let arm = COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1: 1.0, target_system: 1, ..Default::default() };
-    stream.write_all(&frame(245, 190, &MavMessage::COMMAND_LONG(arm))).unwrap();
+    let arm = COMMAND_LONG_DATA {
+        command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+        param1: 1.0,
+        target_system: 1,
+        ..Default::default()
+    };
+    stream
+        .write_all(&frame(245, 190, &MavMessage::COMMAND_LONG(arm)))
+        .unwrap();
     let mut bytes = Vec::new();
     let mut chunk = [0; 1024];
     let acknowledged = |bytes: &[u8]| bytes.windows(10).any(|w| w[0] == 0xFD && w[7] == 77);
@@ -200,16 +248,24 @@ fn lockstep_flights_are_the_same_to_the_bit() {
 }
 
 /// A planner that takes longer than a cycle.
+#[derive(Clone)]
 struct Slow;
 
 impl Controller for Slow {
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
+    }
     fn name(&self) -> &'static str {
         "slow"
     }
     fn reset(&mut self, _seed: u64, _bumpless: Command) {}
     fn command(&mut self, _: &Observation, _: &Target) -> Command {
         std::thread::sleep(Duration::from_millis(30));
-        Command { aileron: 1.0, elevator: 1.0, throttle: 1.0 }
+        Command {
+            aileron: 1.0,
+            elevator: 1.0,
+            throttle: 1.0,
+        }
     }
 }
 
@@ -228,7 +284,11 @@ fn a_planner_that_is_always_late_leaves_the_fallback_flying_and_is_recorded() {
     let vehicle = vehicle.land();
     let summary = companion.end();
     check_surfaces(&vehicle.answers);
-    assert!((vehicle.state().roll.to_degrees() - 20.0).abs() < 1.0, "{:?}", vehicle.state());
+    assert!(
+        (vehicle.state().roll.to_degrees() - 20.0).abs() < 1.0,
+        "{:?}",
+        vehicle.state()
+    );
     assert!(summary.timing.late_plans > 300, "{summary}");
     let (folder, written) = summary.recording.clone().unwrap();
     assert_eq!((written.rows, written.dropped), (summary.vehicle.states, 0));

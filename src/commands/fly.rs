@@ -59,7 +59,11 @@ pub struct Arguments {
 fn seconds(text: &str) -> Result<Duration, String> {
     let number = text.parse::<f64>().map_err(|e| e.to_string())?;
     let duration = Duration::try_from_secs_f64(number).map_err(|e| e.to_string())?;
-    if duration.is_zero() { Err("give a time above zero".into()) } else { Ok(duration) }
+    if duration.is_zero() {
+        Err("give a time above zero".into())
+    } else {
+        Ok(duration)
+    }
 }
 
 /// Flies until Ctrl-C or the end of the duration.
@@ -73,11 +77,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let options = options(arguments, &model);
     let stop = Arc::new(AtomicBool::new(false));
     let told = stop.clone();
-    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed)).context("setting the handler of Ctrl-C")?;
+    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))
+        .context("setting the handler of Ctrl-C")?;
     let flight = Flight::start(&options, crew, stop)?;
     announce(arguments, &flight);
     show_events(&flight, &arguments.vehicle);
-    let summary = flight.join().context("the control thread has died; the recording holds all up to then")?;
+    let summary = flight
+        .join()
+        .context("the control thread has died; the recording holds all up to then")?;
     println!("{summary}");
     Ok(ExitCode::SUCCESS)
 }
@@ -92,7 +99,11 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Options {
         vehicle: arguments.vehicle.clone(),
         clients: arguments.clients.clone(),
         record,
-        pace: if arguments.lockstep { Pace::Lockstep } else { Pace::RealTime },
+        pace: if arguments.lockstep {
+            Pace::Lockstep
+        } else {
+            Pace::RealTime
+        },
         duration: arguments.duration_s,
         plan_deadline: Duration::from_millis(arguments.plan_deadline_ms),
         deflection: model.airframe.actuators.deflection_max,
@@ -118,23 +129,40 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
 /// If the model does not allow a controller, or has no level flight.
 pub fn crew(kind: Kind, model: &GreyBox) -> anyhow::Result<Crew> {
     let controller = build(kind, model)?;
-    let pilot = Pilot::new(Config::for_model(model)?, fallback(model)?)?;
-    let seat = if kind.is_planner() { Seat::Thread } else { Seat::Loop };
-    Ok(Crew { pilot, controller, seat })
+    // The design of an LQI takes a moment; it is not made twice.
+    let fallback = if kind == Kind::Lqi { controller.boxed_clone() } else { fallback(model)? };
+    let pilot = Pilot::new(Config::for_model(model)?, fallback)?;
+    let seat = if kind.is_planner() {
+        Seat::Thread
+    } else {
+        Seat::Loop
+    };
+    Ok(Crew {
+        pilot,
+        controller,
+        seat,
+    })
 }
 
 fn fallback(model: &GreyBox) -> anyhow::Result<Box<dyn Controller>> {
     match build(Kind::Lqi, model) {
         Ok(lqi) => Ok(lqi),
         Err(error) => {
-            eprintln!("greylag: {error}; the fallback is {} instead", Kind::PidRetuned);
+            eprintln!(
+                "greylag: {error}; the fallback is {} instead",
+                Kind::PidRetuned
+            );
             Ok(build(Kind::PidRetuned, model)?)
         }
     }
 }
 
 fn announce(arguments: &Arguments, flight: &Flight) {
-    println!("controller {}, model {}", arguments.controller, arguments.model.display());
+    println!(
+        "controller {}, model {}",
+        arguments.controller,
+        arguments.model.display()
+    );
     println!("vehicle    {}", arguments.vehicle);
     for client in &arguments.clients {
         println!("clients    {client}");

@@ -68,7 +68,10 @@ enum Pending {
     Repeated,
     Unusable,
     Sticks(Sticks),
-    Fly { seen: Observation, throttle: Option<f64> },
+    Fly {
+        seen: Observation,
+        throttle: Option<f64>,
+    },
 }
 
 /// When each kind of trouble was last told.
@@ -86,7 +89,11 @@ impl Pilot {
     /// What [`Config::check`] finds.
     pub fn new(config: Config, fallback: Box<dyn Controller>) -> Result<Self, ConfigError> {
         config.check()?;
-        let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: config.envelope.airspeed_cruise_mps };
+        let nobody = Target {
+            roll: f64::NAN,
+            pitch: f64::NAN,
+            airspeed: config.envelope.airspeed_cruise_mps,
+        };
         Ok(Pilot {
             limits: Limits::from(&config),
             parameters: parameters::table(&config),
@@ -144,7 +151,11 @@ impl Pilot {
             Pending::Fly { seen, .. } => {
                 let engage = (!self.planner_engaged).then_some(self.in_force);
                 self.planner_engaged = true;
-                Some(Request { observation: seen, target: self.target, engage })
+                Some(Request {
+                    observation: seen,
+                    target: self.target,
+                    engage,
+                })
             }
             Pending::Repeated => None,
             _ => {
@@ -160,16 +171,25 @@ impl Pilot {
             Pending::Disarmed => (Command::IDLE, Source::Disarmed),
             Pending::Repeated => (self.in_force, self.source),
             Pending::Unusable => self.without_state(),
-            Pending::Sticks(s) => {
-                (Command { aileron: s.roll, elevator: s.pitch, throttle: s.throttle }, Source::Sticks)
-            }
+            Pending::Sticks(s) => (
+                Command {
+                    aileron: s.roll,
+                    elevator: s.pitch,
+                    throttle: s.throttle,
+                },
+                Source::Sticks,
+            ),
             Pending::Fly { seen, throttle } => self.with_state(plan, &seen, throttle),
         };
         self.source = source;
         if !matches!(self.pending, Pending::Repeated) {
             self.before = self.in_force;
         }
-        self.in_force = if self.armed { self.limits.slew(self.in_force, wanted) } else { Command::IDLE };
+        self.in_force = if self.armed {
+            self.limits.slew(self.in_force, wanted)
+        } else {
+            Command::IDLE
+        };
         self.decision()
     }
 
@@ -217,9 +237,17 @@ impl Pilot {
     }
 
     fn assess(&mut self, quality: Frame) -> Pending {
-        let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: self.config.envelope.airspeed_cruise_mps };
+        let nobody = Target {
+            roll: f64::NAN,
+            pitch: f64::NAN,
+            airspeed: self.config.envelope.airspeed_cruise_mps,
+        };
         if quality == Frame::Repeated {
-            return if self.armed { Pending::Repeated } else { Pending::Disarmed };
+            return if self.armed {
+                Pending::Repeated
+            } else {
+                Pending::Disarmed
+            };
         }
         if let Frame::Defective(reason) = quality {
             self.complain_of_state(reason);
@@ -238,10 +266,25 @@ impl Pilot {
         };
         let (wish, throttle) = self.wish();
         self.target = self.limits.limit(wish, frame.state.airspeed);
-        let Telemetry { time, mut state, actuators, altitude, .. } = frame;
+        let Telemetry {
+            time,
+            mut state,
+            actuators,
+            altitude,
+            ..
+        } = frame;
         // Noise of a sensor at rest.
         state.airspeed = state.airspeed.max(0.0);
-        Pending::Fly { seen: Observation { time, state, actuators, altitude, previous: [self.in_force, self.before] }, throttle }
+        Pending::Fly {
+            seen: Observation {
+                time,
+                state,
+                actuators,
+                altitude,
+                previous: [self.in_force, self.before],
+            },
+            throttle,
+        }
     }
 
     /// The target of the mode, before the envelope, with the throttle if the mode sets it itself.
@@ -249,13 +292,33 @@ impl Pilot {
         let airspeed = self.config.envelope.airspeed_cruise_mps;
         match (self.mode, self.setpoint, self.sticks) {
             (Mode::Offboard, Some((_, s)), _) => {
-                let throttle = s.thrust.filter(|_| self.config.thrust_source == ThrustSource::Setpoint);
-                (Target { roll: s.roll, pitch: s.pitch, airspeed }, throttle)
+                let throttle = s
+                    .thrust
+                    .filter(|_| self.config.thrust_source == ThrustSource::Setpoint);
+                (
+                    Target {
+                        roll: s.roll,
+                        pitch: s.pitch,
+                        airspeed,
+                    },
+                    throttle,
+                )
             }
             (Mode::Stabilized, _, Some((_, s))) => {
                 // A stick forward is nose down; each half of its travel reaches its own limit.
-                let pitch = if s.pitch > 0.0 { s.pitch * self.limits.pitch_min } else { -s.pitch * self.limits.pitch_max };
-                (Target { roll: s.roll * self.limits.bank_max, pitch, airspeed }, Some(s.throttle))
+                let pitch = if s.pitch > 0.0 {
+                    s.pitch * self.limits.pitch_min
+                } else {
+                    -s.pitch * self.limits.pitch_max
+                };
+                (
+                    Target {
+                        roll: s.roll * self.limits.bank_max,
+                        pitch,
+                        airspeed,
+                    },
+                    Some(s.throttle),
+                )
             }
             _ => (self.level_target(), None),
         }
@@ -263,10 +326,19 @@ impl Pilot {
 
     fn level_target(&self) -> Target {
         let airspeed = self.config.envelope.airspeed_cruise_mps;
-        Target { roll: 0.0, pitch: self.config.trim_at(airspeed).pitch_deg.to_radians(), airspeed }
+        Target {
+            roll: 0.0,
+            pitch: self.config.trim_at(airspeed).pitch_deg.to_radians(),
+            airspeed,
+        }
     }
 
-    fn with_state(&mut self, plan: Plan, seen: &Observation, throttle: Option<f64>) -> (Command, Source) {
+    fn with_state(
+        &mut self,
+        plan: Plan,
+        seen: &Observation,
+        throttle: Option<f64>,
+    ) -> (Command, Source) {
         let (mut command, source) = match plan {
             Plan::Ready(command) if command.is_finite() => {
                 self.fallback_engaged = false;
@@ -275,14 +347,19 @@ impl Pilot {
             Plan::Ready(_) => {
                 self.planner_engaged = false;
                 if due(&mut self.complaints.plan, self.clock) {
-                    self.texts.say(Severity::Error, "controller gave no finite command: fallback flies");
+                    self.texts.say(
+                        Severity::Error,
+                        "controller gave no finite command: fallback flies",
+                    );
                 }
                 self.fall_back(seen, Source::Fallback)
             }
             Plan::Late => self.fall_back(seen, Source::Late),
             Plan::None => self.fall_back(seen, Source::Fallback),
         };
-        command.throttle = self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
+        command.throttle = self
+            .limits
+            .protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
         (command, source)
     }
 
@@ -297,30 +374,48 @@ impl Pilot {
         }
         self.fallback_engaged = false;
         if due(&mut self.complaints.fallback, self.clock) {
-            self.texts.say(Severity::Critical, "fallback gave no finite command: level at trim");
+            self.texts.say(
+                Severity::Critical,
+                "fallback gave no finite command: level at trim",
+            );
         }
         (self.level_command(), Source::Level)
     }
 
     /// The command while the state cannot be used.
     fn without_state(&self) -> (Command, Source) {
-        let short = self.estimate.usable_within(self.clock, self.config.state_hold_s);
-        if short && !self.vehicle_lost { (self.in_force, Source::Held) } else { (self.level_command(), Source::Level) }
+        let short = self
+            .estimate
+            .usable_within(self.clock, self.config.state_hold_s);
+        if short && !self.vehicle_lost {
+            (self.in_force, Source::Held)
+        } else {
+            (self.level_command(), Source::Level)
+        }
     }
 
     fn level_command(&self) -> Command {
-        let trim = self.config.trim_at(self.config.envelope.airspeed_cruise_mps);
-        Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle }
+        let trim = self
+            .config
+            .trim_at(self.config.envelope.airspeed_cruise_mps);
+        Command {
+            aileron: 0.0,
+            elevator: trim.elevator,
+            throttle: trim.throttle,
+        }
     }
 
     fn watch_vehicle(&mut self) {
-        let fresh = self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s);
+        let fresh = self
+            .estimate
+            .fresh_within(self.clock, self.config.vehicle_loss_s);
         if fresh != Some(false) || self.vehicle_lost {
             return;
         }
         self.vehicle_lost = true;
         if self.armed {
-            self.texts.say(Severity::Critical, "vehicle link lost: level, HOLD");
+            self.texts
+                .say(Severity::Critical, "vehicle link lost: level, HOLD");
             self.mode = Mode::Hold;
         } else {
             self.texts.say(Severity::Warning, "vehicle link lost");
@@ -328,9 +423,18 @@ impl Pilot {
     }
 
     fn watch_return(&mut self) {
-        if self.vehicle_lost && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true) {
+        if self.vehicle_lost
+            && self
+                .estimate
+                .fresh_within(self.clock, self.config.vehicle_loss_s)
+                == Some(true)
+        {
             self.vehicle_lost = false;
-            let words = if self.armed { "vehicle link back: flying in HOLD" } else { "vehicle link back" };
+            let words = if self.armed {
+                "vehicle link back: flying in HOLD"
+            } else {
+                "vehicle link back"
+            };
             self.texts.say(Severity::Notice, words);
         }
     }
@@ -342,7 +446,10 @@ impl Pilot {
             Mode::Hold | Mode::Return => return,
         };
         if lost {
-            let words = format!("{} lost for {:.1} s: HOLD", what, self.config.offboard_loss_s);
+            let words = format!(
+                "{} lost for {:.1} s: HOLD",
+                what, self.config.offboard_loss_s
+            );
             self.texts.say(Severity::Critical, words);
             self.mode = Mode::Hold;
             self.setpoint_lost = true;
@@ -352,7 +459,10 @@ impl Pilot {
     /// The vehicle's clock has started again: all that was known is of another life.
     fn restart(&mut self) {
         if self.estimate.last().is_some() {
-            self.texts.say(Severity::Warning, "vehicle clock went back: vehicle restarted?");
+            self.texts.say(
+                Severity::Warning,
+                "vehicle clock went back: vehicle restarted?",
+            );
         }
         self.estimate = Estimate::default();
         self.setpoint = None;
@@ -364,7 +474,8 @@ impl Pilot {
 
     fn complain_of_state(&mut self, reason: &'static str) {
         if due(&mut self.complaints.defect, self.clock) {
-            self.texts.say(Severity::Error, format!("vehicle state refused: {reason}"));
+            self.texts
+                .say(Severity::Error, format!("vehicle state refused: {reason}"));
         }
     }
 }

@@ -130,7 +130,11 @@ impl Flight {
     ///
     /// # Errors
     /// The first thing that cannot be opened.
-    pub fn start(options: &Options, crew: Crew, stop: Arc<AtomicBool>) -> Result<Self, FlightError> {
+    pub fn start(
+        options: &Options,
+        crew: Crew,
+        stop: Arc<AtomicBool>,
+    ) -> Result<Self, FlightError> {
         let ports = Ports::open(options)?;
         let recorder = options.record.as_ref().map(Recorder::start).transpose()?;
         let planner = match crew.seat {
@@ -147,7 +151,13 @@ impl Flight {
             .name("control".into())
             .spawn(move || control.run(&stop))
             .map_err(|error| FlightError::Thread("control", error))?;
-        Ok(Flight { events, vehicle, clients, recording, thread })
+        Ok(Flight {
+            events,
+            vehicle,
+            clients,
+            recording,
+            thread,
+        })
     }
 
     /// Whether it is still under way.
