@@ -175,11 +175,17 @@ fn a_mavlink_1_client_is_answered_in_mavlink_1_until_it_shows_2() {
     // The handshake: PROTOCOL_VERSION itself is in MAVLink 2.
     assert_eq!((seen[1].version, seen[1].id), (V2, 300));
     clients.handle(at_ms(1000), peer(1), &hello(V2), &mut double);
+    // A stray MAVLink 1 frame later changes nothing; one after 5 s of silence may be a new program.
+    clients.handle(at_ms(1000), peer(1), &hello(V1), &mut double);
     assert!(
         run(&mut clients, &mut double, 1000, 2000)
             .iter()
             .all(|s| s.version == V2)
     );
+    clients.handle(at_ms(6001), peer(1), &hello(V1), &mut double);
+    let seen = run(&mut clients, &mut double, 6010, 7010);
+    assert!(seen.iter().any(|s| s.peer == peer(1)));
+    assert!(seen.iter().all(|s| s.peer != peer(1) || s.version == V1));
 }
 
 #[test]
@@ -278,6 +284,71 @@ fn a_retransmission_is_acknowledged_again_but_not_carried_out_again() {
         [(400, 0)]
     );
     assert_eq!(double.arms.len(), 2);
+}
+
+#[test]
+fn a_refusal_or_a_question_is_not_answered_from_memory() {
+    let (mut clients, mut double) = new();
+    let mut again = |number, params: [f32; 7], confirmation| {
+        let bytes = raw_frame(76, &command_payload(number, params, 1, 1, confirmation));
+        ask(&mut clients, &mut double, at_ms(100), 1, &bytes)
+    };
+    let offboard = [1.0, 6.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    assert_eq!(acks(&again(176, offboard, 0)), [(176, 1)]);
+    again(400, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0);
+    assert_eq!(acks(&again(176, offboard, 1)), [(176, 0)]);
+    // The version is sent again, since it may be what was lost.
+    for confirmation in 0..2 {
+        assert_eq!(count(&again(512, [148.0; 7], confirmation), 148), 1);
+    }
+}
+
+#[test]
+fn the_modes_can_be_listed() {
+    let (mut clients, mut double) = new();
+    let all = ask(
+        &mut clients,
+        &mut double,
+        at_ms(0),
+        1,
+        &command(512, &[435.0, 0.0]),
+    );
+    let names: Vec<_> = all
+        .iter()
+        .filter_map(|s| match s.message() {
+            MavMessage::AVAILABLE_MODES(m) => {
+                Some((m.mode_name.to_str().unwrap().to_owned(), m.custom_mode))
+            }
+            _ => None,
+        })
+        .collect();
+    assert_eq!(names.len(), 4);
+    // PX4's numbers: HOLD is 4/3, OFFBOARD 6.
+    assert!(
+        names.contains(&("Hold".into(), 0x0304_0000))
+            && names.contains(&("Offboard".into(), 6 << 16))
+    );
+    assert_eq!(
+        count(
+            &ask(
+                &mut clients,
+                &mut double,
+                at_ms(0),
+                1,
+                &command(512, &[435.0, 2.0])
+            ),
+            435
+        ),
+        1
+    );
+    let none = ask(
+        &mut clients,
+        &mut double,
+        at_ms(0),
+        1,
+        &command(512, &[435.0, 9.0]),
+    );
+    assert_eq!(acks(&none), [(512, 2)]);
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Finding the shipped files, and writing new ones without overwriting.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
+
+use crate::report;
 
 /// A path as given, or, if there is no such file below the working folder, the one of that name in
 /// the source tree that the program was built from.
@@ -38,18 +39,9 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
 /// Writes a whole file at once: it is there complete, or not at all.
 pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let save = || -> Result<()> {
-        let mut file = tempfile::NamedTempFile::new_in(folder)?;
-        file.write_all(content.as_bytes())?;
-        match overwrite {
-            Overwrite::Never => file.persist_noclobber(path)?,
-            Overwrite::Force => file.persist(path)?,
-        };
-        Ok(())
-    };
-    save().with_context(|| format!("cannot write {}", path.display()))
+    match overwrite {
+        Overwrite::Never => report::write_new(path, content)?,
+        Overwrite::Force => report::write_over(path, content)?,
+    }
+    Ok(())
 }

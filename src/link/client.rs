@@ -286,7 +286,6 @@ impl Clients {
             self.say(at, Severity::Warning, words);
         }
     }
-
 }
 
 /// There are no missions here: nothing to list, nothing to clear, no room for any.

@@ -4,11 +4,68 @@
 //! arguments, bytes go out as return values. [`transport`] runs on tokio and hands datagrams and
 //! streams over channels. [`vehicle`] speaks to the flight controller, [`client`] to ground
 //! stations and offboard programs; `wire` is the one place that names MAVLink messages.
+//!
+//! How the control thread puts them together (`pilot` is any [`autopilot::Autopilot`]):
+//!
+//! ```no_run
+//! use std::time::Instant;
+//!
+//! use crossbeam_channel::{bounded, select};
+//! use greylag::link::autopilot::Autopilot;
+//! use greylag::link::client::{Clients, Now};
+//! use greylag::link::framing::Source;
+//! use greylag::link::peer::LinkId;
+//! use greylag::link::transport::{Arrival, Network};
+//! use greylag::link::vehicle::{Outputs, Sitl, Vehicle};
+//! use greylag::physics::Time;
+//!
+//! fn serve(pilot: &mut dyn Autopilot) -> Result<(), Box<dyn std::error::Error>> {
+//!     let network = Network::start()?;
+//!     // A channel of its own for the vehicle, so that it can be served first.
+//!     let (to_vehicle, from_vehicle) = bounded(256);
+//!     let (to_clients, from_clients) = bounded(1024);
+//!     let vehicle_link =
+//!         network.open(LinkId(0), &"udpin:127.0.0.1:14600".parse()?, "--vehicle", to_vehicle)?;
+//!     let client_link =
+//!         network.open(LinkId(1), &"udpin:0.0.0.0:14550".parse()?, "--client", to_clients)?;
+//!     let mut vehicle = Vehicle::Sitl(Sitl::new(1, 0.5235));
+//!     let mut clients = Clients::new(Source { system: 1, component: 1 });
+//!     let start = Instant::now();
+//!     let mut now = Now { host: start.elapsed(), vehicle: Time::default() };
+//!     if let Some(peer) = client_link.target() {
+//!         clients.welcome(now, peer);
+//!     }
+//!     loop {
+//!         select! {
+//!             recv(from_vehicle) -> arrival => if let Arrival::Packet(packet) = arrival? {
+//!                 let mut newest = None;
+//!                 vehicle.handle(start.elapsed(), packet.peer, &packet.bytes, |t| newest = Some(t));
+//!                 if let Some(state) = newest {
+//!                     now.vehicle = state.time; // … and the pilot decides what to answer.
+//!                     vehicle_link.send(packet.peer, vehicle.command(state.time, Outputs::Disarmed));
+//!                 }
+//!             },
+//!             default(std::time::Duration::from_millis(10)) => {}
+//!         }
+//!         now.host = start.elapsed();
+//!         for arrival in from_clients.try_iter().take(64) {
+//!             match arrival {
+//!                 Arrival::Packet(packet) => clients.handle(now, packet.peer, &packet.bytes, pilot),
+//!                 Arrival::Opened(peer) => clients.welcome(now, peer),
+//!                 Arrival::Closed(peer) => clients.forget(peer),
+//!             }
+//!         }
+//!         clients.poll(now, pilot);
+//!         clients.drain().for_each(|(peer, frame)| client_link.send(peer, frame));
+//!     }
+//! }
+//! ```
 
 pub mod address;
 pub mod autopilot;
 pub mod client;
 pub mod framing;
+pub mod offboard;
 pub mod peer;
 pub mod transport;
 pub mod vehicle;

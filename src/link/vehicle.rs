@@ -22,7 +22,8 @@ pub struct Telemetry {
     pub time: Time,
     /// How it stands to the state before it.
     pub order: Order,
-    /// What is wrong with it: a part with a fault holds the last good value instead.
+    /// What is wrong with it: a part with a fault holds the last good value instead, or the
+    /// neutral state's when there was none.
     pub faults: Faults,
     /// The eight variables of flight.
     pub state: State,

@@ -30,16 +30,19 @@ impl Atmosphere {
 }
 
 /// Density of the standard atmosphere below 11 km, kg/m³, at geometric `altitude` (m).
+///
+/// Sea-level pressure as JSBSim has it, 2116.228 lbf/ft², 5 parts in a million above ISO 2533.
 fn standard_density(altitude: f64) -> f64 {
     const RADIUS: f64 = 6_356_766.0;
     const LAPSE: f64 = 0.0065;
     const SEA_TEMPERATURE: f64 = 288.15;
-    const SEA_DENSITY: f64 = 1.225;
-    // g / (R · lapse) − 1 with g = 9.80665 m/s² and R = 287.053 J/(kg K)
-    const EXPONENT: f64 = 9.80665 / (287.052_87 * LAPSE) - 1.0;
+    const SEA_PRESSURE: f64 = 2116.228 * 47.880_258_98;
+    /// Gas constant of dry air, J/(kg K).
+    const GAS: f64 = 8.314_32 / 0.028_964_5;
+    const EXPONENT: f64 = 9.80665 / (GAS * LAPSE) - 1.0;
     let geopotential = RADIUS * altitude / (RADIUS + altitude);
     let ratio = 1.0 - LAPSE * geopotential / SEA_TEMPERATURE;
-    SEA_DENSITY * ratio.max(0.0).powf(EXPONENT)
+    SEA_PRESSURE / (GAS * SEA_TEMPERATURE) * ratio.max(0.0).powf(EXPONENT)
 }
 
 #[cfg(test)]

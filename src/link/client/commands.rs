@@ -16,11 +16,15 @@ const AUTOPILOT_VERSION: u32 = 148;
 const HOME_POSITION: u32 = 242;
 const MESSAGE_INTERVAL: u32 = 244;
 const PROTOCOL_VERSION: u32 = 300;
+const AVAILABLE_MODES: u32 = 435;
+/// Commands that change something: NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH, DO_SET_MODE,
+/// COMPONENT_ARM_DISARM. The others only ask, and a question may be asked again.
+const CHANGING: [u16; 4] = [17, 20, 176, 400];
 
-/// What a command comes to: the acknowledgement, then perhaps a message, then perhaps a reason.
+/// What a command comes to: the acknowledgement, then perhaps messages, then perhaps a reason.
 struct Outcome {
     result: CommandResult,
-    message: Option<Message>,
+    messages: Vec<Message>,
     reason: Option<String>,
 }
 
@@ -28,7 +32,7 @@ impl From<CommandResult> for Outcome {
     fn from(result: CommandResult) -> Self {
         Outcome {
             result,
-            message: None,
+            messages: vec![],
             reason: None,
         }
     }
@@ -40,12 +44,12 @@ impl From<Verdict> for Outcome {
             Verdict::Accepted => CommandResult::Accepted.into(),
             Verdict::Rejected(why) => Outcome {
                 result: CommandResult::TemporarilyRejected,
-                message: None,
+                messages: vec![],
                 reason: Some(why),
             },
             Verdict::Denied(why) => Outcome {
                 result: CommandResult::Denied,
-                message: None,
+                messages: vec![],
                 reason: Some(why),
             },
         }
@@ -56,7 +60,7 @@ impl Outcome {
     fn with(message: Message) -> Self {
         Outcome {
             result: CommandResult::Accepted,
-            message: Some(message),
+            messages: vec![message],
             reason: None,
         }
     }
@@ -73,8 +77,8 @@ fn message_number(parameter: f64) -> Option<u32> {
 }
 
 impl Clients {
-    /// Answers a command. One that is sent again (its confirmation counts up) because our answer
-    /// was lost gets the same answer and is not carried out twice.
+    /// Answers a command. One that was carried out and is sent again (its confirmation counts up)
+    /// because our answer was lost gets the same answer and is not carried out twice.
     pub(super) fn command(
         &mut self,
         now: Now,
@@ -88,14 +92,18 @@ impl Clients {
             return;
         }
         let outcome = self.carry_out(now, at, &command, autopilot);
-        self.sessions[at].remember(now.host, command, outcome.result);
+        // One that was refused has changed nothing and may be tried again.
+        if outcome.result == CommandResult::Accepted && CHANGING.contains(&command.number) {
+            self.sessions[at].remember(now.host, command, outcome.result);
+        }
         self.reply(
             at,
             &answer::command_ack(command.number, outcome.result, from),
         );
-        if let Some(message) = outcome.message {
-            self.send_requested(at, &message);
-        }
+        outcome
+            .messages
+            .iter()
+            .for_each(|message| self.send_requested(at, message));
         if let Some(reason) = outcome.reason {
             self.complain(now, at, &reason);
         }
@@ -167,6 +175,16 @@ impl Clients {
             HEARTBEAT => Outcome::with(mode::heartbeat(&autopilot.status())),
             AUTOPILOT_VERSION => Outcome::with(answer::autopilot_version()),
             PROTOCOL_VERSION => Outcome::with(answer::protocol_version()),
+            AVAILABLE_MODES => {
+                let index = if index.is_finite() { index } else { 0.0 };
+                match mode::available_modes(index as usize) {
+                    modes if modes.is_empty() => CommandResult::Denied.into(),
+                    messages => Outcome {
+                        messages,
+                        ..CommandResult::Accepted.into()
+                    },
+                }
+            }
             MESSAGE_INTERVAL => match message_number(index).filter(|id| *id <= u32::from(u16::MAX))
             {
                 Some(id) => Outcome::with(answer::message_interval(id, self.interval_us(at, id))),

@@ -2,6 +2,7 @@
 
 pub mod answer;
 pub mod mode;
+pub mod offboard;
 pub mod request;
 pub mod setpoint;
 pub mod sitl;

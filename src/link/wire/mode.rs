@@ -1,8 +1,8 @@
 //! Flight modes as PX4 writes them into `custom_mode`, with the heartbeat that carries them.
 
 use mavlink::dialects::ardupilotmega::{
-    CURRENT_MODE_DATA, HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavStandardMode,
-    MavState, MavType,
+    AVAILABLE_MODES_DATA, CURRENT_MODE_DATA, HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag,
+    MavModeProperty, MavStandardMode, MavState, MavType,
 };
 
 use super::Message;
@@ -135,6 +135,30 @@ pub fn heartbeat(status: &Status) -> Message {
         system_status: state,
         mavlink_version: 3,
     }))
+}
+
+/// AVAILABLE_MODES, counted from 1; 0 is all of them. Empty when there is no such entry.
+pub fn available_modes(index: usize) -> Vec<Message> {
+    const AUTOMATIC: u32 = 4;
+    let modes = [
+        (Mode::Manual, "Manual", 0),
+        (Mode::Stabilized, "Stabilized", 0),
+        (Mode::Hold, "Hold", AUTOMATIC),
+        (Mode::Offboard, "Offboard", AUTOMATIC),
+    ];
+    let wanted = |at: &usize| index == 0 || index == at + 1;
+    let message = |at: usize| {
+        let (mode, name, properties) = modes[at];
+        Message::coded(MavMessage::AVAILABLE_MODES(AVAILABLE_MODES_DATA {
+            custom_mode: custom_mode(mode),
+            properties: MavModeProperty::from_bits_retain(properties),
+            number_modes: modes.len() as u8,
+            mode_index: at as u8 + 1,
+            standard_mode: MavStandardMode::MAV_STANDARD_MODE_NON_STANDARD,
+            mode_name: name.into(),
+        }))
+    };
+    (0..modes.len()).filter(wanted).map(message).collect()
 }
 
 /// CURRENT_MODE.

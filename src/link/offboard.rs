@@ -1,0 +1,60 @@
+//! An offboard client: the other end of [`client`](super::client), for the demonstration.
+
+use super::autopilot::Mode;
+use super::framing::{FrameCounts, Frames, Source, Version};
+use super::wire::{Message, offboard};
+
+pub use super::wire::offboard::Heard;
+
+/// The autopilot that is spoken to: system 1, component 1.
+const AUTOPILOT: Source = Source { system: 1, component: 1 };
+/// Ourselves: an onboard computer of the same system.
+const OURSELVES: Source = Source { system: 1, component: 191 };
+
+/// MAV_CMD_COMPONENT_ARM_DISARM.
+pub const ARM: u32 = 400;
+/// MAV_CMD_DO_SET_MODE.
+pub const SET_MODE: u32 = 176;
+
+/// A session with one autopilot, free of sockets and clocks.
+#[derive(Clone, Debug, Default)]
+pub struct OffboardClient {
+    sequence: u8,
+    counts: FrameCounts,
+}
+
+impl OffboardClient {
+    /// A heartbeat, to be sent once a second.
+    pub fn heartbeat(&mut self) -> Vec<u8> {
+        self.frame(&offboard::heartbeat())
+    }
+
+    /// A setpoint: roll and pitch in rad, `time_ms` on the client's own clock.
+    pub fn setpoint(&mut self, time_ms: u32, roll: f64, pitch: f64) -> Vec<u8> {
+        self.frame(&offboard::attitude_target(AUTOPILOT, time_ms, roll, pitch))
+    }
+
+    /// The command to arm.
+    pub fn arm(&mut self) -> Vec<u8> {
+        self.frame(&offboard::arm(AUTOPILOT))
+    }
+
+    /// The command to change the mode.
+    pub fn set_mode(&mut self, mode: Mode) -> Vec<u8> {
+        self.frame(&offboard::set_mode(AUTOPILOT, mode))
+    }
+
+    /// Reads a datagram; frames of others than the autopilot are passed over.
+    pub fn read(&mut self, datagram: &[u8], mut hear: impl FnMut(Heard)) {
+        for frame in Frames::new(datagram, &mut self.counts) {
+            if frame.source == AUTOPILOT && let Some(heard) = offboard::read(&frame) {
+                hear(heard);
+            }
+        }
+    }
+
+    fn frame(&mut self, message: &Message) -> Vec<u8> {
+        self.sequence = self.sequence.wrapping_add(1);
+        message.encode(Version::V2, self.sequence, OURSELVES).unwrap_or_default()
+    }
+}

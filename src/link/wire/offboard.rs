@@ -1,0 +1,121 @@
+//! What an offboard client says to an autopilot, with what it hears from it.
+
+use mavlink::dialects::ardupilotmega::{
+    AttitudeTargetTypemask, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage,
+    MavModeFlag, MavState, MavType, SET_ATTITUDE_TARGET_DATA,
+};
+
+use super::mode::{self, ModeRequest};
+use super::{Message, decode, setpoint};
+use crate::link::autopilot::Mode;
+use crate::link::framing::{Frame, Source};
+
+/// What an autopilot was heard to say.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Heard {
+    /// Its heartbeat: whether it is armed, in a mode that is `None` if unknown here.
+    Heartbeat {
+        /// Actuator outputs are live.
+        armed: bool,
+        /// The mode in force.
+        mode: Option<Mode>,
+    },
+    /// Roll and pitch, rad, at `time_s` of its clock.
+    Attitude {
+        /// Its time since boot, s.
+        time_s: f64,
+        /// Roll, rad.
+        roll: f64,
+        /// Pitch, rad.
+        pitch: f64,
+    },
+    /// True airspeed in m/s, altitude in m.
+    Speed {
+        /// Airspeed, m/s.
+        airspeed: f64,
+        /// Altitude above mean sea level, m.
+        altitude: f64,
+    },
+    /// Whether it accepted a command.
+    Ack {
+        /// MAV_CMD number.
+        command: u32,
+        /// MAV_RESULT_ACCEPTED.
+        accepted: bool,
+    },
+    /// A line of text (a chunk of at most 50 characters).
+    Text(String),
+}
+
+/// The heartbeat of an offboard program.
+pub fn heartbeat() -> Message {
+    Message::coded(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+        base_mode: MavModeFlag::empty(),
+        custom_mode: 0,
+        system_status: MavState::MAV_STATE_ACTIVE,
+        mavlink_version: 3,
+    }))
+}
+
+/// SET_ATTITUDE_TARGET with roll and pitch (rad) alone: rates and thrust are masked.
+pub fn attitude_target(to: Source, time_ms: u32, roll: f64, pitch: f64) -> Message {
+    Message::coded(MavMessage::SET_ATTITUDE_TARGET(SET_ATTITUDE_TARGET_DATA {
+        time_boot_ms: time_ms,
+        target_system: to.system,
+        target_component: to.component,
+        type_mask: AttitudeTargetTypemask::from_bits_truncate(1 | 2 | 4 | 64),
+        q: setpoint::quaternion([roll, pitch, 0.0]).map(|x| x as f32),
+        ..Default::default()
+    }))
+}
+
+/// MAV_CMD_COMPONENT_ARM_DISARM.
+pub fn arm(to: Source) -> Message {
+    command(to, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0])
+}
+
+/// MAV_CMD_DO_SET_MODE to a mode, in PX4's numbers.
+pub fn set_mode(to: Source, wanted: Mode) -> Message {
+    let custom = mode::custom_mode(wanted);
+    command(to, MavCmd::MAV_CMD_DO_SET_MODE, [1.0, (custom >> 16 & 0xff) as f32])
+}
+
+fn command(to: Source, command: MavCmd, [param1, param2]: [f32; 2]) -> Message {
+    Message::coded(MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        target_system: to.system,
+        target_component: to.component,
+        command,
+        param1,
+        param2,
+        ..Default::default()
+    }))
+}
+
+/// Reads what an autopilot sent; `None` for what a client of this kind does not need.
+pub fn read(frame: &Frame<'_>) -> Option<Heard> {
+    Some(match decode(frame)? {
+        MavMessage::HEARTBEAT(h) => Heard::Heartbeat {
+            armed: h.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED),
+            mode: match mode::from_set_mode(h.base_mode.bits(), h.custom_mode) {
+                ModeRequest::Known(mode) => Some(mode),
+                ModeRequest::Unknown => None,
+            },
+        },
+        MavMessage::ATTITUDE(a) => Heard::Attitude {
+            time_s: f64::from(a.time_boot_ms) * 1e-3,
+            roll: a.roll.into(),
+            pitch: a.pitch.into(),
+        },
+        MavMessage::VFR_HUD(v) => {
+            Heard::Speed { airspeed: v.airspeed.into(), altitude: v.alt.into() }
+        }
+        MavMessage::COMMAND_ACK(a) => Heard::Ack {
+            command: a.command as u32,
+            accepted: a.result as u32 == 0,
+        },
+        MavMessage::STATUSTEXT(t) => Heard::Text(t.text.to_str().unwrap_or_default().to_owned()),
+        _ => return None,
+    })
+}

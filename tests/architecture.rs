@@ -1,0 +1,143 @@
+//! The layers of `src/lib.rs` as a table: a module uses those above it, and crates stay at home.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The rooms from the ground up, as `src/lib.rs` declares them.
+const LAYERS: &[&str] = &[
+    "num", "physics", "model", "control", "link", "logs", "flight", "sysid", "sim", "learn", "report",
+    "commands",
+];
+
+/// Crates with the only rooms that may name them. A room may be narrowed to a folder below it.
+const HOMES: &[(&str, &[&str])] = &[
+    ("mavlink", &["link"]),
+    ("tokio", &["link", "flight/runtime"]),
+    ("burn", &["learn"]),
+    ("clap", &["commands"]),
+    ("anyhow", &["commands"]),
+    ("indicatif", &["commands"]),
+    ("comfy_table", &["commands"]),
+    ("greylag_sitl", &["sim", "commands"]),
+    ("nalgebra", &["num", "physics", "model", "control", "logs", "flight", "sysid", "learn"]),
+];
+
+/// What the pilot, a function, must not touch.
+const PILOT_BANNED: &[&str] = &[
+    "std::net", "std::time::Instant", "Instant::now", "SystemTime", "std::thread", "std::sync", "Mutex",
+    "std::fs", "std::io", "crossbeam", "tokio", "println!", "eprintln!", "unwrap()", "panic!",
+];
+
+/// Every source file below `src`, with its path below `src`.
+fn sources() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut folders = vec![root.clone()];
+    let mut files = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path: PathBuf = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let name = path.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+                files.push((name, fs::read_to_string(&path).unwrap()));
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+/// The code of a file: comments, and tests at its end, left out.
+fn code(text: &str) -> String {
+    let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or(text);
+    code.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
+}
+
+fn room(file: &str) -> &str {
+    file.split(['/', '.']).next().unwrap_or(file)
+}
+
+fn layer(room: &str) -> Option<usize> {
+    LAYERS.iter().position(|l| *l == room)
+}
+
+/// Whether `word` stands in `text` as a path's first part.
+fn names_crate(text: &str, word: &str) -> bool {
+    let path = format!("{word}::");
+    text.match_indices(&path).any(|(at, _)| {
+        let before = text[..at].chars().next_back();
+        !before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':')
+    })
+}
+
+#[test]
+fn modules_are_declared_in_the_order_of_their_layers() {
+    let (_, lib) = sources().into_iter().find(|(name, _)| name == "lib.rs").unwrap();
+    let declared: Vec<_> =
+        lib.lines().filter_map(|l| l.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
+    let places: Vec<_> = declared
+        .iter()
+        .map(|m| layer(m).unwrap_or_else(|| panic!("{m} is in lib.rs but not in the table of layers")))
+        .collect();
+    assert!(places.is_sorted(), "lib.rs declares {declared:?}, out of the order of the layers");
+}
+
+#[test]
+fn modules_use_only_those_above_them() {
+    for (file, text) in sources() {
+        let Some(own) = layer(room(&file)) else { continue };
+        for used in LAYERS {
+            let below = layer(used).unwrap() > own;
+            assert!(
+                !(below && code(&text).contains(&format!("crate::{used}"))),
+                "src/{file} uses crate::{used}, a layer below {}",
+                LAYERS[own]
+            );
+        }
+    }
+}
+
+#[test]
+fn crates_stay_at_home() {
+    for (file, text) in sources() {
+        for (name, homes) in HOMES {
+            let home = homes.iter().any(|h| {
+                file.strip_prefix(h).is_some_and(|rest| rest.starts_with('/') || rest.starts_with('.'))
+            });
+            assert!(home || !names_crate(&code(&text), name), "src/{file} names {name}, at home in {homes:?}");
+        }
+    }
+}
+
+#[test]
+fn the_pilot_is_a_function() {
+    let pilot: Vec<_> =
+        sources().into_iter().filter(|(name, _)| name.starts_with("flight/pilot")).collect();
+    assert!(!pilot.is_empty(), "there is no src/flight/pilot");
+    for (file, text) in pilot {
+        for banned in PILOT_BANNED {
+            assert!(!code(&text).contains(banned), "src/{file} uses {banned}");
+        }
+    }
+}
+
+#[test]
+fn only_the_wire_names_messages() {
+    for (file, text) in sources() {
+        let wire = file == "link/wire.rs" || file.starts_with("link/wire/");
+        let text = code(&text);
+        assert!(
+            wire || !text.contains("MavMessage::") && !text.contains("_DATA {"),
+            "src/{file} names MAVLink messages, which only link/wire may"
+        );
+    }
+}
+
+#[test]
+fn every_file_says_what_it_is_in_its_first_line() {
+    for (file, text) in sources() {
+        let first = text.lines().next().unwrap_or_default();
+        assert!(first.starts_with("//! "), "src/{file} does not say what it is in its first line");
+    }
+}

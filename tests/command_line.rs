@@ -1,0 +1,51 @@
+//! The program as a user runs it: bad input is one line on standard error with a failing status.
+#![cfg(feature = "sitl")]
+
+use std::fs;
+use std::process::{Command, Output};
+
+fn greylag(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_greylag")).args(arguments).output().unwrap()
+}
+
+/// Fails with one line that says all `words`.
+fn refuses(arguments: &[&str], words: &[&str]) {
+    let output = greylag(arguments);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success(), "{arguments:?} succeeded");
+    for word in words {
+        assert!(error.contains(word), "{arguments:?} says {error:?}, not {word:?}");
+    }
+}
+
+#[test]
+fn evaluate_writes_scores_as_json_and_never_over_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let targets = folder.path().join("targets.csv");
+    fs::write(&targets, "group,roll_deg,pitch_deg\neasy,10,5\nhard_corners,-50,26\n").unwrap();
+    let json = folder.path().join("scores.json");
+    let (targets, out) = (targets.to_str().unwrap(), json.to_str().unwrap());
+    let arguments = ["evaluate", "--controller", "pid", "lqi", "--targets", targets, "--json", out];
+    let output = greylag(&arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let scores: serde_json::Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
+    assert_eq!(scores["schema"], "greylag.evaluation/1");
+    let lqi = &scores["controllers"][1];
+    assert_eq!((&lqi["controller"], &lqi["model"]), (&"lqi".into(), &"jsbsim".into()));
+    let groups: Vec<_> = lqi["groups"].as_array().unwrap().iter().map(|g| g["targets"].clone()).collect();
+    assert_eq!(groups, ["easy", "hard_corners", "all"]);
+    assert!(lqi["groups"][0]["mean_deg"].as_f64().unwrap() < 0.03);
+    assert!(lqi["ms_per_step"]["p999"].as_f64().unwrap() > 0.0);
+    refuses(&arguments, &["scores.json", "--force"]);
+}
+
+#[test]
+fn evaluate_refuses_what_it_cannot_fly() {
+    refuses(&["evaluate", "--controller", "autopilot"], &["autopilot", "lqi"]);
+    refuses(&["evaluate", "--controller", "lqi", "--model", "none.toml"], &["none.toml", "params/x8/prior.toml"]);
+    refuses(&["evaluate", "--controller", "lqi", "--targets", "none.csv"], &["none.csv", "greylag targets"]);
+    refuses(
+        &["evaluate", "--controller", "pid", "--aircraft-dir", "nowhere", "--aircraft", "glider"],
+        &["glider", "nowhere"],
+    );
+}
