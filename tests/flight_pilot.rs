@@ -42,10 +42,7 @@ fn x8() -> Config {
     };
     Config::new(
         airframe.envelope,
-        vec![
-            row(16.67, 2.283, 0.0354, 0.118),
-            row(20.0, 0.858, 0.1314, 0.185),
-        ],
+        vec![row(16.67, 2.283, 0.0354, 0.118), row(20.0, 0.858, 0.1314, 0.185)],
     )
 }
 
@@ -62,11 +59,7 @@ impl Controller for Broken {
     }
     fn reset(&mut self, _seed: u64, _bumpless: Command) {}
     fn command(&mut self, _: &Observation, _: &Target) -> Command {
-        Command {
-            aileron: f64::NAN,
-            elevator: 0.0,
-            throttle: 0.0,
-        }
+        Command { aileron: f64::NAN, elevator: 0.0, throttle: 0.0 }
     }
 }
 
@@ -74,11 +67,7 @@ fn frame(time: Time) -> Telemetry {
     // A breath of turbulence, so that the state is not frozen.
     let ripple = (time.as_micros() % 1000 + time.as_micros() / 10_000) as f64 * 1e-6;
     Telemetry {
-        state: State {
-            p: ripple,
-            airspeed: 20.0,
-            ..State::NEUTRAL
-        },
+        state: State { p: ripple, airspeed: 20.0, ..State::NEUTRAL },
         time,
         order: Order::Next { lost: 0 },
         faults: Faults::NONE,
@@ -100,16 +89,8 @@ struct Flight {
     plan: Plan,
 }
 
-const RIGHT: Command = Command {
-    aileron: 1.0,
-    elevator: -1.0,
-    throttle: 1.0,
-};
-const LEVEL_SETPOINT: AttitudeSetpoint = AttitudeSetpoint {
-    roll: 0.2,
-    pitch: 0.1,
-    thrust: None,
-};
+const RIGHT: Command = Command { aileron: 1.0, elevator: -1.0, throttle: 1.0 };
+const LEVEL_SETPOINT: AttitudeSetpoint = AttitudeSetpoint { roll: 0.2, pitch: 0.1, thrust: None };
 const TICK: Duration = Duration::from_millis(10);
 
 impl Flight {
@@ -119,12 +100,7 @@ impl Flight {
 
     fn with(fallback: Box<dyn Controller>) -> Self {
         let pilot = Pilot::new(x8(), fallback).unwrap();
-        Flight {
-            pilot,
-            now: Time::from_micros(1_000_000),
-            last: None,
-            plan: Plan::Ready(RIGHT),
-        }
+        Flight { pilot, now: Time::from_micros(1_000_000), last: None, plan: Plan::Ready(RIGHT) }
     }
 
     fn armed() -> Self {
@@ -137,20 +113,13 @@ impl Flight {
     fn offboard() -> Self {
         let mut flight = Flight::armed();
         flight.pilot.attitude_setpoint(flight.now, LEVEL_SETPOINT);
-        assert_eq!(
-            flight.pilot.set_mode(flight.now, Mode::Offboard),
-            Verdict::Accepted
-        );
+        assert_eq!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Accepted);
         flight
     }
 
     fn tick_with(&mut self, frame: Telemetry) -> Decision {
         let request = self.pilot.observe(self.now, &frame);
-        let plan = if request.is_some() {
-            self.plan
-        } else {
-            Plan::None
-        };
+        let plan = if request.is_some() { self.plan } else { Plan::None };
         let decision = self.pilot.decide(plan);
         let last = self.last.replace(decision);
         check(last.as_ref(), &decision, 0.2, 0.05);
@@ -167,9 +136,7 @@ impl Flight {
     }
 
     fn texts(&mut self) -> String {
-        std::iter::from_fn(|| self.pilot.take_text())
-            .map(|t| t.words + "\n")
-            .collect()
+        std::iter::from_fn(|| self.pilot.take_text()).map(|t| t.words + "\n").collect()
     }
 }
 
@@ -195,10 +162,7 @@ fn check(last: Option<&Decision>, now: &Decision, surface: f64, throttle: f64) {
 fn disarmed_outputs_are_dead_whatever_the_plan() {
     let mut flight = Flight::new();
     let decision = flight.fly(20);
-    assert_eq!(
-        (decision.command, decision.source),
-        (Command::IDLE, Source::Disarmed)
-    );
+    assert_eq!((decision.command, decision.source), (Command::IDLE, Source::Disarmed));
 }
 
 #[test]
@@ -215,17 +179,11 @@ fn arming_reaches_full_deflection_in_five_ticks_and_no_fewer() {
 #[test]
 fn arming_needs_a_fresh_state_unless_forced() {
     let mut flight = Flight::new();
-    assert!(matches!(
-        flight.pilot.arm(flight.now, false),
-        Verdict::Rejected(_)
-    ));
+    assert!(matches!(flight.pilot.arm(flight.now, false), Verdict::Rejected(_)));
     flight.fly(1);
     // 0.5 s old is the limit and still fresh; a microsecond more is not.
     let late = flight.now.plus(Duration::from_micros(500_001));
-    assert!(matches!(
-        flight.pilot.arm(late, false),
-        Verdict::Rejected(_)
-    ));
+    assert!(matches!(flight.pilot.arm(late, false), Verdict::Rejected(_)));
     assert_eq!(flight.pilot.arm(late, true), Verdict::Accepted);
 }
 
@@ -238,10 +196,7 @@ fn arming_is_refused_at_an_absurd_airspeed_or_attitude() {
         seen.state.airspeed = airspeed;
         seen.state.roll = roll;
         flight.tick_with(seen);
-        assert!(matches!(
-            flight.pilot.arm(flight.now, false),
-            Verdict::Rejected(_)
-        ));
+        assert!(matches!(flight.pilot.arm(flight.now, false), Verdict::Rejected(_)));
         assert_eq!(flight.pilot.arm(flight.now, true), Verdict::Accepted);
     }
 }
@@ -249,9 +204,7 @@ fn arming_is_refused_at_an_absurd_airspeed_or_attitude() {
 #[test]
 fn disarming_in_the_air_needs_force() {
     let mut flight = Flight::armed();
-    let Verdict::Rejected(words) = flight.pilot.disarm(flight.now, false) else {
-        panic!()
-    };
+    let Verdict::Rejected(words) = flight.pilot.disarm(flight.now, false) else { panic!() };
     assert!(words.contains("20.0 m/s"), "{words}");
     assert_eq!(flight.pilot.disarm(flight.now, true), Verdict::Accepted);
     assert_eq!(flight.tick().command, Command::IDLE);
@@ -260,9 +213,7 @@ fn disarming_in_the_air_needs_force() {
 #[test]
 fn return_is_refused_by_name() {
     let mut flight = Flight::armed();
-    let Verdict::Denied(words) = flight.pilot.set_mode(flight.now, Mode::Return) else {
-        panic!()
-    };
+    let Verdict::Denied(words) = flight.pilot.set_mode(flight.now, Mode::Return) else { panic!() };
     assert!(words.contains("RTL"));
 }
 
@@ -271,31 +222,15 @@ fn offboard_needs_arming_and_a_fresh_setpoint() {
     let mut flight = Flight::new();
     flight.fly(5);
     flight.pilot.attitude_setpoint(flight.now, LEVEL_SETPOINT);
-    assert!(matches!(
-        flight.pilot.set_mode(flight.now, Mode::Offboard),
-        Verdict::Rejected(_)
-    ));
+    assert!(matches!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Rejected(_)));
     flight.pilot.arm(flight.now, false);
-    assert_eq!(
-        flight.pilot.set_mode(flight.now, Mode::Offboard),
-        Verdict::Accepted
-    );
+    assert_eq!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Accepted);
     let mut flight = Flight::armed();
-    assert!(matches!(
-        flight.pilot.set_mode(flight.now, Mode::Offboard),
-        Verdict::Rejected(_)
-    ));
-    flight.pilot.attitude_setpoint(
-        flight.now,
-        AttitudeSetpoint {
-            roll: f64::NAN,
-            ..LEVEL_SETPOINT
-        },
-    );
-    assert!(matches!(
-        flight.pilot.set_mode(flight.now, Mode::Offboard),
-        Verdict::Rejected(_)
-    ));
+    assert!(matches!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Rejected(_)));
+    flight
+        .pilot
+        .attitude_setpoint(flight.now, AttitudeSetpoint { roll: f64::NAN, ..LEVEL_SETPOINT });
+    assert!(matches!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Rejected(_)));
 }
 
 #[test]
@@ -314,35 +249,19 @@ fn lost_setpoints_end_offboard_after_one_second_for_good() {
     assert_eq!((target.roll, target.pitch), (0.2, 0.1));
     assert_eq!(flight.fly(99).mode, Mode::Offboard);
     let decision = flight.tick();
-    assert_eq!(
-        (decision.mode, decision.failsafe, decision.target.roll),
-        (Mode::Hold, true, 0.0)
-    );
+    assert_eq!((decision.mode, decision.failsafe, decision.target.roll), (Mode::Hold, true, 0.0));
     assert!(flight.texts().contains("setpoints lost for 1.0 s: HOLD"));
     flight.pilot.attitude_setpoint(flight.now, LEVEL_SETPOINT);
     assert_eq!(flight.tick().mode, Mode::Hold);
-    assert_eq!(
-        flight.pilot.set_mode(flight.now, Mode::Offboard),
-        Verdict::Accepted
-    );
+    assert_eq!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Accepted);
     assert!(!flight.tick().failsafe);
 }
 
 #[test]
 fn the_loss_time_is_a_parameter() {
     let mut flight = Flight::offboard();
-    let index = flight
-        .pilot
-        .parameters()
-        .iter()
-        .position(|p| p.name == "GL_OFFB_LOSS_S")
-        .unwrap();
-    assert_eq!(
-        flight
-            .pilot
-            .set_parameter(index, ParameterValue::Real(0.25)),
-        Verdict::Accepted
-    );
+    let index = flight.pilot.parameters().iter().position(|p| p.name == "GL_OFFB_LOSS_S").unwrap();
+    assert_eq!(flight.pilot.set_parameter(index, ParameterValue::Real(0.25)), Verdict::Accepted);
     assert_eq!(flight.fly(25).mode, Mode::Offboard);
     assert_eq!(flight.tick().mode, Mode::Hold);
 }
@@ -363,28 +282,19 @@ fn a_lost_vehicle_is_flagged_after_half_a_second_and_offboard_does_not_come_back
     assert!(flight.pilot.status().vehicle_alive);
     flight.pilot.advance(gone.plus(Duration::from_micros(2)));
     let status = flight.pilot.status();
-    assert_eq!(
-        (status.vehicle_alive, status.failsafe, status.mode),
-        (false, true, Mode::Hold)
-    );
+    assert_eq!((status.vehicle_alive, status.failsafe, status.mode), (false, true, Mode::Hold));
     assert!(flight.texts().contains("vehicle link lost"));
     flight.now = gone.plus(Duration::from_secs(3));
     flight.pilot.attitude_setpoint(flight.now, LEVEL_SETPOINT);
     // The first command after the gap starts from the last one sent: checked in every tick.
     let decision = flight.tick();
-    assert_eq!(
-        (decision.mode, decision.failsafe, decision.target.roll),
-        (Mode::Hold, false, 0.0)
-    );
+    assert_eq!((decision.mode, decision.failsafe, decision.target.roll), (Mode::Hold, false, 0.0));
     assert!(flight.texts().contains("vehicle link back"));
 }
 
 #[test]
 fn a_frozen_state_counts_as_lost_after_half_a_second_armed_and_never_disarmed() {
-    let still = |now| Telemetry {
-        state: State::NEUTRAL,
-        ..frame(now)
-    };
+    let still = |now| Telemetry { state: State::NEUTRAL, ..frame(now) };
     let mut flight = Flight::new();
     for _ in 0..200 {
         flight.now = flight.now.plus(TICK);
@@ -397,11 +307,7 @@ fn a_frozen_state_counts_as_lost_after_half_a_second_armed_and_never_disarmed() 
         let decision = flight.tick_with(still(flight.now));
         assert_eq!(
             decision.source,
-            if i <= 50 {
-                Source::Planned
-            } else {
-                Source::Level
-            },
+            if i <= 50 { Source::Planned } else { Source::Level },
             "tick {i}"
         );
     }
@@ -411,13 +317,7 @@ fn a_frozen_state_counts_as_lost_after_half_a_second_armed_and_never_disarmed() 
 fn without_a_usable_state_the_command_is_held_for_50_ms_then_surfaces_go_to_trim() {
     let mut flight = Flight::offboard();
     let before = flight.fly(10);
-    let bad = |now| Telemetry {
-        state: State {
-            q: f64::NAN,
-            ..State::NEUTRAL
-        },
-        ..frame(now)
-    };
+    let bad = |now| Telemetry { state: State { q: f64::NAN, ..State::NEUTRAL }, ..frame(now) };
     for i in 1..=60 {
         flight.now = flight.now.plus(TICK);
         let decision = flight.tick_with(bad(flight.now));
@@ -430,25 +330,13 @@ fn without_a_usable_state_the_command_is_held_for_50_ms_then_surfaces_go_to_trim
         } else {
             assert_eq!(decision.source, Source::Level, "tick {i}");
         }
-        assert_eq!(
-            decision.mode,
-            if i <= 50 { Mode::Offboard } else { Mode::Hold },
-            "tick {i}"
-        );
+        assert_eq!(decision.mode, if i <= 50 { Mode::Offboard } else { Mode::Hold }, "tick {i}");
     }
     let trim = flight.pilot.config().trim_at(20.0);
-    let level = Command {
-        aileron: 0.0,
-        elevator: trim.elevator,
-        throttle: trim.throttle,
-    };
+    let level = Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle };
     assert_eq!(flight.last.unwrap().command, level);
     let said = flight.texts();
-    assert_eq!(
-        said.matches("vehicle state refused: body rates").count(),
-        1,
-        "{said}"
-    );
+    assert_eq!(said.matches("vehicle state refused: body rates").count(), 1, "{said}");
 }
 
 #[test]
@@ -465,17 +353,10 @@ fn a_late_plan_is_replaced_by_the_fallback_and_logged_as_late() {
 #[test]
 fn a_plan_that_is_no_number_is_replaced_and_told_once_in_five_seconds() {
     let mut flight = Flight::offboard();
-    flight.plan = Plan::Ready(Command {
-        elevator: f64::INFINITY,
-        ..Command::IDLE
-    });
+    flight.plan = Plan::Ready(Command { elevator: f64::INFINITY, ..Command::IDLE });
     assert_eq!(flight.fly(99).source, Source::Fallback);
     assert_eq!(flight.texts().matches("fallback flies").count(), 1);
-    flight.plan = Plan::Ready(Command {
-        aileron: 1e30,
-        elevator: -1e30,
-        throttle: 1e30,
-    });
+    flight.plan = Plan::Ready(Command { aileron: 1e30, elevator: -1e30, throttle: 1e30 });
     let decision = flight.fly(1);
     assert_eq!(decision.source, Source::Planned);
 }
@@ -487,10 +368,7 @@ fn a_fallback_that_is_no_number_either_ends_level_at_trim() {
     flight.pilot.arm(flight.now, false);
     flight.plan = Plan::None;
     let decision = flight.fly(50);
-    assert_eq!(
-        (decision.source, decision.command.aileron),
-        (Source::Level, 0.0)
-    );
+    assert_eq!((decision.source, decision.command.aileron), (Source::Level, 0.0));
     assert!(
         (decision.command.throttle - flight.pilot.config().trim_at(20.0).throttle).abs() < 1e-12
     );
@@ -502,20 +380,13 @@ fn the_planner_is_told_when_it_takes_over() {
     let mut flight = Flight::armed();
     let ask = |flight: &mut Flight| {
         flight.now = flight.now.plus(TICK);
-        let engage = flight
-            .pilot
-            .observe(flight.now, &frame(flight.now))
-            .unwrap()
-            .engage;
+        let engage = flight.pilot.observe(flight.now, &frame(flight.now)).unwrap().engage;
         let command = flight.pilot.decide(flight.plan).command;
         (engage, command)
     };
     assert_eq!(ask(&mut flight).0, Some(Command::IDLE));
     assert_eq!(ask(&mut flight).0, None);
-    flight.plan = Plan::Ready(Command {
-        aileron: f64::NAN,
-        ..Command::IDLE
-    });
+    flight.plan = Plan::Ready(Command { aileron: f64::NAN, ..Command::IDLE });
     let (_, last) = ask(&mut flight);
     assert_eq!(ask(&mut flight).0, Some(last));
 }
@@ -523,36 +394,16 @@ fn the_planner_is_told_when_it_takes_over() {
 #[test]
 fn sticks_command_surfaces_in_manual_and_attitude_in_stabilized() {
     let mut flight = Flight::armed();
-    assert!(matches!(
-        flight.pilot.set_mode(flight.now, Mode::Manual),
-        Verdict::Rejected(_)
-    ));
-    let sticks = Sticks {
-        roll: 0.5,
-        pitch: -0.5,
-        throttle: 0.6,
-    };
+    assert!(matches!(flight.pilot.set_mode(flight.now, Mode::Manual), Verdict::Rejected(_)));
+    let sticks = Sticks { roll: 0.5, pitch: -0.5, throttle: 0.6 };
     flight.pilot.sticks(flight.now, sticks);
-    assert_eq!(
-        flight.pilot.set_mode(flight.now, Mode::Manual),
-        Verdict::Accepted
-    );
+    assert_eq!(flight.pilot.set_mode(flight.now, Mode::Manual), Verdict::Accepted);
     let decision = flight.fly(15);
     // Stick back is elevator up, which is negative.
-    assert_eq!(
-        decision.command,
-        Command {
-            aileron: 0.5,
-            elevator: -0.5,
-            throttle: 0.6
-        }
-    );
+    assert_eq!(decision.command, Command { aileron: 0.5, elevator: -0.5, throttle: 0.6 });
     assert_eq!(decision.source, Source::Sticks);
     flight.pilot.sticks(flight.now, sticks);
-    assert_eq!(
-        flight.pilot.set_mode(flight.now, Mode::Stabilized),
-        Verdict::Accepted
-    );
+    assert_eq!(flight.pilot.set_mode(flight.now, Mode::Stabilized), Verdict::Accepted);
     let decision = flight.fly(15);
     // Half of 60° of bank, half of 30° nose up; the throttle is the stick's.
     assert!((decision.target.roll.to_degrees() - 30.0).abs() < 1e-9);
@@ -564,21 +415,12 @@ fn sticks_command_surfaces_in_manual_and_attitude_in_stabilized() {
 
 #[test]
 fn thrust_of_the_setpoint_is_flown_only_when_the_parameter_says_so() {
-    let setpoint = AttitudeSetpoint {
-        thrust: Some(0.3),
-        ..LEVEL_SETPOINT
-    };
+    let setpoint = AttitudeSetpoint { thrust: Some(0.3), ..LEVEL_SETPOINT };
     for (source, throttle) in [(0, 1.0), (1, 0.3)] {
         let mut flight = Flight::offboard();
-        let index = flight
-            .pilot
-            .parameters()
-            .iter()
-            .position(|p| p.name == "GL_THRUST_SRC")
-            .unwrap();
-        flight
-            .pilot
-            .set_parameter(index, ParameterValue::Int(source));
+        let index =
+            flight.pilot.parameters().iter().position(|p| p.name == "GL_THRUST_SRC").unwrap();
+        flight.pilot.set_parameter(index, ParameterValue::Int(source));
         flight.pilot.attitude_setpoint(flight.now, setpoint);
         assert!((flight.fly(30).command.throttle - throttle).abs() < 1e-9);
     }
@@ -627,10 +469,8 @@ struct Dice(u64);
 
 impl Dice {
     fn below(&mut self, n: u64) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) % n
     }
     fn number(&mut self) -> f64 {
@@ -643,11 +483,7 @@ impl Dice {
         }
     }
     fn command(&mut self) -> Command {
-        Command {
-            aileron: self.number(),
-            elevator: self.number(),
-            throttle: self.number(),
-        }
+        Command { aileron: self.number(), elevator: self.number(), throttle: self.number() }
     }
 }
 
@@ -684,13 +520,7 @@ fn storm_frame(dice: &mut Dice, now: Time) -> Telemetry {
 }
 
 fn storm_request(dice: &mut Dice, pilot: &mut Pilot, now: Time) {
-    let modes = [
-        Mode::Manual,
-        Mode::Hold,
-        Mode::Return,
-        Mode::Offboard,
-        Mode::Stabilized,
-    ];
+    let modes = [Mode::Manual, Mode::Hold, Mode::Return, Mode::Offboard, Mode::Stabilized];
     match dice.below(12) {
         0..=2 => drop(pilot.arm(now, dice.below(2) == 0)),
         3 if dice.below(10) == 0 => drop(pilot.disarm(now, dice.below(2) == 0)),
@@ -699,20 +529,12 @@ fn storm_request(dice: &mut Dice, pilot: &mut Pilot, now: Time) {
             let thrust = (dice.below(2) == 0).then(|| dice.number());
             pilot.attitude_setpoint(
                 now,
-                AttitudeSetpoint {
-                    roll: dice.number(),
-                    pitch: dice.number(),
-                    thrust,
-                },
+                AttitudeSetpoint { roll: dice.number(), pitch: dice.number(), thrust },
             );
         }
         9..=10 => pilot.sticks(
             now,
-            Sticks {
-                roll: dice.number(),
-                pitch: dice.number(),
-                throttle: dice.number(),
-            },
+            Sticks { roll: dice.number(), pitch: dice.number(), throttle: dice.number() },
         ),
         _ => {
             // The two slew limits stay, since the test measures by them.
@@ -743,13 +565,9 @@ fn storm(seed: u64) -> (Vec<Command>, [usize; 7]) {
         if let Some(request) = pilot.observe(now, &frame) {
             assert!(request.observation.state.is_finite());
             assert!(
-                [
-                    request.target.roll,
-                    request.target.pitch,
-                    request.target.airspeed
-                ]
-                .iter()
-                .all(|x| x.is_finite())
+                [request.target.roll, request.target.pitch, request.target.airspeed]
+                    .iter()
+                    .all(|x| x.is_finite())
             );
         }
         let plan = [Plan::Ready(dice.command()), Plan::Late, Plan::None][dice.below(3) as usize];

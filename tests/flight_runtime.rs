@@ -54,11 +54,7 @@ fn an_attitude_is_flown_and_setpoint_loss_ends_level_in_hold() {
     let settled = |m: &&MavMessage| matches!(m, MavMessage::ATTITUDE(a) if (a.roll.to_degrees() - 20.0).abs() < 0.5 && (a.pitch.to_degrees() - 5.0).abs() < 0.5);
     assert!(client.log.iter().filter(settled).count() > 10);
     let vehicle = land(companion, vehicle);
-    assert!(
-        vehicle.state().roll.to_degrees().abs() < 0.5,
-        "{:?}",
-        vehicle.state()
-    );
+    assert!(vehicle.state().roll.to_degrees().abs() < 0.5, "{:?}", vehicle.state());
 }
 
 #[test]
@@ -73,11 +69,7 @@ fn a_lost_vehicle_is_told_and_flown_in_hold_when_it_is_back() {
     client.steer(20.0, 5.0, 4.0);
     let vehicle = land(companion, vehicle);
     // Never back in OFFBOARD by itself: level, although setpoints of 20° kept coming.
-    assert!(
-        vehicle.state().roll.to_degrees().abs() < 1.0,
-        "{:?}",
-        vehicle.state()
-    );
+    assert!(vehicle.state().roll.to_degrees().abs() < 1.0, "{:?}", vehicle.state());
 }
 
 #[test]
@@ -116,14 +108,7 @@ fn setpoints_of_garbage_move_nothing_and_do_not_keep_offboard_alive() {
     }
     client.wait_for_text("setpoints lost");
     client.wait_for_mode(HOLD);
-    assert!(
-        client
-            .texts()
-            .iter()
-            .any(|t| t.contains("Setpoint refused")),
-        "{:?}",
-        client.texts()
-    );
+    assert!(client.texts().iter().any(|t| t.contains("Setpoint refused")), "{:?}", client.texts());
     land(companion, vehicle);
 }
 
@@ -154,14 +139,8 @@ fn garbage_and_a_flood_from_both_sides_delay_no_answer_and_move_no_surface() {
     let summary = companion.end();
     println!("{summary}");
     check_surfaces(&vehicle.answers);
-    assert!(
-        summary.clients.frames.bad() > 500 && summary.clients.echoes > 300,
-        "{summary:?}"
-    );
-    assert!(
-        summary.vehicle.frames.bad() > 100 && summary.vehicle.foreign > 100,
-        "{summary:?}"
-    );
+    assert!(summary.clients.frames.bad() > 500 && summary.clients.echoes > 300, "{summary:?}");
+    assert!(summary.vehicle.frames.bad() > 100 && summary.vehicle.foreign > 100, "{summary:?}");
     let state = vehicle.state();
     // One flipped frame in a thousand may carry the vehicle's ids with a good CRC: none did.
     assert!(
@@ -175,10 +154,8 @@ fn garbage_and_a_flood_from_both_sides_delay_no_answer_and_move_no_surface() {
 fn a_second_client_watches_and_a_restarted_one_takes_over() {
     let (companion, vehicle, client) = in_offboard();
     let mut second = Client::new(companion.client(0));
-    second.wait(
-        "heartbeat",
-        |m| matches!(m, MavMessage::HEARTBEAT(h) if h.custom_mode == OFFBOARD),
-    );
+    second
+        .wait("heartbeat", |m| matches!(m, MavMessage::HEARTBEAT(h) if h.custom_mode == OFFBOARD));
     for _ in 0..40 {
         client.setpoint(20.0, 5.0);
         second.setpoint(-50.0, 0.0);
@@ -210,9 +187,7 @@ fn a_client_over_tcp_is_served_like_any_other() {
         target_system: 1,
         ..Default::default()
     };
-    stream
-        .write_all(&frame(245, 190, &MavMessage::COMMAND_LONG(arm)))
-        .unwrap();
+    stream.write_all(&frame(245, 190, &MavMessage::COMMAND_LONG(arm))).unwrap();
     let mut bytes = Vec::new();
     let mut chunk = [0; 1024];
     let acknowledged = |bytes: &[u8]| bytes.windows(10).any(|w| w[0] == 0xFD && w[7] == 77);
@@ -261,11 +236,7 @@ impl Controller for Slow {
     fn reset(&mut self, _seed: u64, _bumpless: Command) {}
     fn command(&mut self, _: &Observation, _: &Target) -> Command {
         std::thread::sleep(Duration::from_millis(30));
-        Command {
-            aileron: 1.0,
-            elevator: 1.0,
-            throttle: 1.0,
-        }
+        Command { aileron: 1.0, elevator: 1.0, throttle: 1.0 }
     }
 }
 
@@ -284,11 +255,7 @@ fn a_planner_that_is_always_late_leaves_the_fallback_flying_and_is_recorded() {
     let vehicle = vehicle.land();
     let summary = companion.end();
     check_surfaces(&vehicle.answers);
-    assert!(
-        (vehicle.state().roll.to_degrees() - 20.0).abs() < 1.0,
-        "{:?}",
-        vehicle.state()
-    );
+    assert!((vehicle.state().roll.to_degrees() - 20.0).abs() < 1.0, "{:?}", vehicle.state());
     assert!(summary.timing.late_plans > 300, "{summary}");
     let (folder, written) = summary.recording.clone().unwrap();
     assert_eq!((written.rows, written.dropped), (summary.vehicle.states, 0));

@@ -63,26 +63,16 @@ fn settled_in_process(roll: f64, pitch: f64) -> f64 {
     let mut simulator = Simulator::new(&PlantOptions::default()).unwrap();
     let mut controller = build(Kind::Lqi, x8()).unwrap();
     simulator.reset().unwrap();
-    let target = Target {
-        roll: roll.to_radians(),
-        pitch: pitch.to_radians(),
-        airspeed: 20.0,
-    };
-    let episode = Episode {
-        environment: &mut simulator,
-        controller: controller.as_mut(),
-        seed: 0,
-    };
+    let target = Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 20.0 };
+    let episode = Episode { environment: &mut simulator, controller: controller.as_mut(), seed: 0 };
     episode.fly(&target, |_, _| {}).unwrap().settled_deg
 }
 
 /// Mean of roll and pitch RMSE over samples, degrees.
 fn error_deg(samples: &[Sample], (roll, pitch): (f64, f64)) -> f64 {
     let rmse = |axis: usize, wanted: f64| {
-        let sum: f64 = samples
-            .iter()
-            .map(|s| (s.attitude_rad[axis].to_degrees() - wanted).powi(2))
-            .sum();
+        let sum: f64 =
+            samples.iter().map(|s| (s.attitude_rad[axis].to_degrees() - wanted).powi(2)).sum();
         (sum / samples.len() as f64).sqrt()
     };
     (rmse(0, roll) + rmse(1, pitch)) / 2.0
@@ -105,19 +95,13 @@ fn fly_with(
     let mut options = options(pace);
     options.record = Some(Place::Exactly(root.path().join("flight")));
     let companion = Companion::start(&options);
-    let their_pace = if pace == Pace::Lockstep {
-        shim::Pace::Lockstep
-    } else {
-        shim::Pace::RealTime
-    };
+    let their_pace =
+        if pace == Pace::Lockstep { shim::Pace::Lockstep } else { shim::Pace::RealTime };
     let shim = Shim::start(companion.vehicle(), their_pace, seconds, change);
     let mut client = Client::new(companion.client(0));
     // In lockstep a second of vehicle time is a few milliseconds: the setpoints may be rarer.
     client.send(&parameter("GL_OFFB_LOSS_S", 60.0));
-    client.wait(
-        "echo",
-        |m| matches!(m, MavMessage::PARAM_VALUE(p) if p.param_value == 60.0),
-    );
+    client.wait("echo", |m| matches!(m, MavMessage::PARAM_VALUE(p) if p.param_value == 60.0));
     client.engage(roll, pitch);
     while shim.is_flying() {
         client.setpoint(roll, pitch);
@@ -125,11 +109,8 @@ fn fly_with(
     }
     let flown = shim.end();
     let summary = companion.end();
-    let recorded = csv::load(
-        &root.path().join("flight").join("flight.csv"),
-        Tolerance::Strict,
-    )
-    .unwrap();
+    let recorded =
+        csv::load(&root.path().join("flight").join("flight.csv"), Tolerance::Strict).unwrap();
     assert_eq!((recorded.dropped, recorded.cut_short), (0, false));
     (recorded.flight.samples, summary, flown)
 }
@@ -154,19 +135,9 @@ fn in_lockstep_the_settled_error_is_that_in_process() {
         println!(
             "target {roll}, {pitch}: {over_mavlink:.4} deg over MAVLink, {in_process:.4} deg in process"
         );
-        println!(
-            "{:.0} times real time\n{summary}\n{flown}",
-            flown.flown_s / summary.duration_s
-        );
+        println!("{:.0} times real time\n{summary}\n{flown}", flown.flown_s / summary.duration_s);
         assert!((over_mavlink - in_process).abs() <= AGREEMENT_DEG);
-        assert_eq!(
-            (
-                flown.wrong_answers,
-                flown.unusable_answers,
-                flown.limited_answers
-            ),
-            (0, 0, 0)
-        );
+        assert_eq!((flown.wrong_answers, flown.unusable_answers, flown.limited_answers), (0, 0, 0));
     }
 }
 
@@ -185,10 +156,7 @@ fn ten_minutes_of_level_flight_are_not_taken_for_a_frozen_sensor() {
     let companion = Companion::start(&options(Pace::Lockstep));
     let shim = Shim::start(companion.vehicle(), shim::Pace::Lockstep, 600.0, |_| {});
     let mut client = Client::new(companion.client(0));
-    client.wait(
-        "state",
-        |m| matches!(m, MavMessage::ATTITUDE(a) if a.roll.is_finite()),
-    );
+    client.wait("state", |m| matches!(m, MavMessage::ATTITUDE(a) if a.roll.is_finite()));
     assert_eq!(client.arm(), MavResult::MAV_RESULT_ACCEPTED);
     while shim.is_flying() {
         std::thread::sleep(Duration::from_millis(20));
@@ -238,10 +206,7 @@ fn a_minute_in_real_time_misses_no_cycle() {
     println!("{settled:.4} deg\n{summary}\n{flown}");
     assert!((settled - settled_in_process(TARGETS[0].0, TARGETS[0].1)).abs() <= AGREEMENT_DEG);
     assert_eq!((summary.timing.missed, summary.vehicle.lost), (0, 0));
-    assert!(
-        summary.timing.latency.quantile_us(0.99) <= 2000.0,
-        "{summary}"
-    );
+    assert!(summary.timing.latency.quantile_us(0.99) <= 2000.0, "{summary}");
 }
 
 #[test]

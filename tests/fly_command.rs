@@ -32,17 +32,11 @@ fn free_ports() -> [u16; 2] {
 /// Asserts that the program ends with one line of error with these words, having left no file.
 fn refused(arguments: &[&str], words: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = fly(folder.path(), arguments).output().unwrap();
+    let Output { status, stdout, stderr } = fly(folder.path(), arguments).output().unwrap();
     let said = String::from_utf8(stderr).unwrap();
     assert!(!status.success() && stdout.is_empty(), "{said}");
     assert_eq!(said.trim_end().lines().count(), 1, "{said}");
-    words
-        .iter()
-        .for_each(|word| assert!(said.contains(word), "{word} in {said}"));
+    words.iter().for_each(|word| assert!(said.contains(word), "{word} in {said}"));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
@@ -62,22 +56,13 @@ fn a_port_in_use_is_one_line_and_nothing_is_started() {
 
 #[test]
 fn a_serial_port_is_refused_with_what_to_use_instead() {
-    refused(
-        &["--vehicle", "serial:/dev/ttyACM0:921600"],
-        &["serial:/dev/ttyACM0:921600", "udpin"],
-    );
+    refused(&["--vehicle", "serial:/dev/ttyACM0:921600"], &["serial:/dev/ttyACM0:921600", "udpin"]);
 }
 
 #[test]
 fn files_that_are_not_there_are_named() {
-    refused(
-        &["--model", "params/x8/nowhere.toml"],
-        &["params/x8/nowhere.toml", "model"],
-    );
-    refused(
-        &["--airframe", "nowhere.toml"],
-        &["nowhere.toml", "airframe"],
-    );
+    refused(&["--model", "params/x8/nowhere.toml"], &["params/x8/nowhere.toml", "model"]);
+    refused(&["--airframe", "nowhere.toml"], &["nowhere.toml", "airframe"]);
 }
 
 #[test]
@@ -85,17 +70,8 @@ fn a_recording_is_not_overwritten() {
     let root = tempfile::tempdir().unwrap();
     let old = root.path().join("old");
     std::fs::create_dir(&old).unwrap();
-    let arguments = [
-        "--vehicle",
-        "udpin:127.0.0.1:0",
-        "--client",
-        "udpin:127.0.0.1:0",
-        "--record",
-    ];
-    refused(
-        &[&arguments[..], &[old.to_str().unwrap()]].concat(),
-        &["exists already", "--record"],
-    );
+    let arguments = ["--vehicle", "udpin:127.0.0.1:0", "--client", "udpin:127.0.0.1:0", "--record"];
+    refused(&[&arguments[..], &[old.to_str().unwrap()]].concat(), &["exists already", "--record"]);
 }
 
 #[test]
@@ -129,10 +105,7 @@ fn wait_for(lines: &mut impl Iterator<Item = std::io::Result<String>>, part: &st
 
 /// Ctrl-C.
 fn interrupt(child: &Child) {
-    let status = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
+    let status = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(status.success());
 }
 
@@ -142,12 +115,10 @@ fn a_flight_is_announced_told_summed_up_and_recorded_until_ctrl_c() {
     let [vehicle_port, client_port] = free_ports();
     let vehicle_address = format!("udpin:127.0.0.1:{vehicle_port}");
     let client_address = format!("udpin:127.0.0.1:{client_port}");
-    let mut child = fly(
-        folder.path(),
-        &["--vehicle", &vehicle_address, "--client", &client_address],
-    )
-    .spawn()
-    .unwrap();
+    let mut child =
+        fly(folder.path(), &["--vehicle", &vehicle_address, "--client", &client_address])
+            .spawn()
+            .unwrap();
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
     wait_for(&mut lines, &vehicle_address);
     wait_for(&mut lines, &client_address);
@@ -166,19 +137,13 @@ fn a_flight_is_announced_told_summed_up_and_recorded_until_ctrl_c() {
     assert!(child.wait().unwrap().success());
     vehicle.trouble(Trouble::Silent);
     check_surfaces(&vehicle.land().answers);
-    let flown = csv::load(
-        &folder.path().join("flights/0001/flight.csv"),
-        Tolerance::Strict,
-    )
-    .unwrap();
+    let flown =
+        csv::load(&folder.path().join("flights/0001/flight.csv"), Tolerance::Strict).unwrap();
     assert!(flown.flight.samples.len() > 50 && !flown.cut_short && flown.dropped == 0);
     let summary = std::fs::read_to_string(folder.path().join("flights/0001/summary.txt")).unwrap();
     assert!(summary.contains("state to command: p50"), "{summary}");
     assert!(
-        std::fs::metadata(folder.path().join("flights/0001/flight.tlog"))
-            .unwrap()
-            .len()
-            > 10_000
+        std::fs::metadata(folder.path().join("flights/0001/flight.tlog")).unwrap().len() > 10_000
     );
 }
 
@@ -196,9 +161,6 @@ fn a_duration_ends_the_flight_by_itself() {
     ];
     let output = fly(folder.path(), &arguments).output().unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
-    assert!(
-        output.status.success() && said.contains("flew 0.5 s: 0 states"),
-        "{said}"
-    );
+    assert!(output.status.success() && said.contains("flew 0.5 s: 0 states"), "{said}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

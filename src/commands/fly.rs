@@ -59,11 +59,7 @@ pub struct Arguments {
 fn seconds(text: &str) -> Result<Duration, String> {
     let number = text.parse::<f64>().map_err(|e| e.to_string())?;
     let duration = Duration::try_from_secs_f64(number).map_err(|e| e.to_string())?;
-    if duration.is_zero() {
-        Err("give a time above zero".into())
-    } else {
-        Ok(duration)
-    }
+    if duration.is_zero() { Err("give a time above zero".into()) } else { Ok(duration) }
 }
 
 /// Flies until Ctrl-C or the end of the duration.
@@ -82,9 +78,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let flight = Flight::start(&options, crew, stop)?;
     announce(arguments, &flight);
     show_events(&flight, &arguments.vehicle);
-    let summary = flight
-        .join()
-        .context("the control thread has died; the recording holds all up to then")?;
+    let summary =
+        flight.join().context("the control thread has died; the recording holds all up to then")?;
     println!("{summary}");
     Ok(ExitCode::SUCCESS)
 }
@@ -99,11 +94,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Options {
         vehicle: arguments.vehicle.clone(),
         clients: arguments.clients.clone(),
         record,
-        pace: if arguments.lockstep {
-            Pace::Lockstep
-        } else {
-            Pace::RealTime
-        },
+        pace: if arguments.lockstep { Pace::Lockstep } else { Pace::RealTime },
         duration: arguments.duration_s,
         plan_deadline: Duration::from_millis(arguments.plan_deadline_ms),
         deflection: model.airframe.actuators.deflection_max,
@@ -132,37 +123,22 @@ pub fn crew(kind: Kind, model: &GreyBox) -> anyhow::Result<Crew> {
     // The design of an LQI takes a moment; it is not made twice.
     let fallback = if kind == Kind::Lqi { controller.boxed_clone() } else { fallback(model)? };
     let pilot = Pilot::new(Config::for_model(model)?, fallback)?;
-    let seat = if kind.is_planner() {
-        Seat::Thread
-    } else {
-        Seat::Loop
-    };
-    Ok(Crew {
-        pilot,
-        controller,
-        seat,
-    })
+    let seat = if kind.is_planner() { Seat::Thread } else { Seat::Loop };
+    Ok(Crew { pilot, controller, seat })
 }
 
 fn fallback(model: &GreyBox) -> anyhow::Result<Box<dyn Controller>> {
     match build(Kind::Lqi, model) {
         Ok(lqi) => Ok(lqi),
         Err(error) => {
-            eprintln!(
-                "greylag: {error}; the fallback is {} instead",
-                Kind::PidRetuned
-            );
+            eprintln!("greylag: {error}; the fallback is {} instead", Kind::PidRetuned);
             Ok(build(Kind::PidRetuned, model)?)
         }
     }
 }
 
 fn announce(arguments: &Arguments, flight: &Flight) {
-    println!(
-        "controller {}, model {}",
-        arguments.controller,
-        arguments.model.display()
-    );
+    println!("controller {}, model {}", arguments.controller, arguments.model.display());
     println!("vehicle    {}", arguments.vehicle);
     for client in &arguments.clients {
         println!("clients    {client}");

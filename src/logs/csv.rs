@@ -13,16 +13,8 @@ type Place = fn(&mut Sample) -> &mut f64;
 /// The columns of the format in the order they are written: name, value, place.
 const COLUMNS: [(&str, Get, Place); 25] = [
     ("time_s", |s| s.time_s, |s| &mut s.time_s),
-    (
-        "roll_rad",
-        |s| s.attitude_rad[0],
-        |s| &mut s.attitude_rad[0],
-    ),
-    (
-        "pitch_rad",
-        |s| s.attitude_rad[1],
-        |s| &mut s.attitude_rad[1],
-    ),
+    ("roll_rad", |s| s.attitude_rad[0], |s| &mut s.attitude_rad[0]),
+    ("pitch_rad", |s| s.attitude_rad[1], |s| &mut s.attitude_rad[1]),
     ("yaw_rad", |s| s.attitude_rad[2], |s| &mut s.attitude_rad[2]),
     ("p_radps", |s| s.rates_radps[0], |s| &mut s.rates_radps[0]),
     ("q_radps", |s| s.rates_radps[1], |s| &mut s.rates_radps[1]),
@@ -30,36 +22,12 @@ const COLUMNS: [(&str, Get, Place); 25] = [
     ("airspeed_mps", |s| s.airspeed_mps, |s| &mut s.airspeed_mps),
     ("alpha_rad", |s| s.alpha_rad, |s| &mut s.alpha_rad),
     ("beta_rad", |s| s.beta_rad, |s| &mut s.beta_rad),
-    (
-        "ax_mps2",
-        |s| s.specific_force_mps2[0],
-        |s| &mut s.specific_force_mps2[0],
-    ),
-    (
-        "ay_mps2",
-        |s| s.specific_force_mps2[1],
-        |s| &mut s.specific_force_mps2[1],
-    ),
-    (
-        "az_mps2",
-        |s| s.specific_force_mps2[2],
-        |s| &mut s.specific_force_mps2[2],
-    ),
-    (
-        "vn_mps",
-        |s| s.velocity_ned_mps[0],
-        |s| &mut s.velocity_ned_mps[0],
-    ),
-    (
-        "ve_mps",
-        |s| s.velocity_ned_mps[1],
-        |s| &mut s.velocity_ned_mps[1],
-    ),
-    (
-        "vd_mps",
-        |s| s.velocity_ned_mps[2],
-        |s| &mut s.velocity_ned_mps[2],
-    ),
+    ("ax_mps2", |s| s.specific_force_mps2[0], |s| &mut s.specific_force_mps2[0]),
+    ("ay_mps2", |s| s.specific_force_mps2[1], |s| &mut s.specific_force_mps2[1]),
+    ("az_mps2", |s| s.specific_force_mps2[2], |s| &mut s.specific_force_mps2[2]),
+    ("vn_mps", |s| s.velocity_ned_mps[0], |s| &mut s.velocity_ned_mps[0]),
+    ("ve_mps", |s| s.velocity_ned_mps[1], |s| &mut s.velocity_ned_mps[1]),
+    ("vd_mps", |s| s.velocity_ned_mps[2], |s| &mut s.velocity_ned_mps[2]),
     ("altitude_m", |s| s.altitude_m, |s| &mut s.altitude_m),
     ("aileron_rad", |s| s.aileron_rad, |s| &mut s.aileron_rad),
     ("elevator_rad", |s| s.elevator_rad, |s| &mut s.elevator_rad),
@@ -67,27 +35,12 @@ const COLUMNS: [(&str, Get, Place); 25] = [
     ("aileron_cmd", |s| s.aileron_cmd, |s| &mut s.aileron_cmd),
     ("elevator_cmd", |s| s.elevator_cmd, |s| &mut s.elevator_cmd),
     ("throttle_cmd", |s| s.throttle_cmd, |s| &mut s.throttle_cmd),
-    (
-        "roll_target_rad",
-        |s| s.roll_target_rad,
-        |s| &mut s.roll_target_rad,
-    ),
-    (
-        "pitch_target_rad",
-        |s| s.pitch_target_rad,
-        |s| &mut s.pitch_target_rad,
-    ),
+    ("roll_target_rad", |s| s.roll_target_rad, |s| &mut s.roll_target_rad),
+    ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
 ];
 /// Columns without which a file is no flight log.
-const NEEDED: [&str; 7] = [
-    "time_s",
-    "roll_rad",
-    "pitch_rad",
-    "p_radps",
-    "q_radps",
-    "r_radps",
-    "airspeed_mps",
-];
+const NEEDED: [&str; 7] =
+    ["time_s", "roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"];
 /// For each actuator the command or the position must be there.
 const EITHER: [(&str, &str); 3] = [
     ("aileron_cmd", "aileron_rad"),
@@ -177,10 +130,7 @@ pub struct Reading {
 /// What the writer says.
 pub fn write(flight: &Flight, out: impl Write) -> std::io::Result<()> {
     let mut rows = Rows::new(out, &[])?;
-    flight
-        .samples
-        .iter()
-        .try_for_each(|sample| rows.row(sample, &[]))?;
+    flight.samples.iter().try_for_each(|sample| rows.row(sample, &[]))?;
     rows.flush()
 }
 
@@ -189,13 +139,7 @@ pub fn write(flight: &Flight, out: impl Write) -> std::io::Result<()> {
 /// # Errors
 /// The file exists, or cannot be written.
 pub fn save(flight: &Flight, path: &Path) -> Result<(), CsvError> {
-    let fail = |doing| {
-        move |source| CsvError::File {
-            doing,
-            path: path.to_owned(),
-            source,
-        }
-    };
+    let fail = |doing| move |source| CsvError::File { doing, path: path.to_owned(), source };
     let file = std::fs::File::create_new(path).map_err(fail("create"))?;
     write(flight, std::io::BufWriter::new(file)).map_err(fail("write"))
 }
@@ -213,16 +157,9 @@ impl<W: Write> Rows<W> {
     /// # Errors
     /// What the writer says.
     pub fn new(mut out: W, extra: &[&str]) -> std::io::Result<Self> {
-        let names: Vec<&str> = COLUMNS
-            .iter()
-            .map(|c| c.0)
-            .chain(extra.iter().copied())
-            .collect();
+        let names: Vec<&str> = COLUMNS.iter().map(|c| c.0).chain(extra.iter().copied()).collect();
         writeln!(out, "{}", names.join(","))?;
-        Ok(Rows {
-            out,
-            line: String::with_capacity(512),
-        })
+        Ok(Rows { out, line: String::with_capacity(512) })
     }
 
     /// Writes a sample, then the extra fields (free of commas and quotes) in the header's order.
@@ -263,16 +200,9 @@ impl<W: Write> Rows<W> {
 /// # Errors
 /// The file cannot be read, a needed column is missing, or too many rows are unusable.
 pub fn load(path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
-    let fail = |source| CsvError::File {
-        doing: "read",
-        path: path.to_owned(),
-        source,
-    };
+    let fail = |source| CsvError::File { doing: "read", path: path.to_owned(), source };
     let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .map_err(fail)?
-        .read_to_end(&mut bytes)
-        .map_err(fail)?;
+    std::fs::File::open(path).map_err(fail)?.read_to_end(&mut bytes).map_err(fail)?;
     parse(&bytes, path, tolerance)
 }
 
@@ -281,29 +211,17 @@ pub fn load(path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
 /// # Errors
 /// As [`load`].
 pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
-    let text = |source| CsvError::Text {
-        path: path.to_owned(),
-        source,
-    };
+    let text = |source| CsvError::Text { path: path.to_owned(), source };
     // A row without its line end may miss digits: it is left out.
     let end = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
-    let mut reader = ::csv::ReaderBuilder::new()
-        .flexible(true)
-        .from_reader(&bytes[..end]);
+    let mut reader = ::csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..end]);
     let header = reader.byte_headers().map_err(text)?.clone();
-    let names: Vec<String> = header
-        .iter()
-        .map(|h| String::from_utf8_lossy(h).trim().to_owned())
-        .collect();
+    let names: Vec<String> =
+        header.iter().map(|h| String::from_utf8_lossy(h).trim().to_owned()).collect();
     check_columns(&names, path)?;
-    let places: Vec<Option<Place>> = names
-        .iter()
-        .map(|name| COLUMNS.iter().find(|c| c.0 == name).map(|c| c.2))
-        .collect();
-    let mut reading = Reading {
-        cut_short: end < bytes.len(),
-        ..Reading::default()
-    };
+    let places: Vec<Option<Place>> =
+        names.iter().map(|name| COLUMNS.iter().find(|c| c.0 == name).map(|c| c.2)).collect();
+    let mut reading = Reading { cut_short: end < bytes.len(), ..Reading::default() };
     reading.unknown_columns = names
         .iter()
         .zip(&places)
@@ -330,25 +248,15 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
 
 fn check_columns(names: &[String], path: &Path) -> Result<(), CsvError> {
     let has = |column: &str| names.iter().any(|n| n == column);
-    let missing = |column, remedy| CsvError::Column {
-        path: path.to_owned(),
-        column,
-        remedy,
-    };
+    let missing = |column, remedy| CsvError::Column { path: path.to_owned(), column, remedy };
     for column in NEEDED {
         if !has(column) {
-            return Err(missing(
-                column,
-                "add it, in the unit its name ends with".into(),
-            ));
+            return Err(missing(column, "add it, in the unit its name ends with".into()));
         }
     }
     for (command, position) in EITHER {
         if !has(command) && !has(position) {
-            return Err(missing(
-                command,
-                format!("add it, or the position `{position}`"),
-            ));
+            return Err(missing(command, format!("add it, or the position `{position}`")));
         }
     }
     Ok(())
@@ -369,12 +277,7 @@ fn sample(record: &::csv::ByteRecord, places: &[Option<Place>]) -> Option<Sample
 
 /// Whether a sample is later than the last one, has what is needed, and is possible.
 fn usable(s: &Sample, last: Option<&Sample>) -> bool {
-    let needed = [
-        s.time_s,
-        s.attitude_rad[0],
-        s.attitude_rad[1],
-        s.airspeed_mps,
-    ];
+    let needed = [s.time_s, s.attitude_rad[0], s.attitude_rad[1], s.airspeed_mps];
     let pi = std::f64::consts::PI + 1e-6;
     needed.iter().chain(&s.rates_radps).all(|x| x.is_finite())
         && COLUMNS.iter().all(|c| !c.1(s).is_infinite())
@@ -392,12 +295,9 @@ fn refuse_if_poor(
 ) -> Result<(), CsvError> {
     let poor = reading.dropped as f64 > REFUSED_SHARE * rows as f64;
     match (tolerance, reading.dropped_rows.first()) {
-        (Tolerance::Strict, Some(&first)) if poor => Err(CsvError::Unusable {
-            path: path.to_owned(),
-            dropped: reading.dropped,
-            rows,
-            first,
-        }),
+        (Tolerance::Strict, Some(&first)) if poor => {
+            Err(CsvError::Unusable { path: path.to_owned(), dropped: reading.dropped, rows, first })
+        }
         _ => Ok(()),
     }
 }
@@ -408,19 +308,14 @@ mod tests {
 
     fn flown(rows: usize) -> Flight {
         let sample = |i: usize| {
-            let mut sample = Sample {
-                time_s: i as f64 * 0.01,
-                ..Sample::default()
-            };
+            let mut sample = Sample { time_s: i as f64 * 0.01, ..Sample::default() };
             // Every column a number of its own that no decimal fraction writes exactly.
             for (k, column) in COLUMNS.iter().enumerate().skip(1) {
                 *column.2(&mut sample) = ((i + k) as f64).sin().abs() / 3.0;
             }
             sample
         };
-        Flight {
-            samples: (0..rows).map(sample).collect(),
-        }
+        Flight { samples: (0..rows).map(sample).collect() }
     }
 
     fn text(flight: &Flight) -> Vec<u8> {
@@ -455,10 +350,7 @@ mod tests {
             assert_eq!(reading.flight.samples.len(), rows);
         }
         for end in 0..header {
-            assert!(
-                matches!(read(&whole[..end]), Err(CsvError::Column { .. })),
-                "{end}"
-            );
+            assert!(matches!(read(&whole[..end]), Err(CsvError::Column { .. })), "{end}");
         }
     }
 
@@ -476,23 +368,16 @@ mod tests {
             flight.samples[i].rates_radps[1] = f64::NAN;
         }
         let error = read(&text(&flight)).unwrap_err().to_string();
-        assert!(
-            error.contains("6 of 100") && error.contains("row 12"),
-            "{error}"
-        );
+        assert!(error.contains("6 of 100") && error.contains("row 12"), "{error}");
         let lenient = parse(&text(&flight), Path::new("flight.csv"), Tolerance::Lenient).unwrap();
         assert_eq!(lenient.flight.samples.len(), 94);
     }
 
     #[test]
     fn a_missing_column_is_named_with_what_would_satisfy_it() {
-        let error = read(b"time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps\n")
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("`airspeed_mps`") && error.contains("flight.csv"),
-            "{error}"
-        );
+        let error =
+            read(b"time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps\n").unwrap_err().to_string();
+        assert!(error.contains("`airspeed_mps`") && error.contains("flight.csv"), "{error}");
         let error =
             read(b"time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps,airspeed_mps\n").unwrap_err();
         assert!(error.to_string().contains("`aileron_rad`"), "{error}");
@@ -513,13 +398,7 @@ mod tests {
 
     #[test]
     fn garbage_is_an_error_or_an_empty_flight_but_no_panic() {
-        for bytes in [
-            &b""[..],
-            b"\n\n",
-            b"\xff\xfe\x00\n1,2\n",
-            b"time_s\n\"",
-            &[0u8; 300],
-        ] {
+        for bytes in [&b""[..], b"\n\n", b"\xff\xfe\x00\n1,2\n", b"time_s\n\"", &[0u8; 300]] {
             assert!(read(bytes).is_err());
         }
     }
@@ -530,9 +409,6 @@ mod tests {
         let path = dir.path().join("flight.csv");
         save(&flown(2), &path).unwrap();
         assert!(matches!(save(&flown(9), &path), Err(CsvError::File { .. })));
-        assert_eq!(
-            load(&path, Tolerance::Strict).unwrap().flight.samples.len(),
-            2
-        );
+        assert_eq!(load(&path, Tolerance::Strict).unwrap().flight.samples.len(), 2);
     }
 }

@@ -34,10 +34,7 @@ pub fn x8() -> &'static GreyBox {
 pub fn options(pace: Pace) -> Options {
     Options {
         vehicle: "udpin:127.0.0.1:0".parse().unwrap(),
-        clients: vec![
-            "udpin:127.0.0.1:0".parse().unwrap(),
-            "tcpin:127.0.0.1:0".parse().unwrap(),
-        ],
+        clients: vec!["udpin:127.0.0.1:0".parse().unwrap(), "tcpin:127.0.0.1:0".parse().unwrap()],
         record: None,
         pace,
         duration: None,
@@ -59,10 +56,7 @@ impl Companion {
 
     pub fn with(options: &Options, crew: Crew) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
-        Companion {
-            flight: Some(Flight::start(options, crew, stop.clone()).unwrap()),
-            stop,
-        }
+        Companion { flight: Some(Flight::start(options, crew, stop.clone()).unwrap()), stop }
     }
 
     pub fn vehicle(&self) -> SocketAddr {
@@ -75,11 +69,7 @@ impl Companion {
 
     pub fn end(mut self) -> Summary {
         self.stop.store(true, Ordering::Relaxed);
-        self.flight
-            .take()
-            .unwrap()
-            .join()
-            .expect("the control thread panicked")
+        self.flight.take().unwrap().join().expect("the control thread panicked")
     }
 }
 
@@ -91,11 +81,7 @@ impl Drop for Companion {
 
 /// A MAVLink 2 frame.
 pub fn frame(system: u8, component: u8, message: &MavMessage) -> Vec<u8> {
-    let header = MavHeader {
-        system_id: system.into(),
-        component_id: component,
-        sequence: 0,
-    };
+    let header = MavHeader { system_id: system.into(), component_id: component, sequence: 0 };
     let mut raw = MAVLinkV2MessageRaw::new();
     raw.serialize_message(header, message);
     raw.raw_bytes().to_vec()
@@ -178,31 +164,15 @@ impl Vehicle {
 
     /// The five messages of a state frame.
     fn frames(&self, trouble: Trouble) -> Vec<Vec<u8>> {
-        let (s, z) = (
-            self.twin.state,
-            self.twin.actuators.observed(&x8().airframe.actuators),
-        );
+        let (s, z) = (self.twin.state, self.twin.actuators.observed(&x8().airframe.actuators));
         let time_usec = self.time_us;
         let mut actuator = [0.0; 32];
         let full = x8().airframe.actuators.deflection_max;
-        let scaled = [
-            z.aileron,
-            z.elevator,
-            z.throttle * full,
-            z.aileron_rate,
-            z.elevator_rate,
-        ];
-        actuator
-            .iter_mut()
-            .zip(scaled)
-            .for_each(|(a, x)| *a = (x / full) as f32);
+        let scaled = [z.aileron, z.elevator, z.throttle * full, z.aileron_rate, z.elevator_rate];
+        actuator.iter_mut().zip(scaled).for_each(|(a, x)| *a = (x / full) as f32);
         let (sr, cr) = (s.roll / 2.0).sin_cos();
         let (sp, cp) = (s.pitch / 2.0).sin_cos();
-        let q = if trouble == Trouble::NotANumber {
-            f32::NAN
-        } else {
-            s.q as f32
-        };
+        let q = if trouble == Trouble::NotANumber { f32::NAN } else { s.q as f32 };
         let air = VFR_HUD_DATA {
             airspeed: s.airspeed as f32,
             alt: self.twin.altitude as f32,
@@ -276,9 +246,8 @@ impl Vehicle {
     fn receive(&self, patience: Duration) -> Option<Answer> {
         let end = Instant::now() + patience;
         let mut buffer = [0; 2048];
-        while let Some(left) = end
-            .checked_duration_since(Instant::now())
-            .filter(|left| !left.is_zero())
+        while let Some(left) =
+            end.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())
         {
             self.socket.set_read_timeout(Some(left)).unwrap();
             let Ok(len) = self.socket.recv(&mut buffer) else {
@@ -302,11 +271,8 @@ impl Vehicle {
                 1 => bytes.truncate(self.time_us as usize / 10_000 % whole.len()),
                 // Another system's state.
                 2 => {
-                    bytes = frames
-                        .iter()
-                        .map(|_| frame(9, 200, &tilted()))
-                        .collect::<Vec<_>>()
-                        .concat()
+                    bytes =
+                        frames.iter().map(|_| frame(9, 200, &tilted())).collect::<Vec<_>>().concat()
                 }
                 3 => bytes = vec![0xFD; 300],
                 _ => bytes.clear(),
@@ -353,13 +319,7 @@ fn answer(message: MavMessage) -> Option<Answer> {
     };
     let armed = m.mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED);
     let [aileron, elevator, throttle, ..] = m.controls;
-    Some(Answer {
-        time_us: m.time_usec,
-        aileron,
-        elevator,
-        throttle,
-        armed,
-    })
+    Some(Answer { time_us: m.time_usec, aileron, elevator, throttle, armed })
 }
 
 /// A vehicle under way.
@@ -390,9 +350,7 @@ pub fn check_surfaces(answers: &[Answer]) {
             "{a:?}"
         );
         if a.armed {
-            let step = (a.aileron - last[0])
-                .abs()
-                .max((a.elevator - last[1]).abs());
+            let step = (a.aileron - last[0]).abs().max((a.elevator - last[1]).abs());
             assert!(step <= SLEW, "step of {step} at {a:?}");
         } else {
             assert_eq!([a.aileron, a.elevator, a.throttle], [0.0; 3]);
@@ -413,19 +371,12 @@ impl Client {
     pub fn new(companion: SocketAddr) -> Self {
         let socket = Arc::new(UdpSocket::bind("127.0.0.1:0").unwrap());
         socket.connect(companion).unwrap();
-        socket
-            .set_read_timeout(Some(Duration::from_millis(20)))
-            .unwrap();
+        socket.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
         let (deliver, received) = channel();
         let stop = Arc::new(AtomicBool::new(false));
         let (listening, told) = (socket.clone(), stop.clone());
         std::thread::spawn(move || listen(&listening, &told, &deliver));
-        let client = Client {
-            socket,
-            received,
-            stop,
-            log: Vec::new(),
-        };
+        let client = Client { socket, received, stop, log: Vec::new() };
         client.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
             mavtype: MavType::MAV_TYPE_GCS,
             ..Default::default()

@@ -144,34 +144,14 @@ impl Config {
     pub fn check(&self) -> Result<(), ConfigError> {
         for (name, value, low, high) in self.ranges() {
             if !(value >= low && value <= high) {
-                return Err(ConfigError::Range {
-                    name,
-                    value,
-                    low,
-                    high,
-                });
+                return Err(ConfigError::Range { name, value, low, high });
             }
         }
         let e = &self.envelope;
         let ordered = [
-            (
-                "pitch_min_deg",
-                e.pitch_min_deg,
-                "pitch_max_deg",
-                e.pitch_max_deg,
-            ),
-            (
-                "airspeed_min_mps",
-                e.airspeed_min_mps,
-                "airspeed_cruise_mps",
-                e.airspeed_cruise_mps,
-            ),
-            (
-                "airspeed_cruise_mps",
-                e.airspeed_cruise_mps,
-                "airspeed_max_mps",
-                e.airspeed_max_mps,
-            ),
+            ("pitch_min_deg", e.pitch_min_deg, "pitch_max_deg", e.pitch_max_deg),
+            ("airspeed_min_mps", e.airspeed_min_mps, "airspeed_cruise_mps", e.airspeed_cruise_mps),
+            ("airspeed_cruise_mps", e.airspeed_cruise_mps, "airspeed_max_mps", e.airspeed_max_mps),
         ];
         for (smaller, low, larger, high) in ordered {
             if low >= high {
@@ -188,10 +168,7 @@ impl Config {
                 && t.elevator.abs() <= 1.0
                 && (0.0..=1.0).contains(&t.throttle)
         };
-        let rising = self
-            .trim
-            .windows(2)
-            .all(|w| w[0].airspeed_mps < w[1].airspeed_mps);
+        let rising = self.trim.windows(2).all(|w| w[0].airspeed_mps < w[1].airspeed_mps);
         if self.trim.is_empty() || !rising || !self.trim.iter().all(finite) {
             Err(ConfigError::Trim)
         } else {
@@ -215,12 +192,7 @@ impl Config {
             ("surface_slew_per_s", e.surface_slew_per_s, 1.0, 200.0),
             ("throttle_slew_per_s", self.throttle_slew_per_s, 0.5, 100.0),
             ("arm_tilt_max_deg", self.arm_tilt_max_deg, 5.0, 180.0),
-            (
-                "disarm_airspeed_max_mps",
-                self.disarm_airspeed_max_mps,
-                0.0,
-                100.0,
-            ),
+            ("disarm_airspeed_max_mps", self.disarm_airspeed_max_mps, 0.0, 100.0),
         ]
     }
 
@@ -282,10 +254,7 @@ mod tests {
         ] {
             let row = x8().trim_at(airspeed);
             assert!((row.pitch_deg - pitch).abs() < 0.05, "{row:?}");
-            assert!(
-                (row.elevator - deflection / full).abs() < 0.005,
-                "{row:?}"
-            );
+            assert!((row.elevator - deflection / full).abs() < 0.005, "{row:?}");
             assert!((row.throttle - throttle).abs() < 0.002, "{row:?}");
         }
     }
@@ -298,10 +267,7 @@ mod tests {
             elevator: 0.0,
             throttle: 0.2,
         };
-        let config = Config {
-            trim: vec![row(20.0, 2.0), row(25.0, 1.0)],
-            ..x8()
-        };
+        let config = Config { trim: vec![row(20.0, 2.0), row(25.0, 1.0)], ..x8() };
         assert_eq!(config.trim_at(22.5), row(22.5, 1.5));
         assert_eq!(config.trim_at(5.0), config.trim[0]);
         assert_eq!(config.trim_at(80.0), config.trim[1]);
@@ -316,21 +282,7 @@ mod tests {
             words.contains("airspeed_min_mps") && words.contains("airspeed_cruise_mps"),
             "{words}"
         );
-        assert!(
-            Config {
-                throttle_slew_per_s: f64::NAN,
-                ..x8()
-            }
-            .check()
-            .is_err()
-        );
-        assert!(
-            Config {
-                trim: vec![],
-                ..x8()
-            }
-            .check()
-            .is_err()
-        );
+        assert!(Config { throttle_slew_per_s: f64::NAN, ..x8() }.check().is_err());
+        assert!(Config { trim: vec![], ..x8() }.check().is_err());
     }
 }

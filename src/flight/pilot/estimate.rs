@@ -54,8 +54,7 @@ impl Estimate {
 
     /// Whether `frame` comes from before the vehicle's newest by more than reordering explains.
     pub(super) fn restarted(&self, frame: &Telemetry) -> bool {
-        self.newest
-            .is_some_and(|newest| newest.since(frame.time) > RESTART)
+        self.newest.is_some_and(|newest| newest.since(frame.time) > RESTART)
     }
 
     /// Counts the state as fresh from `now`, as when it has been standing still with a reason.

@@ -120,11 +120,7 @@ mod tests {
     }
 
     fn wish(roll_deg: f64, pitch_deg: f64) -> Target {
-        Target {
-            roll: roll_deg.to_radians(),
-            pitch: pitch_deg.to_radians(),
-            airspeed: 22.0,
-        }
+        Target { roll: roll_deg.to_radians(), pitch: pitch_deg.to_radians(), airspeed: 22.0 }
     }
 
     #[test]
@@ -151,10 +147,7 @@ mod tests {
     #[test]
     fn the_load_limit_binds_where_the_bank_limit_is_wide() {
         // 1 / cos 80° is 5.8; a load of 2.2 allows acos(1 / 2.2) = 62.96°.
-        let envelope = Limits {
-            bank_max: 80f64.to_radians(),
-            ..x8()
-        };
+        let envelope = Limits { bank_max: 80f64.to_radians(), ..x8() };
         assert!((envelope.bank_limit(40.0).to_degrees() - 62.96).abs() < 0.01);
     }
 
@@ -180,16 +173,8 @@ mod tests {
     fn full_travel_takes_ten_ticks() {
         // 2.0 of travel in 0.1 s is 0.2 a tick.
         let e = x8();
-        let mut now = Command {
-            aileron: -1.0,
-            elevator: 1.0,
-            throttle: 0.0,
-        };
-        let wanted = Command {
-            aileron: 1e30,
-            elevator: -5.0,
-            throttle: 2.0,
-        };
+        let mut now = Command { aileron: -1.0, elevator: 1.0, throttle: 0.0 };
+        let wanted = Command { aileron: 1e30, elevator: -5.0, throttle: 2.0 };
         for _ in 0..9 {
             now = e.slew(now, wanted);
             assert!(now.aileron < 1.0 - 1e-9);

@@ -68,10 +68,7 @@ enum Pending {
     Repeated,
     Unusable,
     Sticks(Sticks),
-    Fly {
-        seen: Observation,
-        throttle: Option<f64>,
-    },
+    Fly { seen: Observation, throttle: Option<f64> },
 }
 
 /// When each kind of trouble was last told.
@@ -151,11 +148,7 @@ impl Pilot {
             Pending::Fly { seen, .. } => {
                 let engage = (!self.planner_engaged).then_some(self.in_force);
                 self.planner_engaged = true;
-                Some(Request {
-                    observation: seen,
-                    target: self.target,
-                    engage,
-                })
+                Some(Request { observation: seen, target: self.target, engage })
             }
             Pending::Repeated => None,
             _ => {
@@ -172,11 +165,7 @@ impl Pilot {
             Pending::Repeated => (self.in_force, self.source),
             Pending::Unusable => self.without_state(),
             Pending::Sticks(s) => (
-                Command {
-                    aileron: s.roll,
-                    elevator: s.pitch,
-                    throttle: s.throttle,
-                },
+                Command { aileron: s.roll, elevator: s.pitch, throttle: s.throttle },
                 Source::Sticks,
             ),
             Pending::Fly { seen, throttle } => self.with_state(plan, &seen, throttle),
@@ -185,11 +174,8 @@ impl Pilot {
         if !matches!(self.pending, Pending::Repeated) {
             self.before = self.in_force;
         }
-        self.in_force = if self.armed {
-            self.limits.slew(self.in_force, wanted)
-        } else {
-            Command::IDLE
-        };
+        self.in_force =
+            if self.armed { self.limits.slew(self.in_force, wanted) } else { Command::IDLE };
         self.decision()
     }
 
@@ -243,11 +229,7 @@ impl Pilot {
             airspeed: self.config.envelope.airspeed_cruise_mps,
         };
         if quality == Frame::Repeated {
-            return if self.armed {
-                Pending::Repeated
-            } else {
-                Pending::Disarmed
-            };
+            return if self.armed { Pending::Repeated } else { Pending::Disarmed };
         }
         if let Frame::Defective(reason) = quality {
             self.complain_of_state(reason);
@@ -266,13 +248,7 @@ impl Pilot {
         };
         let (wish, throttle) = self.wish();
         self.target = self.limits.limit(wish, frame.state.airspeed);
-        let Telemetry {
-            time,
-            mut state,
-            actuators,
-            altitude,
-            ..
-        } = frame;
+        let Telemetry { time, mut state, actuators, altitude, .. } = frame;
         // Noise of a sensor at rest.
         state.airspeed = state.airspeed.max(0.0);
         Pending::Fly {
@@ -292,17 +268,9 @@ impl Pilot {
         let airspeed = self.config.envelope.airspeed_cruise_mps;
         match (self.mode, self.setpoint, self.sticks) {
             (Mode::Offboard, Some((_, s)), _) => {
-                let throttle = s
-                    .thrust
-                    .filter(|_| self.config.thrust_source == ThrustSource::Setpoint);
-                (
-                    Target {
-                        roll: s.roll,
-                        pitch: s.pitch,
-                        airspeed,
-                    },
-                    throttle,
-                )
+                let throttle =
+                    s.thrust.filter(|_| self.config.thrust_source == ThrustSource::Setpoint);
+                (Target { roll: s.roll, pitch: s.pitch, airspeed }, throttle)
             }
             (Mode::Stabilized, _, Some((_, s))) => {
                 // A stick forward is nose down; each half of its travel reaches its own limit.
@@ -311,14 +279,7 @@ impl Pilot {
                 } else {
                     -s.pitch * self.limits.pitch_max
                 };
-                (
-                    Target {
-                        roll: s.roll * self.limits.bank_max,
-                        pitch,
-                        airspeed,
-                    },
-                    Some(s.throttle),
-                )
+                (Target { roll: s.roll * self.limits.bank_max, pitch, airspeed }, Some(s.throttle))
             }
             _ => (self.level_target(), None),
         }
@@ -326,11 +287,7 @@ impl Pilot {
 
     fn level_target(&self) -> Target {
         let airspeed = self.config.envelope.airspeed_cruise_mps;
-        Target {
-            roll: 0.0,
-            pitch: self.config.trim_at(airspeed).pitch_deg.to_radians(),
-            airspeed,
-        }
+        Target { roll: 0.0, pitch: self.config.trim_at(airspeed).pitch_deg.to_radians(), airspeed }
     }
 
     fn with_state(
@@ -347,19 +304,16 @@ impl Pilot {
             Plan::Ready(_) => {
                 self.planner_engaged = false;
                 if due(&mut self.complaints.plan, self.clock) {
-                    self.texts.say(
-                        Severity::Error,
-                        "controller gave no finite command: fallback flies",
-                    );
+                    self.texts
+                        .say(Severity::Error, "controller gave no finite command: fallback flies");
                 }
                 self.fall_back(seen, Source::Fallback)
             }
             Plan::Late => self.fall_back(seen, Source::Late),
             Plan::None => self.fall_back(seen, Source::Fallback),
         };
-        command.throttle = self
-            .limits
-            .protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
+        command.throttle =
+            self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
         (command, source)
     }
 
@@ -374,19 +328,14 @@ impl Pilot {
         }
         self.fallback_engaged = false;
         if due(&mut self.complaints.fallback, self.clock) {
-            self.texts.say(
-                Severity::Critical,
-                "fallback gave no finite command: level at trim",
-            );
+            self.texts.say(Severity::Critical, "fallback gave no finite command: level at trim");
         }
         (self.level_command(), Source::Level)
     }
 
     /// The command while the state cannot be used.
     fn without_state(&self) -> (Command, Source) {
-        let short = self
-            .estimate
-            .usable_within(self.clock, self.config.state_hold_s);
+        let short = self.estimate.usable_within(self.clock, self.config.state_hold_s);
         if short && !self.vehicle_lost {
             (self.in_force, Source::Held)
         } else {
@@ -395,27 +344,18 @@ impl Pilot {
     }
 
     fn level_command(&self) -> Command {
-        let trim = self
-            .config
-            .trim_at(self.config.envelope.airspeed_cruise_mps);
-        Command {
-            aileron: 0.0,
-            elevator: trim.elevator,
-            throttle: trim.throttle,
-        }
+        let trim = self.config.trim_at(self.config.envelope.airspeed_cruise_mps);
+        Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle }
     }
 
     fn watch_vehicle(&mut self) {
-        let fresh = self
-            .estimate
-            .fresh_within(self.clock, self.config.vehicle_loss_s);
+        let fresh = self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s);
         if fresh != Some(false) || self.vehicle_lost {
             return;
         }
         self.vehicle_lost = true;
         if self.armed {
-            self.texts
-                .say(Severity::Critical, "vehicle link lost: level, HOLD");
+            self.texts.say(Severity::Critical, "vehicle link lost: level, HOLD");
             self.mode = Mode::Hold;
         } else {
             self.texts.say(Severity::Warning, "vehicle link lost");
@@ -424,17 +364,11 @@ impl Pilot {
 
     fn watch_return(&mut self) {
         if self.vehicle_lost
-            && self
-                .estimate
-                .fresh_within(self.clock, self.config.vehicle_loss_s)
-                == Some(true)
+            && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true)
         {
             self.vehicle_lost = false;
-            let words = if self.armed {
-                "vehicle link back: flying in HOLD"
-            } else {
-                "vehicle link back"
-            };
+            let words =
+                if self.armed { "vehicle link back: flying in HOLD" } else { "vehicle link back" };
             self.texts.say(Severity::Notice, words);
         }
     }
@@ -446,10 +380,7 @@ impl Pilot {
             Mode::Hold | Mode::Return => return,
         };
         if lost {
-            let words = format!(
-                "{} lost for {:.1} s: HOLD",
-                what, self.config.offboard_loss_s
-            );
+            let words = format!("{} lost for {:.1} s: HOLD", what, self.config.offboard_loss_s);
             self.texts.say(Severity::Critical, words);
             self.mode = Mode::Hold;
             self.setpoint_lost = true;
@@ -459,10 +390,7 @@ impl Pilot {
     /// The vehicle's clock has started again: all that was known is of another life.
     fn restart(&mut self) {
         if self.estimate.last().is_some() {
-            self.texts.say(
-                Severity::Warning,
-                "vehicle clock went back: vehicle restarted?",
-            );
+            self.texts.say(Severity::Warning, "vehicle clock went back: vehicle restarted?");
         }
         self.estimate = Estimate::default();
         self.setpoint = None;
@@ -474,8 +402,7 @@ impl Pilot {
 
     fn complain_of_state(&mut self, reason: &'static str) {
         if due(&mut self.complaints.defect, self.clock) {
-            self.texts
-                .say(Severity::Error, format!("vehicle state refused: {reason}"));
+            self.texts.say(Severity::Error, format!("vehicle state refused: {reason}"));
         }
     }
 }

@@ -32,22 +32,13 @@ impl Pilot {
         let state = self.estimate.last().map(|t| t.state)?;
         let tilt = self.config.arm_tilt_max_deg.to_radians();
         if state.roll.abs() > tilt || state.pitch.abs() > tilt {
-            return Some(format!(
-                "tilted beyond {:.0} degrees",
-                self.config.arm_tilt_max_deg
-            ));
+            return Some(format!("tilted beyond {:.0} degrees", self.config.arm_tilt_max_deg));
         }
         if state.airspeed > self.config.envelope.airspeed_max_mps {
-            return Some(format!(
-                "airspeed {:.1} m/s is above the maximum",
-                state.airspeed
-            ));
+            return Some(format!("airspeed {:.1} m/s is above the maximum", state.airspeed));
         }
         if matches!(self.mode, Mode::Manual | Mode::Stabilized) && !self.sticks_fresh() {
-            return Some(format!(
-                "{} without sticks: choose HOLD",
-                mode_name(self.mode)
-            ));
+            return Some(format!("{} without sticks: choose HOLD", mode_name(self.mode)));
         }
         None
     }
@@ -70,27 +61,16 @@ impl Pilot {
     }
 
     pub(super) fn setpoint_fresh(&self) -> bool {
-        within(
-            self.setpoint.map(|(at, _)| at),
-            self.clock,
-            self.config.offboard_loss_s,
-        )
+        within(self.setpoint.map(|(at, _)| at), self.clock, self.config.offboard_loss_s)
     }
 
     pub(super) fn sticks_fresh(&self) -> bool {
-        within(
-            self.sticks.map(|(at, _)| at),
-            self.clock,
-            self.config.offboard_loss_s,
-        )
+        within(self.sticks.map(|(at, _)| at), self.clock, self.config.offboard_loss_s)
     }
 
     pub(super) fn vehicle_alive(&self) -> bool {
         !self.vehicle_lost
-            && self
-                .estimate
-                .fresh_within(self.clock, self.config.vehicle_loss_s)
-                == Some(true)
+            && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true)
     }
 
     fn airspeed(&self) -> f64 {
@@ -112,8 +92,7 @@ impl Autopilot for Pilot {
         self.forget_controllers();
         // Up to now the aircraft may have been standing still.
         self.estimate.refresh(now);
-        self.texts
-            .say(Severity::Notice, format!("armed, {}", mode_name(self.mode)));
+        self.texts.say(Severity::Notice, format!("armed, {}", mode_name(self.mode)));
         Verdict::Accepted
     }
 
@@ -147,8 +126,7 @@ impl Autopilot for Pilot {
         self.setpoint_lost = false;
         if self.mode != mode {
             self.mode = mode;
-            self.texts
-                .say(Severity::Info, format!("mode {}", mode_name(mode)));
+            self.texts.say(Severity::Info, format!("mode {}", mode_name(mode)));
         }
         Verdict::Accepted
     }
@@ -164,15 +142,8 @@ impl Autopilot for Pilot {
 
     fn sticks(&mut self, now: Time, sticks: Sticks) {
         self.advance(now);
-        if [sticks.roll, sticks.pitch, sticks.throttle]
-            .iter()
-            .all(|x| x.is_finite())
-        {
-            let Sticks {
-                roll,
-                pitch,
-                throttle,
-            } = sticks;
+        if [sticks.roll, sticks.pitch, sticks.throttle].iter().all(|x| x.is_finite()) {
+            let Sticks { roll, pitch, throttle } = sticks;
             let limited = Sticks {
                 roll: roll.clamp(-1.0, 1.0),
                 pitch: pitch.clamp(-1.0, 1.0),

@@ -8,66 +8,22 @@ type Real = (&'static str, fn(&Config) -> f64, fn(&mut Config, f64));
 
 /// The real parameters, in the order of their index. Names have at most 16 characters.
 const REALS: [Real; 12] = [
-    (
-        "GL_OFFB_LOSS_S",
-        |c| c.offboard_loss_s,
-        |c, x| c.offboard_loss_s = x,
-    ),
-    (
-        "GL_VEH_LOSS_S",
-        |c| c.vehicle_loss_s,
-        |c, x| c.vehicle_loss_s = x,
-    ),
-    (
-        "GL_BANK_MAX_DEG",
-        |c| c.envelope.bank_max_deg,
-        |c, x| c.envelope.bank_max_deg = x,
-    ),
-    (
-        "GL_PITCH_MAX_DEG",
-        |c| c.envelope.pitch_max_deg,
-        |c, x| c.envelope.pitch_max_deg = x,
-    ),
-    (
-        "GL_PITCH_MIN_DEG",
-        |c| c.envelope.pitch_min_deg,
-        |c, x| c.envelope.pitch_min_deg = x,
-    ),
+    ("GL_OFFB_LOSS_S", |c| c.offboard_loss_s, |c, x| c.offboard_loss_s = x),
+    ("GL_VEH_LOSS_S", |c| c.vehicle_loss_s, |c, x| c.vehicle_loss_s = x),
+    ("GL_BANK_MAX_DEG", |c| c.envelope.bank_max_deg, |c, x| c.envelope.bank_max_deg = x),
+    ("GL_PITCH_MAX_DEG", |c| c.envelope.pitch_max_deg, |c, x| c.envelope.pitch_max_deg = x),
+    ("GL_PITCH_MIN_DEG", |c| c.envelope.pitch_min_deg, |c, x| c.envelope.pitch_min_deg = x),
     (
         "GL_CRUISE_MPS",
         |c| c.envelope.airspeed_cruise_mps,
         |c, x| c.envelope.airspeed_cruise_mps = x,
     ),
-    (
-        "GL_AIRSPD_MIN",
-        |c| c.envelope.airspeed_min_mps,
-        |c, x| c.envelope.airspeed_min_mps = x,
-    ),
-    (
-        "GL_AIRSPD_MAX",
-        |c| c.envelope.airspeed_max_mps,
-        |c, x| c.envelope.airspeed_max_mps = x,
-    ),
-    (
-        "GL_LOAD_MAX",
-        |c| c.envelope.load_factor_max,
-        |c, x| c.envelope.load_factor_max = x,
-    ),
-    (
-        "GL_SLEW_SURF",
-        |c| c.envelope.surface_slew_per_s,
-        |c, x| c.envelope.surface_slew_per_s = x,
-    ),
-    (
-        "GL_SLEW_THR",
-        |c| c.throttle_slew_per_s,
-        |c, x| c.throttle_slew_per_s = x,
-    ),
-    (
-        "GL_DISARM_MPS",
-        |c| c.disarm_airspeed_max_mps,
-        |c, x| c.disarm_airspeed_max_mps = x,
-    ),
+    ("GL_AIRSPD_MIN", |c| c.envelope.airspeed_min_mps, |c, x| c.envelope.airspeed_min_mps = x),
+    ("GL_AIRSPD_MAX", |c| c.envelope.airspeed_max_mps, |c, x| c.envelope.airspeed_max_mps = x),
+    ("GL_LOAD_MAX", |c| c.envelope.load_factor_max, |c, x| c.envelope.load_factor_max = x),
+    ("GL_SLEW_SURF", |c| c.envelope.surface_slew_per_s, |c, x| c.envelope.surface_slew_per_s = x),
+    ("GL_SLEW_THR", |c| c.throttle_slew_per_s, |c, x| c.throttle_slew_per_s = x),
+    ("GL_DISARM_MPS", |c| c.disarm_airspeed_max_mps, |c, x| c.disarm_airspeed_max_mps = x),
 ];
 /// Index of GL_THRUST_SRC: 0 holds the cruise airspeed, 1 takes the setpoint's thrust.
 const THRUST_SOURCE: usize = REALS.len();
@@ -78,23 +34,16 @@ const AUTOPILOT_SYSTEM: i32 = 1;
 
 /// The table that shows `config`.
 pub(super) fn table(config: &Config) -> Vec<Parameter> {
-    let reals = REALS.iter().map(|(name, get, _)| Parameter {
-        name,
-        value: ParameterValue::Real(get(config) as f32),
-    });
+    let reals = REALS
+        .iter()
+        .map(|(name, get, _)| Parameter { name, value: ParameterValue::Real(get(config) as f32) });
     let source = match config.thrust_source {
         ThrustSource::Cruise => 0,
         ThrustSource::Setpoint => 1,
     };
-    let ints = [
-        ("GL_THRUST_SRC", source),
-        ("SYSID_THISMAV", AUTOPILOT_SYSTEM),
-    ];
+    let ints = [("GL_THRUST_SRC", source), ("SYSID_THISMAV", AUTOPILOT_SYSTEM)];
     reals
-        .chain(ints.map(|(name, value)| Parameter {
-            name,
-            value: ParameterValue::Int(value),
-        }))
+        .chain(ints.map(|(name, value)| Parameter { name, value: ParameterValue::Int(value) }))
         .collect()
 }
 
@@ -150,12 +99,8 @@ mod tests {
 
     fn x8() -> Config {
         let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
-        let row = TrimPoint {
-            airspeed_mps: 20.0,
-            pitch_deg: 0.858,
-            elevator: 0.13,
-            throttle: 0.185,
-        };
+        let row =
+            TrimPoint { airspeed_mps: 20.0, pitch_deg: 0.858, elevator: 0.13, throttle: 0.185 };
         Config::new(airframe.envelope, vec![row])
     }
 
@@ -186,10 +131,7 @@ mod tests {
         let Err(Verdict::Denied(words)) = changed(&config, 2, ParameterValue::Real(90.0)) else {
             panic!()
         };
-        assert!(
-            words.contains("GL_BANK_MAX_DEG") && words.contains("80"),
-            "{words}"
-        );
+        assert!(words.contains("GL_BANK_MAX_DEG") && words.contains("80"), "{words}");
         for bad in [f32::NAN, f32::INFINITY, -1e30] {
             assert!(changed(&config, 0, ParameterValue::Real(bad)).is_err());
         }

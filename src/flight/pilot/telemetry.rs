@@ -15,21 +15,13 @@ const STATE_FAULTS: [(Faults, &str); 5] = [
 /// What of this frame cannot be flown on, if anything: what the link has found, and what is not
 /// finite or beyond any aircraft all the same.
 pub(super) fn defect(frame: &Telemetry) -> Option<&'static str> {
-    let found = STATE_FAULTS
-        .iter()
-        .find(|(fault, _)| frame.faults.contains(*fault));
+    let found = STATE_FAULTS.iter().find(|(fault, _)| frame.faults.contains(*fault));
     found.map(|(_, name)| *name).or_else(|| implausible(frame))
 }
 
 fn implausible(frame: &Telemetry) -> Option<&'static str> {
     let (s, z) = (&frame.state, &frame.actuators);
-    let actuators = [
-        z.aileron,
-        z.aileron_rate,
-        z.elevator,
-        z.elevator_rate,
-        z.throttle,
-    ];
+    let actuators = [z.aileron, z.aileron_rate, z.elevator, z.elevator_rate, z.throttle];
     // Comparisons with NaN are false, so these also refuse what is not finite.
     if !(s.roll.abs() <= HALF_TURN && s.pitch.abs() <= HALF_TURN / 2.0) {
         Some("attitude")
@@ -103,13 +95,7 @@ mod tests {
                 frame.state = State::from_array(x);
                 assert!(defect(&frame).is_some(), "state component {i} = {bad}");
             }
-            assert!(
-                defect(&Telemetry {
-                    altitude: bad,
-                    ..good()
-                })
-                .is_some()
-            );
+            assert!(defect(&Telemetry { altitude: bad, ..good() }).is_some());
         }
         for i in 0..5 {
             let mut z = ActuatorState::default();
@@ -121,11 +107,7 @@ mod tests {
                 &mut z.throttle,
             ][i] = f64::NAN;
             assert!(
-                defect(&Telemetry {
-                    actuators: z,
-                    ..good()
-                })
-                .is_some(),
+                defect(&Telemetry { actuators: z, ..good() }).is_some(),
                 "actuator component {i}"
             );
         }

@@ -18,10 +18,7 @@ impl Texts {
         if self.waiting.len() == CAPACITY {
             self.waiting.pop_front();
         }
-        self.waiting.push_back(Text {
-            severity,
-            words: words.into(),
-        });
+        self.waiting.push_back(Text { severity, words: words.into() });
     }
 
     pub(super) fn take(&mut self) -> Option<Text> {

@@ -52,21 +52,14 @@ impl Place {
 }
 
 fn failure(path: &Path, source: std::io::Error) -> RecordError {
-    RecordError::File {
-        path: path.to_owned(),
-        source,
-    }
+    RecordError::File { path: path.to_owned(), source }
 }
 
 fn numbered(root: &Path) -> Result<PathBuf, RecordError> {
     fs::create_dir_all(root).map_err(|source| failure(root, source))?;
     let entries = fs::read_dir(root).map_err(|source| failure(root, source))?;
     let number = |name: std::ffi::OsString| name.to_str().and_then(|n| n.parse::<u32>().ok());
-    let mut next = entries
-        .flatten()
-        .filter_map(|e| number(e.file_name()))
-        .max()
-        .unwrap_or(0);
+    let mut next = entries.flatten().filter_map(|e| number(e.file_name())).max().unwrap_or(0);
     loop {
         next = next.saturating_add(1);
         let path = root.join(format!("{next:04}"));

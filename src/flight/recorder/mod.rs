@@ -63,10 +63,8 @@ impl Recorder {
         let folder = place.create()?;
         let csv = folder::create(&folder, "flight.csv")?;
         let tlog = folder::create(&folder, "flight.tlog")?;
-        Recorder::over(folder.clone(), csv, tlog).map_err(|source| RecordError::File {
-            path: folder,
-            source,
-        })
+        Recorder::over(folder.clone(), csv, tlog)
+            .map_err(|source| RecordError::File { path: folder, source })
     }
 
     /// A recorder over any two writers.
@@ -80,16 +78,8 @@ impl Recorder {
         let dropped = Arc::new(AtomicU64::new(0));
         let mut files = Files::new(csv, tlog, trouble);
         let work = move || files.run(&entries);
-        let thread = std::thread::Builder::new()
-            .name("recorder".into())
-            .spawn(work)?;
-        Ok(Recorder {
-            queue: Some(queue),
-            dropped,
-            troubles,
-            thread: Some(thread),
-            folder,
-        })
+        let thread = std::thread::Builder::new().name("recorder".into()).spawn(work)?;
+        Ok(Recorder { queue: Some(queue), dropped, troubles, thread: Some(thread), folder })
     }
 
     /// Where the files lie.
@@ -104,10 +94,7 @@ impl Recorder {
 
     /// Records a datagram, or whole frames of a stream, sent or received at `unix_us` (µs since 1970).
     pub fn bytes(&self, unix_us: u64, bytes: &[u8]) {
-        self.hand_over(Entry::Bytes {
-            unix_us,
-            bytes: bytes.into(),
-        });
+        self.hand_over(Entry::Bytes { unix_us, bytes: bytes.into() });
     }
 
     /// What has gone wrong since the last call; each file fails at most once.
@@ -126,10 +113,7 @@ impl Recorder {
     }
 
     fn hand_over(&self, entry: Entry) {
-        let full = self
-            .queue
-            .as_ref()
-            .is_none_or(|queue| queue.try_send(entry).is_err());
+        let full = self.queue.as_ref().is_none_or(|queue| queue.try_send(entry).is_err());
         if full {
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
@@ -137,15 +121,8 @@ impl Recorder {
 
     fn close(&mut self) -> Written {
         self.queue = None;
-        let written = self
-            .thread
-            .take()
-            .and_then(|thread| thread.join().ok())
-            .unwrap_or_default();
-        Written {
-            dropped: written.dropped + self.dropped(),
-            ..written
-        }
+        let written = self.thread.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        Written { dropped: written.dropped + self.dropped(), ..written }
     }
 }
 
@@ -170,9 +147,7 @@ impl<W> File<W> {
         };
         if let Err(error) = work(out) {
             self.out = None;
-            let _ = self
-                .trouble
-                .try_send(format!("recording of {} ended: {error}", self.name));
+            let _ = self.trouble.try_send(format!("recording of {} ended: {error}", self.name));
         }
         self.out.is_some()
     }
@@ -187,28 +162,15 @@ struct Files<C: Write, T: Write> {
 
 impl<C: Write, T: Write> Files<C, T> {
     fn new(csv: C, tlog: T, trouble: Sender<String>) -> Self {
-        let mut text = File {
-            name: "flight.csv",
-            out: None,
-            trouble: trouble.clone(),
-        };
+        let mut text = File { name: "flight.csv", out: None, trouble: trouble.clone() };
         match Rows::new(BufWriter::new(csv), &Row::EXTRA) {
             Ok(rows) => text.out = Some(rows),
-            Err(error) => drop(
-                text.trouble
-                    .try_send(format!("recording of flight.csv ended: {error}")),
-            ),
+            Err(error) => {
+                drop(text.trouble.try_send(format!("recording of flight.csv ended: {error}")))
+            }
         }
-        let tlog = File {
-            name: "flight.tlog",
-            out: Some(BufWriter::new(tlog)),
-            trouble,
-        };
-        Files {
-            csv: text,
-            tlog,
-            written: Written::default(),
-        }
+        let tlog = File { name: "flight.tlog", out: Some(BufWriter::new(tlog)), trouble };
+        Files { csv: text, tlog, written: Written::default() }
     }
 
     fn run(&mut self, entries: &Receiver<Entry>) -> Written {
@@ -281,28 +243,16 @@ mod tests {
             source: Source::Planned,
             armed: true,
             mode: Mode::Offboard,
-            target: Target {
-                roll: 0.0,
-                pitch: 0.0,
-                airspeed: 20.0,
-            },
+            target: Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 },
             failsafe: false,
         };
-        Row {
-            sample,
-            decision,
-            latency_us: 123.4,
-        }
+        Row { sample, decision, latency_us: 123.4 }
     }
 
     /// A heartbeat of system 1, component 1 in MAVLink 2, written by rust-mavlink.
     fn frame() -> Vec<u8> {
         use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavMessage};
-        let header = mavlink::MavHeader {
-            system_id: 1,
-            component_id: 1,
-            sequence: 0,
-        };
+        let header = mavlink::MavHeader { system_id: 1, component_id: 1, sequence: 0 };
         let mut bytes = Vec::new();
         mavlink::write_v2_msg(
             &mut bytes,
@@ -322,25 +272,12 @@ mod tests {
         recorder.bytes(0x0001_0203_0405_0607, &two);
         let folder = recorder.folder().to_owned();
         assert!(folder.ends_with("0001"));
-        assert_eq!(
-            recorder.finish(),
-            Written {
-                rows: 300,
-                frames: 2,
-                dropped: 0
-            }
-        );
+        assert_eq!(recorder.finish(), Written { rows: 300, frames: 2, dropped: 0 });
         let reading = csv::load(&folder.join("flight.csv"), Tolerance::Strict).unwrap();
         assert_eq!(reading.flight.samples.len(), 300);
         assert_eq!(reading.unknown_columns, Row::EXTRA);
         let text = std::fs::read_to_string(folder.join("flight.csv")).unwrap();
-        assert!(
-            text.lines()
-                .nth(1)
-                .unwrap()
-                .ends_with(",20,OFFBOARD,1,planned,0,123.4"),
-            "{text}"
-        );
+        assert!(text.lines().nth(1).unwrap().ends_with(",20,OFFBOARD,1,planned,0,123.4"), "{text}");
         let record = [&[0, 1, 2, 3, 4, 5, 6, 7][..], &frame()].concat();
         assert_eq!(
             std::fs::read(folder.join("flight.tlog")).unwrap(),
@@ -362,9 +299,8 @@ mod tests {
     fn nothing_is_overwritten() {
         let root = tempfile::tempdir().unwrap();
         let numbered = Place::Numbered(root.path().join("flights"));
-        let folders: Vec<_> = (0..3)
-            .map(|_| Recorder::start(&numbered).unwrap().folder().to_owned())
-            .collect();
+        let folders: Vec<_> =
+            (0..3).map(|_| Recorder::start(&numbered).unwrap().folder().to_owned()).collect();
         assert!(folders[2].ends_with("0003"));
         let error = Recorder::start(&Place::Exactly(folders[0].clone())).unwrap_err();
         assert!(matches!(error, RecordError::Exists { .. }), "{error}");
@@ -375,12 +311,7 @@ mod tests {
     #[test]
     fn a_full_disk_is_told_once_and_control_is_not_disturbed() {
         // /dev/full refuses every write as a full disk does.
-        let full = || {
-            std::fs::OpenOptions::new()
-                .write(true)
-                .open("/dev/full")
-                .unwrap()
-        };
+        let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
         let recorder = Recorder::over(PathBuf::from("nowhere"), full(), full()).unwrap();
         for i in 0..1000 {
             recorder.row(row(i));
@@ -415,22 +346,12 @@ mod tests {
 
     #[test]
     fn a_slow_disk_costs_rows_that_are_counted_and_no_time() {
-        let stuck = || Stuck {
-            hangs: Duration::from_secs(1),
-        };
+        let stuck = || Stuck { hangs: Duration::from_secs(1) };
         let recorder = Recorder::over(PathBuf::from("nowhere"), stuck(), stuck()).unwrap();
         let before = Instant::now();
         // Twice the queue: nearly the half cannot be taken while the disk sleeps.
         (0..2 * QUEUE as u64).for_each(|i| recorder.row(row(i)));
-        assert!(
-            before.elapsed() < Duration::from_millis(500),
-            "{:?}",
-            before.elapsed()
-        );
-        assert!(
-            recorder.dropped() > QUEUE as u64 / 2,
-            "{}",
-            recorder.dropped()
-        );
+        assert!(before.elapsed() < Duration::from_millis(500), "{:?}", before.elapsed());
+        assert!(recorder.dropped() > QUEUE as u64 / 2, "{}", recorder.dropped());
     }
 }

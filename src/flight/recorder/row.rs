@@ -19,14 +19,8 @@ pub struct Row {
 
 impl Row {
     /// The columns beside those of the log format.
-    pub const EXTRA: [&'static str; 6] = [
-        "airspeed_target_mps",
-        "mode",
-        "armed",
-        "source",
-        "failsafe",
-        "latency_us",
-    ];
+    pub const EXTRA: [&'static str; 6] =
+        ["airspeed_target_mps", "mode", "armed", "source", "failsafe", "latency_us"];
 
     pub(super) fn write<W: Write>(&self, out: &mut Rows<W>) -> std::io::Result<()> {
         let d = &self.decision;

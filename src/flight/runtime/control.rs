@@ -30,10 +30,7 @@ const NO_VEHICLE: Duration = Duration::from_secs(2);
 /// Weight of the newest tick in the load that the status shows.
 const LOAD_WEIGHT: f64 = 0.02;
 /// The autopilot identity.
-const AUTOPILOT: Source = Source {
-    system: 1,
-    component: 1,
-};
+const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
 /// All that the control thread owns.
 pub(super) struct Control {
@@ -98,8 +95,7 @@ impl Control {
     }
 
     fn is_over(&self) -> bool {
-        self.duration
-            .is_some_and(|duration| self.started.elapsed() >= duration)
+        self.duration.is_some_and(|duration| self.started.elapsed() >= duration)
     }
 
     /// Takes one arrival, the vehicle's before a client's, or waits until `until`.
@@ -141,15 +137,11 @@ impl Control {
         }
         self.clock.set(packet.arrived, state.time);
         let request = self.pilot.observe(state.time, state);
-        let plan = request.map_or(Plan::None, |request| {
-            self.planner.plan(&request, packet.arrived)
-        });
+        let plan =
+            request.map_or(Plan::None, |request| self.planner.plan(&request, packet.arrived));
         let decision = self.pilot.decide(plan);
-        self.outputs = if decision.armed {
-            Outputs::Armed(decision.command)
-        } else {
-            Outputs::Disarmed
-        };
+        self.outputs =
+            if decision.armed { Outputs::Armed(decision.command) } else { Outputs::Disarmed };
         let frame = self.vehicle.command(state.time, self.outputs);
         let copy = self.recorder.is_some().then(|| frame.clone());
         self.ports.vehicle.send(packet.peer, frame);
@@ -173,26 +165,16 @@ impl Control {
             self.say(Event::VehicleFound(packet.peer));
         }
         if let Some(last) = self.last_arrival.replace(packet.arrived) {
-            self.timing
-                .interval
-                .note(packet.arrived.saturating_duration_since(last));
+            self.timing.interval.note(packet.arrived.saturating_duration_since(last));
         }
         self.timing.latency.note(latency);
         self.timing.missed += u64::from(latency > CYCLE);
         self.timing.late_plans += u64::from(plan == Plan::Late);
         let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
         self.load += LOAD_WEIGHT * (share - self.load);
-        if let Some(recorder) = self
-            .recorder
-            .as_ref()
-            .filter(|_| state.order != Order::Repeated)
-        {
+        if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {
             let latency_us = latency.as_secs_f64() * 1e6;
-            recorder.row(Row {
-                sample: sample(state, decision),
-                decision: *decision,
-                latency_us,
-            });
+            recorder.row(Row { sample: sample(state, decision), decision: *decision, latency_us });
         }
     }
 
@@ -205,8 +187,7 @@ impl Control {
                     pilot: &mut self.pilot,
                     hear: |event| drop(self.events.try_send(event)),
                 };
-                self.clients
-                    .handle(now, packet.peer, &packet.bytes, &mut pilot);
+                self.clients.handle(now, packet.peer, &packet.bytes, &mut pilot);
                 self.record(&packet.bytes);
             }
             Arrival::Opened(peer) => self.clients.welcome(now, peer),
@@ -223,10 +204,8 @@ impl Control {
         if let Some(trouble) = self.recorder.as_ref().and_then(Recorder::trouble) {
             self.pilot.tell(Severity::Warning, &trouble);
         }
-        let mut pilot = Witness {
-            pilot: &mut self.pilot,
-            hear: |event| drop(self.events.try_send(event)),
-        };
+        let mut pilot =
+            Witness { pilot: &mut self.pilot, hear: |event| drop(self.events.try_send(event)) };
         self.clients.poll(now, &mut pilot);
         self.send_to_clients();
         self.greet_vehicle(now.host);
@@ -277,16 +256,12 @@ impl Control {
     }
 
     fn now(&self, host: Instant) -> Now {
-        Now {
-            host: host.saturating_duration_since(self.started),
-            vehicle: self.clock.at(host),
-        }
+        Now { host: host.saturating_duration_since(self.started), vehicle: self.clock.at(host) }
     }
 
     fn finish(self) -> Summary {
-        let recording = self
-            .recorder
-            .map(|recorder| (recorder.folder().to_owned(), recorder.finish()));
+        let recording =
+            self.recorder.map(|recorder| (recorder.folder().to_owned(), recorder.finish()));
         let summary = Summary {
             duration_s: self.started.elapsed().as_secs_f64(),
             vehicle: self.vehicle.counts(),
@@ -313,11 +288,7 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let (s, z, c) = (&state.state, &state.actuators, &decision.command);
     // A part with a fault still holds its last good value; in a log it is missing.
     let known = |fault: Faults, x: f64| {
-        if state.faults.contains(fault) {
-            f64::NAN
-        } else {
-            x
-        }
+        if state.faults.contains(fault) { f64::NAN } else { x }
     };
     Sample {
         time_s: state.time.as_secs_f64(),
@@ -326,9 +297,7 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
         airspeed_mps: known(Faults::AIR, s.airspeed),
         alpha_rad: known(Faults::INCIDENCE, s.alpha),
         beta_rad: known(Faults::INCIDENCE, s.beta),
-        specific_force_mps2: state
-            .specific_force
-            .map(|x| known(Faults::SPECIFIC_FORCE, x)),
+        specific_force_mps2: state.specific_force.map(|x| known(Faults::SPECIFIC_FORCE, x)),
         velocity_ned_mps: state.velocity,
         altitude_m: known(Faults::AIR, state.altitude),
         aileron_rad: known(Faults::ACTUATORS, z.aileron),

@@ -151,13 +151,7 @@ impl Flight {
             .name("control".into())
             .spawn(move || control.run(&stop))
             .map_err(|error| FlightError::Thread("control", error))?;
-        Ok(Flight {
-            events,
-            vehicle,
-            clients,
-            recording,
-            thread,
-        })
+        Ok(Flight { events, vehicle, clients, recording, thread })
     }
 
     /// Whether it is still under way.

@@ -62,17 +62,12 @@ impl Threaded {
         let (answers, plans) = bounded(2);
         let work = move || {
             for (tick, request) in orders {
-                if answers
-                    .send((tick, run(controller.as_mut(), &request)))
-                    .is_err()
-                {
+                if answers.send((tick, run(controller.as_mut(), &request))).is_err() {
                     return;
                 }
             }
         };
-        let thread = std::thread::Builder::new()
-            .name("planner".into())
-            .spawn(work)?;
+        let thread = std::thread::Builder::new().name("planner".into()).spawn(work)?;
         Ok(Threaded {
             requests: Some(requests),
             plans,
@@ -92,10 +87,7 @@ impl Threaded {
         let Some(requests) = &self.requests else {
             return Plan::None;
         };
-        if requests
-            .try_send((self.tick, Request { engage, ..*request }))
-            .is_err()
-        {
+        if requests.try_send((self.tick, Request { engage, ..*request })).is_err() {
             self.owed = engage;
             return Plan::Late;
         }
@@ -107,10 +99,7 @@ impl Threaded {
         loop {
             let answer = match self.pace {
                 Pace::RealTime => self.plans.recv_deadline(arrived + self.deadline),
-                Pace::Lockstep => self
-                    .plans
-                    .recv()
-                    .map_err(|_| RecvTimeoutError::Disconnected),
+                Pace::Lockstep => self.plans.recv().map_err(|_| RecvTimeoutError::Disconnected),
             };
             match answer {
                 Ok((tick, command)) if tick == self.tick => return Plan::Ready(command),
@@ -150,15 +139,7 @@ mod tests {
             altitude: 600.0,
             previous: [Command::IDLE; 2],
         };
-        Request {
-            observation,
-            target: Target {
-                roll: 0.0,
-                pitch: 0.0,
-                airspeed: 20.0,
-            },
-            engage,
-        }
+        Request { observation, target: Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 }, engage }
     }
 
     /// A controller that takes its time, whose throttle counts its engagements.
@@ -180,42 +161,22 @@ mod tests {
         }
         fn command(&mut self, _: &Observation, _: &Target) -> Command {
             std::thread::sleep(self.takes.pop().unwrap_or_default());
-            Command {
-                throttle: self.engaged,
-                ..Command::IDLE
-            }
+            Command { throttle: self.engaged, ..Command::IDLE }
         }
     }
 
     fn threaded(pace: Pace, takes_ms: &[u64]) -> Threaded {
-        let takes = takes_ms
-            .iter()
-            .rev()
-            .map(|ms| Duration::from_millis(*ms))
-            .collect();
+        let takes = takes_ms.iter().rev().map(|ms| Duration::from_millis(*ms)).collect();
         // 50 ms instead of 8, so that a busy machine does not decide the test.
-        Threaded::start(
-            Box::new(Slow {
-                takes,
-                engaged: 0.0,
-            }),
-            Duration::from_millis(50),
-            pace,
-        )
-        .unwrap()
+        Threaded::start(Box::new(Slow { takes, engaged: 0.0 }), Duration::from_millis(50), pace)
+            .unwrap()
     }
 
     #[test]
     fn a_plan_that_misses_its_tick_is_never_used_at_a_later_one() {
         let mut planner = threaded(Pace::RealTime, &[0, 200]);
-        let engaged = Plan::Ready(Command {
-            throttle: 0.1,
-            ..Command::IDLE
-        });
-        assert_eq!(
-            planner.plan(&any_request(Some(Command::IDLE)), Instant::now()),
-            engaged
-        );
+        let engaged = Plan::Ready(Command { throttle: 0.1, ..Command::IDLE });
+        assert_eq!(planner.plan(&any_request(Some(Command::IDLE)), Instant::now()), engaged);
         let before = Instant::now();
         assert_eq!(planner.plan(&any_request(None), before), Plan::Late);
         assert!(before.elapsed() < Duration::from_millis(150));
@@ -226,30 +187,18 @@ mod tests {
     #[test]
     fn an_engagement_during_a_late_plan_is_told_afterwards() {
         let mut planner = threaded(Pace::RealTime, &[300]);
-        assert_eq!(
-            planner.plan(&any_request(Some(Command::IDLE)), Instant::now()),
-            Plan::Late
-        );
+        assert_eq!(planner.plan(&any_request(Some(Command::IDLE)), Instant::now()), Plan::Late);
         // This one waits in the queue, the next finds the queue full.
         assert_eq!(planner.plan(&any_request(None), Instant::now()), Plan::Late);
-        assert_eq!(
-            planner.plan(&any_request(Some(Command::IDLE)), Instant::now()),
-            Plan::Late
-        );
+        assert_eq!(planner.plan(&any_request(Some(Command::IDLE)), Instant::now()), Plan::Late);
         std::thread::sleep(Duration::from_millis(400));
-        let twice = Plan::Ready(Command {
-            throttle: 0.2,
-            ..Command::IDLE
-        });
+        let twice = Plan::Ready(Command { throttle: 0.2, ..Command::IDLE });
         assert_eq!(planner.plan(&any_request(None), Instant::now()), twice);
     }
 
     #[test]
     fn in_lockstep_the_plan_is_waited_for() {
         let mut planner = threaded(Pace::Lockstep, &[120]);
-        assert!(matches!(
-            planner.plan(&any_request(None), Instant::now()),
-            Plan::Ready(_)
-        ));
+        assert!(matches!(planner.plan(&any_request(None), Instant::now()), Plan::Ready(_)));
     }
 }

@@ -75,13 +75,7 @@ impl fmt::Display for Summary {
             c.for_others
         )?;
         if let Some((folder, w)) = &self.recording {
-            write!(
-                f,
-                "\nrecorded {} rows, {} frames in {}",
-                w.rows,
-                w.frames,
-                folder.display()
-            )?;
+            write!(f, "\nrecorded {} rows, {} frames in {}", w.rows, w.frames, folder.display())?;
             if w.dropped > 0 {
                 write!(f, "; {} dropped", w.dropped)?;
             }

@@ -15,11 +15,7 @@ pub struct Histogram {
 
 impl Default for Histogram {
     fn default() -> Self {
-        Histogram {
-            buckets: vec![0; RESOLVED_US + 1].into(),
-            count: 0,
-            max_us: 0.0,
-        }
+        Histogram { buckets: vec![0; RESOLVED_US + 1].into(), count: 0, max_us: 0.0 }
     }
 }
 
