@@ -5,14 +5,20 @@ use std::time::Duration;
 
 use greylag::control::{Controller, Observation, Target};
 use greylag::flight::pilot::{Config, Decision, Pilot, Plan, Source, TrimPoint};
-use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, ParameterValue, Sticks, Verdict};
+use greylag::link::autopilot::{
+    AttitudeSetpoint, Autopilot, Mode, ParameterValue, Sticks, Verdict,
+};
 use greylag::link::vehicle::{Faults, Order, Telemetry};
 use greylag::physics::{ActuatorState, Airframe, Command, State, Time};
 
 /// A proportional law, enough to see who flies and for what target.
+#[derive(Clone)]
 struct Proportional;
 
 impl Controller for Proportional {
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
+    }
     fn name(&self) -> &'static str {
         "proportional"
     }
@@ -28,14 +34,26 @@ impl Controller for Proportional {
 
 fn x8() -> Config {
     let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
-    let row = |airspeed_mps, pitch_deg, elevator, throttle| TrimPoint { airspeed_mps, pitch_deg, elevator, throttle };
-    Config::new(airframe.envelope, vec![row(16.67, 2.283, 0.0354, 0.118), row(20.0, 0.858, 0.1314, 0.185)])
+    let row = |airspeed_mps, pitch_deg, elevator, throttle| TrimPoint {
+        airspeed_mps,
+        pitch_deg,
+        elevator,
+        throttle,
+    };
+    Config::new(
+        airframe.envelope,
+        vec![row(16.67, 2.283, 0.0354, 0.118), row(20.0, 0.858, 0.1314, 0.185)],
+    )
 }
 
 /// A law that never gives a number.
+#[derive(Clone)]
 struct Broken;
 
 impl Controller for Broken {
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
+    }
     fn name(&self) -> &'static str {
         "broken"
     }
@@ -209,7 +227,9 @@ fn offboard_needs_arming_and_a_fresh_setpoint() {
     assert_eq!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Accepted);
     let mut flight = Flight::armed();
     assert!(matches!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Rejected(_)));
-    flight.pilot.attitude_setpoint(flight.now, AttitudeSetpoint { roll: f64::NAN, ..LEVEL_SETPOINT });
+    flight
+        .pilot
+        .attitude_setpoint(flight.now, AttitudeSetpoint { roll: f64::NAN, ..LEVEL_SETPOINT });
     assert!(matches!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Rejected(_)));
 }
 
@@ -285,7 +305,11 @@ fn a_frozen_state_counts_as_lost_after_half_a_second_armed_and_never_disarmed() 
     for i in 1..=60 {
         flight.now = flight.now.plus(TICK);
         let decision = flight.tick_with(still(flight.now));
-        assert_eq!(decision.source, if i <= 50 { Source::Planned } else { Source::Level }, "tick {i}");
+        assert_eq!(
+            decision.source,
+            if i <= 50 { Source::Planned } else { Source::Level },
+            "tick {i}"
+        );
     }
 }
 
@@ -298,7 +322,11 @@ fn without_a_usable_state_the_command_is_held_for_50_ms_then_surfaces_go_to_trim
         flight.now = flight.now.plus(TICK);
         let decision = flight.tick_with(bad(flight.now));
         if i <= 5 {
-            assert_eq!((decision.source, decision.command), (Source::Held, before.command), "tick {i}");
+            assert_eq!(
+                (decision.source, decision.command),
+                (Source::Held, before.command),
+                "tick {i}"
+            );
         } else {
             assert_eq!(decision.source, Source::Level, "tick {i}");
         }
@@ -341,7 +369,9 @@ fn a_fallback_that_is_no_number_either_ends_level_at_trim() {
     flight.plan = Plan::None;
     let decision = flight.fly(50);
     assert_eq!((decision.source, decision.command.aileron), (Source::Level, 0.0));
-    assert!((decision.command.throttle - flight.pilot.config().trim_at(20.0).throttle).abs() < 1e-12);
+    assert!(
+        (decision.command.throttle - flight.pilot.config().trim_at(20.0).throttle).abs() < 1e-12
+    );
     assert!(flight.texts().contains("level at trim"));
 }
 
@@ -388,7 +418,8 @@ fn thrust_of_the_setpoint_is_flown_only_when_the_parameter_says_so() {
     let setpoint = AttitudeSetpoint { thrust: Some(0.3), ..LEVEL_SETPOINT };
     for (source, throttle) in [(0, 1.0), (1, 0.3)] {
         let mut flight = Flight::offboard();
-        let index = flight.pilot.parameters().iter().position(|p| p.name == "GL_THRUST_SRC").unwrap();
+        let index =
+            flight.pilot.parameters().iter().position(|p| p.name == "GL_THRUST_SRC").unwrap();
         flight.pilot.set_parameter(index, ParameterValue::Int(source));
         flight.pilot.attitude_setpoint(flight.now, setpoint);
         assert!((flight.fly(30).command.throttle - throttle).abs() < 1e-9);
@@ -433,11 +464,13 @@ fn a_vehicle_that_starts_again_is_flown_in_hold() {
 }
 
 /// A 64-bit congruential generator, so that the storm is the same on every machine.
+#[derive(Clone)]
 struct Dice(u64);
 
 impl Dice {
     fn below(&mut self, n: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) % n
     }
     fn number(&mut self) -> f64 {
@@ -455,9 +488,13 @@ impl Dice {
 }
 
 /// A fallback as bad as everything else in the storm.
+#[derive(Clone)]
 struct Wild(Dice);
 
 impl Controller for Wild {
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
+    }
     fn name(&self) -> &'static str {
         "wild"
     }
@@ -490,9 +527,15 @@ fn storm_request(dice: &mut Dice, pilot: &mut Pilot, now: Time) {
         4..=5 => drop(pilot.set_mode(now, modes[dice.below(5) as usize])),
         6..=8 => {
             let thrust = (dice.below(2) == 0).then(|| dice.number());
-            pilot.attitude_setpoint(now, AttitudeSetpoint { roll: dice.number(), pitch: dice.number(), thrust });
+            pilot.attitude_setpoint(
+                now,
+                AttitudeSetpoint { roll: dice.number(), pitch: dice.number(), thrust },
+            );
         }
-        9..=10 => pilot.sticks(now, Sticks { roll: dice.number(), pitch: dice.number(), throttle: dice.number() }),
+        9..=10 => pilot.sticks(
+            now,
+            Sticks { roll: dice.number(), pitch: dice.number(), throttle: dice.number() },
+        ),
         _ => {
             // The two slew limits stay, since the test measures by them.
             let index = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 13][dice.below(12) as usize];
@@ -521,7 +564,11 @@ fn storm(seed: u64) -> (Vec<Command>, [usize; 7]) {
         let frame = storm_frame(&mut dice, now);
         if let Some(request) = pilot.observe(now, &frame) {
             assert!(request.observation.state.is_finite());
-            assert!([request.target.roll, request.target.pitch, request.target.airspeed].iter().all(|x| x.is_finite()));
+            assert!(
+                [request.target.roll, request.target.pitch, request.target.airspeed]
+                    .iter()
+                    .all(|x| x.is_finite())
+            );
         }
         let plan = [Plan::Ready(dice.command()), Plan::Late, Plan::None][dice.below(3) as usize];
         let decision = pilot.decide(plan);

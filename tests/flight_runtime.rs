@@ -84,7 +84,10 @@ fn a_vehicle_whose_rates_are_not_numbers_is_held_level_and_told() {
     // Trim of the X8 at 20 m/s: elevator 0.0688 / 0.5235, throttle 0.185.
     let last = vehicle.answers.last().unwrap();
     assert_eq!(last.aileron, 0.0);
-    assert!((last.elevator - 0.1314).abs() < 0.005 && (last.throttle - 0.185).abs() < 0.005, "{last:?}");
+    assert!(
+        (last.elevator - 0.1314).abs() < 0.005 && (last.throttle - 0.185).abs() < 0.005,
+        "{last:?}"
+    );
 }
 
 #[test]
@@ -93,7 +96,13 @@ fn setpoints_of_garbage_move_nothing_and_do_not_keep_offboard_alive() {
     client.steer(20.0, 5.0, 3.0);
     let nan = f64::NAN;
     for i in 0..40 {
-        let q = [[nan; 4], [1e30, 0.0, 0.0, 0.0], [0.0; 4], [f64::INFINITY, 0.0, 0.0, 1.0], [1.0, nan, 0.0, 0.0]][i % 5];
+        let q = [
+            [nan; 4],
+            [1e30, 0.0, 0.0, 0.0],
+            [0.0; 4],
+            [f64::INFINITY, 0.0, 0.0, 1.0],
+            [1.0, nan, 0.0, 0.0],
+        ][i % 5];
         client.send(&raw_setpoint(q));
         std::thread::sleep(Duration::from_millis(50));
     }
@@ -118,7 +127,11 @@ fn garbage_and_a_flood_from_both_sides_delay_no_answer_and_move_no_surface() {
         client.send_bytes(&good[..i % good.len()]);
         client.send_bytes(&frame(1, 1, &setpoint(-60.0, 30.0)));
         client.send_bytes(&vec![i as u8; i % 2000]);
-        let stranger = COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, target_system: 7, ..Default::default() };
+        let stranger = COMMAND_LONG_DATA {
+            command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            target_system: 7,
+            ..Default::default()
+        };
         client.send(&MavMessage::COMMAND_LONG(stranger));
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -130,14 +143,19 @@ fn garbage_and_a_flood_from_both_sides_delay_no_answer_and_move_no_surface() {
     assert!(summary.vehicle.frames.bad() > 100 && summary.vehicle.foreign > 100, "{summary:?}");
     let state = vehicle.state();
     // One flipped frame in a thousand may carry the vehicle's ids with a good CRC: none did.
-    assert!((state.roll.to_degrees() - 20.0).abs() < 1.0 && (state.pitch.to_degrees() - 5.0).abs() < 1.0, "{state:?}");
+    assert!(
+        (state.roll.to_degrees() - 20.0).abs() < 1.0
+            && (state.pitch.to_degrees() - 5.0).abs() < 1.0,
+        "{state:?}"
+    );
 }
 
 #[test]
 fn a_second_client_watches_and_a_restarted_one_takes_over() {
     let (companion, vehicle, client) = in_offboard();
     let mut second = Client::new(companion.client(0));
-    second.wait("heartbeat", |m| matches!(m, MavMessage::HEARTBEAT(h) if h.custom_mode == OFFBOARD));
+    second
+        .wait("heartbeat", |m| matches!(m, MavMessage::HEARTBEAT(h) if h.custom_mode == OFFBOARD));
     for _ in 0..40 {
         client.setpoint(20.0, 5.0);
         second.setpoint(-50.0, 0.0);
@@ -163,7 +181,12 @@ fn a_client_over_tcp_is_served_like_any_other() {
     vehicle.step(Trouble::None, PATIENCE).unwrap();
     let mut stream = TcpStream::connect(companion.client(1)).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
-    let arm = COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1: 1.0, target_system: 1, ..Default::default() };
+    let arm = COMMAND_LONG_DATA {
+        command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+        param1: 1.0,
+        target_system: 1,
+        ..Default::default()
+    };
     stream.write_all(&frame(245, 190, &MavMessage::COMMAND_LONG(arm))).unwrap();
     let mut bytes = Vec::new();
     let mut chunk = [0; 1024];
@@ -200,9 +223,13 @@ fn lockstep_flights_are_the_same_to_the_bit() {
 }
 
 /// A planner that takes longer than a cycle.
+#[derive(Clone)]
 struct Slow;
 
 impl Controller for Slow {
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
+    }
     fn name(&self) -> &'static str {
         "slow"
     }

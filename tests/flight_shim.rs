@@ -17,7 +17,7 @@ use greylag::logs::Sample;
 use greylag::logs::csv::{self, Tolerance};
 use greylag::sim::{Environment, Episode, Simulator};
 use greylag_sitl::plant::{PlantOptions, Start};
-use greylag_sitl::shim::{self, ShimOptions};
+use greylag_sitl::shim::{self, FrameFaults, Noise, ShimOptions};
 use mavlink::dialects::ardupilotmega::*;
 
 /// Targets in degrees: one of the easy box, one of the hard corners.
@@ -32,10 +32,16 @@ struct Shim {
 }
 
 impl Shim {
-    fn start(companion: SocketAddr, pace: shim::Pace, duration_s: f64) -> Self {
+    fn start(
+        companion: SocketAddr,
+        pace: shim::Pace,
+        duration_s: f64,
+        change: impl FnOnce(&mut ShimOptions),
+    ) -> Self {
         let mut options = ShimOptions::new(PlantOptions::default(), Start::NEUTRAL);
         options.link = format!("udpout:{companion}").parse().unwrap();
         (options.pace, options.duration_s) = (pace, Some(duration_s));
+        change(&mut options);
         let stop = Arc::new(AtomicBool::new(false));
         let told = stop.clone();
         let thread = std::thread::spawn(move || shim::run(&options, &told, &mut |_| {}).unwrap());
@@ -65,7 +71,8 @@ fn settled_in_process(roll: f64, pitch: f64) -> f64 {
 /// Mean of roll and pitch RMSE over samples, degrees.
 fn error_deg(samples: &[Sample], (roll, pitch): (f64, f64)) -> f64 {
     let rmse = |axis: usize, wanted: f64| {
-        let sum: f64 = samples.iter().map(|s| (s.attitude_rad[axis].to_degrees() - wanted).powi(2)).sum();
+        let sum: f64 =
+            samples.iter().map(|s| (s.attitude_rad[axis].to_degrees() - wanted).powi(2)).sum();
         (sum / samples.len() as f64).sqrt()
     };
     (rmse(0, roll) + rmse(1, pitch)) / 2.0
@@ -73,13 +80,24 @@ fn error_deg(samples: &[Sample], (roll, pitch): (f64, f64)) -> f64 {
 
 /// Flies a target in OFFBOARD until the shim's flight is over; gives the flight's samples with
 /// what both sides counted.
-fn fly(pace: Pace, (roll, pitch): (f64, f64), seconds: f64) -> (Vec<Sample>, Summary, shim::Summary) {
+fn fly(pace: Pace, target: (f64, f64), seconds: f64) -> (Vec<Sample>, Summary, shim::Summary) {
+    fly_with(pace, target, seconds, |_| {})
+}
+
+/// [`fly`] on a shim whose options are changed.
+fn fly_with(
+    pace: Pace,
+    (roll, pitch): (f64, f64),
+    seconds: f64,
+    change: impl FnOnce(&mut ShimOptions),
+) -> (Vec<Sample>, Summary, shim::Summary) {
     let root = tempfile::tempdir().unwrap();
     let mut options = options(pace);
     options.record = Some(Place::Exactly(root.path().join("flight")));
     let companion = Companion::start(&options);
-    let their_pace = if pace == Pace::Lockstep { shim::Pace::Lockstep } else { shim::Pace::RealTime };
-    let shim = Shim::start(companion.vehicle(), their_pace, seconds);
+    let their_pace =
+        if pace == Pace::Lockstep { shim::Pace::Lockstep } else { shim::Pace::RealTime };
+    let shim = Shim::start(companion.vehicle(), their_pace, seconds, change);
     let mut client = Client::new(companion.client(0));
     // In lockstep a second of vehicle time is a few milliseconds: the setpoints may be rarer.
     client.send(&parameter("GL_OFFB_LOSS_S", 60.0));
@@ -91,7 +109,8 @@ fn fly(pace: Pace, (roll, pitch): (f64, f64), seconds: f64) -> (Vec<Sample>, Sum
     }
     let flown = shim.end();
     let summary = companion.end();
-    let recorded = csv::load(&root.path().join("flight").join("flight.csv"), Tolerance::Strict).unwrap();
+    let recorded =
+        csv::load(&root.path().join("flight").join("flight.csv"), Tolerance::Strict).unwrap();
     assert_eq!((recorded.dropped, recorded.cut_short), (0, false));
     (recorded.flight.samples, summary, flown)
 }
@@ -113,7 +132,9 @@ fn in_lockstep_the_settled_error_is_that_in_process() {
         let (samples, summary, flown) = fly(Pace::Lockstep, (roll, pitch), 30.0);
         let over_mavlink = error_deg(&samples[samples.len() - 200..], (roll, pitch));
         let in_process = settled_in_process(roll, pitch);
-        println!("target {roll}, {pitch}: {over_mavlink:.4} deg over MAVLink, {in_process:.4} deg in process");
+        println!(
+            "target {roll}, {pitch}: {over_mavlink:.4} deg over MAVLink, {in_process:.4} deg in process"
+        );
         println!("{:.0} times real time\n{summary}\n{flown}", flown.flown_s / summary.duration_s);
         assert!((over_mavlink - in_process).abs() <= AGREEMENT_DEG);
         assert_eq!((flown.wrong_answers, flown.unusable_answers, flown.limited_answers), (0, 0, 0));
@@ -127,6 +148,54 @@ fn in_real_time_an_attitude_is_flown_on_jsbsim() {
     println!("{settled:.4} deg\n{summary}\n{flown}");
     // A loaded machine may be late; it may not lose its way.
     assert!(settled < 0.5, "{settled}");
+}
+
+#[test]
+fn ten_minutes_of_level_flight_are_not_taken_for_a_frozen_sensor() {
+    // Windless and without noise nothing moves once HOLD has settled, but for the altitude.
+    let companion = Companion::start(&options(Pace::Lockstep));
+    let shim = Shim::start(companion.vehicle(), shim::Pace::Lockstep, 600.0, |_| {});
+    let mut client = Client::new(companion.client(0));
+    client.wait("state", |m| matches!(m, MavMessage::ATTITUDE(a) if a.roll.is_finite()));
+    assert_eq!(client.arm(), MavResult::MAV_RESULT_ACCEPTED);
+    while shim.is_flying() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    shim.end();
+    client.catch_up();
+    let critical = |m: &MavMessage| matches!(m, MavMessage::HEARTBEAT(h) if h.system_status == MavState::MAV_STATE_CRITICAL);
+    let lost = |text: &String| text.contains("lost");
+    assert!(
+        !client.log.iter().any(critical) && !client.texts().iter().any(lost),
+        "{:?}",
+        client.texts()
+    );
+    companion.end();
+}
+
+#[test]
+fn noise_and_frames_that_are_dropped_or_late_leave_the_attitude_flown() {
+    let faults = FrameFaults {
+        drop_probability: 0.05,
+        jitter_ms: 3.0,
+        late_probability: 0.02,
+        late_ms: 25.0,
+        ..FrameFaults::default()
+    };
+    let rough =
+        |options: &mut ShimOptions| (options.noise, options.faults) = (Noise::REALISTIC, faults);
+    let (samples, summary, flown) = fly_with(Pace::RealTime, TARGETS[0], 8.0, rough);
+    let settled = error_deg(&samples[samples.len() - 200..], TARGETS[0]);
+    println!("{settled:.4} deg\n{summary}\n{flown}");
+    // The sensors' own noise is 0.2°; the aircraft may add a few of these, no more.
+    assert!(settled < 1.5, "{settled}");
+    assert!(summary.vehicle.lost > 10, "{summary}");
+    for pair in samples.windows(2) {
+        let step = (pair[1].aileron_cmd - pair[0].aileron_cmd)
+            .abs()
+            .max((pair[1].elevator_cmd - pair[0].elevator_cmd).abs());
+        assert!(step <= 0.2 + 1e-9, "{pair:?}");
+    }
 }
 
 #[test]

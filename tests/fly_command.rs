@@ -14,7 +14,12 @@ use greylag::logs::csv::{self, Tolerance};
 /// The program, run in a folder of its own, so that files are found by its source folder.
 fn fly(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_greylag"));
-    command.arg("fly").args(arguments).current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+        .arg("fly")
+        .args(arguments)
+        .current_dir(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
     command
 }
 
@@ -39,8 +44,14 @@ fn refused(arguments: &[&str], words: &[&str]) {
 fn a_port_in_use_is_one_line_and_nothing_is_started() {
     let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
     let address = format!("udpin:{}", taken.local_addr().unwrap());
-    refused(&["--vehicle", &address, "--client", "udpin:127.0.0.1:0"], &[&address, "in use", "--vehicle"]);
-    refused(&["--vehicle", "udpin:127.0.0.1:0", "--client", &address], &[&address, "in use", "--client"]);
+    refused(
+        &["--vehicle", &address, "--client", "udpin:127.0.0.1:0"],
+        &[&address, "in use", "--vehicle"],
+    );
+    refused(
+        &["--vehicle", "udpin:127.0.0.1:0", "--client", &address],
+        &[&address, "in use", "--client"],
+    );
 }
 
 #[test]
@@ -104,7 +115,10 @@ fn a_flight_is_announced_told_summed_up_and_recorded_until_ctrl_c() {
     let [vehicle_port, client_port] = free_ports();
     let vehicle_address = format!("udpin:127.0.0.1:{vehicle_port}");
     let client_address = format!("udpin:127.0.0.1:{client_port}");
-    let mut child = fly(folder.path(), &["--vehicle", &vehicle_address, "--client", &client_address]).spawn().unwrap();
+    let mut child =
+        fly(folder.path(), &["--vehicle", &vehicle_address, "--client", &client_address])
+            .spawn()
+            .unwrap();
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
     wait_for(&mut lines, &vehicle_address);
     wait_for(&mut lines, &client_address);
@@ -123,16 +137,28 @@ fn a_flight_is_announced_told_summed_up_and_recorded_until_ctrl_c() {
     assert!(child.wait().unwrap().success());
     vehicle.trouble(Trouble::Silent);
     check_surfaces(&vehicle.land().answers);
-    let flown = csv::load(&folder.path().join("flights/0001/flight.csv"), Tolerance::Strict).unwrap();
+    let flown =
+        csv::load(&folder.path().join("flights/0001/flight.csv"), Tolerance::Strict).unwrap();
     assert!(flown.flight.samples.len() > 50 && !flown.cut_short && flown.dropped == 0);
-    assert!(std::fs::metadata(folder.path().join("flights/0001/flight.tlog")).unwrap().len() > 10_000);
+    let summary = std::fs::read_to_string(folder.path().join("flights/0001/summary.txt")).unwrap();
+    assert!(summary.contains("state to command: p50"), "{summary}");
+    assert!(
+        std::fs::metadata(folder.path().join("flights/0001/flight.tlog")).unwrap().len() > 10_000
+    );
 }
 
 #[test]
 fn a_duration_ends_the_flight_by_itself() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments =
-        ["--vehicle", "udpin:127.0.0.1:0", "--client", "tcpin:127.0.0.1:0", "--no-record", "--duration-s", "0.5"];
+    let arguments = [
+        "--vehicle",
+        "udpin:127.0.0.1:0",
+        "--client",
+        "tcpin:127.0.0.1:0",
+        "--no-record",
+        "--duration-s",
+        "0.5",
+    ];
     let output = fly(folder.path(), &arguments).output().unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success() && said.contains("flew 0.5 s: 0 states"), "{said}");

@@ -73,11 +73,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let options = options(arguments, &model);
     let stop = Arc::new(AtomicBool::new(false));
     let told = stop.clone();
-    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed)).context("setting the handler of Ctrl-C")?;
+    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))
+        .context("setting the handler of Ctrl-C")?;
     let flight = Flight::start(&options, crew, stop)?;
     announce(arguments, &flight);
     show_events(&flight, &arguments.vehicle);
-    let summary = flight.join().context("the control thread has died; the recording holds all up to then")?;
+    let summary =
+        flight.join().context("the control thread has died; the recording holds all up to then")?;
     println!("{summary}");
     Ok(ExitCode::SUCCESS)
 }
@@ -118,7 +120,9 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
 /// If the model does not allow a controller, or has no level flight.
 pub fn crew(kind: Kind, model: &GreyBox) -> anyhow::Result<Crew> {
     let controller = build(kind, model)?;
-    let pilot = Pilot::new(Config::for_model(model)?, fallback(model)?)?;
+    // The design of an LQI takes a moment; it is not made twice.
+    let fallback = if kind == Kind::Lqi { controller.boxed_clone() } else { fallback(model)? };
+    let pilot = Pilot::new(Config::for_model(model)?, fallback)?;
     let seat = if kind.is_planner() { Seat::Thread } else { Seat::Loop };
     Ok(Crew { pilot, controller, seat })
 }

@@ -39,10 +39,14 @@ const COLUMNS: [(&str, Get, Place); 25] = [
     ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
 ];
 /// Columns without which a file is no flight log.
-const NEEDED: [&str; 7] = ["time_s", "roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"];
+const NEEDED: [&str; 7] =
+    ["time_s", "roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"];
 /// For each actuator the command or the position must be there.
-const EITHER: [(&str, &str); 3] =
-    [("aileron_cmd", "aileron_rad"), ("elevator_cmd", "elevator_rad"), ("throttle_cmd", "throttle")];
+const EITHER: [(&str, &str); 3] = [
+    ("aileron_cmd", "aileron_rad"),
+    ("elevator_cmd", "elevator_rad"),
+    ("throttle_cmd", "throttle"),
+];
 /// Share of unusable rows above which a log is refused.
 const REFUSED_SHARE: f64 = 0.05;
 /// Row numbers kept in the report of unusable rows.
@@ -212,13 +216,18 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
     let end = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
     let mut reader = ::csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..end]);
     let header = reader.byte_headers().map_err(text)?.clone();
-    let names: Vec<String> = header.iter().map(|h| String::from_utf8_lossy(h).trim().to_owned()).collect();
+    let names: Vec<String> =
+        header.iter().map(|h| String::from_utf8_lossy(h).trim().to_owned()).collect();
     check_columns(&names, path)?;
     let places: Vec<Option<Place>> =
         names.iter().map(|name| COLUMNS.iter().find(|c| c.0 == name).map(|c| c.2)).collect();
     let mut reading = Reading { cut_short: end < bytes.len(), ..Reading::default() };
-    reading.unknown_columns =
-        names.iter().zip(&places).filter(|(_, place)| place.is_none()).map(|(name, _)| name.clone()).collect();
+    reading.unknown_columns = names
+        .iter()
+        .zip(&places)
+        .filter(|(_, place)| place.is_none())
+        .map(|(name, _)| name.clone())
+        .collect();
     let mut rows = 0;
     for (i, record) in reader.byte_records().enumerate() {
         let record = record.map_err(text)?;
@@ -278,7 +287,12 @@ fn usable(s: &Sample, last: Option<&Sample>) -> bool {
         && last.is_none_or(|last| s.time_s > last.time_s)
 }
 
-fn refuse_if_poor(reading: &Reading, rows: usize, path: &Path, tolerance: Tolerance) -> Result<(), CsvError> {
+fn refuse_if_poor(
+    reading: &Reading,
+    rows: usize,
+    path: &Path,
+    tolerance: Tolerance,
+) -> Result<(), CsvError> {
     let poor = reading.dropped as f64 > REFUSED_SHARE * rows as f64;
     match (tolerance, reading.dropped_rows.first()) {
         (Tolerance::Strict, Some(&first)) if poor => {
@@ -361,9 +375,11 @@ mod tests {
 
     #[test]
     fn a_missing_column_is_named_with_what_would_satisfy_it() {
-        let error = read(b"time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps\n").unwrap_err().to_string();
+        let error =
+            read(b"time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps\n").unwrap_err().to_string();
         assert!(error.contains("`airspeed_mps`") && error.contains("flight.csv"), "{error}");
-        let error = read(b"time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps,airspeed_mps\n").unwrap_err();
+        let error =
+            read(b"time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps,airspeed_mps\n").unwrap_err();
         assert!(error.to_string().contains("`aileron_rad`"), "{error}");
     }
 

@@ -21,8 +21,6 @@ use mavlink::{MAVLinkV2MessageRaw, MavHeader, Message};
 /// Modes as PX4 numbers them in `custom_mode`.
 pub const HOLD: u32 = 4 << 16 | 3 << 24;
 pub const OFFBOARD: u32 = 6 << 16;
-/// Deflection at normalised 1, rad.
-const DEFLECTION: f64 = 0.5235;
 /// Largest step of a surface between two answers: 20 a second at 100 Hz, with 32-bit rounding.
 const SLEW: f32 = 0.2 + 1e-6;
 
@@ -41,7 +39,7 @@ pub fn options(pace: Pace) -> Options {
         pace,
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
-        deflection: DEFLECTION,
+        deflection: x8().airframe.actuators.deflection_max,
     }
 }
 
@@ -95,7 +93,9 @@ pub fn messages(mut bytes: &[u8]) -> Vec<MavMessage> {
     while bytes.len() >= 12 && bytes[0] == 0xFD {
         let id = u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]);
         let (len, end) = (bytes[1] as usize, 12 + bytes[1] as usize);
-        if let Ok(message) = MavMessage::parse(mavlink::MavlinkVersion::V2, id, &bytes[10..10 + len]) {
+        if let Ok(message) =
+            MavMessage::parse(mavlink::MavlinkVersion::V2, id, &bytes[10..10 + len])
+        {
             found.push(message);
         }
         bytes = &bytes[end..];
@@ -115,7 +115,11 @@ pub struct Answer {
 
 impl Answer {
     fn command(&self) -> Command {
-        Command { aileron: self.aileron.into(), elevator: self.elevator.into(), throttle: self.throttle.into() }
+        Command {
+            aileron: self.aileron.into(),
+            elevator: self.elevator.into(),
+            throttle: self.throttle.into(),
+        }
     }
 }
 
@@ -145,7 +149,13 @@ impl Vehicle {
     pub fn new(companion: SocketAddr) -> Self {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         socket.connect(companion).unwrap();
-        Vehicle { socket, twin: Twin::new(State::NEUTRAL, 600.0), time_us: 0, flying: false, answers: Vec::new() }
+        Vehicle {
+            socket,
+            twin: Twin::new(State::NEUTRAL, 600.0),
+            time_us: 0,
+            flying: false,
+            answers: Vec::new(),
+        }
     }
 
     pub fn state(&self) -> State {
@@ -157,12 +167,17 @@ impl Vehicle {
         let (s, z) = (self.twin.state, self.twin.actuators.observed(&x8().airframe.actuators));
         let time_usec = self.time_us;
         let mut actuator = [0.0; 32];
-        let scaled = [z.aileron, z.elevator, z.throttle * DEFLECTION, z.aileron_rate, z.elevator_rate];
-        actuator.iter_mut().zip(scaled).for_each(|(a, x)| *a = (x / DEFLECTION) as f32);
+        let full = x8().airframe.actuators.deflection_max;
+        let scaled = [z.aileron, z.elevator, z.throttle * full, z.aileron_rate, z.elevator_rate];
+        actuator.iter_mut().zip(scaled).for_each(|(a, x)| *a = (x / full) as f32);
         let (sr, cr) = (s.roll / 2.0).sin_cos();
         let (sp, cp) = (s.pitch / 2.0).sin_cos();
         let q = if trouble == Trouble::NotANumber { f32::NAN } else { s.q as f32 };
-        let air = VFR_HUD_DATA { airspeed: s.airspeed as f32, alt: self.twin.altitude as f32, ..Default::default() };
+        let air = VFR_HUD_DATA {
+            airspeed: s.airspeed as f32,
+            alt: self.twin.altitude as f32,
+            ..Default::default()
+        };
         let attitude = ATTITUDE_QUATERNION_DATA {
             time_boot_ms: (time_usec / 1000) as u32,
             q1: (cr * cp) as f32,
@@ -174,8 +189,11 @@ impl Vehicle {
             yawspeed: s.r as f32,
             ..Default::default()
         };
-        let incidence =
-            AOA_SSA_DATA { time_usec, AOA: s.alpha.to_degrees() as f32, SSA: s.beta.to_degrees() as f32 };
+        let incidence = AOA_SSA_DATA {
+            time_usec,
+            AOA: s.alpha.to_degrees() as f32,
+            SSA: s.beta.to_degrees() as f32,
+        };
         let imu = HIGHRES_IMU_DATA {
             time_usec,
             zacc: -9.81,
@@ -186,7 +204,11 @@ impl Vehicle {
             MavMessage::HIGHRES_IMU(imu),
             MavMessage::VFR_HUD(air),
             MavMessage::AOA_SSA(incidence),
-            MavMessage::ACTUATOR_OUTPUT_STATUS(ACTUATOR_OUTPUT_STATUS_DATA { time_usec, active: 5, actuator }),
+            MavMessage::ACTUATOR_OUTPUT_STATUS(ACTUATOR_OUTPUT_STATUS_DATA {
+                time_usec,
+                active: 5,
+                actuator,
+            }),
             MavMessage::ATTITUDE_QUATERNION(attitude),
         ]
         .iter()
@@ -224,11 +246,15 @@ impl Vehicle {
     fn receive(&self, patience: Duration) -> Option<Answer> {
         let end = Instant::now() + patience;
         let mut buffer = [0; 2048];
-        while let Some(left) = end.checked_duration_since(Instant::now()).filter(|left| !left.is_zero()) {
+        while let Some(left) =
+            end.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())
+        {
             self.socket.set_read_timeout(Some(left)).unwrap();
-            let Ok(len) = self.socket.recv(&mut buffer) else { continue };
+            let Ok(len) = self.socket.recv(&mut buffer) else {
+                continue;
+            };
             let answers = messages(&buffer[..len]).into_iter().filter_map(answer);
-            if let Some(answer) = answers.filter(|a| a.time_us == self.time_us).last() {
+            if let Some(answer) = answers.filter(|a| a.time_us == self.time_us).next_back() {
                 return Some(answer);
             }
         }
@@ -244,7 +270,10 @@ impl Vehicle {
                 0 => bytes[(self.time_us as usize / 7 + 13 * i) % whole.len()] ^= 1 << (i % 8),
                 1 => bytes.truncate(self.time_us as usize / 10_000 % whole.len()),
                 // Another system's state.
-                2 => bytes = frames.iter().map(|_| frame(9, 200, &tilted())).collect::<Vec<_>>().concat(),
+                2 => {
+                    bytes =
+                        frames.iter().map(|_| frame(9, 200, &tilted())).collect::<Vec<_>>().concat()
+                }
                 3 => bytes = vec![0xFD; 300],
                 _ => bytes.clear(),
             }
@@ -275,13 +304,19 @@ impl Vehicle {
     }
 }
 
-/// A bank of 90°, from whom it does not concern.
+/// A bank of 74°, from whom it does not concern.
 fn tilted() -> MavMessage {
-    MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA { q1: 0.7071, q2: 0.7071, ..Default::default() })
+    MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
+        q1: 0.8,
+        q2: 0.6,
+        ..Default::default()
+    })
 }
 
 fn answer(message: MavMessage) -> Option<Answer> {
-    let MavMessage::HIL_ACTUATOR_CONTROLS(m) = message else { return None };
+    let MavMessage::HIL_ACTUATOR_CONTROLS(m) = message else {
+        return None;
+    };
     let armed = m.mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED);
     let [aileron, elevator, throttle, ..] = m.controls;
     Some(Answer { time_us: m.time_usec, aileron, elevator, throttle, armed })
@@ -310,7 +345,10 @@ pub fn check_surfaces(answers: &[Answer]) {
     assert!(!answers.is_empty());
     let mut last = [0.0f32; 2];
     for a in answers {
-        assert!(a.aileron.abs() <= 1.0 && a.elevator.abs() <= 1.0 && (0.0..=1.0).contains(&a.throttle), "{a:?}");
+        assert!(
+            a.aileron.abs() <= 1.0 && a.elevator.abs() <= 1.0 && (0.0..=1.0).contains(&a.throttle),
+            "{a:?}"
+        );
         if a.armed {
             let step = (a.aileron - last[0]).abs().max((a.elevator - last[1]).abs());
             assert!(step <= SLEW, "step of {step} at {a:?}");
@@ -339,7 +377,10 @@ impl Client {
         let (listening, told) = (socket.clone(), stop.clone());
         std::thread::spawn(move || listen(&listening, &told, &deliver));
         let client = Client { socket, received, stop, log: Vec::new() };
-        client.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA { mavtype: MavType::MAV_TYPE_GCS, ..Default::default() }));
+        client.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+            mavtype: MavType::MAV_TYPE_GCS,
+            ..Default::default()
+        }));
         client
     }
 
@@ -377,7 +418,14 @@ impl Client {
     /// Sends a command, and gives its result.
     pub fn command(&mut self, command: MavCmd, parameters: [f32; 3]) -> MavResult {
         let [param1, param2, param3] = parameters;
-        let order = COMMAND_LONG_DATA { command, param1, param2, param3, target_system: 1, ..Default::default() };
+        let order = COMMAND_LONG_DATA {
+            command,
+            param1,
+            param2,
+            param3,
+            target_system: 1,
+            ..Default::default()
+        };
         self.send(&MavMessage::COMMAND_LONG(order));
         let ack = |m: &MavMessage| matches!(m, MavMessage::COMMAND_ACK(a) if a.command == command);
         match self.wait("acknowledgement", ack) {
@@ -397,7 +445,10 @@ impl Client {
 
     /// Waits for a heartbeat that tells this mode.
     pub fn wait_for_mode(&mut self, custom: u32) {
-        self.wait("heartbeat in that mode", |m| matches!(m, MavMessage::HEARTBEAT(h) if h.custom_mode == custom));
+        self.wait(
+            "heartbeat in that mode",
+            |m| matches!(m, MavMessage::HEARTBEAT(h) if h.custom_mode == custom),
+        );
     }
 
     pub fn wait_for_text(&mut self, part: &str) {
@@ -414,7 +465,10 @@ impl Client {
 
     /// Arms and enters OFFBOARD at a target, as an offboard program does.
     pub fn engage(&mut self, roll_deg: f64, pitch_deg: f64) {
-        self.wait("state of the vehicle", |m| matches!(m, MavMessage::ATTITUDE(a) if a.roll.is_finite()));
+        self.wait(
+            "state of the vehicle",
+            |m| matches!(m, MavMessage::ATTITUDE(a) if a.roll.is_finite()),
+        );
         assert_eq!(self.arm(), MavResult::MAV_RESULT_ACCEPTED);
         self.setpoint(roll_deg, pitch_deg);
         assert_eq!(self.mode(OFFBOARD), MavResult::MAV_RESULT_ACCEPTED);

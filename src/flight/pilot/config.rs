@@ -63,7 +63,8 @@ impl Config {
         let envelope = model.airframe.envelope;
         let row = |airspeed: f64| trim_row(model, airspeed);
         row(envelope.airspeed_cruise_mps)?;
-        let count = ((envelope.airspeed_max_mps - envelope.airspeed_min_mps) / TRIM_SPACING) as usize;
+        let count =
+            ((envelope.airspeed_max_mps - envelope.airspeed_min_mps) / TRIM_SPACING) as usize;
         // Airspeeds at which the model has no level trim are left to their neighbours.
         let speeds = (0..=count).map(|i| envelope.airspeed_min_mps + i as f64 * TRIM_SPACING);
         let config = Config::new(envelope, speeds.filter_map(|v| row(v).ok()).collect());
@@ -96,7 +97,8 @@ fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
     Ok(TrimPoint {
         airspeed_mps: airspeed,
         pitch_deg: trim.state.pitch.to_degrees(),
-        elevator: (trim.controls.elevator / model.airframe.actuators.deflection_max).clamp(-1.0, 1.0),
+        elevator: (trim.controls.elevator / model.airframe.actuators.deflection_max)
+            .clamp(-1.0, 1.0),
         throttle: trim.controls.throttle.clamp(0.0, 1.0),
     })
 }
@@ -125,7 +127,9 @@ pub enum ConfigError {
         larger: &'static str,
     },
     /// The trim table cannot be interpolated.
-    #[error("pilot table `trim` needs at least one row, finite numbers, and rising airspeeds: correct the rows")]
+    #[error(
+        "pilot table `trim` needs at least one row, finite numbers, and rising airspeeds: correct the rows"
+    )]
     Trim,
     /// The model has no level flight at the cruise airspeed.
     #[error("the pilot needs level trim at the cruise airspeed: {0}")]
@@ -159,10 +163,17 @@ impl Config {
 
     fn check_trim(&self) -> Result<(), ConfigError> {
         let finite = |t: &TrimPoint| {
-            t.airspeed_mps > 0.0 && t.pitch_deg.abs() <= 30.0 && t.elevator.abs() <= 1.0 && (0.0..=1.0).contains(&t.throttle)
+            t.airspeed_mps > 0.0
+                && t.pitch_deg.abs() <= 30.0
+                && t.elevator.abs() <= 1.0
+                && (0.0..=1.0).contains(&t.throttle)
         };
         let rising = self.trim.windows(2).all(|w| w[0].airspeed_mps < w[1].airspeed_mps);
-        if self.trim.is_empty() || !rising || !self.trim.iter().all(finite) { Err(ConfigError::Trim) } else { Ok(()) }
+        if self.trim.is_empty() || !rising || !self.trim.iter().all(finite) {
+            Err(ConfigError::Trim)
+        } else {
+            Ok(())
+        }
     }
 
     fn ranges(&self) -> [(&'static str, f64, f64, f64); 14] {
@@ -216,8 +227,12 @@ mod tests {
     use super::*;
     use std::path::Path;
 
+    fn model() -> GreyBox {
+        GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap()
+    }
+
     fn x8() -> Config {
-        Config::for_model(&GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap()).unwrap()
+        Config::for_model(&model()).unwrap()
     }
 
     #[test]
@@ -230,20 +245,28 @@ mod tests {
 
     #[test]
     fn trim_is_that_of_the_simulator() {
+        let full = model().airframe.actuators.deflection_max;
         // The three rows measured in JSBSim; 0.01° is a tenth of the table's spacing error.
-        for (airspeed, pitch, deflection, throttle) in
-            [(16.67, 2.283, 0.01855, 0.118), (20.0, 0.858, 0.0688, 0.185), (25.0, -0.30, 0.1096, 0.308)]
-        {
+        for (airspeed, pitch, deflection, throttle) in [
+            (16.67, 2.283, 0.01855, 0.118),
+            (20.0, 0.858, 0.0688, 0.185),
+            (25.0, -0.30, 0.1096, 0.308),
+        ] {
             let row = x8().trim_at(airspeed);
             assert!((row.pitch_deg - pitch).abs() < 0.05, "{row:?}");
-            assert!((row.elevator - deflection / 0.5235).abs() < 0.005, "{row:?}");
+            assert!((row.elevator - deflection / full).abs() < 0.005, "{row:?}");
             assert!((row.throttle - throttle).abs() < 0.002, "{row:?}");
         }
     }
 
     #[test]
     fn trim_is_linear_between_rows_and_constant_beyond() {
-        let row = |airspeed_mps, pitch_deg| TrimPoint { airspeed_mps, pitch_deg, elevator: 0.0, throttle: 0.2 };
+        let row = |airspeed_mps, pitch_deg| TrimPoint {
+            airspeed_mps,
+            pitch_deg,
+            elevator: 0.0,
+            throttle: 0.2,
+        };
         let config = Config { trim: vec![row(20.0, 2.0), row(25.0, 1.0)], ..x8() };
         assert_eq!(config.trim_at(22.5), row(22.5, 1.5));
         assert_eq!(config.trim_at(5.0), config.trim[0]);
@@ -255,7 +278,10 @@ mod tests {
         let mut config = x8();
         config.envelope.airspeed_min_mps = 30.0;
         let words = config.check().unwrap_err().to_string();
-        assert!(words.contains("airspeed_min_mps") && words.contains("airspeed_cruise_mps"), "{words}");
+        assert!(
+            words.contains("airspeed_min_mps") && words.contains("airspeed_cruise_mps"),
+            "{words}"
+        );
         assert!(Config { throttle_slew_per_s: f64::NAN, ..x8() }.check().is_err());
         assert!(Config { trim: vec![], ..x8() }.check().is_err());
     }

@@ -86,7 +86,11 @@ impl Pilot {
     /// What [`Config::check`] finds.
     pub fn new(config: Config, fallback: Box<dyn Controller>) -> Result<Self, ConfigError> {
         config.check()?;
-        let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: config.envelope.airspeed_cruise_mps };
+        let nobody = Target {
+            roll: f64::NAN,
+            pitch: f64::NAN,
+            airspeed: config.envelope.airspeed_cruise_mps,
+        };
         Ok(Pilot {
             limits: Limits::from(&config),
             parameters: parameters::table(&config),
@@ -160,16 +164,18 @@ impl Pilot {
             Pending::Disarmed => (Command::IDLE, Source::Disarmed),
             Pending::Repeated => (self.in_force, self.source),
             Pending::Unusable => self.without_state(),
-            Pending::Sticks(s) => {
-                (Command { aileron: s.roll, elevator: s.pitch, throttle: s.throttle }, Source::Sticks)
-            }
+            Pending::Sticks(s) => (
+                Command { aileron: s.roll, elevator: s.pitch, throttle: s.throttle },
+                Source::Sticks,
+            ),
             Pending::Fly { seen, throttle } => self.with_state(plan, &seen, throttle),
         };
         self.source = source;
         if !matches!(self.pending, Pending::Repeated) {
             self.before = self.in_force;
         }
-        self.in_force = if self.armed { self.limits.slew(self.in_force, wanted) } else { Command::IDLE };
+        self.in_force =
+            if self.armed { self.limits.slew(self.in_force, wanted) } else { Command::IDLE };
         self.decision()
     }
 
@@ -217,7 +223,11 @@ impl Pilot {
     }
 
     fn assess(&mut self, quality: Frame) -> Pending {
-        let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: self.config.envelope.airspeed_cruise_mps };
+        let nobody = Target {
+            roll: f64::NAN,
+            pitch: f64::NAN,
+            airspeed: self.config.envelope.airspeed_cruise_mps,
+        };
         if quality == Frame::Repeated {
             return if self.armed { Pending::Repeated } else { Pending::Disarmed };
         }
@@ -241,7 +251,16 @@ impl Pilot {
         let Telemetry { time, mut state, actuators, altitude, .. } = frame;
         // Noise of a sensor at rest.
         state.airspeed = state.airspeed.max(0.0);
-        Pending::Fly { seen: Observation { time, state, actuators, altitude, previous: [self.in_force, self.before] }, throttle }
+        Pending::Fly {
+            seen: Observation {
+                time,
+                state,
+                actuators,
+                altitude,
+                previous: [self.in_force, self.before],
+            },
+            throttle,
+        }
     }
 
     /// The target of the mode, before the envelope, with the throttle if the mode sets it itself.
@@ -249,12 +268,17 @@ impl Pilot {
         let airspeed = self.config.envelope.airspeed_cruise_mps;
         match (self.mode, self.setpoint, self.sticks) {
             (Mode::Offboard, Some((_, s)), _) => {
-                let throttle = s.thrust.filter(|_| self.config.thrust_source == ThrustSource::Setpoint);
+                let throttle =
+                    s.thrust.filter(|_| self.config.thrust_source == ThrustSource::Setpoint);
                 (Target { roll: s.roll, pitch: s.pitch, airspeed }, throttle)
             }
             (Mode::Stabilized, _, Some((_, s))) => {
                 // A stick forward is nose down; each half of its travel reaches its own limit.
-                let pitch = if s.pitch > 0.0 { s.pitch * self.limits.pitch_min } else { -s.pitch * self.limits.pitch_max };
+                let pitch = if s.pitch > 0.0 {
+                    s.pitch * self.limits.pitch_min
+                } else {
+                    -s.pitch * self.limits.pitch_max
+                };
                 (Target { roll: s.roll * self.limits.bank_max, pitch, airspeed }, Some(s.throttle))
             }
             _ => (self.level_target(), None),
@@ -266,7 +290,12 @@ impl Pilot {
         Target { roll: 0.0, pitch: self.config.trim_at(airspeed).pitch_deg.to_radians(), airspeed }
     }
 
-    fn with_state(&mut self, plan: Plan, seen: &Observation, throttle: Option<f64>) -> (Command, Source) {
+    fn with_state(
+        &mut self,
+        plan: Plan,
+        seen: &Observation,
+        throttle: Option<f64>,
+    ) -> (Command, Source) {
         let (mut command, source) = match plan {
             Plan::Ready(command) if command.is_finite() => {
                 self.fallback_engaged = false;
@@ -275,14 +304,16 @@ impl Pilot {
             Plan::Ready(_) => {
                 self.planner_engaged = false;
                 if due(&mut self.complaints.plan, self.clock) {
-                    self.texts.say(Severity::Error, "controller gave no finite command: fallback flies");
+                    self.texts
+                        .say(Severity::Error, "controller gave no finite command: fallback flies");
                 }
                 self.fall_back(seen, Source::Fallback)
             }
             Plan::Late => self.fall_back(seen, Source::Late),
             Plan::None => self.fall_back(seen, Source::Fallback),
         };
-        command.throttle = self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
+        command.throttle =
+            self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
         (command, source)
     }
 
@@ -305,7 +336,11 @@ impl Pilot {
     /// The command while the state cannot be used.
     fn without_state(&self) -> (Command, Source) {
         let short = self.estimate.usable_within(self.clock, self.config.state_hold_s);
-        if short && !self.vehicle_lost { (self.in_force, Source::Held) } else { (self.level_command(), Source::Level) }
+        if short && !self.vehicle_lost {
+            (self.in_force, Source::Held)
+        } else {
+            (self.level_command(), Source::Level)
+        }
     }
 
     fn level_command(&self) -> Command {
@@ -328,9 +363,12 @@ impl Pilot {
     }
 
     fn watch_return(&mut self) {
-        if self.vehicle_lost && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true) {
+        if self.vehicle_lost
+            && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true)
+        {
             self.vehicle_lost = false;
-            let words = if self.armed { "vehicle link back: flying in HOLD" } else { "vehicle link back" };
+            let words =
+                if self.armed { "vehicle link back: flying in HOLD" } else { "vehicle link back" };
             self.texts.say(Severity::Notice, words);
         }
     }

@@ -3,7 +3,8 @@
 use super::estimate::within;
 use super::{Pilot, Source, parameters};
 use crate::link::autopilot::{
-    AttitudeSetpoint, Autopilot, Mode, Parameter, ParameterValue, Severity, Status, Sticks, Text, Verdict,
+    AttitudeSetpoint, Autopilot, Mode, Parameter, ParameterValue, Severity, Status, Sticks, Text,
+    Verdict,
 };
 use crate::physics::{ActuatorState, Command, Time};
 
@@ -46,8 +47,12 @@ impl Pilot {
     fn mode_obstacle(&self, mode: Mode) -> Option<String> {
         match mode {
             Mode::Offboard if !self.armed => Some("OFFBOARD refused: arm first".into()),
-            Mode::Offboard if !self.vehicle_alive() => Some("OFFBOARD refused: no fresh vehicle state".into()),
-            Mode::Offboard if !self.setpoint_fresh() => Some("OFFBOARD refused: send setpoints first".into()),
+            Mode::Offboard if !self.vehicle_alive() => {
+                Some("OFFBOARD refused: no fresh vehicle state".into())
+            }
+            Mode::Offboard if !self.setpoint_fresh() => {
+                Some("OFFBOARD refused: send setpoints first".into())
+            }
             Mode::Manual | Mode::Stabilized if self.armed && !self.sticks_fresh() => {
                 Some(format!("{} refused: no sticks", mode_name(mode)))
             }
@@ -64,7 +69,8 @@ impl Pilot {
     }
 
     pub(super) fn vehicle_alive(&self) -> bool {
-        !self.vehicle_lost && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true)
+        !self.vehicle_lost
+            && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true)
     }
 
     fn airspeed(&self) -> f64 {
@@ -138,8 +144,11 @@ impl Autopilot for Pilot {
         self.advance(now);
         if [sticks.roll, sticks.pitch, sticks.throttle].iter().all(|x| x.is_finite()) {
             let Sticks { roll, pitch, throttle } = sticks;
-            let limited =
-                Sticks { roll: roll.clamp(-1.0, 1.0), pitch: pitch.clamp(-1.0, 1.0), throttle: throttle.clamp(0.0, 1.0) };
+            let limited = Sticks {
+                roll: roll.clamp(-1.0, 1.0),
+                pitch: pitch.clamp(-1.0, 1.0),
+                throttle: throttle.clamp(0.0, 1.0),
+            };
             self.sticks = Some((now, limited));
         }
     }

@@ -13,7 +13,11 @@ const REALS: [Real; 12] = [
     ("GL_BANK_MAX_DEG", |c| c.envelope.bank_max_deg, |c, x| c.envelope.bank_max_deg = x),
     ("GL_PITCH_MAX_DEG", |c| c.envelope.pitch_max_deg, |c, x| c.envelope.pitch_max_deg = x),
     ("GL_PITCH_MIN_DEG", |c| c.envelope.pitch_min_deg, |c, x| c.envelope.pitch_min_deg = x),
-    ("GL_CRUISE_MPS", |c| c.envelope.airspeed_cruise_mps, |c, x| c.envelope.airspeed_cruise_mps = x),
+    (
+        "GL_CRUISE_MPS",
+        |c| c.envelope.airspeed_cruise_mps,
+        |c, x| c.envelope.airspeed_cruise_mps = x,
+    ),
     ("GL_AIRSPD_MIN", |c| c.envelope.airspeed_min_mps, |c, x| c.envelope.airspeed_min_mps = x),
     ("GL_AIRSPD_MAX", |c| c.envelope.airspeed_max_mps, |c, x| c.envelope.airspeed_max_mps = x),
     ("GL_LOAD_MAX", |c| c.envelope.load_factor_max, |c, x| c.envelope.load_factor_max = x),
@@ -30,32 +34,46 @@ const AUTOPILOT_SYSTEM: i32 = 1;
 
 /// The table that shows `config`.
 pub(super) fn table(config: &Config) -> Vec<Parameter> {
-    let reals = REALS.iter().map(|(name, get, _)| Parameter { name, value: ParameterValue::Real(get(config) as f32) });
+    let reals = REALS
+        .iter()
+        .map(|(name, get, _)| Parameter { name, value: ParameterValue::Real(get(config) as f32) });
     let source = match config.thrust_source {
         ThrustSource::Cruise => 0,
         ThrustSource::Setpoint => 1,
     };
     let ints = [("GL_THRUST_SRC", source), ("SYSID_THISMAV", AUTOPILOT_SYSTEM)];
-    reals.chain(ints.map(|(name, value)| Parameter { name, value: ParameterValue::Int(value) })).collect()
+    reals
+        .chain(ints.map(|(name, value)| Parameter { name, value: ParameterValue::Int(value) }))
+        .collect()
 }
 
 /// `config` with parameter `index` set to `value`.
 ///
 /// # Errors
 /// The verdict to give when the value is refused.
-pub(super) fn changed(config: &Config, index: usize, value: ParameterValue) -> Result<Config, Verdict> {
+pub(super) fn changed(
+    config: &Config,
+    index: usize,
+    value: ParameterValue,
+) -> Result<Config, Verdict> {
     let mut config = config.clone();
     match (index, value) {
         (THRUST_SOURCE, ParameterValue::Int(value)) => {
             config.thrust_source = match value {
                 0 => ThrustSource::Cruise,
                 1 => ThrustSource::Setpoint,
-                _ => return denied(format!("GL_THRUST_SRC {value}: give 0 (cruise airspeed) or 1 (setpoint)")),
+                _ => {
+                    return denied(format!(
+                        "GL_THRUST_SRC {value}: give 0 (cruise airspeed) or 1 (setpoint)"
+                    ));
+                }
             };
         }
         (SYSTEM_ID, ParameterValue::Int(AUTOPILOT_SYSTEM)) => {}
         (SYSTEM_ID, _) => return denied("SYSID_THISMAV is fixed at 1".into()),
-        (index, ParameterValue::Real(value)) if index < REALS.len() => REALS[index].2(&mut config, f64::from(value)),
+        (index, ParameterValue::Real(value)) if index < REALS.len() => {
+            REALS[index].2(&mut config, f64::from(value))
+        }
         _ => return denied(format!("no parameter {index} of this type")),
     }
     match config.check() {
@@ -81,7 +99,8 @@ mod tests {
 
     fn x8() -> Config {
         let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
-        let row = TrimPoint { airspeed_mps: 20.0, pitch_deg: 0.858, elevator: 0.13, throttle: 0.185 };
+        let row =
+            TrimPoint { airspeed_mps: 20.0, pitch_deg: 0.858, elevator: 0.13, throttle: 0.185 };
         Config::new(airframe.envelope, vec![row])
     }
 
@@ -109,7 +128,9 @@ mod tests {
     #[test]
     fn a_refusal_says_what_would_be_accepted() {
         let config = x8();
-        let Err(Verdict::Denied(words)) = changed(&config, 2, ParameterValue::Real(90.0)) else { panic!() };
+        let Err(Verdict::Denied(words)) = changed(&config, 2, ParameterValue::Real(90.0)) else {
+            panic!()
+        };
         assert!(words.contains("GL_BANK_MAX_DEG") && words.contains("80"), "{words}");
         for bad in [f32::NAN, f32::INFINITY, -1e30] {
             assert!(changed(&config, 0, ParameterValue::Real(bad)).is_err());

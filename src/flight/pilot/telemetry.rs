@@ -99,8 +99,17 @@ mod tests {
         }
         for i in 0..5 {
             let mut z = ActuatorState::default();
-            *[&mut z.aileron, &mut z.aileron_rate, &mut z.elevator, &mut z.elevator_rate, &mut z.throttle][i] = f64::NAN;
-            assert!(defect(&Telemetry { actuators: z, ..good() }).is_some(), "actuator component {i}");
+            *[
+                &mut z.aileron,
+                &mut z.aileron_rate,
+                &mut z.elevator,
+                &mut z.elevator_rate,
+                &mut z.throttle,
+            ][i] = f64::NAN;
+            assert!(
+                defect(&Telemetry { actuators: z, ..good() }).is_some(),
+                "actuator component {i}"
+            );
         }
     }
 

@@ -63,11 +63,16 @@ impl Recorder {
         let folder = place.create()?;
         let csv = folder::create(&folder, "flight.csv")?;
         let tlog = folder::create(&folder, "flight.tlog")?;
-        Recorder::over(folder.clone(), csv, tlog).map_err(|source| RecordError::File { path: folder, source })
+        Recorder::over(folder.clone(), csv, tlog)
+            .map_err(|source| RecordError::File { path: folder, source })
     }
 
     /// A recorder over any two writers.
-    fn over(folder: PathBuf, csv: impl Write + Send + 'static, tlog: impl Write + Send + 'static) -> std::io::Result<Self> {
+    fn over(
+        folder: PathBuf,
+        csv: impl Write + Send + 'static,
+        tlog: impl Write + Send + 'static,
+    ) -> std::io::Result<Self> {
         let (queue, entries) = bounded(QUEUE);
         let (trouble, troubles) = bounded(2);
         let dropped = Arc::new(AtomicU64::new(0));
@@ -137,7 +142,9 @@ struct File<W> {
 impl<W> File<W> {
     /// Does `work` on the file; `false` if it has failed, now or before.
     fn attempt(&mut self, work: impl FnOnce(&mut W) -> std::io::Result<()>) -> bool {
-        let Some(out) = &mut self.out else { return false };
+        let Some(out) = &mut self.out else {
+            return false;
+        };
         if let Err(error) = work(out) {
             self.out = None;
             let _ = self.trouble.try_send(format!("recording of {} ended: {error}", self.name));
@@ -158,7 +165,9 @@ impl<C: Write, T: Write> Files<C, T> {
         let mut text = File { name: "flight.csv", out: None, trouble: trouble.clone() };
         match Rows::new(BufWriter::new(csv), &Row::EXTRA) {
             Ok(rows) => text.out = Some(rows),
-            Err(error) => drop(text.trouble.try_send(format!("recording of flight.csv ended: {error}"))),
+            Err(error) => {
+                drop(text.trouble.try_send(format!("recording of flight.csv ended: {error}")))
+            }
         }
         let tlog = File { name: "flight.tlog", out: Some(BufWriter::new(tlog)), trouble };
         Files { csv: text, tlog, written: Written::default() }
@@ -245,7 +254,12 @@ mod tests {
         use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavMessage};
         let header = mavlink::MavHeader { system_id: 1, component_id: 1, sequence: 0 };
         let mut bytes = Vec::new();
-        mavlink::write_v2_msg(&mut bytes, header, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default())).unwrap();
+        mavlink::write_v2_msg(
+            &mut bytes,
+            header,
+            &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()),
+        )
+        .unwrap();
         bytes
     }
 
@@ -265,7 +279,10 @@ mod tests {
         let text = std::fs::read_to_string(folder.join("flight.csv")).unwrap();
         assert!(text.lines().nth(1).unwrap().ends_with(",20,OFFBOARD,1,planned,0,123.4"), "{text}");
         let record = [&[0, 1, 2, 3, 4, 5, 6, 7][..], &frame()].concat();
-        assert_eq!(std::fs::read(folder.join("flight.tlog")).unwrap(), [record.clone(), record].concat());
+        assert_eq!(
+            std::fs::read(folder.join("flight.tlog")).unwrap(),
+            [record.clone(), record].concat()
+        );
     }
 
     #[test]
@@ -282,7 +299,8 @@ mod tests {
     fn nothing_is_overwritten() {
         let root = tempfile::tempdir().unwrap();
         let numbered = Place::Numbered(root.path().join("flights"));
-        let folders: Vec<_> = (0..3).map(|_| Recorder::start(&numbered).unwrap().folder().to_owned()).collect();
+        let folders: Vec<_> =
+            (0..3).map(|_| Recorder::start(&numbered).unwrap().folder().to_owned()).collect();
         assert!(folders[2].ends_with("0003"));
         let error = Recorder::start(&Place::Exactly(folders[0].clone())).unwrap_err();
         assert!(matches!(error, RecordError::Exists { .. }), "{error}");
@@ -302,7 +320,10 @@ mod tests {
         std::thread::sleep(Duration::from_secs(1));
         let told: Vec<_> = std::iter::from_fn(|| recorder.trouble()).collect();
         assert_eq!(told.len(), 2, "{told:?}");
-        assert!(told.iter().any(|t| t.contains("flight.csv")) && told.iter().any(|t| t.contains("flight.tlog")));
+        assert!(
+            told.iter().any(|t| t.contains("flight.csv"))
+                && told.iter().any(|t| t.contains("flight.tlog"))
+        );
         recorder.row(row(2000));
         assert!(recorder.trouble().is_none());
         assert!(recorder.finish().dropped > 0);

@@ -19,14 +19,22 @@ pub struct Row {
 
 impl Row {
     /// The columns beside those of the log format.
-    pub const EXTRA: [&'static str; 6] = ["airspeed_target_mps", "mode", "armed", "source", "failsafe", "latency_us"];
+    pub const EXTRA: [&'static str; 6] =
+        ["airspeed_target_mps", "mode", "armed", "source", "failsafe", "latency_us"];
 
     pub(super) fn write<W: Write>(&self, out: &mut Rows<W>) -> std::io::Result<()> {
         let d = &self.decision;
         let digit = |flag: bool| if flag { "1" } else { "0" };
         let airspeed = format!("{}", d.target.airspeed);
         let latency = format!("{:.1}", self.latency_us);
-        let extra = [&*airspeed, mode_name(d.mode), digit(d.armed), d.source.name(), digit(d.failsafe), &*latency];
+        let extra = [
+            &*airspeed,
+            mode_name(d.mode),
+            digit(d.armed),
+            d.source.name(),
+            digit(d.failsafe),
+            &*latency,
+        ];
         out.row(&self.sample, &extra)
     }
 }

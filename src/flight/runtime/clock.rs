@@ -37,7 +37,9 @@ impl Clock {
 
     /// Vehicle time at `host`; zero before the first state.
     pub(super) fn at(&self, host: Instant) -> Time {
-        let Some((arrived, time)) = self.anchor else { return Time::default() };
+        let Some((arrived, time)) = self.anchor else {
+            return Time::default();
+        };
         let silence = host.saturating_duration_since(arrived);
         match self.pace {
             Pace::RealTime => time.plus(silence),

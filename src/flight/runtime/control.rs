@@ -102,22 +102,29 @@ impl Control {
     fn take_one(&mut self, until: Instant) {
         let wait = until.saturating_duration_since(Instant::now());
         select_biased! {
-            recv(self.ports.from_vehicle) -> arrival => if let Ok(arrival) = arrival { self.from_vehicle(arrival) },
-            recv(self.ports.from_clients) -> arrival => if let Ok(arrival) = arrival { self.from_client(arrival) },
+            recv(self.ports.from_vehicle) -> arrival => if let Ok(arrival) = arrival { self.take_vehicle(arrival) },
+            recv(self.ports.from_clients) -> arrival => if let Ok(arrival) = arrival { self.take_client(arrival) },
             default(wait) => {}
         }
     }
 
-    fn from_vehicle(&mut self, arrival: Arrival) {
-        let Arrival::Packet(packet) = arrival else { return };
+    fn take_vehicle(&mut self, arrival: Arrival) {
+        let Arrival::Packet(packet) = arrival else {
+            return;
+        };
         // The vehicle is taken out for the time of the call, since each tick answers through it.
         let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
         let mut places = states.iter_mut();
-        self.vehicle.handle(packet.arrived.saturating_duration_since(self.started), packet.peer, &packet.bytes, |state| {
-            if let Some(place) = places.next() {
-                *place = Some(state);
-            }
-        });
+        self.vehicle.handle(
+            packet.arrived.saturating_duration_since(self.started),
+            packet.peer,
+            &packet.bytes,
+            |state| {
+                if let Some(place) = places.next() {
+                    *place = Some(state);
+                }
+            },
+        );
         for state in states.iter().flatten() {
             self.tick(state, &packet);
         }
@@ -130,9 +137,11 @@ impl Control {
         }
         self.clock.set(packet.arrived, state.time);
         let request = self.pilot.observe(state.time, state);
-        let plan = request.map_or(Plan::None, |request| self.planner.plan(&request, packet.arrived));
+        let plan =
+            request.map_or(Plan::None, |request| self.planner.plan(&request, packet.arrived));
         let decision = self.pilot.decide(plan);
-        self.outputs = if decision.armed { Outputs::Armed(decision.command) } else { Outputs::Disarmed };
+        self.outputs =
+            if decision.armed { Outputs::Armed(decision.command) } else { Outputs::Disarmed };
         let frame = self.vehicle.command(state.time, self.outputs);
         let copy = self.recorder.is_some().then(|| frame.clone());
         self.ports.vehicle.send(packet.peer, frame);
@@ -144,7 +153,14 @@ impl Control {
     }
 
     /// Notes timing and the row of a tick, after its command is out.
-    fn account(&mut self, state: &Telemetry, decision: &Decision, plan: Plan, packet: &Packet, latency: Duration) {
+    fn account(
+        &mut self,
+        state: &Telemetry,
+        decision: &Decision,
+        plan: Plan,
+        packet: &Packet,
+        latency: Duration,
+    ) {
         if self.last_arrival.is_none() {
             self.say(Event::VehicleFound(packet.peer));
         }
@@ -162,12 +178,15 @@ impl Control {
         }
     }
 
-    fn from_client(&mut self, arrival: Arrival) {
+    fn take_client(&mut self, arrival: Arrival) {
         let host = Instant::now();
         let now = self.now(host);
         match arrival {
             Arrival::Packet(packet) => {
-                let mut pilot = Witness { pilot: &mut self.pilot, hear: |event| drop(self.events.try_send(event)) };
+                let mut pilot = Witness {
+                    pilot: &mut self.pilot,
+                    hear: |event| drop(self.events.try_send(event)),
+                };
                 self.clients.handle(now, packet.peer, &packet.bytes, &mut pilot);
                 self.record(&packet.bytes);
             }
@@ -185,7 +204,8 @@ impl Control {
         if let Some(trouble) = self.recorder.as_ref().and_then(Recorder::trouble) {
             self.pilot.tell(Severity::Warning, &trouble);
         }
-        let mut pilot = Witness { pilot: &mut self.pilot, hear: |event| drop(self.events.try_send(event)) };
+        let mut pilot =
+            Witness { pilot: &mut self.pilot, hear: |event| drop(self.events.try_send(event)) };
         self.clients.poll(now, &mut pilot);
         self.send_to_clients();
         self.greet_vehicle(now.host);
@@ -197,7 +217,9 @@ impl Control {
 
     /// Sends the heartbeat of the vehicle's link, when due and when there is somebody to hear it.
     fn greet_vehicle(&mut self, host: Duration) {
-        let Some(peer) = self.vehicle.peer().or(self.ports.vehicle.target()) else { return };
+        let Some(peer) = self.vehicle.peer().or(self.ports.vehicle.target()) else {
+            return;
+        };
         if let Some(frame) = self.vehicle.heartbeat(host, self.outputs) {
             self.record(&frame);
             self.ports.vehicle.send(peer, frame);
@@ -238,14 +260,17 @@ impl Control {
     }
 
     fn finish(self) -> Summary {
-        let recording = self.recorder.map(|recorder| (recorder.folder().to_owned(), recorder.finish()));
-        Summary {
+        let recording =
+            self.recorder.map(|recorder| (recorder.folder().to_owned(), recorder.finish()));
+        let summary = Summary {
             duration_s: self.started.elapsed().as_secs_f64(),
             vehicle: self.vehicle.counts(),
             clients: self.clients.counts(),
             timing: self.timing,
             recording,
-        }
+        };
+        summary.save();
+        summary
     }
 }
 
@@ -254,13 +279,17 @@ const STATES_PER_PACKET: usize = 8;
 
 /// Microseconds since 1970, as `.tlog` counts them.
 fn unix_us() -> u64 {
-    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64)
+    SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .map_or(0, |since| since.as_micros() as u64)
 }
 
 fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let (s, z, c) = (&state.state, &state.actuators, &decision.command);
     // A part with a fault still holds its last good value; in a log it is missing.
-    let known = |fault: Faults, x: f64| if state.faults.contains(fault) { f64::NAN } else { x };
+    let known = |fault: Faults, x: f64| {
+        if state.faults.contains(fault) { f64::NAN } else { x }
+    };
     Sample {
         time_s: state.time.as_secs_f64(),
         attitude_rad: [s.roll, s.pitch, state.yaw].map(|x| known(Faults::ATTITUDE, x)),

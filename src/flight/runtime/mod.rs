@@ -130,7 +130,11 @@ impl Flight {
     ///
     /// # Errors
     /// The first thing that cannot be opened.
-    pub fn start(options: &Options, crew: Crew, stop: Arc<AtomicBool>) -> Result<Self, FlightError> {
+    pub fn start(
+        options: &Options,
+        crew: Crew,
+        stop: Arc<AtomicBool>,
+    ) -> Result<Self, FlightError> {
         let ports = Ports::open(options)?;
         let recorder = options.record.as_ref().map(Recorder::start).transpose()?;
         let planner = match crew.seat {

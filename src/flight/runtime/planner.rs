@@ -53,7 +53,11 @@ pub(super) struct Threaded {
 impl Threaded {
     /// Starts the thread. A plan must be there `deadline` after its state frame; in lockstep it
     /// is waited for.
-    pub(super) fn start(mut controller: Box<dyn Controller>, deadline: Duration, pace: Pace) -> std::io::Result<Self> {
+    pub(super) fn start(
+        mut controller: Box<dyn Controller>,
+        deadline: Duration,
+        pace: Pace,
+    ) -> std::io::Result<Self> {
         let (requests, orders) = bounded::<(u64, Request)>(1);
         let (answers, plans) = bounded(2);
         let work = move || {
@@ -64,7 +68,15 @@ impl Threaded {
             }
         };
         let thread = std::thread::Builder::new().name("planner".into()).spawn(work)?;
-        Ok(Threaded { requests: Some(requests), plans, thread: Some(thread), tick: 0, owed: None, deadline, pace })
+        Ok(Threaded {
+            requests: Some(requests),
+            plans,
+            thread: Some(thread),
+            tick: 0,
+            owed: None,
+            deadline,
+            pace,
+        })
     }
 
     fn plan(&mut self, request: &Request, arrived: Instant) -> Plan {
@@ -72,7 +84,9 @@ impl Threaded {
         // Plans of earlier ticks are of no use any more.
         while self.plans.try_recv().is_ok() {}
         let engage = request.engage.or(self.owed);
-        let Some(requests) = &self.requests else { return Plan::None };
+        let Some(requests) = &self.requests else {
+            return Plan::None;
+        };
         if requests.try_send((self.tick, Request { engage, ..*request })).is_err() {
             self.owed = engage;
             return Plan::Late;
@@ -129,12 +143,16 @@ mod tests {
     }
 
     /// A controller that takes its time, whose throttle counts its engagements.
+    #[derive(Clone)]
     struct Slow {
         takes: Vec<Duration>,
         engaged: f64,
     }
 
     impl Controller for Slow {
+        fn boxed_clone(&self) -> Box<dyn Controller> {
+            Box::new(self.clone())
+        }
         fn name(&self) -> &'static str {
             "slow"
         }
@@ -150,7 +168,8 @@ mod tests {
     fn threaded(pace: Pace, takes_ms: &[u64]) -> Threaded {
         let takes = takes_ms.iter().rev().map(|ms| Duration::from_millis(*ms)).collect();
         // 50 ms instead of 8, so that a busy machine does not decide the test.
-        Threaded::start(Box::new(Slow { takes, engaged: 0.0 }), Duration::from_millis(50), pace).unwrap()
+        Threaded::start(Box::new(Slow { takes, engaged: 0.0 }), Duration::from_millis(50), pace)
+            .unwrap()
     }
 
     #[test]

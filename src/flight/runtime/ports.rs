@@ -30,7 +30,9 @@ impl Ports {
         let (to_vehicle, from_vehicle) = bounded(VEHICLE_QUEUE);
         let (to_clients, from_clients) = bounded(CLIENT_QUEUE);
         let vehicle = network.open(LinkId(0), &options.vehicle, "--vehicle", to_vehicle)?;
-        let open = |(i, address)| network.open(LinkId(1 + i as u16), address, "--client", to_clients.clone());
+        let open = |(i, address)| {
+            network.open(LinkId(1 + i as u16), address, "--client", to_clients.clone())
+        };
         let clients = options.clients.iter().enumerate().map(open).collect::<Result<_, _>>()?;
         Ok(Ports { vehicle, clients, from_vehicle, from_clients, _network: network })
     }

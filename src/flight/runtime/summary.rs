@@ -1,6 +1,8 @@
 //! What a flight came to, in a few lines.
 
 use std::fmt;
+use std::fs::File;
+use std::io::Write;
 use std::path::PathBuf;
 
 use super::timing::Timing;
@@ -23,10 +25,26 @@ pub struct Summary {
     pub recording: Option<(PathBuf, Written)>,
 }
 
+impl Summary {
+    /// Leaves the summary as `summary.txt` beside the recording. The folder was new, so nothing is
+    /// overwritten; a disk that does not take it has been told of already.
+    pub(super) fn save(&self) {
+        if let Some((folder, _)) = &self.recording
+            && let Ok(mut file) = File::create_new(folder.join("summary.txt"))
+        {
+            let _ = writeln!(file, "{self}");
+        }
+    }
+}
+
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (v, c, t) = (&self.vehicle, &self.clients, &self.timing);
-        writeln!(f, "flew {:.1} s: {} states, {} lost, {} with faults", self.duration_s, v.states, v.lost, v.faulty)?;
+        writeln!(
+            f,
+            "flew {:.1} s: {} states, {} lost, {} with faults",
+            self.duration_s, v.states, v.lost, v.faulty
+        )?;
         if t.latency.count() > 0 {
             writeln!(
                 f,
