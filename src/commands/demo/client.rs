@@ -70,7 +70,11 @@ impl Client {
     /// number of the leg and the seconds flown on it.
     pub fn fly(&mut self, mut watch: impl FnMut(usize, f64, &View)) -> Result<Vec<(f64, String)>> {
         self.aim(0);
-        self.until("a heartbeat and an attitude", |v| v.mode.is_some() && v.time_s > 0.0, |_| None)?;
+        self.until(
+            "a heartbeat and an attitude",
+            |v| v.mode.is_some() && v.time_s > 0.0,
+            |_| None,
+        )?;
         self.until("arming", |v| v.armed && v.accepted == Some(ARM), |p| Some(p.arm()))?;
         let offboard = |v: &View| v.mode == Some(Mode::Offboard) && v.accepted == Some(SET_MODE);
         self.until("offboard mode", offboard, |p| Some(p.set_mode(Mode::Offboard)))?;
@@ -140,7 +144,9 @@ impl Client {
             Heard::Attitude { time_s, roll, pitch } => {
                 (view.time_s, view.roll, view.pitch) = (time_s, roll, pitch);
             }
-            Heard::Speed { airspeed, altitude } => (view.airspeed, view.altitude) = (airspeed, altitude),
+            Heard::Speed { airspeed, altitude } => {
+                (view.airspeed, view.altitude) = (airspeed, altitude)
+            }
             Heard::Ack { command, accepted } if accepted => view.accepted = Some(command),
             Heard::Ack { .. } => {}
             Heard::Text(words) => texts.push((view.time_s, words)),

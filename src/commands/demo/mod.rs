@@ -53,14 +53,19 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let folder = flight.recording.clone().context("the demonstration records")?;
     let companion = flight.clients.first().copied().flatten().context("no client link")?;
     let vehicle = flight.vehicle.context("no vehicle link")?;
-    println!("companion: controller {}, model {}, clients on udp {companion}", arguments.controller, model.name);
+    println!(
+        "companion: controller {}, model {}, clients on udp {companion}",
+        arguments.controller, model.name
+    );
     println!("shim: Skywalker X8 in JSBSim, real time, towards udp {vehicle}");
     let simulator = simulate(&format!("udpout:{vehicle}"), stop.clone())?;
     let mut table = Live::begin();
-    let flown = Client::connect(companion).and_then(|mut c| c.fly(|leg, s, view| table.show(leg, s, view)));
+    let flown =
+        Client::connect(companion).and_then(|mut c| c.fly(|leg, s, view| table.show(leg, s, view)));
     table.end();
     stop.store(true, Ordering::Relaxed);
-    let summary = flight.join().context("the control thread has died; the recording holds all up to then")?;
+    let summary =
+        flight.join().context("the control thread has died; the recording holds all up to then")?;
     let simulated = simulator.join().map_err(|_| anyhow!("the shim's thread has died"))?;
     println!("{summary}");
     println!("{}", simulated?);
@@ -83,7 +88,9 @@ fn options(arguments: &Arguments, model: &crate::model::GreyBox) -> Result<Optio
     Ok(Options {
         vehicle: free_port.clone(),
         clients: vec![free_port],
-        record: Some(arguments.out.clone().map_or(Place::Numbered("flights".into()), Place::Exactly)),
+        record: Some(
+            arguments.out.clone().map_or(Place::Numbered("flights".into()), Place::Exactly),
+        ),
         pace: Pace::RealTime,
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
@@ -115,7 +122,12 @@ struct Live {
 impl Live {
     fn begin() -> Live {
         println!("   target roll/pitch     roll    pitch   error   airspeed  altitude");
-        Live { terminal: std::io::stdout().is_terminal(), leg: None, line: String::new(), shown: Duration::ZERO }
+        Live {
+            terminal: std::io::stdout().is_terminal(),
+            leg: None,
+            line: String::new(),
+            shown: Duration::ZERO,
+        }
     }
 
     fn show(&mut self, leg: usize, seconds: f64, view: &View) {
@@ -129,7 +141,14 @@ impl Live {
         let error = 0.5 * ((roll - target.roll_deg).abs() + (pitch - target.pitch_deg).abs());
         self.line = format!(
             "{:>5.1} s {:>5.0}/{:>3.0} deg {:>8.2} {:>8.2} {:>7.3} {:>7.1} m/s {:>6.0} m",
-            seconds, target.roll_deg, target.pitch_deg, roll, pitch, error, view.airspeed, view.altitude
+            seconds,
+            target.roll_deg,
+            target.pitch_deg,
+            roll,
+            pitch,
+            error,
+            view.airspeed,
+            view.altitude
         );
         if self.terminal && now >= self.shown {
             self.shown = now + Duration::from_millis(100);

@@ -34,7 +34,9 @@ impl Teller<'_> {
             controller: self.controller.into(),
             model: self.model.into(),
             seed: None,
-            command_line: std::env::args().skip(1).fold("greylag".into(), |line, a| line + " " + &a),
+            command_line: std::env::args()
+                .skip(1)
+                .fold("greylag".into(), |line, a| line + " " + &a),
             versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
             segments: LEGS.iter().map(|leg| segment(leg, flight)).collect(),
             tolerance_rad: TOLERANCE_DEG.to_radians(),
@@ -54,7 +56,8 @@ pub fn read(folder: &Path) -> Result<Flight> {
 fn segment(leg: &Leg, flight: &Flight) -> Segment {
     let (roll, pitch) = (leg.roll_deg.to_radians(), leg.pitch_deg.to_radians());
     // the target passes through a single-precision quaternion, good to 1e-7
-    let is = |s: &&Sample| (s.roll_target_rad - roll).abs() + (s.pitch_target_rad - pitch).abs() < 1e-5;
+    let is =
+        |s: &&Sample| (s.roll_target_rad - roll).abs() + (s.pitch_target_rad - pitch).abs() < 1e-5;
     let samples: Vec<&Sample> = flight.samples.iter().filter(is).collect();
     let settled = &samples[samples.len() - samples.len() / 5..];
     let rmse = |error: &dyn Fn(&Sample) -> f64| {

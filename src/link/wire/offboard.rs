@@ -113,10 +113,9 @@ pub fn read(frame: &Frame<'_>) -> Option<Heard> {
         MavMessage::VFR_HUD(v) => {
             Heard::Speed { airspeed: v.airspeed.into(), altitude: v.alt.into() }
         }
-        MavMessage::COMMAND_ACK(a) => Heard::Ack {
-            command: a.command as u32,
-            accepted: a.result as u32 == 0,
-        },
+        MavMessage::COMMAND_ACK(a) => {
+            Heard::Ack { command: a.command as u32, accepted: a.result as u32 == 0 }
+        }
         MavMessage::STATUSTEXT(t) => Heard::Text(t.text.to_str().unwrap_or_default().to_owned()),
         _ => return None,
     })
