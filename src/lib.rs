@@ -2,28 +2,47 @@
 //!
 //! It turns commanded roll and pitch into actuator outputs with a grey-box model of the
 //! aircraft. The modules below are declared in the order of their layers: each may use those
-//! above it, never those below (`tests/architecture.rs` holds them to it).
+//! above it, never those below (`tests/architecture.rs` holds them to it), so this list is the map.
 //!
 //! ```text
 //! in flight   link ──► flight ──► link           flight ⇄ control ──► model ──► physics ──► num
 //!             bytes    100 Hz     bytes          (pilot)              (grey box) (effects)   (numbers)
 //!
-//! on ground   logs ──► params ──► sim ──► report ──► fly again
-//!             flight   TOML       episodes, figures
-//!                                 scores
+//! on ground   logs ──► sysid ──► params ──► sim ──► report ──► fly again
+//!             flight   where it   TOML     episodes, figures
+//!                      fails               scores
 //! ```
+//!
+//! # One tick
+//!
+//! [`link::vehicle`] makes telemetry of a state frame; [`flight::pilot::Pilot::observe`] turns it
+//! into an observation with a target inside the envelope; a [`control::Controller`] answers with a
+//! command; [`flight::pilot::Pilot::decide`] takes that command, or the fallback's, limits how fast
+//! the surfaces move, and the link sends it. The pilot knows no socket and no clock: the same
+//! telemetry gives the same commands.
 //!
 //! # From the paper to the code
 //!
 //! | equation of \[GSFM26\] | item |
 //! |---|---|
-//! | 4, 6 (state) | `physics::State` |
-//! | 5, 7–12 (rigid body) | `physics::rigid_body` |
-//! | 21 (scale x_c) | `model::GreyBox::scale` |
-//! | 27 (actuator state) | `physics::actuators::ActuatorState` |
-//! | 36–46 (forces, moments) | `physics::effects` |
-//! | 13 (CEM-MPC) | `control::cem` |
-//! | 30 (reward) | `control::task` |
+//! | 4, 6 (state) | [`physics::State`] |
+//! | 5, 19 (dynamics) | [`model::GreyBox::rate`] |
+//! | 7–12, 35 (rigid body) | [`physics::rigid_body`] |
+//! | 13 (CEM-MPC) | [`control::cem`] |
+//! | 21 (scale x_c) | [`model::GreyBox::scale`] |
+//! | 27 (actuator state) | [`physics::ActuatorState`], exact filters in [`physics::actuators`] |
+//! | 29 (action) | [`physics::Command`] |
+//! | 30 (reward) | [`control::task::Task`] |
+//! | 31–34 (air-relative velocity) | [`physics::rigid_body::air_velocity`] |
+//! | 36, 39, 43 (forces in body axes) | [`physics::rigid_body::body_force`] |
+//! | 37 (gravity) | [`physics::rigid_body::gravity_in_body`] |
+//! | 38 (thrust) | [`physics::effects::ThrustLinear`] |
+//! | 40 (drag) | [`physics::effects::DragLinear`] |
+//! | 41 (lift) | [`physics::effects::LiftLinear`] |
+//! | 42 (side force) | [`physics::effects::SideForceLinear`] |
+//! | 44–46 (moments) | [`physics::effects::RollLinear`], [`physics::effects::PitchLinear`], [`physics::effects::YawLinear`] |
+//! | Table II (targets) | `sim::targets` |
+//! | section V-E (protocol) | `sim::episode` |
 //!
 //! # Bibliography
 //!

@@ -53,21 +53,21 @@ pub const PUBLIC: Tuning = Tuning {
     pitch: Gains { kp: -2.0, ki: -0.3, kd: -0.1 },
     airspeed: Gains { kp: 0.5, ki: 0.1, kd: 0.0 },
     throttle_trim: 0.129_514,
-    // 30 degrees
-    deflection: 0.523_598_775_598_298_8,
+    deflection: std::f64::consts::FRAC_PI_6,
     airspeed_override: None,
     windup: Windup::Free,
 };
 
 /// Gains retuned in the simulator (random search over the shipped targets, 240 trials), at an
 /// airspeed that leaves a margin before the stall.
+#[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 pub const RETUNED: Tuning = Tuning {
     name: "pid-retuned",
     roll: Gains { kp: 2.54, ki: 0.59, kd: 0.047 },
     pitch: Gains { kp: -0.48, ki: -0.52, kd: -0.06 },
     airspeed: Gains { kp: 0.21, ki: 0.11, kd: 0.0 },
     throttle_trim: 0.2,
-    deflection: 0.5235,
+    deflection: 0.523_5,
     airspeed_override: Some(22.0),
     windup: Windup::Clamped,
 };

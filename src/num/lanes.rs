@@ -100,7 +100,7 @@ const ROUND: f32 = 12_582_912.0;
 fn sin_cos(x: f32) -> (f32, f32) {
     let turns = (x * std::f32::consts::FRAC_2_PI + ROUND) - ROUND;
     // π/2 in three parts, so that the reduced argument keeps its last bits
-    let y = ((x - turns * 1.570_312_5) - turns * 4.837_512_969e-4) - turns * 7.549_789_948e-8;
+    let y = ((x - turns * 1.570_312_5) - turns * 4.837_513e-4) - turns * 7.549_79e-8;
     let quarter = turns - 4.0 * ((turns * 0.25 - 0.375 + ROUND) - ROUND); // 0..3, as a float
     let z = y * y;
     let sine = y + y * z * (-1.666_665_4e-1 + z * (8.332_161e-3 + z * -1.951_529_6e-4));
