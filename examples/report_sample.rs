@@ -8,9 +8,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 
 fn main() -> anyhow::Result<()> {
-    let out = std::env::args_os()
-        .nth(1)
-        .context("say where to write: report_sample OUT.html")?;
+    let out = std::env::args_os().nth(1).context("say where to write: report_sample OUT.html")?;
     let flight = synthetic::flight();
     let page = synthetic::report(&flight).page().render();
     greylag::report::write_new(&PathBuf::from(out), &page)?;

@@ -40,6 +40,7 @@ pub mod control;
 pub mod link;
 pub mod logs;
 pub mod flight;
+pub mod sysid;
 #[cfg(feature = "sitl")]
 pub mod sim;
 pub mod report;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 /// The rooms from the ground up, as `src/lib.rs` declares them.
 const LAYERS: &[&str] = &[
-    "num", "physics", "model", "control", "link", "logs", "flight", "sysid", "sim", "learn", "report",
-    "commands",
+    "num", "physics", "model", "control", "link", "logs", "flight", "sysid", "sim", "learn",
+    "report", "commands",
 ];
 
 /// Crates with the only rooms that may name them. A room may be narrowed to a folder below it.
@@ -24,8 +24,21 @@ const HOMES: &[(&str, &[&str])] = &[
 
 /// What the pilot, a function, must not touch.
 const PILOT_BANNED: &[&str] = &[
-    "std::net", "std::time::Instant", "Instant::now", "SystemTime", "std::thread", "std::sync", "Mutex",
-    "std::fs", "std::io", "crossbeam", "tokio", "println!", "eprintln!", "unwrap()", "panic!",
+    "std::net",
+    "std::time::Instant",
+    "Instant::now",
+    "SystemTime",
+    "std::thread",
+    "std::sync",
+    "Mutex",
+    "std::fs",
+    "std::io",
+    "crossbeam",
+    "tokio",
+    "println!",
+    "eprintln!",
+    "unwrap()",
+    "panic!",
 ];
 
 /// Every source file below `src`, with its path below `src`.
@@ -78,7 +91,9 @@ fn modules_are_declared_in_the_order_of_their_layers() {
         lib.lines().filter_map(|l| l.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
     let places: Vec<_> = declared
         .iter()
-        .map(|m| layer(m).unwrap_or_else(|| panic!("{m} is in lib.rs but not in the table of layers")))
+        .map(|m| {
+            layer(m).unwrap_or_else(|| panic!("{m} is in lib.rs but not in the table of layers"))
+        })
         .collect();
     assert!(places.is_sorted(), "lib.rs declares {declared:?}, out of the order of the layers");
 }
@@ -103,9 +118,13 @@ fn crates_stay_at_home() {
     for (file, text) in sources() {
         for (name, homes) in HOMES {
             let home = homes.iter().any(|h| {
-                file.strip_prefix(h).is_some_and(|rest| rest.starts_with('/') || rest.starts_with('.'))
+                file.strip_prefix(h)
+                    .is_some_and(|rest| rest.starts_with('/') || rest.starts_with('.'))
             });
-            assert!(home || !names_crate(&code(&text), name), "src/{file} names {name}, at home in {homes:?}");
+            assert!(
+                home || !names_crate(&code(&text), name),
+                "src/{file} names {name}, at home in {homes:?}"
+            );
         }
     }
 }

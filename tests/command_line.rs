@@ -32,7 +32,8 @@ fn evaluate_writes_scores_as_json_and_never_over_a_file() {
     assert_eq!(scores["schema"], "greylag.evaluation/1");
     let lqi = &scores["controllers"][1];
     assert_eq!((&lqi["controller"], &lqi["model"]), (&"lqi".into(), &"jsbsim".into()));
-    let groups: Vec<_> = lqi["groups"].as_array().unwrap().iter().map(|g| g["targets"].clone()).collect();
+    let groups: Vec<_> =
+        lqi["groups"].as_array().unwrap().iter().map(|g| g["targets"].clone()).collect();
     assert_eq!(groups, ["easy", "hard_corners", "all"]);
     assert!(lqi["groups"][0]["mean_deg"].as_f64().unwrap() < 0.03);
     assert!(lqi["ms_per_step"]["p999"].as_f64().unwrap() > 0.0);
@@ -42,8 +43,14 @@ fn evaluate_writes_scores_as_json_and_never_over_a_file() {
 #[test]
 fn evaluate_refuses_what_it_cannot_fly() {
     refuses(&["evaluate", "--controller", "autopilot"], &["autopilot", "lqi"]);
-    refuses(&["evaluate", "--controller", "lqi", "--model", "none.toml"], &["none.toml", "params/x8/prior.toml"]);
-    refuses(&["evaluate", "--controller", "lqi", "--targets", "none.csv"], &["none.csv", "greylag targets"]);
+    refuses(
+        &["evaluate", "--controller", "lqi", "--model", "none.toml"],
+        &["none.toml", "params/x8/prior.toml"],
+    );
+    refuses(
+        &["evaluate", "--controller", "lqi", "--targets", "none.csv"],
+        &["none.csv", "greylag targets"],
+    );
     refuses(
         &["evaluate", "--controller", "pid", "--aircraft-dir", "nowhere", "--aircraft", "glider"],
         &["glider", "nowhere"],

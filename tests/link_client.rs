@@ -63,15 +63,9 @@ fn a_newcomer_gets_a_heartbeat_at_once_then_one_a_second() {
     assert_eq!(beat.autopilot, MavAutopilot::MAV_AUTOPILOT_GENERIC);
     // HOLD is AUTO/LOITER: main mode 4, sub mode 3.
     assert_eq!(beat.custom_mode, 4 << 16 | 3 << 24);
-    assert!(
-        beat.base_mode
-            .contains(MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
-    );
+    assert!(beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED));
     assert_eq!(beat.system_status, MavState::MAV_STATE_STANDBY);
-    assert_eq!(
-        heartbeats(&run(&mut clients, &mut double, 510, 5510)).len(),
-        5
-    );
+    assert_eq!(heartbeats(&run(&mut clients, &mut double, 510, 5510)).len(), 5);
 }
 
 #[test]
@@ -81,16 +75,10 @@ fn a_change_of_mode_or_arming_is_told_at_once() {
     run(&mut clients, &mut double, 0, 100);
     double.status.armed = true;
     let beat = &heartbeats(&run(&mut clients, &mut double, 100, 110))[0];
-    assert!(
-        beat.base_mode
-            .contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED)
-    );
+    assert!(beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED));
     assert_eq!(beat.system_status, MavState::MAV_STATE_ACTIVE);
     double.status.mode = Mode::Offboard;
-    assert_eq!(
-        heartbeats(&run(&mut clients, &mut double, 110, 120))[0].custom_mode,
-        6 << 16
-    );
+    assert_eq!(heartbeats(&run(&mut clients, &mut double, 110, 120))[0].custom_mode, 6 << 16);
     double.status.vehicle_alive = false;
     let beat = &heartbeats(&run(&mut clients, &mut double, 120, 130))[0];
     assert_eq!(beat.system_status, MavState::MAV_STATE_CRITICAL);
@@ -104,10 +92,7 @@ fn heartbeats_go_on_while_the_vehicle_clock_stands() {
     let mut beats = 0;
     for ms in (0..10_000).step_by(10) {
         clients.poll(
-            Now {
-                host: Duration::from_millis(ms),
-                vehicle: Time::from_micros(77),
-            },
+            Now { host: Duration::from_millis(ms), vehicle: Time::from_micros(77) },
             &mut double,
         );
         beats += heartbeats(&sent(&mut clients)).len();
@@ -149,16 +134,10 @@ fn a_mavlink_1_client_is_answered_in_mavlink_1_until_it_shows_2() {
     clients.handle(at_ms(0), peer(1), &hello(V1), &mut double);
     clients.handle(at_ms(0), peer(2), &hello(V2), &mut double);
     let seen = run(&mut clients, &mut double, 0, 1000);
-    assert!(
-        seen.iter()
-            .all(|s| s.version == if s.peer == peer(1) { V1 } else { V2 })
-    );
+    assert!(seen.iter().all(|s| s.version == if s.peer == peer(1) { V1 } else { V2 }));
     assert!(seen.iter().filter(|s| s.peer == peer(1)).count() > 40);
     // MAVLink 1 has no extension fields: BATTERY_STATUS is 36 bytes there, COMMAND_ACK 3.
-    assert!(
-        seen.iter()
-            .any(|s| s.id == 147 && s.peer == peer(1) && s.payload.len() == 36)
-    );
+    assert!(seen.iter().any(|s| s.id == 147 && s.peer == peer(1) && s.payload.len() == 36));
     let long = MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
         command: MavCmd::MAV_CMD_REQUEST_MESSAGE,
         param1: 300.0,
@@ -167,21 +146,13 @@ fn a_mavlink_1_client_is_answered_in_mavlink_1_until_it_shows_2() {
         ..Default::default()
     });
     let seen = ask(&mut clients, &mut double, at_ms(1000), 1, &frame(V1, &long));
-    assert_eq!(
-        (seen[0].version, seen[0].payload.as_slice()),
-        (V1, &[0, 2, 0][..]),
-        "ack of 512"
-    );
+    assert_eq!((seen[0].version, seen[0].payload.as_slice()), (V1, &[0, 2, 0][..]), "ack of 512");
     // The handshake: PROTOCOL_VERSION itself is in MAVLink 2.
     assert_eq!((seen[1].version, seen[1].id), (V2, 300));
     clients.handle(at_ms(1000), peer(1), &hello(V2), &mut double);
     // A stray MAVLink 1 frame later changes nothing; one after 5 s of silence may be a new program.
     clients.handle(at_ms(1000), peer(1), &hello(V1), &mut double);
-    assert!(
-        run(&mut clients, &mut double, 1000, 2000)
-            .iter()
-            .all(|s| s.version == V2)
-    );
+    assert!(run(&mut clients, &mut double, 1000, 2000).iter().all(|s| s.version == V2));
     clients.handle(at_ms(6001), peer(1), &hello(V1), &mut double);
     let seen = run(&mut clients, &mut double, 6010, 7010);
     assert!(seen.iter().any(|s| s.peer == peer(1)));
@@ -193,13 +164,7 @@ fn every_command_for_us_is_acknowledged_and_no_other() {
     let (mut clients, mut double) = new();
     let mut answer = |system, component, number| {
         let payload = command_payload(number, [f32::NAN; 7], system, component, 0);
-        acks(&ask(
-            &mut clients,
-            &mut double,
-            at_ms(0),
-            1,
-            &raw_frame(76, &payload),
-        ))
+        acks(&ask(&mut clients, &mut double, at_ms(0), 1, &raw_frame(76, &payload)))
     };
     // 60000 is no MAV_CMD of the dialect; 22 is one that is not flown here. 3 is UNSUPPORTED.
     assert_eq!(answer(1, 1, 60000), [(60000, 3)]);
@@ -231,13 +196,7 @@ fn command_int_is_a_command_too() {
         ..Default::default()
     });
     assert_eq!(
-        acks(&ask(
-            &mut clients,
-            &mut double,
-            at_ms(0),
-            1,
-            &frame(V2, &message)
-        )),
+        acks(&ask(&mut clients, &mut double, at_ms(0), 1, &frame(V2, &message))),
         [(400, 0)]
     );
     assert_eq!(double.arms, [false]);
@@ -246,15 +205,8 @@ fn command_int_is_a_command_too() {
 #[test]
 fn arming_takes_zero_or_one_only_and_the_magic_number_forces() {
     let (mut clients, mut double) = new();
-    let mut arm = |params: &[f32]| {
-        acks(&ask(
-            &mut clients,
-            &mut double,
-            at_ms(0),
-            1,
-            &command(400, params),
-        ))
-    };
+    let mut arm =
+        |params: &[f32]| acks(&ask(&mut clients, &mut double, at_ms(0), 1, &command(400, params)));
     assert_eq!(arm(&[1.0]), [(400, 0)]);
     assert_eq!(arm(&[1.0, 21196.0]), [(400, 0)]);
     assert_eq!(arm(&[0.0]), [(400, 0)]);
@@ -271,18 +223,12 @@ fn a_retransmission_is_acknowledged_again_but_not_carried_out_again() {
     params[0] = 1.0;
     for confirmation in 0..4 {
         let bytes = raw_frame(76, &command_payload(400, params, 1, 1, confirmation));
-        assert_eq!(
-            acks(&ask(&mut clients, &mut double, at_ms(100), 1, &bytes)),
-            [(400, 0)]
-        );
+        assert_eq!(acks(&ask(&mut clients, &mut double, at_ms(100), 1, &bytes)), [(400, 0)]);
     }
     assert_eq!(double.arms.len(), 1);
     // Sent anew, it is carried out anew.
     let bytes = raw_frame(76, &command_payload(400, params, 1, 1, 0));
-    assert_eq!(
-        acks(&ask(&mut clients, &mut double, at_ms(200), 1, &bytes)),
-        [(400, 0)]
-    );
+    assert_eq!(acks(&ask(&mut clients, &mut double, at_ms(200), 1, &bytes)), [(400, 0)]);
     assert_eq!(double.arms.len(), 2);
 }
 
@@ -306,13 +252,7 @@ fn a_refusal_or_a_question_is_not_answered_from_memory() {
 #[test]
 fn the_modes_can_be_listed() {
     let (mut clients, mut double) = new();
-    let all = ask(
-        &mut clients,
-        &mut double,
-        at_ms(0),
-        1,
-        &command(512, &[435.0, 0.0]),
-    );
+    let all = ask(&mut clients, &mut double, at_ms(0), 1, &command(512, &[435.0, 0.0]));
     let names: Vec<_> = all
         .iter()
         .filter_map(|s| match s.message() {
@@ -329,25 +269,10 @@ fn the_modes_can_be_listed() {
             && names.contains(&("Offboard".into(), 6 << 16))
     );
     assert_eq!(
-        count(
-            &ask(
-                &mut clients,
-                &mut double,
-                at_ms(0),
-                1,
-                &command(512, &[435.0, 2.0])
-            ),
-            435
-        ),
+        count(&ask(&mut clients, &mut double, at_ms(0), 1, &command(512, &[435.0, 2.0])), 435),
         1
     );
-    let none = ask(
-        &mut clients,
-        &mut double,
-        at_ms(0),
-        1,
-        &command(512, &[435.0, 9.0]),
-    );
+    let none = ask(&mut clients, &mut double, at_ms(0), 1, &command(512, &[435.0, 9.0]));
     assert_eq!(acks(&none), [(512, 2)]);
 }
 
@@ -363,22 +288,13 @@ fn modes_are_set_in_every_way_that_clients_use() {
     assert_eq!(set(&command(176, &[1.0, (7 << 16) as f32])).0, [(176, 0)]);
     // Temporarily rejected, with the reason in words.
     let (ack, words) = set(&command(176, &[1.0, 6.0]));
-    assert_eq!(
-        (ack, words.as_str()),
-        (vec![(176, 1)], "Offboard needs arming")
-    );
+    assert_eq!((ack, words.as_str()), (vec![(176, 1)], "Offboard needs arming"));
     let (ack, words) = set(&command(176, &[1.0, 4.0, 5.0]));
-    assert_eq!(
-        (ack, words.as_str()),
-        (vec![(176, 2)], "Return is not flown")
-    );
+    assert_eq!((ack, words.as_str()), (vec![(176, 2)], "Return is not flown"));
     assert_eq!(set(&command(176, &[1.0, 99.0])).0, [(176, 2)]);
     assert_eq!(set(&command(176, &[0.0, 6.0])).0, [(176, 2)]);
     // SET_MODE is not acknowledged: custom_mode of MANUAL, flag bit 0 set.
-    assert_eq!(
-        set(&raw_frame(11, &[0, 0, 1, 0, 1, 1])),
-        (vec![], String::new())
-    );
+    assert_eq!(set(&raw_frame(11, &[0, 0, 1, 0, 1, 1])), (vec![], String::new()));
     assert_eq!(
         set(&raw_frame(11, &[0, 0, 9, 0, 1, 1])).1,
         "Mode refused: not a mode of this autopilot"
@@ -391,74 +307,31 @@ fn what_clients_request_is_sent() {
     let (mut clients, mut double) = new();
     // The home position is known only once the autopilot has been looked at.
     assert_eq!(
-        acks(&ask(
-            &mut clients,
-            &mut double,
-            at_ms(0),
-            1,
-            &command(512, &[242.0])
-        )),
+        acks(&ask(&mut clients, &mut double, at_ms(0), 1, &command(512, &[242.0]))),
         [(512, 1)]
     );
     run(&mut clients, &mut double, 0, 10);
-    for id in [
-        0, 1, 24, 30, 31, 33, 36, 74, 83, 147, 148, 242, 245, 300, 2, 436,
-    ] {
-        let seen = ask(
-            &mut clients,
-            &mut double,
-            at_ms(100),
-            1,
-            &command(512, &[id as f32]),
-        );
+    for id in [0, 1, 24, 30, 31, 33, 36, 74, 83, 147, 148, 242, 245, 300, 2, 436] {
+        let seen = ask(&mut clients, &mut double, at_ms(100), 1, &command(512, &[id as f32]));
         assert_eq!(acks(&seen), [(512, 0)], "message {id}");
         assert_eq!(count(&seen, id), 1, "message {id}");
     }
     for (id, result) in [(11039.0, 3), (f32::NAN, 2), (-1.0, 2), (30.5, 2), (1e30, 2)] {
-        let seen = ask(
-            &mut clients,
-            &mut double,
-            at_ms(100),
-            1,
-            &command(512, &[id]),
-        );
+        let seen = ask(&mut clients, &mut double, at_ms(100), 1, &command(512, &[id]));
         assert_eq!(acks(&seen), [(512, result)], "message {id}");
     }
     assert_eq!(
-        count(
-            &ask(
-                &mut clients,
-                &mut double,
-                at_ms(100),
-                1,
-                &command(520, &[1.0])
-            ),
-            148
-        ),
+        count(&ask(&mut clients, &mut double, at_ms(100), 1, &command(520, &[1.0])), 148),
         1
     );
-    assert_eq!(
-        count(
-            &ask(&mut clients, &mut double, at_ms(100), 1, &command(410, &[])),
-            242
-        ),
-        1
-    );
+    assert_eq!(count(&ask(&mut clients, &mut double, at_ms(100), 1, &command(410, &[])), 242), 1);
 }
 
 #[test]
 fn the_version_names_exactly_one_parameter_encoding() {
     let (mut clients, mut double) = new();
-    let seen = ask(
-        &mut clients,
-        &mut double,
-        at_ms(0),
-        1,
-        &command(512, &[148.0]),
-    );
-    let MavMessage::AUTOPILOT_VERSION(version) = seen[1].message() else {
-        panic!("{:?}", seen[1])
-    };
+    let seen = ask(&mut clients, &mut double, at_ms(0), 1, &command(512, &[148.0]));
+    let MavMessage::AUTOPILOT_VERSION(version) = seen[1].message() else { panic!("{:?}", seen[1]) };
     let bits = version.capabilities.bits();
     // MAVLINK2 8192, SET_ATTITUDE_TARGET 64, COMMAND_INT 8, PARAM_ENCODE_BYTEWISE 16.
     assert_eq!(bits, 8192 + 64 + 8 + 16);
@@ -469,50 +342,21 @@ fn intervals_are_per_client_and_limited() {
     let (mut clients, mut double) = new();
     clients.handle(at_ms(0), peer(2), &hello(V2), &mut double);
     // 1 µs is limited to 10 ms, the control cycle; −1 is off.
-    let fast = ask(
-        &mut clients,
-        &mut double,
-        at_ms(0),
-        1,
-        &command(511, &[30.0, 1.0]),
-    );
-    let off = ask(
-        &mut clients,
-        &mut double,
-        at_ms(0),
-        1,
-        &command(511, &[31.0, -1.0]),
-    );
+    let fast = ask(&mut clients, &mut double, at_ms(0), 1, &command(511, &[30.0, 1.0]));
+    let off = ask(&mut clients, &mut double, at_ms(0), 1, &command(511, &[31.0, -1.0]));
     assert_eq!((acks(&fast), acks(&off)), (vec![(511, 0)], vec![(511, 0)]));
     let seen = run(&mut clients, &mut double, 0, 1000);
-    let of = |port, id| {
-        seen.iter()
-            .filter(|s| s.peer == peer(port) && s.id == id)
-            .count()
-    };
+    let of = |port, id| seen.iter().filter(|s| s.peer == peer(port) && s.id == id).count();
     assert_eq!((of(1, 30), of(1, 31)), (100, 0));
     assert_eq!((of(2, 30), of(2, 31)), (10, 10));
 
-    for params in [
-        [9999.0, 1e5],
-        [30.0, f32::NAN],
-        [30.0, -5.0],
-        [f32::NAN, 1e5],
-    ] {
-        let seen = ask(
-            &mut clients,
-            &mut double,
-            at_ms(0),
-            1,
-            &command(511, &params),
-        );
+    for params in [[9999.0, 1e5], [30.0, f32::NAN], [30.0, -5.0], [f32::NAN, 1e5]] {
+        let seen = ask(&mut clients, &mut double, at_ms(0), 1, &command(511, &params));
         assert_eq!(acks(&seen), [(511, 2)], "{params:?}");
     }
     for (id, us) in [(30.0, 10_000), (31.0, -1), (83.0, 200_000), (9999.0, 0)] {
         let seen = ask(&mut clients, &mut double, at_ms(0), 1, &command(510, &[id]));
-        let MavMessage::MESSAGE_INTERVAL(m) = seen[1].message() else {
-            panic!()
-        };
+        let MavMessage::MESSAGE_INTERVAL(m) = seen[1].message() else { panic!() };
         assert_eq!((f32::from(m.message_id), m.interval_us), (id, us));
     }
 }
@@ -522,33 +366,14 @@ fn a_data_stream_request_concerns_the_asker_only() {
     let (mut clients, mut double) = new();
     clients.handle(at_ms(0), peer(2), &hello(V2), &mut double);
     // MAVProxy's request: all streams at 4 Hz. Fields: rate, system, component, group, start.
-    clients.handle(
-        at_ms(0),
-        peer(1),
-        &raw_frame(66, &[4, 0, 1, 1, 0, 1]),
-        &mut double,
-    );
+    clients.handle(at_ms(0), peer(1), &raw_frame(66, &[4, 0, 1, 1, 0, 1]), &mut double);
     let seen = run(&mut clients, &mut double, 0, 10_000);
-    let of = |port, id| {
-        seen.iter()
-            .filter(|s| s.peer == peer(port) && s.id == id)
-            .count()
-    };
+    let of = |port, id| seen.iter().filter(|s| s.peer == peer(port) && s.id == id).count();
     assert_eq!((of(1, 30), of(1, 1)), (40, 40));
     assert_eq!((of(2, 30), of(2, 1)), (100, 10));
-    clients.handle(
-        at_ms(10_000),
-        peer(1),
-        &raw_frame(66, &[4, 0, 1, 1, 10, 0]),
-        &mut double,
-    );
+    clients.handle(at_ms(10_000), peer(1), &raw_frame(66, &[4, 0, 1, 1, 10, 0]), &mut double);
     let seen = run(&mut clients, &mut double, 10_000, 11_000);
-    assert_eq!(
-        seen.iter()
-            .filter(|s| s.peer == peer(1) && s.id == 30)
-            .count(),
-        0
-    );
+    assert_eq!(seen.iter().filter(|s| s.peer == peer(1) && s.id == 30).count(), 0);
 }
 
 #[test]
@@ -557,16 +382,10 @@ fn long_texts_come_in_chunks_that_can_be_joined() {
     clients.handle(at_ms(0), peer(1), &hello(V2), &mut double);
     clients.handle(at_ms(0), peer(2), &hello(V1), &mut double);
     let words = "Setpoints lost for 1.0 s: leaving OFFBOARD, holding wings level at 16.7 m/s until told otherwise.";
-    double.texts.push_back(Text {
-        severity: Severity::Critical,
-        words: words.into(),
-    });
+    double.texts.push_back(Text { severity: Severity::Critical, words: words.into() });
     let seen = run(&mut clients, &mut double, 0, 10);
     let of = |port| {
-        seen.iter()
-            .filter(|s| s.peer == peer(port) && s.id == 253)
-            .cloned()
-            .collect::<Vec<_>>()
+        seen.iter().filter(|s| s.peer == peer(port) && s.id == 253).cloned().collect::<Vec<_>>()
     };
     assert_eq!(texts(&of(1)).concat(), words);
     assert_eq!(texts(&of(2)).concat(), words);
@@ -586,86 +405,47 @@ fn missions_files_time_and_pings_are_answered() {
     let (mut clients, mut double) = new();
     let mut answer = |bytes: &[u8]| ask(&mut clients, &mut double, at_ms(5), 1, bytes);
     let list = answer(&raw_frame(43, &[1, 1]));
-    let MavMessage::MISSION_COUNT(count) = list[0].message() else {
-        panic!()
-    };
-    assert_eq!(
-        (count.count, count.target_system, count.target_component),
-        (0, 255, 190)
-    );
+    let MavMessage::MISSION_COUNT(count) = list[0].message() else { panic!() };
+    assert_eq!((count.count, count.target_system, count.target_component), (0, 255, 190));
     // An upload of three items: MAV_MISSION_UNSUPPORTED is 3.
     let upload = answer(&raw_frame(44, &[3, 0, 1, 1]));
-    assert_eq!(
-        (upload[0].id, &upload[0].payload[..3]),
-        (47, &[255, 190, 3][..])
-    );
+    assert_eq!((upload[0].id, &upload[0].payload[..3]), (47, &[255, 190, 3][..]));
     let cleared = answer(&raw_frame(45, &[1, 1]));
     assert_eq!(cleared[0].id, 47);
 
     // Open a file for reading (opcode 4), sequence 258: NAK (129) of the next sequence number.
     let open = answer(&raw_frame(110, &[0, 1, 1, 2, 1, 9, 4, 0]));
-    assert_eq!(
-        (open[0].id, &open[0].payload[3..8]),
-        (110, &[3, 1, 9, 129, 1][..])
-    );
-    assert!(
-        answer(&raw_frame(110, &[0, 1, 1, 3, 1, 9, 129, 1])).is_empty(),
-        "no NAK of a NAK"
-    );
+    assert_eq!((open[0].id, &open[0].payload[3..8]), (110, &[3, 1, 9, 129, 1][..]));
+    assert!(answer(&raw_frame(110, &[0, 1, 1, 3, 1, 9, 129, 1])).is_empty(), "no NAK of a NAK");
 
-    let sync = MavMessage::TIMESYNC(TIMESYNC_DATA {
-        tc1: 0,
-        ts1: 12345,
-        ..Default::default()
-    });
-    let MavMessage::TIMESYNC(m) = answer(&frame(V2, &sync))[0].message() else {
-        panic!()
-    };
+    let sync = MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 0, ts1: 12345, ..Default::default() });
+    let MavMessage::TIMESYNC(m) = answer(&frame(V2, &sync))[0].message() else { panic!() };
     // 5 ms of vehicle time in ns.
     assert_eq!((m.tc1, m.ts1), (5_000_000, 12345));
-    let reply = MavMessage::TIMESYNC(TIMESYNC_DATA {
-        tc1: 1,
-        ts1: 12345,
-        ..Default::default()
-    });
+    let reply = MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 1, ts1: 12345, ..Default::default() });
     assert!(answer(&frame(V2, &reply)).is_empty());
 
     let mut ping = 99u64.to_le_bytes().to_vec();
     ping.extend([7, 0, 0, 0, 0, 0]);
     let pong = answer(&raw_frame(4, &ping));
-    assert_eq!(
-        (pong[0].id, &pong[0].payload[8..]),
-        (4, &[7, 0, 0, 0, 255, 190][..])
-    );
+    assert_eq!((pong[0].id, &pong[0].payload[8..]), (4, &[7, 0, 0, 0, 255, 190][..]));
 }
 
 #[test]
 fn peers_are_bounded_and_the_longest_silent_one_makes_room() {
     let (mut clients, mut double) = new();
     for port in 0..MAX_SESSIONS as u16 {
-        clients.handle(
-            at_ms(u64::from(port)),
-            peer(100 + port),
-            &hello(V2),
-            &mut double,
-        );
+        clients.handle(at_ms(u64::from(port)), peer(100 + port), &hello(V2), &mut double);
     }
     // All have been heard within 3 s: nobody is displaced.
     clients.handle(at_ms(1000), peer(1), &hello(V2), &mut double);
-    assert_eq!(
-        (clients.session_count(), clients.counts().turned_away),
-        (MAX_SESSIONS, 1)
-    );
+    assert_eq!((clients.session_count(), clients.counts().turned_away), (MAX_SESSIONS, 1));
     // Now all but the first have fallen silent.
     clients.handle(at_ms(4000), peer(100), &hello(V2), &mut double);
     clients.handle(at_ms(4000), peer(1), &hello(V2), &mut double);
     clients.poll(at_ms(4000), &mut double);
     let seen = sent(&mut clients);
-    assert!(
-        [1, 100, 102]
-            .iter()
-            .all(|port| seen.iter().any(|s| s.peer == peer(*port)))
-    );
+    assert!([1, 100, 102].iter().all(|port| seen.iter().any(|s| s.peer == peer(*port))));
     assert!(!seen.iter().any(|s| s.peer == peer(101)));
     // A datagram peer is forgotten after a minute, a connection is not.
     clients.welcome(at_ms(4000), peer(1));
@@ -679,21 +459,13 @@ fn peers_are_bounded_and_the_longest_silent_one_makes_room() {
 fn a_listener_is_served_before_it_speaks() {
     let (mut clients, mut double) = new();
     clients.welcome(at_ms(0), peer(14540));
-    assert_eq!(
-        heartbeats(&run(&mut clients, &mut double, 0, 3000)).len(),
-        3
-    );
+    assert_eq!(heartbeats(&run(&mut clients, &mut double, 0, 3000)).len(), 3);
 }
 
 #[test]
 fn our_own_frames_are_not_answered() {
     let (mut clients, mut double) = new();
-    let echo = frame_from(
-        V2,
-        1,
-        1,
-        &MavMessage::PARAM_REQUEST_LIST(Default::default()),
-    );
+    let echo = frame_from(V2, 1, 1, &MavMessage::PARAM_REQUEST_LIST(Default::default()));
     assert!(ask(&mut clients, &mut double, at_ms(0), 1, &echo).is_empty());
     assert_eq!((clients.session_count(), clients.counts().echoes), (0, 1));
 }
@@ -705,23 +477,12 @@ fn unknown_values_are_not_sent_as_zeros() {
     double.status.attitude = [f64::NAN; 3];
     clients.handle(at_ms(0), peer(1), &hello(V2), &mut double);
     let seen = run(&mut clients, &mut double, 0, 1000);
-    assert_eq!(
-        (count(&seen, 33), count(&seen, 30), count(&seen, 31)),
-        (0, 0, 0)
-    );
+    assert_eq!((count(&seen, 33), count(&seen, 30), count(&seen, 31)), (0, 0, 0));
     let gps = seen.iter().find(|s| s.id == 24).unwrap().message();
-    let MavMessage::GPS_RAW_INT(gps) = gps else {
-        panic!()
-    };
+    let MavMessage::GPS_RAW_INT(gps) = gps else { panic!() };
     assert_eq!(gps.fix_type, GpsFixType::GPS_FIX_TYPE_NO_FIX);
     assert_eq!(
-        acks(&ask(
-            &mut clients,
-            &mut double,
-            at_ms(0),
-            1,
-            &command(512, &[33.0])
-        )),
+        acks(&ask(&mut clients, &mut double, at_ms(0), 1, &command(512, &[33.0]))),
         [(512, 1)]
     );
 }

@@ -24,31 +24,18 @@ fn ids(bytes: &[u8]) -> (Vec<u32>, FrameCounts) {
 
 #[test]
 fn frames_of_rust_mavlink_are_read_in_both_versions() {
-    for (version, expected) in [
-        (MavlinkVersion::V1, Version::V1),
-        (MavlinkVersion::V2, Version::V2),
-    ] {
+    for (version, expected) in
+        [(MavlinkVersion::V1, Version::V1), (MavlinkVersion::V2, Version::V2)]
+    {
         let bytes = frame(version, &attitude());
         let mut counts = FrameCounts::default();
         let frames: Vec<_> = Frames::new(&bytes, &mut counts).collect();
         assert_eq!(frames.len(), 1);
         assert_eq!(frames[0].version, expected);
-        assert_eq!(
-            frames[0].source,
-            Source {
-                system: 255,
-                component: 190
-            }
-        );
+        assert_eq!(frames[0].source, Source { system: 255, component: 190 });
         assert_eq!((frames[0].id, frames[0].sequence), (30, 42));
         assert_eq!(frames[0].bytes, &bytes[..]);
-        assert_eq!(
-            counts,
-            FrameCounts {
-                good: 1,
-                ..Default::default()
-            }
-        );
+        assert_eq!(counts, FrameCounts { good: 1, ..Default::default() });
     }
 }
 
@@ -57,23 +44,15 @@ fn frames_are_written_to_the_byte_as_rust_mavlink_writes_them() {
     // The second message ends in zeros, the third is all zeros: MAVLink 2 cuts them, but for one.
     let messages = [
         attitude(),
-        MavMessage::STATUSTEXT(STATUSTEXT_DATA {
-            text: "short".into(),
-            ..Default::default()
-        }),
+        MavMessage::STATUSTEXT(STATUSTEXT_DATA { text: "short".into(), ..Default::default() }),
         MavMessage::PARAM_REQUEST_LIST(Default::default()),
     ];
     for message in messages {
-        for (codec, ours) in [
-            (MavlinkVersion::V1, Version::V1),
-            (MavlinkVersion::V2, Version::V2),
-        ] {
+        for (codec, ours) in [(MavlinkVersion::V1, Version::V1), (MavlinkVersion::V2, Version::V2)]
+        {
             let mut payload = [0; 255];
             let len = message.ser(codec, &mut payload);
-            let from = Source {
-                system: 255,
-                component: 190,
-            };
+            let from = Source { system: 255, component: 190 };
             let written =
                 framing::write(ours, 42, from, message.message_id(), &payload[..len]).unwrap();
             assert_eq!(written, frame(codec, &message));
@@ -83,10 +62,7 @@ fn frames_are_written_to_the_byte_as_rust_mavlink_writes_them() {
 
 #[test]
 fn mavlink_1_has_no_room_for_numbers_above_255() {
-    let from = Source {
-        system: 1,
-        component: 1,
-    };
+    let from = Source { system: 1, component: 1 };
     assert!(framing::write(Version::V1, 0, from, 300, &[0; 22]).is_none());
     assert!(framing::write(Version::V2, 0, from, 300, &[0; 22]).is_some());
 }
@@ -141,13 +117,7 @@ fn unknown_incompatibility_flags_are_refused_and_signed_frames_are_frames() {
     signed.extend(frame(MavlinkVersion::V1, &attitude()));
     let (found, counts) = ids(&signed);
     assert_eq!(found, [30, 30]);
-    assert_eq!(
-        counts,
-        FrameCounts {
-            good: 2,
-            ..Default::default()
-        }
-    );
+    assert_eq!(counts, FrameCounts { good: 2, ..Default::default() });
 }
 
 #[test]
@@ -157,14 +127,7 @@ fn an_unknown_message_is_counted_and_skipped() {
     bytes.extend(frame(MavlinkVersion::V2, &attitude()));
     let (found, counts) = ids(&bytes);
     assert_eq!(found, [30]);
-    assert_eq!(
-        counts,
-        FrameCounts {
-            good: 1,
-            unknown: 1,
-            ..Default::default()
-        }
-    );
+    assert_eq!(counts, FrameCounts { good: 1, unknown: 1, ..Default::default() });
 }
 
 #[test]
@@ -177,9 +140,7 @@ fn a_stream_is_cut_alike_in_chunks_of_any_size() {
     }
     for size in [1, 2, 7, 64, 1024] {
         let (mut cutter, mut found) = (StreamCutter::default(), 0);
-        stream
-            .chunks(size)
-            .for_each(|chunk| cutter.push(chunk, |_| found += 1));
+        stream.chunks(size).for_each(|chunk| cutter.push(chunk, |_| found += 1));
         cutter.flush(|_| found += 1);
         assert_eq!(found, 10, "chunks of {size}");
         assert!(!cutter.is_waiting());
@@ -195,9 +156,7 @@ fn noise_costs_a_bounded_amount_of_work() {
     assert!(counts.bad() <= 64, "{counts:?}");
     assert!(counts.dropped_bytes > 8000);
     let mut cutter = StreamCutter::default();
-    noise
-        .chunks(1024)
-        .for_each(|chunk| cutter.push(chunk, |_| panic!("a frame in noise")));
+    noise.chunks(1024).for_each(|chunk| cutter.push(chunk, |_| panic!("a frame in noise")));
     cutter.flush(|_| panic!("a frame in noise"));
     assert!(!cutter.is_waiting());
 }

@@ -27,15 +27,9 @@ fn corpus() -> Vec<Vec<u8>> {
         })
         .collect();
     for _ in 0..frames.len() / 12 {
-        let setpoint = SET_ATTITUDE_TARGET_DATA {
-            q: [1.0, 0.1, 0.1, 0.0],
-            thrust: 0.5,
-            ..Default::default()
-        };
-        frames.push(frame(
-            MavlinkVersion::V2,
-            &MavMessage::SET_ATTITUDE_TARGET(setpoint),
-        ));
+        let setpoint =
+            SET_ATTITUDE_TARGET_DATA { q: [1.0, 0.1, 0.1, 0.0], thrust: 0.5, ..Default::default() };
+        frames.push(frame(MavlinkVersion::V2, &MavMessage::SET_ATTITUDE_TARGET(setpoint)));
         frames.push(command(400, &[1.0]));
         frames.push(command(511, &[30.0, 1e5]));
         let mut set = vec![0, 0, 0x20, 0x42, 1, 1];
@@ -100,18 +94,13 @@ fn the_client_side_survives_mutated_frames() {
         // Everything that leaves is a frame with the right CRC.
         answers += sent(&mut clients).len() as u64;
     }
-    let finite = double.setpoints.iter().all(|s| {
-        [s.roll, s.pitch, s.thrust.unwrap_or(0.0)]
-            .iter()
-            .all(|x| x.is_finite())
-    });
+    let finite = double
+        .setpoints
+        .iter()
+        .all(|s| [s.roll, s.pitch, s.thrust.unwrap_or(0.0)].iter().all(|x| x.is_finite()));
     assert!(finite, "a setpoint that is not finite came through");
     // The inputs did get past the parser, and some of them as far as the autopilot.
-    assert!(
-        clients.counts().frames.good > u64::from(INPUTS) / 3,
-        "{:?}",
-        clients.counts()
-    );
+    assert!(clients.counts().frames.good > u64::from(INPUTS) / 3, "{:?}", clients.counts());
     assert!(clients.counts().frames.bad() > 1000);
     assert!(answers > u64::from(INPUTS) && !double.setpoints.is_empty() && !double.arms.is_empty());
 }
@@ -126,20 +115,14 @@ fn the_vehicle_side_survives_mutated_frames() {
         let mut frames = Shown::at(10_000 * i).frames();
         let (at, other) = (rng.random_range(0..5usize), frames[4].clone());
         mutate(&mut rng, &mut frames[at], &other);
-        sitl.handle(
-            Duration::from_millis(10 * i),
-            peer(1),
-            &frames.concat(),
-            |t| {
-                delivered += 1;
-                assert!(t.state.is_finite() && t.yaw.is_finite() && t.altitude.is_finite());
-                assert!(
-                    t.actuators.aileron.is_finite()
-                        && t.specific_force.iter().all(|x| x.is_finite())
-                );
-                assert!(t.state.airspeed.abs() < 200.0 && t.state.p.abs() < 50.0);
-            },
-        );
+        sitl.handle(Duration::from_millis(10 * i), peer(1), &frames.concat(), |t| {
+            delivered += 1;
+            assert!(t.state.is_finite() && t.yaw.is_finite() && t.altitude.is_finite());
+            assert!(
+                t.actuators.aileron.is_finite() && t.specific_force.iter().all(|x| x.is_finite())
+            );
+            assert!(t.state.airspeed.abs() < 200.0 && t.state.p.abs() < 50.0);
+        });
     }
     let counts = sitl.counts();
     // Half of the mutations leave no whole message, many others spoil its time: more than a fifth
@@ -160,9 +143,5 @@ fn the_stream_cutter_survives_mutated_streams() {
             assert!(!cutter.is_waiting());
         }
     }
-    assert!(
-        cutter.counts.good > u64::from(INPUTS) / 3,
-        "{:?}",
-        cutter.counts
-    );
+    assert!(cutter.counts.good > u64::from(INPUTS) / 3, "{:?}", cutter.counts);
 }

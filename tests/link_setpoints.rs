@@ -30,13 +30,7 @@ fn send(
     port: u16,
     data: SET_ATTITUDE_TARGET_DATA,
 ) -> Vec<Seen> {
-    ask(
-        clients,
-        double,
-        at_ms(ms),
-        port,
-        &frame(V2, &MavMessage::SET_ATTITUDE_TARGET(data)),
-    )
+    ask(clients, double, at_ms(ms), port, &frame(V2, &MavMessage::SET_ATTITUDE_TARGET(data)))
 }
 
 /// 60° of bank to the right: half the angle on the x axis.
@@ -48,21 +42,12 @@ fn banked() -> [f32; 4] {
 fn an_attitude_is_decoded_whatever_its_sign_and_scale() {
     let (mut clients, mut double) = new();
     for factor in [1.0, -1.0, 2.0] {
-        send(
-            &mut clients,
-            &mut double,
-            0,
-            1,
-            setpoint(banked().map(|c| factor * c), 0.5, 7),
-        );
+        send(&mut clients, &mut double, 0, 1, setpoint(banked().map(|c| factor * c), 0.5, 7));
     }
     assert_eq!(double.setpoints.len(), 3);
     for got in &double.setpoints {
         // The quaternion's floats carry 24 bits: 1e-6 rad.
-        assert!(
-            (got.roll - 60f64.to_radians()).abs() < 1e-6 && got.pitch.abs() < 1e-6,
-            "{got:?}"
-        );
+        assert!((got.roll - 60f64.to_radians()).abs() < 1e-6 && got.pitch.abs() < 1e-6, "{got:?}");
         assert_eq!(got.thrust, Some(0.5));
     }
 }
@@ -81,10 +66,7 @@ fn yaw_is_ignored_and_masked_thrust_is_absent() {
         setpoint([cy * cp, -sy * sp, cy * sp, sy * cp], f32::NAN, 64 + 7),
     );
     let got = double.setpoints[0];
-    assert!(
-        got.roll.abs() < 1e-6 && (got.pitch - 10f64.to_radians()).abs() < 1e-6,
-        "{got:?}"
-    );
+    assert!(got.roll.abs() < 1e-6 && (got.pitch - 10f64.to_radians()).abs() < 1e-6, "{got:?}");
     assert_eq!(got.thrust, None);
 }
 
@@ -122,14 +104,7 @@ fn refusals_are_told_at_a_bounded_rate() {
     let mut told = 0;
     // 1000 bad setpoints in 10 s: ten at once, then two a second.
     for ms in (0..10_000).step_by(10) {
-        told += texts(&send(
-            &mut clients,
-            &mut double,
-            ms,
-            1,
-            setpoint([0.0; 4], 0.5, 7),
-        ))
-        .len();
+        told += texts(&send(&mut clients, &mut double, ms, 1, setpoint([0.0; 4], 0.5, 7))).len();
     }
     assert!((20..=30).contains(&told), "{told} texts");
 }
@@ -139,35 +114,14 @@ fn two_clients_cannot_steer_at_once() {
     let (mut clients, mut double) = new();
     for ms in (0..2000).step_by(100) {
         send(&mut clients, &mut double, ms, 1, setpoint(banked(), 0.5, 7));
-        send(
-            &mut clients,
-            &mut double,
-            ms,
-            2,
-            setpoint([1.0, 0.0, 0.0, 0.0], 0.5, 7),
-        );
+        send(&mut clients, &mut double, ms, 2, setpoint([1.0, 0.0, 0.0, 0.0], 0.5, 7));
     }
-    assert_eq!(
-        (double.setpoints.len(), clients.counts().contested_setpoints),
-        (20, 20)
-    );
+    assert_eq!((double.setpoints.len(), clients.counts().contested_setpoints), (20, 20));
     assert!(double.setpoints.iter().all(|s| s.roll > 1.0));
     // The first one falls silent at 1.9 s: a second later the helm is free.
-    send(
-        &mut clients,
-        &mut double,
-        2899,
-        2,
-        setpoint([1.0, 0.0, 0.0, 0.0], 0.5, 7),
-    );
+    send(&mut clients, &mut double, 2899, 2, setpoint([1.0, 0.0, 0.0, 0.0], 0.5, 7));
     assert_eq!(double.setpoints.len(), 20);
-    send(
-        &mut clients,
-        &mut double,
-        2900,
-        2,
-        setpoint([1.0, 0.0, 0.0, 0.0], 0.5, 7),
-    );
+    send(&mut clients, &mut double, 2900, 2, setpoint([1.0, 0.0, 0.0, 0.0], 0.5, 7));
     assert_eq!(double.setpoints.len(), 21);
 }
 
@@ -175,33 +129,14 @@ fn two_clients_cannot_steer_at_once() {
 fn sticks_are_scaled_limited_and_refused_when_an_axis_is_missing() {
     let (mut clients, mut double) = new();
     let mut push = |x, y, z| {
-        let data = MANUAL_CONTROL_DATA {
-            x,
-            y,
-            z,
-            target: 1,
-            ..Default::default()
-        };
-        ask(
-            &mut clients,
-            &mut double,
-            at_ms(0),
-            1,
-            &frame(V1, &MavMessage::MANUAL_CONTROL(data)),
-        );
+        let data = MANUAL_CONTROL_DATA { x, y, z, target: 1, ..Default::default() };
+        ask(&mut clients, &mut double, at_ms(0), 1, &frame(V1, &MavMessage::MANUAL_CONTROL(data)));
     };
     push(500, -250, 700);
     push(-32768, 1500, -1000);
     push(i16::MAX, 0, 0);
-    let sticks = |pitch, roll, throttle| Sticks {
-        roll,
-        pitch,
-        throttle,
-    };
-    assert_eq!(
-        double.sticks,
-        [sticks(0.5, -0.25, 0.7), sticks(-1.0, 1.0, 0.0)]
-    );
+    let sticks = |pitch, roll, throttle| Sticks { roll, pitch, throttle };
+    assert_eq!(double.sticks, [sticks(0.5, -0.25, 0.7), sticks(-1.0, 1.0, 0.0)]);
     assert_eq!(clients.counts().refused_setpoints, 1);
 }
 
@@ -228,12 +163,8 @@ fn set(name: &str, value: [u8; 4], kind: u8) -> Vec<u8> {
 #[test]
 fn the_list_is_paced_and_complete() {
     let (mut clients, mut double) = new();
-    double.parameters = (0..50)
-        .map(|_| Parameter {
-            name: "GL_MANY",
-            value: ParameterValue::Real(1.0),
-        })
-        .collect();
+    double.parameters =
+        (0..50).map(|_| Parameter { name: "GL_MANY", value: ParameterValue::Real(1.0) }).collect();
     clients.handle(at_ms(0), peer(1), &raw_frame(21, &[1, 1]), &mut double);
     let mut indices = vec![];
     for ms in (0..1000).step_by(10) {
@@ -252,13 +183,7 @@ fn whole_numbers_travel_bytewise() {
     double.parameters[1].value = ParameterValue::Int(-2);
     let mut read = vec![1, 0, 1, 1];
     read.extend([0; 16]);
-    let seen = ask(
-        &mut clients,
-        &mut double,
-        at_ms(0),
-        1,
-        &raw_frame(20, &read),
-    );
+    let seen = ask(&mut clients, &mut double, at_ms(0), 1, &raw_frame(20, &read));
     // −2 in two's complement, count 3, index 1, the name, type 6 (INT32).
     assert_eq!(seen[0].payload[..8], [0xFE, 0xFF, 0xFF, 0xFF, 3, 0, 1, 0]);
     assert_eq!(seen[0].payload[8..15], *b"GL_SEED");
@@ -280,38 +205,17 @@ fn a_parameter_is_set_and_echoed_to_everybody() {
     let (mut clients, mut double) = new();
     clients.handle(at_ms(0), peer(2), &raw_frame(43, &[1, 1]), &mut double);
     sent(&mut clients);
-    let seen = ask(
-        &mut clients,
-        &mut double,
-        at_ms(0),
-        1,
-        &set("GL_BANK_MAX", 45f32.to_le_bytes(), 9),
-    );
+    let seen =
+        ask(&mut clients, &mut double, at_ms(0), 1, &set("GL_BANK_MAX", 45f32.to_le_bytes(), 9));
     assert_eq!(
         seen.iter().map(|s| (s.peer, s.id)).collect::<Vec<_>>(),
         [(peer(2), 22), (peer(1), 22)]
     );
-    assert!(
-        parameter_values(&seen)
-            .iter()
-            .all(|v| v.param_value == 45.0 && v.param_index == 0)
-    );
+    assert!(parameter_values(&seen).iter().all(|v| v.param_value == 45.0 && v.param_index == 0));
     // pymavlink's param_set_send marks everything REAL32.
-    ask(
-        &mut clients,
-        &mut double,
-        at_ms(0),
-        1,
-        &set("GL_SEED", 12f32.to_le_bytes(), 9),
-    );
+    ask(&mut clients, &mut double, at_ms(0), 1, &set("GL_SEED", 12f32.to_le_bytes(), 9));
     assert_eq!(double.parameters[1].value, ParameterValue::Int(12));
-    ask(
-        &mut clients,
-        &mut double,
-        at_ms(0),
-        1,
-        &set("GL_SIXTEEN_CHARS", 1f32.to_le_bytes(), 9),
-    );
+    ask(&mut clients, &mut double, at_ms(0), 1, &set("GL_SIXTEEN_CHARS", 1f32.to_le_bytes(), 9));
     assert_eq!(double.parameters[2].value, ParameterValue::Real(1.0));
 }
 
@@ -331,13 +235,8 @@ fn a_bad_parameter_leaves_the_old_value_and_says_so() {
     let before = double.parameters.clone();
     for (bytes, error) in cases {
         let seen = ask(&mut clients, &mut double, at_ms(0), 1, &bytes);
-        assert_eq!(
-            seen.iter().map(|s| s.id).take(2).collect::<Vec<_>>(),
-            [345, 22]
-        );
-        let MavMessage::PARAM_ERROR(m) = seen[0].message() else {
-            panic!()
-        };
+        assert_eq!(seen.iter().map(|s| s.id).take(2).collect::<Vec<_>>(), [345, 22]);
+        let MavMessage::PARAM_ERROR(m) = seen[0].message() else { panic!() };
         assert_eq!(m.error as u8, error);
         assert!(texts(&seen).concat().contains("refused"));
         assert_eq!(double.parameters, before);
@@ -362,15 +261,9 @@ fn a_parameter_that_does_not_exist_is_an_error() {
     by_name.extend(*b"_HASH_CHECK\0\0\0\0\0");
     let mut by_index = vec![3, 0, 1, 1];
     by_index.extend([0; 16]);
-    for bytes in [
-        raw_frame(20, &by_name),
-        raw_frame(20, &by_index),
-        set("NOT_HERE", [0; 4], 9),
-    ] {
+    for bytes in [raw_frame(20, &by_name), raw_frame(20, &by_index), set("NOT_HERE", [0; 4], 9)] {
         let seen = ask(&mut clients, &mut double, at_ms(0), 1, &bytes);
-        let MavMessage::PARAM_ERROR(m) = seen[0].message() else {
-            panic!()
-        };
+        let MavMessage::PARAM_ERROR(m) = seen[0].message() else { panic!() };
         assert_eq!(m.error, MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST);
     }
 }

@@ -14,10 +14,7 @@ use greylag::link::transport::{Arrival, Network, Packet};
 const PATIENCE: Duration = Duration::from_secs(10);
 
 fn local(port: u16) -> HostPort {
-    HostPort {
-        host: "127.0.0.1".into(),
-        port,
-    }
+    HostPort { host: "127.0.0.1".into(), port }
 }
 
 /// A heartbeat-sized frame with a running number in it.
@@ -25,10 +22,7 @@ fn frame(number: u8) -> Vec<u8> {
     framing::write(
         Version::V2,
         number,
-        Source {
-            system: 1,
-            component: 1,
-        },
+        Source { system: 1, component: 1 },
         0,
         &[1, 2, 3, 4, 5, 6, 7, 8, 9],
     )
@@ -69,9 +63,7 @@ fn receive(socket: &UdpSocket) -> (Vec<u8>, SocketAddr) {
 fn a_udp_server_answers_each_peer_and_survives_a_dead_one() {
     let network = Network::start().unwrap();
     let (to, inbox) = bounded(64);
-    let link = network
-        .open(LinkId(3), &Address::UdpIn(local(0)), "--client", to)
-        .unwrap();
+    let link = network.open(LinkId(3), &Address::UdpIn(local(0)), "--client", to).unwrap();
     let server = link.local().unwrap();
     let (one, two) = (udp_client(), udp_client());
     let mut peers = vec![];
@@ -104,9 +96,7 @@ fn a_udp_client_speaks_first_and_hears_an_answer_from_any_port() {
     let (server, other) = (udp_client(), udp_client());
     let (to, inbox) = bounded(64);
     let port = server.local_addr().unwrap().port();
-    let link = network
-        .open(LinkId(0), &Address::UdpOut(local(port)), "--client", to)
-        .unwrap();
+    let link = network.open(LinkId(0), &Address::UdpOut(local(port)), "--client", to).unwrap();
     let target = link.target().unwrap();
     assert_eq!(target.address, server.local_addr().unwrap());
     link.send(target, frame(1));
@@ -122,10 +112,7 @@ fn a_port_in_use_is_one_clear_error() {
     let (to, _inbox) = bounded(1);
     let udp = udp_client();
     let address = Address::UdpIn(local(udp.local_addr().unwrap().port()));
-    let error = network
-        .open(LinkId(0), &address, "--client", to.clone())
-        .unwrap_err()
-        .to_string();
+    let error = network.open(LinkId(0), &address, "--client", to.clone()).unwrap_err().to_string();
     assert_eq!(
         error,
         format!(
@@ -134,25 +121,13 @@ fn a_port_in_use_is_one_clear_error() {
     );
     let tcp = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = Address::TcpIn(local(tcp.local_addr().unwrap().port()));
-    let error = network
-        .open(LinkId(0), &address, "--client", to.clone())
-        .unwrap_err()
-        .to_string();
+    let error = network.open(LinkId(0), &address, "--client", to.clone()).unwrap_err().to_string();
     assert!(error.contains("already in use"), "{error}");
     let serial = "serial:/dev/ttyACM0:921600".parse().unwrap();
-    let error = network
-        .open(LinkId(0), &serial, "--vehicle", to.clone())
-        .unwrap_err()
-        .to_string();
+    let error = network.open(LinkId(0), &serial, "--vehicle", to.clone()).unwrap_err().to_string();
     assert!(error.contains("real flight controllers"), "{error}");
-    let nowhere = Address::UdpIn(HostPort {
-        host: "no.such.host.invalid".into(),
-        port: 1,
-    });
-    let error = network
-        .open(LinkId(0), &nowhere, "--client", to)
-        .unwrap_err()
-        .to_string();
+    let nowhere = Address::UdpIn(HostPort { host: "no.such.host.invalid".into(), port: 1 });
+    let error = network.open(LinkId(0), &nowhere, "--client", to).unwrap_err().to_string();
     assert!(error.contains("no.such.host.invalid"), "{error}");
 }
 
@@ -160,14 +135,10 @@ fn a_port_in_use_is_one_clear_error() {
 fn a_full_inbox_drops_and_counts_and_never_waits() {
     let network = Network::start().unwrap();
     let (to, inbox) = bounded(4);
-    let link = network
-        .open(LinkId(0), &Address::UdpIn(local(0)), "--client", to)
-        .unwrap();
+    let link = network.open(LinkId(0), &Address::UdpIn(local(0)), "--client", to).unwrap();
     let client = udp_client();
     for number in 0..200 {
-        client
-            .send_to(&frame(number), link.local().unwrap())
-            .unwrap();
+        client.send_to(&frame(number), link.local().unwrap()).unwrap();
     }
     let start = Instant::now();
     while link.counts().received < 200 {
@@ -185,13 +156,9 @@ fn a_full_inbox_drops_and_counts_and_never_waits() {
 fn an_oversize_datagram_is_dropped_and_counted() {
     let network = Network::start().unwrap();
     let (to, inbox) = bounded(4);
-    let link = network
-        .open(LinkId(0), &Address::UdpIn(local(0)), "--client", to)
-        .unwrap();
+    let link = network.open(LinkId(0), &Address::UdpIn(local(0)), "--client", to).unwrap();
     let client = udp_client();
-    client
-        .send_to(&[0xFD; 20_000], link.local().unwrap())
-        .unwrap();
+    client.send_to(&[0xFD; 20_000], link.local().unwrap()).unwrap();
     client.send_to(&frame(1), link.local().unwrap()).unwrap();
     assert_eq!(packet(&inbox).bytes, frame(1));
     assert_eq!(link.counts().oversize, 1);
@@ -208,9 +175,7 @@ fn read_exactly(stream: &mut TcpStream, len: usize) -> Vec<u8> {
 fn a_tcp_server_serves_several_and_cuts_the_stream_into_frames() {
     let network = Network::start().unwrap();
     let (to, inbox) = bounded(64);
-    let link = network
-        .open(LinkId(1), &Address::TcpIn(local(0)), "--client", to)
-        .unwrap();
+    let link = network.open(LinkId(1), &Address::TcpIn(local(0)), "--client", to).unwrap();
     let mut one = TcpStream::connect(link.local().unwrap()).unwrap();
     let first = opened(&inbox);
     assert_eq!(first.address, one.local_addr().unwrap());
@@ -240,18 +205,9 @@ fn a_tcp_client_connects_again_when_the_server_comes_back() {
     let network = Network::start().unwrap();
     let (to, inbox) = bounded(64);
     // A port that was free a moment ago, with nobody listening yet.
-    let at = TcpListener::bind("127.0.0.1:0")
-        .unwrap()
-        .local_addr()
-        .unwrap();
-    let link = network
-        .open(
-            LinkId(0),
-            &Address::TcpOut(local(at.port())),
-            "--vehicle",
-            to,
-        )
-        .unwrap();
+    let at = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let link =
+        network.open(LinkId(0), &Address::TcpOut(local(at.port())), "--vehicle", to).unwrap();
     std::thread::sleep(Duration::from_millis(300));
     for round in 0..2 {
         let server = TcpListener::bind(at).unwrap();
@@ -271,24 +227,13 @@ fn a_tcp_client_connects_again_when_the_server_comes_back() {
 fn a_tcp_peer_that_does_not_read_loses_frames_and_holds_up_nobody() {
     let network = Network::start().unwrap();
     let (to, inbox) = bounded(64);
-    let link = network
-        .open(LinkId(0), &Address::TcpIn(local(0)), "--client", to)
-        .unwrap();
+    let link = network.open(LinkId(0), &Address::TcpIn(local(0)), "--client", to).unwrap();
     let _deaf = TcpStream::connect(link.local().unwrap()).unwrap();
     let deaf = opened(&inbox);
     let mut good = TcpStream::connect(link.local().unwrap()).unwrap();
     let keen = opened(&inbox);
-    let big = framing::write(
-        Version::V2,
-        0,
-        Source {
-            system: 1,
-            component: 1,
-        },
-        110,
-        &[7; 254],
-    )
-    .unwrap();
+    let big =
+        framing::write(Version::V2, 0, Source { system: 1, component: 1 }, 110, &[7; 254]).unwrap();
     // Loopback sockets hold some megabytes; 40 MB are more than they and the queue take.
     let start = Instant::now();
     let mut asked = Duration::ZERO;
@@ -301,10 +246,7 @@ fn a_tcp_peer_that_does_not_read_loses_frames_and_holds_up_nobody() {
         }
     }
     assert!(link.counts().outbox_full > 0, "{:?}", link.counts());
-    assert!(
-        asked < Duration::from_secs(2),
-        "sending held up its caller for {asked:?}"
-    );
+    assert!(asked < Duration::from_secs(2), "sending held up its caller for {asked:?}");
     std::thread::sleep(Duration::from_millis(50));
     link.send(keen, frame(5));
     assert_eq!(read_exactly(&mut good, frame(5).len()), frame(5));

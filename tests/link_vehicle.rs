@@ -21,10 +21,7 @@ fn take(sitl: &mut Sitl, bytes: &[u8]) -> Vec<Telemetry> {
 
 fn close(got: f64, want: f64) {
     // Floats on the wire: 24 bits.
-    assert!(
-        (got - want).abs() <= 1e-6 * want.abs().max(1.0),
-        "{got} for {want}"
-    );
+    assert!((got - want).abs() <= 1e-6 * want.abs().max(1.0), "{got} for {want}");
 }
 
 #[test]
@@ -38,11 +35,8 @@ fn a_state_frame_is_converted_to_si() {
         vz: 50,
         ..Default::default()
     });
-    let wind = MavMessage::WIND_COV(WIND_COV_DATA {
-        wind_x: 3.0,
-        wind_y: -2.0,
-        ..Default::default()
-    });
+    let wind =
+        MavMessage::WIND_COV(WIND_COV_DATA { wind_x: 3.0, wind_y: -2.0, ..Default::default() });
     let mut bytes = [shim(position), shim(wind)].concat();
     bytes.extend(Shown::at(20_000).bytes());
     let states = take(&mut sitl, &bytes);
@@ -88,10 +82,7 @@ fn garbage_is_flagged_and_the_last_good_value_stands() {
     type Spoil = fn(&mut Shown);
     let cases: [(Spoil, Faults); 9] = [
         (|s| s.attitude.q1 = f32::NAN, Faults::ATTITUDE),
-        (
-            |s| (s.attitude.q1, s.attitude.q2) = (0.0, 0.0),
-            Faults::ATTITUDE,
-        ),
+        (|s| (s.attitude.q1, s.attitude.q2) = (0.0, 0.0), Faults::ATTITUDE),
         (|s| s.attitude.rollspeed = 1e30, Faults::RATES),
         (|s| s.air.airspeed = f32::INFINITY, Faults::AIR),
         (|s| s.air.alt = f32::NAN, Faults::AIR),
@@ -139,13 +130,7 @@ fn loss_repetition_lateness_and_restart_are_told_apart() {
     assert_eq!(order(0), Order::First);
     let counts = sitl.counts();
     assert_eq!(
-        (
-            counts.states,
-            counts.lost,
-            counts.repeated,
-            counts.late,
-            counts.starts
-        ),
+        (counts.states, counts.lost, counts.repeated, counts.late, counts.starts),
         (5, 2, 1, 1, 2)
     );
 }
@@ -183,13 +168,9 @@ fn only_the_vehicle_is_listened_to() {
     assert_eq!(sitl.peer(), Some(peer(1)));
     // A second shim is ignored until the first has been silent for a second.
     let ms = Duration::from_millis;
-    sitl.handle(ms(999), peer(2), &Shown::at(10_000).bytes(), |_| {
-        panic!("two vehicles at once")
-    });
+    sitl.handle(ms(999), peer(2), &Shown::at(10_000).bytes(), |_| panic!("two vehicles at once"));
     let mut taken = 0;
-    sitl.handle(ms(1000), peer(2), &Shown::at(10_000).bytes(), |_| {
-        taken += 1
-    });
+    sitl.handle(ms(1000), peer(2), &Shown::at(10_000).bytes(), |_| taken += 1);
     assert_eq!((taken, sitl.peer()), (1, Some(peer(2))));
 }
 
@@ -204,11 +185,7 @@ fn controls(bytes: &[u8]) -> HIL_ACTUATOR_CONTROLS_DATA {
 fn the_answer_echoes_the_time_and_is_zero_when_disarmed() {
     let mut sitl = Sitl::new(1, DEFLECTION);
     let time = Time::from_micros(123_456);
-    let command = Command {
-        aileron: 0.5,
-        elevator: -3.0,
-        throttle: 0.7,
-    };
+    let command = Command { aileron: 0.5, elevator: -3.0, throttle: 0.7 };
     let armed = controls(&sitl.command(time, Outputs::Armed(command)));
     assert_eq!((armed.time_usec, armed.mode.bits()), (123_456, 128));
     // Beyond its range a command is limited.
@@ -220,18 +197,10 @@ fn the_answer_echoes_the_time_and_is_zero_when_disarmed() {
 #[test]
 fn a_command_that_is_not_finite_never_leaves() {
     let mut sitl = Sitl::new(1, DEFLECTION);
-    let bad = Command {
-        aileron: f64::NAN,
-        elevator: 0.0,
-        throttle: f64::INFINITY,
-    };
+    let bad = Command { aileron: f64::NAN, elevator: 0.0, throttle: f64::INFINITY };
     let first = controls(&sitl.command(Time::default(), Outputs::Armed(bad)));
     assert_eq!(first.controls, [0.0; 16]);
-    let good = Command {
-        aileron: 0.25,
-        elevator: 0.5,
-        throttle: 0.75,
-    };
+    let good = Command { aileron: 0.25, elevator: 0.5, throttle: 0.75 };
     sitl.command(Time::default(), Outputs::Armed(good));
     let after = controls(&sitl.command(Time::default(), Outputs::Armed(bad)));
     assert_eq!(after.controls[..3], [0.25, 0.5, 0.75]);
@@ -241,9 +210,7 @@ fn a_command_that_is_not_finite_never_leaves() {
 #[test]
 fn the_heartbeat_beats_once_a_second() {
     let mut sitl = Sitl::new(1, DEFLECTION);
-    let beats = (0..500).filter(|i| {
-        sitl.heartbeat(Duration::from_millis(10 * i), Outputs::Disarmed)
-            .is_some()
-    });
+    let beats = (0..500)
+        .filter(|i| sitl.heartbeat(Duration::from_millis(10 * i), Outputs::Disarmed).is_some());
     assert_eq!(beats.count(), 5);
 }

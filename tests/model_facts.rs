@@ -32,7 +32,10 @@ fn level_trim_at_three_airspeeds() {
     {
         let trim = Trim::level(&model, v, ALTITUDE).unwrap();
         let found = (trim.state.alpha.to_degrees(), trim.controls.elevator, trim.controls.throttle);
-        println!("{v:5.2} m/s: alpha {:.3} deg, elevator {:.5} rad, throttle {:.4}", found.0, found.1, found.2);
+        println!(
+            "{v:5.2} m/s: alpha {:.3} deg, elevator {:.5} rad, throttle {:.4}",
+            found.0, found.1, found.2
+        );
         assert!((found.0 - alpha).abs() < 6e-3, "alpha {}", found.0);
         assert!((found.1 - elevator).abs() < 6e-5, "elevator {}", found.1);
         assert!((found.2 - throttle).abs() < 6e-4, "throttle {}", found.2);
@@ -43,7 +46,8 @@ fn level_trim_at_three_airspeeds() {
 fn trimmed_turns_are_steady() {
     let model = model("jsbsim");
     for (roll, pitch) in [(60.0_f64, 20.0_f64), (-45.0, -10.0), (20.0, 5.0)] {
-        let trim = Trim::attitude(&model, roll.to_radians(), pitch.to_radians(), 22.0, ALTITUDE).unwrap();
+        let trim =
+            Trim::attitude(&model, roll.to_radians(), pitch.to_radians(), 22.0, ALTITUDE).unwrap();
         let rate = model.rate(&trim.state, &trim.controls, ALTITUDE);
         for (i, x) in rate.to_array().into_iter().enumerate().filter(|(i, _)| *i != 2) {
             // the solver settles at 1e-10

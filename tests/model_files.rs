@@ -49,14 +49,20 @@ fn a_missing_file_is_named() {
 
 #[test]
 fn wrong_schema() {
-    says(&complaint(("schema = 1", "schema = 2"), AS_IT_IS), &["prior.toml", "schema is 2", "schema 1"]);
+    says(
+        &complaint(("schema = 1", "schema = 2"), AS_IT_IS),
+        &["prior.toml", "schema is 2", "schema 1"],
+    );
     says(&complaint(AS_IT_IS, ("schema = 1", "schema = 9")), &["airframe.toml", "schema is 9"]);
 }
 
 #[test]
 fn unknown_keys() {
     says(&complaint(("CL0 =", "CL_0 ="), AS_IT_IS), &["lift_linear.CL_0", "unknown", "CL0"]);
-    says(&complaint(("[effects.lift_linear]", "[effects.lift_linaer]"), AS_IT_IS), &["lift_linaer", "lift_linear"]);
+    says(
+        &complaint(("[effects.lift_linear]", "[effects.lift_linaer]"), AS_IT_IS),
+        &["lift_linaer", "lift_linear"],
+    );
     says(&complaint(("mass_kg", "mass_lb"), AS_IT_IS), &["mass_lb", "mass_kg"]);
     says(&complaint(AS_IT_IS, ("bank_max_deg", "bank_max_rad")), &["bank_max_rad"]);
 }
@@ -70,10 +76,22 @@ fn missing_numbers() {
 
 #[test]
 fn numbers_that_no_aircraft_has() {
-    says(&complaint(("value = 3.364", "value = -3.364"), AS_IT_IS), &["mass_kg", "-3.364", "positive"]);
-    says(&complaint(("value = -0.9343", "value = -1.9343"), AS_IT_IS), &["jxz_kgm2", "not physical"]);
-    says(&complaint(("Clp = { value = -0.4042", "Clp = { value = 0.4042"), AS_IT_IS), &["Clp", "not physical", "roll damping"]);
+    says(
+        &complaint(("value = 3.364", "value = -3.364"), AS_IT_IS),
+        &["mass_kg", "-3.364", "positive"],
+    );
+    says(
+        &complaint(("value = -0.9343", "value = -1.9343"), AS_IT_IS),
+        &["jxz_kgm2", "not physical"],
+    );
+    says(
+        &complaint(("Clp = { value = -0.4042", "Clp = { value = 0.4042"), AS_IT_IS),
+        &["Clp", "not physical", "roll damping"],
+    );
     says(&complaint(("value = 0.0867", "value = nan"), AS_IT_IS), &["CL0", "not physical"]);
     says(&complaint(AS_IT_IS, ("value = 2.1,", "value = 0.0,")), &["span_m", "positive"]);
-    says(&complaint(AS_IT_IS, ("airspeed_min_mps = 13.0", "airspeed_min_mps = 33.0")), &["airspeed_min_mps"]);
+    says(
+        &complaint(AS_IT_IS, ("airspeed_min_mps = 13.0", "airspeed_min_mps = 33.0")),
+        &["airspeed_min_mps"],
+    );
 }

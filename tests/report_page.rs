@@ -12,18 +12,13 @@ use serde_json::Value;
 /// The page without the vendored library, whose licence comments name its home.
 fn without_uplot(html: &str) -> String {
     let script = include_str!("../src/report/assets/uPlot.iife.min.js");
-    assert!(
-        html.contains(script),
-        "uPlot is embedded as it was published"
-    );
+    assert!(html.contains(script), "uPlot is embedded as it was published");
     html.replace(script, "")
 }
 
 /// The data of the plots, as a browser would read it.
 fn figures(html: &str) -> Value {
-    let (_, rest) = html
-        .split_once("id=\"figures\">")
-        .expect("the page has data");
+    let (_, rest) = html.split_once("id=\"figures\">").expect("the page has data");
     let (json, _) = rest.split_once("</script>").expect("the data ends");
     serde_json::from_str(json).expect("the data is JSON")
 }
@@ -41,20 +36,9 @@ fn assert_well_formed(html: &str) {
             assert_eq!(open.pop().as_deref(), Some(name), "closed in order");
             continue;
         }
-        let name = tag
-            .split_whitespace()
-            .next()
-            .expect("a tag has a name")
-            .to_string();
-        assert!(
-            name.chars().all(|c| c.is_ascii_alphanumeric()),
-            "{name} is no element"
-        );
-        assert_eq!(
-            tag.matches('"').count() % 2,
-            0,
-            "the quotes of <{tag}> are paired"
-        );
+        let name = tag.split_whitespace().next().expect("a tag has a name").to_string();
+        assert!(name.chars().all(|c| c.is_ascii_alphanumeric()), "{name} is no element");
+        assert_eq!(tag.matches('"').count() % 2, 0, "the quotes of <{tag}> are paired");
         if name == "script" || name == "style" {
             let close = format!("</{name}>");
             rest = &rest[rest.find(&close).expect("the body ends") + close.len()..];
@@ -71,51 +55,21 @@ fn a_flight_page_is_whole_and_loads_nothing() {
     let html = report_synthetic::report(&flight).page().render();
     assert_well_formed(&html);
     let own = without_uplot(&html);
-    for foreign in [
-        "http:",
-        "https:",
-        "src=",
-        "@import",
-        "url(",
-        "fetch(",
-        "XMLHttpRequest",
-    ] {
+    for foreign in ["http:", "https:", "src=", "@import", "url(", "fetch(", "XMLHttpRequest"] {
         assert!(!own.contains(foreign), "the page holds {foreign}");
     }
-    assert!(
-        html.contains("Copyright (c) 2022 Leon Sorokin"),
-        "uPlot's licence travels with it"
-    );
-    for heading in [
-        "Attitude",
-        "Air data",
-        "Surfaces",
-        "Loop timing",
-        "Targets",
-        "Events",
-        "Provenance",
-    ] {
-        assert!(
-            html.contains(&format!("<h2>{heading}</h2>")),
-            "no section {heading}"
-        );
+    assert!(html.contains("Copyright (c) 2022 Leon Sorokin"), "uPlot's licence travels with it");
+    for heading in
+        ["Attitude", "Air data", "Surfaces", "Loop timing", "Targets", "Events", "Provenance"]
+    {
+        assert!(html.contains(&format!("<h2>{heading}</h2>")), "no section {heading}");
     }
     // Four time figures, a histogram, the plane; 5970 samples with one pause are 5971 rows.
     let figures = figures(&html);
-    let kinds: Vec<&str> = figures
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|f| f["kind"].as_str().unwrap())
-        .collect();
+    let kinds: Vec<&str> =
+        figures.as_array().unwrap().iter().map(|f| f["kind"].as_str().unwrap()).collect();
     assert_eq!(kinds, ["time", "time", "time", "time", "histogram", "xy"]);
-    assert_eq!(
-        figures[0]["data"]["tracks"][0]["time_s"]
-            .as_array()
-            .unwrap()
-            .len(),
-        5971
-    );
+    assert_eq!(figures[0]["data"]["tracks"][0]["time_s"].as_array().unwrap().len(), 5971);
 }
 
 #[test]
@@ -130,11 +84,7 @@ fn gaps_and_missing_values_are_null() {
     };
     assert_eq!(nulls(0, 0, 0), 1, "roll is missing in the pause alone");
     assert_eq!(nulls(1, 1, 0), 1, "so is the angle of attack");
-    assert_eq!(
-        nulls(1, 1, 1),
-        1 + 50,
-        "sideslip also in its half second at 100 Hz"
-    );
+    assert_eq!(nulls(1, 1, 1), 1 + 50, "sideslip also in its half second at 100 Hz");
 }
 
 #[test]
@@ -148,32 +98,20 @@ fn hostile_text_stays_text() {
     report.command_line = hostile.into();
     report.versions.push((hostile.into(), hostile.into()));
     report.timing.as_mut().unwrap().measure = hostile.into();
-    report.events.push(Event {
-        time_s: 1.0,
-        kind: EventKind::Text,
-        text: hostile.into(),
-    });
+    report.events.push(Event { time_s: 1.0, kind: EventKind::Text, text: hostile.into() });
     let mut page = report.page();
     // Labels reach the browser through the data as well as through the markup.
     let mut figure = TimeFigure::default();
     let series = Series::new(hostile, Style::Third, vec![1.0, 2.0]);
-    figure.add_track(
-        &[0.0, 1.0],
-        10.0,
-        vec![Panel::new(hostile, hostile, vec![series])],
-    );
-    page.sections
-        .push(Section::new(hostile, hostile, vec![Figure::Time(figure)]));
+    figure.add_track(&[0.0, 1.0], 10.0, vec![Panel::new(hostile, hostile, vec![series])]);
+    page.sections.push(Section::new(hostile, hostile, vec![Figure::Time(figure)]));
     let html = page.render();
     assert_well_formed(&html);
     assert!(!html.contains("<script>alert"));
     assert!(!html.contains("<b>"));
     let figures = figures(&html);
     let last = figures.as_array().unwrap().last().unwrap();
-    assert_eq!(
-        last["data"]["tracks"][0]["panels"][0]["series"][0]["label"],
-        hostile
-    );
+    assert_eq!(last["data"]["tracks"][0]["panels"][0]["series"][0]["label"], hostile);
 }
 
 fn verdict(report: &FlightReport) -> (Outcome, String) {
@@ -215,23 +153,13 @@ fn the_first_sentence_says_what_happened() {
     report.segments.truncate(2);
     // One cycle just over the budget of 10 ms, one exactly at it.
     let cycles = &mut report.timing.as_mut().unwrap().cycles;
-    cycles.push(Cycle {
-        time_s: 60.0,
-        duration_us: 10_000.1,
-    });
-    cycles.push(Cycle {
-        time_s: 60.01,
-        duration_us: 10_000.0,
-    });
+    cycles.push(Cycle { time_s: 60.0, duration_us: 10_000.1 });
+    cycles.push(Cycle { time_s: 60.01, duration_us: 10_000.0 });
     let sentence = "Tracked 2 of 2 targets; settled error 0.03° easy; 1 late cycle.";
     assert_eq!(verdict(&report), (Outcome::Missed, sentence.into()));
 
     report.timing = None;
-    assert_eq!(
-        verdict(&report).0,
-        Outcome::Open,
-        "a loop that was not timed may have been late"
-    );
+    assert_eq!(verdict(&report).0, Outcome::Open, "a loop that was not timed may have been late");
 }
 
 #[test]
@@ -241,9 +169,7 @@ fn a_flight_without_samples_is_still_a_page() {
     report.timing.as_mut().unwrap().cycles.clear();
     assert_well_formed(&report.page().render());
 
-    let broken = Flight {
-        samples: vec![Sample::default(); 3],
-    };
+    let broken = Flight { samples: vec![Sample::default(); 3] };
     let mut report = report_synthetic::report(&broken);
     report.tolerance_rad = f64::NAN;
     report.segments = vec![settled(Difficulty::Easy, f64::INFINITY)];
@@ -261,26 +187,16 @@ fn a_long_flight_is_thinned_and_says_so() {
         attitude_rad: [if i == 31_234 { 1.0 } else { 0.0 }, 0.0, 0.0],
         ..Sample::default()
     });
-    let flight = Flight {
-        samples: samples.collect(),
-    };
+    let flight = Flight { samples: samples.collect() };
     let html = report_synthetic::report(&flight).page().render();
     assert!(html.contains("smallest and largest of every 5 samples"));
     let figures = figures(&html);
     let track = &figures[0]["data"]["tracks"][0];
     assert_eq!(track["time_s"].as_array().unwrap().len(), 20_000);
-    let roll = track["panels"][0]["series"][0]["values"]
-        .as_array()
-        .unwrap();
-    let highest = roll
-        .iter()
-        .filter_map(Value::as_f64)
-        .fold(f64::MIN, f64::max);
+    let roll = track["panels"][0]["series"][0]["values"].as_array().unwrap();
+    let highest = roll.iter().filter_map(Value::as_f64).fold(f64::MIN, f64::max);
     // One radian in degrees, at the six digits of the page.
-    assert!(
-        (highest - 57.2958).abs() < 1e-5,
-        "the spike of one sample is {highest}"
-    );
+    assert!((highest - 57.2958).abs() < 1e-5, "the spike of one sample is {highest}");
 }
 
 #[test]
@@ -289,10 +205,7 @@ fn a_file_is_never_overwritten_unasked() {
     let path = folder.path().join("report.html");
     write_new(&path, "first").unwrap();
     let refused = write_new(&path, "second").unwrap_err();
-    assert!(
-        matches!(&refused, WriteError::Exists { path: p } if *p == path),
-        "{refused}"
-    );
+    assert!(matches!(&refused, WriteError::Exists { path: p } if *p == path), "{refused}");
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "first");
     write_over(&path, "third").unwrap();
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "third");

@@ -99,7 +99,8 @@ fn simulator_rate(plant: &mut Plant, truth: &Truth) -> [f64; 6] {
     const METRE: f64 = 0.3048;
     let mut get = |name: &str| plant.property(name).unwrap();
     let [u, v, w] = ["u", "v", "w"].map(|c| METRE * get(&format!("velocities/{c}-aero-fps")));
-    let [du, dv, dw] = ["u", "v", "w"].map(|c| METRE * get(&format!("accelerations/{c}dot-ft_sec2")));
+    let [du, dv, dw] =
+        ["u", "v", "w"].map(|c| METRE * get(&format!("accelerations/{c}dot-ft_sec2")));
     let [dp, dq, dr] = ["p", "q", "r"].map(|c| get(&format!("accelerations/{c}dot-rad_sec2")));
     let speed = truth.airspeed_mps;
     let dspeed = (u * du + v * dv + w * dw) / speed;

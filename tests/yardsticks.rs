@@ -7,7 +7,7 @@ use greylag::control::{self, Kind};
 use greylag::model::GreyBox;
 use greylag::sim::evaluation::{Evaluation, evaluate};
 use greylag::sim::targets::Row;
-use greylag::sim::{Episode, Environment, Imagined, Simulator, TargetFile};
+use greylag::sim::{Environment, Episode, Imagined, Simulator, TargetFile};
 
 fn params(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("params").join(name)
@@ -16,12 +16,17 @@ fn params(name: &str) -> std::path::PathBuf {
 fn score(kind: Kind, model: &str, rows: &[Row]) -> Evaluation {
     let model = GreyBox::load(&params("x8").join(format!("{model}.toml"))).unwrap();
     let controller = control::build(kind, &model).unwrap();
-    let outcomes = evaluate(&Default::default(), &|| controller.boxed_clone(), rows, 1, &|| ()).unwrap();
+    let outcomes =
+        evaluate(&Default::default(), &|| controller.boxed_clone(), rows, 1, &|| ()).unwrap();
     let evaluation = Evaluation::new(kind.name(), &model.name, rows, &outcomes);
     for s in &evaluation.groups {
         println!(
             "{} on {}: {} mean {:.4} deg, diverged {:.1} %",
-            evaluation.controller, evaluation.model, s.targets, s.mean_deg, 100.0 * s.divergence_rate
+            evaluation.controller,
+            evaluation.model,
+            s.targets,
+            s.mean_deg,
+            100.0 * s.divergence_rate
         );
     }
     evaluation
@@ -64,8 +69,11 @@ fn the_planner_reaches_an_easy_target_and_repeats_itself() {
     let model = GreyBox::load(&params("x8/prior.toml")).unwrap();
     let mut cem = control::build(Kind::Cem, &model).unwrap();
     let mut simulator = Simulator::new(&Default::default()).unwrap();
-    let target =
-        control::Target { roll: 0.2, pitch: 0.05, airspeed: greylag::physics::State::NEUTRAL.airspeed };
+    let target = control::Target {
+        roll: 0.2,
+        pitch: 0.05,
+        airspeed: greylag::physics::State::NEUTRAL.airspeed,
+    };
     let mut fly = || {
         let mut commands = Vec::new();
         let episode = Episode { environment: &mut simulator, controller: cem.as_mut(), seed: 3 };
@@ -84,7 +92,8 @@ fn the_imagined_aircraft_flies_like_the_simulator() {
     let model = GreyBox::load(&params("x8/jsbsim.toml")).unwrap();
     let mut lqi = control::build(Kind::Lqi, &model).unwrap();
     let target = control::Target { roll: 0.6, pitch: 0.2, airspeed: 16.67 };
-    let (mut real, mut imagined) = (Simulator::new(&Default::default()).unwrap(), Imagined::new(model));
+    let (mut real, mut imagined) =
+        (Simulator::new(&Default::default()).unwrap(), Imagined::new(model));
     let mut fly = |environment: &mut dyn Environment| {
         let mut rolls = Vec::new();
         let episode = Episode { environment, controller: lqi.as_mut(), seed: 0 };

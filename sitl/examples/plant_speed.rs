@@ -17,11 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 plant.reset(&Start::NEUTRAL)?;
             }
             let t = f64::from(k) * 0.01;
-            plant.step(Inputs {
-                aileron: 0.2 * t.sin(),
-                elevator: 0.05,
-                throttle: 0.3,
-            })?;
+            plant.step(Inputs { aileron: 0.2 * t.sin(), elevator: 0.05, throttle: 0.3 })?;
         }
         best = best.min(begun.elapsed().as_secs_f64());
     }
@@ -29,10 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for _ in 0..1000 {
         plant.reset(&Start::NEUTRAL)?;
     }
-    println!(
-        "plant: {:.1} µs a reset",
-        begun.elapsed().as_secs_f64() * 1e3
-    );
+    println!("plant: {:.1} µs a reset", begun.elapsed().as_secs_f64() * 1e3);
     println!(
         "plant: {:.0} steps/s on one core, {:.2} µs a step (a reset every 1000 steps included)",
         f64::from(STEPS) / best,

@@ -99,16 +99,10 @@ impl Air {
         if let Some(&value) = self.wind_ned_mps.iter().find(|v| !is_speed(**v)) {
             return Err(AirError::Wind { value });
         }
-        if let Some(Turbulence {
-            wind_20ft_mps,
-            severity,
-        }) = self.turbulence
+        if let Some(Turbulence { wind_20ft_mps, severity }) = self.turbulence
             && !(is_speed(wind_20ft_mps) && wind_20ft_mps >= 0.0 && (1..=7).contains(&severity))
         {
-            return Err(AirError::Turbulence {
-                wind_20ft_mps,
-                severity,
-            });
+            return Err(AirError::Turbulence { wind_20ft_mps, severity });
         }
         if let Some(index) = self.gusts.iter().position(|gust| !has_shape(gust)) {
             return Err(AirError::Gust { index });
@@ -116,10 +110,7 @@ impl Air {
         self.gusts.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
         for pair in self.gusts.windows(2) {
             if pair[1].start_s < pair[0].end_s() + GUST_GAP_S {
-                return Err(AirError::Overlap {
-                    start_s: pair[1].start_s,
-                    end_s: pair[0].end_s(),
-                });
+                return Err(AirError::Overlap { start_s: pair[1].start_s, end_s: pair[0].end_s() });
             }
         }
         Ok(self)

@@ -10,14 +10,8 @@ use crate::plant::Properties;
 /// The files of the aircraft built into the program, by their path in a JSBSim tree.
 const BUILT_IN: [(&str, &str); 3] = [
     ("x8/x8.xml", include_str!("../aircraft/x8/x8.xml")),
-    (
-        "x8/Engines/x8_motor.xml",
-        include_str!("../aircraft/x8/Engines/x8_motor.xml"),
-    ),
-    (
-        "x8/Engines/x8_direct.xml",
-        include_str!("../aircraft/x8/Engines/x8_direct.xml"),
-    ),
+    ("x8/Engines/x8_motor.xml", include_str!("../aircraft/x8/Engines/x8_motor.xml")),
+    ("x8/Engines/x8_direct.xml", include_str!("../aircraft/x8/Engines/x8_direct.xml")),
 ];
 
 /// Name of the aircraft built into the program.
@@ -88,10 +82,7 @@ pub(crate) fn load(
     effects: &[Hidden],
 ) -> Result<(), AircraftError> {
     let document = hidden::write_into(&read(dir, name)?, properties, effects)?;
-    let mut tree = Tree {
-        disk: dir.map(FileResolver::new),
-        memory: MemoryResolver::new(),
-    };
+    let mut tree = Tree { disk: dir.map(FileResolver::new), memory: MemoryResolver::new() };
     if dir.is_none() {
         for (path, text) in BUILT_IN {
             tree.memory.insert(path, text);
@@ -102,19 +93,14 @@ pub(crate) fn load(
     let path = format!("{name}/{name}.xml");
     tree.memory.insert(path.clone(), document);
     fdm.load_model_file(&tree, &path)
-        .map_err(|source| AircraftError::Load {
-            name: name.to_owned(),
-            source,
-        })
+        .map_err(|source| AircraftError::Load { name: name.to_owned(), source })
 }
 
 /// The text of the aircraft's main document.
 pub(crate) fn read(dir: Option<&Path>, name: &str) -> Result<String, AircraftError> {
     match dir {
         None if name == BUILT_IN_NAME => Ok(BUILT_IN[0].1.to_owned()),
-        None => Err(AircraftError::NotBuiltIn {
-            name: name.to_owned(),
-        }),
+        None => Err(AircraftError::NotBuiltIn { name: name.to_owned() }),
         Some(dir) => {
             let path = dir.join(name).join(format!("{name}.xml"));
             std::fs::read_to_string(&path).map_err(|source| AircraftError::Read { path, source })

@@ -72,36 +72,16 @@ struct AircraftArgs {
 #[command(next_help_heading = "Start", allow_negative_numbers = true)]
 struct StartArgs {
     /// Right wing down is positive.
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     start_roll_deg: f64,
     /// Nose up is positive.
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     start_pitch_deg: f64,
     /// From true north towards east.
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     start_yaw_deg: f64,
     /// Angle of attack.
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     start_alpha_deg: f64,
     /// True airspeed.
     #[arg(long, value_name = "MPS", default_value_t = Start::NEUTRAL.airspeed_mps)]
@@ -116,30 +96,16 @@ struct StartArgs {
 #[command(next_help_heading = "Air")]
 struct AirArgs {
     /// Steady wind, the velocity of the air over the ground.
-    #[arg(
-        long,
-        value_name = "N,E,D",
-        default_value = "0,0,0",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "N,E,D", default_value = "0,0,0", allow_hyphen_values = true)]
     wind_ned_mps: Numbers<3>,
     /// MIL-spec turbulence: 3 light, 4 moderate, 6 severe.
     #[arg(long, value_name = "1..7")]
     turbulence_severity: Option<u8>,
     /// Wind 20 ft above ground, which rules the turbulence near the ground; above 600 m the severity does.
-    #[arg(
-        long,
-        value_name = "MPS",
-        default_value_t = 15.0,
-        requires = "turbulence_severity"
-    )]
+    #[arg(long, value_name = "MPS", default_value_t = 15.0, requires = "turbulence_severity")]
     turbulence_wind_20ft_mps: f64,
     /// A one-minus-cosine gust (may be repeated): start s, velocity NED m/s, rise, hold, fall s.
-    #[arg(
-        long,
-        value_name = "S,N,E,D,RISE,HOLD,FALL",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "S,N,E,D,RISE,HOLD,FALL", allow_hyphen_values = true)]
     gust: Vec<Numbers<7>>,
 }
 
@@ -154,10 +120,7 @@ impl<const N: usize> FromStr for Numbers<N> {
         let parts: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
         let parts = parts.map_err(|_| "it holds something that is not a number".to_owned())?;
         let count = parts.len();
-        parts
-            .try_into()
-            .map(Numbers)
-            .map_err(|_| format!("{N} numbers are needed, {count} given"))
+        parts.try_into().map(Numbers).map_err(|_| format!("{N} numbers are needed, {count} given"))
     }
 }
 
@@ -166,27 +129,15 @@ impl Cli {
     pub fn options(&self) -> ShimOptions {
         ShimOptions {
             link: self.link.clone(),
-            pace: if self.lockstep {
-                Pace::Lockstep
-            } else {
-                Pace::RealTime
-            },
-            launch: if self.no_hold {
-                Launch::Immediate
-            } else {
-                Launch::WhenArmed
-            },
+            pace: if self.lockstep { Pace::Lockstep } else { Pace::RealTime },
+            launch: if self.no_hold { Launch::Immediate } else { Launch::WhenArmed },
             duration_s: self.duration_s,
             start: self.start.state(),
             plant: self.plant(),
             seed: u64::from(self.seed),
             truth: self.truth.clone().map(|path| TruthFile {
                 path,
-                existing: if self.force {
-                    Existing::Replace
-                } else {
-                    Existing::Keep
-                },
+                existing: if self.force { Existing::Replace } else { Existing::Keep },
             }),
             noise: self.sensors.noise(),
             bias: self.sensors.bias(),
@@ -195,11 +146,7 @@ impl Cli {
     }
 
     fn plant(&self) -> PlantOptions {
-        let mut plant = PlantOptions {
-            seed: self.seed,
-            air: self.air.air(),
-            ..Default::default()
-        };
+        let mut plant = PlantOptions { seed: self.seed, air: self.air.air(), ..Default::default() };
         plant.aircraft_dir = self.aircraft.aircraft_dir.clone();
         if let Some(name) = &self.aircraft.aircraft {
             plant.aircraft = name.clone();

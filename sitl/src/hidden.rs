@@ -51,20 +51,11 @@ impl Hidden {
         let effect = EFFECTS
             .iter()
             .find(|effect| effect.id == id)
-            .ok_or_else(|| HiddenError::Unknown {
-                id: id.to_owned(),
-                known: known(),
-            })?;
+            .ok_or_else(|| HiddenError::Unknown { id: id.to_owned(), known: known() })?;
         let (min, max) = effect.bounds;
         if !(min..=max).contains(&amplitude) {
             let Effect { id, unit, .. } = *effect;
-            return Err(HiddenError::Amplitude {
-                id,
-                amplitude,
-                min,
-                max,
-                unit,
-            });
+            return Err(HiddenError::Amplitude { id, amplitude, min, max, unit });
         }
         Ok(Hidden { effect, amplitude })
     }
@@ -103,10 +94,7 @@ impl FromStr for Hidden {
 
     /// Reads `id=amplitude`, such as `pitch_break=-3.0`.
     fn from_str(text: &str) -> Result<Self, HiddenError> {
-        let syntax = || HiddenError::Syntax {
-            text: text.to_owned(),
-            known: known(),
-        };
+        let syntax = || HiddenError::Syntax { text: text.to_owned(), known: known() };
         let (id, amplitude) = text.split_once('=').ok_or_else(syntax)?;
         Hidden::new(id.trim(), amplitude.trim().parse().map_err(|_| syntax())?)
     }
@@ -174,11 +162,7 @@ pub enum HiddenError {
 }
 
 fn known() -> String {
-    EFFECTS
-        .iter()
-        .map(|effect| effect.id)
-        .collect::<Vec<_>>()
-        .join(", ")
+    EFFECTS.iter().map(|effect| effect.id).collect::<Vec<_>>().join(", ")
 }
 
 /// The aircraft document `xml` with `effects` written into it.
@@ -188,17 +172,11 @@ pub(crate) fn write_into(
     effects: &[Hidden],
 ) -> Result<String, HiddenError> {
     for (i, Hidden { effect, .. }) in effects.iter().enumerate() {
-        if effects[..i]
-            .iter()
-            .any(|earlier| earlier.effect.id == effect.id)
-        {
+        if effects[..i].iter().any(|earlier| earlier.effect.id == effect.id) {
             return Err(HiddenError::Twice { id: effect.id });
         }
     }
-    let acting: Vec<_> = effects
-        .iter()
-        .filter(|hidden| hidden.amplitude != 0.0)
-        .collect();
+    let acting: Vec<_> = effects.iter().filter(|hidden| hidden.amplitude != 0.0).collect();
     if acting.is_empty() {
         return Ok(xml.to_owned());
     }
@@ -219,10 +197,7 @@ mod tests {
         let written =
             |effects: &[Hidden]| write_into(&plain, &Properties::default(), effects).unwrap();
         assert_eq!(written(&[]), plain);
-        let zeros: Vec<Hidden> = EFFECTS
-            .iter()
-            .map(|e| Hidden::new(e.id, 0.0).unwrap())
-            .collect();
+        let zeros: Vec<Hidden> = EFFECTS.iter().map(|e| Hidden::new(e.id, 0.0).unwrap()).collect();
         assert_eq!(written(&zeros), plain);
         let one = Hidden::new("pitch_break", 1.0).unwrap();
         assert_ne!(written(&[one]), plain);
@@ -231,16 +206,8 @@ mod tests {
     #[test]
     fn ids_are_unique_and_zero_is_always_within_bounds() {
         for (i, effect) in EFFECTS.iter().enumerate() {
-            assert!(
-                EFFECTS[..i].iter().all(|earlier| earlier.id != effect.id),
-                "{}",
-                effect.id
-            );
-            assert!(
-                effect.bounds.0 <= 0.0 && effect.bounds.1 > 0.0,
-                "{}",
-                effect.id
-            );
+            assert!(EFFECTS[..i].iter().all(|earlier| earlier.id != effect.id), "{}", effect.id);
+            assert!(effect.bounds.0 <= 0.0 && effect.bounds.1 > 0.0, "{}", effect.id);
         }
     }
 }

@@ -51,8 +51,5 @@ fn intent(options: &ShimOptions) -> String {
         Launch::WhenArmed => "held at the start until the companion arms",
         Launch::Immediate => "flying at once",
     };
-    format!(
-        "{} {pace}, {launch}; Ctrl-C ends it",
-        options.plant.aircraft
-    )
+    format!("{} {pace}, {launch}; Ctrl-C ends it", options.plant.aircraft)
 }

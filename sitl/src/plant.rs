@@ -93,34 +93,13 @@ impl Plant {
         options.air = options.air.checked()?;
         let mut fdm = Fdm::new().map_err(jsbsim("starting"))?;
         fdm.set_dt(DT_S);
-        let PlantOptions {
-            aircraft_dir,
-            aircraft,
-            properties,
-            hidden,
-            ..
-        } = &options;
-        aircraft::load(
-            &mut fdm,
-            aircraft_dir.as_deref(),
-            aircraft,
-            properties,
-            hidden,
-        )?;
+        let PlantOptions { aircraft_dir, aircraft, properties, hidden, .. } = &options;
+        aircraft::load(&mut fdm, aircraft_dir.as_deref(), aircraft, properties, hidden)?;
         let nodes = Nodes::find(&fdm, &options)?;
         let mut loaded = jsbsim::Snapshot::new();
-        fdm.snapshot_into(&mut loaded)
-            .map_err(jsbsim("saving the loaded aircraft"))?;
+        fdm.snapshot_into(&mut loaded).map_err(jsbsim("saving the loaded aircraft"))?;
         let (truth, steps, next_gust) = (Truth::default(), 0, 0);
-        let mut plant = Plant {
-            fdm,
-            nodes,
-            options,
-            loaded,
-            truth,
-            steps,
-            next_gust,
-        };
+        let mut plant = Plant { fdm, nodes, options, loaded, truth, steps, next_gust };
         plant.reset(&Start::NEUTRAL)?;
         Ok(plant)
     }
@@ -134,17 +113,12 @@ impl Plant {
         if !start.is_flyable() {
             return Err(PlantError::Start(*start));
         }
-        self.fdm
-            .restore(&self.loaded)
-            .map_err(jsbsim("going back to the loaded aircraft"))?;
+        self.fdm.restore(&self.loaded).map_err(jsbsim("going back to the loaded aircraft"))?;
         self.nodes
             .start(&mut self.fdm, start, &self.options)
             .map_err(jsbsim("setting the start"))?;
         (self.steps, self.next_gust) = (0, 0);
-        let truth = self
-            .nodes
-            .truth(&mut self.fdm)
-            .map_err(jsbsim("reading the start"))?;
+        let truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the start"))?;
         self.accept(truth)
     }
 
@@ -158,16 +132,11 @@ impl Plant {
             return Err(PlantError::Inputs(inputs));
         }
         let inputs = inputs.clamped();
-        self.nodes
-            .command(&mut self.fdm, &inputs)
-            .map_err(jsbsim("writing the commands"))?;
+        self.nodes.command(&mut self.fdm, &inputs).map_err(jsbsim("writing the commands"))?;
         self.blow_due_gust().map_err(jsbsim("starting a gust"))?;
         self.fdm.run().map_err(jsbsim("stepping"))?;
         self.steps += 1;
-        let mut truth = self
-            .nodes
-            .truth(&mut self.fdm)
-            .map_err(jsbsim("reading the state"))?;
+        let mut truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the state"))?;
         truth.time_s = self.steps as f64 * DT_S;
         truth.aileron_rate_radps = (truth.aileron_rad - self.truth.aileron_rad) / DT_S;
         truth.elevator_rate_radps = (truth.elevator_rad - self.truth.elevator_rad) / DT_S;
@@ -185,15 +154,8 @@ impl Plant {
     /// [`PlantError::Jsbsim`] when JSBSim cannot save its state.
     pub fn snapshot(&mut self) -> Result<Snapshot, PlantError> {
         let mut fdm = jsbsim::Snapshot::new();
-        self.fdm
-            .snapshot_into(&mut fdm)
-            .map_err(jsbsim("saving a snapshot"))?;
-        Ok(Snapshot {
-            fdm,
-            truth: self.truth,
-            steps: self.steps,
-            next_gust: self.next_gust,
-        })
+        self.fdm.snapshot_into(&mut fdm).map_err(jsbsim("saving a snapshot"))?;
+        Ok(Snapshot { fdm, truth: self.truth, steps: self.steps, next_gust: self.next_gust })
     }
 
     /// Goes back to `snapshot`: what follows repeats to the bit.
@@ -201,9 +163,7 @@ impl Plant {
     /// # Errors
     /// [`PlantError::Jsbsim`] when the snapshot is of another aircraft.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), PlantError> {
-        self.fdm
-            .restore(&snapshot.fdm)
-            .map_err(jsbsim("restoring a snapshot"))?;
+        self.fdm.restore(&snapshot.fdm).map_err(jsbsim("restoring a snapshot"))?;
         self.truth = snapshot.truth;
         self.steps = snapshot.steps;
         self.next_gust = snapshot.next_gust;
@@ -221,9 +181,7 @@ impl Plant {
     /// [`PlantError::Property`] when the aircraft has no such property.
     pub fn property(&mut self, name: &str) -> Result<f64, PlantError> {
         let node = self.node(name)?;
-        self.fdm
-            .read_node(node)
-            .map_err(jsbsim("reading a property"))
+        self.fdm.read_node(node).map_err(jsbsim("reading a property"))
     }
 
     /// Writes any property of the aircraft in JSBSim's own unit; the next reset undoes it.
@@ -232,21 +190,15 @@ impl Plant {
     /// [`PlantError::Property`] when the aircraft has no such property.
     pub fn set_property(&mut self, name: &str, value: f64) -> Result<(), PlantError> {
         let node = self.node(name)?;
-        self.fdm
-            .write_node(node, value)
-            .map_err(jsbsim("writing a property"))?;
+        self.fdm.write_node(node, value).map_err(jsbsim("writing a property"))?;
         Ok(())
     }
 
     fn node(&self, name: &str) -> Result<jsbsim::NodeId, PlantError> {
-        self.fdm
-            .node(name)
-            .ok()
-            .flatten()
-            .ok_or_else(|| PlantError::Property {
-                aircraft: self.options.aircraft.clone(),
-                property: name.to_owned(),
-            })
+        self.fdm.node(name).ok().flatten().ok_or_else(|| PlantError::Property {
+            aircraft: self.options.aircraft.clone(),
+            property: name.to_owned(),
+        })
     }
 
     fn blow_due_gust(&mut self) -> Result<(), jsbsim::Error> {
@@ -265,10 +217,7 @@ impl Plant {
         self.truth = truth;
         match truth.first_non_finite() {
             None => Ok(truth),
-            Some(quantity) => Err(PlantError::NonFinite {
-                time_s: truth.time_s,
-                quantity,
-            }),
+            Some(quantity) => Err(PlantError::NonFinite { time_s: truth.time_s, quantity }),
         }
     }
 }

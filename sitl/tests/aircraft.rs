@@ -18,11 +18,7 @@ fn twin(edit: impl Fn(String) -> String) -> tempfile::TempDir {
     let (from, to) = (shipped().join("x8"), folder.path().join("twin"));
     fs::create_dir_all(to.join("Engines")).unwrap();
     for engine in ["x8_motor.xml", "x8_direct.xml"] {
-        fs::copy(
-            from.join("Engines").join(engine),
-            to.join("Engines").join(engine),
-        )
-        .unwrap();
+        fs::copy(from.join("Engines").join(engine), to.join("Engines").join(engine)).unwrap();
     }
     let document = fs::read_to_string(from.join("x8.xml")).unwrap();
     fs::write(to.join("twin.xml"), edit(document)).unwrap();
@@ -39,10 +35,7 @@ fn options(folder: &Path, aircraft: &str) -> PlantOptions {
 
 /// What is said of an aircraft that cannot be flown: one line.
 fn refusal(options: &PlantOptions) -> String {
-    let message = Plant::new(options)
-        .err()
-        .expect("this aircraft cannot be flown")
-        .to_string();
+    let message = Plant::new(options).err().expect("this aircraft cannot be flown").to_string();
     println!("{message}");
     assert_eq!(message.lines().count(), 1, "{message}");
     message
@@ -65,20 +58,11 @@ fn another_aircraft_with_the_same_properties_flies_its_own_way() {
 #[test]
 fn hidden_effects_are_written_into_an_aircraft_in_a_folder_too() {
     let folder = twin(|xml| xml);
-    let hidden = vec![
-        "pitch_break=-2".parse().unwrap(),
-        "propwash=0.5".parse().unwrap(),
-    ];
-    let mut other = Plant::new(&PlantOptions {
-        hidden: hidden.clone(),
-        ..options(folder.path(), "twin")
-    })
-    .unwrap();
-    let mut built_in = Plant::new(&PlantOptions {
-        hidden,
-        ..PlantOptions::default()
-    })
-    .unwrap();
+    let hidden = vec!["pitch_break=-2".parse().unwrap(), "propwash=0.5".parse().unwrap()];
+    let mut other =
+        Plant::new(&PlantOptions { hidden: hidden.clone(), ..options(folder.path(), "twin") })
+            .unwrap();
+    let mut built_in = Plant::new(&PlantOptions { hidden, ..PlantOptions::default() }).unwrap();
     assert_same(&fly(&mut other, 0, 200), &fly(&mut built_in, 0, 200));
 }
 
@@ -98,19 +82,10 @@ fn engines_are_found_beside_the_aircraft_folder_as_in_a_jsbsim_tree() {
 
 #[test]
 fn a_wrong_name_or_folder_is_one_clear_line() {
-    let unknown = refusal(&PlantOptions {
-        aircraft: "x9".into(),
-        ..PlantOptions::default()
-    });
-    assert!(
-        unknown.contains("'x9'") && unknown.contains("--aircraft-dir"),
-        "{unknown}"
-    );
+    let unknown = refusal(&PlantOptions { aircraft: "x9".into(), ..PlantOptions::default() });
+    assert!(unknown.contains("'x9'") && unknown.contains("--aircraft-dir"), "{unknown}");
     let name = refusal(&options(&shipped(), "x9"));
-    assert!(
-        name.contains("x9.xml") && name.contains("--aircraft"),
-        "{name}"
-    );
+    assert!(name.contains("x9.xml") && name.contains("--aircraft"), "{name}");
     let folder = refusal(&options(Path::new("no/such/folder"), "x8"));
     assert!(folder.contains("no/such/folder"), "{folder}");
 }
@@ -125,10 +100,7 @@ fn a_broken_aircraft_is_one_clear_line() {
     assert!(refusal(&options(property.path(), "twin")).contains("no-such-property"));
     let axis = twin(|xml| xml.replace("axis name=\"PITCH\"", "axis name=\"YAW\""));
     let hidden = vec!["pitch_break=1".parse().unwrap()];
-    let message = refusal(&PlantOptions {
-        hidden,
-        ..options(axis.path(), "twin")
-    });
+    let message = refusal(&PlantOptions { hidden, ..options(axis.path(), "twin") });
     assert!(message.contains("PITCH"), "{message}");
 }
 
@@ -140,24 +112,17 @@ fn a_property_the_plant_needs_and_the_aircraft_lacks_is_named() {
         message.contains("'fcs/effective-aileron-pos'") && message.contains("'twin'"),
         "{message}"
     );
-    let properties = Properties {
-        aileron_position: "fcs/my-aileron".into(),
-        ..Properties::default()
-    };
-    let mut named = Plant::new(&PlantOptions {
-        properties,
-        ..options(renamed.path(), "twin")
-    })
-    .unwrap();
+    let properties =
+        Properties { aileron_position: "fcs/my-aileron".into(), ..Properties::default() };
+    let mut named =
+        Plant::new(&PlantOptions { properties, ..options(renamed.path(), "twin") }).unwrap();
     assert_same(&fly(&mut named, 0, 50), &fly(&mut plant(), 0, 50));
 }
 
 #[test]
 fn a_plant_can_be_sent_to_another_thread() {
     let mut plant = plant();
-    let there = std::thread::spawn(move || fly(&mut plant, 0, 50))
-        .join()
-        .unwrap();
+    let there = std::thread::spawn(move || fly(&mut plant, 0, 50)).join().unwrap();
     assert_same(&there, &fly(&mut self::plant(), 0, 50));
 }
 
@@ -168,12 +133,6 @@ fn a_snapshot_of_another_aircraft_is_refused() {
     let snapshot = other.snapshot().unwrap();
     let mut plant = plant();
     let before = plant.truth();
-    assert!(
-        plant
-            .restore(&snapshot)
-            .unwrap_err()
-            .to_string()
-            .contains("restoring a snapshot")
-    );
+    assert!(plant.restore(&snapshot).unwrap_err().to_string().contains("restoring a snapshot"));
     assert_eq!(plant.truth(), before);
 }

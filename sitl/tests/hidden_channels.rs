@@ -26,11 +26,7 @@ const LIVELY: Start = Start {
 };
 
 /// A command that moves all actuators.
-const FIRM: Inputs = Inputs {
-    aileron: 0.9,
-    elevator: -0.8,
-    throttle: 1.0,
-};
+const FIRM: Inputs = Inputs { aileron: 0.9, elevator: -0.8, throttle: 1.0 };
 
 /// What acts on the aircraft: drag, side force and lift in wind axes, N; moments, N m; thrust, N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,15 +41,8 @@ struct Loads {
 }
 
 impl Loads {
-    const NONE: Loads = Loads {
-        drag: 0.0,
-        side: 0.0,
-        lift: 0.0,
-        l: 0.0,
-        m: 0.0,
-        n: 0.0,
-        thrust: 0.0,
-    };
+    const NONE: Loads =
+        Loads { drag: 0.0, side: 0.0, lift: 0.0, l: 0.0, m: 0.0, n: 0.0, thrust: 0.0 };
 
     fn of(plant: &mut Plant) -> Loads {
         let mut read = |name: &str, unit: f64| plant.property(name).unwrap() * unit;
@@ -68,27 +57,11 @@ impl Loads {
             read("moments/m-total-lbsft", LBF_FT),
             read("moments/n-total-lbsft", LBF_FT),
         );
-        Loads {
-            drag,
-            side,
-            lift,
-            l,
-            m,
-            n,
-            thrust: plant.truth().thrust_n,
-        }
+        Loads { drag, side, lift, l, m, n, thrust: plant.truth().thrust_n }
     }
 
     fn array(self) -> [f64; 7] {
-        [
-            self.drag,
-            self.side,
-            self.lift,
-            self.l,
-            self.m,
-            self.n,
-            self.thrust,
-        ]
+        [self.drag, self.side, self.lift, self.l, self.m, self.n, self.thrust]
     }
 }
 
@@ -110,16 +83,10 @@ fn acts(effect: &str, steps: u32, expected: impl Fn(&mut Plant, &Truth, f64) -> 
     let (mut plain, mut hidden) = (plant(), plant_with(&[effect]));
     let (a, b) = (lively(&mut plain, steps), lively(&mut hidden, steps));
     assert!((a.alpha_rad - b.alpha_rad).abs() < 1e-12 && (a.p_radps - b.p_radps).abs() < 1e-12);
-    let (before, after) = (
-        Loads::of(&mut plain).array(),
-        Loads::of(&mut hidden).array(),
-    );
+    let (before, after) = (Loads::of(&mut plain).array(), Loads::of(&mut hidden).array());
     let pressure = 0.5 * b.air_density_kgpm3 * b.airspeed_mps.powi(2);
     let expected = expected(&mut hidden, &b, pressure).array();
-    assert!(
-        expected.iter().any(|x| x.abs() > 1e-4),
-        "{effect} expects nothing: {expected:?}"
-    );
+    assert!(expected.iter().any(|x| x.abs() > 1e-4), "{effect} expects nothing: {expected:?}");
     for i in 0..7 {
         let change = after[i] - before[i];
         // JSBSim's unit factors are good to 1e-8; loads here are up to some 100 N.
@@ -163,24 +130,12 @@ fn forces_and_moments_of_the_state_act_in_their_channels() {
     });
     acts("unsteady_lift=3.0", 0, |hidden, t, q| {
         let rate = hidden.property("aero/alphadot-rad_sec").unwrap() * C / (2.0 * t.airspeed_mps);
-        Loads {
-            lift: q * S * 3.0 * rate,
-            m: q * S * C * -1.5 * rate,
-            ..Loads::NONE
-        }
+        Loads { lift: q * S * 3.0 * rate, m: q * S * C * -1.5 * rate, ..Loads::NONE }
     });
     acts("cg_shift=0.02", 0, |hidden, _, _| {
-        let mut force = |axis: &str| {
-            hidden
-                .property(&format!("forces/fb{axis}-aero-lbs"))
-                .unwrap()
-                * LBF
-        };
-        Loads {
-            m: -0.02 * force("z"),
-            n: 0.02 * force("y"),
-            ..Loads::NONE
-        }
+        let mut force =
+            |axis: &str| hidden.property(&format!("forces/fb{axis}-aero-lbs")).unwrap() * LBF;
+        Loads { m: -0.02 * force("z"), n: 0.02 * force("y"), ..Loads::NONE }
     });
 }
 
@@ -189,23 +144,11 @@ fn effects_of_throttle_act_in_their_channels() {
     let v0 = 16.67;
     acts("thrust_decay=0.6", 1, |_, t, _| {
         let plain = t.throttle * 5.900_496 * LBF;
-        Loads {
-            thrust: -0.6 * (t.airspeed_mps / v0 - 1.0) * plain,
-            ..Loads::NONE
-        }
+        Loads { thrust: -0.6 * (t.airspeed_mps / v0 - 1.0) * plain, ..Loads::NONE }
     });
-    acts("thrust_scale=-5.0", 1, |_, t, _| Loads {
-        thrust: -5.0 * t.throttle,
-        ..Loads::NONE
-    });
-    acts("thrust_line_offset=0.03", 1, |_, t, _| Loads {
-        m: 0.03 * t.thrust_n,
-        ..Loads::NONE
-    });
-    acts("motor_torque=0.5", 1, |_, t, _| Loads {
-        l: -0.5 * t.throttle,
-        ..Loads::NONE
-    });
+    acts("thrust_scale=-5.0", 1, |_, t, _| Loads { thrust: -5.0 * t.throttle, ..Loads::NONE });
+    acts("thrust_line_offset=0.03", 1, |_, t, _| Loads { m: 0.03 * t.thrust_n, ..Loads::NONE });
+    acts("motor_torque=0.5", 1, |_, t, _| Loads { l: -0.5 * t.throttle, ..Loads::NONE });
 }
 
 /// Loads that the X8's deflections make: C_δ δ for a change of deflection δa, δe.
@@ -230,35 +173,21 @@ fn acting_as(t: &Truth, q: f64, f: impl Fn(f64) -> f64) -> Loads {
 
 #[test]
 fn effects_on_the_surfaces_act_in_every_channel_the_surfaces_act_in() {
-    acts("propwash=0.8", 1, |_, t, q| {
-        acting_as(t, q, |x| x * (1.0 + 0.8 * (t.throttle - 0.118)))
-    });
+    acts("propwash=0.8", 1, |_, t, q| acting_as(t, q, |x| x * (1.0 + 0.8 * (t.throttle - 0.118))));
     acts("aeroelastic_loss=0.2", 1, |_, t, q| {
-        acting_as(t, q, |x| {
-            x * (1.0 - 0.2 * ((t.airspeed_mps / 16.67).powi(2) - 1.0))
-        })
+        acting_as(t, q, |x| x * (1.0 - 0.2 * ((t.airspeed_mps / 16.67).powi(2) - 1.0)))
     });
     acts("dead_zone=0.02", 1, |_, t, q| {
         acting_as(t, q, |x| x.signum() * (x.abs() - 0.02).max(0.0))
     });
-    acts("backlash=0.02", 1, |_, t, q| {
-        acting_as(t, q, |x| x.signum() * (x.abs() - 0.01).max(0.0))
-    });
+    acts("backlash=0.02", 1, |_, t, q| acting_as(t, q, |x| x.signum() * (x.abs() - 0.01).max(0.0)));
     // From rest: one step of the limit; half a step of a Tustin lag; nothing yet.
-    acts("rate_limit=0.5", 1, |_, t, q| {
-        acting_as(t, q, |x| x.signum() * 0.5 * DT_S)
-    });
-    acts("actuator_lag=0.04", 1, |_, t, q| {
-        acting_as(t, q, |x| x * DT_S / (2.0 * 0.04 + DT_S))
-    });
+    acts("rate_limit=0.5", 1, |_, t, q| acting_as(t, q, |x| x.signum() * 0.5 * DT_S));
+    acts("actuator_lag=0.04", 1, |_, t, q| acting_as(t, q, |x| x * DT_S / (2.0 * 0.04 + DT_S)));
     acts("time_delay=0.05", 1, |_, t, q| acting_as(t, q, |_| 0.0));
     acts("effectiveness_saturation=-2.0", 1, |_, t, q| {
         let all = acting_as(t, q, |x| x * (1.0 - 2.0 * x * x));
-        Loads {
-            l: all.l,
-            m: all.m,
-            ..Loads::NONE
-        }
+        Loads { l: all.l, m: all.m, ..Loads::NONE }
     });
     acts("roll_control_alpha=-0.6", 1, |_, t, q| Loads {
         l: q * S * B * -0.6 * t.alpha_rad * t.aileron_rad,
@@ -276,17 +205,11 @@ fn mass_error_scales_specific_force_and_no_moment() {
     let (a, b) = (lively(&mut plain, 0), lively(&mut hidden, 0));
     for i in 0..3 {
         let (force, lighter) = (b.specific_force_mps2[i], a.specific_force_mps2[i] / 1.25);
-        assert!(
-            (force - lighter).abs() < 1e-9,
-            "axis {i}: {force} for {lighter}"
-        );
+        assert!((force - lighter).abs() < 1e-9, "axis {i}: {force} for {lighter}");
     }
     for rate in ["p", "q", "r"] {
         let name = format!("accelerations/{rate}dot-rad_sec2");
-        let (a, b) = (
-            plain.property(&name).unwrap(),
-            hidden.property(&name).unwrap(),
-        );
+        let (a, b) = (plain.property(&name).unwrap(), hidden.property(&name).unwrap());
         assert!((a - b).abs() < 1e-9, "{name}: {a} {b}");
     }
 }
@@ -309,14 +232,9 @@ fn inertia_xz_changes_roll_and_yaw_acceleration_as_eulers_equations_say() {
             (jxz * roll + jx * yaw) / gamma,
         ];
         for (name, expected) in ["p", "q", "r"].into_iter().zip(expected) {
-            let got = plant
-                .property(&format!("accelerations/{name}dot-rad_sec2"))
-                .unwrap();
+            let got = plant.property(&format!("accelerations/{name}dot-rad_sec2")).unwrap();
             // The earth's rotation, 7e-5 rad/s, is left out of the equations.
-            assert!(
-                (got - expected).abs() < 2e-3,
-                "{effect:?} {name}: {got} for {expected}"
-            );
+            assert!((got - expected).abs() < 2e-3, "{effect:?} {name}: {got} for {expected}");
         }
     }
 }

@@ -12,10 +12,7 @@ fn time_delay_is_exact_to_the_step() {
     let flight: Vec<(f64, f64)> = (0..100)
         .map(|k| {
             let truth = hidden.step(busy(k)).unwrap();
-            (
-                truth.aileron_rad,
-                hidden.property("hidden/aileron-1").unwrap(),
-            )
+            (truth.aileron_rad, hidden.property("hidden/aileron-1").unwrap())
         })
         .collect();
     for k in 5..100 {
@@ -31,25 +28,16 @@ fn actuator_lag_follows_its_recurrence_and_rate_limit_its_limit() {
     for k in 0..200 {
         let aileron = if (k / 20) % 2 == 0 { 1.0 } else { -1.0 };
         let truth = hidden.step(Inputs { aileron, ..IDLE }).unwrap();
-        let (ca, cb) = (
-            DT_S / (2.0 * 0.04 + DT_S),
-            (2.0 * 0.04 - DT_S) / (2.0 * 0.04 + DT_S),
-        );
+        let (ca, cb) = (DT_S / (2.0 * 0.04 + DT_S), (2.0 * 0.04 - DT_S) / (2.0 * 0.04 + DT_S));
         lagged = ca * (truth.aileron_rad + last) + cb * lagged;
         last = truth.aileron_rad;
         let before = limited;
         limited += (lagged - limited).clamp(-1.5 * DT_S, 1.5 * DT_S);
         fastest = fastest.max((limited - before).abs() / DT_S);
         let acts = hidden.property("hidden/aileron-2").unwrap();
-        assert!(
-            (acts - limited).abs() < 1e-12,
-            "step {k}: {acts} for {limited}"
-        );
+        assert!((acts - limited).abs() < 1e-12, "step {k}: {acts} for {limited}");
     }
-    assert!(
-        (fastest - 1.5).abs() < 1e-9,
-        "the limit was not met: {fastest}"
-    );
+    assert!((fastest - 1.5).abs() < 1e-9, "the limit was not met: {fastest}");
 }
 
 /// An amplitude within the bounds that a flight of 3 s survives.
@@ -72,21 +60,12 @@ fn amplitude_zero_changes_nothing_and_any_other_changes_the_flight() {
     for effect in &EFFECTS {
         let nothing = fly(&mut plant_with(&[&format!("{}=0", effect.id)]), 0, 300);
         assert_same(&nothing, &plain);
-        let something = fly(
-            &mut plant_with(&[&format!("{}={}", effect.id, mild(effect.id))]),
-            0,
-            300,
-        );
+        let something =
+            fly(&mut plant_with(&[&format!("{}={}", effect.id, mild(effect.id))]), 0, 300);
         let apart = |a: &Truth, b: &Truth| {
-            (a.roll_rad - b.roll_rad)
-                .abs()
-                .max((a.pitch_rad - b.pitch_rad).abs())
+            (a.roll_rad - b.roll_rad).abs().max((a.pitch_rad - b.pitch_rad).abs())
         };
-        let most = plain
-            .iter()
-            .zip(&something)
-            .map(|(a, b)| apart(a, b))
-            .fold(0.0, f64::max);
+        let most = plain.iter().zip(&something).map(|(a, b)| apart(a, b)).fold(0.0, f64::max);
         println!(
             "{:25} {:8}: attitude changes by up to {:.2}°",
             effect.id,
@@ -99,19 +78,11 @@ fn amplitude_zero_changes_nothing_and_any_other_changes_the_flight() {
 
 #[test]
 fn all_effects_together_load_and_fly() {
-    let all: Vec<String> = EFFECTS
-        .iter()
-        .map(|e| format!("{}={}", e.id, 0.1 * mild(e.id)))
-        .collect();
+    let all: Vec<String> =
+        EFFECTS.iter().map(|e| format!("{}={}", e.id, 0.1 * mild(e.id))).collect();
     let all: Vec<&str> = all
         .iter()
-        .map(|text| {
-            if text.starts_with("time_delay") {
-                "time_delay=0.01"
-            } else {
-                text
-            }
-        })
+        .map(|text| if text.starts_with("time_delay") { "time_delay=0.01" } else { text })
         .collect();
     let flight = fly(&mut plant_with(&all), 0, 300);
     assert_eq!(flight.len(), 300);
@@ -137,18 +108,12 @@ fn text_is_read_and_slips_are_named() {
     }
     let refused = |effects: &[&str]| {
         let hidden = effects.iter().map(|text| text.parse().unwrap()).collect();
-        Plant::new(&PlantOptions {
-            hidden,
-            ..PlantOptions::default()
-        })
-        .err()
-        .expect("refused")
-        .to_string()
+        Plant::new(&PlantOptions { hidden, ..PlantOptions::default() })
+            .err()
+            .expect("refused")
+            .to_string()
     };
     assert!(refused(&["time_delay=0.013"]).contains("whole number of steps"));
     assert!(refused(&["pitch_break=1", "pitch_break=2"]).contains("given twice"));
-    assert!(matches!(
-        Hidden::new("backlash", 2.0),
-        Err(HiddenError::Amplitude { .. })
-    ));
+    assert!(matches!(Hidden::new("backlash", 2.0), Err(HiddenError::Amplitude { .. })));
 }

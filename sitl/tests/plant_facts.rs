@@ -16,10 +16,7 @@ fn neutral_start_pitches_up_at_5_74_rad_per_s2() {
     let truth = plant.truth();
     assert!((truth.air_density_kgpm3 - 1.1560).abs() < 5e-5, "{truth:?}");
     assert!((truth.airspeed_mps - 16.67).abs() < 1e-9, "{truth:?}");
-    assert_eq!(
-        (truth.time_s, truth.aileron_rad, truth.thrust_n),
-        (0.0, 0.0, 0.0)
-    );
+    assert_eq!((truth.time_s, truth.aileron_rad, truth.thrust_n), (0.0, 0.0, 0.0));
     // One Euler step carries the acceleration into the rate.
     let after = plant.step(IDLE).unwrap();
     assert!((after.q_radps - measured * DT_S).abs() < 1e-4, "{after:?}");
@@ -29,25 +26,10 @@ fn neutral_start_pitches_up_at_5_74_rad_per_s2() {
 fn full_throttle_is_26_246_newton_at_any_airspeed() {
     for airspeed_mps in [12.0, 16.67, 25.0] {
         let mut plant = plant();
-        plant
-            .reset(&Start {
-                airspeed_mps,
-                ..Start::NEUTRAL
-            })
-            .unwrap();
+        plant.reset(&Start { airspeed_mps, ..Start::NEUTRAL }).unwrap();
         // 3 s are 15 time constants of the throttle's lag: e^-15 = 3e-7 is left.
-        let truth = hold(
-            &mut plant,
-            Inputs {
-                throttle: 1.0,
-                ..IDLE
-            },
-            300,
-        );
-        println!(
-            "thrust at full throttle from {airspeed_mps} m/s: {:.4} N",
-            truth.thrust_n
-        );
+        let truth = hold(&mut plant, Inputs { throttle: 1.0, ..IDLE }, 300);
+        println!("thrust at full throttle from {airspeed_mps} m/s: {:.4} N", truth.thrust_n);
         assert!((truth.thrust_n - 26.246).abs() < 1e-3, "{truth:?}");
     }
 }
@@ -64,12 +46,7 @@ impl Surface {
     fn coefficients() -> [f64; 3] {
         let (wn, zeta) = (100.0 * DT_S, std::f64::consts::FRAC_1_SQRT_2);
         let denominator = 4.0 + 4.0 * zeta * wn + wn * wn;
-        [
-            wn * wn,
-            8.0 - 2.0 * wn * wn,
-            4.0 - 4.0 * zeta * wn + wn * wn,
-        ]
-        .map(|c| c / denominator)
+        [wn * wn, 8.0 - 2.0 * wn * wn, 4.0 - 4.0 * zeta * wn + wn * wn].map(|c| c / denominator)
     }
 
     fn next(&mut self, command: f64) -> f64 {
@@ -99,11 +76,7 @@ fn actuators_follow_their_recurrences_to_1e_12() {
     for k in 0..400 {
         // Full steps overshoot by 4 % at this damping, so the clip behind the filter is met too.
         let square = |period: u32| {
-            if (k / period).is_multiple_of(2) {
-                1.0
-            } else {
-                -1.0
-            }
+            if (k / period).is_multiple_of(2) { 1.0 } else { -1.0 }
         };
         let inputs = Inputs {
             aileron: square(17),
@@ -118,14 +91,8 @@ fn actuators_follow_their_recurrences_to_1e_12() {
             .max((truth.aileron_rad - aileron.next(inputs.aileron)).abs())
             .max((truth.elevator_rad - elevator.next(inputs.elevator)).abs())
             .max((truth.throttle - lagged).abs());
-        assert_eq!(
-            truth.aileron_rate_radps,
-            (truth.aileron_rad - before.aileron_rad) / DT_S
-        );
-        assert_eq!(
-            truth.elevator_rate_radps,
-            (truth.elevator_rad - before.elevator_rad) / DT_S
-        );
+        assert_eq!(truth.aileron_rate_radps, (truth.aileron_rad - before.aileron_rad) / DT_S);
+        assert_eq!(truth.elevator_rate_radps, (truth.elevator_rad - before.elevator_rad) / DT_S);
         clipped += u32::from(truth.aileron_rad.abs() == FULL_DEFLECTION_RAD);
     }
     println!(
@@ -140,51 +107,24 @@ fn level_flight_feels_one_g_upwards() {
     let mut plant = plant();
     // The level trim of the X8 at 16.67 m/s: α = θ = 2.283°, δe = 0.01855 rad, throttle 0.118.
     let alpha = 2.283_f64.to_radians();
-    plant
-        .reset(&Start {
-            pitch_rad: alpha,
-            alpha_rad: alpha,
-            ..Start::NEUTRAL
-        })
-        .unwrap();
+    plant.reset(&Start { pitch_rad: alpha, alpha_rad: alpha, ..Start::NEUTRAL }).unwrap();
     let truth = hold(
         &mut plant,
-        Inputs {
-            elevator: 0.01855 / FULL_DEFLECTION_RAD,
-            throttle: 0.118,
-            ..IDLE
-        },
+        Inputs { elevator: 0.01855 / FULL_DEFLECTION_RAD, throttle: 0.118, ..IDLE },
         200,
     );
     let [x, y, z] = truth.specific_force_mps2;
     // Surfaces and throttle start centred, so a small phugoid remains: 2 % of g, 1 m.
     assert!((z + 9.806 * alpha.cos()).abs() < 0.2, "{truth:?}");
-    assert!(
-        (x - 9.806 * alpha.sin()).abs() < 0.2 && y.abs() < 0.01,
-        "{truth:?}"
-    );
+    assert!((x - 9.806 * alpha.sin()).abs() < 0.2 && y.abs() < 0.01, "{truth:?}");
     assert!((truth.altitude_m - 600.0).abs() < 1.0, "{truth:?}");
 }
 
 #[test]
 fn positive_aileron_rolls_right_and_positive_elevator_pitches_down() {
-    let roll = hold(
-        &mut plant(),
-        Inputs {
-            aileron: 0.2,
-            ..IDLE
-        },
-        20,
-    );
+    let roll = hold(&mut plant(), Inputs { aileron: 0.2, ..IDLE }, 20);
     assert!(roll.p_radps > 0.1, "{roll:?}");
-    let down = hold(
-        &mut plant(),
-        Inputs {
-            elevator: 0.2,
-            ..IDLE
-        },
-        20,
-    );
+    let down = hold(&mut plant(), Inputs { elevator: 0.2, ..IDLE }, 20);
     let free = hold(&mut plant(), IDLE, 20);
     assert!(down.q_radps < free.q_radps - 0.1, "{down:?} {free:?}");
 }
@@ -200,10 +140,7 @@ fn snapshot_repeats_a_turbulent_flight_to_the_bit() {
     };
     let mut plant = plant_in(Air {
         wind_ned_mps: [2.0, 1.0, 0.0],
-        turbulence: Some(Turbulence {
-            wind_20ft_mps: 7.6,
-            severity: 3,
-        }),
+        turbulence: Some(Turbulence { wind_20ft_mps: 7.6, severity: 3 }),
         gusts: vec![gust],
     });
     fly(&mut plant, 0, 50);
@@ -216,15 +153,9 @@ fn snapshot_repeats_a_turbulent_flight_to_the_bit() {
 
 #[test]
 fn same_seed_same_flight_and_another_seed_another() {
-    let turbulence = Some(Turbulence {
-        wind_20ft_mps: 7.6,
-        severity: 3,
-    });
+    let turbulence = Some(Turbulence { wind_20ft_mps: 7.6, severity: 3 });
     let flight = |seed| {
-        let mut plant = plant_in(Air {
-            turbulence,
-            ..Air::default()
-        });
+        let mut plant = plant_in(Air { turbulence, ..Air::default() });
         plant.reseed(seed);
         plant.reset(&Start::NEUTRAL).unwrap();
         let first = fly(&mut plant, 0, 200);
@@ -239,20 +170,9 @@ fn same_seed_same_flight_and_another_seed_another() {
 
 #[test]
 fn commands_are_clipped_to_their_ranges() {
-    let beyond = Inputs {
-        aileron: 7.0,
-        elevator: -1e30,
-        throttle: 5.0,
-    };
-    let full = Inputs {
-        aileron: 1.0,
-        elevator: -1.0,
-        throttle: 1.0,
-    };
-    let (beyond, full) = (
-        hold(&mut plant(), beyond, 100),
-        hold(&mut plant(), full, 100),
-    );
+    let beyond = Inputs { aileron: 7.0, elevator: -1e30, throttle: 5.0 };
+    let full = Inputs { aileron: 1.0, elevator: -1.0, throttle: 1.0 };
+    let (beyond, full) = (hold(&mut plant(), beyond, 100), hold(&mut plant(), full, 100));
     assert_eq!(beyond, full);
     assert!(full.throttle < 1.0 && full.throttle > 0.99, "{full:?}");
 }
@@ -263,10 +183,7 @@ fn a_command_that_is_no_number_steps_nothing() {
     fly(&mut plant, 0, 10);
     let before = plant.truth();
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let refused = plant.step(Inputs {
-            elevator: bad,
-            ..IDLE
-        });
+        let refused = plant.step(Inputs { elevator: bad, ..IDLE });
         assert!(matches!(refused, Err(PlantError::Inputs(_))), "{refused:?}");
     }
     assert_eq!(plant.truth(), before);
@@ -278,9 +195,7 @@ fn a_command_that_is_no_number_steps_nothing() {
 fn a_state_that_is_no_number_is_an_error_and_a_reset_heals_it() {
     let mut plant = plant();
     let expected = fly(&mut plant, 0, 10);
-    plant
-        .set_property("atmosphere/wind-north-fps", f64::NAN)
-        .unwrap();
+    plant.set_property("atmosphere/wind-north-fps", f64::NAN).unwrap();
     let failed = plant.step(busy(10));
     let error = failed.expect_err("NaN wind makes the airspeed NaN");
     assert!(matches!(error, PlantError::NonFinite { .. }), "{error}");
@@ -293,36 +208,18 @@ fn a_state_that_is_no_number_is_an_error_and_a_reset_heals_it() {
 fn a_start_that_cannot_be_flown_from_is_refused() {
     let mut plant = plant();
     for start in [
-        Start {
-            airspeed_mps: 0.0,
-            ..Start::NEUTRAL
-        },
-        Start {
-            airspeed_mps: f64::NAN,
-            ..Start::NEUTRAL
-        },
-        Start {
-            roll_rad: f64::INFINITY,
-            ..Start::NEUTRAL
-        },
-        Start {
-            altitude_m: 1e9,
-            ..Start::NEUTRAL
-        },
+        Start { airspeed_mps: 0.0, ..Start::NEUTRAL },
+        Start { airspeed_mps: f64::NAN, ..Start::NEUTRAL },
+        Start { roll_rad: f64::INFINITY, ..Start::NEUTRAL },
+        Start { altitude_m: 1e9, ..Start::NEUTRAL },
     ] {
-        assert!(
-            matches!(plant.reset(&start), Err(PlantError::Start(_))),
-            "{start:?}"
-        );
+        assert!(matches!(plant.reset(&start), Err(PlantError::Start(_))), "{start:?}");
     }
 }
 
 /// A level trim of the X8 in JSBSim: airspeed m/s, α deg, elevator rad, throttle.
-const TRIMS: [(f64, f64, f64, f64); 3] = [
-    (16.67, 2.283, 0.01855, 0.118),
-    (20.0, 0.858, 0.0688, 0.185),
-    (25.0, -0.30, 0.1096, 0.308),
-];
+const TRIMS: [(f64, f64, f64, f64); 3] =
+    [(16.67, 2.283, 0.01855, 0.118), (20.0, 0.858, 0.0688, 0.185), (25.0, -0.30, 0.1096, 0.308)];
 
 #[test]
 fn three_level_trims_balance() {
@@ -330,12 +227,7 @@ fn three_level_trims_balance() {
     for (airspeed_mps, alpha_deg, elevator, throttle) in TRIMS {
         let mut plant = plant();
         let alpha = f64::to_radians(alpha_deg);
-        let start = Start {
-            airspeed_mps,
-            pitch_rad: alpha,
-            alpha_rad: alpha,
-            ..Start::NEUTRAL
-        };
+        let start = Start { airspeed_mps, pitch_rad: alpha, alpha_rad: alpha, ..Start::NEUTRAL };
         let truth = plant.reset(&start).unwrap();
         let mut read = |name: &str| plant.property(name).unwrap() * LBF;
         let (drag, lift) = (read("forces/fwx-aero-lbs"), read("forces/fwz-aero-lbs"));
@@ -347,15 +239,9 @@ fn three_level_trims_balance() {
         let upward = lift + area * 0.2781 * elevator + throttle * 26.246 * alpha.sin();
         println!("trim at {airspeed_mps} m/s: elevator {balancing:.5} rad, throttle {needed:.4}");
         // Half a unit of the last printed digit, and what half a unit of α's makes.
-        assert!(
-            (balancing - elevator).abs() < 2.5e-4,
-            "{balancing} for {elevator}"
-        );
+        assert!((balancing - elevator).abs() < 2.5e-4, "{balancing} for {elevator}");
         assert!((needed - throttle).abs() < 6e-4, "{needed} for {throttle}");
         let weight = 3.364 * 9.806;
-        assert!(
-            (upward / weight - 1.0).abs() < 5e-3,
-            "{upward} N for {weight} N"
-        );
+        assert!((upward / weight - 1.0).abs() < 5e-3, "{upward} N for {weight} N");
     }
 }

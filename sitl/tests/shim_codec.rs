@@ -33,23 +33,14 @@ fn agrees<M: Message + PartialEq + std::fmt::Debug>(name: &str, sequence: u8, ou
     let (frames, parser) = parsed(&theirs);
     assert_eq!((frames.len(), parser.bad()), (1, 0), "{name}");
     let frame = &frames[0];
-    assert_eq!(
-        (frame.system, frame.component, frame.sequence),
-        (1, 200, sequence),
-        "{name}"
-    );
+    assert_eq!((frame.system, frame.component, frame.sequence), (1, 200, sequence), "{name}");
     assert_eq!(frame.decode::<M>(), Some(ours), "{name}: values");
 }
 
 fn controls() -> HilActuatorControls {
     let mut controls = [0.0; 16];
     controls[..3].copy_from_slice(&[0.25, -0.5, 0.75]);
-    HilActuatorControls {
-        time_usec: 123_456_789_012_345,
-        flags: 0,
-        controls,
-        mode: 128,
-    }
+    HilActuatorControls { time_usec: 123_456_789_012_345, flags: 0, controls, mode: 128 }
 }
 
 fn imu(id: u8) -> HighresImu {
@@ -200,36 +191,18 @@ fn every_message_agrees_with_pymavlink() {
             actuator: std::array::from_fn(|i| 0.125 * i as f32 - 1.0),
         },
     );
-    agrees(
-        "aoa_ssa",
-        11,
-        AoaSsa {
-            time_usec: 40_000,
-            aoa: 2.25,
-            ssa: -1.75,
-        },
-    );
+    agrees("aoa_ssa", 11, AoaSsa { time_usec: 40_000, aoa: 2.25, ssa: -1.75 });
     agrees("all_zero", 12, AoaSsa::default());
 }
 
 #[test]
 fn mavlink_1_and_signed_frames_are_read() {
     let (frames, _) = parsed(&vector("hil_actuator_controls_v1"));
-    assert_eq!(
-        (frames.len(), frames[0].version, frames[0].sequence),
-        (1, Version::One, 42)
-    );
+    assert_eq!((frames.len(), frames[0].version, frames[0].sequence), (1, Version::One, 42));
     assert_eq!(frames[0].decode::<HilActuatorControls>(), Some(controls()));
     let (frames, parser) = parsed(&vector("heartbeat_signed"));
-    assert_eq!(
-        (frames.len(), parser.bad()),
-        (1, 0),
-        "13 bytes of signature belong to the frame"
-    );
-    assert_eq!(
-        frames[0].decode::<Heartbeat>().map(|m| m.custom_mode),
-        Some(7)
-    );
+    assert_eq!((frames.len(), parser.bad()), (1, 0), "13 bytes of signature belong to the frame");
+    assert_eq!(frames[0].decode::<Heartbeat>().map(|m| m.custom_mode), Some(7));
 }
 
 #[test]
@@ -266,13 +239,7 @@ fn every_truncation_is_one_bad_run_and_no_frame() {
 #[test]
 fn a_stream_in_pieces_of_any_size_gives_the_same_frames() {
     let mut stream = Vec::new();
-    for name in [
-        "heartbeat",
-        "highres_imu",
-        "statustext",
-        "heartbeat_signed",
-        "aoa_ssa",
-    ] {
+    for name in ["heartbeat", "highres_imu", "statustext", "heartbeat_signed", "aoa_ssa"] {
         stream.extend(b"noise between");
         stream.extend(vector(name));
     }

@@ -29,10 +29,7 @@ fn flies_over_every_transport() {
         let count = |id| companion.slow.iter().filter(|frame| frame.id == id).count();
         // HEARTBEAT, SYS_STATUS, WIND_COV at 1, 2 and 3 s; GPS at 5 Hz; position at 10 Hz.
         assert_eq!([count(1), count(231), count(24), count(33)], [3, 3, 15, 30]);
-        assert!(
-            count(0) >= 3,
-            "a repeated frame brings a heartbeat of its own"
-        );
+        assert!(count(0) >= 3, "a repeated frame brings a heartbeat of its own");
         drop(shim.stop());
     };
 
@@ -70,11 +67,7 @@ fn never_steps_without_an_answer() {
     assert_eq!(companion.state().time_us(), 5 * STEP_US);
     let events = shim.events();
     let count = |event: Event| events.iter().filter(|&e| *e == event).count();
-    assert_eq!(
-        (count(Event::Paused), count(Event::Resumed)),
-        (1, 1),
-        "{events:?}"
-    );
+    assert_eq!((count(Event::Paused), count(Event::Resumed)), (1, 1), "{events:?}");
     let summary = shim.stop();
     assert_eq!((summary.answers, summary.repeated_frames), (4, 2));
 }
@@ -93,19 +86,12 @@ fn ignores_answers_to_other_frames() {
     companion.answer(now - STEP_US, [1.0; 3]);
     companion.answer(now, [f32::NAN, 0.0, 0.0]);
     companion.send(&answer(now, [0.0, 0.0, f32::INFINITY], 128));
-    assert!(
-        companion.state_within(Duration::from_millis(400)).is_none(),
-        "no step"
-    );
+    assert!(companion.state_within(Duration::from_millis(400)).is_none(), "no step");
     companion.answer(now, NEUTRAL);
     assert_eq!(companion.state().time_us(), now + STEP_US);
     let summary = shim.stop();
     assert_eq!(
-        (
-            summary.wrong_answers,
-            summary.repeated_answers,
-            summary.unusable_answers
-        ),
+        (summary.wrong_answers, summary.repeated_answers, summary.unusable_answers),
         (4, 1, 2)
     );
 }
@@ -132,20 +118,14 @@ fn garbage_is_counted_and_harmless() {
         other.encode(&answer(first.time_us(), [0.5; 3], 128), &mut bytes);
         companion.send_bytes(&bytes);
     }
-    assert!(
-        companion.state_within(Duration::from_millis(300)).is_none(),
-        "no step"
-    );
+    assert!(companion.state_within(Duration::from_millis(300)).is_none(), "no step");
     // A good answer behind rubbish in the same datagram still counts.
     let mut behind = b"rubbish".to_vec();
     behind.extend(&whole);
     companion.send_bytes(&behind);
     assert_eq!(companion.state().time_us(), first.time_us() + STEP_US);
     let summary = shim.stop();
-    assert_eq!(
-        (summary.bad_frames, summary.foreign_frames, summary.answers),
-        (5, 4, 1)
-    );
+    assert_eq!((summary.bad_frames, summary.foreign_frames, summary.answers), (5, 4, 1));
 }
 
 #[test]
@@ -181,10 +161,7 @@ fn pauses_when_the_companion_dies_and_goes_on_when_it_returns() {
     let after = companion.fly(50, |_| [0.1, 0.0, 0.4]);
     assert_consecutive(&[before, after].concat(), STEP_US);
     let events = shim.events();
-    assert!(
-        events.contains(&Event::Lost) && events.contains(&Event::Resumed),
-        "{events:?}"
-    );
+    assert!(events.contains(&Event::Lost) && events.contains(&Event::Resumed), "{events:?}");
     companion.state();
     assert_eq!(shim.stop().answers, 100);
 
@@ -283,11 +260,7 @@ fn lost_frames_delay_and_never_skip() {
     assert_consecutive(&states, STEP_US);
     let summary = shim.stop();
     // Of 200 frames sent until one passes, 200 · 0.3/0.7 = 86 sendings are lost, ± 11 (1 σ).
-    assert!(
-        (40..=140).contains(&summary.dropped_frames),
-        "{}",
-        summary.dropped_frames
-    );
+    assert!((40..=140).contains(&summary.dropped_frames), "{}", summary.dropped_frames);
     assert_eq!(summary.dropped_frames, summary.repeated_frames);
     // Each costs some 20 ms, not the second of a real loss.
     assert!(begun.elapsed() < Duration::from_secs(15));
@@ -305,27 +278,16 @@ fn is_held_until_armed_while_time_runs() {
     }
     assert_consecutive(&held, STEP_US);
     for state in &held {
-        assert_eq!(
-            (state.attitude.q1, state.hud.alt),
-            (1.0, held[0].hud.alt),
-            "it does not move"
-        );
+        assert_eq!((state.attitude.q1, state.hud.alt), (1.0, held[0].hud.alt), "it does not move");
         assert_eq!(state.actuators.actuator, [0.0; 32], "nor do its surfaces");
     }
     let flown = companion.fly(30, |_| [0.0, 0.0, 0.5]);
     // The first armed answer is to flown[0], so the first step lies between it and flown[1]:
     // q̇ = +5.74 rad/s² at the neutral start (x8_facts), so q = 0.057 rad/s after one step.
     assert_eq!(flown[0].attitude.pitchspeed, held[0].attitude.pitchspeed);
-    assert!(
-        (flown[1].attitude.pitchspeed - 0.0574).abs() < 0.001,
-        "{:?}",
-        flown[1].attitude
-    );
+    assert!((flown[1].attitude.pitchspeed - 0.0574).abs() < 0.001, "{:?}", flown[1].attitude);
     let notices: Vec<_> = shim.notices.try_iter().collect();
-    let launched = notices
-        .iter()
-        .find(|n| n.event == Event::Launched)
-        .expect("launched");
+    let launched = notices.iter().find(|n| n.event == Event::Launched).expect("launched");
     assert!((launched.time_s - flown[0].time_us() as f64 * 1e-6).abs() < 1e-9);
     drop(shim.stop());
 }
@@ -341,18 +303,11 @@ fn a_delayed_frame_shows_the_past() {
         options.faults.delay_ms = delay_ms;
         let shim = Shim::start(options);
         let states = companion.fly(60, |state| {
-            if state.time_us() >= 10 * STEP_US {
-                [0.5, 0.0, 0.3]
-            } else {
-                [0.0, 0.0, 0.3]
-            }
+            if state.time_us() >= 10 * STEP_US { [0.5, 0.0, 0.3] } else { [0.0, 0.0, 0.3] }
         });
         drop(shim.stop());
         assert_consecutive(&states, STEP_US);
-        states
-            .iter()
-            .position(|state| state.actuators.actuator[0] > 0.01)
-            .expect("a response")
+        states.iter().position(|state| state.actuators.actuator[0] > 0.01).expect("a response")
     };
     assert_eq!(response(45.0), response(0.0) + 5);
 }

@@ -11,10 +11,7 @@ use shim_companion::*;
 
 fn sitl(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_greylag-sitl"));
-    command
-        .args(arguments)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
+    command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }
 
@@ -46,10 +43,7 @@ fn a_port_in_use_is_one_clear_line() {
 #[test]
 fn bad_arguments_are_named() {
     fails(&["--link", "carrier-pigeon:1.2.3.4:5"], "carrier-pigeon");
-    fails(
-        &["--link", "udpin:no.such.host.invalid:5"],
-        "no.such.host.invalid",
-    );
+    fails(&["--link", "udpin:no.such.host.invalid:5"], "no.such.host.invalid");
     fails(&["--wind-ned-mps", "1,2"], "3 numbers are needed");
     fails(&["--aircraft", "absent"], "absent");
     fails(&["--hide", "nonsense"], "ID=AMPLITUDE");
@@ -135,22 +129,11 @@ fn all_options_together_fly_in_lockstep() {
     let child = sitl(&arguments).spawn().expect("the program runs");
     let states = companion.fly(50, |_| [0.0, 0.0, 0.4]);
     let output = child.wait_with_output().expect("it ends");
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     // 10 degrees left with 0.2 degrees of noise; 20 m/s shown as 30.
     assert!((states[0].euler()[0].to_degrees() + 10.0).abs() < 1.0);
-    assert!(
-        (states[0].hud.airspeed - 30.0).abs() < 0.5,
-        "{:?}",
-        states[0].hud
-    );
-    let rows = std::fs::read_to_string(&truth)
-        .expect("a truth file")
-        .lines()
-        .count();
+    assert!((states[0].hud.airspeed - 30.0).abs() < 0.5, "{:?}", states[0].hud);
+    let rows = std::fs::read_to_string(&truth).expect("a truth file").lines().count();
     assert_eq!(rows, 51);
     // The same again without --force is refused.
     fails(&arguments, "--force");
@@ -158,9 +141,6 @@ fn all_options_together_fly_in_lockstep() {
 
 fn interrupt(id: u32) {
     std::thread::sleep(Duration::from_millis(50));
-    let sent = Command::new("kill")
-        .args(["-INT", &id.to_string()])
-        .status()
-        .expect("kill");
+    let sent = Command::new("kill").args(["-INT", &id.to_string()]).status().expect("kill");
     assert!(sent.success());
 }

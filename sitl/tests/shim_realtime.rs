@@ -24,25 +24,13 @@ fn sends_a_hundred_frames_a_second_without_drift() {
     }
     // Absolute deadlines: simulated time equals wall time to within one frame, plus what a busy
     // machine adds to the one frame at the end.
-    let (wall, simulated) = (
-        begun.elapsed().as_secs_f64(),
-        (last.time_us() - first.time_us()) as f64 * 1e-6,
-    );
-    assert!(
-        (wall - simulated).abs() < 0.03,
-        "{wall} s of wall time, {simulated} s simulated"
-    );
-    assert_eq!(
-        count,
-        (last.time_us() - first.time_us()) / STEP_US,
-        "no frame is missing"
-    );
+    let (wall, simulated) =
+        (begun.elapsed().as_secs_f64(), (last.time_us() - first.time_us()) as f64 * 1e-6);
+    assert!((wall - simulated).abs() < 0.03, "{wall} s of wall time, {simulated} s simulated");
+    assert_eq!(count, (last.time_us() - first.time_us()) / STEP_US, "no frame is missing");
     let summary = shim.stop();
     println!("{summary}");
-    assert!(
-        summary.latency.count() + 3 >= summary.answers,
-        "every answer's delay is measured"
-    );
+    assert!(summary.latency.count() + 3 >= summary.answers, "every answer's delay is measured");
 }
 
 #[test]
@@ -54,16 +42,8 @@ fn time_runs_without_anybody_there() {
     std::thread::sleep(Duration::from_millis(1000));
     let summary = shim.stop();
     // 100 frames, give or take what the thread's start and a busy machine cost.
-    assert!(
-        (85..=103).contains(&summary.frames),
-        "{} frames",
-        summary.frames
-    );
-    assert_eq!(
-        (summary.answers, summary.flown_s),
-        (0, 0.0),
-        "held until armed"
-    );
+    assert!((85..=103).contains(&summary.frames), "{} frames", summary.frames);
+    assert_eq!((summary.answers, summary.flown_s), (0, 0.0), "held until armed");
 }
 
 #[test]
@@ -77,33 +57,17 @@ fn a_silent_companion_leaves_the_surfaces_where_they_are_commanded() {
     let mut companion = Companion::udp_in(&at);
     let state = companion.state();
     // Surfaces settle in 0.1 s, the throttle lag (0.2 s) in 2.5 s to 4e-6.
-    assert!(
-        (state.actuators.actuator[1] - 0.25).abs() < 1e-3,
-        "{:?}",
-        state.actuators.actuator
-    );
+    assert!((state.actuators.actuator[1] - 0.25).abs() < 1e-3, "{:?}", state.actuators.actuator);
     assert!((state.actuators.actuator[2] - 0.5).abs() < 1e-3);
     // It returns, and is flown with again.
     companion.fly(50, |_| [0.0, -0.25, 0.5]);
     let state = companion.state();
-    assert!(
-        (state.actuators.actuator[1] + 0.25).abs() < 1e-2,
-        "{:?}",
-        state.actuators.actuator
-    );
+    assert!((state.actuators.actuator[1] + 0.25).abs() < 1e-2, "{:?}", state.actuators.actuator);
     let events = shim.events();
     let found = events.iter().filter(|&e| *e == Event::Found).count();
-    assert_eq!(
-        (found, events.contains(&Event::Lost)),
-        (2, true),
-        "{events:?}"
-    );
+    assert_eq!((found, events.contains(&Event::Lost)), (2, true), "{events:?}");
     let summary = shim.stop();
-    assert!(
-        summary.unanswered_steps >= 200,
-        "{} steps alone",
-        summary.unanswered_steps
-    );
+    assert!(summary.unanswered_steps >= 200, "{} steps alone", summary.unanswered_steps);
 }
 
 #[test]
@@ -130,10 +94,7 @@ fn stale_wrong_and_repeated_answers_are_not_flown() {
         companion.state();
     }
     let elevator = companion.state().actuators.actuator[1];
-    assert!(
-        (elevator - 0.1).abs() < 1e-3,
-        "the first answer holds: {elevator}"
-    );
+    assert!((elevator - 0.1).abs() < 1e-3, "the first answer holds: {elevator}");
     let summary = shim.stop();
     assert_eq!(
         (
@@ -162,11 +123,7 @@ fn a_flood_of_answers_costs_no_frame() {
         }
     }
     let summary = shim.stop();
-    assert!(
-        summary.repeated_answers >= 850,
-        "{}",
-        summary.repeated_answers
-    );
+    assert!(summary.repeated_answers >= 850, "{}", summary.repeated_answers);
     assert!(summary.bad_frames >= 950, "{}", summary.bad_frames);
 }
 
@@ -189,22 +146,11 @@ fn frames_are_delayed_and_dropped_as_asked() {
     assert!(times.is_sorted(), "frames keep their order");
     let summary = shim.stop();
     // 300 frames, of which 75 ± 7.5 (1 σ) are lost.
-    assert!(
-        (45..=105).contains(&summary.dropped_frames),
-        "{}",
-        summary.dropped_frames
-    );
+    assert!((45..=105).contains(&summary.dropped_frames), "{}", summary.dropped_frames);
     // The answer to a frame that is 35 ms late comes when 3 or 4 younger frames are made: the
     // latency counts from the sending, so it stays that of the socket.
-    assert!(
-        summary.latency.quantile(0.5) < Duration::from_millis(5),
-        "{summary}"
-    );
-    assert_eq!(
-        summary.wrong_answers + summary.stale_answers,
-        0,
-        "{summary}"
-    );
+    assert!(summary.latency.quantile(0.5) < Duration::from_millis(5), "{summary}");
+    assert_eq!(summary.wrong_answers + summary.stale_answers, 0, "{summary}");
 }
 
 #[test]
@@ -251,12 +197,7 @@ fn late_frames_hold_up_those_behind_them_and_none_is_lost() {
         "{longest:?}"
     );
     // Frames that were held up come in a burst.
-    assert!(
-        gaps.iter()
-            .filter(|gap| **gap < Duration::from_millis(1))
-            .count()
-            >= 8
-    );
+    assert!(gaps.iter().filter(|gap| **gap < Duration::from_millis(1)).count() >= 8);
     assert_eq!(summary.dropped_frames, 0);
 }
 
@@ -269,8 +210,5 @@ fn a_minute_of_real_time() {
     companion.fly(6000, |_| [0.0, 0.05, 0.2]);
     let summary = shim.stop();
     println!("{summary}");
-    assert_eq!(
-        summary.late_cycles, 0,
-        "cycles that began more than 2 ms late"
-    );
+    assert_eq!(summary.late_cycles, 0, "cycles that began more than 2 ms late");
 }

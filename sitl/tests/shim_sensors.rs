@@ -27,10 +27,7 @@ fn held(change: impl FnOnce(&mut ShimOptions), frames: usize) -> Vec<State> {
 fn mean_and_deviation(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;
-    (
-        mean,
-        (values.map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt(),
-    )
+    (mean, (values.map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
 }
 
 #[test]
@@ -48,24 +45,13 @@ fn noise_has_the_deviation_asked_for_in_every_group() {
         ("roll", |s| s.euler()[0], noise.attitude_rad),
         ("pitch", |s| s.euler()[1], noise.attitude_rad),
         ("airspeed", |s| s.hud.airspeed.into(), noise.airspeed_mps),
-        (
-            "alpha",
-            |s| f64::from(s.vanes.aoa).to_radians(),
-            noise.vane_rad,
-        ),
-        (
-            "beta",
-            |s| f64::from(s.vanes.ssa).to_radians(),
-            noise.vane_rad,
-        ),
+        ("alpha", |s| f64::from(s.vanes.aoa).to_radians(), noise.vane_rad),
+        ("beta", |s| f64::from(s.vanes.ssa).to_radians(), noise.vane_rad),
         ("altitude", |s| s.hud.alt.into(), noise.altitude_m),
     ];
     for (name, channel, expected) in channels {
         let (_, deviation) = mean_and_deviation(states.iter().map(channel));
-        assert!(
-            (deviation / expected - 1.0).abs() < 0.06,
-            "{name}: {deviation} for {expected}"
-        );
+        assert!((deviation / expected - 1.0).abs() < 0.06, "{name}: {deviation} for {expected}");
     }
     // Channels do not share their draws: a correlation of 3000 draws is below 0.09 (5 σ).
     let p = mean_and_deviation(states.iter().map(|s| f64::from(s.imu.xgyro)));
@@ -89,10 +75,7 @@ fn a_bias_moves_its_channel_and_no_other() {
     };
     let (with, without) = (held(|o| o.bias = bias, 3)[2], held(|_| (), 3)[2]);
     let moved = |shown: f32, was: f32, by: f64| {
-        assert!(
-            (f64::from(shown) - f64::from(was) - by).abs() < 1e-5,
-            "{shown}, was {was}"
-        );
+        assert!((f64::from(shown) - f64::from(was) - by).abs() < 1e-5, "{shown}, was {was}");
     };
     moved(with.imu.xgyro, without.imu.xgyro, 0.01);
     moved(with.imu.ygyro, without.imu.ygyro, -0.02);
@@ -103,10 +86,7 @@ fn a_bias_moves_its_channel_and_no_other() {
     moved(with.vanes.aoa, without.vanes.aoa, 0.02_f64.to_degrees());
     moved(with.vanes.ssa, without.vanes.ssa, -0.03_f64.to_degrees());
     moved(with.hud.airspeed, without.hud.airspeed, 1.667);
-    assert_eq!(
-        (with.euler(), with.hud.alt),
-        (without.euler(), without.hud.alt)
-    );
+    assert_eq!((with.euler(), with.hud.alt), (without.euler(), without.hud.alt));
 }
 
 /// The truth file of one second of noisy, lossy flight in which the companion flies on what it is
@@ -116,10 +96,7 @@ fn truth_of(seed: u64) -> String {
     let path = folder.path().join("truth.csv");
     let (mut companion, link) = listening();
     let mut options = lockstep(&link);
-    options.truth = Some(TruthFile {
-        path: path.clone(),
-        existing: Existing::Keep,
-    });
+    options.truth = Some(TruthFile { path: path.clone(), existing: Existing::Keep });
     options.duration_s = Some(1.0);
     options.noise = Noise::REALISTIC;
     options.faults.drop_probability = 0.1;
@@ -144,27 +121,14 @@ fn a_truth_file_is_never_overwritten_unasked() {
     let path = folder.path().join("truth.csv");
     std::fs::write(&path, "precious").expect("written");
     let mut options = lockstep("udpin:127.0.0.1:0");
-    options.truth = Some(TruthFile {
-        path: path.clone(),
-        existing: Existing::Keep,
-    });
+    options.truth = Some(TruthFile { path: path.clone(), existing: Existing::Keep });
     let stopped = AtomicBool::new(true);
     let error = shim::run(&options, &stopped, &mut |_| ()).expect_err("it exists");
     assert!(matches!(error, ShimError::TruthExists { .. }), "{error}");
-    assert_eq!(
-        std::fs::read_to_string(&path).expect("still there"),
-        "precious"
-    );
-    options.truth = Some(TruthFile {
-        path: path.clone(),
-        existing: Existing::Replace,
-    });
+    assert_eq!(std::fs::read_to_string(&path).expect("still there"), "precious");
+    options.truth = Some(TruthFile { path: path.clone(), existing: Existing::Replace });
     shim::run(&options, &stopped, &mut |_| ()).expect("allowed");
-    assert!(
-        std::fs::read_to_string(&path)
-            .expect("there")
-            .starts_with("time_s,roll_rad")
-    );
+    assert!(std::fs::read_to_string(&path).expect("there").starts_with("time_s,roll_rad"));
 }
 
 #[test]
@@ -172,9 +136,7 @@ fn options_that_mean_nothing_are_refused_before_anything_is_opened() {
     let refused = |change: fn(&mut ShimOptions)| {
         let mut options = lockstep("udpin:127.0.0.1:0");
         change(&mut options);
-        let error = shim::run(&options, &AtomicBool::new(true), &mut |_| {
-            panic!("it has begun")
-        });
+        let error = shim::run(&options, &AtomicBool::new(true), &mut |_| panic!("it has begun"));
         let error = error.expect_err("refused").to_string();
         assert!(!error.contains('\n') && !error.is_empty(), "{error}");
     };
@@ -188,10 +150,5 @@ fn options_that_mean_nothing_are_refused_before_anything_is_opened() {
     refused(|o| o.duration_s = Some(0.0));
     refused(|o| o.start.airspeed_mps = 0.0);
     refused(|o| o.start.altitude_m = f64::NAN);
-    refused(|o| {
-        o.plant = PlantOptions {
-            aircraft: "absent".into(),
-            ..Default::default()
-        }
-    });
+    refused(|o| o.plant = PlantOptions { aircraft: "absent".into(), ..Default::default() });
 }

@@ -18,9 +18,7 @@ const TOLERANCE: f64 = 1e-9;
 fn replay(plant: &mut Plant, golden: &Golden) -> Vec<Row> {
     let mut rows = Vec::new();
     for (inputs, state) in &golden.steps {
-        let truth = plant
-            .step(*inputs)
-            .expect("the official JSBSim flew this too");
+        let truth = plant.step(*inputs).expect("the official JSBSim flew this too");
         if state.is_some() {
             rows.push(row(&truth));
         }
@@ -33,11 +31,8 @@ fn judge(name: &str, golden: &Golden, rows: &[Row]) -> f64 {
     assert_eq!(golden.steps.len(), 1000, "{name}");
     assert_eq!((golden.states().count(), rows.len()), (200, 200), "{name}");
     let worst = golden.worst(rows.iter());
-    let (column, figure) = COLUMNS
-        .iter()
-        .zip(worst)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .expect("there are columns");
+    let (column, figure) =
+        COLUMNS.iter().zip(worst).max_by(|a, b| a.1.total_cmp(&b.1)).expect("there are columns");
     println!("validate_jsbsim {name}: worst {figure:.1e} of {column} over 1000 steps");
     assert!(worst.iter().all(|w| *w <= TOLERANCE), "{name}: {worst:?}");
     figure
@@ -58,11 +53,7 @@ fn validate_jsbsim_follows_six_command_histories_to_1e_9() {
 fn validate_jsbsim_histories_reach_stall_and_high_bank() {
     let extreme = |name: &str, column: usize| {
         let golden = Golden::read(&folder(), name);
-        golden
-            .states()
-            .map(|row| row[column].abs())
-            .fold(0.0, f64::max)
-            .to_degrees()
+        golden.states().map(|row| row[column].abs()).fold(0.0, f64::max).to_degrees()
     };
     // The wing stalls at 12.3°; a history that stays below it would not test the tables.
     assert!(extreme("ornstein_uhlenbeck", 7) > 12.3 + 5.0);
@@ -72,10 +63,7 @@ fn validate_jsbsim_histories_reach_stall_and_high_bank() {
 #[test]
 fn validate_jsbsim_follows_in_steady_wind_to_1e_9() {
     let golden = Golden::read(&folder(), "wind");
-    let mut plant = plant_in(Air {
-        wind_ned_mps: [5.0, -3.0, 1.0],
-        ..Air::default()
-    });
+    let mut plant = plant_in(Air { wind_ned_mps: [5.0, -3.0, 1.0], ..Air::default() });
     let rows = replay(&mut plant, &golden);
     judge("wind", &golden, &rows);
 }
@@ -90,10 +78,7 @@ fn validate_jsbsim_follows_in_a_gust_to_1e_9() {
         fall_s: 0.8,
     };
     let golden = Golden::read(&folder(), "gust");
-    let mut plant = plant_in(Air {
-        gusts: vec![gust],
-        ..Air::default()
-    });
+    let mut plant = plant_in(Air { gusts: vec![gust], ..Air::default() });
     let rows = replay(&mut plant, &golden);
     judge("gust", &golden, &rows);
 }
@@ -116,36 +101,19 @@ fn validate_jsbsim_golden_files_are_what_the_official_jsbsim_flies() {
         .arg(fresh.path())
         .output()
         .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     for name in HISTORIES.into_iter().chain(["wind", "gust"]) {
-        let (kept, new) = (
-            Golden::read(&folder(), name),
-            Golden::read(fresh.path(), name),
-        );
+        let (kept, new) = (Golden::read(&folder(), name), Golden::read(fresh.path(), name));
         // Another processor may round a PID command in its sixth decimal the other way.
         for (a, b) in kept.steps.iter().zip(&new.steps) {
             let apart = |x: f64, y: f64| (x - y).abs() > 1.1e-6;
             let (a, b) = (a.0, b.0);
-            assert!(
-                !apart(a.aileron, b.aileron) && !apart(a.elevator, b.elevator),
-                "{name}"
-            );
+            assert!(!apart(a.aileron, b.aileron) && !apart(a.elevator, b.elevator), "{name}");
         }
-        judge(
-            &format!("{name} regenerated"),
-            &kept,
-            &new.states().copied().collect::<Vec<_>>(),
-        );
+        judge(&format!("{name} regenerated"), &kept, &new.states().copied().collect::<Vec<_>>());
     }
     let (kept, new) = (Statistics::read(&folder()), Statistics::read(fresh.path()));
-    println!(
-        "turbulence regenerated: worst {:.2} standard errors",
-        kept.worst(&new)
-    );
+    println!("turbulence regenerated: worst {:.2} standard errors", kept.worst(&new));
     assert!(kept.worst(&new) < 4.0);
 }
 
@@ -162,10 +130,7 @@ impl Statistics {
     /// Distance of each pair of means in standard errors of their difference, with its name.
     fn distances(&self, other: &Statistics) -> Vec<(String, f64)> {
         assert!(self.0.keys().eq(other.0.keys()));
-        let named = self
-            .0
-            .iter()
-            .flat_map(|(row, signals)| signals.iter().map(move |s| (row, s)));
+        let named = self.0.iter().flat_map(|(row, signals)| signals.iter().map(move |s| (row, s)));
         named
             .map(|(row, (signal, [mean, error]))| {
                 let [official, official_error] = other.0[row][signal];
@@ -176,10 +141,7 @@ impl Statistics {
     }
 
     fn worst(&self, other: &Statistics) -> f64 {
-        self.distances(other)
-            .iter()
-            .map(|(_, distance)| *distance)
-            .fold(0.0, f64::max)
+        self.distances(other).iter().map(|(_, distance)| *distance).fold(0.0, f64::max)
     }
 }
 
@@ -191,11 +153,8 @@ const DT_S: f64 = 0.01;
 const BANDS_HZ: [&str; 5] = ["0.05", "0.2", "0.8", "3.0", "12.0"];
 const BINS: usize = 5;
 const SIGNALS: [&str; 6] = ["north", "east", "down", "p", "q", "r"];
-const RATES: [&str; 3] = [
-    "atmosphere/p-turb-rad_sec",
-    "atmosphere/q-turb-rad_sec",
-    "atmosphere/r-turb-rad_sec",
-];
+const RATES: [&str; 3] =
+    ["atmosphere/p-turb-rad_sec", "atmosphere/q-turb-rad_sec", "atmosphere/r-turb-rad_sec"];
 
 /// The six turbulence signals of one flight, held wings level at 20 m/s.
 fn turbulent_flight(plant: &mut Plant, seed: u32) -> [Vec<f64>; 6] {
@@ -249,33 +208,17 @@ fn power(x: &[f64]) -> Vec<f64> {
     let mean_square = x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
     let band = |centre: &str| {
         let first = (centre.parse::<f64>().unwrap() * x.len() as f64 * DT_S).round() as usize;
-        (first..first + BINS)
-            .map(|j| periodogram(x, j))
-            .sum::<f64>()
-            / BINS as f64
+        (first..first + BINS).map(|j| periodogram(x, j)).sum::<f64>() / BINS as f64
     };
-    std::iter::once(mean_square)
-        .chain(BANDS_HZ.into_iter().map(band))
-        .collect()
+    std::iter::once(mean_square).chain(BANDS_HZ.into_iter().map(band)).collect()
 }
 
 #[test]
 fn validate_jsbsim_turbulence_has_the_official_variance_and_spectrum() {
-    let turbulence = Some(Turbulence {
-        wind_20ft_mps: 7.6,
-        severity: 3,
-    });
-    let mut plant = plant_in(Air {
-        turbulence,
-        ..Air::default()
-    });
+    let turbulence = Some(Turbulence { wind_20ft_mps: 7.6, severity: 3 });
+    let mut plant = plant_in(Air { turbulence, ..Air::default() });
     let flights: Vec<Vec<Vec<f64>>> = (0..EPISODES)
-        .map(|k| {
-            turbulent_flight(&mut plant, k)
-                .iter()
-                .map(|x| power(x))
-                .collect()
-        })
+        .map(|k| turbulent_flight(&mut plant, k).iter().map(|x| power(x)).collect())
         .collect();
     let rows =
         std::iter::once("mean_square".to_owned()).chain(BANDS_HZ.map(|hz| format!("psd_{hz}_hz")));
@@ -283,11 +226,8 @@ fn validate_jsbsim_turbulence_has_the_official_variance_and_spectrum() {
         let of = |(s, signal): (usize, &str)| {
             let n = f64::from(EPISODES);
             let mean = flights.iter().map(|f| f[s][r]).sum::<f64>() / n;
-            let variance = flights
-                .iter()
-                .map(|f| (f[s][r] - mean).powi(2))
-                .sum::<f64>()
-                / (n - 1.0);
+            let variance =
+                flights.iter().map(|f| (f[s][r] - mean).powi(2)).sum::<f64>() / (n - 1.0);
             (signal.to_owned(), [mean, (variance / n).sqrt()])
         };
         (row, SIGNALS.into_iter().enumerate().map(of).collect())

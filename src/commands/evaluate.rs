@@ -148,12 +148,24 @@ fn table(evaluations: &[Evaluation]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
     table.set_header([
-        "controller", "model", "targets", "n", "mean °", "median °", "IQM °", "max °", "diverged %", "ms/step p50", "p99", "p99.9",
+        "controller",
+        "model",
+        "targets",
+        "n",
+        "mean °",
+        "median °",
+        "IQM °",
+        "max °",
+        "diverged %",
+        "ms/step p50",
+        "p99",
+        "p99.9",
     ]);
     for e in evaluations {
         for s in &e.groups {
             let cost = [e.ms_per_step.p50, e.ms_per_step.p99, e.ms_per_step.p999];
-            let mut row = vec![e.controller.clone(), e.model.clone(), s.targets.clone(), s.count.to_string()];
+            let mut row =
+                vec![e.controller.clone(), e.model.clone(), s.targets.clone(), s.count.to_string()];
             row.extend([s.mean_deg, s.median_deg, s.iqm_deg, s.max_deg].map(|x| format!("{x:.3}")));
             row.push(format!("{:.1}", 100.0 * s.divergence_rate));
             row.extend(cost.map(|x| format!("{x:.4}")));

@@ -1,6 +1,8 @@
 //! Subcommands: arguments, then a few lines of work.
 
 #[cfg(feature = "sitl")]
+mod demo;
+#[cfg(feature = "sitl")]
 mod evaluate;
 mod files;
 pub mod fly;
@@ -22,6 +24,9 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
+    #[cfg(feature = "sitl")]
+    Demo(demo::Arguments),
     /// Score controllers on the target file, flown in JSBSim in this process.
     #[cfg(feature = "sitl")]
     Evaluate(evaluate::Arguments),
@@ -37,6 +42,8 @@ pub fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let result = match Arguments::parse().command {
+        #[cfg(feature = "sitl")]
+        Command::Demo(arguments) => demo::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),

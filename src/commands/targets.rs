@@ -26,6 +26,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let targets = TargetFile::generate(arguments.seed);
     files::write(&arguments.out, &targets.to_csv(), arguments.force.into())?;
-    println!("{} targets of seed {} in {}", targets.rows.len(), arguments.seed, arguments.out.display());
+    println!(
+        "{} targets of seed {} in {}",
+        targets.rows.len(),
+        arguments.seed,
+        arguments.out.display()
+    );
     Ok(ExitCode::SUCCESS)
 }

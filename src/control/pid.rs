@@ -86,11 +86,21 @@ impl Pid {
     }
 
     /// One loop; `stops` are the limits of its output.
-    fn step(&mut self, axis: usize, gains: Gains, error: f64, rate: f64, bias: f64, stops: (f64, f64)) -> f64 {
+    fn step(
+        &mut self,
+        axis: usize,
+        gains: Gains,
+        error: f64,
+        rate: f64,
+        bias: f64,
+        stops: (f64, f64),
+    ) -> f64 {
         let grown = self.integrals[axis] + error * STEP;
-        let output = |integral: f64| bias + gains.kp * error + gains.ki * integral - gains.kd * rate;
+        let output =
+            |integral: f64| bias + gains.kp * error + gains.ki * integral - gains.kd * rate;
         let raw = output(grown);
-        let outward = (raw > stops.1 && gains.ki * error > 0.0) || (raw < stops.0 && gains.ki * error < 0.0);
+        let outward =
+            (raw > stops.1 && gains.ki * error > 0.0) || (raw < stops.0 && gains.ki * error < 0.0);
         if self.tuning.windup == Windup::Free || !outward {
             self.integrals[axis] = grown;
         }
@@ -118,7 +128,8 @@ impl Controller for Pid {
         let airspeed = t.airspeed_override.unwrap_or(target.airspeed);
         let aileron = self.step(0, t.roll, target.roll - s.roll, s.p, 0.0, stops);
         let elevator = self.step(1, t.pitch, target.pitch - s.pitch, s.q, 0.0, stops);
-        let throttle = self.step(2, t.airspeed, airspeed - s.airspeed, 0.0, t.throttle_trim, (0.0, 1.0));
+        let throttle =
+            self.step(2, t.airspeed, airspeed - s.airspeed, 0.0, t.throttle_trim, (0.0, 1.0));
         Command { aileron: aileron / t.deflection, elevator: elevator / t.deflection, throttle }
     }
 }

@@ -68,31 +68,19 @@ pub enum AddressError {
 
 impl HostPort {
     fn parse(whole: &str, rest: &str) -> Result<Self, AddressError> {
-        let (host, port) = rest
-            .rsplit_once(':')
-            .ok_or_else(|| AddressError::Parts(whole.into()))?;
-        let host = host
-            .strip_prefix('[')
-            .and_then(|h| h.strip_suffix(']'))
-            .unwrap_or(host);
+        let (host, port) =
+            rest.rsplit_once(':').ok_or_else(|| AddressError::Parts(whole.into()))?;
+        let host = host.strip_prefix('[').and_then(|h| h.strip_suffix(']')).unwrap_or(host);
         if host.is_empty() || host.contains(['[', ']', ' ']) {
             return Err(AddressError::Parts(whole.into()));
         }
-        let port = port
-            .parse()
-            .map_err(|_| AddressError::Port(whole.into(), port.into()))?;
-        Ok(HostPort {
-            host: host.into(),
-            port,
-        })
+        let port = port.parse().map_err(|_| AddressError::Port(whole.into(), port.into()))?;
+        Ok(HostPort { host: host.into(), port })
     }
 
     /// The first address that the host name stands for.
     pub fn resolve(&self) -> Result<SocketAddr, AddressError> {
-        let failed = |reason: String| AddressError::Lookup {
-            host: self.host.clone(),
-            reason,
-        };
+        let failed = |reason: String| AddressError::Lookup { host: self.host.clone(), reason };
         (self.host.as_str(), self.port)
             .to_socket_addrs()
             .map_err(|e| failed(e.to_string()))?
@@ -105,9 +93,7 @@ impl FromStr for Address {
     type Err = AddressError;
 
     fn from_str(text: &str) -> Result<Self, AddressError> {
-        let (kind, rest) = text
-            .split_once(':')
-            .ok_or_else(|| AddressError::Kind(text.into()))?;
+        let (kind, rest) = text.split_once(':').ok_or_else(|| AddressError::Kind(text.into()))?;
         match kind {
             "udpin" => HostPort::parse(text, rest).map(Address::UdpIn),
             "udpout" => HostPort::parse(text, rest).map(Address::UdpOut),
@@ -125,10 +111,7 @@ fn parse_serial(whole: &str, rest: &str) -> Result<Address, AddressError> {
     match (port, baud) {
         (_, 0) => Err(AddressError::Baud(whole.into(), rate.into())),
         ("", _) => Err(AddressError::Parts(whole.into())),
-        _ => Ok(Address::Serial {
-            port: port.into(),
-            baud,
-        }),
+        _ => Ok(Address::Serial { port: port.into(), baud }),
     }
 }
 

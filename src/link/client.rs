@@ -143,10 +143,7 @@ impl Clients {
 
     /// What was received so far.
     pub fn counts(&self) -> ClientCounts {
-        ClientCounts {
-            dropped: self.outbox.dropped(),
-            ..self.counts
-        }
+        ClientCounts { dropped: self.outbox.dropped(), ..self.counts }
     }
 
     /// How many peers are served.
@@ -217,23 +214,16 @@ impl Clients {
             }
             Request::Mission { step, kind } => self.reply(at, &mission(step, kind, from)),
             // An answer of the other side is not to be answered: 128 is ACK, 129 NAK.
-            Request::File {
-                opcode: 128 | 129, ..
-            } => {}
-            Request::File {
-                sequence,
-                session,
-                opcode,
-            } => {
+            Request::File { opcode: 128 | 129, .. } => {}
+            Request::File { sequence, session, opcode } => {
                 self.reply(at, &answer::file_nak(sequence, session, opcode, from));
             }
             Request::TimeSync { theirs } => {
                 self.reply(at, &answer::time_sync(theirs, now.vehicle, from))
             }
-            Request::Ping {
-                time_usec,
-                sequence,
-            } => self.reply(at, &answer::ping(time_usec, sequence, from)),
+            Request::Ping { time_usec, sequence } => {
+                self.reply(at, &answer::ping(time_usec, sequence, from))
+            }
             Request::DataStream { group, rate } => {
                 self.sessions[at].streams.set_group(group, rate, now.host)
             }
@@ -267,17 +257,8 @@ impl Clients {
     /// A line for one client.
     fn say(&mut self, at: usize, severity: Severity, words: &str) {
         self.text_id = self.text_id.checked_add(1).unwrap_or(1);
-        let words = words
-            .char_indices()
-            .nth(TEXT_LENGTH)
-            .map_or(words, |(end, _)| &words[..end]);
-        self.sessions[at].say(
-            severity,
-            words,
-            self.text_id,
-            self.identity,
-            &mut self.outbox,
-        );
+        let words = words.char_indices().nth(TEXT_LENGTH).map_or(words, |(end, _)| &words[..end]);
+        self.sessions[at].say(severity, words, self.text_id, self.identity, &mut self.outbox);
     }
 
     /// A warning for one client, unless it has had too many lately.

@@ -124,12 +124,9 @@ fn examine(bytes: &[u8]) -> Candidate<'_> {
     let len = end + CHECKSUM + if signed { SIGNATURE } else { 0 };
     let (sequence, system, component, id) = match v1 {
         true => (bytes[2], bytes[3], bytes[4], bytes[5] as u32),
-        false => (
-            bytes[4],
-            bytes[5],
-            bytes[6],
-            u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]),
-        ),
+        false => {
+            (bytes[4], bytes[5], bytes[6], u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]))
+        }
     };
     if bytes.len() < len {
         return Candidate::Incomplete;
@@ -195,9 +192,7 @@ impl<'a, 'c> Frames<'a, 'c> {
 /// the bytes, or in front of another start marker. Anything else is noise in a frame's clothes,
 /// and skipping its length would swallow good frames.
 fn ends_well(bytes: &[u8], len: usize) -> bool {
-    bytes
-        .get(len)
-        .is_none_or(|next| matches!(*next, STX_V1 | STX_V2))
+    bytes.get(len).is_none_or(|next| matches!(*next, STX_V1 | STX_V2))
 }
 
 impl<'a> Iterator for Frames<'a, '_> {
@@ -271,10 +266,7 @@ impl StreamCutter {
     }
 
     fn cut(&mut self, waits: bool, deliver: impl FnMut(Frame<'_>)) {
-        let mut frames = Frames {
-            waits,
-            ..Frames::new(&self.pending, &mut self.counts)
-        };
+        let mut frames = Frames { waits, ..Frames::new(&self.pending, &mut self.counts) };
         frames.by_ref().for_each(deliver);
         let left = frames.rest.len();
         self.pending.drain(..self.pending.len() - left);
@@ -307,11 +299,8 @@ pub fn write(
             bytes.extend_from_slice(payload);
         }
         Version::V2 => {
-            let len = payload
-                .iter()
-                .rposition(|b| *b != 0)
-                .map_or(1, |last| last + 1)
-                .min(payload.len());
+            let len =
+                payload.iter().rposition(|b| *b != 0).map_or(1, |last| last + 1).min(payload.len());
             let [a, b, c, _] = id.to_le_bytes();
             bytes.extend([
                 STX_V2,

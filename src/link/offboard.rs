@@ -47,7 +47,9 @@ impl OffboardClient {
     /// Reads a datagram; frames of others than the autopilot are passed over.
     pub fn read(&mut self, datagram: &[u8], mut hear: impl FnMut(Heard)) {
         for frame in Frames::new(datagram, &mut self.counts) {
-            if frame.source == AUTOPILOT && let Some(heard) = offboard::read(&frame) {
+            if frame.source == AUTOPILOT
+                && let Some(heard) = offboard::read(&frame)
+            {
                 hear(heard);
             }
         }

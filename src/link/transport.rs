@@ -125,20 +125,13 @@ struct Port {
 
 impl Port {
     fn peer(&self, address: SocketAddr) -> PeerId {
-        PeerId {
-            link: self.id,
-            address,
-        }
+        PeerId { link: self.id, address }
     }
 
     /// Passes bytes on, or drops them when nobody fetches.
     fn deliver(&self, address: SocketAddr, bytes: Vec<u8>) {
         count(&self.counters.received);
-        let packet = Packet {
-            peer: self.peer(address),
-            bytes,
-            arrived: Instant::now(),
-        };
+        let packet = Packet { peer: self.peer(address), bytes, arrived: Instant::now() };
         if self.inbox.try_send(Arrival::Packet(packet)).is_err() {
             count(&self.counters.inbox_full);
         }
@@ -164,10 +157,8 @@ pub struct Network {
 impl Network {
     /// Starts the thread, with no link yet.
     pub fn start() -> Result<Self, TransportError> {
-        let runtime = Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .map_err(TransportError::Thread)?;
+        let runtime =
+            Builder::new_current_thread().enable_all().build().map_err(TransportError::Thread)?;
         let handle = runtime.handle().clone();
         let (stop, stopped) = oneshot::channel::<()>();
         let thread = std::thread::Builder::new()
@@ -177,11 +168,7 @@ impl Network {
                 let _ = runtime.block_on(stopped);
             })
             .map_err(TransportError::Thread)?;
-        Ok(Network {
-            handle,
-            stop: Some(stop),
-            thread: Some(thread),
-        })
+        Ok(Network { handle, stop: Some(stop), thread: Some(thread) })
     }
 
     /// Opens a link whose arrivals go to `inbox`. Sockets are bound before this returns, so that
@@ -195,41 +182,27 @@ impl Network {
         inbox: Inbox<Arrival>,
     ) -> Result<Link, TransportError> {
         let counters = Arc::new(Counters::default());
-        let port = Port {
-            id,
-            inbox,
-            counters: counters.clone(),
-        };
+        let port = Port { id, inbox, counters: counters.clone() };
         let (outbox, outgoing) = mpsc::channel(OUTBOX);
         let failed = |source: std::io::Error| match source.kind() {
-            std::io::ErrorKind::AddrInUse => TransportError::InUse {
-                address: address.clone(),
-                option,
-            },
-            _ => TransportError::Open {
-                address: address.clone(),
-                option,
-                source,
-            },
+            std::io::ErrorKind::AddrInUse => {
+                TransportError::InUse { address: address.clone(), option }
+            }
+            _ => TransportError::Open { address: address.clone(), option, source },
         };
         // Sockets are registered with the runtime of the thread that will serve them.
         let _entered = self.handle.enter();
         let (local, target) = match address {
-            Address::UdpIn(at) => (
-                Some(udp::listen(port, at.resolve()?, outgoing).map_err(failed)?),
-                None,
-            ),
+            Address::UdpIn(at) => {
+                (Some(udp::listen(port, at.resolve()?, outgoing).map_err(failed)?), None)
+            }
             Address::UdpOut(to) => {
                 let to = to.resolve()?;
-                (
-                    Some(udp::reach(port, to, outgoing).map_err(failed)?),
-                    Some(to),
-                )
+                (Some(udp::reach(port, to, outgoing).map_err(failed)?), Some(to))
             }
-            Address::TcpIn(at) => (
-                Some(tcp::listen(port, at.resolve()?, outgoing).map_err(failed)?),
-                None,
-            ),
+            Address::TcpIn(at) => {
+                (Some(tcp::listen(port, at.resolve()?, outgoing).map_err(failed)?), None)
+            }
             Address::TcpOut(to) => {
                 tcp::connect(port, to.resolve()?, outgoing);
                 (None, None)
@@ -237,13 +210,7 @@ impl Network {
             Address::Serial { .. } => return Err(TransportError::Serial(address.clone())),
         };
         let target = target.map(|address| PeerId { link: id, address });
-        Ok(Link {
-            id,
-            local,
-            target,
-            outbox,
-            counters,
-        })
+        Ok(Link { id, local, target, outbox, counters })
     }
 }
 

@@ -48,9 +48,7 @@ struct AirFile {
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum DensityFile {
-    Constant {
-        kgpm3: Sourced,
-    },
+    Constant { kgpm3: Sourced },
     Law(String),
 }
 
@@ -98,7 +96,9 @@ impl File {
             terms.push(Term { kind, first, table });
         }
         if terms.is_empty() {
-            return Err("it names no effect, so nothing would hold the aircraft up; add [effects.…]".into());
+            return Err(
+                "it names no effect, so nothing would hold the aircraft up; add [effects.…]".into(),
+            );
         }
         Ok(GreyBox {
             name: self.name,
@@ -136,7 +136,9 @@ impl BodyFile {
 impl AirFile {
     fn checked(&self) -> Result<Atmosphere, String> {
         let density = match &self.density {
-            DensityFile::Constant { kgpm3 } => Density::Constant(positive("air.density.kgpm3", kgpm3)?),
+            DensityFile::Constant { kgpm3 } => {
+                Density::Constant(positive("air.density.kgpm3", kgpm3)?)
+            }
             DensityFile::Law(law) if law == "standard" => Density::Standard,
             DensityFile::Law(law) => {
                 return Err(format!(
@@ -149,11 +151,16 @@ impl AirFile {
 }
 
 /// One effect's coefficients and table out of its TOML table.
-fn effect(about: &Description, content: &toml::Value) -> Result<(Vec<Named>, Option<Table>), String> {
+fn effect(
+    about: &Description,
+    content: &toml::Value,
+) -> Result<(Vec<Named>, Option<Table>), String> {
     let id = about.id;
-    let entries =
-        content.as_table().ok_or_else(|| format!("effects.{id} must be a table of coefficients"))?;
-    let known = |key: &str| about.table == Some(key) || about.coefficients.iter().any(|c| c.name == key);
+    let entries = content
+        .as_table()
+        .ok_or_else(|| format!("effects.{id} must be a table of coefficients"))?;
+    let known =
+        |key: &str| about.table == Some(key) || about.coefficients.iter().any(|c| c.name == key);
     if let Some(key) = entries.keys().find(|key| !known(key)) {
         let names: Vec<_> = about.coefficients.iter().map(|c| c.name).chain(about.table).collect();
         return Err(format!("effects.{id}.{key} is unknown; {id} has {}", names.join(", ")));
@@ -163,8 +170,9 @@ fn effect(about: &Description, content: &toml::Value) -> Result<(Vec<Named>, Opt
     };
     let mut named = Vec::new();
     for c in about.coefficients {
-        let number: Sourced =
-            get(c.name)?.try_into().map_err(|e| format!("effects.{id}.{}: {}", c.name, toml_error(&e)))?;
+        let number: Sourced = get(c.name)?
+            .try_into()
+            .map_err(|e| format!("effects.{id}.{}: {}", c.name, toml_error(&e)))?;
         let (low, high) = c.bounds;
         if !(low..=high).contains(&number.value) {
             return Err(format!(

@@ -72,13 +72,17 @@ impl Trim {
             return Ok(free);
         }
         let stop = free.controls.throttle.clamp(0.0, 1.0);
-        let mut held = solve_attitude(model, roll, pitch, airspeed, altitude, Some(stop)).ok_or_else(fail)?;
+        let mut held =
+            solve_attitude(model, roll, pitch, airspeed, altitude, Some(stop)).ok_or_else(fail)?;
         held.acceleration = model.rate(&held.state, &held.controls, altitude).airspeed;
         Ok(held)
     }
 }
 
-fn level_condition<R: Real>([alpha, elevator, throttle]: [R; 3], airspeed: f64) -> (State<R>, Controls<R>) {
+fn level_condition<R: Real>(
+    [alpha, elevator, throttle]: [R; 3],
+    airspeed: f64,
+) -> (State<R>, Controls<R>) {
     let zero = R::zero();
     let state = State {
         roll: zero,
@@ -127,10 +131,18 @@ fn solve_attitude(
     Some(Trim { state, controls, acceleration: 0.0 })
 }
 
-fn attitude_condition<R: Real>(x: [R; 8], roll: f64, pitch: f64, airspeed: f64) -> (State<R>, Controls<R>) {
+fn attitude_condition<R: Real>(
+    x: [R; 8],
+    roll: f64,
+    pitch: f64,
+    airspeed: f64,
+) -> (State<R>, Controls<R>) {
     let [alpha, beta, p, q, r, aileron, elevator, throttle] = x;
     let [roll, pitch, airspeed] = [roll, pitch, airspeed].map(R::from_f64);
-    (State { roll, pitch, airspeed, p, q, r, alpha, beta }, Controls { aileron, elevator, throttle })
+    (
+        State { roll, pitch, airspeed, p, q, r, alpha, beta },
+        Controls { aileron, elevator, throttle },
+    )
 }
 
 fn failure(model: &GreyBox, roll: f64, pitch: f64, airspeed: f64) -> TrimError {

@@ -104,7 +104,8 @@ fn sin_cos(x: f32) -> (f32, f32) {
     let quarter = turns - 4.0 * ((turns * 0.25 - 0.375 + ROUND) - ROUND); // 0..3, as a float
     let z = y * y;
     let sine = y + y * z * (-1.666_665_4e-1 + z * (8.332_161e-3 + z * -1.951_529_6e-4));
-    let cosine = 1.0 - 0.5 * z + z * z * (4.166_664_6e-2 + z * (-1.388_731_6e-3 + z * 2.443_315_7e-5));
+    let cosine =
+        1.0 - 0.5 * z + z * z * (4.166_664_6e-2 + z * (-1.388_731_6e-3 + z * 2.443_315_7e-5));
     let odd = quarter == 1.0 || quarter == 3.0 || quarter == -1.0;
     let (s, c) = if odd { (cosine, sine) } else { (sine, cosine) };
     let s = if quarter == 2.0 || quarter == 3.0 || quarter == -1.0 { -s } else { s };
@@ -161,7 +162,10 @@ mod tests {
             assert!((c as f64 - (x as f64).cos()).abs() < 1e-6, "cos {x}: {c}");
             assert!((exp(x) as f64 / (x as f64).exp() - 1.0).abs() < 1e-6, "exp {x}");
             let (y, x) = ((x * 7.0).sin(), (x * 3.0).cos());
-            assert!((atan2(y, x) as f64 - (y as f64).atan2(x as f64)).abs() < 1e-6, "atan2 {y} {x}");
+            assert!(
+                (atan2(y, x) as f64 - (y as f64).atan2(x as f64)).abs() < 1e-6,
+                "atan2 {y} {x}"
+            );
         }
         assert_eq!(atan2(0.0, 0.0), 0.0);
     }

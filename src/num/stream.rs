@@ -11,9 +11,10 @@ pub type Stream = ChaCha8Rng;
 /// with different paths are independent, whatever order they are drawn in.
 pub fn stream(seed: u64, path: &[u64]) -> Stream {
     // FNV-1a over the path picks one of ChaCha's 2^64 streams of the key
-    let number = path.iter().flat_map(|p| p.to_le_bytes()).fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    });
+    let number =
+        path.iter().flat_map(|p| p.to_le_bytes()).fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(number);
     rng

@@ -75,7 +75,9 @@ mod tests {
     #[test]
     fn is_linear_between_points_and_constant_beyond() {
         let table = Table::new(&[-1.0, 0.0, 2.0], &[3.0, 1.0, 5.0]).unwrap();
-        for (x, y) in [(-9.0, 3.0), (-1.0, 3.0), (-0.5, 2.0), (0.0, 1.0), (1.0, 3.0), (2.0, 5.0), (7.0, 5.0)] {
+        for (x, y) in
+            [(-9.0, 3.0), (-1.0, 3.0), (-0.5, 2.0), (0.0, 1.0), (1.0, 3.0), (2.0, 5.0), (7.0, 5.0)]
+        {
             assert_eq!(table.at(x), y, "at {x}");
         }
     }

@@ -155,8 +155,7 @@ impl<R: Real> Actuators<R> {
         self.aileron.step(command.aileron, figures);
         self.elevator.step(command.elevator, figures);
         let [b, a] = figures.throttle;
-        self.throttle =
-            (command.throttle + self.throttle_input).scale(b) + self.throttle.scale(a);
+        self.throttle = (command.throttle + self.throttle_input).scale(b) + self.throttle.scale(a);
         self.throttle_input = command.throttle;
     }
 
@@ -220,7 +219,9 @@ mod tests {
             rebuilt.step(&Command::IDLE, &f);
             let (a, b) = (actuators.controls(), rebuilt.controls());
             // equal up to rounding of the difference quotient
-            assert!((a.aileron - b.aileron).abs() < 1e-14 && (a.elevator - b.elevator).abs() < 1e-14);
+            assert!(
+                (a.aileron - b.aileron).abs() < 1e-14 && (a.elevator - b.elevator).abs() < 1e-14
+            );
             assert_eq!(a.throttle, b.throttle);
         }
     }

@@ -52,7 +52,9 @@ mod tests {
     #[test]
     fn standard_atmosphere_at_tabulated_altitudes() {
         // ISO 2533 tables give five figures
-        for (altitude, density) in [(0.0, 1.2250), (600.0, 1.1560), (2000.0, 1.0066), (5000.0, 0.73643)] {
+        for (altitude, density) in
+            [(0.0, 1.2250), (600.0, 1.1560), (2000.0, 1.0066), (5000.0, 0.73643)]
+        {
             let ours = standard_density(altitude);
             assert!((ours / density - 1.0).abs() < 5e-5, "{altitude} m: {ours}");
         }

@@ -136,7 +136,11 @@ pub fn body_to_horizon<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
     let (sin_pitch, cos_pitch) = state.pitch.sin_cos();
     let [x, y, z] = v;
     let turned = y * sin_roll + z * cos_roll;
-    [x * cos_pitch + turned * sin_pitch, y * cos_roll - z * sin_roll, turned * cos_pitch - x * sin_pitch]
+    [
+        x * cos_pitch + turned * sin_pitch,
+        y * cos_roll - z * sin_roll,
+        turned * cos_pitch - x * sin_pitch,
+    ]
 }
 
 /// The inverse of [`body_to_horizon`].
@@ -146,7 +150,11 @@ pub fn horizon_to_body<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
     let (sin_pitch, cos_pitch) = state.pitch.sin_cos();
     let [n, e, d] = v;
     let turned = n * sin_pitch + d * cos_pitch;
-    [n * cos_pitch - d * sin_pitch, e * cos_roll + turned * sin_roll, turned * cos_roll - e * sin_roll]
+    [
+        n * cos_pitch - d * sin_pitch,
+        e * cos_roll + turned * sin_roll,
+        turned * cos_roll - e * sin_roll,
+    ]
 }
 
 #[cfg(test)]
@@ -155,7 +163,14 @@ mod tests {
     use crate::physics::airframe::Geometry;
 
     const STATE: State = State {
-        roll: 0.4, pitch: -0.3, airspeed: 19.0, p: 1.1, q: -0.7, r: 0.5, alpha: 0.12, beta: -0.08,
+        roll: 0.4,
+        pitch: -0.3,
+        airspeed: 19.0,
+        p: 1.1,
+        q: -0.7,
+        r: 0.5,
+        alpha: 0.12,
+        beta: -0.08,
     };
     const GEOMETRY: Geometry = Geometry { area: 0.75, span: 2.1, chord: 0.3571 };
 
@@ -188,7 +203,8 @@ mod tests {
             [body.jx * w[0] - body.jxz * w[2], body.jy * w[1], body.jz * w[2] - body.jxz * w[0]]
         };
         let (w, h) = ([STATE.p, STATE.q, STATE.r], inertia([STATE.p, STATE.q, STATE.r]));
-        let cross = [w[1] * h[2] - w[2] * h[1], w[2] * h[0] - w[0] * h[2], w[0] * h[1] - w[1] * h[0]];
+        let cross =
+            [w[1] * h[2] - w[2] * h[1], w[2] * h[0] - w[0] * h[2], w[0] * h[1] - w[1] * h[0]];
         let jw = inertia([dp, dq, dr]);
         for i in 0..3 {
             assert!((jw[i] + cross[i] - moment[i]).abs() < 1e-12, "axis {i}");

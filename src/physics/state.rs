@@ -25,12 +25,28 @@ pub struct State<R = f64> {
 
 impl State {
     /// Names of the components, in the order of [`State::to_array`], with their units.
-    pub const NAMES: [&'static str; 8] =
-        ["roll_rad", "pitch_rad", "airspeed_mps", "p_radps", "q_radps", "r_radps", "alpha_rad", "beta_rad"];
+    pub const NAMES: [&'static str; 8] = [
+        "roll_rad",
+        "pitch_rad",
+        "airspeed_mps",
+        "p_radps",
+        "q_radps",
+        "r_radps",
+        "alpha_rad",
+        "beta_rad",
+    ];
 
     /// The start of an episode: wings level, no incidence, 16.67 m/s (section V-A of \[GSFM26\]).
-    pub const NEUTRAL: State =
-        State { roll: 0.0, pitch: 0.0, airspeed: 16.67, p: 0.0, q: 0.0, r: 0.0, alpha: 0.0, beta: 0.0 };
+    pub const NEUTRAL: State = State {
+        roll: 0.0,
+        pitch: 0.0,
+        airspeed: 16.67,
+        p: 0.0,
+        q: 0.0,
+        r: 0.0,
+        alpha: 0.0,
+        beta: 0.0,
+    };
 
     /// Whether every component is a finite number.
     pub fn is_finite(&self) -> bool {

@@ -20,12 +20,7 @@ pub(super) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option<usize>> {
 
 /// The times of `rows`; a pause gets the middle of its two neighbours.
 pub(super) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec<f64> {
-    let at = |k: usize| {
-        rows.get(k)
-            .copied()
-            .flatten()
-            .map_or(f64::NAN, |i| time_s[i])
-    };
+    let at = |k: usize| rows.get(k).copied().flatten().map_or(f64::NAN, |i| time_s[i]);
     (0..rows.len())
         .map(|k| match rows[k] {
             Some(i) => time_s[i],
@@ -36,9 +31,7 @@ pub(super) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec<f64> {
 
 /// The values of `rows`; NaN at a pause or where `values` ends early.
 pub(super) fn values_of(rows: &[Option<usize>], values: &[f64]) -> Vec<f64> {
-    rows.iter()
-        .map(|row| row.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN))
-        .collect()
+    rows.iter().map(|row| row.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN)).collect()
 }
 
 /// Two values for every `group` values: the smallest and the largest, in the order they came.
@@ -64,11 +57,7 @@ pub(super) fn pair_times(time_s: &[f64], group: usize) -> Vec<f64> {
         .flat_map(|chunk| {
             let (first, last) = (chunk[0], chunk[chunk.len() - 1]);
             // A last group of one row still needs two ascending times.
-            let middle = if last > first {
-                0.5 * (first + last)
-            } else {
-                first + 1e-3
-            };
+            let middle = if last > first { 0.5 * (first + last) } else { first + 1e-3 };
             [first, middle]
         })
         .collect()

@@ -49,16 +49,9 @@ impl Verdict {
             Outcome::Missed => ("missed", "Missed"),
             Outcome::Open => ("open", "Open"),
         };
-        let details: String = self
-            .details
-            .iter()
-            .map(|d| format!("<li>{}</li>", escape(d)))
-            .collect();
-        let list = if details.is_empty() {
-            details
-        } else {
-            format!("<ul>{details}</ul>")
-        };
+        let details: String =
+            self.details.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
+        let list = if details.is_empty() { details } else { format!("<ul>{details}</ul>") };
         format!(
             "<div class=\"verdict {class}\"><span class=\"outcome\">{word}</span><p>{}</p>{list}</div>\n",
             escape(&self.sentence)

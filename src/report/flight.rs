@@ -121,10 +121,7 @@ impl EventKind {
 impl FlightReport<'_> {
     /// Number of segments that were tracked.
     pub fn tracked(&self) -> usize {
-        self.segments
-            .iter()
-            .filter(|s| s.tracked(self.tolerance_rad))
-            .count()
+        self.segments.iter().filter(|s| s.tracked(self.tolerance_rad)).count()
     }
 
     /// The page of the flight.

@@ -25,11 +25,7 @@ pub(super) fn page(report: &FlightReport) -> Page {
         sections.push(events(report));
     }
     sections.push(provenance(report));
-    Page {
-        title: report.title.clone(),
-        subtitle: subtitle(report),
-        sections,
-    }
+    Page { title: report.title.clone(), subtitle: subtitle(report), sections }
 }
 
 fn subtitle(report: &FlightReport) -> String {
@@ -50,10 +46,7 @@ fn column(report: &FlightReport, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
 
 /// Panels over the samples of the log, with the events marked.
 fn time_figure(report: &FlightReport, panels: Vec<Panel>) -> TimeFigure {
-    let mut figure = TimeFigure {
-        marks: marks(report),
-        ..TimeFigure::default()
-    };
+    let mut figure = TimeFigure { marks: marks(report), ..TimeFigure::default() };
     figure.add_track(&column(report, |s| s.time_s), GAP_S, panels);
     figure
 }
@@ -62,28 +55,13 @@ fn marks(report: &FlightReport) -> Vec<Mark> {
     if report.events.len() > MARKED_EVENTS {
         return Vec::new();
     }
-    let timed = report
-        .events
-        .iter()
-        .enumerate()
-        .filter(|(_, e)| e.time_s.is_finite());
-    timed
-        .map(|(i, e)| Mark {
-            time_s: e.time_s,
-            label: (i + 1).to_string(),
-        })
-        .collect()
+    let timed = report.events.iter().enumerate().filter(|(_, e)| e.time_s.is_finite());
+    timed.map(|(i, e)| Mark { time_s: e.time_s, label: (i + 1).to_string() }).collect()
 }
 
 fn attitude(report: &FlightReport) -> Section {
-    let roll = (
-        column(report, |s| s.attitude_rad[0]),
-        column(report, |s| s.roll_target_rad),
-    );
-    let pitch = (
-        column(report, |s| s.attitude_rad[1]),
-        column(report, |s| s.pitch_target_rad),
-    );
+    let roll = (column(report, |s| s.attitude_rad[0]), column(report, |s| s.roll_target_rad));
+    let pitch = (column(report, |s| s.attitude_rad[1]), column(report, |s| s.pitch_target_rad));
     let panels = vec![
         angle_panel("Roll", report.tolerance_rad, &roll),
         angle_panel("Pitch", report.tolerance_rad, &pitch),
@@ -110,15 +88,9 @@ fn angle_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, V
         Series::new("actual", Style::Actual, to_degrees(actual)),
         Series::new("commanded", Style::Command, to_degrees(command)),
     ];
-    let band = Band {
-        around: 1,
-        half_width: tolerance_rad.to_degrees(),
-        label: "tolerance".into(),
-    };
-    Panel {
-        bands: vec![band],
-        ..Panel::new(title, "°", series)
-    }
+    let band =
+        Band { around: 1, half_width: tolerance_rad.to_degrees(), label: "tolerance".into() };
+    Panel { bands: vec![band], ..Panel::new(title, "°", series) }
 }
 
 fn error_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, Vec<f64>)) -> Panel {
@@ -127,38 +99,22 @@ fn error_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, V
     let tolerance = tolerance_rad.to_degrees();
     Panel {
         // Two decades below the tolerance: what lies under that no longer matters.
-        scale: Scale::Log {
-            floor: positive_or(tolerance / 100.0, 1e-3),
-        },
-        rules: vec![Rule {
-            value: tolerance,
-            label: "tolerance".into(),
-        }],
+        scale: Scale::Log { floor: positive_or(tolerance / 100.0, 1e-3) },
+        rules: vec![Rule { value: tolerance, label: "tolerance".into() }],
         ..Panel::new(title, "°", vec![Series::new("error", Style::Actual, error)])
     }
 }
 
 fn positive_or(value: f64, otherwise: f64) -> f64 {
-    if value.is_finite() && value > 0.0 {
-        value
-    } else {
-        otherwise
-    }
+    if value.is_finite() && value > 0.0 { value } else { otherwise }
 }
 
 fn air_data(report: &FlightReport) -> Section {
-    let airspeed = Series::new(
-        "true airspeed",
-        Style::Actual,
-        column(report, |s| s.airspeed_mps),
-    );
+    let airspeed = Series::new("true airspeed", Style::Actual, column(report, |s| s.airspeed_mps));
     let alpha = column(report, |s| s.alpha_rad.to_degrees());
     let beta = column(report, |s| s.beta_rad.to_degrees());
-    let altitude = Series::new(
-        "above mean sea level",
-        Style::Actual,
-        column(report, |s| s.altitude_m),
-    );
+    let altitude =
+        Series::new("above mean sea level", Style::Actual, column(report, |s| s.altitude_m));
     let panels = vec![
         Panel::new("Airspeed", "m/s", vec![airspeed]),
         Panel::new(
@@ -171,11 +127,7 @@ fn air_data(report: &FlightReport) -> Section {
         ),
         Panel::new("Altitude", "m", vec![altitude]),
     ];
-    Section::new(
-        "Air data",
-        "",
-        vec![Figure::Time(time_figure(report, panels))],
-    )
+    Section::new("Air data", "", vec![Figure::Time(time_figure(report, panels))])
 }
 
 fn surfaces(report: &FlightReport) -> Section {
@@ -214,33 +166,18 @@ fn surfaces(report: &FlightReport) -> Section {
         aileron.to_degrees(),
         elevator.to_degrees()
     );
-    Section::new(
-        "Surfaces",
-        &note,
-        vec![Figure::Time(time_figure(report, panels))],
-    )
+    Section::new("Surfaces", &note, vec![Figure::Time(time_figure(report, panels))])
 }
 
 fn loop_timing(report: &FlightReport, timing: &LoopTiming) -> Section {
-    let [p50, p99, p999, most] = timing
-        .percentiles_us([0.5, 0.99, 0.999, 1.0])
-        .map(|us| us / 1e3);
+    let [p50, p99, p999, most] = timing.percentiles_us([0.5, 0.99, 0.999, 1.0]).map(|us| us / 1e3);
     let budget = timing.budget_us / 1e3;
     let durations: Vec<f64> = timing.cycles.iter().map(|c| c.duration_us / 1e3).collect();
     let times: Vec<f64> = timing.cycles.iter().map(|c| c.time_s).collect();
-    let least = durations
-        .iter()
-        .copied()
-        .filter(|d| *d > 0.0)
-        .fold(f64::INFINITY, f64::min);
-    let rule = |value, label: &str| Rule {
-        value,
-        label: label.into(),
-    };
+    let least = durations.iter().copied().filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
+    let rule = |value, label: &str| Rule { value, label: label.into() };
     let panel = Panel {
-        scale: Scale::Log {
-            floor: positive_or(10f64.powf(least.log10().floor()), 1e-3),
-        },
+        scale: Scale::Log { floor: positive_or(10f64.powf(least.log10().floor()), 1e-3) },
         rules: vec![rule(budget, "budget")],
         ..Panel::new(
             "Cycle duration",
@@ -248,38 +185,19 @@ fn loop_timing(report: &FlightReport, timing: &LoopTiming) -> Section {
             vec![Series::new("duration", Style::Actual, durations.clone())],
         )
     };
-    let mut over_time = TimeFigure {
-        marks: marks(report),
-        ..TimeFigure::default()
-    };
+    let mut over_time = TimeFigure { marks: marks(report), ..TimeFigure::default() };
     over_time.add_track(&times, GAP_S, vec![panel]);
-    let quantiles = [
-        rule(p50, "p50"),
-        rule(p99, "p99"),
-        rule(p999, "p99.9"),
-        rule(budget, "budget"),
-    ];
+    let quantiles =
+        [rule(p50, "p50"), rule(p99, "p99"), rule(p999, "p99.9"), rule(budget, "budget")];
     let histogram = Histogram::log(
         "Cycle durations",
         "Duration (ms)",
         "cycles",
         &durations,
-        quantiles
-            .into_iter()
-            .filter(|r| r.value.is_finite())
-            .collect(),
+        quantiles.into_iter().filter(|r| r.value.is_finite()).collect(),
     );
-    let mut table = Table::new(
-        "Loop timing",
-        &[("Duration", Align::Left), ("(ms)", Align::Right)],
-    );
-    let rows = [
-        ("p50", p50),
-        ("p99", p99),
-        ("p99.9", p999),
-        ("longest", most),
-        ("budget", budget),
-    ];
+    let mut table = Table::new("Loop timing", &[("Duration", Align::Left), ("(ms)", Align::Right)]);
+    let rows = [("p50", p50), ("p99", p99), ("p99.9", p999), ("longest", most), ("budget", budget)];
     for (name, ms) in rows {
         table.push([name.to_string(), format!("{ms:.3}")]);
     }
@@ -288,15 +206,9 @@ fn loop_timing(report: &FlightReport, timing: &LoopTiming) -> Section {
         n => n.to_string(),
     };
     let cycles = timing.cycles.len();
-    let note = format!(
-        "From {}, {cycles} cycles; {late} took longer than the budget.",
-        timing.measure
-    );
-    let figures = vec![
-        Figure::Time(over_time),
-        Figure::Histogram(histogram),
-        Figure::Table(table),
-    ];
+    let note =
+        format!("From {}, {cycles} cycles; {late} took longer than the budget.", timing.measure);
+    let figures = vec![Figure::Time(over_time), Figure::Histogram(histogram), Figure::Table(table)];
     Section::new("Loop timing", &note, figures)
 }
 
@@ -326,10 +238,7 @@ fn events(report: &FlightReport) -> Section {
 }
 
 fn provenance(report: &FlightReport) -> Section {
-    let mut table = Table::new(
-        "Provenance",
-        &[("Item", Align::Left), ("Value", Align::Left)],
-    );
+    let mut table = Table::new("Provenance", &[("Item", Align::Left), ("Value", Align::Left)]);
     let mut push = |item: &str, value: String| table.push([item.to_string(), value]);
     push("Controller", report.controller.clone());
     push("Model", report.model.clone());

@@ -23,11 +23,7 @@ pub(super) fn section(report: &FlightReport) -> Section {
         ],
     );
     for (i, s) in report.segments.iter().enumerate() {
-        let tracked = if s.tracked(report.tolerance_rad) {
-            "yes"
-        } else {
-            "no"
-        };
+        let tracked = if s.tracked(report.tolerance_rad) { "yes" } else { "no" };
         let error = s.settled_error_rad.to_degrees();
         table.rows.push(Row {
             cells: vec![
@@ -37,11 +33,7 @@ pub(super) fn section(report: &FlightReport) -> Section {
                 signed(s.roll_target_rad),
                 signed(s.pitch_target_rad),
                 s.difficulty.name().into(),
-                if error.is_finite() {
-                    format!("{error:.4}")
-                } else {
-                    "unknown".into()
-                },
+                if error.is_finite() { format!("{error:.4}") } else { "unknown".into() },
                 tracked.into(),
             ],
             span_s: Some([s.start_s, s.end_s]),
@@ -58,12 +50,8 @@ pub(super) fn section(report: &FlightReport) -> Section {
 /// Roll against pitch: the path flown, and the targets by whether they were tracked.
 fn target_plane(report: &FlightReport) -> XyFigure {
     let targets = |label: &str, style, mark, tracked: bool| {
-        let of = || {
-            report
-                .segments
-                .iter()
-                .filter(move |s| s.tracked(report.tolerance_rad) == tracked)
-        };
+        let of =
+            || report.segments.iter().filter(move |s| s.tracked(report.tolerance_rad) == tracked);
         XySeries {
             label: label.into(),
             style,
@@ -88,19 +76,11 @@ fn target_plane(report: &FlightReport) -> XyFigure {
         y: angle(1),
     };
     let reached = targets("target, tracked", Style::Second, XyMark::Circles, true);
-    let missed = targets(
-        "target, not tracked",
-        Style::Command,
-        XyMark::Crosses,
-        false,
-    );
+    let missed = targets("target, not tracked", Style::Command, XyMark::Crosses, false);
     XyFigure {
         title: "Roll and pitch plane".into(),
         x_label: "Roll (°)".into(),
         y_label: "Pitch (°)".into(),
-        series: [path, reached, missed]
-            .into_iter()
-            .filter(|s| !s.x.is_empty())
-            .collect(),
+        series: [path, reached, missed].into_iter().filter(|s| !s.x.is_empty()).collect(),
     }
 }

@@ -21,10 +21,7 @@ pub(super) fn verdict(report: &FlightReport) -> Verdict {
     let late = report.timing.as_ref().map(LoopTiming::late);
     let mut parts = Vec::new();
     if all == 0 {
-        parts.push(format!(
-            "Flew {:.1} s without a target",
-            duration_s(&report.flight.samples)
-        ));
+        parts.push(format!("Flew {:.1} s without a target", duration_s(&report.flight.samples)));
     } else {
         parts.push(format!("Tracked {tracked} of {all} targets"));
         parts.extend(settled_by_difficulty(&report.segments));
@@ -41,27 +38,18 @@ pub(super) fn verdict(report: &FlightReport) -> Verdict {
         (0, _) | (_, None) => Outcome::Open,
         _ => Outcome::Reached,
     };
-    Verdict {
-        outcome,
-        sentence: format!("{}.", parts.join("; ")),
-        details: details(report),
-    }
+    Verdict { outcome, sentence: format!("{}.", parts.join("; ")), details: details(report) }
 }
 
 fn settled_by_difficulty(segments: &[Segment]) -> Option<String> {
     let group = |difficulty: Difficulty| {
         let of = segments.iter().filter(|s| s.difficulty == difficulty);
-        let errors: Vec<f64> = of
-            .map(|s| s.settled_error_rad)
-            .filter(|e| e.is_finite())
-            .collect();
+        let errors: Vec<f64> = of.map(|s| s.settled_error_rad).filter(|e| e.is_finite()).collect();
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
         (!errors.is_empty()).then(|| format!("{} {}", degrees(mean), difficulty.name()))
     };
-    let groups: Vec<String> = [Difficulty::Easy, Difficulty::Hard]
-        .into_iter()
-        .filter_map(group)
-        .collect();
+    let groups: Vec<String> =
+        [Difficulty::Easy, Difficulty::Hard].into_iter().filter_map(group).collect();
     (!groups.is_empty()).then(|| format!("settled error {}", groups.join(", ")))
 }
 
@@ -100,9 +88,7 @@ fn not_tracked(report: &FlightReport) -> Vec<String> {
     let mut lines: Vec<String> = missed().take(LISTED_TARGETS).map(line).collect();
     let beyond = missed().count().saturating_sub(LISTED_TARGETS);
     if beyond > 0 {
-        lines.push(format!(
-            "Not tracked either: {beyond} more, in the table of targets."
-        ));
+        lines.push(format!("Not tracked either: {beyond} more, in the table of targets."));
     }
     lines
 }

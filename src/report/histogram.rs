@@ -75,34 +75,20 @@ mod tests {
     #[test]
     fn every_positive_value_is_counted_once_within_its_bin() {
         let values = [0.1, 0.11, 1.0, 10.0, 0.0, -1.0, f64::NAN, f64::INFINITY];
-        let budget = Rule {
-            value: 100.0,
-            label: "budget".into(),
-        };
+        let budget = Rule { value: 100.0, label: "budget".into() };
         let h = Histogram::log("t", "ms", "cycles", &values, vec![budget]);
         // Four of the eight are positive and finite.
         assert_eq!(h.counts.iter().sum::<u64>(), 4);
         assert_eq!(h.edges.len(), h.counts.len() + 1);
         assert!(h.edges[0] <= 0.1 && h.edges[h.edges.len() - 1] > 100.0);
         for v in [0.11, 1.0] {
-            let bin = h
-                .edges
-                .iter()
-                .rposition(|&e| e <= v * (1.0 + 1e-12))
-                .unwrap();
-            assert!(
-                h.counts[bin] >= 1,
-                "{v} is not in the bin from {}",
-                h.edges[bin]
-            );
+            let bin = h.edges.iter().rposition(|&e| e <= v * (1.0 + 1e-12)).unwrap();
+            assert!(h.counts[bin] >= 1, "{v} is not in the bin from {}", h.edges[bin]);
         }
     }
 
     #[test]
     fn no_value_is_an_empty_histogram() {
-        assert_eq!(
-            Histogram::log("t", "ms", "cycles", &[], Vec::new()).counts,
-            [0]
-        );
+        assert_eq!(Histogram::log("t", "ms", "cycles", &[], Vec::new()).counts, [0]);
     }
 }

@@ -46,11 +46,7 @@ fn six_digits(value: f64) -> f32 {
     }
     let unit = 10f64.powi(5 - value.abs().log10().floor() as i32);
     let rounded = (value * unit).round() / unit;
-    if rounded.is_finite() {
-        rounded as f32
-    } else {
-        value as f32
-    }
+    if rounded.is_finite() { rounded as f32 } else { value as f32 }
 }
 
 #[cfg(test)]
@@ -59,10 +55,7 @@ mod tests {
 
     #[test]
     fn escapes_every_special_character() {
-        assert_eq!(
-            escape("<a b='\"&'>\u{7}"),
-            "&lt;a b=&#39;&quot;&amp;&#39;&gt;\u{fffd}"
-        );
+        assert_eq!(escape("<a b='\"&'>\u{7}"), "&lt;a b=&#39;&quot;&amp;&#39;&gt;\u{fffd}");
     }
 
     #[test]
@@ -77,18 +70,9 @@ mod tests {
     fn numbers_keep_six_digits_and_lose_nan() {
         #[derive(Serialize)]
         struct Values(#[serde(serialize_with = "compact")] Vec<f64>);
-        let values = Values(vec![
-            std::f64::consts::PI,
-            -0.000_123_456_78,
-            1e300,
-            f64::NAN,
-            0.0,
-            1e-320,
-        ]);
+        let values =
+            Values(vec![std::f64::consts::PI, -0.000_123_456_78, 1e300, f64::NAN, 0.0, 1e-320]);
         // 1e300 is beyond f32, so it is no number on the page either.
-        assert_eq!(
-            script_json(&values),
-            "[3.14159,-0.000123457,null,null,0.0,0.0]"
-        );
+        assert_eq!(script_json(&values), "[3.14159,-0.000123457,null,null,0.0,0.0]");
     }
 }

@@ -23,28 +23,18 @@ pub struct LoopTiming {
 impl LoopTiming {
     /// Number of cycles that took longer than the budget.
     pub fn late(&self) -> usize {
-        self.cycles
-            .iter()
-            .filter(|c| c.duration_us > self.budget_us)
-            .count()
+        self.cycles.iter().filter(|c| c.duration_us > self.budget_us).count()
     }
 
     /// The duration, µs, that each share (0..1) of the cycles did not exceed, by nearest rank; NaN
     /// without cycles.
     pub fn percentiles_us<const N: usize>(&self, shares: [f64; N]) -> [f64; N] {
-        let mut sorted: Vec<f64> = self
-            .cycles
-            .iter()
-            .map(|c| c.duration_us)
-            .filter(|d| d.is_finite())
-            .collect();
+        let mut sorted: Vec<f64> =
+            self.cycles.iter().map(|c| c.duration_us).filter(|d| d.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
         shares.map(|share| {
             let rank = (share * sorted.len() as f64).ceil() as usize;
-            sorted
-                .get(rank.saturating_sub(1))
-                .copied()
-                .unwrap_or(f64::NAN)
+            sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
         })
     }
 }
@@ -54,10 +44,7 @@ mod tests {
     use super::*;
 
     fn timing(durations_us: impl IntoIterator<Item = f64>) -> LoopTiming {
-        let cycle = |duration_us| Cycle {
-            time_s: 0.0,
-            duration_us,
-        };
+        let cycle = |duration_us| Cycle { time_s: 0.0, duration_us };
         LoopTiming {
             measure: "test".into(),
             budget_us: 990.0,
@@ -69,10 +56,7 @@ mod tests {
     fn percentiles_are_nearest_ranks() {
         // 1..=1000: the value is its own rank, so each percentile can be read off.
         let timing = timing((1..=1000).rev().map(f64::from));
-        assert_eq!(
-            timing.percentiles_us([0.5, 0.99, 0.999, 1.0]),
-            [500.0, 990.0, 999.0, 1000.0]
-        );
+        assert_eq!(timing.percentiles_us([0.5, 0.99, 0.999, 1.0]), [500.0, 990.0, 999.0, 1000.0]);
         assert_eq!(timing.late(), 10);
     }
 

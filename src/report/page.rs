@@ -80,25 +80,15 @@ impl Page {
     }
 
     fn contents(&self) -> String {
-        let titled = self
-            .sections
-            .iter()
-            .enumerate()
-            .filter(|(_, s)| !s.title.is_empty());
-        titled
-            .map(|(i, s)| format!("<a href=\"#s{i}\">{}</a>", escape(&s.title)))
-            .collect()
+        let titled = self.sections.iter().enumerate().filter(|(_, s)| !s.title.is_empty());
+        titled.map(|(i, s)| format!("<a href=\"#s{i}\">{}</a>", escape(&s.title))).collect()
     }
 }
 
 impl Section {
     /// A section of figures under a heading and a note, either of which may be empty.
     pub fn new(title: &str, note: &str, figures: Vec<Figure>) -> Self {
-        Section {
-            title: title.into(),
-            note: note.into(),
-            figures,
-        }
+        Section { title: title.into(), note: note.into(), figures }
     }
 
     /// A section that is one verdict, without a heading.

@@ -43,10 +43,7 @@ pub struct Row {
 impl Table {
     /// A table without rows; `columns` are title and alignment.
     pub fn new(caption: &str, columns: &[(&str, Align)]) -> Self {
-        let column = |&(title, align): &(&str, Align)| Column {
-            title: title.into(),
-            align,
-        };
+        let column = |&(title, align): &(&str, Align)| Column { title: title.into(), align };
         Table {
             caption: caption.into(),
             columns: columns.iter().map(column).collect(),
@@ -56,10 +53,7 @@ impl Table {
 
     /// Adds a row of text.
     pub fn push<I: IntoIterator<Item = String>>(&mut self, cells: I) {
-        self.rows.push(Row {
-            cells: cells.into_iter().collect(),
-            span_s: None,
-        });
+        self.rows.push(Row { cells: cells.into_iter().collect(), span_s: None });
     }
 
     pub(super) fn html(&self) -> String {

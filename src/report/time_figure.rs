@@ -88,11 +88,7 @@ pub struct Series {
 impl Series {
     /// A line from its values.
     pub fn new(label: &str, style: Style, values: Vec<f64>) -> Self {
-        Series {
-            label: label.into(),
-            style,
-            values,
-        }
+        Series { label: label.into(), style, values }
     }
 
     fn is_missing(&self) -> bool {
@@ -135,8 +131,7 @@ impl TimeFigure {
         let kept = rows.iter().flatten().count();
         if kept < time_s.len() {
             let lost = time_s.len() - kept;
-            self.notes
-                .push(format!("{lost} rows out of time order are not drawn."));
+            self.notes.push(format!("{lost} rows out of time order are not drawn."));
         }
         let mut time = decimate::times_of(&rows, time_s);
         for series in panels.iter_mut().flat_map(|p| &mut p.series) {
@@ -153,10 +148,7 @@ impl TimeFigure {
             }
             time = decimate::pair_times(&time, group);
         }
-        self.tracks.push(Track {
-            time_s: time,
-            panels,
-        });
+        self.tracks.push(Track { time_s: time, panels });
     }
 
     fn without_missing(&mut self, panels: Vec<Panel>) -> Vec<Panel> {
@@ -180,8 +172,7 @@ impl TimeFigure {
             }
         }
         if !missing.is_empty() {
-            self.notes
-                .push(format!("Not in this log: {}.", missing.join(", ")));
+            self.notes.push(format!("Not in this log: {}.", missing.join(", ")));
         }
         kept
     }

@@ -31,27 +31,20 @@ pub enum WriteError {
 /// never sees half of it.
 pub fn write_new(path: &Path, text: &str) -> Result<(), WriteError> {
     let file = written_beside(path, text).map_err(|source| io_error(path, source))?;
-    file.persist_noclobber(path)
-        .map(sync)
-        .map_err(|e| match e.error.kind() {
-            io::ErrorKind::AlreadyExists => WriteError::Exists { path: path.into() },
-            _ => io_error(path, e.error),
-        })
+    file.persist_noclobber(path).map(sync).map_err(|e| match e.error.kind() {
+        io::ErrorKind::AlreadyExists => WriteError::Exists { path: path.into() },
+        _ => io_error(path, e.error),
+    })
 }
 
 /// Writes `text` to `path` in place of any file there. A reader sees the old file or the new one.
 pub fn write_over(path: &Path, text: &str) -> Result<(), WriteError> {
     let file = written_beside(path, text).map_err(|source| io_error(path, source))?;
-    file.persist(path)
-        .map(sync)
-        .map_err(|e| io_error(path, e.error))
+    file.persist(path).map(sync).map_err(|e| io_error(path, e.error))
 }
 
 fn io_error(path: &Path, source: io::Error) -> WriteError {
-    WriteError::Io {
-        path: path.into(),
-        source,
-    }
+    WriteError::Io { path: path.into(), source }
 }
 
 /// The text in a temporary file of the same folder, so that renaming it is atomic.

@@ -71,8 +71,5 @@ impl Episode<'_> {
 /// Roll and pitch less their commands, degrees, the shorter way round.
 pub fn attitude_error_deg(state: &State, target: &Target) -> [f64; 2] {
     let wrap = |x: f64| (x + 180.0).rem_euclid(360.0) - 180.0;
-    [
-        wrap((state.roll - target.roll).to_degrees()),
-        wrap((state.pitch - target.pitch).to_degrees()),
-    ]
+    [wrap((state.roll - target.roll).to_degrees()), wrap((state.pitch - target.pitch).to_degrees())]
 }

@@ -104,8 +104,11 @@ impl Evaluation {
             .collect();
         groups.push(Score::new("all", &of(&|g| g != Group::HardOutside)));
         groups.retain(|score| score.count > 0);
-        let cost: Vec<f64> =
-            outcomes.iter().flat_map(|o| &o.cost).map(|d: &Duration| d.as_secs_f64() * 1e3).collect();
+        let cost: Vec<f64> = outcomes
+            .iter()
+            .flat_map(|o| &o.cost)
+            .map(|d: &Duration| d.as_secs_f64() * 1e3)
+            .collect();
         Evaluation {
             controller: controller.into(),
             model: model.into(),

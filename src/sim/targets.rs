@@ -39,7 +39,9 @@ pub struct TargetFile {
 
 /// Why a target file could not be read.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot read the target file {path}: {why}. It needs the columns group,roll_deg,pitch_deg; `greylag targets` writes one")]
+#[error(
+    "cannot read the target file {path}: {why}. It needs the columns group,roll_deg,pitch_deg; `greylag targets` writes one"
+)]
 pub struct TargetError {
     path: String,
     why: String,
@@ -75,7 +77,8 @@ impl TargetFile {
             push(Group::Easy, roll.clamp(-44.99, 44.99), pitch.clamp(-24.99, 24.99));
         }
         for i in 0..100 {
-            let (right, up) = (if i % 2 == 0 { 1.0 } else { -1.0 }, if i / 2 % 2 == 0 { 1.0 } else { -1.0 });
+            let (right, up) =
+                (if i % 2 == 0 { 1.0 } else { -1.0 }, if i / 2 % 2 == 0 { 1.0 } else { -1.0 });
             let (roll, pitch) = (rng.random_range(45.01..60.0), rng.random_range(25.01..30.0));
             push(Group::HardCorners, right * roll, up * pitch);
         }
@@ -114,7 +117,9 @@ impl TargetFile {
     /// The file as CSV.
     pub fn to_csv(&self) -> String {
         let row = |r: &Row| format!("{},{:.2},{:.2}\n", r.group.name(), r.roll_deg, r.pitch_deg);
-        std::iter::once("group,roll_deg,pitch_deg\n".to_owned()).chain(self.rows.iter().map(row)).collect()
+        std::iter::once("group,roll_deg,pitch_deg\n".to_owned())
+            .chain(self.rows.iter().map(row))
+            .collect()
     }
 }
 

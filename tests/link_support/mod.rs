@@ -15,10 +15,7 @@ use mavlink::dialects::ardupilotmega::*;
 use mavlink::{MAVLinkV1MessageRaw, MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
 
 /// Who the companion is.
-pub const US: Source = Source {
-    system: 1,
-    component: 1,
-};
+pub const US: Source = Source { system: 1, component: 1 };
 
 /// An autopilot that obeys and remembers.
 pub struct Double {
@@ -47,11 +44,7 @@ impl Double {
                 position: [45.0, 7.5],
                 velocity: [10.0, 12.0, -0.5],
                 target: [0.2, 0.0],
-                command: Command {
-                    aileron: 0.25,
-                    elevator: -0.5,
-                    throttle: 0.6,
-                },
+                command: Command { aileron: 0.25, elevator: -0.5, throttle: 0.6 },
                 actuators: ActuatorState::default(),
                 load: 0.2,
             },
@@ -119,18 +112,12 @@ impl Autopilot for Double {
 
 /// A moment `ms` after the start, both clocks alike.
 pub fn at_ms(ms: u64) -> Now {
-    Now {
-        host: Duration::from_millis(ms),
-        vehicle: Time::from_micros(ms * 1000),
-    }
+    Now { host: Duration::from_millis(ms), vehicle: Time::from_micros(ms * 1000) }
 }
 
 /// The peer at local port `port`.
 pub fn peer(port: u16) -> PeerId {
-    PeerId {
-        link: LinkId(0),
-        address: SocketAddr::from(([127, 0, 0, 1], port)),
-    }
+    PeerId { link: LinkId(0), address: SocketAddr::from(([127, 0, 0, 1], port)) }
 }
 
 /// A frame from system 255, component 190 (a ground station), written by rust-mavlink.
@@ -145,11 +132,7 @@ pub fn frame_from(
     component: u8,
     message: &MavMessage,
 ) -> Vec<u8> {
-    let header = MavHeader {
-        system_id: system.into(),
-        component_id: component,
-        sequence: 42,
-    };
+    let header = MavHeader { system_id: system.into(), component_id: component, sequence: 42 };
     match version {
         MavlinkVersion::V1 => {
             let mut raw = MAVLinkV1MessageRaw::new();
@@ -222,23 +205,16 @@ pub fn dissect(peer: PeerId, bytes: &[u8]) -> Seen {
     assert_eq!(bytes.len(), header + len + 2);
     let (sequence, system, component, id) = match v1 {
         true => (bytes[2], bytes[3], bytes[4], u32::from(bytes[5])),
-        false => (
-            bytes[4],
-            bytes[5],
-            bytes[6],
-            u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]),
-        ),
+        false => {
+            (bytes[4], bytes[5], bytes[6], u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]))
+        }
     };
     assert_eq!((system, component), (US.system, US.component));
     let crc = mavlink::calculate_crc(&bytes[1..header + len], MavMessage::extra_crc(id));
     assert_eq!(crc.to_le_bytes(), bytes[header + len..]);
     Seen {
         peer,
-        version: if v1 {
-            MavlinkVersion::V1
-        } else {
-            MavlinkVersion::V2
-        },
+        version: if v1 { MavlinkVersion::V1 } else { MavlinkVersion::V2 },
         sequence,
         id,
         payload: bytes[header..header + len].to_vec(),
@@ -248,10 +224,7 @@ pub fn dissect(peer: PeerId, bytes: &[u8]) -> Seen {
 
 /// Everything in the outbox.
 pub fn sent(clients: &mut Clients) -> Vec<Seen> {
-    clients
-        .drain()
-        .map(|(peer, bytes)| dissect(peer, &bytes))
-        .collect()
+    clients.drain().map(|(peer, bytes)| dissect(peer, &bytes)).collect()
 }
 
 /// Handles one datagram and gives what is sent in answer.
@@ -318,21 +291,9 @@ impl Shown {
                 zacc: -9.7,
                 ..Default::default()
             },
-            air: VFR_HUD_DATA {
-                airspeed: 16.5,
-                alt: 301.0,
-                ..Default::default()
-            },
-            incidence: AOA_SSA_DATA {
-                time_usec: time_us,
-                AOA: 3.0,
-                SSA: -1.5,
-            },
-            actuators: ACTUATOR_OUTPUT_STATUS_DATA {
-                time_usec: time_us,
-                active: 5,
-                actuator,
-            },
+            air: VFR_HUD_DATA { airspeed: 16.5, alt: 301.0, ..Default::default() },
+            incidence: AOA_SSA_DATA { time_usec: time_us, AOA: 3.0, SSA: -1.5 },
+            actuators: ACTUATOR_OUTPUT_STATUS_DATA { time_usec: time_us, active: 5, actuator },
             attitude: ATTITUDE_QUATERNION_DATA {
                 time_boot_ms: (time_us / 1000) as u32,
                 q1: cos,

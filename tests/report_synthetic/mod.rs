@@ -94,10 +94,7 @@ pub fn report(flight: &Flight) -> FlightReport<'_> {
         versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
         segments: (0..TARGETS_DEG.len()).map(|i| segment(flight, i)).collect(),
         tolerance_rad: 0.5f64.to_radians(),
-        travel: SurfaceTravel {
-            aileron_rad: 0.52,
-            elevator_rad: 0.52,
-        },
+        travel: SurfaceTravel { aileron_rad: 0.52, elevator_rad: 0.52 },
         timing: Some(timing(flight)),
         events: events(),
     }
@@ -141,28 +138,17 @@ fn timing(flight: &Flight) -> LoopTiming {
         cycles: flight
             .samples
             .iter()
-            .map(|s| Cycle {
-                time_s: s.time_s,
-                duration_us: duration.sample(&mut random),
-            })
+            .map(|s| Cycle { time_s: s.time_s, duration_us: duration.sample(&mut random) })
             .collect(),
     }
 }
 
 fn events() -> Vec<Event> {
-    let event = |time_s, kind, text: &str| Event {
-        time_s,
-        kind,
-        text: text.into(),
-    };
+    let event = |time_s, kind, text: &str| Event { time_s, kind, text: text.into() };
     vec![
         event(0.0, EventKind::Text, "Armed by system 255"),
         event(0.2, EventKind::Mode, "Hold to Offboard"),
-        event(
-            23.0,
-            EventKind::Failsafe,
-            "No state frame for 0.3 s: last command held",
-        ),
+        event(23.0, EventKind::Failsafe, "No state frame for 0.3 s: last command held"),
         event(23.3, EventKind::Text, "State frames are back"),
         event(59.9, EventKind::Mode, "Offboard to Hold"),
     ]

@@ -40,36 +40,16 @@ pub struct SensorArgs {
     #[arg(long, value_name = "M")]
     noise_altitude_m: Option<f64>,
     /// Constant error of the rate gyros.
-    #[arg(
-        long,
-        value_name = "P,Q,R",
-        default_value = "0,0,0",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "P,Q,R", default_value = "0,0,0", allow_hyphen_values = true)]
     bias_gyro_radps: Numbers<3>,
     /// Constant error of the accelerometers.
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        default_value = "0,0,0",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "X,Y,Z", default_value = "0,0,0", allow_hyphen_values = true)]
     bias_accelerometer_mps2: Numbers<3>,
     /// Constant error of the angle of attack.
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     bias_alpha_deg: f64,
     /// Constant error of the sideslip.
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     bias_beta_deg: f64,
     /// The airspeed shown is this times the true one.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
@@ -107,9 +87,7 @@ impl SensorArgs {
         let radians = |degrees: Option<f64>| degrees.map(f64::to_radians);
         Noise {
             gyro_radps: self.noise_gyro_radps.unwrap_or(preset.gyro_radps),
-            accelerometer_mps2: self
-                .noise_accelerometer_mps2
-                .unwrap_or(preset.accelerometer_mps2),
+            accelerometer_mps2: self.noise_accelerometer_mps2.unwrap_or(preset.accelerometer_mps2),
             attitude_rad: radians(self.noise_attitude_deg).unwrap_or(preset.attitude_rad),
             airspeed_mps: self.noise_airspeed_mps.unwrap_or(preset.airspeed_mps),
             vane_rad: radians(self.noise_vane_deg).unwrap_or(preset.vane_rad),

@@ -32,11 +32,7 @@ impl Axis {
 
     /// Property of the length that makes a moment of a force, ft.
     fn length(self) -> &'static str {
-        if self == Axis::Pitch {
-            "metrics/cbarw-ft"
-        } else {
-            "metrics/bw-ft"
-        }
+        if self == Axis::Pitch { "metrics/cbarw-ft" } else { "metrics/bw-ft" }
     }
 }
 
@@ -113,11 +109,8 @@ impl<'a> Document<'a> {
         amplitude: f64,
         terms: &[String],
     ) -> Done {
-        let mut all = vec![
-            property("aero/qbar-psf"),
-            property("metrics/Sw-sqft"),
-            value(amplitude),
-        ];
+        let mut all =
+            vec![property("aero/qbar-psf"), property("metrics/Sw-sqft"), value(amplitude)];
         all.extend_from_slice(terms);
         self.function(axis, name, &product(&all))
     }
@@ -187,9 +180,8 @@ impl<'a> Document<'a> {
 
     /// Moves the centre of gravity aft by `aft`, m.
     pub(super) fn shift_cg(&mut self, aft: f64) -> Done {
-        let place = || HiddenError::Place {
-            place: "<location name=\"CG\"> with an <x>".to_owned(),
-        };
+        let place =
+            || HiddenError::Place { place: "<location name=\"CG\"> with an <x>".to_owned() };
         let at = self.xml.find("name=\"CG\"").ok_or_else(place)?;
         let tag = self.xml[at..].find('>').ok_or_else(place)? + at;
         let unit = self.xml[at..tag].to_owned();
@@ -207,9 +199,7 @@ impl<'a> Document<'a> {
     }
 
     fn change_after(&mut self, from: usize, name: &str, new: impl Fn(f64, &str) -> f64) -> Done {
-        let place = || HiddenError::Place {
-            place: format!("a number in <{name}>"),
-        };
+        let place = || HiddenError::Place { place: format!("a number in <{name}>") };
         let tag = self.find_tag(from, name).ok_or_else(place)?;
         let open = self.xml[tag..].find('>').ok_or_else(place)? + tag + 1;
         let close = self.xml[open..].find('<').ok_or_else(place)? + open;
@@ -231,9 +221,7 @@ impl<'a> Document<'a> {
     /// The inside of an aerodynamic axis.
     fn axis(&self, axis: Axis) -> Result<std::ops::Range<usize>, HiddenError> {
         let name = format!("<axis name=\"{}\"", axis.name());
-        let place = || HiddenError::Place {
-            place: format!("{name}>"),
-        };
+        let place = || HiddenError::Place { place: format!("{name}>") };
         let start = self.xml.find(&name).ok_or_else(place)?;
         let length = self.xml[start..].find("</axis>").ok_or_else(place)?;
         Ok(start..start + length)
@@ -268,11 +256,7 @@ impl<'a> Document<'a> {
         let Some(arm) = self.thrust_offset_ft else {
             return Ok(());
         };
-        self.function(
-            Axis::Pitch,
-            "thrust-line-offset",
-            &product(&[value(arm), sum(&whole)]),
-        )
+        self.function(Axis::Pitch, "thrust-line-offset", &product(&[value(arm), sum(&whole)]))
     }
 
     /// Lets the aerodynamics read what the effects make of a deflection.
@@ -282,20 +266,15 @@ impl<'a> Document<'a> {
         if !self.factors.is_empty() {
             let scaled = format!("hidden/{}-scaled", surface.name());
             let terms = [vec![property(&name)], self.factors.clone()].concat();
-            functions += &format!(
-                "<function name=\"{scaled}\">{}</function>\n",
-                product(&terms)
-            );
+            functions += &format!("<function name=\"{scaled}\">{}</function>\n", product(&terms));
             name = scaled;
         }
         if let Some(cubic) = self.saturation {
             let saturated = format!("hidden/{}-saturated", surface.name());
             let square = product(&[value(cubic), property(&name), property(&name)]);
             let terms = [property(&name), sum(&[value(1.0), square])];
-            functions += &format!(
-                "<function name=\"{saturated}\">{}</function>\n",
-                product(&terms)
-            );
+            functions +=
+                &format!("<function name=\"{saturated}\">{}</function>\n", product(&terms));
             for axis in [Axis::Roll, Axis::Pitch] {
                 let range = self.axis(axis)?;
                 self.rename(range, self.position(surface), &saturated);
@@ -309,15 +288,10 @@ impl<'a> Document<'a> {
 
     /// Where the inside of `<aerodynamics>` begins and ends.
     fn aerodynamics(&self) -> Result<(usize, usize), HiddenError> {
-        let place = || HiddenError::Place {
-            place: "<aerodynamics>".to_owned(),
-        };
+        let place = || HiddenError::Place { place: "<aerodynamics>".to_owned() };
         let tag = self.find_tag(0, "aerodynamics").ok_or_else(place)?;
         let start = self.xml[tag..].find('>').ok_or_else(place)? + tag + 1;
-        let end = self.xml[start..]
-            .find("</aerodynamics>")
-            .ok_or_else(place)?
-            + start;
+        let end = self.xml[start..].find("</aerodynamics>").ok_or_else(place)? + start;
         Ok((start, end))
     }
 
@@ -339,9 +313,7 @@ impl<'a> Document<'a> {
     }
 
     fn insert_before(&mut self, tag: &str, text: &str) -> Done {
-        let place = || HiddenError::Place {
-            place: tag.to_owned(),
-        };
+        let place = || HiddenError::Place { place: tag.to_owned() };
         let at = self.xml.rfind(tag).ok_or_else(place)?;
         self.xml.insert_str(at, text);
         Ok(())

@@ -189,10 +189,7 @@ pub static EFFECTS: [Effect; 24] = [
         unit: "rad",
         bounds: (0.0, 1.0),
         write: |d, a| {
-            d.pass_deflections(
-                "actuator",
-                &format!("<hysteresis_width>{a}</hysteresis_width>"),
-            );
+            d.pass_deflections("actuator", &format!("<hysteresis_width>{a}</hysteresis_width>"));
             Ok(())
         },
     },
@@ -220,11 +217,7 @@ pub static EFFECTS: [Effect; 24] = [
         bounds: (-10.0, 10.0),
         write: |d, a| {
             // JSBSim's ixz is −Jxz, unless the element turns its sign rule off.
-            let sign = if d.has("negated_crossproduct_inertia=\"false\"") {
-                1.0
-            } else {
-                -1.0
-            };
+            let sign = if d.has("negated_crossproduct_inertia=\"false\"") { 1.0 } else { -1.0 };
             let in_unit = |unit: &str| if unit.contains("SLUG") { a / LBF_FT } else { a };
             d.change("ixz", |ixz, unit| ixz + sign * in_unit(unit))
         },

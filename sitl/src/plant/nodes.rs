@@ -201,9 +201,7 @@ impl Nodes {
     }
 
     fn thrust(&self, fdm: &mut Fdm) -> Result<f64, Error> {
-        let hidden = self
-            .hidden_thrust
-            .map_or(Ok(0.0), |node| fdm.read_node(node))?;
+        let hidden = self.hidden_thrust.map_or(Ok(0.0), |node| fdm.read_node(node))?;
         Ok((fdm.read_node(self.thrust)? + hidden) * LBF)
     }
 }
@@ -223,19 +221,10 @@ impl Start {
         let (sin_roll, cos_roll) = self.roll_rad.sin_cos();
         let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
         let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
-        let (ahead, right) = (
-            north * cos_yaw + east * sin_yaw,
-            east * cos_yaw - north * sin_yaw,
-        );
-        let (x, below) = (
-            ahead * cos_pitch - down * sin_pitch,
-            ahead * sin_pitch + down * cos_pitch,
-        );
-        [
-            x,
-            right * cos_roll + below * sin_roll,
-            below * cos_roll - right * sin_roll,
-        ]
+        let (ahead, right) = (north * cos_yaw + east * sin_yaw, east * cos_yaw - north * sin_yaw);
+        let (x, below) =
+            (ahead * cos_pitch - down * sin_pitch, ahead * sin_pitch + down * cos_pitch);
+        [x, right * cos_roll + below * sin_roll, below * cos_roll - right * sin_roll]
     }
 }
 

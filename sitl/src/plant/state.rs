@@ -46,28 +46,11 @@ impl Start {
     };
 
     pub(super) fn is_flyable(&self) -> bool {
-        let Start {
-            roll_rad,
-            pitch_rad,
-            yaw_rad,
-            alpha_rad,
-            beta_rad,
-            p_radps,
-            q_radps,
-            ..
-        } = *self;
-        [
-            roll_rad,
-            pitch_rad,
-            yaw_rad,
-            alpha_rad,
-            beta_rad,
-            p_radps,
-            q_radps,
-            self.r_radps,
-        ]
-        .iter()
-        .all(|x| x.is_finite() && x.abs() < 100.0)
+        let Start { roll_rad, pitch_rad, yaw_rad, alpha_rad, beta_rad, p_radps, q_radps, .. } =
+            *self;
+        [roll_rad, pitch_rad, yaw_rad, alpha_rad, beta_rad, p_radps, q_radps, self.r_radps]
+            .iter()
+            .all(|x| x.is_finite() && x.abs() < 100.0)
             && (0.1..=1000.0).contains(&self.airspeed_mps)
             && (-400.0..=80_000.0).contains(&self.altitude_m)
     }
@@ -167,15 +150,9 @@ impl Truth {
             ("flow angle", self.alpha_rad + self.beta_rad),
             ("specific force", self.specific_force_mps2.iter().sum()),
             ("velocity", self.velocity_ned_mps.iter().sum()),
-            (
-                "position",
-                self.latitude_deg + self.longitude_deg + self.altitude_m,
-            ),
+            ("position", self.latitude_deg + self.longitude_deg + self.altitude_m),
             ("air", self.air_density_kgpm3 + self.static_pressure_pa),
-            (
-                "actuator",
-                self.aileron_rad + self.elevator_rad + self.throttle,
-            ),
+            ("actuator", self.aileron_rad + self.elevator_rad + self.throttle),
             ("thrust", self.thrust_n),
         ]
         .into_iter()

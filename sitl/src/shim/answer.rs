@@ -23,10 +23,7 @@ impl Answer {
     /// Reads an answer; `None` when a control that is used is not a finite number.
     pub fn read(message: &HilActuatorControls) -> Option<Self> {
         let [aileron, elevator, throttle, ..] = message.controls;
-        if ![aileron, elevator, throttle]
-            .iter()
-            .all(|control| control.is_finite())
-        {
+        if ![aileron, elevator, throttle].iter().all(|control| control.is_finite()) {
             return None;
         }
         let told = Inputs {
@@ -56,23 +53,14 @@ mod tests {
     fn message(aileron: f32, throttle: f32, mode: u8) -> HilActuatorControls {
         let mut controls = [0.0; 16];
         (controls[0], controls[2]) = (aileron, throttle);
-        HilActuatorControls {
-            time_usec: 7,
-            controls,
-            mode,
-            ..Default::default()
-        }
+        HilActuatorControls { time_usec: 7, controls, mode, ..Default::default() }
     }
 
     #[test]
     fn limits_what_is_too_large_and_says_so() {
         let answer = Answer::read(&message(1e30, -0.1, ARMED)).expect("finite");
         assert_eq!(
-            (
-                answer.inputs.aileron,
-                answer.inputs.throttle,
-                answer.limited
-            ),
+            (answer.inputs.aileron, answer.inputs.throttle, answer.limited),
             (1.0, 0.0, true)
         );
     }

@@ -23,11 +23,7 @@ impl Faults {
             random.set_stream(number);
             random
         };
-        Faults {
-            rule,
-            drops: stream(2),
-            delays: stream(3),
-        }
+        Faults { rule, drops: stream(2), delays: stream(3) }
     }
 
     /// Whether the next sending is lost.

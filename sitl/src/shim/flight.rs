@@ -44,9 +44,7 @@ impl Flight {
             Pace::Lockstep => (options.faults.delay_ms * 1e3 / FRAME_US as f64).ceil() as usize,
         };
         // Time 0 is never shown: an answer that echoes 0 answers nothing.
-        let pending: VecDeque<_> = (1..=ahead as u64 + 1)
-            .map(|k| (k * FRAME_US, start))
-            .collect();
+        let pending: VecDeque<_> = (1..=ahead as u64 + 1).map(|k| (k * FRAME_US, start)).collect();
         let steps = |seconds: f64| (seconds * 1e6 / FRAME_US as f64).round().max(1.0) as u64;
         Ok(Flight {
             plant,
@@ -96,10 +94,7 @@ impl Flight {
 
     /// Goes one frame on, flying `inputs` if launched; says when the flight is over.
     pub fn advance(&mut self, inputs: Inputs) -> Result<Option<Over>, ShimError> {
-        let mut truth = self
-            .pending
-            .back()
-            .map_or_else(Truth::default, |(_, truth)| *truth);
+        let mut truth = self.pending.back().map_or_else(Truth::default, |(_, truth)| *truth);
         if self.launched {
             if let Some(log) = &mut self.log {
                 log.row(self.time_us, &truth, inputs)?;
@@ -113,10 +108,7 @@ impl Flight {
         if truth.altitude_m <= 0.0 {
             return Ok(Some(Over::Ground));
         }
-        Ok(self
-            .last
-            .filter(|&last| self.flown >= last)
-            .map(|_| Over::Duration))
+        Ok(self.last.filter(|&last| self.flown >= last).map(|_| Over::Duration))
     }
 
     /// Writes out the truth file.

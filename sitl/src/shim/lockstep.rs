@@ -63,13 +63,7 @@ fn ask(
 ) -> Option<Answer> {
     let since = Instant::now();
     let next = since + faults.lateness();
-    let mut asking = Asking {
-        since,
-        next,
-        sent: since,
-        sendings: 0,
-        paused: false,
-    };
+    let mut asking = Asking { since, next, sent: since, sendings: 0, paused: false };
     while !stop.load(Ordering::Relaxed) {
         send_if_due(session, frame, faults, &mut asking);
         answers.clear();

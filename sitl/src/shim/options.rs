@@ -166,10 +166,7 @@ pub struct ShimOptions {
 impl ShimOptions {
     /// The address at which the companion listens by default.
     pub fn default_link() -> Address {
-        Address {
-            transport: Transport::UdpOut,
-            endpoint: "127.0.0.1:14600".to_owned(),
-        }
+        Address { transport: Transport::UdpOut, endpoint: "127.0.0.1:14600".to_owned() }
     }
 
     /// Real time, perfect sensors, held until armed, towards [`ShimOptions::default_link`].
@@ -199,9 +196,7 @@ impl ShimOptions {
             "noise and delays must be 0 or more",
         )?;
         demand(
-            [faults.delay_ms, faults.jitter_ms, faults.late_ms]
-                .iter()
-                .all(|&x| x <= 60_000.0),
+            [faults.delay_ms, faults.jitter_ms, faults.late_ms].iter().all(|&x| x <= 60_000.0),
             "a delay may be 60000 ms at most",
         )?;
         demand(
@@ -215,14 +210,8 @@ impl ShimOptions {
         let bias = &self.bias;
         let mut biases = vec![bias.alpha_rad, bias.beta_rad, bias.airspeed_scale];
         biases.extend(bias.gyro_radps.iter().chain(&bias.accelerometer_mps2));
-        demand(
-            biases.iter().all(|x| x.is_finite()),
-            "a bias must be a finite number",
-        )?;
-        demand(
-            bias.airspeed_scale > 0.0,
-            "the airspeed scale must be positive",
-        )?;
+        demand(biases.iter().all(|x| x.is_finite()), "a bias must be a finite number")?;
+        demand(bias.airspeed_scale > 0.0, "the airspeed scale must be positive")?;
         demand(
             self.duration_s.is_none_or(|s| s.is_finite() && s > 0.0),
             "the duration must be positive",
@@ -240,25 +229,12 @@ impl ShimOptions {
             start.r_radps,
             start.altitude_m,
         ];
-        demand(
-            state.iter().all(|x| x.is_finite()),
-            "the start must be made of finite numbers",
-        )?;
-        demand(
-            start.airspeed_mps > 0.0,
-            "the airspeed at the start must be positive",
-        )?;
-        demand(
-            start.altitude_m > 0.0,
-            "the altitude at the start must be positive",
-        )
+        demand(state.iter().all(|x| x.is_finite()), "the start must be made of finite numbers")?;
+        demand(start.airspeed_mps > 0.0, "the airspeed at the start must be positive")?;
+        demand(start.altitude_m > 0.0, "the altitude at the start must be positive")
     }
 }
 
 fn demand(holds: bool, rule: &'static str) -> Result<(), ShimError> {
-    if holds {
-        Ok(())
-    } else {
-        Err(ShimError::Option { rule })
-    }
+    if holds { Ok(()) } else { Err(ShimError::Option { rule }) }
 }

@@ -125,10 +125,7 @@ impl<'s, 'o> Cycle<'s, 'o> {
             return;
         }
         // Frames keep their order: one that is late holds up those behind it.
-        let due = self
-            .outbox
-            .back()
-            .map_or(due, |&(before, ..)| due.max(before));
+        let due = self.outbox.back().map_or(due, |&(before, ..)| due.max(before));
         self.outbox.push_back((due, frame.time_us, bytes));
     }
 

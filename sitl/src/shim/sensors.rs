@@ -23,11 +23,7 @@ impl Sensors {
     pub fn new(noise: Noise, bias: Bias, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(STREAM);
-        Sensors {
-            noise,
-            bias,
-            random,
-        }
+        Sensors { noise, bias, random }
     }
 
     /// What the sensors show of `truth`: scale, then bias, then noise.

@@ -67,10 +67,7 @@ impl<'a> Session<'a> {
 
     /// Tells the observer.
     pub fn tell(&mut self, event: Event) {
-        (self.observer)(Notice {
-            time_s: self.time_us as f64 * 1e-6,
-            event,
-        });
+        (self.observer)(Notice { time_s: self.time_us as f64 * 1e-6, event });
     }
 
     /// Whether the companion has been heard lately.
@@ -184,10 +181,7 @@ impl<'a> Session<'a> {
 
     /// Notices a companion that has fallen silent.
     pub fn watch(&mut self, now: Instant) {
-        if self
-            .heard
-            .is_some_and(|heard| now.saturating_duration_since(heard) > SILENCE)
-        {
+        if self.heard.is_some_and(|heard| now.saturating_duration_since(heard) > SILENCE) {
             self.link.abandon();
             self.lose();
         }
@@ -199,11 +193,7 @@ impl<'a> Session<'a> {
         self.counts.limited_answers += u64::from(answer.limited);
         if answer.armed != self.armed {
             self.armed = answer.armed;
-            self.tell(if answer.armed {
-                Event::Armed
-            } else {
-                Event::Disarmed
-            });
+            self.tell(if answer.armed { Event::Armed } else { Event::Disarmed });
         }
     }
 

@@ -38,10 +38,7 @@ impl fmt::Display for Event {
             Event::Open(link, Some(local)) => write!(f, "link {link} is open, here {local}"),
             Event::Open(link, None) => write!(f, "link {link} is open"),
             Event::Waiting(link) => {
-                write!(
-                    f,
-                    "waiting for a companion on {link}; start one with `cargo fly`"
-                )
+                write!(f, "waiting for a companion on {link}; start one with `cargo fly`")
             }
             Event::Found => write!(f, "companion found"),
             Event::Lost => write!(f, "companion lost"),
@@ -83,11 +80,7 @@ pub struct Latency {
 
 impl Default for Latency {
     fn default() -> Self {
-        Latency {
-            bins: vec![0; 2001],
-            count: 0,
-            longest: Duration::ZERO,
-        }
+        Latency { bins: vec![0; 2001], count: 0, longest: Duration::ZERO }
     }
 }
 

@@ -139,11 +139,7 @@ fn actuators(time_us: u64, measured: &Truth) -> ActuatorOutputStatus {
     actuator[2] = measured.throttle as f32;
     actuator[3] = (measured.aileron_rate_radps / FULL_DEFLECTION_RAD) as f32;
     actuator[4] = (measured.elevator_rate_radps / FULL_DEFLECTION_RAD) as f32;
-    ActuatorOutputStatus {
-        time_usec: time_us,
-        active: 5,
-        actuator,
-    }
+    ActuatorOutputStatus { time_usec: time_us, active: 5, actuator }
 }
 
 fn attitude(time_us: u64, measured: &Truth) -> AttitudeQuaternion {
@@ -220,9 +216,7 @@ fn gps(time_us: u64, measured: &Truth) -> GpsRawInt {
 }
 
 fn position(time_us: u64, measured: &Truth, home_m: f64) -> GlobalPositionInt {
-    let [north, east, down] = measured
-        .velocity_ned_mps
-        .map(|speed| (speed * 1e2).round() as i16);
+    let [north, east, down] = measured.velocity_ned_mps.map(|speed| (speed * 1e2).round() as i16);
     GlobalPositionInt {
         time_boot_ms: (time_us / 1000) as u32,
         lat: (measured.latitude_deg * 1e7).round() as i32,

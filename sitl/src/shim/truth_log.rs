@@ -35,10 +35,7 @@ impl TruthLog {
             }
             Err(source) => return Err(ShimError::Truth { path, source }),
         };
-        let mut log = TruthLog {
-            path,
-            file: BufWriter::new(file),
-        };
+        let mut log = TruthLog { path, file: BufWriter::new(file) };
         let written = writeln!(log.file, "{HEADER}");
         log.check(written)?;
         Ok(log)
@@ -75,9 +72,7 @@ impl TruthLog {
         ];
         let mut write = || -> io::Result<()> {
             write!(self.file, "{}", time_us as f64 * 1e-6)?;
-            columns
-                .iter()
-                .try_for_each(|value| write!(self.file, ",{value}"))?;
+            columns.iter().try_for_each(|value| write!(self.file, ",{value}"))?;
             writeln!(self.file)
         };
         let written = write();
@@ -91,9 +86,6 @@ impl TruthLog {
     }
 
     fn check(&self, written: io::Result<()>) -> Result<(), ShimError> {
-        written.map_err(|source| ShimError::Truth {
-            path: self.path.clone(),
-            source,
-        })
+        written.map_err(|source| ShimError::Truth { path: self.path.clone(), source })
     }
 }

@@ -5,14 +5,8 @@ use std::path::{Path, PathBuf};
 use greylag_sitl::plant::{Inputs, Truth};
 
 /// The command histories, by the names of their files.
-pub const HISTORIES: [&str; 6] = [
-    "white",
-    "held",
-    "ornstein_uhlenbeck",
-    "pid_30_5",
-    "pid_50_20",
-    "pid_m40_m20",
-];
+pub const HISTORIES: [&str; 6] =
+    ["white", "held", "ornstein_uhlenbeck", "pid_30_5", "pid_50_20", "pid_m40_m20"];
 
 /// Columns of state and actuators.
 pub const COLUMNS: [&str; 14] = [
@@ -75,10 +69,7 @@ impl Golden {
         let mut lines = text.lines();
         let header = format!("aileron,elevator,throttle,{}", COLUMNS.join(","));
         assert_eq!(lines.next(), Some(header.as_str()), "{}", path.display());
-        let number = |cell: &str| {
-            cell.parse::<f64>()
-                .unwrap_or_else(|_| panic!("{name}: {cell}"))
-        };
+        let number = |cell: &str| cell.parse::<f64>().unwrap_or_else(|_| panic!("{name}: {cell}"));
         let steps = lines
             .map(|line| {
                 let cells: Vec<&str> = line.split(',').collect();
@@ -86,14 +77,7 @@ impl Golden {
                 let [aileron, elevator, throttle] = [0, 1, 2].map(|i| number(cells[i]));
                 let state =
                     (!cells[3].is_empty()).then(|| std::array::from_fn(|i| number(cells[3 + i])));
-                (
-                    Inputs {
-                        aileron,
-                        elevator,
-                        throttle,
-                    },
-                    state,
-                )
+                (Inputs { aileron, elevator, throttle }, state)
             })
             .collect();
         Golden { steps }
@@ -122,9 +106,5 @@ impl Golden {
 fn difference(column: usize, a: f64, b: f64) -> f64 {
     let turn = std::f64::consts::TAU;
     let plain = (a - b).abs();
-    if column == 2 {
-        plain.min((plain - turn).abs())
-    } else {
-        plain
-    }
+    if column == 2 { plain.min((plain - turn).abs()) } else { plain }
 }

@@ -7,11 +7,7 @@ use greylag_sitl::air::Air;
 use greylag_sitl::plant::{DT_S, Inputs, Plant, PlantOptions, Truth};
 
 /// Surfaces centred, motor off.
-pub const IDLE: Inputs = Inputs {
-    aileron: 0.0,
-    elevator: 0.0,
-    throttle: 0.0,
-};
+pub const IDLE: Inputs = Inputs { aileron: 0.0, elevator: 0.0, throttle: 0.0 };
 
 /// The built-in X8 in calm air at the neutral start.
 pub fn plant() -> Plant {
@@ -20,24 +16,14 @@ pub fn plant() -> Plant {
 
 /// The built-in X8 in `air` at the neutral start.
 pub fn plant_in(air: Air) -> Plant {
-    Plant::new(&PlantOptions {
-        air,
-        ..PlantOptions::default()
-    })
-    .expect("the built-in X8 loads")
+    Plant::new(&PlantOptions { air, ..PlantOptions::default() }).expect("the built-in X8 loads")
 }
 
 /// The built-in X8 in calm air with `effects` hidden in it, each as `id=amplitude`.
 pub fn plant_with(effects: &[&str]) -> Plant {
-    let hidden = effects
-        .iter()
-        .map(|text| text.parse().expect("a known effect"))
-        .collect();
-    Plant::new(&PlantOptions {
-        hidden,
-        ..PlantOptions::default()
-    })
-    .expect("the X8 takes the effects")
+    let hidden = effects.iter().map(|text| text.parse().expect("a known effect")).collect();
+    Plant::new(&PlantOptions { hidden, ..PlantOptions::default() })
+        .expect("the X8 takes the effects")
 }
 
 /// Command `k` of a history that moves every actuator at every step.
@@ -52,9 +38,7 @@ pub fn busy(k: u32) -> Inputs {
 
 /// Flies the busy history from step `from` up to `to`.
 pub fn fly(plant: &mut Plant, from: u32, to: u32) -> Vec<Truth> {
-    (from..to)
-        .map(|k| plant.step(busy(k)).expect("a gentle flight stays finite"))
-        .collect()
+    (from..to).map(|k| plant.step(busy(k)).expect("a gentle flight stays finite")).collect()
 }
 
 /// Flies `steps` with constant `inputs`.

@@ -18,10 +18,7 @@ pub const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Options of a lockstep run towards `link`.
 pub fn lockstep(link: &str) -> ShimOptions {
-    ShimOptions {
-        pace: Pace::Lockstep,
-        ..real_time(link)
-    }
+    ShimOptions { pace: Pace::Lockstep, ..real_time(link) }
 }
 
 /// Options of a real-time run towards `link`.
@@ -46,11 +43,7 @@ impl Shim {
         let thread = std::thread::spawn(move || {
             shim::run(&options, &seen, &mut |notice| drop(sender.send(notice)))
         });
-        Shim {
-            notices,
-            stop,
-            thread,
-        }
+        Shim { notices, stop, thread }
     }
 
     /// Where a listening shim listens.
@@ -72,10 +65,7 @@ impl Shim {
     }
 
     pub fn end(self) -> Summary {
-        self.thread
-            .join()
-            .expect("the shim does not panic")
-            .expect("the shim ends well")
+        self.thread.join().expect("the shim does not panic").expect("the shim ends well")
     }
 }
 
@@ -141,10 +131,7 @@ impl Companion {
 
     /// Sends datagrams to `to`.
     pub fn udp_out(to: SocketAddr) -> Self {
-        Self::on(Road::Udp(
-            UdpSocket::bind("127.0.0.1:0").expect("any port"),
-            Some(to),
-        ))
+        Self::on(Road::Udp(UdpSocket::bind("127.0.0.1:0").expect("any port"), Some(to)))
     }
 
     pub fn tcp_in(listener: &TcpListener) -> Self {
@@ -184,11 +171,7 @@ impl Companion {
     }
 
     pub fn heartbeat(&mut self) {
-        self.send(&Heartbeat {
-            kind: 1,
-            mavlink_version: 3,
-            ..Heartbeat::default()
-        });
+        self.send(&Heartbeat { kind: 1, mavlink_version: 3, ..Heartbeat::default() });
     }
 
     /// Answers the frame of `time_us`, armed.
@@ -246,15 +229,13 @@ impl Companion {
                 socket.set_read_timeout(Some(patience)).expect("a timeout");
                 let (length, from) = socket.recv_from(&mut buffer).ok()?;
                 peer.get_or_insert(from);
-                self.parser
-                    .datagram(&buffer[..length], &mut |frame| waiting.push(frame));
+                self.parser.datagram(&buffer[..length], &mut |frame| waiting.push(frame));
             }
             Road::Tcp(stream) => {
                 stream.set_read_timeout(Some(patience)).expect("a timeout");
                 // One frame's worth at a time, so that no batch holds two.
                 let length = stream.read(&mut buffer[..64]).ok().filter(|&n| n > 0)?;
-                self.parser
-                    .stream(&buffer[..length], &mut |frame| waiting.push(frame));
+                self.parser.stream(&buffer[..length], &mut |frame| waiting.push(frame));
             }
         }
         Some(())
@@ -286,12 +267,7 @@ impl Companion {
 pub fn answer(time_us: u64, command: [f32; 3], mode: u8) -> HilActuatorControls {
     let mut controls = [0.0; 16];
     controls[..3].copy_from_slice(&command);
-    HilActuatorControls {
-        time_usec: time_us,
-        flags: 0,
-        controls,
-        mode,
-    }
+    HilActuatorControls { time_usec: time_us, flags: 0, controls, mode }
 }
 
 /// A companion that listens on a port of its own, with the `udpout:` address for the shim.

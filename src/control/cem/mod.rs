@@ -27,7 +27,8 @@ pub struct Settings {
 
 impl Settings {
     /// H = 5 is the paper's; N, K, I are not given there: 1024 rollouts a step in all.
-    pub const PAPER: Settings = Settings { population: 256, elites: 16, iterations: 4, spread: 1.0 };
+    pub const PAPER: Settings =
+        Settings { population: 256, elites: 16, iterations: 4, spread: 1.0 };
 }
 
 /// An action in the paper's units: aileron, elevator and throttle in −1..1 (eq. 29).
@@ -87,7 +88,8 @@ impl Cem {
         }
         let elites = self.settings.elites.min(self.order.len());
         // ties go to the lower index, so the order is the same everywhere
-        self.order.select_nth_unstable_by(elites - 1, |a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        self.order
+            .select_nth_unstable_by(elites - 1, |a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let chosen = &mut self.order[..elites];
         chosen.sort_unstable_by_key(|&(_, index)| index);
         let mut mean = [[0.0; 3]; HORIZON];
@@ -102,7 +104,8 @@ impl Cem {
                 }
             }
         }
-        let deviation = |h: usize, c: usize| (square[h][c] - mean[h][c] * mean[h][c]).max(0.0).sqrt();
+        let deviation =
+            |h: usize, c: usize| (square[h][c] - mean[h][c] * mean[h][c]).max(0.0).sqrt();
         let spread = std::array::from_fn(|h| std::array::from_fn(|c| deviation(h, c)));
         (mean, spread)
     }

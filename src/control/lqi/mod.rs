@@ -56,8 +56,7 @@ impl Lqi {
         // too slow for the bank asked for: bank as far as the airspeed allows, and more with it
         let part = self.schedule.tolerable_part(seen.state.airspeed, target.roll, target.pitch);
         let wanted = [part * target.roll, target.pitch];
-        for ((x, wanted), rate) in reference.iter_mut().zip(wanted).zip([ROLL_RATE, PITCH_RATE])
-        {
+        for ((x, wanted), rate) in reference.iter_mut().zip(wanted).zip([ROLL_RATE, PITCH_RATE]) {
             *x += ((wanted - *x) / ROUNDING).clamp(-rate, rate) * STEP;
         }
         self.reference = Some(reference);
@@ -65,7 +64,8 @@ impl Lqi {
     }
 
     fn throttle(&mut self, seen: &Observation, target: &Target, feed_forward: f64) -> f64 {
-        let wanted = self.schedule.comfortable_airspeed(target.roll, target.pitch).max(target.airspeed);
+        let wanted =
+            self.schedule.comfortable_airspeed(target.roll, target.pitch).max(target.airspeed);
         let error = wanted - seen.state.airspeed;
         let raw = feed_forward + AIRSPEED_KP * error + self.airspeed_integral;
         let outward = (raw > 1.0 && error > 0.0) || (raw < 0.0 && error < 0.0);

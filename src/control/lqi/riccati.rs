@@ -49,7 +49,8 @@ mod tests {
     #[test]
     fn scalar_gain_solves_its_equation() {
         let (a, b, q, r) = (1.2, 0.5, 1.0, 0.3);
-        let k = gain(&Matrix1::new(a), &Matrix1::new(b), &Matrix1::new(q), &Matrix1::new(r)).unwrap()[0];
+        let k = gain(&Matrix1::new(a), &Matrix1::new(b), &Matrix1::new(q), &Matrix1::new(r))
+            .unwrap()[0];
         // the positive root of b²p² + (r − a²r − qb²)p − qr = 0
         let (qa, qb, qc) = (b * b, r - a * a * r - q * b * b, -q * r);
         let p = (-qb + (qb * qb - 4.0 * qa * qc).sqrt()) / (2.0 * qa);

@@ -27,8 +27,10 @@ struct Axis {
 
 /// Airspeed in m/s, roll in rad, pitch in rad.
 const AIRSPEED: Axis = Axis { first: 12.0, step: 2.0, count: 20 };
-const ROLL: Axis = Axis { first: -std::f64::consts::FRAC_PI_3, step: std::f64::consts::PI / 18.0, count: 13 };
-const PITCH: Axis = Axis { first: -std::f64::consts::FRAC_PI_6, step: std::f64::consts::PI / 18.0, count: 7 };
+const ROLL: Axis =
+    Axis { first: -std::f64::consts::FRAC_PI_3, step: std::f64::consts::PI / 18.0, count: 13 };
+const PITCH: Axis =
+    Axis { first: -std::f64::consts::FRAC_PI_6, step: std::f64::consts::PI / 18.0, count: 7 };
 
 /// What the schedule holds at a point.
 #[derive(Clone, Copy, Debug)]
@@ -92,12 +94,8 @@ impl Schedule {
     /// The entry at `airspeed` (m/s), `roll` and `pitch` (rad), linear between grid points.
     pub(super) fn at(&self, airspeed: f64, roll: f64, pitch: f64) -> Entry {
         let places = [AIRSPEED.place(airspeed), ROLL.place(roll), PITCH.place(pitch)];
-        let mut sum = Entry {
-            steady: [0.0; 7],
-            deflection: [0.0; 2],
-            throttle: 0.0,
-            gain: Gain::zeros(),
-        };
+        let mut sum =
+            Entry { steady: [0.0; 7], deflection: [0.0; 2], throttle: 0.0, gain: Gain::zeros() };
         for corner in 0..8 {
             let mut weight = 1.0;
             let mut index = [0; 3];
@@ -155,7 +153,9 @@ fn slowest(column: &[Option<Entry>], alpha: f64) -> f64 {
         return AIRSPEED.value(AIRSPEED.count - 1);
     };
     match k.checked_sub(1).and_then(needs).zip(needs(k)) {
-        Some((slower, here)) => AIRSPEED.value(k) - AIRSPEED.step * (alpha - here) / (slower - here),
+        Some((slower, here)) => {
+            AIRSPEED.value(k) - AIRSPEED.step * (alpha - here) / (slower - here)
+        }
         None => AIRSPEED.value(k),
     }
 }

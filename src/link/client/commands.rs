@@ -30,11 +30,7 @@ struct Outcome {
 
 impl From<CommandResult> for Outcome {
     fn from(result: CommandResult) -> Self {
-        Outcome {
-            result,
-            messages: vec![],
-            reason: None,
-        }
+        Outcome { result, messages: vec![], reason: None }
     }
 }
 
@@ -47,22 +43,16 @@ impl From<Verdict> for Outcome {
                 messages: vec![],
                 reason: Some(why),
             },
-            Verdict::Denied(why) => Outcome {
-                result: CommandResult::Denied,
-                messages: vec![],
-                reason: Some(why),
-            },
+            Verdict::Denied(why) => {
+                Outcome { result: CommandResult::Denied, messages: vec![], reason: Some(why) }
+            }
         }
     }
 }
 
 impl Outcome {
     fn with(message: Message) -> Self {
-        Outcome {
-            result: CommandResult::Accepted,
-            messages: vec![message],
-            reason: None,
-        }
+        Outcome { result: CommandResult::Accepted, messages: vec![message], reason: None }
     }
 
     fn denied(reason: &str) -> Self {
@@ -96,14 +86,8 @@ impl Clients {
         if outcome.result == CommandResult::Accepted && CHANGING.contains(&command.number) {
             self.sessions[at].remember(now.host, command, outcome.result);
         }
-        self.reply(
-            at,
-            &answer::command_ack(command.number, outcome.result, from),
-        );
-        outcome
-            .messages
-            .iter()
-            .for_each(|message| self.send_requested(at, message));
+        self.reply(at, &answer::command_ack(command.number, outcome.result, from));
+        outcome.messages.iter().for_each(|message| self.send_requested(at, message));
         if let Some(reason) = outcome.reason {
             self.complain(now, at, &reason);
         }
@@ -179,10 +163,7 @@ impl Clients {
                 let index = if index.is_finite() { index } else { 0.0 };
                 match mode::available_modes(index as usize) {
                     modes if modes.is_empty() => CommandResult::Denied.into(),
-                    messages => Outcome {
-                        messages,
-                        ..CommandResult::Accepted.into()
-                    },
+                    messages => Outcome { messages, ..CommandResult::Accepted.into() },
                 }
             }
             MESSAGE_INTERVAL => match message_number(index).filter(|id| *id <= u32::from(u16::MAX))
@@ -211,11 +192,9 @@ impl Clients {
 
     fn set_message_interval(&mut self, now: Now, at: usize, id: f64, interval_us: f64) -> Outcome {
         let row = message_number(id).and_then(telemetry::position);
-        let set = row.ok_or(()).and_then(|row| {
-            self.sessions[at]
-                .streams
-                .set_interval(row, interval_us, now.host)
-        });
+        let set = row
+            .ok_or(())
+            .and_then(|row| self.sessions[at].streams.set_interval(row, interval_us, now.host));
         match set {
             Ok(()) => CommandResult::Accepted.into(),
             Err(()) => CommandResult::Denied.into(),

@@ -14,16 +14,9 @@ impl Clients {
     /// The home position is where the vehicle was first seen, then where it was armed.
     pub(super) fn note_home(&mut self, status: &Status) {
         let armed_now = status.armed && !self.was_armed;
-        let known = status
-            .position
-            .iter()
-            .chain([&status.altitude])
-            .all(|x| x.is_finite());
+        let known = status.position.iter().chain([&status.altitude]).all(|x| x.is_finite());
         if known && (self.home.is_none() || armed_now) {
-            self.home = Some(Home {
-                position: status.position,
-                altitude: status.altitude,
-            });
+            self.home = Some(Home { position: status.position, altitude: status.altitude });
         }
         self.was_armed = status.armed;
     }
@@ -60,10 +53,6 @@ impl Clients {
     }
 
     pub(super) fn scene(&self, now: Now) -> Scene {
-        Scene {
-            now: now.vehicle,
-            home: self.home,
-            bad_frames: self.counts.frames.bad(),
-        }
+        Scene { now: now.vehicle, home: self.home, bad_frames: self.counts.frames.bad() }
     }
 }

@@ -10,9 +10,7 @@ use crate::link::wire::request::{ParameterKey, ParameterName};
 const EXACT: f32 = 16_777_216.0;
 
 fn find(table: &[Parameter], name: ParameterName) -> Option<usize> {
-    table
-        .iter()
-        .position(|parameter| parameter.name.as_bytes() == name.bytes())
+    table.iter().position(|parameter| parameter.name.as_bytes() == name.bytes())
 }
 
 /// The value in the table's type. A whole number sent as REAL32 is taken for an INT32, because
@@ -84,10 +82,7 @@ impl Clients {
     ) {
         let shown = String::from_utf8_lossy(name.bytes()).into_owned();
         let Some(index) = find(autopilot.parameters(), name) else {
-            self.reply(
-                at,
-                &answer::parameter_error(name, -1, ParameterFault::DoesNotExist, from),
-            );
+            self.reply(at, &answer::parameter_error(name, -1, ParameterFault::DoesNotExist, from));
             self.complain(
                 now,
                 at,
@@ -96,10 +91,7 @@ impl Clients {
             return;
         };
         let refusal = match matched(autopilot.parameters()[index].value, value) {
-            None => Some((
-                ParameterFault::TypeMismatch,
-                "its type is not the table's".to_owned(),
-            )),
+            None => Some((ParameterFault::TypeMismatch, "its type is not the table's".to_owned())),
             Some(value) => match autopilot.set_parameter(index, value) {
                 Verdict::Accepted => None,
                 Verdict::Rejected(reason) | Verdict::Denied(reason) => {

@@ -131,10 +131,8 @@ impl Session {
         let earned =
             host.saturating_sub(self.next_complaint).as_millis() / COMPLAINT_EVERY.as_millis();
         if earned > 0 {
-            self.complaints = COMPLAINTS.min(
-                self.complaints
-                    .saturating_add(earned.min(u128::from(COMPLAINTS)) as u32),
-            );
+            self.complaints = COMPLAINTS
+                .min(self.complaints.saturating_add(earned.min(u128::from(COMPLAINTS)) as u32));
             self.next_complaint = host;
         }
         let allowed = self.complaints > 0;

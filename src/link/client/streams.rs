@@ -25,10 +25,8 @@ impl StreamTable {
     /// The default rates.
     pub fn new(host: Duration) -> Self {
         StreamTable {
-            rows: STREAMS.map(|stream| Row {
-                interval: default_interval(stream.default_hz),
-                due: host,
-            }),
+            rows: STREAMS
+                .map(|stream| Row { interval: default_interval(stream.default_hz), due: host }),
         }
     }
 
@@ -48,9 +46,7 @@ impl StreamTable {
 
     /// The interval of row `at` in µs; −1 when off.
     pub fn interval_us(&self, at: usize) -> i32 {
-        self.rows[at]
-            .interval
-            .map_or(-1, |interval| interval.as_micros() as i32)
+        self.rows[at].interval.map_or(-1, |interval| interval.as_micros() as i32)
     }
 
     /// Sets row `at` as SET_MESSAGE_INTERVAL means it: µs, 0 for the default, −1 for off. What is
@@ -62,10 +58,7 @@ impl StreamTable {
             us if us > 0.0 => Some(limited(us * 1e-6)),
             _ => return Err(()),
         };
-        self.rows[at] = Row {
-            interval,
-            due: host,
-        };
+        self.rows[at] = Row { interval, due: host };
         Ok(())
     }
 
@@ -80,10 +73,7 @@ impl StreamTable {
                     Some(0) => default_interval(stream.default_hz),
                     Some(hz) => Some(limited(1.0 / f64::from(hz))),
                 };
-                *row = Row {
-                    interval,
-                    due: host,
-                };
+                *row = Row { interval, due: host };
             }
         }
     }

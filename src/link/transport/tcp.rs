@@ -79,10 +79,7 @@ async fn accept(port: Port, connections: Connections, listener: TcpListener) {
 }
 
 fn count_of(connections: &Connections) -> usize {
-    connections
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .len()
+    connections.lock().unwrap_or_else(PoisonError::into_inner).len()
 }
 
 /// Serves one connection until it ends, either way.
@@ -91,19 +88,13 @@ async fn serve(port: Port, connections: Connections, stream: TcpStream, peer: So
     let _ = stream.set_nodelay(true);
     let (reading, writing) = stream.into_split();
     let (queue, frames) = channel(QUEUE);
-    connections
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .insert(peer, queue);
+    connections.lock().unwrap_or_else(PoisonError::into_inner).insert(peer, queue);
     port.announce(Arrival::Opened(port.peer(peer))).await;
     tokio::select! {
         () = read(&port, reading, peer) => {}
         () = write(&port, writing, frames) => {}
     }
-    connections
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .remove(&peer);
+    connections.lock().unwrap_or_else(PoisonError::into_inner).remove(&peer);
     port.announce(Arrival::Closed(port.peer(peer))).await;
 }
 
@@ -114,12 +105,10 @@ async fn read(port: &Port, mut stream: OwnedReadHalf, peer: SocketAddr) {
     loop {
         let mut whole = Vec::new();
         let len = match cutter.is_waiting() {
-            true => timeout(PAUSE, stream.read(&mut chunk))
-                .await
-                .unwrap_or_else(|_| {
-                    cutter.flush(|frame| whole.extend_from_slice(frame.bytes));
-                    Err(io::ErrorKind::TimedOut.into())
-                }),
+            true => timeout(PAUSE, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
+                cutter.flush(|frame| whole.extend_from_slice(frame.bytes));
+                Err(io::ErrorKind::TimedOut.into())
+            }),
             false => stream.read(&mut chunk).await,
         };
         match len {
@@ -151,11 +140,7 @@ async fn dispatch(
     mut outgoing: Receiver<(SocketAddr, Vec<u8>)>,
 ) {
     while let Some((to, frame)) = outgoing.recv().await {
-        let queue = connections
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .get(&to)
-            .cloned();
+        let queue = connections.lock().unwrap_or_else(PoisonError::into_inner).get(&to).cloned();
         match queue.map(|queue| queue.try_send(frame)) {
             Some(Ok(())) => {}
             Some(Err(_)) => count(&port.counters.outbox_full),

@@ -127,12 +127,7 @@ impl Sitl {
     /// Whether the frame comes from the vehicle: the right ids, on the peer that the link belongs
     /// to. Two shims at once would otherwise mix their states.
     fn is_vehicle(&mut self, host: Duration, peer: PeerId, frame: &Frame<'_>) -> bool {
-        if frame.source
-            != (Source {
-                system: self.system,
-                component: SHIM,
-            })
-        {
+        if frame.source != (Source { system: self.system, component: SHIM }) {
             return false;
         }
         match self.peer {
@@ -146,32 +141,23 @@ impl Sitl {
 
     fn take(&mut self, message: VehicleMessage) -> Option<Telemetry> {
         match message {
-            VehicleMessage::Imu {
-                time,
-                specific_force,
-            } => self.parts.imu = Some((time, specific_force)),
+            VehicleMessage::Imu { time, specific_force } => {
+                self.parts.imu = Some((time, specific_force))
+            }
             VehicleMessage::Air { airspeed, altitude } => {
                 self.parts.air = Some((airspeed, altitude))
             }
             VehicleMessage::Incidence { time, alpha, beta } => {
                 self.parts.incidence = Some((time, alpha, beta))
             }
-            VehicleMessage::Actuators {
-                time,
-                active,
-                outputs,
-            } => {
+            VehicleMessage::Actuators { time, active, outputs } => {
                 self.parts.actuators = (active >= 5).then_some((time, outputs));
             }
             VehicleMessage::Position { position, velocity } if limits::position(position) => {
                 (self.last.position, self.last.velocity) = (position, velocity);
             }
             VehicleMessage::Wind(wind) if limits::wind(wind) => self.last.wind = wind,
-            VehicleMessage::Attitude {
-                boot_ms,
-                quaternion,
-                rates,
-            } => {
+            VehicleMessage::Attitude { boot_ms, quaternion, rates } => {
                 let parts = std::mem::take(&mut self.parts);
                 return self.complete(parts, boot_ms, quaternion, rates);
             }
@@ -190,10 +176,7 @@ impl Sitl {
         q: [f64; 4],
         rates: [f64; 3],
     ) -> Option<Telemetry> {
-        let whole = parts
-            .imu
-            .zip(parts.air)
-            .zip(parts.incidence.zip(parts.actuators));
+        let whole = parts.imu.zip(parts.air).zip(parts.incidence.zip(parts.actuators));
         let Some((((time, force), air), ((time_b, alpha, beta), (time_c, outputs)))) = whole else {
             self.counts.incomplete += 1;
             return None;
@@ -205,12 +188,7 @@ impl Sitl {
             return None;
         }
         let order = self.order(time);
-        let mut next = Telemetry {
-            time,
-            order,
-            faults: Faults::NONE,
-            ..self.last
-        };
+        let mut next = Telemetry { time, order, faults: Faults::NONE, ..self.last };
         fill_motion(&mut next, q, rates);
         fill_air(&mut next, air, [alpha, beta], force);
         fill_actuators(&mut next, outputs, self.deflection);
@@ -288,14 +266,9 @@ impl Sitl {
     }
 
     fn write(&mut self, message: &Message) -> Vec<u8> {
-        let source = Source {
-            system: self.system,
-            component: COMPANION,
-        };
+        let source = Source { system: self.system, component: COMPANION };
         self.sequence = self.sequence.wrapping_add(1);
-        message
-            .encode(Version::V2, self.sequence, source)
-            .unwrap_or_default()
+        message.encode(Version::V2, self.sequence, source).unwrap_or_default()
     }
 }
 

@@ -34,22 +34,7 @@ pub enum CommandResult {
 pub fn command_ack(number: u16, result: CommandResult, to: Source) -> Message {
     let [low, high] = number.to_le_bytes();
     // command, result, then the extensions: progress, result_param2, target system and component.
-    Message::raw(
-        77,
-        vec![
-            low,
-            high,
-            result as u8,
-            0,
-            0,
-            0,
-            0,
-            0,
-            to.system,
-            to.component,
-        ],
-        3,
-    )
+    Message::raw(77, vec![low, high, result as u8, 0, 0, 0, 0, 0, to.system, to.component], 3)
 }
 
 /// PARAM_VALUE of one table entry.
@@ -105,16 +90,8 @@ pub fn parameter_error(
 /// MAVLink 1 has no field for chunks, so `chunks` there are texts of their own. Letters outside
 /// ASCII become `?`: receivers disagree about them.
 pub fn texts(severity: Severity, words: &str, id: u16) -> Vec<Message> {
-    let bytes: Vec<u8> = words
-        .chars()
-        .map(|c| {
-            if c.is_ascii() && c != '\0' {
-                c as u8
-            } else {
-                b'?'
-            }
-        })
-        .collect();
+    let bytes: Vec<u8> =
+        words.chars().map(|c| if c.is_ascii() && c != '\0' { c as u8 } else { b'?' }).collect();
     if bytes.len() <= TEXT_CHUNK {
         return vec![text(severity, &bytes, 0, 0)];
     }
@@ -163,11 +140,7 @@ pub fn autopilot_version() -> Message {
 /// Major, minor and patch in the upper three bytes; the lowest, 0, marks a development version.
 fn software_version(text: &str) -> u32 {
     let part = |part: &str| part.parse::<u8>().map_or(0, u32::from);
-    text.split(['.', '-'])
-        .take(3)
-        .map(part)
-        .fold(0, |sum, p| sum << 8 | p)
-        << 8
+    text.split(['.', '-']).take(3).map(part).fold(0, |sum, p| sum << 8 | p) << 8
 }
 
 /// PROTOCOL_VERSION: MAVLink 1 and 2, 2 preferred.
@@ -217,11 +190,7 @@ pub enum MissionResult {
 
 /// MISSION_ACK for a mission type.
 pub fn mission_ack(result: MissionResult, kind: u8, to: Source) -> Message {
-    Message::raw(
-        47,
-        vec![to.system, to.component, result as u8, kind, 0, 0, 0, 0],
-        3,
-    )
+    Message::raw(47, vec![to.system, to.component, result as u8, kind, 0, 0, 0, 0], 3)
 }
 
 /// FTP refusal: NAK with "unknown command", as there are no files.
@@ -233,22 +202,18 @@ pub fn file_nak(sequence: u16, session: u8, opcode: u8, to: Source) -> Message {
     // session, opcode, size, the request's opcode; the data start at 12.
     payload[2..6].copy_from_slice(&[session, NAK, 1, opcode]);
     payload[12] = UNKNOWN_COMMAND;
-    Message::coded(MavMessage::FILE_TRANSFER_PROTOCOL(
-        FILE_TRANSFER_PROTOCOL_DATA {
-            target_network: 0,
-            target_system: to.system,
-            target_component: to.component,
-            payload,
-        },
-    ))
+    Message::coded(MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
+        target_network: 0,
+        target_system: to.system,
+        target_component: to.component,
+        payload,
+    }))
 }
 
 /// TIMESYNC answer: our time in ns beside theirs.
 pub fn time_sync(theirs: i64, now: Time, to: Source) -> Message {
     // Zero would read as a request.
-    let ours = i64::try_from(now.as_micros().saturating_mul(1000))
-        .unwrap_or(i64::MAX)
-        .max(1);
+    let ours = i64::try_from(now.as_micros().saturating_mul(1000)).unwrap_or(i64::MAX).max(1);
     Message::coded(MavMessage::TIMESYNC(TIMESYNC_DATA {
         tc1: ours,
         ts1: theirs,

@@ -55,20 +55,10 @@ impl Message {
             Content::Coded(message) => {
                 let mut buffer = [0; 255];
                 let len = message.ser(codec_version(version), &mut buffer);
-                framing::write(
-                    version,
-                    sequence,
-                    source,
-                    message.message_id(),
-                    &buffer[..len],
-                )
+                framing::write(version, sequence, source, message.message_id(), &buffer[..len])
             }
             Content::Raw { id, payload, base } => {
-                let len = if version == Version::V1 {
-                    *base
-                } else {
-                    payload.len()
-                };
+                let len = if version == Version::V1 { *base } else { payload.len() };
                 framing::write(version, sequence, source, *id, &payload[..len])
             }
         }

@@ -59,13 +59,7 @@ pub fn from_do_set_mode(base: f64, main: f64, sub: f64) -> ModeRequest {
 }
 
 fn from_numbers(main: u8, sub: u8) -> ModeRequest {
-    let known = [
-        Mode::Manual,
-        Mode::Hold,
-        Mode::Return,
-        Mode::Offboard,
-        Mode::Stabilized,
-    ];
+    let known = [Mode::Manual, Mode::Hold, Mode::Return, Mode::Offboard, Mode::Stabilized];
     match known.into_iter().find(|mode| numbers(*mode) == (main, sub)) {
         Some(mode) => ModeRequest::Known(mode),
         None => ModeRequest::Unknown,
@@ -108,25 +102,18 @@ impl Pulse {
             (false, true) => MavState::MAV_STATE_ACTIVE,
             (false, false) => MavState::MAV_STATE_STANDBY,
         };
-        Pulse {
-            base: base_mode(status),
-            custom: custom_mode(status.mode),
-            state: state as u8,
-        }
+        Pulse { base: base_mode(status), custom: custom_mode(status.mode), state: state as u8 }
     }
 }
 
 /// HEARTBEAT of a fixed-wing autopilot.
 pub fn heartbeat(status: &Status) -> Message {
     let pulse = Pulse::of(status);
-    let state = [
-        MavState::MAV_STATE_STANDBY,
-        MavState::MAV_STATE_ACTIVE,
-        MavState::MAV_STATE_CRITICAL,
-    ]
-    .into_iter()
-    .find(|s| *s as u8 == pulse.state)
-    .unwrap_or(MavState::MAV_STATE_CRITICAL);
+    let state =
+        [MavState::MAV_STATE_STANDBY, MavState::MAV_STATE_ACTIVE, MavState::MAV_STATE_CRITICAL]
+            .into_iter()
+            .find(|s| *s as u8 == pulse.state)
+            .unwrap_or(MavState::MAV_STATE_CRITICAL);
     Message::coded(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
         custom_mode: pulse.custom,
         mavtype: MavType::MAV_TYPE_FIXED_WING,
@@ -180,22 +167,13 @@ mod tests {
         // PX4's px4_custom_mode.h: { uint16 reserved; uint8 main_mode; uint8 sub_mode }.
         assert_eq!(custom_mode(Mode::Offboard), 6 << 16);
         assert_eq!(custom_mode(Mode::Hold), 0x0304_0000);
-        for mode in [
-            Mode::Manual,
-            Mode::Hold,
-            Mode::Return,
-            Mode::Offboard,
-            Mode::Stabilized,
-        ] {
+        for mode in [Mode::Manual, Mode::Hold, Mode::Return, Mode::Offboard, Mode::Stabilized] {
             let (main, sub) = numbers(mode);
             let known = ModeRequest::Known(mode);
             assert_eq!(from_set_mode(1, custom_mode(mode)), known);
             assert_eq!(from_do_set_mode(1.0, main.into(), sub.into()), known);
             // pymavlink's set_mode_apm puts the whole custom_mode into one float.
-            assert_eq!(
-                from_do_set_mode(1.0, f64::from(custom_mode(mode) as f32), f64::NAN),
-                known
-            );
+            assert_eq!(from_do_set_mode(1.0, f64::from(custom_mode(mode) as f32), f64::NAN), known);
         }
     }
 
@@ -208,9 +186,6 @@ mod tests {
         assert_eq!(from_set_mode(220, 0), ModeRequest::Known(Mode::Hold));
         assert_eq!(from_set_mode(0, 0), ModeRequest::Unknown);
         assert_eq!(from_do_set_mode(f64::NAN, 6.0, 0.0), ModeRequest::Unknown);
-        assert_eq!(
-            from_do_set_mode(1.0, f64::NAN, f64::NAN),
-            ModeRequest::Unknown
-        );
+        assert_eq!(from_do_set_mode(1.0, f64::NAN, f64::NAN), ModeRequest::Unknown);
     }
 }

@@ -73,22 +73,24 @@ pub fn attitude_target(to: Source, time_ms: u32, roll: f64, pitch: f64) -> Messa
 
 /// MAV_CMD_COMPONENT_ARM_DISARM.
 pub fn arm(to: Source) -> Message {
-    command(to, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0])
+    command(to, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0, 0.0])
 }
 
 /// MAV_CMD_DO_SET_MODE to a mode, in PX4's numbers.
 pub fn set_mode(to: Source, wanted: Mode) -> Message {
     let custom = mode::custom_mode(wanted);
-    command(to, MavCmd::MAV_CMD_DO_SET_MODE, [1.0, (custom >> 16 & 0xff) as f32])
+    let [_, _, main, sub] = custom.to_le_bytes();
+    command(to, MavCmd::MAV_CMD_DO_SET_MODE, [1.0, main.into(), sub.into()])
 }
 
-fn command(to: Source, command: MavCmd, [param1, param2]: [f32; 2]) -> Message {
+fn command(to: Source, command: MavCmd, [param1, param2, param3]: [f32; 3]) -> Message {
     Message::coded(MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
         target_system: to.system,
         target_component: to.component,
         command,
         param1,
         param2,
+        param3,
         ..Default::default()
     }))
 }
@@ -111,10 +113,9 @@ pub fn read(frame: &Frame<'_>) -> Option<Heard> {
         MavMessage::VFR_HUD(v) => {
             Heard::Speed { airspeed: v.airspeed.into(), altitude: v.alt.into() }
         }
-        MavMessage::COMMAND_ACK(a) => Heard::Ack {
-            command: a.command as u32,
-            accepted: a.result as u32 == 0,
-        },
+        MavMessage::COMMAND_ACK(a) => {
+            Heard::Ack { command: a.command as u32, accepted: a.result as u32 == 0 }
+        }
         MavMessage::STATUSTEXT(t) => Heard::Text(t.text.to_str().unwrap_or_default().to_owned()),
         _ => return None,
     })

@@ -78,18 +78,11 @@ pub enum Request {
     /// PARAM_REQUEST_READ.
     ParameterRead(ParameterKey),
     /// PARAM_SET; the value is `None` for a type that is not in the table (8 or 16 bits, …).
-    ParameterSet {
-        name: ParameterName,
-        value: Option<ParameterValue>,
-    },
+    ParameterSet { name: ParameterName, value: Option<ParameterValue> },
     /// A mission message with its MAV_MISSION_TYPE.
     Mission { step: MissionStep, kind: u8 },
     /// FILE_TRANSFER_PROTOCOL: sequence number, session and opcode.
-    File {
-        sequence: u16,
-        session: u8,
-        opcode: u8,
-    },
+    File { sequence: u16, session: u8, opcode: u8 },
     /// TIMESYNC request with the client's time, ns.
     TimeSync { theirs: i64 },
     /// PING request.
@@ -101,34 +94,19 @@ pub enum Request {
 /// Decodes a frame into whom it is for and what it asks; `None` for everything else.
 pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
     let fields = Fields(frame.payload);
-    let at = |offset: usize| Recipient {
-        system: fields.u8(offset),
-        component: fields.u8(offset + 1),
-    };
+    let at =
+        |offset: usize| Recipient { system: fields.u8(offset), component: fields.u8(offset + 1) };
     let found = match frame.id {
         76 => (at(30), Request::Command(command_long(fields))),
         75 => (at(30), Request::Command(command_int(fields))),
         11 => {
-            let to = Recipient {
-                system: fields.u8(4),
-                component: 0,
-            };
-            (
-                to,
-                Request::SetMode {
-                    base: fields.u8(5),
-                    custom: fields.u32(0),
-                },
-            )
+            let to = Recipient { system: fields.u8(4), component: 0 };
+            (to, Request::SetMode { base: fields.u8(5), custom: fields.u32(0) })
         }
         // A request is for everybody (0/0), a reply for one.
-        4 if fields.bytes(12) == [0, 0] => (
-            at(12),
-            Request::Ping {
-                time_usec: fields.u64(0),
-                sequence: fields.u32(8),
-            },
-        ),
+        4 if fields.bytes(12) == [0, 0] => {
+            (at(12), Request::Ping { time_usec: fields.u64(0), sequence: fields.u32(8) })
+        }
         23 => (at(4), parameter_set(fields)),
         66 => (at(2), data_stream(fields)),
         43 => (at(0), mission(MissionStep::List, fields.u8(2))),
@@ -150,39 +128,30 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
 fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
     let to = |system: u8, component: u8| Recipient { system, component };
     Some(match message {
-        MavMessage::SET_ATTITUDE_TARGET(m) => (
-            to(m.target_system, m.target_component),
-            Request::Attitude(setpoint::attitude(&m)),
-        ),
+        MavMessage::SET_ATTITUDE_TARGET(m) => {
+            (to(m.target_system, m.target_component), Request::Attitude(setpoint::attitude(&m)))
+        }
         MavMessage::MANUAL_CONTROL(m) => (to(m.target, 0), Request::Sticks(setpoint::sticks(&m))),
-        MavMessage::PARAM_REQUEST_LIST(m) => (
-            to(m.target_system, m.target_component),
-            Request::ParameterList,
-        ),
+        MavMessage::PARAM_REQUEST_LIST(m) => {
+            (to(m.target_system, m.target_component), Request::ParameterList)
+        }
         MavMessage::PARAM_REQUEST_READ(m) => {
             let key = match usize::try_from(m.param_index) {
                 Ok(index) => ParameterKey::Index(index),
                 Err(_) => ParameterKey::Name(ParameterName(*m.param_id)),
             };
-            (
-                to(m.target_system, m.target_component),
-                Request::ParameterRead(key),
-            )
+            (to(m.target_system, m.target_component), Request::ParameterRead(key))
         }
         MavMessage::FILE_TRANSFER_PROTOCOL(m) => {
             let body = Fields(&m.payload);
-            let file = Request::File {
-                sequence: body.u16(0),
-                session: body.u8(2),
-                opcode: body.u8(3),
-            };
+            let file =
+                Request::File { sequence: body.u16(0), session: body.u8(2), opcode: body.u8(3) };
             (to(m.target_system, m.target_component), file)
         }
         // A reply carries a time in tc1, a request zero.
-        MavMessage::TIMESYNC(m) if m.tc1 == 0 => (
-            to(m.target_system, m.target_component),
-            Request::TimeSync { theirs: m.ts1 },
-        ),
+        MavMessage::TIMESYNC(m) if m.tc1 == 0 => {
+            (to(m.target_system, m.target_component), Request::TimeSync { theirs: m.ts1 })
+        }
         _ => return None,
     })
 }
@@ -200,15 +169,7 @@ fn command_int(fields: Fields<'_>) -> CommandRequest {
     let whole = |offset: usize| f64::from(fields.i32(offset));
     CommandRequest {
         number: fields.u16(28),
-        params: [
-            real(0),
-            real(4),
-            real(8),
-            real(12),
-            whole(16),
-            whole(20),
-            real(24),
-        ],
+        params: [real(0), real(4), real(8), real(12), whole(16), whole(20), real(24)],
         confirmation: 0,
     }
 }
@@ -220,18 +181,12 @@ fn parameter_set(fields: Fields<'_>) -> Request {
         9 => Some(ParameterValue::Real(fields.f32(0))),
         _ => None,
     };
-    Request::ParameterSet {
-        name: ParameterName(fields.bytes(6)),
-        value,
-    }
+    Request::ParameterSet { name: ParameterName(fields.bytes(6)), value }
 }
 
 fn data_stream(fields: Fields<'_>) -> Request {
     let rate = (fields.u8(5) != 0).then_some(fields.u16(0));
-    Request::DataStream {
-        group: fields.u8(4),
-        rate,
-    }
+    Request::DataStream { group: fields.u8(4), rate }
 }
 
 fn mission(step: MissionStep, kind: u8) -> Request {

@@ -37,11 +37,7 @@ pub(super) fn attitude(data: &SET_ATTITUDE_TARGET_DATA) -> Result<AttitudeSetpoi
         _ => None,
     };
     let (roll, pitch, _) = euler(data.q.map(f64::from))?;
-    Ok(AttitudeSetpoint {
-        roll,
-        pitch,
-        thrust,
-    })
+    Ok(AttitudeSetpoint { roll, pitch, thrust })
 }
 
 fn thrust(sent: f32) -> Result<f64, SetpointFault> {
@@ -73,11 +69,8 @@ pub fn euler(q: [f64; 4]) -> Result<(f64, f64, f64), SetpointFault> {
 
 /// The quaternion NED→FRD, w first, of Euler angles in rad.
 pub fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
-    let ((sr, cr), (sp, cp), (sy, cy)) = (
-        (roll / 2.0).sin_cos(),
-        (pitch / 2.0).sin_cos(),
-        (yaw / 2.0).sin_cos(),
-    );
+    let ((sr, cr), (sp, cp), (sy, cy)) =
+        ((roll / 2.0).sin_cos(), (pitch / 2.0).sin_cos(), (yaw / 2.0).sin_cos());
     [
         cr * cp * cy + sr * sp * sy,
         sr * cp * cy - cr * sp * sy,
@@ -120,10 +113,7 @@ mod tests {
     fn garbage_is_no_attitude() {
         assert_eq!(euler([0.0; 4]), Err(SetpointFault::NoAttitude));
         assert_eq!(euler([1e30, 0.0, 0.0, 0.0]), Err(SetpointFault::NotFinite));
-        assert_eq!(
-            euler([f64::NAN, 0.0, 0.0, 1.0]),
-            Err(SetpointFault::NotFinite)
-        );
+        assert_eq!(euler([f64::NAN, 0.0, 0.0, 1.0]), Err(SetpointFault::NotFinite));
         assert_eq!(thrust(1e30), Err(SetpointFault::NotFinite));
         assert_eq!(thrust(f32::NAN), Err(SetpointFault::NotFinite));
         assert_eq!(thrust(-0.5), Ok(0.0));

@@ -77,10 +77,9 @@ pub fn read(frame: &Frame<'_>) -> Option<VehicleMessage> {
             time: Time::from_micros(m.time_usec),
             specific_force: [m.xacc, m.yacc, m.zacc].map(wide),
         },
-        MavMessage::VFR_HUD(m) => VehicleMessage::Air {
-            airspeed: wide(m.airspeed),
-            altitude: wide(m.alt),
-        },
+        MavMessage::VFR_HUD(m) => {
+            VehicleMessage::Air { airspeed: wide(m.airspeed), altitude: wide(m.alt) }
+        }
         MavMessage::AOA_SSA(m) => VehicleMessage::Incidence {
             time: Time::from_micros(m.time_usec),
             alpha: wide(m.AOA).to_radians(),
@@ -126,14 +125,12 @@ pub fn actuator_controls(time: Time, outputs: Outputs) -> Message {
         controls[2] = command.throttle as f32;
         mode = ARMED;
     }
-    Message::coded(MavMessage::HIL_ACTUATOR_CONTROLS(
-        HIL_ACTUATOR_CONTROLS_DATA {
-            time_usec: time.as_micros(),
-            controls,
-            mode: MavModeFlag::from_bits_retain(mode),
-            ..HIL_ACTUATOR_CONTROLS_DATA::DEFAULT
-        },
-    ))
+    Message::coded(MavMessage::HIL_ACTUATOR_CONTROLS(HIL_ACTUATOR_CONTROLS_DATA {
+        time_usec: time.as_micros(),
+        controls,
+        mode: MavModeFlag::from_bits_retain(mode),
+        ..HIL_ACTUATOR_CONTROLS_DATA::DEFAULT
+    }))
 }
 
 /// HEARTBEAT of the companion on the vehicle link.

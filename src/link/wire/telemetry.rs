@@ -23,11 +23,7 @@ pub struct Stream {
 }
 
 const fn stream(id: u32, default_hz: f64, group: u8) -> Stream {
-    Stream {
-        id,
-        default_hz,
-        group,
-    }
+    Stream { id, default_hz, group }
 }
 
 /// Every stream, with its default rate.
@@ -93,9 +89,7 @@ pub fn message(id: u32, status: &Status, scene: &Scene) -> Option<Message> {
             ..EXTENDED_SYS_STATE_DATA::DEFAULT
         }),
         242 => {
-            return scene
-                .home
-                .map(|home| answer::home_position(home, scene.now));
+            return scene.home.map(|home| answer::home_position(home, scene.now));
         }
         436 => return Some(mode::current_mode(status)),
         _ => return None,
@@ -143,11 +137,7 @@ fn attitude_quaternion(status: &Status, scene: &Scene) -> Option<MavMessage> {
 
 fn attitude_target(status: &Status, scene: &Scene) -> Option<MavMessage> {
     let [roll, pitch] = finite(status.target)?;
-    let yaw = if status.attitude[2].is_finite() {
-        status.attitude[2]
-    } else {
-        0.0
-    };
+    let yaw = if status.attitude[2].is_finite() { status.attitude[2] } else { 0.0 };
     Some(MavMessage::ATTITUDE_TARGET(ATTITUDE_TARGET_DATA {
         time_boot_ms: boot_ms(scene.now),
         q: setpoint::quaternion([roll, pitch, yaw]).map(|x| x as f32),
@@ -171,9 +161,7 @@ fn vfr_hud(status: &Status) -> MavMessage {
 
 fn global_position(status: &Status, scene: &Scene) -> Option<MavMessage> {
     let [latitude, longitude] = finite(status.position)?;
-    let height = scene
-        .home
-        .map_or(0.0, |home| status.altitude - home.altitude);
+    let height = scene.home.map_or(0.0, |home| status.altitude - home.altitude);
     let [vx, vy, vz] = status.velocity.map(|v| (v * 100.0).round() as i16);
     Some(MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
         time_boot_ms: boot_ms(scene.now),
@@ -252,11 +240,7 @@ fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         onboard_control_sensors_present: sensors,
         onboard_control_sensors_enabled: sensors,
-        onboard_control_sensors_health: if status.vehicle_alive {
-            sensors
-        } else {
-            S::empty()
-        },
+        onboard_control_sensors_health: if status.vehicle_alive { sensors } else { S::empty() },
         load: (status.load * 1000.0).round() as u16,
         errors_comm: scene.bad_frames.min(u64::from(u16::MAX)) as u16,
         voltage_battery: u16::MAX,

@@ -9,10 +9,7 @@ pub struct Writer {
 
 impl Default for Writer {
     fn default() -> Self {
-        Writer {
-            bytes: [0; 255],
-            length: 0,
-        }
+        Writer { bytes: [0; 255], length: 0 }
     }
 }
 
@@ -27,10 +24,7 @@ impl Writer {
     /// The payload without its trailing zeros; at least one byte remains, as MAVLink 2 asks.
     pub fn truncated(&self) -> &[u8] {
         let written = &self.bytes[..self.length];
-        let kept = written
-            .iter()
-            .rposition(|&byte| byte != 0)
-            .map_or(1, |last| last + 1);
+        let kept = written.iter().rposition(|&byte| byte != 0).map_or(1, |last| last + 1);
         &self.bytes[..kept]
     }
 }

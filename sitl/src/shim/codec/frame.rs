@@ -69,11 +69,7 @@ pub struct Encoder {
 impl Encoder {
     /// An encoder whose first frame has sequence number 0.
     pub fn new(system: u8, component: u8) -> Self {
-        Encoder {
-            system,
-            component,
-            sequence: 0,
-        }
+        Encoder { system, component, sequence: 0 }
     }
 
     /// Appends `message` as a frame to `out`.
@@ -84,18 +80,7 @@ impl Encoder {
         let start = out.len();
         let [id0, id1, id2, _] = M::ID.to_le_bytes();
         let (length, sequence) = (payload.len() as u8, self.sequence);
-        out.extend([
-            MAGIC_2,
-            length,
-            0,
-            0,
-            sequence,
-            self.system,
-            self.component,
-            id0,
-            id1,
-            id2,
-        ]);
+        out.extend([MAGIC_2, length, 0, 0, sequence, self.system, self.component, id0, id1, id2]);
         out.extend(payload);
         out.extend(checksum(&out[start + 1..], M::CRC_EXTRA).to_le_bytes());
         self.sequence = self.sequence.wrapping_add(1);

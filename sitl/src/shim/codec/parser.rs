@@ -114,11 +114,7 @@ fn front(bytes: &[u8]) -> Front {
     let Some(extra) = crc_extra(layout.id) else {
         // Without a checksum, only a frame that ends where another begins is believed.
         let plausible = matches!(bytes.get(total), None | Some(&(MAGIC_1 | MAGIC_2)));
-        return if plausible {
-            Front::Unknown(total)
-        } else {
-            Front::Garbage
-        };
+        return if plausible { Front::Unknown(total) } else { Front::Garbage };
     };
     let sum = u16::from_le_bytes([bytes[end - 2], bytes[end - 1]]);
     if checksum(&bytes[1..end - 2], extra) != sum {

@@ -36,15 +36,8 @@ pub struct Address {
 
 impl fmt::Display for Address {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let prefix = Transport::ALL
-            .iter()
-            .find(|(_, transport)| *transport == self.transport);
-        write!(
-            f,
-            "{}:{}",
-            prefix.map_or("", |(prefix, _)| prefix),
-            self.endpoint
-        )
+        let prefix = Transport::ALL.iter().find(|(_, transport)| *transport == self.transport);
+        write!(f, "{}:{}", prefix.map_or("", |(prefix, _)| prefix), self.endpoint)
     }
 }
 
@@ -62,10 +55,7 @@ impl FromStr for Address {
     type Err = AddressError;
 
     fn from_str(given: &str) -> Result<Self, AddressError> {
-        let fail = |fault| AddressError {
-            given: given.to_owned(),
-            fault,
-        };
+        let fail = |fault| AddressError { given: given.to_owned(), fault };
         let (prefix, endpoint) = given.split_once(':').ok_or(fail("it has no transport"))?;
         let transport = Transport::ALL
             .iter()
@@ -76,16 +66,11 @@ impl FromStr for Address {
         if host.is_empty() {
             return Err(fail("it has no host"));
         }
-        let port: u16 = port
-            .parse()
-            .map_err(|_| fail("the port is not a number 0..65535"))?;
+        let port: u16 = port.parse().map_err(|_| fail("the port is not a number 0..65535"))?;
         if port == 0 && matches!(transport, Transport::UdpOut | Transport::TcpOut) {
             return Err(fail("port 0 cannot be sent to"));
         }
-        Ok(Address {
-            transport,
-            endpoint: endpoint.to_owned(),
-        })
+        Ok(Address { transport, endpoint: endpoint.to_owned() })
     }
 }
 
@@ -95,34 +80,18 @@ mod tests {
 
     #[test]
     fn reads_what_it_writes() {
-        for text in [
-            "udpin:0.0.0.0:14600",
-            "udpout:localhost:1",
-            "tcpin:[::1]:5760",
-            "tcpout:h:9",
-        ] {
-            assert_eq!(
-                text.parse::<Address>().map(|a| a.to_string()).as_deref(),
-                Ok(text)
-            );
+        for text in ["udpin:0.0.0.0:14600", "udpout:localhost:1", "tcpin:[::1]:5760", "tcpout:h:9"]
+        {
+            assert_eq!(text.parse::<Address>().map(|a| a.to_string()).as_deref(), Ok(text));
         }
     }
 
     #[test]
     fn refuses_in_one_line_that_names_the_address() {
-        for text in [
-            "",
-            "udp:1.2.3.4:5",
-            "udpin:14600",
-            "udpin::5",
-            "tcpin:h:65536",
-            "udpout:h:0",
-        ] {
+        for text in ["", "udp:1.2.3.4:5", "udpin:14600", "udpin::5", "tcpin:h:65536", "udpout:h:0"]
+        {
             let error = text.parse::<Address>().expect_err(text).to_string();
-            assert!(
-                error.contains(&format!("'{text}'")) && !error.contains('\n'),
-                "{error}"
-            );
+            assert!(error.contains(&format!("'{text}'")) && !error.contains('\n'), "{error}");
         }
     }
 }

@@ -47,10 +47,7 @@ impl TcpLink {
             Transport::TcpIn => listen(resolved)
                 .map(Source::Listener)
                 .map_err(|source| LinkError::opening(address, source))?,
-            _ => Source::Connector {
-                to: resolved,
-                attempt: None,
-            },
+            _ => Source::Connector { to: resolved, attempt: None },
         };
         Ok(TcpLink {
             source,
@@ -182,10 +179,7 @@ fn arrived(
     let Some(running) = attempt else {
         let (sender, receiver) = channel();
         let connect = move || sender.send(TcpStream::connect_timeout(&to, CONNECT));
-        thread::Builder::new()
-            .name("connect".into())
-            .spawn(connect)
-            .ok()?;
+        thread::Builder::new().name("connect".into()).spawn(connect).ok()?;
         *attempt = Some(receiver);
         return None;
     };

@@ -28,12 +28,7 @@ impl UdpLink {
         };
         timed.map_err(|source| LinkError::opening(address, source))?;
         let peer = (address.transport == Transport::UdpOut).then_some(resolved);
-        Ok(UdpLink {
-            socket,
-            transport: address.transport,
-            peer,
-            buffer: Box::new([0; 65536]),
-        })
+        Ok(UdpLink { socket, transport: address.transport, peer, buffer: Box::new([0; 65536]) })
     }
 
     pub(super) fn local(&self) -> Option<SocketAddr> {
@@ -59,10 +54,7 @@ impl UdpLink {
     pub(super) fn send(&mut self, bytes: &[u8]) -> bool {
         // The kernel reports the refusal of an earlier datagram on this one, so it is tried again.
         let mut sent = self.try_send(bytes);
-        if sent
-            .as_ref()
-            .is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused)
-        {
+        if sent.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused) {
             sent = self.try_send(bytes);
         }
         sent.is_ok()
@@ -99,12 +91,7 @@ fn connected(peer: SocketAddr) -> io::Result<UdpSocket> {
 
 /// The first socket address that `address` leads to.
 pub(super) fn resolve(address: &Address) -> Result<SocketAddr, LinkError> {
-    let fail = |source| LinkError::Resolve {
-        address: address.clone(),
-        source,
-    };
+    let fail = |source| LinkError::Resolve { address: address.clone(), source };
     let mut found = address.endpoint.to_socket_addrs().map_err(fail)?;
-    found
-        .next()
-        .ok_or_else(|| fail(io::Error::from(io::ErrorKind::NotFound)))
+    found.next().ok_or_else(|| fail(io::Error::from(io::ErrorKind::NotFound)))
 }

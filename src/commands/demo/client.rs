@@ -1,0 +1,165 @@
+//! The client of the demonstration: arms, enters offboard, flies the schedule over a real socket.
+
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+
+use super::schedule::{LEG_S, LEGS};
+use crate::link::autopilot::Mode;
+use crate::link::offboard::{ARM, Heard, OffboardClient, SET_MODE};
+
+/// How long arming, or entering offboard, may take.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Between two setpoints: 50 Hz; 2 Hz would do.
+const SETPOINT_PERIOD: Duration = Duration::from_millis(20);
+
+/// What the client knows of the flight.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct View {
+    /// The autopilot's time since boot, s.
+    pub time_s: f64,
+    /// Roll, rad.
+    pub roll: f64,
+    /// Pitch, rad.
+    pub pitch: f64,
+    /// Airspeed, m/s.
+    pub airspeed: f64,
+    /// Altitude, m.
+    pub altitude: f64,
+    armed: bool,
+    mode: Option<Mode>,
+    accepted: Option<u32>,
+}
+
+/// A client connected to one companion.
+pub struct Client {
+    socket: UdpSocket,
+    protocol: OffboardClient,
+    view: View,
+    texts: Vec<(f64, String)>,
+    started: Instant,
+    setpoint_due: Instant,
+    heartbeat_due: Instant,
+    target: (f64, f64),
+}
+
+impl Client {
+    /// Opens a socket towards the companion's client link.
+    pub fn connect(companion: SocketAddr) -> Result<Client> {
+        let open = || -> std::io::Result<UdpSocket> {
+            let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
+            socket.connect(companion)?;
+            socket.set_read_timeout(Some(Duration::from_millis(5)))?;
+            Ok(socket)
+        };
+        let now = Instant::now();
+        Ok(Client {
+            socket: open().context("opening the client's socket")?,
+            protocol: OffboardClient::default(),
+            view: View::default(),
+            texts: Vec::new(),
+            started: now,
+            setpoint_due: now,
+            heartbeat_due: now,
+            target: (0.0, 0.0),
+        })
+    }
+
+    /// Arms, enters offboard, flies every leg, and goes to hold. `watch` sees the view with the
+    /// number of the leg and the seconds flown on it.
+    pub fn fly(&mut self, mut watch: impl FnMut(usize, f64, &View)) -> Result<Vec<(f64, String)>> {
+        self.aim(0);
+        self.until(
+            "a heartbeat and an attitude",
+            |v| v.mode.is_some() && v.time_s > 0.0,
+            |_| None,
+        )?;
+        self.until("arming", |v| v.armed && v.accepted == Some(ARM), |p| Some(p.arm()))?;
+        let offboard = |v: &View| v.mode == Some(Mode::Offboard) && v.accepted == Some(SET_MODE);
+        self.until("offboard mode", offboard, |p| Some(p.set_mode(Mode::Offboard)))?;
+        for leg in 0..LEGS.len() {
+            self.aim(leg);
+            let start = self.view.time_s;
+            while self.view.time_s - start < LEG_S {
+                self.turn()?;
+                if self.view.mode != Some(Mode::Offboard) {
+                    bail!("the companion left offboard: {}", self.last_words());
+                }
+                watch(leg, self.view.time_s - start, &self.view);
+            }
+        }
+        self.until("hold mode", |v| v.mode == Some(Mode::Hold), |p| Some(p.set_mode(Mode::Hold)))?;
+        Ok(std::mem::take(&mut self.texts))
+    }
+
+    fn aim(&mut self, leg: usize) {
+        self.target = (LEGS[leg].roll_deg.to_radians(), LEGS[leg].pitch_deg.to_radians());
+    }
+
+    /// Asks every half second until it is so.
+    fn until(
+        &mut self,
+        what: &str,
+        so: impl Fn(&View) -> bool,
+        ask: impl Fn(&mut OffboardClient) -> Option<Vec<u8>>,
+    ) -> Result<()> {
+        let (start, mut due) = (Instant::now(), Instant::now());
+        while !so(&self.view) {
+            if start.elapsed() > PATIENCE {
+                bail!("no {what} within {} s: {}", PATIENCE.as_secs(), self.last_words());
+            }
+            // the companion wants a fresh setpoint before it enters offboard
+            if Instant::now() >= due + Duration::from_millis(100) {
+                if let Some(bytes) = ask(&mut self.protocol) {
+                    self.send(&bytes);
+                }
+                due += Duration::from_millis(500);
+            }
+            self.turn()?;
+        }
+        Ok(())
+    }
+
+    /// Sends what is due, and reads one datagram if there is one.
+    fn turn(&mut self) -> Result<()> {
+        let now = Instant::now();
+        if now >= self.heartbeat_due {
+            self.heartbeat_due = now + Duration::from_secs(1);
+            let bytes = self.protocol.heartbeat();
+            self.send(&bytes);
+        }
+        if now >= self.setpoint_due {
+            self.setpoint_due = now + SETPOINT_PERIOD;
+            let time_ms = self.started.elapsed().as_millis() as u32;
+            let bytes = self.protocol.setpoint(time_ms, self.target.0, self.target.1);
+            self.send(&bytes);
+        }
+        let mut datagram = [0; 2048];
+        // a time-out, or a companion that is not there yet, is no news
+        let Ok(length) = self.socket.recv(&mut datagram) else { return Ok(()) };
+        let (view, texts) = (&mut self.view, &mut self.texts);
+        self.protocol.read(&datagram[..length], |heard| match heard {
+            Heard::Heartbeat { armed, mode } => (view.armed, view.mode) = (armed, mode),
+            Heard::Attitude { time_s, roll, pitch } => {
+                (view.time_s, view.roll, view.pitch) = (time_s, roll, pitch);
+            }
+            Heard::Speed { airspeed, altitude } => {
+                (view.airspeed, view.altitude) = (airspeed, altitude)
+            }
+            Heard::Ack { command, accepted } if accepted => view.accepted = Some(command),
+            Heard::Ack { .. } => {}
+            Heard::Text(words) => texts.push((view.time_s, words)),
+        });
+        Ok(())
+    }
+
+    fn send(&self, bytes: &[u8]) {
+        // a datagram that is lost, is lost: everything here is sent again
+        let _ = self.socket.send(bytes);
+    }
+
+    fn last_words(&self) -> &str {
+        self.texts.last().map_or("it says nothing", |(_, words)| words)
+    }
+}

@@ -1,0 +1,182 @@
+//! `greylag demo`: shim, companion and client in one program, over real sockets.
+
+mod client;
+mod schedule;
+mod story;
+
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use anyhow::{Context, Result, anyhow};
+use greylag_sitl::plant::{PlantOptions, Start};
+use greylag_sitl::shim::{self, ShimOptions};
+
+use crate::commands::files::Overwrite;
+use crate::commands::{files, fly};
+use crate::control::Kind;
+use crate::flight::recorder::Place;
+use crate::flight::runtime::{Flight, Options, Pace};
+use crate::link::address::Address;
+use crate::report::FlightReport;
+use client::{Client, View};
+use schedule::{LEG_S, LEGS};
+use story::{TOLERANCE_DEG, Teller};
+
+/// Options of `greylag demo`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Controller that flies: pid, pid-retuned, lqi or cem.
+    #[arg(long, value_name = "NAME", default_value = "lqi")]
+    controller: Kind,
+    /// Model that the controller is designed from or plans with.
+    #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
+    model: PathBuf,
+    /// New folder for the recording and the report [default: the next number under flights/].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Flies the schedule; the exit status tells whether every target was tracked.
+///
+/// # Errors
+/// If something cannot be opened, or the flight ends before the schedule does.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let model = fly::model(&arguments.model, None)?;
+    let crew = fly::crew(arguments.controller, &model)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let flight = Flight::start(&options(arguments, &model)?, crew, stop.clone())?;
+    let folder = flight.recording.clone().context("the demonstration records")?;
+    let companion = flight.clients.first().copied().flatten().context("no client link")?;
+    let vehicle = flight.vehicle.context("no vehicle link")?;
+    println!(
+        "companion: controller {}, model {}, clients on udp {companion}",
+        arguments.controller, model.name
+    );
+    println!("shim: Skywalker X8 in JSBSim, real time, towards udp {vehicle}");
+    let simulator = simulate(&format!("udpout:{vehicle}"), stop.clone())?;
+    let mut table = Live::begin();
+    let flown =
+        Client::connect(companion).and_then(|mut c| c.fly(|leg, s, view| table.show(leg, s, view)));
+    table.end();
+    stop.store(true, Ordering::Relaxed);
+    let summary =
+        flight.join().context("the control thread has died; the recording holds all up to then")?;
+    let simulated = simulator.join().map_err(|_| anyhow!("the shim's thread has died"))?;
+    println!("{summary}");
+    println!("{}", simulated?);
+    let teller = Teller {
+        controller: arguments.controller.name(),
+        model: &model.name,
+        deflection: model.airframe.actuators.deflection_max,
+        texts: flown?,
+    };
+    let recorded = story::read(&folder)?;
+    let report = teller.tell(&folder, &recorded)?;
+    let page = folder.join("report.html");
+    files::write(&page, &report.page().render(), Overwrite::Never)?;
+    println!("report: {}", page.display());
+    Ok(verdict(&report))
+}
+
+fn options(arguments: &Arguments, model: &crate::model::GreyBox) -> Result<Options> {
+    let free_port: Address = "udpin:127.0.0.1:0".parse()?;
+    Ok(Options {
+        vehicle: free_port.clone(),
+        clients: vec![free_port],
+        record: Some(
+            arguments.out.clone().map_or(Place::Numbered("flights".into()), Place::Exactly),
+        ),
+        pace: Pace::RealTime,
+        duration: None,
+        plan_deadline: Options::PLAN_DEADLINE,
+        deflection: model.airframe.actuators.deflection_max,
+    })
+}
+
+/// Runs the shim on a thread of its own until `stop`.
+fn simulate(
+    link: &str,
+    stop: Arc<AtomicBool>,
+) -> Result<thread::JoinHandle<Result<shim::Summary, shim::ShimError>>> {
+    let link = link.parse()?;
+    let options = ShimOptions { link, ..ShimOptions::new(PlantOptions::default(), Start::NEUTRAL) };
+    thread::Builder::new()
+        .name("shim".into())
+        .spawn(move || shim::run(&options, &stop, &mut |_| ()))
+        .context("starting the shim's thread")
+}
+
+/// One line per leg: rewritten while it is flown on a terminal, written once elsewhere.
+struct Live {
+    terminal: bool,
+    leg: Option<usize>,
+    line: String,
+    shown: Duration,
+}
+
+impl Live {
+    fn begin() -> Live {
+        println!("   target roll/pitch     roll    pitch   error   airspeed  altitude");
+        Live {
+            terminal: std::io::stdout().is_terminal(),
+            leg: None,
+            line: String::new(),
+            shown: Duration::ZERO,
+        }
+    }
+
+    fn show(&mut self, leg: usize, seconds: f64, view: &View) {
+        if self.leg != Some(leg) {
+            self.end();
+            (self.leg, self.shown) = (Some(leg), Duration::ZERO);
+        }
+        let now = Duration::from_secs_f64(seconds.clamp(0.0, LEG_S));
+        let (roll, pitch) = (view.roll.to_degrees(), view.pitch.to_degrees());
+        let target = LEGS[leg];
+        let error = 0.5 * ((roll - target.roll_deg).abs() + (pitch - target.pitch_deg).abs());
+        self.line = format!(
+            "{:>5.1} s {:>5.0}/{:>3.0} deg {:>8.2} {:>8.2} {:>7.3} {:>7.1} m/s {:>6.0} m",
+            seconds,
+            target.roll_deg,
+            target.pitch_deg,
+            roll,
+            pitch,
+            error,
+            view.airspeed,
+            view.altitude
+        );
+        if self.terminal && now >= self.shown {
+            self.shown = now + Duration::from_millis(100);
+            print!("\r{}", self.line);
+            // a terminal that cannot be written to is no reason to stop flying
+            let _ = std::io::stdout().flush();
+        }
+    }
+
+    fn end(&mut self) {
+        if self.leg.take().is_some() {
+            let start = if self.terminal { "\r" } else { "" };
+            println!("{start}{}", self.line);
+        }
+    }
+}
+
+fn verdict(report: &FlightReport<'_>) -> ExitCode {
+    let (tracked, all) = (report.tracked(), report.segments.len());
+    for s in &report.segments {
+        println!(
+            "{:>4} {:>4.0}/{:>3.0} deg: settled error {:.3} deg",
+            s.difficulty.name(),
+            s.roll_target_rad.to_degrees(),
+            s.pitch_target_rad.to_degrees(),
+            s.settled_error_rad.to_degrees()
+        );
+    }
+    println!("tracked {tracked} of {all} targets within {TOLERANCE_DEG} deg");
+    if tracked == all { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}

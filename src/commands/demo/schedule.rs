@@ -1,0 +1,31 @@
+//! The schedule of the demonstration: which attitudes, for how long.
+
+use crate::report::Difficulty;
+
+/// One attitude of the schedule.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leg {
+    /// Commanded roll, degrees.
+    pub roll_deg: f64,
+    /// Commanded pitch, degrees.
+    pub pitch_deg: f64,
+    /// Easy or hard, Table II of the paper.
+    pub difficulty: Difficulty,
+}
+
+/// Length of a leg, s: six of them with start-up stay under a minute.
+pub const LEG_S: f64 = 8.0;
+
+/// Easy targets, then hard ones; climbs and dives alternate, so that the altitude comes back.
+pub const LEGS: [Leg; 6] = [
+    leg(20.0, 5.0, Difficulty::Easy),
+    leg(-30.0, 12.0, Difficulty::Easy),
+    leg(40.0, -10.0, Difficulty::Easy),
+    leg(-55.0, -27.0, Difficulty::Hard),
+    leg(57.0, 28.0, Difficulty::Hard),
+    leg(-58.0, 8.0, Difficulty::Hard),
+];
+
+const fn leg(roll_deg: f64, pitch_deg: f64, difficulty: Difficulty) -> Leg {
+    Leg { roll_deg, pitch_deg, difficulty }
+}

@@ -1,0 +1,101 @@
+//! The recording of the demonstration, read back and told as a report.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+use super::schedule::{LEGS, Leg};
+use crate::logs::csv::{self, Tolerance};
+use crate::logs::{Flight, Sample};
+use crate::report::{Cycle, Event, EventKind, FlightReport, LoopTiming, Segment, SurfaceTravel};
+
+/// Largest settled error that counts as tracked, degrees: half of what the paper calls
+/// "near-perfect tracking" (its section V-E).
+pub const TOLERANCE_DEG: f64 = 0.5;
+
+/// What is told besides the recording.
+pub struct Teller<'a> {
+    /// Name of the controller.
+    pub controller: &'a str,
+    /// Name of the model.
+    pub model: &'a str,
+    /// Deflection at full command, rad.
+    pub deflection: f64,
+    /// What the companion said, with its time, s.
+    pub texts: Vec<(f64, String)>,
+}
+
+impl Teller<'_> {
+    /// Reads the recording in `folder` and makes the report's material of it.
+    pub fn tell<'f>(&self, folder: &Path, flight: &'f Flight) -> Result<FlightReport<'f>> {
+        Ok(FlightReport {
+            title: format!("Greylag demo: {} on the Skywalker X8 in JSBSim", self.controller),
+            flight,
+            controller: self.controller.into(),
+            model: self.model.into(),
+            seed: None,
+            command_line: std::env::args()
+                .skip(1)
+                .fold("greylag".into(), |line, a| line + " " + &a),
+            versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
+            segments: LEGS.iter().map(|leg| segment(leg, flight)).collect(),
+            tolerance_rad: TOLERANCE_DEG.to_radians(),
+            travel: SurfaceTravel { aileron_rad: self.deflection, elevator_rad: self.deflection },
+            timing: Some(timing(&folder.join("flight.csv"))?),
+            events: self.texts.iter().map(event).collect(),
+        })
+    }
+}
+
+/// The recorded flight of `folder`.
+pub fn read(folder: &Path) -> Result<Flight> {
+    Ok(csv::load(&folder.join("flight.csv"), Tolerance::Strict)?.flight)
+}
+
+/// The part of the flight in which a leg's target was in force, with its settled error.
+fn segment(leg: &Leg, flight: &Flight) -> Segment {
+    let (roll, pitch) = (leg.roll_deg.to_radians(), leg.pitch_deg.to_radians());
+    // the target passes through a single-precision quaternion, good to 1e-7
+    let is =
+        |s: &&Sample| (s.roll_target_rad - roll).abs() + (s.pitch_target_rad - pitch).abs() < 1e-5;
+    let samples: Vec<&Sample> = flight.samples.iter().filter(is).collect();
+    let settled = &samples[samples.len() - samples.len() / 5..];
+    let rmse = |error: &dyn Fn(&Sample) -> f64| {
+        (settled.iter().map(|s| error(s).powi(2)).sum::<f64>() / settled.len() as f64).sqrt()
+    };
+    let ends = |sample: Option<&&Sample>| sample.map_or(f64::NAN, |s| s.time_s);
+    Segment {
+        start_s: ends(samples.first()),
+        end_s: ends(samples.last()),
+        roll_target_rad: roll,
+        pitch_target_rad: pitch,
+        difficulty: leg.difficulty,
+        settled_error_rad: 0.5
+            * (rmse(&|s| s.attitude_rad[0] - roll) + rmse(&|s| s.attitude_rad[1] - pitch)),
+    }
+}
+
+fn event((time_s, text): &(f64, String)) -> Event {
+    let failsafe = text.to_lowercase().contains("failsafe");
+    let kind = if failsafe { EventKind::Failsafe } else { EventKind::Text };
+    Event { time_s: *time_s, kind, text: text.clone() }
+}
+
+/// The loop's cycles, from the recording's own column.
+fn timing(path: &Path) -> Result<LoopTiming> {
+    let broken = || format!("reading the loop timing back from {}", path.display());
+    let mut reader = ::csv::Reader::from_path(path).with_context(broken)?;
+    let header = reader.headers().with_context(broken)?;
+    let column = |name: &str| header.iter().position(|h| h == name).with_context(broken);
+    let (time, latency) = (column("time_s")?, column("latency_us")?);
+    let number = |record: &::csv::StringRecord, at: usize| record.get(at)?.parse::<f64>().ok();
+    let mut cycles = Vec::new();
+    for record in reader.records() {
+        let record = record.with_context(broken)?;
+        if let Some((time_s, duration_us)) = number(&record, time).zip(number(&record, latency)) {
+            cycles.push(Cycle { time_s, duration_us });
+        }
+    }
+    let measure = "state frame to actuator command".into();
+    Ok(LoopTiming { measure, budget_us: 10_000.0, cycles })
+}

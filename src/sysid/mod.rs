@@ -1,0 +1,3 @@
+//! From flight logs to what is wrong with a model: reconstruct, compare, localise.
+
+pub mod reconstruction;

@@ -1,0 +1,64 @@
+//! A flight after reconstruction: one clock, no sensor errors, no gaps inside a segment.
+
+use crate::physics::{Command, Controls, State};
+
+/// One instant of a reconstructed flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instant {
+    /// Time on the log's clock, s.
+    pub time_s: f64,
+    /// The state, sensor errors removed.
+    pub state: State,
+    /// Heading ψ, rad; NaN if the log has none.
+    pub yaw: f64,
+    /// The deflections that act.
+    pub controls: Controls,
+    /// The command, where the log has one.
+    pub command: Option<Command>,
+    /// Specific force at the centre of gravity, biases removed, body axes, m/s²; NaN if not logged.
+    pub specific_force: [f64; 3],
+    /// Altitude above mean sea level, m.
+    pub altitude: f64,
+    /// Air density, kg/m³.
+    pub density: f64,
+}
+
+/// A stretch of flight without gaps, equally spaced in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
+    /// The samples, [`Reconstruction::step_s`] apart.
+    pub instants: Vec<Instant>,
+}
+
+/// An error of a sensor, or the wind, as estimated together with the path.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nuisance {
+    /// What it is, for example `gyro_bias_p`, `alpha_bias`, `airspeed_scale`, `wind_north`.
+    pub name: String,
+    /// Its value, in `unit`.
+    pub value: f64,
+    /// Its standard deviation, in `unit`.
+    pub sd: f64,
+    /// Unit, for example `rad/s`.
+    pub unit: &'static str,
+}
+
+/// A reconstructed flight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reconstruction {
+    /// What the flight is called in reports: its file.
+    pub name: String,
+    /// Time between samples, s.
+    pub step_s: f64,
+    /// The flight without its gaps.
+    pub segments: Vec<Segment>,
+    /// What was estimated along.
+    pub nuisances: Vec<Nuisance>,
+    /// Standard deviations of the measurements' noise, in the order roll, pitch, airspeed, p, q, r,
+    /// alpha, beta (units of [`State`]).
+    pub noise: [f64; 8],
+    /// Standard deviation of the accelerometers' noise, m/s².
+    pub force_noise: [f64; 3],
+    /// What the reader must know: assumptions made, power lost, for example for want of a vane.
+    pub notes: Vec<String>,
+}
