@@ -292,9 +292,13 @@ fn a_lost_vehicle_is_flagged_after_half_a_second_and_offboard_does_not_come_back
     assert!(flight.texts().contains("vehicle link back"));
 }
 
+/// Frames of which only the time advances.
+fn still(now: Time) -> Telemetry {
+    Telemetry { state: State::NEUTRAL, ..frame(now) }
+}
+
 #[test]
-fn a_frozen_state_counts_as_lost_after_half_a_second_armed_and_never_disarmed() {
-    let still = |now| Telemetry { state: State::NEUTRAL, ..frame(now) };
+fn a_state_that_does_not_answer_to_the_commands_counts_as_lost_after_half_a_second() {
     let mut flight = Flight::new();
     for _ in 0..200 {
         flight.now = flight.now.plus(TICK);
@@ -305,11 +309,25 @@ fn a_frozen_state_counts_as_lost_after_half_a_second_armed_and_never_disarmed() 
     for i in 1..=60 {
         flight.now = flight.now.plus(TICK);
         let decision = flight.tick_with(still(flight.now));
+        // The first command leaves with the answer to the first frame; 50 ticks later nothing
+        // has come of it.
         assert_eq!(
             decision.source,
-            if i <= 50 { Source::Planned } else { Source::Level },
+            if i <= 51 { Source::Planned } else { Source::Level },
             "tick {i}"
         );
+    }
+}
+
+#[test]
+fn a_simulator_that_has_settled_to_the_bit_is_not_taken_for_a_frozen_sensor() {
+    let mut flight = Flight::armed();
+    flight.fly(20);
+    flight.plan = Plan::Ready(flight.last.unwrap().command);
+    flight.tick();
+    for _ in 0..1000 {
+        flight.now = flight.now.plus(TICK);
+        assert_eq!(flight.tick_with(still(flight.now)).source, Source::Planned);
     }
 }
 
