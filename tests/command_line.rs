@@ -2,6 +2,7 @@
 #![cfg(feature = "sitl")]
 
 use std::fs;
+use std::path::Path;
 use std::process::{Command, Output};
 
 fn greylag(arguments: &[&str]) -> Output {
@@ -55,4 +56,49 @@ fn evaluate_refuses_what_it_cannot_fly() {
         &["evaluate", "--controller", "pid", "--aircraft-dir", "nowhere", "--aircraft", "glider"],
         &["glider", "nowhere"],
     );
+}
+
+/// Any JSBSim aircraft with the usual property names flies: here the X8, half a kilogram heavier.
+#[test]
+fn evaluate_flies_another_aircraft() {
+    let folder = tempfile::tempdir().unwrap();
+    let x8 = Path::new(env!("CARGO_MANIFEST_DIR")).join("sitl/aircraft/x8");
+    let heavy = folder.path().join("heavy");
+    fs::create_dir(&heavy).unwrap();
+    let mut copied = 0;
+    for entry in fs::read_dir(&x8).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        if path.is_dir() {
+            let engines = heavy.join(&name);
+            fs::create_dir(&engines).unwrap();
+            for file in fs::read_dir(&path).unwrap().map(|e| e.unwrap().path()) {
+                fs::copy(&file, engines.join(file.file_name().unwrap())).unwrap();
+            }
+            continue;
+        }
+        let text = fs::read_to_string(&path).unwrap();
+        let heavier = text.replace("7.4163504999", "8.5186617");
+        copied += usize::from(heavier != text);
+        fs::write(heavy.join(name.replace("x8", "heavy")), heavier).unwrap();
+    }
+    assert_eq!(copied, 1, "the X8's weight no longer reads 7.4163504999 lb");
+    let targets = folder.path().join("targets.csv");
+    fs::write(&targets, "group,roll_deg,pitch_deg\neasy,20,5\n").unwrap();
+    let (dir, targets) = (folder.path().to_str().unwrap(), targets.to_str().unwrap());
+    let output = greylag(&[
+        "evaluate",
+        "--controller",
+        "lqi",
+        "--targets",
+        targets,
+        "--aircraft-dir",
+        dir,
+        "--aircraft",
+        "heavy",
+    ]);
+    let (out, error) =
+        (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{error}");
+    assert!(out.contains("lqi") && out.contains("easy"), "{out}");
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use greylag::control::{self, Kind, Target};
 use greylag::model::{GreyBox, STEP, Twin};
 use greylag::num::stream;
+use greylag::physics::actuators::Actuators;
 use greylag::physics::{Channel, Command, Controls, State, rigid_body};
 use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start, Truth};
 use rand_distr::{Distribution, StandardNormal};
@@ -196,4 +197,24 @@ fn validate_replay_from_commands_alone() {
         worst = worst.max(error);
     }
     assert!(worst <= 0.05);
+}
+
+#[test]
+fn validate_actuators_against_the_simulator() {
+    let figures = model("jsbsim").airframe.actuators;
+    let mut worst = 0.0_f64;
+    for (_, commands) in histories() {
+        let mut plant = plant();
+        let mut actuators = Actuators::at_rest(&Controls::default());
+        for command in &commands {
+            let truth = plant.step(inputs(command)).unwrap();
+            actuators.step(command, &figures);
+            let (ours, theirs) = (actuators.controls(), controls(&truth));
+            worst = worst.max((ours.aileron - theirs.aileron).abs());
+            worst = worst.max((ours.elevator - theirs.elevator).abs());
+            worst = worst.max((ours.throttle - theirs.throttle).abs());
+        }
+    }
+    println!("actuator filters within {worst:.1e} of the simulator's (at most 1e-12)");
+    assert!(worst <= 1e-12);
 }
