@@ -253,8 +253,8 @@ impl Vehicle {
             let Ok(len) = self.socket.recv(&mut buffer) else {
                 continue;
             };
-            let answers = messages(&buffer[..len]).into_iter().filter_map(answer);
-            if let Some(answer) = answers.filter(|a| a.time_us == self.time_us).next_back() {
+            let mut answers = messages(&buffer[..len]).into_iter().filter_map(answer);
+            if let Some(answer) = answers.rfind(|a| a.time_us == self.time_us) {
                 return Some(answer);
             }
         }

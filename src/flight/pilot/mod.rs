@@ -13,6 +13,7 @@ mod config;
 mod decision;
 
 mod estimate;
+mod failsafe;
 mod limits;
 mod modes;
 mod parameters;
@@ -33,9 +34,6 @@ use texts::Texts;
 
 /// Least time between two lines about the same kind of trouble, s.
 const COMPLAINT_INTERVAL_S: f64 = 5.0;
-/// Change of a command that a flying aircraft shows within half a second, in units of 0..1:
-/// 0.005 of aileron rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), which no sensor misses.
-const UNFELT_TRAVEL: f64 = 0.005;
 
 /// The pilot of one aircraft.
 pub struct Pilot {
@@ -349,73 +347,6 @@ impl Pilot {
     fn level_command(&self) -> Command {
         let trim = self.config.trim_at(self.config.envelope.airspeed_cruise_mps);
         Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle }
-    }
-
-    /// A state that stands still while nothing asks it to move is no fault: the vehicle waits for
-    /// its launch, or a simulator without noise has settled.
-    fn excuse_stillness(&mut self, quality: Frame, now: Time) {
-        let (was, is) = (self.last_moved, self.in_force);
-        let moves =
-            [is.aileron - was.aileron, is.elevator - was.elevator, is.throttle - was.throttle];
-        if quality == Frame::Usable {
-            self.last_moved = self.in_force;
-        } else if quality == Frame::Frozen
-            && (!self.armed || moves.iter().all(|m| m.abs() <= UNFELT_TRAVEL))
-        {
-            self.estimate.refresh(now);
-        }
-    }
-
-    fn watch_vehicle(&mut self) {
-        let fresh = self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s);
-        if fresh != Some(false) || self.vehicle_lost {
-            return;
-        }
-        self.vehicle_lost = true;
-        if self.armed {
-            self.texts.say(Severity::Critical, "vehicle link lost: level, HOLD");
-            self.mode = Mode::Hold;
-        } else {
-            self.texts.say(Severity::Warning, "vehicle link lost");
-        }
-    }
-
-    fn watch_return(&mut self) {
-        if self.vehicle_lost
-            && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true)
-        {
-            self.vehicle_lost = false;
-            let words =
-                if self.armed { "vehicle link back: flying in HOLD" } else { "vehicle link back" };
-            self.texts.say(Severity::Notice, words);
-        }
-    }
-
-    fn watch_client(&mut self) {
-        let (lost, what) = match self.mode {
-            Mode::Offboard => (!self.setpoint_fresh(), "setpoints"),
-            Mode::Manual | Mode::Stabilized => (self.armed && !self.sticks_fresh(), "sticks"),
-            Mode::Hold | Mode::Return => return,
-        };
-        if lost {
-            let words = format!("{} lost for {:.1} s: HOLD", what, self.config.offboard_loss_s);
-            self.texts.say(Severity::Critical, words);
-            self.mode = Mode::Hold;
-            self.setpoint_lost = true;
-        }
-    }
-
-    /// The vehicle's clock has started again: all that was known is of another life.
-    fn restart(&mut self) {
-        if self.estimate.last().is_some() {
-            self.texts.say(Severity::Warning, "vehicle clock went back: vehicle restarted?");
-        }
-        self.estimate = Estimate::default();
-        self.setpoint = None;
-        self.sticks = None;
-        self.vehicle_lost = false;
-        self.complaints = Complaints::default();
-        self.forget_controllers();
     }
 
     fn complain_of_state(&mut self, reason: &'static str) {
