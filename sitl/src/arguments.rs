@@ -3,13 +3,11 @@
 mod errors;
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::{Args, Parser};
 use errors::{FaultArgs, SensorArgs};
-use greylag_sitl::air::{Air, Gust, Turbulence};
-use greylag_sitl::hidden::Hidden;
-use greylag_sitl::plant::{PlantOptions, Start};
+use greylag_sitl::plant::Start;
+use greylag_sitl::plant_arguments::PlantArgs;
 use greylag_sitl::shim::{Address, Existing, Launch, Pace, ShimOptions, TruthFile};
 
 /// Flies an aircraft in JSBSim and plays its flight controller over MAVLink.
@@ -41,30 +39,13 @@ pub struct Cli {
     #[arg(long, requires = "truth")]
     force: bool,
     #[command(flatten)]
-    aircraft: AircraftArgs,
+    plant: PlantArgs,
     #[command(flatten)]
     start: StartArgs,
-    #[command(flatten)]
-    air: AirArgs,
     #[command(flatten)]
     sensors: SensorArgs,
     #[command(flatten)]
     faults: FaultArgs,
-}
-
-/// Which aircraft.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Aircraft")]
-struct AircraftArgs {
-    /// Folder that holds NAME/NAME.xml; without it the X8 built into the program flies.
-    #[arg(long, value_name = "DIR", requires = "aircraft")]
-    aircraft_dir: Option<PathBuf>,
-    /// Name of the aircraft.
-    #[arg(long, value_name = "NAME")]
-    aircraft: Option<String>,
-    /// Hide an effect in the aircraft (may be repeated); a wrong ID is answered with all that are known.
-    #[arg(long, value_name = "ID=AMPLITUDE", allow_hyphen_values = true)]
-    hide: Vec<Hidden>,
 }
 
 /// The state at the start.
@@ -91,39 +72,6 @@ struct StartArgs {
     start_altitude_m: f64,
 }
 
-/// Wind, turbulence, gusts.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Air")]
-struct AirArgs {
-    /// Steady wind, the velocity of the air over the ground.
-    #[arg(long, value_name = "N,E,D", default_value = "0,0,0", allow_hyphen_values = true)]
-    wind_ned_mps: Numbers<3>,
-    /// MIL-spec turbulence: 3 light, 4 moderate, 6 severe.
-    #[arg(long, value_name = "1..7")]
-    turbulence_severity: Option<u8>,
-    /// Wind 20 ft above ground, which rules the turbulence near the ground; above 600 m the severity does.
-    #[arg(long, value_name = "MPS", default_value_t = 15.0, requires = "turbulence_severity")]
-    turbulence_wind_20ft_mps: f64,
-    /// A one-minus-cosine gust (may be repeated): start s, velocity NED m/s, rise, hold, fall s.
-    #[arg(long, value_name = "S,N,E,D,RISE,HOLD,FALL", allow_hyphen_values = true)]
-    gust: Vec<Numbers<7>>,
-}
-
-/// Numbers written with commas.
-#[derive(Clone, Copy, Debug)]
-struct Numbers<const N: usize>([f64; N]);
-
-impl<const N: usize> FromStr for Numbers<N> {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parts: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-        let parts = parts.map_err(|_| "it holds something that is not a number".to_owned())?;
-        let count = parts.len();
-        parts.try_into().map(Numbers).map_err(|_| format!("{N} numbers are needed, {count} given"))
-    }
-}
-
 impl Cli {
     /// What the command line asks for.
     pub fn options(&self) -> ShimOptions {
@@ -133,7 +81,7 @@ impl Cli {
             launch: if self.no_hold { Launch::Immediate } else { Launch::WhenArmed },
             duration_s: self.duration_s,
             start: self.start.state(),
-            plant: self.plant(),
+            plant: self.plant.options(self.seed),
             seed: u64::from(self.seed),
             truth: self.truth.clone().map(|path| TruthFile {
                 path,
@@ -143,16 +91,6 @@ impl Cli {
             bias: self.sensors.bias(),
             faults: self.faults.rule(),
         }
-    }
-
-    fn plant(&self) -> PlantOptions {
-        let mut plant = PlantOptions { seed: self.seed, air: self.air.air(), ..Default::default() };
-        plant.aircraft_dir = self.aircraft.aircraft_dir.clone();
-        if let Some(name) = &self.aircraft.aircraft {
-            plant.aircraft = name.clone();
-        }
-        plant.hidden = self.aircraft.hide.clone();
-        plant
     }
 }
 
@@ -166,26 +104,6 @@ impl StartArgs {
             airspeed_mps: self.start_airspeed_mps,
             altitude_m: self.start_altitude_m,
             ..Start::NEUTRAL
-        }
-    }
-}
-
-impl AirArgs {
-    fn air(&self) -> Air {
-        let gust = |&Numbers([start_s, n, e, d, rise_s, hold_s, fall_s]): &Numbers<7>| Gust {
-            start_s,
-            velocity_ned_mps: [n, e, d],
-            rise_s,
-            hold_s,
-            fall_s,
-        };
-        Air {
-            wind_ned_mps: self.wind_ned_mps.0,
-            turbulence: self.turbulence_severity.map(|severity| Turbulence {
-                wind_20ft_mps: self.turbulence_wind_20ft_mps,
-                severity,
-            }),
-            gusts: self.gust.iter().map(gust).collect(),
         }
     }
 }

@@ -4,4 +4,5 @@ pub mod air;
 mod aircraft;
 pub mod hidden;
 pub mod plant;
+pub mod plant_arguments;
 pub mod shim;

@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use greylag_sitl::plant::PlantOptions;
+use greylag_sitl::plant_arguments::PlantArgs;
 
 use crate::commands::files::{self, shipped};
 use crate::control::{self, Kind};
@@ -32,15 +33,11 @@ pub struct Arguments {
     /// Only these groups of targets.
     #[arg(long = "group", num_args = 1.., value_parser = parse_group)]
     groups: Vec<Group>,
-    /// Seed of the controllers' own randomness.
+    /// Seed of the controllers' own randomness, with the air's.
     #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Folder of another JSBSim aircraft; it holds NAME/NAME.xml.
-    #[arg(long, requires = "aircraft")]
-    aircraft_dir: Option<PathBuf>,
-    /// Its name.
-    #[arg(long, requires = "aircraft_dir")]
-    aircraft: Option<String>,
+    seed: u32,
+    #[command(flatten)]
+    plant: PlantArgs,
     /// Write the scores as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -54,7 +51,8 @@ pub struct Arguments {
 struct Document<'a> {
     schema: &'static str,
     program: &'static str,
-    seed: u64,
+    command_line: String,
+    seed: u32,
     targets: String,
     aircraft: &'a str,
     controllers: &'a [Evaluation],
@@ -79,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if !arguments.groups.is_empty() {
         targets.rows.retain(|row| arguments.groups.contains(&row.group));
     }
-    let plant = plant(arguments);
+    let plant = arguments.plant.options(arguments.seed);
     let models = arguments
         .models
         .iter()
@@ -96,6 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         let document = Document {
             schema: "greylag.evaluation/1",
             program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+            command_line: std::env::args().collect::<Vec<_>>().join(" "),
             seed: arguments.seed,
             targets: arguments.targets.display().to_string(),
             aircraft: &plant.aircraft,
@@ -104,15 +103,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::write(path, &(serde_json::to_string_pretty(&document)? + "\n"), overwrite)?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-fn plant(arguments: &Arguments) -> PlantOptions {
-    let default = PlantOptions::default();
-    PlantOptions {
-        aircraft_dir: arguments.aircraft_dir.clone(),
-        aircraft: arguments.aircraft.clone().unwrap_or(default.aircraft.clone()),
-        ..default
-    }
 }
 
 fn one(

@@ -49,6 +49,11 @@ impl Simulator {
         Ok(Simulator { plant: Plant::new(options)?, previous: [Command::IDLE; 2] })
     }
 
+    /// The seed of the turbulence from the next reset on.
+    pub fn reseed(&mut self, seed: u32) {
+        self.plant.reseed(seed);
+    }
+
     /// The whole truth of the plant.
     pub fn truth(&self) -> Truth {
         self.plant.truth()

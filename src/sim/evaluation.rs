@@ -57,6 +57,7 @@ pub struct Cost {
 }
 
 /// Flies `rows` in JSBSim with clones of a controller, on all cores; `done` is called after each.
+/// Every row has a seed of its own, whatever core it is flown on.
 ///
 /// # Errors
 /// If the plant cannot be built or reset.
@@ -64,7 +65,7 @@ pub fn evaluate(
     plant: &PlantOptions,
     make: &(dyn Fn() -> Box<dyn Controller> + Sync),
     rows: &[Row],
-    seed: u64,
+    seed: u32,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Outcome>, Trouble> {
     rows.par_iter()
@@ -81,8 +82,10 @@ pub fn evaluate(
                     pitch: row.pitch_deg.to_radians(),
                     airspeed: State::NEUTRAL.airspeed,
                 };
-                let seed = seed.wrapping_add(index as u64);
-                let episode = Episode { environment, controller: controller.as_mut(), seed };
+                let seed = seed.wrapping_add(index as u32);
+                environment.reseed(seed);
+                let controller = controller.as_mut();
+                let episode = Episode { environment, controller, seed: seed.into() };
                 let outcome = episode.fly(&target, |_, _| ())?;
                 done();
                 Ok(outcome)

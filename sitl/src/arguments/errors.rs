@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use greylag_sitl::shim::{Bias, FrameFaults, Noise};
 
-use super::Numbers;
+use greylag_sitl::plant_arguments::Numbers;
 
 /// A preset of sensor noise.
 #[derive(Clone, Copy, Debug, ValueEnum)]

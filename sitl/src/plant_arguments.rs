@@ -1,0 +1,100 @@
+//! The options of a command line that choose an aircraft with its air.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+
+use crate::air::{Air, Gust, Turbulence};
+use crate::hidden::Hidden;
+use crate::plant::PlantOptions;
+
+/// Which aircraft in which air; to be flattened into a program's options.
+#[derive(Clone, Debug, Args)]
+pub struct PlantArgs {
+    #[command(flatten)]
+    aircraft: AircraftArgs,
+    #[command(flatten)]
+    air: AirArgs,
+}
+
+/// Which aircraft.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Aircraft")]
+struct AircraftArgs {
+    /// Folder that holds NAME/NAME.xml; without it the X8 built into the program flies.
+    #[arg(long, value_name = "DIR", requires = "aircraft")]
+    aircraft_dir: Option<PathBuf>,
+    /// Name of the aircraft.
+    #[arg(long, value_name = "NAME")]
+    aircraft: Option<String>,
+    /// Hide an effect in the aircraft (may be repeated); a wrong ID is answered with all that are known.
+    #[arg(long, value_name = "ID=AMPLITUDE", allow_hyphen_values = true)]
+    hide: Vec<Hidden>,
+}
+
+/// Wind, turbulence, gusts.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Air")]
+struct AirArgs {
+    /// Steady wind, the velocity of the air over the ground.
+    #[arg(long, value_name = "N,E,D", default_value = "0,0,0", allow_hyphen_values = true)]
+    wind_ned_mps: Numbers<3>,
+    /// MIL-spec turbulence: 3 light, 4 moderate, 6 severe.
+    #[arg(long, value_name = "1..7")]
+    turbulence_severity: Option<u8>,
+    /// Wind 20 ft above ground, which rules the turbulence near the ground; above 600 m the severity does.
+    #[arg(long, value_name = "MPS", default_value_t = 15.0, requires = "turbulence_severity")]
+    turbulence_wind_20ft_mps: f64,
+    /// A one-minus-cosine gust (may be repeated): start s, velocity NED m/s, rise, hold, fall s.
+    #[arg(long, value_name = "S,N,E,D,RISE,HOLD,FALL", allow_hyphen_values = true)]
+    gust: Vec<Numbers<7>>,
+}
+
+/// Numbers written with commas.
+#[derive(Clone, Copy, Debug)]
+pub struct Numbers<const N: usize>(pub [f64; N]);
+
+impl<const N: usize> FromStr for Numbers<N> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+        let parts = parts.map_err(|_| "it holds something that is not a number".to_owned())?;
+        let count = parts.len();
+        parts.try_into().map(Numbers).map_err(|_| format!("{N} numbers are needed, {count} given"))
+    }
+}
+
+impl PlantArgs {
+    /// What the command line asks for, with turbulence of `seed`.
+    pub fn options(&self, seed: u32) -> PlantOptions {
+        let mut plant = PlantOptions { seed, air: self.air.air(), ..Default::default() };
+        plant.aircraft_dir = self.aircraft.aircraft_dir.clone();
+        if let Some(name) = &self.aircraft.aircraft {
+            plant.aircraft = name.clone();
+        }
+        plant.hidden = self.aircraft.hide.clone();
+        plant
+    }
+}
+
+impl AirArgs {
+    fn air(&self) -> Air {
+        let gust = |&Numbers([start_s, n, e, d, rise_s, hold_s, fall_s]): &Numbers<7>| Gust {
+            start_s,
+            velocity_ned_mps: [n, e, d],
+            rise_s,
+            hold_s,
+            fall_s,
+        };
+        Air {
+            wind_ned_mps: self.wind_ned_mps.0,
+            turbulence: self.turbulence_severity.map(|severity| Turbulence {
+                wind_20ft_mps: self.turbulence_wind_20ft_mps,
+                severity,
+            }),
+            gusts: self.gust.iter().map(gust).collect(),
+        }
+    }
+}
