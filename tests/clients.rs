@@ -1,0 +1,127 @@
+//! Flights with the clients that people have: pymavlink, MAVSDK, MAVProxy, each by a script.
+//!
+//! The scripts lie in `tests/clients/`. They run in a Python environment of their own below the
+//! target folder, which the first test to need it makes. Without Python or PyPI the tests say so
+//! and pass; with `GREYLAG_REQUIRE_CLIENTS=1` they fail instead.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// The folder of the scripts.
+const SCRIPTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/clients");
+const GREYLAG: &str = env!("CARGO_BIN_EXE_greylag");
+
+/// The folder that holds the program, target/PROFILE.
+fn profile_folder() -> &'static Path {
+    Path::new(GREYLAG).parent().unwrap()
+}
+
+/// Runs a command; what it said if it fails or cannot be started.
+fn done(command: &mut Command) -> Result<(), String> {
+    let told = format!("{command:?}");
+    match command.output() {
+        Err(error) => Err(format!("{told}: {error}")),
+        Ok(output) if output.status.success() => Ok(()),
+        Ok(output) => Err(format!("{told}: {}", String::from_utf8_lossy(&output.stderr).trim())),
+    }
+}
+
+/// The Python of the environment, or why there is none. Threads of this test wait for one
+/// another; another test program that makes the same environment is waited for at a file lock.
+fn python() -> &'static Result<PathBuf, String> {
+    static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    PYTHON.get_or_init(|| {
+        let folder = profile_folder().parent().unwrap().join("clients-venv");
+        let lock = File::create(folder.with_extension("lock")).map_err(|e| e.to_string())?;
+        lock.lock().map_err(|e| e.to_string())?;
+        environment(&folder)
+    })
+}
+
+/// Makes the environment unless it is there with the same requirements.
+fn environment(folder: &Path) -> Result<PathBuf, String> {
+    let requirements = Path::new(SCRIPTS).join("requirements.txt");
+    let wanted = fs::read_to_string(&requirements).unwrap();
+    // Written last, so that what was begun and not finished is begun again.
+    let installed = folder.join("installed.txt");
+    let python = folder.join("bin/python");
+    if fs::read_to_string(&installed).is_ok_and(|found| found == wanted) {
+        return Ok(python);
+    }
+    done(Command::new("python3").args(["-m", "venv", "--clear"]).arg(folder))?;
+    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"];
+    done(Command::new(&python).args(pip).arg("--requirement").arg(requirements))?;
+    fs::write(installed, wanted).unwrap();
+    Ok(python)
+}
+
+/// The shim's program. `cargo test --workspace` builds it beside ours; a test of this package
+/// alone does not, so it is asked for here, which costs nothing when it is there.
+fn shim() -> &'static Path {
+    static SHIM: OnceLock<PathBuf> = OnceLock::new();
+    SHIM.get_or_init(|| {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo
+            .args(["build", "--quiet", "--ignore-rust-version", "--package", "greylag-sitl"])
+            .args(["--bin", "greylag-sitl", "--target-dir"])
+            .arg(profile_folder().parent().unwrap())
+            .current_dir(env!("CARGO_MANIFEST_DIR"));
+        // The profile of a folder is its name, but for `dev`.
+        match profile_folder().file_name().and_then(|name| name.to_str()) {
+            Some("debug") => {}
+            Some(profile) => drop(cargo.args(["--profile", profile])),
+            None => panic!("{GREYLAG} lies in no profile's folder"),
+        }
+        done(&mut cargo).unwrap();
+        profile_folder().join(format!("greylag-sitl{}", std::env::consts::EXE_SUFFIX))
+    })
+}
+
+/// Flies a script.
+fn fly(script: &str) {
+    let python = match python() {
+        Ok(python) => python,
+        Err(reason) if std::env::var_os("GREYLAG_REQUIRE_CLIENTS").is_some_and(|v| v == "1") => {
+            panic!("{script} needs python3 with venv, and PyPI: {reason}")
+        }
+        Err(reason) => {
+            eprintln!("\n*** SKIPPED {script}: no Python with its packages: {reason} ***\n");
+            return;
+        }
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let Output { status, stdout, stderr } = Command::new(python)
+        .arg(Path::new(SCRIPTS).join(script))
+        .args(["--greylag", GREYLAG, "--sitl"])
+        .arg(shim())
+        // No __pycache__ among the sources.
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    println!("{}", String::from_utf8_lossy(&stdout));
+    eprintln!("{}", String::from_utf8_lossy(&stderr));
+    assert!(status.success(), "{script} failed: its lines are above");
+}
+
+#[test]
+fn pymavlink_flies_an_attitude() {
+    fly("pymavlink_flight.py");
+}
+
+#[test]
+fn mavsdk_flies_an_attitude() {
+    fly("mavsdk_flight.py");
+}
+
+#[test]
+fn mavproxy_flies_an_attitude_from_its_command_line() {
+    fly("mavproxy_flight.py");
+}
+
+#[test]
+fn misbehaviour_over_real_sockets_neither_ends_the_companion_nor_moves_the_surfaces() {
+    fly("pymavlink_trouble.py");
+}
