@@ -1,11 +1,9 @@
 //! The command line of `greylag-sitl`, in units a person writes.
 
-mod errors;
-
 use std::path::PathBuf;
 
 use clap::{Args, Parser};
-use errors::{FaultArgs, SensorArgs};
+use greylag_sitl::error_arguments::{FaultArgs, SensorArgs};
 use greylag_sitl::plant::Start;
 use greylag_sitl::plant_arguments::PlantArgs;
 use greylag_sitl::shim::{Address, Existing, Launch, Pace, ShimOptions, TruthFile};

@@ -2,6 +2,7 @@
 
 pub mod air;
 mod aircraft;
+pub mod error_arguments;
 pub mod hidden;
 pub mod plant;
 pub mod plant_arguments;

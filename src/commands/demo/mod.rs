@@ -13,7 +13,9 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
-use greylag_sitl::plant::{PlantOptions, Start};
+use greylag_sitl::error_arguments::{FaultArgs, SensorArgs};
+use greylag_sitl::plant::Start;
+use greylag_sitl::plant_arguments::PlantArgs;
 use greylag_sitl::shim::{self, ShimOptions};
 
 use crate::commands::files::Overwrite;
@@ -39,6 +41,15 @@ pub struct Arguments {
     /// New folder for the recording and the report [default: the next number under flights/].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Seed of everything random: turbulence, noise, lost frames.
+    #[arg(long, default_value_t = 1)]
+    seed: u32,
+    #[command(flatten)]
+    plant: PlantArgs,
+    #[command(flatten)]
+    sensors: SensorArgs,
+    #[command(flatten)]
+    faults: FaultArgs,
 }
 
 /// Flies the schedule; the exit status tells whether every target was tracked.
@@ -58,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         arguments.controller, model.name
     );
     println!("shim: Skywalker X8 in JSBSim, real time, towards udp {vehicle}");
-    let simulator = simulate(&format!("udpout:{vehicle}"), stop.clone())?;
+    let simulator = simulate(arguments, &format!("udpout:{vehicle}"), stop.clone())?;
     let mut table = Live::begin();
     let flown =
         Client::connect(companion).and_then(|mut c| c.fly(|leg, s, view| table.show(leg, s, view)));
@@ -71,6 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     println!("{}", simulated?);
     let teller = Teller {
         controller: arguments.controller.name(),
+        seed: arguments.seed.into(),
         model: &model.name,
         deflection: model.airframe.actuators.deflection_max,
         texts: flown?,
@@ -100,11 +112,20 @@ fn options(arguments: &Arguments, model: &crate::model::GreyBox) -> Result<Optio
 
 /// Runs the shim on a thread of its own until `stop`.
 fn simulate(
+    arguments: &Arguments,
     link: &str,
     stop: Arc<AtomicBool>,
 ) -> Result<thread::JoinHandle<Result<shim::Summary, shim::ShimError>>> {
     let link = link.parse()?;
-    let options = ShimOptions { link, ..ShimOptions::new(PlantOptions::default(), Start::NEUTRAL) };
+    let plant = arguments.plant.options(arguments.seed);
+    let options = ShimOptions {
+        link,
+        seed: arguments.seed.into(),
+        noise: arguments.sensors.noise(),
+        bias: arguments.sensors.bias(),
+        faults: arguments.faults.rule(),
+        ..ShimOptions::new(plant, Start::NEUTRAL)
+    };
     thread::Builder::new()
         .name("shim".into())
         .spawn(move || shim::run(&options, &stop, &mut |_| ()))

@@ -19,6 +19,8 @@ pub struct Teller<'a> {
     pub controller: &'a str,
     /// Name of the model.
     pub model: &'a str,
+    /// Seed of everything random.
+    pub seed: u64,
     /// Deflection at full command, rad.
     pub deflection: f64,
     /// What the companion said, with its time, s.
@@ -33,7 +35,7 @@ impl Teller<'_> {
             flight,
             controller: self.controller.into(),
             model: self.model.into(),
-            seed: None,
+            seed: Some(self.seed),
             command_line: std::env::args()
                 .skip(1)
                 .fold("greylag".into(), |line, a| line + " " + &a),

@@ -1,9 +1,9 @@
-//! The part of the command line that says what goes wrong on the way to the companion.
+//! The options of a command line that say what goes wrong on the way to the companion.
 
 use clap::{Args, ValueEnum};
-use greylag_sitl::shim::{Bias, FrameFaults, Noise};
 
-use greylag_sitl::plant_arguments::Numbers;
+use crate::plant_arguments::Numbers;
+use crate::shim::{Bias, FrameFaults, Noise};
 
 /// A preset of sensor noise.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -15,7 +15,7 @@ enum Preset {
 }
 
 /// Sensor errors.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Sensors (standard deviations replace those of the preset)")]
 pub struct SensorArgs {
     /// Preset of white noise.
@@ -57,7 +57,7 @@ pub struct SensorArgs {
 }
 
 /// What befalls state frames.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Frames")]
 pub struct FaultArgs {
     /// Every state frame comes this much late (in lockstep rounded up to whole 10 ms).
