@@ -129,6 +129,8 @@ def main():
             proxy.process.stdin.close()
             proxy.process.kill()
             proxy.process.wait()
+        alarms = [line for line in proxy.lines if "breach" in line or "Failed to load" in line]
+        check(not alarms, f"MAVProxy raised alarms: {alarms}")
         flown.land()
 
 

@@ -237,10 +237,13 @@ fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
         | S::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
         | S::MAV_SYS_STATUS_AHRS
         | S::MAV_SYS_STATUS_PREARM_CHECK;
+    // There is no fence to be breached: MAVProxy reports a breach when this bit is missing.
+    let fence = S::MAV_SYS_STATUS_GEOFENCE;
+    let health = if status.vehicle_alive { sensors | fence } else { fence };
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         onboard_control_sensors_present: sensors,
         onboard_control_sensors_enabled: sensors,
-        onboard_control_sensors_health: if status.vehicle_alive { sensors } else { S::empty() },
+        onboard_control_sensors_health: health,
         load: (status.load * 1000.0).round() as u16,
         errors_comm: scene.bad_frames.min(u64::from(u16::MAX)) as u16,
         voltage_battery: u16::MAX,
