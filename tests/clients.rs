@@ -53,7 +53,13 @@ fn environment(folder: &Path) -> Result<PathBuf, String> {
     }
     done(Command::new("python3").args(["-m", "venv", "--clear"]).arg(folder))?;
     let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"];
-    done(Command::new(&python).args(pip).arg("--requirement").arg(requirements))?;
+    let packages = done(Command::new(&python).args(pip).arg("--requirement").arg(requirements));
+    if let Err(reason) = packages {
+        // No network is a reason to skip; a list that cannot be installed is not.
+        let reached = done(Command::new(&python).args(["-m", "pip", "index", "versions", "pip"]));
+        assert!(reached.is_err(), "PyPI is there, but {reason}");
+        return Err(reason);
+    }
     fs::write(installed, wanted).unwrap();
     Ok(python)
 }
