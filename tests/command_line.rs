@@ -17,6 +17,9 @@ fn refuses(arguments: &[&str], words: &[&str]) {
     for word in words {
         assert!(error.contains(word), "{arguments:?} says {error:?}, not {word:?}");
     }
+    // clap adds its usage to what it refuses; everything else is one line
+    let lines = error.lines().filter(|line| !line.starts_with("flying")).count();
+    assert!(lines == 1 || error.contains("--help"), "{arguments:?} says more than a line: {error}");
 }
 
 #[test]
@@ -53,8 +56,34 @@ fn evaluate_refuses_what_it_cannot_fly() {
         &["none.csv", "greylag targets"],
     );
     refuses(
+        &["evaluate", "--controller", "lqi", "--json", "nodir/x.json"],
+        &["nodir/x.json", "folder"],
+    );
+    refuses(&["demo", "--aircraft", "nosuch"], &["nosuch"]);
+    refuses(&["demo", "--wind-ned-mps", "nan,0,0"], &["wind"]);
+    refuses(
         &["evaluate", "--controller", "pid", "--aircraft-dir", "nowhere", "--aircraft", "glider"],
         &["glider", "nowhere"],
+    );
+}
+
+#[test]
+fn targets_outside_their_group_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("targets.csv");
+    let path = file.to_str().unwrap();
+    for (row, words) in [
+        ("easy,80,80", ["row 1", "|roll| < 45"]),
+        ("easy,nan,0", ["row 1", "easy"]),
+        ("steep,1,1", ["steep", "easy"]),
+    ] {
+        fs::write(&file, format!("group,roll_deg,pitch_deg\n{row}\n")).unwrap();
+        refuses(&["evaluate", "--controller", "pid", "--targets", path], &words);
+    }
+    fs::write(&file, "group,roll_deg,pitch_deg\neasy, 10, 5\n").unwrap();
+    refuses(
+        &["evaluate", "--controller", "pid", "--targets", path, "--group", "hard_corners"],
+        &["group"],
     );
 }
 

@@ -207,7 +207,7 @@ fn lockstep_flight(kind: Kind) -> Vec<Answer> {
     vehicle.step(Trouble::None, PATIENCE).unwrap();
     let mut client = Client::new(companion.client(0));
     assert_eq!(client.arm(), MavResult::MAV_RESULT_ACCEPTED);
-    let steps = if kind.is_planner() { 100 } else { 2000 };
+    let steps = if kind.pace() == greylag::control::Pace::Planned { 100 } else { 2000 };
     for i in 0..steps {
         assert!(vehicle.step(Trouble::None, PATIENCE).is_some(), "step {i}");
     }
@@ -233,7 +233,7 @@ impl Controller for Slow {
     fn name(&self) -> &'static str {
         "slow"
     }
-    fn reset(&mut self, _seed: u64, _bumpless: Command) {}
+    fn reset(&mut self, _seed: u64) {}
     fn command(&mut self, _: &Observation, _: &Target) -> Command {
         std::thread::sleep(Duration::from_millis(30));
         Command { aileron: 1.0, elevator: 1.0, throttle: 1.0 }

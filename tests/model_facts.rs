@@ -1,4 +1,4 @@
-//! The facts of the X8 that the model must reproduce (`params/x8`, shared `x8_facts`).
+//! The facts of the X8 that the model must reproduce (`params/x8`, `params/x8/FACTS.md`).
 
 use std::path::Path;
 

@@ -94,4 +94,23 @@ fn numbers_that_no_aircraft_has() {
         &complaint(AS_IT_IS, ("airspeed_min_mps = 13.0", "airspeed_min_mps = 33.0")),
         &["airspeed_min_mps"],
     );
+    says(
+        &complaint(AS_IT_IS, ("pitch_min_deg = -30.0", "pitch_min_deg = 10.0")),
+        &["pitch_min_deg"],
+    );
+    says(
+        &complaint(AS_IT_IS, ("surface_slew_per_s = 20.0", "surface_slew_per_s = inf")),
+        &["surface_slew_per_s"],
+    );
+    says(&complaint(AS_IT_IS, ("value = 0.2,", "value = 1e-310,")), &["throttle_lag_s"]);
+    says(&complaint(("value = 3.364", "value = 1e300"), AS_IT_IS), &["mass_kg", "at most"]);
+}
+
+#[test]
+fn numbers_without_their_form() {
+    let mass = "mass_kg = { value = 3.364, source = \"Gryte et al. 2018\" }";
+    says(&complaint((mass, "mass_kg = 3.364"), AS_IT_IS), &["a number with its source", "line"]);
+    says(&complaint(("density = {", "density = 1.156 #"), AS_IT_IS), &["standard"]);
+    says(&complaint(("density = { kgpm3", "density = { foo = 3, kgpm3"), AS_IT_IS), &["density"]);
+    says(&complaint(("name = \"prior\"", "name = \"\""), AS_IT_IS), &["name"]);
 }

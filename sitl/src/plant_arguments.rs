@@ -44,7 +44,13 @@ struct AirArgs {
     #[arg(long, value_name = "1..7")]
     turbulence_severity: Option<u8>,
     /// Wind 20 ft above ground, which rules the turbulence near the ground; above 600 m the severity does.
-    #[arg(long, value_name = "MPS", default_value_t = 15.0, requires = "turbulence_severity")]
+    #[arg(
+        long,
+        value_name = "MPS",
+        default_value_t = 15.0,
+        requires = "turbulence_severity",
+        allow_negative_numbers = true
+    )]
     turbulence_wind_20ft_mps: f64,
     /// A one-minus-cosine gust (may be repeated): start s, velocity NED m/s, rise, hold, fall s.
     #[arg(long, value_name = "S,N,E,D,RISE,HOLD,FALL", allow_hyphen_values = true)]

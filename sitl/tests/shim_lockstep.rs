@@ -283,7 +283,7 @@ fn is_held_until_armed_while_time_runs() {
     }
     let flown = companion.fly(30, |_| [0.0, 0.0, 0.5]);
     // The first armed answer is to flown[0], so the first step lies between it and flown[1]:
-    // q̇ = +5.74 rad/s² at the neutral start (x8_facts), so q = 0.057 rad/s after one step.
+    // q̇ = +5.74 rad/s² at the neutral start (FACTS.md), so q = 0.057 rad/s after one step.
     assert_eq!(flown[0].attitude.pitchspeed, held[0].attitude.pitchspeed);
     assert!((flown[1].attitude.pitchspeed - 0.0574).abs() < 0.001, "{:?}", flown[1].attitude);
     let notices: Vec<_> = shim.notices.try_iter().collect();

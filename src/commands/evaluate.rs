@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use comfy_table::Table;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -12,8 +12,9 @@ use serde::Serialize;
 use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::plant_arguments::PlantArgs;
 
+use crate::commands::choices;
 use crate::commands::files::{self, shipped};
-use crate::control::{self, Kind};
+use crate::control::{self, Controller, Kind, Needs};
 use crate::model::GreyBox;
 use crate::sim::evaluation::{Evaluation, evaluate};
 use crate::sim::{Group, TargetFile};
@@ -21,8 +22,8 @@ use crate::sim::{Group, TargetFile};
 /// Options of `greylag evaluate`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Controllers to score: pid, pid-retuned, lqi, cem.
-    #[arg(long = "controller", num_args = 1.., required = true, value_parser = parse_kind)]
+    /// Controllers to score.
+    #[arg(long = "controller", value_name = "NAME", num_args = 1.., required = true, value_parser = choices::controller())]
     controllers: Vec<Kind>,
     /// Models that the controllers are designed from or plan with.
     #[arg(long = "model", num_args = 1.., default_values_os_t = [PathBuf::from("params/x8/jsbsim.toml")])]
@@ -31,7 +32,7 @@ pub struct Arguments {
     #[arg(long, default_value = "params/targets.csv")]
     targets: PathBuf,
     /// Only these groups of targets.
-    #[arg(long = "group", num_args = 1.., value_parser = parse_group)]
+    #[arg(long = "group", num_args = 1.., value_parser = choices::group())]
     groups: Vec<Group>,
     /// Seed of the controllers' own randomness, with the air's.
     #[arg(long, default_value_t = 1)]
@@ -58,38 +59,22 @@ struct Document<'a> {
     controllers: &'a [Evaluation],
 }
 
-fn parse_kind(name: &str) -> Result<Kind, String> {
-    name.parse().map_err(|e: control::SetupError| e.to_string())
-}
-
-fn parse_group(name: &str) -> Result<Group, String> {
-    let found = Group::ALL.into_iter().find(|g| g.name() == name);
-    found.ok_or_else(|| format!("the groups are {}", Group::ALL.map(Group::name).join(", ")))
-}
-
 /// Flies, prints the table, writes the JSON.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     if let Some(path) = &arguments.json {
         files::writable(path, overwrite)?;
     }
-    let mut targets = TargetFile::load(&shipped(&arguments.targets))?;
-    if !arguments.groups.is_empty() {
-        targets.rows.retain(|row| arguments.groups.contains(&row.group));
-    }
+    let targets = targets(arguments)?;
     let plant = arguments.plant.options(arguments.seed);
-    let models = arguments
-        .models
+    // everything that can be wrong is found before the first flight
+    let entrants = entrants(arguments)?;
+    let evaluations = entrants
         .iter()
-        .map(|path| GreyBox::load(&shipped(path)).map_err(Into::into))
+        .map(|e| one(arguments.seed, e, &targets, &plant))
         .collect::<Result<Vec<_>>>()?;
-    let mut evaluations = Vec::new();
-    for kind in &arguments.controllers {
-        for model in &models {
-            evaluations.push(one(arguments, *kind, model, &targets, &plant)?);
-        }
-    }
     println!("{}", table(&evaluations));
+    println!("all: easy with hard_corners, the targets of the paper's Table II");
     if let Some(path) = &arguments.json {
         let document = Document {
             schema: "greylag.evaluation/1",
@@ -105,20 +90,53 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn one(
-    arguments: &Arguments,
+fn targets(arguments: &Arguments) -> Result<TargetFile> {
+    let mut targets = TargetFile::load(&shipped(&arguments.targets))?;
+    if !arguments.groups.is_empty() {
+        targets.rows.retain(|row| arguments.groups.contains(&row.group));
+    }
+    if targets.rows.is_empty() {
+        bail!("{} has no targets of that group; leave --group out", arguments.targets.display());
+    }
+    Ok(targets)
+}
+
+/// A controller ready to fly, with the name of its model.
+struct Entrant {
     kind: Kind,
-    model: &GreyBox,
+    model: String,
+    controller: Box<dyn Controller>,
+}
+
+/// Every controller on every model; one that needs no model enters once.
+fn entrants(arguments: &Arguments) -> Result<Vec<Entrant>> {
+    let load = |path: &PathBuf| GreyBox::load(&shipped(path));
+    let models = arguments.models.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let mut entrants = Vec::new();
+    for kind in &arguments.controllers {
+        let count = if kind.needs() == Needs::Model { models.len() } else { 1 };
+        for model in &models[..count] {
+            let name = if kind.needs() == Needs::Model { &model.name } else { "-" };
+            let controller = control::build(*kind, model)?;
+            entrants.push(Entrant { kind: *kind, model: name.into(), controller });
+        }
+    }
+    Ok(entrants)
+}
+
+fn one(
+    seed: u32,
+    entrant: &Entrant,
     targets: &TargetFile,
     plant: &PlantOptions,
 ) -> Result<Evaluation> {
-    let controller = control::build(kind, model)?;
+    let Entrant { kind, model, controller } = entrant;
+    let progress = progress(targets.rows.len() as u64, &format!("{kind}, model {model}"));
     let make = || controller.boxed_clone();
-    let progress = progress(targets.rows.len() as u64, &format!("{kind} on {}", model.name));
-    let outcomes = evaluate(plant, &make, &targets.rows, arguments.seed, &|| progress.inc(1))
+    let outcomes = evaluate(plant, &make, &targets.rows, seed, &|| progress.inc(1))
         .with_context(|| format!("cannot fly aircraft {}", plant.aircraft))?;
     progress.finish_and_clear();
-    Ok(Evaluation::new(kind.name(), &model.name, &targets.rows, &outcomes))
+    Ok(Evaluation::new(kind.name(), model, &targets.rows, &outcomes))
 }
 
 /// A bar on a terminal, one plain line elsewhere.

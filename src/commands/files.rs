@@ -1,4 +1,4 @@
-//! Finding the shipped files, and writing new ones without overwriting.
+//! The files a user names on the command line.
 
 use std::path::{Path, PathBuf};
 
@@ -32,6 +32,10 @@ impl From<bool> for Overwrite {
 pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     if overwrite == Overwrite::Never && path.exists() {
         bail!("{} exists; name another file, or give --force to replace it", path.display());
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if path.is_dir() || !folder.is_dir() {
+        bail!("cannot write {}: name a file in a folder that exists", path.display());
     }
     Ok(())
 }

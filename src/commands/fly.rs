@@ -10,8 +10,9 @@ use anyhow::Context;
 use clap::Args;
 use crossbeam_channel::RecvTimeoutError;
 
+use crate::commands::choices;
 use crate::commands::files::shipped;
-use crate::control::{Controller, Kind, build};
+use crate::control::{self, Controller, Kind, build};
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
 use crate::flight::runtime::{Crew, Event, Flight, Options, Pace, Seat};
@@ -29,8 +30,8 @@ pub struct Arguments {
     /// Link to clients; may be given several times.
     #[arg(long = "client", value_name = "ADDRESS", default_values = ["udpin:0.0.0.0:14550", "udpout:127.0.0.1:14540"])]
     clients: Vec<Address>,
-    /// Controller: pid, pid-retuned, lqi or cem.
-    #[arg(long, value_name = "NAME", default_value = "lqi")]
+    /// Controller.
+    #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
     controller: Kind,
     /// Model that the controller is designed from or plans with.
     #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
@@ -123,7 +124,7 @@ pub fn crew(kind: Kind, model: &GreyBox) -> anyhow::Result<Crew> {
     // The design of an LQI takes a moment; it is not made twice.
     let fallback = if kind == Kind::Lqi { controller.boxed_clone() } else { fallback(model)? };
     let pilot = Pilot::new(Config::for_model(model)?, fallback)?;
-    let seat = if kind.is_planner() { Seat::Thread } else { Seat::Loop };
+    let seat = if kind.pace() == control::Pace::Planned { Seat::Thread } else { Seat::Loop };
     Ok(Crew { pilot, controller, seat })
 }
 

@@ -1,5 +1,6 @@
 //! Subcommands: arguments, then a few lines of work.
 
+mod choices;
 #[cfg(feature = "sitl")]
 mod demo;
 #[cfg(feature = "sitl")]

@@ -6,7 +6,7 @@ pub mod pid;
 pub mod task;
 mod registry;
 
-pub use registry::{Kind, SetupError, build};
+pub use registry::{Kind, Needs, Pace, SetupError, build};
 
 use crate::physics::{ActuatorState, Command, State, Time};
 
@@ -44,9 +44,9 @@ pub trait Controller: Send + Sync {
     fn name(&self) -> &'static str;
     /// Forgets the past (integrators, warm starts), as before take-off or on re-engagement.
     ///
-    /// `bumpless` is the command in force, from which the next one should continue where the
-    /// law can.
-    fn reset(&mut self, seed: u64, bumpless: Command);
+    /// The first command afterwards may differ from the one in force: whoever hands over limits
+    /// how fast the surfaces move.
+    fn reset(&mut self, seed: u64);
     /// The command for this tick.
     fn command(&mut self, seen: &Observation, target: &Target) -> Command;
     /// Another controller like this one, for another core; the design is not made again.

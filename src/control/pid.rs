@@ -4,14 +4,15 @@ use crate::control::{Controller, Observation, Target};
 use crate::model::STEP;
 use crate::physics::Command;
 
-/// Gains of one loop: command = trim + kp·e + ki·∫e − kd·rate.
+/// Gains of one loop: output = trim + kp·e + ki·∫e − kd·rate, in units of the output (rad of
+/// surface, or throttle) per unit of the error (rad, or m/s).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// On the error.
     pub kp: f64,
-    /// On its integral, 1/s.
+    /// On its integral, per second.
     pub ki: f64,
-    /// On the measured rate, s.
+    /// On the measured rate, times seconds.
     pub kd: f64,
 }
 
@@ -101,10 +102,10 @@ impl Pid {
         let raw = output(grown);
         let outward =
             (raw > stops.1 && gains.ki * error > 0.0) || (raw < stops.0 && gains.ki * error < 0.0);
-        if self.tuning.windup == Windup::Free || !outward {
+        if grown.is_finite() && (self.tuning.windup == Windup::Free || !outward) {
             self.integrals[axis] = grown;
         }
-        output(self.integrals[axis]).clamp(stops.0, stops.1)
+        output(if grown.is_finite() { self.integrals[axis] } else { grown }).clamp(stops.0, stops.1)
     }
 }
 
@@ -117,7 +118,7 @@ impl Controller for Pid {
         Box::new(self.clone())
     }
 
-    fn reset(&mut self, _seed: u64, _bumpless: Command) {
+    fn reset(&mut self, _seed: u64) {
         self.integrals = [0.0; 3];
     }
 

@@ -30,8 +30,26 @@ pub enum SetupError {
     },
 }
 
+/// Where a controller has to run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// In the control loop: it needs microseconds.
+    Immediate,
+    /// On a thread of its own: it plans, and so may miss the deadline.
+    Planned,
+}
+
+/// What a controller is built from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Needs {
+    /// Its own gains.
+    Gains,
+    /// A model of the aircraft.
+    Model,
+}
+
 macro_rules! controllers {
-    ($($kind:ident $name:literal $about:literal => |$model:ident| $build:expr),* $(,)?) => {
+    ($($kind:ident $name:literal $seat:ident $needs:ident $about:literal => |$model:ident| $build:expr),* $(,)?) => {
         /// A controller by name.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Kind { $(#[doc = $about] $kind,)* }
@@ -43,6 +61,16 @@ macro_rules! controllers {
             /// The name that selects it.
             pub const fn name(self) -> &'static str {
                 match self { $(Kind::$kind => $name,)* }
+            }
+
+            /// Where it has to run.
+            pub const fn pace(self) -> Pace {
+                match self { $(Kind::$kind => Pace::$seat,)* }
+            }
+
+            /// What it is built from.
+            pub const fn needs(self) -> Needs {
+                match self { $(Kind::$kind => Needs::$needs,)* }
             }
         }
 
@@ -57,18 +85,13 @@ macro_rules! controllers {
 }
 
 controllers! {
-    Pid "pid" "PID with the gains published with the simulator." => |_model| pid::Pid::new(pid::PUBLIC),
-    PidRetuned "pid-retuned" "PID retuned, at a safer airspeed." => |_model| pid::Pid::new(pid::RETUNED),
-    Lqi "lqi" "Gain-scheduled LQI designed from the model." => |model| lqi::Lqi::new(model)?,
-    Cem "cem" "CEM-MPC over five steps of the model." => |model| cem::Cem::new(model, cem::Settings::PAPER),
+    Pid "pid" Immediate Gains "PID with the gains published with the simulator." => |_model| pid::Pid::new(pid::PUBLIC),
+    PidRetuned "pid-retuned" Immediate Gains "PID retuned, at a safer airspeed." => |_model| pid::Pid::new(pid::RETUNED),
+    Lqi "lqi" Immediate Model "Gain-scheduled LQI designed from the model." => |model| lqi::Lqi::new(model)?,
+    Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |model| cem::Cem::new(model, cem::Settings::PAPER),
 }
 
 impl Kind {
-    /// Whether it plans, and so may miss the deadline: it then runs on a thread of its own.
-    pub fn is_planner(self) -> bool {
-        self == Kind::Cem
-    }
-
     fn names() -> String {
         Kind::ALL.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ")
     }

@@ -8,7 +8,7 @@ use super::grey_box::Term;
 use super::{GreyBox, Integrator, Named};
 use crate::num::Table;
 use crate::physics::Airframe;
-use crate::physics::airframe::{FileError, Sourced, check_schema, positive, toml_error};
+use crate::physics::airframe::{FileError, Sourced, check_schema, named, positive, toml_error};
 use crate::physics::atmosphere::{Atmosphere, Density};
 use crate::physics::effects::{Description, Kind};
 use crate::physics::rigid_body::{ForceAxes, RigidBody};
@@ -46,10 +46,19 @@ struct AirFile {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "density must be \"standard\" or { kgpm3 = { value = …, source = … } }"
+)]
 enum DensityFile {
-    Constant { kgpm3: Sourced },
+    Constant(ConstantDensity),
     Law(String),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ConstantDensity {
+    kgpm3: Sourced,
 }
 
 #[derive(Deserialize)]
@@ -76,7 +85,7 @@ impl GreyBox {
             example: "prior.toml",
         })?;
         let content = |why| FileError::Content { what, path: path.into(), why };
-        let file: File = toml::from_str(&text).map_err(|e| content(toml_error(&e)))?;
+        let file: File = toml::from_str(&text).map_err(|e| content(toml_error(&text, &e)))?;
         check_schema(file.schema).map_err(content)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let airframe = Airframe::load(&folder.join(&file.airframe))?;
@@ -101,7 +110,7 @@ impl File {
             );
         }
         Ok(GreyBox {
-            name: self.name,
+            name: named(self.name)?,
             airframe,
             body: self.rigid_body.checked()?,
             atmosphere: self.air.checked()?,
@@ -116,10 +125,10 @@ impl File {
 impl BodyFile {
     fn checked(&self) -> Result<RigidBody, String> {
         let body = RigidBody {
-            mass: positive("rigid_body.mass_kg", &self.mass_kg)?,
-            jx: positive("rigid_body.jx_kgm2", &self.jx_kgm2)?,
-            jy: positive("rigid_body.jy_kgm2", &self.jy_kgm2)?,
-            jz: positive("rigid_body.jz_kgm2", &self.jz_kgm2)?,
+            mass: positive("rigid_body.mass_kg", &self.mass_kg, 10000.0)?,
+            jx: positive("rigid_body.jx_kgm2", &self.jx_kgm2, 100000.0)?,
+            jy: positive("rigid_body.jy_kgm2", &self.jy_kgm2, 100000.0)?,
+            jz: positive("rigid_body.jz_kgm2", &self.jz_kgm2, 100000.0)?,
             jxz: self.jxz_kgm2.value,
         };
         if body.jx * body.jz > body.jxz * body.jxz {
@@ -136,8 +145,8 @@ impl BodyFile {
 impl AirFile {
     fn checked(&self) -> Result<Atmosphere, String> {
         let density = match &self.density {
-            DensityFile::Constant { kgpm3 } => {
-                Density::Constant(positive("air.density.kgpm3", kgpm3)?)
+            DensityFile::Constant(ConstantDensity { kgpm3 }) => {
+                Density::Constant(positive("air.density.kgpm3", kgpm3, 2.0)?)
             }
             DensityFile::Law(law) if law == "standard" => Density::Standard,
             DensityFile::Law(law) => {
@@ -146,7 +155,7 @@ impl AirFile {
                 ));
             }
         };
-        Ok(Atmosphere { density, gravity: positive("air.gravity_mps2", &self.gravity_mps2)? })
+        Ok(Atmosphere { density, gravity: positive("air.gravity_mps2", &self.gravity_mps2, 12.0)? })
     }
 }
 
@@ -170,9 +179,13 @@ fn effect(
     };
     let mut named = Vec::new();
     for c in about.coefficients {
-        let number: Sourced = get(c.name)?
-            .try_into()
-            .map_err(|e| format!("effects.{id}.{}: {}", c.name, toml_error(&e)))?;
+        let number: Sourced = get(c.name)?.try_into().map_err(|e| {
+            format!(
+                "effects.{id}.{}: {}",
+                c.name,
+                e.message().lines().collect::<Vec<_>>().join("; ")
+            )
+        })?;
         let (low, high) = c.bounds;
         if !(low..=high).contains(&number.value) {
             return Err(format!(
@@ -191,11 +204,12 @@ fn effect(
 
 fn table(id: &str, key: &str, content: toml::Value) -> Result<Table, String> {
     let at = |why: String| format!("effects.{id}.{key}: {why}");
-    let points: TableFile = content.try_into().map_err(|e| at(toml_error(&e)))?;
+    let points: TableFile =
+        content.try_into().map_err(|e| at(e.message().lines().collect::<Vec<_>>().join("; ")))?;
     Table::new(&points.alpha_rad, &points.value).map_err(|e| at(e.to_string()))
 }
 
 fn unknown_effect(id: &str) -> String {
     let ids: Vec<_> = Kind::ALL.iter().map(|k| k.describe().id).collect();
-    format!("effects.{id} is unknown to this program; it knows {}", ids.join(", "))
+    format!("effects.{id:?} is unknown to this program; it knows {}", ids.join(", "))
 }

@@ -65,7 +65,7 @@ impl GreyBox {
         }
     }
 
-    /// The effects that the model names, in the order of its file.
+    /// The effects that the model names, in the order of their ids.
     pub fn effects(&self) -> impl Iterator<Item = Kind> {
         self.terms.iter().map(|term| term.kind)
     }

@@ -36,9 +36,15 @@ pub struct TrimError {
 impl Trim {
     /// Straight and level at `airspeed` (m/s) and `altitude` (m): γ = 0, so θ = α.
     ///
+    /// The controls that hold it may lie beyond their stops: whether the aircraft has that much
+    /// thrust is for the caller to see.
+    ///
     /// # Errors
-    /// If the model cannot fly level at that airspeed.
+    /// If no controls hold level flight at that airspeed.
     pub fn level(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Trim, TrimError> {
+        if airspeed.is_nan() || airspeed <= 0.0 {
+            return Err(failure(model, 0.0, 0.0, airspeed));
+        }
         let condition = |x: [Dual<3>; 3]| level_condition(x, airspeed);
         newton::solve([0.03, 0.0, 0.2], [0.1, 0.2, 0.5], |x| {
             let (state, controls) = condition(x);

@@ -95,7 +95,7 @@ impl<const N: usize> Real for Lanes<N> {
 /// Adding and subtracting 1.5 · 2²³ rounds to the nearest integer without a call.
 const ROUND: f32 = 12_582_912.0;
 
-/// Sine and cosine to 2 ulp for |x| < 8192, without branches (Cephes `sinf`, `cosf`).
+/// Sine and cosine to 1e-7 absolute for |x| < 8192, without branches (Cephes `sinf`, `cosf`).
 #[inline(always)]
 fn sin_cos(x: f32) -> (f32, f32) {
     let turns = (x * std::f32::consts::FRAC_2_PI + ROUND) - ROUND;

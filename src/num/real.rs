@@ -40,15 +40,15 @@ pub trait Real:
     fn abs(self) -> Self {
         Self::where_less(self, Self::zero(), -self, self)
     }
-    /// The smaller of two numbers.
+    /// The smaller of two numbers; NaN if `self` is, so that limits do not hide a lost number.
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        Self::where_less(self, other, self, other)
+        Self::where_less(other, self, other, self)
     }
-    /// The larger of two numbers.
+    /// The larger of two numbers; NaN if `self` is.
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        Self::where_less(other, self, self, other)
+        Self::where_less(self, other, other, self)
     }
     /// Zero.
     #[inline(always)]

@@ -5,7 +5,6 @@ use super::Real;
 /// A piecewise linear function of one variable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    start: f64,
     floor: f64,
     /// (x at the segment's start, its length, slope).
     segments: Vec<(f64, f64, f64)>,
@@ -17,16 +16,22 @@ pub enum TableError {
     /// Too few points.
     #[error("a table needs at least two points, this one has {0}")]
     TooShort(usize),
+    /// Too many points.
+    #[error("a table may have {MAX_POINTS} points, this one has {0}; thin it out")]
+    TooLong(usize),
     /// The two lists differ in length.
     #[error("a table needs as many ordinates as abscissae, this one has {0} and {1}")]
     Uneven(usize, usize),
     /// The abscissae are not increasing.
-    #[error("a table's abscissae must increase: point {0} does not")]
+    #[error("a table's abscissae must increase: point {} does not", .0 + 1)]
     NotIncreasing(usize),
     /// A number is not finite.
-    #[error("a table's numbers must be finite: point {0} is not")]
+    #[error("a table's numbers must be finite: point {} is not", .0 + 1)]
     NotFinite(usize),
 }
+
+/// Points that one evaluation of the model can bear.
+const MAX_POINTS: usize = 1000;
 
 impl Table {
     /// The table through the points (`x[i]`, `y[i]`), `x` increasing.
@@ -36,6 +41,9 @@ impl Table {
         }
         if x.len() < 2 {
             return Err(TableError::TooShort(x.len()));
+        }
+        if x.len() > MAX_POINTS {
+            return Err(TableError::TooLong(x.len()));
         }
         if let Some(i) = (0..x.len()).find(|&i| !(x[i].is_finite() && y[i].is_finite())) {
             return Err(TableError::NotFinite(i));
@@ -49,28 +57,28 @@ impl Table {
                 (x[i - 1], length, (y[i] - y[i - 1]) / length)
             })
             .collect();
-        Ok(Table { start: x[0], floor: y[0], segments })
+        Ok(Table { floor: y[0], segments })
     }
 
-    /// The function's value at `x`. A sum of clipped ramps: no search, hence no branch per lane.
+    /// The function's value at `x`, NaN if `x` is. A sum of clipped ramps: no search, hence no
+    /// branch per lane. On an abscissa the derivative is the right segment's.
     #[inline(always)]
     pub fn at<R: Real>(&self, x: R) -> R {
-        let mut y = R::from_f64(self.floor);
+        // x − x is zero, or NaN
+        let mut y = R::from_f64(self.floor) + (x - x);
         for &(start, length, slope) in &self.segments {
-            y += (x - R::from_f64(start)).clamp(0.0, length).scale(slope);
+            let part = (x - R::from_f64(start)).max(R::zero());
+            let length = R::from_f64(length);
+            y += R::where_less(part, length, part, length).scale(slope);
         }
         y
-    }
-
-    /// The smallest abscissa of the table.
-    pub fn start(&self) -> f64 {
-        self.start
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::num::Dual;
 
     #[test]
     fn is_linear_between_points_and_constant_beyond() {
@@ -80,6 +88,17 @@ mod tests {
         {
             assert_eq!(table.at(x), y, "at {x}");
         }
+    }
+
+    #[test]
+    fn on_a_point_the_slope_is_that_of_the_right_side() {
+        let table = Table::new(&[-1.0, 0.0, 2.0], &[3.0, 1.0, 5.0]).unwrap();
+        for (x, slope) in
+            [(-1.0, -2.0), (0.0, 2.0), (2.0, 0.0), (-0.5, -2.0), (1.0, 2.0), (-9.0, 0.0)]
+        {
+            assert_eq!(table.at(Dual::<1>::variable(x, 0)).gradient, [slope], "at {x}");
+        }
+        assert!(table.at(f64::NAN).is_nan());
     }
 
     #[test]

@@ -129,7 +129,8 @@ impl<R: Real> Actuators<R> {
 
     /// The filters that explain an observed `state` after the commands `previous` (newest first).
     ///
-    /// Exact unless a surface is at its stop, where the filter's own output is not observed.
+    /// Exact unless a surface is at its stop, where the filter's own output is not observed: the
+    /// first step after leaving it may then be off by up to 8 % of the travel.
     pub fn from_observed(
         state: &ActuatorState<R>,
         previous: &[Command<R>; 2],

@@ -62,7 +62,7 @@ pub struct Envelope {
     pub airspeed_max_mps: f64,
     /// Airspeed held when nothing else is asked for, m/s.
     pub airspeed_cruise_mps: f64,
-    /// Fastest change of a surface command, full travels (−1 to 1 is two) a second.
+    /// Fastest change of a surface command, in units of the command (−1..1) a second.
     pub surface_slew_per_s: f64,
 }
 
@@ -81,7 +81,7 @@ pub struct Airframe {
 
 /// A number in a parameter file, with where it comes from.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a number with its source: { value = …, source = \"…\" }")]
 pub struct Sourced {
     /// The number, in the unit that the field's name ends with.
     pub value: f64,
@@ -163,22 +163,23 @@ impl Airframe {
 
     /// [`load`](Self::load) from the file's text; the error is what is wrong with it.
     pub fn parse(text: &str) -> Result<Airframe, String> {
-        let file: File = toml::from_str(text).map_err(|e| toml_error(&e))?;
+        let file: File = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
         check_schema(file.schema)?;
+        let file = File { name: named(file.name)?, ..file };
         let g = &file.geometry;
         let a = &file.actuators;
         Ok(Airframe {
             name: file.name,
             geometry: Geometry {
-                area: positive("geometry.wing_area_m2", &g.wing_area_m2)?,
-                span: positive("geometry.span_m", &g.span_m)?,
-                chord: positive("geometry.mean_chord_m", &g.mean_chord_m)?,
+                area: positive("geometry.wing_area_m2", &g.wing_area_m2, 1000.0)?,
+                span: positive("geometry.span_m", &g.span_m, 100.0)?,
+                chord: positive("geometry.mean_chord_m", &g.mean_chord_m, 50.0)?,
             },
             actuators: ActuatorFigures::tustin(
-                positive("actuators.surface_frequency_radps", &a.surface_frequency_radps)?,
-                positive("actuators.surface_damping", &a.surface_damping)?,
-                positive("actuators.deflection_max_rad", &a.deflection_max_rad)?,
-                positive("actuators.throttle_lag_s", &a.throttle_lag_s)?,
+                positive("actuators.surface_frequency_radps", &a.surface_frequency_radps, 1000.0)?,
+                positive("actuators.surface_damping", &a.surface_damping, 10.0)?,
+                positive("actuators.deflection_max_rad", &a.deflection_max_rad, 1.6)?,
+                positive("actuators.throttle_lag_s", &a.throttle_lag_s, 20.0)?,
                 0.01,
             ),
             envelope: file.envelope.checked()?,
@@ -191,11 +192,17 @@ impl Envelope {
         let rules = [
             (self.bank_max_deg > 0.0 && self.bank_max_deg < 90.0, "bank_max_deg must lie in 0..90"),
             (
-                -90.0 < self.pitch_min_deg && self.pitch_min_deg < self.pitch_max_deg,
-                "pitch_min_deg must lie between -90 and pitch_max_deg",
+                -90.0 < self.pitch_min_deg && self.pitch_min_deg < 0.0,
+                "pitch_min_deg must lie between -90 and 0",
             ),
-            (self.pitch_max_deg < 90.0, "pitch_max_deg must be under 90"),
-            (self.load_factor_max > 1.0, "load_factor_max must exceed 1"),
+            (
+                0.0 < self.pitch_max_deg && self.pitch_max_deg < 90.0,
+                "pitch_max_deg must lie between 0 and 90",
+            ),
+            (
+                self.load_factor_max > 1.0 && self.load_factor_max <= 20.0,
+                "load_factor_max must lie between 1 and 20",
+            ),
             (
                 0.0 < self.airspeed_min_mps && self.airspeed_min_mps < self.airspeed_cruise_mps,
                 "airspeed_min_mps must be positive and under airspeed_cruise_mps",
@@ -204,13 +211,22 @@ impl Envelope {
                 self.airspeed_cruise_mps < self.airspeed_max_mps && self.airspeed_max_mps < 1000.0,
                 "airspeed_max_mps must exceed airspeed_cruise_mps",
             ),
-            (self.surface_slew_per_s > 0.0, "surface_slew_per_s must be positive"),
+            (
+                self.surface_slew_per_s > 0.0 && self.surface_slew_per_s <= 200.0,
+                "surface_slew_per_s must lie between 0 and 200",
+            ),
         ];
         match rules.iter().find(|(holds, _)| !holds) {
             Some((_, rule)) => Err(format!("envelope.{rule}; correct it there")),
             None => Ok(self),
         }
     }
+}
+
+/// A name that tables and file names can bear.
+pub(crate) fn named(name: String) -> Result<String, String> {
+    let fits = !name.trim().is_empty() && name.len() <= 64 && !name.chars().any(char::is_control);
+    if fits { Ok(name) } else { Err("name must be one line of 1 to 64 bytes; give it one".into()) }
 }
 
 /// Refuses a file of another layout than this program's.
@@ -224,15 +240,25 @@ pub(crate) fn check_schema(schema: u32) -> Result<(), String> {
     ))
 }
 
-/// A number that must be finite and above zero.
-pub(crate) fn positive(field: &str, number: &Sourced) -> Result<f64, String> {
-    if number.value.is_finite() && number.value > 0.0 {
+/// A number that must lie above zero and at most at `most`, the largest that an aircraft has.
+pub(crate) fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String> {
+    if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
+        return Err(format!("{field}.sd must be a positive number"));
+    }
+    if number.value >= most * 1e-9 && number.value <= most {
         return Ok(number.value);
     }
-    Err(format!("{field} = {} is not physical: it must be a positive number", number.value))
+    Err(format!(
+        "{field} = {} is not physical: it must be positive and at most {most}",
+        number.value
+    ))
 }
 
-/// A TOML error on one line: what and where.
-pub(crate) fn toml_error(error: &toml::de::Error) -> String {
-    error.to_string().lines().filter(|l| !l.trim().is_empty()).collect::<Vec<_>>().join(" ")
+/// A TOML error on one line: where, then what.
+pub(crate) fn toml_error(text: &str, error: &toml::de::Error) -> String {
+    let line =
+        error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
+    let message = error.message().lines().collect::<Vec<_>>().join("; ");
+    let short: String = message.chars().take(300).collect();
+    line.map_or(short.clone(), |line| format!("line {line}: {short}"))
 }

@@ -18,6 +18,12 @@ pub enum Trouble {
     /// A model's state is no longer a number.
     #[error("the imagined aircraft of model {0} left the numbers; its model does not hold there")]
     Diverged(String),
+    /// One of several equal simulators could not be made.
+    #[error("{0}")]
+    Worker(String),
+    /// The controller's command is not finite.
+    #[error("the command is not a finite number; the controller has lost its state")]
+    Command,
 }
 
 /// A world that advances by 0.01 s a step.
@@ -136,6 +142,9 @@ impl Environment for Imagined {
     }
 
     fn step(&mut self, command: Command) -> Result<Observation, Trouble> {
+        if !command.is_finite() {
+            return Err(Trouble::Command);
+        }
         let command = command.clamped();
         self.twin.step(&self.model, &command);
         self.previous = [command, self.previous[0]];

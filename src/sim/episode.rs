@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::control::{Controller, Observation, Target};
-use crate::physics::{Command, State};
+use crate::physics::Command;
 use crate::sim::{Environment, Trouble};
 
 /// Steps of an episode (section V-E of \[GSFM26\]).
@@ -45,9 +45,9 @@ impl Episode<'_> {
         mut watch: impl FnMut(&Observation, &Command),
     ) -> Result<Outcome, Trouble> {
         let mut seen = self.environment.reset()?;
-        self.controller.reset(self.seed, Command::IDLE);
+        self.controller.reset(self.seed);
         let mut cost = Vec::with_capacity(STEPS);
-        let (mut roll, mut pitch) = (0.0, 0.0);
+        let mut errors = Vec::with_capacity(SETTLED);
         for step in 0..STEPS {
             let start = Instant::now();
             let command = self.controller.command(&seen, target);
@@ -58,18 +58,103 @@ impl Episode<'_> {
                 Err(_) => return Ok(Outcome { settled_deg: 180.0, cost }),
             };
             if step >= STEPS - SETTLED {
-                let [r, p] = attitude_error_deg(&seen.state, target);
-                roll += r * r;
-                pitch += p * p;
+                errors.push(attitude_error_deg([seen.state.roll, seen.state.pitch], target));
             }
         }
-        let rmse = |sum: f64| (sum / SETTLED as f64).sqrt();
-        Ok(Outcome { settled_deg: (rmse(roll) + rmse(pitch)) / 2.0, cost })
+        Ok(Outcome { settled_deg: settled_error_deg(&errors), cost })
     }
 }
 
-/// Roll and pitch less their commands, degrees, the shorter way round.
-pub fn attitude_error_deg(state: &State, target: &Target) -> [f64; 2] {
+/// The settled error of \[GSFM26\] section V-E: the mean of roll and pitch RMSE, degrees, of
+/// attitude errors (roll, pitch) in degrees; NaN for none.
+pub fn settled_error_deg(errors: &[[f64; 2]]) -> f64 {
+    let rmse = |axis: usize| {
+        let squares: f64 = errors.iter().map(|e| e[axis] * e[axis]).sum();
+        (squares / errors.len() as f64).sqrt()
+    };
+    (rmse(0) + rmse(1)) / 2.0
+}
+
+/// Roll and pitch (rad) less their commands, degrees, the shorter way round.
+pub fn attitude_error_deg([roll, pitch]: [f64; 2], target: &Target) -> [f64; 2] {
     let wrap = |x: f64| (x + 180.0).rem_euclid(360.0) - 180.0;
-    [wrap((state.roll - target.roll).to_degrees()), wrap((state.pitch - target.pitch).to_degrees())]
+    [wrap((roll - target.roll).to_degrees()), wrap((pitch - target.pitch).to_degrees())]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::{ActuatorState, State, Time};
+
+    const TARGET: Target = Target { roll: 0.0, pitch: 0.0, airspeed: 16.67 };
+
+    /// Off by a given attitude in the last fifth, or lost at a step.
+    struct Fake {
+        step: usize,
+        settled: [f64; 2],
+        lost_at: usize,
+    }
+
+    impl Fake {
+        fn see(&self) -> Observation {
+            let settled = self.step > STEPS - SETTLED;
+            let [roll, pitch] = if settled { self.settled.map(f64::to_radians) } else { [1.0; 2] };
+            Observation {
+                time: Time::default(),
+                state: State { roll, pitch, ..State::NEUTRAL },
+                actuators: ActuatorState::default(),
+                altitude: 600.0,
+                previous: [Command::IDLE; 2],
+            }
+        }
+    }
+
+    impl Environment for Fake {
+        fn reset(&mut self) -> Result<Observation, Trouble> {
+            self.step = 0;
+            Ok(self.see())
+        }
+        fn step(&mut self, _: Command) -> Result<Observation, Trouble> {
+            self.step += 1;
+            if self.step == self.lost_at { Err(Trouble::Command) } else { Ok(self.see()) }
+        }
+    }
+
+    #[derive(Clone)]
+    struct Idle;
+
+    impl Controller for Idle {
+        fn name(&self) -> &'static str {
+            "idle"
+        }
+        fn reset(&mut self, _: u64) {}
+        fn command(&mut self, _: &Observation, _: &Target) -> Command {
+            Command::IDLE
+        }
+        fn boxed_clone(&self) -> Box<dyn Controller> {
+            Box::new(self.clone())
+        }
+    }
+
+    fn settled(settled: [f64; 2], lost_at: usize) -> f64 {
+        let mut environment = Fake { step: 0, settled, lost_at };
+        let episode = Episode { environment: &mut environment, controller: &mut Idle, seed: 0 };
+        episode.fly(&TARGET, |_, _| ()).unwrap().settled_deg
+    }
+
+    #[test]
+    fn only_the_last_fifth_counts_and_roll_and_pitch_are_averaged() {
+        assert!((settled([3.0, -1.0], usize::MAX) - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn angles_are_compared_the_shorter_way_round() {
+        assert!((settled([359.0, 0.0], usize::MAX) - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_lost_aircraft_is_off_by_180_degrees_even_at_the_last_step() {
+        assert_eq!(settled([0.0; 2], STEPS), 180.0);
+        assert!(180.0 > DIVERGED_DEG);
+    }
 }

@@ -21,7 +21,11 @@ pub enum Group {
 
 /// A commanded attitude to score.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Row {
+    /// Its place in the file, from 0: what its random numbers are drawn for.
+    #[serde(skip)]
+    pub number: u32,
     /// Which group it belongs to.
     pub group: Group,
     /// Commanded roll, degrees.
@@ -59,6 +63,27 @@ impl Group {
             Group::HardOutside => "hard_outside",
         }
     }
+
+    /// Where its targets lie, in words.
+    const fn rule(self) -> &'static str {
+        match self {
+            Group::Easy => "easy is |roll| < 45 with |pitch| < 25",
+            Group::HardCorners => "hard_corners is |roll| in 45..60 with |pitch| in 25..30",
+            Group::HardOutside => "hard_outside is within 60 and 30, outside the easy box",
+        }
+    }
+
+    /// Whether a target in degrees belongs to it.
+    pub fn contains(self, roll_deg: f64, pitch_deg: f64) -> bool {
+        let (roll, pitch) = (roll_deg.abs(), pitch_deg.abs());
+        let easy = roll < 45.0 && pitch < 25.0;
+        let hard = roll <= 60.0 && pitch <= 30.0 && !easy;
+        match self {
+            Group::Easy => easy,
+            Group::HardCorners => hard && roll >= 45.0 && pitch >= 25.0,
+            Group::HardOutside => hard,
+        }
+    }
 }
 
 impl TargetFile {
@@ -68,7 +93,8 @@ impl TargetFile {
         let mut rows = Vec::new();
         let round = |x: f64| (x * 100.0).round() / 100.0;
         let mut push = |group, roll: f64, pitch: f64| {
-            rows.push(Row { group, roll_deg: round(roll), pitch_deg: round(pitch) });
+            let number = rows.len() as u32;
+            rows.push(Row { number, group, roll_deg: round(roll), pitch_deg: round(pitch) });
         };
         for i in 0..140 {
             let cell = |k: usize, count: usize, x: f64| (k as f64 + x) / count as f64;
@@ -101,17 +127,25 @@ impl TargetFile {
     /// If it cannot be read, is no such table, is empty, or commands more than ±89°.
     pub fn load(path: &Path) -> Result<TargetFile, TargetError> {
         let fail = |why: String| TargetError { path: path.display().to_string(), why };
-        let mut reader = csv::Reader::from_path(path).map_err(|e| fail(e.to_string()))?;
-        let rows: Vec<Row> =
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_path(path)
+            .map_err(|e| fail(e.to_string()))?;
+        let mut rows: Vec<Row> =
             reader.deserialize().collect::<Result<_, _>>().map_err(|e| fail(e.to_string()))?;
         if rows.is_empty() {
             return Err(fail("it has no rows".into()));
         }
-        let flyable = |r: &Row| r.roll_deg.abs() < 89.0 && r.pitch_deg.abs() < 89.0;
-        match rows.iter().position(|r| !flyable(r)) {
-            Some(i) => Err(fail(format!("row {} commands 89° or more", i + 1))),
-            None => Ok(TargetFile { rows }),
+        for (i, row) in rows.iter_mut().enumerate() {
+            row.number = i as u32;
+            if !row.group.contains(row.roll_deg, row.pitch_deg) {
+                let Row { group, roll_deg, pitch_deg, .. } = row;
+                let name = group.name();
+                let why = format!("row {}: {roll_deg}, {pitch_deg} is not {name}", i + 1);
+                return Err(fail(format!("{why}; {}", group.rule())));
+            }
         }
+        Ok(TargetFile { rows })
     }
 
     /// The file as CSV.
@@ -139,15 +173,14 @@ mod tests {
         let count = |g| file.rows.iter().filter(|r| r.group == g).count();
         assert_eq!(Group::ALL.map(count), [140, 100, 100]);
         for r in &file.rows {
-            let (roll, pitch) = (r.roll_deg.abs(), r.pitch_deg.abs());
-            let easy = roll < 45.0 && pitch < 25.0;
-            let corner = roll > 45.0 && pitch > 25.0;
-            assert!(roll <= 60.0 && pitch <= 30.0);
-            match r.group {
-                Group::Easy => assert!(easy),
-                Group::HardCorners => assert!(corner),
-                Group::HardOutside => assert!(!easy),
-            }
+            assert!(r.group.contains(r.roll_deg, r.pitch_deg), "{r:?}");
         }
+        assert!(!Group::Easy.contains(45.0, 0.0) && Group::HardOutside.contains(45.0, 0.0));
+        assert!(
+            !Group::HardCorners.contains(50.0, 20.0) && Group::HardCorners.contains(-50.0, 26.0)
+        );
+        assert!(
+            !Group::HardOutside.contains(61.0, 0.0) && !Group::HardOutside.contains(f64::NAN, 0.0)
+        );
     }
 }

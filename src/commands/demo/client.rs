@@ -81,8 +81,12 @@ impl Client {
         for leg in 0..LEGS.len() {
             self.aim(leg);
             let start = self.view.time_s;
+            let begun = Instant::now();
             while self.view.time_s - start < LEG_S {
                 self.turn()?;
+                if begun.elapsed() > PATIENCE.mul_f64(3.0) {
+                    bail!("the companion has fallen silent: {}", self.last_words());
+                }
                 if self.view.mode != Some(Mode::Offboard) {
                     bail!("the companion left offboard: {}", self.last_words());
                 }

@@ -14,10 +14,11 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
 use greylag_sitl::error_arguments::{FaultArgs, SensorArgs};
-use greylag_sitl::plant::Start;
+use greylag_sitl::plant::{Plant, Start};
 use greylag_sitl::plant_arguments::PlantArgs;
 use greylag_sitl::shim::{self, ShimOptions};
 
+use crate::commands::choices;
 use crate::commands::files::Overwrite;
 use crate::commands::{files, fly};
 use crate::control::Kind;
@@ -32,8 +33,8 @@ use story::{TOLERANCE_DEG, Teller};
 /// Options of `greylag demo`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Controller that flies: pid, pid-retuned, lqi or cem.
-    #[arg(long, value_name = "NAME", default_value = "lqi")]
+    /// Controller that flies.
+    #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
     controller: Kind,
     /// Model that the controller is designed from or plans with.
     #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
@@ -59,6 +60,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, None)?;
     let crew = fly::crew(arguments.controller, &model)?;
+    // an aircraft that cannot fly is found before anything is opened or written
+    let plant = arguments.plant.options(arguments.seed);
+    Plant::new(&plant)?.reset(&Start::NEUTRAL)?;
     let stop = Arc::new(AtomicBool::new(false));
     let flight = Flight::start(&options(arguments, &model)?, crew, stop.clone())?;
     let folder = flight.recording.clone().context("the demonstration records")?;
@@ -68,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         "companion: controller {}, model {}, clients on udp {companion}",
         arguments.controller, model.name
     );
-    println!("shim: Skywalker X8 in JSBSim, real time, towards udp {vehicle}");
+    println!("shim: aircraft {} in JSBSim, real time, towards udp {vehicle}", plant.aircraft);
     let simulator = simulate(arguments, &format!("udpout:{vehicle}"), stop.clone())?;
     let mut table = Live::begin();
     let flown =
@@ -84,6 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         controller: arguments.controller.name(),
         seed: arguments.seed.into(),
         model: &model.name,
+        aircraft: &plant.aircraft,
         deflection: model.airframe.actuators.deflection_max,
         texts: flown?,
     };

@@ -5,9 +5,11 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use super::schedule::{LEGS, Leg};
+use crate::control::Target;
 use crate::logs::csv::{self, Tolerance};
 use crate::logs::{Flight, Sample};
 use crate::report::{Cycle, Event, EventKind, FlightReport, LoopTiming, Segment, SurfaceTravel};
+use crate::sim::episode::{attitude_error_deg, settled_error_deg};
 
 /// Largest settled error that counts as tracked, degrees: half of what the paper calls
 /// "near-perfect tracking" (its section V-E).
@@ -19,6 +21,8 @@ pub struct Teller<'a> {
     pub controller: &'a str,
     /// Name of the model.
     pub model: &'a str,
+    /// Name of the aircraft.
+    pub aircraft: &'a str,
     /// Seed of everything random.
     pub seed: u64,
     /// Deflection at full command, rad.
@@ -31,7 +35,10 @@ impl Teller<'_> {
     /// Reads the recording in `folder` and makes the report's material of it.
     pub fn tell<'f>(&self, folder: &Path, flight: &'f Flight) -> Result<FlightReport<'f>> {
         Ok(FlightReport {
-            title: format!("Greylag demo: {} on the Skywalker X8 in JSBSim", self.controller),
+            title: format!(
+                "Greylag demo: {} on aircraft {} in JSBSim",
+                self.controller, self.aircraft
+            ),
             flight,
             controller: self.controller.into(),
             model: self.model.into(),
@@ -62,9 +69,11 @@ fn segment(leg: &Leg, flight: &Flight) -> Segment {
         |s: &&Sample| (s.roll_target_rad - roll).abs() + (s.pitch_target_rad - pitch).abs() < 1e-5;
     let samples: Vec<&Sample> = flight.samples.iter().filter(is).collect();
     let settled = &samples[samples.len() - samples.len() / 5..];
-    let rmse = |error: &dyn Fn(&Sample) -> f64| {
-        (settled.iter().map(|s| error(s).powi(2)).sum::<f64>() / settled.len() as f64).sqrt()
-    };
+    let target = Target { roll, pitch, airspeed: f64::NAN };
+    let errors: Vec<[f64; 2]> = settled
+        .iter()
+        .map(|s| attitude_error_deg([s.attitude_rad[0], s.attitude_rad[1]], &target))
+        .collect();
     let ends = |sample: Option<&&Sample>| sample.map_or(f64::NAN, |s| s.time_s);
     Segment {
         start_s: ends(samples.first()),
@@ -72,8 +81,7 @@ fn segment(leg: &Leg, flight: &Flight) -> Segment {
         roll_target_rad: roll,
         pitch_target_rad: pitch,
         difficulty: leg.difficulty,
-        settled_error_rad: 0.5
-            * (rmse(&|s| s.attitude_rad[0] - roll) + rmse(&|s| s.attitude_rad[1] - pitch)),
+        settled_error_rad: settled_error_deg(&errors).to_radians(),
     }
 }
 

@@ -76,8 +76,8 @@ impl Cem {
         }
     }
 
-    /// Mean and standard deviation of the elites' actions.
-    fn refit(&mut self) -> ([Action; HORIZON], [Action; HORIZON]) {
+    /// Mean and standard deviation of the elites' actions; `None` if no candidate stays finite.
+    fn refit(&mut self) -> Option<([Action; HORIZON], [Action; HORIZON])> {
         self.order.clear();
         for (b, returns) in self.returns.iter().enumerate() {
             for (i, &value) in returns.0.iter().enumerate() {
@@ -86,11 +86,14 @@ impl Cem {
                 self.order.push((value, (b * WIDTH + i) as u32));
             }
         }
-        let elites = self.settings.elites.min(self.order.len());
+        let elites = self.settings.elites.clamp(1, self.order.len());
         // ties go to the lower index, so the order is the same everywhere
         self.order
             .select_nth_unstable_by(elites - 1, |a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let chosen = &mut self.order[..elites];
+        if chosen.iter().any(|(value, _)| *value == f32::NEG_INFINITY) {
+            return None;
+        }
         chosen.sort_unstable_by_key(|&(_, index)| index);
         let mut mean = [[0.0; 3]; HORIZON];
         let mut square = [[0.0; 3]; HORIZON];
@@ -107,7 +110,7 @@ impl Cem {
         let deviation =
             |h: usize, c: usize| (square[h][c] - mean[h][c] * mean[h][c]).max(0.0).sqrt();
         let spread = std::array::from_fn(|h| std::array::from_fn(|c| deviation(h, c)));
-        (mean, spread)
+        Some((mean, spread))
     }
 }
 
@@ -120,7 +123,7 @@ impl Controller for Cem {
         Box::new(self.clone())
     }
 
-    fn reset(&mut self, seed: u64, _bumpless: Command) {
+    fn reset(&mut self, seed: u64) {
         (self.seed, self.tick) = (seed, 0);
     }
 
@@ -133,7 +136,13 @@ impl Controller for Cem {
             self.sample(&mut rng, &mean, &spread);
             let scene = Scene { model: &self.model, task: &Task::PAPER, seen, target };
             self.instructions.returns(&scene, &self.blocks, &mut self.returns);
-            (mean, spread) = self.refit();
+            match self.refit() {
+                Some(fitted) => (mean, spread) = fitted,
+                // said by a command that is no number: whoever flies has a fallback
+                None => {
+                    return Command { aileron: f64::NAN, elevator: f64::NAN, throttle: f64::NAN };
+                }
+            }
         }
         let [aileron, elevator, thrust] = mean[0];
         Command { aileron, elevator, throttle: (thrust + 1.0) / 2.0 }.clamped()

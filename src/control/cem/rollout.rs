@@ -85,6 +85,10 @@ fn returns(scene: &Scene, blocks: &[Block], out: &mut [Lanes<WIDTH>]) {
 }
 
 /// The return of one block: actuators, model and reward in the order of the simulator.
+///
+/// The integrator's memory starts empty: the first step of [`Integrator::Jsbsim`] is then Euler's.
+///
+/// [`Integrator::Jsbsim`]: crate::model::Integrator::Jsbsim
 #[inline(always)]
 fn rollout(scene: &Scene, block: &Block) -> Lanes<WIDTH> {
     let Scene { model, task, seen, target } = scene;

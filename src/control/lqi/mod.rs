@@ -36,7 +36,9 @@ pub struct Lqi {
 }
 
 impl Lqi {
-    /// Designs the controller over the envelope of `model`.
+    /// Designs the controller for `model` over 12..50 m/s, ±60° of roll and ±30° of pitch.
+    ///
+    /// The margins before the stall and the airspeed loop are those of the X8.
     ///
     /// # Errors
     /// If the model cannot be trimmed or stabilised at some attitude at any airspeed.
@@ -57,7 +59,10 @@ impl Lqi {
         let part = self.schedule.tolerable_part(seen.state.airspeed, target.roll, target.pitch);
         let wanted = [part * target.roll, target.pitch];
         for ((x, wanted), rate) in reference.iter_mut().zip(wanted).zip([ROLL_RATE, PITCH_RATE]) {
-            *x += ((wanted - *x) / ROUNDING).clamp(-rate, rate) * STEP;
+            let step = ((wanted - *x) / ROUNDING).clamp(-rate, rate) * STEP;
+            if step.is_finite() {
+                *x += step;
+            }
         }
         self.reference = Some(reference);
         reference
@@ -69,7 +74,7 @@ impl Lqi {
         let error = wanted - seen.state.airspeed;
         let raw = feed_forward + AIRSPEED_KP * error + self.airspeed_integral;
         let outward = (raw > 1.0 && error > 0.0) || (raw < 0.0 && error < 0.0);
-        if !outward {
+        if !outward && error.is_finite() {
             self.airspeed_integral += AIRSPEED_KI * error * STEP;
         }
         raw.clamp(0.0, 1.0)
@@ -85,7 +90,7 @@ impl Controller for Lqi {
         Box::new(self.clone())
     }
 
-    fn reset(&mut self, _seed: u64, _bumpless: Command) {
+    fn reset(&mut self, _seed: u64) {
         self.reference = None;
         self.integral = [0.0; 2];
         self.airspeed_integral = 0.0;
@@ -124,7 +129,7 @@ impl Controller for Lqi {
         let raw = [(aileron + u[0]) / self.deflection, (elevator + u[1]) / self.deflection];
         // conditional integration: an axis whose surface is at its stop does not wind up
         for axis in 0..2 {
-            if raw[axis].abs() < 1.0 {
+            if raw[axis].abs() < 1.0 && x[axis].is_finite() {
                 self.integral[axis] += x[axis] * STEP;
             }
         }

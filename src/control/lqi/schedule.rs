@@ -10,8 +10,8 @@ use crate::physics::State;
 /// Altitude of the designs, m: the start of an episode.
 const ALTITUDE: f64 = 600.0;
 
-/// Incidence that steady flight should not exceed, rad (2.9°): a quarter of the stall's 12.3°,
-/// which at 60° of bank asks for 24 m/s.
+/// Incidence that steady flight should not exceed, rad (2.9°): a quarter of the X8's stall at
+/// 12.3°, which at 60° of bank asks for 22 m/s.
 const COMFORT: f64 = 0.05;
 
 /// Incidence that no commanded attitude may need, rad (5.2°): the rest is for the transient.

@@ -11,9 +11,8 @@ pub struct Request {
     pub observation: Observation,
     /// What is wanted, already inside the envelope.
     pub target: Target,
-    /// Set when the planner takes over from something else: it must forget its past and
-    /// continue from this command.
-    pub engage: Option<Command>,
+    /// Set when the planner takes over from something else: it must forget its past.
+    pub engage: bool,
 }
 
 /// What became of the request.

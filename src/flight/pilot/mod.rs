@@ -147,7 +147,7 @@ impl Pilot {
         self.pending = self.assess(quality);
         match self.pending {
             Pending::Fly { seen, .. } => {
-                let engage = (!self.planner_engaged).then_some(self.in_force);
+                let engage = !self.planner_engaged;
                 self.planner_engaged = true;
                 Some(Request { observation: seen, target: self.target, engage })
             }
@@ -320,7 +320,7 @@ impl Pilot {
 
     fn fall_back(&mut self, seen: &Observation, source: Source) -> (Command, Source) {
         if !self.fallback_engaged {
-            self.fallback.reset(0, self.in_force);
+            self.fallback.reset(0);
             self.fallback_engaged = true;
         }
         let command = self.fallback.command(seen, &self.target);

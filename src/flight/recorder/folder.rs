@@ -17,13 +17,13 @@ pub enum Place {
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The folder is there already.
-    #[error("cannot record to {}: it exists already; name a new folder (--record) or move the old one away", path.display())]
+    #[error("cannot record to {}: it exists already; name a new folder or move the old one away", path.display())]
     Exists {
         /// The folder.
         path: PathBuf,
     },
     /// Something cannot be created.
-    #[error("cannot create recording {}: {source}; name a folder that can be written (--record), or fly with --no-record", path.display())]
+    #[error("cannot create recording {}: {source}; name a folder that can be written", path.display())]
     File {
         /// The file or folder.
         path: PathBuf,

@@ -32,8 +32,8 @@ impl Planner {
 }
 
 fn run(controller: &mut dyn Controller, request: &Request) -> Command {
-    if let Some(in_force) = request.engage {
-        controller.reset(SEED, in_force);
+    if request.engage {
+        controller.reset(SEED);
     }
     controller.command(&request.observation, &request.target)
 }
@@ -45,7 +45,7 @@ pub(super) struct Threaded {
     thread: Option<JoinHandle<()>>,
     tick: u64,
     /// An engagement that the planner has not been told of, because it was busy.
-    owed: Option<Command>,
+    owed: bool,
     deadline: Duration,
     pace: Pace,
 }
@@ -73,7 +73,7 @@ impl Threaded {
             plans,
             thread: Some(thread),
             tick: 0,
-            owed: None,
+            owed: false,
             deadline,
             pace,
         })
@@ -83,7 +83,7 @@ impl Threaded {
         self.tick += 1;
         // Plans of earlier ticks are of no use any more.
         while self.plans.try_recv().is_ok() {}
-        let engage = request.engage.or(self.owed);
+        let engage = request.engage || self.owed;
         let Some(requests) = &self.requests else {
             return Plan::None;
         };
@@ -91,7 +91,7 @@ impl Threaded {
             self.owed = engage;
             return Plan::Late;
         }
-        self.owed = None;
+        self.owed = false;
         self.wait(arrived)
     }
 
@@ -131,7 +131,7 @@ mod tests {
     use crate::physics::{ActuatorState, State, Time};
 
     /// Something to plan for, of no interest beside its being there.
-    fn any_request(engage: Option<Command>) -> Request {
+    fn any_request(engage: bool) -> Request {
         let observation = Observation {
             time: Time::default(),
             state: State::NEUTRAL,
@@ -156,7 +156,7 @@ mod tests {
         fn name(&self) -> &'static str {
             "slow"
         }
-        fn reset(&mut self, _seed: u64, _bumpless: Command) {
+        fn reset(&mut self, _seed: u64) {
             self.engaged += 0.1;
         }
         fn command(&mut self, _: &Observation, _: &Target) -> Command {
@@ -176,29 +176,29 @@ mod tests {
     fn a_plan_that_misses_its_tick_is_never_used_at_a_later_one() {
         let mut planner = threaded(Pace::RealTime, &[0, 200]);
         let engaged = Plan::Ready(Command { throttle: 0.1, ..Command::IDLE });
-        assert_eq!(planner.plan(&any_request(Some(Command::IDLE)), Instant::now()), engaged);
+        assert_eq!(planner.plan(&any_request(true), Instant::now()), engaged);
         let before = Instant::now();
-        assert_eq!(planner.plan(&any_request(None), before), Plan::Late);
+        assert_eq!(planner.plan(&any_request(false), before), Plan::Late);
         assert!(before.elapsed() < Duration::from_millis(150));
         std::thread::sleep(Duration::from_millis(300));
-        assert_eq!(planner.plan(&any_request(None), Instant::now()), engaged);
+        assert_eq!(planner.plan(&any_request(false), Instant::now()), engaged);
     }
 
     #[test]
     fn an_engagement_during_a_late_plan_is_told_afterwards() {
         let mut planner = threaded(Pace::RealTime, &[300]);
-        assert_eq!(planner.plan(&any_request(Some(Command::IDLE)), Instant::now()), Plan::Late);
+        assert_eq!(planner.plan(&any_request(true), Instant::now()), Plan::Late);
         // This one waits in the queue, the next finds the queue full.
-        assert_eq!(planner.plan(&any_request(None), Instant::now()), Plan::Late);
-        assert_eq!(planner.plan(&any_request(Some(Command::IDLE)), Instant::now()), Plan::Late);
+        assert_eq!(planner.plan(&any_request(false), Instant::now()), Plan::Late);
+        assert_eq!(planner.plan(&any_request(true), Instant::now()), Plan::Late);
         std::thread::sleep(Duration::from_millis(400));
         let twice = Plan::Ready(Command { throttle: 0.2, ..Command::IDLE });
-        assert_eq!(planner.plan(&any_request(None), Instant::now()), twice);
+        assert_eq!(planner.plan(&any_request(false), Instant::now()), twice);
     }
 
     #[test]
     fn in_lockstep_the_plan_is_waited_for() {
         let mut planner = threaded(Pace::Lockstep, &[120]);
-        assert!(matches!(planner.plan(&any_request(None), Instant::now()), Plan::Ready(_)));
+        assert!(matches!(planner.plan(&any_request(false), Instant::now()), Plan::Ready(_)));
     }
 }

@@ -11,7 +11,7 @@ impl Effect for DragBeta2 {
     const ID: &'static str = "drag_beta2";
     const DESCRIPTION: &'static str = "Drag due to sideslip, by its magnitude and its square.";
     const FORMULA: &'static str = "D = Q (CDβ |β| + CDβ² β²)";
-    const SOURCE: &'static str = "Gryte18; JSBSim reading in x8_facts";
+    const SOURCE: &'static str = "Gryte18; JSBSim reading in params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] = &[
         coefficient("CDbeta", "drag due to the magnitude of sideslip, 1/rad", (-0.5, 0.5)),
         coefficient("CDbeta2", "drag due to the square of sideslip, 1/rad²", (0.0, 5.0)),

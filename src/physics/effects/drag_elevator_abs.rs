@@ -11,7 +11,7 @@ impl Effect for DragElevatorAbs {
     const ID: &'static str = "drag_elevator_abs";
     const DESCRIPTION: &'static str = "Drag due to the magnitude of the elevator deflection.";
     const FORMULA: &'static str = "D = Q CD|δe| |δe|";
-    const SOURCE: &'static str = "JSBSim reading in x8_facts";
+    const SOURCE: &'static str = "JSBSim reading in params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] = &[
         coefficient("CDde", "drag due to the magnitude of elevator, 1/rad", (0.0, 0.5)),
     ];

@@ -29,7 +29,7 @@ pub(crate) const fn coefficient(
 
 /// A physical effect that is linear in its coefficients.
 pub trait Effect {
-    /// The id of parameter files, JSON and the command line (shared catalogue `effects.md`).
+    /// The id of parameter files, JSON and the command line.
     const ID: &'static str;
     /// What it is, in one sentence.
     const DESCRIPTION: &'static str;

@@ -1,0 +1,20 @@
+//! Options whose values are the names of a list, so that `--help` shows them.
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+use crate::control::Kind;
+
+/// The controllers of [`crate::control`].
+pub fn controller() -> impl TypedValueParser<Value = Kind> {
+    PossibleValuesParser::new(Kind::ALL.iter().map(|kind| kind.name()))
+        .try_map(|name| name.parse::<Kind>())
+}
+
+/// The groups of targets.
+#[cfg(feature = "sitl")]
+pub fn group() -> impl TypedValueParser<Value = crate::sim::Group> {
+    use crate::sim::Group;
+    PossibleValuesParser::new(Group::ALL.map(Group::name)).try_map(|name| {
+        Group::ALL.into_iter().find(|g| g.name() == name).ok_or("there is no such group")
+    })
+}
