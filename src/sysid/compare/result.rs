@@ -26,6 +26,27 @@ pub struct Comparison {
     pub notes: Vec<String>,
 }
 
+/// A comparison as the JSON document: the first model's free run and channels stand at the top.
+#[derive(Debug, Serialize)]
+pub struct Document<'a> {
+    #[serde(flatten)]
+    comparison: &'a Comparison,
+    free_run: &'a [HorizonScore],
+    channels: &'a [ChannelResult],
+}
+
+impl Comparison {
+    /// The JSON document.
+    pub fn document(&self) -> Document<'_> {
+        let first = self.models.first();
+        Document {
+            comparison: self,
+            free_run: first.map_or(&[], |m| &m.free_run),
+            channels: first.map_or(&[], |m| &m.channels),
+        }
+    }
+}
+
 /// Lengths and bounds that the figures depend on.
 #[derive(Clone, Debug, Serialize)]
 pub struct Settings {
@@ -267,6 +288,58 @@ pub enum RegimeVariable {
     Time,
     /// The flight.
     Flight,
+}
+
+impl RegimeVariable {
+    /// Those that are numbers: all but the flight.
+    pub const CONTINUOUS: [RegimeVariable; 13] = [
+        RegimeVariable::Alpha,
+        RegimeVariable::Beta,
+        RegimeVariable::Airspeed,
+        RegimeVariable::Throttle,
+        RegimeVariable::P,
+        RegimeVariable::Q,
+        RegimeVariable::R,
+        RegimeVariable::Aileron,
+        RegimeVariable::Elevator,
+        RegimeVariable::AileronRate,
+        RegimeVariable::ElevatorRate,
+        RegimeVariable::Altitude,
+        RegimeVariable::Time,
+    ];
+
+    /// What it is called in plots.
+    pub const fn name(self) -> &'static str {
+        match self {
+            RegimeVariable::Alpha => "angle of attack",
+            RegimeVariable::Beta => "sideslip",
+            RegimeVariable::Airspeed => "airspeed",
+            RegimeVariable::Throttle => "throttle",
+            RegimeVariable::P => "roll rate",
+            RegimeVariable::Q => "pitch rate",
+            RegimeVariable::R => "yaw rate",
+            RegimeVariable::Aileron => "aileron",
+            RegimeVariable::Elevator => "elevator",
+            RegimeVariable::AileronRate => "aileron movement",
+            RegimeVariable::ElevatorRate => "elevator movement",
+            RegimeVariable::Altitude => "altitude",
+            RegimeVariable::Time => "time",
+            RegimeVariable::Flight => "flight",
+        }
+    }
+
+    /// The unit that it is binned in.
+    pub const fn unit(self) -> &'static str {
+        use RegimeVariable as V;
+        match self {
+            V::Alpha | V::Beta | V::Aileron | V::Elevator => "°",
+            V::P | V::Q | V::R | V::AileronRate | V::ElevatorRate => "°/s",
+            V::Airspeed => "m/s",
+            V::Altitude => "m",
+            V::Time => "s",
+            V::Throttle | V::Flight => "",
+        }
+    }
 }
 
 /// Mean residual over one regime variable.
