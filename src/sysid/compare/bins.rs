@@ -8,7 +8,7 @@ use crate::num::statistics::{mean, quantile};
 
 /// Fewest independent samples that support a bin.
 pub const SUPPORT: usize = 20;
-/// Number of bins aimed at between the 2 % and 98 % quantiles of a variable.
+/// Number of bins aimed at between the outermost edges.
 const BINS: f64 = 8.0;
 /// The same for each side of the α–β map.
 const MAP_BINS: f64 = 10.0;
@@ -101,7 +101,7 @@ fn continuous(
     channel: u64,
 ) -> Option<RegimeBins> {
     let values: Vec<f64> = residuals.iter().map(|r| r.regime[v]).collect();
-    let edges = edges(&values, BINS)?;
+    let edges = edges(&values, BINS, tail(independent(residuals.iter())))?;
     let count = edges.len() + 1;
     let mut members: Vec<Vec<&Residual>> = vec![Vec::new(); count];
     for r in residuals {
@@ -171,10 +171,15 @@ fn explained(groups: &[Vec<&Residual>]) -> f64 {
     if share.is_finite() && count > k { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Round edges that cut the middle 96 % of `values` into about `bins` bins; `None` if they do not
-/// vary.
-fn edges(values: &[f64], bins: f64) -> Option<Vec<f64>> {
-    let (low, high) = (quantile(values, 0.02), quantile(values, 0.98));
+/// The share of values that each end bin takes: enough to be supported, 2 to 20 %.
+fn tail(independent: usize) -> f64 {
+    (1.2 * SUPPORT as f64 / independent as f64).clamp(0.02, 0.2)
+}
+
+/// Round edges that cut what lies between the quantiles `tail` and 1 − `tail` into about `bins`
+/// bins; `None` if it does not vary.
+fn edges(values: &[f64], bins: f64, tail: f64) -> Option<Vec<f64>> {
+    let (low, high) = (quantile(values, tail), quantile(values, 1.0 - tail));
     let width = round_width((high - low) / bins);
     if !(width.is_finite() && width > 1e-9 * (1.0 + low.abs() + high.abs())) {
         return None;
@@ -184,7 +189,7 @@ fn edges(values: &[f64], bins: f64) -> Option<Vec<f64>> {
     Some((first..=last).map(|k| k as f64 * width).collect())
 }
 
-/// 1, 2 or 5 times a power of ten, the nearest below 1.5 times `width`.
+/// The nearest of 1, 2 or 5 times a power of ten.
 fn round_width(width: f64) -> f64 {
     let power = 10_f64.powf(width.log10().floor());
     let lead = width / power;
@@ -230,7 +235,7 @@ pub fn map(residuals: &[Residual]) -> Map {
 /// Edges of one side of the map, the outermost beyond all values (at least one cell).
 fn side(residuals: &[Residual], v: usize) -> Vec<f64> {
     let values: Vec<f64> = residuals.iter().map(|r| r.regime[v]).collect();
-    let mut edges = edges(&values, MAP_BINS).filter(|e| e.len() > 1).unwrap_or_default();
+    let mut edges = edges(&values, MAP_BINS, 0.02).filter(|e| e.len() > 1).unwrap_or_default();
     let (Some(first), Some(last)) = (edges.first().copied(), edges.last().copied()) else {
         let middle = quantile(&values, 0.5).floor();
         return vec![middle, middle + 1.0];
@@ -248,9 +253,9 @@ mod tests {
     #[test]
     fn edges_are_round_and_cover_the_middle() {
         let values: Vec<f64> = (0..1000).map(|i| i as f64 * 0.013).collect();
-        assert_eq!(edges(&values, 8.0), Some((1..=6).map(|k| 2.0 * k as f64).collect()));
-        assert_eq!(edges(&[3.0; 50], 8.0), None);
-        assert_eq!(edges(&[], 8.0), None);
+        assert_eq!(edges(&values, 8.0, 0.02), Some((1..=6).map(|k| 2.0 * k as f64).collect()));
+        assert_eq!(edges(&[3.0; 50], 8.0, 0.02), None);
+        assert_eq!(edges(&[], 8.0, 0.02), None);
     }
 
     #[test]

@@ -88,16 +88,15 @@ fn is_constant(residuals: &[Residual], told: &RegimeBins) -> bool {
     told.explained * (square - mean * mean) < 0.1 * mean * mean
 }
 
-/// First and last of the adjacent supported bins around the surest failure.
+/// First and last of the adjacent bins around the surest failure.
 fn range(bins: &[Bin]) -> Option<(usize, usize)> {
     let sure = |b: &Bin| b.interval[0].abs().min(b.interval[1].abs());
     let peak = (0..bins.len())
         .filter(|&k| bins[k].supported && excludes_zero(bins[k].interval))
         .max_by(|&a, &b| sure(&bins[a]).total_cmp(&sure(&bins[b])))?;
     let worst = bins[peak].mean;
-    let alike = |k: usize| {
-        bins[k].supported && bins[k].label.is_empty() && bins[k].mean / worst >= RANGE_PART
-    };
+    // thin neighbours may join: together with the worst bin they are supported
+    let alike = |k: usize| bins[k].label.is_empty() && bins[k].mean / worst >= RANGE_PART;
     let from = (0..peak).rev().take_while(|&k| alike(k)).last().unwrap_or(peak);
     let to = (peak + 1..bins.len()).take_while(|&k| alike(k)).last().unwrap_or(peak);
     Some((from, to))

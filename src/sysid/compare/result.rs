@@ -246,6 +246,11 @@ pub struct ChannelResult {
     /// explains everything) upwards (over 1: worse than a constant). NaN if the flights do not move
     /// the channel above the noise.
     pub unexplained_fraction: f64,
+    /// What the residual beyond noise does to the state: scaled error (error / x_c) a second, RMS.
+    /// Comparable between channels.
+    pub effect_per_s: f64,
+    /// Share of the mean square residual that is a constant offset, 0..1.
+    pub offset_share: f64,
     /// The worst regime in one sentence.
     pub worst_regime: String,
     /// The same as numbers; `None` if no supported regime differs from zero.

@@ -193,11 +193,31 @@ fn channel(
         residual_rms: power.residual.sqrt(),
         noise_sd: power.noise.sqrt(),
         unexplained_fraction: power.unexplained(),
+        effect_per_s: (power.residual - power.noise).max(0.0).sqrt() * leverage(model, id),
+        offset_share: power.offset,
         worst_regime,
         regime: found.map(|f| f.regime),
         bins,
         map: bins::map(&residuals),
     })
+}
+
+/// What one unit of a channel does to the state it drives: scaled error a second, 1/s.
+fn leverage(model: &GreyBox, id: ChannelId) -> f64 {
+    let [_, _, v, p, q, r, alpha, beta] = model.scale();
+    let body = &model.body;
+    match id {
+        ChannelId::Drag => 1.0 / (body.mass * v),
+        // a force across the path turns it by force / (m V)
+        ChannelId::Lift => 1.0 / (body.mass * v * alpha),
+        ChannelId::Side => 1.0 / (body.mass * v * beta),
+        ChannelId::Roll => 1.0 / (body.jx * p),
+        ChannelId::Pitch => 1.0 / (body.jy * q),
+        ChannelId::Yaw => 1.0 / (body.jz * r),
+        ChannelId::Airspeed => 1.0 / v,
+        ChannelId::Alpha => 1.0 / alpha,
+        ChannelId::Beta => 1.0 / beta,
+    }
 }
 
 /// Mean noise variance over the windows of all flights.
@@ -215,16 +235,21 @@ struct Power {
     residual: f64,
     /// Variance that noise accounts for.
     noise: f64,
+    /// Share of the mean square residual that is its mean.
+    offset: f64,
 }
 
 impl Power {
     fn of(residuals: &[Residual], noise: f64) -> Power {
         let count = residuals.len() as f64;
         let mean = residuals.iter().map(|r| r.measured).sum::<f64>() / count;
+        let residual = residuals.iter().map(|r| r.value.powi(2)).sum::<f64>() / count;
+        let offset = residuals.iter().map(|r| r.value).sum::<f64>() / count;
         Power {
             measured: residuals.iter().map(|r| (r.measured - mean).powi(2)).sum::<f64>() / count,
-            residual: residuals.iter().map(|r| r.value.powi(2)).sum::<f64>() / count,
+            residual,
             noise,
+            offset: offset * offset / residual,
         }
     }
 
@@ -261,34 +286,35 @@ fn channel_trace(flight: &Prepared, series: &Series) -> ChannelTrace {
     trace
 }
 
-/// The sentences of a model: the worst force first (it moves V, α, β), then the worst moment (it
-/// moves p, q, r), then the others by unexplained share. The rates of V, α, β repeat the forces
-/// and are left out where the logs have those.
+/// The sentences of a model: the worst of forces (they move V, α, β) and the worst of moments (they
+/// move p, q, r) lead, the others follow. The rates of V, α, β repeat the forces and are left out
+/// where the logs have those.
 fn sentences(channels: &[ChannelResult]) -> Vec<String> {
     use ChannelId::{Drag, Lift, Pitch, Roll, Side, Yaw};
-    let forces = channels.iter().any(|c| matches!(c.channel, Drag | Lift | Side));
-    let moment = |c: &&ChannelResult| matches!(c.channel, Roll | Pitch | Yaw);
-    let path =
-        |c: &&ChannelResult| !moment(c) && (!forces || matches!(c.channel, Drag | Lift | Side));
-    let ranked = |keep: &dyn Fn(&&ChannelResult) -> bool| {
-        let mut list: Vec<&ChannelResult> = channels.iter().filter(keep).collect();
-        let worth = |c: &ChannelResult| {
-            if c.unexplained_fraction.is_nan() { -1.0 } else { c.unexplained_fraction }
-        };
-        list.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
-        list
-    };
-    let (path, moments) = (ranked(&path), ranked(&moment));
-    let mut rest: Vec<&ChannelResult> =
-        path.iter().skip(1).chain(moments.iter().skip(1)).copied().collect();
-    rest.sort_by(|a, b| {
-        let known = |c: &ChannelResult| {
-            if c.unexplained_fraction.is_nan() { -1.0 } else { c.unexplained_fraction }
-        };
-        known(b).total_cmp(&known(a))
-    });
-    let leading = path.first().into_iter().chain(moments.first()).copied();
-    leading.chain(rest).map(|c| capital(&c.worst_regime) + ".").collect()
+    let is_force = |c: &&ChannelResult| matches!(c.channel, Drag | Lift | Side);
+    let is_moment = |c: &&ChannelResult| matches!(c.channel, Roll | Pitch | Yaw);
+    let forces = channels.iter().any(|c| is_force(&c));
+    let mut path: Vec<_> =
+        channels.iter().filter(|c| !is_moment(c) && is_force(c) == forces).collect();
+    let mut moments: Vec<_> = channels.iter().filter(is_moment).collect();
+    let worst_first = |a: &&ChannelResult, b: &&ChannelResult| told(b).total_cmp(&told(a));
+    path.sort_by(worst_first);
+    moments.sort_by(worst_first);
+    let (path_lead, path_rest) = path.split_at(path.len().min(1));
+    let (moment_lead, moment_rest) = moments.split_at(moments.len().min(1));
+    let (mut leading, mut rest) =
+        ([path_lead, moment_lead].concat(), [path_rest, moment_rest].concat());
+    leading.sort_by(worst_first);
+    rest.sort_by(worst_first);
+    leading.iter().chain(&rest).map(|c| capital(&c.worst_regime) + ".").collect()
+}
+
+/// The part of a channel's effect that its sentence accounts for: what its offset and its most
+/// telling variable explain.
+fn told(channel: &ChannelResult) -> f64 {
+    let share = channel.bins.iter().map(|b| b.explained).fold(0.0, f64::max);
+    let told = channel.offset_share + (1.0 - channel.offset_share) * share;
+    channel.effect_per_s * told.sqrt()
 }
 
 fn capital(text: &str) -> String {

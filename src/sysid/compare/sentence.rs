@@ -5,6 +5,8 @@ use super::result::{ChannelId, Regime, RegimeVariable};
 
 /// A channel that the model explains but for less than this is said to be explained.
 const EXPLAINED: f64 = 0.01;
+/// Below this no regime is worth naming.
+const NOTHING_LEFT: f64 = 0.001;
 
 /// What a sentence about a channel is made from.
 pub struct Subject<'a> {
@@ -29,6 +31,9 @@ pub fn sentence(subject: &Subject) -> String {
         );
     }
     let share = percent(100.0 * subject.unexplained);
+    if subject.unexplained < NOTHING_LEFT {
+        return format!("{noun} is explained: {share} of its variation is left");
+    }
     let Some(finding) = subject.finding else {
         return format!(
             "{noun}: {share} of its variation is unexplained, with no regime in which the model is surely off"
@@ -113,6 +118,7 @@ fn strength(channel: ChannelId, regime: &Regime) -> String {
 /// Where: " for α > 9°", with how the error runs along the variable.
 fn place(regime: &Regime, trend: Trend) -> String {
     let Some(variable) = regime.variable else { return " throughout".into() };
+    let whole = regime.low.is_nan() && regime.high.is_nan();
     let name = spoken(variable);
     let trend = match trend {
         Trend::Grows => format!(", and the error grows with {name}"),
@@ -122,6 +128,7 @@ fn place(regime: &Regime, trend: Trend) -> String {
     };
     match variable {
         RegimeVariable::Flight => " in one flight".into(),
+        _ if whole => format!(" throughout{trend}"),
         _ => format!(" for {}{trend}", range(regime, variable)),
     }
 }
@@ -136,20 +143,37 @@ fn spoken(variable: RegimeVariable) -> &'static str {
     }
 }
 
-/// "α > 9°", "throttle 0.2 to 0.4", "aileron moving right faster than 20 °/s".
+/// "α > 9°", "throttle 0.2 to 0.4", "the aileron moving right faster than 20 °/s".
 fn range(regime: &Regime, variable: RegimeVariable) -> String {
-    let gap = if variable.unit() == "°" || variable.unit().is_empty() { "" } else { " " };
-    let value = |x: f64| format!("{}{gap}{}", significant(x, 3), variable.unit());
-    let name = match variable {
-        RegimeVariable::AileronRate => "aileron moving at",
-        RegimeVariable::ElevatorRate => "elevator moving at",
-        other => spoken(other),
-    };
-    match (regime.low.is_finite(), regime.high.is_finite()) {
-        (true, false) => format!("{name} > {}", value(regime.low)),
-        (false, true) => format!("{name} < {}", value(regime.high)),
-        (true, true) => format!("{name} {} to {}", significant(regime.low, 3), value(regime.high)),
-        (false, false) => format!("any {name}"),
+    use RegimeVariable::{AileronRate, ElevatorRate};
+    let (low, high) = (regime.low, regime.high);
+    match (variable, low >= 0.0, high <= 0.0) {
+        (AileronRate, true, _) => format!("the aileron moving right {}", speed(low, high)),
+        (AileronRate, _, true) => format!("the aileron moving left {}", speed(-high, -low)),
+        (ElevatorRate, true, _) => format!("the elevator moving down {}", speed(low, high)),
+        (ElevatorRate, _, true) => format!("the elevator moving up {}", speed(-high, -low)),
+        (AileronRate, ..) => format!("aileron movement{}", between(low, high, variable.unit())),
+        (ElevatorRate, ..) => format!("elevator movement{}", between(low, high, variable.unit())),
+        _ => format!("{}{}", spoken(variable), between(low, high, variable.unit())),
+    }
+}
+
+fn speed(low: f64, high: f64) -> String {
+    match (low, high.is_finite()) {
+        (low, false) => format!("faster than {} °/s", significant(low, 3)),
+        (0.0, true) => format!("slower than {} °/s", significant(high, 3)),
+        (low, true) => format!("at {} to {} °/s", significant(low, 3), significant(high, 3)),
+    }
+}
+
+fn between(low: f64, high: f64, unit: &str) -> String {
+    let gap = if unit == "°" || unit.is_empty() { "" } else { " " };
+    let value = |x: f64| format!("{}{gap}{unit}", significant(x, 3));
+    match (low.is_finite(), high.is_finite()) {
+        (true, false) => format!(" > {}", value(low)),
+        (false, true) => format!(" < {}", value(high)),
+        (true, true) => format!(" {} to {}", significant(low, 3), value(high)),
+        (false, false) => String::new(),
     }
 }
 
@@ -253,7 +277,7 @@ mod tests {
         assert_eq!(
             say(ChannelId::Yaw, at, Trend::Reverses),
             "yawing moment is 0.90 ± 0.12 N m too far to the left (it has the wrong sign) for \
-             aileron moving at 20 to 40 °/s, and the error changes sign with how fast the aileron \
+             the aileron moving right at 20 to 40 °/s, and the error changes sign with how fast the aileron \
              moves, 210 samples, flight a.csv only"
         );
         let at = regime(RegimeVariable::Q, f64::NAN, -30.0, 0.04, 0.0);
