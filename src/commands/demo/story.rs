@@ -43,6 +43,7 @@ impl Teller<'_> {
             travel: SurfaceTravel { aileron_rad: self.deflection, elevator_rad: self.deflection },
             timing: Some(timing(&folder.join("flight.csv"))?),
             events: self.texts.iter().map(event).collect(),
+            comparison: None,
         })
     }
 }
