@@ -1,3 +1,4 @@
 //! From flight logs to what is wrong with a model: reconstruct, compare, localise.
 
+pub mod reconstruct;
 pub mod reconstruction;
