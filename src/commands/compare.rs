@@ -19,7 +19,9 @@ const INCOMPLETE: u8 = 3;
 
 /// Options of `greylag compare`.
 #[derive(clap::Args)]
-#[command(after_help = "Exit status: 0 done, 1 nothing could be compared, 3 done without some log.")]
+#[command(
+    after_help = "Exit status: 0 done, 1 nothing could be compared, 3 done without some log."
+)]
 pub struct Arguments {
     /// Model files, compared side by side; the first one leads the report.
     #[arg(long = "model", num_args = 1.., required = true)]
@@ -87,10 +89,7 @@ fn page(_comparison: &Comparison) -> Option<String> {
 }
 
 /// The flights that could be reconstructed, with what was wrong with logs.
-fn reconstruct_all(
-    arguments: &Arguments,
-    model: &GreyBox,
-) -> (Vec<Reconstruction>, Vec<String>) {
+fn reconstruct_all(arguments: &Arguments, model: &GreyBox) -> (Vec<Reconstruction>, Vec<String>) {
     let (mut flights, mut trouble) = (Vec::new(), Vec::new());
     let names = names(&arguments.logs);
     for (k, (path, name)) in arguments.logs.iter().zip(names).enumerate() {
@@ -184,8 +183,18 @@ fn empty_table<const N: usize>(header: [&str; N], words: usize) -> Table {
 /// Free-run errors in the units of a flight.
 fn free_run_table(models: &[ModelResult]) -> Table {
     let header = [
-        "model", "horizon s", "RMSE / x_c", "diverged", "roll °", "pitch °", "V m/s", "p °/s",
-        "q °/s", "r °/s", "α °", "β °",
+        "model",
+        "horizon s",
+        "RMSE / x_c",
+        "diverged",
+        "roll °",
+        "pitch °",
+        "V m/s",
+        "p °/s",
+        "q °/s",
+        "r °/s",
+        "α °",
+        "β °",
     ];
     let mut table = empty_table(header, 1);
     for model in models {

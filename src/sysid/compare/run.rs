@@ -101,6 +101,12 @@ fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, Compar
                 flight.name
             ));
         }
+        if flight.noise.iter().chain(&flight.force_noise).all(|sd| !sd.is_finite()) {
+            notes.push(format!(
+                "{}: the sensors' noise is not known, so all that is left over counts as unexplained",
+                flight.name
+            ));
+        }
         used.push(flight);
         prepared.push(ready);
     }
@@ -187,6 +193,7 @@ fn channel(
         channel: id,
         unexplained: power.unexplained(),
         finding: found.as_ref(),
+        follows: finding::follows(&bins),
         mass: model.body.mass,
         flights: flights.len(),
     });
