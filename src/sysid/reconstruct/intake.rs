@@ -6,8 +6,7 @@ use crate::logs::{Flight, Sample};
 use crate::num::statistics::quantile;
 use crate::physics::actuators::Actuators;
 use crate::physics::atmosphere::{Atmosphere, Density};
-use crate::physics::{Command, Controls, State};
-use crate::sysid::reconstruction::{Instant, Reconstruction, Segment};
+use crate::physics::{Command, Controls};
 
 /// Fewest samples of a sensor in a segment that are worth using.
 const FEWEST: usize = 10;
@@ -372,41 +371,4 @@ fn controls(channels: &Channels, times: &[f64], options: &Options) -> Vec<Contro
         });
     }
     all
-}
-
-/// The log as it is, without any correction.
-pub fn as_measured(log: Log, options: &Options) -> Reconstruction {
-    let or = |x: f64, default: f64| if x.is_finite() { x } else { default };
-    let segment = |track: &Track| Segment {
-        instants: (0..track.len())
-            .map(|k| Instant {
-                time_s: track.start + k as f64 * log.step,
-                state: State {
-                    roll: track.attitude[k][0],
-                    pitch: track.attitude[k][1],
-                    airspeed: track.airspeed[k],
-                    p: track.rates[k][0],
-                    q: track.rates[k][1],
-                    r: track.rates[k][2],
-                    alpha: or(track.vanes[k][0], 0.0),
-                    beta: or(track.vanes[k][1], 0.0),
-                },
-                yaw: track.attitude[k][2],
-                controls: track.controls[k],
-                command: track.commands[k],
-                specific_force: track.force[k],
-                altitude: track.altitude[k],
-                density: track.density[k],
-            })
-            .collect(),
-    };
-    Reconstruction {
-        name: options.name.clone(),
-        step_s: log.step,
-        segments: log.tracks.iter().map(segment).collect(),
-        nuisances: Vec::new(),
-        noise: [f64::NAN; 8],
-        force_noise: [f64::NAN; 3],
-        notes: log.notes,
-    }
 }

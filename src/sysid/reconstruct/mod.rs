@@ -3,8 +3,17 @@
 //! Kinematics hold no aerodynamics, so what the sensors do wrong, and what the wind does, is decided
 //! here, before any model of the aircraft is looked at.
 
+mod band;
 mod channel;
 mod intake;
+mod kinematics;
+mod measurement;
+mod noise;
+mod nuisance;
+mod outcome;
+mod path;
+mod rotation;
+mod smoother;
 
 use crate::logs::Flight;
 use crate::physics::airframe::ActuatorFigures;
@@ -117,5 +126,6 @@ pub enum ReconstructError {
 /// its sensors contradict one another.
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
-    Ok(intake::as_measured(log, options))
+    let smoothed = smoother::smooth(&log, options)?;
+    Ok(outcome::assemble(log, smoothed, options))
 }
