@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use greylag::control::{self, Controller, Kind, Target};
+use greylag::control::{self, Kind, Target};
 use greylag::logs::{Flight, Sample};
 use greylag::model::GreyBox;
 use greylag::num::stream::{Stream, stream};

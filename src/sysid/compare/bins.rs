@@ -115,7 +115,8 @@ fn continuous(
     };
     let bins = (0..count).filter(|k| !members[*k].is_empty()).map(bin).collect();
     let (name, unit) = (variable.name(), variable.unit());
-    Some(RegimeBins { variable, name, unit, explained: explained(&members), bins })
+    let explained = explained(&members).max(along_a_line(&values, residuals));
+    Some(RegimeBins { variable, name, unit, explained, bins })
 }
 
 fn by_flight(residuals: &[Residual], flights: &[Prepared], seed: u64, channel: u64) -> RegimeBins {
@@ -174,6 +175,22 @@ fn explained(groups: &[Vec<&Residual>]) -> f64 {
 /// The share of values that each end bin takes: enough to be supported, 2 to 20 %.
 fn tail(independent: usize) -> f64 {
     (1.2 * SUPPORT as f64 / independent as f64).clamp(0.02, 0.2)
+}
+
+/// Share of the variance that a straight line over `values` explains: bins are coarse where a few
+/// far values carry the error.
+fn along_a_line(values: &[f64], residuals: &[Residual]) -> f64 {
+    let (mx, my) =
+        (mean(values), residuals.iter().map(|r| r.value).sum::<f64>() / values.len() as f64);
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for (x, r) in values.iter().zip(residuals) {
+        xx += (x - mx).powi(2);
+        xy += (x - mx) * (r.value - my);
+        yy += (r.value - my).powi(2);
+    }
+    let count = independent(residuals.iter()) as f64;
+    let share = 1.0 - (1.0 - xy * xy / (xx * yy)) * (count - 1.0) / (count - 2.0);
+    if share.is_finite() && count > 2.0 { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// Round edges that cut what lies between the quantiles `tail` and 1 − `tail` into about `bins`

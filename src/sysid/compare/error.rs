@@ -14,9 +14,9 @@ pub enum CompareError {
         "no flight to compare with: {0}; give a log in which the aircraft flies for some seconds without gaps"
     )]
     NoFlight(String),
-    /// The samples do not fit the models' time step.
+    /// The flight has no clock.
     #[error(
-        "flight {flight} has a sample every {step_s} s, which is neither a multiple nor a whole fraction of the models' step of 0.01 s: reconstruct it on such a clock"
+        "flight {flight} is said to have a sample every {step_s} s, which is no clock to compare on: it must lie in 1e-6 to 1 s"
     )]
     Clock {
         /// The flight.

@@ -8,6 +8,8 @@ use super::result::{Bin, Regime, RegimeBins, RegimeVariable};
 const SHARE_FLOOR: f64 = 0.1;
 /// Time, altitude and flight are named only if they explain this much more than any other variable.
 const CIRCUMSTANCE_MARGIN: f64 = 0.15;
+/// A residual follows a variable that explains at least this much of its variance.
+const FOLLOWS: f64 = 0.5;
 /// A bin belongs to the worst range if its mean is at least this part of the worst bin's.
 const RANGE_PART: f64 = 0.5;
 /// Fewest independent samples by which a flight shows a regime.
@@ -63,6 +65,11 @@ pub fn worst(
     let ordered = told.variable != RegimeVariable::Flight;
     let trend = if ordered { trend(&told.bins) } else { Trend::None };
     Some(Finding { regime, trend })
+}
+
+/// The variable that a residual mainly follows, whether or not some range of it is supported.
+pub fn follows(bins: &[RegimeBins]) -> Option<RegimeVariable> {
+    telling(bins).filter(|b| b.explained > FOLLOWS).map(|b| b.variable)
 }
 
 fn excludes_zero([low, high]: [f64; 2]) -> bool {

@@ -1,9 +1,12 @@
 //! A reconstructed flight made ready to be compared: on the models' clock, in the air, cut in windows.
 
+use std::f64::consts::{PI, TAU};
+
 use super::CompareError;
 use super::kernel::{Kernel, weigh};
 use super::result::{FlightResult, FlightTrace, NuisanceResult, RegimeVariable};
 use crate::model::STEP;
+use crate::physics::State;
 use crate::sysid::reconstruction::{Instant, Reconstruction};
 
 /// Slower than this (m/s) an aircraft of any size is taken to stand, not to fly.
@@ -47,16 +50,17 @@ impl Prepared {
     /// Puts `flight` on the models' clock and keeps what was flown faster than `slowest` (m/s).
     ///
     /// # Errors
-    /// [`CompareError::Clock`] if its clock does not fit.
+    /// [`CompareError::Clock`] if it has no clock.
     pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Prepared, CompareError> {
-        let (every, substeps) = clock(flight)?;
+        let substeps = substeps(flight)?;
+        let dt = STEP * substeps as f64;
         let segments: Vec<Vec<Instant>> = flight
             .segments
             .iter()
             .flat_map(|segment| in_the_air(&segment.instants, slowest.max(FLYING_FLOOR)))
-            .map(|piece| piece.iter().step_by(every).copied().collect())
+            .map(|piece| on_clock(piece, flight.step_s, dt))
+            .filter(|piece| piece.len() > 1)
             .collect();
-        let dt = flight.step_s * every as f64;
         let kernel = Kernel::hann(dt);
         let known = |sd: f64| if sd.is_finite() { sd } else { 0.0 };
         let first = flight.segments.iter().find_map(|s| s.instants.first());
@@ -134,18 +138,46 @@ fn push(trace: &mut FlightTrace, time_s: f64, state: [f64; 8], controls: [f64; 3
     trace.controls.iter_mut().zip(controls).for_each(|(list, x)| list.push(x));
 }
 
-/// Samples to one kept, and model steps to one kept sample.
-fn clock(flight: &Reconstruction) -> Result<(usize, usize), CompareError> {
-    let wrong = || CompareError::Clock { flight: flight.name.clone(), step_s: flight.step_s };
-    if !(flight.step_s.is_finite() && flight.step_s > 0.0) {
-        return Err(wrong());
+/// Model steps of [`STEP`] between samples of the models' clock: the nearest whole number.
+fn substeps(flight: &Reconstruction) -> Result<usize, CompareError> {
+    let step_s = flight.step_s;
+    if !(1e-6..=1.0).contains(&step_s) {
+        return Err(CompareError::Clock { flight: flight.name.clone(), step_s });
     }
-    let (slower, faster) = (flight.step_s / STEP, STEP / flight.step_s);
-    let whole = |x: f64| x >= 0.999 && (x - x.round()).abs() < 1e-3;
-    match (whole(slower), whole(faster)) {
-        (true, _) => Ok((1, slower.round() as usize)),
-        (false, true) => Ok((faster.round() as usize, 1)),
-        (false, false) => Err(wrong()),
+    Ok(((step_s / STEP).round() as usize).max(1))
+}
+
+/// The samples of a stretch `dt` (s) apart: as they are if they are so already, else linear between
+/// them, deflections held.
+fn on_clock(instants: &[Instant], step_s: f64, dt: f64) -> Vec<Instant> {
+    if (step_s / dt - 1.0).abs() < 1e-6 {
+        return instants.to_vec();
+    }
+    let every = (dt / step_s).round() as usize;
+    if every > 1 && (dt / (step_s * every as f64) - 1.0).abs() < 1e-6 {
+        return instants.iter().step_by(every).copied().collect();
+    }
+    let count = ((instants.len() - 1) as f64 * step_s / dt).floor() as usize;
+    let at = |k: usize| {
+        let place = k as f64 * dt / step_s;
+        let i = (place.floor() as usize).min(instants.len() - 2);
+        between(&instants[i], &instants[i + 1], place - i as f64)
+    };
+    (0..=count).map(at).collect()
+}
+
+fn between(a: &Instant, b: &Instant, part: f64) -> Instant {
+    let mix = |x: f64, y: f64| x + (y - x) * part;
+    let (x, mut y) = (a.state.to_array(), b.state.to_array());
+    // roll the short way round
+    y[0] = x[0] + (y[0] - x[0] + PI).rem_euclid(TAU) - PI;
+    Instant {
+        time_s: mix(a.time_s, b.time_s),
+        state: State::from_array(std::array::from_fn(|k| mix(x[k], y[k]))),
+        specific_force: std::array::from_fn(|k| mix(a.specific_force[k], b.specific_force[k])),
+        altitude: mix(a.altitude, b.altitude),
+        density: mix(a.density, b.density),
+        ..*a
     }
 }
 

@@ -356,7 +356,8 @@ pub struct RegimeBins {
     pub name: &'static str,
     /// Its unit here, chosen for people: `°`, `°/s`, `m/s`, `m`, `s`, or empty.
     pub unit: &'static str,
-    /// Share of the residual's variance that the bins explain, adjusted for their number, 0..1.
+    /// Share of the residual's variance that the bins, or a straight line, explain, whichever is
+    /// more, adjusted for their number of parameters, 0..1.
     pub explained: f64,
     /// The bins, ascending; for flights one each, in their order.
     pub bins: Vec<Bin>,

@@ -10,7 +10,8 @@ use super::flight::Prepared;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
 use super::kernel::KERNEL_S;
 use super::result::{
-    ChannelId, ChannelResult, ChannelTrace, Comparison, ModelResult, ModelTrace, Settings,
+    ChannelId, ChannelResult, ChannelTrace, Comparison, HorizonScore, ModelResult, ModelTrace,
+    Settings,
 };
 use super::sentence::{Subject, sentence};
 use super::weak::{self, Series};
@@ -100,6 +101,12 @@ fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, Compar
                 flight.name
             ));
         }
+        if flight.noise.iter().chain(&flight.force_noise).all(|sd| !sd.is_finite()) {
+            notes.push(format!(
+                "{}: the sensors' noise is not known, so all that is left over counts as unexplained",
+                flight.name
+            ));
+        }
         used.push(flight);
         prepared.push(ready);
     }
@@ -147,10 +154,15 @@ fn one_model(model: &GreyBox, flights: &[Prepared], options: &Options) -> ModelR
         .filter_map(|(k, id)| channel(model, *id, k as u64, flights, &series, options.seed))
         .collect();
     let traces = paths.into_iter().zip(flights).zip(&series);
+    let free_run: Vec<_> = options.horizons_s.iter().map(|h| runs.score(*h)).collect();
+    let mut sentences = sentences(&channels);
+    if let Some(warning) = diverges(&free_run) {
+        sentences.insert(0, warning);
+    }
     ModelResult {
         name: model.name.clone(),
-        sentences: sentences(&channels),
-        free_run: options.horizons_s.iter().map(|h| runs.score(*h)).collect(),
+        sentences,
+        free_run,
         growth: runs.growth(),
         channels,
         traces: traces
@@ -181,6 +193,7 @@ fn channel(
         channel: id,
         unexplained: power.unexplained(),
         finding: found.as_ref(),
+        follows: finding::follows(&bins),
         mass: model.body.mass,
         flights: flights.len(),
     });
@@ -199,6 +212,17 @@ fn channel(
         regime: found.map(|f| f.regime),
         bins,
         map: bins::map(&residuals),
+    })
+}
+
+/// Says so if most free runs are lost by the shortest horizon.
+fn diverges(scores: &[HorizonScore]) -> Option<String> {
+    let first = scores.iter().min_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))?;
+    (first.divergence_rate > 0.5).then(|| {
+        format!(
+            "The model diverges at once: {} of {} free runs are lost within {} s, so its free-run errors are those of the bound.",
+            first.diverged, first.runs, first.horizon_s
+        )
     })
 }
 

@@ -16,6 +16,8 @@ pub struct Subject<'a> {
     pub unexplained: f64,
     /// Its worst regime.
     pub finding: Option<&'a Finding>,
+    /// The variable that the residual mainly follows.
+    pub follows: Option<RegimeVariable>,
     /// Mass of the aircraft as the model believes it, kg.
     pub mass: f64,
     /// Number of flights compared.
@@ -35,12 +37,17 @@ pub fn sentence(subject: &Subject) -> String {
         return format!("{noun} is explained: {share} of its variation is left");
     }
     let Some(finding) = subject.finding else {
-        return format!(
-            "{noun}: {share} of its variation is unexplained, with no regime in which the model is surely off"
-        );
+        let why = match subject.follows {
+            Some(variable) => format!(
+                "which follows {}, though no range of it has the samples to give a figure",
+                spoken(variable)
+            ),
+            None => "with no regime in which the model is surely off".into(),
+        };
+        return format!("{noun}: {share} of its variation is unexplained, {why}");
     };
     let what = error(subject, &finding.regime);
-    let place = place(&finding.regime, finding.trend);
+    let place = place(subject, finding);
     let who = who(&finding.regime, subject.flights);
     if subject.unexplained < EXPLAINED {
         return format!(
@@ -116,8 +123,11 @@ fn strength(channel: ChannelId, regime: &Regime) -> String {
 }
 
 /// Where: " for α > 9°", with how the error runs along the variable.
-fn place(regime: &Regime, trend: Trend) -> String {
-    let Some(variable) = regime.variable else { return " throughout".into() };
+fn place(subject: &Subject, Finding { regime, trend }: &Finding) -> String {
+    let Some(variable) = regime.variable else {
+        let along = subject.follows.map(|v| format!(", and the error follows {}", spoken(v)));
+        return format!(" throughout{}", along.unwrap_or_default());
+    };
     let whole = regime.low.is_nan() && regime.high.is_nan();
     let name = spoken(variable);
     let trend = match trend {
@@ -247,6 +257,7 @@ mod tests {
             channel,
             unexplained: 0.4,
             finding: Some(&finding),
+            follows: None,
             mass: 3.364,
             flights: 2,
         })

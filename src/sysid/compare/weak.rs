@@ -202,13 +202,13 @@ fn noise_variance(model: &GreyBox, flight: &Prepared) -> [f64; 9] {
         .collect();
     let mut variance = measured_noise(model, flight, average, slope);
     for at in &some {
-        let part = predicted_noise(model, at, &flight.noise);
+        let part = state_noise(model, at, &flight.noise);
         (0..9).for_each(|k| variance[k] += average * part[k] / some.len() as f64);
     }
     variance
 }
 
-/// The part that enters through what is measured.
+/// The part that enters through what the kernel weighs: accelerations, rates, airspeed, α, β.
 fn measured_noise(model: &GreyBox, flight: &Prepared, average: f64, slope: f64) -> [f64; 9] {
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|sd| sd * sd);
     let [fx, fy, fz] = flight.force_noise.map(|sd| (model.body.mass * sd).powi(2));
@@ -220,14 +220,14 @@ fn measured_noise(model: &GreyBox, flight: &Prepared, average: f64, slope: f64) 
     std::array::from_fn(|k| [force, moment, path][k / 3][k % 3])
 }
 
-/// The variance of one sample of what is predicted, by central differences.
-fn predicted_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
+/// The variance that the state's noise brings into one sample of the residual, by central differences.
+fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
     let mut variance = [0.0; 9];
     for (k, sd) in noise.iter().enumerate().filter(|(_, sd)| **sd > 0.0) {
         let moved = |by: f64| {
             let mut x = at.state.to_array();
             x[k] += by;
-            predicted(model, &Instant { state: State::from_array(x), ..*at })
+            residual(model, &Instant { state: State::from_array(x), ..*at })
         };
         let (up, down) = (moved(*sd), moved(-sd));
         (0..9).for_each(|c| variance[c] += (0.5 * (up[c] - down[c])).powi(2));
@@ -235,8 +235,12 @@ fn predicted_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] 
     variance
 }
 
-fn predicted(model: &GreyBox, at: &Instant) -> [f64; 9] {
-    let force = predicted_force(model, at);
+/// Predicted less what the state's noise moves of the measured side too: the forces turned by α and
+/// β, the gyroscopic moments.
+fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
+    let (force, measured) = (predicted_force(model, at), measured_force(model, at));
+    let known = at.specific_force.iter().all(|f| f.is_finite());
+    let force = std::array::from_fn(|k| force[k] - if known { measured[k] } else { 0.0 });
     let rate = model.rate(&at.state, &at.controls, at.altitude);
     let turning = gyroscopic(&model.body, &at.state);
     let moment = moment(model, at, at);
