@@ -39,15 +39,15 @@ pub(super) fn summary(c: &Comparison) -> Section {
     let note = "Free runs from reconstructed states. Theil's U: 0 is perfect, 1 is no relation; \
                 its shares say whether the error is an offset (bias), too much or too little \
                 movement (variance) or movement at the wrong time (covariance).";
-    Section::new("How far predictions stray", note, figures)
+    Section::new("Free runs", note, figures)
 }
 
 fn summary_row(model: &str, score: &HorizonScore) -> Vec<String> {
     let mut row = vec![
         model.to_string(),
-        number(score.horizon_s),
+        score.horizon_s.to_string(),
         score.runs.to_string(),
-        number(100.0 * score.divergence_rate),
+        percent(score.divergence_rate),
         number(score.rmse_scaled),
     ];
     let finite = score.states.iter().filter(|s| s.rmse_scaled.is_finite());
@@ -64,7 +64,7 @@ fn state_cells(s: &StateScore) -> Vec<String> {
     let (name, unit, factor) = people(s.state);
     let mut cells = vec![name.to_string(), format!("{} {unit}", number(factor * s.rmse))];
     cells.push(number(s.theil_u));
-    cells.extend([s.bias_share, s.variance_share, s.covariance_share].map(|x| percent(x)));
+    cells.extend([s.bias_share, s.variance_share, s.covariance_share].map(percent));
     cells
 }
 
@@ -74,11 +74,19 @@ fn percent(share: f64) -> String {
 
 /// A state's name and unit as people say them, and the factor from its SI unit.
 fn people(state: &str) -> (&str, &'static str, f64) {
-    let degree = 1f64.to_degrees();
-    match state.rsplit_once('_') {
-        Some((name, "rad")) => (name, "°", degree),
-        Some((name, "radps")) => (name, "°/s", degree),
-        Some((name, "mps")) => (name, "m/s", 1.0),
+    let (name, unit) = state.rsplit_once('_').unwrap_or((state, ""));
+    let name = match name {
+        "p" => "roll rate p",
+        "q" => "pitch rate q",
+        "r" => "yaw rate r",
+        "alpha" => "angle of attack α",
+        "beta" => "sideslip β",
+        other => other,
+    };
+    match unit {
+        "rad" => (name, "°", 1f64.to_degrees()),
+        "radps" => (name, "°/s", 1f64.to_degrees()),
+        "mps" => (name, "m/s", 1.0),
         _ => (state, "", 1.0),
     }
 }

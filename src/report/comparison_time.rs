@@ -162,7 +162,7 @@ fn figure(
     // Steps up to a second are the drawing's; the segments' own rows break the lines.
     figure.add_track(&take(&trace.time_s, 1.0), f64::INFINITY, panels.collect());
     if every > 1 {
-        figure.notes.push(format!("Every {every}th sample is drawn."));
+        figure.notes.push(format!("One sample in {every} is drawn."));
     }
     figure
 }

@@ -18,14 +18,14 @@ pub(super) fn regimes(c: &Comparison) -> Section {
          positive one means that the model is too low. Grey: fewer than {} independent samples.",
         c.settings.support
     );
-    choice("Where: over each variable", &note, ANCHOR, options)
+    choice("Where it fails", &note, ANCHOR, options)
 }
 
 pub(super) fn maps(c: &Comparison) -> Section {
     let options = by_channel(c, |id| heat_maps(c, id));
     let note = "Mean of measured less model over angle of attack and sideslip, one map a model on \
                 one scale. Orange: the model is too low; blue: too high.";
-    choice("Where: α and β", note, "map", options)
+    choice("α–β map", note, "map", options)
 }
 
 fn choice(title: &str, note: &str, anchor: &str, options: Vec<super::ChoiceOption>) -> Section {
