@@ -1,6 +1,7 @@
 //! Subcommands: arguments, then a few lines of work.
 
 mod choices;
+mod compare;
 #[cfg(feature = "sitl")]
 mod demo;
 #[cfg(feature = "sitl")]
@@ -25,6 +26,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Compare models with flight logs: how far predictions stray, in which channel and regime.
+    Compare(compare::Arguments),
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
     #[cfg(feature = "sitl")]
     Demo(demo::Arguments),
@@ -43,6 +46,7 @@ pub fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let result = match Arguments::parse().command {
+        Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Demo(arguments) => demo::run(&arguments),
         #[cfg(feature = "sitl")]

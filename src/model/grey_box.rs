@@ -5,7 +5,7 @@ use crate::num::{Real, Table};
 use crate::physics::atmosphere::Atmosphere;
 use crate::physics::effects::Kind;
 use crate::physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
-use crate::physics::{AirData, Airframe, Controls, Point, State, Wrench};
+use crate::physics::{AirData, Airframe, Channel, Controls, Point, State, Wrench};
 
 /// A coefficient of a model with its full name.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,14 +92,29 @@ impl GreyBox {
         controls: &Controls<R>,
         air: &AirData<R>,
     ) -> Wrench<R> {
-        let at = Point { state, controls, air, geometry: &self.airframe.geometry };
         let mut wrench = Wrench::zero();
+        self.contributions(state, controls, air, |index, channel, amount| {
+            wrench.add(channel, amount.scale(self.coefficients[index].value));
+        });
+        wrench
+    }
+
+    /// What one unit of each coefficient contributes: calls `term` with its place in
+    /// [`coefficients`](GreyBox::coefficients), a channel and the amount in N or N m.
+    #[inline(always)]
+    pub fn contributions<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+        mut term: impl FnMut(usize, Channel, R),
+    ) {
+        let at = Point { state, controls, air, geometry: &self.airframe.geometry };
         for Term { kind, first, table } in &self.terms {
-            kind.basis(&at, table.as_ref(), |index, channel, amount: R| {
-                wrench.add(channel, amount.scale(self.coefficients[first + index].value));
+            kind.basis(&at, table.as_ref(), |index, channel, amount| {
+                term(first + index, channel, amount);
             });
         }
-        wrench
     }
 
     /// Linear acceleration (specific force plus gravity, body axes, m/s²) and angular acceleration

@@ -87,9 +87,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let teller = Teller {
         controller: arguments.controller.name(),
         seed: arguments.seed.into(),
-        model: &model.name,
+        model: &model,
         aircraft: &plant.aircraft,
-        deflection: model.airframe.actuators.deflection_max,
         texts: flown?,
     };
     let recorded = story::read(&folder)?;

@@ -54,7 +54,7 @@ function timeChart(host, figure, track, panel, last) {
       sideAxis(log ? { splits: decades, values: (u, s) => s.map(showDecade), filter: (u, s) => s } : {}),
     ],
     series: [{}, ...panel.series.map((s) => ({
-      label: s.label, stroke: style(s.style), dash: DASH[s.style], width: Math.max(1.5, 0.1 * rem()),
+      label: s.label, stroke: style(s.style), dash: DASH[s.style], width: Math.max(1.5, 0.1 * rem()) * (s.style === "measured" ? 2.6 : 1),
       points: { size: 3, show: true, filter: lonePoints }, spanGaps: false, pxAlign: 0,
     }))],
     hooks: {
@@ -189,11 +189,14 @@ function xyChart(host, data) {
 function columns(host) {
   return getComputedStyle(host.closest(".panels")).gridTemplateColumns.split(" ").length;
 }
+const DRAWN = { xy: xyChart, histogram: histogramChart, intervals: intervalChart, heat: heatChart, curves: curvesChart };
 function build() {
   for (const u of charts) u.destroy();
   charts = [];
   timeCharts = [];
-  for (const host of document.querySelectorAll(".plot")) {
+  const shown = [...document.querySelectorAll(".plot")].filter((host) => !hidden(host));
+  newClock(shown.map((host) => figures[host.dataset.figure]).filter((f) => f.kind === "time"));
+  for (const host of shown) {
     const { kind, data } = figures[host.dataset.figure];
     if (kind === "time") {
       const track = data.tracks[host.dataset.track];
@@ -202,7 +205,7 @@ function build() {
       const last = all.indexOf(host) >= all.length - columns(host);
       host.style.height = last ? `calc(var(--plot-height) + 2.2rem)` : "";
       charts.push(timeChart(host, data, track, track.panels[host.dataset.panel], last));
-    } else charts.push((kind === "xy" ? xyChart : histogramChart)(host, data));
+    } else charts.push(DRAWN[kind](host, data));
   }
   tell();
   root.dataset.charts = charts.length;

@@ -1,0 +1,258 @@
+//! `greylag compare`: where models fail against flight logs.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use comfy_table::{CellAlignment, Table};
+
+use crate::commands::files::{self, shipped};
+use crate::logs::Flight;
+use crate::logs::csv::{self, Tolerance};
+use crate::model::GreyBox;
+use crate::report::ComparisonReport;
+use crate::sysid::compare::{Comparison, ModelResult, Options, compare};
+use crate::sysid::reconstruct::{self, reconstruct};
+use crate::sysid::reconstruction::Reconstruction;
+
+/// Exit status of a comparison that had to leave a log out.
+const INCOMPLETE: u8 = 3;
+
+/// Options of `greylag compare`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Exit status: 0 done, 1 nothing could be compared, 3 done without some log."
+)]
+pub struct Arguments {
+    /// Model files, compared side by side; the first one leads the report.
+    #[arg(long = "model", num_args = 1.., required = true)]
+    models: Vec<PathBuf>,
+    /// Flight logs.
+    #[arg(long = "log", num_args = 1.., required = true)]
+    logs: Vec<PathBuf>,
+    /// Horizons of the free runs, s.
+    #[arg(long = "horizon", value_delimiter = ',', default_values_t = [1.0, 2.0, 5.0, 10.0])]
+    horizons: Vec<f64>,
+    /// Write everything that was found as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write the report, one HTML page.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Seed of the bootstrap intervals.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Read logs in which more than 5 % of the rows are unusable.
+    #[arg(long)]
+    lenient: bool,
+    /// Replace the JSON and the report if they exist.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Reads, reconstructs, compares; prints the sentences and the tables; writes JSON and report.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let overwrite = arguments.force.into();
+    for path in arguments.json.iter().chain(&arguments.report) {
+        files::writable(path, overwrite)?;
+    }
+    let models = arguments
+        .models
+        .iter()
+        .map(|path| GreyBox::load(&shipped(path)).map_err(Into::into))
+        .collect::<Result<Vec<_>>>()?;
+    let (flights, mut trouble) = reconstruct_all(arguments, &models[0]);
+    if flights.is_empty() {
+        bail!("no log can be compared: {}", trouble.join("; "));
+    }
+    let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
+    let mut comparison = compare(&models, &flights, &options, &|doing| eprintln!("{doing}"))?;
+    let complete = comparison.flights.len() == arguments.logs.len();
+    trouble.append(&mut comparison.notes);
+    comparison.notes = trouble;
+    print(&comparison);
+    if let Some(path) = &arguments.json {
+        let text = serde_json::to_string_pretty(&comparison.document())? + "\n";
+        files::write(path, &text, overwrite)?;
+    }
+    if let Some(path) = &arguments.report {
+        files::write(path, &page(arguments, &comparison), overwrite)?;
+    }
+    Ok(if complete { ExitCode::SUCCESS } else { ExitCode::from(INCOMPLETE) })
+}
+
+/// The report as HTML.
+fn page(arguments: &Arguments, comparison: &Comparison) -> String {
+    let paths = |all: &[PathBuf]| all.iter().map(|p| p.display().to_string()).collect();
+    let report = ComparisonReport {
+        title: "Models against flights".into(),
+        comparison,
+        model_files: paths(&arguments.models),
+        log_files: paths(&arguments.logs),
+        command_line: std::env::args().skip(1).fold("greylag".into(), |line, a| line + " " + &a),
+        versions: Vec::new(),
+    };
+    report.page().render()
+}
+
+/// The flights that could be reconstructed, with what was wrong with logs.
+fn reconstruct_all(arguments: &Arguments, model: &GreyBox) -> (Vec<Reconstruction>, Vec<String>) {
+    let (mut flights, mut trouble) = (Vec::new(), Vec::new());
+    let names = names(&arguments.logs);
+    for (k, (path, name)) in arguments.logs.iter().zip(names).enumerate() {
+        eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, arguments.logs.len());
+        let tolerance = if arguments.lenient { Tolerance::Lenient } else { Tolerance::Strict };
+        match reconstruct_one(path, name, tolerance, model) {
+            Ok((flight, notes)) => {
+                flights.push(flight);
+                trouble.extend(notes);
+            }
+            Err(error) => {
+                let error = format!("{error:#}");
+                eprintln!("greylag: {error}");
+                trouble.push(format!("left out: {error}"));
+            }
+        }
+    }
+    (flights, trouble)
+}
+
+fn reconstruct_one(
+    path: &Path,
+    name: String,
+    tolerance: Tolerance,
+    model: &GreyBox,
+) -> Result<(Reconstruction, Vec<String>)> {
+    let (flight, notes) = read(path, &name, tolerance)?;
+    let options = reconstruct::Options {
+        gravity: model.atmosphere.gravity,
+        ..reconstruct::Options::new(name, model.airframe.actuators)
+    };
+    let flight = reconstruct(&flight, &options)
+        .with_context(|| format!("cannot use flight log {}", path.display()))?;
+    Ok((flight, notes))
+}
+
+/// The flight in a log, with what was odd about the file.
+fn read(path: &Path, name: &str, tolerance: Tolerance) -> Result<(Flight, Vec<String>)> {
+    let reading = csv::load(path, tolerance)?;
+    let mut notes = Vec::new();
+    if reading.dropped > 0 {
+        notes.push(format!(
+            "{name}: {} unusable rows dropped, the first is row {}",
+            reading.dropped,
+            reading.dropped_rows.first().copied().unwrap_or_default()
+        ));
+    }
+    if reading.cut_short {
+        notes.push(format!("{name}: the file ends in the middle of a row, which is left out"));
+    }
+    Ok((reading.flight, notes))
+}
+
+/// What the flights are called: the file's name, or the whole path where two share it.
+fn names(logs: &[PathBuf]) -> Vec<String> {
+    let short = |path: &PathBuf| {
+        path.file_name().map_or(path.display().to_string(), |n| n.to_string_lossy().into_owned())
+    };
+    let all: Vec<String> = logs.iter().map(short).collect();
+    let alone = |name: &String| all.iter().filter(|n| *n == name).count() == 1;
+    let pick = |(path, name): (&PathBuf, &String)| match alone(name) {
+        true => name.clone(),
+        false => path.display().to_string(),
+    };
+    logs.iter().zip(&all).map(pick).collect()
+}
+
+fn print(comparison: &Comparison) {
+    for model in &comparison.models {
+        println!("{}", model.name);
+        model.sentences.iter().for_each(|sentence| println!("  {sentence}"));
+        println!();
+    }
+    println!("{}\n{}", free_run_table(&comparison.models), channel_table(&comparison.models));
+    for flight in &comparison.flights {
+        flight.notes.iter().for_each(|note| println!("{}: {note}", flight.name));
+    }
+    comparison.notes.iter().for_each(|note| println!("note: {note}"));
+}
+
+fn empty_table<const N: usize>(header: [&str; N], words: usize) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(header);
+    for column in table.column_iter_mut().skip(words) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+/// Free-run errors in the units of a flight.
+fn free_run_table(models: &[ModelResult]) -> Table {
+    let header = [
+        "model",
+        "horizon s",
+        "RMSE / x_c",
+        "diverged",
+        "roll °",
+        "pitch °",
+        "V m/s",
+        "p °/s",
+        "q °/s",
+        "r °/s",
+        "α °",
+        "β °",
+    ];
+    let mut table = empty_table(header, 1);
+    for model in models {
+        for score in model.free_run.iter().filter(|s| s.runs > 0) {
+            let mut row = vec![
+                model.name.clone(),
+                format!("{}", score.horizon_s),
+                format!("{:.5}", score.rmse_scaled),
+                format!("{}/{}", score.diverged, score.runs),
+            ];
+            row.extend(score.states.iter().map(|s| {
+                let angle = s.state != "airspeed_mps";
+                number(if angle { s.rmse.to_degrees() } else { s.rmse })
+            }));
+            table.add_row(row);
+        }
+    }
+    table
+}
+
+fn channel_table(models: &[ModelResult]) -> Table {
+    let header = ["model", "channel", "unexplained", "measured sd", "residual", "noise", "unit"];
+    let mut table = empty_table(header, 2);
+    for model in models {
+        for c in &model.channels {
+            let share = match c.unexplained_fraction {
+                share if share.is_nan() => "not excited".into(),
+                share => format!("{:.2} %", 100.0 * share),
+            };
+            table.add_row([
+                model.name.clone(),
+                format!("{} {}", c.channel.symbol(), c.name),
+                share,
+                number(c.measured_sd),
+                number(c.residual_rms),
+                number(c.noise_sd),
+                c.unit.into(),
+            ]);
+        }
+    }
+    table
+}
+
+/// Three significant figures; a dash for what is not known.
+fn number(x: f64) -> String {
+    match x {
+        x if !x.is_finite() => "–".into(),
+        x if x.abs() < 1e-4 => "0".into(),
+        x => {
+            let places = (2 - x.abs().log10().floor() as i32).clamp(0, 6) as usize;
+            format!("{x:.places$}")
+        }
+    }
+}

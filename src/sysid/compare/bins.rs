@@ -1,0 +1,298 @@
+//! Mean residuals over the regime variables, each with its interval and its support.
+
+use super::bootstrap::{self, BLOCK_S, Block};
+use super::flight::Prepared;
+use super::result::{Bin, ChannelId, Map, MapCell, RegimeBins, RegimeVariable};
+use super::weak::Series;
+use crate::num::statistics::{mean, quantile};
+
+/// Fewest independent samples that support a bin.
+pub const SUPPORT: usize = 20;
+/// Number of bins aimed at between the outermost edges.
+const BINS: f64 = 8.0;
+/// The same for each side of the α–β map.
+const MAP_BINS: f64 = 10.0;
+
+/// A window's residual with its place, over all flights.
+#[derive(Clone, Copy, Debug)]
+pub struct Residual {
+    /// Measured − model, in the channel's unit.
+    pub value: f64,
+    /// Measured.
+    pub measured: f64,
+    /// Index of the flight.
+    pub flight: usize,
+    /// Number of the block of the bootstrap, ascending.
+    pub block: usize,
+    /// Its place in the order of [`RegimeVariable::CONTINUOUS`].
+    pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
+    /// Independent samples that it stands for: the stride over the kernel's length.
+    pub weight: f64,
+}
+
+/// The finite residuals of `channel` over all flights; `series` holds a list a flight.
+pub fn residuals(
+    channel: ChannelId,
+    flights: &[Prepared],
+    series: &[Vec<Series>],
+) -> Vec<Residual> {
+    let mut all: Vec<Residual> = Vec::new();
+    let (mut block, mut last) = (0, None);
+    for (flight, (prepared, lists)) in flights.iter().zip(series).enumerate() {
+        let Some(list) = lists.iter().find(|s| s.channel == channel) else { continue };
+        let kernel = &prepared.kernel;
+        let weight = kernel.stride() as f64 / kernel.steps() as f64;
+        for (k, window) in prepared.windows.iter().enumerate() {
+            let key = Some((flight, window.segment, (window.time_s / BLOCK_S).floor() as i64));
+            if key != last {
+                (block, last) = (block + 1, key);
+            }
+            let (measured, value) = (list.measured[k], list.measured[k] - list.predicted[k]);
+            if value.is_finite() {
+                let regime = window.regime;
+                all.push(Residual { value, measured, flight, block, regime, weight });
+            }
+        }
+    }
+    all
+}
+
+/// Independent samples in `residuals`.
+pub fn independent<'a>(residuals: impl Iterator<Item = &'a Residual>) -> usize {
+    residuals.map(|r| r.weight).sum::<f64>().floor() as usize
+}
+
+/// Mean residual and its interval; `path` names the bootstrap's random stream.
+pub fn mean_interval<'a>(
+    residuals: impl Iterator<Item = &'a Residual>,
+    seed: u64,
+    path: &[u64],
+) -> (f64, [f64; 2]) {
+    let blocks = bootstrap::blocks(residuals.map(|r| (r.block, r.value)));
+    let sum = blocks
+        .iter()
+        .fold(Block::default(), |a, b| Block { sum: a.sum + b.sum, count: a.count + b.count });
+    (sum.sum / sum.count, bootstrap::interval(&blocks, seed, path))
+}
+
+/// Bins over every variable that the flights vary.
+pub fn all(
+    residuals: &[Residual],
+    flights: &[Prepared],
+    seed: u64,
+    channel: u64,
+) -> Vec<RegimeBins> {
+    let mut found: Vec<RegimeBins> = RegimeVariable::CONTINUOUS
+        .iter()
+        .enumerate()
+        .filter_map(|(v, variable)| continuous(residuals, *variable, v, seed, channel))
+        .collect();
+    if flights.len() > 1 {
+        found.push(by_flight(residuals, flights, seed, channel));
+    }
+    found
+}
+
+fn continuous(
+    residuals: &[Residual],
+    variable: RegimeVariable,
+    v: usize,
+    seed: u64,
+    channel: u64,
+) -> Option<RegimeBins> {
+    let values: Vec<f64> = residuals.iter().map(|r| r.regime[v]).collect();
+    let edges = edges(&values, BINS, tail(independent(residuals.iter())))?;
+    let count = edges.len() + 1;
+    let mut members: Vec<Vec<&Residual>> = vec![Vec::new(); count];
+    for r in residuals {
+        members[edges.partition_point(|e| *e <= r.regime[v])].push(r);
+    }
+    let bin = |k: usize| Bin {
+        low: k.checked_sub(1).map_or(f64::NAN, |i| edges[i]),
+        high: edges.get(k).copied().unwrap_or(f64::NAN),
+        center: mean(&members[k].iter().map(|r| r.regime[v]).collect::<Vec<_>>()),
+        ..statistics(&members[k], seed, &[channel, v as u64, k as u64])
+    };
+    let bins = (0..count).filter(|k| !members[*k].is_empty()).map(bin).collect();
+    let (name, unit) = (variable.name(), variable.unit());
+    let explained = explained(&members).max(along_a_line(&values, residuals));
+    Some(RegimeBins { variable, name, unit, explained, bins })
+}
+
+fn by_flight(residuals: &[Residual], flights: &[Prepared], seed: u64, channel: u64) -> RegimeBins {
+    let variable = RegimeVariable::Flight;
+    let mut members: Vec<Vec<&Residual>> = vec![Vec::new(); flights.len()];
+    residuals.iter().for_each(|r| members[r.flight].push(r));
+    let bin = |k: usize| Bin {
+        low: k as f64 - 0.5,
+        high: k as f64 + 0.5,
+        center: k as f64,
+        label: flights[k].name.clone(),
+        ..statistics(&members[k], seed, &[channel, 99, k as u64])
+    };
+    RegimeBins {
+        variable,
+        name: variable.name(),
+        unit: variable.unit(),
+        explained: explained(&members),
+        bins: (0..flights.len()).filter(|k| !members[*k].is_empty()).map(bin).collect(),
+    }
+}
+
+/// A bin's numbers; its edges are the caller's.
+fn statistics(members: &[&Residual], seed: u64, path: &[u64]) -> Bin {
+    let (mean, interval) = mean_interval(members.iter().copied(), seed, path);
+    let independent = independent(members.iter().copied());
+    Bin {
+        low: f64::NAN,
+        high: f64::NAN,
+        center: f64::NAN,
+        label: String::new(),
+        mean,
+        interval,
+        measured: members.iter().map(|r| r.measured).sum::<f64>() / members.len() as f64,
+        independent,
+        supported: independent >= SUPPORT,
+    }
+}
+
+/// Share of the variance that the groups' means explain, adjusted for the number of groups.
+fn explained(groups: &[Vec<&Residual>]) -> f64 {
+    let total: Vec<f64> = groups.iter().flatten().map(|r| r.value).collect();
+    let squares = |of: &[f64]| {
+        let mean = mean(of);
+        of.iter().map(|x| (x - mean).powi(2)).sum::<f64>()
+    };
+    let values = |g: &Vec<&Residual>| g.iter().map(|r| r.value).collect::<Vec<_>>();
+    let filled: Vec<Vec<f64>> = groups.iter().filter(|g| !g.is_empty()).map(values).collect();
+    let within: f64 = filled.iter().map(|g| squares(g)).sum();
+    let count = independent(groups.iter().flatten().copied()) as f64;
+    let k = filled.len() as f64;
+    let share = 1.0 - (within / (count - k)) / (squares(&total) / (count - 1.0));
+    if share.is_finite() && count > k { share.clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// The share of values that each end bin takes: enough to be supported, 2 to 20 %.
+fn tail(independent: usize) -> f64 {
+    (1.2 * SUPPORT as f64 / independent as f64).clamp(0.02, 0.2)
+}
+
+/// Share of the variance that a straight line over `values` explains: bins are coarse where a few
+/// far values carry the error.
+fn along_a_line(values: &[f64], residuals: &[Residual]) -> f64 {
+    let (mx, my) =
+        (mean(values), residuals.iter().map(|r| r.value).sum::<f64>() / values.len() as f64);
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for (x, r) in values.iter().zip(residuals) {
+        xx += (x - mx).powi(2);
+        xy += (x - mx) * (r.value - my);
+        yy += (r.value - my).powi(2);
+    }
+    let count = independent(residuals.iter()) as f64;
+    let share = 1.0 - (1.0 - xy * xy / (xx * yy)) * (count - 1.0) / (count - 2.0);
+    if share.is_finite() && count > 2.0 { share.clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// Round edges that cut what lies between the quantiles `tail` and 1 − `tail` into about `bins`
+/// bins; `None` if it does not vary.
+fn edges(values: &[f64], bins: f64, tail: f64) -> Option<Vec<f64>> {
+    let (low, high) = (quantile(values, tail), quantile(values, 1.0 - tail));
+    let width = round_width((high - low) / bins);
+    if !(width.is_finite() && width > 1e-9 * (1.0 + low.abs() + high.abs())) {
+        return None;
+    }
+    let first = (low / width).ceil() as i64;
+    let last = (high / width).floor() as i64;
+    Some((first..=last).map(|k| k as f64 * width).collect())
+}
+
+/// The nearest of 1, 2 or 5 times a power of ten.
+fn round_width(width: f64) -> f64 {
+    let power = 10_f64.powf(width.log10().floor());
+    let lead = width / power;
+    power
+        * if lead < 1.5 {
+            1.0
+        } else if lead < 3.5 {
+            2.0
+        } else if lead < 7.5 {
+            5.0
+        } else {
+            10.0
+        }
+}
+
+/// Mean residual over α and β.
+pub fn map(residuals: &[Residual]) -> Map {
+    let (alpha, beta) = (side(residuals, 0), side(residuals, 1));
+    let (columns, rows) = (alpha.len() - 1, beta.len() - 1);
+    let mut members: Vec<Vec<&Residual>> = vec![Vec::new(); columns * rows];
+    let place = |edges: &[f64], x: f64| {
+        edges.partition_point(|e| *e <= x).checked_sub(1).filter(|k| k + 1 < edges.len())
+    };
+    for r in residuals {
+        if let (Some(a), Some(b)) = (place(&alpha, r.regime[0]), place(&beta, r.regime[1])) {
+            members[b * columns + a].push(r);
+        }
+    }
+    let cell = |(k, members): (usize, &Vec<&Residual>)| {
+        let independent = independent(members.iter().copied());
+        MapCell {
+            alpha: k % columns,
+            beta: k / columns,
+            mean: mean(&members.iter().map(|r| r.value).collect::<Vec<_>>()),
+            independent,
+            supported: independent >= SUPPORT,
+        }
+    };
+    let cells = members.iter().enumerate().filter(|(_, m)| !m.is_empty()).map(cell).collect();
+    Map { alpha_deg: alpha, beta_deg: beta, cells }
+}
+
+/// Edges of one side of the map, the outermost beyond all values (at least one cell).
+fn side(residuals: &[Residual], v: usize) -> Vec<f64> {
+    let values: Vec<f64> = residuals.iter().map(|r| r.regime[v]).collect();
+    let mut edges = edges(&values, MAP_BINS, 0.02).filter(|e| e.len() > 1).unwrap_or_default();
+    let (Some(first), Some(last)) = (edges.first().copied(), edges.last().copied()) else {
+        let middle = quantile(&values, 0.5).floor();
+        return vec![middle, middle + 1.0];
+    };
+    let width = (last - first) / (edges.len() - 1) as f64;
+    edges.insert(0, first - width);
+    edges.push(last + width);
+    edges
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_are_round_and_cover_the_middle() {
+        let values: Vec<f64> = (0..1000).map(|i| i as f64 * 0.013).collect();
+        assert_eq!(edges(&values, 8.0, 0.02), Some((1..=6).map(|k| 2.0 * k as f64).collect()));
+        assert_eq!(edges(&[3.0; 50], 8.0, 0.02), None);
+        assert_eq!(edges(&[], 8.0, 0.02), None);
+    }
+
+    #[test]
+    fn a_step_over_alpha_is_explained_by_alpha_and_not_by_time() {
+        let residual = |i: usize| {
+            // a permutation, so that alpha and time are unrelated
+            let alpha = (i * 37 % 100) as f64 / 10.0;
+            let mut regime = [0.0; 13];
+            (regime[0], regime[12]) = (alpha, i as f64);
+            let value = if alpha > 8.0 { 4.0 } else { 0.0 };
+            Residual { value, measured: 10.0, flight: 0, block: i / 5, regime, weight: 0.5 }
+        };
+        let residuals: Vec<Residual> = (0..400).map(residual).collect();
+        let found = all(&residuals, &[], 1, 0);
+        let share = |v| found.iter().find(|b| b.variable == v).map_or(f64::NAN, |b| b.explained);
+        assert!(share(RegimeVariable::Alpha) > 0.8, "{}", share(RegimeVariable::Alpha));
+        assert!(share(RegimeVariable::Time) < 0.1, "{}", share(RegimeVariable::Time));
+        // constants have no bins
+        assert!(found.iter().all(|b| b.variable != RegimeVariable::Beta));
+        let high = found[0].bins.last().unwrap();
+        assert!(high.mean > 3.0 && high.low >= 8.0 && high.high.is_nan() && high.supported);
+    }
+}

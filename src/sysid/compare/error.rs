@@ -1,0 +1,30 @@
+//! Why a comparison cannot be made.
+
+/// Why a comparison cannot be made.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum CompareError {
+    /// No model was given.
+    #[error("nothing to compare: name at least one model file (--model)")]
+    NoModel,
+    /// No flight was given.
+    #[error("nothing to compare with: name at least one flight log (--log)")]
+    NoLog,
+    /// No log holds a flight that can be used.
+    #[error(
+        "no flight to compare with: {0}; give a log in which the aircraft flies for some seconds without gaps"
+    )]
+    NoFlight(String),
+    /// The flight has no clock.
+    #[error(
+        "flight {flight} is said to have a sample every {step_s} s, which is no clock to compare on: it must lie in 1e-6 to 1 s"
+    )]
+    Clock {
+        /// The flight.
+        flight: String,
+        /// Its step, s.
+        step_s: f64,
+    },
+    /// A horizon cannot be flown.
+    #[error("horizon {0} s cannot be flown: give horizons from 0.01 to 600 s")]
+    Horizon(f64),
+}

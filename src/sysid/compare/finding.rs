@@ -1,0 +1,183 @@
+//! The worst regime of a channel: the variable that tells it apart, with the range that fails.
+
+use super::bins::{self, Residual, SUPPORT};
+use super::flight::Prepared;
+use super::result::{Bin, Regime, RegimeBins, RegimeVariable};
+
+/// A variable that explains less of the residual's variance than this tells nothing apart.
+const SHARE_FLOOR: f64 = 0.1;
+/// Time, altitude and flight are named only if they explain this much more than any other variable.
+const CIRCUMSTANCE_MARGIN: f64 = 0.15;
+/// A residual follows a variable that explains at least this much of its variance.
+const FOLLOWS: f64 = 0.5;
+/// A bin belongs to the worst range if its mean is at least this part of the worst bin's.
+const RANGE_PART: f64 = 0.5;
+/// Fewest independent samples by which a flight shows a regime.
+const FLIGHT_SUPPORT: usize = 5;
+
+/// How the residual changes along the variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trend {
+    /// Its size grows with the variable.
+    Grows,
+    /// Its size falls with the variable.
+    Falls,
+    /// It changes sign with the variable.
+    Reverses,
+    /// None of these.
+    None,
+}
+
+/// The worst regime with how the residual runs along its variable.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// The regime.
+    pub regime: Regime,
+    /// The trend along its variable.
+    pub trend: Trend,
+}
+
+/// The worst regime of a channel; `None` if nothing supported differs from zero.
+pub fn worst(
+    residuals: &[Residual],
+    bins: &[RegimeBins],
+    flights: &[Prepared],
+    seed: u64,
+    channel: u64,
+) -> Option<Finding> {
+    let everywhere = || {
+        let all: Vec<&Residual> = residuals.iter().collect();
+        let (_, interval) = bins::mean_interval(all.iter().copied(), seed, &[channel, 100]);
+        (excludes_zero(interval) && bins::independent(all.iter().copied()) >= SUPPORT).then(|| {
+            let regime = regime(&all, None, [f64::NAN; 2], flights, seed, channel);
+            Finding { regime, trend: Trend::None }
+        })
+    };
+    let Some(told) = telling(bins).filter(|b| !is_constant(residuals, b)) else {
+        return everywhere();
+    };
+    let Some((from, to)) = range(&told.bins) else { return everywhere() };
+    let (first, last) = (&told.bins[from], &told.bins[to]);
+    let inside: Vec<&Residual> =
+        residuals.iter().filter(|r| lies_in(r, told.variable, first.low, last.high)).collect();
+    let ends = [first.low, last.high];
+    let regime = regime(&inside, Some(told.variable), ends, flights, seed, channel);
+    let ordered = told.variable != RegimeVariable::Flight;
+    let trend = if ordered { trend(&told.bins) } else { Trend::None };
+    Some(Finding { regime, trend })
+}
+
+/// The variable that a residual mainly follows, whether or not some range of it is supported.
+pub fn follows(bins: &[RegimeBins]) -> Option<RegimeVariable> {
+    telling(bins).filter(|b| b.explained > FOLLOWS).map(|b| b.variable)
+}
+
+fn excludes_zero([low, high]: [f64; 2]) -> bool {
+    low > 0.0 || high < 0.0
+}
+
+/// The variable that explains most, time, altitude and flight by a margin only.
+fn telling(bins: &[RegimeBins]) -> Option<&RegimeBins> {
+    use RegimeVariable::{Altitude, Flight, Time};
+    let worth = |b: &RegimeBins| {
+        let circumstance = matches!(b.variable, Time | Altitude | Flight);
+        b.explained - if circumstance { CIRCUMSTANCE_MARGIN } else { 0.0 }
+    };
+    let best = bins.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)))?;
+    (worth(best) > SHARE_FLOOR).then_some(best)
+}
+
+/// Whether the residual is an offset rather than something that the variable tells apart.
+fn is_constant(residuals: &[Residual], told: &RegimeBins) -> bool {
+    let count = residuals.len() as f64;
+    let mean = residuals.iter().map(|r| r.value).sum::<f64>() / count;
+    let square = residuals.iter().map(|r| r.value * r.value).sum::<f64>() / count;
+    told.explained * (square - mean * mean) < 0.1 * mean * mean
+}
+
+/// First and last of the adjacent bins around the surest failure.
+fn range(bins: &[Bin]) -> Option<(usize, usize)> {
+    let sure = |b: &Bin| b.interval[0].abs().min(b.interval[1].abs());
+    let peak = (0..bins.len())
+        .filter(|&k| bins[k].supported && excludes_zero(bins[k].interval))
+        .max_by(|&a, &b| sure(&bins[a]).total_cmp(&sure(&bins[b])))?;
+    let worst = bins[peak].mean;
+    // thin neighbours may join: together with the worst bin they are supported
+    let alike = |k: usize| bins[k].label.is_empty() && bins[k].mean / worst >= RANGE_PART;
+    let from = (0..peak).rev().take_while(|&k| alike(k)).last().unwrap_or(peak);
+    let to = (peak + 1..bins.len()).take_while(|&k| alike(k)).last().unwrap_or(peak);
+    Some((from, to))
+}
+
+fn lies_in(r: &Residual, variable: RegimeVariable, low: f64, high: f64) -> bool {
+    let place = RegimeVariable::CONTINUOUS.iter().position(|v| *v == variable);
+    let x = place.map_or(r.flight as f64, |v| r.regime[v]);
+    // an open end is NaN, which no number is below or above
+    !(x < low || x >= high)
+}
+
+fn regime(
+    inside: &[&Residual],
+    variable: Option<RegimeVariable>,
+    [low, high]: [f64; 2],
+    flights: &[Prepared],
+    seed: u64,
+    channel: u64,
+) -> Regime {
+    let (mean, interval) = bins::mean_interval(inside.iter().copied(), seed, &[channel, 101]);
+    let shows = |k: &usize| {
+        let own = || inside.iter().copied().filter(|r| r.flight == *k);
+        let sum: f64 = own().map(|r| r.value).sum();
+        bins::independent(own()) >= FLIGHT_SUPPORT && sum * mean > 0.0
+    };
+    Regime {
+        variable,
+        low,
+        high,
+        unit: variable.map_or("", RegimeVariable::unit),
+        mean,
+        interval,
+        relative_percent: relative_percent(inside, mean),
+        independent: bins::independent(inside.iter().copied()),
+        flights: (0..flights.len()).filter(shows).map(|k| flights[k].name.clone()).collect(),
+    }
+}
+
+/// (model − measured) / measured in %; NaN unless nine in ten measured values have one sign.
+fn relative_percent(inside: &[&Residual], mean: f64) -> f64 {
+    let measured = inside.iter().map(|r| r.measured).sum::<f64>() / inside.len() as f64;
+    let same = inside.iter().filter(|r| r.measured * measured > 0.0).count() as f64;
+    if same >= 0.9 * inside.len() as f64 { -100.0 * mean / measured } else { f64::NAN }
+}
+
+/// How the means of the supported bins run along the variable.
+fn trend(bins: &[Bin]) -> Trend {
+    let known: Vec<&Bin> = bins.iter().filter(|b| b.supported).collect();
+    if known.len() < 4 {
+        return Trend::None;
+    }
+    let signed = correlation(&known, |b| b.mean);
+    let size = correlation(&known, |b| b.mean.abs());
+    let significant = || known.iter().filter(|b| excludes_zero(b.interval));
+    let reverses = significant().any(|b| b.mean > 0.0) && significant().any(|b| b.mean < 0.0);
+    if reverses && signed.abs() > 0.9 && size.abs() < 0.9 {
+        Trend::Reverses
+    } else if size > 0.9 {
+        Trend::Grows
+    } else if size < -0.9 {
+        Trend::Falls
+    } else {
+        Trend::None
+    }
+}
+
+/// Weighted correlation of the bins' centres with `y`.
+fn correlation(bins: &[&Bin], y: impl Fn(&Bin) -> f64) -> f64 {
+    let weight = |b: &Bin| b.independent as f64;
+    let total: f64 = bins.iter().map(|b| weight(b)).sum();
+    let mean = |f: &dyn Fn(&Bin) -> f64| bins.iter().map(|b| weight(b) * f(b)).sum::<f64>() / total;
+    let (mx, my) = (mean(&|b| b.center), mean(&y));
+    let xy = mean(&|b| (b.center - mx) * (y(b) - my));
+    let (xx, yy) = (mean(&|b| (b.center - mx).powi(2)), mean(&|b| (y(b) - my).powi(2)));
+    xy / (xx * yy).sqrt()
+}

@@ -1,0 +1,249 @@
+//! Free runs: the model flies from reconstructed states on the recorded deflections.
+
+use std::f64::consts::{PI, TAU};
+
+use rayon::prelude::*;
+
+use super::flight::Prepared;
+use super::result::{GrowthPoint, HorizonScore, StateScore};
+use crate::model::{GreyBox, Memory};
+use crate::num::statistics::{mean, quantile};
+use crate::physics::State;
+use crate::sysid::reconstruction::Instant;
+
+/// Time between starts, s.
+pub const START_EVERY_S: f64 = 3.0;
+/// A run has diverged once its scaled error (root mean square over the states of error / x_c)
+/// exceeds this: as if every state were off by its whole scale, 1 rad, V0, 2 V0/b and so on.
+pub const DIVERGENCE_BOUND: f64 = 1.0;
+/// Points of the growth curve.
+pub const GROWTH_POINTS: usize = 25;
+
+/// Where a run stands at a moment: measured and predicted state; `None` once diverged.
+type Look = Option<[[f64; 8]; 2]>;
+
+/// All free runs of a model over all flights.
+pub struct Runs {
+    /// Moments at which they are looked at, s after the start, ascending.
+    times: Vec<f64>,
+    /// A list a run: its looks, as far as the flight goes on.
+    runs: Vec<Vec<Look>>,
+    scale: [f64; 8],
+}
+
+/// The predicted states of runs restarted every [`START_EVERY_S`], laid out as
+/// [`FlightTrace`](super::result::FlightTrace).
+pub type Trace = [Vec<f64>; 8];
+
+/// Flies `model` over all `flights`, looking at the `horizons` (s) and at the points of the growth
+/// curve up to the longest of them.
+pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Vec<Trace>) {
+    let longest = horizons.iter().copied().fold(0.0, f64::max);
+    let growth = (1..=GROWTH_POINTS).map(|k| longest * k as f64 / GROWTH_POINTS as f64);
+    let mut times: Vec<f64> = horizons.iter().copied().chain(growth).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+    let mut runs = Vec::new();
+    let mut traces = Vec::new();
+    for flight in flights {
+        let (flown, trace) = fly_one(model, flight, &times);
+        runs.extend(flown);
+        traces.push(trace);
+    }
+    (Runs { times, runs, scale: model.scale() }, traces)
+}
+
+fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>, Trace) {
+    let every = ((START_EVERY_S / flight.dt).round() as usize).max(1);
+    let looks: Vec<usize> =
+        times.iter().map(|t| ((t / flight.dt).round() as usize).max(1)).collect();
+    let mut runs = Vec::new();
+    let mut trace = Trace::default();
+    for segment in &flight.segments {
+        let starts: Vec<usize> = (0..segment.len() - 1).step_by(every).collect();
+        let flown: Vec<(Vec<Look>, Vec<[f64; 8]>)> = starts
+            .par_iter()
+            .map(|&start| run(model, flight.substeps, segment, start, &looks, every))
+            .collect();
+        let mut drawn: Vec<[f64; 8]> = Vec::with_capacity(segment.len() + 1);
+        for (start, (looks, path)) in starts.iter().zip(flown) {
+            drawn.resize(*start, [f64::NAN; 8]);
+            drawn.extend(path);
+            runs.push(looks);
+        }
+        // the row between segments is NaN, as in the flight's trace
+        drawn.resize(segment.len(), [f64::NAN; 8]);
+        drawn.push([f64::NAN; 8]);
+        for row in drawn {
+            trace.iter_mut().zip(row).for_each(|(list, x)| list.push(x));
+        }
+    }
+    (runs, trace)
+}
+
+/// One run from sample `start`: its looks, and its path over the first `keep` samples.
+fn run(
+    model: &GreyBox,
+    substeps: usize,
+    segment: &[Instant],
+    start: usize,
+    looks: &[usize],
+    keep: usize,
+) -> (Vec<Look>, Vec<[f64; 8]>) {
+    let scale = model.scale();
+    let mut memory = Memory::default();
+    let advance = |at: &Instant, state: State, memory: &mut Memory| {
+        (0..substeps).fold(state, |s, _| model.step(&s, &at.controls, at.altitude, memory))
+    };
+    if let Some(before) = start.checked_sub(1).map(|i| &segment[i]) {
+        // the integrator remembers the step before
+        advance(before, before.state, &mut memory);
+    }
+    let last = looks.last().map_or(0, |l| (start + l).min(segment.len() - 1));
+    let mut state = segment[start].state;
+    let mut seen = Vec::new();
+    let mut path = vec![state.to_array()];
+    for i in start..last.max((start + keep).min(segment.len()) - 1) {
+        state = advance(&segment[i], state, &mut memory);
+        let measured = segment[i + 1].state.to_array();
+        let error = error(&measured, &state.to_array());
+        let good = scaled(&error, &scale) <= DIVERGENCE_BOUND;
+        if path.len() < keep && good {
+            path.push(state.to_array());
+        }
+        for _ in looks.iter().filter(|l| **l == i + 1 - start) {
+            seen.push(good.then(|| [measured, state.to_array()]));
+        }
+        if !good {
+            let reached = looks.iter().filter(|l| start + *l < segment.len()).count();
+            seen.resize(reached, None);
+            break;
+        }
+    }
+    (seen, path)
+}
+
+/// Predicted − measured; roll the short way round.
+fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
+    let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
+    error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
+    error
+}
+
+/// Root mean square of error / x_c; NaN if anything is.
+fn scaled(error: &[f64; 8], scale: &[f64; 8]) -> f64 {
+    (error.iter().zip(scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0).sqrt()
+}
+
+impl Runs {
+    fn at(&self, time: f64) -> Vec<Look> {
+        let place = self.times.iter().position(|t| (t - time).abs() < 1e-9);
+        place.map_or(Vec::new(), |k| self.runs.iter().filter_map(|r| r.get(k).copied()).collect())
+    }
+
+    /// The scaled error of each run at a time, a diverged one at the bound.
+    fn errors(&self, looks: &[Look]) -> Vec<f64> {
+        let one = |look: &Look| match look {
+            Some([measured, predicted]) => scaled(&error(measured, predicted), &self.scale),
+            None => DIVERGENCE_BOUND,
+        };
+        looks.iter().map(one).collect()
+    }
+
+    /// The score at a horizon, s.
+    pub fn score(&self, horizon_s: f64) -> HorizonScore {
+        let looks = self.at(horizon_s);
+        let diverged = looks.iter().filter(|l| l.is_none()).count();
+        let whole: Vec<[[f64; 8]; 2]> = looks.iter().flatten().copied().collect();
+        HorizonScore {
+            horizon_s,
+            runs: looks.len(),
+            diverged,
+            divergence_rate: diverged as f64 / looks.len() as f64,
+            rmse_scaled: root_mean_square(&self.errors(&looks)),
+            states: (0..8).map(|k| self.state_score(k, &whole)).collect(),
+        }
+    }
+
+    /// The growth of the error with time.
+    pub fn growth(&self) -> Vec<GrowthPoint> {
+        let point = |&time_s: &f64| {
+            let looks = self.at(time_s);
+            let errors = self.errors(&looks);
+            GrowthPoint {
+                time_s,
+                runs: looks.len(),
+                diverged: looks.iter().filter(|l| l.is_none()).count(),
+                rmse_scaled: root_mean_square(&errors),
+                median_scaled: quantile(&errors, 0.5),
+                p90_scaled: quantile(&errors, 0.9),
+            }
+        };
+        self.times.iter().map(point).filter(|p| p.runs > 0).collect()
+    }
+
+    /// RMSE and Theil's U with its shares for one state.
+    fn state_score(&self, k: usize, runs: &[[[f64; 8]; 2]]) -> StateScore {
+        let measured: Vec<f64> = runs.iter().map(|r| r[0][k]).collect();
+        // through the error, so that a roll across ±180° counts the short way round
+        let predicted: Vec<f64> = runs.iter().map(|r| r[0][k] + error(&r[0], &r[1])[k]).collect();
+        let errors: Vec<f64> = predicted.iter().zip(&measured).map(|(a, b)| a - b).collect();
+        let rmse = root_mean_square(&errors);
+        let (mean_a, mean_b) = (mean(&predicted), mean(&measured));
+        let (sd_a, sd_b) = (deviation(&predicted, mean_a), deviation(&measured, mean_b));
+        let bias = (mean_a - mean_b).powi(2) / (rmse * rmse);
+        let variance = (sd_a - sd_b).powi(2) / (rmse * rmse);
+        StateScore {
+            state: State::NAMES[k],
+            rmse,
+            rmse_scaled: rmse / self.scale[k],
+            theil_u: rmse / (root_mean_square(&predicted) + root_mean_square(&measured)),
+            bias_share: bias,
+            variance_share: variance,
+            covariance_share: (1.0 - bias - variance).max(0.0),
+        }
+    }
+}
+
+fn root_mean_square(x: &[f64]) -> f64 {
+    (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt()
+}
+
+fn deviation(x: &[f64], mean: f64) -> f64 {
+    (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn theils_shares_of_known_errors() {
+        let runs = |f: fn(f64) -> f64| Runs {
+            times: vec![1.0],
+            scale: [1.0; 8],
+            runs: [-0.4, -0.1, 0.2, 0.3].map(|x: f64| vec![Some([[x; 8], [f(x); 8]])]).to_vec(),
+        };
+        let offset = runs(|x| x + 0.1).score(1.0);
+        let s = &offset.states[1];
+        assert!((s.rmse - 0.1).abs() < 1e-12 && (s.bias_share - 1.0).abs() < 1e-9);
+        // twice the measured: RMSE = RMS of measured, so U = 1/(2 + 1)
+        let doubled = runs(|x| 2.0 * x).score(1.0);
+        let s = &doubled.states[1];
+        assert!((s.theil_u - 1.0 / 3.0).abs() < 1e-12 && (s.variance_share - 1.0).abs() < 1e-9);
+        assert_eq!(offset.divergence_rate, 0.0);
+    }
+
+    #[test]
+    fn a_diverged_run_counts_with_the_bound() {
+        let exact = Some([[0.1; 8]; 2]);
+        let runs = Runs { times: vec![1.0], scale: [1.0; 8], runs: vec![vec![exact], vec![None]] };
+        let score = runs.score(1.0);
+        assert_eq!((score.runs, score.diverged, score.divergence_rate), (2, 1, 0.5));
+        assert!((score.rmse_scaled - DIVERGENCE_BOUND / 2_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(score.states[2].rmse, 0.0);
+        // a roll of 179° predicted as −179° is 2° off
+        let e = error(&[179_f64.to_radians(); 8], &[-179_f64.to_radians(); 8]);
+        assert!((e[0] - 2_f64.to_radians()).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,25 @@
+//! Models against flights: how far free runs stray, and in which channel and regime a model fails.
+//!
+//! The method is that of the shared note `missing_effects.md`, steps 3, 4 and 11. "Before" is the
+//! model as given; tuning it is the business of what ranks missing effects, for which
+//! [`weak::columns`] gives what to regress on.
+
+mod bins;
+pub mod bootstrap;
+mod error;
+mod finding;
+pub mod flight;
+pub mod free_run;
+pub mod kernel;
+mod result;
+mod run;
+mod sentence;
+pub mod weak;
+
+pub use error::CompareError;
+pub use result::{
+    Bin, ChannelId, ChannelResult, ChannelTrace, Comparison, Document, FlightResult, FlightTrace,
+    GrowthPoint, HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, Regime,
+    RegimeBins, RegimeVariable, Settings, StateScore,
+};
+pub use run::{Options, compare};

@@ -1,0 +1,347 @@
+//! The comparison itself: every model over every flight, then what it amounts to.
+
+use rayon::prelude::*;
+
+use super::CompareError;
+use super::bins::{self, Residual, SUPPORT};
+use super::bootstrap::{BLOCK_S, RESAMPLES};
+use super::finding;
+use super::flight::Prepared;
+use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
+use super::kernel::KERNEL_S;
+use super::result::{
+    ChannelId, ChannelResult, ChannelTrace, Comparison, HorizonScore, ModelResult, ModelTrace,
+    Settings,
+};
+use super::sentence::{Subject, sentence};
+use super::weak::{self, Series};
+use crate::model::GreyBox;
+use crate::sysid::reconstruction::Reconstruction;
+
+/// The channel's variance, less noise, must be at least this part of itself for a share to mean
+/// something.
+const EXCITED: f64 = 0.05;
+
+/// What a comparison is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Horizons of the free runs, s.
+    pub horizons_s: Vec<f64>,
+    /// Seed of the bootstrap.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options { horizons_s: vec![1.0, 2.0, 5.0, 10.0], seed: 1 }
+    }
+}
+
+/// Compares `models` with reconstructed `flights`; `progress` hears what is being done.
+///
+/// # Errors
+/// Nothing was given, no log holds a flight, or a clock or horizon does not fit.
+pub fn compare(
+    models: &[GreyBox],
+    flights: &[Reconstruction],
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Comparison, CompareError> {
+    let first = models.first().ok_or(CompareError::NoModel)?;
+    if let Some(h) = options.horizons_s.iter().find(|h| !(0.01..=600.0).contains(*h)) {
+        return Err(CompareError::Horizon(*h));
+    }
+    let slowest = 0.5 * first.airframe.envelope.airspeed_min_mps;
+    let (used, prepared, mut notes) = usable(flights, slowest)?;
+    notes.extend(short_of(&prepared, &options.horizons_s));
+    let models = models
+        .iter()
+        .map(|model| {
+            progress(&format!("comparing {} with {} flight(s)", model.name, prepared.len()));
+            one_model(model, &prepared, options)
+        })
+        .collect::<Vec<_>>();
+    Ok(Comparison {
+        schema: "greylag.comparison/1",
+        program: concat!("greylag ", env!("CARGO_PKG_VERSION")).into(),
+        seed: options.seed,
+        sentences: models[0].sentences.clone(),
+        models,
+        flights: prepared.iter().zip(used).map(|(p, from)| p.result(from)).collect(),
+        settings: Settings {
+            start_every_s: START_EVERY_S,
+            horizons_s: options.horizons_s.clone(),
+            divergence_bound: DIVERGENCE_BOUND,
+            kernel_s: KERNEL_S,
+            block_s: BLOCK_S,
+            resamples: RESAMPLES,
+            support: SUPPORT,
+        },
+        notes,
+    })
+}
+
+type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);
+
+/// The flights that can be compared, with what was left out and why.
+fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, CompareError> {
+    if flights.is_empty() {
+        return Err(CompareError::NoLog);
+    }
+    let (mut used, mut prepared, mut notes) = (Vec::new(), Vec::new(), Vec::new());
+    for flight in flights {
+        let ready = Prepared::new(flight, slowest)?;
+        if ready.windows.is_empty() {
+            notes.push(why_unusable(flight, slowest));
+            continue;
+        }
+        if !ready.has_force() {
+            notes.push(format!(
+                "{}: no accelerometers, so its forces D, L, Y are skipped; the rates of V, α and β stand in for them with less power",
+                flight.name
+            ));
+        }
+        if flight.noise.iter().chain(&flight.force_noise).all(|sd| !sd.is_finite()) {
+            notes.push(format!(
+                "{}: the sensors' noise is not known, so all that is left over counts as unexplained",
+                flight.name
+            ));
+        }
+        used.push(flight);
+        prepared.push(ready);
+    }
+    if prepared.is_empty() {
+        return Err(CompareError::NoFlight(notes.join("; ")));
+    }
+    Ok((used, prepared, notes))
+}
+
+fn why_unusable(flight: &Reconstruction, slowest: f64) -> String {
+    let speeds = flight.segments.iter().flat_map(|s| &s.instants).map(|i| i.state.airspeed);
+    match speeds.filter(|v| v.is_finite()).fold(f64::NAN, f64::max) {
+        fastest if fastest.is_nan() => format!("{}: holds no usable sample", flight.name),
+        fastest if fastest < slowest => format!(
+            "{}: no flight in it, the airspeed never exceeds {fastest:.1} m/s where flying begins at {slowest:.1} m/s",
+            flight.name
+        ),
+        _ => format!(
+            "{}: no stretch of {KERNEL_S} s in the air without a gap or a missing actuator",
+            flight.name
+        ),
+    }
+}
+
+/// A note for each horizon that no stretch of flight is long enough for.
+fn short_of(flights: &[Prepared], horizons: &[f64]) -> Vec<String> {
+    let longest = flights
+        .iter()
+        .flat_map(|f| f.segments.iter().map(|s| (s.len() - 1) as f64 * f.dt))
+        .fold(0.0, f64::max);
+    let beyond = horizons.iter().filter(|h| **h > longest + 1e-9);
+    beyond
+        .map(|h| {
+            format!("no stretch of flight is {h} s long (the longest is {longest:.1} s): no free run reaches that horizon")
+        })
+        .collect()
+}
+
+fn one_model(model: &GreyBox, flights: &[Prepared], options: &Options) -> ModelResult {
+    let (runs, paths) = free_run::fly(model, flights, &options.horizons_s);
+    let series: Vec<Vec<Series>> = flights.par_iter().map(|f| weak::channels(model, f)).collect();
+    let channels: Vec<ChannelResult> = ChannelId::ALL
+        .par_iter()
+        .enumerate()
+        .filter_map(|(k, id)| channel(model, *id, k as u64, flights, &series, options.seed))
+        .collect();
+    let traces = paths.into_iter().zip(flights).zip(&series);
+    let free_run: Vec<_> = options.horizons_s.iter().map(|h| runs.score(*h)).collect();
+    let mut sentences = sentences(&channels);
+    if let Some(warning) = diverges(&free_run) {
+        sentences.insert(0, warning);
+    }
+    ModelResult {
+        name: model.name.clone(),
+        sentences,
+        free_run,
+        growth: runs.growth(),
+        channels,
+        traces: traces
+            .map(|((states, flight), series)| ModelTrace {
+                states,
+                channels: series.iter().map(|s| channel_trace(flight, s)).collect(),
+            })
+            .collect(),
+    }
+}
+
+fn channel(
+    model: &GreyBox,
+    id: ChannelId,
+    number: u64,
+    flights: &[Prepared],
+    series: &[Vec<Series>],
+    seed: u64,
+) -> Option<ChannelResult> {
+    let residuals = bins::residuals(id, flights, series);
+    if residuals.is_empty() {
+        return None;
+    }
+    let power = Power::of(&residuals, noise(id, series));
+    let bins = bins::all(&residuals, flights, seed, number);
+    let found = finding::worst(&residuals, &bins, flights, seed, number);
+    let worst_regime = sentence(&Subject {
+        channel: id,
+        unexplained: power.unexplained(),
+        finding: found.as_ref(),
+        follows: finding::follows(&bins),
+        mass: model.body.mass,
+        flights: flights.len(),
+    });
+    Some(ChannelResult {
+        channel: id,
+        name: id.name(),
+        unit: id.unit(),
+        windows: residuals.len(),
+        measured_sd: power.measured.sqrt(),
+        residual_rms: power.residual.sqrt(),
+        noise_sd: power.noise.sqrt(),
+        unexplained_fraction: power.unexplained(),
+        effect_per_s: (power.residual - power.noise).max(0.0).sqrt() * leverage(model, id),
+        offset_share: power.offset,
+        worst_regime,
+        regime: found.map(|f| f.regime),
+        bins,
+        map: bins::map(&residuals),
+    })
+}
+
+/// Says so if most free runs are lost by the shortest horizon.
+fn diverges(scores: &[HorizonScore]) -> Option<String> {
+    let first = scores.iter().min_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))?;
+    (first.divergence_rate > 0.5).then(|| {
+        format!(
+            "The model diverges at once: {} of {} free runs are lost within {} s, so its free-run errors are those of the bound.",
+            first.diverged, first.runs, first.horizon_s
+        )
+    })
+}
+
+/// What one unit of a channel does to the state it drives: scaled error a second, 1/s.
+fn leverage(model: &GreyBox, id: ChannelId) -> f64 {
+    let [_, _, v, p, q, r, alpha, beta] = model.scale();
+    let body = &model.body;
+    match id {
+        ChannelId::Drag => 1.0 / (body.mass * v),
+        // a force across the path turns it by force / (m V)
+        ChannelId::Lift => 1.0 / (body.mass * v * alpha),
+        ChannelId::Side => 1.0 / (body.mass * v * beta),
+        ChannelId::Roll => 1.0 / (body.jx * p),
+        ChannelId::Pitch => 1.0 / (body.jy * q),
+        ChannelId::Yaw => 1.0 / (body.jz * r),
+        ChannelId::Airspeed => 1.0 / v,
+        ChannelId::Alpha => 1.0 / alpha,
+        ChannelId::Beta => 1.0 / beta,
+    }
+}
+
+/// Mean noise variance over the windows of all flights.
+fn noise(id: ChannelId, series: &[Vec<Series>]) -> f64 {
+    let own = || series.iter().flatten().filter(|s| s.channel == id);
+    let windows = |s: &Series| s.measured.iter().filter(|x| x.is_finite()).count() as f64;
+    own().map(|s| s.noise_variance * windows(s)).sum::<f64>() / own().map(windows).sum::<f64>()
+}
+
+/// Mean squares of a channel.
+struct Power {
+    /// Variance of what was measured.
+    measured: f64,
+    /// Mean square residual.
+    residual: f64,
+    /// Variance that noise accounts for.
+    noise: f64,
+    /// Share of the mean square residual that is its mean.
+    offset: f64,
+}
+
+impl Power {
+    fn of(residuals: &[Residual], noise: f64) -> Power {
+        let count = residuals.len() as f64;
+        let mean = residuals.iter().map(|r| r.measured).sum::<f64>() / count;
+        let residual = residuals.iter().map(|r| r.value.powi(2)).sum::<f64>() / count;
+        let offset = residuals.iter().map(|r| r.value).sum::<f64>() / count;
+        Power {
+            measured: residuals.iter().map(|r| (r.measured - mean).powi(2)).sum::<f64>() / count,
+            residual,
+            noise,
+            offset: offset * offset / residual,
+        }
+    }
+
+    fn unexplained(&self) -> f64 {
+        let signal = self.measured - self.noise;
+        if signal > EXCITED * self.measured {
+            (self.residual - self.noise).max(0.0) / signal
+        } else {
+            f64::NAN
+        }
+    }
+}
+
+fn channel_trace(flight: &Prepared, series: &Series) -> ChannelTrace {
+    let mut trace = ChannelTrace {
+        channel: series.channel,
+        time_s: Vec::new(),
+        measured: Vec::new(),
+        predicted: Vec::new(),
+    };
+    let mut segment = None;
+    for (k, window) in flight.windows.iter().enumerate() {
+        if segment.is_some_and(|s| s != window.segment) {
+            // a NaN row breaks the curve between segments
+            trace.time_s.push(window.time_s - flight.dt);
+            trace.measured.push(f64::NAN);
+            trace.predicted.push(f64::NAN);
+        }
+        segment = Some(window.segment);
+        trace.time_s.push(window.time_s);
+        trace.measured.push(series.measured[k]);
+        trace.predicted.push(series.predicted[k]);
+    }
+    trace
+}
+
+/// The sentences of a model: the worst of forces (they move V, α, β) and the worst of moments (they
+/// move p, q, r) lead, the others follow. The rates of V, α, β repeat the forces and are left out
+/// where the logs have those.
+fn sentences(channels: &[ChannelResult]) -> Vec<String> {
+    use ChannelId::{Drag, Lift, Pitch, Roll, Side, Yaw};
+    let is_force = |c: &&ChannelResult| matches!(c.channel, Drag | Lift | Side);
+    let is_moment = |c: &&ChannelResult| matches!(c.channel, Roll | Pitch | Yaw);
+    let forces = channels.iter().any(|c| is_force(&c));
+    let mut path: Vec<_> =
+        channels.iter().filter(|c| !is_moment(c) && is_force(c) == forces).collect();
+    let mut moments: Vec<_> = channels.iter().filter(is_moment).collect();
+    let worst_first = |a: &&ChannelResult, b: &&ChannelResult| told(b).total_cmp(&told(a));
+    path.sort_by(worst_first);
+    moments.sort_by(worst_first);
+    let (path_lead, path_rest) = path.split_at(path.len().min(1));
+    let (moment_lead, moment_rest) = moments.split_at(moments.len().min(1));
+    let (mut leading, mut rest) =
+        ([path_lead, moment_lead].concat(), [path_rest, moment_rest].concat());
+    leading.sort_by(worst_first);
+    rest.sort_by(worst_first);
+    leading.iter().chain(&rest).map(|c| capital(&c.worst_regime) + ".").collect()
+}
+
+/// The part of a channel's effect that its sentence accounts for: what its offset and its most
+/// telling variable explain.
+fn told(channel: &ChannelResult) -> f64 {
+    let share = channel.bins.iter().map(|b| b.explained).fold(0.0, f64::max);
+    let told = channel.offset_share + (1.0 - channel.offset_share) * share;
+    channel.effect_per_s * told.sqrt()
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect())
+}

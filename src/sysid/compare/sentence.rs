@@ -1,0 +1,308 @@
+//! A channel's finding as one sentence of plain language.
+
+use super::finding::{Finding, Trend};
+use super::result::{ChannelId, Regime, RegimeVariable};
+
+/// A channel that the model explains but for less than this is said to be explained.
+const EXPLAINED: f64 = 0.01;
+/// Below this no regime is worth naming.
+const NOTHING_LEFT: f64 = 0.001;
+
+/// What a sentence about a channel is made from.
+pub struct Subject<'a> {
+    /// The channel.
+    pub channel: ChannelId,
+    /// Its unexplained share; NaN if the flights do not move it above the noise.
+    pub unexplained: f64,
+    /// Its worst regime.
+    pub finding: Option<&'a Finding>,
+    /// The variable that the residual mainly follows.
+    pub follows: Option<RegimeVariable>,
+    /// Mass of the aircraft as the model believes it, kg.
+    pub mass: f64,
+    /// Number of flights compared.
+    pub flights: usize,
+}
+
+/// The sentence, without a full stop, beginning in lower case.
+pub fn sentence(subject: &Subject) -> String {
+    let noun = noun(subject.channel);
+    if subject.unexplained.is_nan() {
+        return format!(
+            "{noun}: these flights do not move it above the sensors' noise, so nothing can be said"
+        );
+    }
+    let share = percent(100.0 * subject.unexplained);
+    if subject.unexplained < NOTHING_LEFT {
+        return format!("{noun} is explained: {share} of its variation is left");
+    }
+    let Some(finding) = subject.finding else {
+        let why = match subject.follows {
+            Some(variable) => format!(
+                "which follows {}, though no range of it has the samples to give a figure",
+                spoken(variable)
+            ),
+            None => "with no regime in which the model is surely off".into(),
+        };
+        return format!("{noun}: {share} of its variation is unexplained, {why}");
+    };
+    let what = error(subject, &finding.regime);
+    let place = place(subject, finding);
+    let who = who(&finding.regime, subject.flights);
+    if subject.unexplained < EXPLAINED {
+        return format!(
+            "{noun} is explained but for {share} of its variation; at worst it is {what}{place}, {who}"
+        );
+    }
+    format!("{noun} is {what}{place}, {who}")
+}
+
+fn noun(channel: ChannelId) -> &'static str {
+    match channel {
+        ChannelId::Drag => {
+            "forward force along the flight path (thrust less drag, airspeed channel)"
+        }
+        ChannelId::Lift => "lift",
+        ChannelId::Side => "side force",
+        ChannelId::Roll => "rolling moment",
+        ChannelId::Pitch => "pitching moment",
+        ChannelId::Yaw => "yawing moment",
+        ChannelId::Airspeed => "rate of airspeed (airspeed channel)",
+        ChannelId::Alpha => "rate of angle of attack",
+        ChannelId::Beta => "rate of sideslip",
+    }
+}
+
+/// How the model is off, by its own sign: `(model too low, model too high)`.
+fn directions(channel: ChannelId) -> (&'static str, &'static str) {
+    match channel {
+        // measured is drag less thrust; people think of the forward force
+        ChannelId::Drag => ("too high", "too low"),
+        ChannelId::Lift | ChannelId::Airspeed | ChannelId::Alpha => ("too low", "too high"),
+        ChannelId::Side | ChannelId::Beta | ChannelId::Yaw => {
+            ("too far to the left", "too far to the right")
+        }
+        ChannelId::Roll => ("too far to the left", "too far to the right"),
+        ChannelId::Pitch => ("too far nose down", "too far nose up"),
+    }
+}
+
+/// "8.2 ± 0.3 N too low" or "28 ± 4 % too high".
+fn error(subject: &Subject, regime: &Regime) -> String {
+    let half = 0.5 * (regime.interval[1] - regime.interval[0]);
+    let (low, high) = directions(subject.channel);
+    if subject.channel == ChannelId::Lift && regime.relative_percent.is_finite() {
+        let half = half * (regime.relative_percent / regime.mean).abs();
+        let way = if regime.relative_percent > 0.0 { high } else { low };
+        return format!("{} % {way}", plus_minus(regime.relative_percent.abs(), half));
+    }
+    let way = if regime.mean > 0.0 { low } else { high };
+    let (scale, unit) = match subject.channel {
+        ChannelId::Alpha | ChannelId::Beta => (1_f64.to_degrees(), "°/s"),
+        other => (1.0, other.unit()),
+    };
+    let size = format!("{} {unit} {way}", plus_minus(regime.mean.abs() * scale, half * scale));
+    match subject.channel {
+        ChannelId::Drag => {
+            let acceleration = regime.mean.abs() / subject.mass;
+            format!("{size} ({} m/s² of airspeed)", significant(acceleration, 2))
+        }
+        _ => size + &strength(subject.channel, regime),
+    }
+}
+
+/// For moments, what the error is of the measured one, where that has one sign.
+fn strength(channel: ChannelId, regime: &Regime) -> String {
+    let moment = matches!(channel, ChannelId::Roll | ChannelId::Pitch | ChannelId::Yaw);
+    match regime.relative_percent {
+        x if !moment || x.is_nan() => String::new(),
+        x if x < -100.0 => " (it has the wrong sign)".into(),
+        x if x < 0.0 => format!(" ({} % too weak)", significant(-x, 2)),
+        x => format!(" ({} % too strong)", significant(x, 2)),
+    }
+}
+
+/// Where: " for α > 9°", with how the error runs along the variable.
+fn place(subject: &Subject, Finding { regime, trend }: &Finding) -> String {
+    let Some(variable) = regime.variable else {
+        let along = subject.follows.map(|v| format!(", and the error follows {}", spoken(v)));
+        return format!(" throughout{}", along.unwrap_or_default());
+    };
+    let whole = regime.low.is_nan() && regime.high.is_nan();
+    let name = spoken(variable);
+    let trend = match trend {
+        Trend::Grows => format!(", and the error grows with {name}"),
+        Trend::Falls => format!(", and the error falls as {name} rises"),
+        Trend::Reverses => format!(", and the error changes sign with {name}"),
+        Trend::None => String::new(),
+    };
+    match variable {
+        RegimeVariable::Flight => " in one flight".into(),
+        _ if whole => format!(" throughout{trend}"),
+        _ => format!(" for {}{trend}", range(regime, variable)),
+    }
+}
+
+fn spoken(variable: RegimeVariable) -> &'static str {
+    match variable {
+        RegimeVariable::Alpha => "α",
+        RegimeVariable::Beta => "β",
+        RegimeVariable::AileronRate => "how fast the aileron moves",
+        RegimeVariable::ElevatorRate => "how fast the elevator moves",
+        other => other.name(),
+    }
+}
+
+/// "α > 9°", "throttle 0.2 to 0.4", "the aileron moving right faster than 20 °/s".
+fn range(regime: &Regime, variable: RegimeVariable) -> String {
+    use RegimeVariable::{AileronRate, ElevatorRate};
+    let (low, high) = (regime.low, regime.high);
+    match (variable, low >= 0.0, high <= 0.0) {
+        (AileronRate, true, _) => format!("the aileron moving right {}", speed(low, high)),
+        (AileronRate, _, true) => format!("the aileron moving left {}", speed(-high, -low)),
+        (ElevatorRate, true, _) => format!("the elevator moving down {}", speed(low, high)),
+        (ElevatorRate, _, true) => format!("the elevator moving up {}", speed(-high, -low)),
+        (AileronRate, ..) => format!("aileron movement{}", between(low, high, variable.unit())),
+        (ElevatorRate, ..) => format!("elevator movement{}", between(low, high, variable.unit())),
+        _ => format!("{}{}", spoken(variable), between(low, high, variable.unit())),
+    }
+}
+
+fn speed(low: f64, high: f64) -> String {
+    match (low, high.is_finite()) {
+        (low, false) => format!("faster than {} °/s", significant(low, 3)),
+        (0.0, true) => format!("slower than {} °/s", significant(high, 3)),
+        (low, true) => format!("at {} to {} °/s", significant(low, 3), significant(high, 3)),
+    }
+}
+
+fn between(low: f64, high: f64, unit: &str) -> String {
+    let gap = if unit == "°" || unit.is_empty() { "" } else { " " };
+    let value = |x: f64| format!("{}{gap}{unit}", significant(x, 3));
+    match (low.is_finite(), high.is_finite()) {
+        (true, false) => format!(" > {}", value(low)),
+        (false, true) => format!(" < {}", value(high)),
+        (true, true) => format!(" {} to {}", significant(low, 3), value(high)),
+        (false, false) => String::new(),
+    }
+}
+
+/// "210 samples, both flights".
+fn who(regime: &Regime, flights: usize) -> String {
+    let seen = regime.flights.len();
+    let who = match (seen, flights) {
+        (_, 1) => "one flight".into(),
+        (2, 2) => "both flights".into(),
+        (a, b) if a == b => format!("all {b} flights"),
+        (1, _) => format!("flight {} only", regime.flights[0]),
+        (a, b) => format!("{a} of {b} flights"),
+    };
+    format!("{} samples, {who}", regime.independent)
+}
+
+/// "8.2 ± 0.3": as many places as the uncertainty warrants.
+fn plus_minus(value: f64, half: f64) -> String {
+    if !(half.is_finite() && half > 0.0) {
+        return significant(value, 3);
+    }
+    // one figure of the uncertainty, two if it begins with 1; never finer than a thousandth of the value
+    let half = half.max(1e-3 * value.abs());
+    let power = half.log10().floor();
+    let power = if half / 10_f64.powf(power) < 2.0 { power - 1.0 } else { power };
+    let places = (-power).max(0.0) as usize;
+    format!("{value:.places$} ± {half:.places$}")
+}
+
+/// `x` to `figures` significant figures, without trailing zeros after the point.
+fn significant(x: f64, figures: i32) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return "0".into();
+    }
+    let places = (figures - 1 - x.abs().log10().floor() as i32).max(0) as usize;
+    let text = format!("{x:.places$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').into(),
+        false => text,
+    }
+}
+
+fn percent(x: f64) -> String {
+    match x {
+        x if x < 0.1 => "less than 0.1 %".into(),
+        x => format!("{} %", significant(x, 2)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn regime(variable: RegimeVariable, low: f64, high: f64, mean: f64, half: f64) -> Regime {
+        Regime {
+            variable: Some(variable),
+            low,
+            high,
+            unit: variable.unit(),
+            mean,
+            interval: [mean - half, mean + half],
+            relative_percent: f64::NAN,
+            independent: 210,
+            flights: vec!["a.csv".into(), "b.csv".into()],
+        }
+    }
+
+    fn say(channel: ChannelId, regime: Regime, trend: Trend) -> String {
+        let finding = Finding { regime, trend };
+        sentence(&Subject {
+            channel,
+            unexplained: 0.4,
+            finding: Some(&finding),
+            follows: None,
+            mass: 3.364,
+            flights: 2,
+        })
+    }
+
+    #[test]
+    fn the_sentence_of_the_issue() {
+        // measured 25 N, model 32 N: the residual is −7 ± 1 N, the model 28 ± 4 % too high
+        let mut at = regime(RegimeVariable::Alpha, 9.0, f64::NAN, -7.0, 1.0);
+        at.relative_percent = 28.0;
+        let said = say(ChannelId::Lift, at, Trend::None);
+        assert_eq!(said, "lift is 28 ± 4 % too high for α > 9°, 210 samples, both flights");
+    }
+
+    #[test]
+    fn forces_and_moments_say_their_direction_in_words() {
+        // measured drag less thrust is 8.2 N lower than the model's: the model pushes too little
+        let at = regime(RegimeVariable::Throttle, 0.4, f64::NAN, -8.2, 0.31);
+        assert_eq!(
+            say(ChannelId::Drag, at, Trend::Grows),
+            "forward force along the flight path (thrust less drag, airspeed channel) is \
+             8.2 ± 0.3 N too low (2.4 m/s² of airspeed) for throttle > 0.4, and the error grows \
+             with throttle, 210 samples, both flights"
+        );
+        let mut at = regime(RegimeVariable::AileronRate, 20.0, 40.0, 0.9, 0.12);
+        at.relative_percent = -130.0;
+        at.flights.pop();
+        assert_eq!(
+            say(ChannelId::Yaw, at, Trend::Reverses),
+            "yawing moment is 0.90 ± 0.12 N m too far to the left (it has the wrong sign) for \
+             the aileron moving right at 20 to 40 °/s, and the error changes sign with how fast the aileron \
+             moves, 210 samples, flight a.csv only"
+        );
+        let at = regime(RegimeVariable::Q, f64::NAN, -30.0, 0.04, 0.0);
+        let said = say(ChannelId::Pitch, at, Trend::None);
+        assert!(said.contains("is 0.04 N m too far nose down for pitch rate < -30 °/s"), "{said}");
+    }
+
+    #[test]
+    fn numbers_carry_the_places_that_their_uncertainty_warrants() {
+        assert_eq!(plus_minus(8.2345, 0.312), "8.2 ± 0.3");
+        assert_eq!(plus_minus(8.2345, 0.17), "8.23 ± 0.17");
+        assert_eq!(plus_minus(123.4, 31.0), "123 ± 31");
+        assert_eq!(significant(0.4000001, 3), "0.4");
+        assert_eq!(significant(1234.5, 2), "1234");
+        assert_eq!(percent(0.01), "less than 0.1 %");
+    }
+}

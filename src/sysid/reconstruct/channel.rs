@@ -1,0 +1,120 @@
+//! A channel of a log: its samples in time order, missing ones left out.
+
+/// Share of repeated values above which a channel is taken to be slower than the log's rows.
+const HELD_SHARE: f64 = 0.3;
+
+/// What a channel is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A number.
+    Linear,
+    /// An angle that wraps at ±π, rad.
+    Angle,
+    /// A command or a position, which may well stay where it is.
+    Kept,
+}
+
+/// The finite samples of a channel.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    time: Vec<f64>,
+    value: Vec<f64>,
+    /// Whether it showed one and the same value all the time.
+    pub stuck: bool,
+}
+
+impl Channel {
+    /// The finite ones of `samples` (time in s, value); values that repeat the last one are left out
+    /// if they are many, for then the log holds a slower sensor's value. Angles are unwrapped.
+    pub fn new(samples: impl Iterator<Item = (f64, f64)>, kind: Kind) -> Channel {
+        let (mut time, mut value): (Vec<f64>, Vec<f64>) =
+            samples.filter(|(_, x)| x.is_finite()).unzip();
+        let fresh: Vec<bool> =
+            (0..value.len()).map(|i| i == 0 || value[i] != value[i - 1]).collect();
+        let repeated = fresh.iter().filter(|f| !**f).count();
+        let stuck = kind != Kind::Kept && value.len() > 20 && repeated + 1 == value.len();
+        if kind != Kind::Kept && repeated as f64 > HELD_SHARE * value.len() as f64 && !stuck {
+            let mut keep = fresh.iter();
+            time.retain(|_| *keep.next().unwrap_or(&true));
+            let mut keep = fresh.iter();
+            value.retain(|_| *keep.next().unwrap_or(&true));
+        }
+        if kind == Kind::Angle {
+            unwrap(&mut value);
+        }
+        Channel { time, value, stuck }
+    }
+
+    /// Whether it has no sample.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// The number of samples from `start` to `end`, s.
+    pub fn count(&self, start: f64, end: f64) -> usize {
+        let (a, b) =
+            (self.time.partition_point(|t| *t < start), self.time.partition_point(|t| *t <= end));
+        b.saturating_sub(a)
+    }
+
+    /// Linear interpolation at `t` (s) between samples at most `reach` (s) apart; else NaN.
+    pub fn between(&self, t: f64, reach: f64) -> f64 {
+        match self.around(t) {
+            (_, Some((time, x))) if time == t => x,
+            (Some((ta, a)), Some((tb, b))) if tb - ta <= reach => {
+                a + (b - a) * (t - ta) / (tb - ta)
+            }
+            _ => f64::NAN,
+        }
+    }
+
+    /// The measurement for `t` (s), one for each sample of the channel: NaN without a sample within
+    /// `near` (s), else the interpolation of [`between`](Self::between), else that sample.
+    pub fn measured(&self, t: f64, reach: f64, near: f64) -> f64 {
+        let (left, right) = self.around(t);
+        let distance = |s: &(f64, f64)| (s.0 - t).abs();
+        let nearest = [left, right]
+            .into_iter()
+            .flatten()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .filter(|s| distance(s) <= near);
+        let Some((_, nearest)) = nearest else { return f64::NAN };
+        let between = self.between(t, reach);
+        if between.is_nan() { nearest } else { between }
+    }
+
+    /// The samples before `t`, and at or after it.
+    fn around(&self, t: f64) -> (Option<(f64, f64)>, Option<(f64, f64)>) {
+        let after = self.time.partition_point(|x| *x < t);
+        let side = |i: usize| Some((*self.time.get(i)?, *self.value.get(i)?));
+        (after.checked_sub(1).and_then(side), side(after))
+    }
+
+    /// The last sample at or before `t` (zero-order hold); NaN before the first one.
+    pub fn held(&self, t: f64) -> f64 {
+        let after = self.time.partition_point(|x| *x <= t);
+        after.checked_sub(1).map_or(f64::NAN, |i| self.value[i])
+    }
+
+    /// The median of its values; NaN if it has none.
+    pub fn median(&self) -> f64 {
+        if self.value.is_empty() {
+            f64::NAN
+        } else {
+            crate::num::statistics::quantile(&self.value, 0.5)
+        }
+    }
+}
+
+fn unwrap(angles: &mut [f64]) {
+    use std::f64::consts::TAU;
+    for i in 1..angles.len() {
+        angles[i] -= TAU * ((angles[i] - angles[i - 1]) / TAU).round();
+    }
+}
+
+/// The angle between −π and π, rad.
+pub fn wrap(angle: f64) -> f64 {
+    use std::f64::consts::TAU;
+    angle - TAU * (angle / TAU).round()
+}

@@ -1,0 +1,131 @@
+//! Flight-path reconstruction: from a log to states without sensor errors.
+//!
+//! Kinematics hold no aerodynamics, so what the sensors do wrong, and what the wind does, is decided
+//! here, before any model of the aircraft is looked at.
+
+mod band;
+mod channel;
+mod intake;
+mod kinematics;
+mod measurement;
+mod noise;
+mod nuisance;
+mod outcome;
+mod path;
+mod rotation;
+mod smoother;
+
+use crate::logs::Flight;
+use crate::physics::airframe::ActuatorFigures;
+use crate::sysid::reconstruction::Reconstruction;
+
+/// What a rate sample stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Timing {
+    /// The rate from this sample to the next one, as JSBSim and [`crate::model::Integrator`]'s scheme
+    /// of that name have it: rates and attitude by explicit Euler, velocity by Adams–Bashforth 2.
+    Held,
+    /// The rate at the instant of the sample.
+    Sampled,
+}
+
+/// What a reconstruction is told besides the log.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// What the flight is called in reports: its file.
+    pub name: String,
+    /// The airframe's actuators: commands become deflections through them where the log has none.
+    pub actuators: ActuatorFigures,
+    /// Effective gravity, m/s².
+    pub gravity: f64,
+    /// What a rate sample stands for. Clock skews are relative to the gyros' samples so understood.
+    pub timing: Timing,
+    /// Shortest time between reconstructed samples, s; a slower log keeps its own median period.
+    pub step_s: f64,
+    /// Longest time between rows that is no gap, s.
+    pub gap_s: f64,
+    /// Shortest segment worth reconstructing, s.
+    pub shortest_s: f64,
+    /// Airspeed under which the aircraft is taken not to fly, m/s.
+    pub airspeed_min_mps: f64,
+}
+
+impl Options {
+    /// The usual figures for the flight `name` of an aircraft with `actuators`.
+    pub fn new(name: impl Into<String>, actuators: ActuatorFigures) -> Options {
+        Options {
+            name: name.into(),
+            actuators,
+            gravity: 9.80665,
+            timing: Timing::Held,
+            step_s: 0.01,
+            gap_s: 0.1,
+            shortest_s: 2.0,
+            airspeed_min_mps: 5.0,
+        }
+    }
+}
+
+/// Why a flight cannot be reconstructed.
+#[derive(Debug, thiserror::Error)]
+pub enum ReconstructError {
+    /// A needed channel is missing altogether.
+    #[error(
+        "cannot reconstruct {flight}: it has no usable {channel}; log it, or map the message that \
+         holds it to the column {column}"
+    )]
+    Missing {
+        /// The flight.
+        flight: String,
+        /// What is missing.
+        channel: &'static str,
+        /// The column of the log format that would satisfy it.
+        column: &'static str,
+    },
+    /// There is no flight in the log.
+    #[error(
+        "cannot reconstruct {flight}: its airspeed never exceeds {fastest_mps:.1} m/s, so there is no \
+         flight in it; check the unit of airspeed_mps, or give a log of a flight"
+    )]
+    NoFlight {
+        /// The flight.
+        flight: String,
+        /// The largest airspeed in it, m/s.
+        fastest_mps: f64,
+    },
+    /// No stretch is long enough.
+    #[error(
+        "cannot reconstruct {flight}: its longest stretch in flight without a gap is {longest_s:.1} s, \
+         under {shortest_s:.1} s; give a longer log, or one with a steadier logging rate"
+    )]
+    TooShort {
+        /// The flight.
+        flight: String,
+        /// Its longest stretch, s.
+        longest_s: f64,
+        /// The shortest stretch worth reconstructing, s.
+        shortest_s: f64,
+    },
+    /// The sensors contradict one another so that no path was found.
+    #[error(
+        "cannot reconstruct {flight}: no flight path fits its sensors ({why}); check the units and \
+         signs of attitude, rates and accelerations"
+    )]
+    NoPath {
+        /// The flight.
+        flight: String,
+        /// How the search ended.
+        why: &'static str,
+    },
+}
+
+/// Reconstructs `flight`: one uniform clock a segment, sensor errors and wind estimated and removed.
+///
+/// # Errors
+/// A needed channel is missing, there is no flight in the log or no stretch of it is long enough, or
+/// its sensors contradict one another.
+pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
+    let log = intake::take_in(flight, options)?;
+    let smoothed = smoother::smooth(&log, options)?;
+    Ok(outcome::assemble(log, smoothed, options))
+}

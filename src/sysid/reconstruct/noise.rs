@@ -1,0 +1,95 @@
+//! Noise levels, taken from the data.
+
+use crate::num::statistics::quantile;
+
+/// Fewest values from which a level is taken.
+const FEWEST: usize = 8;
+
+/// Standard deviation of the white part of `samples`, from their fourth differences, which a
+/// smooth signal hardly has; NaN for too few samples. Missing ones are passed over.
+pub fn white(samples: impl Iterator<Item = f64>) -> f64 {
+    let x: Vec<f64> = samples.filter(|x| x.is_finite()).collect();
+    let differences: Vec<f64> =
+        x.windows(5).map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs()).collect();
+    if differences.len() < FEWEST {
+        return f64::NAN;
+    }
+    // white noise of unit variance has fourth differences of variance 70
+    let gain = 70.0_f64.sqrt();
+    let median = 1.4826 * quantile(&differences, 0.5) / gain;
+    let mean_square = differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64;
+    // coarsely quantised data has a median of zero
+    if median > 0.0 { median } else { mean_square.sqrt() / gain }
+}
+
+/// Root mean square of `residuals` with outliers pulled in to four times the median level; NaN for
+/// too few.
+pub fn level(residuals: &[f64]) -> f64 {
+    if residuals.len() < FEWEST {
+        return f64::NAN;
+    }
+    let sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
+    let bound = 4.0 * 1.4826 * quantile(&sizes, 0.5);
+    let bound = if bound > 0.0 { bound } else { f64::INFINITY };
+    let sum: f64 = sizes.iter().map(|r| r.min(bound).powi(2)).sum();
+    (sum / sizes.len() as f64).sqrt()
+}
+
+/// How much wider than for white noise a mean of `residuals` scatters: the ratio of standard
+/// deviations, at least 1, from the means of blocks of `block` values.
+pub fn colour(residuals: &[f64], block: usize) -> f64 {
+    let count = residuals.len() / block.max(1);
+    if block < 2 || count < FEWEST {
+        return 1.0;
+    }
+    let variance = residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64;
+    let of_means = residuals
+        .chunks_exact(block)
+        .map(|b| (b.iter().sum::<f64>() / block as f64).powi(2))
+        .sum::<f64>()
+        / count as f64;
+    let ratio = of_means * block as f64 / variance;
+    // the ratio of white noise scatters by √(2 / count) around one
+    let chance = 1.0 + 3.0 * (2.0 / count as f64).sqrt();
+    if ratio > chance { ratio.sqrt() } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::stream::stream;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn noise(n: usize) -> Vec<f64> {
+        let mut random = stream(1, &[]);
+        (0..n).map(|_| StandardNormal.sample(&mut random)).collect()
+    }
+
+    #[test]
+    fn levels_of_known_noise_on_a_smooth_signal() {
+        let noise = noise(4000);
+        let signal = |k: usize| 3.0 * (k as f64 * 0.05).sin();
+        let x = noise.iter().enumerate().map(|(k, n)| signal(k) + 0.02 * n);
+        // a median of 4000 correlated values is good to about 3 %
+        assert!((white(x) / 0.02 - 1.0).abs() < 0.06);
+        assert!((level(&noise) - 1.0).abs() < 0.04);
+    }
+
+    #[test]
+    fn colour_tells_slow_noise_from_white() {
+        let noise = noise(8000);
+        assert_eq!(colour(&noise, 100), 1.0);
+        let mut slow = 0.0;
+        let slow: Vec<f64> = noise
+            .iter()
+            .map(|n| {
+                slow = 0.9 * slow + n;
+                slow
+            })
+            .collect();
+        // for a first-order process the ratio of variances is (1 + 0.9) / (1 − 0.9) = 19, less the
+        // ends of the blocks
+        let found = colour(&slow, 100);
+        assert!((3.4..4.8).contains(&found), "{found}");
+    }
+}

@@ -1,0 +1,101 @@
+//! The constants estimated along with the path: their names, units and prior widths.
+
+use super::{Options, intake::Sensors};
+
+/// Number of constants.
+pub const COUNT: usize = 17;
+/// Place of the gyro biases p, q, r.
+pub const GYRO: usize = 0;
+/// Place of the accelerometer biases x, y, z.
+pub const FORCE: usize = 3;
+/// Place of the bias of the angle-of-attack vane.
+pub const ALPHA: usize = 6;
+/// Place of the bias of the sideslip vane.
+pub const BETA: usize = 7;
+/// Place of the airspeed scale less one: measured = (1 + scale) · true.
+pub const SCALE: usize = 8;
+/// Place of the wind north, east, down.
+pub const WIND: usize = 9;
+/// Place of the delay of the attitude behind the gyros.
+pub const SKEW_ATTITUDE: usize = 12;
+/// Place of the delay of the accelerometers.
+pub const SKEW_FORCE: usize = 13;
+/// Place of the delay of the airspeed.
+pub const SKEW_AIRSPEED: usize = 14;
+/// Place of the delay of the vanes.
+pub const SKEW_VANES: usize = 15;
+/// Place of the delay of the velocity over ground.
+pub const SKEW_VELOCITY: usize = 16;
+
+/// Prior width of a clock skew, samples: ±1.5 samples are its 95 % interval.
+pub const SKEW_SAMPLES: f64 = 0.77;
+
+/// Values of the constants.
+pub type Values = [f64; COUNT];
+
+/// Names and units, by place.
+pub const NAMES: [(&str, &str); COUNT] = [
+    ("gyro_bias_p", "rad/s"),
+    ("gyro_bias_q", "rad/s"),
+    ("gyro_bias_r", "rad/s"),
+    ("accelerometer_bias_x", "m/s²"),
+    ("accelerometer_bias_y", "m/s²"),
+    ("accelerometer_bias_z", "m/s²"),
+    ("alpha_bias", "rad"),
+    ("beta_bias", "rad"),
+    ("airspeed_scale", ""),
+    ("wind_north", "m/s"),
+    ("wind_east", "m/s"),
+    ("wind_down", "m/s"),
+    ("skew_attitude", "s"),
+    ("skew_accelerometer", "s"),
+    ("skew_airspeed", "s"),
+    ("skew_vanes", "s"),
+    ("skew_velocity", "s"),
+];
+
+/// Standard deviations before the data is seen, with samples `step` (s) apart.
+pub fn prior_widths(step: f64) -> Values {
+    let mut width = [SKEW_SAMPLES * step; COUNT];
+    width[GYRO..GYRO + 3].fill(0.05);
+    width[FORCE..FORCE + 3].fill(1.0);
+    width[ALPHA..=BETA].fill(5.0_f64.to_radians());
+    width[SCALE] = 0.2;
+    width[WIND..WIND + 2].fill(15.0);
+    // air rises and sinks, but not for the length of a flight
+    width[WIND + 2] = 1.0;
+    width
+}
+
+/// Whether the log has the sensor that a constant belongs to.
+pub fn concerned(place: usize, has: &Sensors) -> bool {
+    match place {
+        ALPHA => has.alpha,
+        BETA => has.beta,
+        SKEW_VANES => has.alpha || has.beta,
+        FORCE..ALPHA | SKEW_FORCE => has.force,
+        SKEW_VELOCITY => has.velocity,
+        _ => true,
+    }
+}
+
+/// What would let the data see a constant that they do not.
+pub fn remedy(place: usize, has: &Sensors) -> &'static str {
+    match place {
+        SCALE | WIND..SKEW_ATTITUDE if !has.velocity => "log the velocity over ground",
+        SCALE | WIND..SKEW_ATTITUDE if !has.yaw => "log the heading",
+        SCALE | WIND..SKEW_ATTITUDE => "fly several headings",
+        ALPHA | BETA => "fly at several airspeeds and banks",
+        _ => "fly livelier manoeuvres",
+    }
+}
+
+/// The note on a constant that keeps its prior.
+pub fn unseen(place: usize, has: &Sensors, options: &Options) -> String {
+    format!(
+        "The data of {} cannot tell {}: it keeps its prior; {} to see it.",
+        options.name,
+        NAMES[place].0,
+        remedy(place, has)
+    )
+}

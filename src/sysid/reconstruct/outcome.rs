@@ -1,0 +1,119 @@
+//! The outcome: what the smoother found, as a reconstruction with its notes.
+
+use super::Options;
+use super::intake::{Log, Track};
+use super::kinematics::shifted;
+use super::nuisance::{self, COUNT, FORCE, GYRO, SCALE, SKEW_FORCE, Values};
+use super::path::{Path, flow_angles};
+use super::rotation::to_euler;
+use super::smoother::Smoothed;
+use crate::physics::State;
+use crate::sysid::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
+
+/// Part of the prior width above which the data is said not to see a constant.
+const UNSEEN: f64 = 0.7;
+
+/// Puts together what is handed out.
+pub fn assemble(log: Log, smoothed: Smoothed, options: &Options) -> Reconstruction {
+    let segments = log
+        .tracks
+        .iter()
+        .zip(&smoothed.paths)
+        .map(|(track, path)| segment(track, path, &smoothed.values, &log))
+        .collect();
+    let mut notes = log.notes.clone();
+    declare(&log, &smoothed, options, &mut notes);
+    let l = &smoothed.levels;
+    let m = &l.measured;
+    Reconstruction {
+        name: options.name.clone(),
+        step_s: log.step,
+        segments,
+        nuisances: nuisances(&log, &smoothed),
+        noise: [m[0], m[1], m[3], l.gyro[0], l.gyro[1], l.gyro[2], m[4], m[5]],
+        force_noise: if log.has.force { l.force } else { [f64::NAN; 3] },
+        notes,
+    }
+}
+
+fn segment(track: &Track, path: &Path, values: &Values, log: &Log) -> Segment {
+    let (force, _) = shifted(&track.force, values[SKEW_FORCE] / log.step);
+    let instant = |k: usize| {
+        let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
+        let air = path.air_velocity(k);
+        let [alpha, beta] = flow_angles(&air);
+        let [p, q, r] = std::array::from_fn(|i| track.rates[k][i] - values[GYRO + i]);
+        Instant {
+            time_s: track.start + k as f64 * log.step,
+            state: State { roll, pitch, airspeed: air.norm(), p, q, r, alpha, beta },
+            yaw: if log.has.yaw { yaw } else { f64::NAN },
+            controls: track.controls[k],
+            command: track.commands[k],
+            specific_force: std::array::from_fn(|i| force[k][i] - values[FORCE + i]),
+            altitude: track.altitude[k],
+            density: track.density[k],
+        }
+    };
+    Segment { instants: (0..track.len()).map(instant).collect() }
+}
+
+/// The constants that the log's sensors have, the airspeed scale as a factor.
+fn nuisances(log: &Log, smoothed: &Smoothed) -> Vec<Nuisance> {
+    (0..COUNT)
+        .filter(|place| nuisance::concerned(*place, &log.has))
+        .map(|place| {
+            let (name, unit) = nuisance::NAMES[place];
+            let offset = if place == SCALE { 1.0 } else { 0.0 };
+            Nuisance {
+                name: name.into(),
+                value: offset + smoothed.values[place],
+                sd: smoothed.deviations[place],
+                unit,
+            }
+        })
+        .collect()
+}
+
+fn declare(log: &Log, smoothed: &Smoothed, options: &Options, notes: &mut Vec<String>) {
+    let has = &log.has;
+    let mut note = |when: bool, text: &str| {
+        if when {
+            notes.push(text.into());
+        }
+    };
+    note(
+        !has.force,
+        "No accelerometers: the path between samples is smoothed, not driven, and forces cannot be \
+         compared.",
+    );
+    let vanes = match (has.alpha, has.beta) {
+        (true, true) => "",
+        (false, true) => "angle of attack",
+        (true, false) => "sideslip",
+        (false, false) => "angle of attack and sideslip",
+    };
+    if !vanes.is_empty() {
+        notes.push(format!(
+            "No vane for {vanes}: reconstructed from {}; gusts are not seen there, and effects of {vanes} \
+             are known less well.",
+            match (has.velocity, has.force) {
+                (true, true) => "the wind-corrected velocity and the inertial sensors",
+                (true, false) => "the wind-corrected velocity",
+                (false, true) => "the inertial sensors alone, so that a slow error remains",
+                (false, false) => "the airspeed and the attitude, which hardly hold it",
+            }
+        ));
+    }
+    let widths = nuisance::prior_widths(log.step);
+    for place in (0..COUNT).filter(|p| nuisance::concerned(*p, has)) {
+        if smoothed.deviations[place] > UNSEEN * widths[place] {
+            notes.push(nuisance::unseen(place, has, options));
+        }
+    }
+    if smoothed.levels.gusts > 1.0 {
+        notes.push(
+            "The air was rough: its velocity changed by more than the inertial sensors account for."
+                .into(),
+        );
+    }
+}
