@@ -288,3 +288,37 @@ fn nominal_flights_of_any_length_show_both_slips() {
     println!("{yaw}");
     assert!(yaw.contains("which follows how fast the aileron moves"), "{yaw}");
 }
+
+/// The same through the reconstruction, as a user's logs go.
+#[test]
+fn validate_reconstructed_flights() {
+    use greylag::sysid::reconstruct::{self, reconstruct};
+    let airframe = model("jsbsim").airframe;
+    for noise in [EXACT, REALISTIC] {
+        let flights: Vec<_> = (1..=3)
+            .map(|seed| {
+                let options = reconstruct::Options {
+                    gravity: 9.806,
+                    ..reconstruct::Options::new(format!("{seed}.csv"), airframe.actuators)
+                };
+                reconstruct(&fly(seed, 60.0, noise), &options).unwrap()
+            })
+            .collect();
+        println!("noise {:?} {:?}", flights[0].noise, flights[0].force_noise);
+        for f in &flights {
+            for n in &f.nuisances {
+                println!("{} {} {:.5} ± {:.5} {}", f.name, n.name, n.value, n.sd, n.unit);
+            }
+        }
+        let (prior, twin) = (one("prior", &flights), one("jsbsim", &flights));
+        let (p, t) = (scaled(&prior, 5.0), scaled(&twin, 5.0));
+        println!("5 s after reconstruction: jsbsim {t:.2e}, true prior {p:.2e}");
+        for c in &twin.channels {
+            println!(
+                "{:?} {:.5} residual {:.5} noise {:.5}",
+                c.channel, c.unexplained_fraction, c.residual_rms, c.noise_sd
+            );
+        }
+        finds_both_slips(&one("prior-as-printed", &flights));
+    }
+}
