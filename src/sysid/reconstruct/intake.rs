@@ -22,8 +22,6 @@ pub struct Log {
     pub tracks: Vec<Track>,
     /// Which sensors the log has.
     pub has: Sensors,
-    /// Whether all deflections are logged.
-    pub deflections_logged: bool,
     /// What the reader must know.
     pub notes: Vec<String>,
 }
@@ -173,8 +171,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     declare(&channels, &has, &mut notes);
     let stretches = stretches(flight, &has, options)?;
     let step = step(&stretches, options);
-    let deflections_logged = channels.positions.iter().all(|c| !c.is_empty());
-    let mut log = Log { step, tracks: Vec::new(), has, deflections_logged, notes };
+    let mut log = Log { step, tracks: Vec::new(), has, notes };
     let mut longest = 0.0_f64;
     for times in &stretches {
         let [start, end] = [times[0], times[times.len() - 1]];
