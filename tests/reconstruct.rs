@@ -54,25 +54,99 @@ fn a_perfect_log_stays_as_it_is() {
     }
 }
 
-#[test]
-fn planted_errors_are_found() {
-    let flown = fly(60.0, air([4.0, -4.5, 0.0], None), 2);
-    let errors = Errors {
-        gyro_bias: [0.01, -0.01, 0.01],
-        force_bias: [0.2, -0.2, 0.2],
+/// The planted errors of one trial: signs, the wind's direction and what is delayed vary.
+fn planted(seed: u64) -> (Errors, [f64; 3], Vec<(&'static str, f64)>) {
+    let sign = |bit: u64| if (seed >> bit) & 1 == 0 { 1.0 } else { -1.0 };
+    let course = seed as f64 * 2.4;
+    let wind = [6.0 * course.cos(), 6.0 * course.sin(), 0.0];
+    let (g, a) = (0.01, 0.2);
+    let mut errors = Errors {
+        gyro_bias: [g * sign(0), g * sign(1), g * sign(2)],
+        force_bias: [a * sign(1), a * sign(2), a * sign(0)],
         airspeed_scale: 1.05,
-        alpha_bias: 1.0_f64.to_radians(),
-        beta_bias: 0.5_f64.to_radians(),
-        skew: [0.007, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        alpha_bias: sign(0) * 1.0_f64.to_radians(),
+        beta_bias: sign(1) * 0.5_f64.to_radians(),
+        skew: [0.0; 7],
         noise: Errors::NOISE,
     };
-    let log = spoil(&flown, &errors, 2);
-    let start = std::time::Instant::now();
-    let found = reconstruct(&log, &options()).unwrap();
-    println!("took {:?}", start.elapsed());
-    print(&found);
-    let errors = state_errors(&flown, &found);
-    for (name, [largest, rms]) in greylag::physics::State::NAMES.iter().zip(errors) {
-        println!("{name:14} largest {largest:.2e} rms {rms:.2e}");
+    // attitude, accelerometers, airspeed, vanes, velocity: all but the gyros, the reference
+    let late = [0, 2, 3, 4, 5][seed as usize % 5];
+    errors.skew[late] = 0.007;
+    let e = &errors;
+    let expected = vec![
+        ("gyro_bias_p", e.gyro_bias[0]),
+        ("gyro_bias_q", e.gyro_bias[1]),
+        ("gyro_bias_r", e.gyro_bias[2]),
+        ("accelerometer_bias_x", e.force_bias[0]),
+        ("accelerometer_bias_y", e.force_bias[1]),
+        ("accelerometer_bias_z", e.force_bias[2]),
+        ("alpha_bias", e.alpha_bias),
+        ("beta_bias", e.beta_bias),
+        ("airspeed_scale", e.airspeed_scale),
+        ("wind_north", wind[0]),
+        ("wind_east", wind[1]),
+        ("wind_down", wind[2]),
+        ("skew_attitude", e.skew[0]),
+        ("skew_accelerometer", e.skew[2]),
+        ("skew_airspeed", e.skew[3]),
+        ("skew_vanes", e.skew[4]),
+        ("skew_velocity", e.skew[5]),
+    ];
+    (errors, wind, expected)
+}
+
+/// How often the planted errors lie within their stated 95 % intervals, over `trials` flights.
+fn coverage(trials: u64, seconds: f64, severity: Option<u8>) -> Vec<(&'static str, f64)> {
+    let mut hits: Vec<(&'static str, f64)> = Vec::new();
+    let (mut squares, mut widths) = (Vec::new(), Vec::new());
+    let mut slowest = 0.0_f64;
+    for trial in 0..trials {
+        let (errors, wind, expected) = planted(trial);
+        let flown = fly(seconds, air(wind, severity), trial);
+        let log = spoil(&flown, &errors, trial);
+        let start = std::time::Instant::now();
+        let found = reconstruct(&log, &options()).unwrap();
+        slowest = slowest.max(start.elapsed().as_secs_f64());
+        hits.resize(expected.len(), ("", 0.0));
+        squares.resize(expected.len(), 0.0);
+        widths.resize(expected.len(), 0.0);
+        for (i, (name, value)) in expected.iter().enumerate() {
+            let n = found.nuisances.iter().find(|n| n.name == *name).unwrap();
+            let z = (n.value - value) / n.sd;
+            hits[i].0 = name;
+            hits[i].1 += if z.abs() < 1.96 { 1.0 / trials as f64 } else { 0.0 };
+            squares[i] += z * z / trials as f64;
+            widths[i] += n.sd / trials as f64;
+        }
     }
+    println!("{trials} flights of {seconds} s, turbulence {severity:?}; slowest took {slowest:.3} s");
+    for (i, (name, hits)) in hits.iter().enumerate() {
+        let (rms, width) = (f64::sqrt(squares[i]), widths[i]);
+        println!("{name:22} {:5.1} % within, rms z {rms:.2}, mean sd {width:.5}", hits * 100.0);
+    }
+    hits
+}
+
+#[test]
+fn planted_errors_lie_within_their_intervals() {
+    let hits = coverage(6, 40.0, None);
+    let share = hits.iter().map(|h| h.1).sum::<f64>() / hits.len() as f64;
+    // 102 intervals of 95 %: a share under 0.87 has a chance of 1 in 2000
+    assert!(share > 0.87, "{share}");
+}
+
+#[test]
+#[ignore = "50 flights: run in release"]
+fn planted_errors_lie_within_their_intervals_in_fifty_trials() {
+    for (name, share) in coverage(50, 60.0, None) {
+        assert!(share >= 0.9, "{name}: {share}");
+    }
+}
+
+#[test]
+#[ignore = "20 flights: run in release"]
+fn planted_errors_in_turbulence() {
+    let hits = coverage(20, 60.0, Some(3));
+    let share = hits.iter().map(|h| h.1).sum::<f64>() / hits.len() as f64;
+    assert!(share >= 0.9, "{share}");
 }

@@ -66,8 +66,7 @@ impl Prepared {
         let left = |stated: f64, of: &dyn Fn(&Instant) -> f64| {
             if stated.is_finite() { stated.min(white_noise(&segments, of)) } else { 0.0 }
         };
-        let noise =
-            std::array::from_fn(|k| left(flight.noise[k], &|i| i.state.to_array()[k]));
+        let noise = std::array::from_fn(|k| left(flight.noise[k], &|i| i.state.to_array()[k]));
         let force_noise =
             std::array::from_fn(|k| left(flight.force_noise[k], &|i| i.specific_force[k]));
         let first = flight.segments.iter().find_map(|s| s.instants.first());

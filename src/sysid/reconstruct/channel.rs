@@ -52,8 +52,7 @@ impl Channel {
 
     /// The number of samples from `start` to `end`, s.
     pub fn count(&self, start: f64, end: f64) -> usize {
-        let (a, b) =
-            (self.time.partition_point(|t| *t < start), self.time.partition_point(|t| *t <= end));
+        let (a, b) = (self.time.partition_point(|t| *t < start), self.time.partition_point(|t| *t <= end));
         b.saturating_sub(a)
     }
 
@@ -61,9 +60,7 @@ impl Channel {
     pub fn between(&self, t: f64, reach: f64) -> f64 {
         match self.around(t) {
             (_, Some((time, x))) if time == t => x,
-            (Some((ta, a)), Some((tb, b))) if tb - ta <= reach => {
-                a + (b - a) * (t - ta) / (tb - ta)
-            }
+            (Some((ta, a)), Some((tb, b))) if tb - ta <= reach => a + (b - a) * (t - ta) / (tb - ta),
             _ => f64::NAN,
         }
     }
@@ -94,15 +91,6 @@ impl Channel {
     pub fn held(&self, t: f64) -> f64 {
         let after = self.time.partition_point(|x| *x <= t);
         after.checked_sub(1).map_or(f64::NAN, |i| self.value[i])
-    }
-
-    /// The median of its values; NaN if it has none.
-    pub fn median(&self) -> f64 {
-        if self.value.is_empty() {
-            f64::NAN
-        } else {
-            crate::num::statistics::quantile(&self.value, 0.5)
-        }
     }
 }
 

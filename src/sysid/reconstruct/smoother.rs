@@ -99,8 +99,9 @@ pub fn smooth(log: &Log, options: &Options) -> Result<Smoothed, ReconstructError
         if iteration == FIRST && log.has.force {
             found.levels.gusts = problem.gusts(&found, bound).unwrap_or(1.0);
         }
-        let solved =
-            problem.solve(&found, bound).ok_or_else(|| no_path("the equations became singular"))?;
+        let solved = problem
+            .solve(&found, bound)
+            .ok_or_else(|| no_path("the equations became singular"))?;
         let moved = apply(&mut found, &solved);
         if !moved.is_finite() {
             return Err(no_path("the path left the numbers"));
@@ -136,7 +137,8 @@ impl Problem<'_> {
         let mut stretches = Vec::new();
         for (track, path) in self.log.tracks.iter().zip(&found.paths) {
             let mut rows = self.inertial(track, path, found, &mut constants, &mut cost);
-            let spread = std::array::from_fn(|i| found.levels.measured[i] * found.levels.colour[i]);
+            let spread =
+                std::array::from_fn(|i| found.levels.measured[i] * found.levels.colour[i]);
             let mut sums = measurement::Sums {
                 matrix: &mut constants.matrix,
                 right: &mut constants.right,
@@ -158,15 +160,10 @@ impl Problem<'_> {
         let factor = constants.matrix.cholesky()?;
         let step = factor.solve(&constants.right);
         let fall = constants.fall + constants.right.dot(&step);
-        let log_det = constants.log_det + 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
+        let log_det = constants.log_det
+            + 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
         let covariance = factor.inverse();
-        Some(Solved {
-            stretches,
-            constants: step,
-            covariance,
-            residuals,
-            misfit: cost - fall + log_det,
-        })
+        Some(Solved { stretches, constants: step, covariance, residuals, misfit: cost - fall + log_det })
     }
 
     fn inertial(
@@ -183,9 +180,8 @@ impl Problem<'_> {
         // a start of which nothing is known
         rows[0].own = Block::from_diagonal(&NodeVector::from([0.01, 0.01, 0.01, 1e-4, 1e-4, 1e-4]));
         let l = &found.levels;
-        let spread: [f64; 6] = std::array::from_fn(
-            |i| if i < 3 { l.gyro[i] } else { l.gusts * l.force[i - 3] } * step,
-        );
+        let spread: [f64; 6] =
+            std::array::from_fn(|i| if i < 3 { l.gyro[i] } else { l.gusts * l.force[i - 3] } * step);
         let weight = SMatrix::<f64, 6, 1>::from(spread.map(|s| 1.0 / (s * s)));
         for k in 0..path.len() - 1 {
             let link = drive.link(path, &found.values, k, step, gravity);
