@@ -289,36 +289,40 @@ fn nominal_flights_of_any_length_show_both_slips() {
     assert!(yaw.contains("which follows how fast the aileron moves"), "{yaw}");
 }
 
-/// The same through the reconstruction, as a user's logs go.
-#[test]
-fn validate_reconstructed_flights() {
+/// Through the reconstruction, as a user's logs go.
+fn reconstructed(noise: Noise) -> Vec<Reconstruction> {
     use greylag::sysid::reconstruct::{self, reconstruct};
-    let airframe = model("jsbsim").airframe;
-    for noise in [EXACT, REALISTIC] {
-        let flights: Vec<_> = (1..=3)
-            .map(|seed| {
-                let options = reconstruct::Options {
-                    gravity: 9.806,
-                    ..reconstruct::Options::new(format!("{seed}.csv"), airframe.actuators)
-                };
-                reconstruct(&fly(seed, 60.0, noise), &options).unwrap()
-            })
-            .collect();
-        println!("noise {:?} {:?}", flights[0].noise, flights[0].force_noise);
-        for f in &flights {
-            for n in &f.nuisances {
-                println!("{} {} {:.5} ± {:.5} {}", f.name, n.name, n.value, n.sd, n.unit);
-            }
-        }
-        let (prior, twin) = (one("prior", &flights), one("jsbsim", &flights));
-        let (p, t) = (scaled(&prior, 5.0), scaled(&twin, 5.0));
-        println!("5 s after reconstruction: jsbsim {t:.2e}, true prior {p:.2e}");
-        for c in &twin.channels {
-            println!(
-                "{:?} {:.5} residual {:.5} noise {:.5}",
-                c.channel, c.unexplained_fraction, c.residual_rms, c.noise_sd
-            );
-        }
-        finds_both_slips(&one("prior-as-printed", &flights));
+    let aircraft = model("jsbsim");
+    let one_flight = |seed| {
+        let options = reconstruct::Options {
+            gravity: aircraft.atmosphere.gravity,
+            ..reconstruct::Options::new(format!("{seed}.csv"), aircraft.airframe.actuators)
+        };
+        reconstruct(&fly(seed, 60.0, noise), &options).unwrap()
+    };
+    (1..=3).map(one_flight).collect()
+}
+
+#[test]
+fn validate_reconstructed_exact_flights() {
+    let flights = reconstructed(EXACT);
+    let (p, t) = (scaled(&one("prior", &flights), 5.0), scaled(&one("jsbsim", &flights), 5.0));
+    println!(
+        "5 s after reconstruction: jsbsim {t:.2e}, true prior {p:.2e}, {:.3} %",
+        100.0 * t / p
+    );
+    // the figure of the issue; reached: 0.14 %
+    assert!(t <= 0.01 * p);
+    finds_both_slips(&one("prior-as-printed", &flights));
+}
+
+#[test]
+fn validate_reconstructed_noisy_flights() {
+    let flights = reconstructed(REALISTIC);
+    for c in &one("jsbsim", &flights).channels {
+        println!("{:?} {:.5} unexplained", c.channel, c.unexplained_fraction);
+        // errors of the smoothed path count as the model's; reached: 1 % in the rate of α
+        assert!(c.unexplained_fraction < 0.02, "{:?}", c.channel);
     }
+    finds_both_slips(&one("prior-as-printed", &flights));
 }
