@@ -3,7 +3,7 @@
 
     tests/report_screenshot.py REPORT.html FOLDER
 
-Writes FOLDER/{390,1280,2560}-{light,dark}.png, and two of a zoomed page, and fails on any console message of level
+Writes FOLDER/{390,1280,2560}-{light,dark}.png, and two of a zoomed page, and print.pdf, and fails on any console message of level
 error, exception, network request, plot without ink, text wider than the page, or control
 that does not do what it says. Needs Debian's `chromium` (or $CHROMIUM); no Python package.
 """
@@ -25,7 +25,7 @@ FLAGS = [
 ]
 # Plots whose inside shows too few pixels of a colour: the grid, the marks and the page are grey.
 PLOTS_WITHOUT_INK = """
-[...document.querySelectorAll('.plot')].filter(plot => {
+[...document.querySelectorAll('.plot')].filter(plot => plot.checkVisibility()).filter(plot => {
   const canvas = plot.querySelector('canvas');
   if (!canvas || !canvas.width) return true;
   const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
@@ -190,7 +190,7 @@ def key(browser, name):
 
 
 # The title and the outputs of every legend: at a linked cursor each figure over time shows values.
-READINGS = """[...document.querySelectorAll('.panels figure')]
+READINGS = """[...document.querySelectorAll('.panels figure')].filter(f => f.checkVisibility())
   .map(f => [f.querySelector('h3').textContent, [...f.querySelectorAll('.legend button output')].map(o => o.textContent)])"""
 
 
@@ -220,7 +220,7 @@ def try_mouse_and_keys(browser, zoomed_shot):
 
     def double():
         # On another plot than the one that was dragged across.
-        last = browser.value("document.querySelectorAll('.panels .plot').length - 1")
+        last = browser.value("document.querySelectorAll('.panels .u-over').length - 1")
         left, top, width, height = over_of(browser, last)
         for clicks in (1, 2):
             mouse(browser, "mousePressed", left + width / 2, top + height / 2, clicks)
@@ -228,7 +228,7 @@ def try_mouse_and_keys(browser, zoomed_shot):
     if window_after(browser, double) != whole:
         found.append("a double click does not reset the zoom")
 
-    browser.value("document.querySelector('.plot').focus()")
+    browser.value("document.querySelector('.panels .uplot').closest('.plot').focus()")
     if window_after(browser, lambda: key(browser, "+")) == whole:
         found.append("the plus key does not zoom")
     if window_after(browser, lambda: key(browser, "0")) != whole:
@@ -246,7 +246,40 @@ def try_mouse_and_keys(browser, zoomed_shot):
     browser.value("document.getElementById('theme').click()")
     if browser.value(theme) == before or browser.value(PLOTS_WITHOUT_INK):
         found.append("the theme button does not redraw the page in the other theme")
+    return found + try_choices(browser) + try_readouts(browser)
+
+
+def try_choices(browser):
+    """Presses every button of every choice, and follows every link of the findings."""
+    found = []
+    seen = "[...document.querySelectorAll('.choice')].map(c => [...c.querySelectorAll(':scope > .option')].filter(o => o.checkVisibility()).map(o => o.dataset.option))"
+    if any(len(options) != 1 for options in browser.value(seen)):
+        found.append("a choice does not show exactly one alternative")
+    buttons = browser.value("document.querySelectorAll('.options button').length")
+    for i in range(buttons):
+        name = browser.value(f"(b => (b.click(), b.dataset.option))(document.querySelectorAll('.options button')[{i}])")
+        if not browser.value(f"document.querySelectorAll('.options button')[{i}].getAttribute('aria-pressed') === 'true'"):
+            found.append(f"the button {name} does not stay pressed")
+        if not any(name in options for options in browser.value(seen)):
+            found.append(f"the button {name} shows nothing")
+        found += [f"no ink after choosing {name} in: {plot}" for plot in browser.value(PLOTS_WITHOUT_INK)]
+    for i in range(browser.value("document.querySelectorAll('a.show').length")):
+        name = browser.value(f"(a => (a.click(), a.dataset.option))(document.querySelectorAll('a.show')[{i}])")
+        if not any(name in options for options in browser.value(seen)):
+            found.append(f"the link to {name} does not show it")
+        time.sleep(0.05)
     return found
+
+
+# Presses an arrow key on every plot that tells single values; those that then say nothing.
+SILENT = """[...document.querySelectorAll('.intervals .plot, .heat .plot')].filter(p => p.checkVisibility()).filter(p => {
+  p.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true, cancelable: true}));
+  return !p.parentElement.querySelector('.readout').textContent;
+}).map(p => p.getAttribute('aria-label'))"""
+
+
+def try_readouts(browser):
+    return [f"an arrow key reads nothing in: {plot}" for plot in browser.value(SILENT)]
 
 
 def try_touch(browser):
@@ -297,6 +330,8 @@ def main():
                     found += try_mouse_and_keys(browser, folder / f"{name}-zoomed.png")
                 found += complaints(browser.events)
                 failures += [f"{name}: {what}" for what in found]
+        (folder / "print.pdf").write_bytes(base64.b64decode(
+            browser.call("Page.printToPDF", printBackground=False)["data"]))
         browser.close()
     for failure in dict.fromkeys(failures):
         print(failure, file=sys.stderr)

@@ -10,6 +10,7 @@ use crate::commands::files::{self, shipped};
 use crate::logs::Flight;
 use crate::logs::csv::{self, Tolerance};
 use crate::model::GreyBox;
+use crate::report::ComparisonReport;
 use crate::sysid::compare::{Comparison, ModelResult, Options, compare};
 use crate::sysid::reconstruct::{self, reconstruct};
 use crate::sysid::reconstruction::Reconstruction;
@@ -75,17 +76,23 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::write(path, &text, overwrite)?;
     }
     if let Some(path) = &arguments.report {
-        match page(&comparison) {
-            Some(html) => files::write(path, &html, overwrite)?,
-            None => eprintln!("the report is not written: this program cannot draw it yet"),
-        }
+        files::write(path, &page(arguments, &comparison), overwrite)?;
     }
     Ok(if complete { ExitCode::SUCCESS } else { ExitCode::from(INCOMPLETE) })
 }
 
 /// The report as HTML.
-fn page(_comparison: &Comparison) -> Option<String> {
-    None
+fn page(arguments: &Arguments, comparison: &Comparison) -> String {
+    let paths = |all: &[PathBuf]| all.iter().map(|p| p.display().to_string()).collect();
+    let report = ComparisonReport {
+        title: "Models against flights".into(),
+        comparison,
+        model_files: paths(&arguments.models),
+        log_files: paths(&arguments.logs),
+        command_line: std::env::args().skip(1).fold("greylag".into(), |line, a| line + " " + &a),
+        versions: Vec::new(),
+    };
+    report.page().render()
 }
 
 /// The flights that could be reconstructed, with what was wrong with logs.

@@ -3,7 +3,9 @@
 use serde::Serialize;
 
 use super::html::escape;
-use super::{Histogram, Table, TimeFigure, XyFigure};
+use super::{
+    Bars, Choice, Curves, Findings, HeatMap, Histogram, Intervals, Table, TimeFigure, XyFigure,
+};
 
 /// One figure of a section.
 #[derive(Clone, Debug)]
@@ -18,6 +20,18 @@ pub enum Figure {
     Histogram(Histogram),
     /// Rows and columns of text.
     Table(Table),
+    /// Sentences that say what was found.
+    Findings(Findings),
+    /// Alternatives of which one is seen.
+    Choice(Choice),
+    /// Lines over a quantity, by decades.
+    Curves(Curves),
+    /// Means in bins.
+    Intervals(Intervals),
+    /// A signed quantity over two others.
+    HeatMap(HeatMap),
+    /// Horizontal bars.
+    Bars(Bars),
 }
 
 /// How a verdict came out.
@@ -71,6 +85,29 @@ pub enum Style {
     Second,
     /// A third thing that happened: purple.
     Third,
+    /// A fourth: ochre.
+    Fourth,
+    /// What was measured, where others were predicted: the ink of the text.
+    Measured,
+}
+
+impl Style {
+    /// Of several alike, such as models, the one at `index`; they repeat after the fourth.
+    pub fn nth(index: usize) -> Style {
+        [Style::Actual, Style::Second, Style::Third, Style::Fourth][index % 4]
+    }
+
+    /// Its name in the style sheet.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Style::Command => "command",
+            Style::Actual => "actual",
+            Style::Second => "second",
+            Style::Third => "third",
+            Style::Fourth => "fourth",
+            Style::Measured => "measured",
+        }
+    }
 }
 
 /// A straight line at one value, such as a budget or a percentile.

@@ -2,6 +2,7 @@
 
 use super::{LoopTiming, Page, flight_page};
 use crate::logs::Flight;
+use crate::sysid::compare::Comparison;
 
 /// A flight with what is known about it.
 #[derive(Clone, Debug)]
@@ -30,6 +31,8 @@ pub struct FlightReport<'a> {
     pub timing: Option<LoopTiming>,
     /// What happened, in time order.
     pub events: Vec<Event>,
+    /// How well the model predicts this flight; `None` when they were not compared.
+    pub comparison: Option<Comparison>,
 }
 
 /// Deflections at a command of +1.

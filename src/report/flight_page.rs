@@ -1,6 +1,7 @@
 //! The page of one flight.
 
 use super::flight::FlightReport;
+use super::comparison_page;
 use super::flight_targets;
 use super::flight_verdict::{degrees, duration_s, verdict};
 use super::{
@@ -21,6 +22,7 @@ pub(super) fn page(report: &FlightReport) -> Page {
     if !report.segments.is_empty() {
         sections.push(flight_targets::section(report));
     }
+    sections.extend(report.comparison.as_ref().map(comparison_page::short_section));
     if !report.events.is_empty() {
         sections.push(events(report));
     }

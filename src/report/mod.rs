@@ -2,19 +2,30 @@
 //!
 //! A [`Page`] is a title over [`Section`]s, a section holds [`Figure`]s in order, and
 //! [`Page::render`] turns them into one string with style, script and data inside.
-//! [`FlightReport`] is the page of one flight. The plots are drawn in the reader's browser by
+//! [`FlightReport`] is the page of one flight, [`ComparisonReport`] that of models against flights. The plots are drawn in the reader's browser by
 //! uPlot 1.6.32 (MIT, `assets/uPlot.LICENSE`), which is embedded.
 //!
 //! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
 
+mod bars;
+mod choice;
+mod comparison;
+mod comparison_page;
+mod comparison_tables;
+mod comparison_time;
+mod comparison_where;
+mod curves;
 mod decimate;
 mod figure;
+mod findings;
 mod flight;
 mod flight_page;
 mod flight_targets;
 mod flight_verdict;
+mod heat_map;
 mod histogram;
 mod html;
+mod intervals;
 mod loop_timing;
 mod page;
 mod table;
@@ -22,9 +33,17 @@ mod time_figure;
 mod write;
 mod xy;
 
+pub use bars::{BarGroup, Bars};
+pub use choice::{Choice, ChoiceOption};
+pub use comparison::ComparisonReport;
+pub use comparison_page::comparison_page;
+pub use curves::Curves;
 pub use figure::{Figure, Outcome, Rule, Style, Verdict};
+pub use findings::{Finding, Findings, Link};
 pub use flight::{Difficulty, Event, EventKind, FlightReport, Segment, SurfaceTravel};
+pub use heat_map::{HeatCell, HeatMap};
 pub use histogram::Histogram;
+pub use intervals::{IntervalBins, IntervalPanel, Intervals};
 pub use loop_timing::{Cycle, LoopTiming};
 pub use page::{Page, Section};
 pub use table::{Align, Column, Row, Table};

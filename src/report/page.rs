@@ -10,9 +10,10 @@ const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("assets/uPlot.LICENSE");
 const STYLE: &str = include_str!("assets/page.css");
 /// Draws the figures, in one scope: each part uses those before it.
-const SCRIPTS: [&str; 3] = [
+const SCRIPTS: [&str; 4] = [
     include_str!("assets/draw.js"),
     include_str!("assets/link.js"),
+    include_str!("assets/bins.js"),
     include_str!("assets/page.js"),
 ];
 /// Runs before the page is drawn, so that a dark screen does not flash white.
@@ -115,11 +116,26 @@ impl Section {
 }
 
 impl Figure {
-    fn html(&self, data: &mut Vec<String>) -> String {
+    pub(super) fn html(&self, data: &mut Vec<String>) -> String {
         let index = data.len();
         match self {
             Figure::Verdict(verdict) => verdict.html(),
             Figure::Table(table) => table.html(),
+            Figure::Findings(findings) => findings.html(),
+            Figure::Bars(bars) => bars.html(),
+            Figure::Choice(choice) => choice.html(data),
+            Figure::Curves(figure) => {
+                data.push(plot_json("curves", script_json(figure)));
+                figure.html(index)
+            }
+            Figure::Intervals(figure) => {
+                data.push(plot_json("intervals", script_json(figure)));
+                figure.html(index)
+            }
+            Figure::HeatMap(figure) => {
+                data.push(plot_json("heat", script_json(figure)));
+                figure.html(index)
+            }
             Figure::Time(figure) => {
                 data.push(plot_json("time", script_json(figure)));
                 figure.html(index)

@@ -97,6 +97,7 @@ pub fn report(flight: &Flight) -> FlightReport<'_> {
         travel: SurfaceTravel { aileron_rad: 0.52, elevator_rad: 0.52 },
         timing: Some(timing(flight)),
         events: events(),
+        comparison: None,
     }
 }
 

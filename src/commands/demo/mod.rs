@@ -71,8 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     println!("{}", simulated?);
     let teller = Teller {
         controller: arguments.controller.name(),
-        model: &model.name,
-        deflection: model.airframe.actuators.deflection_max,
+        model: &model,
         texts: flown?,
     };
     let recorded = story::read(&folder)?;

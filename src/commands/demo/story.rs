@@ -7,7 +7,10 @@ use anyhow::{Context, Result};
 use super::schedule::{LEGS, Leg};
 use crate::logs::csv::{self, Tolerance};
 use crate::logs::{Flight, Sample};
+use crate::model::GreyBox;
 use crate::report::{Cycle, Event, EventKind, FlightReport, LoopTiming, Segment, SurfaceTravel};
+use crate::sysid::compare::{self, Comparison};
+use crate::sysid::reconstruct;
 
 /// Largest settled error that counts as tracked, degrees: half of what the paper calls
 /// "near-perfect tracking" (its section V-E).
@@ -17,10 +20,8 @@ pub const TOLERANCE_DEG: f64 = 0.5;
 pub struct Teller<'a> {
     /// Name of the controller.
     pub controller: &'a str,
-    /// Name of the model.
-    pub model: &'a str,
-    /// Deflection at full command, rad.
-    pub deflection: f64,
+    /// The model that the controller is designed from.
+    pub model: &'a GreyBox,
     /// What the companion said, with its time, s.
     pub texts: Vec<(f64, String)>,
 }
@@ -28,11 +29,12 @@ pub struct Teller<'a> {
 impl Teller<'_> {
     /// Reads the recording in `folder` and makes the report's material of it.
     pub fn tell<'f>(&self, folder: &Path, flight: &'f Flight) -> Result<FlightReport<'f>> {
+        let deflection = self.model.airframe.actuators.deflection_max;
         Ok(FlightReport {
             title: format!("Greylag demo: {} on the Skywalker X8 in JSBSim", self.controller),
             flight,
             controller: self.controller.into(),
-            model: self.model.into(),
+            model: self.model.name.clone(),
             seed: None,
             command_line: std::env::args()
                 .skip(1)
@@ -40,10 +42,27 @@ impl Teller<'_> {
             versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
             segments: LEGS.iter().map(|leg| segment(leg, flight)).collect(),
             tolerance_rad: TOLERANCE_DEG.to_radians(),
-            travel: SurfaceTravel { aileron_rad: self.deflection, elevator_rad: self.deflection },
+            travel: SurfaceTravel { aileron_rad: deflection, elevator_rad: deflection },
             timing: Some(timing(&folder.join("flight.csv"))?),
             events: self.texts.iter().map(event).collect(),
+            comparison: self.compared(flight),
         })
+    }
+}
+
+impl Teller<'_> {
+    /// How well the model predicts `flight`; a flight that cannot be compared is still reported.
+    fn compared(&self, flight: &Flight) -> Option<Comparison> {
+        let options = reconstruct::Options {
+            gravity: self.model.atmosphere.gravity,
+            ..reconstruct::Options::new("flight.csv", self.model.airframe.actuators)
+        };
+        let told = |why: &dyn std::fmt::Display| {
+            eprintln!("the report has no comparison of model and flight: {why}");
+        };
+        let path = reconstruct::reconstruct(flight, &options).map_err(|e| told(&e)).ok()?;
+        let models = std::slice::from_ref(self.model);
+        compare::compare(models, &[path], &compare::Options::default(), &|_| ()).map_err(|e| told(&e)).ok()
     }
 }
 

@@ -2,10 +2,10 @@
 
 // ---- legends ----
 
-const DASH = { command: [6, 3] };
+const DASH = { command: [6, 3], third: [8, 3], fourth: [2, 2] };
 function sample(kind, shape) {
   const ink = `var(--${kind})`;
-  const line = `<line x1="0" x2="26" y1="6" y2="6" stroke="${ink}" stroke-width="2"${kind === "command" ? ' stroke-dasharray="6 3"' : ""}/>`;
+  const line = `<line x1="0" x2="26" y1="6" y2="6" stroke="${ink}" stroke-width="2"${DASH[kind] ? ` stroke-dasharray="${DASH[kind].join(" ")}"` : ""}/>`;
   const drawn = {
     circles: `<circle cx="13" cy="6" r="4.5" fill="none" stroke="${ink}" stroke-width="2"/>`,
     crosses: `<path d="M9 2l8 8m0-8l-8 8" stroke="${ink}" stroke-width="2"/>`,
@@ -45,13 +45,17 @@ function legend(host, entries, onToggle) {
 let charts = [];
 let timeCharts = [];
 let whole = [Infinity, -Infinity];
-for (const f of figures.filter((f) => f.kind === "time"))
-  for (const { time_s: t } of f.data.tracks) {
-    if (!t.length) continue;
-    whole = [Math.min(whole[0], t[0]), Math.max(whole[1], t[t.length - 1])];
-  }
-if (whole[0] === whole[1]) whole = [whole[0] - 0.5, whole[1] + 0.5];
 let view = whole;
+/** The clock spans the time figures that are seen; the view stays while the span does. */
+function newClock(seen) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const f of seen) for (const { time_s: t } of f.data.tracks) {
+    if (t.length) [low, high] = [Math.min(low, t[0]), Math.max(high, t[t.length - 1])];
+  }
+  if (low === high) [low, high] = [low - 0.5, high + 0.5];
+  if (low === whole[0] && high === whole[1]) return;
+  view = whole = [low, high];
+}
 const sync = uPlot.sync("clock");
 const readout = document.getElementById("window");
 const reset = document.getElementById("reset");

@@ -189,11 +189,14 @@ function xyChart(host, data) {
 function columns(host) {
   return getComputedStyle(host.closest(".panels")).gridTemplateColumns.split(" ").length;
 }
+const DRAWN = { xy: xyChart, histogram: histogramChart, intervals: intervalChart, heat: heatChart, curves: curvesChart };
 function build() {
   for (const u of charts) u.destroy();
   charts = [];
   timeCharts = [];
-  for (const host of document.querySelectorAll(".plot")) {
+  const shown = [...document.querySelectorAll(".plot")].filter((host) => !hidden(host));
+  newClock(shown.map((host) => figures[host.dataset.figure]).filter((f) => f.kind === "time"));
+  for (const host of shown) {
     const { kind, data } = figures[host.dataset.figure];
     if (kind === "time") {
       const track = data.tracks[host.dataset.track];
@@ -202,7 +205,7 @@ function build() {
       const last = all.indexOf(host) >= all.length - columns(host);
       host.style.height = last ? `calc(var(--plot-height) + 2.2rem)` : "";
       charts.push(timeChart(host, data, track, track.panels[host.dataset.panel], last));
-    } else charts.push((kind === "xy" ? xyChart : histogramChart)(host, data));
+    } else charts.push(DRAWN[kind](host, data));
   }
   tell();
   root.dataset.charts = charts.length;

@@ -1,0 +1,25 @@
+//! Writes the report of a made-up comparison: `cargo run --example comparison_sample -- OUT.html`.
+
+#[path = "../tests/report_comparison/mod.rs"]
+mod synthetic;
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use greylag::report::{ComparisonReport, write_new};
+
+fn main() -> anyhow::Result<()> {
+    let out = std::env::args_os().nth(1).context("say where: comparison_sample OUT.html")?;
+    // Ten minutes in all, the length that the page is sized for.
+    let comparison = synthetic::comparison(300.0);
+    let report = ComparisonReport {
+        title: "Synthetic comparison".into(),
+        comparison: &comparison,
+        model_files: vec!["params/x8/prior-as-printed.toml".into(), "amended.toml".into()],
+        log_files: vec!["flight-a.csv".into(), "flight-b.ulg".into()],
+        command_line: "comparison_sample OUT.html".into(),
+        versions: Vec::new(),
+    };
+    write_new(&PathBuf::from(out), &report.page().render())?;
+    Ok(())
+}
