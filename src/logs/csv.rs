@@ -11,7 +11,7 @@ type Get = fn(&Sample) -> f64;
 type Place = fn(&mut Sample) -> &mut f64;
 
 /// The columns of the format in the order they are written: name, value, place.
-const COLUMNS: [(&str, Get, Place); 25] = [
+const COLUMNS: [(&str, Get, Place); 28] = [
     ("time_s", |s| s.time_s, |s| &mut s.time_s),
     ("roll_rad", |s| s.attitude_rad[0], |s| &mut s.attitude_rad[0]),
     ("pitch_rad", |s| s.attitude_rad[1], |s| &mut s.attitude_rad[1]),
@@ -29,11 +29,14 @@ const COLUMNS: [(&str, Get, Place); 25] = [
     ("ve_mps", |s| s.velocity_ned_mps[1], |s| &mut s.velocity_ned_mps[1]),
     ("vd_mps", |s| s.velocity_ned_mps[2], |s| &mut s.velocity_ned_mps[2]),
     ("altitude_m", |s| s.altitude_m, |s| &mut s.altitude_m),
+    ("air_density_kgpm3", |s| s.air_density_kgpm3, |s| &mut s.air_density_kgpm3),
     ("aileron_rad", |s| s.aileron_rad, |s| &mut s.aileron_rad),
     ("elevator_rad", |s| s.elevator_rad, |s| &mut s.elevator_rad),
+    ("rudder_rad", |s| s.rudder_rad, |s| &mut s.rudder_rad),
     ("throttle", |s| s.throttle, |s| &mut s.throttle),
     ("aileron_cmd", |s| s.aileron_cmd, |s| &mut s.aileron_cmd),
     ("elevator_cmd", |s| s.elevator_cmd, |s| &mut s.elevator_cmd),
+    ("rudder_cmd", |s| s.rudder_cmd, |s| &mut s.rudder_cmd),
     ("throttle_cmd", |s| s.throttle_cmd, |s| &mut s.throttle_cmd),
     ("roll_target_rad", |s| s.roll_target_rad, |s| &mut s.roll_target_rad),
     ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
@@ -315,7 +318,7 @@ mod tests {
             }
             sample
         };
-        Flight { samples: (0..rows).map(sample).collect() }
+        (0..rows).map(sample).collect::<Vec<_>>().into()
     }
 
     fn text(flight: &Flight) -> Vec<u8> {
