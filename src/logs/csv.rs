@@ -3,54 +3,11 @@
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
+use super::columns::{COLUMNS, EITHER, NEEDED, Place, index};
+use super::mapping::{Mapping, TEXT};
+use super::rows;
+pub use super::rows::Tolerance;
 use super::{Flight, Sample};
-
-/// Reads a place in a sample.
-type Get = fn(&Sample) -> f64;
-/// Gives access to a place in a sample.
-type Place = fn(&mut Sample) -> &mut f64;
-
-/// The columns of the format in the order they are written: name, value, place.
-const COLUMNS: [(&str, Get, Place); 25] = [
-    ("time_s", |s| s.time_s, |s| &mut s.time_s),
-    ("roll_rad", |s| s.attitude_rad[0], |s| &mut s.attitude_rad[0]),
-    ("pitch_rad", |s| s.attitude_rad[1], |s| &mut s.attitude_rad[1]),
-    ("yaw_rad", |s| s.attitude_rad[2], |s| &mut s.attitude_rad[2]),
-    ("p_radps", |s| s.rates_radps[0], |s| &mut s.rates_radps[0]),
-    ("q_radps", |s| s.rates_radps[1], |s| &mut s.rates_radps[1]),
-    ("r_radps", |s| s.rates_radps[2], |s| &mut s.rates_radps[2]),
-    ("airspeed_mps", |s| s.airspeed_mps, |s| &mut s.airspeed_mps),
-    ("alpha_rad", |s| s.alpha_rad, |s| &mut s.alpha_rad),
-    ("beta_rad", |s| s.beta_rad, |s| &mut s.beta_rad),
-    ("ax_mps2", |s| s.specific_force_mps2[0], |s| &mut s.specific_force_mps2[0]),
-    ("ay_mps2", |s| s.specific_force_mps2[1], |s| &mut s.specific_force_mps2[1]),
-    ("az_mps2", |s| s.specific_force_mps2[2], |s| &mut s.specific_force_mps2[2]),
-    ("vn_mps", |s| s.velocity_ned_mps[0], |s| &mut s.velocity_ned_mps[0]),
-    ("ve_mps", |s| s.velocity_ned_mps[1], |s| &mut s.velocity_ned_mps[1]),
-    ("vd_mps", |s| s.velocity_ned_mps[2], |s| &mut s.velocity_ned_mps[2]),
-    ("altitude_m", |s| s.altitude_m, |s| &mut s.altitude_m),
-    ("aileron_rad", |s| s.aileron_rad, |s| &mut s.aileron_rad),
-    ("elevator_rad", |s| s.elevator_rad, |s| &mut s.elevator_rad),
-    ("throttle", |s| s.throttle, |s| &mut s.throttle),
-    ("aileron_cmd", |s| s.aileron_cmd, |s| &mut s.aileron_cmd),
-    ("elevator_cmd", |s| s.elevator_cmd, |s| &mut s.elevator_cmd),
-    ("throttle_cmd", |s| s.throttle_cmd, |s| &mut s.throttle_cmd),
-    ("roll_target_rad", |s| s.roll_target_rad, |s| &mut s.roll_target_rad),
-    ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
-];
-/// Columns without which a file is no flight log.
-const NEEDED: [&str; 7] =
-    ["time_s", "roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"];
-/// For each actuator the command or the position must be there.
-const EITHER: [(&str, &str); 3] = [
-    ("aileron_cmd", "aileron_rad"),
-    ("elevator_cmd", "elevator_rad"),
-    ("throttle_cmd", "throttle"),
-];
-/// Share of unusable rows above which a log is refused.
-const REFUSED_SHARE: f64 = 0.05;
-/// Row numbers kept in the report of unusable rows.
-const ROWS_NAMED: usize = 20;
 
 /// Why a CSV flight log cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -97,15 +54,6 @@ pub enum CsvError {
         /// The first of those dropped, the header being row 1.
         first: usize,
     },
-}
-
-/// Whether a log with many unusable rows is read all the same.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tolerance {
-    /// More than 5 % of unusable rows refuse the log.
-    Strict,
-    /// Unusable rows are dropped, however many.
-    Lenient,
 }
 
 /// A flight read from a file, with what was odd about it.
@@ -211,6 +159,22 @@ pub fn load(path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
 /// # Errors
 /// As [`load`].
 pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
+    settle(raw(bytes, path, &Mapping::default())?, path, tolerance)
+}
+
+/// A table as it stands in the file, before any row is judged.
+pub(super) struct Raw {
+    /// The rows; `None` for one that holds something else than numbers.
+    pub rows: Vec<Option<Sample>>,
+    unknown_columns: Vec<String>,
+    cut_short: bool,
+}
+
+/// Where a field goes: place, scale, offset.
+type Target = (Place, f64, f64);
+
+/// Reads the rows, taking columns under other names or in other units where `mapping` says so.
+pub(super) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, CsvError> {
     let text = |source| CsvError::Text { path: path.to_owned(), source };
     // A row without its line end may miss digits: it is left out.
     let end = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
@@ -218,36 +182,62 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
     let header = reader.byte_headers().map_err(text)?.clone();
     let names: Vec<String> =
         header.iter().map(|h| String::from_utf8_lossy(h).trim().to_owned()).collect();
-    check_columns(&names, path)?;
-    let places: Vec<Option<Place>> =
-        names.iter().map(|name| COLUMNS.iter().find(|c| c.0 == name).map(|c| c.2)).collect();
-    let mut reading = Reading { cut_short: end < bytes.len(), ..Reading::default() };
-    reading.unknown_columns = names
-        .iter()
-        .zip(&places)
-        .filter(|(_, place)| place.is_none())
-        .map(|(name, _)| name.clone())
-        .collect();
-    let mut rows = 0;
-    for (i, record) in reader.byte_records().enumerate() {
-        let record = record.map_err(text)?;
-        rows += 1;
-        match sample(&record, &places).filter(|s| usable(s, reading.flight.samples.last())) {
-            Some(sample) => reading.flight.samples.push(sample),
-            None => {
-                reading.dropped += 1;
-                if reading.dropped_rows.len() < ROWS_NAMED {
-                    reading.dropped_rows.push(i + 2);
-                }
-            }
-        }
+    let targets: Vec<Vec<Target>> = names.iter().map(|name| targets(name, mapping)).collect();
+    check_columns(&names, mapping, path)?;
+    let unknown = names.iter().zip(&targets).filter(|(_, targets)| targets.is_empty());
+    let unknown_columns = unknown.map(|(name, _)| name.clone()).collect();
+    let mut rows = Vec::new();
+    for record in reader.byte_records() {
+        rows.push(sample(&record.map_err(text)?, &targets));
     }
-    refuse_if_poor(&reading, rows, path, tolerance)?;
-    Ok(reading)
+    Ok(Raw { rows, unknown_columns, cut_short: end < bytes.len() })
 }
 
-fn check_columns(names: &[String], path: &Path) -> Result<(), CsvError> {
-    let has = |column: &str| names.iter().any(|n| n == column);
+/// Drops the unusable rows, refuses the table if they are too many.
+pub(super) fn settle(raw: Raw, path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
+    let mut rows = rows::Rows::default();
+    // The header is row 1.
+    raw.rows.into_iter().enumerate().for_each(|(i, sample)| rows.take(i + 2, sample));
+    if let Some(first) = rows.refused(tolerance) {
+        let (dropped, rows) = (rows.dropped, rows.total);
+        return Err(CsvError::Unusable { path: path.to_owned(), dropped, rows, first });
+    }
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let unknown_columns = raw.unknown_columns;
+    Ok(Reading {
+        flight: Flight {
+            name,
+            samples: rows.samples,
+            unknown_columns: unknown_columns.clone(),
+            notes: Vec::new(),
+        },
+        unknown_columns,
+        dropped: rows.dropped,
+        dropped_rows: rows.dropped_rows,
+        cut_short: raw.cut_short,
+    })
+}
+
+/// Where the file's column `name` goes.
+fn targets(name: &str, mapping: &Mapping) -> Vec<Target> {
+    let mut targets: Vec<Target> = mapping
+        .of_topic(TEXT)
+        .filter(|(_, entry)| entry.field == name)
+        .filter_map(|(column, e)| Some((COLUMNS[index(column)?].2, e.scale, e.offset)))
+        .collect();
+    if mapping.get(name).is_none()
+        && let Some(i) = index(name)
+    {
+        targets.push((COLUMNS[i].2, 1.0, 0.0));
+    }
+    targets
+}
+
+fn check_columns(names: &[String], mapping: &Mapping, path: &Path) -> Result<(), CsvError> {
+    let has = |column: &str| {
+        let name = mapping.get(column).map_or(column, |entry| &entry.field);
+        names.iter().any(|n| n == name)
+    };
     let missing = |column, remedy| CsvError::Column { path: path.to_owned(), column, remedy };
     for column in NEEDED {
         if !has(column) {
@@ -263,43 +253,21 @@ fn check_columns(names: &[String], path: &Path) -> Result<(), CsvError> {
 }
 
 /// The sample of a record; `None` when a field is no number.
-fn sample(record: &::csv::ByteRecord, places: &[Option<Place>]) -> Option<Sample> {
+fn sample(record: &::csv::ByteRecord, targets: &[Vec<Target>]) -> Option<Sample> {
     let mut sample = Sample::default();
-    for (field, place) in record.iter().zip(places) {
-        let Some(place) = place else { continue };
+    for (field, targets) in record.iter().zip(targets) {
+        if targets.is_empty() {
+            continue;
+        }
         let field = std::str::from_utf8(field).ok()?.trim();
         if !field.is_empty() {
-            *place(&mut sample) = field.parse().ok()?;
+            let x: f64 = field.parse().ok()?;
+            for (place, scale, offset) in targets {
+                *place(&mut sample) = if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
+            }
         }
     }
     Some(sample)
-}
-
-/// Whether a sample is later than the last one, has what is needed, and is possible.
-fn usable(s: &Sample, last: Option<&Sample>) -> bool {
-    let needed = [s.time_s, s.attitude_rad[0], s.attitude_rad[1], s.airspeed_mps];
-    let pi = std::f64::consts::PI + 1e-6;
-    needed.iter().chain(&s.rates_radps).all(|x| x.is_finite())
-        && COLUMNS.iter().all(|c| !c.1(s).is_infinite())
-        && s.attitude_rad[0].abs() <= pi
-        && s.attitude_rad[1].abs() <= pi / 2.0
-        && s.airspeed_mps >= 0.0
-        && last.is_none_or(|last| s.time_s > last.time_s)
-}
-
-fn refuse_if_poor(
-    reading: &Reading,
-    rows: usize,
-    path: &Path,
-    tolerance: Tolerance,
-) -> Result<(), CsvError> {
-    let poor = reading.dropped as f64 > REFUSED_SHARE * rows as f64;
-    match (tolerance, reading.dropped_rows.first()) {
-        (Tolerance::Strict, Some(&first)) if poor => {
-            Err(CsvError::Unusable { path: path.to_owned(), dropped: reading.dropped, rows, first })
-        }
-        _ => Ok(()),
-    }
 }
 
 #[cfg(test)]
@@ -315,7 +283,7 @@ mod tests {
             }
             sample
         };
-        Flight { samples: (0..rows).map(sample).collect() }
+        (0..rows).map(sample).collect::<Vec<_>>().into()
     }
 
     fn text(flight: &Flight) -> Vec<u8> {
