@@ -123,7 +123,7 @@ impl Errors {
 pub fn spoil(flown: &Flown, errors: &Errors, seed: u64) -> Flight {
     let mut random = stream(seed, &[2]);
     let samples = (0..flown.truth.len()).map(|k| row(flown, errors, k, &mut random)).collect();
-    Flight { samples }
+    Flight::from(samples)
 }
 
 fn row(flown: &Flown, e: &Errors, k: usize, random: &mut Stream) -> Sample {
