@@ -13,6 +13,8 @@ use crate::sysid::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
 
 /// Part of the prior width above which the data is said not to see a constant.
 const UNSEEN: f64 = 0.7;
+/// Gusts worth a note, m/s.
+const ROUGH: f64 = 0.1;
 /// Smallest delay of the actuators that is put right, samples: less is within what the regression that
 /// finds it leaves out.
 const CORRECTED: f64 = 0.25;
@@ -153,10 +155,10 @@ fn declare(log: &Log, smoothed: &Smoothed, options: &Options, notes: &mut Vec<St
             notes.push(nuisance::unseen(place, has, options));
         }
     }
-    if smoothed.levels.gusts > 1.0 {
-        notes.push(
-            "The air was rough: its velocity changed by more than the inertial sensors account for."
-                .into(),
-        );
+    if smoothed.levels.gusts > ROUGH {
+        notes.push(format!(
+            "The air was rough: gusts of about {:.1} m/s beside the mean wind.",
+            smoothed.levels.gusts
+        ));
     }
 }
