@@ -122,7 +122,7 @@ impl Errors {
 /// What sensors with `errors` log of a flight.
 pub fn spoil(flown: &Flown, errors: &Errors, seed: u64) -> Flight {
     let mut random = stream(seed, &[2]);
-    let samples = (0..flown.truth.len()).map(|k| row(flown, errors, k, &mut random)).collect();
+    let samples: Vec<Sample> = (0..flown.truth.len()).map(|k| row(flown, errors, k, &mut random)).collect();
     Flight::from(samples)
 }
 
