@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .collect::<Result<Vec<_>>>()?;
     let Intake { flights, mut notes, mut in_doubt } = take_in(arguments, &models[0])?;
     if flights.is_empty() {
-        bail!("no log can be compared: {}", notes.join("; "));
+        bail!("no log can be compared: what is wrong with each is said above");
     }
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let mut comparison = compare(&models, &flights, &options, &|doing| eprintln!("{doing}"))?;

@@ -4,7 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::CompareError;
 use super::kernel::{Kernel, weigh};
-use super::result::{FlightResult, FlightTrace, NuisanceResult, RegimeVariable};
+use super::names::RegimeVariable;
+use super::result::{FlightResult, FlightTrace, NuisanceResult};
 use crate::model::STEP;
 use crate::physics::State;
 use crate::sysid::reconstruction::{Instant, Reconstruction};
@@ -99,7 +100,7 @@ impl Prepared {
     }
 
     /// Number of samples.
-    pub fn len(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.segments.iter().map(Vec::len).sum()
     }
 
@@ -115,7 +116,7 @@ impl Prepared {
         FlightResult {
             name: self.name.clone(),
             step_s: self.dt,
-            samples: self.len(),
+            samples: self.sample_count(),
             segments_s: self.segments.iter().filter_map(ends).collect(),
             nuisances: from.nuisances.iter().map(nuisance).collect(),
             notes: from.notes.clone(),
