@@ -73,7 +73,7 @@ impl Reading {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.verb {
         Verb::Info { file, json, reading } => {
-            let info = Info::of(&crate::logs::load(file, &reading.options()?)?);
+            let info = Info::of(&crate::logs::inspect(file, &reading.options()?)?);
             match json {
                 true => println!("{}", serde_json::to_string_pretty(&info)?),
                 false => print(&info),

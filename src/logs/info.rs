@@ -73,7 +73,7 @@ impl Info {
             to_s: times.last().copied().unwrap_or(0.0),
             rate_hz: if period > 0.0 { 1.0 / period } else { 0.0 },
             gaps: gaps.collect(),
-            flight_s: flown.sum(),
+            flight_s: flown.fold(0.0, |sum, x| sum + x),
             phases,
             channels: log.channels.clone(),
             purposes: purposes(log),
