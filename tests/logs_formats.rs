@@ -23,7 +23,9 @@ fn difference(a: &[Sample], b: &[Sample]) -> [f64; 3] {
     assert_eq!(a.len(), b.len());
     let mut worst = [0.0f64; 3];
     // A NaN must not pass for agreement.
-    let mut take = |i: usize, d: f64| worst[i] = if d.is_nan() { f64::INFINITY } else { worst[i].max(d.abs()) };
+    let mut take = |i: usize, d: f64| {
+        worst[i] = if d.is_nan() { f64::INFINITY } else { worst[i].max(d.abs()) }
+    };
     for (a, b) in a.iter().zip(b) {
         assert!((a.time_s - b.time_s).abs() < 1e-9);
         for k in 0..3 {
@@ -123,7 +125,9 @@ fn a_mapping_overrides_what_the_format_means() {
     let mut wrong = truth.clone();
     wrong.iter_mut().for_each(|s| s.airspeed_mps *= 3.6);
     let text = |from: &str| {
-        format!("schema = 1\n[columns]\nairspeed_mps = {{ from = \"{from}\", scale = 0.2777777777777778 }}\n")
+        format!(
+            "schema = 1\n[columns]\nairspeed_mps = {{ from = \"{from}\", scale = 0.2777777777777778 }}\n"
+        )
     };
     for (from, bytes) in [
         ("csv.airspeed_mps", csv(&wrong)),
@@ -131,17 +135,25 @@ fn a_mapping_overrides_what_the_format_means() {
         ("VFR_HUD.airspeed", tlog(&wrong)),
     ] {
         let mapping = Mapping::parse(&text(from), Path::new("mapping.toml")).unwrap();
-        let log = parse(&bytes, Path::new("f"), &Options { mapping, ..Options::default() }).unwrap();
+        let log =
+            parse(&bytes, Path::new("f"), &Options { mapping, ..Options::default() }).unwrap();
         assert!(difference(&truth, &log.flight.samples)[1] < 5e-6, "{from}");
     }
-    for bad in ["schema = 2\n[columns]\n", "schema = 1\n[columns]\nspeed = { from = \"a.b\" }", "schema = 1\n[columns]\nroll_rad = { from = \"a\" }"] {
-        assert!(Mapping::parse(bad, Path::new("m.toml")).unwrap_err().to_string().contains("m.toml"));
+    for bad in [
+        "schema = 2\n[columns]\n",
+        "schema = 1\n[columns]\nspeed = { from = \"a.b\" }",
+        "schema = 1\n[columns]\nroll_rad = { from = \"a\" }",
+    ] {
+        assert!(
+            Mapping::parse(bad, Path::new("m.toml")).unwrap_err().to_string().contains("m.toml")
+        );
     }
 }
 
 #[test]
 fn foreign_empty_and_incomplete_files_are_refused_by_name() {
-    let refuse = |bytes: &[u8]| parse(bytes, Path::new("odd.bin"), &Options::default()).unwrap_err();
+    let refuse =
+        |bytes: &[u8]| parse(bytes, Path::new("odd.bin"), &Options::default()).unwrap_err();
     assert!(matches!(refuse(b""), LogError::Empty { .. }));
     assert!(matches!(refuse(b"\x89PNG\r\n\x1a\n0000"), LogError::Foreign { .. }));
     let mut bare = samples(300);
@@ -167,14 +179,17 @@ fn shared(name: &str) -> Option<PathBuf> {
     let root = std::env::var_os("GREYLAG_SHARED").map_or(beside, PathBuf::from);
     let path = root.join("data/logs").join(name);
     if !path.exists() {
-        println!("skipped: {name} is not there (set GREYLAG_SHARED to the folder that holds data/logs)");
+        println!(
+            "skipped: {name} is not there (set GREYLAG_SHARED to the folder that holds data/logs)"
+        );
     }
     path.exists().then_some(path)
 }
 
 #[test]
 fn a_real_px4_log_on_the_ground_says_so() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/px4_vtol_sample_log_small.ulg");
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/px4_vtol_sample_log_small.ulg");
     let log = inspect(&path, &Options::default()).unwrap();
     // Counts by pyulog 1.3.0.
     let counted = |n: &str| log.topics.iter().find(|t| t.0 == n).map(|t| t.2);
@@ -217,4 +232,37 @@ fn ten_minutes_at_100_hz_are_read_in_a_second() {
         // The limit is for an optimised build on an idle machine.
         assert!(cfg!(debug_assertions) || took < 1.0, "{took}");
     }
+}
+
+/// pyulog and pymavlink read what the writers of these tests write: the formats are the real ones.
+#[test]
+fn other_readers_read_the_same_numbers() {
+    let python = std::env::var("GREYLAG_PYTHON").unwrap_or("python3".into());
+    let have = |m: &str| {
+        let import =
+            std::process::Command::new(&python).args(["-c", &format!("import {m}")]).output();
+        import.is_ok_and(|o| o.status.success())
+    };
+    if !have("pyulog, pymavlink") {
+        println!(
+            "skipped: {python} lacks pyulog or pymavlink (name one that has them in GREYLAG_PYTHON)"
+        );
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let truth = samples(300);
+    for (name, bytes) in [
+        ("flight.csv", csv(&truth)),
+        ("flight.ulg", ulog(&truth)),
+        ("flight.bin", dataflash(&truth)),
+        ("flight.tlog", tlog(&truth)),
+    ] {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/logs_crosscheck.py");
+    let run = std::process::Command::new(&python).arg(script).arg(folder.path()).output().unwrap();
+    let (said, complained) =
+        (String::from_utf8_lossy(&run.stdout), String::from_utf8_lossy(&run.stderr));
+    println!("{said}");
+    assert!(run.status.success(), "{said}{complained}");
 }

@@ -32,7 +32,9 @@ fn mutate(inputs: usize, seed: u64) -> usize {
                     let to = rng.random_range(0..bytes.len());
                     bytes.splice(to..to, piece);
                 }
-                _ => bytes[at] = [rng.random(), 0, 1, 0x7F, 0x80, 0xFF][rng.random_range(0..6usize)],
+                _ => {
+                    bytes[at] = [rng.random(), 0, 1, 0x7F, 0x80, 0xFF][rng.random_range(0..6usize)]
+                }
             }
             if bytes.len() < 2 {
                 break;

@@ -63,8 +63,7 @@ struct Reading {
 impl Reading {
     fn options(&self) -> Result<Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
-        let tolerance =
-            if self.lenient { csv::Tolerance::Lenient } else { csv::Tolerance::Strict };
+        let tolerance = if self.lenient { csv::Tolerance::Lenient } else { csv::Tolerance::Strict };
         Ok(Options { tolerance, mapping })
     }
 }

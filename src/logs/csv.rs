@@ -278,7 +278,8 @@ fn sample(record: &::csv::ByteRecord, targets: &[Vec<Target>]) -> Option<Sample>
         if !field.is_empty() {
             let x: f64 = field.parse().ok()?;
             for (place, scale, offset) in targets {
-                *place(&mut sample) = if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
+                *place(&mut sample) =
+                    if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
             }
         }
     }

@@ -7,11 +7,11 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::Sample;
 use super::columns::{COLUMNS, EITHER, NEEDED, index, is_held, is_wrapped};
 use super::load::Channel;
 use super::mapping::rule::{Fill, Rule};
 use super::topics::{Topics, period_s};
-use super::Sample;
 use crate::physics::atmosphere::{Atmosphere, Density};
 
 /// The longest time that a fast channel is carried over, s.
@@ -288,9 +288,8 @@ fn make_true(rows: &mut [Sample]) -> String {
 
 /// Cuts the rows before all needed channels have begun, and after one has ended.
 fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
-    let whole = |s: &Sample| {
-        NEEDED.iter().all(|c| index(c).is_none_or(|i| COLUMNS[i].1(s).is_finite()))
-    };
+    let whole =
+        |s: &Sample| NEEDED.iter().all(|c| index(c).is_none_or(|i| COLUMNS[i].1(s).is_finite()));
     let first = rows.iter().position(whole).unwrap_or(0);
     let end = rows.iter().rposition(whole).map_or(rows.len(), |i| i + 1);
     let cut = rows.len() - (end - first);
@@ -301,4 +300,3 @@ fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
         *rows = rows[first..end].to_vec();
     }
 }
-

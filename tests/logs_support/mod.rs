@@ -159,7 +159,11 @@ pub fn dataflash(samples: &[Sample]) -> Vec<u8> {
         record(5, Some(0), &[0.0, s.air_density_kgpm3 * 287.053 * 288.15, 15.0]);
         record(6, Some(0), &s.velocity_ned_mps);
         record(7, None, &[0.0, 0.0, s.altitude_m]);
-        record(8, None, &[4500.0 * s.aileron_cmd, -4500.0 * s.elevator_cmd, 100.0 * s.throttle_cmd]);
+        record(
+            8,
+            None,
+            &[4500.0 * s.aileron_cmd, -4500.0 * s.elevator_cmd, 100.0 * s.throttle_cmd],
+        );
     }
     out
 }
@@ -182,12 +186,66 @@ pub fn tlog(samples: &[Sample]) -> Vec<u8> {
         controls[2] = s.throttle_cmd as f32;
         let pressure = (s.air_density_kgpm3 * 287.053 * 288.15 / 100.0) as f32;
         let messages = [
-            (200, MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA { time_boot_ms: (us / 1000) as u32, vx: v[0], vy: v[1], vz: v[2], ..Default::default() })),
-            (200, MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA { time_usec: us, xacc: f[0], yacc: f[1], zacc: f[2], abs_pressure: pressure, temperature: 15.0, ..Default::default() })),
-            (200, MavMessage::VFR_HUD(VFR_HUD_DATA { airspeed: s.airspeed_mps as f32, alt: s.altitude_m as f32, ..Default::default() })),
-            (200, MavMessage::AOA_SSA(AOA_SSA_DATA { time_usec: us, AOA: s.alpha_rad.to_degrees() as f32, SSA: s.beta_rad.to_degrees() as f32 })),
-            (200, MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA { time_boot_ms: (us / 1000) as u32, q1: q[0], q2: q[1], q3: q[2], q4: q[3], rollspeed: p, pitchspeed: r, yawspeed: y, ..Default::default() })),
-            (1, MavMessage::HIL_ACTUATOR_CONTROLS(HIL_ACTUATOR_CONTROLS_DATA { time_usec: us, controls, ..Default::default() })),
+            (
+                200,
+                MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+                    time_boot_ms: (us / 1000) as u32,
+                    vx: v[0],
+                    vy: v[1],
+                    vz: v[2],
+                    ..Default::default()
+                }),
+            ),
+            (
+                200,
+                MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA {
+                    time_usec: us,
+                    xacc: f[0],
+                    yacc: f[1],
+                    zacc: f[2],
+                    abs_pressure: pressure,
+                    temperature: 15.0,
+                    ..Default::default()
+                }),
+            ),
+            (
+                200,
+                MavMessage::VFR_HUD(VFR_HUD_DATA {
+                    airspeed: s.airspeed_mps as f32,
+                    alt: s.altitude_m as f32,
+                    ..Default::default()
+                }),
+            ),
+            (
+                200,
+                MavMessage::AOA_SSA(AOA_SSA_DATA {
+                    time_usec: us,
+                    AOA: s.alpha_rad.to_degrees() as f32,
+                    SSA: s.beta_rad.to_degrees() as f32,
+                }),
+            ),
+            (
+                200,
+                MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
+                    time_boot_ms: (us / 1000) as u32,
+                    q1: q[0],
+                    q2: q[1],
+                    q3: q[2],
+                    q4: q[3],
+                    rollspeed: p,
+                    pitchspeed: r,
+                    yawspeed: y,
+                    ..Default::default()
+                }),
+            ),
+            (
+                1,
+                MavMessage::HIL_ACTUATOR_CONTROLS(HIL_ACTUATOR_CONTROLS_DATA {
+                    time_usec: us,
+                    controls,
+                    ..Default::default()
+                }),
+            ),
         ];
         for (component_id, message) in messages {
             out.extend(stamp.to_be_bytes());
