@@ -63,8 +63,7 @@ struct Reading {
 impl Reading {
     fn options(&self) -> Result<Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
-        let tolerance =
-            if self.lenient { csv::Tolerance::Lenient } else { csv::Tolerance::Strict };
+        let tolerance = if self.lenient { csv::Tolerance::Lenient } else { csv::Tolerance::Strict };
         Ok(Options { tolerance, mapping })
     }
 }
@@ -73,7 +72,7 @@ impl Reading {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.verb {
         Verb::Info { file, json, reading } => {
-            let info = Info::of(&crate::logs::load(file, &reading.options()?)?);
+            let info = Info::of(&crate::logs::inspect(file, &reading.options()?)?);
             match json {
                 true => println!("{}", serde_json::to_string_pretty(&info)?),
                 false => print(&info),

@@ -91,7 +91,8 @@ fn angles_and_rates(rows: &[Sample]) -> Vec<Finding> {
     let rate = quantile(values(rows, |s| s.rates_radps[0].abs()), 0.99).unwrap_or(0.0);
     let large = roll > 3.3 || pitch > 1.7;
     let angles_in_degrees = large || ratio.is_some_and(|r| near(r, 1.0 / degree, 0.4));
-    let rates_in_degrees = ratio.is_some_and(|r| near(r, degree, 0.4)) || rate > 12.0
+    let rates_in_degrees = ratio.is_some_and(|r| near(r, degree, 0.4))
+        || rate > 12.0
         || large && ratio.is_some_and(|r| near(r, 1.0, 0.4));
     if angles_in_degrees {
         out.push(Finding::problem(format!(
@@ -186,7 +187,9 @@ fn constant(rows: &[Sample]) -> Vec<Finding> {
         let Some(first) = seen.first() else { continue };
         let dead = seen.len() >= 2 * ENOUGH && seen.iter().all(|x| x == first);
         // Commands rest, rudders are often absent, targets hold.
-        let may_rest = ["_cmd", "_target_rad", "rudder_rad", "air_density_kgpm3"].iter().any(|e| name.ends_with(e))
+        let may_rest = ["_cmd", "_target_rad", "rudder_rad", "air_density_kgpm3"]
+            .iter()
+            .any(|e| name.ends_with(e))
             || matches!(*name, "throttle" | "altitude_m");
         if dead && !may_rest {
             let text = format!(

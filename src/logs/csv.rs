@@ -193,14 +193,29 @@ pub(super) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, C
     Ok(Raw { rows, unknown_columns, cut_short: end < bytes.len() })
 }
 
+/// What [`settle`] would say against a table.
+pub(super) fn poor(raw: &Raw, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
+    let mut rows = rows::Rows::default();
+    raw.rows.iter().enumerate().for_each(|(i, sample)| rows.take(i + 2, *sample));
+    refusal(&rows, path, tolerance)
+}
+
+fn refusal(rows: &rows::Rows, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
+    rows.refused(tolerance).map(|first| CsvError::Unusable {
+        path: path.to_owned(),
+        dropped: rows.dropped,
+        rows: rows.total,
+        first,
+    })
+}
+
 /// Drops the unusable rows, refuses the table if they are too many.
 pub(super) fn settle(raw: Raw, path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
     let mut rows = rows::Rows::default();
     // The header is row 1.
     raw.rows.into_iter().enumerate().for_each(|(i, sample)| rows.take(i + 2, sample));
-    if let Some(first) = rows.refused(tolerance) {
-        let (dropped, rows) = (rows.dropped, rows.total);
-        return Err(CsvError::Unusable { path: path.to_owned(), dropped, rows, first });
+    if let Some(error) = refusal(&rows, path, tolerance) {
+        return Err(error);
     }
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let unknown_columns = raw.unknown_columns;
@@ -263,7 +278,8 @@ fn sample(record: &::csv::ByteRecord, targets: &[Vec<Target>]) -> Option<Sample>
         if !field.is_empty() {
             let x: f64 = field.parse().ok()?;
             for (place, scale, offset) in targets {
-                *place(&mut sample) = if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
+                *place(&mut sample) =
+                    if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
             }
         }
     }

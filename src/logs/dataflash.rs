@@ -3,7 +3,7 @@
 //! Written here because the crate falls short (`ardupilot-binlog` 0.2.0 looked at): a FMT record
 //! whose length is below 3 makes it panic, it ends silently after a number of consecutive errors
 //! so that a truncated log looks like a whole one, allocates a name and a list for every record,
-//! and knows no instances. It is the oracle in the tests instead.
+//! and knows no instances. The independent check is pymavlink (`tests/logs_crosscheck.py`).
 //!
 //! Not read: texts, arrays (`a`), units and multipliers of FMTU and MULT (the format letters `c C e
 //! E L` carry their own scale, which is what pymavlink applies, too).

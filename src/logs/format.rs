@@ -38,7 +38,8 @@ impl Format {
         }
         let start = &bytes[..bytes.len().min(4096)];
         let header = start.split(|b| *b == b'\n').next().unwrap_or_default();
-        let text = !header.is_empty() && header.iter().all(|b| *b >= b' ' || *b == b'\t' || *b == b'\r');
+        let text =
+            !header.is_empty() && header.iter().all(|b| *b >= b' ' || *b == b'\t' || *b == b'\r');
         (text && header.contains(&b',')).then_some(Format::Csv)
     }
 

@@ -73,7 +73,7 @@ impl Info {
             to_s: times.last().copied().unwrap_or(0.0),
             rate_hz: if period > 0.0 { 1.0 / period } else { 0.0 },
             gaps: gaps.collect(),
-            flight_s: flown.sum(),
+            flight_s: flown.fold(0.0, |sum, x| sum + x),
             phases,
             channels: log.channels.clone(),
             purposes: purposes(log),
@@ -110,7 +110,8 @@ fn purposes(log: &Log) -> Vec<Purpose> {
             _ => {}
         }
     }
-    let states = lacking(&["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"]);
+    let states =
+        lacking(&["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"]);
     let join = |a: &[String], b: &[String]| [a, b].concat();
     let incidence = lacking(&["alpha_rad", "beta_rad"]);
     let velocity = lacking(&["vn_mps", "ve_mps", "vd_mps"]);
@@ -127,8 +128,11 @@ fn purposes(log: &Log) -> Vec<Purpose> {
     } else {
         vec!["alpha and beta from wind-corrected velocity, at a loss of power".to_owned()]
     };
-    let no_incidence =
-        if incidence.is_empty() || velocity.is_empty() { Vec::new() } else { join(&incidence, &velocity) };
+    let no_incidence = if incidence.is_empty() || velocity.is_empty() {
+        Vec::new()
+    } else {
+        join(&incidence, &velocity)
+    };
     vec![
         Purpose {
             name: "comparison in free run",

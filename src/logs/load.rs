@@ -112,14 +112,32 @@ pub enum LogError {
     },
 }
 
+/// Whether a log is to be computed with, or only looked at.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Use {
+    Compute,
+    Look,
+}
+
+/// Reads as much of a log as there is, for a look at it: missing columns with unusable rows are
+/// findings, not errors.
+///
+/// # Errors
+/// The file cannot be read, or is no log.
+pub fn inspect(path: &Path, options: &Options) -> Result<Log, LogError> {
+    parse_for(&read(path)?, path, options, Use::Look)
+}
+
 /// Reads a log, whatever its format.
 ///
 /// # Errors
 /// The file cannot be read, is no log, lacks a needed column, or has too many unusable rows.
 pub fn load(path: &Path, options: &Options) -> Result<Log, LogError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| LogError::File { path: path.to_owned(), source })?;
-    parse(&bytes, path, options)
+    parse(&read(path)?, path, options)
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, LogError> {
+    std::fs::read(path).map_err(|source| LogError::File { path: path.to_owned(), source })
 }
 
 /// Reads a log from bytes; `path` is what errors and the flight call it.
@@ -127,6 +145,10 @@ pub fn load(path: &Path, options: &Options) -> Result<Log, LogError> {
 /// # Errors
 /// As [`load`].
 pub fn parse(bytes: &[u8], path: &Path, options: &Options) -> Result<Log, LogError> {
+    parse_for(bytes, path, options, Use::Compute)
+}
+
+fn parse_for(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Log, LogError> {
     if bytes.is_empty() {
         return Err(LogError::Empty { path: path.to_owned() });
     }
@@ -135,24 +157,51 @@ pub fn parse(bytes: &[u8], path: &Path, options: &Options) -> Result<Log, LogErr
     };
     let wanted = |topic: &str| options.mapping.wants(format, topic);
     let topics = match format {
-        Format::Csv => return text(bytes, path, options),
+        Format::Csv => return text(bytes, path, options, to),
         Format::Ulog => ulog::read(bytes, &wanted),
         Format::Dataflash => dataflash::read(bytes, &wanted),
         Format::Tlog => tlog::read(bytes, &wanted),
     };
-    binary(format, topics, path, options)
+    binary(format, topics, path, options, to)
 }
 
-fn binary(format: Format, topics: Topics, path: &Path, o: &Options) -> Result<Log, LogError> {
+fn binary(
+    format: Format,
+    topics: Topics,
+    path: &Path,
+    o: &Options,
+    to: Use,
+) -> Result<Log, LogError> {
     let rules = o.mapping.rules(format, &topics);
-    let table = table::build(&topics, &rules).map_err(|missing| missing_column(path, &topics, missing))?;
-    let mut findings = topics.findings;
+    let table = table::build(&topics, &rules);
+    let mut findings = Vec::new();
+    for missing in &table.missing {
+        let error = missing_column(path, &topics, missing);
+        if to == Use::Compute {
+            return Err(error);
+        }
+        findings.push(Finding::problem(error.to_string()));
+    }
+    findings.extend(topics.findings);
     findings.extend(checks::check(&table.rows));
     let mut kept = rows::Rows::default();
-    table.rows.into_iter().enumerate().for_each(|(i, sample)| kept.take(i + 1, Some(sample)));
-    if let Some(first) = kept.refused(o.tolerance) {
+    let mut looked_at = rows::Rows::default();
+    for (i, sample) in table.rows.into_iter().enumerate() {
+        kept.take(i + 1, Some(sample));
+        if to == Use::Look {
+            looked_at.take_incomplete(i + 1, sample);
+        }
+    }
+    if !table.missing.is_empty() {
+        kept = looked_at;
+    } else if let Some(first) = kept.refused(o.tolerance) {
         let (dropped, rows, hint) = (kept.dropped, kept.total, hint(&findings));
-        return Err(LogError::Unusable { path: path.to_owned(), dropped, rows, first, hint });
+        let error = LogError::Unusable { path: path.to_owned(), dropped, rows, first, hint };
+        if to == Use::Compute {
+            return Err(error);
+        }
+        findings.push(Finding::problem(error.to_string()));
+        kept = looked_at;
     }
     findings.extend(dropped(kept.dropped, &kept.dropped_rows));
     findings.extend(table.notes.iter().map(Finding::note));
@@ -172,12 +221,17 @@ fn binary(format: Format, topics: Topics, path: &Path, o: &Options) -> Result<Lo
     })
 }
 
-fn text(bytes: &[u8], path: &Path, options: &Options) -> Result<Log, LogError> {
+fn text(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Log, LogError> {
     let bare = |source| LogError::Csv { source, hint: String::new() };
     let raw = csv::raw(bytes, path, &options.mapping).map_err(bare)?;
     let whole: Vec<Sample> = raw.rows.iter().flatten().copied().collect();
     let mut findings = checks::check(&whole);
-    let reading = csv::settle(raw, path, options.tolerance)
+    let poor = csv::poor(&raw, path, options.tolerance);
+    if let (Some(source), Use::Look) = (&poor, to) {
+        findings.push(Finding::problem(source.to_string()));
+    }
+    let tolerance = if to == Use::Look { Tolerance::Lenient } else { options.tolerance };
+    let reading = csv::settle(raw, path, tolerance)
         .map_err(|source| LogError::Csv { source, hint: hint(&findings) })?;
     if reading.cut_short {
         findings.push(Finding::warning("the file ends in the middle of a row, which is left out"));
@@ -234,7 +288,7 @@ fn dropped(count: usize, numbers: &[usize]) -> Option<Finding> {
     })
 }
 
-fn missing_column(path: &Path, topics: &Topics, missing: table::Missing) -> LogError {
+fn missing_column(path: &Path, topics: &Topics, missing: &table::Missing) -> LogError {
     let or = missing.or.map(|p| format!(" (or of `{p}`)")).unwrap_or_default();
     let mut has: Vec<&str> = topics.counts.keys().map(|(name, _)| name.as_str()).collect();
     has.dedup();

@@ -21,4 +21,4 @@ mod ulog;
 
 pub use flight::{Flight, Sample};
 pub use format::Format;
-pub use load::{Channel, Log, LogError, Options, load, parse};
+pub use load::{Channel, Log, LogError, Options, inspect, load, parse};

@@ -60,7 +60,9 @@ pub fn phases(rows: &[Sample]) -> Vec<Phase> {
     for mut phase in raw {
         let short = phase.to_s - phase.from_s < SUSTAINED_S;
         match out.last_mut() {
-            Some(last) if phase.from_s - last.to_s <= split && (short || last.kind == phase.kind) => {
+            Some(last)
+                if phase.from_s - last.to_s <= split && (short || last.kind == phase.kind) =>
+            {
                 last.to_s = phase.to_s;
                 last.rows += phase.rows;
             }

@@ -45,6 +45,17 @@ impl Rows {
         }
     }
 
+    /// Takes every row that is later than the last one, complete or not.
+    pub fn take_incomplete(&mut self, number: usize, sample: Sample) {
+        let later = self.samples.last().is_none_or(|last| sample.time_s > last.time_s);
+        if later {
+            self.total += 1;
+            self.samples.push(sample);
+        } else {
+            self.take(number, None);
+        }
+    }
+
     /// The first dropped row, if there are too many of them.
     pub fn refused(&self, tolerance: Tolerance) -> Option<usize> {
         let poor = self.dropped as f64 > REFUSED_SHARE * self.total as f64;

@@ -7,11 +7,11 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::Sample;
 use super::columns::{COLUMNS, EITHER, NEEDED, index, is_held, is_wrapped};
 use super::load::Channel;
 use super::mapping::rule::{Fill, Rule};
 use super::topics::{Topics, period_s};
-use super::Sample;
 use crate::physics::atmosphere::{Atmosphere, Density};
 
 /// The longest time that a fast channel is carried over, s.
@@ -62,6 +62,8 @@ pub(super) struct Table {
     pub rows: Vec<Sample>,
     pub channels: Vec<Channel>,
     pub notes: Vec<String>,
+    /// The needed columns that nothing fills.
+    pub missing: Vec<Missing>,
 }
 
 /// A needed column that nothing fills.
@@ -73,20 +75,17 @@ pub(super) struct Missing {
 }
 
 /// Puts what the rules find onto one table.
-pub(super) fn build(topics: &Topics, rules: &[Rule]) -> Result<Table, Missing> {
+pub(super) fn build(topics: &Topics, rules: &[Rule]) -> Table {
     let tracks = choose(topics, rules);
     let filled = |column: &str| tracks.iter().any(|t| t.rule.columns().contains(&column));
+    // The time comes with any channel.
     let missing = |column: &'static str, or: Option<&'static str>| {
         let of_column = rules.iter().filter(|r| r.columns().contains(&column));
         Missing { column, or, looked_for: of_column.map(Rule::origin).collect() }
     };
-    // The time comes with any channel.
-    if let Some(column) = NEEDED[1..].iter().find(|c| !filled(c)) {
-        return Err(missing(column, None));
-    }
-    if let Some((command, position)) = EITHER.iter().find(|(c, p)| !filled(c) && !filled(p)) {
-        return Err(missing(command, Some(position)));
-    }
+    let alone = NEEDED[1..].iter().filter(|c| !filled(c)).map(|c| missing(c, None));
+    let either = EITHER.iter().filter(|(c, p)| !filled(c) && !filled(p));
+    let missing: Vec<Missing> = alone.chain(either.map(|(c, p)| missing(c, Some(p)))).collect();
     let of = |column: &str| tracks.iter().find(|t| t.rule.columns().contains(&column));
     let base = [of("roll_rad"), of("p_radps")].into_iter().flatten().max_by_key(|t| t.times.len());
     let base = base.map(|t| t.times.clone()).unwrap_or_default();
@@ -102,8 +101,10 @@ pub(super) fn build(topics: &Topics, rules: &[Rule]) -> Result<Table, Missing> {
     if of("airspeed_mps").is_some_and(|t| t.rule.equivalent) {
         notes.push(make_true(&mut rows));
     }
-    cut_ends(&mut rows, &mut notes);
-    Ok(Table { rows, channels: tracks.iter().map(Track::channel).collect(), notes })
+    if missing.is_empty() {
+        cut_ends(&mut rows, &mut notes);
+    }
+    Table { rows, channels: tracks.iter().map(Track::channel).collect(), notes, missing }
 }
 
 /// For each column the best rule that has data.
@@ -287,9 +288,8 @@ fn make_true(rows: &mut [Sample]) -> String {
 
 /// Cuts the rows before all needed channels have begun, and after one has ended.
 fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
-    let whole = |s: &Sample| {
-        NEEDED.iter().all(|c| index(c).is_none_or(|i| COLUMNS[i].1(s).is_finite()))
-    };
+    let whole =
+        |s: &Sample| NEEDED.iter().all(|c| index(c).is_none_or(|i| COLUMNS[i].1(s).is_finite()));
     let first = rows.iter().position(whole).unwrap_or(0);
     let end = rows.iter().rposition(whole).map_or(rows.len(), |i| i + 1);
     let cut = rows.len() - (end - first);
@@ -300,4 +300,3 @@ fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
         *rows = rows[first..end].to_vec();
     }
 }
-

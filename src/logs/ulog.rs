@@ -4,7 +4,7 @@
 //! 0.4.0). `px4-ulog` stops at the first inconsistent record, refuses a second registration of a
 //! message number, panics by design where a value's type changes, and decodes every field of every
 //! topic; `yule_log` brings a logger and a regular-expression engine along. Neither skips topics
-//! that nobody asked for. `px4-ulog` is the oracle in the tests instead.
+//! that nobody asked for. The independent check is pyulog (`tests/logs_crosscheck.py`).
 //!
 //! Not read: logged strings, appended-data offsets beyond what follows in file order, defaults of
 //! parameters. Parameter changes in flight overwrite the value.
@@ -239,7 +239,8 @@ impl Reader {
     }
 
     fn finish(mut self) -> Topics {
-        let mut subscriptions: Vec<_> = std::mem::take(&mut self.subscriptions).into_iter().collect();
+        let mut subscriptions: Vec<_> =
+            std::mem::take(&mut self.subscriptions).into_iter().collect();
         subscriptions.sort_by_key(|(number, _)| *number);
         subscriptions.into_iter().for_each(|(_, s)| self.keep(s));
         if self.dropouts > 0 {

@@ -48,10 +48,9 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
         let note = "alpha and beta are ArduPilot's estimates from velocity and wind, not vanes";
         out.push(Rule::linear(column, "AOA", field, degree).noting(note));
     }
-    out.push(
-        Rule::density("BARO", ("Press", 1.0), ("Temp", 1.0))
-            .noting("air density is from BARO's pressure with its sensor's temperature, which runs warm"),
-    );
+    out.push(Rule::density("BARO", ("Press", 1.0), ("Temp", 1.0)).noting(
+        "air density is from BARO's pressure with its sensor's temperature, which runs warm",
+    ));
     // Positive elevator is nose up there.
     for (column, field, gain) in [
         ("aileron_cmd", "Ail", 1.0 / FULL),

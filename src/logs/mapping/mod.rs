@@ -14,7 +14,7 @@
 //! or system/component (telemetry log).
 
 mod ardupilot;
-mod mavlink;
+mod telemetry;
 mod px4;
 pub(super) mod rule;
 mod servos;
@@ -130,7 +130,10 @@ impl Mapping {
                 )));
             }
             let Some((topic, field)) = e.from.split_once('.') else {
-                return Err(wrong(format!("column `{column}`: from = \"{}\" is not \"topic.field\"", e.from)));
+                return Err(wrong(format!(
+                    "column `{column}`: from = \"{}\" is not \"topic.field\"",
+                    e.from
+                )));
             };
             if !e.scale.is_finite() || !e.offset.is_finite() {
                 return Err(wrong(format!("column `{column}`: scale and offset must be finite")));
@@ -139,11 +142,14 @@ impl Mapping {
                 None => None,
                 Some(Instance::Number(n)) => Some(n),
                 Some(Instance::Source(text)) => Some(source(&text).ok_or_else(|| {
-                    wrong(format!("column `{column}`: instance \"{text}\" is not \"system/component\""))
+                    wrong(format!(
+                        "column `{column}`: instance \"{text}\" is not \"system/component\""
+                    ))
                 })?),
             };
             let (topic, field) = (topic.to_owned(), field.to_owned());
-            entries.insert(column, Entry { topic, field, scale: e.scale, offset: e.offset, instance });
+            entries
+                .insert(column, Entry { topic, field, scale: e.scale, offset: e.offset, instance });
         }
         Ok(Mapping(entries))
     }
@@ -172,7 +178,7 @@ impl Mapping {
             Format::Csv => Vec::new(),
             Format::Ulog => px4::rules(topics),
             Format::Dataflash => ardupilot::rules(topics),
-            Format::Tlog => mavlink::rules(topics),
+            Format::Tlog => telemetry::rules(topics),
         };
         let free = others.into_iter().filter_map(|rule| rule.without(|c| self.0.contains_key(c)));
         own.chain(free).collect()
@@ -184,7 +190,7 @@ impl Mapping {
             Format::Csv => &[],
             Format::Ulog => &px4::TOPICS,
             Format::Dataflash => &ardupilot::TOPICS,
-            Format::Tlog => &mavlink::TOPICS,
+            Format::Tlog => &telemetry::TOPICS,
         };
         own.contains(&topic) || self.uses(topic)
     }

@@ -75,9 +75,11 @@ fn commands(topics: &Topics) -> Vec<Rule> {
     // The three torques, then thrust, of the controller that flies the wings.
     let vtol = topics.first("vtol_vehicle_status").is_some();
     let fixed_wing = if vtol { Some(1) } else { None };
-    for (column, field, gain) in
-        [("aileron_cmd", "xyz[0]", 1.0), ("elevator_cmd", "xyz[1]", -1.0), ("rudder_cmd", "xyz[2]", 1.0)]
-    {
+    for (column, field, gain) in [
+        ("aileron_cmd", "xyz[0]", 1.0),
+        ("elevator_cmd", "xyz[1]", -1.0),
+        ("rudder_cmd", "xyz[2]", 1.0),
+    ] {
         out.push(Rule::linear(column, "vehicle_torque_setpoint", field, gain).of(fixed_wing));
     }
     out.push(Rule::linear("throttle_cmd", "vehicle_thrust_setpoint", "xyz[0]", 1.0).of(fixed_wing));

@@ -18,26 +18,35 @@ const ELEVON_RIGHT: f64 = 78.0;
 /// Positive elevator is nose up in ArduPilot, nose down in the log format. Elevons: left =
 /// g (elevator − aileron), right = g (elevator + aileron), g = MIXING_GAIN (0.5).
 pub fn rules(topics: &Topics, topic: &str, field: impl Fn(usize) -> String) -> Vec<Rule> {
-    let parameter = |n: usize, what: &str| topics.parameters.get(&format!("SERVO{n}_{what}")).copied();
-    let channels = |function: f64| (1..=CHANNELS).filter(move |n| parameter(*n, "FUNCTION") == Some(function));
+    let parameter =
+        |n: usize, what: &str| topics.parameters.get(&format!("SERVO{n}_{what}")).copied();
+    let channels =
+        |function: f64| (1..=CHANNELS).filter(move |n| parameter(*n, "FUNCTION") == Some(function));
     let sign = |n: usize| if parameter(n, "REVERSED") == Some(1.0) { -1.0 } else { 1.0 };
     let surface = |n: usize, gain: f64| {
-        let (min, max) = (parameter(n, "MIN").unwrap_or(1100.0), parameter(n, "MAX").unwrap_or(1900.0));
+        let (min, max) =
+            (parameter(n, "MIN").unwrap_or(1100.0), parameter(n, "MAX").unwrap_or(1900.0));
         let trim = parameter(n, "TRIM").unwrap_or(1500.0);
         Term { field: field(n), gain: gain * sign(n), shape: Shape::Surface { min, trim, max } }
     };
-    let note = |what: &str| format!("{what} taken from servo pulses with SERVOn_MIN, _TRIM, _MAX, _REVERSED");
+    let note = |what: &str| {
+        format!("{what} taken from servo pulses with SERVOn_MIN, _TRIM, _MAX, _REVERSED")
+    };
     let mut out = Vec::new();
-    for (column, function, gain) in
-        [("aileron_cmd", AILERON, 1.0), ("elevator_cmd", ELEVATOR, -1.0), ("rudder_cmd", RUDDER, 1.0)]
-    {
+    for (column, function, gain) in [
+        ("aileron_cmd", AILERON, 1.0),
+        ("elevator_cmd", ELEVATOR, -1.0),
+        ("rudder_cmd", RUDDER, 1.0),
+    ] {
         // Two servos of one function move alike: the first tells.
         if let Some(n) = channels(function).next() {
             out.push(Rule::sum(column, topic, vec![surface(n, gain)]).noting(note(column)));
         }
     }
-    let half = 0.5 / topics.parameters.get("MIXING_GAIN").copied().filter(|g| *g > 0.0).unwrap_or(0.5);
-    if let (Some(left), Some(right)) = (channels(ELEVON_LEFT).next(), channels(ELEVON_RIGHT).next()) {
+    let half =
+        0.5 / topics.parameters.get("MIXING_GAIN").copied().filter(|g| *g > 0.0).unwrap_or(0.5);
+    if let (Some(left), Some(right)) = (channels(ELEVON_LEFT).next(), channels(ELEVON_RIGHT).next())
+    {
         let aileron = vec![surface(right, half), surface(left, -half)];
         let elevator = vec![surface(right, -half), surface(left, -half)];
         out.push(Rule::sum("aileron_cmd", topic, aileron).noting(note("elevons: aileron_cmd")));

@@ -43,7 +43,8 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
     for rule in &mut out {
         // Another component of the same system may send what the first does not.
         let has = |i: u16| topics.topics.contains_key(&(rule.topic.clone(), i));
-        let other = topics.instances(&rule.topic).map(|(i, _)| i).find(|i| i.to_be_bytes()[0] == system);
+        let other =
+            topics.instances(&rule.topic).map(|(i, _)| i).find(|i| i.to_be_bytes()[0] == system);
         rule.instance = if has(vehicle) { Some(vehicle) } else { other.or(Some(vehicle)) };
     }
     let mut commands = Vec::new();
