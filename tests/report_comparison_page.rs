@@ -105,7 +105,10 @@ fn what_is_predicted_stands_beside_what_was_measured() {
     let worst = comparison
         .flights
         .iter()
-        .position(|f| f.trace.time_s[0] <= time[0].as_f64().unwrap() && time[0].as_f64().unwrap() <= *f.trace.time_s.last().unwrap())
+        .position(|f| {
+            f.trace.time_s[0] <= time[0].as_f64().unwrap()
+                && time[0].as_f64().unwrap() <= *f.trace.time_s.last().unwrap()
+        })
         .unwrap();
     let trace = &comparison.flights[worst].trace;
     for i in [0, 10, 100] {

@@ -62,6 +62,7 @@ fn value_text(value: f64, unit: &str) -> String {
     match value {
         v if !v.is_finite() => "cannot be told".into(),
         v if v.abs() >= 1e4 => format!("{v:.1e} {unit}"),
+        v if v.abs() < 0.005 => format!("< 0.01 {unit}"),
         v if v.abs() < 0.095 => format!("{v:.2} {unit}"),
         v if v.abs() < 9.95 => format!("{v:.1} {unit}"),
         v => format!("{v:.0} {unit}"),

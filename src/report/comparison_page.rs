@@ -100,7 +100,8 @@ fn unexplained(c: &Comparison) -> Figure {
         let of = model.channels.iter().find(|ch| ch.channel == id);
         of.map_or(f64::NAN, |ch| 100.0 * ch.unexplained_fraction)
     };
-    let seen = |id: &ChannelId| c.models.iter().any(|m| m.channels.iter().any(|x| x.channel == *id));
+    let seen =
+        |id: &ChannelId| c.models.iter().any(|m| m.channels.iter().any(|x| x.channel == *id));
     let groups: Vec<BarGroup> = ChannelId::ALL
         .into_iter()
         .filter(seen)
@@ -156,7 +157,8 @@ pub(super) fn by_channel(
     c: &Comparison,
     figures: impl Fn(ChannelId) -> Vec<Figure>,
 ) -> Vec<ChoiceOption> {
-    let seen = |id: &ChannelId| c.models.iter().any(|m| m.channels.iter().any(|x| x.channel == *id));
+    let seen =
+        |id: &ChannelId| c.models.iter().any(|m| m.channels.iter().any(|x| x.channel == *id));
     let option = |id| ChoiceOption { name: channel_name(id), figures: figures(id) };
     let all = ChannelId::ALL.into_iter().filter(seen).map(option);
     all.filter(|o| !o.figures.is_empty()).collect()

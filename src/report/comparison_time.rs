@@ -93,8 +93,7 @@ fn errors(c: &Comparison) -> Vec<Vec<f64>> {
         let at = |list: &Vec<f64>| list.get(i).copied().unwrap_or(f64::NAN);
         (at(&m.states[k]) - at(&f.states[k])).powi(2)
     };
-    let mut sums: Vec<Vec<f64>> =
-        pairs.iter().map(|(f, _)| vec![0.0; f.time_s.len()]).collect();
+    let mut sums: Vec<Vec<f64>> = pairs.iter().map(|(f, _)| vec![0.0; f.time_s.len()]).collect();
     for k in 0..STATES.len() {
         let rows = |p: usize| 0..pairs[p].0.time_s.len();
         let all = (0..pairs.len()).flat_map(|p| rows(p).map(move |i| (p, i)));
@@ -132,12 +131,7 @@ fn stretches(c: &Comparison) -> Vec<Stretch> {
     found
 }
 
-fn figure(
-    c: &Comparison,
-    flight: usize,
-    rows: std::ops::Range<usize>,
-    most: usize,
-) -> TimeFigure {
+fn figure(c: &Comparison, flight: usize, rows: std::ops::Range<usize>, most: usize) -> TimeFigure {
     let trace = &c.flights[flight].trace;
     let every = rows.len().div_ceil(most).max(1);
     let gap = |i: usize| trace.states.iter().all(|s| s.get(i).is_none_or(|v| v.is_nan()));

@@ -1,9 +1,7 @@
 //! Where a model fails: its residual over each regime variable, over α with β.
 
 use super::comparison_page::{by_channel, keys};
-use super::{
-    Choice, Figure, HeatCell, HeatMap, IntervalBins, IntervalPanel, Intervals, Section,
-};
+use super::{Choice, Figure, HeatCell, HeatMap, IntervalBins, IntervalPanel, Intervals, Section};
 use crate::sysid::compare::{
     ChannelId, ChannelResult, Comparison, Map, RegimeBins, RegimeVariable,
 };

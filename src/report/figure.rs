@@ -87,7 +87,7 @@ pub enum Style {
     Third,
     /// A fourth: ochre.
     Fourth,
-    /// What was measured, where others were predicted: the ink of the text.
+    /// What was measured, where others were predicted: grey, and wide enough to be seen under them.
     Measured,
 }
 

@@ -31,10 +31,8 @@ pub struct Link {
 
 impl Findings {
     pub(super) fn html(&self) -> String {
-        let lead: String =
-            self.lead.iter().map(|f| format!("<p>{}</p>", f.html())).collect();
-        let rest: String =
-            self.rest.iter().map(|f| format!("<li>{}</li>", f.html())).collect();
+        let lead: String = self.lead.iter().map(|f| format!("<p>{}</p>", f.html())).collect();
+        let rest: String = self.rest.iter().map(|f| format!("<li>{}</li>", f.html())).collect();
         let list = if rest.is_empty() { rest } else { format!("<ul>{rest}</ul>") };
         format!("<div class=\"verdict findings\">{lead}{list}</div>\n")
     }

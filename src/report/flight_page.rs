@@ -1,7 +1,7 @@
 //! The page of one flight.
 
-use super::flight::FlightReport;
 use super::comparison_page;
+use super::flight::FlightReport;
 use super::flight_targets;
 use super::flight_verdict::{degrees, duration_s, verdict};
 use super::{

@@ -51,7 +51,8 @@ fn flight((name, start): (&str, f64), seconds: f64) -> FlightResult {
             list.push(0.1 * (0.7 * t + k as f64).sin());
         }
     }
-    let nuisance = |name: &str, value, sd, unit| NuisanceResult { name: name.into(), value, sd, unit };
+    let nuisance =
+        |name: &str, value, sd, unit| NuisanceResult { name: name.into(), value, sd, unit };
     FlightResult {
         name: name.into(),
         step_s: STEP_S,
@@ -153,7 +154,9 @@ fn channel(id: ChannelId, index: usize, size: f64) -> ChannelResult {
              too low for throttle > 60 %, 140 samples, both flights"
         }
         ChannelId::Lift => "lift is 28 ± 4 % too high for α > 9°, 210 samples, both flights",
-        ChannelId::Yaw => "yawing moment is 0.14 ± 0.02 N m too far to the left for aileron > 6°, 96 samples, both flights",
+        ChannelId::Yaw => {
+            "yawing moment is 0.14 ± 0.02 N m too far to the left for aileron > 6°, 96 samples, both flights"
+        }
         _ => return plain(id, index, size, scale),
     };
     ChannelResult { worst_regime: regime.into(), ..plain(id, index, size, scale) }
@@ -236,7 +239,13 @@ fn map(scale: f64) -> Map {
             let samples = (120.0 * (-(x * x + 1.5 * y * y) / 9.0).exp()) as usize;
             if samples > 0 {
                 let mean = scale * (x / 5.0 + 0.05 * y);
-                cells.push(MapCell { alpha, beta, mean, independent: samples, supported: samples >= 20 });
+                cells.push(MapCell {
+                    alpha,
+                    beta,
+                    mean,
+                    independent: samples,
+                    supported: samples >= 20,
+                });
             }
         }
     }

@@ -62,7 +62,9 @@ impl Teller<'_> {
         };
         let path = reconstruct::reconstruct(flight, &options).map_err(|e| told(&e)).ok()?;
         let models = std::slice::from_ref(self.model);
-        compare::compare(models, &[path], &compare::Options::default(), &|_| ()).map_err(|e| told(&e)).ok()
+        compare::compare(models, &[path], &compare::Options::default(), &|_| ())
+            .map_err(|e| told(&e))
+            .ok()
     }
 }
 

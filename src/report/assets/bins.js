@@ -215,7 +215,7 @@ function curvesChart(host, data) {
     scales: { x: { time: false, range: (u, a, b) => [Math.min(0, a), b] }, y: { distr: 3, log: 10, range: () => yr } },
     axes: [
       axis({ size: 1.7 * rem(), values: showTicks, space: 3.5 * rem(), label: data.x_label, labelSize: 1.4 * rem(), labelGap: 0 }),
-      sideAxis({ splits: decadesFine, values: showFine, filter: (u, s) => s, label: data.y_label, labelSize: 1.4 * rem(), labelGap: 0 }),
+      sideAxis({ splits: decadesFine, values: (u, s) => s.map((v) => (v == null ? "" : v < 0.001 ? signed(v.toExponential(0)) : showChosen(v))), filter: (u, s) => s, label: data.y_label, labelSize: 1.4 * rem(), labelGap: 0 }),
     ],
     series: [{}, ...data.series.map((s) => ({
       label: s.label, stroke: style(s.style), dash: DASH[s.style], width: Math.max(2, 0.12 * rem()),

@@ -5,7 +5,7 @@
 const DASH = { command: [6, 3], third: [8, 3], fourth: [2, 2] };
 function sample(kind, shape) {
   const ink = `var(--${kind})`;
-  const line = `<line x1="0" x2="26" y1="6" y2="6" stroke="${ink}" stroke-width="2"${DASH[kind] ? ` stroke-dasharray="${DASH[kind].join(" ")}"` : ""}/>`;
+  const line = `<line x1="0" x2="26" y1="6" y2="6" stroke="${ink}" stroke-width="${kind === "measured" ? 5 : 2}"${DASH[kind] ? ` stroke-dasharray="${DASH[kind].join(" ")}"` : ""}/>`;
   const drawn = {
     circles: `<circle cx="13" cy="6" r="4.5" fill="none" stroke="${ink}" stroke-width="2"/>`,
     crosses: `<path d="M9 2l8 8m0-8l-8 8" stroke="${ink}" stroke-width="2"/>`,

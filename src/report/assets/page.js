@@ -54,7 +54,7 @@ function timeChart(host, figure, track, panel, last) {
       sideAxis(log ? { splits: decades, values: (u, s) => s.map(showDecade), filter: (u, s) => s } : {}),
     ],
     series: [{}, ...panel.series.map((s) => ({
-      label: s.label, stroke: style(s.style), dash: DASH[s.style], width: Math.max(1.5, 0.1 * rem()),
+      label: s.label, stroke: style(s.style), dash: DASH[s.style], width: Math.max(1.5, 0.1 * rem()) * (s.style === "measured" ? 2.6 : 1),
       points: { size: 3, show: true, filter: lonePoints }, spanGaps: false, pxAlign: 0,
     }))],
     hooks: {
