@@ -326,6 +326,9 @@ fn coverage(trials: u64, seconds: f64, severity: Option<u8>) -> Vec<(&'static st
             hits[i].1 += if z.abs() < 1.96 { 1.0 / trials as f64 } else { 0.0 };
             squares[i] += z * z / trials as f64;
             means[i] += z / trials as f64;
+            if z.abs() > 1.96 {
+                println!("trial {trial}: {name} planted {value:.5}, z {z:+.2}");
+            }
             widths[i] += n.sd / trials as f64;
         }
     }

@@ -39,7 +39,7 @@ pub fn skew_of(channel: usize) -> usize {
 }
 
 /// The measurement of a channel at sample `k`; NaN if there is none.
-fn measured(track: &Track, channel: usize, k: usize) -> f64 {
+pub fn measured(track: &Track, channel: usize, k: usize) -> f64 {
     match channel {
         0..3 => track.attitude[k][channel],
         3 => track.airspeed[k],

@@ -23,17 +23,19 @@ const FLOORS: [f64; CHANNELS] = [2e-5, 2e-5, 2e-5, 1e-3, 5e-5, 5e-5, 1e-3, 1e-3,
 const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 0.5];
 /// What the velocity may do where no accelerometer says it, m/s².
 const UNKNOWN_FORCE: f64 = 3.0;
-/// First guess of the gusts, m/s; calm air; and the factor to which their level is sought.
-const FIRST_GUSTS: f64 = 0.5;
+/// Gusts of calm air, m/s, and the factor to which their level is sought.
 const CALM: f64 = 0.002;
 const GUST_FACTOR: f64 = 2.2;
 /// Residuals beyond this many standard deviations count less.
 const BOUND: f64 = 4.0;
+/// Part of their deviation within which constants are held, and iterations with them held.
+const HELD: f64 = 1e-3;
+const GUSTY: usize = 4;
 /// Iterations before levels are taken from residuals, and in all.
 const FIRST: usize = 5;
 const LAST: usize = 25;
-/// Block over which residuals are averaged to see their colour, s.
-const COLOUR_BLOCK: f64 = 1.0;
+/// Blocks over which residuals are averaged to see their colour, s.
+const COLOUR_BLOCKS: [f64; 2] = [1.0, 4.0];
 
 /// Noise levels, as standard deviations.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +48,9 @@ pub struct Levels {
     pub gusts: f64,
     /// The measured channels.
     pub measured: [f64; CHANNELS],
+    /// Their least levels: the white part of what was measured, where the samples come fast enough to
+    /// tell. A path that may follow the measurements closely leaves residuals that are too small.
+    pub white: [f64; CHANNELS],
     /// How much wider than white noise their means scatter.
     pub colour: [f64; CHANNELS],
 }
@@ -68,6 +73,8 @@ pub struct Smoothed {
 struct Problem<'a> {
     log: &'a Log,
     options: &'a Options,
+    /// What is known of the constants beforehand: values and widths.
+    prior: Values,
     widths: Values,
 }
 
@@ -87,7 +94,8 @@ struct Solved {
 /// [`ReconstructError::NoPath`] if the search does not settle on numbers.
 pub fn smooth(log: &Log, options: &Options) -> Result<Smoothed, ReconstructError> {
     let no_path = |why| ReconstructError::NoPath { flight: options.name.clone(), why };
-    let problem = Problem { log, options, widths: nuisance::prior_widths(log.step) };
+    let widths = nuisance::prior_widths(log.step);
+    let problem = Problem { log, options, prior: [0.0; COUNT], widths };
     let mut found = Smoothed {
         paths: log.tracks.iter().map(Path::guess).collect(),
         values: [0.0; COUNT],
@@ -98,9 +106,6 @@ pub fn smooth(log: &Log, options: &Options) -> Result<Smoothed, ReconstructError
     start(&mut found, log);
     for iteration in 0..LAST {
         let bound = if iteration < FIRST { f64::INFINITY } else { BOUND };
-        if iteration == FIRST {
-            found.levels.gusts = problem.gusts(&found, bound).unwrap_or(FIRST_GUSTS);
-        }
         let solved = problem
             .solve(&found, bound)
             .ok_or_else(|| no_path("the equations became singular"))?;
@@ -117,9 +122,10 @@ pub fn smooth(log: &Log, options: &Options) -> Result<Smoothed, ReconstructError
         }
         let change = renew(&mut found.levels, &solved.residuals, log.step);
         if iteration > FIRST && moved < 0.05 && change < 0.02 {
-            return Ok(found);
+            break;
         }
     }
+    gusty(&problem, &mut found).ok_or_else(|| no_path("the gusts left the numbers"))?;
     Ok(found)
 }
 
@@ -135,8 +141,9 @@ impl Problem<'_> {
         for place in 0..COUNT {
             let information = self.widths[place].powi(-2);
             constants.matrix[(place, place)] = information;
-            constants.right[place] = -information * found.values[place];
-            cost += information * found.values[place].powi(2);
+            let away = found.values[place] - self.prior[place];
+            constants.right[place] = -information * away;
+            cost += information * away * away;
         }
         let mut residuals: [Vec<f64>; CHANNELS] = Default::default();
         let mut stretches = Vec::new();
@@ -242,6 +249,36 @@ impl Problem<'_> {
     }
 }
 
+/// Lets the air gust along the path where the data find that likelier, the constants held.
+///
+/// Until here gusts are noise of airspeed and vanes. To seek the path, the gusts and the constants
+/// together would find an airspeed scale far above one, for it makes every gust smaller.
+fn gusty(problem: &Problem, found: &mut Smoothed) -> Option<()> {
+    let mut trial = found.clone();
+    for channel in 3..6 {
+        trial.levels.measured[channel] = trial.levels.white[channel];
+        trial.levels.colour[channel] = 1.0;
+    }
+    let held = Problem {
+        prior: found.values,
+        widths: found.deviations.map(|d| HELD * d),
+        ..*problem
+    };
+    trial.levels.gusts = held.gusts(&trial, f64::INFINITY)?;
+    if trial.levels.gusts <= CALM {
+        return Some(());
+    }
+    for _ in 0..GUSTY {
+        let solved = held.solve(&trial, BOUND)?;
+        if !apply(&mut trial, &solved).is_finite() {
+            return None;
+        }
+    }
+    trial.deviations = found.deviations;
+    *found = trial;
+    Some(())
+}
+
 /// Sets out in the wind that the measurements leave.
 fn start(found: &mut Smoothed, log: &Log) {
     let mut sum = (Vector3::zeros(), 0.0);
@@ -295,12 +332,19 @@ fn first_levels(log: &Log) -> Levels {
         4 | 5 => over(&|t, k| t.vanes[k][i - 4]),
         _ => over(&|t, k| t.velocity[k][i - 6]),
     });
+    let samples: usize = log.tracks.iter().map(Track::len).sum();
+    let dense = |i: usize| {
+        let tracks = log.tracks.iter();
+        let count = tracks.flat_map(|t| (0..t.len()).map(move |k| measurement::measured(t, i, k)));
+        2 * count.filter(|x| x.is_finite()).count() > samples
+    };
     let force = |i: usize| over(&|t, k| t.force[k][i]).max(FORCE_FLOOR);
     Levels {
         gyro: std::array::from_fn(|i| or(over(&|t, k| t.rates[k][i]), 0.0).max(GYRO_FLOOR)),
         force: std::array::from_fn(|i| if log.has.force { force(i) } else { UNKNOWN_FORCE }),
-        gusts: FIRST_GUSTS,
+        gusts: CALM,
         measured: std::array::from_fn(|i| or(white[i], DEFAULTS[i]).max(FLOORS[i])),
+        white: std::array::from_fn(|i| if dense(i) { white[i].max(FLOORS[i]) } else { FLOORS[i] }),
         colour: [1.0; CHANNELS],
     }
 }
@@ -313,11 +357,11 @@ fn renew(levels: &mut Levels, residuals: &[Vec<f64>; CHANNELS], step: f64) -> f6
         if level.is_nan() {
             continue;
         }
-        let level = level.max(FLOORS[channel]);
+        let level = level.max(levels.white[channel]);
         change = change.max((level / levels.measured[channel]).ln().abs());
         levels.measured[channel] = level;
-        let block = (COLOUR_BLOCK / step).round() as usize;
-        levels.colour[channel] = noise::colour(residuals, block);
+        let over = |block: f64| noise::colour(residuals, (block / step).round() as usize);
+        levels.colour[channel] = COLOUR_BLOCKS.map(over).into_iter().fold(1.0, f64::max);
     }
     change
 }
