@@ -6,12 +6,19 @@ mod compare_support;
 use std::time::Instant;
 
 use compare_support::{REALISTIC, fly, model};
+use greylag::logs::{self, csv};
+use greylag::report::ComparisonReport;
 use greylag::sysid::compare::{Options, compare};
 use greylag::sysid::reconstruct::{self, reconstruct};
 
 fn main() {
-    let flight = fly(1, 600.0, REALISTIC);
-    println!("{} samples; {} MB resident before", flight.samples.len(), resident_mb());
+    let mut text = Vec::new();
+    csv::write(&fly(1, 600.0, REALISTIC), &mut text).expect("memory");
+    println!("ten minutes at 100 Hz; {} MB resident before", status_mb("VmRSS:"));
+    let start = Instant::now();
+    let log = logs::parse(&text, "ten-minutes.csv".as_ref(), &logs::Options::default());
+    let flight = log.expect("a log").flight;
+    println!("{} samples read in {:.2} s", flight.samples.len(), start.elapsed().as_secs_f64());
     let start = Instant::now();
     let prior = model("prior-as-printed");
     let options = reconstruct::Options::new("ten minutes", prior.airframe.actuators);
@@ -21,8 +28,24 @@ fn main() {
     let found = compare(&[prior, model("jsbsim")], &[flight], &Options::default(), &|_| ());
     let found = found.expect("a comparison");
     println!("two models compared in {:.2} s", start.elapsed().as_secs_f64());
+    let start = Instant::now();
     let json = serde_json::to_string(&found.document()).expect("numbers");
-    println!("JSON of {} kB; peak {} MB", json.len() / 1000, peak_mb());
+    let report = ComparisonReport {
+        title: "Ten minutes".into(),
+        comparison: &found,
+        model_files: Vec::new(),
+        log_files: Vec::new(),
+        command_line: String::new(),
+        versions: Vec::new(),
+    };
+    let page = report.page().render();
+    println!(
+        "JSON of {} kB, report of {} kB in {:.2} s",
+        json.len() / 1000,
+        page.len() / 1000,
+        start.elapsed().as_secs_f64()
+    );
+    println!("peak {} MB, the simulator and the log's text included", status_mb("VmHWM:"));
 }
 
 /// A line of `/proc/self/status`, in MB; 0 where there is none.
@@ -30,12 +53,4 @@ fn status_mb(key: &str) -> u64 {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = text.lines().find(|l| l.starts_with(key)).unwrap_or_default();
     line.split_whitespace().nth(1).and_then(|kb| kb.parse::<u64>().ok()).unwrap_or(0) / 1000
-}
-
-fn resident_mb() -> u64 {
-    status_mb("VmRSS:")
-}
-
-fn peak_mb() -> u64 {
-    status_mb("VmHWM:")
 }

@@ -169,7 +169,7 @@ fn a_flight_without_samples_is_still_a_page() {
     report.timing.as_mut().unwrap().cycles.clear();
     assert_well_formed(&report.page().render());
 
-    let broken = Flight { samples: vec![Sample::default(); 3] };
+    let broken = Flight::from(vec![Sample::default(); 3]);
     let mut report = report_synthetic::report(&broken);
     report.tolerance_rad = f64::NAN;
     report.segments = vec![settled(Difficulty::Easy, f64::INFINITY)];
@@ -187,7 +187,7 @@ fn a_long_flight_is_thinned_and_says_so() {
         attitude_rad: [if i == 31_234 { 1.0 } else { 0.0 }, 0.0, 0.0],
         ..Sample::default()
     });
-    let flight = Flight { samples: samples.collect() };
+    let flight = Flight::from(samples.collect::<Vec<_>>());
     let html = report_synthetic::report(&flight).page().render();
     assert!(html.contains("smallest and largest of every 5 samples"));
     let figures = figures(&html);

@@ -7,27 +7,28 @@ use anyhow::{Context, Result, bail};
 use comfy_table::{CellAlignment, Table};
 
 use crate::commands::files::{self, shipped};
-use crate::logs::Flight;
-use crate::logs::csv::{self, Tolerance};
+use crate::logs::finding::{Finding, Severity};
+use crate::logs::mapping::Mapping;
+use crate::logs::{self, csv::Tolerance};
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
 use crate::sysid::compare::{Comparison, ModelResult, Options, compare};
 use crate::sysid::reconstruct::{self, reconstruct};
 use crate::sysid::reconstruction::Reconstruction;
 
-/// Exit status of a comparison that had to leave a log out.
-const INCOMPLETE: u8 = 3;
+/// Exit status of a comparison that had to leave a log out, or whose logs are wrong somewhere.
+const IN_DOUBT: u8 = 2;
 
 /// Options of `greylag compare`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit status: 0 done, 1 nothing could be compared, 3 done without some log."
+    after_help = "Exit status: 0 done, 1 nothing could be compared, 2 done, but a log was left out or holds what makes the figures wrong."
 )]
 pub struct Arguments {
     /// Model files, compared side by side; the first one leads the report.
     #[arg(long = "model", num_args = 1.., required = true)]
     models: Vec<PathBuf>,
-    /// Flight logs.
+    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
     #[arg(long = "log", num_args = 1.., required = true)]
     logs: Vec<PathBuf>,
     /// Horizons of the free runs, s.
@@ -42,6 +43,9 @@ pub struct Arguments {
     /// Seed of the bootstrap intervals.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// A TOML file that says where columns of the logs come from.
+    #[arg(long)]
+    mapping: Option<PathBuf>,
     /// Read logs in which more than 5 % of the rows are unusable.
     #[arg(long)]
     lenient: bool,
@@ -61,15 +65,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .iter()
         .map(|path| GreyBox::load(&shipped(path)).map_err(Into::into))
         .collect::<Result<Vec<_>>>()?;
-    let (flights, mut trouble) = reconstruct_all(arguments, &models[0]);
+    let Intake { flights, mut notes, mut in_doubt } = take_in(arguments, &models[0])?;
     if flights.is_empty() {
-        bail!("no log can be compared: {}", trouble.join("; "));
+        bail!("no log can be compared: what is wrong with each is said above");
     }
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let mut comparison = compare(&models, &flights, &options, &|doing| eprintln!("{doing}"))?;
-    let complete = comparison.flights.len() == arguments.logs.len();
-    trouble.append(&mut comparison.notes);
-    comparison.notes = trouble;
+    in_doubt |= comparison.flights.len() < arguments.logs.len();
+    notes.append(&mut comparison.notes);
+    comparison.notes = notes;
     print(&comparison);
     if let Some(path) = &arguments.json {
         let text = serde_json::to_string_pretty(&comparison.document())? + "\n";
@@ -78,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.report {
         files::write(path, &page(arguments, &comparison), overwrite)?;
     }
-    Ok(if complete { ExitCode::SUCCESS } else { ExitCode::from(INCOMPLETE) })
+    Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
 /// The report as HTML.
@@ -90,64 +94,61 @@ fn page(arguments: &Arguments, comparison: &Comparison) -> String {
         model_files: paths(&arguments.models),
         log_files: paths(&arguments.logs),
         command_line: std::env::args().skip(1).fold("greylag".into(), |line, a| line + " " + &a),
-        versions: Vec::new(),
+        versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
     };
     report.page().render()
 }
 
-/// The flights that could be reconstructed, with what was wrong with logs.
-fn reconstruct_all(arguments: &Arguments, model: &GreyBox) -> (Vec<Reconstruction>, Vec<String>) {
-    let (mut flights, mut trouble) = (Vec::new(), Vec::new());
-    let names = names(&arguments.logs);
-    for (k, (path, name)) in arguments.logs.iter().zip(names).enumerate() {
+/// What the logs gave.
+#[derive(Default)]
+struct Intake {
+    /// The flights that could be reconstructed.
+    flights: Vec<Reconstruction>,
+    /// What was odd about the logs, left-out ones included.
+    notes: Vec<String>,
+    /// Whether a log was left out or holds what makes the figures wrong.
+    in_doubt: bool,
+}
+
+/// Reads and reconstructs the logs; one that cannot be is said and left out.
+fn take_in(arguments: &Arguments, model: &GreyBox) -> Result<Intake> {
+    let mapping = arguments.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
+    let tolerance = if arguments.lenient { Tolerance::Lenient } else { Tolerance::Strict };
+    let reading = logs::Options { tolerance, mapping };
+    let mut intake = Intake::default();
+    for (k, (path, name)) in arguments.logs.iter().zip(names(&arguments.logs)).enumerate() {
         eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, arguments.logs.len());
-        let tolerance = if arguments.lenient { Tolerance::Lenient } else { Tolerance::Strict };
-        match reconstruct_one(path, name, tolerance, model) {
-            Ok((flight, notes)) => {
-                flights.push(flight);
-                trouble.extend(notes);
+        match reconstruct_one(path, &name, &reading, model) {
+            Ok((flight, findings)) => {
+                intake.flights.push(flight);
+                intake.in_doubt |= findings.iter().any(|f| f.severity == Severity::Problem);
+                intake.notes.extend(findings.iter().map(|f| format!("{name}: {f}")));
             }
             Err(error) => {
-                let error = format!("{error:#}");
-                eprintln!("greylag: {error}");
-                trouble.push(format!("left out: {error}"));
+                eprintln!("greylag: {error:#}");
+                intake.in_doubt = true;
+                intake.notes.push(format!("left out: {error:#}"));
             }
         }
     }
-    (flights, trouble)
+    Ok(intake)
 }
 
+/// The reconstructed flight of a log, with what was odd about the file.
 fn reconstruct_one(
     path: &Path,
-    name: String,
-    tolerance: Tolerance,
+    name: &str,
+    reading: &logs::Options,
     model: &GreyBox,
-) -> Result<(Reconstruction, Vec<String>)> {
-    let (flight, notes) = read(path, &name, tolerance)?;
+) -> Result<(Reconstruction, Vec<Finding>)> {
+    let log = logs::load(path, reading)?;
     let options = reconstruct::Options {
         gravity: model.atmosphere.gravity,
         ..reconstruct::Options::new(name, model.airframe.actuators)
     };
-    let flight = reconstruct(&flight, &options)
+    let flight = reconstruct(&log.flight, &options)
         .with_context(|| format!("cannot use flight log {}", path.display()))?;
-    Ok((flight, notes))
-}
-
-/// The flight in a log, with what was odd about the file.
-fn read(path: &Path, name: &str, tolerance: Tolerance) -> Result<(Flight, Vec<String>)> {
-    let reading = csv::load(path, tolerance)?;
-    let mut notes = Vec::new();
-    if reading.dropped > 0 {
-        notes.push(format!(
-            "{name}: {} unusable rows dropped, the first is row {}",
-            reading.dropped,
-            reading.dropped_rows.first().copied().unwrap_or_default()
-        ));
-    }
-    if reading.cut_short {
-        notes.push(format!("{name}: the file ends in the middle of a row, which is left out"));
-    }
-    Ok((reading.flight, notes))
+    Ok((flight, log.findings))
 }
 
 /// What the flights are called: the file's name, or the whole path where two share it.

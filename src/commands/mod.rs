@@ -8,6 +8,7 @@ mod demo;
 mod evaluate;
 mod files;
 pub mod fly;
+mod logs;
 #[cfg(feature = "sitl")]
 mod targets;
 
@@ -36,6 +37,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// Fly a vehicle, serving ground stations and offboard programs.
     Fly(fly::Arguments),
+    /// Say what a flight log holds, or write it as a CSV table.
+    Logs(logs::Arguments),
     /// Write a target file.
     #[cfg(feature = "sitl")]
     Targets(targets::Arguments),
@@ -52,6 +55,7 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "sitl")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),
+        Command::Logs(arguments) => logs::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Targets(arguments) => targets::run(&arguments),
     };

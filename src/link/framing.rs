@@ -109,6 +109,20 @@ enum Candidate<'a> {
     Incomplete,
 }
 
+/// The length that the frame at the start of `bytes` claims; `None` without a start marker or
+/// with too few bytes to tell.
+pub fn frame_len(bytes: &[u8]) -> Option<usize> {
+    let payload = usize::from(*bytes.get(1)?);
+    match bytes[0] {
+        STX_V1 => Some(HEADER_V1 + payload + CHECKSUM),
+        STX_V2 => {
+            let signed = bytes.get(2)? & FLAG_SIGNED != 0;
+            Some(HEADER_V2 + payload + CHECKSUM + if signed { SIGNATURE } else { 0 })
+        }
+        _ => None,
+    }
+}
+
 /// Examines the bytes from a start marker on.
 fn examine(bytes: &[u8]) -> Candidate<'_> {
     let v1 = bytes[0] == STX_V1;

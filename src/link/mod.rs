@@ -70,3 +70,5 @@ pub mod peer;
 pub mod transport;
 pub mod vehicle;
 mod wire;
+
+pub use wire::logged;

@@ -1,46 +1,14 @@
 //! The CSV form of a flight log: one row a sample, a header row, SI units.
 
-mod read;
-
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
+use super::columns::{COLUMNS, EITHER, NEEDED, Place, index};
+use super::mapping::{Mapping, TEXT};
+use super::rows;
+pub use super::rows::Tolerance;
 use super::{Flight, Sample};
-pub use read::{Reading, Tolerance, load, parse};
 
-/// Reads a place in a sample.
-type Get = fn(&Sample) -> f64;
-/// Gives access to a place in a sample.
-type Place = fn(&mut Sample) -> &mut f64;
-
-/// The columns of the format in the order they are written: name, value, place.
-const COLUMNS: [(&str, Get, Place); 25] = [
-    ("time_s", |s| s.time_s, |s| &mut s.time_s),
-    ("roll_rad", |s| s.attitude_rad[0], |s| &mut s.attitude_rad[0]),
-    ("pitch_rad", |s| s.attitude_rad[1], |s| &mut s.attitude_rad[1]),
-    ("yaw_rad", |s| s.attitude_rad[2], |s| &mut s.attitude_rad[2]),
-    ("p_radps", |s| s.rates_radps[0], |s| &mut s.rates_radps[0]),
-    ("q_radps", |s| s.rates_radps[1], |s| &mut s.rates_radps[1]),
-    ("r_radps", |s| s.rates_radps[2], |s| &mut s.rates_radps[2]),
-    ("airspeed_mps", |s| s.airspeed_mps, |s| &mut s.airspeed_mps),
-    ("alpha_rad", |s| s.alpha_rad, |s| &mut s.alpha_rad),
-    ("beta_rad", |s| s.beta_rad, |s| &mut s.beta_rad),
-    ("ax_mps2", |s| s.specific_force_mps2[0], |s| &mut s.specific_force_mps2[0]),
-    ("ay_mps2", |s| s.specific_force_mps2[1], |s| &mut s.specific_force_mps2[1]),
-    ("az_mps2", |s| s.specific_force_mps2[2], |s| &mut s.specific_force_mps2[2]),
-    ("vn_mps", |s| s.velocity_ned_mps[0], |s| &mut s.velocity_ned_mps[0]),
-    ("ve_mps", |s| s.velocity_ned_mps[1], |s| &mut s.velocity_ned_mps[1]),
-    ("vd_mps", |s| s.velocity_ned_mps[2], |s| &mut s.velocity_ned_mps[2]),
-    ("altitude_m", |s| s.altitude_m, |s| &mut s.altitude_m),
-    ("aileron_rad", |s| s.aileron_rad, |s| &mut s.aileron_rad),
-    ("elevator_rad", |s| s.elevator_rad, |s| &mut s.elevator_rad),
-    ("throttle", |s| s.throttle, |s| &mut s.throttle),
-    ("aileron_cmd", |s| s.aileron_cmd, |s| &mut s.aileron_cmd),
-    ("elevator_cmd", |s| s.elevator_cmd, |s| &mut s.elevator_cmd),
-    ("throttle_cmd", |s| s.throttle_cmd, |s| &mut s.throttle_cmd),
-    ("roll_target_rad", |s| s.roll_target_rad, |s| &mut s.roll_target_rad),
-    ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
-];
 /// Why a CSV flight log cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CsvError {
@@ -86,6 +54,21 @@ pub enum CsvError {
         /// The first of those dropped, the header being row 1.
         first: usize,
     },
+}
+
+/// A flight read from a file, with what was odd about it.
+#[derive(Clone, Debug, Default)]
+pub struct Reading {
+    /// The flight.
+    pub flight: Flight,
+    /// Columns that the format does not name.
+    pub unknown_columns: Vec<String>,
+    /// Rows dropped as out of order, repeated, non-finite where needed, or impossible.
+    pub dropped: usize,
+    /// The numbers of the first of them, the header being row 1.
+    pub dropped_rows: Vec<usize>,
+    /// Whether the file ends in the middle of a row, which is left out.
+    pub cut_short: bool,
 }
 
 /// Writes `flight` to `out`. Missing values become empty fields; numbers are written so that they
@@ -160,6 +143,149 @@ impl<W: Write> Rows<W> {
     }
 }
 
+/// Reads a flight log from a file.
+///
+/// # Errors
+/// The file cannot be read, a needed column is missing, or too many rows are unusable.
+pub fn load(path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
+    let fail = |source| CsvError::File { doing: "read", path: path.to_owned(), source };
+    let mut bytes = Vec::new();
+    std::fs::File::open(path).map_err(fail)?.read_to_end(&mut bytes).map_err(fail)?;
+    parse(&bytes, path, tolerance)
+}
+
+/// Reads a flight log from bytes; `path` is what errors call it.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
+    settle(raw(bytes, path, &Mapping::default())?, path, tolerance)
+}
+
+/// A table as it stands in the file, before any row is judged.
+pub(super) struct Raw {
+    /// The rows; `None` for one that holds something else than numbers.
+    pub rows: Vec<Option<Sample>>,
+    unknown_columns: Vec<String>,
+    cut_short: bool,
+}
+
+/// Where a field goes: place, scale, offset.
+type Target = (Place, f64, f64);
+
+/// Reads the rows, taking columns under other names or in other units where `mapping` says so.
+pub(super) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, CsvError> {
+    let text = |source| CsvError::Text { path: path.to_owned(), source };
+    // A row without its line end may miss digits: it is left out.
+    let end = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
+    let mut reader = ::csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..end]);
+    let header = reader.byte_headers().map_err(text)?.clone();
+    let names: Vec<String> =
+        header.iter().map(|h| String::from_utf8_lossy(h).trim().to_owned()).collect();
+    let targets: Vec<Vec<Target>> = names.iter().map(|name| targets(name, mapping)).collect();
+    check_columns(&names, mapping, path)?;
+    let unknown = names.iter().zip(&targets).filter(|(_, targets)| targets.is_empty());
+    let unknown_columns = unknown.map(|(name, _)| name.clone()).collect();
+    let mut rows = Vec::new();
+    for record in reader.byte_records() {
+        rows.push(sample(&record.map_err(text)?, &targets));
+    }
+    Ok(Raw { rows, unknown_columns, cut_short: end < bytes.len() })
+}
+
+/// What [`settle`] would say against a table.
+pub(super) fn poor(raw: &Raw, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
+    let mut rows = rows::Rows::default();
+    raw.rows.iter().enumerate().for_each(|(i, sample)| rows.take(i + 2, *sample));
+    refusal(&rows, path, tolerance)
+}
+
+fn refusal(rows: &rows::Rows, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
+    rows.refused(tolerance).map(|first| CsvError::Unusable {
+        path: path.to_owned(),
+        dropped: rows.dropped,
+        rows: rows.total,
+        first,
+    })
+}
+
+/// Drops the unusable rows, refuses the table if they are too many.
+pub(super) fn settle(raw: Raw, path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
+    let mut rows = rows::Rows::default();
+    // The header is row 1.
+    raw.rows.into_iter().enumerate().for_each(|(i, sample)| rows.take(i + 2, sample));
+    if let Some(error) = refusal(&rows, path, tolerance) {
+        return Err(error);
+    }
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let unknown_columns = raw.unknown_columns;
+    Ok(Reading {
+        flight: Flight {
+            name,
+            samples: rows.samples,
+            unknown_columns: unknown_columns.clone(),
+            notes: Vec::new(),
+        },
+        unknown_columns,
+        dropped: rows.dropped,
+        dropped_rows: rows.dropped_rows,
+        cut_short: raw.cut_short,
+    })
+}
+
+/// Where the file's column `name` goes.
+fn targets(name: &str, mapping: &Mapping) -> Vec<Target> {
+    let mut targets: Vec<Target> = mapping
+        .of_topic(TEXT)
+        .filter(|(_, entry)| entry.field == name)
+        .filter_map(|(column, e)| Some((COLUMNS[index(column)?].2, e.scale, e.offset)))
+        .collect();
+    if mapping.get(name).is_none()
+        && let Some(i) = index(name)
+    {
+        targets.push((COLUMNS[i].2, 1.0, 0.0));
+    }
+    targets
+}
+
+fn check_columns(names: &[String], mapping: &Mapping, path: &Path) -> Result<(), CsvError> {
+    let has = |column: &str| {
+        let name = mapping.get(column).map_or(column, |entry| &entry.field);
+        names.iter().any(|n| n == name)
+    };
+    let missing = |column, remedy| CsvError::Column { path: path.to_owned(), column, remedy };
+    for column in NEEDED {
+        if !has(column) {
+            return Err(missing(column, "add it, in the unit its name ends with".into()));
+        }
+    }
+    for (command, position) in EITHER {
+        if !has(command) && !has(position) {
+            return Err(missing(command, format!("add it, or the position `{position}`")));
+        }
+    }
+    Ok(())
+}
+
+/// The sample of a record; `None` when a field is no number.
+fn sample(record: &::csv::ByteRecord, targets: &[Vec<Target>]) -> Option<Sample> {
+    let mut sample = Sample::default();
+    for (field, targets) in record.iter().zip(targets) {
+        if targets.is_empty() {
+            continue;
+        }
+        let field = std::str::from_utf8(field).ok()?.trim();
+        if !field.is_empty() {
+            let x: f64 = field.parse().ok()?;
+            for (place, scale, offset) in targets {
+                *place(&mut sample) =
+                    if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
+            }
+        }
+    }
+    Some(sample)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,7 +299,7 @@ mod tests {
             }
             sample
         };
-        Flight { samples: (0..rows).map(sample).collect() }
+        (0..rows).map(sample).collect::<Vec<_>>().into()
     }
 
     fn text(flight: &Flight) -> Vec<u8> {

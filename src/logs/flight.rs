@@ -21,16 +21,22 @@ pub struct Sample {
     pub velocity_ned_mps: [f64; 3],
     /// Altitude above mean sea level, m.
     pub altitude_m: f64,
+    /// Air density, kg/m³.
+    pub air_density_kgpm3: f64,
     /// Aileron deflection that acts, rad.
     pub aileron_rad: f64,
     /// Elevator deflection that acts, rad.
     pub elevator_rad: f64,
+    /// Rudder deflection that acts, rad.
+    pub rudder_rad: f64,
     /// Throttle position that acts, 0..1.
     pub throttle: f64,
     /// Commanded aileron, −1..1.
     pub aileron_cmd: f64,
     /// Commanded elevator, −1..1.
     pub elevator_cmd: f64,
+    /// Commanded rudder, −1..1.
+    pub rudder_cmd: f64,
     /// Commanded throttle, 0..1.
     pub throttle_cmd: f64,
     /// Commanded roll φ*, rad (an extra column, `roll_target_rad`).
@@ -53,11 +59,14 @@ impl Default for Sample {
             specific_force_mps2: [nan; 3],
             velocity_ned_mps: [nan; 3],
             altitude_m: nan,
+            air_density_kgpm3: nan,
             aileron_rad: nan,
             elevator_rad: nan,
+            rudder_rad: nan,
             throttle: nan,
             aileron_cmd: nan,
             elevator_cmd: nan,
+            rudder_cmd: nan,
             throttle_cmd: nan,
             roll_target_rad: nan,
             pitch_target_rad: nan,
@@ -65,9 +74,24 @@ impl Default for Sample {
     }
 }
 
-/// A flight: samples in time order.
-#[derive(Clone, Debug, Default)]
+/// A flight: samples in time order, with what is known about them as a whole.
+///
+/// Where only the rows matter, `Flight::from(samples)` or `..Flight::default()` fill in the rest.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flight {
+    /// What the flight is called in reports: its file's name.
+    pub name: String,
     /// The rows, in time order.
     pub samples: Vec<Sample>,
+    /// Channels of the file that the format does not name.
+    pub unknown_columns: Vec<String>,
+    /// What was assumed or derived while reading, one sentence each.
+    pub notes: Vec<String>,
+}
+
+impl From<Vec<Sample>> for Flight {
+    /// A flight without a name.
+    fn from(samples: Vec<Sample>) -> Self {
+        Flight { samples, ..Flight::default() }
+    }
 }

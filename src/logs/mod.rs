@@ -1,6 +1,24 @@
-//! A flight in memory, and the formats it is read from and written to.
+//! A flight in memory, with the formats it is read from or written to.
+//!
+//! [`load`] reads any of the four formats, told apart by their first bytes, onto one table.
 
 pub mod csv;
+pub mod finding;
+mod checks;
+mod columns;
+mod dataflash;
 mod flight;
+mod format;
+pub mod info;
+mod load;
+pub mod mapping;
+pub mod phases;
+mod rows;
+mod table;
+mod tlog;
+mod topics;
+mod ulog;
 
 pub use flight::{Flight, Sample};
+pub use format::Format;
+pub use load::{Channel, Log, LogError, Options, inspect, load, parse};

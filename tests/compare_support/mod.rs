@@ -27,13 +27,19 @@ pub struct Noise {
     pub state: [f64; 8],
     /// Accelerometers, m/s².
     pub force: f64,
+    /// Velocity over ground, m/s.
+    pub velocity: f64,
 }
 
 /// Perfect sensors.
-pub const EXACT: Noise = Noise { state: [0.0; 8], force: 0.0 };
-/// A small autopilot: 0.3° attitude and vanes, 0.3 m/s airspeed, 0.3 °/s gyros, 0.1 m/s² accelerometers.
-pub const REALISTIC: Noise =
-    Noise { state: [0.005, 0.005, 0.3, 0.005, 0.005, 0.005, 0.005, 0.005], force: 0.1 };
+pub const EXACT: Noise = Noise { state: [0.0; 8], force: 0.0, velocity: 0.0 };
+/// A small autopilot: 0.3° attitude and vanes, 0.3 m/s airspeed, 0.3 °/s gyros, 0.1 m/s² accelerometers,
+/// 0.1 m/s velocity.
+pub const REALISTIC: Noise = Noise {
+    state: [0.005, 0.005, 0.3, 0.005, 0.005, 0.005, 0.005, 0.005],
+    force: 0.1,
+    velocity: 0.1,
+};
 
 /// What is flown on top of the legs.
 #[derive(Clone, Copy)]
@@ -54,7 +60,7 @@ pub fn fly_with(seed: u64, seconds: f64, noise: Noise, excitation: f64) -> Fligh
     let mut lqi = control::build(Kind::Lqi, &model("jsbsim")).unwrap();
     let mut random = stream(seed, &[11]);
     let mut seen = simulator.reset().unwrap();
-    lqi.reset(seed, Command::IDLE);
+    lqi.reset(seed);
     let mut target = Target { roll: 0.0, pitch: 0.05, airspeed: 18.0 };
     let mut on_top = Excitation { until: 300, command: Command::IDLE };
     let mut flight = Flight::default();
@@ -115,7 +121,7 @@ fn sample(truth: &Truth, command: &Command, noise: Noise, random: &mut Stream) -
         alpha_rad: sensed(truth.alpha_rad, alpha),
         beta_rad: sensed(truth.beta_rad, beta),
         specific_force_mps2: truth.specific_force_mps2.map(|f| sensed(f, noise.force)),
-        velocity_ned_mps: truth.velocity_ned_mps,
+        velocity_ned_mps: truth.velocity_ned_mps.map(|v| sensed(v, noise.velocity)),
         altitude_m: truth.altitude_m,
         aileron_rad: truth.aileron_rad,
         elevator_rad: truth.elevator_rad,

@@ -49,7 +49,7 @@ pub fn fly(seconds: f64, air: Air, seed: u64) -> Flown {
     let mut random = stream(seed, &[1]);
     let phases: [f64; 8] = std::array::from_fn(|_| random.random::<f64>() * std::f64::consts::TAU);
     let mut seen = simulator.reset().unwrap();
-    lqi.reset(seed, Command::IDLE);
+    lqi.reset(seed);
     let mut target = Target { roll: 0.0, pitch: 0.05, airspeed: 18.0 };
     let (mut truth, mut commands) = (Vec::new(), Vec::new());
     for k in 0..(seconds / STEP) as usize {
@@ -122,8 +122,9 @@ impl Errors {
 /// What sensors with `errors` log of a flight.
 pub fn spoil(flown: &Flown, errors: &Errors, seed: u64) -> Flight {
     let mut random = stream(seed, &[2]);
-    let samples = (0..flown.truth.len()).map(|k| row(flown, errors, k, &mut random)).collect();
-    Flight { samples }
+    let samples: Vec<Sample> =
+        (0..flown.truth.len()).map(|k| row(flown, errors, k, &mut random)).collect();
+    Flight::from(samples)
 }
 
 fn row(flown: &Flown, e: &Errors, k: usize, random: &mut Stream) -> Sample {

@@ -79,7 +79,7 @@ pub fn flight() -> Flight {
             ..Sample::default()
         });
     }
-    Flight { samples }
+    Flight::from(samples)
 }
 
 /// The report of `flight`, whose settled errors are those of its samples.

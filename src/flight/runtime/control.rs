@@ -308,5 +308,6 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
         throttle_cmd: c.throttle,
         roll_target_rad: decision.target.roll,
         pitch_target_rad: decision.target.pitch,
+        ..Sample::default()
     }
 }

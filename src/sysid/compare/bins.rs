@@ -2,7 +2,8 @@
 
 use super::bootstrap::{self, BLOCK_S, Block};
 use super::flight::Prepared;
-use super::result::{Bin, ChannelId, Map, MapCell, RegimeBins, RegimeVariable};
+use super::names::{ChannelId, RegimeVariable};
+use super::result::{Bin, Map, MapCell, RegimeBins};
 use super::weak::Series;
 use crate::num::statistics::{mean, quantile};
 

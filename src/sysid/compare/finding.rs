@@ -2,7 +2,8 @@
 
 use super::bins::{self, Residual, SUPPORT};
 use super::flight::Prepared;
-use super::result::{Bin, Regime, RegimeBins, RegimeVariable};
+use super::names::RegimeVariable;
+use super::result::{Bin, Regime, RegimeBins};
 
 /// A variable that explains less of the residual's variance than this tells nothing apart.
 const SHARE_FLOOR: f64 = 0.1;

@@ -4,7 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::CompareError;
 use super::kernel::{Kernel, weigh};
-use super::result::{FlightResult, FlightTrace, NuisanceResult, RegimeVariable};
+use super::names::RegimeVariable;
+use super::result::{FlightResult, FlightTrace, NuisanceResult};
 use crate::model::STEP;
 use crate::physics::State;
 use crate::sysid::reconstruction::{Instant, Reconstruction};
@@ -23,9 +24,10 @@ pub struct Prepared {
     pub substeps: usize,
     /// Stretches in the air without gaps.
     pub segments: Vec<Vec<Instant>>,
-    /// Noise of roll, pitch, airspeed, p, q, r, α, β; zero where unknown.
+    /// Noise of roll, pitch, airspeed, p, q, r, α, β that the reconstruction has left in; zero where
+    /// unknown.
     pub noise: [f64; 8],
-    /// Noise of the accelerometers, m/s²; zero where unknown.
+    /// Noise of the accelerometers, m/s², likewise.
     pub force_noise: [f64; 3],
     /// The kernel on its clock.
     pub kernel: Kernel,
@@ -62,7 +64,12 @@ impl Prepared {
             .filter(|piece| piece.len() > 1)
             .collect();
         let kernel = Kernel::hann(dt);
-        let known = |sd: f64| if sd.is_finite() { sd } else { 0.0 };
+        let left = |stated: f64, of: &dyn Fn(&Instant) -> f64| {
+            if stated.is_finite() { stated.min(white_noise(&segments, of)) } else { 0.0 }
+        };
+        let noise = std::array::from_fn(|k| left(flight.noise[k], &|i| i.state.to_array()[k]));
+        let force_noise =
+            std::array::from_fn(|k| left(flight.force_noise[k], &|i| i.specific_force[k]));
         let first = flight.segments.iter().find_map(|s| s.instants.first());
         let windows = windows(&segments, &kernel, first.map_or(0.0, |i| i.time_s));
         Ok(Prepared {
@@ -70,8 +77,8 @@ impl Prepared {
             dt,
             substeps,
             segments,
-            noise: flight.noise.map(known),
-            force_noise: flight.force_noise.map(known),
+            noise,
+            force_noise,
             kernel,
             windows,
         })
@@ -93,7 +100,7 @@ impl Prepared {
     }
 
     /// Number of samples.
-    pub fn len(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.segments.iter().map(Vec::len).sum()
     }
 
@@ -109,7 +116,7 @@ impl Prepared {
         FlightResult {
             name: self.name.clone(),
             step_s: self.dt,
-            samples: self.len(),
+            samples: self.sample_count(),
             segments_s: self.segments.iter().filter_map(ends).collect(),
             nuisances: from.nuisances.iter().map(nuisance).collect(),
             notes: from.notes.clone(),
@@ -164,6 +171,20 @@ fn on_clock(instants: &[Instant], step_s: f64, dt: f64) -> Vec<Instant> {
         between(&instants[i], &instants[i + 1], place - i as f64)
     };
     (0..=count).map(at).collect()
+}
+
+/// Standard deviation of white noise in a series, by third differences, which a smooth signal does
+/// not have: their variance is 1 + 9 + 9 + 1 = 20 times that of the noise.
+fn white_noise(segments: &[Vec<Instant>], of: &dyn Fn(&Instant) -> f64) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for four in segments.iter().flat_map(|s| s.windows(4)) {
+        let third = of(&four[3]) - of(&four[0]) - 3.0 * (of(&four[2]) - of(&four[1]));
+        if third.is_finite() {
+            sum += third * third;
+            count += 1.0;
+        }
+    }
+    if count > 0.0 { (sum / count / 20.0_f64).sqrt() } else { f64::INFINITY }
 }
 
 fn between(a: &Instant, b: &Instant, part: f64) -> Instant {

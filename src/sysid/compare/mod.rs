@@ -11,15 +11,18 @@ mod finding;
 pub mod flight;
 pub mod free_run;
 pub mod kernel;
+mod names;
 mod result;
 mod run;
 mod sentence;
+mod verdict;
 pub mod weak;
 
 pub use error::CompareError;
+pub use names::{ChannelId, RegimeVariable};
 pub use result::{
-    Bin, ChannelId, ChannelResult, ChannelTrace, Comparison, Document, FlightResult, FlightTrace,
-    GrowthPoint, HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, Regime,
-    RegimeBins, RegimeVariable, Settings, StateScore,
+    Bin, ChannelResult, ChannelTrace, Comparison, Document, FlightResult, FlightTrace, GrowthPoint,
+    HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, Regime, RegimeBins,
+    Settings, StateScore,
 };
 pub use run::{Options, compare};

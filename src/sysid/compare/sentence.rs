@@ -1,7 +1,8 @@
 //! A channel's finding as one sentence of plain language.
 
 use super::finding::{Finding, Trend};
-use super::result::{ChannelId, Regime, RegimeVariable};
+use super::names::{ChannelId, RegimeVariable};
+use super::result::Regime;
 
 /// A channel that the model explains but for less than this is said to be explained.
 const EXPLAINED: f64 = 0.01;

@@ -5,7 +5,7 @@
 
 use super::flight::{Prepared, Window};
 use super::kernel::{Kernel, weigh};
-use super::result::ChannelId;
+use super::names::ChannelId;
 use crate::model::{GreyBox, Integrator, Memory};
 use crate::physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
 use crate::physics::{AirData, Channel, State, Wrench};

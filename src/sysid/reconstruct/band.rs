@@ -4,8 +4,8 @@ use nalgebra::{SMatrix, SVector};
 
 use super::nuisance::COUNT;
 
-/// Unknowns at an instant: three of attitude, three of velocity.
-pub const NODE: usize = 6;
+/// Unknowns at an instant: three each of attitude, velocity over ground and gust.
+pub const NODE: usize = 9;
 
 /// A square block of an instant's unknowns.
 pub type Block = SMatrix<f64, NODE, NODE>;

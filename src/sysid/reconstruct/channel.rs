@@ -95,15 +95,6 @@ impl Channel {
         let after = self.time.partition_point(|x| *x <= t);
         after.checked_sub(1).map_or(f64::NAN, |i| self.value[i])
     }
-
-    /// The median of its values; NaN if it has none.
-    pub fn median(&self) -> f64 {
-        if self.value.is_empty() {
-            f64::NAN
-        } else {
-            crate::num::statistics::quantile(&self.value, 0.5)
-        }
-    }
 }
 
 fn unwrap(angles: &mut [f64]) {

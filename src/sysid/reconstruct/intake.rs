@@ -10,6 +10,8 @@ use crate::physics::{Command, Controls};
 
 /// Fewest samples of a sensor in a segment that are worth using.
 const FEWEST: usize = 10;
+/// Time over which a climb is taken from the altitude, s.
+const CLIMB_WINDOW: f64 = 1.0;
 /// Time around a row over which its airspeed is averaged to tell flight from ground, s.
 const AIRBORNE_WINDOW: f64 = 1.0;
 
@@ -22,8 +24,6 @@ pub struct Log {
     pub tracks: Vec<Track>,
     /// Which sensors the log has.
     pub has: Sensors,
-    /// Whether all deflections are logged.
-    pub deflections_logged: bool,
     /// What the reader must know.
     pub notes: Vec<String>,
 }
@@ -168,8 +168,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     declare(&channels, &has, &mut notes);
     let stretches = stretches(flight, &has, options)?;
     let step = step(&stretches, options);
-    let deflections_logged = channels.positions.iter().all(|c| !c.is_empty());
-    let mut log = Log { step, tracks: Vec::new(), has, deflections_logged, notes };
+    let mut log = Log { step, tracks: Vec::new(), has, notes };
     let mut longest = 0.0_f64;
     for times in &stretches {
         let [start, end] = [times[0], times[times.len() - 1]];
@@ -317,6 +316,9 @@ fn track(
         track.altitude.push(if altitude.is_nan() { held } else { altitude });
         track.commands.push(command(channels, t));
     }
+    if has.altitude && !has.velocity {
+        climb(&mut track, step);
+    }
     let air = Atmosphere { density: Density::Standard, gravity: options.gravity };
     track.density = track
         .altitude
@@ -325,6 +327,18 @@ fn track(
         .collect();
     track.controls = controls(channels, &times, options);
     track
+}
+
+/// Takes the vertical velocity from the altitude, once every [`CLIMB_WINDOW`], so that the errors of
+/// the altitude enter once each.
+fn climb(track: &mut Track, step: f64) {
+    let half = (CLIMB_WINDOW / step / 2.0).round().max(1.0) as usize;
+    let mut k = half;
+    while k + half < track.len() {
+        let rise = track.altitude[k + half] - track.altitude[k - half];
+        track.velocity[k][2] = -rise / (2 * half) as f64 / step;
+        k += 2 * half;
+    }
 }
 
 /// The command in force at `t`; where only some are logged, the others are NaN.

@@ -5,9 +5,18 @@ use nalgebra::{Matrix3, Vector3};
 use super::Timing;
 use super::band::{Block, Border, NodeVector};
 use super::intake::Track;
-use super::nuisance::{FORCE, GYRO, SKEW_FORCE, Values};
+use super::nuisance::{EARTH, FORCE, GYRO, SKEW_FORCE, Values};
 use super::path::Path;
 use super::rotation::{cross, exp, log};
+
+/// Time over which a gust is forgotten, s: the length scale of turbulence some hundred metres up over
+/// the airspeed of a small aircraft.
+const GUST_TIME: f64 = 20.0;
+
+/// The part of a gust that is left after `step`, s.
+pub fn gust_kept(step: f64) -> f64 {
+    (-step / GUST_TIME).exp()
+}
 
 /// Mean rates and forces over each interval, as the gyros and accelerometers have them.
 #[derive(Clone, Debug)]
@@ -22,7 +31,7 @@ pub struct Drive {
 
 /// The difference between one sample carried on and the next one, and how it depends on both.
 pub struct Link {
-    /// Attitude (rad) then velocity (m/s, body axes).
+    /// Attitude (rad), velocity (m/s, body axes), gust (m/s, earth axes).
     pub residual: NodeVector,
     /// By the first sample.
     pub first: Block,
@@ -67,12 +76,17 @@ impl Drive {
     }
 
     /// The link between samples `k` and `k + 1` of `path`.
+    ///
+    /// The gust decays over [`GUST_TIME`].
     pub fn link(&self, path: &Path, values: &Values, k: usize, step: f64, gravity: f64) -> Link {
         let body = path.attitude[k].transpose();
         let turned = body * path.attitude[k + 1];
         let attitude = log(&(exp(&(self.rate[k] * step)).transpose() * turned));
         let down = Vector3::new(0.0, 0.0, gravity);
-        let gained = body * (path.velocity[k + 1] - path.velocity[k] - down * step);
+        let earth = Vector3::new(values[EARTH], 0.0, values[EARTH + 1]);
+        let v = path.velocity[k];
+        let coriolis = earth.cross(&v) * -2.0;
+        let gained = body * (path.velocity[k + 1] - v - (down + coriolis) * step);
         let bias = Vector3::from_column_slice(&values[FORCE..FORCE + 3]);
         let velocity = gained - (self.force[k] - bias) * step;
         let mut link = Link {
@@ -83,7 +97,11 @@ impl Drive {
         };
         link.residual.fixed_rows_mut::<3>(0).copy_from(&attitude);
         link.residual.fixed_rows_mut::<3>(3).copy_from(&velocity);
-        let one = Matrix3::identity();
+        let (one, kept) = (Matrix3::identity(), gust_kept(step));
+        let gust = path.gust[k + 1] - path.gust[k] * kept;
+        link.residual.fixed_rows_mut::<3>(6).copy_from(&gust);
+        link.first.fixed_view_mut::<3, 3>(6, 6).copy_from(&(one * -kept));
+        link.second.fixed_view_mut::<3, 3>(6, 6).copy_from(&one);
         link.first.fixed_view_mut::<3, 3>(0, 0).copy_from(&-turned.transpose());
         link.second.fixed_view_mut::<3, 3>(0, 0).copy_from(&one);
         link.first.fixed_view_mut::<3, 3>(3, 0).copy_from(&cross(&gained));
@@ -91,6 +109,10 @@ impl Drive {
         link.second.fixed_view_mut::<3, 3>(3, 3).copy_from(&body);
         link.constants.fixed_view_mut::<3, 3>(0, GYRO).copy_from(&(one * step));
         link.constants.fixed_view_mut::<3, 3>(3, FORCE).copy_from(&(one * step));
+        for (place, axis) in [(EARTH, Vector3::x()), (EARTH + 1, Vector3::z())] {
+            let slope = body * axis.cross(&v) * (2.0 * step);
+            link.constants.fixed_view_mut::<3, 1>(3, place).copy_from(&slope);
+        }
         let by_skew = self.force_by_skew[k] * -step;
         link.constants.fixed_view_mut::<3, 1>(3, SKEW_FORCE).copy_from(&by_skew);
         link

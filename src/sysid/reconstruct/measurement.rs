@@ -12,10 +12,10 @@ use super::nuisance::{
 use super::path::{CHANNELS, Path, SLOW};
 use super::rotation::{cross, euler_by_turn};
 
-/// How a channel depends on the path at an instant and on one constant of its own.
+/// How a channel depends on the path at an instant and on the constants besides its delay.
 struct Slope {
     node: RowSVector<f64, NODE>,
-    constant: Option<(usize, f64)>,
+    constants: SVector<f64, COUNT>,
 }
 
 /// The constants' share in the normal equations, and the sum of squares.
@@ -39,7 +39,7 @@ pub fn skew_of(channel: usize) -> usize {
 }
 
 /// The measurement of a channel at sample `k`; NaN if there is none.
-fn measured(track: &Track, channel: usize, k: usize) -> f64 {
+pub fn measured(track: &Track, channel: usize, k: usize) -> f64 {
     match channel {
         0..3 => track.attitude[k][channel],
         3 => track.airspeed[k],
@@ -88,11 +88,8 @@ pub fn add(
             residuals[channel].push(residual);
             let size = (residual / spread[channel]).abs();
             let weight = (bound / size).min(1.0) / spread[channel].powi(2);
-            let mut constants = SVector::<f64, COUNT>::zeros();
+            let mut constants = slope.constants;
             constants[skew_of(channel)] = -gain * (rate + bend * part) / step;
-            if let Some((place, by)) = slope.constant {
-                constants[place] += by;
-            }
             accumulate(&mut rows[j], sums, &slope.node, &constants, residual, weight);
         }
     }
@@ -126,7 +123,6 @@ fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
         3 => (h * (1.0 + values[SCALE]), 1.0 + values[SCALE]),
         4 => (h + values[ALPHA], 1.0),
         5 => (h + values[BETA], 1.0),
-        6..CHANNELS => (h + values[WIND + channel - 6], 1.0),
         _ => (h, 1.0),
     }
 }
@@ -139,39 +135,45 @@ fn slopes(
     values: &Values,
 ) -> [Option<Slope>; CHANNELS] {
     let body = path.attitude[k].transpose();
-    let u = body * path.velocity[k];
+    let u = path.air_velocity(k);
     let (v, plane) = (u.norm(), u.x.hypot(u.z));
-    let (by_turn, by_velocity) = (cross(&u), body);
-    let through = |g: Vector3<f64>, constant| {
+    let by_turn = cross(&u);
+    let none = SVector::<f64, COUNT>::zeros();
+    let through = |g: Vector3<f64>, place: usize, by: f64| {
         let mut node = RowSVector::<f64, NODE>::zeros();
         node.fixed_columns_mut::<3>(0).copy_from(&(g.transpose() * by_turn));
-        node.fixed_columns_mut::<3>(3).copy_from(&(g.transpose() * by_velocity));
-        Slope { node, constant }
+        let slope = g.transpose() * body;
+        node.fixed_columns_mut::<3>(3).copy_from(&slope);
+        node.fixed_columns_mut::<3>(6).copy_from(&-slope);
+        let mut constants = SVector::<f64, COUNT>::zeros();
+        constants.fixed_rows_mut::<3>(WIND).copy_from(&-slope.transpose());
+        constants[place] = by;
+        Slope { node, constants }
     };
     let euler = euler_by_turn([shown[0], shown[1], shown[2]]);
     std::array::from_fn(|channel| match channel {
         0..3 => euler.map(|euler| {
             let mut node = RowSVector::<f64, NODE>::zeros();
             node.fixed_columns_mut::<3>(0).copy_from(&euler.row(channel));
-            Slope { node, constant: None }
+            Slope { node, constants: none }
         }),
-        _ if plane < SLOW => None,
+        3..6 if plane < SLOW => None,
         3 => {
             let gain = 1.0 + values[SCALE];
-            Some(through(u * (gain / v), Some((SCALE, v))))
+            Some(through(u * (gain / v), SCALE, v))
         }
         4 => {
             let g = Vector3::new(-u.z, 0.0, u.x) / (plane * plane);
-            Some(through(g, Some((ALPHA, 1.0))))
+            Some(through(g, ALPHA, 1.0))
         }
         5 => {
             let g = (Vector3::new(0.0, 1.0, 0.0) - u * (u.y / (v * v))) / plane;
-            Some(through(g, Some((BETA, 1.0))))
+            Some(through(g, BETA, 1.0))
         }
         _ => {
             let mut node = RowSVector::<f64, NODE>::zeros();
             node[channel - 3] = 1.0;
-            Some(Slope { node, constant: Some((WIND + channel - 6, 1.0)) })
+            Some(Slope { node, constants: none })
         }
     })
 }

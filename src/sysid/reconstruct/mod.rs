@@ -3,10 +3,12 @@
 //! Kinematics hold no aerodynamics, so what the sensors do wrong, and what the wind does, is decided
 //! here, before any model of the aircraft is looked at.
 
+mod actuator_skew;
 mod band;
 mod channel;
 mod intake;
 mod kinematics;
+mod manoeuvres;
 mod measurement;
 mod noise;
 mod nuisance;
@@ -14,6 +16,8 @@ mod outcome;
 mod path;
 mod rotation;
 mod smoother;
+
+pub use manoeuvres::{Kind as ManoeuvreKind, Manoeuvre, manoeuvres};
 
 use crate::logs::Flight;
 use crate::physics::airframe::ActuatorFigures;

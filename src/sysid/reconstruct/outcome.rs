@@ -1,21 +1,27 @@
 //! The outcome: what the smoother found, as a reconstruction with its notes.
 
 use super::Options;
+use super::actuator_skew::{self, Skew};
 use super::intake::{Log, Track};
 use super::kinematics::shifted;
 use super::nuisance::{self, COUNT, FORCE, GYRO, SCALE, SKEW_FORCE, Values};
 use super::path::{Path, flow_angles};
 use super::rotation::to_euler;
 use super::smoother::Smoothed;
-use crate::physics::State;
+use crate::physics::{Controls, State};
 use crate::sysid::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
 
 /// Part of the prior width above which the data is said not to see a constant.
 const UNSEEN: f64 = 0.7;
+/// Gusts worth a note, m/s.
+const ROUGH: f64 = 0.1;
+/// Smallest delay of the actuators that is put right, samples: less is within what the regression that
+/// finds it leaves out.
+const CORRECTED: f64 = 0.25;
 
 /// Puts together what is handed out.
 pub fn assemble(log: Log, smoothed: Smoothed, options: &Options) -> Reconstruction {
-    let segments = log
+    let mut segments: Vec<Segment> = log
         .tracks
         .iter()
         .zip(&smoothed.paths)
@@ -23,13 +29,28 @@ pub fn assemble(log: Log, smoothed: Smoothed, options: &Options) -> Reconstructi
         .collect();
     let mut notes = log.notes.clone();
     declare(&log, &smoothed, options, &mut notes);
+    let mut nuisances = nuisances(&log, &smoothed);
+    let skew = actuator_skew::estimate(&segments, log.step, options.timing);
+    if correct(&mut segments, &skew, log.step) {
+        notes.push(format!(
+            "The recorded actuators came {:.1} ms late against the gyros and were put right; a lag of \
+             the surfaces that the record does not show would look the same.",
+            1e3 * skew.late
+        ));
+    }
+    nuisances.push(Nuisance {
+        name: "skew_actuators".into(),
+        value: skew.late,
+        sd: skew.deviation,
+        unit: "s",
+    });
     let l = &smoothed.levels;
     let m = &l.measured;
     Reconstruction {
         name: options.name.clone(),
         step_s: log.step,
         segments,
-        nuisances: nuisances(&log, &smoothed),
+        nuisances,
         noise: [m[0], m[1], m[3], l.gyro[0], l.gyro[1], l.gyro[2], m[4], m[5]],
         force_noise: if log.has.force { l.force } else { [f64::NAN; 3] },
         notes,
@@ -55,6 +76,30 @@ fn segment(track: &Track, path: &Path, values: &Values, log: &Log) -> Segment {
         }
     };
     Segment { instants: (0..track.len()).map(instant).collect() }
+}
+
+/// Puts deflections right that came late beyond doubt, by linear interpolation; says whether it did.
+fn correct(segments: &mut [Segment], skew: &Skew, step: f64) -> bool {
+    let late = skew.late / step;
+    if late.abs() < CORRECTED || skew.late.abs() < 2.0 * skew.deviation {
+        return false;
+    }
+    for segment in segments {
+        let recorded: Vec<Controls> = segment.instants.iter().map(|i| i.controls).collect();
+        let last = recorded.len() - 1;
+        for (k, instant) in segment.instants.iter_mut().enumerate() {
+            let place = (k as f64 + late).clamp(0.0, last as f64);
+            let (i, part) = (place as usize, place.fract());
+            let (a, b) = (&recorded[i], &recorded[(i + 1).min(last)]);
+            let mix = |a: f64, b: f64| a + part * (b - a);
+            instant.controls = Controls {
+                aileron: mix(a.aileron, b.aileron),
+                elevator: mix(a.elevator, b.elevator),
+                throttle: mix(a.throttle, b.throttle),
+            };
+        }
+    }
+    true
 }
 
 /// The constants that the log's sensors have, the airspeed scale as a factor.
@@ -110,10 +155,10 @@ fn declare(log: &Log, smoothed: &Smoothed, options: &Options, notes: &mut Vec<St
             notes.push(nuisance::unseen(place, has, options));
         }
     }
-    if smoothed.levels.gusts > 1.0 {
-        notes.push(
-            "The air was rough: its velocity changed by more than the inertial sensors account for."
-                .into(),
-        );
+    if smoothed.levels.gusts > ROUGH {
+        notes.push(format!(
+            "The air was rough: gusts of about {:.1} m/s beside the mean wind.",
+            smoothed.levels.gusts
+        ));
     }
 }

@@ -1,4 +1,4 @@
-//! The flight path of a stretch, with what the sensors should show along it.
+//! The flight path of a stretch: motion and air at every sample, with what the sensors should show along it.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -15,8 +15,12 @@ pub const SLOW: f64 = 2.0;
 pub struct Path {
     /// Body to earth axes.
     pub attitude: Vec<Matrix3<f64>>,
-    /// Velocity relative to the air, earth axes, m/s.
+    /// Velocity over ground, earth axes, m/s.
     pub velocity: Vec<Vector3<f64>>,
+    /// Velocity of the air over ground less the mean wind, earth axes, m/s.
+    pub gust: Vec<Vector3<f64>>,
+    /// Mean wind: velocity of the air over ground, earth axes, m/s.
+    pub wind: Vector3<f64>,
 }
 
 impl Path {
@@ -41,7 +45,8 @@ impl Path {
                 *old = x;
             }
         };
-        let mut path = Path { attitude: Vec::new(), velocity: Vec::new() };
+        let (gust, wind) = (vec![Vector3::zeros(); track.len()], Vector3::zeros());
+        let mut path = Path { attitude: Vec::new(), velocity: Vec::new(), gust, wind };
         for k in 0..track.len() {
             for (angle, measured) in angles.iter_mut().zip(track.attitude[k]) {
                 keep(measured, angle);
@@ -62,6 +67,25 @@ impl Path {
         path
     }
 
+    /// The wind that the velocities over ground measured in `track` leave for this path: their sum and
+    /// number.
+    pub fn wind_left(&self, track: &Track) -> (Vector3<f64>, f64) {
+        let mut sum = (Vector3::zeros(), 0.0);
+        for (measured, own) in track.velocity.iter().zip(&self.velocity) {
+            let left = Vector3::from(*measured) - own;
+            if left.iter().all(|x| x.is_finite()) {
+                sum = (sum.0 + left, sum.1 + 1.0);
+            }
+        }
+        sum
+    }
+
+    /// Takes the same motion through the air in a wind.
+    pub fn carry(&mut self, wind: Vector3<f64>) {
+        self.wind = wind;
+        self.velocity.iter_mut().for_each(|v| *v += wind);
+    }
+
     /// The number of samples.
     pub fn len(&self) -> usize {
         self.attitude.len()
@@ -69,10 +93,10 @@ impl Path {
 
     /// Velocity relative to the air in body axes at sample `k`, m/s.
     pub fn air_velocity(&self, k: usize) -> Vector3<f64> {
-        self.attitude[k].transpose() * self.velocity[k]
+        self.attitude[k].transpose() * (self.velocity[k] - self.wind - self.gust[k])
     }
 
-    /// What sensors without errors would show at sample `k`, in calm air.
+    /// What sensors without errors would show at sample `k`.
     pub fn shown(&self, k: usize) -> [f64; CHANNELS] {
         let [roll, pitch, yaw] = rotation::to_euler(&self.attitude[k]);
         let u = self.air_velocity(k);

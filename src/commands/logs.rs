@@ -1,0 +1,164 @@
+//! `greylag logs`: what a flight log holds, or the same as a CSV table.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::Subcommand;
+
+use crate::commands::files;
+use crate::logs::finding::Severity;
+use crate::logs::info::Info;
+use crate::logs::mapping::Mapping;
+use crate::logs::phases::Kind;
+use crate::logs::{Log, Options, csv};
+
+/// Exit status when what would be computed from the log is wrong.
+const PROBLEM: u8 = 2;
+
+/// Options of `greylag logs`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Say what a log holds, at which rates, with which gaps, and what it is missing for which
+    /// purpose. Exit status 2 when something makes its numbers wrong.
+    Info {
+        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+        file: PathBuf,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+        #[command(flatten)]
+        reading: Reading,
+    },
+    /// Write a log of any format as a CSV table.
+    Convert {
+        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+        input: PathBuf,
+        /// The table.
+        output: PathBuf,
+        /// Replace the table if it exists.
+        #[arg(long)]
+        force: bool,
+        #[command(flatten)]
+        reading: Reading,
+    },
+}
+
+#[derive(clap::Args)]
+struct Reading {
+    /// A TOML file that says where columns come from.
+    #[arg(long)]
+    mapping: Option<PathBuf>,
+    /// Read the log however many of its rows are unusable.
+    #[arg(long)]
+    lenient: bool,
+}
+
+impl Reading {
+    fn options(&self) -> Result<Options> {
+        let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
+        let tolerance = if self.lenient { csv::Tolerance::Lenient } else { csv::Tolerance::Strict };
+        Ok(Options { tolerance, mapping })
+    }
+}
+
+/// Does what the verb says.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    match &arguments.verb {
+        Verb::Info { file, json, reading } => {
+            let info = Info::of(&crate::logs::inspect(file, &reading.options()?)?);
+            match json {
+                true => println!("{}", serde_json::to_string_pretty(&info)?),
+                false => print(&info),
+            }
+            Ok(status(&info))
+        }
+        Verb::Convert { input, output, force, reading } => {
+            files::writable(output, (*force).into())?;
+            let log = crate::logs::load(input, &reading.options()?)?;
+            convert(&log, output, *force)
+        }
+    }
+}
+
+fn convert(log: &Log, output: &std::path::Path, force: bool) -> Result<ExitCode> {
+    let mut bytes = Vec::new();
+    csv::write(&log.flight, &mut bytes)?;
+    let text = String::from_utf8(bytes).context("the table is no text")?;
+    files::write(output, &text, force.into())?;
+    log.findings.iter().for_each(|finding| eprintln!("{finding}"));
+    println!("{} rows of {} in {}", log.flight.samples.len(), log.flight.name, output.display());
+    Ok(status(&Info::of(log)))
+}
+
+fn status(info: &Info) -> ExitCode {
+    if info.severity() == Severity::Problem { ExitCode::from(PROBLEM) } else { ExitCode::SUCCESS }
+}
+
+fn print(info: &Info) {
+    println!("{}: {}", info.name, info.format.name());
+    println!(
+        "{} rows, {:.3} to {:.3} s ({:.1} s), {:.1} Hz; {:.1} s in flight; {} rows dropped",
+        info.rows,
+        info.from_s,
+        info.to_s,
+        info.to_s - info.from_s,
+        info.rate_hz,
+        info.flight_s,
+        info.dropped_rows
+    );
+    println!("\nPhases");
+    for phase in info.phases.iter().take(SHOWN) {
+        let kind = if phase.kind == Kind::Flight { "in flight" } else { "on ground" };
+        println!("  {:>10.2} to {:>10.2} s  {kind}  {} rows", phase.from_s, phase.to_s, phase.rows);
+    }
+    more(info.phases.len());
+    if !info.gaps.is_empty() {
+        println!("\nGaps");
+        for (start, length) in info.gaps.iter().take(SHOWN) {
+            println!("  {length:.2} s at {start:.2} s");
+        }
+        more(info.gaps.len());
+    }
+    println!("\nChannels");
+    let mut table = comfy_table::Table::new();
+    table.load_style(comfy_table::presets::NOTHING);
+    table.set_header(["column", "from", "rate", "samples", "longest gap"]);
+    for channel in &info.channels {
+        table.add_row([
+            channel.columns.join(", "),
+            channel.origin.clone(),
+            format!("{:.1} Hz", channel.rate_hz),
+            channel.samples.to_string(),
+            format!("{:.2} s", channel.largest_gap_s),
+        ]);
+    }
+    println!("{table}\n\nServes for");
+    for purpose in &info.purposes {
+        let verdict = match purpose.missing.is_empty() {
+            true => "yes".to_owned(),
+            false => format!("no, for want of {}", purpose.missing.join(", ")),
+        };
+        println!("  {}: {verdict}", purpose.name);
+        purpose.instead.iter().for_each(|x| println!("      with {x}"));
+    }
+    if !info.findings.is_empty() {
+        println!("\nTo know");
+        info.findings.iter().for_each(|finding| println!("  {finding}"));
+    }
+}
+
+/// Phases and gaps printed; `--json` has them all.
+const SHOWN: usize = 12;
+
+fn more(count: usize) {
+    if count > SHOWN {
+        println!("  … and {} more", count - SHOWN);
+    }
+}

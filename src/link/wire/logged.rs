@@ -1,0 +1,229 @@
+//! The messages of a telemetry log as named numbers, in the units of the wire.
+
+use mavlink::dialects::ardupilotmega::MavMessage;
+
+use super::{Frame, decode};
+
+/// The time that a message carries itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Own {
+    /// Milliseconds since the sender started, modulo 2³².
+    BootMs(u32),
+    /// Microseconds since the sender started, or since 1970.
+    Micros(u64),
+    /// The message carries none.
+    None,
+}
+
+/// A message as named numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Values {
+    /// The message's name.
+    pub topic: &'static str,
+    /// Its own time.
+    pub own: Own,
+    /// Names of its fields.
+    pub fields: &'static [&'static str],
+    /// Their values in the units of the wire; those beyond `fields` mean nothing.
+    pub values: [f64; 16],
+}
+
+/// A message that a log reader uses.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Logged {
+    /// A message of numbers.
+    Values(Values),
+    /// PARAM_VALUE.
+    Parameter {
+        /// The parameter's name.
+        name: String,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// The names of the actuator fields.
+const CONTROLS: [&str; 4] = ["controls0", "controls1", "controls2", "controls3"];
+const ACTUATORS: [&str; 5] = ["actuator0", "actuator1", "actuator2", "actuator3", "actuator4"];
+const SERVOS: [&str; 16] = [
+    "servo1_raw",
+    "servo2_raw",
+    "servo3_raw",
+    "servo4_raw",
+    "servo5_raw",
+    "servo6_raw",
+    "servo7_raw",
+    "servo8_raw",
+    "servo9_raw",
+    "servo10_raw",
+    "servo11_raw",
+    "servo12_raw",
+    "servo13_raw",
+    "servo14_raw",
+    "servo15_raw",
+    "servo16_raw",
+];
+
+/// Decodes a frame; `None` for messages that say nothing about the flight's states or commands.
+pub fn read(frame: &Frame<'_>) -> Option<Logged> {
+    Some(Logged::Values(match decode(frame)? {
+        MavMessage::PARAM_VALUE(m) => {
+            let name = m.param_id.to_str().unwrap_or_default().to_owned();
+            return Some(Logged::Parameter { name, value: f64::from(m.param_value) });
+        }
+        MavMessage::HEARTBEAT(m) => values(
+            "HEARTBEAT",
+            Own::None,
+            &["type", "autopilot"],
+            &[f64::from(m.mavtype as u32), f64::from(m.autopilot as u32)],
+        ),
+        MavMessage::ATTITUDE_QUATERNION(m) => floats(
+            "ATTITUDE_QUATERNION",
+            Own::BootMs(m.time_boot_ms),
+            &["q1", "q2", "q3", "q4", "rollspeed", "pitchspeed", "yawspeed"],
+            &[m.q1, m.q2, m.q3, m.q4, m.rollspeed, m.pitchspeed, m.yawspeed],
+        ),
+        MavMessage::ATTITUDE(m) => floats(
+            "ATTITUDE",
+            Own::BootMs(m.time_boot_ms),
+            &["roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"],
+            &[m.roll, m.pitch, m.yaw, m.rollspeed, m.pitchspeed, m.yawspeed],
+        ),
+        MavMessage::HIGHRES_IMU(m) => floats(
+            "HIGHRES_IMU",
+            Own::Micros(m.time_usec),
+            &[
+                "xacc",
+                "yacc",
+                "zacc",
+                "xgyro",
+                "ygyro",
+                "zgyro",
+                "abs_pressure",
+                "pressure_alt",
+                "temperature",
+            ],
+            &[
+                m.xacc,
+                m.yacc,
+                m.zacc,
+                m.xgyro,
+                m.ygyro,
+                m.zgyro,
+                m.abs_pressure,
+                m.pressure_alt,
+                m.temperature,
+            ],
+        ),
+        MavMessage::RAW_IMU(m) => values(
+            "RAW_IMU",
+            Own::Micros(m.time_usec),
+            &["xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"],
+            &[m.xacc, m.yacc, m.zacc, m.xgyro, m.ygyro, m.zgyro].map(f64::from),
+        ),
+        MavMessage::SCALED_IMU(m) => values(
+            "SCALED_IMU",
+            Own::BootMs(m.time_boot_ms),
+            &["xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"],
+            &[m.xacc, m.yacc, m.zacc, m.xgyro, m.ygyro, m.zgyro].map(f64::from),
+        ),
+        MavMessage::SCALED_PRESSURE(m) => values(
+            "SCALED_PRESSURE",
+            Own::BootMs(m.time_boot_ms),
+            &["press_abs", "temperature"],
+            &[f64::from(m.press_abs), f64::from(m.temperature)],
+        ),
+        MavMessage::VFR_HUD(m) => values(
+            "VFR_HUD",
+            Own::None,
+            &["airspeed", "groundspeed", "alt", "climb", "throttle"],
+            &[
+                f64::from(m.airspeed),
+                f64::from(m.groundspeed),
+                f64::from(m.alt),
+                f64::from(m.climb),
+                f64::from(m.throttle),
+            ],
+        ),
+        MavMessage::AOA_SSA(m) => {
+            floats("AOA_SSA", Own::Micros(m.time_usec), &["AOA", "SSA"], &[m.AOA, m.SSA])
+        }
+        MavMessage::ACTUATOR_OUTPUT_STATUS(m) => floats(
+            "ACTUATOR_OUTPUT_STATUS",
+            Own::Micros(m.time_usec),
+            &ACTUATORS,
+            &m.actuator[..ACTUATORS.len()],
+        ),
+        MavMessage::HIL_ACTUATOR_CONTROLS(m) => floats(
+            "HIL_ACTUATOR_CONTROLS",
+            Own::Micros(m.time_usec),
+            &CONTROLS,
+            &m.controls[..CONTROLS.len()],
+        ),
+        MavMessage::SERVO_OUTPUT_RAW(m) => values(
+            "SERVO_OUTPUT_RAW",
+            Own::Micros(u64::from(m.time_usec)),
+            &SERVOS,
+            &[
+                m.servo1_raw,
+                m.servo2_raw,
+                m.servo3_raw,
+                m.servo4_raw,
+                m.servo5_raw,
+                m.servo6_raw,
+                m.servo7_raw,
+                m.servo8_raw,
+                m.servo9_raw,
+                m.servo10_raw,
+                m.servo11_raw,
+                m.servo12_raw,
+                m.servo13_raw,
+                m.servo14_raw,
+                m.servo15_raw,
+                m.servo16_raw,
+            ]
+            .map(f64::from),
+        ),
+        MavMessage::GLOBAL_POSITION_INT(m) => values(
+            "GLOBAL_POSITION_INT",
+            Own::BootMs(m.time_boot_ms),
+            &["vx", "vy", "vz", "alt"],
+            &[f64::from(m.vx), f64::from(m.vy), f64::from(m.vz), f64::from(m.alt)],
+        ),
+        MavMessage::LOCAL_POSITION_NED(m) => floats(
+            "LOCAL_POSITION_NED",
+            Own::BootMs(m.time_boot_ms),
+            &["vx", "vy", "vz"],
+            &[m.vx, m.vy, m.vz],
+        ),
+        MavMessage::WIND_COV(m) => floats(
+            "WIND_COV",
+            Own::Micros(m.time_usec),
+            &["wind_x", "wind_y", "wind_z"],
+            &[m.wind_x, m.wind_y, m.wind_z],
+        ),
+        _ => return None,
+    }))
+}
+
+fn floats(
+    topic: &'static str,
+    own: Own,
+    fields: &'static [&'static str],
+    numbers: &[f32],
+) -> Values {
+    let mut wide = [f64::NAN; 16];
+    wide.iter_mut().zip(numbers).for_each(|(to, x)| *to = f64::from(*x));
+    Values { topic, own, fields, values: wide }
+}
+
+fn values(
+    topic: &'static str,
+    own: Own,
+    fields: &'static [&'static str],
+    numbers: &[f64],
+) -> Values {
+    let mut wide = [f64::NAN; 16];
+    wide.iter_mut().zip(numbers).for_each(|(to, x)| *to = *x);
+    Values { topic, own, fields, values: wide }
+}

@@ -1,0 +1,204 @@
+//! ArduPilot DataFlash `.bin` read into topics.
+//!
+//! Written here because the crate falls short (`ardupilot-binlog` 0.2.0 looked at): a FMT record
+//! whose length is below 3 makes it panic, it ends silently after a number of consecutive errors
+//! so that a truncated log looks like a whole one, allocates a name and a list for every record,
+//! and knows no instances. The independent check is pymavlink (`tests/logs_crosscheck.py`).
+//!
+//! Not read: texts, arrays (`a`), units and multipliers of FMTU and MULT (the format letters `c C e
+//! E L` carry their own scale, which is what pymavlink applies, too).
+
+use std::collections::BTreeMap;
+
+use super::finding::Finding;
+use super::format::DATAFLASH_MAGIC;
+use super::topics::{Topic, Topics};
+
+/// Magic and type.
+const HEADER: usize = 3;
+/// The type of the record that declares types, its length, and that of its texts.
+const FMT: u8 = 128;
+const FMT_LEN: usize = 89;
+
+/// A declared record type.
+struct Declared {
+    name: String,
+    len: usize,
+    /// Label, format letter, offset behind the header.
+    fields: Vec<(String, u8, usize)>,
+    time: Option<(u8, usize, f64)>,
+    instance: Option<(u8, usize)>,
+    wanted: bool,
+}
+
+fn size(letter: u8) -> Option<usize> {
+    Some(match letter {
+        b'b' | b'B' | b'M' => 1,
+        b'h' | b'H' | b'c' | b'C' | b'g' => 2,
+        b'i' | b'I' | b'f' | b'n' | b'e' | b'E' | b'L' => 4,
+        b'd' | b'q' | b'Q' => 8,
+        b'N' => 16,
+        b'Z' | b'a' => 64,
+        _ => return None,
+    })
+}
+
+/// A number of format `letter`; NaN for texts and for what lies beyond the record.
+fn number(letter: u8, bytes: &[u8], offset: usize) -> f64 {
+    fn take<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
+        bytes.get(offset..)?.first_chunk().copied()
+    }
+    let value = match letter {
+        b'b' => take(bytes, offset).map(|b| f64::from(i8::from_le_bytes(b))),
+        b'B' | b'M' => take(bytes, offset).map(|b| f64::from(u8::from_le_bytes(b))),
+        b'h' => take(bytes, offset).map(|b| f64::from(i16::from_le_bytes(b))),
+        b'H' => take(bytes, offset).map(|b| f64::from(u16::from_le_bytes(b))),
+        b'c' => take(bytes, offset).map(|b| f64::from(i16::from_le_bytes(b)) / 100.0),
+        b'C' => take(bytes, offset).map(|b| f64::from(u16::from_le_bytes(b)) / 100.0),
+        b'i' => take(bytes, offset).map(|b| f64::from(i32::from_le_bytes(b))),
+        b'I' => take(bytes, offset).map(|b| f64::from(u32::from_le_bytes(b))),
+        b'e' => take(bytes, offset).map(|b| f64::from(i32::from_le_bytes(b)) / 100.0),
+        b'E' => take(bytes, offset).map(|b| f64::from(u32::from_le_bytes(b)) / 100.0),
+        b'L' => take(bytes, offset).map(|b| f64::from(i32::from_le_bytes(b)) * 1e-7),
+        b'f' => take(bytes, offset).map(|b| f64::from(f32::from_le_bytes(b))),
+        b'd' => take(bytes, offset).map(f64::from_le_bytes),
+        b'q' => take(bytes, offset).map(|b| i64::from_le_bytes(b) as f64),
+        b'Q' => take(bytes, offset).map(|b| u64::from_le_bytes(b) as f64),
+        _ => None,
+    };
+    value.unwrap_or(f64::NAN)
+}
+
+fn text(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
+    String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
+}
+
+/// The declaration in the body of a FMT record; `None` if it contradicts itself.
+fn declaration(body: &[u8], wanted: &dyn Fn(&str) -> bool) -> Option<(u8, Declared)> {
+    let (kind, len) = (*body.first()?, usize::from(*body.get(1)?));
+    let (name, letters) = (text(body.get(2..6)?), text(body.get(6..22)?));
+    let labels = text(body.get(22..86)?);
+    let mut fields = Vec::new();
+    let mut offset = 0;
+    for (letter, label) in letters.bytes().zip(labels.split(',')) {
+        fields.push((label.trim().to_owned(), letter, offset));
+        offset += size(letter)?;
+    }
+    if len < HEADER + offset {
+        return None;
+    }
+    let find = |label: &str| fields.iter().find(|f| f.0 == label).map(|f| (f.1, f.2));
+    let time = find("TimeUS")
+        .map(|(letter, offset)| (letter, offset, 1e-6))
+        .or_else(|| find("TimeMS").map(|(letter, offset)| (letter, offset, 1e-3)));
+    // Cores of the estimators, sensors of a kind.
+    let label = if name.starts_with("XK") { "C" } else { "I" };
+    let instance = find(label).filter(|(letter, _)| *letter == b'B');
+    let wanted = wanted(&name);
+    Some((kind, Declared { name, len, fields, time, instance, wanted }))
+}
+
+#[derive(Default)]
+struct Reader {
+    declared: BTreeMap<u8, Declared>,
+    /// Samples by type, instance.
+    topics: BTreeMap<(u8, u16), Topic>,
+    counts: BTreeMap<(u8, u16), usize>,
+    out: Topics,
+}
+
+/// Reads what `wanted` names; everything else is counted.
+pub(super) fn read(bytes: &[u8], wanted: &dyn Fn(&str) -> bool) -> Topics {
+    let mut reader = Reader::default();
+    let mut at = 0;
+    let mut skipped = 0usize;
+    let mut cut = 0usize;
+    while at < bytes.len() {
+        let kind = match &bytes[at..] {
+            [a, b, kind, ..] if [*a, *b] == DATAFLASH_MAGIC => *kind,
+            rest => {
+                if rest.len() < HEADER {
+                    cut = rest.len();
+                    break;
+                }
+                skipped += 1;
+                at += 1;
+                continue;
+            }
+        };
+        let len = match (kind, reader.declared.get(&kind)) {
+            (FMT, _) => FMT_LEN,
+            (_, Some(declared)) => declared.len,
+            (_, None) => {
+                skipped += 1;
+                at += 1;
+                continue;
+            }
+        };
+        let Some(body) = bytes.get(at + HEADER..at + len) else {
+            cut = bytes.len() - at;
+            break;
+        };
+        reader.record(kind, body, wanted);
+        at += len;
+    }
+    reader.finish(skipped, cut)
+}
+
+impl Reader {
+    fn record(&mut self, kind: u8, body: &[u8], wanted: &dyn Fn(&str) -> bool) {
+        if kind == FMT {
+            if let Some((kind, declared)) = declaration(body, wanted) {
+                self.declared.entry(kind).or_insert(declared);
+            }
+            return;
+        }
+        let Some(declared) = self.declared.get(&kind) else { return };
+        if declared.name == "PARM" {
+            let name = declared.fields.iter().find(|f| f.0 == "Name");
+            let value = declared.fields.iter().find(|f| f.0 == "Value");
+            if let (Some(name), Some(value)) = (name, value) {
+                let value = number(value.1, body, value.2);
+                let name = text(body.get(name.2..name.2 + 16).unwrap_or_default());
+                self.out.parameters.insert(name, value);
+            }
+            return;
+        }
+        let instance = declared.instance.map_or(0, |(letter, at)| number(letter, body, at) as u16);
+        *self.counts.entry((kind, instance)).or_default() += 1;
+        let Some((letter, at, unit)) = declared.time.filter(|_| declared.wanted) else { return };
+        let topic = self
+            .topics
+            .entry((kind, instance))
+            .or_insert_with(|| Topic::new(declared.fields.iter().map(|f| f.0.clone())));
+        topic.time_s.push(number(letter, body, at) * unit);
+        for ((_, letter, offset), values) in declared.fields.iter().zip(&mut topic.values) {
+            values.push(number(*letter, body, *offset));
+        }
+    }
+
+    fn finish(mut self, skipped: usize, cut: usize) -> Topics {
+        let key = |declared: &BTreeMap<u8, Declared>, kind: u8, instance: u16| {
+            (declared.get(&kind).map(|d| d.name.clone()).unwrap_or_default(), instance)
+        };
+        for ((kind, instance), count) in self.counts {
+            *self.out.counts.entry(key(&self.declared, kind, instance)).or_default() += count;
+        }
+        for ((kind, instance), topic) in self.topics {
+            self.out.topics.entry(key(&self.declared, kind, instance)).or_insert(topic);
+        }
+        if skipped > 0 {
+            self.out.findings.push(Finding::warning(format!(
+                "{skipped} bytes of the file belong to no record and were skipped: it is damaged there"
+            )));
+        }
+        // The card's last block is padded, so that a cut record at the end is the rule.
+        if cut > 0 {
+            self.out.findings.push(Finding::warning(format!(
+                "the file ends in the middle of a record, {cut} bytes of which are left out"
+            )));
+        }
+        self.out
+    }
+}

@@ -1,0 +1,55 @@
+//! The four log formats, told apart by how they begin.
+
+use serde::Serialize;
+
+/// A log format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// The plain table.
+    Csv,
+    /// PX4 ULog.
+    Ulog,
+    /// ArduPilot DataFlash `.bin`.
+    Dataflash,
+    /// MAVLink telemetry log.
+    Tlog,
+}
+
+/// First bytes of a ULog file.
+pub(super) const ULOG_MAGIC: [u8; 7] = [0x55, 0x4C, 0x6F, 0x67, 0x01, 0x12, 0x35];
+/// First bytes of every DataFlash record.
+pub(super) const DATAFLASH_MAGIC: [u8; 2] = [0xA3, 0x95];
+/// Start markers of MAVLink 1 and 2, behind the eight bytes of the time.
+pub(super) const MAVLINK_MARKERS: [u8; 2] = [0xFE, 0xFD];
+
+impl Format {
+    /// The format of a file by its content; `None` if it is none of the four.
+    pub fn of(bytes: &[u8]) -> Option<Format> {
+        if bytes.starts_with(&ULOG_MAGIC) {
+            return Some(Format::Ulog);
+        }
+        if bytes.starts_with(&DATAFLASH_MAGIC) {
+            return Some(Format::Dataflash);
+        }
+        // A time before the year 2100 in microseconds has a zero first byte, which no text has.
+        if bytes.first() == Some(&0) && bytes.get(8).is_some_and(|b| MAVLINK_MARKERS.contains(b)) {
+            return Some(Format::Tlog);
+        }
+        let start = &bytes[..bytes.len().min(4096)];
+        let header = start.split(|b| *b == b'\n').next().unwrap_or_default();
+        let text =
+            !header.is_empty() && header.iter().all(|b| *b >= b' ' || *b == b'\t' || *b == b'\r');
+        (text && header.contains(&b',')).then_some(Format::Csv)
+    }
+
+    /// The format's name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Csv => "CSV table",
+            Format::Ulog => "PX4 ULog",
+            Format::Dataflash => "ArduPilot DataFlash",
+            Format::Tlog => "MAVLink telemetry log",
+        }
+    }
+}

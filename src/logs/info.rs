@@ -1,0 +1,154 @@
+//! What a log holds, how far it goes, what it is missing for which purpose.
+
+use serde::Serialize;
+
+use super::columns::COLUMNS;
+use super::finding::{Finding, Severity};
+use super::phases::{self, Kind, Phase};
+use super::{Channel, Format, Log};
+
+/// What `greylag logs info` says of a log.
+#[derive(Clone, Debug, Serialize)]
+pub struct Info {
+    /// `greylag.log-info/1`.
+    pub schema: &'static str,
+    /// The flight's name.
+    pub name: String,
+    /// The file's format.
+    pub format: Format,
+    /// Rows of the table.
+    pub rows: usize,
+    /// Rows that were dropped.
+    pub dropped_rows: usize,
+    /// Time of the first row, s.
+    pub from_s: f64,
+    /// Time of the last row, s.
+    pub to_s: f64,
+    /// Rows a second, by the median period.
+    pub rate_hz: f64,
+    /// Gaps that split the log: their starts with their lengths, s.
+    pub gaps: Vec<(f64, f64)>,
+    /// Time in flight, s.
+    pub flight_s: f64,
+    /// What the aircraft does when.
+    pub phases: Vec<Phase>,
+    /// What fills the table.
+    pub channels: Vec<Channel>,
+    /// What the log serves for.
+    pub purposes: Vec<Purpose>,
+    /// Topics of the file: name, instance, records.
+    pub topics: Vec<(String, u16, usize)>,
+    /// What its user should know.
+    pub findings: Vec<Finding>,
+}
+
+/// Something a log may serve for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Purpose {
+    /// What it is.
+    pub name: &'static str,
+    /// What the log lacks for it; nothing if it serves.
+    pub missing: Vec<String>,
+    /// What takes the place of what is absent.
+    pub instead: Vec<String>,
+}
+
+impl Info {
+    /// What there is to say of a log.
+    pub fn of(log: &Log) -> Info {
+        let samples = &log.flight.samples;
+        let times: Vec<f64> = samples.iter().map(|s| s.time_s).collect();
+        let period = super::topics::period_s(&times);
+        let split = phases::split_s(samples);
+        let gaps = times.windows(2).filter(|w| w[1] - w[0] > split).map(|w| (w[0], w[1] - w[0]));
+        let phases = phases::phases(samples);
+        let flown = phases.iter().filter(|p| p.kind == Kind::Flight).map(|p| p.to_s - p.from_s);
+        Info {
+            schema: "greylag.log-info/1",
+            name: log.flight.name.clone(),
+            format: log.format,
+            rows: samples.len(),
+            dropped_rows: log.dropped,
+            from_s: times.first().copied().unwrap_or(0.0),
+            to_s: times.last().copied().unwrap_or(0.0),
+            rate_hz: if period > 0.0 { 1.0 / period } else { 0.0 },
+            gaps: gaps.collect(),
+            flight_s: flown.fold(0.0, |sum, x| sum + x),
+            phases,
+            channels: log.channels.clone(),
+            purposes: purposes(log),
+            topics: log.topics.clone(),
+            findings: log.findings.clone(),
+        }
+    }
+
+    /// The worst of the findings.
+    pub fn severity(&self) -> Severity {
+        self.findings.iter().map(|f| f.severity).max().unwrap_or(Severity::Note)
+    }
+}
+
+/// Share of rows in which a column must hold a value to count as there.
+const PRESENT: f64 = 0.5;
+
+fn purposes(log: &Log) -> Vec<Purpose> {
+    let samples = &log.flight.samples;
+    let has = |column: &str| {
+        let get = COLUMNS.iter().find(|c| c.0 == column).map(|c| c.1);
+        let count = get.map_or(0, |get| samples.iter().filter(|s| get(s).is_finite()).count());
+        !samples.is_empty() && count as f64 >= PRESENT * samples.len() as f64
+    };
+    let lacking = |columns: &[&str]| -> Vec<String> {
+        columns.iter().filter(|c| !has(c)).map(|c| (*c).to_owned()).collect()
+    };
+    let mut actuators = Vec::new();
+    let mut instead = Vec::new();
+    for (command, position) in super::columns::EITHER {
+        match (has(command), has(position)) {
+            (false, false) => actuators.push(format!("{command} or {position}")),
+            (true, false) => instead.push(format!("{position} through the actuator model")),
+            _ => {}
+        }
+    }
+    let states =
+        lacking(&["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"]);
+    let join = |a: &[String], b: &[String]| [a, b].concat();
+    let incidence = lacking(&["alpha_rad", "beta_rad"]);
+    let velocity = lacking(&["vn_mps", "ve_mps", "vd_mps"]);
+    let forces = lacking(&["ax_mps2", "ay_mps2", "az_mps2"]);
+    let density = if has("air_density_kgpm3") {
+        Vec::new()
+    } else if has("altitude_m") {
+        vec!["air density of the standard atmosphere at the logged altitude".to_owned()]
+    } else {
+        vec!["air density of the standard atmosphere at sea level".to_owned()]
+    };
+    let rebuilt = if incidence.is_empty() || !velocity.is_empty() {
+        Vec::new()
+    } else {
+        vec!["alpha and beta from wind-corrected velocity, at a loss of power".to_owned()]
+    };
+    let no_incidence = if incidence.is_empty() || velocity.is_empty() {
+        Vec::new()
+    } else {
+        join(&incidence, &velocity)
+    };
+    vec![
+        Purpose {
+            name: "comparison in free run",
+            missing: [&states[..], &actuators, &no_incidence].concat(),
+            instead: [&instead[..], &rebuilt].concat(),
+        },
+        Purpose {
+            name: "moments l, m, n",
+            missing: [&states[..], &actuators].concat(),
+            instead: [&instead[..], &density].concat(),
+        },
+        Purpose {
+            name: "forces D, Y, L",
+            missing: [&states[..], &actuators, &forces].concat(),
+            instead: [&instead[..], &density].concat(),
+        },
+        Purpose { name: "alpha, beta", missing: no_incidence, instead: rebuilt },
+    ]
+}

@@ -1,0 +1,65 @@
+//! ArduPilot's DataFlash records as columns.
+//!
+//! Not mapped: V-tails, differential spoilers, several motors, and the wind of XKF2, which the log
+//! format has no column for.
+
+use super::rule::Rule;
+use super::servos;
+use crate::logs::topics::Topics;
+
+/// The record types that the rules use.
+pub const TOPICS: [&str; 11] =
+    ["ATT", "IMU", "ARSP", "AOA", "BARO", "XKF1", "NKF1", "POS", "RCOU", "AETR", "CTUN"];
+
+/// AETR's full deflection, centidegrees.
+const FULL: f64 = 4500.0;
+
+/// The rules, preferred ones first.
+pub fn rules(topics: &Topics) -> Vec<Rule> {
+    let degree = 1_f64.to_radians();
+    let mut out = Vec::new();
+    for (column, topic, field, gain) in [
+        ("roll_rad", "ATT", "Roll", degree),
+        ("pitch_rad", "ATT", "Pitch", degree),
+        ("yaw_rad", "ATT", "Yaw", degree),
+        ("p_radps", "IMU", "GyrX", 1.0),
+        ("q_radps", "IMU", "GyrY", 1.0),
+        ("r_radps", "IMU", "GyrZ", 1.0),
+        ("ax_mps2", "IMU", "AccX", 1.0),
+        ("ay_mps2", "IMU", "AccY", 1.0),
+        ("az_mps2", "IMU", "AccZ", 1.0),
+        ("vn_mps", "XKF1", "VN", 1.0),
+        ("ve_mps", "XKF1", "VE", 1.0),
+        ("vd_mps", "XKF1", "VD", 1.0),
+        ("vn_mps", "NKF1", "VN", 1.0),
+        ("ve_mps", "NKF1", "VE", 1.0),
+        ("vd_mps", "NKF1", "VD", 1.0),
+        ("altitude_m", "POS", "Alt", 1.0),
+        ("roll_target_rad", "ATT", "DesRoll", degree),
+        ("pitch_target_rad", "ATT", "DesPitch", degree),
+    ] {
+        out.push(Rule::linear(column, topic, field, gain));
+    }
+    let note = "airspeed is ARSP's equivalent airspeed, made true by the air's density";
+    out.push(Rule::linear("airspeed_mps", "ARSP", "Airspeed", 1.0).equivalent().noting(note));
+    let note = "airspeed is CTUN's equivalent airspeed (sensor or estimate), made true by the air's density";
+    out.push(Rule::linear("airspeed_mps", "CTUN", "As", 1.0).equivalent().noting(note));
+    for (column, field) in [("alpha_rad", "AOA"), ("beta_rad", "SSA")] {
+        let note = "alpha and beta are ArduPilot's estimates from velocity and wind, not vanes";
+        out.push(Rule::linear(column, "AOA", field, degree).noting(note));
+    }
+    out.push(Rule::density("BARO", ("Press", 1.0), ("Temp", 1.0)).noting(
+        "air density is from BARO's pressure with its sensor's temperature, which runs warm",
+    ));
+    // Positive elevator is nose up there.
+    for (column, field, gain) in [
+        ("aileron_cmd", "Ail", 1.0 / FULL),
+        ("elevator_cmd", "Elev", -1.0 / FULL),
+        ("rudder_cmd", "Rudd", 1.0 / FULL),
+        ("throttle_cmd", "Thr", 0.01),
+    ] {
+        out.push(Rule::linear(column, "AETR", field, gain));
+    }
+    out.extend(servos::rules(topics, "RCOU", |n| format!("C{n}")));
+    out
+}

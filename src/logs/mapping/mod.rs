@@ -1,0 +1,203 @@
+//! Which topic of a log becomes which column.
+//!
+//! Each binary format has rules in order of preference; a mapping file overrides them by column:
+//!
+//! ```toml
+//! schema = 1
+//! [columns]
+//! airspeed_mps = { from = "VFR_HUD.airspeed", scale = 0.514444 }  # logged in knots
+//! alpha_rad = { from = "AOA_SSA.AOA", scale = 0.0174533, offset = -0.02, instance = "1/200" }
+//! roll_rad = { from = "csv.roll_deg", scale = 0.0174533 }         # another column of a CSV
+//! ```
+//!
+//! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash)
+//! or system/component (telemetry log).
+
+mod ardupilot;
+mod telemetry;
+mod px4;
+pub(super) mod rule;
+mod servos;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::columns::index;
+use super::format::Format;
+use super::topics::Topics;
+use rule::Rule;
+
+/// The topic name by which a mapping means the columns of a CSV file.
+pub const TEXT: &str = "csv";
+
+/// Why a mapping file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum MappingError {
+    /// The file cannot be read.
+    #[error("cannot read mapping {}: {source}: check the path", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The text is no mapping.
+    #[error("mapping {}: {text}", path.display())]
+    Text {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        text: String,
+    },
+}
+
+/// Where a column comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// The topic, message or record type.
+    pub topic: String,
+    /// Its field.
+    pub field: String,
+    /// Factor.
+    pub scale: f64,
+    /// Summand, in the column's unit.
+    pub offset: f64,
+    /// The topic's instance; the first one if none is named.
+    pub instance: Option<u16>,
+}
+
+/// A user's mapping, by column.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mapping(BTreeMap<String, Entry>);
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    schema: u32,
+    columns: BTreeMap<String, WrittenEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenEntry {
+    from: String,
+    #[serde(default = "one")]
+    scale: f64,
+    #[serde(default)]
+    offset: f64,
+    instance: Option<Instance>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Instance {
+    Number(u16),
+    Source(String),
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Mapping {
+    /// Reads a mapping file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is no mapping.
+    pub fn load(path: &Path) -> Result<Mapping, MappingError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| MappingError::File { path: path.to_owned(), source })?;
+        Mapping::parse(&text, path)
+    }
+
+    /// Reads a mapping from text; `path` is what errors call it.
+    ///
+    /// # Errors
+    /// The text is no mapping.
+    pub fn parse(text: &str, path: &Path) -> Result<Mapping, MappingError> {
+        let wrong = |text: String| MappingError::Text { path: path.to_owned(), text };
+        let written: Written = toml::from_str(text).map_err(|e| wrong(e.to_string()))?;
+        if written.schema != 1 {
+            return Err(wrong(format!("schema {} is not known; write schema = 1", written.schema)));
+        }
+        let mut entries = BTreeMap::new();
+        for (column, e) in written.columns {
+            if index(&column).is_none() {
+                return Err(wrong(format!(
+                    "`{column}` is no column of the log format; use one of its names, such as airspeed_mps"
+                )));
+            }
+            let Some((topic, field)) = e.from.split_once('.') else {
+                return Err(wrong(format!(
+                    "column `{column}`: from = \"{}\" is not \"topic.field\"",
+                    e.from
+                )));
+            };
+            if !e.scale.is_finite() || !e.offset.is_finite() {
+                return Err(wrong(format!("column `{column}`: scale and offset must be finite")));
+            }
+            let instance = match e.instance {
+                None => None,
+                Some(Instance::Number(n)) => Some(n),
+                Some(Instance::Source(text)) => Some(source(&text).ok_or_else(|| {
+                    wrong(format!(
+                        "column `{column}`: instance \"{text}\" is not \"system/component\""
+                    ))
+                })?),
+            };
+            let (topic, field) = (topic.to_owned(), field.to_owned());
+            entries
+                .insert(column, Entry { topic, field, scale: e.scale, offset: e.offset, instance });
+        }
+        Ok(Mapping(entries))
+    }
+
+    /// The entry of a column.
+    pub fn get(&self, column: &str) -> Option<&Entry> {
+        self.0.get(column)
+    }
+
+    /// The entries of a topic, with their columns.
+    pub fn of_topic<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = (&'a str, &'a Entry)> {
+        self.0.iter().filter(move |(_, e)| e.topic == topic).map(|(column, e)| (column.as_str(), e))
+    }
+
+    /// Whether a topic is used.
+    pub(super) fn uses(&self, topic: &str) -> bool {
+        self.0.values().any(|e| e.topic == topic)
+    }
+
+    /// The mapping's rules followed by the format's own for the other columns.
+    pub(super) fn rules(&self, format: Format, topics: &Topics) -> Vec<Rule> {
+        let own = self.0.iter().map(|(column, e)| {
+            Rule::linear(column, &e.topic, &e.field, e.scale).plus(e.offset).of(e.instance)
+        });
+        let others = match format {
+            Format::Csv => Vec::new(),
+            Format::Ulog => px4::rules(topics),
+            Format::Dataflash => ardupilot::rules(topics),
+            Format::Tlog => telemetry::rules(topics),
+        };
+        let free = others.into_iter().filter_map(|rule| rule.without(|c| self.0.contains_key(c)));
+        own.chain(free).collect()
+    }
+
+    /// Whether a topic of a format is needed for any rule.
+    pub(super) fn wants(&self, format: Format, topic: &str) -> bool {
+        let own: &[&str] = match format {
+            Format::Csv => &[],
+            Format::Ulog => &px4::TOPICS,
+            Format::Dataflash => &ardupilot::TOPICS,
+            Format::Tlog => &telemetry::TOPICS,
+        };
+        own.contains(&topic) || self.uses(topic)
+    }
+}
+
+/// `system/component` as an instance.
+fn source(text: &str) -> Option<u16> {
+    let (system, component) = text.split_once('/')?;
+    Some(u16::from_be_bytes([system.trim().parse().ok()?, component.trim().parse().ok()?]))
+}

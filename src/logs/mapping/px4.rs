@@ -1,0 +1,122 @@
+//! PX4's topics as columns.
+//!
+//! Signs: pitch torque is positive nose up in PX4, elevator positive nose down here. Not mapped:
+//! `actuator_outputs` (pulses whose meaning lies in parameters of the mixer), several motors
+//! (the first counts), and `wind`, which the log format has no column for.
+
+use super::rule::{Rule, Shape, Term};
+use crate::logs::topics::Topics;
+
+/// The topics that the rules use.
+pub const TOPICS: [&str; 19] = [
+    "vehicle_attitude",
+    "vehicle_angular_velocity",
+    "vehicle_acceleration",
+    "sensor_combined",
+    "airspeed_validated",
+    "airspeed",
+    "airflow_aoa",
+    "airflow_slip",
+    "vehicle_air_data",
+    "vehicle_local_position",
+    "vehicle_global_position",
+    "vtol_vehicle_status",
+    "actuator_servos",
+    "actuator_motors",
+    "vehicle_torque_setpoint",
+    "vehicle_thrust_setpoint",
+    "actuator_controls_0",
+    "actuator_controls_1",
+    "vehicle_attitude_setpoint",
+];
+
+/// The rules, preferred ones first.
+pub fn rules(topics: &Topics) -> Vec<Rule> {
+    let mut out = vec![Rule::quaternion("vehicle_attitude", ["q[0]", "q[1]", "q[2]", "q[3]"])];
+    for (i, (rate, force)) in
+        [("p_radps", "ax_mps2"), ("q_radps", "ay_mps2"), ("r_radps", "az_mps2")].iter().enumerate()
+    {
+        out.push(Rule::linear(rate, "vehicle_angular_velocity", &format!("xyz[{i}]"), 1.0));
+        out.push(
+            Rule::linear(rate, "sensor_combined", &format!("gyro_rad[{i}]"), 1.0)
+                .noting("rates are sensor_combined's, gyro biases not removed"),
+        );
+        out.push(Rule::linear(force, "vehicle_acceleration", &format!("xyz[{i}]"), 1.0));
+        out.push(
+            Rule::linear(force, "sensor_combined", &format!("accelerometer_m_s2[{i}]"), 1.0)
+                .noting("specific force is sensor_combined's, at the sensor, biases not removed"),
+        );
+    }
+    out.push(Rule::linear("airspeed_mps", "airspeed_validated", "true_airspeed_m_s", 1.0));
+    out.push(
+        Rule::linear("airspeed_mps", "airspeed", "true_airspeed_m_s", 1.0)
+            .noting("airspeed is the sensor's own true airspeed, not the validated one"),
+    );
+    out.push(Rule::linear("alpha_rad", "airflow_aoa", "aoa_rad", 1.0));
+    out.push(Rule::linear("beta_rad", "airflow_slip", "slip_rad", 1.0));
+    for (column, field) in [("vn_mps", "vx"), ("ve_mps", "vy"), ("vd_mps", "vz")] {
+        out.push(Rule::linear(column, "vehicle_local_position", field, 1.0));
+    }
+    out.push(Rule::linear("altitude_m", "vehicle_global_position", "alt", 1.0));
+    out.push(
+        Rule::linear("altitude_m", "vehicle_air_data", "baro_alt_meter", 1.0)
+            .noting("altitude is barometric"),
+    );
+    out.push(Rule::linear("air_density_kgpm3", "vehicle_air_data", "rho", 1.0));
+    out.push(Rule::linear("roll_target_rad", "vehicle_attitude_setpoint", "roll_body", 1.0));
+    out.push(Rule::linear("pitch_target_rad", "vehicle_attitude_setpoint", "pitch_body", 1.0));
+    out.extend(commands(topics));
+    out
+}
+
+fn commands(topics: &Topics) -> Vec<Rule> {
+    let mut out = allocated(topics);
+    out.push(Rule::linear("throttle_cmd", "actuator_motors", "control[0]", 1.0));
+    // The three torques, then thrust, of the controller that flies the wings.
+    let vtol = topics.first("vtol_vehicle_status").is_some();
+    let fixed_wing = if vtol { Some(1) } else { None };
+    for (column, field, gain) in [
+        ("aileron_cmd", "xyz[0]", 1.0),
+        ("elevator_cmd", "xyz[1]", -1.0),
+        ("rudder_cmd", "xyz[2]", 1.0),
+    ] {
+        out.push(Rule::linear(column, "vehicle_torque_setpoint", field, gain).of(fixed_wing));
+    }
+    out.push(Rule::linear("throttle_cmd", "vehicle_thrust_setpoint", "xyz[0]", 1.0).of(fixed_wing));
+    let group = if vtol { "actuator_controls_1" } else { "actuator_controls_0" };
+    for (column, i, gain) in [
+        ("aileron_cmd", 0, 1.0),
+        ("elevator_cmd", 1, -1.0),
+        ("rudder_cmd", 2, 1.0),
+        ("throttle_cmd", 3, 1.0),
+    ] {
+        let rule = Rule::linear(column, group, &format!("control[{i}]"), gain);
+        out.push(rule.noting(format!("commands are {group}'s, before the mixer")));
+    }
+    out
+}
+
+/// Commands from the servos' outputs by the torque that each is said to make (CA_SV_CSn_TRQ_*).
+fn allocated(topics: &Topics) -> Vec<Rule> {
+    let mut out = Vec::new();
+    for (column, axis, sign) in
+        [("aileron_cmd", "R", 1.0), ("elevator_cmd", "P", -1.0), ("rudder_cmd", "Y", 1.0)]
+    {
+        let torque = |n: usize| {
+            let t = topics.parameters.get(&format!("CA_SV_CS{n}_TRQ_{axis}")).copied();
+            t.filter(|t| t.is_finite() && *t != 0.0).map(|t| (n, t))
+        };
+        let torques: Vec<(usize, f64)> = (0..8).filter_map(torque).collect();
+        let sum: f64 = torques.iter().map(|(_, t)| t.abs()).sum();
+        if sum > 0.0 {
+            let term = |(n, t): &(usize, f64)| Term {
+                field: format!("control[{n}]"),
+                gain: sign * t / sum,
+                shape: Shape::Linear,
+            };
+            let rule = Rule::sum(column, "actuator_servos", torques.iter().map(term).collect());
+            out.push(rule.noting("commands are actuator_servos' by CA_SV_CSn_TRQ_R, _P, _Y"));
+        }
+    }
+    out
+}

@@ -1,0 +1,62 @@
+//! ArduPilot's servo outputs undone into commands by the SERVOn parameters.
+
+use super::rule::{Rule, Shape, Term};
+use crate::logs::topics::Topics;
+
+/// Channels of RCOU.
+const CHANNELS: usize = 16;
+/// SERVOn_FUNCTION numbers.
+const AILERON: f64 = 4.0;
+const ELEVATOR: f64 = 19.0;
+const RUDDER: f64 = 21.0;
+const THROTTLE: f64 = 70.0;
+const ELEVON_LEFT: f64 = 77.0;
+const ELEVON_RIGHT: f64 = 78.0;
+
+/// The commands behind the pulses of `topic`, whose fields are named `field(n)`, n from 1.
+///
+/// Positive elevator is nose up in ArduPilot, nose down in the log format. Elevons: left =
+/// g (elevator − aileron), right = g (elevator + aileron), g = MIXING_GAIN (0.5).
+pub fn rules(topics: &Topics, topic: &str, field: impl Fn(usize) -> String) -> Vec<Rule> {
+    let parameter =
+        |n: usize, what: &str| topics.parameters.get(&format!("SERVO{n}_{what}")).copied();
+    let channels =
+        |function: f64| (1..=CHANNELS).filter(move |n| parameter(*n, "FUNCTION") == Some(function));
+    let sign = |n: usize| if parameter(n, "REVERSED") == Some(1.0) { -1.0 } else { 1.0 };
+    let surface = |n: usize, gain: f64| {
+        let (min, max) =
+            (parameter(n, "MIN").unwrap_or(1100.0), parameter(n, "MAX").unwrap_or(1900.0));
+        let trim = parameter(n, "TRIM").unwrap_or(1500.0);
+        Term { field: field(n), gain: gain * sign(n), shape: Shape::Surface { min, trim, max } }
+    };
+    let note = |what: &str| {
+        format!("{what} taken from servo pulses with SERVOn_MIN, _TRIM, _MAX, _REVERSED")
+    };
+    let mut out = Vec::new();
+    for (column, function, gain) in [
+        ("aileron_cmd", AILERON, 1.0),
+        ("elevator_cmd", ELEVATOR, -1.0),
+        ("rudder_cmd", RUDDER, 1.0),
+    ] {
+        // Two servos of one function move alike: the first tells.
+        if let Some(n) = channels(function).next() {
+            out.push(Rule::sum(column, topic, vec![surface(n, gain)]).noting(note(column)));
+        }
+    }
+    let half =
+        0.5 / topics.parameters.get("MIXING_GAIN").copied().filter(|g| *g > 0.0).unwrap_or(0.5);
+    if let (Some(left), Some(right)) = (channels(ELEVON_LEFT).next(), channels(ELEVON_RIGHT).next())
+    {
+        let aileron = vec![surface(right, half), surface(left, -half)];
+        let elevator = vec![surface(right, -half), surface(left, -half)];
+        out.push(Rule::sum("aileron_cmd", topic, aileron).noting(note("elevons: aileron_cmd")));
+        out.push(Rule::sum("elevator_cmd", topic, elevator).noting(note("elevons: elevator_cmd")));
+    }
+    if let Some(n) = channels(THROTTLE).next() {
+        let (a, b) = (parameter(n, "MIN").unwrap_or(1100.0), parameter(n, "MAX").unwrap_or(1900.0));
+        let term = Term { field: field(n), gain: sign(n), shape: Shape::Range { min: a, max: b } };
+        let reversed = if sign(n) < 0.0 { 1.0 } else { 0.0 };
+        out.push(Rule::sum("throttle_cmd", topic, vec![term]).plus(reversed));
+    }
+    out
+}

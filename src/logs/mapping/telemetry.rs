@@ -1,0 +1,136 @@
+//! A telemetry log's messages as columns.
+//!
+//! States come from the system and component that sends most attitudes, commands from any
+//! component of that system. VFR_HUD is true airspeed from a simulator (profile `sitl`), equivalent
+//! airspeed from ArduPilot or PX4.
+
+use super::rule::Rule;
+use super::servos;
+use crate::logs::topics::{Topic, Topics};
+
+/// The messages that the rules use.
+pub const TOPICS: [&str; 15] = [
+    "HEARTBEAT",
+    "ATTITUDE_QUATERNION",
+    "ATTITUDE",
+    "HIGHRES_IMU",
+    "RAW_IMU",
+    "SCALED_IMU",
+    "SCALED_PRESSURE",
+    "VFR_HUD",
+    "AOA_SSA",
+    "ACTUATOR_OUTPUT_STATUS",
+    "HIL_ACTUATOR_CONTROLS",
+    "SERVO_OUTPUT_RAW",
+    "GLOBAL_POSITION_INT",
+    "LOCAL_POSITION_NED",
+    "WIND_COV",
+];
+
+/// MAV_AUTOPILOT numbers of stacks whose VFR_HUD is not true airspeed.
+const EQUIVALENT: [f64; 2] = [3.0, 12.0];
+/// Milli-g, m/s².
+const MILLI_G: f64 = 9.80665e-3;
+/// Deflection at normalised 1 of the shim's aircraft, rad.
+const DEFLECTION: f64 = 0.5235;
+
+/// The rules, preferred ones first.
+pub fn rules(topics: &Topics) -> Vec<Rule> {
+    let Some(vehicle) = vehicle(topics) else { return Vec::new() };
+    let system = vehicle.to_be_bytes()[0];
+    let mut out = states();
+    out.push(airspeed(topics, system));
+    for rule in &mut out {
+        // Another component of the same system may send what the first does not.
+        let has = |i: u16| topics.topics.contains_key(&(rule.topic.clone(), i));
+        let other =
+            topics.instances(&rule.topic).map(|(i, _)| i).find(|i| i.to_be_bytes()[0] == system);
+        rule.instance = if has(vehicle) { Some(vehicle) } else { other.or(Some(vehicle)) };
+    }
+    let mut commands = Vec::new();
+    for (column, field) in
+        [("aileron_cmd", "controls0"), ("elevator_cmd", "controls1"), ("throttle_cmd", "controls2")]
+    {
+        commands.push(
+            Rule::linear(column, "HIL_ACTUATOR_CONTROLS", field, 1.0)
+                .noting("commands are HIL_ACTUATOR_CONTROLS in the order of the sitl profile"),
+        );
+    }
+    commands.extend(servos::rules(topics, "SERVO_OUTPUT_RAW", |n| format!("servo{n}_raw")));
+    for rule in &mut commands {
+        let of_system = |i: &u16| i.to_be_bytes()[0] == system;
+        let found = topics.instances(&rule.topic).max_by_key(|(_, t)| t.time_s.len());
+        rule.instance = found.map(|(i, _)| i).filter(of_system);
+    }
+    out.extend(commands);
+    out
+}
+
+/// The instance that sends most attitudes.
+fn vehicle(topics: &Topics) -> Option<u16> {
+    let both = topics.instances("ATTITUDE_QUATERNION").chain(topics.instances("ATTITUDE"));
+    both.max_by_key(|(_, t)| t.time_s.len()).map(|(i, _)| i)
+}
+
+fn airspeed(topics: &Topics, system: u8) -> Rule {
+    let of_system = |(i, topic): (u16, &Topic)| {
+        (i.to_be_bytes()[0] == system).then(|| topic.field("autopilot")?.last().copied())?
+    };
+    let autopilot = topics.instances("HEARTBEAT").filter_map(of_system);
+    let rule = Rule::linear("airspeed_mps", "VFR_HUD", "airspeed", 1.0);
+    if autopilot.into_iter().any(|a| EQUIVALENT.contains(&a)) {
+        rule.equivalent().noting(
+            "airspeed is VFR_HUD's of a real autopilot: equivalent airspeed, made true by the air's density",
+        )
+    } else {
+        rule.noting("airspeed is VFR_HUD's, taken as true airspeed (sitl profile)")
+    }
+}
+
+fn states() -> Vec<Rule> {
+    let degree = 1_f64.to_radians();
+    let mut out = vec![Rule::quaternion("ATTITUDE_QUATERNION", ["q1", "q2", "q3", "q4"])];
+    for (column, topic, field, gain) in [
+        ("roll_rad", "ATTITUDE", "roll", 1.0),
+        ("pitch_rad", "ATTITUDE", "pitch", 1.0),
+        ("yaw_rad", "ATTITUDE", "yaw", 1.0),
+        ("p_radps", "ATTITUDE_QUATERNION", "rollspeed", 1.0),
+        ("q_radps", "ATTITUDE_QUATERNION", "pitchspeed", 1.0),
+        ("r_radps", "ATTITUDE_QUATERNION", "yawspeed", 1.0),
+        ("p_radps", "ATTITUDE", "rollspeed", 1.0),
+        ("q_radps", "ATTITUDE", "pitchspeed", 1.0),
+        ("r_radps", "ATTITUDE", "yawspeed", 1.0),
+        ("ax_mps2", "HIGHRES_IMU", "xacc", 1.0),
+        ("ay_mps2", "HIGHRES_IMU", "yacc", 1.0),
+        ("az_mps2", "HIGHRES_IMU", "zacc", 1.0),
+        ("ax_mps2", "RAW_IMU", "xacc", MILLI_G),
+        ("ay_mps2", "RAW_IMU", "yacc", MILLI_G),
+        ("az_mps2", "RAW_IMU", "zacc", MILLI_G),
+        ("ax_mps2", "SCALED_IMU", "xacc", MILLI_G),
+        ("ay_mps2", "SCALED_IMU", "yacc", MILLI_G),
+        ("az_mps2", "SCALED_IMU", "zacc", MILLI_G),
+        ("alpha_rad", "AOA_SSA", "AOA", degree),
+        ("beta_rad", "AOA_SSA", "SSA", degree),
+        ("vn_mps", "LOCAL_POSITION_NED", "vx", 1.0),
+        ("ve_mps", "LOCAL_POSITION_NED", "vy", 1.0),
+        ("vd_mps", "LOCAL_POSITION_NED", "vz", 1.0),
+        ("vn_mps", "GLOBAL_POSITION_INT", "vx", 0.01),
+        ("ve_mps", "GLOBAL_POSITION_INT", "vy", 0.01),
+        ("vd_mps", "GLOBAL_POSITION_INT", "vz", 0.01),
+        ("altitude_m", "VFR_HUD", "alt", 1.0),
+        ("altitude_m", "GLOBAL_POSITION_INT", "alt", 0.001),
+    ] {
+        out.push(Rule::linear(column, topic, field, gain));
+    }
+    out.push(Rule::density("HIGHRES_IMU", ("abs_pressure", 100.0), ("temperature", 1.0)));
+    out.push(Rule::density("SCALED_PRESSURE", ("press_abs", 100.0), ("temperature", 0.01)));
+    let note = "deflections are ACTUATOR_OUTPUT_STATUS in the order of the sitl profile, 0.5235 rad at 1; another aircraft needs a mapping";
+    for (column, field, gain) in [
+        ("aileron_rad", "actuator0", DEFLECTION),
+        ("elevator_rad", "actuator1", DEFLECTION),
+        ("throttle", "actuator2", 1.0),
+    ] {
+        out.push(Rule::linear(column, "ACTUATOR_OUTPUT_STATUS", field, gain).noting(note));
+    }
+    out
+}

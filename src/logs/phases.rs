@@ -1,0 +1,78 @@
+//! Phases of a log: on the ground, in flight, split at gaps.
+
+use serde::Serialize;
+
+use super::Sample;
+
+/// Airspeed above which an aircraft is taken to fly, m/s.
+pub const FLYING_MPS: f64 = 7.0;
+/// How long it must stay above, s.
+pub const SUSTAINED_S: f64 = 2.0;
+/// A gap that splits the log, s, unless the log is slower than that.
+const GAP_S: f64 = 0.1;
+
+/// What an aircraft does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// It stands or rolls.
+    Ground,
+    /// It flies.
+    Flight,
+}
+
+/// A stretch of a log without gaps in which the aircraft does one thing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Phase {
+    /// What it does.
+    pub kind: Kind,
+    /// Time of the first row, s.
+    pub from_s: f64,
+    /// Time of the last row, s.
+    pub to_s: f64,
+    /// Rows in it.
+    pub rows: usize,
+}
+
+/// The time between rows above which a log is split, s.
+pub fn split_s(rows: &[Sample]) -> f64 {
+    let times: Vec<f64> = rows.iter().map(|s| s.time_s).collect();
+    GAP_S.max(3.0 * super::topics::period_s(&times))
+}
+
+/// The phases of a log in order.
+pub fn phases(rows: &[Sample]) -> Vec<Phase> {
+    let split = split_s(rows);
+    let flying = |s: &Sample| if s.airspeed_mps > FLYING_MPS { Kind::Flight } else { Kind::Ground };
+    let mut raw: Vec<Phase> = Vec::new();
+    for row in rows.iter().filter(|s| s.time_s.is_finite() && s.airspeed_mps.is_finite()) {
+        let kind = flying(row);
+        match raw.last_mut() {
+            Some(p) if row.time_s - p.to_s <= split && p.kind == kind => {
+                p.to_s = row.time_s;
+                p.rows += 1;
+            }
+            _ => raw.push(Phase { kind, from_s: row.time_s, to_s: row.time_s, rows: 1 }),
+        }
+    }
+    // What is too short takes the kind of what it touches.
+    let mut out: Vec<Phase> = Vec::new();
+    for mut phase in raw {
+        let short = phase.to_s - phase.from_s < SUSTAINED_S;
+        match out.last_mut() {
+            Some(last)
+                if phase.from_s - last.to_s <= split && (short || last.kind == phase.kind) =>
+            {
+                last.to_s = phase.to_s;
+                last.rows += phase.rows;
+            }
+            _ => {
+                if short {
+                    phase.kind = Kind::Ground;
+                }
+                out.push(phase);
+            }
+        }
+    }
+    out
+}

@@ -1,0 +1,302 @@
+//! Channels at their own rates put onto one table.
+//!
+//! The table's times are those of the faster of attitude and rates. Continuous channels are
+//! interpolated linearly, angles unwrapped, quaternions before they become angles; commands hold.
+//! Nothing is carried across more than 0.1 s, or three sample periods of a slower channel. Gaps in
+//! the table's own times stay gaps.
+
+use std::f64::consts::{PI, TAU};
+
+use super::Sample;
+use super::columns::{COLUMNS, EITHER, NEEDED, index, is_held, is_wrapped};
+use super::load::Channel;
+use super::mapping::rule::{Fill, Rule};
+use super::topics::{Topics, period_s};
+use crate::physics::atmosphere::{Atmosphere, Density};
+
+/// The longest time that a fast channel is carried over, s.
+const GAP_S: f64 = 0.1;
+/// The same for a slow one, in its sample periods.
+const GAP_PERIODS: f64 = 3.0;
+/// Two times this close are the same, s: logs count microseconds or milliseconds.
+const SAME_S: f64 = 1e-6;
+/// Share of finite values that makes a channel usable before others of its column.
+const GOOD_SHARE: f64 = 0.5;
+/// A preferred channel slower than this, Hz, yields to one five times as fast.
+const SLOW_HZ: f64 = 10.0;
+/// Density of the standard atmosphere at sea level, kg/m³.
+const SEA_LEVEL: f64 = 1.225;
+
+/// The standard atmosphere; gravity plays no part here.
+const STANDARD: Atmosphere = Atmosphere { density: Density::Standard, gravity: 9.80665 };
+
+/// A rule with its data.
+struct Track {
+    rule: Rule,
+    origin: String,
+    times: Vec<f64>,
+    series: Vec<Vec<f64>>,
+    finite_share: f64,
+    rate_hz: f64,
+}
+
+impl Track {
+    fn limit_s(&self) -> f64 {
+        if self.rate_hz > 0.0 { GAP_S.max(GAP_PERIODS / self.rate_hz) } else { GAP_S }
+    }
+
+    fn channel(&self) -> Channel {
+        let gap = self.times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        Channel {
+            columns: self.rule.columns().into_iter().map(str::to_owned).collect(),
+            origin: self.origin.clone(),
+            samples: self.times.len(),
+            rate_hz: self.rate_hz,
+            largest_gap_s: gap,
+        }
+    }
+}
+
+/// The table before any row is judged.
+pub(super) struct Table {
+    pub rows: Vec<Sample>,
+    pub channels: Vec<Channel>,
+    pub notes: Vec<String>,
+    /// The needed columns that nothing fills.
+    pub missing: Vec<Missing>,
+}
+
+/// A needed column that nothing fills.
+pub(super) struct Missing {
+    pub column: &'static str,
+    pub or: Option<&'static str>,
+    /// What the rules looked for.
+    pub looked_for: Vec<String>,
+}
+
+/// Puts what the rules find onto one table.
+pub(super) fn build(topics: &Topics, rules: &[Rule]) -> Table {
+    let tracks = choose(topics, rules);
+    let filled = |column: &str| tracks.iter().any(|t| t.rule.columns().contains(&column));
+    // The time comes with any channel.
+    let missing = |column: &'static str, or: Option<&'static str>| {
+        let of_column = rules.iter().filter(|r| r.columns().contains(&column));
+        Missing { column, or, looked_for: of_column.map(Rule::origin).collect() }
+    };
+    let alone = NEEDED[1..].iter().filter(|c| !filled(c)).map(|c| missing(c, None));
+    let either = EITHER.iter().filter(|(c, p)| !filled(c) && !filled(p));
+    let missing: Vec<Missing> = alone.chain(either.map(|(c, p)| missing(c, Some(p)))).collect();
+    let of = |column: &str| tracks.iter().find(|t| t.rule.columns().contains(&column));
+    let base = [of("roll_rad"), of("p_radps")].into_iter().flatten().max_by_key(|t| t.times.len());
+    let base = base.map(|t| t.times.clone()).unwrap_or_default();
+    let mut rows: Vec<Sample> =
+        base.iter().map(|t| Sample { time_s: *t, ..Sample::default() }).collect();
+    tracks.iter().for_each(|track| fill(&mut rows, track));
+    let mut notes: Vec<String> = Vec::new();
+    for note in tracks.iter().filter_map(|t| t.rule.note.as_ref()) {
+        if !notes.contains(note) {
+            notes.push(note.clone());
+        }
+    }
+    if of("airspeed_mps").is_some_and(|t| t.rule.equivalent) {
+        notes.push(make_true(&mut rows));
+    }
+    if missing.is_empty() {
+        cut_ends(&mut rows, &mut notes);
+    }
+    Table { rows, channels: tracks.iter().map(Track::channel).collect(), notes, missing }
+}
+
+/// For each column the best rule that has data.
+fn choose(topics: &Topics, rules: &[Rule]) -> Vec<Track> {
+    let mut chosen: Vec<Track> = Vec::new();
+    for rule in rules {
+        let Some(track) = track(topics, rule) else { continue };
+        let same = |t: &&mut Track| t.rule.columns()[0] == rule.columns()[0];
+        let filled = |t: &Track| t.rule.columns().iter().any(|c| rule.columns().contains(c));
+        let taken = chosen.iter().any(filled);
+        match chosen.iter_mut().find(same) {
+            // An attitude from angles gives way whole, and never mixes with one from a quaternion.
+            None if taken => {}
+            None => chosen.push(track),
+            Some(old) => {
+                let better = old.finite_share < GOOD_SHARE && track.finite_share >= GOOD_SHARE;
+                let much_faster = old.rate_hz < SLOW_HZ
+                    && track.rate_hz > 5.0 * old.rate_hz
+                    && track.finite_share >= GOOD_SHARE;
+                if better || much_faster {
+                    *old = track;
+                }
+            }
+        }
+    }
+    chosen
+}
+
+/// The data of a rule: finite values at increasing times.
+fn track(topics: &Topics, rule: &Rule) -> Option<Track> {
+    let instance = match rule.instance {
+        Some(i) => topics.topics.get(&(rule.topic.clone(), i)).map(|t| (i, t)),
+        None => topics.instances(&rule.topic).next(),
+    };
+    let (instance, topic) = instance?;
+    let all = rule.series(topic)?;
+    let mut times = Vec::with_capacity(topic.time_s.len());
+    let mut series = vec![Vec::with_capacity(topic.time_s.len()); all.len()];
+    for (i, t) in topic.time_s.iter().enumerate() {
+        let increasing = times.last().is_none_or(|last| t > last);
+        if t.is_finite() && increasing && all.iter().all(|s| s[i].is_finite()) {
+            times.push(*t);
+            series.iter_mut().zip(&all).for_each(|(to, from)| to.push(from[i]));
+        }
+    }
+    if times.is_empty() {
+        return None;
+    }
+    let finite_share = times.len() as f64 / topic.time_s.len() as f64;
+    let origin = match instance {
+        0 => rule.origin(),
+        i => format!("{} [{i}]", rule.origin()),
+    };
+    let period = period_s(&times);
+    let rate_hz = if period > 0.0 { 1.0 / period } else { 0.0 };
+    Some(Track { rule: rule.clone(), origin, times, series, finite_share, rate_hz })
+}
+
+fn fill(rows: &mut [Sample], track: &Track) {
+    let limit = track.limit_s();
+    match &track.rule.fill {
+        Fill::Quaternion(_) => fill_attitude(rows, track, limit),
+        Fill::Sum { .. } | Fill::Density { .. } => {
+            let column = track.rule.columns()[0];
+            let Some(i) = index(column) else { return };
+            let place = COLUMNS[i].2;
+            let mut series = track.series[0].clone();
+            let wraps = is_wrapped(column) && is_angle(&series, column);
+            if wraps {
+                unwrap(&mut series);
+            }
+            for row in rows.iter_mut() {
+                let at = At::new(row.time_s, &track.times);
+                let value = match is_held(column) {
+                    true => at.held(&series, &track.times, limit),
+                    false => at.between(&series, &track.times, limit),
+                };
+                *place(row) = if wraps { wrap(value) } else { value };
+            }
+        }
+    }
+}
+
+fn fill_attitude(rows: &mut [Sample], track: &Track, limit: f64) {
+    let mut q = track.series.clone();
+    // q and −q are one attitude: neighbours on the same side of the sphere interpolate.
+    for i in 1..track.times.len() {
+        let dot: f64 = q.iter().map(|s| s[i] * s[i - 1]).sum();
+        if dot < 0.0 {
+            q.iter_mut().for_each(|s| s[i] = -s[i]);
+        }
+    }
+    for row in rows.iter_mut() {
+        let at = At::new(row.time_s, &track.times);
+        let [w, x, y, z] = [0, 1, 2, 3].map(|k| at.between(&q[k], &track.times, limit));
+        let n = (w * w + x * x + y * y + z * z).sqrt();
+        if !(n > 0.5 && n < 2.0) {
+            continue;
+        }
+        let [w, x, y, z] = [w / n, x / n, y / n, z / n];
+        row.attitude_rad = [
+            (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
+            (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
+            (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+        ];
+    }
+}
+
+/// Where a time lies among a channel's times.
+#[derive(Clone, Copy)]
+struct At {
+    t: f64,
+    /// The first sample later than `t`.
+    after: usize,
+}
+
+impl At {
+    fn new(t: f64, times: &[f64]) -> At {
+        At { t, after: times.partition_point(|x| *x <= t + SAME_S) }
+    }
+
+    fn held(self, values: &[f64], times: &[f64], limit: f64) -> f64 {
+        match self.after.checked_sub(1) {
+            Some(i) if self.t - times[i] <= limit => values[i],
+            _ => f64::NAN,
+        }
+    }
+
+    fn between(self, values: &[f64], times: &[f64], limit: f64) -> f64 {
+        let Some(i) = self.after.checked_sub(1) else { return f64::NAN };
+        let past = self.t - times[i];
+        if past.abs() <= SAME_S {
+            return values[i];
+        }
+        match times.get(self.after) {
+            Some(next) if next - times[i] <= limit => {
+                values[i] + (values[self.after] - values[i]) * past / (next - times[i])
+            }
+            _ => f64::NAN,
+        }
+    }
+}
+
+/// Whether a series can be radians at all: a heading may run to 2π, a roll angle to π. Wrapping
+/// anything larger would hide that it is in degrees.
+fn is_angle(series: &[f64], column: &str) -> bool {
+    let limit = if column == "yaw_rad" { TAU } else { PI };
+    series.iter().all(|x| x.abs() <= limit + 1e-3)
+}
+
+fn unwrap(angles: &mut [f64]) {
+    for i in 1..angles.len() {
+        angles[i] -= ((angles[i] - angles[i - 1]) / TAU).round() * TAU;
+    }
+}
+
+/// Brings an interpolated angle back to −π..π.
+fn wrap(angle: f64) -> f64 {
+    angle - (angle / TAU).round() * TAU
+}
+
+/// Turns equivalent into true airspeed; says by which density.
+fn make_true(rows: &mut [Sample]) -> String {
+    let mut by = [0usize; 3];
+    for row in rows.iter_mut() {
+        let (i, density) = if row.air_density_kgpm3 > 0.0 {
+            (0, row.air_density_kgpm3)
+        } else if row.altitude_m.is_finite() {
+            (1, STANDARD.density_at(row.altitude_m))
+        } else {
+            (2, SEA_LEVEL)
+        };
+        by[i] += 1;
+        row.airspeed_mps *= (SEA_LEVEL / density).sqrt();
+    }
+    format!(
+        "true airspeed by logged density in {} rows, by the standard atmosphere at the logged altitude in {}, at sea level in {}",
+        by[0], by[1], by[2]
+    )
+}
+
+/// Cuts the rows before all needed channels have begun, and after one has ended.
+fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
+    let whole =
+        |s: &Sample| NEEDED.iter().all(|c| index(c).is_none_or(|i| COLUMNS[i].1(s).is_finite()));
+    let first = rows.iter().position(whole).unwrap_or(0);
+    let end = rows.iter().rposition(whole).map_or(rows.len(), |i| i + 1);
+    let cut = rows.len() - (end - first);
+    if cut > 0 {
+        notes.push(format!(
+            "{cut} rows before all needed channels have begun or after one has ended are left out"
+        ));
+        *rows = rows[first..end].to_vec();
+    }
+}

@@ -1,0 +1,69 @@
+//! What a binary log holds: topics with numeric fields over time.
+
+use std::collections::BTreeMap;
+
+use super::finding::Finding;
+
+/// One instance of a topic, stored field by field.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Topic {
+    /// Sample times, s.
+    pub time_s: Vec<f64>,
+    /// Names of the fields.
+    pub fields: Vec<String>,
+    /// The fields' values, in the order of `fields`, each as long as `time_s`.
+    pub values: Vec<Vec<f64>>,
+}
+
+impl Topic {
+    /// A topic without samples.
+    pub fn new<S: Into<String>>(fields: impl IntoIterator<Item = S>) -> Self {
+        let fields: Vec<String> = fields.into_iter().map(Into::into).collect();
+        let values = vec![Vec::new(); fields.len()];
+        Topic { time_s: Vec::new(), fields, values }
+    }
+
+    /// The values of a field.
+    pub fn field(&self, name: &str) -> Option<&[f64]> {
+        let i = self.fields.iter().position(|f| f == name)?;
+        Some(&self.values[i])
+    }
+}
+
+/// The median time between samples, s; 0 for fewer than two.
+pub(super) fn period_s(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> =
+        times.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0 && d.is_finite()).collect();
+    if steps.is_empty() {
+        return 0.0;
+    }
+    let middle = steps.len() / 2;
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The content of a binary log.
+#[derive(Debug, Default)]
+pub(super) struct Topics {
+    /// The topics that were asked for, by name with instance.
+    pub topics: BTreeMap<(String, u16), Topic>,
+    /// How many records each topic of the file has, asked for or not.
+    pub counts: BTreeMap<(String, u16), usize>,
+    /// Parameters of the vehicle; the last value of each.
+    pub parameters: BTreeMap<String, f64>,
+    /// What was odd about the file.
+    pub findings: Vec<Finding>,
+}
+
+impl Topics {
+    /// The instances of a topic.
+    pub fn instances(&self, name: &str) -> impl Iterator<Item = (u16, &Topic)> {
+        let from = (name.to_owned(), 0);
+        let until = (name.to_owned(), u16::MAX);
+        self.topics.range(from..=until).map(|((_, instance), topic)| (*instance, topic))
+    }
+
+    /// The first instance of a topic.
+    pub fn first(&self, name: &str) -> Option<&Topic> {
+        self.instances(name).next().map(|(_, topic)| topic)
+    }
+}

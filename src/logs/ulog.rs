@@ -1,0 +1,299 @@
+//! PX4 ULog read into topics.
+//!
+//! Written here because the crates fall short (versions looked at: `px4-ulog` 0.6.1, `yule_log`
+//! 0.4.0). `px4-ulog` stops at the first inconsistent record, refuses a second registration of a
+//! message number, panics by design where a value's type changes, and decodes every field of every
+//! topic; `yule_log` brings a logger and a regular-expression engine along. Neither skips topics
+//! that nobody asked for. The independent check is pyulog (`tests/logs_crosscheck.py`).
+//!
+//! Not read: logged strings, appended-data offsets beyond what follows in file order, defaults of
+//! parameters. Parameter changes in flight overwrite the value.
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::finding::Finding;
+use super::format::ULOG_MAGIC;
+use super::topics::{Topic, Topics};
+
+/// Magic, version and start time.
+const HEADER: usize = 16;
+/// Nesting of message types; PX4 has three levels at most.
+const DEPTH: usize = 8;
+/// Numeric fields of one topic; PX4's largest has a few hundred.
+const FIELDS: usize = 2048;
+
+/// A type of a field with its size in bytes.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+impl Kind {
+    fn named(name: &str) -> Option<Kind> {
+        Some(match name {
+            "int8_t" => Kind::I8,
+            "uint8_t" | "bool" | "char" => Kind::U8,
+            "int16_t" => Kind::I16,
+            "uint16_t" => Kind::U16,
+            "int32_t" => Kind::I32,
+            "uint32_t" => Kind::U32,
+            "int64_t" => Kind::I64,
+            "uint64_t" => Kind::U64,
+            "float" => Kind::F32,
+            "double" => Kind::F64,
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Kind::I8 | Kind::U8 => 1,
+            Kind::I16 | Kind::U16 => 2,
+            Kind::I32 | Kind::U32 | Kind::F32 => 4,
+            Kind::I64 | Kind::U64 | Kind::F64 => 8,
+        }
+    }
+
+    /// The value at `offset`; NaN beyond the end, where PX4 has cut the padding.
+    fn at(self, bytes: &[u8], offset: usize) -> f64 {
+        fn take<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
+            bytes.get(offset..)?.first_chunk().copied()
+        }
+        let value = match self {
+            Kind::I8 => take(bytes, offset).map(|b| f64::from(i8::from_le_bytes(b))),
+            Kind::U8 => take(bytes, offset).map(|b| f64::from(u8::from_le_bytes(b))),
+            Kind::I16 => take(bytes, offset).map(|b| f64::from(i16::from_le_bytes(b))),
+            Kind::U16 => take(bytes, offset).map(|b| f64::from(u16::from_le_bytes(b))),
+            Kind::I32 => take(bytes, offset).map(|b| f64::from(i32::from_le_bytes(b))),
+            Kind::U32 => take(bytes, offset).map(|b| f64::from(u32::from_le_bytes(b))),
+            Kind::I64 => take(bytes, offset).map(|b| i64::from_le_bytes(b) as f64),
+            Kind::U64 => take(bytes, offset).map(|b| u64::from_le_bytes(b) as f64),
+            Kind::F32 => take(bytes, offset).map(|b| f64::from(f32::from_le_bytes(b))),
+            Kind::F64 => take(bytes, offset).map(f64::from_le_bytes),
+        };
+        value.unwrap_or(f64::NAN)
+    }
+}
+
+/// A field of a subscribed topic, flattened.
+#[derive(Clone, Debug)]
+struct Field {
+    name: String,
+    kind: Kind,
+    offset: usize,
+}
+
+/// A message number's topic.
+struct Subscription {
+    key: (String, u16),
+    /// The fields, if the topic was asked for.
+    fields: Vec<Field>,
+    /// Where `timestamp` and `timestamp_sample` stand.
+    stamp: Option<(Kind, usize)>,
+    sampled: Option<(Kind, usize)>,
+    topic: Option<Topic>,
+    count: usize,
+}
+
+#[derive(Default)]
+struct Reader {
+    formats: BTreeMap<String, String>,
+    subscriptions: HashMap<u16, Subscription>,
+    out: Topics,
+    dropout_ms: u64,
+    dropouts: usize,
+    orphans: usize,
+    bad_fields: usize,
+}
+
+/// Reads what `wanted` names; everything else is counted.
+pub(super) fn read(bytes: &[u8], wanted: &dyn Fn(&str) -> bool) -> Topics {
+    let mut reader = Reader::default();
+    if !bytes.starts_with(&ULOG_MAGIC) || bytes.len() < HEADER {
+        reader.out.findings.push(Finding::warning("the file ends within its header"));
+        return reader.out;
+    }
+    let mut rest = &bytes[HEADER..];
+    let mut skipped = 0usize;
+    while let [low, high, kind, tail @ ..] = rest {
+        let size = usize::from(u16::from_le_bytes([*low, *high]));
+        if !b"BFIMPQAR DCLSO".contains(kind) || *kind == b' ' {
+            // No record starts here: look for the next place that could hold one.
+            skipped += 1;
+            rest = &rest[1..];
+            continue;
+        }
+        let Some(body) = tail.get(..size) else {
+            reader.out.findings.push(Finding::warning(format!(
+                "the file ends in the middle of a record, {} bytes of which are left out",
+                rest.len()
+            )));
+            break;
+        };
+        reader.record(*kind, body, wanted);
+        rest = &tail[size..];
+    }
+    if skipped > 0 {
+        reader.out.findings.push(Finding::warning(format!(
+            "{skipped} bytes of the file belong to no record and were skipped: it is damaged there"
+        )));
+    }
+    reader.finish()
+}
+
+impl Reader {
+    fn record(&mut self, kind: u8, body: &[u8], wanted: &dyn Fn(&str) -> bool) {
+        match kind {
+            b'F' => self.format(body),
+            b'A' => self.subscribe(body, wanted),
+            b'D' => self.data(body),
+            b'P' => self.parameter(body),
+            b'O' => {
+                self.dropouts += 1;
+                self.dropout_ms += Kind::U16.at(body, 0).max(0.0) as u64;
+            }
+            _ => {}
+        }
+    }
+
+    fn format(&mut self, body: &[u8]) {
+        let text = String::from_utf8_lossy(body);
+        if let Some((name, fields)) = text.split_once(':') {
+            self.formats.insert(name.to_owned(), fields.to_owned());
+        }
+    }
+
+    fn parameter(&mut self, body: &[u8]) {
+        let Some((&len, rest)) = body.split_first() else { return };
+        let Some((key, value)) = rest.split_at_checked(usize::from(len)) else { return };
+        let key = String::from_utf8_lossy(key);
+        if let Some((kind, name)) = key.split_once(' ')
+            && let Some(kind) = Kind::named(kind)
+        {
+            let value = kind.at(value, 0);
+            if value.is_finite() {
+                self.out.parameters.insert(name.to_owned(), value);
+            }
+        }
+    }
+
+    fn subscribe(&mut self, body: &[u8], wanted: &dyn Fn(&str) -> bool) {
+        let [instance, low, high, name @ ..] = body else { return };
+        let name = String::from_utf8_lossy(name).into_owned();
+        let mut fields = Vec::new();
+        flatten(&self.formats, &name, "", DEPTH, &mut 0, &mut fields);
+        let find = |n: &str| fields.iter().find(|f| f.name == n).map(|f| (f.kind, f.offset));
+        let (stamp, sampled) = (find("timestamp"), find("timestamp_sample"));
+        if stamp.is_none() {
+            self.bad_fields += 1;
+        }
+        let wants = wanted(&name);
+        if !wants {
+            fields.clear();
+        }
+        let topic = wants.then(|| Topic::new(fields.iter().map(|f| f.name.clone())));
+        let number = u16::from_le_bytes([*low, *high]);
+        let key = (name, u16::from(*instance));
+        let old = self
+            .subscriptions
+            .insert(number, Subscription { key, fields, stamp, sampled, topic, count: 0 });
+        if let Some(old) = old {
+            self.keep(old);
+        }
+    }
+
+    fn data(&mut self, body: &[u8]) {
+        let number = body.first_chunk().map(|b| u16::from_le_bytes(*b));
+        let Some(subscription) = number.and_then(|n| self.subscriptions.get_mut(&n)) else {
+            self.orphans += 1;
+            return;
+        };
+        subscription.count += 1;
+        let (body, Some(topic)) = (&body[2..], &mut subscription.topic) else { return };
+        let Some((kind, offset)) = subscription.stamp else { return };
+        let sampled = subscription.sampled.map_or(0.0, |(kind, offset)| kind.at(body, offset));
+        let micros = if sampled > 0.0 { sampled } else { kind.at(body, offset) };
+        if !micros.is_finite() {
+            return;
+        }
+        topic.time_s.push(micros * 1e-6);
+        for (field, values) in subscription.fields.iter().zip(&mut topic.values) {
+            values.push(field.kind.at(body, field.offset));
+        }
+    }
+
+    fn keep(&mut self, old: Subscription) {
+        *self.out.counts.entry(old.key.clone()).or_default() += old.count;
+        if let Some(topic) = old.topic.filter(|t| !t.time_s.is_empty()) {
+            self.out.topics.entry(old.key).or_insert(topic);
+        }
+    }
+
+    fn finish(mut self) -> Topics {
+        let mut subscriptions: Vec<_> =
+            std::mem::take(&mut self.subscriptions).into_iter().collect();
+        subscriptions.sort_by_key(|(number, _)| *number);
+        subscriptions.into_iter().for_each(|(_, s)| self.keep(s));
+        if self.dropouts > 0 {
+            self.out.findings.push(Finding::warning(format!(
+                "the logger dropped out {} times, {} ms in all: rows are missing there",
+                self.dropouts, self.dropout_ms
+            )));
+        }
+        if self.orphans + self.bad_fields > 0 {
+            self.out.findings.push(Finding::warning(format!(
+                "{} records of topics that the file does not declare were left out",
+                self.orphans + self.bad_fields
+            )));
+        }
+        self.out
+    }
+}
+
+/// The numeric fields of message `name`, nested ones as `outer.inner`, elements as `field[0]`.
+fn flatten(
+    formats: &BTreeMap<String, String>,
+    name: &str,
+    prefix: &str,
+    depth: usize,
+    offset: &mut usize,
+    out: &mut Vec<Field>,
+) {
+    let (Some(text), Some(depth)) = (formats.get(name), depth.checked_sub(1)) else { return };
+    for (kind, field) in text.split(';').filter_map(|f| f.trim().split_once(' ')) {
+        let (kind, count) = match kind.split_once('[') {
+            None => (kind, None),
+            Some((kind, n)) => (kind, n.trim_end_matches(']').parse::<usize>().ok()),
+        };
+        for i in 0..count.unwrap_or(1) {
+            if out.len() >= FIELDS || *offset > usize::from(u16::MAX) {
+                return;
+            }
+            let index = if count.is_some() { format!("[{i}]") } else { String::new() };
+            let path = format!("{prefix}{field}{index}");
+            match Kind::named(kind) {
+                Some(kind) => {
+                    out.push(Field { name: path, kind, offset: *offset });
+                    *offset += kind.size();
+                }
+                None => {
+                    let before = *offset;
+                    flatten(formats, kind, &format!("{path}."), depth, offset, out);
+                    // An unknown type: nothing behind it can be found.
+                    if *offset == before {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+}

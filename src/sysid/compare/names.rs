@@ -1,0 +1,176 @@
+//! The channels with the regime variables, as they are named everywhere.
+
+use serde::Serialize;
+
+/// A channel in which a model is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+pub enum ChannelId {
+    /// Drag less thrust along the airflow, N, positive backwards.
+    #[serde(rename = "D")]
+    Drag,
+    /// Lift, thrust's part included, N, positive upwards.
+    #[serde(rename = "L")]
+    Lift,
+    /// Side force, N, positive to the right.
+    #[serde(rename = "Y")]
+    Side,
+    /// Rolling moment l, N m, positive right wing down.
+    #[serde(rename = "l")]
+    Roll,
+    /// Pitching moment m, N m, positive nose up.
+    #[serde(rename = "m")]
+    Pitch,
+    /// Yawing moment n, N m, positive nose right.
+    #[serde(rename = "n")]
+    Yaw,
+    /// Rate of airspeed, m/s².
+    #[serde(rename = "V")]
+    Airspeed,
+    /// Rate of the angle of attack, rad/s.
+    #[serde(rename = "alpha")]
+    Alpha,
+    /// Rate of sideslip, rad/s.
+    #[serde(rename = "beta")]
+    Beta,
+}
+
+impl ChannelId {
+    /// All channels, forces before moments before kinematics.
+    pub const ALL: [ChannelId; 9] = [
+        ChannelId::Drag,
+        ChannelId::Lift,
+        ChannelId::Side,
+        ChannelId::Roll,
+        ChannelId::Pitch,
+        ChannelId::Yaw,
+        ChannelId::Airspeed,
+        ChannelId::Alpha,
+        ChannelId::Beta,
+    ];
+
+    /// What it is called in tables and plots.
+    pub const fn name(self) -> &'static str {
+        match self {
+            ChannelId::Drag => "drag less thrust",
+            ChannelId::Lift => "lift",
+            ChannelId::Side => "side force",
+            ChannelId::Roll => "rolling moment",
+            ChannelId::Pitch => "pitching moment",
+            ChannelId::Yaw => "yawing moment",
+            ChannelId::Airspeed => "rate of airspeed",
+            ChannelId::Alpha => "rate of angle of attack",
+            ChannelId::Beta => "rate of sideslip",
+        }
+    }
+
+    /// The letter of the equations.
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            ChannelId::Drag => "D",
+            ChannelId::Lift => "L",
+            ChannelId::Side => "Y",
+            ChannelId::Roll => "l",
+            ChannelId::Pitch => "m",
+            ChannelId::Yaw => "n",
+            ChannelId::Airspeed => "V̇",
+            ChannelId::Alpha => "α̇",
+            ChannelId::Beta => "β̇",
+        }
+    }
+
+    /// The unit of its residuals.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            ChannelId::Drag | ChannelId::Lift | ChannelId::Side => "N",
+            ChannelId::Roll | ChannelId::Pitch | ChannelId::Yaw => "N m",
+            ChannelId::Airspeed => "m/s²",
+            ChannelId::Alpha | ChannelId::Beta => "rad/s",
+        }
+    }
+}
+
+/// A quantity that says where in the envelope a window lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RegimeVariable {
+    /// Angle of attack.
+    Alpha,
+    /// Sideslip.
+    Beta,
+    /// True airspeed.
+    Airspeed,
+    /// Throttle position.
+    Throttle,
+    /// Roll rate.
+    P,
+    /// Pitch rate.
+    Q,
+    /// Yaw rate.
+    R,
+    /// Aileron deflection.
+    Aileron,
+    /// Elevator deflection.
+    Elevator,
+    /// Rate of the aileron deflection: what a dynamic error follows.
+    AileronRate,
+    /// Rate of the elevator deflection.
+    ElevatorRate,
+    /// Altitude above mean sea level.
+    Altitude,
+    /// Time since the log's first sample.
+    Time,
+    /// The flight.
+    Flight,
+}
+
+impl RegimeVariable {
+    /// Those that are numbers: all but the flight.
+    pub const CONTINUOUS: [RegimeVariable; 13] = [
+        RegimeVariable::Alpha,
+        RegimeVariable::Beta,
+        RegimeVariable::Airspeed,
+        RegimeVariable::Throttle,
+        RegimeVariable::P,
+        RegimeVariable::Q,
+        RegimeVariable::R,
+        RegimeVariable::Aileron,
+        RegimeVariable::Elevator,
+        RegimeVariable::AileronRate,
+        RegimeVariable::ElevatorRate,
+        RegimeVariable::Altitude,
+        RegimeVariable::Time,
+    ];
+
+    /// What it is called in plots.
+    pub const fn name(self) -> &'static str {
+        match self {
+            RegimeVariable::Alpha => "angle of attack",
+            RegimeVariable::Beta => "sideslip",
+            RegimeVariable::Airspeed => "airspeed",
+            RegimeVariable::Throttle => "throttle",
+            RegimeVariable::P => "roll rate",
+            RegimeVariable::Q => "pitch rate",
+            RegimeVariable::R => "yaw rate",
+            RegimeVariable::Aileron => "aileron",
+            RegimeVariable::Elevator => "elevator",
+            RegimeVariable::AileronRate => "aileron movement",
+            RegimeVariable::ElevatorRate => "elevator movement",
+            RegimeVariable::Altitude => "altitude",
+            RegimeVariable::Time => "time",
+            RegimeVariable::Flight => "flight",
+        }
+    }
+
+    /// The unit that it is binned in.
+    pub const fn unit(self) -> &'static str {
+        use RegimeVariable as V;
+        match self {
+            V::Alpha | V::Beta | V::Aileron | V::Elevator => "°",
+            V::P | V::Q | V::R | V::AileronRate | V::ElevatorRate => "°/s",
+            V::Airspeed => "m/s",
+            V::Altitude => "m",
+            V::Time => "s",
+            V::Throttle | V::Flight => "",
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! The findings of a model in the order in which they are told.
+
+use super::names::ChannelId;
+use super::result::{ChannelResult, HorizonScore};
+
+/// The sentences of a model: the worst of forces (they move V, α, β) and the worst of moments (they
+/// move p, q, r) lead, the others follow. The rates of V, α, β repeat the forces and are left out
+/// where the logs have those.
+pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<String> {
+    use ChannelId::{Drag, Lift, Pitch, Roll, Side, Yaw};
+    let is_force = |c: &&ChannelResult| matches!(c.channel, Drag | Lift | Side);
+    let is_moment = |c: &&ChannelResult| matches!(c.channel, Roll | Pitch | Yaw);
+    let forces = channels.iter().any(|c| is_force(&c));
+    let mut path: Vec<_> =
+        channels.iter().filter(|c| !is_moment(c) && is_force(c) == forces).collect();
+    let mut moments: Vec<_> = channels.iter().filter(is_moment).collect();
+    let worst_first = |a: &&ChannelResult, b: &&ChannelResult| told(b).total_cmp(&told(a));
+    path.sort_by(worst_first);
+    moments.sort_by(worst_first);
+    let (path_lead, path_rest) = path.split_at(path.len().min(1));
+    let (moment_lead, moment_rest) = moments.split_at(moments.len().min(1));
+    let (mut leading, mut rest) =
+        ([path_lead, moment_lead].concat(), [path_rest, moment_rest].concat());
+    leading.sort_by(worst_first);
+    rest.sort_by(worst_first);
+    let told = leading.iter().chain(&rest).map(|c| capital(&c.worst_regime) + ".");
+    diverges(free_run).into_iter().chain(told).collect()
+}
+
+/// The part of a channel's effect that its sentence accounts for: what its offset and its most
+/// telling variable explain.
+fn told(channel: &ChannelResult) -> f64 {
+    let share = channel.bins.iter().map(|b| b.explained).fold(0.0, f64::max);
+    let told = channel.offset_share + (1.0 - channel.offset_share) * share;
+    channel.effect_per_s * told.sqrt()
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect())
+}
+
+/// Says so if most free runs are lost by the shortest horizon.
+fn diverges(scores: &[HorizonScore]) -> Option<String> {
+    let first = scores.iter().min_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))?;
+    (first.divergence_rate > 0.5).then(|| {
+        format!(
+            "The model diverges at once: {} of {} free runs are lost within {} s, so its free-run errors are those of the bound.",
+            first.diverged, first.runs, first.horizon_s
+        )
+    })
+}

@@ -1,0 +1,162 @@
+//! The delay of the recorded actuators behind the gyros, from the moments that they make.
+//!
+//! Kinematics do not know the actuators; the angular accelerations do. Roll and pitch accelerations
+//! are regressed, averaged over a short kernel so that nothing is differentiated, on rates, flow
+//! angles, inertial coupling, deflection and rate of deflection: the last coefficient over the one
+//! before it is the delay. A lag of the surfaces that the record does not show looks the same.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Timing;
+use super::nuisance::SKEW_SAMPLES;
+use crate::sysid::reconstruction::{Instant, Segment};
+
+/// Length of the averaging kernel, s.
+const KERNEL: f64 = 0.15;
+/// Windows whose residuals are taken to hang together: about 1 s.
+const BLOCK: usize = 14;
+/// Fewest windows for each unknown.
+const SUPPORT: usize = 10;
+
+/// A delay with its standard deviation, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Skew {
+    /// How late the record is.
+    pub late: f64,
+    /// Standard deviation, that of the prior included.
+    pub deviation: f64,
+}
+
+/// The delay of the recorded deflections, from roll and pitch together with the prior of ±1.5 samples.
+pub fn estimate(segments: &[Segment], step: f64, timing: Timing) -> Skew {
+    let prior = (SKEW_SAMPLES * step).powi(-2);
+    let (mut information, mut weighted) = (prior, 0.0);
+    let axes: [(fn(&Instant) -> f64, fn(&Instant) -> Vec<f64>); 2] =
+        [(|i| i.state.p, roll_terms), (|i| i.state.q, pitch_terms)];
+    for (rate, terms) in axes {
+        if let Some(skew) = from_axis(segments, step, timing, rate, terms) {
+            let i = skew.deviation.powi(-2);
+            information += i;
+            weighted += i * skew.late;
+        }
+    }
+    Skew { late: weighted / information, deviation: information.sqrt().recip() }
+}
+
+/// What the roll acceleration depends on, the deflection last.
+fn roll_terms(i: &Instant) -> Vec<f64> {
+    let (s, v) = (&i.state, i.state.airspeed);
+    let v2 = v * v;
+    vec![v2, v2 * s.beta, v * s.p, v * s.r, s.p * s.q, s.q * s.r, v2 * i.controls.aileron]
+}
+
+/// What the pitch acceleration depends on, the deflection last.
+fn pitch_terms(i: &Instant) -> Vec<f64> {
+    let (s, v) = (&i.state, i.state.airspeed);
+    let v2 = v * v;
+    let coupling = s.p * s.p - s.r * s.r;
+    vec![v2, v2 * s.alpha, v * s.q, s.p * s.r, coupling, v2 * i.controls.elevator]
+}
+
+fn from_axis(
+    segments: &[Segment],
+    step: f64,
+    timing: Timing,
+    rate: fn(&Instant) -> f64,
+    terms: fn(&Instant) -> Vec<f64>,
+) -> Option<Skew> {
+    let half = ((KERNEL / step / 2.0).round() as usize).max(3);
+    let kernel: Vec<f64> = (0..=2 * half)
+        .map(|j| {
+            let phase = std::f64::consts::PI * (j + 1) as f64 / (half + 1) as f64;
+            0.5 * (1.0 - phase.cos())
+        })
+        .collect();
+    let (mut rows, mut values) = (Vec::new(), Vec::new());
+    for segment in segments {
+        let terms: Vec<Vec<f64>> = held(segment.instants.iter().map(terms).collect(), timing);
+        let rates: Vec<f64> = segment.instants.iter().map(rate).collect();
+        let mut middle = half + 1;
+        while middle + half + 1 < rates.len() {
+            let (row, value) = window(&kernel, &terms, &rates, middle - half, step);
+            rows.push(row);
+            values.push(value);
+            middle += half;
+        }
+    }
+    regress(&rows, &values)
+}
+
+/// The terms over the interval that starts with each sample.
+fn held(terms: Vec<Vec<f64>>, timing: Timing) -> Vec<Vec<f64>> {
+    match timing {
+        Timing::Held => terms,
+        Timing::Sampled => (0..terms.len())
+            .map(|k| {
+                let after = &terms[(k + 1).min(terms.len() - 1)];
+                terms[k].iter().zip(after).map(|(a, b)| 0.5 * (a + b)).collect()
+            })
+            .collect(),
+    }
+}
+
+/// Kernel averages from sample `start`: the terms with the last one's rate of change, the acceleration.
+fn window(
+    kernel: &[f64],
+    terms: &[Vec<f64>],
+    rates: &[f64],
+    start: usize,
+    step: f64,
+) -> (Vec<f64>, f64) {
+    let last = terms[start].len() - 1;
+    let mut row = vec![0.0; last + 2];
+    let mut value = 0.0;
+    for (j, weight) in kernel.iter().enumerate() {
+        let k = start + j;
+        for (x, term) in row.iter_mut().zip(&terms[k]) {
+            *x += weight * term;
+        }
+        row[last + 1] += weight * (terms[k + 1][last] - terms[k - 1][last]) / (2.0 * step);
+        value += weight * (rates[k + 1] - rates[k]) / step;
+    }
+    (row, value)
+}
+
+/// Least squares with a covariance that allows for residuals which hang together in blocks.
+fn regress(rows: &[Vec<f64>], values: &[f64]) -> Option<Skew> {
+    let columns = rows.first()?.len();
+    if rows.len() < SUPPORT * columns {
+        return None;
+    }
+    let mut x = DMatrix::from_fn(rows.len(), columns, |i, j| rows[i][j]);
+    let scale: Vec<f64> = (0..columns).map(|j| x.column(j).norm()).collect();
+    if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
+        return None;
+    }
+    for (j, s) in scale.iter().enumerate() {
+        x.column_mut(j).scale_mut(s.recip());
+    }
+    let y = DVector::from_column_slice(values);
+    let inverse = (x.transpose() * &x).cholesky()?.inverse();
+    let solution = &inverse * x.transpose() * &y;
+    let residual = y - &x * &solution;
+    let mut meat = DMatrix::<f64>::zeros(columns, columns);
+    for start in (0..rows.len()).step_by(BLOCK) {
+        let n = BLOCK.min(rows.len() - start);
+        let score = x.rows(start, n).transpose() * residual.rows(start, n);
+        meat += &score * score.transpose();
+    }
+    let covariance = &inverse * meat * &inverse;
+    let (deflection, by_rate) = (columns - 2, columns - 1);
+    let gain = solution[deflection] / scale[deflection];
+    let late = solution[by_rate] / scale[by_rate] / gain;
+    // of the quotient, to first order
+    let gradient = DVector::from_fn(columns, |j, _| match j {
+        j if j == by_rate => 1.0 / (scale[by_rate] * gain),
+        j if j == deflection => -late / (scale[deflection] * gain),
+        _ => 0.0,
+    });
+    let deviation = (gradient.transpose() * covariance * gradient)[0].sqrt();
+    (late.is_finite() && deviation.is_finite() && deviation > 0.0)
+        .then_some(Skew { late, deviation })
+}
