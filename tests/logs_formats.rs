@@ -107,6 +107,10 @@ fn wrong_units_are_named() {
     assert!(rates.contains("p, q, r look like degrees"), "{rates}");
     let kmh = with(|s| s.airspeed_mps *= 3.6);
     assert!(kmh.contains("km/h"), "{kmh}");
+    // Turns tell it where no velocity over ground is logged.
+    let alone =
+        with(|s| (s.airspeed_mps, s.velocity_ned_mps) = (s.airspeed_mps * 3.6, [f64::NAN; 3]));
+    assert!(alone.contains("km/h"), "{alone}");
     let knots = with(|s| s.airspeed_mps *= 1.943_844);
     assert!(knots.contains("knots"), "{knots}");
     let g = with(|s| s.specific_force_mps2 = s.specific_force_mps2.map(|a| a / 9.80665));

@@ -135,8 +135,8 @@ fn airspeed(rows: &[Sample]) -> Option<Finding> {
         (v > 8.0).then_some(s.airspeed_mps / v)
     });
     let ground: Vec<f64> = ground.filter(|x| x.is_finite()).collect();
-    let spread = Some((quantile(ground.clone(), 0.25)?, quantile(ground.clone(), 0.75)?));
-    let weak_wind = spread.is_some_and(|(a, b)| b - a < 0.25 * b);
+    let quarters = (quantile(ground.clone(), 0.25), quantile(ground.clone(), 0.75));
+    let weak_wind = matches!(quarters, (Some(a), Some(b)) if b - a < 0.25 * b);
     let by_ground = quantile(ground, 0.5).filter(|_| weak_wind);
     verdict(by_turns, "turns").or_else(|| verdict(by_ground, "the velocity over ground"))
 }
