@@ -108,7 +108,8 @@ fn what_the_data_cannot_see_keeps_its_prior_and_is_named() {
 
 #[test]
 fn little_is_enough_for_a_path() {
-    let strip: [(&str, fn(&mut Sample)); 4] = [
+    type Strip = fn(&mut Sample);
+    let strip: [(&str, Strip); 4] = [
         ("accelerometers", |s| s.specific_force_mps2 = [f64::NAN; 3]),
         ("heading", |s| s.attitude_rad[2] = f64::NAN),
         ("altitude", |s| s.altitude_m = f64::NAN),
@@ -235,7 +236,8 @@ fn bad_logs_are_refused_with_what_would_help() {
 #[test]
 fn odd_logs_are_reconstructed_without_panic() {
     let (_, good) = planted_flight(|_| (), 8.0);
-    let odd: [(&str, fn(usize, &mut Sample)); 8] = [
+    type Spoil = fn(usize, &mut Sample);
+    let odd: [(&str, Spoil); 8] = [
         ("stuck vane", |_, s| s.alpha_rad = 0.03),
         ("sparse vane", |k, s| s.alpha_rad = if k % 50 == 0 { s.alpha_rad } else { f64::NAN }),
         ("held velocity", |k, s| s.velocity_ned_mps = [(k / 20) as f64; 3]),

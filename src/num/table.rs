@@ -64,8 +64,8 @@ impl Table {
     /// branch per lane. On an abscissa the derivative is the right segment's.
     #[inline(always)]
     pub fn at<R: Real>(&self, x: R) -> R {
-        // x − x is zero, or NaN
-        let mut y = R::from_f64(self.floor) + (x - x);
+        // zero, or NaN
+        let mut y = R::from_f64(self.floor) + x.scale(0.0);
         for &(start, length, slope) in &self.segments {
             let part = (x - R::from_f64(start)).max(R::zero());
             let length = R::from_f64(length);

@@ -84,7 +84,7 @@ fn excitation(t: f64, phases: &[f64; 8]) -> [f64; 3] {
         x if x < 3.0 || (5.0..6.0).contains(&x) => 0.15,
         _ => -0.15,
     };
-    let (a, e) = if (t / 10.0) as u64 % 2 == 0 { (level, 0.0) } else { (0.0, level) };
+    let (a, e) = if ((t / 10.0) as u64).is_multiple_of(2) { (level, 0.0) } else { (0.0, level) };
     [0.04 * multisine(0, 0.4) + a, 0.03 * multisine(3, 0.5) + e, 0.05 * multisine(5, 0.15)]
 }
 

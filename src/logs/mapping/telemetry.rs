@@ -32,6 +32,7 @@ const EQUIVALENT: [f64; 2] = [3.0, 12.0];
 /// Milli-g, m/s².
 const MILLI_G: f64 = 9.80665e-3;
 /// Deflection at normalised 1 of the shim's aircraft, rad.
+#[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 const DEFLECTION: f64 = 0.5235;
 
 /// The rules, preferred ones first.

@@ -27,12 +27,16 @@ pub struct Skew {
     pub deviation: f64,
 }
 
+/// Reads a body rate, rad/s.
+type Rate = fn(&Instant) -> f64;
+/// The terms that explain its change.
+type Terms = fn(&Instant) -> Vec<f64>;
+
 /// The delay of the recorded deflections, from roll and pitch together with the prior of ±1.5 samples.
 pub fn estimate(segments: &[Segment], step: f64, timing: Timing) -> Skew {
     let prior = (SKEW_SAMPLES * step).powi(-2);
     let (mut information, mut weighted) = (prior, 0.0);
-    let axes: [(fn(&Instant) -> f64, fn(&Instant) -> Vec<f64>); 2] =
-        [(|i| i.state.p, roll_terms), (|i| i.state.q, pitch_terms)];
+    let axes: [(Rate, Terms); 2] = [(|i| i.state.p, roll_terms), (|i| i.state.q, pitch_terms)];
     for (rate, terms) in axes {
         if let Some(skew) = from_axis(segments, step, timing, rate, terms) {
             let i = skew.deviation.powi(-2);

@@ -157,8 +157,8 @@ mod tests {
         let p = factor.solve(&constants.right);
         let x = substitute(&eliminated, &p);
         let reference = dense.clone().lu().solve(&right).unwrap();
-        for k in 0..N {
-            assert!((x[k] - reference.fixed_rows::<NODE>(k * NODE)).norm() < 1e-12);
+        for (k, node) in x.iter().enumerate().take(N) {
+            assert!((node - reference.fixed_rows::<NODE>(k * NODE)).norm() < 1e-12);
         }
         assert!((p - reference.fixed_rows::<COUNT>(N * NODE)).norm() < 1e-12);
         let fall = constants.fall + constants.right.dot(&p);

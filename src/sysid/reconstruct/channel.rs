@@ -60,8 +60,8 @@ impl Channel {
     /// Linear interpolation at `t` (s) between samples at most `reach` (s) apart; else NaN.
     pub fn between(&self, t: f64, reach: f64) -> f64 {
         match self.around(t) {
-            (_, Some((time, x))) if time == t => x,
-            (Some((ta, a)), Some((tb, b))) if tb - ta <= reach => {
+            [_, Some((time, x))] if time == t => x,
+            [Some((ta, a)), Some((tb, b))] if tb - ta <= reach => {
                 a + (b - a) * (t - ta) / (tb - ta)
             }
             _ => f64::NAN,
@@ -71,7 +71,7 @@ impl Channel {
     /// The measurement for `t` (s), one for each sample of the channel: NaN without a sample within
     /// `near` (s), else the interpolation of [`between`](Self::between), else that sample.
     pub fn measured(&self, t: f64, reach: f64, near: f64) -> f64 {
-        let (left, right) = self.around(t);
+        let [left, right] = self.around(t);
         let distance = |s: &(f64, f64)| (s.0 - t).abs();
         let nearest = [left, right]
             .into_iter()
@@ -84,10 +84,10 @@ impl Channel {
     }
 
     /// The samples before `t`, and at or after it.
-    fn around(&self, t: f64) -> (Option<(f64, f64)>, Option<(f64, f64)>) {
+    fn around(&self, t: f64) -> [Option<(f64, f64)>; 2] {
         let after = self.time.partition_point(|x| *x < t);
         let side = |i: usize| Some((*self.time.get(i)?, *self.value.get(i)?));
-        (after.checked_sub(1).and_then(side), side(after))
+        [after.checked_sub(1).and_then(side), side(after)]
     }
 
     /// The last sample at or before `t` (zero-order hold); NaN before the first one.
