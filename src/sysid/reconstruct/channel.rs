@@ -52,7 +52,8 @@ impl Channel {
 
     /// The number of samples from `start` to `end`, s.
     pub fn count(&self, start: f64, end: f64) -> usize {
-        let (a, b) = (self.time.partition_point(|t| *t < start), self.time.partition_point(|t| *t <= end));
+        let (a, b) =
+            (self.time.partition_point(|t| *t < start), self.time.partition_point(|t| *t <= end));
         b.saturating_sub(a)
     }
 
@@ -60,7 +61,9 @@ impl Channel {
     pub fn between(&self, t: f64, reach: f64) -> f64 {
         match self.around(t) {
             (_, Some((time, x))) if time == t => x,
-            (Some((ta, a)), Some((tb, b))) if tb - ta <= reach => a + (b - a) * (t - ta) / (tb - ta),
+            (Some((ta, a)), Some((tb, b))) if tb - ta <= reach => {
+                a + (b - a) * (t - ta) / (tb - ta)
+            }
             _ => f64::NAN,
         }
     }

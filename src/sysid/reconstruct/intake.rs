@@ -112,9 +112,7 @@ impl Channels {
             velocity: three(Kind::Linear, &|s, i| s.velocity_ned_mps[i]),
             altitude: channel(Kind::Kept, &|s| s.altitude_m),
             positions: three(Kind::Kept, &|s, i| [s.aileron_rad, s.elevator_rad, s.throttle][i]),
-            commands: three(Kind::Kept, &|s, i| {
-                [s.aileron_cmd, s.elevator_cmd, s.throttle_cmd][i]
-            }),
+            commands: three(Kind::Kept, &|s, i| [s.aileron_cmd, s.elevator_cmd, s.throttle_cmd][i]),
         }
     }
 
@@ -132,11 +130,8 @@ impl Channels {
 
     /// Says which needed channel is missing, or shows one and the same value all the time.
     fn check(&self, flight: &str) -> Result<(), ReconstructError> {
-        let missing = |channel, column| ReconstructError::Missing {
-            flight: flight.into(),
-            channel,
-            column,
-        };
+        let missing =
+            |channel, column| ReconstructError::Missing { flight: flight.into(), channel, column };
         let sensors: [(&[Channel], _, _); 3] = [
             (&self.attitude[..2], "attitude that changes", "roll_rad, pitch_rad"),
             (&self.rates, "body rates that change", "p_radps, q_radps, r_radps"),
@@ -187,9 +182,9 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
             None
         };
         match why {
-            Some(why) => log.notes.push(format!(
-                "The stretch from {start:.2} s to {end:.2} s is left out: {why}."
-            )),
+            Some(why) => log
+                .notes
+                .push(format!("The stretch from {start:.2} s to {end:.2} s is left out: {why}.")),
             None => log.tracks.push(track(&channels, &has, [start, end], step, options)),
         }
     }
@@ -257,10 +252,7 @@ fn stretches(
 }
 
 /// Tells flight from ground by the mean airspeed around a time.
-fn airborne(
-    flight: &Flight,
-    options: &Options,
-) -> Result<impl Fn(f64) -> bool, ReconstructError> {
+fn airborne(flight: &Flight, options: &Options) -> Result<impl Fn(f64) -> bool, ReconstructError> {
     let rows = flight.samples.iter().map(|s| (s.time_s, s.airspeed_mps));
     let (times, speeds): (Vec<f64>, Vec<f64>) =
         rows.filter(|(t, v)| t.is_finite() && v.is_finite()).unzip();

@@ -6,8 +6,8 @@ use super::band::{Corner, CornerVector, NODE, Row};
 use super::channel::wrap;
 use super::intake::Track;
 use super::nuisance::{
-    ALPHA, BETA, COUNT, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_VANES,
-    SKEW_VELOCITY, Values, WIND,
+    ALPHA, BETA, COUNT, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_VANES, SKEW_VELOCITY, Values,
+    WIND,
 };
 use super::path::{CHANNELS, Path, SLOW};
 use super::rotation::{cross, euler_by_turn};

@@ -9,10 +9,8 @@ const FEWEST: usize = 8;
 /// smooth signal hardly has; NaN for too few samples. Missing ones are passed over.
 pub fn white(samples: impl Iterator<Item = f64>) -> f64 {
     let x: Vec<f64> = samples.filter(|x| x.is_finite()).collect();
-    let differences: Vec<f64> = x
-        .windows(5)
-        .map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs())
-        .collect();
+    let differences: Vec<f64> =
+        x.windows(5).map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs()).collect();
     if differences.len() < FEWEST {
         return f64::NAN;
     }

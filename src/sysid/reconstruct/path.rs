@@ -32,7 +32,10 @@ impl Path {
         };
         let mut angles: [f64; 3] = std::array::from_fn(|i| {
             let course = course.map_or(0.0, |v| v[1].atan2(v[0]));
-            first(Box::new(track.attitude.iter().map(move |a| a[i])), if i == 2 { course } else { 0.0 })
+            first(
+                Box::new(track.attitude.iter().map(move |a| a[i])),
+                if i == 2 { course } else { 0.0 },
+            )
         });
         let mut airspeed = first(Box::new(track.airspeed.iter().copied()), 15.0);
         let [mut alpha, mut beta] =

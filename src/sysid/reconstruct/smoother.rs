@@ -2,9 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::band::{
-    self, Block, Border, Constants, Corner, CornerVector, NODE, NodeVector, Row,
-};
+use super::band::{self, Block, Border, Constants, Corner, CornerVector, NODE, NodeVector, Row};
 use super::intake::{Log, Track};
 use super::kinematics::{Drive, gust_kept};
 use super::measurement;
@@ -106,9 +104,8 @@ pub fn smooth(log: &Log, options: &Options) -> Result<Smoothed, ReconstructError
     start(&mut found, log);
     for iteration in 0..LAST {
         let bound = if iteration < FIRST { f64::INFINITY } else { BOUND };
-        let solved = problem
-            .solve(&found, bound)
-            .ok_or_else(|| no_path("the equations became singular"))?;
+        let solved =
+            problem.solve(&found, bound).ok_or_else(|| no_path("the equations became singular"))?;
         let moved = apply(&mut found, &solved);
         if !moved.is_finite() {
             return Err(no_path("the path left the numbers"));
@@ -149,8 +146,7 @@ impl Problem<'_> {
         let mut stretches = Vec::new();
         for (track, path) in self.log.tracks.iter().zip(&found.paths) {
             let mut rows = self.inertial(track, path, found, &mut constants, &mut cost);
-            let spread =
-                std::array::from_fn(|i| found.levels.measured[i] * found.levels.colour[i]);
+            let spread = std::array::from_fn(|i| found.levels.measured[i] * found.levels.colour[i]);
             let mut sums = measurement::Sums {
                 matrix: &mut constants.matrix,
                 right: &mut constants.right,
@@ -172,10 +168,15 @@ impl Problem<'_> {
         let factor = constants.matrix.cholesky()?;
         let step = factor.solve(&constants.right);
         let fall = constants.fall + constants.right.dot(&step);
-        let log_det = constants.log_det
-            + 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
+        let log_det = constants.log_det + 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
         let covariance = factor.inverse();
-        Some(Solved { stretches, constants: step, covariance, residuals, misfit: cost - fall + log_det })
+        Some(Solved {
+            stretches,
+            constants: step,
+            covariance,
+            residuals,
+            misfit: cost - fall + log_det,
+        })
     }
 
     fn inertial(
@@ -259,11 +260,8 @@ fn gusty(problem: &Problem, found: &mut Smoothed) -> Option<()> {
         trial.levels.measured[channel] = trial.levels.white[channel];
         trial.levels.colour[channel] = 1.0;
     }
-    let held = Problem {
-        prior: found.values,
-        widths: found.deviations.map(|d| HELD * d),
-        ..*problem
-    };
+    let held =
+        Problem { prior: found.values, widths: found.deviations.map(|d| HELD * d), ..*problem };
     trial.levels.gusts = held.gusts(&trial, f64::INFINITY)?;
     if trial.levels.gusts <= CALM {
         return Some(());
