@@ -42,9 +42,9 @@ impl Bars {
     fn group_html(&self, group: &BarGroup) -> String {
         let mut html = format!("<dt>{}</dt>", escape(&group.label));
         for (value, (name, style)) in group.values.iter().zip(&self.keys) {
-            let share = (100.0 * value / self.full).clamp(0.0, 100.0);
-            let share = if share.is_finite() { share } else { 0.0 };
-            let cut = if *value > self.full { " cut" } else { "" };
+            let share = if value.is_finite() { 100.0 * value / self.full } else { 0.0 };
+            let share = share.clamp(0.0, 100.0);
+            let cut = if value.is_finite() && *value > self.full { " cut" } else { "" };
             html.push_str(&format!(
                 "<dd title=\"{}\"><span class=\"track\"><i class=\"bar-fill{cut}\" \
                  style=\"width:{share:.2}%;background:var(--{})\"></i></span>\

@@ -17,7 +17,7 @@ pub enum Place {
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The folder is there already.
-    #[error("cannot record to {}: it exists already; name a new folder or move the old one away", path.display())]
+    #[error("cannot record to {}: it exists already; name a new folder (fly --record, demo --out) or move the old one away", path.display())]
     Exists {
         /// The folder.
         path: PathBuf,
