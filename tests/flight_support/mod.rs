@@ -1,6 +1,6 @@
 //! A scripted vehicle that speaks the `sitl` profile, a client, and a flight between them: real
 //! sockets, frames by rust-mavlink, the X8's model as the aircraft.
-#![allow(dead_code)]
+#![allow(dead_code)] // each test that includes this module uses its part
 
 use std::net::{SocketAddr, UdpSocket};
 use std::path::Path;

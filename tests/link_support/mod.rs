@@ -1,6 +1,6 @@
 //! What the link's tests share: an autopilot double, and a client that writes and reads frames
 //! with rust-mavlink's own code.
-#![allow(dead_code)]
+#![allow(dead_code)] // each test that includes this module uses its part
 
 use std::collections::VecDeque;
 use std::net::SocketAddr;

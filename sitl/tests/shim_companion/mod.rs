@@ -1,5 +1,5 @@
 //! A companion for tests: the far end of the link, over real sockets, told what to answer.
-#![allow(dead_code)]
+#![allow(dead_code)] // each test that includes this module uses its part
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};

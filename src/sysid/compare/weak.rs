@@ -1,6 +1,6 @@
 //! Channels in weak form: measured and predicted forces, moments and rates, window by window.
 //!
-//! Measured data is never differentiated: see [`Kernel`](super::kernel::Kernel). Products are
+//! Measured data is never differentiated: see [`Kernel`]. Products are
 //! formed before smoothing.
 
 use super::flight::{Prepared, Window};
