@@ -1,5 +1,5 @@
 //! Writers of the binary formats, sharing no code with the readers.
-#![allow(dead_code)]
+#![allow(dead_code)] // each test that includes this module uses its part
 
 use greylag::logs::Sample;
 
