@@ -1,20 +1,17 @@
 //! `greylag compare`: where models fail against flight logs.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
 
 use crate::commands::files::{self, shipped};
-use crate::logs::finding::{Finding, Severity};
-use crate::logs::mapping::Mapping;
-use crate::logs::{self, csv::Tolerance};
+use crate::commands::intake::{Intake, LogArguments};
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
 use crate::sysid::compare::{Comparison, ModelResult, Options, compare};
-use crate::sysid::reconstruct::{self, reconstruct};
-use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::reconstruct::ActuatorClock;
 
 /// Exit status of a comparison that had to leave a log out, or whose logs are wrong somewhere.
 const IN_DOUBT: u8 = 2;
@@ -28,9 +25,8 @@ pub struct Arguments {
     /// Model files, compared side by side; the first one leads the report.
     #[arg(long = "model", num_args = 1.., required = true)]
     models: Vec<PathBuf>,
-    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
-    #[arg(long = "log", num_args = 1.., required = true)]
-    logs: Vec<PathBuf>,
+    #[command(flatten)]
+    logs: LogArguments,
     /// Horizons of the free runs, s.
     #[arg(long = "horizon", value_delimiter = ',', default_values_t = [1.0, 2.0, 5.0, 10.0])]
     horizons: Vec<f64>,
@@ -43,12 +39,6 @@ pub struct Arguments {
     /// Seed of the bootstrap intervals.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// A TOML file that says where columns of the logs come from.
-    #[arg(long)]
-    mapping: Option<PathBuf>,
-    /// Read logs in which more than 5 % of the rows are unusable.
-    #[arg(long)]
-    lenient: bool,
     /// Replace the JSON and the report if they exist.
     #[arg(long)]
     force: bool,
@@ -65,13 +55,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .iter()
         .map(|path| GreyBox::load(&shipped(path)).map_err(Into::into))
         .collect::<Result<Vec<_>>>()?;
-    let Intake { flights, mut notes, mut in_doubt } = take_in(arguments, &models[0])?;
-    if flights.is_empty() {
-        bail!("no log can be compared: what is wrong with each is said above");
-    }
+    let Intake { flights, mut notes, mut in_doubt } = arguments.logs.take_in(&models[0], ActuatorClock::Estimated)?;
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let mut comparison = compare(&models, &flights, &options, &|doing| eprintln!("{doing}"))?;
-    in_doubt |= comparison.flights.len() < arguments.logs.len();
+    in_doubt |= comparison.flights.len() < arguments.logs.paths.len();
     notes.append(&mut comparison.notes);
     comparison.notes = notes;
     print(&comparison);
@@ -92,77 +79,11 @@ fn page(arguments: &Arguments, comparison: &Comparison) -> String {
         title: "Models against flights".into(),
         comparison,
         model_files: paths(&arguments.models),
-        log_files: paths(&arguments.logs),
+        log_files: paths(&arguments.logs.paths),
         command_line: std::env::args().skip(1).fold("greylag".into(), |line, a| line + " " + &a),
         versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
     };
     report.page().render()
-}
-
-/// What the logs gave.
-#[derive(Default)]
-struct Intake {
-    /// The flights that could be reconstructed.
-    flights: Vec<Reconstruction>,
-    /// What was odd about the logs, left-out ones included.
-    notes: Vec<String>,
-    /// Whether a log was left out or holds what makes the figures wrong.
-    in_doubt: bool,
-}
-
-/// Reads and reconstructs the logs; one that cannot be is said and left out.
-fn take_in(arguments: &Arguments, model: &GreyBox) -> Result<Intake> {
-    let mapping = arguments.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
-    let tolerance = if arguments.lenient { Tolerance::Lenient } else { Tolerance::Strict };
-    let reading = logs::Options { tolerance, mapping };
-    let mut intake = Intake::default();
-    for (k, (path, name)) in arguments.logs.iter().zip(names(&arguments.logs)).enumerate() {
-        eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, arguments.logs.len());
-        match reconstruct_one(path, &name, &reading, model) {
-            Ok((flight, findings)) => {
-                intake.flights.push(flight);
-                intake.in_doubt |= findings.iter().any(|f| f.severity == Severity::Problem);
-                intake.notes.extend(findings.iter().map(|f| format!("{name}: {f}")));
-            }
-            Err(error) => {
-                eprintln!("greylag: {error:#}");
-                intake.in_doubt = true;
-                intake.notes.push(format!("left out: {error:#}"));
-            }
-        }
-    }
-    Ok(intake)
-}
-
-/// The reconstructed flight of a log, with what was odd about the file.
-fn reconstruct_one(
-    path: &Path,
-    name: &str,
-    reading: &logs::Options,
-    model: &GreyBox,
-) -> Result<(Reconstruction, Vec<Finding>)> {
-    let log = logs::load(path, reading)?;
-    let options = reconstruct::Options {
-        gravity: model.atmosphere.gravity,
-        ..reconstruct::Options::new(name, model.airframe.actuators)
-    };
-    let flight = reconstruct(&log.flight, &options)
-        .with_context(|| format!("cannot use flight log {}", path.display()))?;
-    Ok((flight, log.findings))
-}
-
-/// What the flights are called: the file's name, or the whole path where two share it.
-fn names(logs: &[PathBuf]) -> Vec<String> {
-    let short = |path: &PathBuf| {
-        path.file_name().map_or(path.display().to_string(), |n| n.to_string_lossy().into_owned())
-    };
-    let all: Vec<String> = logs.iter().map(short).collect();
-    let alone = |name: &String| all.iter().filter(|n| *n == name).count() == 1;
-    let pick = |(path, name): (&PathBuf, &String)| match alone(name) {
-        true => name.clone(),
-        false => path.display().to_string(),
-    };
-    logs.iter().zip(&all).map(pick).collect()
 }
 
 fn print(comparison: &Comparison) {

@@ -8,6 +8,7 @@ mod demo;
 mod evaluate;
 mod files;
 pub mod fly;
+mod intake;
 mod logs;
 #[cfg(feature = "sitl")]
 mod targets;

@@ -11,6 +11,7 @@ use crate::physics::Airframe;
 use crate::physics::airframe::{FileError, Sourced, check_schema, named, positive, toml_error};
 use crate::physics::atmosphere::{Atmosphere, Density};
 use crate::physics::effects::{Description, Kind};
+use crate::physics::inputs;
 use crate::physics::rigid_body::{ForceAxes, RigidBody};
 
 #[derive(Deserialize)]
@@ -96,29 +97,46 @@ impl GreyBox {
 impl File {
     fn into_model(self, airframe: Airframe) -> Result<GreyBox, String> {
         let mut terms = Vec::new();
-        let mut coefficients = Vec::new();
+        let (mut coefficients, mut acting) = (Vec::new(), Vec::new());
         for (id, content) in &self.effects {
-            let kind = Kind::from_id(id).ok_or_else(|| unknown_effect(id))?;
             let first = coefficients.len();
+            if let Some(kind) = inputs::Kind::from_id(id) {
+                coefficients.extend(effect(&kind.describe(), content)?.0);
+                acting.push((kind, first));
+                continue;
+            }
+            let kind = Kind::from_id(id).ok_or_else(|| unknown_effect(id))?;
             let (named, table) = effect(&kind.describe(), content)?;
             coefficients.extend(named);
-            terms.push(Term { kind, first, table });
+            terms.push(Term::new(kind, first, table));
         }
         if terms.is_empty() {
             return Err(
                 "it names no effect, so nothing would hold the aircraft up; add [effects.…]".into(),
             );
         }
-        Ok(GreyBox {
+        if acting.len() > inputs::MOST {
+            return Err(format!(
+                "it names {} effects between actuators and surfaces; {} is the most",
+                acting.len(),
+                inputs::MOST
+            ));
+        }
+        let body = self.rigid_body.checked()?;
+        let mut model = GreyBox {
             name: named(self.name)?,
             airframe,
-            body: self.rigid_body.checked()?,
+            body,
+            bare_body: body,
             atmosphere: self.air.checked()?,
             axes: self.force_axes,
             integrator: self.integrator,
             terms,
+            inputs: acting,
             coefficients,
-        })
+        };
+        model.settle();
+        Ok(model)
     }
 }
 
@@ -210,6 +228,7 @@ fn table(id: &str, key: &str, content: toml::Value) -> Result<Table, String> {
 }
 
 fn unknown_effect(id: &str) -> String {
-    let ids: Vec<_> = Kind::ALL.iter().map(|k| k.describe().id).collect();
+    let inputs = inputs::Kind::ALL.iter().map(|k| k.describe().id);
+    let ids: Vec<_> = Kind::ALL.iter().map(|k| k.describe().id).chain(inputs).collect();
     format!("effects.{id:?} is unknown to this program; it knows {}", ids.join(", "))
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::GreyBox;
 use crate::num::Real;
 use crate::physics::actuators::Actuators;
+use crate::physics::inputs::InputMemory;
 use crate::physics::rigid_body::{self, Vector};
 use crate::physics::{Command, Controls, State};
 
@@ -129,13 +130,15 @@ pub struct Twin {
     /// Altitude above mean sea level, m.
     pub altitude: f64,
     memory: Memory,
+    inputs: InputMemory,
 }
 
 impl Twin {
     /// An aircraft at `state` and `altitude` (m), actuators at zero.
     pub fn new(state: State, altitude: f64) -> Twin {
         let actuators = Actuators::at_rest(&Controls::default());
-        Twin { state, actuators, altitude, memory: Memory::default() }
+        let inputs = InputMemory::at_rest(&Controls::default());
+        Twin { state, actuators, altitude, memory: Memory::default(), inputs }
     }
 
     /// Advances by [`STEP`] in the order of the simulator: the state moves under the actuators as
@@ -144,7 +147,7 @@ impl Twin {
         let air = model.air(&self.state, self.altitude);
         let velocity = rigid_body::air_velocity(&self.state, &air);
         let climb = -rigid_body::body_to_horizon(&self.state, velocity)[2];
-        let controls = self.actuators.controls();
+        let controls = model.act(&self.actuators.controls(), &mut self.inputs);
         self.state = model.step(&self.state, &controls, self.altitude, &mut self.memory);
         self.altitude += climb * STEP;
         self.actuators.step(command, &model.airframe.actuators);

@@ -7,7 +7,7 @@ mod linear;
 mod newton;
 mod trim;
 
-pub use grey_box::{GreyBox, Named};
+pub use grey_box::{GreyBox, JoinError, Named};
 pub use integrator::{Integrator, Memory, STEP, Twin};
 pub use linear::{Linear, linearise};
 pub use trim::{Trim, TrimError};

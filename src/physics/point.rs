@@ -2,7 +2,8 @@
 
 use crate::num::Real;
 use crate::physics::airframe::Geometry;
-use crate::physics::{Controls, State};
+use crate::physics::rigid_body::Vector;
+use crate::physics::{Controls, State, Wrench};
 
 /// What the airflow is, worked out once for all effects.
 #[derive(Clone, Copy, Debug)]
@@ -57,4 +58,31 @@ pub struct Point<'a, R = f64> {
     pub air: &'a AirData<R>,
     /// Wing area, span and chord.
     pub geometry: &'a Geometry,
+    /// What the effects that need only the point make; zero for those effects themselves.
+    pub base: &'a Base<R>,
+}
+
+/// What the effects that need only the point make together.
+#[derive(Clone, Copy, Debug)]
+pub struct Base<R = f64> {
+    /// Their forces and moments.
+    pub wrench: Wrench<R>,
+    /// Their force in body axes, N.
+    pub force: Vector<R>,
+    /// The part of `wrench` due to aileron and elevator.
+    pub deflected: Wrench<R>,
+    /// What `wrench` would be without deflections and body rates.
+    pub still: Wrench<R>,
+    /// The state's rate, 1/s, of the model with all its effects.
+    pub rate: State<R>,
+}
+
+impl<R: Real> Base<R> {
+    /// Nothing known.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        let wrench = Wrench::zero();
+        let rate = State::from_array([R::zero(); 8]);
+        Base { wrench, force: [R::zero(); 3], deflected: wrench, still: wrench, rate }
+    }
 }

@@ -54,4 +54,9 @@ impl<R: Real> Wrench<R> {
     pub fn get(&self, channel: Channel) -> R {
         self.0[channel as usize]
     }
+    /// `self` less `other`.
+    #[inline(always)]
+    pub fn minus(&self, other: &Self) -> Self {
+        Wrench(std::array::from_fn(|i| self.0[i] - other.0[i]))
+    }
 }

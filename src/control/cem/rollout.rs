@@ -5,6 +5,7 @@ use crate::control::{Observation, Target};
 use crate::model::{GreyBox, Memory};
 use crate::num::{Lanes, Real};
 use crate::physics::actuators::Actuators;
+use crate::physics::inputs::InputMemory;
 use crate::physics::{ActuatorState, Command, State};
 
 /// Candidates that move together.
@@ -110,10 +111,12 @@ fn rollout(scene: &Scene, block: &Block) -> Lanes<WIDTH> {
     });
     let mut actuators = Actuators::from_observed(&observed, &previous, figures);
     let mut memory = Memory::default();
+    // what acted before the tick is not observed: the surfaces are taken to have been where they are
+    let mut inputs = InputMemory::at_rest(&actuators.controls());
     let mut sum = Lanes::zero();
     let mut weight = 1.0;
     for [aileron, elevator, thrust] in block {
-        let controls = actuators.controls();
+        let controls = model.act(&actuators.controls(), &mut inputs);
         state = model.step(&state, &controls, seen.altitude, &mut memory);
         let throttle = (*thrust + lane(1.0)).scale(0.5);
         actuators.step(&Command { aileron: *aileron, elevator: *elevator, throttle }, figures);

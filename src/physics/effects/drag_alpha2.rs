@@ -1,7 +1,7 @@
 //! Drag that grows with the square of incidence.
 
-use super::{Coefficient, Effect, coefficient};
-use crate::num::{Real, Table};
+use super::{Coefficient, Effect, Own, coefficient};
+use crate::num::Real;
 use crate::physics::{Channel, Point};
 
 /// Induced drag as the square of angle of attack.
@@ -17,10 +17,7 @@ impl Effect for DragAlpha2 {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(
-        at: &Point<R>,
-        _: Option<&Table>,
-        mut term: impl FnMut(usize, Channel, R),
+    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
     ) {
         let q = at.air.q_s;
         term(0, Channel::Drag, q * at.state.alpha * at.state.alpha);

@@ -1,7 +1,7 @@
 //! Drag of flying sideways.
 
-use super::{Coefficient, Effect, coefficient};
-use crate::num::{Real, Table};
+use super::{Coefficient, Effect, Own, coefficient};
+use crate::num::Real;
 use crate::physics::{Channel, Point};
 
 /// Drag due to sideslip, by its magnitude and its square.
@@ -18,10 +18,7 @@ impl Effect for DragBeta2 {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(
-        at: &Point<R>,
-        _: Option<&Table>,
-        mut term: impl FnMut(usize, Channel, R),
+    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
     ) {
         let q = at.air.q_s;
         term(0, Channel::Drag, q * at.state.beta.abs());

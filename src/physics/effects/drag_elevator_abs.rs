@@ -1,7 +1,7 @@
 //! Drag of a deflected elevator, up or down alike.
 
-use super::{Coefficient, Effect, coefficient};
-use crate::num::{Real, Table};
+use super::{Coefficient, Effect, Own, coefficient};
+use crate::num::Real;
 use crate::physics::{Channel, Point};
 
 /// Drag due to the magnitude of the elevator deflection.
@@ -17,10 +17,7 @@ impl Effect for DragElevatorAbs {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(
-        at: &Point<R>,
-        _: Option<&Table>,
-        mut term: impl FnMut(usize, Channel, R),
+    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
     ) {
         let q = at.air.q_s;
         term(0, Channel::Drag, q * at.controls.elevator.abs());

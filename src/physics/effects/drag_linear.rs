@@ -1,7 +1,7 @@
 //! Drag that is linear in incidence, pitch rate and elevator.
 
-use super::{Coefficient, Effect, coefficient};
-use crate::num::{Real, Table};
+use super::{Coefficient, Effect, Own, coefficient};
+use crate::num::Real;
 use crate::physics::{Channel, Point};
 
 /// Drag linear in angle of attack, pitch rate and elevator.
@@ -20,10 +20,7 @@ impl Effect for DragLinear {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(
-        at: &Point<R>,
-        _: Option<&Table>,
-        mut term: impl FnMut(usize, Channel, R),
+    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
     ) {
         let q = at.air.q_s;
         term(0, Channel::Drag, q);

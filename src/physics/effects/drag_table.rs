@@ -1,7 +1,7 @@
 //! Drag from a table over incidence.
 
-use super::{Coefficient, Effect, coefficient};
-use crate::num::{Real, Table};
+use super::{Coefficient, Effect, Own, coefficient};
+use crate::num::Real;
 use crate::physics::{Channel, Point};
 
 /// Drag as a table over angle of attack.
@@ -17,12 +17,9 @@ impl Effect for DragTable {
     const TABLE: Option<&'static str> = Some("CD");
 
     #[inline(always)]
-    fn basis<R: Real>(
-        at: &Point<R>,
-        table: Option<&Table>,
-        mut term: impl FnMut(usize, Channel, R),
+    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R),
     ) {
-        if let Some(table) = table {
+        if let Some(table) = own.table {
             term(0, Channel::Drag, at.air.q_s * table.at(at.state.alpha));
         }
     }

@@ -1,7 +1,7 @@
 //! Lift from a table over incidence, stall included.
 
-use super::{Coefficient, Effect, coefficient};
-use crate::num::{Real, Table};
+use super::{Coefficient, Effect, Own, coefficient};
+use crate::num::Real;
 use crate::physics::{Channel, Point};
 
 /// Lift as a table over angle of attack, stall included.
@@ -17,12 +17,9 @@ impl Effect for LiftTable {
     const TABLE: Option<&'static str> = Some("CL");
 
     #[inline(always)]
-    fn basis<R: Real>(
-        at: &Point<R>,
-        table: Option<&Table>,
-        mut term: impl FnMut(usize, Channel, R),
+    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R),
     ) {
-        if let Some(table) = table {
+        if let Some(table) = own.table {
             term(0, Channel::Lift, at.air.q_s * table.at(at.state.alpha));
         }
     }

@@ -1,10 +1,12 @@
 //! Physical effects: each adds one group of forces or moments, in one file of its own.
 //!
 //! To add one: write its file beside these and name it in the list at the end of this file. It
-//! then takes part in the model, its trim and its linearisation, the planner and the parameter
-//! files under its id.
+//! then takes part in the model, its trim and its linearisation, the planner, the parameter
+//! files, the search for missing effects and the report under its id. Effects on what the surfaces
+//! do with their commands are in [`inputs`](crate::physics::inputs).
 
 use crate::num::{Real, Table};
+use crate::physics::rigid_body::RigidBody;
 use crate::physics::{Channel, Point};
 
 /// A coefficient of an effect.
@@ -27,7 +29,44 @@ pub(crate) const fn coefficient(
     Coefficient { name, meaning, bounds }
 }
 
-/// A physical effect that is linear in its coefficients.
+/// What an effect must be told besides the point itself.
+///
+/// Effects that need more are evaluated after those that need only the point, and see what those make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Needs {
+    /// The state, the controls and the airflow.
+    Point,
+    /// Also [`Point::base`]: the forces and moments of the effects that need only the point.
+    Base,
+    /// Also [`Base::deflected`](crate::physics::point::Base::deflected) and
+    /// [`Base::still`](crate::physics::point::Base::still).
+    Parts,
+    /// Also [`Base::rate`](crate::physics::point::Base::rate).
+    Rate,
+}
+
+/// What belongs to one effect of one model.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Own<'a> {
+    /// Its table; present exactly if [`Effect::TABLE`] is.
+    pub table: Option<&'a Table>,
+    /// The values of its shape constants: the last [`Effect::SHAPE`] coefficients.
+    pub shape: &'a [f64],
+}
+
+/// What the search for missing effects knows of one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entry {
+    /// Ids of effects, or names of coefficients, that it is easily mistaken for.
+    pub look_alikes: &'static [&'static str],
+    /// The manoeuvre that tells it from them, in words.
+    pub separated_by: &'static str,
+    /// Values of all coefficients at which a search over shape constants starts; empty for an effect
+    /// that is linear in all of them.
+    pub starts: &'static [&'static [f64]],
+}
+
+/// A physical effect that is linear in its coefficients, but for shape constants.
 pub trait Effect {
     /// The id of parameter files, JSON and the command line.
     const ID: &'static str;
@@ -37,18 +76,27 @@ pub trait Effect {
     const FORMULA: &'static str;
     /// Where the formula comes from.
     const SOURCE: &'static str;
-    /// The coefficients, in the order of [`basis`](Effect::basis).
+    /// The coefficients, in the order of [`basis`](Effect::basis), then the shape constants.
     const COEFFICIENTS: &'static [Coefficient];
+    /// How many of the coefficients, at the end of the list, are constants in which the effect is not
+    /// linear.
+    const SHAPE: usize = 0;
     /// Name of the ordinate of a table over `alpha_rad` that the effect needs.
     const TABLE: Option<&'static str> = None;
+    /// What it must be told.
+    const NEEDS: Needs = Needs::Point;
+    /// Its entry in the catalogue of effects that a model may lack; `None` for parts of a prior.
+    const ENTRY: Option<Entry> = None;
 
     /// Reports, through `term(index, channel, amount)`, what one unit of the coefficient `index`
-    /// contributes to a channel at `at`. Forces in N, moments in N m. `table` is the effect's own
-    /// and present exactly if [`TABLE`](Effect::TABLE) is.
-    fn basis<R: Real>(at: &Point<R>, table: Option<&Table>, term: impl FnMut(usize, Channel, R));
+    /// contributes to a channel at `at`. Forces in N, moments in N m.
+    fn basis<R: Real>(at: &Point<R>, own: Own, term: impl FnMut(usize, Channel, R));
+
+    /// Changes the rigid body by the effect's coefficients.
+    fn change(_coefficients: &[f64], _body: &mut RigidBody) {}
 }
 
-/// What the list knows of an effect.
+/// What is known of an effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Description {
     /// [`Effect::ID`].
@@ -61,8 +109,12 @@ pub struct Description {
     pub source: &'static str,
     /// [`Effect::COEFFICIENTS`].
     pub coefficients: &'static [Coefficient],
+    /// How many coefficients at the end of the list are shape constants.
+    pub shape: usize,
     /// [`Effect::TABLE`].
     pub table: Option<&'static str>,
+    /// [`Effect::ENTRY`].
+    pub entry: Option<Entry>,
 }
 
 macro_rules! effects {
@@ -88,8 +140,15 @@ macro_rules! effects {
                     formula: $type::FORMULA,
                     source: $type::SOURCE,
                     coefficients: $type::COEFFICIENTS,
+                    shape: $type::SHAPE,
                     table: $type::TABLE,
+                    entry: $type::ENTRY,
                 },)* }
+            }
+
+            /// [`Effect::NEEDS`] of this effect.
+            pub const fn needs(self) -> Needs {
+                match self { $(Kind::$type => $type::NEEDS,)* }
             }
 
             /// [`Effect::basis`] of this effect.
@@ -97,10 +156,15 @@ macro_rules! effects {
             pub fn basis<R: Real>(
                 self,
                 at: &Point<R>,
-                table: Option<&Table>,
+                own: Own,
                 term: impl FnMut(usize, Channel, R),
             ) {
-                match self { $(Kind::$type => $type::basis(at, table, term),)* }
+                match self { $(Kind::$type => $type::basis(at, own, term),)* }
+            }
+
+            /// [`Effect::change`] of this effect.
+            pub fn change(self, coefficients: &[f64], body: &mut RigidBody) {
+                match self { $(Kind::$type => $type::change(coefficients, body),)* }
             }
         }
     };
@@ -126,6 +190,11 @@ effects! {
     drag_alpha2::DragAlpha2,
     drag_beta2::DragBeta2,
     drag_elevator_abs::DragElevatorAbs,
+    lift_stall::LiftStall,
+    cg_shift::CgShift,
+    inertia_xz::InertiaXz,
+    unsteady_lift::UnsteadyLift,
+    effectiveness_saturation::EffectivenessSaturation,
 }
 
 #[cfg(test)]

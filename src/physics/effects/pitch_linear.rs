@@ -1,7 +1,7 @@
 //! Pitching moment that is linear in incidence, pitch rate and elevator.
 
-use super::{Coefficient, Effect, coefficient};
-use crate::num::{Real, Table};
+use super::{Coefficient, Effect, Own, coefficient};
+use crate::num::Real;
 use crate::physics::{Channel, Point};
 
 /// Pitching moment linear in angle of attack, pitch rate and elevator.
@@ -20,10 +20,7 @@ impl Effect for PitchLinear {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(
-        at: &Point<R>,
-        _: Option<&Table>,
-        mut term: impl FnMut(usize, Channel, R),
+    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
     ) {
         let q = at.air.q_s.scale(at.geometry.chord);
         term(0, Channel::Pitch, q);

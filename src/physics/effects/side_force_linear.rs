@@ -1,7 +1,7 @@
 //! Side force that is linear in sideslip, rates and aileron.
 
-use super::{Coefficient, Effect, coefficient};
-use crate::num::{Real, Table};
+use super::{Coefficient, Effect, Own, coefficient};
+use crate::num::Real;
 use crate::physics::{Channel, Point};
 
 /// Side force linear in sideslip, roll and yaw rate and aileron.
@@ -21,10 +21,7 @@ impl Effect for SideForceLinear {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(
-        at: &Point<R>,
-        _: Option<&Table>,
-        mut term: impl FnMut(usize, Channel, R),
+    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
     ) {
         let q = at.air.q_s;
         term(0, Channel::Side, q);

@@ -1,7 +1,7 @@
 //! Thrust that is proportional to throttle, whatever the airspeed.
 
-use super::{Coefficient, Effect, coefficient};
-use crate::num::{Real, Table};
+use super::{Coefficient, Effect, Own, coefficient};
+use crate::num::Real;
 use crate::physics::{Channel, Point};
 
 /// Thrust along body x, proportional to throttle.
@@ -16,10 +16,7 @@ impl Effect for ThrustLinear {
         &[coefficient("Cp_n", "thrust at full throttle, N", (0.0, 10_000.0))];
 
     #[inline(always)]
-    fn basis<R: Real>(
-        at: &Point<R>,
-        _: Option<&Table>,
-        mut term: impl FnMut(usize, Channel, R),
+    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
     ) {
         term(0, Channel::BodyX, at.controls.throttle);
     }

@@ -1,7 +1,7 @@
 //! Yawing moment that is linear in sideslip, rates and aileron.
 
-use super::{Coefficient, Effect, coefficient};
-use crate::num::{Real, Table};
+use super::{Coefficient, Effect, Own, coefficient};
+use crate::num::Real;
 use crate::physics::{Channel, Point};
 
 /// Yawing moment linear in sideslip, roll and yaw rate and aileron.
@@ -21,10 +21,7 @@ impl Effect for YawLinear {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(
-        at: &Point<R>,
-        _: Option<&Table>,
-        mut term: impl FnMut(usize, Channel, R),
+    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
     ) {
         let q = at.air.q_s.scale(at.geometry.span);
         term(0, Channel::Yaw, q);

@@ -1,13 +1,15 @@
 //! A reconstructed flight made ready to be compared: on the models' clock, in the air, cut in windows.
 
+use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
 
 use super::CompareError;
 use super::kernel::{Kernel, weigh};
 use super::names::RegimeVariable;
 use super::result::{FlightResult, FlightTrace, NuisanceResult};
-use crate::model::STEP;
+use crate::model::{GreyBox, STEP};
 use crate::physics::State;
+use crate::physics::inputs::InputMemory;
 use crate::sysid::reconstruction::{Instant, Reconstruction};
 
 /// Slower than this (m/s) an aircraft of any size is taken to stand, not to fly.
@@ -82,6 +84,26 @@ impl Prepared {
             kernel,
             windows,
         })
+    }
+
+    /// The flight with the deflections that act under `model`'s input effects in place of the measured
+    /// ones.
+    pub fn acting(&self, model: &GreyBox) -> Cow<'_, Prepared> {
+        if model.acts_at_once() {
+            return Cow::Borrowed(self);
+        }
+        let mut acting = self.clone();
+        for instants in &mut acting.segments {
+            let Some(first) = instants.first() else { continue };
+            let mut memory = InputMemory::at_rest(&first.controls);
+            for instant in instants {
+                let measured = instant.controls;
+                for _ in 0..self.substeps {
+                    instant.controls = model.act(&measured, &mut memory);
+                }
+            }
+        }
+        Cow::Owned(acting)
     }
 
     /// The samples of a window.

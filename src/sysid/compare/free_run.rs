@@ -46,7 +46,7 @@ pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Ve
     let mut runs = Vec::new();
     let mut traces = Vec::new();
     for flight in flights {
-        let (flown, trace) = fly_one(model, flight, &times);
+        let (flown, trace) = fly_one(model, &flight.acting(model), &times);
         runs.extend(flown);
         traces.push(trace);
     }

@@ -31,6 +31,7 @@ pub struct Series {
 ///
 /// Forces need the accelerometers and are left out if the flight has none.
 pub fn channels(model: &GreyBox, flight: &Prepared) -> Vec<Series> {
+    let flight = &*flight.acting(model);
     let steps: Vec<Vec<Vector<f64>>> =
         flight.segments.iter().map(|s| one_step_rates(model, s, flight)).collect();
     let both: Vec<[[f64; 2]; 9]> = flight
@@ -259,7 +260,11 @@ pub struct Columns {
 }
 
 /// The columns of `model` over the windows of `flight`, to regress the measured channels on.
+///
+/// Shape constants and those of effects on inputs or inertia have columns of zeros: the model is not
+/// linear in them, or they act on the measured side.
 pub fn columns(model: &GreyBox, flight: &Prepared) -> Columns {
+    let flight = &*flight.acting(model);
     let names: Vec<String> = model.coefficients().iter().map(|c| c.name.clone()).collect();
     let mut values: Vec<[Vec<f64>; 6]> =
         vec![std::array::from_fn(|_| vec![0.0; flight.windows.len()]); names.len()];

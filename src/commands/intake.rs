@@ -1,0 +1,102 @@
+//! The options that name flight logs, from the files to reconstructed flights.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use crate::logs::finding::{Finding, Severity};
+use crate::logs::mapping::Mapping;
+use crate::logs::{self, csv::Tolerance};
+use crate::model::GreyBox;
+use crate::sysid::reconstruct::{self, ActuatorClock, reconstruct};
+use crate::sysid::reconstruction::Reconstruction;
+
+/// Which logs, read how.
+#[derive(clap::Args)]
+pub struct LogArguments {
+    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+    #[arg(long = "log", num_args = 1.., required = true)]
+    pub paths: Vec<PathBuf>,
+    /// A TOML file that says where columns of the logs come from.
+    #[arg(long)]
+    mapping: Option<PathBuf>,
+    /// Read logs in which more than 5 % of the rows are unusable.
+    #[arg(long)]
+    lenient: bool,
+}
+
+/// What the logs gave.
+#[derive(Default)]
+pub struct Intake {
+    /// The flights that could be reconstructed; at least one.
+    pub flights: Vec<Reconstruction>,
+    /// What was odd about the logs, left-out ones included.
+    pub notes: Vec<String>,
+    /// Whether a log was left out or holds what makes the figures wrong.
+    pub in_doubt: bool,
+}
+
+impl LogArguments {
+    /// Reads and reconstructs the logs; one that cannot be is said and left out.
+    ///
+    /// # Errors
+    /// If the mapping cannot be read, or no log is left.
+    pub fn take_in(&self, model: &GreyBox, clock: ActuatorClock) -> Result<Intake> {
+        let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
+        let tolerance = if self.lenient { Tolerance::Lenient } else { Tolerance::Strict };
+        let reading = logs::Options { tolerance, mapping };
+        let mut intake = Intake::default();
+        for (k, (path, name)) in self.paths.iter().zip(names(&self.paths)).enumerate() {
+            eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, self.paths.len());
+            match reconstruct_one(path, &name, &reading, model, clock) {
+                Ok((flight, findings)) => {
+                    intake.flights.push(flight);
+                    intake.in_doubt |= findings.iter().any(|f| f.severity == Severity::Problem);
+                    intake.notes.extend(findings.iter().map(|f| format!("{name}: {f}")));
+                }
+                Err(error) => {
+                    eprintln!("greylag: {error:#}");
+                    intake.in_doubt = true;
+                    intake.notes.push(format!("left out: {error:#}"));
+                }
+            }
+        }
+        if intake.flights.is_empty() {
+            bail!("no log can be used: what is wrong with each is said above");
+        }
+        Ok(intake)
+    }
+}
+
+/// The reconstructed flight of a log, with what was odd about the file.
+fn reconstruct_one(
+    path: &Path,
+    name: &str,
+    reading: &logs::Options,
+    model: &GreyBox,
+    clock: ActuatorClock,
+) -> Result<(Reconstruction, Vec<Finding>)> {
+    let log = logs::load(path, reading)?;
+    let options = reconstruct::Options {
+        gravity: model.atmosphere.gravity,
+        actuators_clock: clock,
+        ..reconstruct::Options::new(name, model.airframe.actuators)
+    };
+    let flight = reconstruct(&log.flight, &options)
+        .with_context(|| format!("cannot use flight log {}", path.display()))?;
+    Ok((flight, log.findings))
+}
+
+/// What the flights are called: the file's name, or the whole path where two share it.
+fn names(logs: &[PathBuf]) -> Vec<String> {
+    let short = |path: &PathBuf| {
+        path.file_name().map_or(path.display().to_string(), |n| n.to_string_lossy().into_owned())
+    };
+    let all: Vec<String> = logs.iter().map(short).collect();
+    let alone = |name: &String| all.iter().filter(|n| *n == name).count() == 1;
+    let pick = |(path, name): (&PathBuf, &String)| match alone(name) {
+        true => name.clone(),
+        false => path.display().to_string(),
+    };
+    logs.iter().zip(&all).map(pick).collect()
+}

@@ -1,0 +1,32 @@
+//! Surfaces whose moments do not grow in proportion to their deflection.
+
+use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use crate::num::Real;
+use crate::physics::{Channel, Point};
+
+/// Roll and pitch effectiveness that changes with the square of the deflection.
+pub struct EffectivenessSaturation;
+
+impl Effect for EffectivenessSaturation {
+    const ID: &'static str = "effectiveness_saturation";
+    const DESCRIPTION: &'static str =
+        "The surfaces' rolling and pitching moments saturate at large deflections.";
+    const FORMULA: &'static str = "l = k l_δ δa², m = k m_δ δe²; l_δ, m_δ the linear moments";
+    const SOURCE: &'static str = "Klein and Morelli, Aircraft System Identification, section 3.3";
+    const COEFFICIENTS: &'static [Coefficient] =
+        &[coefficient("k_perrad2", "change of effectiveness, 1/rad²", (-10.0, 10.0))];
+    const NEEDS: Needs = Needs::Parts;
+    const ENTRY: Option<Entry> = Some(Entry {
+        look_alikes: &["dead_zone", "Clda", "Cmde"],
+        separated_by: "large against small steps of aileron and elevator",
+        starts: &[],
+    });
+
+    #[inline(always)]
+    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+        let (aileron, elevator) = (at.controls.aileron, at.controls.elevator);
+        let of = |channel| at.base.deflected.get(channel);
+        term(0, Channel::Roll, of(Channel::Roll) * aileron * aileron);
+        term(0, Channel::Pitch, of(Channel::Pitch) * elevator * elevator);
+    }
+}

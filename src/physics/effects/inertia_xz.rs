@@ -1,0 +1,30 @@
+//! A product of inertia that differs from the model's.
+
+use super::{Coefficient, Effect, Entry, Own, coefficient};
+use crate::num::Real;
+use crate::physics::rigid_body::RigidBody;
+use crate::physics::{Channel, Point};
+
+/// An addition to the product of inertia Jxz.
+pub struct InertiaXz;
+
+impl Effect for InertiaXz {
+    const ID: &'static str = "inertia_xz";
+    const DESCRIPTION: &'static str = "The product of inertia Jxz differs from the model's.";
+    const FORMULA: &'static str = "l = ΔJxz (ṙ + pq), n = ΔJxz (ṗ − qr), m = −ΔJxz (p² − r²)";
+    const SOURCE: &'static str = "BM12 section 3.3, −Jxz in the inertia matrix";
+    const COEFFICIENTS: &'static [Coefficient] =
+        &[coefficient("dJxz_kgm2", "addition to the product of inertia, kg m²", (-10.0, 10.0))];
+    const ENTRY: Option<Entry> = Some(Entry {
+        look_alikes: &["Cnda", "Cnp", "Clr"],
+        separated_by: "fast rolls to both sides",
+        starts: &[],
+    });
+
+    #[inline(always)]
+    fn basis<R: Real>(_: &Point<R>, _: Own, _: impl FnMut(usize, Channel, R)) {}
+
+    fn change(coefficients: &[f64], body: &mut RigidBody) {
+        body.jxz += coefficients[0];
+    }
+}

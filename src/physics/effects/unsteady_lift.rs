@@ -1,0 +1,34 @@
+//! Lift that depends on how fast the angle of attack changes.
+
+use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use crate::num::Real;
+use crate::physics::{Channel, Point};
+
+/// Lift and pitching moment due to the rate of the angle of attack.
+pub struct UnsteadyLift;
+
+impl Effect for UnsteadyLift {
+    const ID: &'static str = "unsteady_lift";
+    const DESCRIPTION: &'static str =
+        "Lift and pitching moment due to the rate of the angle of attack.";
+    const FORMULA: &'static str = "L = Q c/(2V) CLα̇ α̇, m = Q c²/(2V) Cmα̇ α̇";
+    const SOURCE: &'static str = "Etkin and Reid, Dynamics of Flight, section 5.4";
+    const COEFFICIENTS: &'static [Coefficient] = &[
+        coefficient("CLalphadot", "lift due to the rate of angle of attack", (-20.0, 20.0)),
+        coefficient("Cmalphadot", "pitching moment due to the rate of angle of attack", (-20.0, 20.0)),
+    ];
+    const NEEDS: Needs = Needs::Rate;
+    const ENTRY: Option<Entry> = Some(Entry {
+        look_alikes: &["CLq", "Cmq"],
+        separated_by: "elevator doublets against steady pull-ups: α̇ and q then differ",
+        starts: &[],
+    });
+
+    #[inline(always)]
+    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+        let chord = at.geometry.chord;
+        let rate = at.base.rate.alpha.scale(0.5 * chord) / at.state.airspeed;
+        term(0, Channel::Lift, at.air.q_s * rate);
+        term(1, Channel::Pitch, (at.air.q_s * rate).scale(chord));
+    }
+}

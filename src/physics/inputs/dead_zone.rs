@@ -1,0 +1,27 @@
+//! Surfaces that do nothing for small deflections.
+
+use super::{InputEffect, Past};
+use crate::num::Real;
+use crate::physics::effects::{Coefficient, Entry, coefficient};
+
+/// A dead zone about the centre.
+pub struct DeadZone;
+
+impl InputEffect for DeadZone {
+    const ID: &'static str = "dead_zone";
+    const DESCRIPTION: &'static str = "The surfaces do not act within a dead zone about their centre.";
+    const FORMULA: &'static str = "y = 0 for |u| < d, else u − d sign(u)";
+    const SOURCE: &'static str = "JSBSim's deadband";
+    const COEFFICIENTS: &'static [Coefficient; 1] =
+        &[coefficient("halfwidth_rad", "half the width of the zone, rad", (0.0, 0.3))];
+    const ENTRY: Entry = Entry {
+        look_alikes: &["effectiveness_saturation", "backlash"],
+        separated_by: "small against large doublets",
+        starts: &[&[0.005], &[0.01], &[0.02], &[0.04], &[0.08]],
+    };
+
+    #[inline(always)]
+    fn act<R: Real>(constant: f64, _: &mut Past<R>, input: R) -> R {
+        input - input.clamp(-constant, constant)
+    }
+}

@@ -1,0 +1,137 @@
+//! Effects between the actuators' measured positions and what acts on the air: one file each.
+//!
+//! They have memory and are not linear in their constant. To add one: write its file beside these
+//! and name it in the list at the end of this file.
+
+use crate::num::Real;
+use crate::physics::Controls;
+use crate::physics::effects::{Coefficient, Description, Entry};
+
+/// Time between two calls of [`InputEffect::act`], s.
+pub const STEP: f64 = 0.01;
+
+/// Past deflections that an effect may remember.
+pub const PAST: usize = 24;
+
+/// Effects that one model may have.
+pub const MOST: usize = 3;
+
+/// An effect on what the surfaces do, with one constant.
+pub trait InputEffect {
+    /// The id of parameter files, JSON and the command line.
+    const ID: &'static str;
+    /// What it is, in one sentence.
+    const DESCRIPTION: &'static str;
+    /// What it does to a deflection u, in textbook letters.
+    const FORMULA: &'static str;
+    /// Where the formula comes from.
+    const SOURCE: &'static str;
+    /// Its constant.
+    const COEFFICIENTS: &'static [Coefficient; 1];
+    /// Its entry in the catalogue of effects.
+    const ENTRY: Entry;
+
+    /// The surface's deflection (rad) that acts now, `input` being its measured position, `constant`
+    /// the effect's. Called once every [`STEP`].
+    fn act<R: Real>(constant: f64, memory: &mut Past<R>, input: R) -> R;
+}
+
+/// What an effect remembers of one surface, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Past<R = f64> {
+    /// The deflection that acted last.
+    pub output: R,
+    /// Earlier inputs, newest first.
+    pub inputs: [R; PAST],
+}
+
+impl<R: Real> Past<R> {
+    /// A surface that has been at `deflection` for long.
+    #[inline(always)]
+    pub fn at_rest(deflection: R) -> Self {
+        Past { output: deflection, inputs: [deflection; PAST] }
+    }
+
+    /// Puts `input` at the front of the inputs.
+    #[inline(always)]
+    pub fn push(&mut self, input: R) {
+        self.inputs.copy_within(0..PAST - 1, 1);
+        self.inputs[0] = input;
+    }
+}
+
+/// What the input effects of a model remember of aileron and elevator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InputMemory<R = f64>([[Past<R>; 2]; MOST]);
+
+impl<R: Real> InputMemory<R> {
+    /// Surfaces that have been at `controls` for long.
+    #[inline(always)]
+    pub fn at_rest(controls: &Controls<R>) -> Self {
+        InputMemory([[Past::at_rest(controls.aileron), Past::at_rest(controls.elevator)]; MOST])
+    }
+
+    /// What acts now through the effect in `place` (below [`MOST`]) of a model's list.
+    #[inline(always)]
+    pub fn act(&mut self, place: usize, kind: Kind, constant: f64, z: &Controls<R>) -> Controls<R> {
+        let [aileron, elevator] = &mut self.0[place];
+        Controls {
+            aileron: kind.act(constant, aileron, z.aileron),
+            elevator: kind.act(constant, elevator, z.elevator),
+            throttle: z.throttle,
+        }
+    }
+}
+
+macro_rules! inputs {
+    ($($module:ident :: $type:ident),* $(,)?) => {
+        $(mod $module; pub use $module::$type;)*
+
+        /// One of the input effects of the list.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Kind { $(
+            #[doc = concat!("See [`", stringify!($type), "`].")]
+            $type,
+        )* }
+
+        impl Kind {
+            /// Every input effect there is.
+            pub const ALL: &'static [Kind] = &[$(Kind::$type),*];
+
+            /// What is known of the effect.
+            pub const fn describe(self) -> Description {
+                match self { $(Kind::$type => Description {
+                    id: $type::ID,
+                    description: $type::DESCRIPTION,
+                    formula: $type::FORMULA,
+                    source: $type::SOURCE,
+                    coefficients: $type::COEFFICIENTS,
+                    shape: 1,
+                    table: None,
+                    entry: Some($type::ENTRY),
+                },)* }
+            }
+
+            /// [`InputEffect::act`] of this effect.
+            #[inline(always)]
+            pub fn act<R: Real>(self, constant: f64, memory: &mut Past<R>, input: R) -> R {
+                match self { $(Kind::$type => $type::act(constant, memory, input),)* }
+            }
+        }
+    };
+}
+
+impl Kind {
+    /// The input effect of that id.
+    pub fn from_id(id: &str) -> Option<Kind> {
+        Kind::ALL.iter().copied().find(|kind| kind.describe().id == id)
+    }
+}
+
+inputs! {
+    actuator_lag::ActuatorLag,
+    time_delay::TimeDelay,
+    dead_zone::DeadZone,
+    backlash::Backlash,
+    rate_limit::RateLimit,
+}

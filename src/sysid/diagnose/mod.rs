@@ -1,0 +1,8 @@
+//! Which physical effect a model lacks.
+
+mod result;
+
+pub use result::{
+    Advice, Candidate, ChannelLeft, Curve, Decoy, Diagnosis, FlightEstimate, Measurement, Nulls,
+    Parameter, Settings, Tuned, Verdict,
+};
