@@ -4,7 +4,7 @@
 mod reconstruct_support;
 
 use greylag::logs::{Flight, Sample};
-use greylag::sysid::reconstruct::{ManoeuvreKind, manoeuvres, reconstruct};
+use greylag::sysid::reconstruct::{ActuatorClock, ManoeuvreKind, Options, manoeuvres, reconstruct};
 use greylag::sysid::reconstruction::Reconstruction;
 use reconstruct_support::{Errors, Flown, air, fly, options, spoil};
 
@@ -145,6 +145,16 @@ fn actuators_that_come_late_are_put_right() {
     }
     println!("aileron: rms error {corrected:.2e} after {logged:.2e}");
     assert!(corrected < logged / 4.0);
+    // left on the log's clock when asked
+    let as_recorded = Options { actuators_clock: ActuatorClock::AsRecorded, ..options() };
+    let log = spoil(&flown, &errors, 3);
+    let found = reconstruct(&log, &as_recorded).unwrap();
+    assert!(found.notes.iter().any(|n| n.contains("left as recorded")), "{:?}", found.notes);
+    for instant in &found.segments[0].instants {
+        let row = &log.samples[(instant.time_s / 0.01).round() as usize];
+        // the uniform clock is the log's own, to rounding
+        assert!((instant.controls.aileron - row.aileron_rad).abs() < 1e-9);
+    }
 }
 
 #[test]

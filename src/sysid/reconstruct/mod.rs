@@ -33,6 +33,17 @@ pub enum Timing {
     Sampled,
 }
 
+/// Which clock the deflections are handed out on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ActuatorClock {
+    /// The gyros': recorded deflections that came late beyond doubt are put right. A time delay or a lag
+    /// of the surfaces that the record does not show looks the same, so it goes with the delay.
+    Estimated,
+    /// The log's: deflections stay as recorded, so that whoever looks for missing effects decides what
+    /// is clock, what is physics. `skew_actuators` is estimated all the same, for information.
+    AsRecorded,
+}
+
 /// What a reconstruction is told besides the log.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -44,6 +55,8 @@ pub struct Options {
     pub gravity: f64,
     /// What a rate sample stands for. Clock skews are relative to the gyros' samples so understood.
     pub timing: Timing,
+    /// Which clock the deflections are handed out on.
+    pub actuators_clock: ActuatorClock,
     /// Shortest time between reconstructed samples, s; a slower log keeps its own median period.
     pub step_s: f64,
     /// Longest time between rows that is no gap, s.
@@ -62,6 +75,7 @@ impl Options {
             actuators,
             gravity: 9.80665,
             timing: Timing::Held,
+            actuators_clock: ActuatorClock::Estimated,
             step_s: 0.01,
             gap_s: 0.1,
             shortest_s: 2.0,

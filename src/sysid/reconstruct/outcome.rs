@@ -1,6 +1,5 @@
 //! The outcome: what the smoother found, as a reconstruction with its notes.
 
-use super::Options;
 use super::actuator_skew::{self, Skew};
 use super::intake::{Log, Track};
 use super::kinematics::shifted;
@@ -8,6 +7,7 @@ use super::nuisance::{self, COUNT, FORCE, GYRO, SCALE, SKEW_FORCE, Values};
 use super::path::{Path, flow_angles};
 use super::rotation::to_euler;
 use super::smoother::Smoothed;
+use super::{ActuatorClock, Options};
 use crate::physics::{Controls, State};
 use crate::sysid::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
 
@@ -31,7 +31,15 @@ pub fn assemble(log: Log, smoothed: Smoothed, options: &Options) -> Reconstructi
     declare(&log, &smoothed, options, &mut notes);
     let mut nuisances = nuisances(&log, &smoothed);
     let skew = actuator_skew::estimate(&segments, log.step, options.timing);
-    if correct(&mut segments, &skew, log.step) {
+    let late = late_beyond_doubt(&skew, log.step);
+    if late && options.actuators_clock == ActuatorClock::AsRecorded {
+        notes.push(format!(
+            "The recorded actuators seem {:.1} ms late against the gyros, by their clock or by a lag that \
+             the record does not show; they are left as recorded.",
+            1e3 * skew.late
+        ));
+    } else if late {
+        correct(&mut segments, &skew, log.step);
         notes.push(format!(
             "The recorded actuators came {:.1} ms late against the gyros and were put right; a lag of \
              the surfaces that the record does not show would look the same.",
@@ -78,12 +86,14 @@ fn segment(track: &Track, path: &Path, values: &Values, log: &Log) -> Segment {
     Segment { instants: (0..track.len()).map(instant).collect() }
 }
 
-/// Puts deflections right that came late beyond doubt, by linear interpolation; says whether it did.
-fn correct(segments: &mut [Segment], skew: &Skew, step: f64) -> bool {
+/// Whether the recorded deflections came late by more than the estimate may err.
+fn late_beyond_doubt(skew: &Skew, step: f64) -> bool {
+    skew.late.abs() >= CORRECTED * step && skew.late.abs() >= 2.0 * skew.deviation
+}
+
+/// Puts late deflections right, by linear interpolation.
+fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
     let late = skew.late / step;
-    if late.abs() < CORRECTED || skew.late.abs() < 2.0 * skew.deviation {
-        return false;
-    }
     for segment in segments {
         let recorded: Vec<Controls> = segment.instants.iter().map(|i| i.controls).collect();
         let last = recorded.len() - 1;
@@ -99,7 +109,6 @@ fn correct(segments: &mut [Segment], skew: &Skew, step: f64) -> bool {
             };
         }
     }
-    true
 }
 
 /// The constants that the log's sensors have, the airspeed scale as a factor.
