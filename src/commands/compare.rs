@@ -55,7 +55,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .iter()
         .map(|path| GreyBox::load(&shipped(path)).map_err(Into::into))
         .collect::<Result<Vec<_>>>()?;
-    let Intake { flights, mut notes, mut in_doubt } = arguments.logs.take_in(&models[0], ActuatorClock::Estimated)?;
+    let Intake { flights, mut notes, mut in_doubt } =
+        arguments.logs.take_in(&models[0], ActuatorClock::Estimated)?;
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let mut comparison = compare(&models, &flights, &options, &|doing| eprintln!("{doing}"))?;
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();

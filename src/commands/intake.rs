@@ -62,7 +62,7 @@ impl LogArguments {
             }
         }
         if intake.flights.is_empty() {
-            bail!("no log can be used: what is wrong with each is said above");
+            bail!("no log can be compared: what is wrong with each is said above");
         }
         Ok(intake)
     }

@@ -57,7 +57,9 @@ impl Term {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum JoinError {
     /// There is no such effect.
-    #[error("effect {id:?} is unknown to this program; `greylag effects list` names those it knows")]
+    #[error(
+        "effect {id:?} is unknown to this program; `greylag effects list` names those it knows"
+    )]
     Unknown {
         /// The id asked for.
         id: String,
@@ -89,7 +91,9 @@ pub enum JoinError {
         values: Vec<f64>,
     },
     /// More input effects than a model can have.
-    #[error("model {model} has {most} effects between actuators and surfaces already, which is the most")]
+    #[error(
+        "model {model} has {most} effects between actuators and surfaces already, which is the most"
+    )]
     Inputs {
         /// The model.
         model: String,
@@ -243,11 +247,7 @@ impl GreyBox {
     /// What acts on the air when the actuators are measured at `controls`; called once every
     /// [`STEP`](crate::model::STEP).
     #[inline(always)]
-    pub fn act<R: Real>(
-        &self,
-        controls: &Controls<R>,
-        memory: &mut InputMemory<R>,
-    ) -> Controls<R> {
+    pub fn act<R: Real>(&self, controls: &Controls<R>, memory: &mut InputMemory<R>) -> Controls<R> {
         let mut acting = *controls;
         for (place, (kind, index)) in self.inputs.iter().enumerate() {
             acting = memory.act(place, *kind, self.coefficients[*index].value, &acting);
@@ -339,12 +339,7 @@ impl GreyBox {
 
     /// What the effects need that need more than the point.
     #[inline(always)]
-    fn base<R: Real>(
-        &self,
-        state: &State<R>,
-        controls: &Controls<R>,
-        air: &AirData<R>,
-    ) -> Base<R> {
+    fn base<R: Real>(&self, state: &State<R>, controls: &Controls<R>, air: &AirData<R>) -> Base<R> {
         let mut base = Base::zero();
         let needs = self.terms.last().map_or(Needs::Point, |term| term.kind.needs());
         if needs == Needs::Point {
