@@ -11,7 +11,7 @@ mod kinematics;
 mod manoeuvres;
 mod measurement;
 mod noise;
-mod nuisance;
+pub(in crate::sysid) mod nuisance;
 mod outcome;
 mod path;
 mod rotation;
