@@ -6,8 +6,10 @@
 mod actuator_skew;
 mod band;
 mod channel;
+mod equations;
 mod intake;
 mod kinematics;
+mod levels;
 mod manoeuvres;
 mod measurement;
 mod noise;
