@@ -112,11 +112,12 @@ pub fn simulator_rate(plant: &mut Plant, truth: &Truth) -> [f64; 8] {
     [droll, dpitch, dspeed, dp, dq, dr, dalpha, dbeta]
 }
 
-/// The rate of the model on an earth that turns: with the Coriolis acceleration, and gyroscopic
-/// terms from inertial rates. The eight states hold neither heading nor latitude, so this lives
+/// The rate of the model on an earth that turns: with the Coriolis acceleration, gyroscopic terms from
+/// inertial rates, and a gravity that falls with altitude from the start's 600 m. The eight states hold neither heading nor latitude, so this lives
 /// here, to show that nothing else is missing.
 pub fn rate_on_turning_earth(model: &GreyBox, truth: &Truth, acting: &Controls) -> [f64; 8] {
     const EARTH_RATE: f64 = 7.292_115e-5;
+    const EARTH_RADIUS: f64 = 6_371_000.0;
     let s = state(truth);
     let air = model.air(&s, truth.altitude_m);
     let (sin, cos) = truth.latitude_deg.to_radians().sin_cos();
@@ -131,6 +132,10 @@ pub fn rate_on_turning_earth(model: &GreyBox, truth: &Truth, acting: &Controls) 
     for i in 0..3 {
         acceleration[i] -= 2.0 * coriolis[i];
     }
+    let (start, now) = (EARTH_RADIUS + 600.0, EARTH_RADIUS + truth.altitude_m);
+    let lost = model.atmosphere.gravity * ((start / now).powi(2) - 1.0);
+    let less = rigid_body::gravity_in_body(&s, lost);
+    (0..3).for_each(|i| acceleration[i] += less[i]);
     let inertial = State { p: s.p + earth[0], q: s.q + earth[1], r: s.r + earth[2], ..s };
     let wrench = model.wrench(&s, acting, &air);
     let moment = [Channel::Roll, Channel::Pitch, Channel::Yaw].map(|c| wrench.get(c));
