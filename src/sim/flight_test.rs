@@ -65,8 +65,7 @@ pub fn fly(
     pilot.reset(plant.seed.into());
     let mut seen = simulator.reset().map_err(trouble)?;
     let steps = (schedule.duration() / greylag_sitl::plant::DT_S).round() as usize;
-    let mut flown =
-        Flown { truth: Vec::with_capacity(steps), commands: Vec::with_capacity(steps) };
+    let mut flown = Flown { truth: Vec::with_capacity(steps), commands: Vec::with_capacity(steps) };
     let nobody = Target { roll: 0.0, pitch: 0.0, airspeed: f64::NAN };
     for _ in 0..steps {
         let truth = simulator.truth();

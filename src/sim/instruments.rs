@@ -139,13 +139,15 @@ impl Instruments {
                 turn(&|t| t.pitch_rad) + draw(Attitude),
                 wrap(turn(&|t| t.yaw_rad) + draw(Attitude)),
             ],
-            rates_radps: [0, 1, 2].map(|i| late(Gyros, &rates[i]) + self.gyro_bias[i] + draw(Gyros)),
+            rates_radps: [0, 1, 2]
+                .map(|i| late(Gyros, &rates[i]) + self.gyro_bias[i] + draw(Gyros)),
             specific_force_mps2: [0, 1, 2].map(|i| {
                 late(Accelerometers, &|t| t.specific_force_mps2[i])
                     + self.force_bias[i]
                     + draw(Accelerometers)
             }),
-            airspeed_mps: late(Airspeed, &|t| t.airspeed_mps) * self.airspeed_scale + draw(Airspeed),
+            airspeed_mps: late(Airspeed, &|t| t.airspeed_mps) * self.airspeed_scale
+                + draw(Airspeed),
             alpha_rad: late(Vanes, &|t| t.alpha_rad) + self.alpha_bias + draw(Vanes),
             beta_rad: late(Vanes, &|t| t.beta_rad) + self.beta_bias + draw(Vanes),
             velocity_ned_mps: [0, 1, 2]

@@ -102,12 +102,20 @@ pub struct Excitation {
     pub start: f64,
     /// How it goes.
     pub shape: Shape,
+    /// Share (0..=1) of the controller's reaction on this axis that is let through meanwhile: a good
+    /// controller undoes an excitation before the aircraft has moved.
+    pub authority: f64,
 }
 
 impl Excitation {
     /// `shape` on `axis` with `amplitude` (the axis's unit), `start` (s) after its step began.
     pub fn new(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Excitation {
-        Excitation { axis, amplitude, start, shape }
+        Excitation { axis, amplitude, start, shape, authority: 1.0 }
+    }
+
+    /// The same with only a share `authority` (0..=1) of the controller's reaction.
+    pub fn against(self, authority: f64) -> Excitation {
+        Excitation { authority, ..self }
     }
 
     /// How long it lasts, s; infinite to the end of the step.
@@ -128,25 +136,25 @@ impl Excitation {
         }
     }
 
-    /// Its value `t` (s) after the start of a step of `duration` (s).
-    pub(super) fn at(&self, t: f64, duration: f64) -> f64 {
+    /// Its value `t` (s) after the start of a step of `duration` (s), while it lasts.
+    pub(super) fn at(&self, t: f64, duration: f64) -> Option<f64> {
         let into = t - self.start;
         if into < 0.0 || into >= self.length() {
-            return 0.0;
+            return None;
         }
-        self.amplitude
-            * match &self.shape {
-                Shape::Step { .. } => 1.0,
-                Shape::Doublet { width } => sign(into < *width),
-                Shape::ThreeTwoOneOne { width } => {
-                    sign(into < 3.0 * width || (5.0 * width..6.0 * width).contains(&into))
-                }
-                Shape::Multisine { lines, .. } => {
-                    let fade = (into.min(duration - t) / FADE_S).clamp(0.0, 1.0);
-                    let sum: f64 = lines.iter().map(|[w, phase]| (w * into + phase).sin()).sum();
-                    fade * sum / (lines.len() as f64).sqrt()
-                }
+        let unit = match &self.shape {
+            Shape::Step { .. } => 1.0,
+            Shape::Doublet { width } => sign(into < *width),
+            Shape::ThreeTwoOneOne { width } => {
+                sign(into < 3.0 * width || (5.0 * width..6.0 * width).contains(&into))
             }
+            Shape::Multisine { lines, .. } => {
+                let fade = (into.min(duration - t) / FADE_S).clamp(0.0, 1.0);
+                let sum: f64 = lines.iter().map(|[w, phase]| (w * into + phase).sin()).sum();
+                fade * sum / (lines.len() as f64).sqrt()
+            }
+        };
+        Some(self.amplitude * unit)
     }
 }
 

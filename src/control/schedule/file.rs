@@ -70,6 +70,7 @@ struct ExcitationFile {
     amplitude_mps: Option<f64>,
     start_s: Option<f64>,
     width_s: Option<f64>,
+    authority: Option<f64>,
     low_hz: Option<f64>,
     high_hz: Option<f64>,
     seed: Option<u64>,
@@ -97,7 +98,8 @@ impl Schedule {
             let excitations = step.excitation.iter().map(ExcitationFile::checked);
             let excitations: Result<Vec<_>, String> = excitations.collect();
             let excitations = excitations.map_err(|why| format!("step {}: {why}", k + 1))?;
-            let held = Step::hold(step.duration_s, step.roll_deg, step.pitch_deg, step.airspeed_mps);
+            let held =
+                Step::hold(step.duration_s, step.roll_deg, step.pitch_deg, step.airspeed_mps);
             Ok(Step { excitations, ..held })
         });
         let steps = steps.collect::<Result<Vec<_>, String>>()?;
@@ -139,6 +141,7 @@ impl From<&Excitation> for ExcitationFile {
     fn from(e: &Excitation) -> Self {
         let mut file = ExcitationFile { on: e.axis.name().into(), ..Default::default() };
         file.start_s = (e.start != 0.0).then_some(e.start);
+        file.authority = (e.authority != 1.0).then_some(e.authority);
         match e.axis {
             Axis::Roll | Axis::Pitch => file.amplitude_deg = Some(tidy(e.amplitude.to_degrees())),
             Axis::Airspeed => file.amplitude_mps = Some(e.amplitude),
@@ -166,7 +169,14 @@ impl ExcitationFile {
         })?;
         let amplitude = self.amplitude(axis)?;
         let shape = self.shape()?;
-        Ok(Excitation::new(axis, amplitude, self.start_s.unwrap_or(0.0), shape))
+        if self.authority.is_some() && matches!(axis, Axis::Roll | Axis::Pitch | Axis::Airspeed) {
+            return Err(format!(
+                "excitation.authority means nothing to the target of {}; take it out",
+                axis.name()
+            ));
+        }
+        let excitation = Excitation::new(axis, amplitude, self.start_s.unwrap_or(0.0), shape);
+        Ok(excitation.against(self.authority.unwrap_or(1.0)))
     }
 
     /// The amplitude under the key that the axis's unit asks for.
@@ -186,8 +196,7 @@ impl ExcitationFile {
             return Err(format!("excitation.{wrong} does not fit {}; write {key}", axis.name()));
         }
         let value = all.iter().find(|(k, _)| *k == key).and_then(|(_, value)| *value);
-        let value =
-            value.ok_or_else(|| format!("excitation.{key} ({unit}) is missing; add it"))?;
+        let value = value.ok_or_else(|| format!("excitation.{key} ({unit}) is missing; add it"))?;
         Ok(if key == "amplitude_deg" { value.to_radians() } else { value })
     }
 
@@ -231,7 +240,10 @@ impl ExcitationFile {
 /// What is wrong with `steps`, by the number of the step.
 pub(super) fn check(steps: &[Step]) -> Result<(), String> {
     if steps.is_empty() {
-        return Err("it has no step; add [[step]] with duration_s, roll_deg, pitch_deg and airspeed_mps".into());
+        return Err(
+            "it has no step; add [[step]] with duration_s, roll_deg, pitch_deg and airspeed_mps"
+                .into(),
+        );
     }
     for (k, step) in steps.iter().enumerate() {
         check_step(step).map_err(|why| format!("step {}: {why}", k + 1))?;
@@ -272,6 +284,7 @@ fn check_step(step: &Step) -> Result<(), String> {
         };
         within(&format!("amplitude on {}", e.axis.name()), e.amplitude, -most, most)?;
         within("start_s", e.start, 0.0, step.duration)?;
+        within("authority", e.authority, 0.0, 1.0)?;
         if e.length().is_finite() {
             within("width_s of the whole excitation", e.length(), 0.01, step.duration - e.start)?;
         }

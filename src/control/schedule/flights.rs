@@ -3,8 +3,8 @@
 use rand::RngExt;
 
 use super::excitation::Axis::{self, Aileron, Elevator, Throttle};
-use super::menu::{doublet, pulse, push, sines, stall};
-use super::{Excitation, Schedule, Shape, Step};
+use super::menu::{doublet, firm, loose, pulse, push, sines, stall};
+use super::{Schedule, Shape, Step};
 use crate::num::stream::{Stream, stream};
 
 /// Length of each flight, s.
@@ -79,15 +79,19 @@ fn shake(step: &mut Step, draw: &mut Draw) {
 fn three211(draw: &mut Draw, axis: Axis, amplitude: f64, v: f64) -> Step {
     let shape = Shape::ThreeTwoOneOne { width: draw.within(0.2, 0.3) };
     let amplitude = draw.about(amplitude) * draw.side();
-    Step::hold(4.0, 0.0, draw.within(2.0, 5.0), v).with(Excitation::new(axis, amplitude, 0.8, shape))
+    Step::hold(4.0, 0.0, draw.within(2.0, 5.0), v).with(loose(axis, amplitude, 0.8, shape))
 }
 
 /// Doublets of two sizes on `axis`.
 fn two_sizes(draw: &mut Draw, axis: Axis, v: f64) -> Step {
     let (small, large) = (draw.about(0.05), draw.about(0.38));
     let step = Step::hold(4.5, 0.0, draw.within(2.0, 5.0), v);
-    step.with(doublet(axis, small * draw.side(), 0.5, draw.within(0.25, 0.4)))
-        .with(doublet(axis, large * draw.side(), 2.0, draw.within(0.2, 0.3)))
+    step.with(doublet(axis, small * draw.side(), 0.5, draw.within(0.25, 0.4))).with(doublet(
+        axis,
+        large * draw.side(),
+        2.0,
+        draw.within(0.2, 0.3),
+    ))
 }
 
 /// A step of the throttle up and down at `v` (m/s).
@@ -101,7 +105,7 @@ fn throttle(draw: &mut Draw, v: f64) -> Step {
 fn roll(draw: &mut Draw, side: f64, v: f64) -> Step {
     let (bank, amplitude) = (draw.within(32.0, 45.0), draw.about(0.3));
     let step = Step::hold(2.6, side * bank, draw.within(2.0, 6.0), v);
-    step.with(pulse(Aileron, side * amplitude, draw.within(0.1, 0.5), 0.4))
+    step.with(firm(Aileron, side * amplitude, draw.within(0.1, 0.5), 0.4))
 }
 
 /// A pull, with the roll going on, in a bank.
@@ -109,7 +113,7 @@ fn pull(draw: &mut Draw, side: f64) -> Step {
     let (bank, amplitude) = (draw.within(40.0, 52.0), draw.about(0.25));
     let step = Step::hold(4.5, side * bank, 5.0, draw.within(20.0, 23.0));
     let step = step.with(pulse(Elevator, -amplitude, 1.0, 0.4));
-    step.with(pulse(Elevator, -amplitude, 2.8, 0.4)).with(pulse(Aileron, -0.2 * side, 2.8, 0.4))
+    step.with(pulse(Elevator, -amplitude, 2.8, 0.4)).with(firm(Aileron, -0.2 * side, 2.8, 0.4))
 }
 
 /// Sideslip by slow aileron sines.
@@ -125,7 +129,7 @@ fn along(draw: &mut Draw) -> Vec<Step> {
         Step::hold(1.5, 0.0, 3.0, v),
         three211(draw, Elevator, 0.22, v),
         throttle(draw, v),
-        stall(draw.within(0.85, 1.0)),
+        stall(draw.within(1.9, 2.3)),
         Step::hold(2.5, 0.0, 0.0, 20.0),
         push(draw.within(0.85, 1.0)),
         two_sizes(draw, Elevator, 19.0),
@@ -173,10 +177,10 @@ fn mixed(draw: &mut Draw) -> Vec<Step> {
     let bank = 30.0 * side;
     steps.extend([
         Step::hold(4.0, bank, 5.0, 20.0)
-            .with(pulse(Aileron, 0.3 * side, 1.0, 0.5))
+            .with(firm(Aileron, 0.3 * side, 1.0, 0.5))
             .with(pulse(Elevator, -0.3, 1.0, 0.5)),
         throttle(draw, 20.0),
-        stall(draw.within(0.8, 1.0)),
+        stall(draw.within(1.7, 2.1)),
         Step::hold(2.0, 0.0, 0.0, 20.0),
         pull(draw, -side),
         two_sizes(draw, Elevator, 17.0),
@@ -191,15 +195,20 @@ fn other(draw: &mut Draw) -> Vec<Step> {
         let (roll_deg, pitch_deg) = (draw.within(-40.0, 40.0), draw.within(-6.0, 10.0));
         let leg = Step::hold(5.0, roll_deg, pitch_deg, draw.within(15.0, 24.0));
         let [a, e] = [draw.about(0.2), draw.about(0.18)].map(|x| x * draw.side());
-        let leg = leg.with(doublet(Aileron, a, draw.within(0.3, 1.0), draw.within(0.25, 0.6)));
-        let leg = leg.with(doublet(Elevator, e, draw.within(2.0, 3.0), draw.within(0.2, 0.5)));
+        let leg = leg.with(doublet(Aileron, a, draw.within(1.6, 2.0), draw.within(0.2, 0.45)));
+        let leg = leg.with(doublet(Elevator, e, draw.within(3.1, 3.6), draw.within(0.2, 0.45)));
         steps.push(leg.with(pulse(Throttle, draw.within(-0.5, 0.5), 1.5, 2.0)));
-        let leg = Step::hold(4.0, draw.within(-30.0, 30.0), draw.within(0.0, 6.0), draw.within(16.0, 23.0));
+        let leg = Step::hold(
+            4.0,
+            draw.within(-30.0, 30.0),
+            draw.within(0.0, 6.0),
+            draw.within(16.0, 23.0),
+        );
         let (fast, slow) = (draw.about(0.12), draw.about(0.10));
         let leg = leg.with(sines(Aileron, fast, 0.3, 3.0, draw.seed()));
         steps.push(leg.with(sines(Elevator, slow, 0.3, 3.0, draw.seed())));
     }
-    steps.push(stall(draw.within(0.8, 1.0)));
+    steps.push(stall(draw.within(1.7, 2.1)));
     steps.push(Step::hold(2.0, 0.0, 0.0, 20.0));
     steps.push(push(draw.within(0.7, 0.9)));
     let side = draw.side();

@@ -68,7 +68,8 @@ pub const MENU: &[Manoeuvre] = &[
         description: "Doublets of both surfaces at full and at no throttle: propeller wash.",
         steps: || {
             let at = |throttle: f64| {
-                let step = Step::hold(5.0, 0.0, 3.0, 18.0).with(pulse(Throttle, throttle, 0.0, 5.0));
+                let step =
+                    Step::hold(5.0, 0.0, 3.0, 18.0).with(pulse(Throttle, throttle, 0.0, 5.0));
                 step.with(doublet(Elevator, 0.2, 1.0, 0.35)).with(doublet(Aileron, 0.2, 2.8, 0.35))
             };
             vec![at(0.7), at(-0.7), at(0.7)]
@@ -103,7 +104,7 @@ pub const MENU: &[Manoeuvre] = &[
         steps: || {
             let one = |side: f64| {
                 let step = Step::hold(4.0, 30.0 * side, 4.0, 19.0);
-                step.with(pulse(Aileron, 0.3 * side, 0.6, 0.5)).with(pulse(Elevator, -0.3, 0.6, 0.5))
+                step.with(firm(Aileron, 0.3 * side, 0.6, 0.5)).with(pulse(Elevator, -0.3, 0.6, 0.5))
             };
             vec![one(1.0), one(-1.0), one(1.0)]
         },
@@ -113,7 +114,7 @@ pub const MENU: &[Manoeuvre] = &[
         description: "Fast rolls from bank to bank: products of inertia, roll damping.",
         steps: || {
             let one = |side: f64| {
-                Step::hold(2.5, 40.0 * side, 4.0, 21.0).with(pulse(Aileron, 0.35 * side, 0.1, 0.4))
+                Step::hold(2.5, 40.0 * side, 4.0, 21.0).with(firm(Aileron, 0.35 * side, 0.1, 0.4))
             };
             [1.0, -1.0, 1.0, -1.0, 1.0, -1.0].map(one).to_vec()
         },
@@ -122,7 +123,8 @@ pub const MENU: &[Manoeuvre] = &[
         name: "skid",
         description: "Aileron doublets at the yaw mode's pace with wings near level: sideslip without a rudder.",
         steps: || {
-            let sway = |v: f64| Step::hold(8.0, 0.0, 3.0, v).with(sines(Aileron, 0.35, 0.5, 1.1, 5));
+            let sway =
+                |v: f64| Step::hold(8.0, 0.0, 3.0, v).with(sines(Aileron, 0.35, 0.5, 1.1, 5));
             vec![sway(15.0), sway(20.0)]
         },
     },
@@ -193,23 +195,29 @@ pub const MENU: &[Manoeuvre] = &[
     },
 ];
 
-/// Slow with the nose up and the throttle closed, then a pull beyond the stall, of `depth` 0..1.
+/// Slow with the nose up and the throttle closed to beyond the stall, then the nose down; `depth`
+/// 0..1 is how long the nose is held up.
 pub(super) fn stall(depth: f64) -> Step {
-    let step = Step::hold(7.0, 0.0, 14.0, 12.0).with(pulse(Throttle, -1.0, 0.0, 6.0));
-    step.with(pulse(Elevator, -0.35 * depth, 3.6, 0.35)).with(pulse(Elevator, -0.35 * depth, 5.2, 0.35))
+    let up = 3.2 + 0.8 * depth;
+    let step = Step::hold(up + 2.8, 0.0, 14.0, 12.0).with(pulse(Throttle, -1.0, 0.0, up));
+    step.with(pulse(Pitch, (-20.0_f64).to_radians(), up, 1.2))
 }
 
-/// A push to a clearly negative angle of attack, of `depth` 0..1.
+/// Pushes to a clearly negative angle of attack, of `depth` 0..1.
 pub(super) fn push(depth: f64) -> Step {
-    let step = Step::hold(4.0, 0.0, 8.0, 18.0);
-    step.with(pulse(Elevator, 0.45 * depth, 1.0, 0.4)).with(pulse(Elevator, 0.45 * depth, 2.6, 0.4))
+    let step = Step::hold(4.0, 0.0, 10.0, 18.0);
+    step.with(pulse(Elevator, 0.35 * depth, 1.2, 0.35)).with(pulse(
+        Elevator,
+        0.25 * depth,
+        2.8,
+        0.4,
+    ))
 }
 
 /// A 3-2-1-1 of `axis` near level at `v` (m/s).
 fn step_3211(axis: Axis, amplitude: f64, width: f64, pitch_deg: f64, v: f64) -> Step {
     let shape = Shape::ThreeTwoOneOne { width };
-    Step::hold(7.0 * width + 4.0, 0.0, pitch_deg - 2.0, v)
-        .with(Excitation::new(axis, amplitude, 1.5, shape))
+    Step::hold(7.0 * width + 4.0, 0.0, pitch_deg - 2.0, v).with(loose(axis, amplitude, 1.5, shape))
 }
 
 /// Sines on aileron, elevator and throttle at once, with slow changes of attitude.
@@ -231,14 +239,28 @@ fn doublets(amplitude: f64) -> Vec<Step> {
     vec![on(Elevator), on(Aileron)]
 }
 
+/// Share of the controller's reaction during pulses of a surface.
+const LOOSE: f64 = 0.25;
+
+/// `shape` on `axis`, against a controller held off where the axis is a surface.
+pub(super) fn loose(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Excitation {
+    let authority = if matches!(axis, Aileron | Elevator) { LOOSE } else { 1.0 };
+    Excitation::new(axis, amplitude, start, shape).against(authority)
+}
+
+/// The same as [`pulse`] with the controller in full authority: for pulses on top of a manoeuvre.
+pub(super) fn firm(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
+    Excitation::new(axis, amplitude, start, Shape::Step { width })
+}
+
 /// +`amplitude` for `width` (s) from `start` (s) on.
 pub(super) fn pulse(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
-    Excitation::new(axis, amplitude, start, Shape::Step { width })
+    loose(axis, amplitude, start, Shape::Step { width })
 }
 
 /// ±`amplitude`, each for `width` (s), from `start` (s) on.
 pub(super) fn doublet(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
-    Excitation::new(axis, amplitude, start, Shape::Doublet { width })
+    loose(axis, amplitude, start, Shape::Doublet { width })
 }
 
 /// Sines from `low` to `high` (Hz) throughout.

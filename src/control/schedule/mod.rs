@@ -1,7 +1,7 @@
 //! A flight-test schedule: which attitudes and airspeeds to hold, with what excitation on top.
 //!
 //! A schedule is a pure function of time: [`Schedule::at`] gives the target with what is added to
-//! the controller's command. [`Scheduled`] flies one; [`menu`] names ready-made
+//! the controller's command. [`Scheduled`] flies one, [`Overlay`] is its law; [`menu`] names ready-made
 //! manoeuvres, [`flights`] draws whole flights; the file form is [`Schedule::load`] and [`Schedule::to_toml`].
 
 mod excitation;
@@ -12,7 +12,7 @@ mod scheduled;
 
 pub use excitation::{Axis, Excitation, Shape};
 pub use file::ScheduleError;
-pub use scheduled::Scheduled;
+pub use scheduled::{Overlay, Scheduled};
 
 use crate::control::Target;
 use crate::physics::Command;
@@ -55,6 +55,25 @@ impl Step {
     }
 }
 
+/// What a schedule asks for at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Demand {
+    /// The attitude and the airspeed to hold.
+    pub target: Target,
+    /// What is added to the controller's command.
+    pub added: Command,
+    /// Share (0..=1) of the controller's own reaction on aileron, elevator and throttle that is let
+    /// through, counted from its command when the excitation began.
+    pub authority: [f64; 3],
+}
+
+impl Demand {
+    /// `target` without excitation.
+    pub fn hold(target: Target) -> Demand {
+        Demand { target, added: Command::IDLE, authority: [1.0; 3] }
+    }
+}
+
 /// A flight-test schedule; after its end the wings are level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
@@ -89,11 +108,11 @@ impl Schedule {
         self.steps.iter().map(|step| step.duration).sum()
     }
 
-    /// What is wanted at `t` (s after the start), and what is added to the controller's command.
+    /// What is asked for at `t` (s after the start).
     ///
     /// Before the start it is the first step's target, after the end wings level at the last
     /// airspeed, both without excitation.
-    pub fn at(&self, t: f64) -> (Target, Command) {
+    pub fn at(&self, t: f64) -> Demand {
         let mut begins = 0.0;
         for step in &self.steps {
             if t < begins + step.duration {
@@ -101,7 +120,7 @@ impl Schedule {
             }
             begins += step.duration;
         }
-        (self.after(), Command::IDLE)
+        Demand::hold(self.after())
     }
 
     /// What is wanted after the end: wings level, nose on the horizon, the last airspeed.
@@ -110,11 +129,14 @@ impl Schedule {
         Target { roll: 0.0, pitch: 0.0, airspeed }
     }
 
-    /// The same schedule with every excitation multiplied by `factor` in 0..=1.
+    /// The same schedule with every excitation of a surface or the throttle multiplied by `factor`
+    /// in 0..=1.
     pub fn gentler(&self, factor: f64) -> Schedule {
         let mut gentler = self.clone();
+        let commands = [Axis::Aileron, Axis::Elevator, Axis::Throttle];
         let all = gentler.steps.iter_mut().flat_map(|step| &mut step.excitations);
-        all.for_each(|excitation| excitation.amplitude *= factor.clamp(0.0, 1.0));
+        all.filter(|e| commands.contains(&e.axis))
+            .for_each(|e| e.amplitude *= factor.clamp(0.0, 1.0));
         gentler
     }
 
@@ -125,19 +147,24 @@ impl Schedule {
     }
 }
 
-/// The target and the addition `t` (s) after the start of `step`.
-fn within(step: &Step, t: f64) -> (Target, Command) {
-    let (mut target, mut added) = (step.target, Command::IDLE);
+/// What is asked for `t` (s) after the start of `step`.
+fn within(step: &Step, t: f64) -> Demand {
+    let mut demand = Demand::hold(step.target);
+    let Demand { target, added, authority } = &mut demand;
     for excitation in &step.excitations {
-        let value = excitation.at(t, step.duration);
-        match excitation.axis {
-            Axis::Aileron => added.aileron += value,
-            Axis::Elevator => added.elevator += value,
-            Axis::Throttle => added.throttle += value,
-            Axis::Roll => target.roll += value,
-            Axis::Pitch => target.pitch += value,
-            Axis::Airspeed => target.airspeed += value,
+        let Some(value) = excitation.at(t, step.duration) else { continue };
+        let (sum, share) = match excitation.axis {
+            Axis::Aileron => (&mut added.aileron, Some(&mut authority[0])),
+            Axis::Elevator => (&mut added.elevator, Some(&mut authority[1])),
+            Axis::Throttle => (&mut added.throttle, Some(&mut authority[2])),
+            Axis::Roll => (&mut target.roll, None),
+            Axis::Pitch => (&mut target.pitch, None),
+            Axis::Airspeed => (&mut target.airspeed, None),
+        };
+        *sum += value;
+        if let Some(share) = share {
+            *share = share.min(excitation.authority);
         }
     }
-    (target, added)
+    demand
 }
