@@ -168,12 +168,30 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
 
 /// A table as it stands in the file, before any row is judged.
 pub(super) struct Raw {
-    /// The rows; `None` for one that holds something else than numbers.
-    pub rows: Vec<Option<Sample>>,
+    /// The rows that could be read and have a time.
+    pub rows: Vec<Sample>,
+    /// How many of the file's rows stand before each of them.
+    places: Vec<usize>,
+    /// Rows in the file.
+    total: usize,
     /// The needed columns that it lacks.
     pub missing: Vec<CsvError>,
     unknown_columns: Vec<String>,
     cut_short: bool,
+}
+
+impl Raw {
+    /// The rows, those that could not be read included, as `take` judges them.
+    fn judged(&self, take: impl Fn(&mut rows::Rows, usize, Option<Sample>)) -> rows::Rows {
+        let mut rows = rows::Rows::default();
+        let mut next = self.rows.iter().zip(&self.places).peekable();
+        for i in 0..self.total {
+            let own = next.next_if(|(_, place)| **place == i).map(|(sample, _)| *sample);
+            // The header is row 1.
+            take(&mut rows, i + 2, own);
+        }
+        rows
+    }
 }
 
 /// Where a field goes: place, scale, offset.
@@ -192,18 +210,23 @@ pub(super) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, C
     let missing = missing_columns(&names, mapping, path);
     let unknown = names.iter().zip(&targets).filter(|(_, targets)| targets.is_empty());
     let unknown_columns = unknown.map(|(name, _)| name.clone()).collect();
-    let mut rows = Vec::new();
+    let (mut rows, mut places, mut total) = (Vec::new(), Vec::new(), 0);
     for record in reader.byte_records() {
-        rows.push(sample(&record.map_err(text)?, &targets));
+        let record = record.map_err(text)?;
+        // A row that lacks fields is damaged, and would take many times its size.
+        let whole = record.len() >= targets.len();
+        if let Some(sample) = sample(&record, &targets).filter(|s| whole && s.time_s.is_finite()) {
+            rows.push(sample);
+            places.push(total);
+        }
+        total += 1;
     }
-    Ok(Raw { rows, missing, unknown_columns, cut_short: end < bytes.len() })
+    Ok(Raw { rows, places, total, missing, unknown_columns, cut_short: end < bytes.len() })
 }
 
 /// What [`settle`] would say against a table.
 pub(super) fn poor(raw: &Raw, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
-    let mut rows = rows::Rows::default();
-    raw.rows.iter().enumerate().for_each(|(i, sample)| rows.take(i + 2, *sample));
-    refusal(&rows, path, tolerance)
+    refusal(&raw.judged(rows::Rows::take), path, tolerance)
 }
 
 fn refusal(rows: &rows::Rows, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
@@ -217,9 +240,7 @@ fn refusal(rows: &rows::Rows, path: &Path, tolerance: Tolerance) -> Option<CsvEr
 
 /// Drops the unusable rows, refuses the table if they are too many.
 pub(super) fn settle(raw: Raw, path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
-    let mut rows = rows::Rows::default();
-    // The header is row 1.
-    raw.rows.iter().enumerate().for_each(|(i, sample)| rows.take(i + 2, *sample));
+    let rows = raw.judged(rows::Rows::take);
     if let Some(error) = refusal(&rows, path, tolerance) {
         return Err(error);
     }
@@ -228,13 +249,10 @@ pub(super) fn settle(raw: Raw, path: &Path, tolerance: Tolerance) -> Result<Read
 
 /// Keeps every row that is later than the last one, complete or not: for a look at the table.
 pub(super) fn keep_all(raw: Raw, path: &Path) -> Reading {
-    let mut rows = rows::Rows::default();
-    for (i, sample) in raw.rows.iter().enumerate() {
-        match sample {
-            Some(sample) => rows.take_incomplete(i + 2, *sample),
-            None => rows.take(i + 2, None),
-        }
-    }
+    let rows = raw.judged(|rows, number, sample| match sample {
+        Some(sample) => rows.take_incomplete(number, sample),
+        None => rows.take(number, None),
+    });
     reading(raw, rows, path)
 }
 

@@ -233,8 +233,7 @@ fn text(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Log, Lo
         }
         findings.push(Finding::problem(source.to_string()));
     }
-    let whole: Vec<Sample> = raw.rows.iter().flatten().copied().collect();
-    findings.extend(checks::check(&whole));
+    findings.extend(checks::check(&raw.rows));
     let reading = if lacking {
         csv::keep_all(raw, path)
     } else {

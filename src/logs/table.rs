@@ -6,7 +6,7 @@
 //! the table's own times stay gaps.
 //!
 //! What is measured much more slowly than the table's times (velocity over ground at 10 Hz) stands
-//! in the row next to each of its samples only: rows filled by interpolation would count as
+//! in the row that follows each of its samples only: rows filled by interpolation would count as
 //! measurements that nobody made. The other rows stay empty, or hold where a row needs a value.
 
 use std::f64::consts::{PI, TAU};
@@ -122,14 +122,19 @@ pub(super) fn build(topics: &Topics, rules: &[Rule]) -> Table {
     for track in &tracks {
         if track.is_sparse(period) {
             sparse.push((track, fill_sparse(&mut rows, track, period)));
-            notes.push(format!(
-                "{} is logged at {:.1} Hz only: it stands in the rows of its own samples",
-                track.rule.columns().join(", "),
-                track.rate_hz
-            ));
         } else {
             fill(&mut rows, track);
         }
+    }
+    if !sparse.is_empty() {
+        let slow = |(t, _): &(&Track, Vec<bool>)| {
+            format!("{} ({:.1} Hz)", t.rule.columns().join(", "), t.rate_hz)
+        };
+        let slow: Vec<String> = sparse.iter().map(slow).collect();
+        notes.push(format!(
+            "measured more slowly than the table's rows, in the rows of their own samples only: {}",
+            slow.join(", ")
+        ));
     }
     for note in tracks.iter().filter_map(|t| t.rule.note.as_ref()) {
         if !notes.contains(note) {
@@ -207,17 +212,15 @@ fn fill(rows: &mut [Sample], track: &Track) {
     rows.iter_mut().for_each(|row| reader.put(row));
 }
 
-/// Fills the rows next to the samples of `track`, rows `period` (s) apart; says which those are.
+/// Fills the rows that follow the samples of `track`, rows `period` (s) apart; says which those are.
 fn fill_sparse(rows: &mut [Sample], track: &Track, period: f64) -> Vec<bool> {
     let mut fresh = vec![false; rows.len()];
     let Some(reader) = Reader::new(track) else { return fresh };
     for t in &track.times {
-        let after = rows.partition_point(|row| row.time_s < *t);
-        let near = [after.checked_sub(1), Some(after)].into_iter().flatten();
-        let distance = |i: &usize| rows.get(*i).map_or(f64::INFINITY, |r| (r.time_s - t).abs());
-        let nearest = near.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        if let Some(i) = nearest.filter(|i| distance(i) <= period) {
-            fresh[i] = true;
+        // At or after the sample, where the next one is waited for.
+        let next = rows.partition_point(|row| row.time_s < t - SAME_S);
+        if rows.get(next).is_some_and(|row| row.time_s - t <= period) {
+            fresh[next] = true;
         }
     }
     rows.iter_mut().zip(&fresh).filter(|(_, fresh)| **fresh).for_each(|(row, _)| reader.put(row));

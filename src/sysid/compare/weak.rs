@@ -230,7 +230,7 @@ fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
 
 /// Predicted less what the state's noise moves of the measured side too: the forces turned by α and
 /// β, the gyroscopic moments.
-fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
+pub(super) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     let (force, measured) = (predicted_force(model, at), measured_force(model, at));
     let known = at.specific_force.iter().all(|f| f.is_finite());
     let force = std::array::from_fn(|k| force[k] - if known { measured[k] } else { 0.0 });
