@@ -7,15 +7,14 @@ use super::band::{self, Left, Link, Node, Stretch, add_gram};
 use super::intake::{Log, Track};
 use super::kinematics::{Drive, MOTION, MOTION_AND_GUST, Step, gust_kept};
 use super::levels::Levels;
-use super::measurement::{self, Gusts, Reading};
+use super::measurement::{self, AT, OTHERS, Others, Reading};
 use super::nuisance::{COUNT, INERTIAL, Values, WIND};
 use super::path::Path;
 use super::rotation::{exp, orthonormal};
 use super::{Options, ReconstructError};
 
-/// Columns where the constants are free: all, those at instants, those between; right-hand side last.
+/// Columns where the constants are free: all, those between instants; right-hand side last.
 const WIDTH: usize = COUNT + 1;
-const AT: usize = INERTIAL + 1;
 const BETWEEN: usize = COUNT - INERTIAL + 1;
 
 /// What was found so far.
@@ -57,47 +56,64 @@ pub struct Solved<const N: usize> {
 impl Problem<'_> {
     /// The path's motion with the constants, gusts as they are.
     pub fn calm(&self, found: &Found, bound: f64) -> Option<Solved<MOTION>> {
-        self.solve::<MOTION, WIDTH, AT, BETWEEN>(found, bound, Gusts::InTheAir)
-    }
-
-    /// Motion with gusts and constants, gusts as noise of the sensors of the air.
-    pub fn free(&self, found: &Found, bound: f64) -> Option<Solved<MOTION_AND_GUST>> {
-        self.solve::<MOTION_AND_GUST, WIDTH, AT, BETWEEN>(found, bound, Gusts::OnTheSensors)
+        self.solve::<MOTION, WIDTH, AT, BETWEEN>(found, bound)
     }
 
     /// Motion with gusts, the constants held.
     pub fn held(&self, found: &Found, bound: f64) -> Option<Solved<MOTION_AND_GUST>> {
-        self.solve::<MOTION_AND_GUST, 1, 1, 1>(found, bound, Gusts::InTheAir)
+        self.solve::<MOTION_AND_GUST, 1, 1, 1>(found, bound)
     }
 
     /// −2 ln L of the levels, up to what does not change with the gusts' level, with the constants held.
     pub fn misfit(&self, found: &Found, bound: f64) -> Option<f64> {
-        let (_, _, left) =
-            self.eliminate::<MOTION_AND_GUST, 1, 1, 1>(found, bound, Gusts::InTheAir)?;
+        let (_, _, left) = self.eliminate::<MOTION_AND_GUST, 1, 1, 1>(found, bound, None)?;
         let components = 3.0 * found.paths.iter().map(Path::len).sum::<usize>() as f64;
         let misfit = left.corner[0][0] + left.log_det;
         Some(misfit + 2.0 * components * found.levels.gusts.ln())
+    }
+
+    /// What the constants of [`calm`](Self::calm) would be moved by if the sensors of the air had the
+    /// residuals `others`, by stretch, then instant.
+    pub fn moved_by(
+        &self,
+        found: &Found,
+        bound: f64,
+        others: &[Vec<[Others; 3]>],
+    ) -> Option<[Values; OTHERS]> {
+        const W: usize = WIDTH + OTHERS;
+        const M: usize = AT + OTHERS;
+        let eliminated = self.eliminate::<MOTION, W, M, BETWEEN>(found, bound, Some(others));
+        let (_, _, left) = eliminated?;
+        let factor = self.information(&left)?.cholesky()?;
+        Some(std::array::from_fn(|r| {
+            let right = SVector::<f64, COUNT>::from_fn(|i, _| left.corner[OTHERS + i][r]);
+            factor.solve(&right).into()
+        }))
+    }
+
+    /// What is known of the constants, before the data and by them: the last columns but one.
+    fn information<const W: usize>(&self, left: &Left<W>) -> Option<SMatrix<f64, COUNT, COUNT>> {
+        let first = W.checked_sub(WIDTH)?;
+        Some(SMatrix::from_fn(|i, j| {
+            let before = if i == j { self.widths[i].powi(-2) } else { 0.0 };
+            left.corner[first + i][first + j] + before
+        }))
     }
 
     fn solve<const N: usize, const W: usize, const M: usize, const D: usize>(
         &self,
         found: &Found,
         bound: f64,
-        gusts: Gusts,
     ) -> Option<Solved<N>> {
-        let (stretches, readings, left) = self.eliminate::<N, W, M, D>(found, bound, gusts)?;
+        let (stretches, readings, left) = self.eliminate::<N, W, M, D>(found, bound, None)?;
         let (mut constants, mut deviations) = ([0.0; COUNT], [0.0; COUNT]);
         let mut by = [0.0; W];
         by[W - 1] = 1.0;
         if W == WIDTH {
-            let matrix = SMatrix::<f64, COUNT, COUNT>::from_fn(|i, j| {
-                let away = if i == j { self.widths[i].powi(-2) } else { 0.0 };
-                left.corner[i][j] + away
-            });
             let right = SVector::<f64, COUNT>::from_fn(|i, _| {
                 left.corner[i][W - 1] - found.values[i] / self.widths[i].powi(2)
             });
-            let factor = matrix.cholesky()?;
+            let factor = self.information(&left)?.cholesky()?;
             constants = factor.solve(&right).into();
             let covariance = factor.inverse();
             deviations = std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt());
@@ -112,11 +128,14 @@ impl Problem<'_> {
         &self,
         found: &Found,
         bound: f64,
-        gusts: Gusts,
+        others: Option<&[Vec<[Others; 3]>]>,
     ) -> Option<(Vec<Stretch<N, W>>, Vec<Vec<Reading>>, Left<W>)> {
-        let pairs = self.log.tracks.par_iter().zip(&found.paths);
+        let pairs = self.log.tracks.par_iter().zip(&found.paths).enumerate();
         let done: Vec<_> = pairs
-            .map(|(track, path)| self.stretch::<N, W, M, D>(track, path, found, bound, gusts))
+            .map(|(i, (track, path))| {
+                let others = others.and_then(|o| o.get(i)).map(Vec::as_slice);
+                self.stretch::<N, W, M, D>(track, path, found, bound, others)
+            })
             .collect::<Option<_>>()?;
         let (mut stretches, mut readings, mut left) = (Vec::new(), Vec::new(), Left::ZERO);
         for (stretch, reading, share) in done {
@@ -134,11 +153,11 @@ impl Problem<'_> {
         path: &Path,
         found: &Found,
         bound: f64,
-        gusts: Gusts,
+        others: Option<&[[Others; 3]]>,
     ) -> Option<(Stretch<N, W>, Vec<Reading>, Left<W>)> {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let (values, l) = (&found.values, &found.levels);
-        let readings = measurement::readings(track, path, values, step, gusts);
+        let readings = measurement::readings(track, path, values, step);
         let drive = Drive::new(track, values, step, self.options.timing, gravity);
         let spread = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
         let gust = l.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
@@ -152,7 +171,15 @@ impl Problem<'_> {
                 start::<N, W>(&path.gust[0], l.gusts, node, corner);
             }
             measurement::add::<N, W, M>(
-                path, values, k, gusts, &readings[k], &spread, bound, node, corner,
+                path,
+                values,
+                k,
+                &readings[k],
+                &spread,
+                bound,
+                others.map(|o| &o[k]),
+                node,
+                corner,
             );
         };
         let link = |k: usize, corner: &mut band::Corner<W>| {
@@ -241,7 +268,11 @@ impl<const N: usize> Solved<N> {
                 }
             }
         }
-        if largest.is_finite() { Ok(largest) } else { Err(no_path(flight, "the path left the numbers")) }
+        if largest.is_finite() {
+            Ok(largest)
+        } else {
+            Err(no_path(flight, "the path left the numbers"))
+        }
     }
 }
 

@@ -38,41 +38,45 @@ pub struct Levels {
 }
 
 impl Levels {
-/// Levels before anything is fitted: the white part of every channel.
+    /// Levels before anything is fitted: the white part of every channel.
     pub fn first(log: &Log) -> Levels {
-    let over = |get: &dyn Fn(&Track, usize) -> f64| {
-        noise::white(log.tracks.iter().flat_map(|t| (0..t.len()).map(move |k| get(t, k))))
-    };
-    let or = |level: f64, default: f64| if level.is_finite() { level } else { default };
-    let attitude = |i: usize| {
-        // angles near ±π jump; their sine and cosine do not
-        let (a, b) = (over(&|t, k| t.attitude[k][i].sin()), over(&|t, k| t.attitude[k][i].cos()));
-        a.hypot(b)
-    };
-    let white: [f64; CHANNELS] = std::array::from_fn(|i| match i {
-        0..3 => attitude(i),
-        3 => over(&|t, k| t.airspeed[k]),
-        4 | 5 => over(&|t, k| t.vanes[k][i - 4]),
-        _ => over(&|t, k| t.velocity[k][i - 6]),
-    });
-    let samples: usize = log.tracks.iter().map(Track::len).sum();
-    let dense = |i: usize| {
-        let tracks = log.tracks.iter();
-        let count = tracks.flat_map(|t| (0..t.len()).map(move |k| measurement::measured(t, i, k)));
-        2 * count.filter(|x| x.is_finite()).count() > samples
-    };
-    let force = |i: usize| over(&|t, k| t.force[k][i]).max(FORCE_FLOOR);
-    Levels {
-        gyro: std::array::from_fn(|i| or(over(&|t, k| t.rates[k][i]), 0.0).max(GYRO_FLOOR)),
-        force: std::array::from_fn(|i| if log.has.force { force(i) } else { UNKNOWN_FORCE }),
-        gusts: CALM,
-        measured: std::array::from_fn(|i| or(white[i], DEFAULTS[i]).max(FLOORS[i])),
-        white: std::array::from_fn(|i| if dense(i) { white[i].max(FLOORS[i]) } else { FLOORS[i] }),
-        colour: [1.0; CHANNELS],
+        let over = |get: &dyn Fn(&Track, usize) -> f64| {
+            noise::white(log.tracks.iter().flat_map(|t| (0..t.len()).map(move |k| get(t, k))))
+        };
+        let or = |level: f64, default: f64| if level.is_finite() { level } else { default };
+        let attitude = |i: usize| {
+            // angles near ±π jump; their sine and cosine do not
+            let (a, b) =
+                (over(&|t, k| t.attitude[k][i].sin()), over(&|t, k| t.attitude[k][i].cos()));
+            a.hypot(b)
+        };
+        let white: [f64; CHANNELS] = std::array::from_fn(|i| match i {
+            0..3 => attitude(i),
+            3 => over(&|t, k| t.airspeed[k]),
+            4 | 5 => over(&|t, k| t.vanes[k][i - 4]),
+            _ => over(&|t, k| t.velocity[k][i - 6]),
+        });
+        let samples: usize = log.tracks.iter().map(Track::len).sum();
+        let dense = |i: usize| {
+            let tracks = log.tracks.iter();
+            let count =
+                tracks.flat_map(|t| (0..t.len()).map(move |k| measurement::measured(t, i, k)));
+            2 * count.filter(|x| x.is_finite()).count() > samples
+        };
+        let force = |i: usize| over(&|t, k| t.force[k][i]).max(FORCE_FLOOR);
+        Levels {
+            gyro: std::array::from_fn(|i| or(over(&|t, k| t.rates[k][i]), 0.0).max(GYRO_FLOOR)),
+            force: std::array::from_fn(|i| if log.has.force { force(i) } else { UNKNOWN_FORCE }),
+            gusts: CALM,
+            measured: std::array::from_fn(|i| or(white[i], DEFAULTS[i]).max(FLOORS[i])),
+            white: std::array::from_fn(
+                |i| if dense(i) { white[i].max(FLOORS[i]) } else { FLOORS[i] },
+            ),
+            colour: [1.0; CHANNELS],
+        }
     }
-}
 
-/// Takes the levels anew from the residuals of every stretch; returns the largest relative change.
+    /// Takes the levels anew from the residuals of every stretch; returns the largest relative change.
     pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
         let mut change = 0.0_f64;
         for channel in 0..CHANNELS {

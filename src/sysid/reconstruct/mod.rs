@@ -7,6 +7,7 @@ mod actuator_skew;
 mod band;
 mod channel;
 mod equations;
+mod gusts;
 mod intake;
 mod kinematics;
 mod levels;

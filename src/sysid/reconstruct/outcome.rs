@@ -1,12 +1,12 @@
 //! The outcome: what the smoother found, as a reconstruction with its notes.
 
 use super::actuator_skew::{self, Skew};
+use super::equations::Found;
 use super::intake::{Log, Track};
 use super::kinematics::shifted;
 use super::nuisance::{self, COUNT, FORCE, GYRO, SCALE, SKEW_FORCE, Values};
 use super::path::{Path, flow_angles};
 use super::rotation::to_euler;
-use super::equations::Found;
 use super::{ActuatorClock, Options};
 use crate::physics::{Controls, State};
 use crate::sysid::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
@@ -66,7 +66,7 @@ pub fn assemble(log: Log, smoothed: Found, options: &Options) -> Reconstruction 
 }
 
 fn segment(track: &Track, path: &Path, values: &Values, log: &Log) -> Segment {
-    let (force, _) = shifted(&track.force, values[SKEW_FORCE] / log.step);
+    let (force, _) = shifted(&track.force, values[SKEW_FORCE] / log.step, log.step);
     let instant = |k: usize| {
         let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
         let air = path.air_velocity(k);
