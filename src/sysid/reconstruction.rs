@@ -54,9 +54,13 @@ pub struct Reconstruction {
     pub segments: Vec<Segment>,
     /// What was estimated along.
     pub nuisances: Vec<Nuisance>,
-    /// Standard deviations of the measurements' noise, in the order roll, pitch, airspeed, p, q, r,
-    /// alpha, beta (units of [`State`]).
+    /// Standard deviations of the noise of the measurements as logged, in the order roll, pitch,
+    /// airspeed, p, q, r, alpha, beta (units of [`State`]): the sensors', before smoothing.
     pub noise: [f64; 8],
+    /// Standard deviations of what is left of it in the states of [`Self::segments`], in the same order:
+    /// rates are the gyros' less their biases, not smoothed; the others err slowly, over tenths of
+    /// seconds. The constant part of the errors is in [`Self::nuisances`], not here.
+    pub left: [f64; 8],
     /// Standard deviation of the accelerometers' noise, m/s².
     pub force_noise: [f64; 3],
     /// What the reader must know: assumptions made, power lost, for example for want of a vane.

@@ -1,17 +1,18 @@
 //! The equations of a fit: all stretches linearised at what was found, eliminated, solved.
 
 use nalgebra::{SMatrix, SVector, Vector3};
+use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::band::{self, Left, Link, Node, Stretch, add_gram};
 use super::intake::{Log, Track};
 use super::kinematics::{Drive, MOTION, MOTION_AND_GUST, Step, gust_kept};
-use super::levels::Levels;
+use super::levels::{CALM, Levels};
 use super::measurement::{self, AT, OTHERS, Others, Reading};
 use super::nuisance::{COUNT, INERTIAL, Values, WIND};
 use super::path::Path;
-use super::rotation::{exp, orthonormal};
-use super::{Options, ReconstructError};
+use super::{Options, ReconstructError, Timing};
+use crate::num::stream::Stream;
 
 /// Columns where the constants are free: all, those between instants; right-hand side last.
 const WIDTH: usize = COUNT + 1;
@@ -51,6 +52,15 @@ pub struct Solved<const N: usize> {
     deviations: Values,
     /// The readings before the move.
     pub readings: Vec<Vec<Reading>>,
+}
+
+/// A path with an error like that of the one found.
+#[derive(Clone, Debug)]
+pub struct Erring {
+    /// The path of each track.
+    pub paths: Vec<Path>,
+    /// The noise of the gyros of each track, rad/s.
+    pub gyro: Vec<Vec<[f64; 3]>>,
 }
 
 impl Problem<'_> {
@@ -98,6 +108,77 @@ impl Problem<'_> {
             let before = if i == j { self.widths[i].powi(-2) } else { 0.0 };
             left.corner[first + i][first + j] + before
         }))
+    }
+
+    /// How the path errs that was found, in one draw of the noise of every sensor, the constants held.
+    pub fn erring(&self, found: &Found, random: &mut Stream) -> Option<Erring> {
+        let mut erring = Erring { paths: found.paths.clone(), gyro: Vec::new() };
+        for (track, path) in self.log.tracks.iter().zip(&mut erring.paths) {
+            let gyro = if found.levels.gusts > CALM {
+                self.err::<MOTION_AND_GUST>(track, path, found, random)?
+            } else {
+                self.err::<MOTION>(track, path, found, random)?
+            };
+            erring.gyro.push(gyro);
+        }
+        Some(erring)
+    }
+
+    /// Moves `path` by its error in one draw; returns the gyros' noise in it, rad/s.
+    fn err<const N: usize>(
+        &self,
+        track: &Track,
+        path: &mut Path,
+        found: &Found,
+        random: &mut Stream,
+    ) -> Option<Vec<[f64; 3]>> {
+        let (step, gravity) = (self.log.step, self.options.gravity);
+        let (values, l) = (&found.values, &found.levels);
+        let mut unit = || -> f64 { StandardNormal.sample(random) };
+        let noise: Vec<[f64; N]> =
+            (0..path.len()).map(|_| std::array::from_fn(|_| unit())).collect();
+        let measured = measurement::readings(track, path, values, step);
+        let readings: Vec<Reading> = measured
+            .into_iter()
+            .map(|r| r.with(std::array::from_fn(|i| l.measured[i] * unit())))
+            .collect();
+        let drive = Drive::new(track, values, step, self.options.timing, gravity);
+        let sd = step_deviations::<N>(l, step);
+        let along: &Path = path;
+        let instant = |k: usize, node: &mut Node<N, 1>, corner: &mut band::Corner<1>| {
+            if k == 0 {
+                start::<N, 1>(&Vector3::zeros(), l.gusts, node, corner);
+            }
+            let reading = &readings[k];
+            let spread = &l.measured;
+            measurement::add::<N, 1, 1>(
+                along,
+                values,
+                k,
+                reading,
+                spread,
+                f64::INFINITY,
+                None,
+                node,
+                corner,
+            );
+        };
+        let link = |k: usize, corner: &mut band::Corner<1>| {
+            let mut step = drive.step::<N, 1>(along, values, k, step, gravity);
+            for i in 0..N {
+                let unit = match (i, self.options.timing) {
+                    (0..3, Timing::Sampled) => 0.5 * (noise[k][i] + noise[k + 1][i]),
+                    _ => noise[k][i],
+                };
+                step.rest[i][0] = sd[i] * unit;
+            }
+            weigh(step, &sd, corner)
+        };
+        let (stretch, _) = band::eliminate(along.len(), instant, link)?;
+        for (k, x) in stretch.substitute(&[1.0]).iter().enumerate() {
+            path.shift(k, x);
+        }
+        Some(noise.iter().map(|unit| std::array::from_fn(|i| l.gyro[i] * unit[i])).collect())
     }
 
     fn solve<const N: usize, const W: usize, const M: usize, const D: usize>(
@@ -160,12 +241,7 @@ impl Problem<'_> {
         let readings = measurement::readings(track, path, values, step);
         let drive = Drive::new(track, values, step, self.options.timing, gravity);
         let spread = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
-        let gust = l.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
-        let sd: [f64; N] = std::array::from_fn(|i| match i {
-            0..3 => l.gyro[i] * step,
-            3..MOTION => l.force[i - 3] * step,
-            _ => gust,
-        });
+        let sd = step_deviations::<N>(l, step);
         let instant = |k: usize, node: &mut Node<N, W>, corner: &mut band::Corner<W>| {
             if k == 0 {
                 start::<N, W>(&path.gust[0], l.gusts, node, corner);
@@ -189,6 +265,16 @@ impl Problem<'_> {
         let (stretch, left) = band::eliminate(path.len(), instant, link)?;
         Some((stretch, readings, left))
     }
+}
+
+/// Standard deviations of the differences between samples `step` (s) apart.
+fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
+    let gust = levels.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
+    std::array::from_fn(|i| match i {
+        0..3 => levels.gyro[i] * step,
+        3..MOTION => levels.force[i - 3] * step,
+        _ => gust,
+    })
 }
 
 /// A start of which nothing is known but the size of gusts.
@@ -260,12 +346,7 @@ impl<const N: usize> Solved<N> {
         for (path, moves) in found.paths.iter_mut().zip(&self.moves) {
             path.wind = wind;
             for (k, x) in moves.iter().enumerate() {
-                let turn = Vector3::new(x[0], x[1], x[2]);
-                path.attitude[k] = orthonormal(&(path.attitude[k] * exp(&turn)));
-                path.velocity[k] += Vector3::new(x[3], x[4], x[5]);
-                if N == MOTION_AND_GUST {
-                    path.gust[k] += Vector3::new(x[6], x[7], x[8]);
-                }
+                path.shift(k, x);
             }
         }
         if largest.is_finite() {

@@ -13,10 +13,6 @@ use super::rotation::{cross, exp, log};
 /// the airspeed of a small aircraft.
 const GUST_TIME: f64 = 20.0;
 
-/// Time over which a parabola is laid through the forces to move them by less than a sample, s: short
-/// beside the short period of a small aircraft.
-const SLOPE_TIME: f64 = 0.08;
-
 /// The part of a gust that is left after `step`, s.
 pub fn gust_kept(step: f64) -> f64 {
     (-step / GUST_TIME).exp()
@@ -71,7 +67,7 @@ impl Drive {
         let n = track.len();
         let bias = Vector3::from_column_slice(&values[GYRO..GYRO + 3]);
         let gyro = |k: usize| Vector3::from(track.rates[k]) - bias;
-        let (force, slope) = shifted(&track.force, values[SKEW_FORCE] / step, step);
+        let (force, slope) = shifted(&track.force, values[SKEW_FORCE] / step);
         let has_force = track.force.first().is_some_and(|f| f[0].is_finite());
         let mut drive = Drive { rate: vec![], force: vec![], force_by_skew: vec![] };
         for k in 0..n - 1 {
@@ -158,34 +154,19 @@ fn weight(track: &Track, k: usize, gravity: f64) -> Vector3<f64> {
     r.transpose() * Vector3::new(0.0, 0.0, -gravity)
 }
 
-/// `samples`, `step` (s) apart, that came `late` samples late, put right by less than a sample from the
-/// nearest one along parabolas, with the change of each by one more sample of lateness.
-///
-/// The parabolas are fitted over [`SLOPE_TIME`]: through three samples only they would average the noise
-/// more the further they reach, and the likeliest delay would be half a sample whatever the delay.
-pub fn shifted(
-    samples: &[[f64; 3]],
-    late: f64,
-    step: f64,
-) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
+/// `samples` that came `late` samples late, put right by parabolas through three of them, with the
+/// change of each by one more sample of lateness.
+pub fn shifted(samples: &[[f64; 3]], late: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
     let last = samples.len() as isize - 1;
     let at = |i: isize| Vector3::from(samples[i.clamp(0, last) as usize]);
     let whole = late.round();
     let part = late - whole;
-    let half = (SLOPE_TIME / step / 2.0).round().clamp(1.0, 10.0) as isize;
-    let moment = |power: i32| (-half..=half).map(|i| (i as f64).powi(power)).sum::<f64>();
-    let (count, second, fourth) = (moment(0), moment(2), moment(4));
-    let by_bend = 2.0 / (fourth - second * second / count);
     (0..=last)
         .map(|k| {
-            let middle = k + whole as isize;
-            let (mut slope, mut bend) = (Vector3::zeros(), Vector3::zeros());
-            for i in -half..=half {
-                let (x, value) = (i as f64, at(middle + i));
-                slope += value * (x / second);
-                bend += value * ((x * x - second / count) * by_bend);
-            }
-            (at(middle) + slope * part + bend * (0.5 * part * part), slope + bend * part)
+            let i = k + whole as isize;
+            let (a, b, c) = (at(i - 1), at(i), at(i + 1));
+            let (slope, bend) = ((c - a) * 0.5, a - b * 2.0 + c);
+            (b + slope * part + bend * (0.5 * part * part), slope + bend * part)
         })
         .unzip()
 }
@@ -199,8 +180,8 @@ mod tests {
         // a parabola is interpolated exactly
         let f = |t: f64| 0.3 + 0.2 * t - 0.05 * t * t;
         let samples: Vec<[f64; 3]> = (0..20).map(|k| [f(k as f64 - 0.7); 3]).collect();
-        let (shifted, slope) = shifted(&samples, 0.7, 0.01);
-        for k in 5..14 {
+        let (shifted, slope) = shifted(&samples, 0.7);
+        for k in 3..15 {
             let t = k as f64;
             assert!((shifted[k].x - f(t)).abs() < 1e-12);
             assert!((slope[k].x - (0.2 - 0.1 * t)).abs() < 1e-12);

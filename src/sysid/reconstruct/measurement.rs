@@ -30,6 +30,16 @@ pub struct Reading {
     by_late: [f64; CHANNELS],
 }
 
+impl Reading {
+    /// The same with other residuals where there are measurements.
+    pub fn with(mut self, residuals: [f64; CHANNELS]) -> Reading {
+        for (residual, other) in self.residual.iter_mut().zip(residuals) {
+            *residual = if residual.is_nan() { f64::NAN } else { other };
+        }
+        self
+    }
+}
+
 /// The delay that a channel is read with.
 pub fn skew_of(channel: usize) -> usize {
     match channel {

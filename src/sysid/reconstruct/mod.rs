@@ -22,6 +22,8 @@ mod smoother;
 
 pub use manoeuvres::{Kind as ManoeuvreKind, Manoeuvre, manoeuvres};
 
+use equations::Problem;
+
 use crate::logs::Flight;
 use crate::physics::airframe::ActuatorFigures;
 use crate::sysid::reconstruction::Reconstruction;
@@ -147,6 +149,7 @@ pub enum ReconstructError {
 /// its sensors contradict one another.
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
-    let smoothed = smoother::smooth(&log, options)?;
-    Ok(outcome::assemble(log, smoothed, options))
+    let problem = Problem { log: &log, options, widths: nuisance::prior_widths(log.step) };
+    let found = smoother::smooth(&problem)?;
+    outcome::assemble(&problem, &found)
 }

@@ -7,13 +7,13 @@
 
 use nalgebra::Vector3;
 
+use super::ReconstructError;
 use super::equations::{Found, Problem, no_path};
 use super::gusts;
 use super::intake::Log;
 use super::levels::{CALM, Levels};
-use super::nuisance::{self, COUNT, WIND};
+use super::nuisance::{COUNT, WIND};
 use super::path::Path;
-use super::{Options, ReconstructError};
 
 /// Levels of gusts that are tried, m/s, then the factors around the best of them.
 const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
@@ -30,14 +30,13 @@ const LAST: usize = 25;
 const SETTLED: f64 = 0.05;
 const LEVEL_SETTLED: f64 = 0.02;
 
-/// Smooths all stretches of `log` together.
+/// Smooths all stretches of the log together.
 ///
 /// # Errors
 /// [`ReconstructError::NoPath`] if the search does not settle on numbers.
-pub fn smooth(log: &Log, options: &Options) -> Result<Found, ReconstructError> {
+pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
+    let Problem { log, options, widths } = *problem;
     let singular = || no_path(&options.name, "the equations became singular");
-    let widths = nuisance::prior_widths(log.step);
-    let problem = Problem { log, options, widths };
     let mut found = Found {
         paths: log.tracks.iter().map(Path::guess).collect(),
         values: [0.0; COUNT],
@@ -57,7 +56,7 @@ pub fn smooth(log: &Log, options: &Options) -> Result<Found, ReconstructError> {
             break;
         }
     }
-    gusty(&problem, &mut found, &singular)?;
+    gusty(problem, &mut found, &singular)?;
     Ok(found)
 }
 
