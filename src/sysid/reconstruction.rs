@@ -31,6 +31,9 @@ pub struct Segment {
 }
 
 /// An error of a sensor, or the wind, as estimated together with the path.
+///
+/// The wind is the steady one, about which gusts vary; its deviation holds how far a mean over the flight
+/// may be from it. The velocity through the air at an instant has the gust in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nuisance {
     /// What it is, for example `gyro_bias_p`, `alpha_bias`, `airspeed_scale`, `wind_north`.

@@ -13,7 +13,7 @@ const FLOORS: [f64; CHANNELS] = [2e-5, 2e-5, 2e-5, 1e-3, 5e-5, 5e-5, 1e-3, 1e-3,
 /// Least level of a channel in what the noise of gyros or accelerometers moves the path by between two
 /// samples. Were it less, the path would follow every single measurement, and the likeliest delay be half
 /// a sample, whatever the delay: there interpolation averages neighbours.
-const CARRIED: f64 = 10.0;
+const CARRIED: f64 = 30.0;
 /// Levels where too few samples tell: rad, m/s, rad, m/s.
 const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 0.5];
 /// What the velocity may do where no accelerometer says it, m/s².
@@ -76,7 +76,7 @@ impl Levels {
         let (turn, gain) = (between(gyro), between(force));
         let floor: [f64; CHANNELS] = std::array::from_fn(|i| {
             FLOORS[i].max(match i {
-                0..3 => turn,
+                0..=2 => turn,
                 4 | 5 => or(gain * count / sum, 0.0),
                 _ => gain,
             })

@@ -36,7 +36,8 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     let mut nuisances = nuisances(log, found);
     let erring = draws(problem, found)?;
     let left = left(&segments, &erring, &found.levels.gyro);
-    let skew = actuator_skew::estimate(&segments, &erring, log.step, options.timing);
+    let gusts = found.levels.gusts;
+    let skew = actuator_skew::estimate(&segments, &erring, log.step, options.timing, gusts);
     let late = late_beyond_doubt(&skew, log.step);
     if late && options.actuators_clock == ActuatorClock::AsRecorded {
         notes.push(format!(
