@@ -4,6 +4,7 @@ mod choices;
 mod compare;
 #[cfg(feature = "sitl")]
 mod demo;
+mod effects;
 #[cfg(feature = "sitl")]
 mod evaluate;
 mod files;
@@ -35,6 +36,8 @@ enum Command {
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
     #[cfg(feature = "sitl")]
     Demo(demo::Arguments),
+    /// Say what the catalogue of physical effects knows.
+    Effects(effects::Arguments),
     /// Score controllers on the target file, flown in JSBSim in this process.
     #[cfg(feature = "sitl")]
     Evaluate(evaluate::Arguments),
@@ -58,6 +61,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Demo(arguments) => demo::run(&arguments),
+        Command::Effects(arguments) => effects::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),
