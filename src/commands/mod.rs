@@ -5,6 +5,8 @@ mod compare;
 #[cfg(feature = "sitl")]
 mod demo;
 #[cfg(feature = "sitl")]
+mod design;
+#[cfg(feature = "sitl")]
 mod evaluate;
 mod files;
 pub mod fly;
@@ -35,6 +37,9 @@ enum Command {
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
     #[cfg(feature = "sitl")]
     Demo(demo::Arguments),
+    /// Find the manoeuvre that tells two missing effects apart, as a schedule to fly.
+    #[cfg(feature = "sitl")]
+    Design(design::Arguments),
     /// Score controllers on the target file, flown in JSBSim in this process.
     #[cfg(feature = "sitl")]
     Evaluate(evaluate::Arguments),
@@ -58,6 +63,8 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Demo(arguments) => demo::run(&arguments),
+        #[cfg(feature = "sitl")]
+        Command::Design(arguments) => design::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),

@@ -5,3 +5,4 @@ pub mod diagnose;
 pub mod measurement_effects;
 pub mod reconstruct;
 pub mod reconstruction;
+pub mod separation;
