@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let manoeuvre = menu::named(best.name).context("the menu has lost a manoeuvre")?;
     let times = (seconds / best.duration_s).ceil().max(1.0) as usize;
     println!(
-        "{}: {}\n{seconds:.0} s of it tell {} from {} (evidence {ENOUGH}); one pass takes {:.0} s",
+        "{}: {}\n{seconds:.1} s of it tell {} from {} (evidence {ENOUGH}); one pass takes {:.0} s",
         best.name, manoeuvre.description, a.id, b.id, best.duration_s
     );
     if let Some(path) = &arguments.out {
@@ -113,7 +113,10 @@ fn table(all: &[Prospect]) -> Table {
             format!("{:.0}", prospect.duration_s),
             prospect.apart().map_or("leaves the bounds".into(), |x| format!("{x:.0}")),
             number(visible),
-            number(prospect.seconds().filter(|s| s.is_finite())),
+            prospect
+                .seconds()
+                .filter(|s| s.is_finite())
+                .map_or("–".into(), |s| format!("{s:.1}")),
         ]);
     }
     table

@@ -118,7 +118,8 @@ fn truth(model: &GreyBox, suspect: &Suspect) -> Result<GreyBox, DesignError> {
     Ok(with)
 }
 
-/// The values of its coefficients: those given, else clear ones.
+/// The values of its coefficients: those given, else clear ones, else the middle of those at which a
+/// search starts.
 fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
     if !suspect.values.is_empty() {
         return Ok(suspect.values.clone());
@@ -128,13 +129,14 @@ fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
         // joining it says what is known
         return Ok(model.clone().join(id, &[]).map(|()| Vec::new())?);
     };
-    let starts = about.entry.map_or(&[][..], |entry| entry.starts);
-    if let Some(middle) = starts.get(starts.len() / 2).filter(|_| about.shape > 0) {
-        return Ok(middle.to_vec());
+    let clear = Kind::from_id(id).map(|Kind { clear: [low, high], .. }| 0.5 * (low + high));
+    let clear = clear.and_then(|amplitude| Missing::new(id, amplitude).ok());
+    if let Some(missing) = clear.filter(|missing| !missing.values.is_empty()) {
+        return Ok(missing.values);
     }
-    let unknown = || DesignError::Amplitude { id: id.into() };
-    let [low, high] = Kind::from_id(id).ok_or_else(unknown)?.clear;
-    Ok(Missing::new(id, 0.5 * (low + high)).map_err(|_| unknown())?.values)
+    let starts = about.entry.map_or(&[][..], |entry| entry.starts);
+    let middle = starts.get(starts.len() / 2).map(|middle| middle.to_vec());
+    middle.ok_or_else(|| DesignError::Amplitude { id: id.into() })
 }
 
 fn describe(id: &str) -> Option<Description> {
@@ -142,9 +144,12 @@ fn describe(id: &str) -> Option<Description> {
     known.or_else(|| inputs::Kind::from_id(id).map(inputs::Kind::describe))
 }
 
-/// The ways in which the effect may be fitted: for each set of shape constants `model` with one unit
+/// The ways in which the effect may be fitted to data of `model`: for each set of shape constants `model` with one unit
 /// of each linear coefficient, or with the effect as a whole where it has none.
-fn alternatives(model: &GreyBox, suspect: &Suspect) -> Result<Vec<Vec<GreyBox>>, DesignError> {
+///
+/// # Errors
+/// The effect is unknown, there already, or its size is not known.
+pub fn alternatives(model: &GreyBox, suspect: &Suspect) -> Result<Vec<Vec<GreyBox>>, DesignError> {
     let own = values(model, suspect)?;
     let about = describe(&suspect.id);
     let starts = about.and_then(|about| about.entry).map_or(&[][..], |entry| entry.starts);
