@@ -6,6 +6,8 @@ mod compare;
 mod demo;
 mod effects;
 #[cfg(feature = "sitl")]
+mod design;
+#[cfg(feature = "sitl")]
 mod evaluate;
 mod files;
 pub mod fly;
@@ -38,6 +40,9 @@ enum Command {
     Demo(demo::Arguments),
     /// Say what the catalogue of physical effects knows.
     Effects(effects::Arguments),
+    /// Find the manoeuvre that tells two missing effects apart, as a schedule to fly.
+    #[cfg(feature = "sitl")]
+    Design(design::Arguments),
     /// Score controllers on the target file, flown in JSBSim in this process.
     #[cfg(feature = "sitl")]
     Evaluate(evaluate::Arguments),
@@ -62,6 +67,8 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "sitl")]
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Effects(arguments) => effects::run(&arguments),
+        #[cfg(feature = "sitl")]
+        Command::Design(arguments) => design::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),

@@ -6,3 +6,4 @@ pub mod measurement_effects;
 pub mod reconstruct;
 pub mod reconstruction;
 pub mod signature;
+pub mod separation;
