@@ -11,6 +11,8 @@ pub mod fly;
 mod intake;
 mod logs;
 #[cfg(feature = "sitl")]
+mod mystery;
+#[cfg(feature = "sitl")]
 mod targets;
 
 use std::process::ExitCode;
@@ -40,6 +42,9 @@ enum Command {
     Fly(fly::Arguments),
     /// Say what a flight log holds, or write it as a CSV table.
     Logs(logs::Arguments),
+    /// Fly an aircraft that has an effect which its model lacks: data to find it in.
+    #[cfg(feature = "sitl")]
+    Mystery(mystery::Arguments),
     /// Write a target file.
     #[cfg(feature = "sitl")]
     Targets(targets::Arguments),
@@ -57,6 +62,8 @@ pub fn main() -> ExitCode {
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),
         Command::Logs(arguments) => logs::run(&arguments),
+        #[cfg(feature = "sitl")]
+        Command::Mystery(arguments) => mystery::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Targets(arguments) => targets::run(&arguments),
     };

@@ -3,5 +3,6 @@
 pub mod amend;
 pub mod compare;
 pub mod diagnose;
+pub mod measurement_effects;
 pub mod reconstruct;
 pub mod reconstruction;
