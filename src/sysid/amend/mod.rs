@@ -5,6 +5,7 @@
 //! it was worth.
 
 
+mod amendment;
 mod equation_error;
 mod error;
 mod flight;
@@ -15,7 +16,7 @@ mod parameters;
 mod result;
 mod shooting;
 
-
+pub use amendment::{Added, Amended, Options, Refused, amend, split};
 pub use error::AmendError;
 pub use flight::Flight;
 pub use output_error::{Fit, FitOptions};
