@@ -1,5 +1,6 @@
 //! Subcommands: arguments, then a few lines of work.
 
+mod amend;
 mod choices;
 mod compare;
 #[cfg(feature = "sitl")]
@@ -33,6 +34,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Refit a model to flights and add missing effects to it, judged on flights it has not seen.
+    Amend(amend::Arguments),
     /// Compare models with flight logs: how far predictions stray, in which channel and regime.
     Compare(compare::Arguments),
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
@@ -63,6 +66,7 @@ pub fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let result = match Arguments::parse().command {
+        Command::Amend(arguments) => amend::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Demo(arguments) => demo::run(&arguments),

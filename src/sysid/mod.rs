@@ -1,5 +1,6 @@
 //! From flight logs to what is wrong with a model: reconstruct, compare, localise, rank, amend.
 
+pub mod amend;
 pub mod compare;
 pub mod diagnose;
 pub mod measurement_effects;
