@@ -115,6 +115,7 @@ fn figures(pairs: &[Pair]) -> Vec<Figure> {
             let with = line(pair, "with it", Style::Actual, &pair.with);
             let bare = |label: &str| label.split(',').next().unwrap_or_default().to_owned();
             Figure::Xy(XyFigure {
+                bands: Vec::new(),
                 title: format!("{} over {}", bare(pair.y_label), bare(pair.x_label)),
                 x_label: pair.x_label.into(),
                 y_label: pair.y_label.into(),
