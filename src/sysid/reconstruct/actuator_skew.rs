@@ -47,7 +47,13 @@ type Terms = fn(&Instant) -> Vec<f64>;
 /// Errors of the states on the right-hand side of a regression pull its coefficients. `erring` holds the
 /// same flight with one more error each like those that it has: what they pull once more is taken off
 /// (simulation extrapolation, Cook and Stefanski 1994, linear).
-pub fn estimate(segments: &[Segment], erring: &[Vec<Segment>], step: f64, timing: Timing) -> Skew {
+pub fn estimate(
+    segments: &[Segment],
+    erring: &[Vec<Segment>],
+    step: f64,
+    timing: Timing,
+    gusts: f64,
+) -> Skew {
     let prior = (SKEW_SAMPLES * step).powi(-2);
     let (mut information, mut weighted) = (prior, 0.0);
     let axes: [(Rate, Terms); 2] = [(|i| i.state.p, roll_terms), (|i| i.state.q, pitch_terms)];
