@@ -206,7 +206,6 @@ impl Problem<'_> {
         Some(Solved { moves, constants, deviations, readings })
     }
 
-    #[expect(clippy::type_complexity, reason = "three lists by stretch, taken apart at once")]
     fn eliminate<const N: usize, const W: usize, const M: usize, const D: usize>(
         &self,
         found: &Found,
@@ -229,7 +228,6 @@ impl Problem<'_> {
         Some((stretches, readings, left))
     }
 
-    #[expect(clippy::type_complexity, reason = "as the caller")]
     fn stretch<const N: usize, const W: usize, const M: usize, const D: usize>(
         &self,
         track: &Track,
