@@ -136,13 +136,13 @@ fn cholesky<const N: usize>(a: &Block<N>) -> Option<Block<N>> {
 
 /// Solves L y = `y` in place.
 fn forward<const N: usize, const W: usize>(l: &Block<N>, y: &mut Wide<N, W>) {
-    for i in 0..N {
+    for (i, by) in l.iter().enumerate() {
         let (done, rest) = y.split_at_mut(i);
         let row = &mut rest[0];
-        for (by, done) in l[i].iter().zip(done.iter()) {
+        for (by, done) in by.iter().zip(done.iter()) {
             row.iter_mut().zip(done).for_each(|(x, d)| *x -= by * d);
         }
-        let scale = l[i][i].recip();
+        let scale = by[i].recip();
         row.iter_mut().for_each(|x| *x *= scale);
     }
 }

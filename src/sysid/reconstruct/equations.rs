@@ -38,7 +38,9 @@ pub struct Problem<'a> {
     pub log: &'a Log,
     /// What the reconstruction is told.
     pub options: &'a Options,
-    /// Standard deviations of the constants around zero before the data is seen.
+    /// Means of the constants before the data is seen.
+    pub means: Values,
+    /// Standard deviations of the constants before the data is seen.
     pub widths: Values,
 }
 
@@ -192,7 +194,7 @@ impl Problem<'_> {
         by[W - 1] = 1.0;
         if W == WIDTH {
             let right = SVector::<f64, COUNT>::from_fn(|i, _| {
-                left.corner[i][W - 1] - found.values[i] / self.widths[i].powi(2)
+                left.corner[i][W - 1] - (found.values[i] - self.means[i]) / self.widths[i].powi(2)
             });
             let factor = self.information(&left)?.cholesky()?;
             constants = factor.solve(&right).into();
@@ -204,7 +206,6 @@ impl Problem<'_> {
         Some(Solved { moves, constants, deviations, readings })
     }
 
-    #[expect(clippy::type_complexity, reason = "three lists by stretch, taken apart at once")]
     fn eliminate<const N: usize, const W: usize, const M: usize, const D: usize>(
         &self,
         found: &Found,
@@ -227,7 +228,6 @@ impl Problem<'_> {
         Some((stretches, readings, left))
     }
 
-    #[expect(clippy::type_complexity, reason = "as the caller")]
     fn stretch<const N: usize, const W: usize, const M: usize, const D: usize>(
         &self,
         track: &Track,

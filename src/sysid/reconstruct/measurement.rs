@@ -188,10 +188,6 @@ fn spill<const M: usize, const W: usize>(row: &mut [f64; W], part: &[f64; M]) {
 
 /// How every channel depends on the path at sample `k`, `None` where it says nothing, and on the
 /// constants.
-#[expect(
-    clippy::type_complexity,
-    reason = "two tables by channel, taken apart at the one call site"
-)]
 fn slopes<const N: usize, const M: usize>(
     path: &Path,
     k: usize,

@@ -149,7 +149,8 @@ pub enum ReconstructError {
 /// its sensors contradict one another.
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
-    let problem = Problem { log: &log, options, widths: nuisance::prior_widths(log.step) };
+    let (means, widths) = (nuisance::prior_means(), nuisance::prior_widths(log.step));
+    let problem = Problem { log: &log, options, means, widths };
     let found = smoother::smooth(&problem)?;
     outcome::assemble(&problem, &found)
 }

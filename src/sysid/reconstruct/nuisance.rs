@@ -75,8 +75,16 @@ pub fn prior_widths(step: f64) -> Values {
     width[WIND..WIND + 2].fill(15.0);
     // air rises and sinks, but not for the length of a flight
     width[WIND + 2] = 1.0;
-    width[EARTH..EARTH + 2].fill(5e-5);
+    width[EARTH..EARTH + 2].copy_from_slice(&[1.3e-5, 4.2e-5]);
     width
+}
+
+/// Means before the data is seen: zero but for the Earth's rate, 7.29e-5 rad/s at any latitude from −65°
+/// to 65°, whose north component is never negative. Its deviations are those of the same latitudes.
+pub fn prior_means() -> Values {
+    let mut mean = [0.0; COUNT];
+    mean[EARTH] = 5.8e-5;
+    mean
 }
 
 /// Whether the log has the sensor that a constant belongs to.

@@ -12,7 +12,7 @@ use super::equations::{Found, Problem, no_path};
 use super::gusts;
 use super::intake::Log;
 use super::levels::{CALM, Levels};
-use super::nuisance::{COUNT, WIND};
+use super::nuisance::WIND;
 use super::path::Path;
 
 /// Levels of gusts that are tried, m/s, then the factors around the best of them.
@@ -35,11 +35,11 @@ const LEVEL_SETTLED: f64 = 0.02;
 /// # Errors
 /// [`ReconstructError::NoPath`] if the search does not settle on numbers.
 pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
-    let Problem { log, options, widths } = *problem;
+    let Problem { log, options, means, widths } = *problem;
     let singular = || no_path(&options.name, "the equations became singular");
     let mut found = Found {
         paths: log.tracks.iter().map(Path::guess).collect(),
-        values: [0.0; COUNT],
+        values: means,
         deviations: widths,
         levels: Levels::first(log),
     };
