@@ -103,6 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 fn list() -> String {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_content_arrangement(comfy_table::ContentArrangement::Dynamic);
     table.set_header(["effect", "acts on", "channels", "parameters", "what it is"]);
     for (place, about) in catalogue() {
         let unit = |unit: &str| if unit.is_empty() { "".into() } else { format!(" ({unit})") };
@@ -149,7 +150,8 @@ fn show(show: &Show) -> Result<()> {
     println!("  parameters");
     for c in about.coefficients {
         let (low, high) = c.bounds;
-        println!("    {:18} {}; {low} to {high} {}", c.name, c.meaning, c.unit);
+        let line = format!("    {:18} {}; {low} to {high} {}", c.name, c.meaning, c.unit);
+        println!("{}", line.trim_end());
     }
     if let Some(table) = about.table {
         println!("    {table:18} table over alpha_rad, which only a model file can give");
