@@ -207,8 +207,8 @@ fn effect(
         let (low, high) = c.bounds;
         if !(low..=high).contains(&number.value) {
             return Err(format!(
-                "effects.{id}.{} = {} is not physical: {} lies in {low}..{high}",
-                c.name, number.value, c.meaning
+                "effects.{id}.{} = {} is not physical: {} lies in {low}..{high} {}",
+                c.name, number.value, c.meaning, c.unit
             ));
         }
         if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {

@@ -271,7 +271,7 @@ impl GreyBox {
     #[inline(always)]
     pub fn air<R: Real>(&self, state: &State<R>, altitude: f64) -> AirData<R> {
         let density = R::from_f64(self.atmosphere.density_at(altitude));
-        AirData::new(state, density, &self.airframe.geometry)
+        AirData::new(state, density, altitude, &self.airframe.geometry)
     }
 
     /// Forces and moments of all effects.
@@ -313,7 +313,8 @@ impl GreyBox {
         base: &Base<R>,
         term: &mut impl FnMut(usize, Channel, R),
     ) {
-        let at = Point { state, controls, air, geometry: &self.airframe.geometry, base };
+        let (geometry, axes) = (&self.airframe.geometry, self.axes);
+        let at = Point { state, controls, air, geometry, axes, base };
         for Term { kind, first, table, shape } in terms {
             let own = Own { table: table.as_ref(), shape };
             kind.basis(&at, own, |index, channel, amount| term(first + index, channel, amount));

@@ -3,6 +3,8 @@
 pub mod environment;
 pub mod episode;
 pub mod evaluation;
+pub mod flight_test;
+pub mod instruments;
 pub mod targets;
 
 pub use environment::{Environment, Imagined, Simulator, Trouble};

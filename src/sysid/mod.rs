@@ -2,5 +2,6 @@
 
 pub mod compare;
 pub mod diagnose;
+pub mod measurement_effects;
 pub mod reconstruct;
 pub mod reconstruction;

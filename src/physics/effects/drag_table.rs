@@ -13,12 +13,11 @@ impl Effect for DragTable {
     const FORMULA: &'static str = "D = Q k CD(α)";
     const SOURCE: &'static str = "JSBSim table reading in params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] =
-        &[coefficient("k", "factor on the whole table", (0.0, 10.0))];
+        &[coefficient("k", "factor on the whole table", "", (0.0, 10.0))];
     const TABLE: Option<&'static str> = Some("CD");
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R),
-    ) {
+    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R)) {
         if let Some(table) = own.table {
             term(0, Channel::Drag, at.air.q_s * table.at(at.state.alpha));
         }

@@ -14,10 +14,11 @@ impl Effect for EffectivenessSaturation {
     const FORMULA: &'static str = "l = k l_δ δa², m = k m_δ δe²; l_δ, m_δ the linear moments";
     const SOURCE: &'static str = "Klein and Morelli, Aircraft System Identification, section 3.3";
     const COEFFICIENTS: &'static [Coefficient] =
-        &[coefficient("k_perrad2", "change of effectiveness, 1/rad²", (-10.0, 10.0))];
+        &[coefficient("k_perrad2", "change of effectiveness", "1/rad²", (-10.0, 10.0))];
     const NEEDS: Needs = Needs::Parts;
     const ENTRY: Option<Entry> = Some(Entry {
-        look_alikes: &["dead_zone", "Clda", "Cmde"],
+        channels: &[Channel::Roll, Channel::Pitch],
+        look_alikes: &["dead_zone", "roll_linear.Clda", "pitch_linear.Cmde"],
         separated_by: "large against small steps of aileron and elevator",
         starts: &[],
     });

@@ -14,14 +14,20 @@ impl Effect for LiftStall {
     const FORMULA: &'static str = "L = k σ(α; α0, M) (Q 2 sign(α) sin²α cosα − L_still)";
     const SOURCE: &'static str = "BM12 eqs. (4.9), (4.10)";
     const COEFFICIENTS: &'static [Coefficient] = &[
-        coefficient("k", "share of the lift that stalls; 1 for all of it", (0.0, 1.5)),
-        coefficient("alpha0_rad", "angle of attack at which half the lift has gone over, rad", (0.05, 0.6)),
-        coefficient("M", "sharpness of the transition, 1/rad", (5.0, 500.0)),
+        coefficient("k", "share of the lift that stalls; 1 for all of it", "", (0.0, 1.5)),
+        coefficient(
+            "alpha0_rad",
+            "angle of attack at which half the lift has gone over",
+            "rad",
+            (0.05, 0.6),
+        ),
+        coefficient("M", "sharpness of the transition", "1/rad", (5.0, 500.0)),
     ];
     const SHAPE: usize = 2;
     const NEEDS: Needs = Needs::Parts;
     const ENTRY: Option<Entry> = Some(Entry {
-        look_alikes: &["drag_alpha2", "pitch_break", "CLalpha"],
+        channels: &[Channel::Lift],
+        look_alikes: &["drag_alpha2", "pitch_break", "lift_linear.CLalpha"],
         separated_by: "slow to an angle of attack well beyond the stall and push to the negative one",
         starts: &[
             &[1.0, 0.12, 50.0],

@@ -13,12 +13,11 @@ impl Effect for LiftTable {
     const FORMULA: &'static str = "L = Q k CL(α)";
     const SOURCE: &'static str = "JSBSim table reading in params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] =
-        &[coefficient("k", "factor on the whole table", (0.0, 10.0))];
+        &[coefficient("k", "factor on the whole table", "", (0.0, 10.0))];
     const TABLE: Option<&'static str> = Some("CL");
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R),
-    ) {
+    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R)) {
         if let Some(table) = own.table {
             term(0, Channel::Lift, at.air.q_s * table.at(at.state.alpha));
         }

@@ -14,8 +14,10 @@ use crate::physics::{Channel, Point};
 pub struct Coefficient {
     /// Its name in parameter files.
     pub name: &'static str,
-    /// What it is, with its unit.
+    /// What it is.
     pub meaning: &'static str,
+    /// Its unit; empty for a number without one.
+    pub unit: &'static str,
     /// The physically possible values.
     pub bounds: (f64, f64),
 }
@@ -24,10 +26,15 @@ pub struct Coefficient {
 pub(crate) const fn coefficient(
     name: &'static str,
     meaning: &'static str,
+    unit: &'static str,
     bounds: (f64, f64),
 ) -> Coefficient {
-    Coefficient { name, meaning, bounds }
+    Coefficient { name, meaning, unit, bounds }
 }
+
+/// Channels of the forces and moments that the air makes: all but thrust.
+const AERODYNAMIC: [Channel; 6] =
+    [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
 /// What an effect must be told besides the point itself.
 ///
@@ -57,12 +64,16 @@ pub struct Own<'a> {
 /// What the search for missing effects knows of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
-    /// Ids of effects, or names of coefficients, that it is easily mistaken for.
+    /// Channels in which it acts; empty for an effect on the deflections, which acts wherever they do.
+    /// A changed mass or inertia acts as if it were a force or moment in these.
+    pub channels: &'static [Channel],
+    /// What it is easily mistaken for: ids of effects, full names (`effect.coefficient`) of a prior's
+    /// coefficients, or a sensor's error in words.
     pub look_alikes: &'static [&'static str],
     /// The manoeuvre that tells it from them, in words.
     pub separated_by: &'static str,
     /// Values of all coefficients at which a search over shape constants starts; empty for an effect
-    /// that is linear in all of them.
+    /// that is linear in all of them, or whose constants must be known beforehand.
     pub starts: &'static [&'static [f64]],
 }
 
@@ -191,10 +202,25 @@ effects! {
     drag_beta2::DragBeta2,
     drag_elevator_abs::DragElevatorAbs,
     lift_stall::LiftStall,
+    pitch_break::PitchBreak,
     cg_shift::CgShift,
-    inertia_xz::InertiaXz,
     unsteady_lift::UnsteadyLift,
+    thrust_decay::ThrustDecay,
+    thrust_scale::ThrustScale,
+    thrust_line_offset::ThrustLineOffset,
+    motor_torque::MotorTorque,
+    propeller_gyro::PropellerGyro,
+    propwash::Propwash,
+    aeroelastic_loss::AeroelasticLoss,
+    air_density::AirDensity,
+    mass_error::MassError,
+    inertia_xz::InertiaXz,
+    asymmetry::Asymmetry,
+    dihedral_alpha::DihedralAlpha,
+    roll_control_alpha::RollControlAlpha,
     effectiveness_saturation::EffectivenessSaturation,
+    ground_effect::GroundEffect,
+    external_load::ExternalLoad,
 }
 
 #[cfg(test)]

@@ -14,12 +14,18 @@ impl Effect for UnsteadyLift {
     const FORMULA: &'static str = "L = Q c/(2V) CLα̇ α̇, m = Q c²/(2V) Cmα̇ α̇";
     const SOURCE: &'static str = "Etkin and Reid, Dynamics of Flight, section 5.4";
     const COEFFICIENTS: &'static [Coefficient] = &[
-        coefficient("CLalphadot", "lift due to the rate of angle of attack", (-20.0, 20.0)),
-        coefficient("Cmalphadot", "pitching moment due to the rate of angle of attack", (-20.0, 20.0)),
+        coefficient("CLalphadot", "lift due to the rate of angle of attack", "", (-20.0, 20.0)),
+        coefficient(
+            "Cmalphadot",
+            "pitching moment due to the rate of angle of attack",
+            "",
+            (-20.0, 20.0),
+        ),
     ];
     const NEEDS: Needs = Needs::Rate;
     const ENTRY: Option<Entry> = Some(Entry {
-        look_alikes: &["CLq", "Cmq"],
+        channels: &[Channel::Lift, Channel::Pitch],
+        look_alikes: &["lift_linear.CLq", "pitch_linear.Cmq"],
         separated_by: "elevator doublets against steady pull-ups: α̇ and q then differ",
         starts: &[],
     });

@@ -135,20 +135,12 @@ fn predicted_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
 
 /// The inverse of [`rigid_body::body_force`]: D less thrust, L, Y.
 pub(in crate::sysid) fn to_force_axes<R: Real>(
-    [x, y, z]: Vector<R>,
+    force: Vector<R>,
     air: &AirData<R>,
     axes: ForceAxes,
 ) -> Vector<R> {
-    let along = x * air.cos_alpha + z * air.sin_alpha;
-    let lift = x * air.sin_alpha - z * air.cos_alpha;
-    match axes {
-        ForceAxes::Stability => [-along, lift, y],
-        ForceAxes::Wind => [
-            -(along * air.cos_beta + y * air.sin_beta),
-            lift,
-            y * air.cos_beta - along * air.sin_beta,
-        ],
-    }
+    let [drag, side, lift] = rigid_body::aerodynamic_force(force, air, axes);
+    [drag, lift, side]
 }
 
 /// Σ K (J Δω/Δt + ω × Jω), N m, with the model's inertia.

@@ -6,12 +6,14 @@
 mod actuator_skew;
 mod band;
 mod channel;
+mod equations;
 mod intake;
 mod kinematics;
+mod levels;
 mod manoeuvres;
 mod measurement;
 mod noise;
-mod nuisance;
+pub(in crate::sysid) mod nuisance;
 mod outcome;
 mod path;
 mod rotation;

@@ -6,7 +6,7 @@ use super::kinematics::shifted;
 use super::nuisance::{self, COUNT, FORCE, GYRO, SCALE, SKEW_FORCE, Values};
 use super::path::{Path, flow_angles};
 use super::rotation::to_euler;
-use super::smoother::Smoothed;
+use super::equations::Found;
 use super::{ActuatorClock, Options};
 use crate::physics::{Controls, State};
 use crate::sysid::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
@@ -20,7 +20,7 @@ const ROUGH: f64 = 0.1;
 const CORRECTED: f64 = 0.25;
 
 /// Puts together what is handed out.
-pub fn assemble(log: Log, smoothed: Smoothed, options: &Options) -> Reconstruction {
+pub fn assemble(log: Log, smoothed: Found, options: &Options) -> Reconstruction {
     let mut segments: Vec<Segment> = log
         .tracks
         .iter()
@@ -112,8 +112,9 @@ fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
 }
 
 /// The constants that the log's sensors have, the airspeed scale as a factor.
-fn nuisances(log: &Log, smoothed: &Smoothed) -> Vec<Nuisance> {
-    (0..COUNT)
+fn nuisances(log: &Log, smoothed: &Found) -> Vec<Nuisance> {
+    nuisance::ORDER
+        .into_iter()
         .filter(|place| nuisance::concerned(*place, &log.has))
         .map(|place| {
             let (name, unit) = nuisance::NAMES[place];
@@ -128,7 +129,7 @@ fn nuisances(log: &Log, smoothed: &Smoothed) -> Vec<Nuisance> {
         .collect()
 }
 
-fn declare(log: &Log, smoothed: &Smoothed, options: &Options, notes: &mut Vec<String>) {
+fn declare(log: &Log, smoothed: &Found, options: &Options, notes: &mut Vec<String>) {
     let has = &log.has;
     let mut note = |when: bool, text: &str| {
         if when {

@@ -95,16 +95,6 @@ impl Path {
     pub fn air_velocity(&self, k: usize) -> Vector3<f64> {
         self.attitude[k].transpose() * (self.velocity[k] - self.wind - self.gust[k])
     }
-
-    /// What sensors without errors would show at sample `k`.
-    pub fn shown(&self, k: usize) -> [f64; CHANNELS] {
-        let [roll, pitch, yaw] = rotation::to_euler(&self.attitude[k]);
-        let u = self.air_velocity(k);
-        let v = u.norm();
-        let [alpha, beta] = flow_angles(&u);
-        let ground = self.velocity[k];
-        [roll, pitch, yaw, v, alpha, beta, ground.x, ground.y, ground.z]
-    }
 }
 
 /// α and β of a velocity relative to the air in body axes, rad.
