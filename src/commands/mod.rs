@@ -4,6 +4,7 @@ mod choices;
 mod compare;
 #[cfg(feature = "sitl")]
 mod demo;
+mod diagnose;
 #[cfg(feature = "sitl")]
 mod evaluate;
 mod files;
@@ -33,6 +34,8 @@ enum Command {
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
     #[cfg(feature = "sitl")]
     Demo(demo::Arguments),
+    /// Name the physical effect that a model lacks, from flight logs.
+    Diagnose(diagnose::Arguments),
     /// Score controllers on the target file, flown in JSBSim in this process.
     #[cfg(feature = "sitl")]
     Evaluate(evaluate::Arguments),
@@ -53,6 +56,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Demo(arguments) => demo::run(&arguments),
+        Command::Diagnose(arguments) => diagnose::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),

@@ -35,11 +35,12 @@ pub fn draw(p: &Projected, seed: u64, k: usize) -> Draw {
 
 /// The best evidence in each of `count` null flights, ascending.
 pub fn best(p: &Projected, trials: &[Trial], seed: u64, count: usize) -> Vec<f64> {
+    let grams = p.grams();
     let mut best: Vec<f64> = (0..count)
         .into_par_iter()
         .map(|k| {
             let draw = draw(p, seed, k);
-            let evidence = trials.iter().filter_map(|t| t.score(p, &draw)).map(|s| s.evidence);
+            let evidence = trials.iter().filter_map(|t| t.score(&grams, &draw)).map(|s| s.evidence);
             evidence.fold(f64::NEG_INFINITY, f64::max)
         })
         .collect();

@@ -123,6 +123,30 @@ impl Projected {
     pub fn width(&self) -> usize {
         self.total.ncols() - 1
     }
+
+    /// The Gram matrices of the data as they are.
+    pub fn grams(&self) -> Grams<'_> {
+        let blocks = self.blocks.iter().collect();
+        Grams { blocks, prior: &self.prior, total: self.total.clone() }
+    }
+
+    /// The Gram matrices of `blocks`, some of which may be missing and some there several times.
+    pub fn resampled(&self, blocks: impl Iterator<Item = usize>) -> Grams<'_> {
+        let blocks: Vec<&DMatrix<f64>> = blocks.map(|b| &self.blocks[b]).collect();
+        let mut total = self.prior.clone();
+        blocks.iter().for_each(|b| total += *b);
+        Grams { blocks, prior: &self.prior, total }
+    }
+}
+
+/// Gram matrices of candidate columns and residual over a choice of blocks.
+pub struct Grams<'a> {
+    /// Of each block.
+    pub blocks: Vec<&'a DMatrix<f64>>,
+    /// Of the pseudo-observations at the prior.
+    pub prior: &'a DMatrix<f64>,
+    /// Their sum.
+    pub total: DMatrix<f64>,
 }
 
 /// The inverse of a symmetric matrix whose rows may be of very different size.

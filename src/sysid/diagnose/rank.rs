@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::projected::{Projected, scaled_inverse};
+use super::projected::{Grams, scaled_inverse};
 
 /// Where a candidate is linearised.
 #[derive(Clone, Debug)]
@@ -48,8 +48,8 @@ pub struct Score {
     pub weights: Vec<(usize, f64)>,
     /// Which point it started from.
     pub point: usize,
-    /// Whether a coefficient ended at the end of its range.
-    pub bound: bool,
+    /// Whether a coefficient ended where its linearisation is trusted no further, or at its bound.
+    pub held: bool,
 }
 
 /// Products of the candidate columns with a residual, as a whole and block by block.
@@ -62,21 +62,21 @@ pub struct Draw {
 
 impl Draw {
     /// Of the data.
-    pub fn measured(p: &Projected) -> Draw {
-        let last = p.width();
+    pub fn measured(p: &Grams) -> Draw {
+        let last = p.total.ncols() - 1;
         let of = |m: &DMatrix<f64>| m.view((0, last), (last, 1)).column(0).into_owned();
-        Draw { total: of(&p.total), blocks: p.blocks.iter().map(of).collect() }
+        Draw { total: of(&p.total), blocks: p.blocks.iter().map(|b| of(b)).collect() }
     }
 }
 
 impl Trial {
     /// The best of its points under `draw`.
-    pub fn score(&self, p: &Projected, draw: &Draw) -> Option<Score> {
+    pub fn score(&self, p: &Grams, draw: &Draw) -> Option<Score> {
         let scores = (0..self.points.len()).filter_map(|k| self.score_at(p, draw, k));
         scores.max_by(|a, b| a.fall.total_cmp(&b.fall))
     }
 
-    fn score_at(&self, p: &Projected, draw: &Draw, place: usize) -> Option<Score> {
+    fn score_at(&self, p: &Grams, draw: &Draw, place: usize) -> Option<Score> {
         let point = &self.points[place];
         let columns: Vec<usize> = point.free.iter().map(|f| f.1).collect();
         let gram = select(&p.total, &columns);
@@ -117,7 +117,7 @@ impl Trial {
             deviations: all_deviations,
             weights,
             point: place,
-            bound: step.1,
+            held: step.1,
         })
     }
 
@@ -184,14 +184,14 @@ fn pick(vector: &DVector<f64>, columns: &[usize]) -> DVector<f64> {
 
 /// θ' V⁻¹ θ with the blocks' own scatter in V, and the standard deviations.
 fn joint_wald(
-    p: &Projected,
+    p: &Grams,
     draw: &Draw,
     columns: &[usize],
     inverse: &DMatrix<f64>,
     weights: &[(usize, f64)],
     theta: &DVector<f64>,
 ) -> (f64, Vec<f64>) {
-    let mut meat = select(&p.prior, columns);
+    let mut meat = select(p.prior, columns);
     let count = p.blocks.len() as f64;
     let correction = count / (count - 1.0).max(1.0);
     for (gram, product) in p.blocks.iter().zip(&draw.blocks) {
@@ -210,7 +210,7 @@ fn joint_wald(
 
 /// The same for the amount of a fixed contribution.
 fn ray_wald(
-    p: &Projected,
+    p: &Grams,
     draw: &Draw,
     weights: &[(usize, f64)],
     linear: f64,
@@ -222,10 +222,19 @@ fn ray_wald(
     let amount = linear / square;
     let count = p.blocks.len() as f64;
     let correction = count / (count - 1.0).max(1.0);
-    let mut meat = quadratic(weights, weights, &p.prior);
+    let mut meat = quadratic(weights, weights, p.prior);
     for (gram, product) in p.blocks.iter().zip(&draw.blocks) {
         let (l, s) = along(weights, gram, product);
         meat += correction * (l - s * amount).powi(2);
     }
     if amount > 0.0 && meat > 0.0 { linear * linear / meat } else { 0.0 }
+}
+
+/// Standard deviations of the first of `columns` fitted together: by the noise alone, and by the scatter
+/// of the blocks of `null`.
+pub fn deviations(p: &Grams, null: &Draw, columns: &[usize]) -> Option<(f64, f64)> {
+    let inverse = scaled_inverse(&select(&p.total, columns))?;
+    let zero = DVector::zeros(columns.len());
+    let (_, deviations) = joint_wald(p, null, columns, &inverse, &[], &zero);
+    Some((inverse[(0, 0)].max(0.0).sqrt(), deviations[0]))
 }

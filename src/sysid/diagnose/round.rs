@@ -51,7 +51,10 @@ pub struct Round {
     pub last: usize,
     /// The noise.
     pub noise: Noise,
-    entries: Vec<Entry>,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// The candidates as they are described.
+    pub entries: Vec<Entry>,
     refined: Vec<(&'static str, Vec<f64>)>,
 }
 
@@ -77,11 +80,12 @@ impl Round {
             cells,
             known,
             coefficients,
-            trials: offset(made.trials, 0),
+            trials: made.trials,
             projected,
             placed,
             last,
             noise,
+            seed: problem.seed,
             entries: entries.to_vec(),
             refined: Vec::new(),
         })
@@ -136,12 +140,95 @@ impl Round {
     }
 
     fn scores(&self) -> Vec<(usize, Score)> {
-        let draw = Draw::measured(&self.projected);
+        let grams = self.projected.grams();
+        let draw = Draw::measured(&grams);
         let mut scores: Vec<(usize, Score)> = (0..self.trials.len())
-            .filter_map(|k| Some((k, self.trials[k].score(&self.projected, &draw)?)))
+            .filter_map(|k| Some((k, self.trials[k].score(&grams, &draw)?)))
             .collect();
-        scores.sort_by(|a, b| b.1.evidence.total_cmp(&a.1.evidence));
+        let key = |(k, s): &(usize, Score)| (!self.at_bound(*k, s), s.evidence);
+        scores.sort_by(|a, b| {
+            let (a, b) = (key(a), key(b));
+            b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+        });
         scores
+    }
+
+    /// Whether a free coefficient of the trial ended at its physical bound.
+    pub fn at_bound(&self, trial: usize, score: &Score) -> bool {
+        let trial = &self.trials[trial];
+        let Some(entry) = self.entries.iter().find(|e| e.about.id == trial.id) else { return false };
+        trial.points[score.point].free.iter().any(|(index, _, _)| {
+            let (low, high) = entry.about.coefficients[*index].bounds;
+            let near = 1e-6 * (high - low);
+            let value = score.values[*index];
+            value <= low + near || value >= high - near
+        })
+    }
+
+    /// The model with its coefficients where they go once `score`'s effect has joined.
+    pub fn with(&self, score: &Score) -> GreyBox {
+        let p = &self.projected;
+        let mut model = self.model.clone();
+        let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
+        for (k, place) in self.coefficients.iter().enumerate() {
+            let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
+            values[*place] += p.tuned[k] - given;
+        }
+        model.set_coefficients(&values);
+        model
+    }
+
+    /// Measured less the tuned model, sensors' errors taken out, flight by flight.
+    pub fn tuned_residual(&self) -> Vec<Column> {
+        let na = self.known.len();
+        let of = |placed: &Placed| {
+            let (mut columns, mut weights) = (Vec::new(), Vec::new());
+            for (place, column) in placed {
+                if *place < na {
+                    weights.push(-self.projected.tuned[*place]);
+                    columns.push(column.clone());
+                } else if *place == self.last {
+                    weights.push(1.0);
+                    columns.push(column.clone());
+                }
+            }
+            combine(&columns, &weights)
+        };
+        self.placed.iter().map(of).collect()
+    }
+
+    /// What `score` adds to the residual, flight by flight.
+    pub fn contribution(&self, score: &Score) -> Vec<Column> {
+        let na = self.known.len();
+        let of = |placed: &Placed| {
+            let columns: Vec<Column> = score
+                .weights
+                .iter()
+                .filter_map(|(c, _)| {
+                    placed.iter().find(|(p, _)| *p == na + c).map(|(_, column)| column.clone())
+                })
+                .collect();
+            let weights: Vec<f64> = score.weights.iter().map(|(_, w)| *w).collect();
+            combine(&columns, &weights)
+        };
+        self.placed.iter().map(of).collect()
+    }
+
+    /// Channels in which `score` takes at least a tenth of what it takes in the best, the best first.
+    pub fn channels_of(&self, score: &Score) -> Vec<usize> {
+        let mut taken = [0.0; 6];
+        let last = self.projected.width();
+        for (cell, rows) in self.cells.list.iter().zip(&self.projected.rows) {
+            for row in rows.row_iter() {
+                let x: f64 = score.weights.iter().map(|(c, w)| w * row[*c]).sum();
+                taken[cell.channel] += x * (2.0 * row[last] - x);
+            }
+        }
+        let most = taken.iter().fold(0.0_f64, |a, b| a.max(*b));
+        let mut channels: Vec<usize> =
+            (0..6).filter(|c| taken[*c] > 0.1 * most && taken[*c] > 0.0).collect();
+        channels.sort_by(|a, b| taken[*b].total_cmp(&taken[*a]));
+        channels
     }
 
     /// The model with its coefficients where the data and their prior put them.
@@ -159,10 +246,6 @@ impl Round {
 /// The list's columns up to `place`.
 fn up_to(list: &Placed, place: usize) -> Placed {
     list.iter().take_while(|(p, _)| *p <= place).cloned().collect()
-}
-
-fn offset(trials: Vec<Trial>, _by: usize) -> Vec<Trial> {
-    trials
 }
 
 /// Puts candidates and residual behind the known columns; the residual's place.
