@@ -90,6 +90,11 @@ fn starts(entry: &Entry) -> &'static [&'static [f64]] {
     entry.about.entry.map_or(&[], |e| e.starts)
 }
 
+/// Whether an effect is linear in all its constants.
+pub fn straight(entry: &Entry) -> bool {
+    starts(entry).is_empty()
+}
+
 /// Coefficients that a search leaves free: all but gains that are one in every start.
 pub fn free(entry: &Entry) -> Vec<usize> {
     let linear = entry.about.coefficients.len() - entry.about.shape;

@@ -75,11 +75,6 @@ impl Cells {
     pub fn blocks(&self) -> usize {
         self.flight_of_block.len()
     }
-
-    /// Windows of a channel over all flights.
-    pub fn windows_in(&self, channel: usize) -> usize {
-        self.list.iter().filter(|c| c.channel == channel).map(|c| c.windows.len()).sum()
-    }
 }
 
 fn cell(flight: usize, channel: usize, ready: &Ready, block_of: &[usize]) -> Cell {

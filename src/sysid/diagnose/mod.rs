@@ -31,6 +31,7 @@ mod run;
 mod search;
 mod sensors;
 mod sentences;
+mod shared;
 mod shares;
 mod whiten;
 

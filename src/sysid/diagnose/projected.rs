@@ -49,13 +49,15 @@ pub struct Projected {
 
 impl Projected {
     /// `placed`: flight by flight, the columns of the known unknowns (places 0..), of the candidates
-    /// behind them, and of the residual in the last place `last`.
+    /// behind them, and of the residual in the last place `last`; `shared`: what their product with the
+    /// residual is by shared noise alone, by place, zero beyond its end.
     pub fn new(
         cells: &Cells,
         placed: &[Placed],
         last: usize,
         known: &[Known],
         noise: &Noise,
+        shared: &[f64],
     ) -> Option<Projected> {
         let (na, ny) = (known.len(), last - known.len() + 1);
         let whitened: Vec<(Vec<usize>, DMatrix<f64>)> = cells
@@ -79,7 +81,9 @@ impl Projected {
                 }
             }
         }
+        let shared_of = |place: usize| shared.get(place).copied().unwrap_or(0.0);
         for (k, known) in known.iter().enumerate() {
+            ay[(k, ny - 1)] -= shared_of(k);
             aa[(k, k)] += known.weight();
             ay[(k, ny - 1)] += known.weight() * known.offset;
             // what neither data nor prior tells stays where it is
@@ -93,7 +97,17 @@ impl Projected {
             .par_iter()
             .map(|(places, z)| project(places, z, na, ny, &taken))
             .collect();
-        let blocks = block_grams(cells, &rows, ny);
+        let mut blocks = block_grams(cells, &rows, ny);
+        let of_known = DVector::from_iterator(na, (0..na).map(shared_of));
+        let own = DVector::from_iterator(ny - 1, (na..last).map(shared_of));
+        let bias = own - taken.columns(0, ny - 1).tr_mul(&of_known);
+        let share = 1.0 / blocks.len().max(1) as f64;
+        for block in &mut blocks {
+            for k in 0..ny - 1 {
+                block[(k, ny - 1)] -= share * bias[k];
+                block[(ny - 1, k)] -= share * bias[k];
+            }
+        }
         let by_channel = by_channel(cells, &rows, ny);
         let mut root = -taken.clone();
         for (k, known) in known.iter().enumerate() {

@@ -32,13 +32,11 @@ pub struct Trial {
 /// What a candidate reaches.
 #[derive(Clone, Debug)]
 pub struct Score {
-    /// The smaller of `gain` and `wald`.
+    /// The smaller of `fall` less d ln n and `wald`.
     pub evidence: f64,
-    /// Fall of the squared whitened error less d ln n.
-    pub gain: f64,
     /// Block-robust Wald statistic.
     pub wald: f64,
-    /// The fall itself.
+    /// Fall of the squared whitened error.
     pub fall: f64,
     /// Values of all coefficients.
     pub values: Vec<f64>,
@@ -48,8 +46,6 @@ pub struct Score {
     pub weights: Vec<(usize, f64)>,
     /// Which point it started from.
     pub point: usize,
-    /// Whether a coefficient ended where its linearisation is trusted no further, or at its bound.
-    pub held: bool,
 }
 
 /// Products of the candidate columns with a residual, as a whole and block by block.
@@ -110,14 +106,12 @@ impl Trial {
         }
         Some(Score {
             evidence: gain.min(wald),
-            gain,
             wald,
             fall,
             values,
             deviations: all_deviations,
             weights,
             point: place,
-            held: step.1,
         })
     }
 

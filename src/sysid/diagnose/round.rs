@@ -9,6 +9,7 @@ use super::noise::Noise;
 use super::projected::{Known, Projected};
 use super::rank::{Draw, Score, Trial};
 use super::sensors;
+use super::shared;
 use crate::model::GreyBox;
 use crate::sysid::compare::flight::Prepared;
 
@@ -23,6 +24,8 @@ pub struct Problem {
     pub flights: Vec<Prepared>,
     /// Prior value and width of each coefficient of the model given.
     pub prior: Vec<(f64, f64)>,
+    /// Errors of the reconstructed paths.
+    pub path: Vec<shared::PathError>,
     /// Prior widths of the sensors' errors, flight by flight.
     pub sensors: Vec<[f64; super::columns::SENSORS]>,
     /// Seed of everything random.
@@ -56,6 +59,8 @@ pub struct Round {
     /// The candidates as they are described.
     pub entries: Vec<Entry>,
     refined: Vec<(&'static str, Vec<f64>)>,
+    /// What noise that columns share with the residual feigns, by place.
+    pub shared: Vec<f64>,
 }
 
 impl Round {
@@ -73,7 +78,8 @@ impl Round {
         let rich = rich(&placed, known.len(), &made.trials);
         let noise = Noise::estimate(&cells, &rich, last);
         let kept: Vec<Placed> = placed.iter().map(|l| up_to(l, last)).collect();
-        let projected = Projected::new(&cells, &kept, last, &known, &noise)?;
+        let shared = shared(problem, &model, entries, &cells, &kept, last, &noise);
+        let projected = Projected::new(&cells, &kept, last, &known, &noise, &shared)?;
         Some(Round {
             model,
             flights,
@@ -88,6 +94,7 @@ impl Round {
             seed: problem.seed,
             entries: entries.to_vec(),
             refined: Vec::new(),
+            shared,
         })
     }
 
@@ -126,7 +133,7 @@ impl Round {
             self.placed.iter().map(|l| up_to(l, count.saturating_sub(1))).collect();
         let last = place(&mut placed, count, &made, &self.flights);
         let Some(projected) =
-            Projected::new(&self.cells, &placed, last, &self.known, &self.noise)
+            Projected::new(&self.cells, &placed, last, &self.known, &self.noise, &self.shared)
         else {
             return false;
         };
@@ -265,6 +272,32 @@ fn rich(placed: &[Placed], count: usize, trials: &[Trial]) -> Vec<Placed> {
         curved.flat_map(|p| p.free.iter().map(|f| count + f.1)).collect();
     let keep = |l: &Placed| l.iter().filter(|(p, _)| !left_out.contains(p)).cloned().collect();
     placed.iter().map(keep).collect()
+}
+
+/// What noise that columns share with the residual feigns: by place, of the known unknowns and the linear
+/// candidates, which stand in front.
+fn shared(
+    problem: &Problem,
+    model: &GreyBox,
+    entries: &[Entry],
+    cells: &Cells,
+    before: &[Placed],
+    last: usize,
+    noise: &Noise,
+) -> Vec<f64> {
+    let straight: Vec<Entry> = entries.iter().filter(|e| catalogue::straight(e)).copied().collect();
+    let disturbed = problem.flights.iter().zip(&problem.path).enumerate();
+    let flights: Vec<Ready> = disturbed
+        .map(|(k, (f, path))| Ready::new(model, &shared::disturbed(f, path, problem.seed, k)))
+        .collect();
+    let (known, _, mut after) = known(problem, model, &flights);
+    let made = catalogue::columns(model, &flights, &straight, &[]);
+    let end = place(&mut after, known.len(), &made, &flights);
+    // the residual stands where it stands before
+    for list in &mut after {
+        list.iter_mut().filter(|(p, _)| *p == end).for_each(|(p, _)| *p = last);
+    }
+    shared::products(cells, before, &after, last, noise)
 }
 
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);

@@ -13,6 +13,7 @@ use super::round::Problem;
 use super::search::{Found, search};
 use super::sensors;
 use super::sentences;
+use super::shared;
 use super::shares;
 use crate::model::GreyBox;
 use crate::physics::{effects, inputs};
@@ -117,7 +118,9 @@ fn problem<'a>(
     }
     let sensors = used.iter().zip(&prepared).map(|(f, p)| sensors::widths(f, p.dt)).collect();
     let prior = model.coefficients().iter().map(|c| (c.value, c.width())).collect();
-    Ok((Problem { flights: prepared, prior, sensors, seed: options.seed }, used, notes))
+    let path = used.iter().zip(&prepared).map(|(f, p)| shared::path_error(f, p.dt)).collect();
+    let problem = Problem { flights: prepared, prior, path, sensors, seed: options.seed };
+    Ok((problem, used, notes))
 }
 
 fn verdict(found: &Found) -> Verdict {

@@ -124,6 +124,17 @@ pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
             ));
         }
     }
+    let round = found.round();
+    for (k, known) in round.known.iter().enumerate().skip(round.coefficients.len()) {
+        let off = round.projected.tuned[k] / known.width;
+        if off.abs() > FAR + 1.0 {
+            notes.push(format!(
+                "{} would have to be {off:+.1} standard deviations beyond what its flight path says: something \
+                 that acts like it may be missing.",
+                known.name
+            ));
+        }
+    }
     if !options.without.is_empty() {
         notes.push(format!("Left out of the catalogue: {}.", options.without.join(", ")));
     }
