@@ -8,6 +8,7 @@ mod demo;
 mod effects;
 #[cfg(feature = "sitl")]
 mod design;
+mod diagnose;
 #[cfg(feature = "sitl")]
 mod evaluate;
 mod files;
@@ -46,6 +47,8 @@ enum Command {
     /// Find the manoeuvre that tells two missing effects apart, as a schedule to fly.
     #[cfg(feature = "sitl")]
     Design(design::Arguments),
+    /// Name the physical effect that a model lacks, from flight logs.
+    Diagnose(diagnose::Arguments),
     /// Score controllers on the target file, flown in JSBSim in this process.
     #[cfg(feature = "sitl")]
     Evaluate(evaluate::Arguments),
@@ -73,6 +76,7 @@ pub fn main() -> ExitCode {
         Command::Effects(arguments) => effects::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Design(arguments) => design::run(&arguments),
+        Command::Diagnose(arguments) => diagnose::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),

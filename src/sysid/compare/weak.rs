@@ -7,6 +7,7 @@ use super::flight::{Prepared, Window};
 use super::kernel::{Kernel, weigh};
 use super::names::ChannelId;
 use crate::model::{GreyBox, Integrator, Memory};
+use crate::num::Real;
 use crate::physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
 use crate::physics::{AirData, Channel, State, Wrench};
 use crate::sysid::reconstruction::Instant;
@@ -133,7 +134,11 @@ fn predicted_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
 }
 
 /// The inverse of [`rigid_body::body_force`]: D less thrust, L, Y.
-fn to_force_axes(force: Vector<f64>, air: &AirData, axes: ForceAxes) -> Vector<f64> {
+pub(in crate::sysid) fn to_force_axes<R: Real>(
+    force: Vector<R>,
+    air: &AirData<R>,
+    axes: ForceAxes,
+) -> Vector<R> {
     let [drag, side, lift] = rigid_body::aerodynamic_force(force, air, axes);
     [drag, lift, side]
 }
@@ -149,12 +154,16 @@ fn measured_moment(model: &GreyBox, samples: &[Instant], kernel: &Kernel) -> Vec
 }
 
 /// J ω.
-fn inertia(body: &RigidBody, w: Vector<f64>) -> Vector<f64> {
-    [body.jx * w[0] - body.jxz * w[2], body.jy * w[1], body.jz * w[2] - body.jxz * w[0]]
+pub(in crate::sysid) fn inertia<R: Real>(body: &RigidBody, w: Vector<R>) -> Vector<R> {
+    [
+        w[0].scale(body.jx) - w[2].scale(body.jxz),
+        w[1].scale(body.jy),
+        w[2].scale(body.jz) - w[0].scale(body.jxz),
+    ]
 }
 
 /// ω × J ω.
-fn gyroscopic(body: &RigidBody, state: &State) -> Vector<f64> {
+pub(in crate::sysid) fn gyroscopic<R: Real>(body: &RigidBody, state: &State<R>) -> Vector<R> {
     let w = [state.p, state.q, state.r];
     let h = inertia(body, w);
     [w[1] * h[2] - w[2] * h[1], w[2] * h[0] - w[0] * h[2], w[0] * h[1] - w[1] * h[0]]

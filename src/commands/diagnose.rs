@@ -1,0 +1,152 @@
+//! `greylag diagnose`: which physical effect a model lacks.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use comfy_table::{CellAlignment, Table};
+
+use crate::commands::files::{self, shipped};
+use crate::commands::intake::{Intake, LogArguments};
+use crate::model::GreyBox;
+use crate::sysid::diagnose::{Candidate, Diagnosis, Options, diagnose};
+use crate::sysid::reconstruct::ActuatorClock;
+
+/// Exit status of a diagnosis that had to leave a log out, or whose logs are wrong somewhere.
+const IN_DOUBT: u8 = 2;
+/// Candidates in the table.
+const ROWS: usize = 12;
+
+/// Options of `greylag diagnose`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Exit status: 0 done, whatever was found; 1 nothing could be diagnosed; 2 done, but a log was left out or holds what makes the figures wrong. The verdict is in the output: effect, adequate or unexplained."
+)]
+pub struct Arguments {
+    /// The model file.
+    #[arg(long)]
+    model: PathBuf,
+    #[command(flatten)]
+    logs: LogArguments,
+    /// Write everything that was found as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Simulated flights without a missing effect that set the thresholds.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
+    nulls: u16,
+    /// Seed of everything that is drawn.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Ids to be left out of the catalogue.
+    #[arg(long, num_args = 1..)]
+    without: Vec<String>,
+    /// Replace the JSON if it exists.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Reads, reconstructs, diagnoses; prints sentences and table; writes JSON.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let overwrite = arguments.force.into();
+    if let Some(path) = &arguments.json {
+        files::writable(path, overwrite)?;
+    }
+    let model = GreyBox::load(&shipped(&arguments.model))?;
+    let Intake { flights, mut notes, in_doubt } =
+        arguments.logs.take_in(&model, ActuatorClock::AsRecorded)?;
+    let options = Options {
+        seed: arguments.seed,
+        nulls: arguments.nulls.into(),
+        without: arguments.without.clone(),
+        ..Options::default()
+    };
+    let mut diagnosis = diagnose(&model, &flights, &options, &|doing| eprintln!("{doing}"))?;
+    for flight in &flights {
+        notes.extend(flight.notes.iter().map(|note| format!("{}: {note}", flight.name)));
+    }
+    notes.append(&mut diagnosis.notes);
+    diagnosis.notes = notes;
+    print(&diagnosis);
+    if let Some(path) = &arguments.json {
+        files::write(path, &(serde_json::to_string_pretty(&diagnosis)? + "\n"), overwrite)?;
+    }
+    Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+fn print(diagnosis: &Diagnosis) {
+    println!("{}", diagnosis.model);
+    diagnosis.sentences.iter().for_each(|sentence| println!("  {sentence}"));
+    println!("\n{}\n{}", effects(diagnosis), channels(diagnosis));
+    for advice in &diagnosis.advice {
+        println!("fly {}: {}", advice.manoeuvre, advice.why);
+    }
+    diagnosis.notes.iter().for_each(|note| println!("note: {note}"));
+}
+
+fn table<const N: usize>(header: [&str; N]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(header);
+    table
+}
+
+fn effects(diagnosis: &Diagnosis) -> Table {
+    let mut table =
+        table(["effect", "evidence", "by chance", "estimate", "channels", "could have been seen"]);
+    for column in table.column_iter_mut().skip(1).take(2) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    for c in diagnosis.effects.iter().take(ROWS) {
+        let verdict = match (c.asserted, c.refused.is_empty()) {
+            (true, _) => " (missing)",
+            (false, true) => "",
+            (false, false) => " (refused)",
+        };
+        table.add_row([
+            format!("{}{verdict}", c.id),
+            format!("{:.1}", c.evidence),
+            format!("{:.1}", c.threshold),
+            estimate(c),
+            c.channels.join(" "),
+            c.minimum_detectable.map_or("–".into(), |x| format!("from {}", number(x))),
+        ]);
+    }
+    table
+}
+
+fn estimate(c: &Candidate) -> String {
+    let of = |p: &crate::sysid::diagnose::Parameter| {
+        let half = 0.5 * (p.ci95[1] - p.ci95[0]);
+        let text = format!("{} {} ± {} {}", p.name, number(p.value), number(half), p.unit);
+        text.trim().to_owned()
+    };
+    c.parameters.iter().map(of).collect::<Vec<_>>().join(", ")
+}
+
+fn channels(diagnosis: &Diagnosis) -> Table {
+    let mut table = table(["channel", "unexplained, tuned", "with the effects", "worst regime"]);
+    for column in table.column_iter_mut().skip(1).take(2) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    for c in &diagnosis.channels {
+        table.add_row([
+            c.channel.clone(),
+            format!("{:.3} %", 100.0 * c.tuned_unexplained_fraction),
+            format!("{:.3} %", 100.0 * c.unexplained_fraction),
+            c.worst_regime.clone().unwrap_or("–".into()),
+        ]);
+    }
+    table
+}
+
+/// Three significant figures; a dash for what is not known.
+fn number(x: f64) -> String {
+    match x {
+        x if !x.is_finite() => "–".into(),
+        0.0 => "0".into(),
+        x => {
+            let places = (2 - x.abs().log10().floor() as i32).clamp(0, 6) as usize;
+            format!("{x:.places$}")
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! A flexible model without physics: random Fourier features of state, deflections and their past.
+
+use std::f64::consts::TAU;
+
+use rand::RngExt;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::columns::Ready;
+use super::gather::{Column, gather};
+use super::local::CHANNELS;
+use crate::model::{GreyBox, Integrator};
+use crate::num::stream::{Stream, stream};
+use crate::physics::State;
+use crate::sysid::compare::flight::Prepared;
+
+/// Random stream of the features.
+const FEATURES: u64 = 81;
+/// Cosines.
+const COSINES: usize = 40;
+/// What they are of: α, β, V, p, q, r, deflections and throttle now, deflections a while ago.
+const VARIABLES: usize = 11;
+/// How many they are: the variables themselves and the cosines.
+pub const COUNT: usize = VARIABLES + COSINES;
+/// Standard deviation of the cosines' frequencies, per standard deviation of a variable: features that
+/// bend about once over what was flown.
+const BEND: f64 = 0.5;
+/// How long ago the past deflections were, s.
+const AGO_S: f64 = 0.08;
+
+/// A cosine's frequency along each variable and its phase.
+struct Cosine {
+    frequency: [f64; VARIABLES],
+    phase: f64,
+}
+
+/// The features of every flight; the same in all channels, each times the dynamic pressure.
+pub fn features(model: &GreyBox, flights: &[Ready], seed: u64) -> Vec<Vec<Column>> {
+    let spread = spread(flights);
+    let mut random = stream(seed, &[FEATURES]);
+    let cosines: Vec<Cosine> = (0..COSINES).map(|_| cosine(&mut random)).collect();
+    let of = |flight: &Ready| {
+        let one = gather(&flight.acting, Integrator::Jsbsim, COUNT, |place, add| {
+            let raw = variables(&flight.acting, place.segment, place.index);
+            let z: [f64; VARIABLES] =
+                std::array::from_fn(|k| (raw[k] - spread[k][0]) / spread[k][1]);
+            let pressure = pressure(model, &place.at.state, place.at.altitude);
+            // forces weigh by samples, moments by steps: the two sides of a window
+            for channel in [0, 3] {
+                for (k, z) in z.iter().enumerate() {
+                    add(k, channel, pressure * z);
+                }
+                for (k, c) in cosines.iter().enumerate() {
+                    let turn: f64 = c.frequency.iter().zip(&z).map(|(f, z)| f * z).sum();
+                    add(VARIABLES + k, channel, pressure * (turn + c.phase).cos());
+                }
+            }
+        });
+        one.into_iter().map(everywhere).collect()
+    };
+    flights.iter().map(of).collect()
+}
+
+fn everywhere(column: Column) -> Column {
+    std::array::from_fn(|c| column[if c < CHANNELS / 2 { 0 } else { CHANNELS / 2 }].clone())
+}
+
+fn cosine(random: &mut Stream) -> Cosine {
+    let mut unit = || -> f64 { StandardNormal.sample(random) };
+    let frequency = std::array::from_fn(|_| BEND * unit());
+    Cosine { frequency, phase: TAU * random.random::<f64>() }
+}
+
+fn pressure(model: &GreyBox, state: &State, altitude: f64) -> f64 {
+    model.air(state, altitude).q_s
+}
+
+fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES] {
+    let instants = &flight.segments[segment];
+    let i = &instants[index];
+    let ago = &instants[index.saturating_sub((AGO_S / flight.dt).round() as usize)].controls;
+    let (s, z) = (&i.state, &i.controls);
+    [
+        s.alpha, s.beta, s.airspeed, s.p, s.q, s.r, z.aileron, z.elevator, z.throttle,
+        ago.aileron - z.aileron, ago.elevator - z.elevator,
+    ]
+}
+
+/// Mean and standard deviation of each variable over all flights.
+fn spread(flights: &[Ready]) -> [[f64; 2]; VARIABLES] {
+    let (mut sum, mut square, mut count) = ([0.0; VARIABLES], [0.0; VARIABLES], 0.0);
+    for flight in flights {
+        for (segment, instants) in flight.acting.segments.iter().enumerate() {
+            for index in 0..instants.len() {
+                let x = variables(&flight.acting, segment, index);
+                for k in 0..VARIABLES {
+                    sum[k] += x[k];
+                    square[k] += x[k] * x[k];
+                }
+                count += 1.0;
+            }
+        }
+    }
+    std::array::from_fn(|k| {
+        let mean = sum[k] / count;
+        [mean, (square[k] / count - mean * mean).max(0.0).sqrt().max(1e-6)]
+    })
+}

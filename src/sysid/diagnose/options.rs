@@ -1,0 +1,40 @@
+//! What a diagnosis is asked for.
+
+/// How much a diagnosis works out besides its answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// Everything.
+    Full,
+    /// The same numbers without curves and decoys, which only show and check.
+    Lean,
+}
+
+/// What a diagnosis is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Seed of nulls, bootstraps, decoys and the flexible model.
+    pub seed: u64,
+    /// Simulated null flights.
+    pub nulls: usize,
+    /// Block bootstraps.
+    pub bootstraps: usize,
+    /// Chance that is allowed of any assertion in a flight that lacks nothing.
+    pub level: f64,
+    /// Ids left out of the catalogue.
+    pub without: Vec<String>,
+    /// What is worked out besides.
+    pub detail: Detail,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            seed: 1,
+            nulls: 100,
+            bootstraps: 100,
+            level: 0.01,
+            without: Vec::new(),
+            detail: Detail::Full,
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Every candidate as it is told: asserted ones first, then by evidence.
+
+use super::checks;
+use super::curves;
+use super::options::{Detail, Options};
+use super::rank::{Score, Trial};
+use super::result::{Candidate, FlightEstimate, Parameter};
+use super::round::Round;
+use super::run::describe;
+use super::search::{Found, Selected};
+use crate::physics::effects::Description;
+use crate::sysid::compare::ChannelId;
+
+/// Runners-up with a curve.
+const RUNNERS_UP: usize = 2;
+/// Half of a 95 % interval in standard deviations.
+const INTERVAL: f64 = 1.96;
+
+/// All candidates.
+pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
+    let (asserted, refused): (Vec<&Selected>, Vec<&Selected>) =
+        found.selected.iter().partition(|s| s.refused.is_empty());
+    let mut list: Vec<Candidate> =
+        asserted.iter().chain(&refused).filter_map(|s| selected(found, s, options)).collect();
+    let round = found.round();
+    for (place, (trial, score)) in found.scores.iter().enumerate() {
+        let trial = &round.trials[*trial];
+        if list.iter().any(|c| c.id == trial.id) {
+            continue;
+        }
+        let Some(about) = describe(trial.id) else { continue };
+        let mut candidate = open(found, trial, score, &about);
+        if round.at_bound(found.scores[place].0, score) {
+            candidate.refused.push("a constant lies at the end of what is physically possible".into());
+        }
+        if options.detail == Detail::Full && place < RUNNERS_UP {
+            candidate.curve = curves::curve(
+                round,
+                &round.contribution(score),
+                &round.channels_of(score),
+                relative(score),
+                true,
+            );
+        }
+        list.push(candidate);
+    }
+    list
+}
+
+/// The largest standard deviation relative to its value, of a fitted contribution.
+fn relative(score: &Score) -> f64 {
+    score.wald.max(1e-9).sqrt().recip()
+}
+
+fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate> {
+    let about = describe(s.id)?;
+    let round = found.round();
+    let parameters = about.coefficients.iter().enumerate().map(|(k, c)| {
+        let (value, sd) = fitted(round, s.id, c.name).unwrap_or((s.score.values[k], 0.0));
+        // the blocks' scatter stands in the deviation of the round that selected it
+        parameter(&about, k, value, sd.max(s.score.deviations[k]))
+    });
+    let parameters = parameters.collect();
+    let curve = match options.detail {
+        Detail::Full => curves::curve(
+            round,
+            &s.contribution,
+            &s.channels,
+            relative(&s.score),
+            !round.model.has(s.id),
+        ),
+        Detail::Lean => None,
+    };
+    Some(Candidate {
+        id: s.id.into(),
+        description: about.description,
+        asserted: s.refused.is_empty(),
+        evidence: s.score.evidence,
+        threshold: s.threshold,
+        parameters,
+        channels: names(&s.channels),
+        indistinguishable_from: s.class.clone(),
+        heldout_error_reduction: s.heldout,
+        selected_in_bootstraps: s.selected,
+        by_flight: flights(round, &s.by_flight),
+        minimum_detectable: detectable(&found.first, s.id, found.threshold),
+        refused: s.refused.clone(),
+        curve,
+    })
+}
+
+/// Value and standard deviation of a coefficient that has joined the model.
+fn fitted(round: &Round, id: &str, name: &str) -> Option<(f64, f64)> {
+    let full = format!("{id}.{name}");
+    let place = round.model.coefficients().iter().position(|c| c.name == full)?;
+    let value = round.model.coefficients()[place].value;
+    match round.coefficients.iter().position(|k| *k == place) {
+        None => Some((value, 0.0)),
+        Some(k) => {
+            let p = &round.projected;
+            Some((value + p.tuned[k], p.covariance[(k, k)].max(0.0).sqrt()))
+        }
+    }
+}
+
+fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Candidate {
+    let round = found.round();
+    let parameters = (0..about.coefficients.len())
+        .map(|k| parameter(about, k, score.values[k], score.deviations[k]))
+        .collect();
+    Candidate {
+        id: trial.id.into(),
+        description: about.description,
+        asserted: false,
+        evidence: score.evidence,
+        threshold: found.threshold,
+        parameters,
+        channels: names(&round.channels_of(score)),
+        indistinguishable_from: Vec::new(),
+        heldout_error_reduction: f64::NAN,
+        selected_in_bootstraps: f64::NAN,
+        by_flight: flights(round, &checks::by_flight(round, trial, score)),
+        minimum_detectable: detectable(round, trial.id, found.threshold),
+        refused: Vec::new(),
+        curve: None,
+    }
+}
+
+fn parameter(about: &Description, k: usize, value: f64, sd: f64) -> Parameter {
+    let c = &about.coefficients[k];
+    Parameter {
+        name: c.name.into(),
+        value,
+        ci95: [value - INTERVAL * sd, value + INTERVAL * sd],
+        unit: c.unit.into(),
+    }
+}
+
+fn names(channels: &[usize]) -> Vec<String> {
+    const NAMES: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
+    debug_assert_eq!(ChannelId::ALL[0], ChannelId::Drag);
+    channels.iter().map(|c| NAMES[*c].to_owned()).collect()
+}
+
+fn flights(round: &Round, values: &[[f64; 2]]) -> Vec<FlightEstimate> {
+    let of = |(flight, [value, sd]): (&super::columns::Ready, &[f64; 2])| FlightEstimate {
+        flight: flight.measured.name.clone(),
+        value: *value,
+        sd: *sd,
+    };
+    round.flights.iter().zip(values).map(of).collect()
+}
+
+/// The smallest amount of the first free coefficient whose evidence would have exceeded `threshold`, five
+/// times in six; `None` for shapes, of which there is no small amount.
+fn detectable(round: &Round, id: &str, threshold: f64) -> Option<f64> {
+    let trial = round.trials.iter().find(|t| t.id == id)?;
+    let point = trial.points.first()?;
+    if point.contribution.is_some() && point.free.len() != 1 {
+        return None;
+    }
+    let grams = round.projected.grams();
+    let null = super::rank::Draw {
+        total: nalgebra::DVector::zeros(round.projected.width()),
+        blocks: round.projected.noise.clone(),
+    };
+    let columns: Vec<usize> = point.free.iter().map(|f| f.1).collect();
+    let (alone, robust) = super::rank::deviations(&grams, &null, &columns)?;
+    let penalty = columns.len() as f64 * trial.support.max(2.0).ln();
+    let by_gain = (threshold.max(0.0) + penalty).sqrt() * alone;
+    let by_wald = threshold.max(0.0).sqrt() * robust;
+    let amount = by_gain.max(by_wald) + robust.max(alone);
+    amount.is_finite().then_some(amount)
+}

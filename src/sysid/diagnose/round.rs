@@ -1,0 +1,379 @@
+//! One round of the search: a model linearised over all flights, with every candidate's columns.
+
+use super::catalogue::{self, Columns, Entry};
+use super::cells::{Cells, Placed};
+use super::columns::{Ready, combine};
+use super::features;
+use super::gather::Column;
+use super::noise::Noise;
+use super::projected::{Known, Projected};
+use super::rank::{Draw, Score, Trial};
+use super::sensors;
+use super::shared;
+use crate::model::GreyBox;
+use crate::sysid::compare::flight::Prepared;
+
+/// Times a nonlinear candidate is linearised anew where it fits best.
+const REFINEMENTS: usize = 3;
+/// A nonlinear candidate this far below the best is not worth it.
+const HOPELESS: f64 = 40.0;
+
+/// What all rounds share.
+pub struct Problem {
+    /// The flights.
+    pub flights: Vec<Prepared>,
+    /// Prior value and width of each coefficient of the model given.
+    pub prior: Vec<(f64, f64)>,
+    /// Errors of the reconstructed paths.
+    pub path: Vec<shared::PathError>,
+    /// Prior widths of the sensors' errors, flight by flight.
+    pub sensors: Vec<[f64; super::columns::SENSORS]>,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+/// A model linearised.
+pub struct Round {
+    /// The model.
+    pub model: GreyBox,
+    /// The flights under it.
+    pub flights: Vec<Ready>,
+    /// Their cells.
+    pub cells: Cells,
+    /// Coefficients and sensor errors fitted along.
+    pub known: Vec<Known>,
+    /// Place of each known coefficient in the model's list.
+    pub coefficients: Vec<usize>,
+    /// The candidates.
+    pub trials: Vec<Trial>,
+    /// Everything projected.
+    pub projected: Projected,
+    /// Columns flight by flight: known, candidates, residual, features.
+    pub placed: Vec<Placed>,
+    /// Place of the residual in them.
+    pub last: usize,
+    /// The noise.
+    pub noise: Noise,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// The candidates as they are described.
+    pub entries: Vec<Entry>,
+    refined: Vec<(&'static str, Vec<f64>)>,
+    /// What noise that columns share with the residual feigns, by place.
+    pub shared: Vec<f64>,
+}
+
+impl Round {
+    /// `model` with `entries` as candidates; `None` if the flights do not hold it at all.
+    pub fn new(problem: &Problem, model: GreyBox, entries: &[Entry]) -> Option<Round> {
+        let flights: Vec<Ready> = problem.flights.iter().map(|f| Ready::new(&model, f)).collect();
+        let cells = Cells::new(&flights);
+        let (known, coefficients, mut placed) = known(problem, &model, &flights);
+        let features = features::features(&model, &flights, problem.seed);
+        let made = catalogue::columns(&model, &flights, entries, &[]);
+        let last = place(&mut placed, known.len(), &made, &flights);
+        for (list, own) in placed.iter_mut().zip(features) {
+            list.extend(own.into_iter().enumerate().map(|(k, c)| (last + 1 + k, c)));
+        }
+        let rich = rich(&placed, known.len(), &made.trials);
+        let noise = Noise::estimate(&cells, &rich, last);
+        let kept: Vec<Placed> = placed.iter().map(|l| up_to(l, last)).collect();
+        let shared = shared(problem, &model, entries, &cells, &kept, last, &noise);
+        let projected = Projected::new(&cells, &kept, last, &known, &noise, &shared)?;
+        Some(Round {
+            model,
+            flights,
+            cells,
+            known,
+            coefficients,
+            trials: made.trials,
+            projected,
+            placed,
+            last,
+            noise,
+            seed: problem.seed,
+            entries: entries.to_vec(),
+            refined: Vec::new(),
+            shared,
+        })
+    }
+
+    /// The scores of all candidates, best evidence first; nonlinear ones near the top are linearised
+    /// again where they fit best.
+    pub fn rank(&mut self) -> Vec<(usize, Score)> {
+        let mut scores = self.scores();
+        for _ in 0..REFINEMENTS {
+            let best = scores.first().map_or(0.0, |(_, s)| s.evidence);
+            let mut wanted: Vec<(&'static str, Vec<f64>)> = Vec::new();
+            for (k, score) in &scores {
+                let trial = &self.trials[*k];
+                let point = &trial.points[score.point];
+                let moved = point.free.iter().any(|(index, _, [low, high])| {
+                    let by = (score.values[*index] - point.values[*index]).abs();
+                    by > 0.02 * (high - low)
+                });
+                if point.contribution.is_some() && moved && score.evidence > best - HOPELESS {
+                    wanted.push((trial.id, score.values.clone()));
+                }
+            }
+            if wanted.is_empty() || !self.refine(wanted) {
+                break;
+            }
+            scores = self.scores();
+        }
+        scores
+    }
+
+    /// Adds places at which candidates are linearised; `false` if that cannot be done.
+    fn refine(&mut self, wanted: Vec<(&'static str, Vec<f64>)>) -> bool {
+        self.refined.extend(wanted);
+        let made = catalogue::columns(&self.model, &self.flights, &self.entries, &self.refined);
+        let count = self.known.len();
+        let mut placed: Vec<Placed> =
+            self.placed.iter().map(|l| up_to(l, count.saturating_sub(1))).collect();
+        let last = place(&mut placed, count, &made, &self.flights);
+        let Some(projected) =
+            Projected::new(&self.cells, &placed, last, &self.known, &self.noise, &self.shared)
+        else {
+            return false;
+        };
+        for (list, old) in placed.iter_mut().zip(&self.placed) {
+            let features = old.iter().filter(|(p, _)| *p > self.last);
+            list.extend(features.map(|(p, c)| (p - self.last + last, c.clone())));
+        }
+        (self.placed, self.last, self.projected) = (placed, last, projected);
+        self.trials = made.trials;
+        true
+    }
+
+    fn scores(&self) -> Vec<(usize, Score)> {
+        let grams = self.projected.grams();
+        let draw = Draw::measured(&grams);
+        let mut scores: Vec<(usize, Score)> = (0..self.trials.len())
+            .filter_map(|k| Some((k, self.trials[k].score(&grams, &draw)?)))
+            .collect();
+        let key = |(k, s): &(usize, Score)| (!self.at_bound(*k, s), s.evidence);
+        scores.sort_by(|a, b| {
+            let (a, b) = (key(a), key(b));
+            b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+        });
+        scores
+    }
+
+    /// Whether a free coefficient of the trial ended at its physical bound.
+    pub fn at_bound(&self, trial: usize, score: &Score) -> bool {
+        let trial = &self.trials[trial];
+        let Some(entry) = self.entries.iter().find(|e| e.about.id == trial.id) else { return false };
+        trial.points[score.point].free.iter().any(|(index, _, _)| {
+            let (low, high) = entry.about.coefficients[*index].bounds;
+            let near = 1e-6 * (high - low);
+            let value = score.values[*index];
+            value <= low + near || value >= high - near
+        })
+    }
+
+    /// The model with its coefficients where they go once `score`'s effect has joined.
+    pub fn with(&self, score: &Score) -> GreyBox {
+        let p = &self.projected;
+        let mut model = self.model.clone();
+        let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
+        for (k, place) in self.coefficients.iter().enumerate() {
+            let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
+            values[*place] += p.tuned[k] - given;
+        }
+        model.set_coefficients(&values);
+        model
+    }
+
+    /// Measured less the tuned model, sensors' errors taken out, flight by flight.
+    pub fn tuned_residual(&self) -> Vec<Column> {
+        let na = self.known.len();
+        let of = |placed: &Placed| {
+            let (mut columns, mut weights) = (Vec::new(), Vec::new());
+            for (place, column) in placed {
+                if *place < na {
+                    weights.push(-self.projected.tuned[*place]);
+                    columns.push(column.clone());
+                } else if *place == self.last {
+                    weights.push(1.0);
+                    columns.push(column.clone());
+                }
+            }
+            combine(&columns, &weights)
+        };
+        self.placed.iter().map(of).collect()
+    }
+
+    /// What `score` adds to the residual, flight by flight.
+    pub fn contribution(&self, score: &Score) -> Vec<Column> {
+        let na = self.known.len();
+        let of = |placed: &Placed| {
+            let columns: Vec<Column> = score
+                .weights
+                .iter()
+                .filter_map(|(c, _)| {
+                    placed.iter().find(|(p, _)| *p == na + c).map(|(_, column)| column.clone())
+                })
+                .collect();
+            let weights: Vec<f64> = score.weights.iter().map(|(_, w)| *w).collect();
+            combine(&columns, &weights)
+        };
+        self.placed.iter().map(of).collect()
+    }
+
+    /// Channels in which `score` takes at least a tenth of what it takes in the best, the best first.
+    pub fn channels_of(&self, score: &Score) -> Vec<usize> {
+        let mut taken = [0.0; 6];
+        let last = self.projected.width();
+        for (cell, rows) in self.cells.list.iter().zip(&self.projected.rows) {
+            for row in rows.row_iter() {
+                let x: f64 = score.weights.iter().map(|(c, w)| w * row[*c]).sum();
+                taken[cell.channel] += x * (2.0 * row[last] - x);
+            }
+        }
+        let most = taken.iter().fold(0.0_f64, |a, b| a.max(*b));
+        let mut channels: Vec<usize> =
+            (0..6).filter(|c| taken[*c] > 0.1 * most && taken[*c] > 0.0).collect();
+        channels.sort_by(|a, b| taken[*b].total_cmp(&taken[*a]));
+        channels
+    }
+
+    /// The model with its coefficients where the data and their prior put them.
+    pub fn tuned(&self) -> GreyBox {
+        let mut model = self.model.clone();
+        let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
+        for (k, place) in self.coefficients.iter().enumerate() {
+            values[*place] += self.projected.tuned[k];
+        }
+        model.set_coefficients(&values);
+        model
+    }
+}
+
+/// The list's columns up to `place`.
+fn up_to(list: &Placed, place: usize) -> Placed {
+    list.iter().take_while(|(p, _)| *p <= place).cloned().collect()
+}
+
+/// Puts candidates and residual behind the known columns; the residual's place.
+fn place(placed: &mut [Placed], count: usize, made: &Columns, flights: &[Ready]) -> usize {
+    let last = count + made.columns.first().map_or(0, Vec::len);
+    for ((list, own), flight) in placed.iter_mut().zip(&made.columns).zip(flights) {
+        list.extend(own.iter().cloned().enumerate().map(|(k, c)| (count + k, c)));
+        list.push((last, flight.residual.clone()));
+    }
+    last
+}
+
+/// The columns of the rich fit: all but the derivatives of nonlinear candidates.
+fn rich(placed: &[Placed], count: usize, trials: &[Trial]) -> Vec<Placed> {
+    let curved = trials.iter().flat_map(|t| &t.points).filter(|p| p.contribution.is_some());
+    let left_out: Vec<usize> =
+        curved.flat_map(|p| p.free.iter().map(|f| count + f.1)).collect();
+    let keep = |l: &Placed| l.iter().filter(|(p, _)| !left_out.contains(p)).cloned().collect();
+    placed.iter().map(keep).collect()
+}
+
+/// What noise that columns share with the residual feigns: by place, of the known unknowns and the linear
+/// candidates, which stand in front.
+fn shared(
+    problem: &Problem,
+    model: &GreyBox,
+    entries: &[Entry],
+    cells: &Cells,
+    before: &[Placed],
+    last: usize,
+    noise: &Noise,
+) -> Vec<f64> {
+    let straight: Vec<Entry> = entries.iter().filter(|e| catalogue::straight(e)).copied().collect();
+    let disturbed = problem.flights.iter().zip(&problem.path).enumerate();
+    let flights: Vec<Ready> = disturbed
+        .map(|(k, (f, path))| Ready::new(model, &shared::disturbed(f, path, problem.seed, k)))
+        .collect();
+    let (known, _, mut after) = known(problem, model, &flights);
+    let made = catalogue::columns(model, &flights, &straight, &[]);
+    let end = place(&mut after, known.len(), &made, &flights);
+    // the residual stands where it stands before
+    for list in &mut after {
+        list.iter_mut().filter(|(p, _)| *p == end).for_each(|(p, _)| *p = last);
+    }
+    shared::products(cells, before, &after, last, noise)
+}
+
+type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
+
+/// The known unknowns and their columns: free coefficients, then the sensors of each flight.
+fn known(problem: &Problem, model: &GreyBox, flights: &[Ready]) -> KnownColumns {
+    let (mut known, mut coefficients) = (Vec::new(), Vec::new());
+    let mut placed: Vec<Placed> = vec![Vec::new(); flights.len()];
+    let linear = model.linear();
+    let count = model.coefficients().len();
+    let columns: Vec<Vec<Column>> = flights.iter().map(|f| f.linear(model, 0..count)).collect();
+    for (index, named) in model.coefficients().iter().enumerate() {
+        let (value, width) =
+            problem.prior.get(index).copied().unwrap_or((named.value, f64::INFINITY));
+        if width <= 0.0 || !searched(model, index) {
+            continue;
+        }
+        for ((list, flight), columns) in placed.iter_mut().zip(flights).zip(&columns) {
+            let column = match linear[index] {
+                true => columns[index].clone(),
+                false => tangent(model, flight, index),
+            };
+            list.push((known.len(), column));
+        }
+        coefficients.push(index);
+        known.push(Known { name: named.name.clone(), width, offset: value - named.value });
+    }
+    for (k, (list, flight)) in placed.iter_mut().zip(flights).enumerate() {
+        for (i, column) in flight.sensors.iter().enumerate() {
+            list.push((known.len(), column.clone()));
+            known.push(Known {
+                name: format!("{} of flight {}", sensors::NAMES[i], k + 1),
+                width: problem.sensors[k][i],
+                offset: 0.0,
+            });
+        }
+    }
+    (known, coefficients, placed)
+}
+
+/// Whether a search leaves the coefficient free: gains of nominally one are held.
+fn searched(model: &GreyBox, index: usize) -> bool {
+    let name = &model.coefficients()[index].name;
+    let Some((id, own)) = name.split_once('.') else { return true };
+    let Some(about) = model.effects().find(|about| about.id == id) else { return true };
+    let entry = Entry { about, operator: false };
+    let starts = about.entry.map_or(0, |e| e.starts.len());
+    starts == 0
+        || catalogue::free(&entry).iter().any(|k| about.coefficients[*k].name == own)
+}
+
+/// The derivative of the prediction by a coefficient that the model is not linear in.
+fn tangent(model: &GreyBox, flight: &Ready, index: usize) -> Column {
+    let named = &model.coefficients()[index];
+    let by = (0.02 * named.value.abs()).max(1e-4);
+    let moved = |by: f64| {
+        let mut moved = model.clone();
+        moved.set_coefficient(&named.name, named.value + by);
+        moved
+    };
+    let id = named.name.split('.').next().unwrap_or_default();
+    let own: Vec<usize> = (0..model.coefficients().len())
+        .filter(|k| model.coefficients()[*k].name.split('.').next() == Some(id))
+        .collect();
+    let linear = model.linear();
+    let of = |model: &GreyBox| {
+        if own.iter().all(|k| !linear[*k]) {
+            return flight.operator(model);
+        }
+        let (first, last) = (own[0], own[own.len() - 1] + 1);
+        let values: Vec<f64> = (first..last)
+            .map(|k| if linear[k] { model.coefficients()[k].value } else { 0.0 })
+            .collect();
+        combine(&flight.linear(model, first..last), &values)
+    };
+    // lags, delays and dead zones are not negative
+    let down = by.min(named.value.max(0.0));
+    combine(&[of(&moved(by)), of(&moved(-down))], &[1.0 / (by + down), -1.0 / (by + down)])
+}

@@ -1,0 +1,146 @@
+//! The diagnosis itself: flights in, answer out.
+
+use super::advice;
+use super::catalogue;
+use super::decoys;
+use super::error::DiagnoseError;
+use super::excitation;
+use super::measurement;
+use super::options::{Detail, Options};
+use super::ranking;
+use super::result::{Diagnosis, Nulls, Settings, Verdict};
+use super::round::Problem;
+use super::search::{Found, search};
+use super::sensors;
+use super::sentences;
+use super::shared;
+use super::shares;
+use crate::model::GreyBox;
+use crate::physics::{effects, inputs};
+use crate::sysid::compare::flight::Prepared;
+use crate::sysid::reconstruction::Reconstruction;
+
+/// Says which effects of the catalogue `model` lacks according to `flights`, which must have been
+/// reconstructed with their deflections as recorded; `progress` hears what is being done.
+///
+/// # Errors
+/// There is too little flight or nothing in it moves, an id to be left out is unknown, or a flight has
+/// no clock.
+pub fn diagnose(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Diagnosis, DiagnoseError> {
+    known(&options.without)?;
+    let (problem, used, mut notes) = problem(model, flights, options)?;
+    notes.extend(excitation::check(&problem.flights)?);
+    let found = search(&problem, model, options, progress)
+        .ok_or_else(|| DiagnoseError::Unusable { model: model.name.clone() })?;
+    let effects = ranking::candidates(&found, options);
+    let channels = shares::channels(&found);
+    let measurement = measurement::measurement(&used);
+    let verdict = verdict(&found);
+    notes.extend(sentences::notes(&found, model, options));
+    let decoys = match options.detail {
+        Detail::Full => decoys::decoys(&found, options.seed),
+        Detail::Lean => Vec::new(),
+    };
+    Ok(Diagnosis {
+        schema: "greylag.diagnosis/1",
+        version: env!("CARGO_PKG_VERSION"),
+        model: model.name.clone(),
+        verdict,
+        sentences: sentences::sentences(&found, verdict, &effects, &channels, &measurement),
+        advice: advice::advice(&found, verdict, &effects, &channels),
+        effects,
+        channels,
+        measurement,
+        tuned: shares::tuned(&found, model),
+        nulls: Nulls {
+            count: options.nulls,
+            best: found.nulls.clone(),
+            level: options.level,
+        },
+        decoys,
+        learnable_remainder: found.learnable(),
+        notes,
+        settings: Settings {
+            seed: options.seed,
+            nulls: options.nulls,
+            bootstraps: options.bootstraps,
+            without: options.without.clone(),
+        },
+    })
+}
+
+/// Whether every id is one of the catalogue.
+fn known(ids: &[String]) -> Result<(), DiagnoseError> {
+    let all: Vec<&str> = effects::Kind::ALL
+        .iter()
+        .map(|k| k.describe().id)
+        .chain(inputs::Kind::ALL.iter().map(|k| k.describe().id))
+        .collect();
+    match ids.iter().find(|id| !all.contains(&id.as_str())) {
+        None => Ok(()),
+        Some(id) => Err(DiagnoseError::UnknownEffect { id: id.clone() }),
+    }
+}
+
+type Prepared3<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
+
+/// The flights on the model's clock, with what was left out.
+fn problem<'a>(
+    model: &GreyBox,
+    flights: &'a [Reconstruction],
+    options: &Options,
+) -> Result<Prepared3<'a>, DiagnoseError> {
+    if flights.is_empty() {
+        return Err(DiagnoseError::NoFlight);
+    }
+    let slowest = 0.5 * model.airframe.envelope.airspeed_min_mps;
+    let (mut prepared, mut used, mut notes) = (Vec::new(), Vec::new(), Vec::new());
+    for flight in flights {
+        let ready = Prepared::new(flight, slowest)?;
+        if ready.windows.is_empty() {
+            notes.push(format!("{}: no stretch in the air long enough; left out", flight.name));
+            continue;
+        }
+        if !ready.has_force() {
+            notes.push(format!(
+                "{}: no accelerometers, so drag, lift and side force are not compared, and effects on \
+                 them alone are not seen",
+                flight.name
+            ));
+        }
+        prepared.push(ready);
+        used.push(flight);
+    }
+    let sensors = used.iter().zip(&prepared).map(|(f, p)| sensors::widths(f, p.dt)).collect();
+    let prior = model.coefficients().iter().map(|c| (c.value, c.width())).collect();
+    let path = used.iter().zip(&prepared).map(|(f, p)| shared::path_error(f, p.dt)).collect();
+    let problem = Problem { flights: prepared, prior, path, sensors, seed: options.seed };
+    Ok((problem, used, notes))
+}
+
+fn verdict(found: &Found) -> Verdict {
+    let significant = found.remainder.total > found.remainder.total_threshold;
+    if found.selected.iter().any(|s| s.refused.is_empty()) {
+        Verdict::Effect
+    } else if !found.selected.is_empty() || significant {
+        Verdict::Unexplained
+    } else {
+        Verdict::Adequate
+    }
+}
+
+/// The description of an effect of the catalogue.
+pub fn describe(id: &str) -> Option<effects::Description> {
+    let physical = effects::Kind::from_id(id).map(|k| k.describe());
+    physical.or_else(|| inputs::Kind::from_id(id).map(|k| k.describe()))
+}
+
+/// Ids of the candidates that a model lacks and that can be searched for.
+pub fn searched(model: &GreyBox, without: &[String]) -> Vec<&'static str> {
+    catalogue::candidates(model, without).iter().map(|e| e.about.id).collect()
+}

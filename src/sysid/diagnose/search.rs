@@ -1,0 +1,210 @@
+//! Forward selection: the effect with the best evidence joins the model, and again, until none passes.
+
+use super::catalogue::{self, Entry};
+use super::checks;
+use super::nulls;
+use super::options::Options;
+use super::rank::Score;
+use super::remainder::{Remainder, remainder};
+use super::round::{Problem, Round};
+use crate::model::GreyBox;
+
+/// Most effects that are asserted together.
+const MOST: usize = 6;
+/// Least fall of the error on held-out segments.
+pub const HELD_OUT: f64 = 0.1;
+/// Least share of bootstraps in which the effect, or one of its class, is the best.
+pub const SELECTED: f64 = 0.8;
+/// Passes of tuning after an effect has joined, which is where nonlinear ones settle.
+const SETTLING: usize = 2;
+/// Part of what a flexible model could remove that an effect may leave in its channels.
+const LEFT: f64 = 0.3;
+
+/// The candidate that a round selected, with its checks.
+#[derive(Clone, Debug)]
+pub struct Selected {
+    /// Its id.
+    pub id: &'static str,
+    /// Its score in that round.
+    pub score: Score,
+    /// Threshold of that round.
+    pub threshold: f64,
+    /// Ids that the data cannot tell from it.
+    pub class: Vec<String>,
+    /// Share of the error removed from held-out segments.
+    pub heldout: f64,
+    /// Share of bootstraps.
+    pub selected: f64,
+    /// First free coefficient flight by flight, with standard deviations.
+    pub by_flight: Vec<[f64; 2]>,
+    /// Channels, the one with most of it first.
+    pub channels: Vec<usize>,
+    /// Why it is not asserted; empty if it is.
+    pub refused: Vec<String>,
+    /// What it added to the residual, fitted, flight by flight.
+    pub contribution: Vec<super::gather::Column>,
+}
+
+/// How a search ended.
+pub struct Found {
+    /// The first round: the model tuned, nothing joined.
+    pub first: Round,
+    /// What a flexible model could remove of what the first round leaves.
+    pub first_remainder: Remainder,
+    /// The last round, with every asserted effect in the model; `None` if that is the first one.
+    pub last: Option<Round>,
+    /// The same of the last round.
+    pub remainder: Remainder,
+    /// Scores of the last round.
+    pub scores: Vec<(usize, Score)>,
+    /// Best evidence in the null flights of the first round.
+    pub nulls: Vec<f64>,
+    /// Threshold of the last round.
+    pub threshold: f64,
+    /// Asserted effects in the order of selection, then the one refused, if there is one.
+    pub selected: Vec<Selected>,
+}
+
+impl Found {
+    /// The last round.
+    pub fn round(&self) -> &Round {
+        self.last.as_ref().unwrap_or(&self.first)
+    }
+}
+
+/// Searches for what `model` lacks; `None` if the flights do not hold the model at all.
+pub fn search(
+    problem: &Problem,
+    model: &GreyBox,
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Option<Found> {
+    progress("tuning the model's own coefficients");
+    let tuned = Round::new(problem, model.clone(), &[])?.tuned();
+    let entries = catalogue::candidates(model, &options.without);
+    progress(&format!("ranking {} candidate effects", entries.len()));
+    let mut first = Round::new(problem, tuned, &entries)?;
+    let scores = first.rank();
+    let nulls = nulls::best(&first.projected, &first.trials, options.seed, options.nulls);
+    let threshold = nulls::threshold(&nulls, options.level);
+    let first_remainder = remainder(&first, options.nulls, options.level);
+    let mut found = Found {
+        remainder: first_remainder.clone(),
+        first,
+        first_remainder,
+        last: None,
+        scores,
+        nulls,
+        threshold,
+        selected: Vec::new(),
+    };
+    while found.selected.len() < MOST {
+        let Some(winner) = examine(&found, options) else { break };
+        let passed = winner.refused.is_empty();
+        progress(&format!("{}: {}", winner.id, if passed { "joins" } else { "is refused" }));
+        found.selected.push(winner);
+        if !passed || !found.join(problem, &entries, options) {
+            break;
+        }
+    }
+    found.judge_remainder();
+    Some(found)
+}
+
+/// The best candidate, if its evidence exceeds the threshold, with all its checks.
+fn examine(found: &Found, options: &Options) -> Option<Selected> {
+    let round = found.round();
+    let (place, score) = found.scores.first()?;
+    if score.evidence.partial_cmp(&found.threshold)? != std::cmp::Ordering::Greater {
+        return None;
+    }
+    let trial = &round.trials[*place];
+    let mut refused = Vec::new();
+    if round.at_bound(*place, score) {
+        refused.push("a constant lies at the end of what is physically possible".into());
+    }
+    let class = checks::class(round, &found.scores, 0);
+    let members: Vec<usize> =
+        std::iter::once(*place).chain(class.iter().map(|k| found.scores[*k].0)).collect();
+    let heldout = checks::heldout_reduction(round, trial, score);
+    if heldout < HELD_OUT || heldout.is_nan() {
+        refused.push(format!(
+            "it takes {:.0} % of the error on held-out segments, under {:.0} %",
+            100.0 * heldout,
+            100.0 * HELD_OUT
+        ));
+    }
+    let selected = checks::selected(round, &found.scores, &members, options.bootstraps);
+    if selected < SELECTED && options.bootstraps > 0 {
+        refused.push(format!(
+            "it is the best in {:.0} % of the block bootstraps, under {:.0} %",
+            100.0 * selected,
+            100.0 * SELECTED
+        ));
+    }
+    let by_flight = checks::by_flight(round, trial, score);
+    let first = trial.points[score.point].free[0].0;
+    if checks::contradict(score.values[first], &by_flight) {
+        refused.push("the flights contradict one another about its amount".into());
+    }
+    let contribution = round.contribution(score);
+    Some(Selected {
+        id: trial.id,
+        score: score.clone(),
+        threshold: found.threshold,
+        class: class.iter().map(|k| round.trials[found.scores[*k].0].id.to_owned()).collect(),
+        heldout,
+        selected,
+        by_flight,
+        channels: round.channels_of(score),
+        refused,
+        contribution,
+    })
+}
+
+impl Found {
+    /// Joins the effect selected last to the model and ranks what is left.
+    fn join(&mut self, problem: &Problem, entries: &[Entry], options: &Options) -> bool {
+        let Some(winner) = self.selected.last() else { return false };
+        let mut model = self.round().with(&winner.score);
+        if model.join(winner.id, &winner.score.values).is_err() {
+            return false;
+        }
+        for _ in 0..SETTLING {
+            let Some(round) = Round::new(problem, model.clone(), &[]) else { return false };
+            model = round.tuned();
+        }
+        let open: Vec<Entry> =
+            entries.iter().filter(|e| !model.has(e.about.id)).copied().collect();
+        let Some(mut round) = Round::new(problem, model, &open) else { return false };
+        self.scores = round.rank();
+        let nulls = nulls::best(&round.projected, &round.trials, options.seed, options.nulls);
+        self.threshold = nulls::threshold(&nulls, options.level);
+        self.remainder = remainder(&round, options.nulls, options.level);
+        self.last = Some(round);
+        true
+    }
+
+    /// Refuses effects that leave in their own channels much of what a flexible model could remove.
+    fn judge_remainder(&mut self) {
+        let (before, after) = (&self.first_remainder, &self.remainder);
+        for effect in self.selected.iter_mut().filter(|s| s.refused.is_empty()) {
+            let own = |of: &[f64; 6]| effect.channels.iter().map(|c| of[*c]).sum::<f64>();
+            let significant = effect.channels.iter().any(|c| after.removable[*c] > after.threshold[*c]);
+            let share = own(&after.removable) / own(&before.removable).max(1.0);
+            if significant && share > LEFT {
+                effect.refused.push(format!(
+                    "with it, a flexible model could still remove {:.0} % of what it could without",
+                    100.0 * share
+                ));
+            }
+        }
+    }
+
+    /// Share of the squared error beyond noise under the tuned model that a flexible model could still
+    /// remove.
+    pub fn learnable(&self) -> f64 {
+        let excess = checks::excess(&self.first, &[true; 6]);
+        self.remainder.total / excess.max(self.remainder.total).max(1.0)
+    }
+}

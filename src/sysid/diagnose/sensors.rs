@@ -1,0 +1,37 @@
+//! What the sensors may still have wrong after the reconstruction.
+
+use super::columns::SENSORS;
+use crate::sysid::reconstruction::Reconstruction;
+
+/// Names of the sensor errors, in the order of [`super::columns::Ready::sensors`].
+pub const NAMES: [&str; SENSORS] = [
+    "gyro_bias_p",
+    "gyro_bias_q",
+    "gyro_bias_r",
+    "alpha_bias",
+    "beta_bias",
+    "airspeed_scale",
+    "accelerometer_bias_x",
+    "accelerometer_bias_y",
+    "accelerometer_bias_z",
+    "skew_actuators",
+];
+
+/// Least standard deviations: rad/s, rad, a share, m/s²; a filter that knows only its own errors states
+/// less than it has.
+const FLOOR: [f64; SENSORS - 1] =
+    [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01];
+/// Prior width of the actuators' clock, samples: ±1.5 samples are its 95 % interval.
+const SKEW_SAMPLES: f64 = 0.77;
+
+/// Prior widths of the sensor errors of a flight whose samples are `dt` (s) apart.
+pub fn widths(flight: &Reconstruction, dt: f64) -> [f64; SENSORS] {
+    let stated = |name: &str| {
+        let of = flight.nuisances.iter().find(|n| n.name == name).map(|n| n.sd);
+        of.filter(|sd| sd.is_finite()).unwrap_or(0.0)
+    };
+    std::array::from_fn(|k| match FLOOR.get(k) {
+        Some(floor) => stated(NAMES[k]).max(*floor),
+        None => SKEW_SAMPLES * dt,
+    })
+}

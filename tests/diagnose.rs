@@ -1,0 +1,139 @@
+//! Effects hidden inside JSBSim are named, nothing is named where nothing is missing.
+#![cfg(feature = "sitl")]
+
+use std::path::Path;
+
+use greylag::control::schedule::flights;
+use greylag::control::{self, Kind};
+use greylag::model::GreyBox;
+use greylag::num::stream::stream;
+use greylag::sim::flight_test::fly_within_bounds;
+use greylag::sim::instruments::Instruments;
+use greylag::sysid::diagnose::{DiagnoseError, Diagnosis, Options, Verdict, diagnose};
+use greylag::sysid::reconstruct::{self, ActuatorClock, reconstruct};
+use greylag::sysid::reconstruction::Reconstruction;
+use greylag_sitl::hidden::Hidden;
+use greylag_sitl::plant::PlantOptions;
+use rand_distr::{Distribution, StandardNormal};
+
+fn exact() -> GreyBox {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+    GreyBox::load(&path).unwrap()
+}
+
+/// The reference model with every coefficient wrong by 15 % (standard deviation).
+fn wrong(seed: u64) -> GreyBox {
+    let mut model = exact();
+    let mut random = stream(seed, &[1]);
+    let mut off = |value: f64| {
+        let unit: f64 = StandardNormal.sample(&mut random);
+        value * (1.0 + 0.15 * unit.clamp(-2.0, 2.0))
+    };
+    let values: Vec<f64> = model.coefficients().iter().map(|c| off(c.value)).collect();
+    model.set_coefficients(&values);
+    model
+}
+
+/// Two flights of 50 s with `hidden` in the aircraft, through noisy instruments and reconstruction.
+fn flown(seed: u64, hidden: &[(&str, f64)]) -> Vec<Reconstruction> {
+    let lqi = control::build(Kind::Lqi, &exact()).unwrap();
+    let hidden: Vec<Hidden> =
+        hidden.iter().map(|(id, amount)| Hidden::new(id, *amount).unwrap()).collect();
+    let one = |(k, schedule): (usize, &control::schedule::Schedule)| {
+        let plant = PlantOptions { hidden: hidden.clone(), ..PlantOptions::default() };
+        let flown = fly_within_bounds(&plant, &*lqi, schedule).unwrap();
+        let instruments = Instruments::drawn(10 * seed + k as u64);
+        let log = instruments.log(&flown, &schedule.name, 10 * seed + k as u64);
+        let options = reconstruct::Options {
+            gravity: 9.806,
+            actuators_clock: ActuatorClock::AsRecorded,
+            ..reconstruct::Options::new(schedule.name.clone(), exact().airframe.actuators)
+        };
+        reconstruct(&log, &options).unwrap()
+    };
+    // pitch, then everything at once
+    let [pitch, _, all] = flights::training(seed);
+    [pitch, all].iter().enumerate().map(one).collect()
+}
+
+fn asked(seed: u64, flights: &[Reconstruction], options: &Options) -> Diagnosis {
+    let found = diagnose(&wrong(seed), flights, options, &|_| {}).unwrap();
+    println!("{:?} {:#?}", found.verdict, found.sentences);
+    found
+}
+
+/// The effect is the first one asserted and its first parameter is right within `share`.
+fn found(id: &str, amount: f64, share: f64, seed: u64) {
+    let flights = flown(seed, &[(id, amount)]);
+    let found = asked(seed, &flights, &Options::default());
+    assert_eq!(found.verdict, Verdict::Effect);
+    let first = &found.effects[0];
+    assert!(first.asserted && first.id == id, "{} {}", first.id, first.evidence);
+    let value = first.parameters[0].value;
+    assert!((value / amount - 1.0).abs() < share, "{value} for {amount}");
+    assert!(found.sentences[0].contains(id));
+}
+
+// 5 % is what the issue asks of the median parameter error at clear amplitudes; operators and inertia
+// are linearised in weak form, which leaves them some 10 %
+
+#[test]
+fn a_static_effect_is_named() {
+    found("dihedral_alpha", 0.5, 0.05, 1);
+}
+
+#[test]
+fn an_effect_on_the_body_is_named() {
+    found("inertia_xz", 0.08, 0.1, 2);
+}
+
+#[test]
+fn an_effect_on_the_deflections_is_named() {
+    found("dead_zone", 0.025, 0.1, 3);
+}
+
+#[test]
+fn nothing_is_named_where_nothing_is_missing_and_the_seed_decides_everything() {
+    let flights = flown(4, &[]);
+    let options = Options { nulls: 40, bootstraps: 20, ..Options::default() };
+    let first = asked(4, &flights, &options);
+    assert!(first.effects.iter().all(|c| !c.asserted));
+    assert_eq!(first.verdict, Verdict::Adequate);
+    let second = asked(4, &flights, &options);
+    assert_eq!(serde_json::to_string(&first).unwrap(), serde_json::to_string(&second).unwrap());
+}
+
+#[test]
+fn an_effect_that_the_catalogue_lacks_is_left_unexplained() {
+    let flights = flown(5, &[("thrust_line_offset", 0.03)]);
+    let options = Options { without: vec!["thrust_line_offset".into()], ..Options::default() };
+    let found = asked(5, &flights, &options);
+    assert_eq!(found.verdict, Verdict::Unexplained);
+    assert!(found.effects.iter().all(|c| c.id != "thrust_line_offset"));
+}
+
+#[test]
+fn what_cannot_be_diagnosed_is_said() {
+    let flights = flown(6, &[]);
+    let model = wrong(6);
+    let of = |flights: &[Reconstruction], without: &[&str]| {
+        let without = without.iter().map(|id| (*id).to_owned()).collect();
+        diagnose(&model, flights, &Options { without, ..Options::default() }, &|_| {}).unwrap_err()
+    };
+    assert!(matches!(of(&[], &[]), DiagnoseError::NoFlight));
+    let unknown = of(&flights, &["flutter"]);
+    assert!(unknown.to_string().contains("flutter"), "{unknown}");
+    let mut short = flights[0].clone();
+    short.segments[0].instants.truncate(500);
+    assert!(matches!(of(&[short], &[]), DiagnoseError::TooLittle { .. }));
+    let mut still = flights[0].clone();
+    for segment in &mut still.segments {
+        let first = segment.instants[0];
+        for instant in &mut segment.instants {
+            instant.state.alpha = first.state.alpha;
+            instant.controls = first.controls;
+        }
+    }
+    let said = of(&[still], &[]).to_string();
+    assert!(said.contains("elevator") && said.contains("fly"), "{said}");
+}
