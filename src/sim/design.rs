@@ -209,6 +209,7 @@ fn imagine(
         segments: vec![Segment { instants }],
         nuisances: Vec::new(),
         noise,
+        left: noise,
         force_noise,
         notes: Vec::new(),
     };
