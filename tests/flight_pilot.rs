@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
+use greylag::control::schedule::{Axis, Excitation, Schedule, Shape, Step};
 use greylag::control::{Controller, Observation, Target};
 use greylag::flight::pilot::{Config, Decision, Pilot, Plan, Source, TrimPoint};
 use greylag::link::autopilot::{
@@ -611,4 +612,42 @@ fn no_storm_of_input_makes_a_command_that_is_not_finite_in_range_and_slew_limite
 #[test]
 fn the_same_input_gives_the_same_commands_to_the_bit() {
     assert_eq!(storm(7).0, storm(7).0);
+}
+
+#[test]
+fn a_schedule_is_flown_inside_the_limits_for_as_long_as_offboard_lasts() {
+    let kick = Excitation::new(Axis::Elevator, 0.5, 0.5, Shape::Step { width: 0.5 });
+    let steep = Step::hold(2.0, 70.0, 5.0, 5.0).with(kick);
+    let mut flight = Flight::offboard();
+    flight.pilot.follow(Schedule::new("steep", "", vec![steep]).unwrap());
+    flight.plan = Plan::Ready(Command { aileron: 0.0, elevator: -0.1, throttle: 0.3 });
+    fn fly(flight: &mut Flight, ticks: usize) -> Decision {
+        let one = |_| {
+            flight.pilot.attitude_setpoint(flight.now, LEVEL_SETPOINT);
+            flight.tick()
+        };
+        (0..ticks).map(one).last().unwrap()
+    }
+    let begun = fly(&mut flight, 40);
+    // 70° and 5 m/s are asked for; 60° and 13 m/s are the envelope's
+    assert!((begun.target.roll.to_degrees() - 60.0).abs() < 1e-9, "{begun:?}");
+    assert_eq!((begun.target.airspeed, begun.command.elevator), (13.0, -0.1));
+    // 0.5 s after the start the kick comes in, 0.2 a tick
+    let kicked = fly(&mut flight, 30);
+    assert!((kicked.command.elevator - 0.4).abs() < 1e-9, "{kicked:?}");
+    assert_eq!(fly(&mut flight, 60).command.elevator, -0.1);
+    let over = fly(&mut flight, 100);
+    assert_eq!((over.target.roll, over.target.pitch), (0.0, 0.0));
+    let told = flight.texts();
+    assert!(
+        told.contains("schedule steep begins") && told.contains("schedule steep is over"),
+        "{told}"
+    );
+    // without setpoints offboard ends as ever; on the next entry the schedule begins anew
+    flight.fly(120);
+    assert_eq!(flight.fly(1).mode, Mode::Hold);
+    flight.pilot.attitude_setpoint(flight.now, LEVEL_SETPOINT);
+    assert_eq!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Accepted);
+    assert!((fly(&mut flight, 20).target.roll.to_degrees() - 60.0).abs() < 1e-9);
+    assert!(flight.texts().contains("schedule steep begins"));
 }

@@ -15,6 +15,9 @@ use crate::sim::design::{ENOUGH, Prospect, Suspect, prospects};
 /// Longest schedule that is written, s: beyond it the manoeuvre is repeated by hand.
 const LONGEST_S: f64 = 600.0;
 
+/// Fewest passes: one on each of two opposite headings.
+const LEAST: f64 = 2.0;
+
 /// Options of `greylag design`.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -58,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         );
     };
     let manoeuvre = menu::named(best.name).context("the menu has lost a manoeuvre")?;
-    let times = (seconds / best.duration_s).ceil().max(1.0) as usize;
+    let times = (seconds / best.duration_s).ceil().max(LEAST) as usize;
     println!(
         "{}: {}\n{seconds:.1} s of it tell {} from {} (evidence {ENOUGH}); one pass takes {:.0} s",
         best.name, manoeuvre.description, a.id, b.id, best.duration_s
@@ -66,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.out {
         files::write(path, &repeated(manoeuvre, times).to_toml(), overwrite)?;
         println!(
-            "written to {} ({times} times); fly it with `greylag demo --schedule {}`",
+            "written to {} ({times} times, on opposite headings); fly it with `greylag demo --schedule {}`",
             path.display(),
             path.display()
         );
@@ -95,8 +98,11 @@ fn read(text: &str) -> Result<(String, Vec<f64>)> {
     Ok((id.trim().into(), values.with_context(wrong)?))
 }
 
+/// The manoeuvre so many times, each on the heading opposite to the last one: on a single heading the
+/// wind cannot be told from an airspeed sensor's scale.
 fn repeated(manoeuvre: &menu::Manoeuvre, times: usize) -> Schedule {
-    (1..times).fold(manoeuvre.schedule(), |all, _| all.then(manoeuvre.schedule()))
+    let again = |all: Schedule, _| all.then(menu::TURN.schedule()).then(manoeuvre.schedule());
+    (1..times).fold(manoeuvre.schedule(), again)
 }
 
 fn table(all: &[Prospect]) -> Table {

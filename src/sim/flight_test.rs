@@ -30,7 +30,7 @@ pub enum FlightTestError {
         /// The schedule's name.
         schedule: String,
         /// What it says.
-        why: Trouble,
+        why: Box<Trouble>,
     },
     /// The aircraft does not stay where it is asked to.
     #[error(
@@ -59,7 +59,8 @@ pub fn fly(
     controller: &dyn Controller,
     schedule: &Schedule,
 ) -> Result<Flown, FlightTestError> {
-    let trouble = |why| FlightTestError::Trouble { schedule: schedule.name.clone(), why };
+    let trouble =
+        |why| FlightTestError::Trouble { schedule: schedule.name.clone(), why: Box::new(why) };
     let mut simulator = Simulator::new(plant).map_err(trouble)?;
     let mut pilot = Scheduled::new(controller.boxed_clone(), schedule.clone());
     pilot.reset(plant.seed.into());

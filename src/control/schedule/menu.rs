@@ -25,6 +25,14 @@ impl Manoeuvre {
     }
 }
 
+/// A turn onto the opposite heading, to be flown between manoeuvres.
+pub const TURN: Manoeuvre = Manoeuvre {
+    name: "turn",
+    description: "A turn onto the opposite heading.",
+    // at 45° and 19 m/s the heading turns by 30 °/s
+    steps: || vec![Step::hold(6.5, 45.0, 5.0, 19.0)],
+};
+
 /// The manoeuvre of that name.
 pub fn named(name: &str) -> Option<&'static Manoeuvre> {
     MENU.iter().find(|m| m.name == name)
