@@ -55,7 +55,9 @@ fn campaign() {
     let wanted = std::env::var("CASES").unwrap_or_default();
     let seeds: u64 = std::env::var("SEEDS").map_or(3, |s| s.parse().unwrap());
     let (mut covered, mut asked) = (0, 0);
-    for (id, amplitude, start, truth) in CASES.iter().filter(|c| wanted.contains(c.0) || wanted.is_empty()) {
+    for (id, amplitude, start, truth) in
+        CASES.iter().filter(|c| wanted.contains(c.0) || wanted.is_empty())
+    {
         for seed in 1..=seeds {
             let stall = *id == "lift_stall";
             let (hidden, manoeuvres, exact) = match stall {
@@ -75,12 +77,24 @@ fn campaign() {
             let a5 = error_5s(&amended.model, &held);
             println!(
                 "{id} {seed}: {seconds:.2} s {} it, 5 s: given {:.4} tuned {t5:.4} amended {a5:.4} oracle {o5:.4} ratio {:.2} closure {:.3} weak {}/{} sd {:.5?}",
-                amended.iterations, error_5s(&wrong, &held), a5 / o5, (t5 - a5) / (t5 - o5),
-                amended.weakened, amended.shots, amended.residual_sd,
+                amended.iterations,
+                error_5s(&wrong, &held),
+                a5 / o5,
+                (t5 - a5) / (t5 - o5),
+                amended.weakened,
+                amended.shots,
+                amended.residual_sd,
             );
             let new: Vec<_> = amended.parameters.iter().filter(|p| p.added).collect();
             for (p, truth) in new.iter().zip(*truth) {
-                println!("    {} {:.5} ± {:.5} (truth {truth}, {:.1} %, {:.2} sd)", p.name, p.value, p.sd, 100.0 * (p.value / truth - 1.0), (p.value - truth) / p.sd);
+                println!(
+                    "    {} {:.5} ± {:.5} (truth {truth}, {:.1} %, {:.2} sd)",
+                    p.name,
+                    p.value,
+                    p.sd,
+                    100.0 * (p.value / truth - 1.0),
+                    (p.value - truth) / p.sd
+                );
                 if truth.is_finite() {
                     asked += 1;
                     covered += usize::from(p.ci95[0] <= *truth && *truth <= p.ci95[1]);
@@ -95,10 +109,17 @@ fn campaign() {
                 z2 += z * z;
                 c += usize::from(z.abs() < 1.96);
                 if z.abs() > 2.5 {
-                    worst.push(format!("{} {z:.1} ({:.1} %)", p.name, 100.0 * (p.value / truth - 1.0)));
+                    worst.push(format!(
+                        "{} {z:.1} ({:.1} %)",
+                        p.name,
+                        100.0 * (p.value / truth - 1.0)
+                    ));
                 }
             }
-            println!("    prior: {c}/{n} covered, rms z {:.2}; {worst:?}", (z2 / f64::from(n)).sqrt());
+            println!(
+                "    prior: {c}/{n} covered, rms z {:.2}; {worst:?}",
+                (z2 / f64::from(n)).sqrt()
+            );
             for f in &amended.flights {
                 println!("    {f:.5?}");
             }

@@ -88,10 +88,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     for id in &arguments.effects {
         if effects::Kind::from_id(id).is_none() && inputs::Kind::from_id(id).is_none() {
-            bail!("effect {id:?} is unknown to this program; `greylag effects list` names those it knows");
+            bail!(
+                "effect {id:?} is unknown to this program; `greylag effects list` names those it knows"
+            );
         }
         if model.has(id) {
-            bail!("model {} has the effect {id} already; --tune-only refits its coefficients", model.name);
+            bail!(
+                "model {} has the effect {id} already; --tune-only refits its coefficients",
+                model.name
+            );
         }
     }
     let (paths, held) = divided(&arguments.logs.paths, &arguments.hold_out);
@@ -100,7 +105,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Intake { mut flights, mut notes, mut in_doubt } =
         arguments.logs.of(paths).take_in(&model, clock)?;
     let tests = if held.is_empty() {
-        notes.push(format!("{}: fitted to its first two thirds, judged by the last", flights[0].name));
+        notes.push(format!(
+            "{}: fitted to its first two thirds, judged by the last",
+            flights[0].name
+        ));
         let [first, last] = amend::split(&flights[0]);
         flights = vec![first];
         vec![last]
@@ -115,11 +123,13 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
         ..amend::Options::default()
     };
-    let mut amended = amend::amend(&model, &flights, &tests, &options, &|doing| eprintln!("{doing}"))?;
+    let mut amended =
+        amend::amend(&model, &flights, &tests, &options, &|doing| eprintln!("{doing}"))?;
     let story = &mut amended.amendment;
     story.notes.splice(0..0, notes);
     in_doubt |= story.effects.iter().any(|e| !e.refused.is_empty());
-    in_doubt |= story.notes.iter().any(|n| n.contains("by") && n.contains("alone: something differed"));
+    in_doubt |=
+        story.notes.iter().any(|n| n.contains("by") && n.contains("alone: something differed"));
     print(story);
     let all_refused = !story.effects.is_empty() && !story.parameters.iter().any(|p| p.added);
     if all_refused {
@@ -255,7 +265,10 @@ fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) 
     let source = |name: &str| {
         let id = name.split('.').next().unwrap_or_default();
         let prior = effects::Kind::from_id(id).map(|k| k.describe().source);
-        prior.or_else(|| inputs::Kind::from_id(id).map(|k| k.describe().source)).unwrap_or("").into()
+        prior
+            .or_else(|| inputs::Kind::from_id(id).map(|k| k.describe().source))
+            .unwrap_or("")
+            .into()
     };
     let all = amended.model.coefficients();
     let changed = all.iter().filter(|c| fitted.iter().any(|p| p.name == c.name && !p.added));
@@ -316,7 +329,8 @@ fn parameter_table(parameters: &[Parameter]) -> Table {
             _ => "",
         };
         let [low, high] = p.ci95;
-        let row = [p.name.clone(), before, number(p.value), number(low), number(high), remark.into()];
+        let row =
+            [p.name.clone(), before, number(p.value), number(low), number(high), remark.into()];
         table.add_row(row);
     }
     table

@@ -50,9 +50,10 @@ pub fn fly(hidden: &str, seconds: f64, manoeuvres: Manoeuvres, seed: u64) -> Flo
         command.aileron += aileron;
         command.elevator += elevator;
         command.throttle += throttle;
-        // pull for a second every eight
-        if manoeuvres == Manoeuvres::Stalls && t % 8.0 > 6.2 && t % 8.0 < 7.0 {
-            command.elevator -= 0.5;
+        // nearly full elevator for a second every eight, on top of which nothing flies: 0.9 of it moves
+        // the trim by 13° of incidence, past the stall at 12°
+        if manoeuvres == Manoeuvres::Stalls && t % 8.0 > 6.2 && t % 8.0 < 7.2 {
+            command.elevator = -0.9;
         }
         truth.push(simulator.truth());
         commands.push(command.clamped());

@@ -277,9 +277,14 @@ fn sentences(story: &Amendment) -> Vec<String> {
     let mut all = Vec::new();
     let (given, before, after) =
         (judged(&story.given), judged(&story.before), judged(&story.after));
-    let kept: Vec<&str> = story.effects.iter().map(|e| e.id.as_str()).filter(|id| {
-        story.parameters.iter().any(|p| p.added && p.name.starts_with(&format!("{id}.")))
-    }).collect();
+    let kept: Vec<&str> = story
+        .effects
+        .iter()
+        .map(|e| e.id.as_str())
+        .filter(|id| {
+            story.parameters.iter().any(|p| p.added && p.name.starts_with(&format!("{id}.")))
+        })
+        .collect();
     if let (Some(given), Some(before), Some(after)) = (given, before, after) {
         all.push(format!(
             "On flights that the fit did not see, tuning the coefficients {} ({given:.5} to \
@@ -295,7 +300,8 @@ fn sentences(story: &Amendment) -> Vec<String> {
         }
     }
     for effect in story.effects.iter().filter(|e| !e.refused.is_empty()) {
-        let verb = if kept.contains(&effect.id.as_str()) { "kept though refused" } else { "refused" };
+        let verb =
+            if kept.contains(&effect.id.as_str()) { "kept though refused" } else { "refused" };
         let next = match effect.fly_next.as_str() {
             "" => String::new(),
             next => format!(" What would decide: {next}."),

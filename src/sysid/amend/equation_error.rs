@@ -49,7 +49,8 @@ fn starts(free: &[Free]) -> Vec<Vec<f64>> {
         values.sort_by(f64::total_cmp);
         values.dedup();
         if values.len() > 1 {
-            let each = |value: &f64| starts.iter().map(|s| replaced(s, k, *value)).collect::<Vec<_>>();
+            let each =
+                |value: &f64| starts.iter().map(|s| replaced(s, k, *value)).collect::<Vec<_>>();
             starts = values.iter().flat_map(each).collect();
         }
     }
@@ -167,9 +168,8 @@ fn step(
         right[k] -= (theta[k] - f.prior) * f.width.powi(-2);
     }
     let scale = information.diagonal().map(|d| d.sqrt().recip());
-    let scaled = DMatrix::from_fn(free.len(), free.len(), |a, b| {
-        information[(a, b)] * scale[a] * scale[b]
-    });
+    let scaled =
+        DMatrix::from_fn(free.len(), free.len(), |a, b| information[(a, b)] * scale[a] * scale[b]);
     let mut step = scaled.cholesky()?.solve(&right.component_mul(&scale));
     step.component_mul_assign(&scale);
     Some(step)

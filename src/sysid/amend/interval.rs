@@ -26,8 +26,6 @@ pub(super) fn covariance(
         meat.ger(blocks / (blocks - 1.0).max(1.0), score, score, 1.0);
     }
     let sandwich = &inverse * meat * &inverse;
-    let sd = (0..inverse.nrows())
-        .map(|k| inverse[(k, k)].max(sandwich[(k, k)]).sqrt())
-        .collect();
+    let sd = (0..inverse.nrows()).map(|k| inverse[(k, k)].max(sandwich[(k, k)]).sqrt()).collect();
     Some(Covariance { sd })
 }

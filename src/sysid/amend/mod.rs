@@ -4,7 +4,6 @@
 //! coefficients near, multi-step shooting finishes them, and flights that the fit never saw say what
 //! it was worth.
 
-
 mod amendment;
 mod equation_error;
 mod error;

@@ -62,15 +62,9 @@ pub(super) struct Neighbourhood {
 }
 
 /// What acts in every flight under `model`.
-pub(super) fn acting(
-    model: &GreyBox,
-    flights: &[Flight],
-    place: &Place,
-    later: f64,
-) -> Acting {
-    let one = |(f, s): (&Flight, &[f64; SENSORS])| {
-        shooting::acting(model, &f.prepared, s[SKEW] + later)
-    };
+pub(super) fn acting(model: &GreyBox, flights: &[Flight], place: &Place, later: f64) -> Acting {
+    let one =
+        |(f, s): (&Flight, &[f64; SENSORS])| shooting::acting(model, &f.prepared, s[SKEW] + later);
     flights.iter().zip(&place.sensors).map(one).collect()
 }
 
@@ -135,33 +129,31 @@ pub(super) fn run(
 ) -> Vec<[f64; 8]> {
     let flight = &flights[shot.flight].prepared;
     let start = shooting::start(shot, flight, sensors, from);
-    let path =
-        shooting::fly(model, flight, shot, &controls[shot.flight][shot.segment], start);
+    let path = shooting::fly(model, flight, shot, &controls[shot.flight][shot.segment], start);
     shooting::residuals(flight, shot, sensors, &path)
 }
 
-/// The normal equations of shot number `index`.
-pub(super) fn normal(
+/// Derivatives of the residuals of shot number `index`: columns for the free coefficients, its flight's
+/// sensor constants and its initial state, eight rows a sample.
+pub(super) fn jacobian(
     around: &Neighbourhood,
     flights: &[Flight],
     shot: &Shot,
     index: usize,
     place: &Place,
-    w: &Weights,
-) -> Normal {
+) -> DMatrix<f64> {
     let (sensors, from) = (&place.sensors[shot.flight], &place.starts[index]);
     let fly = |model: &GreyBox, controls: &Acting, from: &[f64; 8]| {
         run(model, controls, flights, shot, sensors, from)
     };
     let here = fly(&around.model, &around.acting, from);
     let count = around.variants.len();
-    let rows = 8 * shot.steps;
-    let root: [f64; 8] = w.output.map(|x| (shot.weight * x).sqrt());
-    let mut j = DMatrix::<f64>::zeros(rows, count + SENSORS + 8);
+    let mut j = DMatrix::<f64>::zeros(8 * shot.steps, count + SENSORS + 8);
     let mut fill = |column: usize, low: &[[f64; 8]], high: &[[f64; 8]], between: f64| {
+        let mut column = j.column_mut(column);
         for (k, (a, b)) in low.iter().zip(high).enumerate() {
             for (i, d) in shooting::error(a, b).iter().enumerate() {
-                j[(8 * k + i, column)] = root[i] * d / between;
+                column[8 * k + i] = d / between;
             }
         }
     };
@@ -178,19 +170,29 @@ pub(super) fn normal(
         let high = fly(&around.model, &around.acting, &moved);
         fill(count + SENSORS + i, &here, &high, *step);
     }
-    sensor_columns(&mut j, count, flights, shot, &root);
-    let r = DVector::from_fn(rows, |row, _| root[row % 8] * here[row / 8][row % 8]);
+    sensor_columns(&mut j, count, flights, shot);
+    j
+}
+
+/// The normal equations of a shot whose residuals have the derivatives `jacobian`.
+pub(super) fn normal(
+    jacobian: &DMatrix<f64>,
+    residuals: &[[f64; 8]],
+    shot: &Shot,
+    from: &[f64; 8],
+    w: &Weights,
+) -> Normal {
+    let root: [f64; 8] = w.output.map(|x| (shot.weight * x).sqrt());
+    let mut j = jacobian.clone();
+    for mut column in j.column_iter_mut() {
+        column.iter_mut().enumerate().for_each(|(row, x)| *x *= root[row % 8]);
+    }
+    let r = DVector::from_fn(j.nrows(), |row, _| root[row % 8] * residuals[row / 8][row % 8]);
     eliminate(&j, &r, from, w)
 }
 
 /// The offsets of the sensors: what they add, less what they take from the initial state.
-fn sensor_columns(
-    j: &mut DMatrix<f64>,
-    count: usize,
-    flights: &[Flight],
-    shot: &Shot,
-    root: &[f64; 8],
-) {
+fn sensor_columns(j: &mut DMatrix<f64>, count: usize, flights: &[Flight], shot: &Shot) {
     let segment = &flights[shot.flight].prepared.segments[shot.segment];
     for (k, state) in OFFSETS.iter().enumerate() {
         let unit = |i: usize| match *state {
@@ -199,7 +201,7 @@ fn sensor_columns(
         };
         let (column, initial) = (count + SKEW + 1 + k, count + SENSORS + state);
         for row in 0..j.nrows() {
-            let direct = if row % 8 == *state { root[*state] * unit(1 + row / 8) } else { 0.0 };
+            let direct = if row % 8 == *state { unit(1 + row / 8) } else { 0.0 };
             j[(row, column)] = direct - unit(0) * j[(row, initial)];
         }
     }
@@ -207,8 +209,10 @@ fn sensor_columns(
 
 fn eliminate(j: &DMatrix<f64>, r: &DVector<f64>, from: &[f64; 8], w: &Weights) -> Normal {
     let m = j.ncols() - 8;
-    let all = j.tr_mul(j);
-    let gradient = j.tr_mul(r);
+    // a product of matrices, which is blocked, and not tr_mul, which is not
+    let across = j.transpose();
+    let all = &across * j;
+    let gradient = &across * r;
     let mut own = SMatrix::<f64, 8, 8>::from_fn(|a, b| all[(m + a, m + b)]);
     let mut start_gradient = SVector::<f64, 8>::from_fn(|a, _| gradient[m + a]);
     for k in 0..8 {

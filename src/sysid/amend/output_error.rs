@@ -25,6 +25,12 @@ pub const LEAST_S: f64 = 10.0;
 const NORMAL_95: f64 = 1.96;
 /// Settled: no coefficient changes by more than this share of its standard deviation.
 const SETTLED: f64 = 0.03;
+/// Renewed derivatives that change no coefficient by more standard deviations than this are the last.
+const RENEWED: f64 = 0.1;
+/// The same for lengths before the last.
+const NEAR: f64 = 5.0;
+/// Most steps under the same derivatives.
+const INNER: usize = 6;
 /// Not settled, and so refused, if the last change exceeds this many standard deviations.
 const UNSETTLED: f64 = 0.5;
 /// Least standard deviations of residuals, in the units of the state: what the models' steps and the
@@ -46,13 +52,13 @@ pub struct FitOptions {
     pub added: Vec<String>,
     /// Lengths of shots, s, one after the other.
     pub lengths_s: Vec<f64>,
-    /// Iterations allowed for each length.
-    pub iterations: usize,
+    /// Times that the derivatives may be renewed for the last length.
+    pub renewals: usize,
 }
 
 impl Default for FitOptions {
     fn default() -> Self {
-        FitOptions { added: Vec::new(), lengths_s: vec![1.0, 5.0], iterations: 12 }
+        FitOptions { added: Vec::new(), lengths_s: vec![1.0, 5.0], renewals: 8 }
     }
 }
 
@@ -101,10 +107,14 @@ pub fn fit(
     progress(&format!("{}: equation error over {} flight(s)", model.name, flights.len()));
     let theta = equation_error::start(model, &free, flights);
     let mut search = Search::new(model, flights, free, theta);
-    for length_s in &options.lengths_s {
+    for (k, length_s) in options.lengths_s.iter().enumerate() {
         progress(&format!("{}: output error over {length_s} s", model.name));
         search.shots_of(*length_s)?;
-        search.settle(options.iterations)?;
+        // only the last length decides the figures
+        match k + 1 == options.lengths_s.len() {
+            true => search.settle(options.renewals, RENEWED)?,
+            false => search.settle(options.renewals.min(2), NEAR)?,
+        }
     }
     search.finish()
 }
@@ -115,6 +125,8 @@ struct Search<'a> {
     flights: &'a [Flight],
     free: Vec<Free>,
     shots: Vec<Shot>,
+    /// Derivatives of each shot's residuals, not always the newest.
+    jacobians: Vec<DMatrix<f64>>,
     /// Shots cut short because their runs leave the flight.
     short: usize,
     place: Place,
@@ -143,6 +155,7 @@ impl<'a> Search<'a> {
             flights,
             free,
             shots: Vec::new(),
+            jacobians: Vec::new(),
             short: 0,
             place: Place { theta, sensors, starts: Vec::new() },
             weights,
@@ -195,37 +208,47 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Iterates until nothing moves, weights included.
-    fn settle(&mut self, most: usize) -> Result<(), AmendError> {
-        let mut damping = 1e-4;
-        let mut since = 0;
-        for iteration in 0..most {
-            let system = self.system();
-            let moved = self.step(&system, &mut damping)?;
-            self.iterations += 1;
-            since += 1;
-            let settled = !moved || self.change.0 < SETTLED;
-            let close = self.change.0 < 1.0;
-            // weights follow once the coefficients are near, and never after every step
-            if settled && iteration > 0 && since > 1 {
-                let changed = self.reweigh();
-                if changed < 0.1 {
+    /// Iterates until nothing moves, weights included: the derivatives, which cost most, are renewed
+    /// once nothing moves under the old ones, until that changes nothing by more than `tolerance`
+    /// standard deviations.
+    fn settle(&mut self, renewals: usize, tolerance: f64) -> Result<(), AmendError> {
+        let mut damping = 1e-6;
+        for renewal in 0..renewals {
+            self.differentiate();
+            let mut first = f64::INFINITY;
+            for inner in 0..INNER {
+                let system = self.system();
+                let moved = self.step(&system, &mut damping)?;
+                self.iterations += 1;
+                if inner == 0 {
+                    first = self.change.0;
+                }
+                if self.change.0 < 3.0 || renewal + inner < 2 {
+                    self.reweigh();
+                }
+                if !moved || self.change.0 < SETTLED {
                     break;
                 }
-                since = 0;
-            } else if close || iteration < 2 {
-                self.reweigh();
+            }
+            if renewal > 0 && first < tolerance {
+                break;
             }
         }
         Ok(())
     }
 
-    /// Sets the weights by the present residuals; the largest relative change of a standard deviation.
-    fn reweigh(&mut self) -> f64 {
+    fn differentiate(&mut self) {
+        let around = Neighbourhood::new(self.base, &self.free, self.flights, &self.place);
+        let one = |(index, shot): (usize, &Shot)| {
+            normal::jacobian(&around, self.flights, shot, index, &self.place)
+        };
+        self.jacobians = self.shots.par_iter().enumerate().map(one).collect();
+    }
+
+    /// Sets the weights by the present residuals.
+    fn reweigh(&mut self) {
         let residuals = self.residuals();
-        let mut changed = 0.0_f64;
         let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
-        let old = self.weights.output;
         for k in 0..8 {
             let (mut sum, mut count) = (0.0, 0.0);
             for (shot, r) in self.shots.iter().zip(&residuals) {
@@ -235,7 +258,6 @@ impl<'a> Search<'a> {
             let variance = (sum / count).max(FLOOR[k].powi(2));
             let together = together(&residuals, k);
             self.weights.output[k] = 1.0 / (variance * together);
-            changed = changed.max((self.weights.output[k] / old[k]).sqrt().ln().abs());
         }
         let mean = |r: &Vec<[f64; 8]>| {
             let w = &self.weights.output;
@@ -246,7 +268,6 @@ impl<'a> Search<'a> {
         for (shot, mean) in self.shots.iter_mut().zip(means) {
             shot.weight = (usual / mean).min(1.0);
         }
-        changed
     }
 
     fn residuals(&self) -> Vec<Vec<[f64; 8]>> {
@@ -294,11 +315,12 @@ impl<'a> Search<'a> {
     }
 
     fn system(&self) -> System {
-        let around = Neighbourhood::new(self.base, &self.free, self.flights, &self.place);
-        let one = |(index, shot): (usize, &Shot)| {
-            normal::normal(&around, self.flights, shot, index, &self.place, &self.weights)
+        let residuals = self.residuals();
+        let one = |index: usize| {
+            let (shot, from) = (&self.shots[index], &self.place.starts[index]);
+            normal::normal(&self.jacobians[index], &residuals[index], shot, from, &self.weights)
         };
-        let shots: Vec<Normal> = self.shots.par_iter().enumerate().map(one).collect();
+        let shots: Vec<Normal> = (0..self.shots.len()).into_par_iter().map(one).collect();
         let prior = self.prior();
         let mut information = DMatrix::from_diagonal(&prior);
         let mut gradient = prior.component_mul(&self.unknowns(&self.place));
@@ -441,6 +463,8 @@ impl<'a> Search<'a> {
             return Err(AmendError::NoExcitation { model: model_name() });
         }
         let by_flight = self.by_flight(&system);
+        let wider = self.disagreement(&sd, &by_flight);
+        let sd: Vec<f64> = sd.iter().map(|x| x * wider).collect();
         let parameters = self.parameters(&sd, &by_flight);
         let flights = self.flights.iter().zip(&self.place.sensors).enumerate();
         let weakened = self.shots.iter().filter(|s| s.weight < 0.5).count() + self.short;
@@ -489,7 +513,8 @@ impl<'a> Search<'a> {
         let mut all = vec![Vec::new(); count];
         for (number, flight) in self.flights.iter().enumerate() {
             let size = count + SENSORS;
-            let (mut information, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
+            let (mut information, mut gradient) =
+                (DMatrix::zeros(size, size), DVector::zeros(size));
             let places = self.places(number);
             let unknowns = self.unknowns(&self.place);
             for (a, p) in places.iter().enumerate() {
@@ -513,6 +538,23 @@ impl<'a> Search<'a> {
             }
         }
         all
+    }
+
+    /// By how much intervals must widen for the flights to agree as well as they say: the root mean
+    /// square of their own estimates less the common one, in standard deviations of the difference (Birge
+    /// ratio), at least 1. What is wrong in the same way throughout a flight, as a clock is, shows here.
+    fn disagreement(&self, sd: &[f64], by_flight: &[Vec<FlightEstimate>]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (k, f) in self.free.iter().enumerate() {
+            for own in by_flight[k].iter().filter(|e| e.sd < LEARNED * f.width) {
+                let variance = own.sd.powi(2) - sd[k].powi(2);
+                if variance > 0.1 * own.sd.powi(2) {
+                    sum += (own.value - self.place.theta[k]).powi(2) / variance;
+                    count += 1.0;
+                }
+            }
+        }
+        if count > 0.0 { f64::max(1.0, (sum / count).sqrt()) } else { 1.0 }
     }
 
     fn residual_sd(&self) -> [f64; 8] {

@@ -99,7 +99,12 @@ pub(super) fn offset(sensors: &[f64; SENSORS], state: &[f64; 8]) -> [f64; 8] {
 }
 
 /// The state in which a shot starts: as reconstructed, less what the sensors add, plus `from`.
-pub(super) fn start(shot: &Shot, flight: &Prepared, sensors: &[f64; SENSORS], from: &[f64; 8]) -> [f64; 8] {
+pub(super) fn start(
+    shot: &Shot,
+    flight: &Prepared,
+    sensors: &[f64; SENSORS],
+    from: &[f64; 8],
+) -> [f64; 8] {
     let measured = flight.segments[shot.segment][shot.start].state.to_array();
     let offset = offset(sensors, &measured);
     std::array::from_fn(|k| measured[k] - offset[k] + from[k])
