@@ -10,56 +10,9 @@ use greylag::physics::{Channel, Command, Controls};
 use greylag_sitl::hidden::{EFFECTS, Hidden};
 use greylag_sitl::plant::{Plant, Truth};
 use validate_support::{
-    controls, histories, inputs as sent, model, plant, rate_on_turning_earth, simulator_rate, state,
+    AMPLITUDES, amended, controls, histories, inputs as sent, model, plant, rate_on_turning_earth,
+    simulator_rate, state,
 };
-
-/// Amplitudes several times what two minutes of flight show, so that an error of the formula cannot
-/// hide in the tolerance.
-const AMPLITUDES: [(&str, f64); 24] = [
-    ("drag_alpha2", 1.5),
-    ("drag_beta2", 0.7),
-    ("drag_elevator_abs", 0.3),
-    ("pitch_break", -3.0),
-    ("cg_shift", 0.02),
-    ("unsteady_lift", 3.0),
-    ("thrust_decay", 0.6),
-    ("thrust_scale", -5.0),
-    ("thrust_line_offset", 0.03),
-    ("motor_torque", 0.5),
-    ("propeller_gyro", 0.05),
-    ("propwash", 0.8),
-    ("aeroelastic_loss", 0.2),
-    ("actuator_lag", 0.04),
-    ("time_delay", 0.05),
-    ("dead_zone", 0.02),
-    ("backlash", 0.02),
-    ("rate_limit", 0.5),
-    ("mass_error", 0.25),
-    ("inertia_xz", 0.3),
-    ("asymmetry", 0.004),
-    ("dihedral_alpha", -0.8),
-    ("roll_control_alpha", -0.6),
-    ("effectiveness_saturation", -2.0),
-];
-
-/// The reference model with the effect at the amplitude that JSBSim hides.
-fn amended(id: &str, amplitude: f64) -> GreyBox {
-    let mut model = model("jsbsim");
-    let add = |model: &mut GreyBox, name: &str| {
-        let before = model.coefficients().iter().find(|c| c.name == name).unwrap().value;
-        assert!(model.set_coefficient(name, before + amplitude));
-    };
-    match id {
-        // the reference model has these two already
-        "drag_beta2" => add(&mut model, "drag_beta2.CDbeta2"),
-        "drag_elevator_abs" => add(&mut model, "drag_elevator_abs.CDde"),
-        "unsteady_lift" => model.join(id, &[amplitude, -0.5 * amplitude]).unwrap(),
-        "asymmetry" => model.join(id, &[amplitude; 3]).unwrap(),
-        "roll_control_alpha" => model.join(id, &[amplitude, 0.0]).unwrap(),
-        _ => model.join(id, &[amplitude]).unwrap(),
-    }
-    model
-}
 
 /// Airspeed below which nothing is compared, m/s: what is left out of the model, gravity's change with
 /// place, is 5e-4 m/s² over the flights and divided by the airspeed in α̇ and β̇.

@@ -132,11 +132,16 @@ impl File {
             axes: self.force_axes,
             integrator: self.integrator,
             terms,
+            independent: 0,
             inputs: acting,
             coefficients,
         };
         model.settle();
-        Ok(model)
+        if model.body.is_physical() {
+            return Ok(model);
+        }
+        Err("its effects leave no positive mass, or jx·jz not above jxz²; give them smaller values"
+            .into())
     }
 }
 
@@ -149,7 +154,7 @@ impl BodyFile {
             jz: positive("rigid_body.jz_kgm2", &self.jz_kgm2, 100000.0)?,
             jxz: self.jxz_kgm2.value,
         };
-        if body.jx * body.jz > body.jxz * body.jxz {
+        if body.is_physical() {
             return Ok(body);
         }
         Err(format!(

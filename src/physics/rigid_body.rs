@@ -21,6 +21,14 @@ pub struct RigidBody<R = f64> {
     pub jxz: R,
 }
 
+impl RigidBody {
+    /// Whether a body can have these figures: a positive mass, and a positive inertia about every axis.
+    pub fn is_physical(&self) -> bool {
+        let RigidBody { mass, jx, jy, jz, jxz } = *self;
+        mass > 0.0 && jx > 0.0 && jy > 0.0 && jz > 0.0 && jx * jz > jxz * jxz
+    }
+}
+
 impl<R: Copy> RigidBody<R> {
     /// Applies `f` to every figure.
     #[inline(always)]
@@ -89,7 +97,11 @@ pub fn aerodynamic_force<R: Real>(
 pub fn gravity_in_body<R: Real>(state: &State<R>, gravity: f64) -> Vector<R> {
     let (sin_roll, cos_roll) = state.roll.sin_cos();
     let (sin_pitch, cos_pitch) = state.pitch.sin_cos();
-    [-sin_pitch, cos_pitch * sin_roll, cos_pitch * cos_roll].map(|x| x.scale(gravity))
+    [
+        -sin_pitch.scale(gravity),
+        (cos_pitch * sin_roll).scale(gravity),
+        (cos_pitch * cos_roll).scale(gravity),
+    ]
 }
 
 /// Angular acceleration, rad/s² (eq. 10 with the Γ terms of \[BM12\] section 3.3).

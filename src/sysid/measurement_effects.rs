@@ -25,6 +25,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 6] = [
             channels: &[],
             look_alikes: &["airspeed_scale", "alpha_bias", "beta_bias"],
             separated_by: "a full turn: over the ground its sign changes with the heading",
+            example: &[],
             starts: &[],
         })
     },
@@ -38,6 +39,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 6] = [
             channels: &[],
             look_alikes: &["steady_wind", "lift_linear.CL0", "pitch_linear.Cm0"],
             separated_by: "level flight at several airspeeds, upwind and downwind",
+            example: &[],
             starts: &[],
         })
     },
@@ -51,6 +53,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 6] = [
             channels: &[],
             look_alikes: &["asymmetry", "steady_wind"],
             separated_by: "straight flight on two opposite headings, and turns to both sides",
+            example: &[],
             starts: &[],
         })
     },
@@ -64,6 +67,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 6] = [
             channels: &[],
             look_alikes: &["steady_wind", "air_density"],
             separated_by: "several headings with the velocity over ground logged",
+            example: &[],
             starts: &[],
         })
     },
@@ -77,6 +81,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 6] = [
             channels: &[],
             look_alikes: &["propeller_gyro", "asymmetry", "external_load", "thrust_scale"],
             separated_by: "steady flight on several headings and banks, and a stand still before take-off",
+            example: &[],
             starts: &[],
         })
     },
@@ -90,6 +95,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 6] = [
             channels: &[],
             look_alikes: &["time_delay", "actuator_lag", "unsteady_lift"],
             separated_by: "fast rolls and pull-ups: kinematics tell the skew without the surfaces",
+            example: &[],
             starts: &[],
         })
     },

@@ -1,6 +1,6 @@
 //! Surfaces that twist the wing under them as airspeed grows.
 
-use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point, State};
 
@@ -30,15 +30,16 @@ impl Effect for AeroelasticLoss {
         ],
         look_alikes: &["propwash", "roll_linear.Clda", "pitch_linear.Cmde"],
         separated_by: "aileron and elevator doublets from slow to fast flight at one throttle, diving for speed",
+        example: &[0.2],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let ratio = at.state.airspeed.scale(1.0 / V0);
         let excess = ratio * ratio - R::from_f64(1.0);
         for channel in AERODYNAMIC {
-            term(0, channel, -at.base.deflected.get(channel) * excess);
+            terms.add(0, channel, -at.base.deflected.get(channel) * excess);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Air that is denser or thinner than the model has it.
 
-use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -30,13 +30,14 @@ impl Effect for AirDensity {
         ],
         look_alikes: &["mass_error", "airspeed_scale"],
         separated_by: "two altitudes under one known atmosphere; at one altitude, with free coefficients, no manoeuvre tells it: it scales them all",
+        example: &[0.2],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         for channel in AERODYNAMIC {
-            term(0, channel, at.base.wrench.get(channel));
+            terms.add(0, channel, at.base.wrench.get(channel));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! An airframe whose left half is not the mirror of its right half.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -32,14 +32,15 @@ impl Effect for Asymmetry {
             "beta_bias",
         ],
         separated_by: "throttle steps at several airspeeds: it grows with V² and does not know the throttle",
+        example: &[0.004, 0.004, 0.004],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let (force, moment) = (at.air.q_s, at.air.q_s.scale(at.geometry.span));
-        term(0, Channel::Roll, moment);
-        term(1, Channel::Yaw, moment);
-        term(2, Channel::Side, force);
+        terms.add(0, Channel::Roll, moment);
+        terms.add(1, Channel::Yaw, moment);
+        terms.add(2, Channel::Side, force);
     }
 }

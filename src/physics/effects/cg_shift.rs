@@ -1,6 +1,6 @@
 //! A centre of gravity that is not where the model has it.
 
-use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -24,13 +24,14 @@ impl Effect for CgShift {
         channels: &[Channel::Pitch, Channel::Yaw],
         look_alikes: &["pitch_break", "pitch_linear.Cmalpha", "pitch_linear.Cm0"],
         separated_by: "a skid: the same distance acts in pitch and in yaw",
+        example: &[0.02],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let [_, y, z] = at.base.force;
-        term(0, Channel::Pitch, -z);
-        term(0, Channel::Yaw, y);
+        terms.add(0, Channel::Pitch, -z);
+        terms.add(0, Channel::Yaw, y);
     }
 }

@@ -1,6 +1,6 @@
 //! Dihedral effect that changes with incidence, as sweep makes it.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point, State};
 
@@ -23,12 +23,13 @@ impl Effect for DihedralAlpha {
         channels: &[Channel::Roll],
         look_alikes: &["roll_linear.Clbeta", "roll_control_alpha", "roll_linear.Clp"],
         separated_by: "skids at two angles of attack, pulse against steady roll",
+        example: &[-0.8],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let State { alpha, beta, .. } = *at.state;
-        term(0, Channel::Roll, at.air.q_s.scale(at.geometry.span) * alpha * beta);
+        terms.add(0, Channel::Roll, at.air.q_s.scale(at.geometry.span) * alpha * beta);
     }
 }

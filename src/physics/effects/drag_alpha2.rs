@@ -1,6 +1,6 @@
 //! Drag that grows with the square of incidence.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -18,12 +18,13 @@ impl Effect for DragAlpha2 {
         channels: &[Channel::Drag],
         look_alikes: &["drag_elevator_abs", "drag_linear.CDalpha", "drag_linear.CD0"],
         separated_by: "push-overs and pull-ups at fixed elevator, so that incidence changes alone",
+        example: &[1.5],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s;
-        term(0, Channel::Drag, q * at.state.alpha * at.state.alpha);
+        terms.add(0, Channel::Drag, q * at.state.alpha * at.state.alpha);
     }
 }

@@ -1,6 +1,6 @@
 //! Drag of a deflected elevator, up or down alike.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -18,12 +18,13 @@ impl Effect for DragElevatorAbs {
         channels: &[Channel::Drag],
         look_alikes: &["drag_alpha2", "drag_linear.CDde"],
         separated_by: "an elevator multisine about trim: faster than incidence can follow",
+        example: &[0.3],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s;
-        term(0, Channel::Drag, q * at.controls.elevator.abs());
+        terms.add(0, Channel::Drag, q * at.controls.elevator.abs());
     }
 }

@@ -1,6 +1,6 @@
 //! Drag that is linear in incidence, pitch rate and elevator.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -20,11 +20,11 @@ impl Effect for DragLinear {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s;
-        term(0, Channel::Drag, q);
-        term(1, Channel::Drag, q * at.state.alpha);
-        term(2, Channel::Drag, q * at.air.q_hat);
-        term(3, Channel::Drag, q * at.controls.elevator);
+        terms.add(0, Channel::Drag, q);
+        terms.add(1, Channel::Drag, q * at.state.alpha);
+        terms.add(2, Channel::Drag, q * at.air.q_hat);
+        terms.add(3, Channel::Drag, q * at.controls.elevator);
     }
 }

@@ -1,6 +1,6 @@
 //! Drag from a table over incidence.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -17,9 +17,9 @@ impl Effect for DragTable {
     const TABLE: Option<&'static str> = Some("CD");
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         if let Some(table) = own.table {
-            term(0, Channel::Drag, at.air.q_s * table.at(at.state.alpha));
+            terms.add(0, Channel::Drag, at.air.q_s * table.at(at.state.alpha));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A load that hangs on the aircraft and pulls straight down.
 
-use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point, rigid_body};
 
@@ -25,15 +25,16 @@ impl Effect for ExternalLoad {
         channels: &[Channel::Drag, Channel::Lift, Channel::Side],
         look_alikes: &["mass_error", "lift_linear.CL0", "accelerometer bias"],
         separated_by: "steep turns and pull-ups: a mass multiplies the load factor, a load does not",
+        example: &[5.0],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let force = rigid_body::gravity_in_body(at.state, 1.0);
         let [drag, side, lift] = rigid_body::aerodynamic_force(force, at.air, at.axes);
-        term(0, Channel::Drag, drag);
-        term(0, Channel::Side, side);
-        term(0, Channel::Lift, lift);
+        terms.add(0, Channel::Drag, drag);
+        terms.add(0, Channel::Side, side);
+        terms.add(0, Channel::Lift, lift);
     }
 }

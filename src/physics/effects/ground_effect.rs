@@ -1,6 +1,6 @@
 //! Lift gained, drag lost, within a span of the ground.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -37,17 +37,18 @@ impl Effect for GroundEffect {
         channels: &[Channel::Lift, Channel::Drag],
         look_alikes: &["lift_linear.CLalpha", "drag_alpha2", "air_density"],
         separated_by: "level passes at heights of a tenth of the span and of three spans; above one span nothing is to be seen",
+        example: &[1.0, 1.0, 599.0],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         let &[ground] = own.shape else { return };
         let height = (at.air.altitude - ground).max(0.0);
         let share = (-height / at.geometry.span).exp();
         let alpha = at.state.alpha;
         let force = at.air.q_s.scale(share) * alpha;
-        term(0, Channel::Lift, force);
-        term(1, Channel::Drag, -force * alpha);
+        terms.add(0, Channel::Lift, force);
+        terms.add(1, Channel::Drag, -force * alpha);
     }
 }

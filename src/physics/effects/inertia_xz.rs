@@ -1,6 +1,6 @@
 //! A product of inertia that differs from the model's.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::rigid_body::RigidBody;
 use crate::physics::{Channel, Point};
@@ -19,11 +19,12 @@ impl Effect for InertiaXz {
         channels: &[Channel::Roll, Channel::Pitch, Channel::Yaw],
         look_alikes: &["yaw_linear.Cnda", "yaw_linear.Cnp", "roll_linear.Clr"],
         separated_by: "fast rolls to both sides",
+        example: &[0.3],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(_: &Point<R>, _: Own, _: impl FnMut(usize, Channel, R)) {}
+    fn basis<R: Real>(_: &Point<R>, _: Own, _: &mut impl Terms<R>) {}
 
     fn change(coefficients: &[f64], body: &mut RigidBody) {
         body.jxz += coefficients[0];

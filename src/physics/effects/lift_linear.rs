@@ -1,6 +1,6 @@
 //! Lift that is linear in incidence, pitch rate and elevator.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -20,11 +20,11 @@ impl Effect for LiftLinear {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s;
-        term(0, Channel::Lift, q);
-        term(1, Channel::Lift, q * at.state.alpha);
-        term(2, Channel::Lift, q * at.air.q_hat);
-        term(3, Channel::Lift, q * at.controls.elevator);
+        terms.add(0, Channel::Lift, q);
+        terms.add(1, Channel::Lift, q * at.state.alpha);
+        terms.add(2, Channel::Lift, q * at.air.q_hat);
+        terms.add(3, Channel::Lift, q * at.controls.elevator);
     }
 }

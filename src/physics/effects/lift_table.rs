@@ -1,6 +1,6 @@
 //! Lift from a table over incidence, stall included.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -17,9 +17,9 @@ impl Effect for LiftTable {
     const TABLE: Option<&'static str> = Some("CL");
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         if let Some(table) = own.table {
-            term(0, Channel::Lift, at.air.q_s * table.at(at.state.alpha));
+            terms.add(0, Channel::Lift, at.air.q_s * table.at(at.state.alpha));
         }
     }
 }

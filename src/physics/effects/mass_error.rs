@@ -1,6 +1,6 @@
 //! An aircraft that is heavier or lighter than the model has it.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::rigid_body::RigidBody;
 use crate::physics::{Channel, Point};
@@ -19,11 +19,12 @@ impl Effect for MassError {
         channels: &[Channel::Drag, Channel::Lift, Channel::Side, Channel::BodyX],
         look_alikes: &["air_density", "external_load", "thrust_scale"],
         separated_by: "throttle steps and pull-ups: thrust too moves a heavier aircraft less, while moments stay",
+        example: &[0.25],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(_: &Point<R>, _: Own, _: impl FnMut(usize, Channel, R)) {}
+    fn basis<R: Real>(_: &Point<R>, _: Own, _: &mut impl Terms<R>) {}
 
     fn change(coefficients: &[f64], body: &mut RigidBody) {
         body.mass *= 1.0 + coefficients[0];

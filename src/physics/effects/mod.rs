@@ -72,9 +72,21 @@ pub struct Entry {
     pub look_alikes: &'static [&'static str],
     /// The manoeuvre that tells it from them, in words.
     pub separated_by: &'static str,
+    /// Values of all coefficients at which the effect is plain to see on an aircraft like the X8; empty
+    /// for errors of the measurement.
+    pub example: &'static [f64],
     /// Values of all coefficients at which a search over shape constants starts; empty for an effect
     /// that is linear in all of them, or whose constants must be known beforehand.
     pub starts: &'static [&'static [f64]],
+}
+
+/// What takes the terms that an effect reports.
+///
+/// A trait rather than a closure, because its one method can be made to be inlined: a planner's
+/// vector instructions end where a call begins.
+pub trait Terms<R> {
+    /// What one unit of the effect's coefficient `index` contributes to `channel`, N or N m.
+    fn add(&mut self, index: usize, channel: Channel, amount: R);
 }
 
 /// A physical effect that is linear in its coefficients, but for shape constants.
@@ -99,9 +111,8 @@ pub trait Effect {
     /// Its entry in the catalogue of effects that a model may lack; `None` for parts of a prior.
     const ENTRY: Option<Entry> = None;
 
-    /// Reports, through `term(index, channel, amount)`, what one unit of the coefficient `index`
-    /// contributes to a channel at `at`. Forces in N, moments in N m.
-    fn basis<R: Real>(at: &Point<R>, own: Own, term: impl FnMut(usize, Channel, R));
+    /// Reports to `terms` what one unit of each coefficient contributes to each channel at `at`.
+    fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>);
 
     /// Changes the rigid body by the effect's coefficients.
     fn change(_coefficients: &[f64], _body: &mut RigidBody) {}
@@ -162,15 +173,31 @@ macro_rules! effects {
                 match self { $(Kind::$type => $type::NEEDS,)* }
             }
 
-            /// [`Effect::basis`] of this effect.
+            /// [`Effect::basis`] of this effect if it needs only the point; else nothing. A sum over
+            /// such effects then holds no code of the others, which is half the time of a planner.
             #[inline(always)]
-            pub fn basis<R: Real>(
+            pub fn independent_basis<R: Real>(
                 self,
                 at: &Point<R>,
                 own: Own,
-                term: impl FnMut(usize, Channel, R),
+                terms: &mut impl Terms<R>,
             ) {
-                match self { $(Kind::$type => $type::basis(at, own, term),)* }
+                match self { $(Kind::$type => if matches!($type::NEEDS, Needs::Point) {
+                    $type::basis(at, own, terms)
+                },)* }
+            }
+
+            /// [`Effect::basis`] of this effect if it needs more than the point; else nothing.
+            #[inline(always)]
+            pub fn dependent_basis<R: Real>(
+                self,
+                at: &Point<R>,
+                own: Own,
+                terms: &mut impl Terms<R>,
+            ) {
+                match self { $(Kind::$type => if !matches!($type::NEEDS, Needs::Point) {
+                    $type::basis(at, own, terms)
+                },)* }
             }
 
             /// [`Effect::change`] of this effect.

@@ -1,6 +1,6 @@
 //! The torque that turns the propeller, taken up by the airframe.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -24,11 +24,12 @@ impl Effect for MotorTorque {
         channels: &[Channel::Roll],
         look_alikes: &["asymmetry", "roll_linear.Cl0"],
         separated_by: "throttle steps at fixed airspeed: an asymmetry does not know the throttle",
+        example: &[0.5],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
-        term(0, Channel::Roll, -at.controls.throttle);
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
+        terms.add(0, Channel::Roll, -at.controls.throttle);
     }
 }

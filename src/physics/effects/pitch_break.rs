@@ -1,6 +1,6 @@
 //! Pitching moment that breaks away from the straight line at large incidence.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point, State};
 
@@ -23,13 +23,14 @@ impl Effect for PitchBreak {
         channels: &[Channel::Pitch],
         look_alikes: &["cg_shift", "pitch_linear.Cmalpha", "lift_stall"],
         separated_by: "slow to large angles of attack of both signs: the cube vanishes at small ones",
+        example: &[-3.0],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let State { alpha, .. } = *at.state;
         let moment = at.air.q_s.scale(at.geometry.chord);
-        term(0, Channel::Pitch, moment * alpha * alpha * alpha);
+        terms.add(0, Channel::Pitch, moment * alpha * alpha * alpha);
     }
 }

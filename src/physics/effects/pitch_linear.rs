@@ -1,6 +1,6 @@
 //! Pitching moment that is linear in incidence, pitch rate and elevator.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -21,11 +21,11 @@ impl Effect for PitchLinear {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s.scale(at.geometry.chord);
-        term(0, Channel::Pitch, q);
-        term(1, Channel::Pitch, q * at.state.alpha);
-        term(2, Channel::Pitch, q * at.air.q_hat);
-        term(3, Channel::Pitch, q * at.controls.elevator);
+        terms.add(0, Channel::Pitch, q);
+        terms.add(1, Channel::Pitch, q * at.state.alpha);
+        terms.add(2, Channel::Pitch, q * at.air.q_hat);
+        terms.add(3, Channel::Pitch, q * at.controls.elevator);
     }
 }

@@ -1,6 +1,6 @@
 //! A propeller that resists being turned out of its plane.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -22,12 +22,13 @@ impl Effect for PropellerGyro {
         channels: &[Channel::Pitch, Channel::Yaw],
         look_alikes: &["yaw_linear.Cnp", "inertia_xz", "gyro bias"],
         separated_by: "turns and pull-ups: one h serves pitch under yaw rate and yaw under pitch rate, with opposite signs",
+        example: &[0.05],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
-        term(0, Channel::Pitch, at.state.r);
-        term(0, Channel::Yaw, -at.state.q);
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
+        terms.add(0, Channel::Pitch, at.state.r);
+        terms.add(0, Channel::Yaw, -at.state.q);
     }
 }

@@ -1,6 +1,6 @@
 //! Surfaces that work better in the wash of the propeller.
 
-use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -35,14 +35,15 @@ impl Effect for Propwash {
         ],
         look_alikes: &["aeroelastic_loss", "roll_linear.Clda", "pitch_linear.Cmde"],
         separated_by: "aileron and elevator doublets at several throttles and one airspeed",
+        example: &[0.8],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let excess = at.controls.throttle - R::from_f64(THROTTLE0);
         for channel in AERODYNAMIC {
-            term(0, channel, at.base.deflected.get(channel) * excess);
+            terms.add(0, channel, at.base.deflected.get(channel) * excess);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Ailerons whose effect changes with incidence.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -30,14 +30,15 @@ impl Effect for RollControlAlpha {
         channels: &[Channel::Roll, Channel::Yaw],
         look_alikes: &["roll_linear.Clda", "aeroelastic_loss", "dihedral_alpha"],
         separated_by: "aileron pulses at two angles of attack and one airspeed, in a bank with and without pull",
+        example: &[-0.6, 0.1],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let product = at.state.alpha * at.controls.aileron;
         let moment = at.air.q_s.scale(at.geometry.span) * product;
-        term(0, Channel::Roll, moment);
-        term(1, Channel::Yaw, moment);
+        terms.add(0, Channel::Roll, moment);
+        terms.add(1, Channel::Yaw, moment);
     }
 }

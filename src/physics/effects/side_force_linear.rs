@@ -1,6 +1,6 @@
 //! Side force that is linear in sideslip, rates and aileron.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -22,12 +22,12 @@ impl Effect for SideForceLinear {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s;
-        term(0, Channel::Side, q);
-        term(1, Channel::Side, q * at.state.beta);
-        term(2, Channel::Side, q * at.air.p_hat);
-        term(3, Channel::Side, q * at.air.r_hat);
-        term(4, Channel::Side, q * at.controls.aileron);
+        terms.add(0, Channel::Side, q);
+        terms.add(1, Channel::Side, q * at.state.beta);
+        terms.add(2, Channel::Side, q * at.air.p_hat);
+        terms.add(3, Channel::Side, q * at.air.r_hat);
+        terms.add(4, Channel::Side, q * at.controls.aileron);
     }
 }

@@ -1,6 +1,6 @@
 //! Thrust that falls with airspeed.
 
-use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point, State};
 
@@ -23,12 +23,13 @@ impl Effect for ThrustDecay {
         channels: &[Channel::BodyX],
         look_alikes: &["drag_linear.CD0", "thrust_linear.Cp_n", "thrust_scale"],
         separated_by: "throttle steps at several airspeeds: drag does not know the throttle",
+        example: &[0.6],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let excess = at.state.airspeed.scale(1.0 / V0) - R::from_f64(1.0);
-        term(0, Channel::BodyX, -at.base.wrench.get(Channel::BodyX) * excess);
+        terms.add(0, Channel::BodyX, -at.base.wrench.get(Channel::BodyX) * excess);
     }
 }

@@ -1,6 +1,6 @@
 //! A line of thrust that passes the centre of gravity.
 
-use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -24,11 +24,12 @@ impl Effect for ThrustLineOffset {
         channels: &[Channel::Pitch],
         look_alikes: &["pitch_linear.Cm0", "cg_shift", "propwash"],
         separated_by: "throttle doublets: Cm0 does not know the throttle",
+        example: &[0.03],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
-        term(0, Channel::Pitch, at.base.wrench.get(Channel::BodyX));
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
+        terms.add(0, Channel::Pitch, at.base.wrench.get(Channel::BodyX));
     }
 }

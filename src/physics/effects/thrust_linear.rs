@@ -1,6 +1,6 @@
 //! Thrust that is proportional to throttle, whatever the airspeed.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -16,7 +16,7 @@ impl Effect for ThrustLinear {
         &[coefficient("Cp_n", "thrust at full throttle", "N", (0.0, 10_000.0))];
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
-        term(0, Channel::BodyX, at.controls.throttle);
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
+        terms.add(0, Channel::BodyX, at.controls.throttle);
     }
 }

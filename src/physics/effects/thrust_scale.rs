@@ -1,6 +1,6 @@
 //! Thrust that the model has too much or too little of.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -23,11 +23,12 @@ impl Effect for ThrustScale {
         channels: &[Channel::BodyX],
         look_alikes: &["thrust_linear.Cp_n", "thrust_decay", "drag_linear.CD0"],
         separated_by: "throttle doublets at one airspeed; a free thrust_linear.Cp_n is the same term, so only its prior width tells them apart",
+        example: &[-5.0],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
-        term(0, Channel::BodyX, at.controls.throttle);
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
+        terms.add(0, Channel::BodyX, at.controls.throttle);
     }
 }

@@ -1,6 +1,6 @@
 //! Lift that depends on how fast the angle of attack changes.
 
-use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -27,14 +27,15 @@ impl Effect for UnsteadyLift {
         channels: &[Channel::Lift, Channel::Pitch],
         look_alikes: &["lift_linear.CLq", "pitch_linear.Cmq"],
         separated_by: "elevator doublets against steady pull-ups: α̇ and q then differ",
+        example: &[3.0, -1.5],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let chord = at.geometry.chord;
         let rate = at.base.rate.alpha.scale(0.5 * chord) / at.state.airspeed;
-        term(0, Channel::Lift, at.air.q_s * rate);
-        term(1, Channel::Pitch, (at.air.q_s * rate).scale(chord));
+        terms.add(0, Channel::Lift, at.air.q_s * rate);
+        terms.add(1, Channel::Pitch, (at.air.q_s * rate).scale(chord));
     }
 }

@@ -1,6 +1,6 @@
 //! Yawing moment that is linear in sideslip, rates and aileron.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -27,12 +27,12 @@ impl Effect for YawLinear {
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s.scale(at.geometry.span);
-        term(0, Channel::Yaw, q);
-        term(1, Channel::Yaw, q * at.state.beta);
-        term(2, Channel::Yaw, q * at.air.p_hat);
-        term(3, Channel::Yaw, q * at.air.r_hat);
-        term(4, Channel::Yaw, q * at.controls.aileron);
+        terms.add(0, Channel::Yaw, q);
+        terms.add(1, Channel::Yaw, q * at.state.beta);
+        terms.add(2, Channel::Yaw, q * at.air.p_hat);
+        terms.add(3, Channel::Yaw, q * at.air.r_hat);
+        terms.add(4, Channel::Yaw, q * at.controls.aileron);
     }
 }

@@ -18,6 +18,7 @@ impl InputEffect for ActuatorLag {
         channels: &[],
         look_alikes: &["time_delay", "rate_limit"],
         separated_by: "aileron and elevator above 2 Hz",
+        example: &[0.04],
         starts: &[&[0.01], &[0.02], &[0.04], &[0.08], &[0.16], &[0.32]],
     };
 

@@ -19,6 +19,7 @@ impl InputEffect for Backlash {
         channels: &[],
         look_alikes: &["dead_zone", "time_delay"],
         separated_by: "small against large doublets away from the centre",
+        example: &[0.02],
         starts: &[&[0.005], &[0.01], &[0.02], &[0.04], &[0.08]],
     };
 

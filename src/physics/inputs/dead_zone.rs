@@ -19,6 +19,7 @@ impl InputEffect for DeadZone {
         channels: &[],
         look_alikes: &["effectiveness_saturation", "backlash"],
         separated_by: "small against large doublets",
+        example: &[0.02],
         starts: &[&[0.005], &[0.01], &[0.02], &[0.04], &[0.08]],
     };
 

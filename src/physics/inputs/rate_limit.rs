@@ -18,6 +18,7 @@ impl InputEffect for RateLimit {
         channels: &[],
         look_alikes: &["actuator_lag", "time_delay"],
         separated_by: "large against small doublets",
+        example: &[0.5],
         starts: &[&[8.0], &[4.0], &[2.0], &[1.0], &[0.5]],
     };
 

@@ -18,6 +18,7 @@ impl InputEffect for TimeDelay {
         channels: &[],
         look_alikes: &["actuator_lag", "clock_skew"],
         separated_by: "slow and fast aileron and elevator: the delay is the same for both",
+        example: &[0.05],
         starts: &[&[0.01], &[0.02], &[0.03], &[0.05], &[0.08], &[0.12]],
     };
 

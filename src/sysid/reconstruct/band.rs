@@ -269,7 +269,11 @@ mod tests {
         let mut dense = DMatrix::<f64>::identity(size, size);
         let mut right = DVector::<f64>::zeros(size);
         let mut links = vec![
-            Link { first: Node::<N, { C + 1 }>::ZERO, second: Node::ZERO, coupling: [[0.0; N]; N] };
+            Link {
+                first: Node::<N, { C + 1 }>::ZERO,
+                second: Node::ZERO,
+                coupling: [[0.0; N]; N]
+            };
             COUNT - 1
         ];
         let mut corner = [[0.0; C + 1]; C + 1];

@@ -115,8 +115,7 @@ impl Drive {
         let bias = Vector3::from_column_slice(&values[FORCE..FORCE + 3]);
         let velocity = gained - (self.force[k] - bias) * step;
         let one = Matrix3::identity();
-        let mut link =
-            Step { first: [[0.0; N]; N], second: [[0.0; N]; N], rest: [[0.0; D]; N] };
+        let mut link = Step { first: [[0.0; N]; N], second: [[0.0; N]; N], rest: [[0.0; D]; N] };
         put(&mut link.first, (0, 0), &-turned.transpose());
         put(&mut link.second, (0, 0), &one);
         put(&mut link.first, (3, 0), &cross(&gained));

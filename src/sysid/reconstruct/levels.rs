@@ -10,6 +10,10 @@ const GYRO_FLOOR: f64 = 2e-4;
 const FORCE_FLOOR: f64 = 5e-3;
 /// Smallest noise levels of the measured channels.
 const FLOORS: [f64; CHANNELS] = [2e-5, 2e-5, 2e-5, 1e-3, 5e-5, 5e-5, 1e-3, 1e-3, 1e-3];
+/// Least level of a channel in what the noise of gyros or accelerometers moves the path by between two
+/// samples. Were it less, the path would follow every single measurement, and the likeliest delay be half
+/// a sample, whatever the delay: there interpolation averages neighbours.
+const CARRIED: f64 = 30.0;
 /// Levels where too few samples tell: rad, m/s, rad, m/s.
 const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 0.5];
 /// What the velocity may do where no accelerometer says it, m/s².
@@ -38,41 +42,58 @@ pub struct Levels {
 }
 
 impl Levels {
-/// Levels before anything is fitted: the white part of every channel.
+    /// Levels before anything is fitted: the white part of every channel.
     pub fn first(log: &Log) -> Levels {
-    let over = |get: &dyn Fn(&Track, usize) -> f64| {
-        noise::white(log.tracks.iter().flat_map(|t| (0..t.len()).map(move |k| get(t, k))))
-    };
-    let or = |level: f64, default: f64| if level.is_finite() { level } else { default };
-    let attitude = |i: usize| {
-        // angles near ±π jump; their sine and cosine do not
-        let (a, b) = (over(&|t, k| t.attitude[k][i].sin()), over(&|t, k| t.attitude[k][i].cos()));
-        a.hypot(b)
-    };
-    let white: [f64; CHANNELS] = std::array::from_fn(|i| match i {
-        0..3 => attitude(i),
-        3 => over(&|t, k| t.airspeed[k]),
-        4 | 5 => over(&|t, k| t.vanes[k][i - 4]),
-        _ => over(&|t, k| t.velocity[k][i - 6]),
-    });
-    let samples: usize = log.tracks.iter().map(Track::len).sum();
-    let dense = |i: usize| {
-        let tracks = log.tracks.iter();
-        let count = tracks.flat_map(|t| (0..t.len()).map(move |k| measurement::measured(t, i, k)));
-        2 * count.filter(|x| x.is_finite()).count() > samples
-    };
-    let force = |i: usize| over(&|t, k| t.force[k][i]).max(FORCE_FLOOR);
-    Levels {
-        gyro: std::array::from_fn(|i| or(over(&|t, k| t.rates[k][i]), 0.0).max(GYRO_FLOOR)),
-        force: std::array::from_fn(|i| if log.has.force { force(i) } else { UNKNOWN_FORCE }),
-        gusts: CALM,
-        measured: std::array::from_fn(|i| or(white[i], DEFAULTS[i]).max(FLOORS[i])),
-        white: std::array::from_fn(|i| if dense(i) { white[i].max(FLOORS[i]) } else { FLOORS[i] }),
-        colour: [1.0; CHANNELS],
+        let over = |get: &dyn Fn(&Track, usize) -> f64| {
+            noise::white(log.tracks.iter().flat_map(|t| (0..t.len()).map(move |k| get(t, k))))
+        };
+        let or = |level: f64, default: f64| if level.is_finite() { level } else { default };
+        let attitude = |i: usize| {
+            // angles near ±π jump; their sine and cosine do not
+            let (a, b) =
+                (over(&|t, k| t.attitude[k][i].sin()), over(&|t, k| t.attitude[k][i].cos()));
+            a.hypot(b)
+        };
+        let white: [f64; CHANNELS] = std::array::from_fn(|i| match i {
+            0..3 => attitude(i),
+            3 => over(&|t, k| t.airspeed[k]),
+            4 | 5 => over(&|t, k| t.vanes[k][i - 4]),
+            _ => over(&|t, k| t.velocity[k][i - 6]),
+        });
+        let samples: usize = log.tracks.iter().map(Track::len).sum();
+        let dense = |i: usize| {
+            let tracks = log.tracks.iter();
+            let count =
+                tracks.flat_map(|t| (0..t.len()).map(move |k| measurement::measured(t, i, k)));
+            2 * count.filter(|x| x.is_finite()).count() > samples
+        };
+        let force = |i: usize| over(&|t, k| t.force[k][i]).max(FORCE_FLOOR);
+        let gyro = [0, 1, 2].map(|i| or(over(&|t, k| t.rates[k][i]), 0.0).max(GYRO_FLOOR));
+        let force = [0, 1, 2].map(|i| if log.has.force { force(i) } else { UNKNOWN_FORCE });
+        let speeds = log.tracks.iter().flat_map(|t| &t.airspeed).filter(|v| v.is_finite());
+        let (sum, count) = speeds.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+        let between = |sd: [f64; 3]| CARRIED * log.step * sd.into_iter().fold(0.0, f64::max);
+        let (turn, gain) = (between(gyro), between(force));
+        let floor: [f64; CHANNELS] = std::array::from_fn(|i| {
+            FLOORS[i].max(match i {
+                0..=2 => turn,
+                4 | 5 => or(gain * count / sum, 0.0),
+                _ => gain,
+            })
+        });
+        Levels {
+            gyro,
+            force,
+            gusts: CALM,
+            measured: std::array::from_fn(|i| or(white[i], DEFAULTS[i]).max(floor[i])),
+            white: std::array::from_fn(
+                |i| if dense(i) { white[i].max(floor[i]) } else { floor[i] },
+            ),
+            colour: [1.0; CHANNELS],
+        }
     }
-}
 
-/// Takes the levels anew from the residuals of every stretch; returns the largest relative change.
+    /// Takes the levels anew from the residuals of every stretch; returns the largest relative change.
     pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
         let mut change = 0.0_f64;
         for channel in 0..CHANNELS {

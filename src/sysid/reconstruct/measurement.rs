@@ -8,20 +8,18 @@ use super::channel::wrap;
 use super::intake::Track;
 use super::kinematics::MOTION_AND_GUST;
 use super::nuisance::{
-    ALPHA, BETA, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_VANES, SKEW_VELOCITY, Values, WIND,
+    ALPHA, BETA, INERTIAL, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_VANES, SKEW_VELOCITY, Values,
+    WIND,
 };
 use super::path::{CHANNELS, Path, SLOW, flow_angles};
 use super::rotation::{cross, euler_by_turn, to_euler};
 
-/// How gusts enter what the sensors of the air should show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Gusts {
-    /// As a part of the velocity of the air.
-    InTheAir,
-    /// As noise of the sensors that hangs together in time: linearly, and not scaled with the
-    /// airspeed, so that an airspeed scale above one cannot make them smaller.
-    OnTheSensors,
-}
+/// Columns of the constants that act at instants, right-hand side last.
+pub const AT: usize = INERTIAL + 1;
+/// How many further residuals the equations can be solved for at once.
+pub const OTHERS: usize = 16;
+/// Further residuals of a channel.
+pub type Others = [f64; OTHERS];
 
 /// The measurements of an instant against what its path should show; NaN where there is none.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +28,16 @@ pub struct Reading {
     pub residual: [f64; CHANNELS],
     /// How what should be shown changes with the delay, per s.
     by_late: [f64; CHANNELS],
+}
+
+impl Reading {
+    /// The same with other residuals where there are measurements.
+    pub fn with(mut self, residuals: [f64; CHANNELS]) -> Reading {
+        for (residual, other) in self.residual.iter_mut().zip(residuals) {
+            *residual = if residual.is_nan() { f64::NAN } else { other };
+        }
+        self
+    }
 }
 
 /// The delay that a channel is read with.
@@ -52,14 +60,6 @@ pub fn measured(track: &Track, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// The motion through the air that the slopes of the sensors are taken at, body axes, m/s.
-fn through_air(path: &Path, k: usize, gusts: Gusts) -> Vector3<f64> {
-    match gusts {
-        Gusts::InTheAir => path.air_velocity(k),
-        Gusts::OnTheSensors => path.attitude[k].transpose() * (path.velocity[k] - path.wind),
-    }
-}
-
 /// How airspeed, α and β change with the velocity through the air; `None` if it is slow.
 fn air_slopes(u: &Vector3<f64>) -> Option<Matrix3<f64>> {
     let (v, plane) = (u.norm(), u.x.hypot(u.z));
@@ -72,44 +72,32 @@ fn air_slopes(u: &Vector3<f64>) -> Option<Matrix3<f64>> {
 }
 
 /// What sensors without errors would show at sample `k`.
-fn shown(path: &Path, k: usize, gusts: Gusts) -> [f64; CHANNELS] {
+fn shown(path: &Path, k: usize) -> [f64; CHANNELS] {
     let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
-    let u = through_air(path, k, gusts);
+    let u = path.air_velocity(k);
     let [alpha, beta] = flow_angles(&u);
     let ground = path.velocity[k];
     [roll, pitch, yaw, u.norm(), alpha, beta, ground.x, ground.y, ground.z]
 }
 
-/// What gusts take from the channels at sample `k` beside what [`shown`] has of them.
-fn on_sensors(path: &Path, k: usize, gusts: Gusts) -> [f64; CHANNELS] {
-    let mut taken = [0.0; CHANNELS];
-    if gusts == Gusts::OnTheSensors
-        && let Some(slopes) = air_slopes(&through_air(path, k, gusts))
-    {
-        let by_gust = slopes * path.attitude[k].transpose() * path.gust[k];
-        taken[3..6].copy_from_slice(by_gust.as_slice());
-    }
-    taken
+/// How airspeed, α and β as measured change with a gust at sample `k`, earth axes.
+pub fn by_gust(path: &Path, k: usize, values: &Values) -> Option<Matrix3<f64>> {
+    let mut slopes = air_slopes(&path.air_velocity(k))?;
+    slopes.row_mut(0).scale_mut(1.0 + values[SCALE]);
+    Some(slopes * -path.attitude[k].transpose())
 }
 
 /// The readings at every sample of `track`, samples `step` (s) apart.
-pub fn readings(
-    track: &Track,
-    path: &Path,
-    values: &Values,
-    step: f64,
-    gusts: Gusts,
-) -> Vec<Reading> {
+pub fn readings(track: &Track, path: &Path, values: &Values, step: f64) -> Vec<Reading> {
     let none = Reading { residual: [f64::NAN; CHANNELS], by_late: [0.0; CHANNELS] };
     let n = path.len();
     let shown: Vec<[f64; CHANNELS]> =
-        (0..n).into_par_iter().with_min_len(1000).map(|k| shown(path, k, gusts)).collect();
+        (0..n).into_par_iter().with_min_len(1000).map(|k| shown(path, k)).collect();
     let read = |j: usize| {
         let mut reading = none;
         if j == 0 || j + 1 >= n {
             return reading;
         }
-        let taken = on_sensors(path, j, gusts);
         for channel in 0..CHANNELS {
             let late = values[skew_of(channel)] / step;
             let whole = late.round();
@@ -126,8 +114,9 @@ pub fn readings(
             let (ahead, behind) =
                 (angle(shown[j + 1][channel] - h), angle(h - shown[j - 1][channel]));
             let (rate, bend, part) = ((ahead + behind) * 0.5, ahead - behind, whole - late);
-            let (h, gain) = with_errors(channel, h + rate * part + 0.5 * bend * part * part, values);
-            reading.residual[channel] = angle(y - h + taken[channel]);
+            let (h, gain) =
+                with_errors(channel, h + rate * part + 0.5 * bend * part * part, values);
+            reading.residual[channel] = angle(y - h);
             reading.by_late[channel] = -gain * (rate + bend * part) / step;
         }
         reading
@@ -146,24 +135,24 @@ fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
 }
 
 /// Adds the reading of sample `k` to the equations. `spread` holds the standard deviations of the
-/// channels; a residual beyond `bound` of them counts less. The constants that act at instants are the
-/// first `M` − 1 columns, none if `M` is 1.
+/// channels; a residual beyond `bound` of them counts less. The first columns are `others`, further
+/// residuals of the sensors of the air; then come the constants that act at instants, none if `M` is 1.
 #[expect(clippy::too_many_arguments, reason = "one call site; a struct would only rename them")]
 pub fn add<const N: usize, const W: usize, const M: usize>(
     path: &Path,
     values: &Values,
     k: usize,
-    gusts: Gusts,
     reading: &Reading,
     spread: &[f64; CHANNELS],
     bound: f64,
+    others: Option<&[Others; 3]>,
     node: &mut Node<N, W>,
     corner: &mut Corner<W>,
 ) {
     if reading.residual.iter().all(|x| x.is_nan()) {
         return;
     }
-    let (by_node, by_constants) = slopes::<N, M>(path, k, values, gusts, reading);
+    let (by_node, by_constants) = slopes::<N, M>(path, k, values, reading);
     let (mut nodes, mut rests) = ([[0.0; N]; CHANNELS], [[0.0; M]; CHANNELS]);
     for channel in 0..CHANNELS {
         let residual = reading.residual[channel];
@@ -173,6 +162,10 @@ pub fn add<const N: usize, const W: usize, const M: usize>(
         nodes[channel] = slope.map(|x| x * weight);
         rests[channel] = by_constants[channel].map(|x| x * weight);
         rests[channel][M - 1] = residual * weight;
+        if let (3..6, Some(others)) = (channel, others) {
+            let columns = rests[channel].iter_mut().zip(&others[channel - 3]);
+            columns.for_each(|(x, other)| *x = other * weight);
+        }
     }
     add_gram(&mut node.own, &nodes, &nodes);
     let mut coupling = [[0.0; M]; N];
@@ -195,16 +188,19 @@ fn spill<const M: usize, const W: usize>(row: &mut [f64; W], part: &[f64; M]) {
 
 /// How every channel depends on the path at sample `k`, `None` where it says nothing, and on the
 /// constants.
-#[expect(clippy::type_complexity, reason = "two tables by channel, taken apart at the one call site")]
+#[expect(
+    clippy::type_complexity,
+    reason = "two tables by channel, taken apart at the one call site"
+)]
 fn slopes<const N: usize, const M: usize>(
     path: &Path,
     k: usize,
     values: &Values,
-    gusts: Gusts,
     reading: &Reading,
 ) -> ([Option<[f64; N]>; CHANNELS], [[f64; M]; CHANNELS]) {
     let body = path.attitude[k].transpose();
-    let u = through_air(path, k, gusts);
+    let u = path.air_velocity(k);
+    let from = M.saturating_sub(AT);
     let mut nodes = [None; CHANNELS];
     let mut constants = [[0.0; M]; CHANNELS];
     if let Some(euler) = euler_by_turn(&path.attitude[k]) {
@@ -215,12 +211,7 @@ fn slopes<const N: usize, const M: usize>(
         }
     }
     if let Some(mut slopes) = air_slopes(&u) {
-        let mut by_gust = slopes * body;
-        let gain = 1.0 + values[SCALE];
-        slopes.row_mut(0).scale_mut(gain);
-        if gusts == Gusts::InTheAir {
-            by_gust.row_mut(0).scale_mut(gain);
-        }
+        slopes.row_mut(0).scale_mut(1.0 + values[SCALE]);
         let (by_turn, by_velocity) = (slopes * cross(&u), slopes * body);
         for i in 0..3 {
             let mut row = [0.0; N];
@@ -228,17 +219,17 @@ fn slopes<const N: usize, const M: usize>(
                 row[j] = by_turn[(i, j)];
                 row[3 + j] = by_velocity[(i, j)];
                 if N == MOTION_AND_GUST {
-                    row[6 + j] = -by_gust[(i, j)];
+                    row[6 + j] = -by_velocity[(i, j)];
                 }
                 if M > 1 {
-                    constants[3 + i][WIND + j] = -by_velocity[(i, j)];
+                    constants[3 + i][from + WIND + j] = -by_velocity[(i, j)];
                 }
             }
             nodes[3 + i] = Some(row);
         }
         if M > 1 {
-            constants[3][SCALE] = u.norm();
-            (constants[4][ALPHA], constants[5][BETA]) = (1.0, 1.0);
+            constants[3][from + SCALE] = u.norm();
+            (constants[4][from + ALPHA], constants[5][from + BETA]) = (1.0, 1.0);
         }
     }
     for (channel, node) in nodes.iter_mut().enumerate().skip(6) {
@@ -248,7 +239,7 @@ fn slopes<const N: usize, const M: usize>(
     }
     if M > 1 {
         for (channel, row) in constants.iter_mut().enumerate() {
-            row[skew_of(channel)] = reading.by_late[channel];
+            row[from + skew_of(channel)] = reading.by_late[channel];
         }
     }
     (nodes, constants)

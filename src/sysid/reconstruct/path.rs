@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::intake::Track;
+use super::kinematics::MOTION_AND_GUST;
 use super::rotation;
 
 /// Number of measured channels: roll, pitch, yaw, airspeed, α, β, velocity north, east, down.
@@ -84,6 +85,17 @@ impl Path {
     pub fn carry(&mut self, wind: Vector3<f64>) {
         self.wind = wind;
         self.velocity.iter_mut().for_each(|v| *v += wind);
+    }
+
+    /// Moves sample `k` by a turn (rad, body axes), a velocity and, if there are nine, a gust (m/s, earth
+    /// axes).
+    pub fn shift<const N: usize>(&mut self, k: usize, by: &[f64; N]) {
+        let three = |i: usize| Vector3::new(by[i], by[i + 1], by[i + 2]);
+        self.attitude[k] = rotation::orthonormal(&(self.attitude[k] * rotation::exp(&three(0))));
+        self.velocity[k] += three(3);
+        if N == MOTION_AND_GUST {
+            self.gust[k] += three(6);
+        }
     }
 
     /// The number of samples.

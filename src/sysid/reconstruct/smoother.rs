@@ -1,20 +1,23 @@
 //! The smoother: the path and the constants that fit all sensors best, by Gauss–Newton.
 //!
-//! Calm air is one fit of motion and constants. In rough air the gusts are first noise of the sensors
-//! of the air that hangs together in time, with which the constants and their deviations are found;
-//! then, the constants held, they are velocities of the air.
+//! First gusts are noise of the sensors of the air, with which motion and constants are fitted. Where the
+//! data find gusts likelier, the air then gusts along the path, the constants held; what gusts of that
+//! level may have done to the constants goes into their deviations. To seek path, gusts and constants
+//! together would find an airspeed scale far above one, for it makes every gust smaller.
 
 use nalgebra::Vector3;
 
+use super::ReconstructError;
 use super::equations::{Found, Problem, no_path};
+use super::gusts;
 use super::intake::Log;
 use super::levels::{CALM, Levels};
-use super::nuisance::{self, COUNT, WIND};
+use super::nuisance::{COUNT, WIND};
 use super::path::Path;
-use super::{Options, ReconstructError};
 
-/// The factor to which the level of gusts is sought.
-const GUST_FACTOR: f64 = 2.2;
+/// Levels of gusts that are tried, m/s, then the factors around the best of them.
+const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
+const FINE: [f64; 3] = [2.0, 1.4, 1.2];
 /// Residuals beyond this many standard deviations count less.
 const BOUND: f64 = 4.0;
 /// Iterations with gusts.
@@ -27,14 +30,13 @@ const LAST: usize = 25;
 const SETTLED: f64 = 0.05;
 const LEVEL_SETTLED: f64 = 0.02;
 
-/// Smooths all stretches of `log` together.
+/// Smooths all stretches of the log together.
 ///
 /// # Errors
 /// [`ReconstructError::NoPath`] if the search does not settle on numbers.
-pub fn smooth(log: &Log, options: &Options) -> Result<Found, ReconstructError> {
+pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
+    let Problem { log, options, widths } = *problem;
     let singular = || no_path(&options.name, "the equations became singular");
-    let widths = nuisance::prior_widths(log.step);
-    let problem = Problem { log, options, widths };
     let mut found = Found {
         paths: log.tracks.iter().map(Path::guess).collect(),
         values: [0.0; COUNT],
@@ -54,7 +56,7 @@ pub fn smooth(log: &Log, options: &Options) -> Result<Found, ReconstructError> {
             break;
         }
     }
-    gusty(&problem, &mut found, &singular)?;
+    gusty(problem, &mut found, &singular)?;
     Ok(found)
 }
 
@@ -73,15 +75,12 @@ fn gusty(
     if trial.levels.gusts <= CALM {
         return Ok(());
     }
-    for _ in 0..GUSTY {
-        let solved = problem.free(&trial, BOUND).ok_or_else(singular)?;
-        solved.apply(&mut trial, &problem.options.name)?;
-    }
-    trial.levels.gusts = likeliest_gusts(problem, &trial).ok_or_else(singular)?;
+    let deviations = gusts::deviations(problem, found, &trial, BOUND).ok_or_else(singular)?;
     for _ in 0..GUSTY {
         let solved = problem.held(&trial, BOUND).ok_or_else(singular)?;
         solved.apply(&mut trial, &problem.options.name)?;
     }
+    trial.deviations = deviations;
     *found = trial;
     Ok(())
 }
@@ -94,18 +93,22 @@ fn likeliest_gusts(problem: &Problem, found: &Found) -> Option<f64> {
         problem.misfit(&trial, f64::INFINITY)
     };
     let (mut best, mut least) = (CALM, misfit(CALM)?);
-    for coarse in [0.02, 0.2, 1.0, 5.0] {
+    for coarse in COARSE {
         let now = misfit(coarse)?;
         if now > least {
             break;
         }
         (best, least) = (coarse, now);
     }
-    if best > CALM {
-        for fine in [best / GUST_FACTOR, best * GUST_FACTOR] {
+    if best == CALM {
+        return Some(CALM);
+    }
+    for factor in FINE {
+        for fine in [best / factor, best * factor] {
             let now = misfit(fine)?;
             if now < least {
                 (best, least) = (fine, now);
+                break;
             }
         }
     }
