@@ -177,30 +177,32 @@ pub(super) fn agreement(d: &Diagnosis) -> Section {
 
 fn by_flight(c: &Candidate) -> Option<Whiskers> {
     let first = c.parameters.first()?;
-    let text =
-        |value: f64, ends: [f64; 2]| format!("{} ({})", number(value), interval(ends[0], ends[1]));
-    let own = c.by_flight.iter().map(|f| {
-        let ends = [f.value - NORMAL_95 * f.sd, f.value + NORMAL_95 * f.sd];
-        Whisker {
-            label: f.flight.clone(),
-            style: Style::Second,
-            value: f.value,
-            interval: ends,
-            text: text(f.value, ends),
-        }
-    });
-    let all = Whisker {
-        label: "all flights".into(),
-        style: Style::Actual,
-        value: first.value,
-        interval: first.ci95,
-        text: text(first.value, first.ci95),
+    let flights = c.by_flight.iter().map(|f| (f.flight.as_str(), f.value, f.sd));
+    let title = format!("{}: {}", c.id, first.name);
+    Some(flight_by_flight(title, &first.unit, flights, (first.value, first.ci95)))
+}
+
+/// What each flight alone says of a value (flight, value, standard deviation), above what all say
+/// together (value with its 95 % interval).
+pub(super) fn flight_by_flight<'a>(
+    title: String,
+    unit: &str,
+    flights: impl Iterator<Item = (&'a str, f64, f64)>,
+    (value, ends): (f64, [f64; 2]),
+) -> Whiskers {
+    let row = |label: &str, style: Style, value: f64, ends: [f64; 2]| Whisker {
+        label: label.into(),
+        style,
+        value,
+        interval: ends,
+        text: format!("{} ({})", number(value), interval(ends[0], ends[1])),
     };
-    Some(Whiskers {
-        title: format!("{}: {}", c.id, first.name),
-        unit: first.unit.clone(),
-        lines: vec![0.0],
-        legend: "dashed: none of it".into(),
-        rows: own.chain([all]).collect(),
-    })
+    let mut rows: Vec<Whisker> = flights
+        .map(|(flight, value, sd)| {
+            row(flight, Style::Second, value, [value - NORMAL_95 * sd, value + NORMAL_95 * sd])
+        })
+        .collect();
+    rows.push(row("all flights", Style::Actual, value, ends));
+    let legend = "dashed: none of it".into();
+    Whiskers { title, unit: unit.into(), lines: vec![0.0], legend, rows }
 }

@@ -42,11 +42,12 @@ pub(super) fn unseen(d: &Diagnosis) -> Section {
     section("What could not have been seen", note, table)
 }
 
-pub(super) fn tuned(d: &Diagnosis) -> Section {
-    if d.tuned.is_empty() {
+/// The prior's coefficients as tuned, those that moved most first.
+pub(super) fn tuned(tuned: &[Tuned]) -> Section {
+    if tuned.is_empty() {
         return Section::default();
     }
-    let mut sorted: Vec<&Tuned> = d.tuned.iter().collect();
+    let mut sorted: Vec<&Tuned> = tuned.iter().collect();
     let pull = |t: &Tuned| ((t.value - t.prior) / t.prior_sd).abs();
     sorted.sort_by(|a, b| pull(b).total_cmp(&pull(a)));
     let figure = Whiskers {
