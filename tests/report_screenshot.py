@@ -196,11 +196,18 @@ READINGS = """[...document.querySelectorAll('.panels figure')].filter(f => f.che
   .map(f => [f.querySelector('h3').textContent, [...f.querySelectorAll('.legend button output')].map(o => o.textContent)])"""
 
 
+def untimed(browser):
+    """A page may have no plot over time; one that has must show its window."""
+    if browser.value("document.querySelector('.panels .plot') == null"):
+        return []
+    return ["the plots over time show no window"]
+
+
 def try_mouse_and_keys(browser, zoomed_shot):
     found = []
     whole = browser.value(WINDOW)
     if not whole:
-        return ["the page has no plot over time to try"]
+        return untimed(browser)
     zoomed = window_after(browser, lambda: drag(browser, 0.25, 0.5))
     start, end = (float(t) for t in zoomed.removesuffix(" s").split(" to "))
     all_start, all_end = (float(t) for t in whole.removesuffix(" s").split(" to "))
@@ -287,7 +294,7 @@ def try_readouts(browser):
 def try_touch(browser):
     whole = browser.value(WINDOW)
     if not whole:
-        return ["the page has no plot over time to try"]
+        return untimed(browser)
 
     def pinch():
         left, top, width, height = over_of(browser, 0)

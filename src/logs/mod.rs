@@ -13,6 +13,7 @@ pub mod info;
 mod load;
 pub mod mapping;
 pub mod phases;
+mod resample;
 mod rows;
 mod table;
 mod tlog;

@@ -27,7 +27,7 @@ pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     sections.extend(report.held_out.map(proof::before_and_after));
     sections.push(tables::advice(d));
     sections.push(tables::unseen(d));
-    sections.push(tables::tuned(d));
+    sections.push(tables::tuned(&d.tuned));
     sections.push(tables::measurement(d));
     sections.push(tables::candidates(d));
     sections.push(tables::notes(d));

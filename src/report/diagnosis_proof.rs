@@ -3,12 +3,13 @@
 use super::Align::{Left, Right};
 use super::comparison_page::{growth, unexplained};
 use super::comparison_tables::summary;
-use super::numbers::{number, percent};
-use super::{Figure, Histogram, Rule, Section, Table, Verdict as Statement};
-use crate::report::Outcome;
+use super::numbers::{evidence, number, percent};
+use super::{Figure, Finding, Findings, Histogram, Rule, Section, Table};
 use crate::sysid::compare::{Comparison, ModelResult};
 use crate::sysid::diagnose::Diagnosis;
 
+/// Evidence under which a simulated flight is not drawn: decades of nothing would fill the scale.
+const DRAWN: f64 = 0.1;
 /// Decoys in the table, the strongest first.
 const DECOYS: usize = 8;
 /// The horizon that the sentence speaks of, s, where there is one.
@@ -32,7 +33,7 @@ pub(super) fn chance(d: &Diagnosis) -> Section {
             "Best candidate of each simulated flight",
             "Evidence",
             "simulated flights",
-            &d.nulls.best,
+            &d.nulls.best.iter().copied().filter(|e| *e >= DRAWN).collect::<Vec<_>>(),
             rules,
         )));
     }
@@ -44,14 +45,13 @@ pub(super) fn chance(d: &Diagnosis) -> Section {
 
 fn chance_note(d: &Diagnosis) -> String {
     let n = &d.nulls;
-    let zero = n.best.iter().filter(|e| **e <= 0.0).count();
-    let hidden = match zero {
+    let hidden = match n.best.iter().filter(|e| **e < DRAWN).count() {
         0 => String::new(),
-        _ => format!(" {zero} found nothing at all and are not drawn."),
+        found => format!(" In {found} nothing reached {DRAWN}; they are not drawn."),
     };
     let strongest = n.best.iter().copied().filter(|e| e.is_finite()).fold(f64::NAN, f64::max);
     let most = match strongest.is_finite() {
-        true => format!(" The strongest reached {}.", number(strongest)),
+        true => format!(" The strongest reached {}.", evidence(strongest)),
         false => String::new(),
     };
     format!(
@@ -59,7 +59,7 @@ fn chance_note(d: &Diagnosis) -> String {
          diagnosed alike; whatever is found in them is chance. Thresholds allow {} %.{most}{hidden} \
          Decoys are columns that cannot be effects: reversed in time, or with their phases shuffled.",
         n.count,
-        number(100.0 * n.level),
+        (1e4 * n.level).round() / 100.0,
     )
 }
 
@@ -68,7 +68,7 @@ fn decoys(d: &Diagnosis) -> Table {
     all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     let mut table = Table::new("Decoys", &[("Decoy", Left), ("Evidence", Right)]);
     for decoy in all.iter().take(DECOYS) {
-        table.push([decoy.name.clone(), number(decoy.evidence)]);
+        table.push([decoy.name.clone(), evidence(decoy.evidence)]);
     }
     if all.len() > DECOYS {
         table.push([format!("{} more, all weaker", all.len() - DECOYS), String::new()]);
@@ -78,10 +78,11 @@ fn decoys(d: &Diagnosis) -> Table {
 
 /// Free runs and what is unexplained on flights that no fit has seen, model by model.
 pub(super) fn before_and_after(c: &Comparison) -> Section {
-    let mut figures = vec![Figure::Verdict(statement(c))];
+    let mut figures = vec![Figure::Findings(statement(c))];
     figures.extend(growth(c));
     figures.push(unexplained(c));
-    figures.extend(summary(c).figures);
+    // The table by horizon; state by state is for the comparison's own page.
+    figures.extend(summary(c).figures.into_iter().take(1));
     let names = c.flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
     let note = format!(
         "The models fly freely on the recorded actuators of {names}, which no fit has seen, from \
@@ -92,26 +93,29 @@ pub(super) fn before_and_after(c: &Comparison) -> Section {
 }
 
 /// The fall of the error in one sentence: from the last but one model, the tuned one, to the last.
-fn statement(c: &Comparison) -> Statement {
+fn statement(c: &Comparison) -> Findings {
     let horizons = || c.settings.horizons_s.iter().copied();
     let told = horizons().find(|h| *h == TOLD_S).or(horizons().next_back()).unwrap_or(TOLD_S);
     let error = |m: &ModelResult| {
         m.free_run.iter().find(|s| s.horizon_s == told).map_or(f64::NAN, |s| s.rmse_scaled)
     };
-    let [.., before, after] = &c.models[..] else {
-        let sentence = "One model alone: there is nothing to compare it with.".into();
-        return Statement { outcome: Outcome::Open, sentence, details: Vec::new() };
+    let plain = |sentence: String| Finding { sentence, link: None };
+    let lead = match &c.models[..] {
+        [.., before, after] => {
+            let what = match 1.0 - error(after) / error(before) {
+                fall if !fall.is_finite() => "cannot be told".to_string(),
+                fall if fall >= 0.0 => format!("falls by {} %", percent(fall)),
+                fall => format!("rises by {} %", percent(-fall)),
+            };
+            format!(
+                "On flights that no fit has seen, the error after {told} s {what} from “{}” to “{}”.",
+                before.name, after.name
+            )
+        }
+        _ => "There is one model only, and nothing to compare it with.".into(),
     };
-    let (a, b) = (error(before), error(after));
-    let (outcome, what) = match 1.0 - b / a {
-        fall if !fall.is_finite() => (Outcome::Open, "cannot be told".to_string()),
-        fall if fall > 0.0 => (Outcome::Reached, format!("falls by {} %", percent(fall))),
-        fall => (Outcome::Missed, format!("rises by {} %", percent(-fall))),
+    let detail = |m: &ModelResult| {
+        plain(format!("{}: {} of the characteristic values x_c", m.name, number(error(m))))
     };
-    let sentence = format!(
-        "On flights that no fit has seen, the error after {told} s {what} with {}.",
-        after.name
-    );
-    let detail = |m: &ModelResult| format!("{}: {} of x_c", m.name, number(error(m)));
-    Statement { outcome, sentence, details: c.models.iter().map(detail).collect() }
+    Findings { lead: vec![plain(lead)], rest: c.models.iter().map(detail).collect() }
 }

@@ -1,10 +1,11 @@
 //! The suspects of a diagnosis: evidence, curves, agreement between flights.
 
+use super::Align::{Left, Right};
 use super::diagnosis_page::channel_of;
 use super::numbers::{NORMAL_95, interval, number};
 use super::{
-    Choice, ChoiceOption, Evidence, EvidenceGroup, EvidenceRow, Figure, Section, Style, Whisker,
-    Whiskers, XyBand, XyFigure, XyMark, XySeries,
+    Choice, ChoiceOption, Evidence, EvidenceGroup, EvidenceRow, Figure, Section, Style, Table,
+    Whisker, Whiskers, XyBand, XyFigure, XyMark, XySeries,
 };
 use crate::sysid::diagnose::{Candidate, Curve, Diagnosis};
 
@@ -37,7 +38,11 @@ pub(super) fn ranking(d: &Diagnosis) -> Section {
     let more = below.len().saturating_sub(BELOW);
     groups.push(EvidenceGroup {
         title: "No more than chance".into(),
-        note: if more > 0 { format!("{more} more are in the table below.") } else { String::new() },
+        note: match more {
+            0 => String::new(),
+            1 => "One more is in the table below.".into(),
+            n => format!("{n} more are in the table below."),
+        },
         style: Style::Measured,
         rows: below.into_iter().take(BELOW).map(row).collect(),
     });
@@ -67,14 +72,14 @@ fn tied<'a>(d: &'a Diagnosis, found: &'a Candidate, seen: &mut Vec<&'a str>) -> 
             "These data cannot tell them apart; what to fly does.".to_string(),
         ),
     };
-    let rows = std::iter::once(found).chain(others).map(row).collect();
+    let plain = |c: &Candidate| EvidenceRow { detail: detail(c).join("; "), ..row(c) };
+    let rows = std::iter::once(found).chain(others).map(plain).collect();
     EvidenceGroup { title, note, style: Style::Actual, rows }
 }
 
 fn row(c: &Candidate) -> EvidenceRow {
-    let mut detail = vec![c.description.trim_end_matches('.').to_string()];
-    detail.extend(c.refused.iter().map(|why| format!("refused: {why}")));
-    if !c.asserted && !c.indistinguishable_from.is_empty() {
+    let mut detail = detail(c);
+    if !c.indistinguishable_from.is_empty() {
         detail.push(format!("not to be told from {}", c.indistinguishable_from.join(", ")));
     }
     EvidenceRow {
@@ -83,6 +88,12 @@ fn row(c: &Candidate) -> EvidenceRow {
         value: c.evidence,
         threshold: c.threshold,
     }
+}
+
+fn detail(c: &Candidate) -> Vec<String> {
+    let what = c.description.trim_end_matches('.').to_string();
+    let refused = c.refused.iter().map(|why| format!("refused: {}", why.trim_end_matches('.')));
+    std::iter::once(what).chain(refused).collect()
 }
 
 pub(super) fn curves(d: &Diagnosis) -> Section {
@@ -105,7 +116,7 @@ pub(super) fn curves(d: &Diagnosis) -> Section {
 }
 
 fn figures(c: &Candidate, curve: &Curve) -> Vec<Figure> {
-    vec![Figure::Xy(plot(c, curve)), Figure::Whiskers(parameters(c))]
+    vec![Figure::Xy(plot(c, curve)), Figure::Table(parameters(c))]
 }
 
 fn plot(c: &Candidate, curve: &Curve) -> XyFigure {
@@ -141,28 +152,15 @@ fn plot(c: &Candidate, curve: &Curve) -> XyFigure {
     }
 }
 
-/// Each parameter in its own half widths: what it is, how far from nought.
-fn parameters(c: &Candidate) -> Whiskers {
-    let rows = c.parameters.iter().map(|p| {
-        let half = 0.5 * (p.ci95[1] - p.ci95[0]).abs();
-        let scaled = |x: f64| if half > 0.0 { x / half } else { f64::NAN };
-        Whisker {
-            label: match p.unit.is_empty() {
-                true => p.name.clone(),
-                false => format!("{}: {}", p.name, p.unit),
-            },
-            style: Style::Actual,
-            value: scaled(p.value),
-            interval: p.ci95.map(scaled),
-            text: format!("{} ({})", number(p.value), interval(p.ci95[0], p.ci95[1])),
-        }
-    });
-    Whiskers {
-        title: "Parameters".into(),
-        unit: "in half widths of the 95 % interval".into(),
-        lines: vec![(0.0, "none:".into())],
-        rows: rows.collect(),
+fn parameters(c: &Candidate) -> Table {
+    let columns =
+        [("Parameter", Left), ("Value", Right), ("95 % interval", Right), ("What it is", Left)];
+    let mut table = Table::new(&format!("Parameters of {}", c.id), &columns);
+    for p in &c.parameters {
+        let ends = interval(p.ci95[0], p.ci95[1]);
+        table.push([p.name.clone(), number(p.value), ends, p.unit.clone()]);
     }
+    table
 }
 
 pub(super) fn agreement(d: &Diagnosis) -> Section {
@@ -179,29 +177,32 @@ pub(super) fn agreement(d: &Diagnosis) -> Section {
 
 fn by_flight(c: &Candidate) -> Option<Whiskers> {
     let first = c.parameters.first()?;
-    let text =
-        |value: f64, ends: [f64; 2]| format!("{} ({})", number(value), interval(ends[0], ends[1]));
-    let own = c.by_flight.iter().map(|f| {
-        let ends = [f.value - NORMAL_95 * f.sd, f.value + NORMAL_95 * f.sd];
-        Whisker {
-            label: f.flight.clone(),
-            style: Style::Second,
-            value: f.value,
-            interval: ends,
-            text: text(f.value, ends),
-        }
-    });
-    let all = Whisker {
-        label: "all flights".into(),
-        style: Style::Actual,
-        value: first.value,
-        interval: first.ci95,
-        text: text(first.value, first.ci95),
+    let flights = c.by_flight.iter().map(|f| (f.flight.as_str(), f.value, f.sd));
+    let title = format!("{}: {}", c.id, first.name);
+    Some(flight_by_flight(title, &first.unit, flights, (first.value, first.ci95)))
+}
+
+/// What each flight alone says of a value (flight, value, standard deviation), above what all say
+/// together (value with its 95 % interval).
+pub(super) fn flight_by_flight<'a>(
+    title: String,
+    unit: &str,
+    flights: impl Iterator<Item = (&'a str, f64, f64)>,
+    (value, ends): (f64, [f64; 2]),
+) -> Whiskers {
+    let row = |label: &str, style: Style, value: f64, ends: [f64; 2]| Whisker {
+        label: label.into(),
+        style,
+        value,
+        interval: ends,
+        text: format!("{} ({})", number(value), interval(ends[0], ends[1])),
     };
-    Some(Whiskers {
-        title: format!("{}: {}", c.id, first.name),
-        unit: first.unit.clone(),
-        lines: vec![(0.0, "none:".into())],
-        rows: own.chain([all]).collect(),
-    })
+    let mut rows: Vec<Whisker> = flights
+        .map(|(flight, value, sd)| {
+            row(flight, Style::Second, value, [value - NORMAL_95 * sd, value + NORMAL_95 * sd])
+        })
+        .collect();
+    rows.push(row("all flights", Style::Actual, value, ends));
+    let legend = "dashed: none of it".into();
+    Whiskers { title, unit: unit.into(), lines: vec![0.0], legend, rows }
 }

@@ -2,56 +2,59 @@
 
 use super::Align::{Left, Right};
 use super::diagnosis::DiagnosisReport;
-use super::numbers::{NORMAL_95, interval, number, percent};
-use super::{Figure, Section, Style, Table, Whisker, Whiskers};
-use crate::sysid::diagnose::{Candidate, Diagnosis, Tuned};
+use super::numbers::{NORMAL_95, evidence, interval, number, percent};
+use super::{Figure, Finding, Findings, Section, Style, Table, Whisker, Whiskers};
+use crate::sysid::diagnose::{Advice, Candidate, Diagnosis, Tuned};
 
 pub(super) fn advice(d: &Diagnosis) -> Section {
-    let columns = [("Fly", Left), ("because", Left), ("with", Left)];
-    let mut table = Table::new("What to fly next", &columns);
-    for a in &d.advice {
-        let command = a
-            .between
-            .as_ref()
-            .map_or(String::new(), |[a, b]| format!("greylag design --between {a} {b}"));
-        table.push([a.manoeuvre.clone(), a.why.clone(), command]);
+    let finding = |a: &Advice| {
+        let command = match &a.between {
+            Some([a, b]) => format!(" Its schedule: greylag design --between {a} {b}."),
+            None => String::new(),
+        };
+        let [manoeuvre, why] = [&a.manoeuvre, &a.why].map(|x| x.trim_end_matches('.'));
+        Finding { sentence: format!("{manoeuvre}: {why}.{command}"), link: None }
+    };
+    let lead: Vec<Finding> = d.advice.iter().take(1).map(finding).collect();
+    if lead.is_empty() {
+        return Section::default();
     }
-    section("What to fly next", "The most useful first.", table)
+    let rest = d.advice.iter().skip(1).map(finding).collect();
+    let figure = Figure::Findings(Findings { lead, rest });
+    Section::new("What to fly next", "The most useful first.", vec![figure])
 }
 
 /// The smallest amounts that the data would have shown, of what is not asserted.
 pub(super) fn unseen(d: &Diagnosis) -> Section {
-    let columns =
-        [("Effect", Left), ("Parameter", Left), ("Not seen below", Right), ("What it is", Left)];
+    let columns = [("Effect", Left), ("Not seen below", Right), ("of", Left), ("What it is", Left)];
     let mut table = Table::new("What could not have been seen", &columns);
     for c in d.effects.iter().filter(|c| !c.asserted) {
-        let parameter = c.parameters.first();
-        let name = parameter.map_or(String::new(), |p| p.name.clone());
         let amount = c.minimum_detectable.map_or_else(|| "any amount".into(), number);
-        let unit = parameter.map_or(String::new(), |p| p.unit.clone());
-        table.push([c.id.clone(), name, amount, join(c.description, &unit)]);
+        let what = c.parameters.first().map_or(String::new(), |p| match p.unit.is_empty() {
+            true => p.name.clone(),
+            false => format!("{}, {}", p.name, p.unit),
+        });
+        let description = c.description.trim_end_matches('.').to_string();
+        table.push([c.id.clone(), amount, what, description]);
     }
     let note = "An effect that is not asserted may still be there: with these flights it could not \
                 have been seen below this amount.";
     section("What could not have been seen", note, table)
 }
 
-fn join(description: &str, unit: &str) -> String {
-    let description = description.trim_end_matches('.');
-    if unit.is_empty() { description.into() } else { format!("{description} ({unit})") }
-}
-
-pub(super) fn tuned(d: &Diagnosis) -> Section {
-    if d.tuned.is_empty() {
+/// The prior's coefficients as tuned, those that moved most first.
+pub(super) fn tuned(tuned: &[Tuned]) -> Section {
+    if tuned.is_empty() {
         return Section::default();
     }
-    let mut sorted: Vec<&Tuned> = d.tuned.iter().collect();
+    let mut sorted: Vec<&Tuned> = tuned.iter().collect();
     let pull = |t: &Tuned| ((t.value - t.prior) / t.prior_sd).abs();
     sorted.sort_by(|a, b| pull(b).total_cmp(&pull(a)));
     let figure = Whiskers {
         title: "Prior to tuned".into(),
         unit: "in standard deviations of the prior".into(),
-        lines: vec![(-2.0, String::new()), (0.0, "prior:".into()), (2.0, String::new())],
+        lines: vec![-2.0, 0.0, 2.0],
+        legend: "dashed: the prior and ± 2".into(),
         rows: sorted.iter().map(|t| tuned_row(t)).collect(),
     };
     let far = sorted.iter().filter(|t| pull(t) > 2.0).count();
@@ -125,8 +128,8 @@ pub(super) fn candidates(d: &Diagnosis) -> Section {
         table.push([
             c.id.clone(),
             if c.asserted { "yes".into() } else { "no".to_string() },
-            number(c.evidence),
-            number(c.threshold),
+            evidence(c.evidence),
+            evidence(c.threshold),
             percent(c.heldout_error_reduction),
             percent(c.selected_in_bootstraps),
             first(c),

@@ -2,7 +2,7 @@
 
 use super::Style;
 use super::html::escape;
-use super::numbers::number;
+use super::numbers::evidence;
 
 /// Longest bars, in thresholds; longer ones are cut, and marked.
 const FULL: f64 = 6.0;
@@ -94,8 +94,10 @@ impl EvidenceRow {
         };
         let text = match (self.value.is_finite(), self.threshold.is_finite()) {
             (false, _) => "cannot be told".into(),
-            (true, false) => format!("{}, chance not known", number(self.value)),
-            (true, true) => format!("{}, chance {}", number(self.value), number(self.threshold)),
+            (true, false) => format!("{}, chance not known", evidence(self.value)),
+            (true, true) => {
+                format!("{}, chance {}", evidence(self.value), evidence(self.threshold))
+            }
         };
         format!(
             "<dt>{}{detail}</dt><dd><span class=\"track\"><i class=\"bar-fill{cut}\" \
@@ -129,7 +131,7 @@ mod tests {
         // Twelve thresholds are cut at six; half a threshold is a twelfth of six; the rest is nothing.
         assert_eq!(widths, ["100.00", "8.33", "0.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("bar-fill cut") && html.contains("left:16.67%"));
-        assert!(html.contains("5.00, chance 10.0") && html.contains("cannot be told"));
+        assert!(html.contains("5.0, chance 10.0") && html.contains("cannot be told"));
     }
 
     #[test]

@@ -3,11 +3,13 @@
 //! A [`Page`] is a title over [`Section`]s, a section holds [`Figure`]s in order, and
 //! [`Page::render`] turns them into one string with style, script and data inside.
 //! [`FlightReport`] is the page of one flight, [`ComparisonReport`] that of models against flights,
-//! [`DiagnosisReport`] that of what a model lacks. The plots are drawn in the reader's browser by uPlot
+//! [`DiagnosisReport`] that of what a model lacks, [`AmendmentReport`] that of a model with it added. The plots are drawn in the reader's browser by uPlot
 //! 1.6.32 (MIT, `assets/uPlot.LICENSE`), which is embedded.
 //!
 //! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
 
+mod amendment;
+mod amendment_page;
 mod bars;
 mod choice;
 mod comparison;
@@ -44,6 +46,8 @@ mod whiskers;
 mod write;
 mod xy;
 
+pub use amendment::AmendmentReport;
+pub use amendment_page::amendment_page;
 pub use bars::{BarGroup, Bars};
 pub use choice::{Choice, ChoiceOption};
 pub use comparison::ComparisonReport;

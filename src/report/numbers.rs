@@ -17,6 +17,17 @@ pub(super) fn number(value: f64) -> String {
     text.replace('-', "−")
 }
 
+/// Evidence to a tenth, from a hundred on to one; a dash for what is no number.
+pub(super) fn evidence(value: f64) -> String {
+    let text = match value {
+        v if !v.is_finite() => return "–".into(),
+        v if v.abs() < 99.95 => format!("{v:.1}"),
+        v if v.abs() < 1e6 => format!("{v:.0}"),
+        v => format!("{v:.1e}"),
+    };
+    text.replace('-', "−")
+}
+
 /// A share as a whole percentage; a dash for what is no number.
 pub(super) fn percent(share: f64) -> String {
     if share.is_finite() {

@@ -2,6 +2,9 @@
 
 use super::html::escape;
 
+/// Letters above which a text of the last column is broken into lines of some width.
+const LONG: usize = 28;
+
 /// A table.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
@@ -67,8 +70,14 @@ impl Table {
             .enumerate()
             .map(|(i, c)| format!("<th scope=\"col\"{}>{}</th>", class(i), escape(&c.title)))
             .collect();
+        let last = |row: &Row| row.cells.last().map_or(0, |text| text.chars().count());
+        let long = if self.rows.iter().map(last).max().unwrap_or(0) > LONG {
+            " class=\"long\""
+        } else {
+            ""
+        };
         let mut html = format!(
-            "<div class=\"table\" tabindex=\"0\"><table><caption>{}</caption>\
+            "<div class=\"table\" tabindex=\"0\"><table{long}><caption>{}</caption>\
              <thead><tr>{head}</tr></thead>\n<tbody>\n",
             escape(&self.caption)
         );

@@ -14,8 +14,10 @@ pub struct Whiskers {
     pub title: String,
     /// The unit of the scale.
     pub unit: String,
-    /// Upright lines behind the values: where, in the unit, with what each stands for.
-    pub lines: Vec<(f64, String)>,
+    /// Where upright lines stand behind the values, in the unit.
+    pub lines: Vec<f64>,
+    /// What the lines stand for.
+    pub legend: String,
     /// The values, top to bottom.
     pub rows: Vec<Whisker>,
 }
@@ -39,7 +41,7 @@ impl Whiskers {
     /// The ends of the scale; `None` if nothing is finite.
     fn scale(&self) -> Option<[f64; 2]> {
         let values = self.rows.iter().flat_map(|r| [r.value, r.interval[0], r.interval[1]]);
-        let all = values.chain(self.lines.iter().map(|l| l.0)).filter(|v| v.is_finite());
+        let all = values.chain(self.lines.iter().copied()).filter(|v| v.is_finite());
         let [low, high] =
             all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
         let width = high - low;
@@ -53,12 +55,10 @@ impl Whiskers {
         let lines: String = self
             .lines
             .iter()
-            .filter(|l| l.0.is_finite())
-            .map(|l| format!("<i class=\"tick\" style=\"left:{:.2}%\"></i>", place(l.0)))
+            .filter(|at| at.is_finite())
+            .map(|at| format!("<i class=\"tick\" style=\"left:{:.2}%\"></i>", place(*at)))
             .collect();
         let rows: String = self.rows.iter().map(|r| r.html(&place, &lines)).collect();
-        let legend: Vec<String> =
-            self.lines.iter().map(|(at, what)| format!("{what} {}", number(*at))).collect();
         format!(
             "<figure class=\"panel whiskers\"><figcaption><h3>{}</h3><span class=\"unit\">{}</span>\
              </figcaption>\n<dl>\n{rows}<dt class=\"ends\"></dt><dd class=\"ends\">\
@@ -67,7 +67,7 @@ impl Whiskers {
             escape(&self.title),
             escape(&self.unit),
             number(low),
-            escape(&legend.join(", ")),
+            escape(&self.legend),
             number(high)
         )
     }
@@ -118,8 +118,8 @@ mod tests {
             row(1e300, [-1e300, 1e308]),
         ];
         for rows in [rows.clone(), rows[1..2].to_vec(), Vec::new()] {
-            let lines = vec![(0.0, "none".into()), (f64::NAN, "odd".into())];
-            let html = Whiskers { title: "t".into(), unit: "u".into(), lines, rows }.html();
+            let (lines, legend) = (vec![0.0, f64::NAN], "none".into());
+            let html = Whiskers { title: "t".into(), unit: "u".into(), lines, legend, rows }.html();
             assert!(!html.contains("NaN") && !html.contains("inf"), "{html}");
             for part in html.split("left:").skip(1) {
                 let left: f64 = part.split('%').next().unwrap().parse().unwrap();
@@ -134,6 +134,7 @@ mod tests {
             title: "t".into(),
             unit: String::new(),
             lines: Vec::new(),
+            legend: String::new(),
             rows: vec![row(3.0, [3.0, 3.0])],
         };
         assert!(figure.html().contains("class=\"point\" style=\"left:50.00%"));

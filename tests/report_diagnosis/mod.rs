@@ -33,7 +33,7 @@ const CANDIDATES: [Row; 12] = [
         "CLalpha2",
         -2.31,
         0.19,
-        "–",
+        "a coefficient, dimensionless",
         0.4,
     ),
     (
@@ -44,7 +44,7 @@ const CANDIDATES: [Row; 12] = [
         "CDalpha2",
         0.42,
         0.2,
-        "–",
+        "a coefficient, dimensionless",
         0.12,
     ),
     (
@@ -66,7 +66,7 @@ const CANDIDATES: [Row; 12] = [
         "CLalphadot",
         1.2,
         1.9,
-        "–",
+        "a coefficient, dimensionless",
         3.2,
     ),
     (
@@ -77,7 +77,7 @@ const CANDIDATES: [Row; 12] = [
         "dCp",
         0.02,
         0.04,
-        "–",
+        "a coefficient, dimensionless",
         0.06,
     ),
     (
@@ -93,7 +93,17 @@ const CANDIDATES: [Row; 12] = [
     ),
     ("actuator_lag", "The surfaces follow late.", 1.9, 10.4, "tau", 0.002, 0.006, "s", 0.012),
     ("dead_zone", "Small deflections do nothing.", 0.7, 10.0, "width", 0.001, 0.004, "rad", 0.011),
-    ("asymmetry", "The airframe is not symmetric.", -1.2, 12.0, "Cl0", 0.0002, 0.0006, "–", 0.001),
+    (
+        "asymmetry",
+        "The airframe is not symmetric.",
+        -1.2,
+        12.0,
+        "Cl0",
+        0.0002,
+        0.0006,
+        "a coefficient, dimensionless",
+        0.001,
+    ),
     (
         "ground_effect",
         "The ground lifts within one span.",
@@ -102,7 +112,7 @@ const CANDIDATES: [Row; 12] = [
         "k",
         0.0,
         f64::NAN,
-        "–",
+        "a coefficient, dimensionless",
         f64::NAN,
     ),
     (

@@ -1,0 +1,24 @@
+//! Writes the report of a made-up amendment: `cargo run --example amendment_sample -- OUT.html`.
+
+#[path = "../tests/report_amendment/mod.rs"]
+mod report_amendment;
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use greylag::report::{AmendmentReport, write_new};
+
+fn main() -> anyhow::Result<()> {
+    let out = std::env::args_os().nth(1).context("say where: amendment_sample OUT.html")?;
+    let report = AmendmentReport {
+        title: "Synthetic amendment".into(),
+        amendment: &report_amendment::amendment(),
+        held_out: None,
+        model_files: vec!["params/x8/prior.toml".into(), "amended/model.toml".into()],
+        log_files: vec!["train-1.csv".into(), "train-2.csv".into()],
+        command_line: "amendment_sample OUT.html".into(),
+        versions: Vec::new(),
+    };
+    write_new(&PathBuf::from(out), &report.page().render())?;
+    Ok(())
+}

@@ -1,0 +1,151 @@
+//! A channel read at any time: interpolated, held, its angles unwrapped.
+
+use std::f64::consts::{PI, TAU};
+
+use super::Sample;
+use super::columns::{COLUMNS, Place, index, is_held, is_wrapped};
+use super::mapping::rule::{Fill, Rule};
+
+/// Two times this close are the same, s: logs count microseconds or milliseconds.
+pub(super) const SAME_S: f64 = 1e-6;
+
+/// A track made ready to be read at any time.
+pub(super) struct Reader<'a> {
+    times: &'a [f64],
+    series: Vec<Vec<f64>>,
+    /// The longest time that it is carried over, s.
+    limit: f64,
+    to: Target,
+}
+
+/// What a track's series become.
+enum Target {
+    Attitude,
+    Column { place: Place, held: bool, wraps: bool },
+}
+
+impl<'a> Reader<'a> {
+    /// Of a rule with its data; `limit` is the longest time (s) that it is carried over.
+    pub(super) fn new(
+        rule: &Rule,
+        times: &'a [f64],
+        series: &[Vec<f64>],
+        limit: f64,
+    ) -> Option<Reader<'a>> {
+        let mut series = series.to_vec();
+        let to = match &rule.fill {
+            Fill::Quaternion(_) => {
+                one_sided(&mut series);
+                Target::Attitude
+            }
+            Fill::Sum { .. } | Fill::Density { .. } => {
+                let column = rule.columns()[0];
+                let wraps = is_wrapped(column) && is_angle(&series[0], column);
+                if wraps {
+                    unwrap(&mut series[0]);
+                }
+                let place = COLUMNS[index(column)?].2;
+                Target::Column { place, held: is_held(column), wraps }
+            }
+        };
+        Some(Reader { times, series, limit, to })
+    }
+
+    /// Fills the row's columns at the row's time.
+    pub(super) fn put(&self, row: &mut Sample) {
+        let (times, limit) = (self.times, self.limit);
+        let at = At::new(row.time_s, times);
+        match &self.to {
+            Target::Attitude => {
+                let q = [0, 1, 2, 3].map(|k| at.between(&self.series[k], times, limit));
+                if let Some(attitude) = euler(q) {
+                    row.attitude_rad = attitude;
+                }
+            }
+            Target::Column { place, held, wraps } => {
+                let value = match held {
+                    true => at.held(&self.series[0], times, limit),
+                    false => at.between(&self.series[0], times, limit),
+                };
+                *place(row) = if *wraps { wrap(value) } else { value };
+            }
+        }
+    }
+}
+
+/// Turns quaternions so that neighbours lie on one side of the sphere, as q and −q are one attitude.
+fn one_sided(q: &mut [Vec<f64>]) {
+    for i in 1..q[0].len() {
+        let dot: f64 = q.iter().map(|s| s[i] * s[i - 1]).sum();
+        if dot < 0.0 {
+            q.iter_mut().for_each(|s| s[i] = -s[i]);
+        }
+    }
+}
+
+/// Roll, pitch, yaw of a quaternion of about unit length.
+fn euler([w, x, y, z]: [f64; 4]) -> Option<[f64; 3]> {
+    let n = (w * w + x * x + y * y + z * z).sqrt();
+    if !(n > 0.5 && n < 2.0) {
+        return None;
+    }
+    let [w, x, y, z] = [w / n, x / n, y / n, z / n];
+    Some([
+        (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
+        (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
+        (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+    ])
+}
+
+/// Where a time lies among a channel's times.
+#[derive(Clone, Copy)]
+struct At {
+    t: f64,
+    /// The first sample later than `t`.
+    after: usize,
+}
+
+impl At {
+    fn new(t: f64, times: &[f64]) -> At {
+        At { t, after: times.partition_point(|x| *x <= t + SAME_S) }
+    }
+
+    fn held(self, values: &[f64], times: &[f64], limit: f64) -> f64 {
+        match self.after.checked_sub(1) {
+            Some(i) if self.t - times[i] <= limit => values[i],
+            _ => f64::NAN,
+        }
+    }
+
+    fn between(self, values: &[f64], times: &[f64], limit: f64) -> f64 {
+        let Some(i) = self.after.checked_sub(1) else { return f64::NAN };
+        let past = self.t - times[i];
+        if past.abs() <= SAME_S {
+            return values[i];
+        }
+        match times.get(self.after) {
+            Some(next) if next - times[i] <= limit => {
+                values[i] + (values[self.after] - values[i]) * past / (next - times[i])
+            }
+            _ => f64::NAN,
+        }
+    }
+}
+
+/// Whether a series can be radians at all: a heading may run to 2π, a roll angle to π. Wrapping
+/// anything larger would hide that it is in degrees.
+fn is_angle(series: &[f64], column: &str) -> bool {
+    let limit = if column == "yaw_rad" { TAU } else { PI };
+    series.iter().all(|x| x.abs() <= limit + 1e-3)
+}
+
+fn unwrap(angles: &mut [f64]) {
+    for i in 1..angles.len() {
+        angles[i] -= ((angles[i] - angles[i - 1]) / TAU).round() * TAU;
+    }
+}
+
+/// Brings an interpolated angle back to −π..π.
+fn wrap(angle: f64) -> f64 {
+    angle - (angle / TAU).round() * TAU
+}
