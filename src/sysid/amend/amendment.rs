@@ -204,7 +204,7 @@ impl Judge<'_> {
         let after = self.scores(&fit.model);
         effect.refused = objections(&added.id, &fit.parameters);
         if let (Some(a), Some(b)) = (judged(&after), judged(before))
-            && !(a < (1.0 - IMPROVED) * b)
+            && (a.is_nan() || a >= (1.0 - IMPROVED) * b)
         {
             effect.refused.push(format!(
                 "free runs of {JUDGED_AT_S} s on flights that the fit did not see come no closer \

@@ -249,13 +249,13 @@ impl<'a> Search<'a> {
     fn reweigh(&mut self) {
         let residuals = self.residuals();
         let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
-        for k in 0..8 {
+        for (k, floor) in FLOOR.iter().enumerate() {
             let (mut sum, mut count) = (0.0, 0.0);
             for (shot, r) in self.shots.iter().zip(&residuals) {
                 sum += shot.weight * square(r, k);
                 count += shot.weight * r.len() as f64;
             }
-            let variance = (sum / count).max(FLOOR[k].powi(2));
+            let variance = (sum / count).max(floor.powi(2));
             let together = together(&residuals, k);
             self.weights.output[k] = 1.0 / (variance * together);
         }
@@ -590,7 +590,7 @@ fn together(residuals: &[Vec<[f64; 8]>], k: usize) -> f64 {
     let mut together = 1.0;
     for lag in 1..longest {
         let correlation = mean(product(lag)) / own;
-        if !(correlation > 0.05) {
+        if correlation.is_nan() || correlation <= 0.05 {
             break;
         }
         together += 2.0 * correlation;
