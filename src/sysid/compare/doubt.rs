@@ -14,8 +14,11 @@ use crate::sysid::reconstruction::{Instant, Nuisance};
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 pub const NORMAL_95: f64 = 1.96;
 
-/// The constants that move a residual, with what an error of one unit does to an instant.
-const CONSTANTS: [(&str, fn(&mut Instant, f64)); COUNT] = [
+/// What an error of so many units does to an instant.
+type Move = fn(&mut Instant, f64);
+
+/// The constants that move a residual.
+const CONSTANTS: [(&str, Move); COUNT] = [
     ("gyro_bias_p", |i, by| i.state.p += by),
     ("gyro_bias_q", |i, by| i.state.q += by),
     ("gyro_bias_r", |i, by| i.state.r += by),
