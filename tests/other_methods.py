@@ -16,21 +16,24 @@ import numpy as np
 
 
 def read(path):
-    """y, the columns that are fitted anyway, the candidates by effect, the truth."""
+    """y, the columns that are fitted anyway, the candidates by effect, the truth, the rows behind them."""
     with open(path) as lines:
         truth = lines.readline().split(":", 1)[1].strip()
         names = lines.readline().strip().split(",")
         table = np.loadtxt(lines, delimiter=",", ndmin=2)
     table = table[np.isfinite(table).all(axis=1)]
+    rows = len(table)
+    # least squares needs no more of the table than its triangular factor, which is far smaller
+    table = np.linalg.qr(table, mode="r")
     own = [k for k, name in enumerate(names) if name.startswith(("prior:", "bias:"))]
     effects = {}
     for k, name in enumerate(names):
         if name.startswith("candidate:"):
             effects.setdefault(name.split(":")[1], []).append(k)
-    return table[:, 0], table[:, own], {e: table[:, k] for e, k in effects.items()}, truth
+    return table[:, 0], table[:, own], {e: table[:, k] for e, k in effects.items()}, truth, rows
 
 
-def stlsq(y, own, effects):
+def stlsq(y, own, effects, rows):
     """Effects by the size of what STLSQ gives them, at the threshold of the lowest BIC."""
     import pysindy
 
@@ -42,14 +45,14 @@ def stlsq(y, own, effects):
     size[size == 0] = 1
     scaled = columns / size
     best = None
-    for threshold in np.geomspace(0.02, 2, 12) * np.std(y) * np.sqrt(len(y)) / 10:
+    for threshold in np.geomspace(0.02, 2, 12) * np.linalg.norm(y) / 10:
         optimizer = pysindy.STLSQ(threshold=threshold, alpha=1e-6, max_iter=30)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             optimizer.fit(scaled, y[:, None])
         x = np.asarray(optimizer.coef_).ravel()
         residual = y - scaled @ x
-        bic = len(y) * np.log(np.mean(residual**2)) + np.count_nonzero(x) * np.log(len(y))
+        bic = rows * np.log(residual @ residual / rows) + np.count_nonzero(x) * np.log(rows)
         if best is None or bic < best[0]:
             best = (bic, x)
     share = {name: 0.0 for name in names}
@@ -60,7 +63,7 @@ def stlsq(y, own, effects):
     return ranked
 
 
-def stepwise(y, own, effects, enter=4.0):
+def stepwise(y, own, effects, rows, enter=4.0):
     """Effects in the order in which partial F tests let them in (Klein and Morelli, section 5.4)."""
     chosen, ranked = own, []
     while len(ranked) < 5:
@@ -76,7 +79,7 @@ def stepwise(y, own, effects, enter=4.0):
                 if length < 1e-8 * (columns[:, k] @ columns[:, k]) or length == 0:
                     continue
                 gain = (column @ left) ** 2 / length
-                f = gain / ((left @ left - gain) / (len(y) - chosen.shape[1] - 1))
+                f = gain / ((left @ left - gain) / (rows - chosen.shape[1] - 1))
                 if best is None or f > best[0]:
                     best = (f, name, columns[:, [k]])
         if best is None or best[0] < enter:
@@ -93,11 +96,11 @@ def main():
     three = {name: [] for name in methods}
     nulls = {name: [] for name in methods}
     for path in files:
-        y, own, effects, truth = read(path)
+        y, own, effects, truth, rows = read(path)
         if "without_" in path.name or "+" in truth:
             continue
         for name, method in methods.items():
-            ranked = method(y, own, effects)
+            ranked = method(y, own, effects, rows)
             if truth:
                 first[name].append(ranked[:1] == [truth])
                 three[name].append(truth in ranked[:3])

@@ -1,0 +1,59 @@
+//! The question of a case, put to the diagnosis.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use greylag::model::GreyBox;
+use greylag::sysid::diagnose::{Candidate, Detail, Diagnosis, Options, diagnose};
+use greylag::sysid::reconstruction::Reconstruction;
+
+use crate::cases::Case;
+use crate::record::Record;
+
+/// Candidates that are kept of a diagnosis.
+const KEPT: usize = 10;
+
+/// What the diagnosis says.
+pub struct Answer {
+    said: Diagnosis,
+    /// Values of the asserted effects' coefficients, in their own order.
+    pub values: BTreeMap<String, Vec<f64>>,
+}
+
+/// Asks what `model` lacks on the flights of `case`, with so many simulated nulls or as many as usual.
+pub fn ask(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    case: &Case,
+    nulls: Option<usize>,
+) -> Result<Answer> {
+    let usual = Options::default();
+    let options = Options {
+        seed: case.seed,
+        without: case.without.clone(),
+        detail: Detail::Lean,
+        nulls: nulls.unwrap_or(usual.nulls),
+        ..usual
+    };
+    let said = diagnose(model, flights, &options, &|_| ())?;
+    let asserted = said.effects.iter().filter(|c| c.asserted);
+    let values = asserted.map(|c| (c.id.clone(), c.parameters.iter().map(|p| p.value).collect()));
+    let values = values.collect();
+    Ok(Answer { said, values })
+}
+
+impl Answer {
+    /// Notes what is kept.
+    pub fn write_into(&self, record: &mut Record) {
+        let effects = &self.said.effects;
+        let id = |c: &Candidate| c.id.clone();
+        record.verdict = format!("{:?}", self.said.verdict).to_lowercase();
+        record.ranked = effects.iter().take(KEPT).map(id).collect();
+        record.asserted = effects.iter().filter(|c| c.asserted).map(id).collect();
+        record.evidence = effects.iter().take(KEPT).map(|c| [c.evidence, c.threshold]).collect();
+        let told = effects.iter().enumerate().filter(|(k, c)| *k == 0 || c.asserted);
+        record.alike = told.map(|(_, c)| (id(c), c.indistinguishable_from.clone())).collect();
+        let least = |c: &Candidate| Some((c.id.clone(), c.minimum_detectable?));
+        record.minimum_detectable = effects.iter().filter_map(least).collect();
+    }
+}

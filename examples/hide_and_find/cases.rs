@@ -1,0 +1,153 @@
+//! The cases of the campaign: what is hidden, how much of it, and what the catalogue is robbed of.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use greylag::num::statistics::quantile;
+use greylag::num::stream::stream;
+use greylag::sim::missing::{KINDS, Kind, Missing};
+use rand::RngExt;
+
+use crate::record::Record;
+
+/// Amplitudes as multiples of the minimum detectable one.
+pub const FACTORS: [f64; 3] = [1.0, 2.0, 5.0];
+/// Amplitude of both effects of a pair, and of one that the catalogue lacks, likewise.
+const CLEAR: f64 = 5.0;
+/// Share of the largest clear amplitude that is taken for the minimum detectable one as long as no
+/// null has said what it is.
+const ASSUMED: f64 = 0.1;
+
+/// One case.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// `nulls`, `effects`, `without` or `pairs`.
+    pub part: &'static str,
+    /// What is missing.
+    pub missing: Vec<Missing>,
+    /// Amplitude as a multiple of the minimum detectable one; 0 for nulls.
+    pub factor: f64,
+    /// Ids that the catalogue is robbed of.
+    pub without: Vec<String>,
+    /// What everything is drawn from.
+    pub seed: u64,
+}
+
+impl Case {
+    /// Its name in the results.
+    pub fn key(&self) -> String {
+        let ids: Vec<&str> = self.missing.iter().map(|m| m.id).collect();
+        format!("{}/{}/x{}/{}", self.part, ids.join("+"), self.factor, self.seed)
+    }
+
+    /// The ids that are to be found.
+    pub fn truth(&self) -> Vec<String> {
+        let acts = |m: &&Missing| m.amplitude != 0.0;
+        self.missing.iter().filter(acts).map(|m| m.id.to_owned()).collect()
+    }
+}
+
+/// The minimum detectable amplitude of each effect: the median over the nulls.
+pub struct Seen(BTreeMap<String, f64>);
+
+impl Seen {
+    /// What the nulls among `records` say.
+    pub fn of(records: &[Record]) -> Seen {
+        let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+        for record in records.iter().filter(|r| r.part == "nulls") {
+            for (id, least) in &record.minimum_detectable {
+                all.entry(id.clone()).or_default().push(*least);
+            }
+        }
+        Seen(all.into_iter().map(|(id, least)| (id, quantile(&least, 0.5))).collect())
+    }
+
+    /// The amplitude of `factor` times the minimum detectable one, its sign drawn where it may have
+    /// either.
+    fn amplitude(&self, kind: &Kind, factor: f64, seed: u64) -> f64 {
+        let [low, high] = kind.clear;
+        let (largest, sign) = (low.abs().max(high.abs()), (low + high).signum());
+        let least = self.0.get(kind.id).copied().filter(|x| x.is_finite() && *x > 0.0);
+        let size = match kind.id {
+            // it cannot be hidden in part
+            "lift_stall" => return 1.0,
+            // a slower rate is more of it
+            "rate_limit" => least.unwrap_or(largest / ASSUMED.sqrt()) / factor,
+            _ => factor * least.unwrap_or(ASSUMED * largest),
+        };
+        let flip = kind.either_sign && stream(seed, &[83]).random::<bool>();
+        kind.allowed(if flip { -sign * size } else { sign * size })
+    }
+
+    fn missing(&self, kind: &Kind, factor: f64, seed: u64) -> Option<Missing> {
+        Missing::new(kind.id, self.amplitude(kind, factor, seed)).ok()
+    }
+}
+
+/// Flights on which nothing is missing. In every other one aircraft and model both lack what the
+/// aircraft has of its own, so that all effects are candidates in some.
+pub fn nulls(seeds: Range<u64>) -> Vec<Case> {
+    let absent = |id: &str| Missing::new(id, 0.0).ok();
+    let case = |seed: u64| Case {
+        part: "nulls",
+        missing: if seed.is_multiple_of(2) {
+            Vec::new()
+        } else {
+            ["drag_beta2", "drag_elevator_abs"].iter().filter_map(|id| absent(id)).collect()
+        },
+        factor: 0.0,
+        without: Vec::new(),
+        seed,
+    };
+    seeds.map(case).collect()
+}
+
+/// Each effect at each amplitude.
+pub fn effects(seeds: Range<u64>, seen: &Seen, wanted: impl Fn(&str) -> bool) -> Vec<Case> {
+    let mut all = Vec::new();
+    for seed in seeds {
+        for kind in KINDS.iter().filter(|kind| wanted(kind.id)) {
+            let factors = if kind.id == "lift_stall" { &FACTORS[2..] } else { &FACTORS };
+            for &factor in factors {
+                all.extend(seen.missing(kind, factor, seed).map(|missing| Case {
+                    part: "effects",
+                    missing: vec![missing],
+                    factor,
+                    without: Vec::new(),
+                    seed,
+                }));
+            }
+        }
+    }
+    all
+}
+
+/// Each effect, clear to see, with a catalogue that does not have it.
+pub fn without(seeds: Range<u64>, seen: &Seen, wanted: impl Fn(&str) -> bool) -> Vec<Case> {
+    let clear = |case: &Case| case.factor == CLEAR;
+    let robbed = |case: Case| Case { part: "without", without: case.truth(), ..case };
+    effects(seeds, seen, wanted).into_iter().filter(clear).map(robbed).collect()
+}
+
+/// Pairs of effects, as many a seed as there are effects, each with another drawn from the seed.
+pub fn pairs(seeds: Range<u64>, seen: &Seen, wanted: impl Fn(&str) -> bool) -> Vec<Case> {
+    let mut all = Vec::new();
+    for seed in seeds {
+        let mut random = stream(seed, &[84]);
+        let by = random.random_range(1..KINDS.len() as u32) as usize;
+        for (k, kind) in KINDS.iter().enumerate().filter(|(_, kind)| wanted(kind.id)) {
+            let other = KINDS[(k + by) % KINDS.len()];
+            let both = [kind, &other].map(|kind| seen.missing(kind, CLEAR, seed));
+            if let [Some(a), Some(b)] = both {
+                all.push(Case {
+                    part: "pairs",
+                    missing: vec![a, b],
+                    factor: CLEAR,
+                    without: Vec::new(),
+                    seed,
+                });
+            }
+        }
+    }
+    all
+}

@@ -1,0 +1,121 @@
+//! The regression behind a case as CSV, for other methods to try their hand at the same signals.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use greylag::model::GreyBox;
+use greylag::physics::{effects, inputs};
+use greylag::sim::design::{Suspect, alternatives};
+use greylag::sysid::compare::flight::Prepared;
+use greylag::sysid::compare::weak::{Series, channels, columns};
+
+use crate::cases::Case;
+use crate::search::Flown;
+
+/// Channels of the regression: D, L, Y, l, m, n.
+const CHANNELS: usize = 6;
+
+/// A column over all windows of all flights, channel after channel within a flight.
+struct Column {
+    name: String,
+    values: Vec<f64>,
+}
+
+/// Writes `KEY.csv`: a row a window and channel, scaled by the channel's noise. `y` is measured less
+/// predicted by the starting model; `prior:…` are the columns of its coefficients times their prior
+/// widths, `bias:…` constants, `candidate:ID:k` what the effects of the catalogue would add.
+pub fn write(folder: &Path, case: &Case, flown: &Flown) -> Result<()> {
+    let flights: Vec<Prepared> =
+        flown.training.iter().map(|f| Prepared::new(f, 5.0)).collect::<Result<_, _>>()?;
+    let model = &flown.model;
+    let scales: Vec<[f64; CHANNELS]> = flights.iter().map(|f| noise(&channels(model, f))).collect();
+    let gaps = |with: &GreyBox| -> Vec<f64> {
+        flights.iter().zip(&scales).flat_map(|(f, s)| scaled(&channels(with, f), s)).collect()
+    };
+    let lacks = gaps(model);
+    let mut all = prior(model, &flights, &scales);
+    for id in candidates(model, &case.without) {
+        let suspect = Suspect { id: id.into(), values: Vec::new() };
+        // an effect of which nobody knows how large it may be is no candidate here
+        let Ok(ways) = alternatives(model, &suspect) else { continue };
+        for (k, with) in ways.iter().flatten().enumerate() {
+            let values = lacks.iter().zip(gaps(with)).map(|(a, b)| a - b).collect();
+            all.push(Column { name: format!("candidate:{id}:{k}"), values });
+        }
+    }
+    let name = case.key().replace(['/', '+'], "_");
+    let path = folder.join(format!("{name}.csv"));
+    std::fs::write(&path, text(&case.truth(), &lacks, &all))
+        .with_context(|| format!("writing {}", path.display()))
+}
+
+/// Effects of the catalogue that the model lacks.
+fn candidates<'a>(
+    model: &'a GreyBox,
+    without: &'a [String],
+) -> impl Iterator<Item = &'static str> + 'a {
+    let forces = effects::Kind::ALL.iter().map(|kind| kind.describe());
+    let inputs = inputs::Kind::ALL.iter().map(|kind| kind.describe());
+    let all = forces.chain(inputs).filter(|about| about.entry.is_some()).map(|about| about.id);
+    all.filter(|id| !model.has(id) && !without.iter().any(|w| w == id))
+}
+
+/// Standard deviation of each channel's noise.
+fn noise(series: &[Series]) -> [f64; CHANNELS] {
+    let mut scale = [f64::INFINITY; CHANNELS];
+    for s in series.iter().filter(|s| (s.channel as usize) < CHANNELS) {
+        scale[s.channel as usize] = s.noise_variance.sqrt();
+    }
+    scale
+}
+
+/// Measured less predicted in units of noise.
+fn scaled(series: &[Series], scale: &[f64; CHANNELS]) -> Vec<f64> {
+    let own = series.iter().filter(|s| (s.channel as usize) < CHANNELS);
+    own.flat_map(|s| {
+        let scale = scale[s.channel as usize];
+        let both = s.measured.iter().zip(&s.predicted);
+        both.map(move |(m, p)| (m - p) / scale).collect::<Vec<_>>()
+    })
+    .collect()
+}
+
+/// The columns of the model's own coefficients and of constant sensor errors.
+fn prior(model: &GreyBox, flights: &[Prepared], scales: &[[f64; CHANNELS]]) -> Vec<Column> {
+    let linear = model.linear();
+    let found: Vec<_> = flights.iter().map(|f| columns(model, f)).collect();
+    let mut all = Vec::new();
+    for (k, c) in model.coefficients().iter().enumerate().filter(|(k, _)| linear[*k]) {
+        if c.width() > 0.0 {
+            let of = found.iter().zip(scales).flat_map(|(columns, scale)| {
+                let channel =
+                    |n: usize| columns.values[k][n].iter().map(move |x| c.width() * x / scale[n]);
+                (0..CHANNELS).flat_map(channel).collect::<Vec<_>>()
+            });
+            all.push(Column { name: format!("prior:{}", c.name), values: of.collect() });
+        }
+    }
+    for wanted in 0..CHANNELS {
+        let one = |n: usize| f64::from(u8::from(n == wanted));
+        let of = flights.iter().flat_map(|f| {
+            (0..CHANNELS).flat_map(move |n| std::iter::repeat_n(one(n), f.windows.len()))
+        });
+        all.push(Column { name: format!("bias:{wanted}"), values: of.collect() });
+    }
+    all
+}
+
+fn text(truth: &[String], lacks: &[f64], all: &[Column]) -> String {
+    let mut out = format!("# truth: {}\ny", truth.join("+"));
+    all.iter().for_each(|column| out += &format!(",{}", column.name));
+    out.push('\n');
+    for (row, y) in lacks.iter().enumerate() {
+        let _ = write!(out, "{y:.5e}");
+        all.iter().for_each(|column| {
+            let _ = write!(out, ",{:.5e}", column.values[row]);
+        });
+        out.push('\n');
+    }
+    out
+}

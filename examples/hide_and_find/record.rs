@@ -1,0 +1,131 @@
+//! What is kept of a case: one line of JSON.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+
+use crate::cases::Case;
+
+/// A parameter of an asserted true effect, after the fit.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct Found {
+    /// `effect.coefficient`.
+    pub name: String,
+    /// The hidden value.
+    pub truth: f64,
+    /// The fitted one.
+    pub value: f64,
+    /// Its 95 % interval.
+    pub ci95: [f64; 2],
+}
+
+/// Free-run errors over 5 s on held-out flights, scaled by x_c.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+pub struct HeldOut {
+    /// Of the tuned prior.
+    pub tuned: f64,
+    /// With what was asserted.
+    pub amended: f64,
+    /// With what is true, fitted in the same way.
+    pub oracle: f64,
+}
+
+/// Seconds that the steps of a case took.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize)]
+pub struct Seconds {
+    /// Flying, logging, reconstructing.
+    pub flights: f64,
+    /// The diagnosis.
+    pub diagnose: f64,
+    /// The fits.
+    pub amend: f64,
+}
+
+/// A case with what came of it.
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+pub struct Record {
+    /// The case's name.
+    pub key: String,
+    /// `nulls`, `effects`, `without` or `pairs`.
+    pub part: String,
+    /// What was missing.
+    pub truth: Vec<String>,
+    /// How much of it.
+    pub amplitudes: Vec<f64>,
+    /// The same as a multiple of the minimum detectable amplitude.
+    pub factor: f64,
+    /// Why there is no answer, if there is none.
+    pub failure: Option<String>,
+    /// The answer in one word.
+    pub verdict: String,
+    /// Candidates as the diagnosis lists them.
+    pub ranked: Vec<String>,
+    /// Those that it asserts.
+    pub asserted: Vec<String>,
+    /// For each of those, and for the first, what cannot be told from it.
+    pub alike: BTreeMap<String, Vec<String>>,
+    /// Evidence and threshold of the first ten.
+    pub evidence: Vec<[f64; 2]>,
+    /// Smallest amplitude of each candidate that would have shown.
+    pub minimum_detectable: BTreeMap<String, f64>,
+    /// Parameters of true effects that were asserted.
+    pub parameters: Vec<Found>,
+    /// Errors on held-out flights.
+    pub held_out: Option<HeldOut>,
+    /// How long it took.
+    pub seconds: Seconds,
+}
+
+impl Record {
+    /// What is known before the search.
+    pub fn of(case: &Case) -> Record {
+        Record {
+            key: case.key(),
+            part: case.part.into(),
+            truth: case.truth(),
+            amplitudes: case.missing.iter().map(|m| m.amplitude).collect(),
+            factor: case.factor,
+            ..Record::default()
+        }
+    }
+
+    /// A case that could not be flown or read.
+    pub fn failed(case: &Case, why: &anyhow::Error) -> Record {
+        Record { failure: Some(format!("{why:#}")), ..Record::of(case) }
+    }
+
+    /// Whether `id` is asserted, itself or by one that cannot be told from it.
+    pub fn names(&self, id: &str) -> bool {
+        self.asserted.iter().any(|a| a == id || self.is_alike(a, id))
+    }
+
+    /// Whether the diagnosis says that `other` cannot be told from `id`.
+    pub fn is_alike(&self, id: &str, other: &str) -> bool {
+        self.alike.get(id).is_some_and(|alike| alike.iter().any(|a| a == other))
+    }
+}
+
+/// The records in a file; none if there is no file yet. A last line that was cut short is left out.
+pub fn load(path: &Path) -> Result<Vec<Record>> {
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
+    let count = text.lines().count();
+    let mut records = Vec::with_capacity(count);
+    for (k, line) in text.lines().enumerate() {
+        match serde_json::from_str(line) {
+            Ok(record) => records.push(record),
+            Err(_) if k + 1 == count => {
+                eprintln!("the last line of the results is cut short: done again")
+            }
+            Err(error) => {
+                return Err(error).with_context(|| format!("{} line {}", path.display(), k + 1));
+            }
+        }
+    }
+    Ok(records)
+}
