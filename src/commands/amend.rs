@@ -13,9 +13,12 @@ use crate::commands::intake::{Intake, LogArguments};
 use crate::model::GreyBox;
 use crate::model::edit::{Edit, Number};
 use crate::physics::{effects, inputs};
+use crate::report::AmendmentReport;
 use crate::sysid::amend::{self, Added, Amended, Amendment, Parameter, Refused};
-use crate::sysid::compare::HorizonScore;
+use crate::sysid::compare::{self, HorizonScore, compare};
+use crate::sysid::diagnose::{self, Candidate, diagnose};
 use crate::sysid::reconstruct::ActuatorClock;
+use crate::sysid::reconstruction::Reconstruction;
 
 /// Exit status when an effect was refused, a log left out, or flights contradict one another.
 const IN_DOUBT: u8 = 2;
@@ -55,7 +58,10 @@ pub struct Arguments {
     /// Folder for model.toml, the airframe and amend.json; made if there is none.
     #[arg(long)]
     out: PathBuf,
-    /// Replace files of the folder that exist.
+    /// Write the report, one HTML page.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Replace files that exist.
     #[arg(long)]
     force: bool,
 }
@@ -82,6 +88,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let path = shipped(&arguments.model);
     let overwrite = arguments.force.into();
     let model = GreyBox::load(&path)?;
+    if let Some(path) = &arguments.report {
+        files::writable(path, overwrite)?;
+    }
     let places = Places::new(&path, &arguments.out, overwrite)?;
     if let Some(twice) = arguments.hold_out.iter().find(|p| arguments.logs.paths.contains(p)) {
         bail!("{} cannot be fitted to and held out at once; name it in one place", twice.display());
@@ -119,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         more.flights
     };
     let options = amend::Options {
-        effects: wanted(arguments)?,
+        effects: wanted(arguments, &model, &flights)?,
         refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
         ..amend::Options::default()
     };
@@ -139,7 +148,36 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         );
     }
     places.write(&model, &amended, &logs, &hold_out, overwrite)?;
+    if let Some(path) = &arguments.report {
+        files::write(path, &page(arguments, &model, &amended, &tests, &places)?, overwrite)?;
+    }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+/// The report as HTML, with how the errors grow on the flights that the fit did not see.
+fn page(
+    arguments: &Arguments,
+    model: &GreyBox,
+    amended: &Amended,
+    tests: &[Reconstruction],
+    places: &Places,
+) -> Result<String> {
+    let models = [model.clone(), amended.tuned.clone(), amended.model.clone()];
+    let held_out = compare(&models, tests, &compare::Options::default(), &|_| ())?;
+    let paths = arguments.logs.paths.iter().chain(&arguments.hold_out);
+    let report = AmendmentReport {
+        title: format!("{} amended", model.name),
+        amendment: &amended.amendment,
+        held_out: Some(&held_out),
+        model_files: vec![
+            arguments.model.display().to_string(),
+            places.model().display().to_string(),
+        ],
+        log_files: paths.map(|p| p.display().to_string()).collect(),
+        command_line: files::command_line(),
+        versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
+    };
+    Ok(report.page().render())
 }
 
 /// Logs to fit to, logs to judge by: the last one if none are named, none of a single one.
@@ -150,14 +188,35 @@ fn divided(logs: &[PathBuf], hold_out: &[PathBuf]) -> (Vec<PathBuf>, Vec<PathBuf
     }
 }
 
-fn wanted(arguments: &Arguments) -> Result<Vec<Added>> {
-    if arguments.accept {
-        bail!(
-            "--accept needs a diagnosis, which this version cannot make yet; name the effects with \
-             --effect"
-        );
+/// The effects to add: those named, or those that a diagnosis of the flights asserts.
+fn wanted(
+    arguments: &Arguments,
+    model: &GreyBox,
+    flights: &[Reconstruction],
+) -> Result<Vec<Added>> {
+    if !arguments.accept {
+        let named = |id: &String| Added { id: id.clone(), start: None };
+        return Ok(arguments.effects.iter().map(named).collect());
     }
-    Ok(arguments.effects.iter().map(|id| Added { id: id.clone(), start: None }).collect())
+    let options = diagnose::Options::default();
+    let diagnosis = diagnose(model, flights, &options, &|doing| eprintln!("{doing}"))?;
+    let asserted: Vec<Added> =
+        diagnosis.effects.iter().filter(|c| c.asserted).map(accepted).collect();
+    if asserted.is_empty() {
+        let said = diagnosis.sentences.join(" ");
+        bail!("the diagnosis asserts no effect, so there is none to accept; it says: {said}");
+    }
+    Ok(asserted)
+}
+
+/// An asserted effect, to be searched for near where the diagnosis has it.
+fn accepted(candidate: &Candidate) -> Added {
+    let coefficients = effects::Kind::from_id(&candidate.id)
+        .map(|k| k.describe().coefficients)
+        .or_else(|| inputs::Kind::from_id(&candidate.id).map(|k| k.describe().coefficients));
+    let value = |name: &str| candidate.parameters.iter().find(|p| p.name == name).map(|p| p.value);
+    let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
+    Added { id: candidate.id.clone(), start }
 }
 
 fn hashed(paths: &[PathBuf]) -> Result<Vec<Hashed>> {

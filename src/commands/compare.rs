@@ -81,7 +81,7 @@ fn page(arguments: &Arguments, comparison: &Comparison) -> String {
         comparison,
         model_files: paths(&arguments.models),
         log_files: paths(&arguments.logs.paths),
-        command_line: std::env::args().skip(1).fold("greylag".into(), |line, a| line + " " + &a),
+        command_line: files::command_line(),
         versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
     };
     report.page().render()

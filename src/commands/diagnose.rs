@@ -9,8 +9,11 @@ use comfy_table::{CellAlignment, Table};
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
 use crate::model::GreyBox;
+use crate::report::DiagnosisReport;
+use crate::sysid::compare::{self, compare};
 use crate::sysid::diagnose::{Candidate, Diagnosis, Options, diagnose};
 use crate::sysid::reconstruct::ActuatorClock;
+use crate::sysid::reconstruction::Reconstruction;
 
 /// Exit status of a diagnosis that had to leave a log out, or whose logs are wrong somewhere.
 const IN_DOUBT: u8 = 2;
@@ -31,6 +34,9 @@ pub struct Arguments {
     /// Write everything that was found as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Write the report, one HTML page.
+    #[arg(long)]
+    report: Option<PathBuf>,
     /// Simulated flights without a missing effect that set the thresholds.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
@@ -40,15 +46,15 @@ pub struct Arguments {
     /// Ids to be left out of the catalogue.
     #[arg(long, num_args = 1..)]
     without: Vec<String>,
-    /// Replace the JSON if it exists.
+    /// Replace the JSON and the report if they exist.
     #[arg(long)]
     force: bool,
 }
 
-/// Reads, reconstructs, diagnoses; prints sentences and table; writes JSON.
+/// Reads, reconstructs, diagnoses; prints sentences and table; writes JSON and report.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    if let Some(path) = &arguments.json {
+    for path in arguments.json.iter().chain(&arguments.report) {
         files::writable(path, overwrite)?;
     }
     let model = GreyBox::load(&shipped(&arguments.model))?;
@@ -70,7 +76,32 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.json {
         files::write(path, &(serde_json::to_string_pretty(&diagnosis)? + "\n"), overwrite)?;
     }
+    if let Some(path) = &arguments.report {
+        files::write(path, &page(arguments, &diagnosis, &model, &flights)?, overwrite)?;
+    }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+/// The report as HTML, with where the model fails as given.
+fn page(
+    arguments: &Arguments,
+    diagnosis: &Diagnosis,
+    model: &GreyBox,
+    flights: &[Reconstruction],
+) -> Result<String> {
+    let models = std::slice::from_ref(model);
+    let failing = compare(models, flights, &compare::Options::default(), &|_| ())?;
+    let report = DiagnosisReport {
+        title: format!("What {} lacks", diagnosis.model),
+        diagnosis,
+        failing: Some(&failing),
+        held_out: None,
+        model_file: arguments.model.display().to_string(),
+        log_files: arguments.logs.paths.iter().map(|p| p.display().to_string()).collect(),
+        command_line: files::command_line(),
+        versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
+    };
+    Ok(report.page().render())
 }
 
 fn print(diagnosis: &Diagnosis) {

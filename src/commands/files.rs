@@ -49,3 +49,8 @@ pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     }
     Ok(())
 }
+
+/// The command line of this run, for reports.
+pub fn command_line() -> String {
+    std::env::args().skip(1).fold("greylag".into(), |line, a| line + " " + &a)
+}

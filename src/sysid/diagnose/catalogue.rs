@@ -33,9 +33,8 @@ pub fn candidates(model: &GreyBox, without: &[String]) -> Vec<Entry> {
         .chain(on_inputs)
         .filter(|e| {
             let about = &e.about;
-            let searched = about
-                .entry
-                .is_some_and(|entry| about.shape == 0 || !entry.starts.is_empty());
+            let searched =
+                about.entry.is_some_and(|entry| about.shape == 0 || !entry.starts.is_empty());
             searched
                 && about.table.is_none()
                 && !model.has(about.id)
@@ -75,7 +74,8 @@ pub fn columns(
     let made: Vec<Option<Vec<Vec<Column>>>> =
         places.par_iter().map(|(e, values)| curved_columns(model, flights, e, values)).collect();
     for e in curved {
-        let mut trial = Trial { id: e.about.id, points: Vec::new(), support: 0.0, channels: [false; 6] };
+        let mut trial =
+            Trial { id: e.about.id, points: Vec::new(), support: 0.0, channels: [false; 6] };
         for ((of, values), made) in places.iter().zip(&made) {
             if let (true, Some(made)) = (of.about.id == e.about.id, made) {
                 all.add_point(&mut trial, e, values, made);
@@ -111,8 +111,12 @@ impl Columns {
         let mut everything = model.clone();
         let mut joined = Vec::new();
         for e in entries {
-            let values: Vec<f64> =
-                e.about.coefficients.iter().map(|c| 0.0_f64.clamp(c.bounds.0, c.bounds.1)).collect();
+            let values: Vec<f64> = e
+                .about
+                .coefficients
+                .iter()
+                .map(|c| 0.0_f64.clamp(c.bounds.0, c.bounds.1))
+                .collect();
             if everything.join(e.about.id, &values).is_ok() {
                 joined.push((*e, values));
             }
@@ -158,7 +162,11 @@ impl Columns {
         trial.points.push(Point {
             values: values.to_vec(),
             contribution: Some(first),
-            free: free(entry).iter().enumerate().map(|(i, &k)| (k, first + 1 + i, reach(k))).collect(),
+            free: free(entry)
+                .iter()
+                .enumerate()
+                .map(|(i, &k)| (k, first + 1 + i, reach(k)))
+                .collect(),
         });
     }
 
@@ -170,10 +178,12 @@ impl Columns {
             .flat_map(|p| p.free.iter().map(|f| f.1).chain(p.contribution))
             .collect();
         for channel in 0..CHANNELS {
-            let acts = self.columns.iter().any(|list| own.iter().any(|c| !list[*c][channel].is_empty()));
+            let acts =
+                self.columns.iter().any(|list| own.iter().any(|c| !list[*c][channel].is_empty()));
             trial.channels[channel] = acts;
             if acts {
-                let finite = |f: &Ready| f.residual[channel].iter().filter(|x| x.is_finite()).count();
+                let finite =
+                    |f: &Ready| f.residual[channel].iter().filter(|x| x.is_finite()).count();
                 // neighbouring windows overlap by half
                 trial.support += 0.5 * flights.iter().map(finite).sum::<usize>() as f64;
             }

@@ -79,8 +79,7 @@ impl Cells {
 
 fn cell(flight: usize, channel: usize, ready: &Ready, block_of: &[usize]) -> Cell {
     let values = &ready.residual[channel];
-    let windows: Vec<usize> =
-        (0..values.len()).filter(|w| values[*w].is_finite()).collect();
+    let windows: Vec<usize> = (0..values.len()).filter(|w| values[*w].is_finite()).collect();
     let segment = |w: usize| ready.acting.windows[w].segment;
     let runs = (1..=windows.len())
         .filter(|&k| {

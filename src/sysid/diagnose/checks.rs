@@ -135,7 +135,8 @@ pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<[f64; 2]> {
     let columns: Vec<usize> = point.free.iter().map(|f| f.1).collect();
     let first = point.free[0].0;
     // how much more the blocks scatter than the noise alone
-    let whole = DMatrix::from_fn(columns.len(), columns.len(), |i, j| p.total[(columns[i], columns[j])]);
+    let whole =
+        DMatrix::from_fn(columns.len(), columns.len(), |i, j| p.total[(columns[i], columns[j])]);
     let alone = scaled_inverse(&whole).map_or(f64::NAN, |m| m[(0, 0)].sqrt());
     let inflation = (score.deviations[first] / alone).max(1.0);
     (0..round.flights.len())
@@ -148,7 +149,8 @@ pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<[f64; 2]> {
             let product = DVector::from_iterator(
                 columns.len(),
                 columns.iter().map(|c| {
-                    let known: f64 = score.weights.iter().map(|(d, w)| w * grams.total[(*c, *d)]).sum();
+                    let known: f64 =
+                        score.weights.iter().map(|(d, w)| w * grams.total[(*c, *d)]).sum();
                     grams.total[(*c, last)] - known
                 }),
             );

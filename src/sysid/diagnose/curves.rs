@@ -26,7 +26,9 @@ pub fn curve(
     let (mut made, mut scatter, mut regimes) = (Vec::new(), Vec::new(), Vec::new());
     for ((flight, own), residual) in round.flights.iter().zip(contribution).zip(&residual) {
         for (w, window) in flight.acting.windows.iter().enumerate() {
-            let (Some(x), Some(r)) = (own[channel].get(w), residual[channel].get(w)) else { continue };
+            let (Some(x), Some(r)) = (own[channel].get(w), residual[channel].get(w)) else {
+                continue;
+            };
             if r.is_finite() {
                 made.push(*x);
                 scatter.push(r + if left { 0.0 } else { *x });
@@ -65,7 +67,8 @@ fn bins(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     let mut order: Vec<usize> = (0..x.len()).collect();
     order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));
     let size = order.len().div_ceil(PLACES).max(1);
-    let mean = |bin: &[usize], of: &[f64]| bin.iter().map(|k| of[*k]).sum::<f64>() / bin.len() as f64;
+    let mean =
+        |bin: &[usize], of: &[f64]| bin.iter().map(|k| of[*k]).sum::<f64>() / bin.len() as f64;
     order.chunks(size).map(|bin| [mean(bin, x), mean(bin, y)]).collect()
 }
 

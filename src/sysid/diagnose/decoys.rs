@@ -57,8 +57,14 @@ fn evidence(round: &Round, names: &[(String, Trial)], lists: &[Vec<Column>]) -> 
             known.chain(own).chain(residual.map(|(_, c)| (last, c.clone()))).collect()
         })
         .collect();
-    let Some(p) = Projected::new(&round.cells, &placed, last, &round.known, &round.noise, &round.shared[..na])
-    else {
+    let Some(p) = Projected::new(
+        &round.cells,
+        &placed,
+        last,
+        &round.known,
+        &round.noise,
+        &round.shared[..na],
+    ) else {
         return Vec::new();
     };
     let grams = p.grams();

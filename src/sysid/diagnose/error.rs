@@ -41,7 +41,9 @@ pub enum DiagnoseError {
         model: String,
     },
     /// An effect to be left out is not one of the catalogue.
-    #[error("cannot leave out effect {id:?}: it is unknown; `greylag effects list` names those there are")]
+    #[error(
+        "cannot leave out effect {id:?}: it is unknown; `greylag effects list` names those there are"
+    )]
     UnknownEffect {
         /// What was asked for.
         id: String,

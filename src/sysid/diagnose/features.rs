@@ -80,8 +80,17 @@ fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES
     let ago = &instants[index.saturating_sub((AGO_S / flight.dt).round() as usize)].controls;
     let (s, z) = (&i.state, &i.controls);
     [
-        s.alpha, s.beta, s.airspeed, s.p, s.q, s.r, z.aileron, z.elevator, z.throttle,
-        ago.aileron - z.aileron, ago.elevator - z.elevator,
+        s.alpha,
+        s.beta,
+        s.airspeed,
+        s.p,
+        s.q,
+        s.r,
+        z.aileron,
+        z.elevator,
+        z.throttle,
+        ago.aileron - z.aileron,
+        ago.elevator - z.elevator,
     ]
 }
 

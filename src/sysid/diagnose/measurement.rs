@@ -28,8 +28,7 @@ pub fn measurement(flights: &[&Reconstruction]) -> Vec<Measurement> {
 }
 
 fn one(flight: &str, n: &Nuisance) -> Option<Measurement> {
-    let (_, id, nominal, allowed) =
-        KINDS.iter().find(|(prefix, ..)| n.name.starts_with(prefix))?;
+    let (_, id, nominal, allowed) = KINDS.iter().find(|(prefix, ..)| n.name.starts_with(prefix))?;
     let off = (n.value - nominal).abs();
     let decided = *id != "actuators_late";
     Some(Measurement {

@@ -55,10 +55,8 @@ fn one_channel(
         let rows: Vec<Rows> =
             own.iter().map(|k| rows(&cells.list[*k], rich, last, &whitener)).collect();
         let Some(fit) = Fit::new(&rows) else { break };
-        let raw: Vec<Vec<f64>> = own
-            .iter()
-            .flat_map(|k| raw_residual(&cells.list[*k], rich, last, &fit))
-            .collect();
+        let raw: Vec<Vec<f64>> =
+            own.iter().flat_map(|k| raw_residual(&cells.list[*k], rich, last, &fit)).collect();
         if pass == PASSES {
             let lists: Vec<Vec<f64>> = own
                 .iter()
@@ -69,8 +67,7 @@ fn one_channel(
             let square: f64 = lists.iter().flatten().map(|x| x * x).sum();
             let level = (square / count as f64).sqrt();
             let level = if level.is_finite() && level > 0.0 { level } else { 1.0 };
-            let lists =
-                lists.iter().map(|l| l.iter().map(|x| x / level).collect()).collect();
+            let lists = lists.iter().map(|l| l.iter().map(|x| x / level).collect()).collect();
             return (whitener.scaled(level), lists);
         }
         whitener = Whitener::fit(&raw, ORDER);

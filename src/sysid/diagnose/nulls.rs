@@ -27,8 +27,7 @@ pub fn draw(p: &Projected, seed: u64, k: usize) -> Draw {
             block
         })
         .collect();
-    let prior =
-        DVector::from_fn(p.prior_root.ncols(), |_, _| StandardNormal.sample(&mut random));
+    let prior = DVector::from_fn(p.prior_root.ncols(), |_, _| StandardNormal.sample(&mut random));
     total += &p.prior_root * prior;
     Draw { total, blocks }
 }
@@ -72,9 +71,8 @@ mod tests {
         // the maximum of 20 chi-square-like draws E = −2 ln U: its 99 % quantile is −2 ln(1 − 0.99^(1/20))
         let exact = -2.0 * (1.0 - 0.99_f64.powf(1.0 / 20.0)).ln();
         let mut random = stream(5, &[]);
-        let mut largest = || {
-            (0..20).map(|_| -2.0 * random.random::<f64>().ln()).fold(0.0, f64::max)
-        };
+        let mut largest =
+            || (0..20).map(|_| -2.0 * random.random::<f64>().ln()).fold(0.0, f64::max);
         let sample: Vec<f64> = (0..4000).map(|_| largest()).collect();
         let found = threshold(&sample, 0.01);
         // 4000 draws: the scale is good to about 2 %

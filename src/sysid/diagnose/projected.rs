@@ -93,10 +93,8 @@ impl Projected {
         }
         let covariance = scaled_inverse(&aa)?;
         let taken = &covariance * &ay;
-        let rows: Vec<DMatrix<f64>> = whitened
-            .par_iter()
-            .map(|(places, z)| project(places, z, na, ny, &taken))
-            .collect();
+        let rows: Vec<DMatrix<f64>> =
+            whitened.par_iter().map(|(places, z)| project(places, z, na, ny, &taken)).collect();
         let mut blocks = block_grams(cells, &rows, ny);
         let of_known = DVector::from_iterator(na, (0..na).map(shared_of));
         let own = DVector::from_iterator(ny - 1, (na..last).map(shared_of));

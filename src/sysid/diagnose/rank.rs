@@ -79,10 +79,8 @@ impl Trial {
         let inverse = scaled_inverse(&gram)?;
         let mut product = pick(&draw.total, &columns);
         if let Some(own) = point.contribution {
-            product -= DVector::from_iterator(
-                columns.len(),
-                columns.iter().map(|c| p.total[(*c, own)]),
-            );
+            product -=
+                DVector::from_iterator(columns.len(), columns.iter().map(|c| p.total[(*c, own)]));
         }
         let step = self.within(point, &gram, &product, &inverse * &product);
         let mut weights: Vec<(usize, f64)> =
@@ -203,13 +201,7 @@ fn joint_wald(
 }
 
 /// The same for the amount of a fixed contribution.
-fn ray_wald(
-    p: &Grams,
-    draw: &Draw,
-    weights: &[(usize, f64)],
-    linear: f64,
-    square: f64,
-) -> f64 {
+fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, square: f64) -> f64 {
     if square <= 0.0 {
         return 0.0;
     }

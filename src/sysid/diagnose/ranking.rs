@@ -31,7 +31,9 @@ pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
         let Some(about) = describe(trial.id) else { continue };
         let mut candidate = open(found, trial, score, &about);
         if round.at_bound(found.scores[place].0, score) {
-            candidate.refused.push("a constant lies at the end of what is physically possible".into());
+            candidate
+                .refused
+                .push("a constant lies at the end of what is physically possible".into());
         }
         if options.detail == Detail::Full && place < RUNNERS_UP {
             candidate.curve = curves::curve(

@@ -45,7 +45,8 @@ struct Fold {
 
 /// What a flexible model could remove of what `round` leaves; the thresholds from `count` draws of noise.
 pub fn remainder(round: &Round, count: usize, level: f64) -> Remainder {
-    let channels: Vec<Option<Channel>> = (0..6).into_par_iter().map(|c| channel(round, c)).collect();
+    let channels: Vec<Option<Channel>> =
+        (0..6).into_par_iter().map(|c| channel(round, c)).collect();
     let gain = |sign: Option<&[f64]>| -> [f64; 6] {
         std::array::from_fn(|c| channels[c].as_ref().map_or(0.0, |ch| ch.gain(sign)))
     };
@@ -97,7 +98,9 @@ fn channel(round: &Round, channel: usize) -> Option<Channel> {
     let count = folds.len();
     for (own, fold) in folds.iter_mut().enumerate() {
         let width = fold.features.ncols();
-        let sum = (0..count).filter(|k| *k != own).fold(DMatrix::zeros(width, width), |s, k| s + &grams[k]);
+        let sum = (0..count)
+            .filter(|k| *k != own)
+            .fold(DMatrix::zeros(width, width), |s, k| s + &grams[k]);
         let scale = sum.trace() / width as f64;
         for ridge in RIDGES {
             let ridged = &sum + DMatrix::identity(width, width) * (ridge * scale + 1e-9);
@@ -109,10 +112,7 @@ fn channel(round: &Round, channel: usize) -> Option<Channel> {
 
 /// Whitened features of unit size and noise of each cell, with what the known unknowns can follow of them
 /// taken out.
-fn projected_features(
-    round: &Round,
-    cells: &[usize],
-) -> Option<Vec<(DMatrix<f64>, DVector<f64>)>> {
+fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<(DMatrix<f64>, DVector<f64>)>> {
     let na = round.known.len();
     let mut all = Vec::new();
     for k in cells {
@@ -169,9 +169,7 @@ impl Channel {
             .iter()
             .map(|f| match signs {
                 None => f.target.clone(),
-                Some(s) => {
-                    DVector::from_fn(f.noise.len(), |i, _| f.noise[i] * s[f.blocks[i]])
-                }
+                Some(s) => DVector::from_fn(f.noise.len(), |i, _| f.noise[i] * s[f.blocks[i]]),
             })
             .collect();
         let products: Vec<DVector<f64>> =

@@ -163,7 +163,9 @@ impl Round {
     /// Whether a free coefficient of the trial ended at its physical bound.
     pub fn at_bound(&self, trial: usize, score: &Score) -> bool {
         let trial = &self.trials[trial];
-        let Some(entry) = self.entries.iter().find(|e| e.about.id == trial.id) else { return false };
+        let Some(entry) = self.entries.iter().find(|e| e.about.id == trial.id) else {
+            return false;
+        };
         trial.points[score.point].free.iter().any(|(index, _, _)| {
             let (low, high) = entry.about.coefficients[*index].bounds;
             let near = 1e-6 * (high - low);
@@ -268,8 +270,7 @@ fn place(placed: &mut [Placed], count: usize, made: &Columns, flights: &[Ready])
 /// The columns of the rich fit: all but the derivatives of nonlinear candidates.
 fn rich(placed: &[Placed], count: usize, trials: &[Trial]) -> Vec<Placed> {
     let curved = trials.iter().flat_map(|t| &t.points).filter(|p| p.contribution.is_some());
-    let left_out: Vec<usize> =
-        curved.flat_map(|p| p.free.iter().map(|f| count + f.1)).collect();
+    let left_out: Vec<usize> = curved.flat_map(|p| p.free.iter().map(|f| count + f.1)).collect();
     let keep = |l: &Placed| l.iter().filter(|(p, _)| !left_out.contains(p)).cloned().collect();
     placed.iter().map(keep).collect()
 }
@@ -345,8 +346,7 @@ fn searched(model: &GreyBox, index: usize) -> bool {
     let Some(about) = model.effects().find(|about| about.id == id) else { return true };
     let entry = Entry { about, operator: false };
     let starts = about.entry.map_or(0, |e| e.starts.len());
-    starts == 0
-        || catalogue::free(&entry).iter().any(|k| about.coefficients[*k].name == own)
+    starts == 0 || catalogue::free(&entry).iter().any(|k| about.coefficients[*k].name == own)
 }
 
 /// The derivative of the prediction by a coefficient that the model is not linear in.

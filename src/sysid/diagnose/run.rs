@@ -57,11 +57,7 @@ pub fn diagnose(
         channels,
         measurement,
         tuned: shares::tuned(&found, model),
-        nulls: Nulls {
-            count: options.nulls,
-            best: found.nulls.clone(),
-            level: options.level,
-        },
+        nulls: Nulls { count: options.nulls, best: found.nulls.clone(), level: options.level },
         decoys,
         learnable_remainder: found.learnable(),
         notes,

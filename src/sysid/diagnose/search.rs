@@ -174,8 +174,7 @@ impl Found {
             let Some(round) = Round::new(problem, model.clone(), &[]) else { return false };
             model = round.tuned();
         }
-        let open: Vec<Entry> =
-            entries.iter().filter(|e| !model.has(e.about.id)).copied().collect();
+        let open: Vec<Entry> = entries.iter().filter(|e| !model.has(e.about.id)).copied().collect();
         let Some(mut round) = Round::new(problem, model, &open) else { return false };
         self.scores = round.rank();
         let nulls = nulls::best(&round.projected, &round.trials, options.seed, options.nulls);
@@ -190,7 +189,8 @@ impl Found {
         let (before, after) = (&self.first_remainder, &self.remainder);
         for effect in self.selected.iter_mut().filter(|s| s.refused.is_empty()) {
             let own = |of: &[f64; 6]| effect.channels.iter().map(|c| of[*c]).sum::<f64>();
-            let significant = effect.channels.iter().any(|c| after.removable[*c] > after.threshold[*c]);
+            let significant =
+                effect.channels.iter().any(|c| after.removable[*c] > after.threshold[*c]);
             let share = own(&after.removable) / own(&before.removable).max(1.0);
             if significant && share > LEFT {
                 effect.refused.push(format!(

@@ -19,8 +19,7 @@ pub const NAMES: [&str; SENSORS] = [
 
 /// Least standard deviations: rad/s, rad, a share, m/s²; a filter that knows only its own errors states
 /// less than it has.
-const FLOOR: [f64; SENSORS - 1] =
-    [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01];
+const FLOOR: [f64; SENSORS - 1] = [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01];
 /// Prior width of the actuators' clock, samples: ±1.5 samples are its 95 % interval.
 const SKEW_SAMPLES: f64 = 0.77;
 

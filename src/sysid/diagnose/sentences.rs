@@ -41,12 +41,19 @@ pub fn sentences(
         ));
     }
     said.extend(effects.iter().filter(|c| !c.refused.is_empty() && c.evidence > c.threshold).map(
-        |c| format!("{} is not asserted although its evidence is {:.0}: {}.", c.id, c.evidence, c.refused.join("; ")),
+        |c| {
+            format!(
+                "{} is not asserted although its evidence is {:.0}: {}.",
+                c.id,
+                c.evidence,
+                c.refused.join("; ")
+            )
+        },
     ));
     if verdict == Verdict::Unexplained {
-        let worst = channels.iter().max_by(|a, b| {
-            a.unexplained_fraction.total_cmp(&b.unexplained_fraction)
-        });
+        let worst = channels
+            .iter()
+            .max_by(|a, b| a.unexplained_fraction.total_cmp(&b.unexplained_fraction));
         said.extend(worst.and_then(|c| {
             let regime = c.worst_regime.as_ref()?;
             Some(format!("Most is left in {}: {regime}.", c.channel))

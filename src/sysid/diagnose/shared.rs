@@ -75,10 +75,13 @@ pub fn products(
         let (places, old) = cell.matrix(&before[cell.flight], whitener);
         let (same, new) = cell.matrix(&after[cell.flight], whitener);
         let column = |place: usize| {
-            let (i, j) = (places.iter().position(|p| *p == place)?, same.iter().position(|p| *p == place)?);
+            let (i, j) =
+                (places.iter().position(|p| *p == place)?, same.iter().position(|p| *p == place)?);
             Some(new.column(j) - old.column(i))
         };
-        let Some(residual) = column(last).filter(|r| r.iter().all(|x| x.is_finite())) else { continue };
+        let Some(residual) = column(last).filter(|r| r.iter().all(|x| x.is_finite())) else {
+            continue;
+        };
         for place in places.iter().filter(|p| **p < last) {
             if let Some(added) = column(*place) {
                 sums[*place] += added.dot(&residual);

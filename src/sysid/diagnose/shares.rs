@@ -16,8 +16,12 @@ const SYMBOLS: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
 /// Every channel that the flights allow.
 pub fn channels(found: &Found) -> Vec<ChannelLeft> {
     let (before, after) = (found.first.tuned_residual(), found.round().tuned_residual());
-    let series: Vec<Vec<weak::Series>> =
-        found.first.flights.iter().map(|f| weak::channels(&found.first.model, &f.measured)).collect();
+    let series: Vec<Vec<weak::Series>> = found
+        .first
+        .flights
+        .iter()
+        .map(|f| weak::channels(&found.first.model, &f.measured))
+        .collect();
     let mut list = Vec::new();
     for (k, id) in ChannelId::ALL.iter().enumerate().take(6) {
         let own: Vec<&weak::Series> =
@@ -29,8 +33,8 @@ pub fn channels(found: &Found) -> Vec<ChannelLeft> {
         }
         let noise = mean(&own.iter().map(|s| s.noise_variance).collect::<Vec<_>>());
         let middle = mean(&measured);
-        let variance = measured.iter().map(|x| (x - middle).powi(2)).sum::<f64>()
-            / measured.len() as f64;
+        let variance =
+            measured.iter().map(|x| (x - middle).powi(2)).sum::<f64>() / measured.len() as f64;
         let share = |residual: &[super::gather::Column]| {
             let squares: Vec<f64> = residual
                 .iter()
