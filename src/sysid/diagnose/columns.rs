@@ -12,8 +12,8 @@ use crate::sysid::compare::weak::{gyroscopic, inertia, to_force_axes};
 use crate::sysid::reconstruction::Instant;
 
 /// Columns of sensor errors: gyros p, q, r, α, β, share of the airspeed, accelerometers x, y, z, then
-/// lateness of the recorded actuators (s).
-pub const SENSORS: usize = 10;
+/// lateness of α, β, airspeed and recorded actuators (s).
+pub const SENSORS: usize = 13;
 
 /// A flight under a model.
 #[derive(Clone, Debug)]
@@ -39,7 +39,7 @@ impl Ready {
             .iter()
             .map(|s| s.iter().map(|at| local::local(model, at, &at.controls)).collect())
             .collect();
-        let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 1, |place, add| {
+        let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 4, |place, add| {
             // the end of a step of RK4 is close to its start
             let here = &locals[place.segment][place.index];
             let value = if place.at.time_s == acting.segments[place.segment][place.index].time_s {
@@ -60,15 +60,20 @@ impl Ready {
                 let force = to_force_axes(force, &air, model.axes);
                 (0..3).for_each(|c| add(1 + INPUTS + axis, c, force[c]));
             }
-            let rate = control_rates(&acting, place.segment, place.index);
-            for (i, rate) in rate.iter().enumerate() {
+            let flow = |i: &Instant| [i.state.alpha, i.state.beta, i.state.airspeed];
+            for (i, rate) in differences(&acting, place.segment, place.index, flow).iter().enumerate() {
+                let slope = &here.slope[ALPHA + i];
+                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 3 + i, c, -rate * slope[c]));
+            }
+            let moved = |i: &Instant| [i.controls.aileron, i.controls.elevator, i.controls.throttle];
+            for (i, rate) in differences(&acting, place.segment, place.index, moved).iter().enumerate() {
                 let slope = &here.slope[CONTROLS + i];
-                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 3, c, -rate * slope[c]));
+                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 6, c, -rate * slope[c]));
             }
         });
         let mut residual = std::mem::take(&mut columns[0]);
         add_spin(model, &acting, &mut residual);
-        let sensors = (1..=CONTROLS).chain(1 + INPUTS..1 + INPUTS + 4);
+        let sensors = (1..=CONTROLS).chain(1 + INPUTS..1 + INPUTS + 7);
         let sensors: Vec<Column> = sensors.map(|k| std::mem::take(&mut columns[k])).collect();
         let controls = locals
             .iter()
@@ -194,12 +199,16 @@ fn add_spin(model: &GreyBox, flight: &Prepared, residual: &mut Column) {
     }
 }
 
-/// Rates of aileron, elevator (rad/s) and throttle (1/s) by central differences.
-fn control_rates(flight: &Prepared, segment: usize, index: usize) -> [f64; 3] {
+/// Rates of `of` by central differences, 1/s.
+fn differences(
+    flight: &Prepared,
+    segment: usize,
+    index: usize,
+    of: impl Fn(&Instant) -> [f64; 3],
+) -> [f64; 3] {
     let instants = &flight.segments[segment];
     let (before, after) = (index.saturating_sub(1), (index + 1).min(instants.len() - 1));
     let per = 1.0 / (flight.dt * (after - before).max(1) as f64);
-    let of = |i: &Instant| [i.controls.aileron, i.controls.elevator, i.controls.throttle];
     let (a, b) = (of(&instants[before]), of(&instants[after]));
     [0, 1, 2].map(|k| (b[k] - a[k]) * per)
 }

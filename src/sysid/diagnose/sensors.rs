@@ -14,18 +14,24 @@ pub const NAMES: [&str; SENSORS] = [
     "accelerometer_bias_x",
     "accelerometer_bias_y",
     "accelerometer_bias_z",
+    "skew_alpha",
+    "skew_beta",
+    "skew_airspeed",
     "skew_actuators",
 ];
 
-/// Least standard deviations: rad/s, rad, a share, m/s²; a filter that knows only its own errors states
+/// Least standard deviations: rad/s, rad, a share, m/s², s; a filter that knows only its own errors states
 /// less than it has.
-const FLOOR: [f64; SENSORS - 1] = [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01];
+const FLOOR: [f64; SENSORS - 1] =
+    [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01, 5e-4, 5e-4, 2e-3];
 /// Prior width of the actuators' clock, samples: ±1.5 samples are its 95 % interval.
 const SKEW_SAMPLES: f64 = 0.77;
 
 /// Prior widths of the sensor errors of a flight whose samples are `dt` (s) apart.
 pub fn widths(flight: &Reconstruction, dt: f64) -> [f64; SENSORS] {
     let stated = |name: &str| {
+        // the vanes share a clock
+        let name = if matches!(name, "skew_alpha" | "skew_beta") { "skew_vanes" } else { name };
         let of = flight.nuisances.iter().find(|n| n.name == name).map(|n| n.sd);
         of.filter(|sd| sd.is_finite()).unwrap_or(0.0)
     };

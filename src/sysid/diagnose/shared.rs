@@ -15,49 +15,85 @@ use crate::sysid::reconstruction::Reconstruction;
 /// Random stream of the disturbance.
 const DISTURBANCE: u64 = 85;
 
-/// The path's error in V, α and β: standard deviation, and how much of it lasts a sample.
+/// What the path's V, α and β are made of: the noise of their sensors, and how much of the past a sample
+/// keeps in the smoother.
 pub type PathError = [[f64; 2]; 3];
 
-/// The path's error of a flight whose samples are `dt` (s) apart, of a steady smoother that weighs the
-/// measured value against the integrated accelerations: with variances R of the measurement and q of a
-/// step of the integration, its variance is √(qR)/2 and lasts √(R/q) samples.
+/// The steady smoother of a flight whose samples are `dt` (s) apart, which weighs the measured value
+/// against the integrated rates: with variances R of the measurement and q of a step of the integration, it
+/// remembers √(R/q) samples to either side.
 pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     let [fx, fy, fz] = flight.force_noise.map(|x| if x.is_finite() { x } else { 0.0 });
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|x| if x.is_finite() { x } else { 0.0 });
     let speeds = flight.segments.iter().flat_map(|s| s.instants.iter().map(|i| i.state.airspeed));
     let (sum, count) = speeds.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
     let speed: f64 = if count > 0.0 { sum / count } else { 1.0 };
-    let of = |measured: f64, step: f64| {
-        if measured <= 0.0 || step <= 0.0 {
-            return [0.0, 0.0];
-        }
-        let (r, q) = (measured * measured, (step * dt).powi(2));
-        [(0.5 * (q * r).sqrt()).sqrt(), (-(q / r).sqrt()).exp()]
+    let of = |measured: f64, rate: f64| {
+        if measured <= 0.0 || rate <= 0.0 { [0.0, 0.0] } else { [measured, (-rate * dt / measured).exp()] }
     };
     [of(v, fx), of(alpha, (fz / speed).hypot(q)), of(beta, (fy / speed).hypot(r).hypot(0.1 * p))]
 }
 
-/// `flight` with noise of its gyros and an error of its path once more.
+/// `flight` with noise of its inertial sensors, its vanes and its airspeed once more, as they go through the
+/// smoother of its path.
 pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, number: usize) -> Prepared {
     let mut random = stream(seed, &[DISTURBANCE, number as u64]);
     let mut unit = || -> f64 { StandardNormal.sample(&mut random) };
     let mut out = flight.clone();
     for segment in &mut out.segments {
-        let mut error = path.map(|[sd, _]| sd * unit());
-        for instant in segment {
+        // V, α, β: error of the integrated rates, then of what is measured less that
+        let mut drift: [Vec<f64>; 3] = Default::default();
+        let mut measured: [Vec<f64>; 3] = Default::default();
+        let mut sum = [0.0; 3];
+        for instant in segment.iter_mut() {
             let s = &mut instant.state;
-            s.p += flight.noise[3] * unit();
-            s.q += flight.noise[4] * unit();
-            s.r += flight.noise[5] * unit();
-            s.airspeed += error[0];
-            s.alpha += error[1];
-            s.beta += error[2];
-            for (e, [sd, lasts]) in error.iter_mut().zip(path) {
-                *e = lasts * *e + sd * (1.0 - lasts * lasts).sqrt() * unit();
+            let rates = [3, 4, 5].map(|k| flight.noise[k] * unit());
+            let forces = flight.force_noise.map(|sd| sd * unit());
+            for k in 0..3 {
+                drift[k].push(sum[k]);
+                measured[k].push(path[k][0] * unit() - sum[k]);
+            }
+            let (sin, cos) = s.alpha.sin_cos();
+            let v = s.airspeed.max(1.0);
+            sum[0] += forces[0] * flight.dt;
+            sum[1] += (rates[1] + forces[2] / v) * flight.dt;
+            sum[2] += (rates[0] * sin - rates[2] * cos + forces[1] / v) * flight.dt;
+            (s.p, s.q, s.r) = (s.p + rates[0], s.q + rates[1], s.r + rates[2]);
+            (0..3).for_each(|k| instant.specific_force[k] += forces[k]);
+        }
+        for k in 0..3 {
+            if path[k][0] <= 0.0 {
+                continue;
+            }
+            let kept = path[k][1];
+            let low = both_ways(&measured[k], kept);
+            for ((instant, drift), low) in segment.iter_mut().zip(&drift[k]).zip(low) {
+                let s = &mut instant.state;
+                *[&mut s.airspeed, &mut s.alpha, &mut s.beta][k] += drift + low;
             }
         }
     }
     out
+}
+
+/// First-order low-pass filters forward and backward, each of which keeps `kept` of the past; they start
+/// from the mean of the first samples that they remember.
+fn both_ways(x: &[f64], kept: f64) -> Vec<f64> {
+    let pass = |x: &mut dyn Iterator<Item = f64>, start: f64| {
+        let mut y = start;
+        x.map(|x| {
+            y = kept * y + (1.0 - kept) * x;
+            y
+        })
+        .collect::<Vec<f64>>()
+    };
+    let memory = ((1.0 - kept).recip().ceil() as usize).clamp(1, x.len().max(1));
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
+    let forward = pass(&mut x.iter().copied(), mean(&x[..memory.min(x.len())]));
+    let end = mean(&forward[forward.len().saturating_sub(memory)..]);
+    let mut back = pass(&mut forward.iter().rev().copied(), end);
+    back.reverse();
+    back
 }
 
 /// Products of what a disturbance adds to the columns before `last` with what it adds to the residual in
