@@ -99,6 +99,9 @@ fn refitted(base: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> Vec<D
 fn remaining(prior: &[DVector<f64>], free: Vec<DVector<f64>>, gap: &DVector<f64>) -> f64 {
     let free = free.into_iter().filter(|column| column.norm_squared() > 0.0);
     let columns: Vec<DVector<f64>> = prior.iter().cloned().chain(free).collect();
+    if columns.is_empty() {
+        return gap.norm_squared();
+    }
     let all = DMatrix::from_columns(&columns);
     let mut normal = all.transpose() * &all;
     for k in 0..columns.len() {
