@@ -65,7 +65,7 @@ fn campaign() {
                 false => (format!("{id}={amplitude}"), Manoeuvres::Usual, sensors::model()),
             };
             let (train, held) = flights(&hidden, manoeuvres, seed);
-            let model = if *id == "drag_alpha2" { exact.clone() } else { exact.clone() };
+            let model = exact.clone();
             let wrong = off(&model, seed);
             let t = Instant::now();
             let Some(amended) = fit(&wrong, id, start, &train) else { continue };

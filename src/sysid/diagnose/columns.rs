@@ -61,12 +61,17 @@ impl Ready {
                 (0..3).for_each(|c| add(1 + INPUTS + axis, c, force[c]));
             }
             let flow = |i: &Instant| [i.state.alpha, i.state.beta, i.state.airspeed];
-            for (i, rate) in differences(&acting, place.segment, place.index, flow).iter().enumerate() {
+            for (i, rate) in
+                differences(&acting, place.segment, place.index, flow).iter().enumerate()
+            {
                 let slope = &here.slope[ALPHA + i];
                 (0..CHANNELS).for_each(|c| add(1 + INPUTS + 3 + i, c, -rate * slope[c]));
             }
-            let moved = |i: &Instant| [i.controls.aileron, i.controls.elevator, i.controls.throttle];
-            for (i, rate) in differences(&acting, place.segment, place.index, moved).iter().enumerate() {
+            let moved =
+                |i: &Instant| [i.controls.aileron, i.controls.elevator, i.controls.throttle];
+            for (i, rate) in
+                differences(&acting, place.segment, place.index, moved).iter().enumerate()
+            {
                 let slope = &here.slope[CONTROLS + i];
                 (0..CHANNELS).for_each(|c| add(1 + INPUTS + 6, c, -rate * slope[c]));
             }
@@ -154,8 +159,8 @@ impl Ready {
             let (a, b) = (&self.acting.segments[k][i].controls, &other.segments[k][i].controls);
             let moved = [b.aileron - a.aileron, b.elevator - a.elevator];
             let slopes = &self.controls[k][i];
-            for c in 0..CHANNELS {
-                add(0, c, moved[0] * slopes[0][c] + moved[1] * slopes[1][c]);
+            for (c, (aileron, elevator)) in slopes[0].iter().zip(slopes[1]).enumerate() {
+                add(0, c, moved[0] * aileron + moved[1] * elevator);
             }
         });
         columns.pop().unwrap_or_default()

@@ -17,8 +17,7 @@ pub fn sentences(
     channels: &[ChannelLeft],
     measurement: &[Measurement],
 ) -> Vec<String> {
-    let mut said: Vec<String> =
-        effects.iter().filter(|c| c.asserted).map(|c| asserted(c)).collect();
+    let mut said: Vec<String> = effects.iter().filter(|c| c.asserted).map(asserted).collect();
     match verdict {
         Verdict::Effect => {}
         Verdict::Adequate => said.push(format!(

@@ -29,7 +29,11 @@ pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     let (sum, count) = speeds.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
     let speed: f64 = if count > 0.0 { sum / count } else { 1.0 };
     let of = |measured: f64, rate: f64| {
-        if measured <= 0.0 || rate <= 0.0 { [0.0, 0.0] } else { [measured, (-rate * dt / measured).exp()] }
+        if measured <= 0.0 || rate <= 0.0 {
+            [0.0, 0.0]
+        } else {
+            [measured, (-rate * dt / measured).exp()]
+        }
     };
     [of(v, fx), of(alpha, (fz / speed).hypot(q)), of(beta, (fy / speed).hypot(r).hypot(0.1 * p))]
 }
