@@ -1,0 +1,201 @@
+//! `greylag amend`: a model refitted to flights, missing effects added.
+
+mod places;
+mod tables;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+use places::{Places, hashed};
+use tables::print;
+
+use crate::commands::files::{self, shipped};
+use crate::commands::intake::{Intake, LogArguments};
+use crate::model::GreyBox;
+use crate::physics::{effects, inputs};
+use crate::report::AmendmentReport;
+use crate::sysid::amend::{self, Added, Amended, Refused};
+use crate::sysid::compare::{self, compare};
+use crate::sysid::diagnose::{self, Candidate, diagnose};
+use crate::sysid::reconstruct::ActuatorClock;
+use crate::sysid::reconstruction::Reconstruction;
+
+/// Exit status when an effect was refused, a log left out, or flights contradict one another.
+const IN_DOUBT: u8 = 2;
+
+/// Options of `greylag amend`.
+#[derive(clap::Args)]
+#[command(
+    group = clap::ArgGroup::new("what").required(true),
+    after_help = "Exit status: 0 done, 1 nothing was written, 2 written, but an effect was refused, a log was left out or flights contradict one another."
+)]
+pub struct Arguments {
+    /// Model file to start from; it stays as it is.
+    #[arg(long)]
+    model: PathBuf,
+    #[command(flatten)]
+    logs: LogArguments,
+    /// Logs to judge by, which the fit does not see; without them the last log, or, of a single one,
+    /// its last third.
+    #[arg(long, num_args = 1..)]
+    hold_out: Vec<PathBuf>,
+    /// Add the effects that a diagnosis of these logs asserts.
+    #[arg(long, group = "what")]
+    accept: bool,
+    /// Add these effects of the catalogue, in this order.
+    #[arg(long = "effect", value_name = "ID", num_args = 1.., group = "what")]
+    effects: Vec<String>,
+    /// Add nothing: fit the model's own coefficients.
+    #[arg(long, group = "what")]
+    tune_only: bool,
+    /// Write effects into the model that the data refuse.
+    #[arg(long)]
+    accept_anyway: bool,
+    /// Folder for model.toml, the airframe and amend.json; made if there is none.
+    #[arg(long)]
+    out: PathBuf,
+    /// Write the report, one HTML page.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Replace files that exist.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Reads, reconstructs, fits; prints before and after; writes the model.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let path = shipped(&arguments.model);
+    let overwrite = arguments.force.into();
+    let model = GreyBox::load(&path)?;
+    if let Some(path) = &arguments.report {
+        files::writable(path, overwrite)?;
+    }
+    let places = Places::new(&path, &arguments.out, overwrite)?;
+    if let Some(twice) = arguments.hold_out.iter().find(|p| arguments.logs.paths.contains(p)) {
+        bail!("{} cannot be fitted to and held out at once; name it in one place", twice.display());
+    }
+    for id in &arguments.effects {
+        if effects::Kind::from_id(id).is_none() && inputs::Kind::from_id(id).is_none() {
+            bail!(
+                "effect {id:?} is unknown to this program; `greylag effects list` names those it knows"
+            );
+        }
+        if model.has(id) {
+            bail!(
+                "model {} has the effect {id} already; --tune-only refits its coefficients",
+                model.name
+            );
+        }
+    }
+    let (paths, held) = divided(&arguments.logs.paths, &arguments.hold_out);
+    let (logs, hold_out) = (hashed(&paths)?, hashed(&held)?);
+    let clock = ActuatorClock::AsRecorded;
+    let Intake { mut flights, mut notes, mut in_doubt } =
+        arguments.logs.of(paths).take_in(&model, clock)?;
+    let tests = if held.is_empty() {
+        notes.push(format!(
+            "{}: fitted to its first two thirds, judged by the last",
+            flights[0].name
+        ));
+        let [first, last] = amend::split(&flights[0]);
+        flights = vec![first];
+        vec![last]
+    } else {
+        let more = arguments.logs.of(held).take_in(&model, clock)?;
+        notes.extend(more.notes);
+        in_doubt |= more.in_doubt;
+        more.flights
+    };
+    let options = amend::Options {
+        effects: wanted(arguments, &model, &flights)?,
+        refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
+        ..amend::Options::default()
+    };
+    let mut amended =
+        amend::amend(&model, &flights, &tests, &options, &|doing| eprintln!("{doing}"))?;
+    let story = &mut amended.amendment;
+    story.notes.splice(0..0, notes);
+    in_doubt |= story.effects.iter().any(|e| !e.refused.is_empty());
+    in_doubt |=
+        story.notes.iter().any(|n| n.contains("by") && n.contains("alone: something differed"));
+    print(story);
+    let all_refused = !story.effects.is_empty() && !story.parameters.iter().any(|p| p.added);
+    if all_refused {
+        bail!(
+            "no effect was accepted, so nothing was written; --tune-only writes the tuned model, \
+             --accept-anyway writes a refused effect"
+        );
+    }
+    places.write(&model, &amended, &logs, &hold_out, overwrite)?;
+    if let Some(path) = &arguments.report {
+        files::write(path, &page(arguments, &model, &amended, &tests, &places)?, overwrite)?;
+    }
+    Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+/// The report as HTML, with how the errors grow on the flights that the fit did not see.
+fn page(
+    arguments: &Arguments,
+    model: &GreyBox,
+    amended: &Amended,
+    tests: &[Reconstruction],
+    places: &Places,
+) -> Result<String> {
+    let models = [model.clone(), amended.tuned.clone(), amended.model.clone()];
+    let held_out = compare(&models, tests, &compare::Options::default(), &|_| ())?;
+    let paths = arguments.logs.paths.iter().chain(&arguments.hold_out);
+    let report = AmendmentReport {
+        title: format!("{} amended", model.name),
+        amendment: &amended.amendment,
+        held_out: Some(&held_out),
+        model_files: vec![
+            arguments.model.display().to_string(),
+            places.model().display().to_string(),
+        ],
+        log_files: paths.map(|p| p.display().to_string()).collect(),
+        command_line: files::command_line(),
+        versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
+    };
+    Ok(report.page().render())
+}
+
+/// Logs to fit to, logs to judge by: the last one if none are named, none of a single one.
+fn divided(logs: &[PathBuf], hold_out: &[PathBuf]) -> (Vec<PathBuf>, Vec<PathBuf>) {
+    match (logs, hold_out) {
+        ([first @ .., last], []) if !first.is_empty() => (first.to_vec(), vec![last.clone()]),
+        _ => (logs.to_vec(), hold_out.to_vec()),
+    }
+}
+
+/// The effects to add: those named, or those that a diagnosis of the flights asserts.
+fn wanted(
+    arguments: &Arguments,
+    model: &GreyBox,
+    flights: &[Reconstruction],
+) -> Result<Vec<Added>> {
+    if !arguments.accept {
+        let named = |id: &String| Added { id: id.clone(), start: None };
+        return Ok(arguments.effects.iter().map(named).collect());
+    }
+    let options = diagnose::Options::default();
+    let diagnosis = diagnose(model, flights, &options, &|doing| eprintln!("{doing}"))?;
+    let asserted: Vec<Added> =
+        diagnosis.effects.iter().filter(|c| c.asserted).map(accepted).collect();
+    if asserted.is_empty() {
+        let said = diagnosis.sentences.join(" ");
+        bail!("the diagnosis asserts no effect, so there is none to accept; it says: {said}");
+    }
+    Ok(asserted)
+}
+
+/// An asserted effect, to be searched for near where the diagnosis has it.
+fn accepted(candidate: &Candidate) -> Added {
+    let coefficients = effects::Kind::from_id(&candidate.id)
+        .map(|k| k.describe().coefficients)
+        .or_else(|| inputs::Kind::from_id(&candidate.id).map(|k| k.describe().coefficients));
+    let value = |name: &str| candidate.parameters.iter().find(|p| p.name == name).map(|p| p.value);
+    let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
+    Added { id: candidate.id.clone(), start }
+}

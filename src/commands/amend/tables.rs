@@ -1,0 +1,72 @@
+//! What `greylag amend` prints.
+
+use comfy_table::{CellAlignment, Table};
+
+use crate::sysid::amend::{Amendment, Parameter};
+use crate::sysid::compare::HorizonScore;
+
+/// Parameters, errors, sentences, notes.
+pub fn print(story: &Amendment) {
+    println!("{}\n{}", parameter_table(&story.parameters), error_table(story));
+    story.sentences.iter().for_each(|sentence| println!("{sentence}"));
+    story.notes.iter().for_each(|note| println!("note: {note}"));
+}
+
+fn empty_table<const N: usize>(header: [&str; N]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(header);
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+fn parameter_table(parameters: &[Parameter]) -> Table {
+    let mut table = empty_table(["coefficient", "before", "fitted", "95 % from", "to", ""]);
+    for p in parameters {
+        let before = if p.added { "–".into() } else { number(p.prior) };
+        let remark = match (p.at_bound, p.added) {
+            (true, _) => "at its bound",
+            (_, true) => "added",
+            _ => "",
+        };
+        let [low, high] = p.ci95;
+        let row =
+            [p.name.clone(), before, number(p.value), number(low), number(high), remark.into()];
+        table.add_row(row);
+    }
+    table
+}
+
+/// Free-run errors on the flights that the fit did not see.
+fn error_table(story: &Amendment) -> Table {
+    let header = ["RMSE / x_c on held-out flights", "1 s", "2 s", "5 s", "10 s", "diverged"];
+    let mut table = empty_table(header);
+    let rows = [("as given", &story.given), ("tuned", &story.before), ("amended", &story.after)];
+    for (name, scores) in rows {
+        let mut row = vec![name.to_string()];
+        row.extend(scores.iter().map(error));
+        let last = scores.iter().rfind(|s| s.runs > 0);
+        row.push(last.map_or("–".into(), |s| format!("{}/{}", s.diverged, s.runs)));
+        table.add_row(row);
+    }
+    table
+}
+
+fn error(score: &HorizonScore) -> String {
+    if score.runs > 0 { format!("{:.5}", score.rmse_scaled) } else { "–".into() }
+}
+
+/// Four significant figures.
+fn number(x: f64) -> String {
+    match x.abs() {
+        0.0 => "0".into(),
+        size if !size.is_finite() => "–".into(),
+        size if size < 1e-5 => format!("{x:.2e}"),
+        size => {
+            let places = (3 - size.log10().floor() as i32).clamp(0, 8) as usize;
+            format!("{x:.places$}")
+        }
+    }
+}
