@@ -118,8 +118,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let story = &mut amended.amendment;
     story.notes.splice(0..0, notes);
     in_doubt |= story.effects.iter().any(|e| !e.refused.is_empty());
-    in_doubt |=
-        story.notes.iter().any(|n| n.contains("by") && n.contains("alone: something differed"));
+    in_doubt |= !amend::contradictions(&story.parameters).is_empty();
     print(story);
     let all_refused = !story.effects.is_empty() && !story.parameters.iter().any(|p| p.added);
     if all_refused {

@@ -259,7 +259,8 @@ fn outlier(p: &Parameter) -> Option<(&str, f64)> {
     found.map(|e| (e.flight.as_str(), e.value))
 }
 
-fn contradictions(parameters: &[Parameter]) -> Vec<String> {
+/// Coefficients that one flight sees clearly otherwise than all flights together, in words.
+pub fn contradictions(parameters: &[Parameter]) -> Vec<String> {
     let named = parameters.iter().filter(|p| !p.added);
     named
         .filter_map(|p| {

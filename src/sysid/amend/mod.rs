@@ -15,7 +15,7 @@ mod parameters;
 mod result;
 mod shooting;
 
-pub use amendment::{Added, Amended, Options, Refused, amend, split};
+pub use amendment::{Added, Amended, Options, Refused, amend, contradictions, split};
 pub use error::AmendError;
 pub use flight::Flight;
 pub use output_error::{Fit, FitOptions};
