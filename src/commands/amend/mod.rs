@@ -142,7 +142,8 @@ fn page(
     tests: &[Reconstruction],
     places: &Places,
 ) -> Result<String> {
-    let models = [model.clone(), amended.tuned.clone(), amended.model.clone()];
+    let mut models = [model.clone(), amended.tuned.clone(), amended.model.clone()];
+    models[1].name = format!("{}-tuned", model.name);
     let held_out = compare(&models, tests, &compare::Options::default(), &|_| ())?;
     let paths = arguments.logs.paths.iter().chain(&arguments.hold_out);
     let report = AmendmentReport {

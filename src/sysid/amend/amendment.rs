@@ -288,7 +288,7 @@ fn sentences(story: &Amendment) -> Vec<String> {
         .collect();
     if let (Some(given), Some(before), Some(after)) = (given, before, after) {
         all.push(format!(
-            "On flights that the fit did not see, tuning the coefficients {} ({given:.5} to \
+            "On flights that the fit did not see, {} once the coefficients are tuned ({given:.5} to \
              {before:.5} of the reference scale, free runs of {JUDGED_AT_S} s).",
             change(given, before)
         ));
