@@ -12,8 +12,8 @@ use crate::sysid::compare::weak::{gyroscopic, inertia, to_force_axes};
 use crate::sysid::reconstruction::Instant;
 
 /// Columns of sensor errors: gyros p, q, r, α, β, share of the airspeed, accelerometers x, y, z, then
-/// lateness of α, β, airspeed and recorded actuators (s).
-pub const SENSORS: usize = 13;
+/// lateness of α, β, airspeed, accelerometers and recorded actuators (s).
+pub const SENSORS: usize = 14;
 
 /// A flight under a model.
 #[derive(Clone, Debug)]
@@ -39,7 +39,7 @@ impl Ready {
             .iter()
             .map(|s| s.iter().map(|at| local::local(model, at, &at.controls)).collect())
             .collect();
-        let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 4, |place, add| {
+        let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 5, |place, add| {
             // the end of a step of RK4 is close to its start
             let here = &locals[place.segment][place.index];
             let value = if place.at.time_s == acting.segments[place.segment][place.index].time_s {
@@ -73,12 +73,17 @@ impl Ready {
                 differences(&acting, place.segment, place.index, moved).iter().enumerate()
             {
                 let slope = &here.slope[CONTROLS + i];
-                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 6, c, -rate * slope[c]));
+                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 7, c, -rate * slope[c]));
+            }
+            let force = differences(&acting, place.segment, place.index, |i| i.specific_force);
+            if force.iter().all(|f| f.is_finite()) {
+                let force = to_force_axes(force.map(|f| -f * model.body.mass), &air, model.axes);
+                (0..3).for_each(|c| add(1 + INPUTS + 6, c, force[c]));
             }
         });
         let mut residual = std::mem::take(&mut columns[0]);
         add_spin(model, &acting, &mut residual);
-        let sensors = (1..=CONTROLS).chain(1 + INPUTS..1 + INPUTS + 7);
+        let sensors = (1..=CONTROLS).chain(1 + INPUTS..1 + INPUTS + 8);
         let sensors: Vec<Column> = sensors.map(|k| std::mem::take(&mut columns[k])).collect();
         let controls = locals
             .iter()

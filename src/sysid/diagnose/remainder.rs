@@ -78,11 +78,9 @@ fn channel(round: &Round, channel: usize) -> Option<Channel> {
         (0..round.cells.list.len()).filter(|k| round.cells.list[*k].channel == channel).collect();
     let pieces = if cells.len() >= 2 { 1 } else { FOLDS };
     let projected = projected_features(round, &cells)?;
-    let last = round.projected.width();
     let mut folds = Vec::new();
-    for (k, (features, noise)) in cells.iter().zip(projected) {
+    for (k, (features, noise, target)) in cells.iter().zip(projected) {
         let rows = features.nrows();
-        let target = round.projected.rows[*k].column(last).into_owned();
         for piece in 0..pieces {
             let (from, to) = (rows * piece / pieces, rows * (piece + 1) / pieces);
             folds.push(Fold {
@@ -110,9 +108,12 @@ fn channel(round: &Round, channel: usize) -> Option<Channel> {
     Some(Channel { folds })
 }
 
-/// Whitened features of unit size and noise of each cell, with what the known unknowns can follow of them
-/// taken out.
-fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<(DMatrix<f64>, DVector<f64>)>> {
+/// Whitened features of unit size, noise and residual of each cell, with what the known unknowns can follow
+/// of them taken out: by plain least squares, else a flexible model would find again what shared noise feigns.
+fn projected_features(
+    round: &Round,
+    cells: &[usize],
+) -> Option<Vec<(DMatrix<f64>, DVector<f64>, DVector<f64>)>> {
     let na = round.known.len();
     let mut all = Vec::new();
     for k in cells {
@@ -124,8 +125,9 @@ fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<(DMatrix<f64
         let mut a = DMatrix::zeros(z.nrows(), na);
         (0..known).for_each(|i| a.set_column(places[i], &z.column(i)));
         let mut y = z.columns(first, z.ncols() - first).into_owned();
-        y = y.insert_column(0, 0.0);
+        y = y.insert_columns(0, 2, 0.0);
         y.set_column(0, &DVector::from_column_slice(&round.noise.residuals[*k]));
+        y.set_column(1, &z.column(first - 1));
         all.push((a, y));
     }
     let mut gram = DMatrix::zeros(na, na);
@@ -150,12 +152,13 @@ fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<(DMatrix<f64
     let rows: usize = rest.iter().map(DMatrix::nrows).sum();
     let split = |left: DMatrix<f64>| {
         let noise = left.column(0).into_owned();
-        let mut features = left.remove_column(0);
+        let target = left.column(1).into_owned();
+        let mut features = left.remove_columns(0, 2);
         for (j, mut column) in features.column_iter_mut().enumerate() {
-            let size: f64 = (square[j + 1] / rows as f64).sqrt();
+            let size: f64 = (square[j + 2] / rows as f64).sqrt();
             column /= size.max(1e-12);
         }
-        (features, noise)
+        (features, noise, target)
     };
     Some(rest.into_iter().map(split).collect())
 }

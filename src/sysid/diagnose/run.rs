@@ -123,7 +123,7 @@ fn verdict(found: &Found) -> Verdict {
     let significant = found.remainder.total > found.remainder.total_threshold;
     if found.selected.iter().any(|s| s.refused.is_empty()) {
         Verdict::Effect
-    } else if !found.selected.is_empty() || significant {
+    } else if found.selected.iter().any(|s| !s.slight) || significant {
         Verdict::Unexplained
     } else {
         Verdict::Adequate

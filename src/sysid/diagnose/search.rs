@@ -41,6 +41,8 @@ pub struct Selected {
     pub channels: Vec<usize>,
     /// Why it is not asserted; empty if it is.
     pub refused: Vec<String>,
+    /// Whether it takes too little of the error to matter, whatever else speaks against it.
+    pub slight: bool,
     /// What it added to the residual, fitted, flight by flight.
     pub contribution: Vec<super::gather::Column>,
 }
@@ -127,7 +129,8 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
     let members: Vec<usize> =
         std::iter::once(*place).chain(class.iter().map(|k| found.scores[*k].0)).collect();
     let heldout = checks::heldout_reduction(round, trial, score);
-    if heldout < HELD_OUT || heldout.is_nan() {
+    let slight = heldout < HELD_OUT || heldout.is_nan();
+    if slight {
         refused.push(format!(
             "it takes {:.0} % of the error on held-out segments, under {:.0} %",
             100.0 * heldout,
@@ -158,6 +161,7 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
         by_flight,
         channels: round.channels_of(score),
         refused,
+        slight,
         contribution,
     })
 }

@@ -17,13 +17,14 @@ pub const NAMES: [&str; SENSORS] = [
     "skew_alpha",
     "skew_beta",
     "skew_airspeed",
+    "skew_accelerometer",
     "skew_actuators",
 ];
 
 /// Least standard deviations: rad/s, rad, a share, m/s², s; a filter that knows only its own errors states
 /// less than it has.
 const FLOOR: [f64; SENSORS - 1] =
-    [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01, 5e-4, 5e-4, 2e-3];
+    [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01, 5e-4, 5e-4, 2e-3, 5e-4];
 /// Prior width of the actuators' clock, samples: ±1.5 samples are its 95 % interval.
 const SKEW_SAMPLES: f64 = 0.77;
 
@@ -36,7 +37,26 @@ pub fn widths(flight: &Reconstruction, dt: f64) -> [f64; SENSORS] {
         of.filter(|sd| sd.is_finite()).unwrap_or(0.0)
     };
     std::array::from_fn(|k| match FLOOR.get(k) {
-        Some(floor) => stated(NAMES[k]).max(*floor),
+        Some(floor) => {
+            let e: Vec<f64> = std::env::var("GLF")
+                .unwrap_or_default()
+                .split(',')
+                .filter_map(|x| x.parse().ok())
+                .collect();
+            let floor = e
+                .get(match k {
+                    0..3 => 0,
+                    3 | 4 => 1,
+                    5 => 2,
+                    6..9 => 3,
+                    9 | 10 => 4,
+                    11 => 5,
+                    _ => 6,
+                })
+                .filter(|x| **x > 0.0)
+                .unwrap_or(floor);
+            stated(NAMES[k]).max(*floor)
+        }
         None => SKEW_SAMPLES * dt,
     })
 }

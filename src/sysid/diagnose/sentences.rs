@@ -132,8 +132,8 @@ pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
     }
     notes.push(format!(
         "A flexible model lowers the squared error of flights that it was not fitted on by {:.0} times the \
-         noise's variance; {:.0} is reached by chance.",
-        found.remainder.total, found.remainder.total_threshold
+         noise's variance; {:.0} is reached by chance. By channel (D L Y l m n): {:.0?}.",
+        found.remainder.total, found.remainder.total_threshold, found.remainder.removable
     ));
     let round = found.round();
     for (k, known) in round.known.iter().enumerate().skip(round.coefficients.len()) {
