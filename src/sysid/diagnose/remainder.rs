@@ -108,12 +108,12 @@ fn channel(round: &Round, channel: usize) -> Option<Channel> {
     Some(Channel { folds })
 }
 
+/// Features, noise and residual of one cell.
+type Projected = (DMatrix<f64>, DVector<f64>, DVector<f64>);
+
 /// Whitened features of unit size, noise and residual of each cell, with what the known unknowns can follow
 /// of them taken out: by plain least squares, else a flexible model would find again what shared noise feigns.
-fn projected_features(
-    round: &Round,
-    cells: &[usize],
-) -> Option<Vec<(DMatrix<f64>, DVector<f64>, DVector<f64>)>> {
+fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> {
     let na = round.known.len();
     let mut all = Vec::new();
     for k in cells {
