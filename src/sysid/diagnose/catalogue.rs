@@ -13,7 +13,7 @@ use crate::physics::inputs;
 /// Share of a shape constant by which its derivative is taken.
 const MOVED: f64 = 0.02;
 /// Largest change of a shape constant that its linearisation is trusted with, as a share.
-const REACH: f64 = 0.35;
+pub const REACH: f64 = 0.35;
 
 /// An effect that may be missing.
 #[derive(Clone, Copy, Debug)]

@@ -92,9 +92,9 @@ pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> 
         .collect()
 }
 
-/// Share of `count` block bootstraps in which one of the trials of `class` has the best evidence; blocks
-/// are drawn flight by flight.
-pub fn selected(round: &Round, scores: &[(usize, Score)], class: &[usize], count: usize) -> f64 {
+/// Share of `count` block bootstraps in which one of the trials of `class` comes first among those of `open`,
+/// the best ones first; blocks are drawn flight by flight.
+pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) -> f64 {
     let seed = round.seed;
     let by_flight: Vec<Vec<usize>> = (0..round.flights.len())
         .map(|f| {
@@ -102,7 +102,7 @@ pub fn selected(round: &Round, scores: &[(usize, Score)], class: &[usize], count
             (0..of.len()).filter(|b| of[*b] == f).collect()
         })
         .collect();
-    let competing: Vec<usize> = scores.iter().take(COMPETING).map(|(trial, _)| *trial).collect();
+    let competing = &open[..open.len().min(COMPETING)];
     let wins = (0..count)
         .into_par_iter()
         .filter(|k| {
@@ -119,7 +119,7 @@ pub fn selected(round: &Round, scores: &[(usize, Score)], class: &[usize], count
                 .iter()
                 .filter_map(|t| Some((*t, round.trials[*t].score(&grams, &draw)?)))
                 .filter(|(t, s)| !round.at_bound(*t, s))
-                .max_by(|a, b| a.1.evidence.total_cmp(&b.1.evidence));
+                .max_by(|a, b| a.1.order.total_cmp(&b.1.order));
             best.is_some_and(|(t, s)| class.contains(&t) && s.evidence > 0.0)
         })
         .count();

@@ -14,6 +14,7 @@ const RIDGE: f64 = 1e-4;
 const PASSES: usize = 2;
 
 /// The noise of every channel.
+#[derive(Clone)]
 pub struct Noise {
     /// Whitener of each channel.
     pub whiteners: [Whitener; CHANNELS],

@@ -36,6 +36,10 @@ pub struct Score {
     pub evidence: f64,
     /// Block-robust Wald statistic.
     pub wald: f64,
+    /// What candidates are ordered by: the evidence where it is not positive, else the geometric mean of
+    /// penalised gain and Wald statistic. Far above chance, the smaller of the two alone would order by how
+    /// evenly an effect is spread over the blocks.
+    pub order: f64,
     /// Fall of the squared whitened error.
     pub fall: f64,
     /// Values of all coefficients.
@@ -104,6 +108,7 @@ impl Trial {
         }
         Some(Score {
             evidence: gain.min(wald),
+            order: if gain.min(wald) > 0.0 { (gain * wald).sqrt() } else { gain.min(wald) },
             wald,
             fall,
             values,

@@ -95,12 +95,13 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
 fn fitted(round: &Round, id: &str, name: &str) -> Option<(f64, f64)> {
     let full = format!("{id}.{name}");
     let place = round.model.coefficients().iter().position(|c| c.name == full)?;
-    let value = round.model.coefficients()[place].value;
+    let tuned = round.tuned();
+    let value = tuned.coefficients()[place].value;
     match round.coefficients.iter().position(|k| *k == place) {
         None => Some((value, 0.0)),
         Some(k) => {
             let p = &round.projected;
-            Some((value + p.tuned[k], p.covariance[(k, k)].max(0.0).sqrt()))
+            Some((value, p.covariance[(k, k)].max(0.0).sqrt()))
         }
     }
 }

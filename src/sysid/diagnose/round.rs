@@ -6,7 +6,7 @@ use super::columns::{Ready, combine};
 use super::features;
 use super::gather::Column;
 use super::noise::Noise;
-use super::projected::{Known, Projected};
+use super::projected::{Known, Projected, scaled_inverse};
 use super::rank::{Draw, Score, Trial};
 use super::sensors;
 use super::shared;
@@ -15,8 +15,10 @@ use crate::sysid::compare::flight::Prepared;
 
 /// Times a nonlinear candidate is linearised anew where it fits best.
 const REFINEMENTS: usize = 3;
-/// A nonlinear candidate this far below the best is not worth it.
-const HOPELESS: f64 = 40.0;
+/// A nonlinear candidate is worth it if it takes this part of what the best one takes,
+const WORTH: f64 = 0.2;
+/// or if its evidence is this close to the best.
+const CLOSE: f64 = 40.0;
 
 /// What all rounds share.
 pub struct Problem {
@@ -54,6 +56,8 @@ pub struct Round {
     pub last: usize,
     /// The noise.
     pub noise: Noise,
+    /// Coefficients of the model given; those behind have joined.
+    pub given: usize,
     /// Seed of everything random.
     pub seed: u64,
     /// The candidates as they are described.
@@ -66,6 +70,16 @@ pub struct Round {
 impl Round {
     /// `model` with `entries` as candidates; `None` if the flights do not hold it at all.
     pub fn new(problem: &Problem, model: GreyBox, entries: &[Entry]) -> Option<Round> {
+        Round::under(problem, model, entries, None)
+    }
+
+    /// The same under the noise of another round.
+    pub fn under(
+        problem: &Problem,
+        model: GreyBox,
+        entries: &[Entry],
+        noise: Option<&Noise>,
+    ) -> Option<Round> {
         let flights: Vec<Ready> = problem.flights.iter().map(|f| Ready::new(&model, f)).collect();
         let cells = Cells::new(&flights);
         let (known, coefficients, mut placed) = known(problem, &model, &flights);
@@ -75,10 +89,12 @@ impl Round {
         for (list, own) in placed.iter_mut().zip(features) {
             list.extend(own.into_iter().enumerate().map(|(k, c)| (last + 1 + k, c)));
         }
-        let rich = rich(&placed, known.len(), &made.trials);
-        let noise = Noise::estimate(&cells, &rich, last);
+        let noise = noise.cloned().unwrap_or_else(|| {
+            Noise::estimate(&cells, &rich(&placed, known.len(), &made.trials), last)
+        });
         let kept: Vec<Placed> = placed.iter().map(|l| up_to(l, last)).collect();
-        let shared = shared(problem, &model, entries, &cells, &kept, last, &noise);
+        let shared =
+            shared(&Setting { problem, model: &model, entries }, &cells, &kept, last, &noise);
         let projected = Projected::new(&cells, &kept, last, &known, &noise, &shared)?;
         Some(Round {
             model,
@@ -91,6 +107,7 @@ impl Round {
             placed,
             last,
             noise,
+            given: problem.prior.len(),
             seed: problem.seed,
             entries: entries.to_vec(),
             refined: Vec::new(),
@@ -104,6 +121,7 @@ impl Round {
         let mut scores = self.scores();
         for _ in 0..REFINEMENTS {
             let best = scores.first().map_or(0.0, |(_, s)| s.evidence);
+            let most = scores.iter().map(|(_, s)| s.fall).fold(0.0, f64::max);
             let mut wanted: Vec<(&'static str, Vec<f64>)> = Vec::new();
             for (k, score) in &scores {
                 let trial = &self.trials[*k];
@@ -112,7 +130,8 @@ impl Round {
                     let by = (score.values[*index] - point.values[*index]).abs();
                     by > 0.02 * (high - low)
                 });
-                if point.contribution.is_some() && moved && score.evidence > best - HOPELESS {
+                let worth = score.fall > WORTH * most || score.evidence > best - CLOSE;
+                if point.contribution.is_some() && moved && worth {
                     wanted.push((trial.id, score.values.clone()));
                 }
             }
@@ -152,7 +171,7 @@ impl Round {
         let mut scores: Vec<(usize, Score)> = (0..self.trials.len())
             .filter_map(|k| Some((k, self.trials[k].score(&grams, &draw)?)))
             .collect();
-        let key = |(k, s): &(usize, Score)| (!self.at_bound(*k, s), s.evidence);
+        let key = |(k, s): &(usize, Score)| (!self.at_bound(*k, s), s.order);
         scores.sort_by(|a, b| {
             let (a, b) = (key(a), key(b));
             b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
@@ -172,6 +191,27 @@ impl Round {
             let value = score.values[*index];
             value <= low + near || value >= high - near
         })
+    }
+
+    /// Wald statistic of all free constants of an effect that has joined against nought; `None` for one whose
+    /// constants are not amounts.
+    pub fn amount(&self, id: &str) -> Option<f64> {
+        let prefix = format!("{id}.");
+        let operator = crate::physics::inputs::Kind::from_id(id).is_some();
+        let linear = self.model.linear();
+        let named = self.model.coefficients();
+        let own: Vec<usize> = (0..self.coefficients.len())
+            .filter(|k| named[self.coefficients[*k]].name.starts_with(&prefix))
+            .collect();
+        if own.is_empty() || !(operator || own.iter().all(|k| linear[self.coefficients[*k]])) {
+            return None;
+        }
+        let p = &self.projected;
+        let value = |k: &usize| named[self.coefficients[*k]].value + p.tuned[*k];
+        let theta = nalgebra::DVector::from_iterator(own.len(), own.iter().map(value));
+        let covariance =
+            nalgebra::DMatrix::from_fn(own.len(), own.len(), |i, j| p.covariance[(own[i], own[j])]);
+        Some(theta.dot(&(scaled_inverse(&covariance)? * &theta)))
     }
 
     /// The model with its coefficients where they go once `score`'s effect has joined.
@@ -240,12 +280,18 @@ impl Round {
         channels
     }
 
-    /// The model with its coefficients where the data and their prior put them.
+    /// The model with its coefficients where the data and their prior put them, asserted effects' within
+    /// their bounds.
     pub fn tuned(&self) -> GreyBox {
         let mut model = self.model.clone();
         let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
         for (k, place) in self.coefficients.iter().enumerate() {
             values[*place] += self.projected.tuned[k];
+            if *place >= self.given
+                && let Some((low, high)) = bounds(&model, *place)
+            {
+                values[*place] = values[*place].clamp(low, high);
+            }
         }
         model.set_coefficients(&values);
         model
@@ -275,24 +321,29 @@ fn rich(placed: &[Placed], count: usize, trials: &[Trial]) -> Vec<Placed> {
     placed.iter().map(keep).collect()
 }
 
+/// The flights with their noise once more, under `model`.
+fn disturbed(problem: &Problem, model: &GreyBox) -> Vec<Ready> {
+    let flights = problem.flights.iter().zip(&problem.path).enumerate();
+    flights
+        .map(|(k, (f, path))| Ready::new(model, &shared::disturbed(f, path, problem.seed, k)))
+        .collect()
+}
+
+/// What a round is made of.
+struct Setting<'a> {
+    problem: &'a Problem,
+    model: &'a GreyBox,
+    entries: &'a [Entry],
+}
+
 /// What noise that columns share with the residual feigns: by place, of the known unknowns and the linear
 /// candidates, which stand in front.
-fn shared(
-    problem: &Problem,
-    model: &GreyBox,
-    entries: &[Entry],
-    cells: &Cells,
-    before: &[Placed],
-    last: usize,
-    noise: &Noise,
-) -> Vec<f64> {
-    let straight: Vec<Entry> = entries.iter().filter(|e| catalogue::straight(e)).copied().collect();
-    let disturbed = problem.flights.iter().zip(&problem.path).enumerate();
-    let flights: Vec<Ready> = disturbed
-        .map(|(k, (f, path))| Ready::new(model, &shared::disturbed(f, path, problem.seed, k)))
-        .collect();
-    let (known, _, mut after) = known(problem, model, &flights);
-    let made = catalogue::columns(model, &flights, &straight, &[]);
+fn shared(of: &Setting, cells: &Cells, before: &[Placed], last: usize, noise: &Noise) -> Vec<f64> {
+    let straight: Vec<Entry> =
+        of.entries.iter().filter(|e| catalogue::straight(e)).copied().collect();
+    let flights = disturbed(of.problem, of.model);
+    let (known, _, mut after) = known(of.problem, of.model, &flights);
+    let made = catalogue::columns(of.model, &flights, &straight, &[]);
     let end = place(&mut after, known.len(), &made, &flights);
     // the residual stands where it stands before
     for list in &mut after {
@@ -311,8 +362,10 @@ fn known(problem: &Problem, model: &GreyBox, flights: &[Ready]) -> KnownColumns 
     let count = model.coefficients().len();
     let columns: Vec<Vec<Column>> = flights.iter().map(|f| f.linear(model, 0..count)).collect();
     for (index, named) in model.coefficients().iter().enumerate() {
-        let (value, width) =
-            problem.prior.get(index).copied().unwrap_or((named.value, f64::INFINITY));
+        // a shape constant that has joined is not moved farther than its linearisation reaches
+        let joined =
+            if linear[index] { f64::INFINITY } else { catalogue::REACH * named.value.abs() };
+        let (value, width) = problem.prior.get(index).copied().unwrap_or((named.value, joined));
         if width <= 0.0 || !searched(model, index) {
             continue;
         }
@@ -337,6 +390,13 @@ fn known(problem: &Problem, model: &GreyBox, flights: &[Ready]) -> KnownColumns 
         }
     }
     (known, coefficients, placed)
+}
+
+/// The physical bounds of a coefficient.
+fn bounds(model: &GreyBox, index: usize) -> Option<(f64, f64)> {
+    let (id, own) = model.coefficients()[index].name.split_once('.')?;
+    let about = model.effects().find(|about| about.id == id)?;
+    about.coefficients.iter().find(|c| c.name == own).map(|c| c.bounds)
 }
 
 /// Whether a search leaves the coefficient free: gains of nominally one are held.

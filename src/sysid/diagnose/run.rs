@@ -20,6 +20,10 @@ use crate::physics::{effects, inputs};
 use crate::sysid::compare::flight::Prepared;
 use crate::sysid::reconstruction::Reconstruction;
 
+/// Least share of the error beyond noise that must be learnable before something is said to be missing:
+/// what the reconstruction leaves is no effect.
+const WORTH_SAYING: f64 = 0.1;
+
 /// Says which effects of the catalogue `model` lacks according to `flights`, which must have been
 /// reconstructed with their deflections as recorded; `progress` hears what is being done.
 ///
@@ -120,7 +124,8 @@ fn problem<'a>(
 }
 
 fn verdict(found: &Found) -> Verdict {
-    let significant = found.remainder.total > found.remainder.total_threshold;
+    let significant =
+        found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;
     if found.selected.iter().any(|s| s.refused.is_empty()) {
         Verdict::Effect
     } else if found.selected.iter().any(|s| !s.slight) || significant {

@@ -17,6 +17,12 @@ pub const HELD_OUT: f64 = 0.1;
 pub const SELECTED: f64 = 0.8;
 /// Passes of tuning after an effect has joined, which is where nonlinear ones settle.
 const SETTLING: usize = 2;
+/// Candidates of this part of the best one's order contend with it,
+const CONTENDING: f64 = 0.2;
+/// if their contribution is this much like its own;
+const CONTENDING_LIKENESS: f64 = 0.6;
+/// so many at most.
+const CONTENDERS: usize = 4;
 /// Part of what a flexible model could remove that an effect may leave in its channels.
 const LEFT: f64 = 0.3;
 
@@ -63,6 +69,8 @@ pub struct Found {
     pub nulls: Vec<f64>,
     /// Threshold of the last round.
     pub threshold: f64,
+    /// Trials of the last round that lost against the first one once both had settled.
+    pub beaten: Vec<usize>,
     /// Asserted effects in the order of selection, then the one refused, if there is one.
     pub selected: Vec<Selected>,
 }
@@ -98,19 +106,69 @@ pub fn search(
         scores,
         nulls,
         threshold,
+        beaten: Vec::new(),
         selected: Vec::new(),
     };
     while found.selected.len() < MOST {
+        found.beaten.clear();
+        run_off(problem, &mut found);
         let Some(winner) = examine(&found, options) else { break };
         let passed = winner.refused.is_empty();
         progress(&format!("{}: {}", winner.id, if passed { "joins" } else { "is refused" }));
         found.selected.push(winner);
-        if !passed || !found.join(problem, &entries, options) {
+        if !passed || !found.join(problem, model, &entries, options) {
             break;
         }
     }
     found.judge_remainder();
     Some(found)
+}
+
+/// Puts the best of several close contenders first, each joined to the model and settled under one noise, and
+/// takes those out that lose clearly: a linearisation at the model without them does not tell them apart.
+fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
+    let round = found.last.as_ref().unwrap_or(&found.first);
+    let (_, best) = found.scores.first()?;
+    if best.evidence < found.threshold {
+        return None;
+    }
+    let contend: Vec<usize> = (0..found.scores.len())
+        .filter(|k| {
+            let (trial, score) = &found.scores[*k];
+            score.order > CONTENDING * best.order
+                && !round.at_bound(*trial, score)
+                && checks::likeness(round, best, score).abs() > CONTENDING_LIKENESS
+        })
+        .take(CONTENDERS)
+        .collect();
+    if contend.len() < 2 {
+        return None;
+    }
+    let error = |k: &usize| {
+        let (trial, score) = &found.scores[*k];
+        let mut model = round.with(score);
+        model.join(round.trials[*trial].id, &score.values).ok()?;
+        let mut left = f64::INFINITY;
+        for _ in 0..=SETTLING {
+            let settled = Round::under(problem, model, &[], Some(&round.noise))?;
+            let last = settled.projected.width();
+            left = settled.projected.total[(last, last)];
+            model = settled.tuned();
+        }
+        Some(left)
+    };
+    let errors: Vec<(usize, f64)> =
+        contend.iter().map(|k| (*k, error(k).unwrap_or(f64::INFINITY))).collect();
+    let (winner, least) = *errors.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let beaten: Vec<usize> = errors
+        .iter()
+        .filter(|(k, e)| *k != winner && *e > least + checks::CLOSE)
+        .map(|(k, _)| found.scores[*k].0)
+        .collect();
+    let first = found.scores.remove(winner);
+    found.scores.insert(0, first);
+    found.beaten = beaten;
+    Some(())
 }
 
 /// The best candidate, if its evidence exceeds the threshold, with all its checks.
@@ -125,7 +183,8 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
     if round.at_bound(*place, score) {
         refused.push("a constant lies at the end of what is physically possible".into());
     }
-    let class = checks::class(round, &found.scores, 0);
+    let mut class = checks::class(round, &found.scores, 0);
+    class.retain(|k| !found.beaten.contains(&found.scores[*k].0));
     let members: Vec<usize> =
         std::iter::once(*place).chain(class.iter().map(|k| found.scores[*k].0)).collect();
     let heldout = checks::heldout_reduction(round, trial, score);
@@ -137,7 +196,9 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
             100.0 * HELD_OUT
         ));
     }
-    let selected = checks::selected(round, &found.scores, &members, options.bootstraps);
+    let open: Vec<usize> =
+        found.scores.iter().map(|(t, _)| *t).filter(|t| !found.beaten.contains(t)).collect();
+    let selected = checks::selected(round, &open, &members, options.bootstraps);
     if selected < SELECTED && options.bootstraps > 0 {
         refused.push(format!(
             "it is the best in {:.0} % of the block bootstraps, under {:.0} %",
@@ -166,10 +227,37 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
     })
 }
 
+/// `current` without the effect `id`, which `given` does not have either.
+fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
+    let mut model = given.clone();
+    let joined: Vec<&'static str> =
+        current.effects().map(|e| e.id).filter(|e| *e != id && !given.has(e)).collect();
+    let own = |effect: &str| -> Vec<f64> {
+        let prefix = format!("{effect}.");
+        let of = current.coefficients().iter().filter(|c| c.name.starts_with(&prefix));
+        of.map(|c| c.value).collect()
+    };
+    for effect in joined {
+        // what it had is possible again
+        let _ = model.join(effect, &own(effect));
+    }
+    for c in current.coefficients() {
+        model.set_coefficient(&c.name, c.value);
+    }
+    model
+}
+
 impl Found {
     /// Joins the effect selected last to the model and ranks what is left.
-    fn join(&mut self, problem: &Problem, entries: &[Entry], options: &Options) -> bool {
-        let Some(winner) = self.selected.last() else { return false };
+    /// An earlier one that is nothing beside it goes.
+    fn join(
+        &mut self,
+        problem: &Problem,
+        given: &GreyBox,
+        entries: &[Entry],
+        options: &Options,
+    ) -> bool {
+        let Some(winner) = self.selected.last().cloned() else { return false };
         let mut model = self.round().with(&winner.score);
         if model.join(winner.id, &winner.score.values).is_err() {
             return false;
@@ -177,6 +265,15 @@ impl Found {
         for _ in 0..SETTLING {
             let Some(round) = Round::new(problem, model.clone(), &[]) else { return false };
             model = round.tuned();
+            let newest = winner.id;
+            let idle = self.selected.iter().find(|s| {
+                s.id != newest && round.amount(s.id).is_some_and(|wald| wald < self.threshold)
+            });
+            if let Some(idle) = idle.map(|s| s.id) {
+                model = without(given, &model, idle);
+                self.selected.retain(|s| s.id != idle);
+                break;
+            }
         }
         let open: Vec<Entry> = entries.iter().filter(|e| !model.has(e.about.id)).copied().collect();
         let Some(mut round) = Round::new(problem, model, &open) else { return false };

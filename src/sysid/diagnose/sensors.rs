@@ -37,26 +37,7 @@ pub fn widths(flight: &Reconstruction, dt: f64) -> [f64; SENSORS] {
         of.filter(|sd| sd.is_finite()).unwrap_or(0.0)
     };
     std::array::from_fn(|k| match FLOOR.get(k) {
-        Some(floor) => {
-            let e: Vec<f64> = std::env::var("GLF")
-                .unwrap_or_default()
-                .split(',')
-                .filter_map(|x| x.parse().ok())
-                .collect();
-            let floor = e
-                .get(match k {
-                    0..3 => 0,
-                    3 | 4 => 1,
-                    5 => 2,
-                    6..9 => 3,
-                    9 | 10 => 4,
-                    11 => 5,
-                    _ => 6,
-                })
-                .filter(|x| **x > 0.0)
-                .unwrap_or(floor);
-            stated(NAMES[k]).max(*floor)
-        }
+        Some(floor) => stated(NAMES[k]).max(*floor),
         None => SKEW_SAMPLES * dt,
     })
 }
