@@ -403,7 +403,7 @@ fn planted_errors_in_turbulence() {
 fn planted_errors_beside_a_clean_velocity_over_ground() {
     let mut noise = Errors::NOISE;
     noise[5] = 0.0;
-    // the actuators' delay reaches 86 %: its errors of 0.2 ms are drawn from a noise that is not there
+    // the actuators' delay reaches 86 %, with errors of 0.2 ms; why is not known
     let campaign = Campaign { seeds: 720_000..720_050, noise, ..FIFTY };
     assert_covered(&campaign, &["skew_actuators"]);
 }
