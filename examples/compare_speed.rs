@@ -1,4 +1,4 @@
-//! How long a comparison of a ten-minute log takes, with its memory: `cargo run --release --example compare_speed`.
+//! How long comparison or diagnosis of a ten-minute log takes, with the memory: `cargo run --release --example compare_speed`.
 
 #[path = "../tests/compare_support/mod.rs"]
 mod compare_support;
@@ -9,7 +9,8 @@ use compare_support::{REALISTIC, fly, model};
 use greylag::logs::{self, csv};
 use greylag::report::ComparisonReport;
 use greylag::sysid::compare::{Options, compare};
-use greylag::sysid::reconstruct::{self, reconstruct};
+use greylag::sysid::diagnose::{self, diagnose};
+use greylag::sysid::reconstruct::{self, ActuatorClock, reconstruct};
 
 fn main() {
     let mut text = Vec::new();
@@ -21,11 +22,22 @@ fn main() {
     println!("{} samples read in {:.2} s", flight.samples.len(), start.elapsed().as_secs_f64());
     let start = Instant::now();
     let prior = model("prior-as-printed");
-    let options = reconstruct::Options::new("ten minutes", prior.airframe.actuators);
+    let mut options = reconstruct::Options::new("ten minutes", prior.airframe.actuators);
+    options.actuators_clock = ActuatorClock::AsRecorded;
     let flight = reconstruct(&flight, &options).expect("a flight");
     println!("reconstructed in {:.2} s", start.elapsed().as_secs_f64());
+    let flights = [flight];
     let start = Instant::now();
-    let found = compare(&[prior, model("jsbsim")], &[flight], &Options::default(), &|_| ());
+    let answer = diagnose(&model("jsbsim"), &flights, &diagnose::Options::default(), &|_| ());
+    let answer = answer.expect("a diagnosis");
+    println!(
+        "diagnosed with {} nulls in {:.2} s: {:?}",
+        answer.nulls.count,
+        start.elapsed().as_secs_f64(),
+        answer.verdict
+    );
+    let start = Instant::now();
+    let found = compare(&[prior, model("jsbsim")], &flights, &Options::default(), &|_| ());
     let found = found.expect("a comparison");
     println!("two models compared in {:.2} s", start.elapsed().as_secs_f64());
     let start = Instant::now();

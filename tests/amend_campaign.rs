@@ -50,7 +50,7 @@ const CASES: &[Case] = &[
 ];
 
 #[test]
-#[ignore = "minutes: the figures of the README"]
+#[ignore = "minutes: output error over several seeds and effects"]
 fn campaign() {
     let wanted = std::env::var("CASES").unwrap_or_default();
     let seeds: u64 = std::env::var("SEEDS").map_or(3, |s| s.parse().unwrap());

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::control::{Kind, build};
 use crate::logs::csv;
 use crate::model::GreyBox;
+use crate::physics::catalogue;
 use crate::sim::missing::{Kind as MissingKind, Missing};
 use crate::sim::starting_model::starting_model;
 use crate::sim::trial::Trial;
@@ -128,10 +129,8 @@ fn answer(seed: u64, missing: &Missing) -> Answer {
 
 /// The names of the constants of the catalogue's effect `id`.
 fn coefficient_names(id: &str) -> Vec<&'static str> {
-    use crate::physics::{effects, inputs};
-    let known = effects::Kind::from_id(id).map(effects::Kind::describe);
-    let known = known.or_else(|| inputs::Kind::from_id(id).map(inputs::Kind::describe));
-    known.map_or(Vec::new(), |about| about.coefficients.iter().map(|c| c.name).collect())
+    catalogue::describe(id)
+        .map_or(Vec::new(), |about| about.coefficients.iter().map(|c| c.name).collect())
 }
 
 /// JSON in hexadecimal digits: nobody reads it by accident.

@@ -11,8 +11,8 @@ use crate::physics::Airframe;
 use crate::physics::airframe::{FileError, Sourced, check_schema, named, positive, toml_error};
 use crate::physics::atmosphere::{Atmosphere, Density};
 use crate::physics::effects::{Description, Kind};
-use crate::physics::inputs;
 use crate::physics::rigid_body::{ForceAxes, RigidBody};
+use crate::physics::{catalogue, inputs};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -233,7 +233,6 @@ fn table(id: &str, key: &str, content: toml::Value) -> Result<Table, String> {
 }
 
 fn unknown_effect(id: &str) -> String {
-    let inputs = inputs::Kind::ALL.iter().map(|k| k.describe().id);
-    let ids: Vec<_> = Kind::ALL.iter().map(|k| k.describe().id).chain(inputs).collect();
+    let ids: Vec<_> = catalogue::all().map(|about| about.id).collect();
     format!("effects.{id:?} is unknown to this program; it knows {}", ids.join(", "))
 }

@@ -5,6 +5,7 @@
 pub mod actuators;
 pub mod airframe;
 pub mod atmosphere;
+pub mod catalogue;
 pub mod effects;
 pub mod inputs;
 pub mod point;

@@ -6,8 +6,8 @@ use crate::control::schedule::menu::{MENU, Manoeuvre};
 use crate::control::schedule::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use crate::control::{Controller, Observation, Target};
 use crate::model::{GreyBox, JoinError};
-use crate::physics::effects::{self, Description};
-use crate::physics::inputs::{self, InputMemory};
+use crate::physics::catalogue;
+use crate::physics::inputs::InputMemory;
 use crate::physics::rigid_body;
 use crate::physics::{Controls, State};
 use crate::sim::instruments::{Group, Instruments};
@@ -125,7 +125,7 @@ fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
         return Ok(suspect.values.clone());
     }
     let id = suspect.id.as_str();
-    let Some(about) = describe(id) else {
+    let Some(about) = catalogue::describe(id) else {
         // joining it says what is known
         return Ok(model.clone().join(id, &[]).map(|()| Vec::new())?);
     };
@@ -139,11 +139,6 @@ fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
     middle.ok_or_else(|| DesignError::Amplitude { id: id.into() })
 }
 
-fn describe(id: &str) -> Option<Description> {
-    let known = effects::Kind::from_id(id).map(effects::Kind::describe);
-    known.or_else(|| inputs::Kind::from_id(id).map(inputs::Kind::describe))
-}
-
 /// The ways in which the effect may be fitted to data of `model`: for each set of shape constants `model` with one unit
 /// of each linear coefficient, or with the effect as a whole where it has none.
 ///
@@ -151,7 +146,7 @@ fn describe(id: &str) -> Option<Description> {
 /// The effect is unknown, there already, or its size is not known.
 pub fn alternatives(model: &GreyBox, suspect: &Suspect) -> Result<Vec<Vec<GreyBox>>, DesignError> {
     let own = values(model, suspect)?;
-    let about = describe(&suspect.id);
+    let about = catalogue::describe(&suspect.id);
     let starts = about.and_then(|about| about.entry).map_or(&[][..], |entry| entry.starts);
     let linear = about.map_or(0, |about| about.coefficients.len() - about.shape);
     let joined = |values: &[f64]| -> Result<GreyBox, DesignError> {

@@ -9,8 +9,7 @@ use super::codec::{
 use crate::plant::Truth;
 
 /// Full surface deflection, rad: what ±1 means in ACTUATOR_OUTPUT_STATUS.
-// The aircraft's limit as its file has it, not π/6.
-#[allow(clippy::approx_constant)]
+#[allow(clippy::approx_constant)] // The aircraft's limit as its file has it, not π/6.
 pub const FULL_DEFLECTION_RAD: f64 = 0.5235;
 
 /// Simulated time from one frame to the next, µs.

@@ -14,7 +14,7 @@ use tables::print;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
 use crate::model::GreyBox;
-use crate::physics::{effects, inputs};
+use crate::physics::catalogue;
 use crate::report::AmendmentReport;
 use crate::sysid::amend::{self, Added, Amended, Refused};
 use crate::sysid::compare::{self, compare};
@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         bail!("{} cannot be fitted to and held out at once; name it in one place", twice.display());
     }
     for id in &arguments.effects {
-        if effects::Kind::from_id(id).is_none() && inputs::Kind::from_id(id).is_none() {
+        if catalogue::describe(id).is_none() {
             bail!(
                 "effect {id:?} is unknown to this program; `greylag effects list` names those it knows"
             );
@@ -192,9 +192,7 @@ fn wanted(
 
 /// An asserted effect, to be searched for near where the diagnosis has it.
 fn accepted(candidate: &Candidate) -> Added {
-    let coefficients = effects::Kind::from_id(&candidate.id)
-        .map(|k| k.describe().coefficients)
-        .or_else(|| inputs::Kind::from_id(&candidate.id).map(|k| k.describe().coefficients));
+    let coefficients = catalogue::describe(&candidate.id).map(|about| about.coefficients);
     let value = |name: &str| candidate.parameters.iter().find(|p| p.name == name).map(|p| p.value);
     let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
     Added { id: candidate.id.clone(), start }

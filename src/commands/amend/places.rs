@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use crate::commands::files::{self, Overwrite};
 use crate::model::GreyBox;
 use crate::model::edit::{Edit, Number};
-use crate::physics::{effects, inputs};
+use crate::physics::catalogue;
 use crate::sysid::amend::{Amended, Amendment};
 
 /// Characters of a file's SHA-256 that sources carry.
@@ -141,11 +141,7 @@ fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) 
     let new = |name: &str| !before.coefficients().iter().any(|c| c.name == name);
     let source = |name: &str| {
         let id = name.split('.').next().unwrap_or_default();
-        let prior = effects::Kind::from_id(id).map(|k| k.describe().source);
-        prior
-            .or_else(|| inputs::Kind::from_id(id).map(|k| k.describe().source))
-            .unwrap_or("")
-            .into()
+        catalogue::describe(id).map_or("", |about| about.source).into()
     };
     let all = amended.model.coefficients();
     let changed = all.iter().filter(|c| fitted.iter().any(|p| p.name == c.name && !p.added));

@@ -170,6 +170,9 @@ struct Judge<'a> {
     horizons_s: &'a [f64],
 }
 
+/// A fit that is kept, with its scores.
+type Kept = (Fit, Vec<HorizonScore>);
+
 impl Judge<'_> {
     fn scores(&self, model: &GreyBox) -> Vec<HorizonScore> {
         let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
@@ -178,14 +181,13 @@ impl Judge<'_> {
     }
 
     /// What the data say of an effect, and the fit with it if it is kept.
-    #[allow(clippy::type_complexity)] // the fit travels with its scores
     fn verdict(
         &self,
         added: &Added,
         fitted: Result<Fit, AmendError>,
         before: &[HorizonScore],
         refused: Refused,
-    ) -> Result<(AddedEffect, Option<(Fit, Vec<HorizonScore>)>), AmendError> {
+    ) -> Result<(AddedEffect, Option<Kept>), AmendError> {
         let about = parameters::describe(&added.id).map(|(about, _)| about);
         let mut effect = AddedEffect {
             id: added.id.clone(),

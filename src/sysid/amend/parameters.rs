@@ -1,7 +1,8 @@
 //! The coefficients that a fit may change, with their priors, bounds and steps.
 
 use crate::model::GreyBox;
-use crate::physics::effects::{self, Description};
+use crate::physics::catalogue;
+use crate::physics::effects::Description;
 use crate::physics::inputs;
 
 /// Coefficients of added effects that stay where they start: shares of a whole, which cannot be told
@@ -42,8 +43,7 @@ pub(super) struct Free {
 
 /// What is known of the effect `id`, and whether it acts on inputs.
 pub(super) fn describe(id: &str) -> Option<(Description, bool)> {
-    let acts = effects::Kind::from_id(id).map(|k| (k.describe(), false));
-    acts.or_else(|| inputs::Kind::from_id(id).map(|k| (k.describe(), true)))
+    catalogue::describe(id).map(|about| (about, inputs::Kind::from_id(id).is_some()))
 }
 
 /// The coefficients of `model` that may change when `added` are the ids of new effects.

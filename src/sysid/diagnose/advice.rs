@@ -1,7 +1,7 @@
 //! What to fly next.
+use crate::physics::catalogue::describe;
 
 use super::result::{Advice, Candidate, ChannelLeft, Verdict};
-use super::run::describe;
 use super::search::Found;
 
 /// Pieces of advice on effects that these data could not have shown.

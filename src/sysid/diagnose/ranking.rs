@@ -6,8 +6,8 @@ use super::options::{Detail, Options};
 use super::rank::{Score, Trial};
 use super::result::{Candidate, FlightEstimate, Parameter};
 use super::round::Round;
-use super::run::describe;
 use super::search::{Found, Selected};
+use crate::physics::catalogue::describe;
 use crate::physics::effects::Description;
 use crate::sysid::compare::ChannelId;
 

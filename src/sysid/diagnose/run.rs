@@ -16,7 +16,7 @@ use super::sentences;
 use super::shared;
 use super::shares;
 use crate::model::GreyBox;
-use crate::physics::{effects, inputs};
+use crate::physics;
 use crate::sysid::compare::flight::Prepared;
 use crate::sysid::reconstruction::Reconstruction;
 
@@ -76,25 +76,21 @@ pub fn diagnose(
 
 /// Whether every id is one of the catalogue.
 fn known(ids: &[String]) -> Result<(), DiagnoseError> {
-    let all: Vec<&str> = effects::Kind::ALL
-        .iter()
-        .map(|k| k.describe().id)
-        .chain(inputs::Kind::ALL.iter().map(|k| k.describe().id))
-        .collect();
-    match ids.iter().find(|id| !all.contains(&id.as_str())) {
+    match ids.iter().find(|id| physics::catalogue::describe(id).is_none()) {
         None => Ok(()),
         Some(id) => Err(DiagnoseError::UnknownEffect { id: id.clone() }),
     }
 }
 
-type Prepared3<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
+/// The problem, the flights it is made of, what the reader must know.
+type Intake<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
 
 /// The flights on the model's clock, with what was left out.
 fn problem<'a>(
     model: &GreyBox,
     flights: &'a [Reconstruction],
     options: &Options,
-) -> Result<Prepared3<'a>, DiagnoseError> {
+) -> Result<Intake<'a>, DiagnoseError> {
     if flights.is_empty() {
         return Err(DiagnoseError::NoFlight);
     }
@@ -133,12 +129,6 @@ fn verdict(found: &Found) -> Verdict {
     } else {
         Verdict::Adequate
     }
-}
-
-/// The description of an effect of the catalogue.
-pub fn describe(id: &str) -> Option<effects::Description> {
-    let physical = effects::Kind::from_id(id).map(|k| k.describe());
-    physical.or_else(|| inputs::Kind::from_id(id).map(|k| k.describe()))
 }
 
 /// Ids of the candidates that a model lacks and that can be searched for.

@@ -2,9 +2,9 @@
 
 use super::options::Options;
 use super::result::{Candidate, ChannelLeft, Measurement, Verdict};
-use super::run::describe;
 use super::search::Found;
 use crate::model::GreyBox;
+use crate::physics::catalogue::describe;
 
 /// Prior standard deviations beyond which a tuned coefficient is worth a note.
 const FAR: f64 = 3.0;
