@@ -37,7 +37,7 @@ pub struct Arguments {
     /// Write the report, one HTML page.
     #[arg(long)]
     report: Option<PathBuf>,
-    /// Simulated flights without a missing effect that set the thresholds.
+    /// Nulls, drawn so that they lack no effect, that set the thresholds.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
     /// Seed of everything that is drawn.

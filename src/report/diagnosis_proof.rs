@@ -8,14 +8,14 @@ use super::{Figure, Finding, Findings, Histogram, Rule, Section, Table};
 use crate::sysid::compare::{Comparison, ModelResult};
 use crate::sysid::diagnose::Diagnosis;
 
-/// Evidence under which a simulated flight is not drawn: decades of nothing would fill the scale.
+/// Evidence under which a null is not drawn: decades of nothing would fill the scale.
 const DRAWN: f64 = 0.1;
 /// Decoys in the table, the strongest first.
 const DECOYS: usize = 8;
 /// The horizon that the sentence speaks of, s, where there is one.
 const TOLD_S: f64 = 5.0;
 
-/// What chance reaches: simulated flights that lack nothing, columns that cannot be effects.
+/// What chance reaches: nulls that lack nothing, columns that cannot be effects.
 pub(super) fn chance(d: &Diagnosis) -> Section {
     let mut figures = Vec::new();
     let best = d.effects.iter().find(|c| c.asserted).or(d.effects.first());
@@ -30,9 +30,9 @@ pub(super) fn chance(d: &Diagnosis) -> Section {
         rules.push(Rule { value: decoy, label: "best decoy".into() });
         rules.retain(|r| r.value.is_finite() && r.value > 0.0);
         figures.push(Figure::Histogram(Histogram::log(
-            "Best candidate of each simulated flight",
+            "Best candidate of each null",
             "Evidence",
-            "simulated flights",
+            "nulls",
             &d.nulls.best.iter().copied().filter(|e| *e >= DRAWN).collect::<Vec<_>>(),
             rules,
         )));
@@ -55,8 +55,9 @@ fn chance_note(d: &Diagnosis) -> String {
         false => String::new(),
     };
     format!(
-        "{} flights of the tuned model were simulated with the same commands and sensors and \
-         diagnosed alike; whatever is found in them is chance. Thresholds allow {} %.{most}{hidden} \
+        "{} nulls were drawn that lack nothing: these flights under the tuned model, with what the \
+         richest fit leaves as noise, its sign drawn anew for every stretch of some seconds, and the \
+         coefficients wrong by chance within their widths. What is found in them is chance. Thresholds allow {} %.{most}{hidden} \
          Decoys are columns that cannot be effects: reversed in time, or with their phases shuffled.",
         n.count,
         (1e4 * n.level).round() / 100.0,

@@ -52,8 +52,8 @@ pub(super) fn ranking(d: &Diagnosis) -> Section {
     }
     let note = "Evidence is the smaller of what the candidate gains in fit, less a penalty for its \
                 parameters, and how surely its coefficients differ from nought over independent \
-                stretches of flight. What chance reaches was found in simulated flights that lack \
-                nothing. A candidate above it is refused where it does not hold on stretches that \
+                stretches of flight. What chance reaches was found in nulls, drawn so that \
+                they lack nothing. A candidate above it is refused where it does not hold on stretches that \
                 the fit did not see, leaves what is physically possible, or the flights disagree.";
     let figure = Evidence { title: "Evidence against chance".into(), groups };
     Section::new("Suspects", note, vec![Figure::Evidence(figure)])

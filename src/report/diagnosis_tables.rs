@@ -170,7 +170,7 @@ pub(super) fn provenance(report: &DiagnosisReport) -> Section {
     report.log_files.iter().for_each(|file| push("Log", file.clone()));
     let s = &d.settings;
     push("Seed", s.seed.to_string());
-    push("Simulated flights", s.nulls.to_string());
+    push("Nulls drawn", s.nulls.to_string());
     push("Bootstraps", s.bootstraps.to_string());
     if !s.without.is_empty() {
         push("Left out of the catalogue", s.without.join(", "));

@@ -14,7 +14,7 @@ pub enum Detail {
 pub struct Options {
     /// Seed of nulls, bootstraps, decoys and the flexible model.
     pub seed: u64,
-    /// Simulated null flights.
+    /// Nulls drawn.
     pub nulls: usize,
     /// Block bootstraps.
     pub bootstraps: usize,

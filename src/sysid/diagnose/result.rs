@@ -37,7 +37,7 @@ pub struct Diagnosis {
     pub tuned: Vec<Tuned>,
     /// What to fly next, the most useful first.
     pub advice: Vec<Advice>,
-    /// The simulated flights without a missing effect that set the thresholds.
+    /// The nulls, which lack no effect, that set the thresholds.
     pub nulls: Nulls,
     /// Columns that cannot be effects, tried to see what chance reaches.
     pub decoys: Vec<Decoy>,
@@ -62,7 +62,7 @@ pub struct Candidate {
     /// The smaller of its penalised gain and its block-robust Wald statistic, in the step in which
     /// it was selected, or in the last one.
     pub evidence: f64,
-    /// What chance reaches in the simulated null flights.
+    /// What chance reaches in the nulls.
     pub threshold: f64,
     /// Its parameters as fitted together with the prior.
     pub parameters: Vec<Parameter>,
@@ -186,7 +186,8 @@ pub struct Advice {
     pub between: Option<[String; 2]>,
 }
 
-/// The simulated null flights.
+/// Nulls: the flights under the tuned model, with the noise of the richest fit, its sign drawn anew block by
+/// block, and the prior wrong by chance within its widths.
 #[derive(Clone, Debug, Serialize)]
 pub struct Nulls {
     /// How many.
@@ -211,7 +212,7 @@ pub struct Decoy {
 pub struct Settings {
     /// Seed of nulls, bootstraps and decoys.
     pub seed: u64,
-    /// Simulated null flights.
+    /// Nulls drawn.
     pub nulls: usize,
     /// Block bootstraps.
     pub bootstraps: usize,
