@@ -1,6 +1,6 @@
 //! The dynamics model: which effects act, with which coefficients, on which rigid body.
 
-use crate::model::Integrator;
+use crate::model::{Integrator, Residual};
 use crate::num::{Real, Table};
 use crate::physics::atmosphere::Atmosphere;
 use crate::physics::effects::{Description, Kind, Needs, Own};
@@ -102,9 +102,8 @@ pub enum JoinError {
     },
 }
 
-/// ṡ = F_p(s, z; θ_p), eq. (5) of \[GSFM26\]: a sum of effects on a rigid body.
-///
-/// (The residual F_a of eq. (19) joins here.)
+/// ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: a sum of effects on a rigid body, with
+/// what was learned beside it.
 #[derive(Clone, Debug)]
 pub struct GreyBox {
     /// The model's name, from its file.
@@ -121,6 +120,8 @@ pub struct GreyBox {
     pub axes: ForceAxes,
     /// How it steps through time.
     pub integrator: Integrator,
+    /// What was learned beside the effects, F_a.
+    pub residual: Option<Residual>,
     /// Effects that need only the point come first.
     pub(super) terms: Vec<Term>,
     /// Input effects with the place of their constant.
@@ -407,6 +408,10 @@ impl GreyBox {
     ) -> State<R> {
         let air = self.air(state, altitude);
         let (acceleration, spin) = self.accelerations(state, controls, &air);
-        rigid_body::state_rate(state, &air, acceleration, spin)
+        let rate = rigid_body::state_rate(state, &air, acceleration, spin);
+        match &self.residual {
+            Some(residual) => rate.advance(&residual.rate(state, controls), 1.0),
+            None => rate,
+        }
     }
 }

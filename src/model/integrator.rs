@@ -72,7 +72,15 @@ impl GreyBox {
         memory: &mut Memory<R>,
     ) -> State<R> {
         let air = self.air(s, altitude);
-        let (acceleration, spin) = self.accelerations(s, controls, &air);
+        let (mut acceleration, mut spin) = self.accelerations(s, controls, &air);
+        if let Some(residual) = &self.residual {
+            // this scheme knows accelerations only: what was learned of φ̇ and θ̇ has no place in it
+            let learned = residual.rate(s, controls);
+            let push = rigid_body::acceleration_of(s, &air, &learned);
+            let turn = [learned.p, learned.q, learned.r];
+            acceleration = std::array::from_fn(|i| acceleration[i] + push[i]);
+            spin = std::array::from_fn(|i| spin[i] + turn[i]);
+        }
         let acceleration = rigid_body::body_to_horizon(s, acceleration);
         let velocity = rigid_body::body_to_horizon(s, rigid_body::air_velocity(s, &air));
         let last = memory.0.unwrap_or(acceleration);

@@ -5,9 +5,11 @@ mod grey_box;
 mod integrator;
 mod linear;
 mod newton;
+pub mod residual;
 mod trim;
 
 pub use grey_box::{GreyBox, JoinError, Named};
 pub use integrator::{Integrator, Memory, STEP, Twin};
 pub use linear::{Linear, linearise};
+pub use residual::Residual;
 pub use trim::{Trim, TrimError};

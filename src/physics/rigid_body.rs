@@ -129,6 +129,25 @@ pub fn state_rate<R: Real>(
     State { roll, pitch, airspeed, p: spin[0], q: spin[1], r: spin[2], alpha, beta }
 }
 
+/// The acceleration in body axes (m/s²) that changes airspeed, α and β at the rates of `rate`: what
+/// [`state_rate`] makes of acceleration, turned round.
+#[inline(always)]
+pub fn acceleration_of<R: Real>(
+    state: &State<R>,
+    air: &AirData<R>,
+    rate: &State<R>,
+) -> Vector<R> {
+    let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
+    let across = state.airspeed * rate.beta;
+    let forward = rate.airspeed * cos_beta - across * sin_beta;
+    let downward = state.airspeed * cos_beta * rate.alpha;
+    [
+        forward * cos_alpha - downward * sin_alpha,
+        rate.airspeed * sin_beta + across * cos_beta,
+        forward * sin_alpha + downward * cos_alpha,
+    ]
+}
+
 /// Rotates a vector from body axes to the local horizon turned with the heading (ψ = 0).
 #[inline(always)]
 pub fn body_to_horizon<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
@@ -191,6 +210,17 @@ mod tests {
         assert!((rate.airspeed - dva).abs() < 1e-12);
         assert!((rate.alpha - (u * dw - w * du) / (u * u + w * w)).abs() < 1e-12);
         assert!((rate.beta - (va * dv - v * dva) / (va * (va * va - v * v).sqrt())).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_acceleration_of_rates_changes_the_state_at_these_rates() {
+        let air = AirData::new(&STATE, 1.156, &GEOMETRY);
+        let wanted = State { airspeed: 1.5, alpha: -2.0, beta: 0.7, ..State::default() };
+        let still = state_rate(&STATE, &air, [0.0; 3], [0.0; 3]);
+        let moved = state_rate(&STATE, &air, acceleration_of(&STATE, &air, &wanted), [0.0; 3]);
+        for (moved, wanted) in still.advance(&wanted, 1.0).to_array().iter().zip(moved.to_array()) {
+            assert!((moved - wanted).abs() < 1e-13);
+        }
     }
 
     /// Euler's equations J ω̇ + ω × Jω = M with the inertia matrix written out.
