@@ -62,5 +62,7 @@ pub mod flight;
 pub mod sysid;
 #[cfg(feature = "sitl")]
 pub mod sim;
+#[cfg(feature = "learn")]
+pub mod learn;
 pub mod report;
 pub mod commands;

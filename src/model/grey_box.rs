@@ -155,6 +155,17 @@ impl GreyBox {
         self.renew();
     }
 
+    /// Changes mass and inertia; effects on them act on the new ones.
+    pub fn set_body(&mut self, body: RigidBody) {
+        self.bare_body = body;
+        self.renew();
+    }
+
+    /// Mass and inertia without the effects on them.
+    pub fn bare_body(&self) -> &RigidBody {
+        &self.bare_body
+    }
+
     /// Adds the effect `id` with `values` of its coefficients, in its own order.
     ///
     /// # Errors
@@ -304,6 +315,35 @@ impl GreyBox {
         self.terms_at(&self.terms, state, controls, air, &base, &mut term);
     }
 
+    /// [`contributions`](GreyBox::contributions) of a model whose effects all need only the point, with
+    /// nothing compiled in for others: see [`needs`](GreyBox::needs).
+    #[inline(always)]
+    pub(crate) fn point_contributions<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+        mut term: impl FnMut(usize, Channel, R),
+    ) {
+        self.terms_at(&self.terms, state, controls, air, &Base::zero(), &mut term);
+    }
+
+    /// [`wrench`](GreyBox::wrench), likewise.
+    #[inline(always)]
+    pub(crate) fn point_wrench<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+    ) -> Wrench<R> {
+        self.sum(&self.terms, state, controls, air, &Base::zero())
+    }
+
+    /// The most that one of the effects must be told.
+    pub fn needs(&self) -> Needs {
+        self.terms.last().map_or(Needs::Point, |term| term.kind.needs())
+    }
+
     #[inline(always)]
     fn terms_at<R: Real>(
         &self,
@@ -383,7 +423,7 @@ impl GreyBox {
     }
 
     #[inline(always)]
-    fn accelerations_under<R: Real>(
+    pub(crate) fn accelerations_under<R: Real>(
         &self,
         wrench: &Wrench<R>,
         state: &State<R>,

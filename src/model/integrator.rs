@@ -7,7 +7,7 @@ use crate::num::Real;
 use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
 use crate::physics::rigid_body::{self, Vector};
-use crate::physics::{Command, Controls, State};
+use crate::physics::{AirData, Command, Controls, State};
 
 /// The time step of control and simulation, s.
 pub const STEP: f64 = 0.01;
@@ -81,30 +81,46 @@ impl GreyBox {
             acceleration = std::array::from_fn(|i| acceleration[i] + push[i]);
             spin = std::array::from_fn(|i| spin[i] + turn[i]);
         }
-        let acceleration = rigid_body::body_to_horizon(s, acceleration);
-        let velocity = rigid_body::body_to_horizon(s, rigid_body::air_velocity(s, &air));
-        let last = memory.0.unwrap_or(acceleration);
-        let velocity: Vector<R> = std::array::from_fn(|i| {
-            velocity[i] + acceleration[i].scale(1.5 * STEP) - last[i].scale(0.5 * STEP)
-        });
-        let (roll, pitch, turn) = euler_step_attitude(s);
-        let (sin, cos) = turn.sin_cos();
-        let to_new_heading = |[n, e, d]: Vector<R>| [n * cos + e * sin, e * cos - n * sin, d];
-        memory.0 = Some(to_new_heading(acceleration));
-        let turned = State { roll, pitch, ..*s };
-        let [u, v, w] = rigid_body::horizon_to_body(&turned, to_new_heading(velocity));
-        let airspeed = (u * u + v * v + w * w).sqrt();
-        State {
-            roll,
-            pitch,
-            airspeed,
-            p: s.p + spin[0].scale(STEP),
-            q: s.q + spin[1].scale(STEP),
-            r: s.r + spin[2].scale(STEP),
-            alpha: w.atan2(u),
-            beta: (v / airspeed).asin(),
-        }
+        let (next, last) = advance_jsbsim(s, &air, acceleration, spin, memory.0);
+        memory.0 = Some(last);
+        next
     }
+}
+
+/// The state one [`STEP`] later by [`Integrator::Jsbsim`] from accelerations in body axes (m/s²,
+/// rad/s²) and the last acceleration in the horizon frame, if there is one; and what is to be
+/// remembered in its place.
+#[inline(always)]
+pub(crate) fn advance_jsbsim<R: Real>(
+    s: &State<R>,
+    air: &AirData<R>,
+    acceleration: Vector<R>,
+    spin: Vector<R>,
+    last: Option<Vector<R>>,
+) -> (State<R>, Vector<R>) {
+    let acceleration = rigid_body::body_to_horizon(s, acceleration);
+    let velocity = rigid_body::body_to_horizon(s, rigid_body::air_velocity(s, air));
+    let last = last.unwrap_or(acceleration);
+    let velocity: Vector<R> = std::array::from_fn(|i| {
+        velocity[i] + acceleration[i].scale(1.5 * STEP) - last[i].scale(0.5 * STEP)
+    });
+    let (roll, pitch, turn) = euler_step_attitude(s);
+    let (sin, cos) = turn.sin_cos();
+    let to_new_heading = |[n, e, d]: Vector<R>| [n * cos + e * sin, e * cos - n * sin, d];
+    let turned = State { roll, pitch, ..*s };
+    let [u, v, w] = rigid_body::horizon_to_body(&turned, to_new_heading(velocity));
+    let airspeed = (u * u + v * v + w * w).sqrt();
+    let next = State {
+        roll,
+        pitch,
+        airspeed,
+        p: s.p + spin[0].scale(STEP),
+        q: s.q + spin[1].scale(STEP),
+        r: s.r + spin[2].scale(STEP),
+        alpha: w.atan2(u),
+        beta: (v / airspeed).asin(),
+    };
+    (next, to_new_heading(acceleration))
 }
 
 /// Attitude after an explicit Euler step of the quaternion: roll, pitch, and the turn in heading.

@@ -9,6 +9,7 @@ pub mod residual;
 mod trim;
 
 pub use grey_box::{GreyBox, JoinError, Named};
+pub(crate) use integrator::advance_jsbsim;
 pub use integrator::{Integrator, Memory, STEP, Twin};
 pub use linear::{Linear, linearise};
 pub use residual::Residual;

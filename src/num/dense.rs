@@ -16,34 +16,18 @@ const BLOCK: usize = 16;
 /// All parameters lie in one list, layer after layer: the weights, `[in, out]` as the crate burn
 /// stores them, then the biases.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Dense<W = f32> {
+pub struct Dense {
     sizes: Vec<usize>,
-    parameters: Vec<W>,
+    parameters: Vec<f32>,
 }
 
 /// One affine layer, y = x W + b.
 #[derive(Clone, Copy, Debug)]
-pub struct Layer<'a, W> {
+pub struct Layer<'a> {
     /// W, `[in, out]`: the weights of one input lie together.
-    pub weights: &'a [W],
+    pub weights: &'a [f32],
     /// b.
-    pub bias: &'a [W],
-}
-
-/// A parameter of a network, as it is stored.
-pub trait Weight: Copy + Into<f64> + Send + Sync + std::fmt::Debug + 'static {
-    /// The nearest one to `x`.
-    fn nearest(x: f64) -> Self;
-}
-impl Weight for f32 {
-    fn nearest(x: f64) -> f32 {
-        x as f32
-    }
-}
-impl Weight for f64 {
-    fn nearest(x: f64) -> f64 {
-        x
-    }
+    pub bias: &'a [f32],
 }
 
 /// Why numbers do not make a network.
@@ -74,12 +58,12 @@ fn count(sizes: &[usize]) -> usize {
     sizes.windows(2).map(|s| (s[0] + 1) * s[1]).sum()
 }
 
-impl<W: Weight> Dense<W> {
+impl Dense {
     /// A network of layers `sizes` (inputs first) with these parameters.
     ///
     /// # Errors
     /// If they do not fit, or one is not finite.
-    pub fn new(sizes: &[usize], parameters: Vec<W>) -> Result<Self, DenseError> {
+    pub fn new(sizes: &[usize], parameters: Vec<f32>) -> Result<Self, DenseError> {
         let fits = |n: &usize| (1..=WIDEST).contains(n);
         if sizes.len() < 2 || !sizes.iter().all(fits) {
             return Err(DenseError::Sizes(sizes.into()));
@@ -88,7 +72,7 @@ impl<W: Weight> Dense<W> {
         if expected != found {
             return Err(DenseError::Count { sizes: sizes.into(), expected, found });
         }
-        match parameters.iter().position(|p| !(*p).into().is_finite()) {
+        match parameters.iter().position(|p| !p.is_finite()) {
             Some(place) => Err(DenseError::NotFinite(place)),
             None => Ok(Dense { sizes: sizes.into(), parameters }),
         }
@@ -103,7 +87,7 @@ impl<W: Weight> Dense<W> {
         let mut parameters = Vec::new();
         for (k, s) in sizes.windows(2).enumerate() {
             let bound = if k + 2 == sizes.len() { 0.0 } else { 1.0 / (s[0].max(1) as f64).sqrt() };
-            let draw = |_| W::nearest(bound * rng.random_range(-1.0..1.0));
+            let draw = |_| (bound * rng.random_range(-1.0..1.0)) as f32;
             parameters.extend((0..(s[0] + 1) * s[1]).map(draw));
         }
         Dense::new(sizes, parameters)
@@ -115,18 +99,18 @@ impl<W: Weight> Dense<W> {
     }
 
     /// All parameters.
-    pub fn parameters(&self) -> &[W] {
+    pub fn parameters(&self) -> &[f32] {
         &self.parameters
     }
 
     /// All parameters, to be changed. Whoever writes keeps them finite.
-    pub fn parameters_mut(&mut self) -> &mut [W] {
+    pub fn parameters_mut(&mut self) -> &mut [f32] {
         &mut self.parameters
     }
 
     /// The layers in order.
     #[inline(always)]
-    pub fn layers(&self) -> impl Iterator<Item = Layer<'_, W>> {
+    pub fn layers(&self) -> impl Iterator<Item = Layer<'_>> {
         let mut rest = &self.parameters[..];
         self.sizes.windows(2).map(move |s| {
             let (weights, after) = rest.split_at(s[0] * s[1]);
@@ -158,7 +142,7 @@ impl<W: Weight> Dense<W> {
     }
 }
 
-impl<W: Weight> Layer<'_, W> {
+impl Layer<'_> {
     /// y = x W + b.
     #[inline(always)]
     pub fn apply<R: Real>(&self, input: &[R], output: &mut [R]) {
@@ -181,7 +165,7 @@ impl<W: Weight> Layer<'_, W> {
     #[inline(always)]
     fn columns<R: Real, const B: usize>(&self, first: usize, input: &[R], output: &mut [R]) {
         let outputs = output.len();
-        let number = |w: W| R::from_f64(w.into());
+        let number = |w: f32| R::from_f64(w.into());
         let bias = &self.bias[first..first + B];
         let mut sum: [R; B] = std::array::from_fn(|j| number(bias[j]));
         for (x, row) in input.iter().zip(self.weights.chunks_exact(outputs)) {
@@ -208,7 +192,7 @@ mod tests {
     use crate::num::{Dual, Lanes, stream};
 
     /// A network none of whose layers is a multiple of the block.
-    fn network() -> Dense<f64> {
+    fn network() -> Dense {
         let mut network = Dense::silent(&[3, 21, 9, 2], &mut stream::stream(5, &[])).unwrap();
         let mut rng = stream::stream(6, &[]);
         let last = network.parameters().len() - 20;
@@ -217,7 +201,7 @@ mod tests {
     }
 
     /// The definition, written out.
-    fn by_hand(network: &Dense<f64>, input: [f64; 3]) -> Vec<f64> {
+    fn by_hand(network: &Dense, input: [f64; 3]) -> Vec<f64> {
         let mut x = input.to_vec();
         let last = network.sizes().len() - 2;
         for (k, layer) in network.layers().enumerate() {
@@ -225,8 +209,10 @@ mod tests {
             x = (0..outputs)
                 .map(|j| {
                     let sum: f64 =
-                        (0..x.len()).map(|i| x[i] * layer.weights[i * outputs + j]).sum();
-                    let y = sum + layer.bias[j];
+                        (0..x.len())
+                        .map(|i| x[i] * f64::from(layer.weights[i * outputs + j]))
+                        .sum();
+                    let y = sum + f64::from(layer.bias[j]);
                     if k < last { y.max(0.0) } else { y }
                 })
                 .collect();
@@ -237,15 +223,12 @@ mod tests {
     #[test]
     fn answers_are_the_definition_over_every_scalar() {
         let network = network();
-        let single =
-            Dense::new(network.sizes(), network.parameters().iter().map(|p| *p as f32).collect())
-                .unwrap();
         for k in 0..20 {
             let x = [0, 1, 2].map(|i| ((7 * k + i) as f64).sin());
             let expected = by_hand(&network, x);
             let plain: [f64; 2] = network.evaluate(x);
-            let lanes: [Lanes<4>; 2] = single.evaluate(x.map(Lanes::from_f64));
-            let fused: [Lanes<4, true>; 2] = single.evaluate(x.map(Lanes::from_f64));
+            let lanes: [Lanes<4>; 2] = network.evaluate(x.map(Lanes::from_f64));
+            let fused: [Lanes<4, true>; 2] = network.evaluate(x.map(Lanes::from_f64));
             for i in 0..2 {
                 // rounding of sums of 21 terms of order one
                 assert!((plain[i] - expected[i]).abs() < 1e-14);
@@ -277,12 +260,12 @@ mod tests {
 
     #[test]
     fn starts_silent_and_refuses_what_does_not_fit() {
-        let network = Dense::<f32>::silent(&[9, 64, 64, 8], &mut stream::stream(1, &[])).unwrap();
+        let network = Dense::silent(&[9, 64, 64, 8], &mut stream::stream(1, &[])).unwrap();
         assert_eq!(network.evaluate([0.7_f64; 9]), [0.0_f64; 8]);
         assert!(network.parameters()[..9 * 64].iter().all(|w| w.abs() <= 1.0 / 3.0 && *w != 0.0));
-        assert!(matches!(Dense::new(&[2, 1], vec![0.0_f32; 2]), Err(DenseError::Count { .. })));
-        assert!(matches!(Dense::new(&[2], vec![0.0_f32; 0]), Err(DenseError::Sizes(_))));
-        assert!(matches!(Dense::new(&[2, 129], vec![0.0_f32; 387]), Err(DenseError::Sizes(_))));
+        assert!(matches!(Dense::new(&[2, 1], vec![0.0; 2]), Err(DenseError::Count { .. })));
+        assert!(matches!(Dense::new(&[2], vec![]), Err(DenseError::Sizes(_))));
+        assert!(matches!(Dense::new(&[2, 129], vec![0.0; 387]), Err(DenseError::Sizes(_))));
         assert_eq!(Dense::new(&[1, 1], vec![1.0, f32::NAN]), Err(DenseError::NotFinite(1)));
     }
 }

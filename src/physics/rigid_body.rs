@@ -148,6 +148,55 @@ pub fn acceleration_of<R: Real>(
     ]
 }
 
+/// The transpose of [`state_rate`] in acceleration and spin: what a `slope` of anything with respect
+/// to the rates is with respect to acceleration (body axes) and angular acceleration.
+#[inline(always)]
+pub fn state_rate_transposed<R: Real>(
+    state: &State<R>,
+    air: &AirData<R>,
+    slope: &State<R>,
+) -> (Vector<R>, Vector<R>) {
+    let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
+    let across = slope.beta / state.airspeed;
+    let forward = cos_beta * slope.airspeed - sin_beta * across;
+    let downward = slope.alpha / (state.airspeed * cos_beta);
+    let acceleration = [
+        cos_alpha * forward - sin_alpha * downward,
+        sin_beta * slope.airspeed + cos_beta * across,
+        sin_alpha * forward + cos_alpha * downward,
+    ];
+    (acceleration, [slope.p, slope.q, slope.r])
+}
+
+/// The transpose of [`body_force`] and [`angular_acceleration`] in the wrench: what slopes with
+/// respect to acceleration (body axes) and angular acceleration are with respect to each channel.
+#[inline(always)]
+pub fn accelerations_transposed<R: Real>(
+    body: &RigidBody<R>,
+    air: &AirData<R>,
+    axes: ForceAxes,
+    acceleration: Vector<R>,
+    spin: Vector<R>,
+) -> Wrench<R> {
+    let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
+    let [x, y, z] = acceleration.map(|a| a / body.mass);
+    let along = cos_alpha * x + sin_alpha * z;
+    let (drag, side) = match axes {
+        ForceAxes::Stability => (-along, y),
+        ForceAxes::Wind => (-cos_beta * along - sin_beta * y, cos_beta * y - sin_beta * along),
+    };
+    let gamma = body.jx * body.jz - body.jxz * body.jxz;
+    let mut wrench = Wrench::zero();
+    wrench.add(Channel::Drag, drag);
+    wrench.add(Channel::Side, side);
+    wrench.add(Channel::Lift, sin_alpha * x - cos_alpha * z);
+    wrench.add(Channel::BodyX, x);
+    wrench.add(Channel::Roll, (body.jz * spin[0] + body.jxz * spin[2]) / gamma);
+    wrench.add(Channel::Pitch, spin[1] / body.jy);
+    wrench.add(Channel::Yaw, (body.jxz * spin[0] + body.jx * spin[2]) / gamma);
+    wrench
+}
+
 /// Rotates a vector from body axes to the local horizon turned with the heading (ψ = 0).
 #[inline(always)]
 pub fn body_to_horizon<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
