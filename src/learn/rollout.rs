@@ -1,0 +1,497 @@
+//! A block of rollouts: forward with a trace, then in reverse for the slopes, eqs. (20) and (22).
+
+use crate::learn::network::Passes;
+use crate::learn::packet::Packet;
+use crate::learn::prior::{At, Said, Slopes, add, transposed};
+use crate::model::residual::Scales;
+use crate::model::{GreyBox, Integrator, STEP, advance_jsbsim};
+use crate::num::{Dual, Real};
+use crate::physics::rigid_body::{self, Vector};
+use crate::physics::{AirData, Controls, State};
+
+/// Points whose weight gradients are summed at once, so that what they read stays in the cache.
+const CHUNK: usize = 20;
+
+/// Weights of RK4's four slopes, in steps.
+const RK4_WEIGHTS: [f64; 4] = [STEP / 6.0, STEP / 3.0, STEP / 3.0, STEP / 6.0];
+/// How far before each of RK4's slopes the state is moved along the one before, in steps.
+const RK4_AHEAD: [f64; 4] = [0.0, STEP / 2.0, STEP / 2.0, STEP];
+
+/// The model that is learned.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The prior with its present coefficients; its own residual is not used.
+    pub prior: GreyBox,
+    /// The residual's network.
+    pub network: Passes,
+    /// Its scales.
+    pub scales: Scales,
+    /// Whether the slopes with respect to the prior's coefficients are wanted.
+    pub prior_slopes: PriorSlopes,
+}
+
+/// Whether the prior's coefficients are learned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PriorSlopes {
+    /// They stay.
+    None,
+    /// The slopes with respect to all of them, and to Jxz, are summed up.
+    All,
+}
+
+/// What was recorded of `Packet::WIDTH` rollouts.
+#[derive(Clone, Debug, Default)]
+pub struct Recorded<R> {
+    /// States before the start, at the start, and after each step; roll in −π..π.
+    pub states: Vec<[R; 8]>,
+    /// Aileron, elevator, throttle that act, from the step before the start on.
+    pub controls: Vec<[R; 3]>,
+    /// Air density from the step before the start on, kg/m³.
+    pub density: Vec<R>,
+    /// 1 for a rollout that counts, 0 for one that fills the block up.
+    pub weight: Option<R>,
+}
+
+/// What a forward pass leaves for the reverse one. Step 0 is the one before the start, which
+/// [`Integrator::Jsbsim`] remembers; RK4 leaves it out.
+#[derive(Clone, Debug)]
+pub struct Trace<R> {
+    /// The states at which the model was asked: one a step, four a step for RK4.
+    states: Vec<State<R>>,
+    /// The network's units at each of them.
+    units: Vec<R>,
+    /// F_p and F_a at the start of each step.
+    rates: Vec<[State<R>; 2]>,
+    /// The states after each step.
+    ends: Vec<State<R>>,
+    /// The acceleration in each step, and what is remembered before it.
+    memory: Vec<[Vector<R>; 2]>,
+    /// The network's slopes of a chunk of points.
+    slopes: Vec<R>,
+    /// Sums over points of the slopes with respect to the coefficients.
+    coefficients: Vec<R>,
+}
+
+/// What a forward pass finds, summed over the rollouts that count.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sums {
+    /// Σ over steps of ‖(ŝ − s)/x_c‖².
+    pub error: f64,
+    /// Σ over steps of ‖F_p/x_c‖².
+    pub prior: f64,
+    /// Σ over steps of ‖F_a/x_c‖².
+    pub learned: f64,
+}
+
+/// Slopes of the objective with respect to the three of [`Sums`].
+pub type SumSlopes = Sums;
+
+/// Slopes of the objective with respect to what is learned.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Gradient {
+    /// With respect to the network's parameters.
+    pub network: Vec<f64>,
+    /// With respect to the prior's coefficients, then Jxz (kg m²).
+    pub prior: Vec<f64>,
+}
+
+/// How often a step asks the model.
+const fn stages(integrator: Integrator) -> usize {
+    match integrator {
+        Integrator::Rk4 => 4,
+        Integrator::Jsbsim => 1,
+    }
+}
+
+impl<R: Packet> Trace<R> {
+    /// Room for rollouts of up to `steps` steps of `subject`.
+    pub fn new(subject: &Subject, steps: usize) -> Self {
+        let points = (steps + 1) * stages(subject.prior.integrator);
+        let nothing = nothing();
+        Trace {
+            states: vec![nothing; points],
+            units: vec![R::zero(); points * subject.network.trace()],
+            rates: vec![[nothing; 2]; steps + 1],
+            ends: vec![nothing; steps + 1],
+            memory: vec![[[R::zero(); 3]; 2]; steps + 1],
+            slopes: vec![R::zero(); CHUNK * subject.network.slopes()],
+            coefficients: vec![R::zero(); subject.prior.coefficients().len() + 1],
+        }
+    }
+}
+
+#[inline(always)]
+fn nothing<R: Real>() -> State<R> {
+    State::from_array([R::zero(); 8])
+}
+
+#[inline(always)]
+fn sum<R: Real>(a: &State<R>, b: &State<R>) -> State<R> {
+    let (a, b) = (a.to_array(), b.to_array());
+    State::from_array(std::array::from_fn(|i| a[i] + b[i]))
+}
+
+/// A pass over one block.
+pub struct Pass<'a, R> {
+    /// The model.
+    pub subject: &'a Subject,
+    /// What was recorded.
+    pub recorded: &'a Recorded<R>,
+    /// The scale of errors and rates, eq. (21) or ones.
+    pub scale: &'a [f64; 8],
+}
+
+impl<R: Packet> Pass<'_, R> {
+    fn steps(&self) -> usize {
+        self.recorded.controls.len() - 1
+    }
+
+    /// Flies the block: the sums, and a number a lane that is finite where the path is.
+    #[inline(always)]
+    pub fn forward(&self, trace: &mut Trace<R>) -> (Sums, R) {
+        let totals = match self.subject.prior.integrator {
+            Integrator::Rk4 => self.forward_rk4(trace),
+            Integrator::Jsbsim => self.forward_jsbsim(trace),
+        };
+        let [error, prior, learned] = totals.map(|t| t.sum().into());
+        (Sums { error, prior, learned }, totals[0] + totals[1] + totals[2])
+    }
+
+    /// Adds the slopes of what was flown to `gradient`, `of` being those with respect to the sums.
+    #[inline(always)]
+    pub fn reverse(&self, trace: &mut Trace<R>, of: &SumSlopes, gradient: &mut Gradient) {
+        trace.coefficients.fill(R::zero());
+        match self.subject.prior.integrator {
+            Integrator::Rk4 => self.reverse_rk4(trace, of, gradient),
+            Integrator::Jsbsim => self.reverse_jsbsim(trace, of, gradient),
+        }
+        for (sum, part) in gradient.prior.iter_mut().zip(&trace.coefficients) {
+            *sum += part.sum().into();
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, step: usize, state: State<R>) -> At<R> {
+        let [aileron, elevator, throttle] = self.recorded.controls[step];
+        let controls = Controls { aileron, elevator, throttle };
+        At { state, controls, density: self.recorded.density[step] }
+    }
+
+    /// F_a at a point.
+    #[inline(always)]
+    fn learned(&self, at: &At<R>, point: usize, trace: &mut Trace<R>) -> State<R> {
+        let Subject { network, scales, .. } = self.subject;
+        let width = network.trace();
+        let units = &mut trace.units[point * width..][..width];
+        trace.states[point] = at.state;
+        scales.rate(network.forward(scales.inputs(&at.state, &at.controls), units))
+    }
+
+    /// x/x_c² and ‖x/x_c‖² of the rollouts that count.
+    #[inline(always)]
+    fn weighted(&self, x: [R; 8]) -> ([R; 8], R) {
+        let weight = self.recorded.weight.unwrap_or(R::from_f64(1.0));
+        let mut square = R::zero();
+        let half_slope = std::array::from_fn(|i| {
+            let y = (x[i] * weight).scale(1.0 / (self.scale[i] * self.scale[i]));
+            square += x[i] * y;
+            y
+        });
+        (half_slope, square)
+    }
+
+    /// ŝ − s weighted so after `step`; roll the short way round.
+    #[inline(always)]
+    fn error(&self, step: usize, predicted: &State<R>) -> ([R; 8], R) {
+        use std::f64::consts::{PI, TAU};
+        let (seen, predicted) = (self.recorded.states[step + 1], predicted.to_array());
+        let mut error: [R; 8] = std::array::from_fn(|i| predicted[i] - seen[i]);
+        let [half, turn] = [PI, TAU].map(R::from_f64);
+        error[0] = R::where_less(half, error[0], error[0] - turn, error[0]);
+        error[0] = R::where_less(error[0], -half, error[0] + turn, error[0]);
+        self.weighted(error)
+    }
+
+    /// Adds a step's error and norms.
+    #[inline(always)]
+    fn tally(&self, step: usize, trace: &Trace<R>, totals: &mut [R; 3]) {
+        let [prior, learned] = &trace.rates[step];
+        totals[0] += self.error(step, &trace.ends[step]).1;
+        totals[1] += self.weighted(prior.to_array()).1;
+        totals[2] += self.weighted(learned.to_array()).1;
+    }
+
+    /// Slopes with respect to the state after a step, to F_p and to F_a that the step's part of the
+    /// sums has.
+    #[inline(always)]
+    fn direct(&self, step: usize, trace: &Trace<R>, of: &SumSlopes) -> [State<R>; 3] {
+        let [prior, learned] = &trace.rates[step];
+        let double = |x: [R; 8], slope: f64| State::from_array(x.map(|y| y.scale(2.0 * slope)));
+        [
+            double(self.error(step, &trace.ends[step]).0, of.error),
+            double(self.weighted(prior.to_array()).0, of.prior),
+            double(self.weighted(learned.to_array()).0, of.learned),
+        ]
+    }
+
+    #[inline(always)]
+    fn forward_rk4(&self, trace: &mut Trace<R>) -> [R; 3] {
+        let mut totals = [R::zero(); 3];
+        let mut state = State::from_array(self.recorded.states[1]);
+        for step in 1..=self.steps() {
+            let start = state;
+            let mut rate = nothing();
+            for stage in 0..4 {
+                let at = self.at(step, start.advance(&rate, RK4_AHEAD[stage]));
+                let learned = self.learned(&at, 4 * step + stage, trace);
+                let prior = at.ask(&self.subject.prior).rate;
+                if stage == 0 {
+                    trace.rates[step] = [prior, learned];
+                }
+                rate = sum(&prior, &learned);
+                state = state.advance(&rate, RK4_WEIGHTS[stage]);
+            }
+            trace.ends[step] = state;
+            self.tally(step, trace, &mut totals);
+        }
+        totals
+    }
+
+    #[inline(always)]
+    fn reverse_rk4(&self, trace: &mut Trace<R>, of: &SumSlopes, gradient: &mut Gradient) {
+        // the slope with respect to the state after the step
+        let mut slope = nothing();
+        for step in (1..=self.steps()).rev() {
+            let [error, norm_prior, norm_learned] = self.direct(step, trace, of);
+            slope = sum(&slope, &error);
+            let mut before = slope;
+            // the slope with respect to the state at which the stage after this one asked
+            let mut later = nothing();
+            for stage in (0..4).rev() {
+                let ahead = RK4_AHEAD.get(stage + 1).copied().unwrap_or(0.0);
+                let rate = nothing().advance(&slope, RK4_WEIGHTS[stage]).advance(&later, ahead);
+                let mut slopes = [rate; 2];
+                if stage == 0 {
+                    slopes = [sum(&rate, &norm_prior), sum(&rate, &norm_learned)];
+                }
+                let none = [R::zero(); 3];
+                let prior = Slopes { acceleration: none, spin: none, rate: slopes[0] };
+                let point = Place { step, point: 4 * step + stage, first: 4 };
+                later = self.point(trace, point, &prior, &slopes[1], gradient);
+                before = sum(&before, &later);
+            }
+            slope = before;
+        }
+    }
+
+    #[inline(always)]
+    fn forward_jsbsim(&self, trace: &mut Trace<R>) -> [R; 3] {
+        let mut totals = [R::zero(); 3];
+        let mut state = State::from_array(self.recorded.states[0]);
+        let mut last = None;
+        for step in 0..=self.steps() {
+            let at = self.at(step, state);
+            // this scheme knows accelerations only
+            let zero = R::zero();
+            let learned = State { roll: zero, pitch: zero, ..self.learned(&at, step, trace) };
+            let said = at.ask(&self.subject.prior);
+            let air = at.air(&self.subject.prior);
+            let (acceleration, spin) = pushed(&said, &learned, &at.state, &air);
+            trace.rates[step] = [said.rate, learned];
+            trace.memory[step] = [acceleration, last.unwrap_or([zero; 3])];
+            let (next, remembered) = advance_jsbsim(&state, &air, acceleration, spin, last);
+            last = Some(remembered);
+            trace.ends[step] = next;
+            if step == 0 {
+                state = State::from_array(self.recorded.states[1]);
+            } else {
+                self.tally(step, trace, &mut totals);
+                state = next;
+            }
+        }
+        totals
+    }
+
+    #[inline(always)]
+    fn reverse_jsbsim(&self, trace: &mut Trace<R>, of: &SumSlopes, gradient: &mut Gradient) {
+        let mut slope = nothing();
+        let mut slope_memory = [R::zero(); 3];
+        for step in (0..=self.steps()).rev() {
+            let mut norms = [nothing(); 2];
+            if step == 0 {
+                // the start is what was recorded; only what is remembered goes on
+                slope = nothing();
+            } else {
+                let [error, prior, learned] = self.direct(step, trace, of);
+                slope = sum(&slope, &error);
+                norms = [prior, learned];
+            }
+            let at = self.at(step, trace.states[step]);
+            let learned = &trace.rates[step][1];
+            let back = self.advance_back(&at, learned, &trace.memory[step], &slope, &slope_memory);
+            let prior = Slopes { acceleration: back.acceleration, spin: back.spin, rate: norms[0] };
+            let learned = sum(&back.learned, &norms[1]);
+            let point = Place { step, point: step, first: 0 };
+            let through = self.point(trace, point, &prior, &learned, gradient);
+            slope = sum(&back.state, &through);
+            slope_memory = back.memory;
+        }
+    }
+
+    /// Slopes through the scheme of JSBSim: of the state after the step and of what is remembered
+    /// then, with respect to what they are made of.
+    #[inline(always)]
+    fn advance_back(
+        &self,
+        at: &At<R>,
+        learned: &State<R>,
+        [acceleration, memory]: &[Vector<R>; 2],
+        after: &State<R>,
+        remembered: &Vector<R>,
+    ) -> Back<R> {
+        const N: usize = 14;
+        let geometry = &self.subject.prior.airframe.geometry;
+        let mut inputs = [R::zero(); N];
+        inputs[..8].copy_from_slice(&at.state.to_array());
+        inputs[8..11].copy_from_slice(acceleration);
+        inputs[11..].copy_from_slice(memory);
+        let sums = transposed(&inputs, |x| {
+            let fixed = |x: R| Dual { value: x, gradient: [R::zero(); 2] };
+            let state = State::from_array(std::array::from_fn(|i| x[i]));
+            let air = AirData::new(&state, fixed(at.density), geometry);
+            let acceleration = std::array::from_fn(|i| x[8 + i]);
+            let memory = std::array::from_fn(|i| x[11 + i]);
+            let zero = [fixed(R::zero()); 3];
+            let (next, last) = advance_jsbsim(&state, &air, acceleration, zero, Some(memory));
+            let mut sum = [R::zero(); 2];
+            next.to_array().iter().zip(after.to_array()).for_each(|(out, s)| add(&mut sum, out, s));
+            last.iter().zip(remembered).for_each(|(out, s)| add(&mut sum, out, *s));
+            sum
+        });
+        let push: Vector<R> = std::array::from_fn(|i| sums[8 + i]);
+        let spin = [after.p, after.q, after.r].map(|s| s.scale(STEP));
+        let plain = at.air(&self.subject.prior);
+        let (through, learned) = push_back(&at.state, &plain, learned, &push, &spin);
+        let state = State::from_array(std::array::from_fn(|i| sums[i]));
+        Back {
+            state: sum(&state, &through),
+            learned,
+            acceleration: push,
+            spin,
+            memory: std::array::from_fn(|i| sums[11 + i]),
+        }
+    }
+
+    /// Slopes through prior and residual at a point, to the state there; adds those to what is
+    /// learned. Points come in falling order.
+    #[inline(always)]
+    fn point(
+        &self,
+        trace: &mut Trace<R>,
+        place: Place,
+        prior: &Slopes<R>,
+        learned: &State<R>,
+        gradient: &mut Gradient,
+    ) -> State<R> {
+        let Place { step, point, first } = place;
+        let Subject { network, scales, .. } = self.subject;
+        let at = self.at(step, trace.states[point]);
+        let mut slope = at.slope(&self.subject.prior, prior);
+        if self.subject.prior_slopes == PriorSlopes::All {
+            at.coefficients(&self.subject.prior, prior, &mut trace.coefficients);
+        }
+        let (width, wide) = (network.trace(), network.slopes());
+        let slot = (point - first) % CHUNK;
+        let learned = learned.to_array();
+        let output = std::array::from_fn(|i| learned[i].scale(scales.output[i]));
+        let units = &trace.units[point * width..][..width];
+        let input = network.backward(units, output, &mut trace.slopes[slot * wide..][..wide]);
+        // the first six inputs are the state from airspeed on
+        for i in 0..6 {
+            slope[2 + i] = input[i].mul_add(R::from_f64(scales.factor[i]), slope[2 + i]);
+        }
+        if slot == 0 {
+            let points = (self.steps() + 1) * stages(self.subject.prior.integrator);
+            let count = CHUNK.min(points - point);
+            let units = &trace.units[point * width..][..count * width];
+            network.gather(units, &trace.slopes[..count * wide], &mut gradient.network);
+        }
+        State::from_array(slope)
+    }
+}
+
+/// A point of a rollout.
+#[derive(Clone, Copy)]
+struct Place {
+    /// The step it belongs to.
+    step: usize,
+    /// Its number.
+    point: usize,
+    /// The number of the first point of the rollout.
+    first: usize,
+}
+
+/// Slopes with respect to what a step is made of.
+struct Back<R> {
+    state: State<R>,
+    learned: State<R>,
+    acceleration: Vector<R>,
+    spin: Vector<R>,
+    memory: Vector<R>,
+}
+
+/// Acceleration and spin of the prior with those learned.
+#[inline(always)]
+fn pushed<R: Real>(
+    said: &Said<R>,
+    learned: &State<R>,
+    state: &State<R>,
+    air: &AirData<R>,
+) -> (Vector<R>, Vector<R>) {
+    let push = rigid_body::acceleration_of(state, air, learned);
+    let turn = [learned.p, learned.q, learned.r];
+    let acceleration = std::array::from_fn(|i| said.acceleration[i] + push[i]);
+    (acceleration, std::array::from_fn(|i| said.spin[i] + turn[i]))
+}
+
+/// Slopes through [`pushed`], with respect to the state and to what was learned.
+#[inline(always)]
+fn push_back<R: Real>(
+    state: &State<R>,
+    air: &AirData<R>,
+    learned: &State<R>,
+    push: &Vector<R>,
+    spin: &Vector<R>,
+) -> (State<R>, State<R>) {
+    let AirData { sin_alpha: sa, cos_alpha: ca, sin_beta: sb, cos_beta: cb, .. } = *air;
+    let [x, y, z] = *push;
+    let (forward, downward) = (ca * x + sa * z, ca * z - sa * x);
+    let speed = state.airspeed;
+    let across = cb * y - sb * forward;
+    let zero = R::zero();
+    let to_learned = State {
+        roll: zero,
+        pitch: zero,
+        airspeed: cb * forward + sb * y,
+        p: spin[0],
+        q: spin[1],
+        r: spin[2],
+        alpha: speed * cb * downward,
+        beta: speed * across,
+    };
+    // a = V̇ e_V + V β̇ e_β + V cosβ α̇ e_α, with the unit vectors turning with α and β
+    let turned = learned.airspeed * cb - speed * learned.beta * sb;
+    let to_state = State {
+        roll: zero,
+        pitch: zero,
+        airspeed: learned.beta * across + learned.alpha * cb * downward,
+        p: zero,
+        q: zero,
+        r: zero,
+        alpha: turned * downward - speed * cb * learned.alpha * forward,
+        beta: learned.airspeed * across
+            - speed * learned.beta * (cb * forward + sb * y)
+            - speed * sb * learned.alpha * downward,
+    };
+    (to_state, to_learned)
+}
