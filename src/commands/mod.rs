@@ -1,6 +1,8 @@
 //! Subcommands: arguments, then a few lines of work.
 
 mod choices;
+#[cfg(feature = "sitl")]
+mod collect;
 mod compare;
 #[cfg(feature = "sitl")]
 mod demo;
@@ -12,6 +14,8 @@ mod intake;
 mod logs;
 #[cfg(feature = "sitl")]
 mod targets;
+#[cfg(feature = "learn")]
+mod train;
 
 use std::process::ExitCode;
 
@@ -28,6 +32,9 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Explore in JSBSim, to have flights to learn from.
+    #[cfg(feature = "sitl")]
+    Collect(collect::Arguments),
     /// Compare models with flight logs: how far predictions stray, in which channel and regime.
     Compare(compare::Arguments),
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
@@ -43,6 +50,9 @@ enum Command {
     /// Write a target file.
     #[cfg(feature = "sitl")]
     Targets(targets::Arguments),
+    /// Learn from flights.
+    #[cfg(feature = "learn")]
+    Train(train::Arguments),
 }
 
 /// Runs the subcommand of the command line; what goes wrong is said in one line.
@@ -50,6 +60,8 @@ pub fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let result = match Arguments::parse().command {
+        #[cfg(feature = "sitl")]
+        Command::Collect(arguments) => collect::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Demo(arguments) => demo::run(&arguments),
@@ -59,6 +71,8 @@ pub fn main() -> ExitCode {
         Command::Logs(arguments) => logs::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Targets(arguments) => targets::run(&arguments),
+        #[cfg(feature = "learn")]
+        Command::Train(arguments) => train::run(&arguments),
     };
     result.unwrap_or_else(|error| {
         eprintln!("greylag: {error:#}");

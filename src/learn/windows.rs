@@ -52,12 +52,36 @@ pub struct Window {
     pub start: u32,
 }
 
-/// Every window of `steps` steps, in order.
+/// Steepest pitch at which Euler angles still move slowly, rad: beyond it they have a pole.
+const STEEPEST: f64 = 1.4;
+/// Airspeed under which flow angles mean nothing, m/s.
+const SLOWEST: f64 = 5.0;
+
+/// Whether the eight variables describe the flight well there.
+fn regular(state: &State) -> bool {
+    state.is_finite() && state.pitch.abs() < STEEPEST && state.airspeed > SLOWEST
+}
+
+/// Every window of `steps` steps, in order, in which the aircraft flies and does not point at the
+/// zenith or the nadir.
 pub fn windows(tracks: &[Track], steps: usize) -> Vec<Window> {
-    let all = tracks.iter().enumerate().flat_map(|(track, t)| {
-        t.starts(steps).map(move |start| Window { track: track as u32, start: start as u32 })
-    });
-    all.collect()
+    let mut all = Vec::new();
+    for (track, t) in tracks.iter().enumerate() {
+        // regular samples up to each one
+        let mut run = 0;
+        let runs: Vec<usize> = t
+            .states
+            .iter()
+            .map(|s| {
+                run = if regular(s) { run + 1 } else { 0 };
+                run
+            })
+            .collect();
+        let good = |start: &usize| runs[start + steps] >= steps + 2;
+        let starts = t.starts(steps).filter(good);
+        all.extend(starts.map(|start| Window { track: track as u32, start: start as u32 }));
+    }
+    all
 }
 
 /// SHA-256 of the tracks, hexadecimal.

@@ -1,5 +1,6 @@
 //! Flying a controller and scoring it: environments, targets, episodes, evaluations.
 
+pub mod collect;
 pub mod environment;
 pub mod episode;
 pub mod evaluation;
