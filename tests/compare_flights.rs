@@ -9,7 +9,8 @@ use compare_support::{EXACT, Noise, REALISTIC, as_measured, fly, model};
 use greylag::model::GreyBox;
 use greylag::sysid::compare::flight::Prepared;
 use greylag::sysid::compare::{
-    ChannelId, ChannelResult, CompareError, Comparison, ModelResult, Options, compare, weak,
+    Bin, ChannelId, ChannelResult, CompareError, Comparison, ModelResult, Options, RegimeVariable,
+    compare, weak,
 };
 use greylag::sysid::reconstruction::Reconstruction;
 
@@ -127,6 +128,38 @@ fn a_planted_lift_error_is_told_in_percent() {
     let regime = lift.regime.as_ref().unwrap();
     assert!((24.0..32.0).contains(&regime.relative_percent), "{}", regime.relative_percent);
     assert!(result.sentences[0].starts_with("Lift"), "{:?}", result.sentences);
+}
+
+#[test]
+fn an_uncertain_bias_is_part_of_the_interval() {
+    use greylag::sysid::reconstruction::Nuisance;
+    let sd = 0.5_f64.to_radians();
+    let off = |by: f64, sd: f64| {
+        let mut flight = noisy()[0].clone();
+        flight.segments[0].instants.iter_mut().for_each(|i| i.state.alpha += by);
+        flight.nuisances =
+            vec![Nuisance { name: "alpha_bias".into(), value: 0.0, sd, unit: "rad" }];
+        let mut result = one("jsbsim", &[flight]);
+        let lift = result.channels.iter_mut().find(|c| c.channel == ChannelId::Lift).unwrap();
+        let time = lift.bins.iter_mut().find(|b| b.variable == RegimeVariable::Time).unwrap();
+        let bins = std::mem::take(&mut time.bins);
+        bins.into_iter().filter(|b| b.supported).collect::<Vec<_>>()
+    };
+    let missed =
+        |bins: &[Bin]| bins.iter().filter(|b| b.interval[0] > 0.0 || b.interval[1] < 0.0).count();
+    // An angle of attack that is 0.7° off moves lift by 5 N everywhere: a failure where it is sure …
+    let (sure, unsure) = (off(1.4 * sd, 0.0), off(1.4 * sd, sd));
+    assert_eq!(missed(&sure), sure.len());
+    // … none where the reconstruction says ± 1°, and again one at 2.1° off.
+    assert_eq!(missed(&unsure), 0);
+    let far = off(4.2 * sd, sd);
+    assert_eq!(missed(&far), far.len());
+    // CLα q S = 4.02 × ½ 1.225 × (15 to 24 m/s)² × 0.75 m² is 416 to 1064 N a radian.
+    for (a, b) in sure.iter().zip(&unsure) {
+        let half = |b: &Bin| 0.5 * (b.interval[1] - b.interval[0]);
+        let doubt = (half(b).powi(2) - half(a).powi(2)).sqrt() / (1.96 * sd);
+        assert!((400.0..1100.0).contains(&doubt), "{doubt} N/rad");
+    }
 }
 
 #[test]

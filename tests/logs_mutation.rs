@@ -1,22 +1,78 @@
-//! Hostile files: logs of all formats mutated by the thousand.
+//! Hostile files: logs of all formats mutated by the thousand, their memory counted.
 
 mod logs_support;
 
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::path::Path;
 
 use greylag::logs::csv::Tolerance;
-use greylag::logs::{Options, parse};
+use greylag::logs::{Log, LogError, Options, parse};
 use logs_support::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Reads `inputs` mutated files, returns how many were read as a log all the same.
-fn mutate(inputs: usize, seed: u64) -> usize {
-    let truth = samples(4);
-    let whole = [csv(&truth), ulog(&truth), dataflash(&truth), tlog(&truth)];
+/// The system's allocator with a count, for each thread, of the bytes that live and of their peak.
+struct Counting;
+
+thread_local! {
+    static LIVE: Cell<usize> = const { Cell::new(0) };
+    static PEAK: Cell<usize> = const { Cell::new(0) };
+}
+
+fn count(more: usize, less: usize) {
+    // Threads that end have no counters any more; what they free is of no interest.
+    let _ = LIVE.try_with(|live| {
+        live.set((live.get() + more).saturating_sub(less));
+        let _ = PEAK.try_with(|peak| peak.set(peak.get().max(live.get())));
+    });
+}
+
+// SAFETY: every call is handed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count(layout.size(), 0);
+        // SAFETY: the caller keeps the contract of `alloc`.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        count(0, layout.size());
+        // SAFETY: as above.
+        unsafe { System.dealloc(at, layout) }
+    }
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // Old and new may live side by side while it copies.
+        count(size, 0);
+        count(0, layout.size());
+        // SAFETY: as above.
+        unsafe { System.realloc(at, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// A file's reading may take this many times its size (at worst 89 are reached, 3 by honest logs),
+const MULTIPLE: usize = 100;
+/// and this much besides: rules, names, the reader's tables.
+const BESIDES: usize = 1 << 20;
+
+/// Reads `bytes`, returns the peak of the memory that it took.
+fn measured(bytes: &[u8]) -> (Result<Log, LogError>, usize) {
     let options = Options { tolerance: Tolerance::Lenient, ..Options::default() };
+    let before = LIVE.get();
+    PEAK.set(before);
+    let log = parse(bytes, Path::new("mutated"), &options);
+    (log, PEAK.get() - before)
+}
+
+/// Reads `inputs` mutated files of `rows` rows each, returns how many were read as a log all the same,
+/// and the most memory that one took in multiples of its size, what is allowed besides taken off.
+fn mutate(inputs: usize, rows: usize, seed: u64) -> (usize, f64) {
+    let truth = samples(rows);
+    let whole = [csv(&truth), ulog(&truth), dataflash(&truth), tlog(&truth)];
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut read = 0;
+    let (mut read, mut most) = (0, 0.0f64);
     for i in 0..inputs {
         let mut bytes = whole[i % 4].clone();
         for _ in 0..rng.random_range(1..6u32) {
@@ -40,20 +96,114 @@ fn mutate(inputs: usize, seed: u64) -> usize {
                 break;
             }
         }
-        if let Ok(log) = parse(&bytes, Path::new("mutated"), &options) {
+        let (log, peak) = measured(&bytes);
+        most = most.max(peak.saturating_sub(BESIDES) as f64 / bytes.len() as f64);
+        assert!(
+            peak <= MULTIPLE * bytes.len() + BESIDES,
+            "input {i} of seed {seed}: {peak} bytes for {}",
+            bytes.len()
+        );
+        if let Ok(log) = log {
             // Nothing is invented: no more rows than the bytes could hold.
             assert!(log.flight.samples.len() <= bytes.len() / 16);
             read += 1;
         }
     }
-    read
+    (read, most)
 }
 
 #[test]
 fn mutated_logs_cause_no_panic() {
-    let read = mutate(100_000, 1);
+    let (read, _) = mutate(100_000, 4, 1);
     // Most mutations leave a readable log: the readers are really reached.
     assert!(read > 30_000, "{read}");
+}
+
+#[test]
+fn memory_stays_within_a_multiple_of_the_file() {
+    // Files of 200 to 500 kB, beside which what is allowed besides is little.
+    let (read, most) = mutate(200, 1500, 3);
+    println!("{read} of 200 read as logs; at most {most:.1} times the file's size");
+    assert!(read > 60, "{read}");
+}
+
+/// A ULog record.
+fn record(out: &mut Vec<u8>, kind: u8, body: &[u8]) {
+    out.extend((body.len() as u16).to_le_bytes());
+    out.push(kind);
+    out.extend(body);
+}
+
+/// Files made to take much memory for few bytes.
+fn bombs() -> Vec<(&'static str, Vec<u8>)> {
+    let mut head = vec![0x55, 0x4C, 0x6F, 0x67, 0x01, 0x12, 0x35, 1];
+    head.extend(0u64.to_le_bytes());
+    let wide = b"vehicle_attitude:uint64_t timestamp;float[2000] q;";
+    record(&mut head, b'F', wide);
+    // One wide topic subscribed to under every number.
+    let mut subscribed = head.clone();
+    for n in 0..20_000u16 {
+        let [low, high] = n.to_le_bytes();
+        record(
+            &mut subscribed,
+            b'A',
+            &[&[(n % 251) as u8, low, high], &b"vehicle_attitude"[..]].concat(),
+        );
+    }
+    // Each with a record as short as can be.
+    let mut short = subscribed.clone();
+    for n in 0..20_000u16 {
+        record(&mut short, b'D', &[&n.to_le_bytes()[..], &[1; 8]].concat());
+    }
+    // Types that hold one another eight times over.
+    let mut nested = head.clone();
+    for depth in 0..20 {
+        let text = format!("t{depth}:t{}[200] a;", depth + 1);
+        record(&mut nested, b'F', text.as_bytes());
+    }
+    record(&mut nested, b'F', b"t20:uint8_t[255] x;");
+    record(&mut nested, b'F', b"vehicle_acceleration:uint64_t timestamp;t0[99] y;");
+    for n in 0..5000u16 {
+        record(
+            &mut nested,
+            b'A',
+            &[&[0, n as u8, (n >> 8) as u8], &b"vehicle_acceleration"[..]].concat(),
+        );
+    }
+    // A message of zeros, which the wire cuts to one byte, from every component there can be.
+    let mut sources = Vec::new();
+    for source in 0..20_000u16 {
+        use mavlink::dialects::ardupilotmega::*;
+        sources.extend(u64::from(source).to_be_bytes());
+        let [system_id, component_id] = source.to_be_bytes();
+        let header = mavlink::MavHeader { system_id: system_id.into(), component_id, sequence: 0 };
+        let message = MavMessage::SERVO_OUTPUT_RAW(SERVO_OUTPUT_RAW_DATA::default());
+        mavlink::write_v2_msg(&mut sources, header, &message).unwrap();
+    }
+    let header = "time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps,airspeed_mps,aileron_cmd,elevator_cmd,throttle_cmd\n";
+    let narrow = format!("{header}{}", "1\n".repeat(100_000)).into_bytes();
+    let bare = format!("{header}{}", "1,,,,,,,,,\n".repeat(50_000)).into_bytes();
+    let rising: String = (0..50_000).map(|i| format!("{i},0,0,0,0,0,9,0,0,0\n")).collect();
+    let plain = format!("{header}{rising}").into_bytes();
+    vec![
+        ("subscriptions", subscribed),
+        ("short records", short),
+        ("nested types", nested),
+        ("sources", sources),
+        ("rows without fields", narrow),
+        ("rows of empty fields", bare),
+        ("rows as short as can be", plain),
+    ]
+}
+
+#[test]
+fn files_made_to_take_memory_do_not_get_it() {
+    for (name, bytes) in bombs() {
+        let (log, peak) = measured(&bytes);
+        let multiple = peak as f64 / bytes.len() as f64;
+        println!("{name}: {} kB, {multiple:.1} times, read: {}", bytes.len() / 1000, log.is_ok());
+        assert!(peak <= MULTIPLE * bytes.len() + BESIDES, "{name}: {multiple}");
+    }
 }
 
 /// Recorded: see the printed line; run with `--release -- --ignored --nocapture`.
@@ -61,6 +211,9 @@ fn mutated_logs_cause_no_panic() {
 #[ignore = "takes four minutes; the test above does a tenth of it"]
 fn a_million_mutated_logs_cause_no_panic() {
     let before = std::time::Instant::now();
-    let read = mutate(1_000_000, 2);
-    println!("1000000 inputs, {read} read as logs, {:.0} s", before.elapsed().as_secs_f64());
+    let (read, most) = mutate(1_000_000, 4, 2);
+    println!(
+        "1000000 inputs, {read} read as logs, {:.0} s, at most {most:.1} times a file's size above {BESIDES} bytes",
+        before.elapsed().as_secs_f64()
+    );
 }

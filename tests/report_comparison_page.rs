@@ -122,6 +122,43 @@ fn what_is_predicted_stands_beside_what_was_measured() {
 }
 
 #[test]
+fn forces_and_moments_are_drawn_on_the_clock_of_the_states() {
+    let comparison = report_comparison::comparison(60.0);
+    let figures = figures(&report(&comparison).page().render());
+    for figure in of_kind(&figures, "time") {
+        let ends = |track: &Value| {
+            let time = track["time_s"].as_array().unwrap();
+            [time[0].as_f64().unwrap(), time[time.len() - 1].as_f64().unwrap()]
+        };
+        let (states, channels) = (&figure["tracks"][0], &figure["tracks"][1]);
+        // Six channels of a force or a moment each; windows lie within the stretch.
+        assert_eq!(channels["panels"].as_array().unwrap().len(), 6);
+        assert!(ends(states)[0] <= ends(channels)[0] && ends(channels)[1] <= ends(states)[1]);
+    }
+    let lift = &of_kind(&figures, "time")[0]["tracks"][1]["panels"][1];
+    assert_eq!((&lift["title"], &lift["unit"]), (&"L lift".into(), &"N".into()));
+    // The first model of the sample predicts 70 % of what was measured.
+    let at = |k: usize| lift["series"][k]["values"][40].as_f64().unwrap();
+    assert!((at(1) / at(0) - 0.7).abs() < 1e-3, "{} {}", at(1), at(0));
+}
+
+#[test]
+fn flights_that_are_not_drawn_are_named() {
+    let mut comparison = report_comparison::comparison(60.0);
+    for i in 0..6 {
+        let mut more = comparison.flights[0].clone();
+        more.name = format!("more-{i}.csv");
+        comparison.flights.push(more);
+        for model in &mut comparison.models {
+            model.traces.push(model.traces[0].clone());
+        }
+    }
+    let html = report(&comparison).page().render();
+    // Eight flights, of which six are drawn.
+    assert!(html.contains("Not drawn as a whole: more-4.csv, more-5.csv."));
+}
+
+#[test]
 fn hostile_text_stays_text() {
     let hostile = "</script><script>alert(1)</script><!-- \"' & <b>\u{0}";
     let mut comparison = report_comparison::comparison(60.0);

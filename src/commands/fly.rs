@@ -12,6 +12,7 @@ use crossbeam_channel::RecvTimeoutError;
 
 use crate::commands::choices;
 use crate::commands::files::shipped;
+use crate::control::schedule::Schedule;
 use crate::control::{self, Controller, Kind, build};
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
@@ -39,6 +40,9 @@ pub struct Arguments {
     /// Airframe file in place of the one that the model names.
     #[arg(long, value_name = "FILE")]
     airframe: Option<PathBuf>,
+    /// Fly this flight-test schedule whenever a client is in offboard.
+    #[arg(long, value_name = "FILE")]
+    schedule: Option<PathBuf>,
     /// New folder for the recording [default: the next number under flights/].
     #[arg(long, value_name = "DIR", conflicts_with = "no_record")]
     record: Option<PathBuf>,
@@ -70,7 +74,10 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// has been started then.
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let model = model(&arguments.model, arguments.airframe.as_deref())?;
-    let crew = crew(arguments.controller, &model)?;
+    let mut crew = crew(arguments.controller, &model)?;
+    if let Some(path) = &arguments.schedule {
+        crew.pilot.follow(Schedule::load(path)?);
+    }
     let options = options(arguments, &model);
     let stop = Arc::new(AtomicBool::new(false));
     let told = stop.clone();

@@ -12,7 +12,7 @@ use crate::sysid::reconstruct::{self, ActuatorClock, reconstruct};
 use crate::sysid::reconstruction::Reconstruction;
 
 /// Which logs, read how.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub struct LogArguments {
     /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
     #[arg(long = "log", num_args = 1.., required = true)]
@@ -37,6 +37,11 @@ pub struct Intake {
 }
 
 impl LogArguments {
+    /// Other logs, read in the same way.
+    pub fn of(&self, paths: Vec<PathBuf>) -> LogArguments {
+        LogArguments { paths, ..self.clone() }
+    }
+
     /// Reads and reconstructs the logs; one that cannot be is said and left out.
     ///
     /// # Errors

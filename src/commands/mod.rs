@@ -1,17 +1,23 @@
 //! Subcommands: arguments, then a few lines of work.
 
+mod amend;
 mod choices;
 #[cfg(feature = "sitl")]
 mod collect;
 mod compare;
 #[cfg(feature = "sitl")]
 mod demo;
+mod effects;
+#[cfg(feature = "sitl")]
+mod design;
 #[cfg(feature = "sitl")]
 mod evaluate;
 mod files;
 pub mod fly;
 mod intake;
 mod logs;
+#[cfg(feature = "sitl")]
+mod mystery;
 #[cfg(feature = "sitl")]
 mod targets;
 #[cfg(feature = "learn")]
@@ -32,6 +38,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Refit a model to flights and add missing effects to it, judged on flights it has not seen.
+    Amend(amend::Arguments),
     /// Explore in JSBSim, to have flights to learn from.
     #[cfg(feature = "sitl")]
     Collect(collect::Arguments),
@@ -40,6 +48,11 @@ enum Command {
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
     #[cfg(feature = "sitl")]
     Demo(demo::Arguments),
+    /// Say what the catalogue of physical effects knows.
+    Effects(effects::Arguments),
+    /// Find the manoeuvre that tells two missing effects apart, as a schedule to fly.
+    #[cfg(feature = "sitl")]
+    Design(design::Arguments),
     /// Score controllers on the target file, flown in JSBSim in this process.
     #[cfg(feature = "sitl")]
     Evaluate(evaluate::Arguments),
@@ -47,6 +60,9 @@ enum Command {
     Fly(fly::Arguments),
     /// Say what a flight log holds, or write it as a CSV table.
     Logs(logs::Arguments),
+    /// Fly an aircraft that has an effect which its model lacks: data to find it in.
+    #[cfg(feature = "sitl")]
+    Mystery(mystery::Arguments),
     /// Write a target file.
     #[cfg(feature = "sitl")]
     Targets(targets::Arguments),
@@ -60,15 +76,21 @@ pub fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let result = match Arguments::parse().command {
+        Command::Amend(arguments) => amend::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Collect(arguments) => collect::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Demo(arguments) => demo::run(&arguments),
+        Command::Effects(arguments) => effects::run(&arguments),
+        #[cfg(feature = "sitl")]
+        Command::Design(arguments) => design::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),
         Command::Logs(arguments) => logs::run(&arguments),
+        #[cfg(feature = "sitl")]
+        Command::Mystery(arguments) => mystery::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Targets(arguments) => targets::run(&arguments),
         #[cfg(feature = "learn")]

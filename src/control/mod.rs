@@ -3,6 +3,7 @@
 pub mod cem;
 pub mod lqi;
 pub mod pid;
+pub mod schedule;
 pub mod task;
 mod registry;
 

@@ -7,7 +7,8 @@ use crate::model::GreyBox;
 use crate::num::{Dual, Real};
 use crate::physics::effects::Needs;
 use crate::physics::rigid_body::{self, RigidBody};
-use crate::physics::{AirData, Wrench};
+use crate::physics::Wrench;
+use crate::physics::effects::Kind;
 
 /// The name under which the product of inertia is trainable.
 ///
@@ -51,9 +52,9 @@ pub enum TrainableError {
         /// What it has.
         known: String,
     },
-    /// An effect acts on what others make.
+    /// An effect acts on what others make, or near the ground.
     #[error(
-        "model {model} has the effect {effect}, which acts on what other effects make: learning through it is not built; leave it out of the prior"
+        "model {model} has the effect {effect}, which acts on what other effects make or near the ground: learning through it is not built; leave it out of the prior"
     )]
     Effect {
         /// The model.
@@ -66,29 +67,36 @@ pub enum TrainableError {
 /// Whether a model can be learned through at all.
 ///
 /// # Errors
-/// If one of its effects acts on what others make.
+/// If one of its effects acts on what others make, or near the ground only.
 pub fn check(model: &GreyBox) -> Result<(), TrainableError> {
-    if model.needs() == Needs::Point {
-        return Ok(());
+    let bars = |id: &str| {
+        // rollouts do not know the height above ground
+        id == "ground_effect" || Kind::from_id(id).is_some_and(|k| k.needs() != Needs::Point)
+    };
+    match model.effects().find(|e| bars(e.id)) {
+        None => Ok(()),
+        Some(e) => Err(TrainableError::Effect { model: model.name.clone(), effect: e.id }),
     }
-    let effect = model.effects().find(|e| {
-        crate::physics::effects::Kind::from_id(e.id).is_some_and(|k| k.needs() != Needs::Point)
-    });
-    Err(TrainableError::Effect { model: model.name.clone(), effect: effect.map_or("?", |e| e.id) })
 }
 
-/// Names of all that can be trained of `model`.
+/// Names of all that can be trained of `model`: the coefficients that its forces and moments are
+/// linear in, and Jxz.
 pub fn trainable(model: &GreyBox) -> Vec<String> {
-    let linear = model.linear();
-    let acts = |name: &str| {
-        let id = name.split('.').next().unwrap_or_default();
-        // what changes the body itself makes no force of its own; Jxz is trained as such
-        crate::physics::effects::Kind::from_id(id).is_some() && id != "inertia_xz"
-    };
-    let coefficients = model.coefficients().iter().zip(linear);
-    let mut names: Vec<String> =
-        coefficients.filter(|(c, l)| *l && acts(&c.name)).map(|(c, _)| c.name.clone()).collect();
-    names.push(JXZ.into());
+    let mut names = vec![JXZ.to_owned()];
+    for about in model.effects() {
+        let Some(kind) = Kind::from_id(about.id) else { continue };
+        let count = about.coefficients.len();
+        for (k, c) in about.coefficients[..count - about.shape].iter().enumerate() {
+            // what changes the body is no force
+            let one: Vec<f64> = (0..count).map(|i| if i == k { 0.1 } else { 0.0 }).collect();
+            let (mut body, mut still) = (*model.bare_body(), *model.bare_body());
+            kind.change(&one, &mut body);
+            kind.change(&vec![0.0; count], &mut still);
+            if body == still {
+                names.push(format!("{}.{}", about.id, c.name));
+            }
+        }
+    }
     names
 }
 
@@ -190,10 +198,10 @@ fn gram(model: &GreyBox, places: &[usize], tracks: &[Track]) -> DMatrix<f64> {
 /// ∂F_p/∂θ of every coefficient, then of Jxz, at a sample.
 fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
     let (state, controls) = (&track.states[k], &track.controls[k]);
-    let air = AirData::new(state, track.density[k], &model.airframe.geometry);
+    let air = model.air(state, track.altitude[k]);
     let still = rigid_body::state_rate(state, &air, [0.0; 3], [0.0; 3]).to_array();
     let mut wrenches = vec![Wrench::zero(); model.coefficients().len()];
-    model.point_contributions(state, controls, &air, |i, channel, x| wrenches[i].add(channel, x));
+    model.contributions(state, controls, &air, |i, channel, x| wrenches[i].add(channel, x));
     let none = crate::physics::State { p: 0.0, q: 0.0, r: 0.0, ..*state };
     let mut columns: Vec<[f64; 8]> = wrenches
         .iter()
@@ -207,7 +215,7 @@ fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
             std::array::from_fn(|i| rate[i] - still[i])
         })
         .collect();
-    let wrench = model.point_wrench(state, controls, &air);
+    let wrench = model.wrench(state, controls, &air);
     let moment = [4, 5, 6].map(|c| Dual::<1>::from_f64(wrench.get(crate::physics::Channel::ALL[c])));
     let body: RigidBody<Dual<1>> = model.body.map(Dual::from_f64);
     let body = RigidBody { jxz: Dual::variable(model.body.jxz, 0), ..body };

@@ -1,10 +1,14 @@
 //! The prior at a point: its rates, and the slopes through it to state and coefficients.
 
 use crate::learn::packet::Packet;
-use crate::model::GreyBox;
+use crate::model::{GreyBox, Starting};
 use crate::num::{Dual, Real};
 use crate::physics::rigid_body::{self, Vector};
-use crate::physics::{AirData, Controls, State};
+use crate::physics::effects::Terms;
+use crate::physics::{AirData, Channel, Controls, State, Wrench};
+
+/// Altitude given to the airflow, m: far from the ground. What air there is comes with the density.
+pub const ALOFT: f64 = f64::INFINITY;
 
 /// What the prior says at a point.
 #[derive(Clone, Copy, Debug)]
@@ -43,15 +47,15 @@ impl<R: Real> At<R> {
     /// The airflow there.
     #[inline(always)]
     pub fn air(&self, model: &GreyBox) -> AirData<R> {
-        AirData::new(&self.state, self.density, &model.airframe.geometry)
+        AirData::new(&self.state, self.density, ALOFT, &model.airframe.geometry)
     }
 
     /// What the prior of `model` says.
     #[inline(always)]
     pub fn ask(&self, model: &GreyBox) -> Said<R> {
         let air = self.air(model);
-        let wrench = model.point_wrench(&self.state, &self.controls, &air);
-        let (acceleration, spin) = model.accelerations_under(&wrench, &self.state, &air);
+        let (acceleration, spin) =
+            model.independent_accelerations(&self.state, &self.controls, &air);
         let rate = rigid_body::state_rate(&self.state, &air, acceleration, spin);
         Said { acceleration, spin, rate }
     }
@@ -122,15 +126,10 @@ impl<R: Packet> At<R> {
         let push = std::array::from_fn(|i| push[i] + slopes.acceleration[i]);
         let turn: Vector<R> = std::array::from_fn(|i| turn[i] + slopes.spin[i]);
         let wrench = rigid_body::accelerations_transposed(&body, &air, model.axes, push, turn);
-        let mut moment = [R::zero(); 3];
-        model.point_contributions(&self.state, &self.controls, &air, |index, channel, amount| {
-            sums[index] = amount.mul_add(wrench.get(channel), sums[index]);
-            let value = R::from_f64(model.coefficients()[index].value);
-            // the moments are the last three channels
-            if let Some(axis) = (channel as usize).checked_sub(4) {
-                moment[axis] = amount.mul_add(value, moment[axis]);
-            }
-        });
+        let mut tally =
+            Tally { model, first: 0, wrench: &wrench, sums: &mut *sums, moment: [R::zero(); 3] };
+        model.report_independent(&self.state, &self.controls, &air, &mut tally);
+        let moment = tally.moment;
         let fixed = |x: R| Dual { value: x, gradient: [R::zero(); 1] };
         let mut dual = body.map(fixed);
         dual.jxz = Dual::variable(body.jxz, 0);
@@ -140,5 +139,37 @@ impl<R: Packet> At<R> {
                 *last = spin.gradient[0].mul_add(turn, *last);
             }
         }
+    }
+}
+
+/// Takes the terms of a prior's effects: slopes with respect to coefficients, and the moments.
+struct Tally<'a, R> {
+    model: &'a GreyBox,
+    first: usize,
+    wrench: &'a Wrench<R>,
+    sums: &'a mut [R],
+    moment: Vector<R>,
+}
+
+impl<R: Real> Terms<R> for Tally<'_, R> {
+    #[inline(always)]
+    fn add(&mut self, index: usize, channel: Channel, amount: R) {
+        let place = self.first + index;
+        self.sums[place] = amount.mul_add(self.wrench.get(channel), self.sums[place]);
+        let axis = match channel {
+            Channel::Roll => 0,
+            Channel::Pitch => 1,
+            Channel::Yaw => 2,
+            _ => return,
+        };
+        let value = R::from_f64(self.model.coefficients()[place].value);
+        self.moment[axis] = amount.mul_add(value, self.moment[axis]);
+    }
+}
+
+impl<R: Real> Starting<R> for Tally<'_, R> {
+    #[inline(always)]
+    fn start_at(&mut self, first: usize) {
+        self.first = first;
     }
 }

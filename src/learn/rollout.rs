@@ -2,7 +2,7 @@
 
 use crate::learn::network::Passes;
 use crate::learn::packet::Packet;
-use crate::learn::prior::{At, Said, Slopes, add, transposed};
+use crate::learn::prior::{ALOFT, At, Said, Slopes, add, transposed};
 use crate::model::residual::Scales;
 use crate::model::{GreyBox, Integrator, STEP, advance_jsbsim};
 use crate::num::{Dual, Real};
@@ -358,7 +358,7 @@ impl<R: Packet> Pass<'_, R> {
         let sums = transposed(&inputs, |x| {
             let fixed = |x: R| Dual { value: x, gradient: [R::zero(); 2] };
             let state = State::from_array(std::array::from_fn(|i| x[i]));
-            let air = AirData::new(&state, fixed(at.density), geometry);
+            let air = AirData::new(&state, fixed(at.density), ALOFT, geometry);
             let acceleration = std::array::from_fn(|i| x[8 + i]);
             let memory = std::array::from_fn(|i| x[11 + i]);
             let zero = [fixed(R::zero()); 3];

@@ -159,15 +159,39 @@ pub fn load(path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
 /// # Errors
 /// As [`load`].
 pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
-    settle(raw(bytes, path, &Mapping::default())?, path, tolerance)
+    let mut raw = raw(bytes, path, &Mapping::default())?;
+    if !raw.missing.is_empty() {
+        return Err(raw.missing.remove(0));
+    }
+    settle(raw, path, tolerance)
 }
 
 /// A table as it stands in the file, before any row is judged.
 pub(super) struct Raw {
-    /// The rows; `None` for one that holds something else than numbers.
-    pub rows: Vec<Option<Sample>>,
+    /// The rows that could be read and have a time.
+    pub rows: Vec<Sample>,
+    /// How many of the file's rows stand before each of them.
+    places: Vec<usize>,
+    /// Rows in the file.
+    total: usize,
+    /// The needed columns that it lacks.
+    pub missing: Vec<CsvError>,
     unknown_columns: Vec<String>,
     cut_short: bool,
+}
+
+impl Raw {
+    /// The rows, those that could not be read included, as `take` judges them.
+    fn judged(&self, take: impl Fn(&mut rows::Rows, usize, Option<Sample>)) -> rows::Rows {
+        let mut rows = rows::Rows::default();
+        let mut next = self.rows.iter().zip(&self.places).peekable();
+        for i in 0..self.total {
+            let own = next.next_if(|(_, place)| **place == i).map(|(sample, _)| *sample);
+            // The header is row 1.
+            take(&mut rows, i + 2, own);
+        }
+        rows
+    }
 }
 
 /// Where a field goes: place, scale, offset.
@@ -183,21 +207,26 @@ pub(super) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, C
     let names: Vec<String> =
         header.iter().map(|h| String::from_utf8_lossy(h).trim().to_owned()).collect();
     let targets: Vec<Vec<Target>> = names.iter().map(|name| targets(name, mapping)).collect();
-    check_columns(&names, mapping, path)?;
+    let missing = missing_columns(&names, mapping, path);
     let unknown = names.iter().zip(&targets).filter(|(_, targets)| targets.is_empty());
     let unknown_columns = unknown.map(|(name, _)| name.clone()).collect();
-    let mut rows = Vec::new();
+    let (mut rows, mut places, mut total) = (Vec::new(), Vec::new(), 0);
     for record in reader.byte_records() {
-        rows.push(sample(&record.map_err(text)?, &targets));
+        let record = record.map_err(text)?;
+        // A row that lacks fields is damaged, and would take many times its size.
+        let whole = record.len() >= targets.len();
+        if let Some(sample) = sample(&record, &targets).filter(|s| whole && s.time_s.is_finite()) {
+            rows.push(sample);
+            places.push(total);
+        }
+        total += 1;
     }
-    Ok(Raw { rows, unknown_columns, cut_short: end < bytes.len() })
+    Ok(Raw { rows, places, total, missing, unknown_columns, cut_short: end < bytes.len() })
 }
 
 /// What [`settle`] would say against a table.
 pub(super) fn poor(raw: &Raw, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
-    let mut rows = rows::Rows::default();
-    raw.rows.iter().enumerate().for_each(|(i, sample)| rows.take(i + 2, *sample));
-    refusal(&rows, path, tolerance)
+    refusal(&raw.judged(rows::Rows::take), path, tolerance)
 }
 
 fn refusal(rows: &rows::Rows, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
@@ -211,15 +240,26 @@ fn refusal(rows: &rows::Rows, path: &Path, tolerance: Tolerance) -> Option<CsvEr
 
 /// Drops the unusable rows, refuses the table if they are too many.
 pub(super) fn settle(raw: Raw, path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
-    let mut rows = rows::Rows::default();
-    // The header is row 1.
-    raw.rows.into_iter().enumerate().for_each(|(i, sample)| rows.take(i + 2, sample));
+    let rows = raw.judged(rows::Rows::take);
     if let Some(error) = refusal(&rows, path, tolerance) {
         return Err(error);
     }
+    Ok(reading(raw, rows, path))
+}
+
+/// Keeps every row that is later than the last one, complete or not: for a look at the table.
+pub(super) fn keep_all(raw: Raw, path: &Path) -> Reading {
+    let rows = raw.judged(|rows, number, sample| match sample {
+        Some(sample) => rows.take_incomplete(number, sample),
+        None => rows.take(number, None),
+    });
+    reading(raw, rows, path)
+}
+
+fn reading(raw: Raw, rows: rows::Rows, path: &Path) -> Reading {
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let unknown_columns = raw.unknown_columns;
-    Ok(Reading {
+    Reading {
         flight: Flight {
             name,
             samples: rows.samples,
@@ -230,7 +270,7 @@ pub(super) fn settle(raw: Raw, path: &Path, tolerance: Tolerance) -> Result<Read
         dropped: rows.dropped,
         dropped_rows: rows.dropped_rows,
         cut_short: raw.cut_short,
-    })
+    }
 }
 
 /// Where the file's column `name` goes.
@@ -248,23 +288,21 @@ fn targets(name: &str, mapping: &Mapping) -> Vec<Target> {
     targets
 }
 
-fn check_columns(names: &[String], mapping: &Mapping, path: &Path) -> Result<(), CsvError> {
+/// The needed columns that are not among `names`, each with what would satisfy it.
+fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvError> {
     let has = |column: &str| {
         let name = mapping.get(column).map_or(column, |entry| &entry.field);
         names.iter().any(|n| n == name)
     };
     let missing = |column, remedy| CsvError::Column { path: path.to_owned(), column, remedy };
-    for column in NEEDED {
-        if !has(column) {
-            return Err(missing(column, "add it, in the unit its name ends with".into()));
-        }
-    }
-    for (command, position) in EITHER {
-        if !has(command) && !has(position) {
-            return Err(missing(command, format!("add it, or the position `{position}`")));
-        }
-    }
-    Ok(())
+    let alone = NEEDED.into_iter().filter(|column| !has(column));
+    let alone =
+        alone.map(|column| missing(column, "add it, in the unit its name ends with".into()));
+    let either = EITHER.into_iter().filter(|(command, position)| !has(command) && !has(position));
+    let either = either.map(|(command, position)| {
+        missing(command, format!("add it, or the position `{position}`"))
+    });
+    alone.chain(either).collect()
 }
 
 /// The sample of a record; `None` when a field is no number.

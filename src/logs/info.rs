@@ -88,15 +88,19 @@ impl Info {
     }
 }
 
-/// Share of rows in which a column must hold a value to count as there.
+/// Share of the rows, or of the time by its own rate, that a column must cover to count as there.
 const PRESENT: f64 = 0.5;
 
 fn purposes(log: &Log) -> Vec<Purpose> {
     let samples = &log.flight.samples;
+    let whole = samples.first().zip(samples.last()).map_or(0.0, |(a, b)| b.time_s - a.time_s);
     let has = |column: &str| {
         let get = COLUMNS.iter().find(|c| c.0 == column).map(|c| c.1);
         let count = get.map_or(0, |get| samples.iter().filter(|s| get(s).is_finite()).count());
-        !samples.is_empty() && count as f64 >= PRESENT * samples.len() as f64
+        let channel = log.channels.iter().find(|c| c.columns.iter().any(|x| x == column));
+        let rate = channel.map_or(f64::INFINITY, |c| c.rate_hz);
+        let covered = rate > 0.0 && count as f64 >= PRESENT * rate * whole;
+        count > 0 && (count as f64 >= PRESENT * samples.len() as f64 || covered)
     };
     let lacking = |columns: &[&str]| -> Vec<String> {
         columns.iter().filter(|c| !has(c)).map(|c| (*c).to_owned()).collect()

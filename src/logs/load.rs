@@ -223,16 +223,28 @@ fn binary(
 
 fn text(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Log, LogError> {
     let bare = |source| LogError::Csv { source, hint: String::new() };
-    let raw = csv::raw(bytes, path, &options.mapping).map_err(bare)?;
-    let whole: Vec<Sample> = raw.rows.iter().flatten().copied().collect();
-    let mut findings = checks::check(&whole);
-    let poor = csv::poor(&raw, path, options.tolerance);
-    if let (Some(source), Use::Look) = (&poor, to) {
+    let mut raw = csv::raw(bytes, path, &options.mapping).map_err(bare)?;
+    let missing = std::mem::take(&mut raw.missing);
+    let lacking = !missing.is_empty();
+    let mut findings: Vec<Finding> = Vec::new();
+    for source in missing {
+        if to == Use::Compute {
+            return Err(bare(source));
+        }
         findings.push(Finding::problem(source.to_string()));
     }
-    let tolerance = if to == Use::Look { Tolerance::Lenient } else { options.tolerance };
-    let reading = csv::settle(raw, path, tolerance)
-        .map_err(|source| LogError::Csv { source, hint: hint(&findings) })?;
+    findings.extend(checks::check(&raw.rows));
+    let reading = if lacking {
+        csv::keep_all(raw, path)
+    } else {
+        let poor = csv::poor(&raw, path, options.tolerance);
+        if let (Some(source), Use::Look) = (&poor, to) {
+            findings.push(Finding::problem(source.to_string()));
+        }
+        let tolerance = if to == Use::Look { Tolerance::Lenient } else { options.tolerance };
+        csv::settle(raw, path, tolerance)
+            .map_err(|source| LogError::Csv { source, hint: hint(&findings) })?
+    };
     if reading.cut_short {
         findings.push(Finding::warning("the file ends in the middle of a row, which is left out"));
     }

@@ -48,7 +48,7 @@ impl Rows {
     /// Takes every row that is later than the last one, complete or not.
     pub fn take_incomplete(&mut self, number: usize, sample: Sample) {
         let later = self.samples.last().is_none_or(|last| sample.time_s > last.time_s);
-        if later {
+        if later && sample.time_s.is_finite() {
             self.total += 1;
             self.samples.push(sample);
         } else {

@@ -4,11 +4,15 @@
 //! interpolated linearly, angles unwrapped, quaternions before they become angles; commands hold.
 //! Nothing is carried across more than 0.1 s, or three sample periods of a slower channel. Gaps in
 //! the table's own times stay gaps.
+//!
+//! What is measured much more slowly than the table's times (velocity over ground at 10 Hz) stands
+//! in the row that follows each of its samples only: rows filled by interpolation would count as
+//! measurements that nobody made. The other rows stay empty, or hold where a row needs a value.
 
 use std::f64::consts::{PI, TAU};
 
 use super::Sample;
-use super::columns::{COLUMNS, EITHER, NEEDED, index, is_held, is_wrapped};
+use super::columns::{COLUMNS, EITHER, NEEDED, Place, index, is_held, is_wrapped};
 use super::load::Channel;
 use super::mapping::rule::{Fill, Rule};
 use super::topics::{Topics, period_s};
@@ -24,6 +28,21 @@ const SAME_S: f64 = 1e-6;
 const GOOD_SHARE: f64 = 0.5;
 /// A preferred channel slower than this, Hz, yields to one five times as fast.
 const SLOW_HZ: f64 = 10.0;
+/// A measured channel with less than this part of the table's rate stands at its own samples only.
+/// Held values repeat in a third of the rows then, by which a reconstruction knows them.
+const SPARSE: f64 = 0.65;
+/// Columns that are measurements of the path, not what drives it.
+const MEASURED: [&str; 9] = [
+    "roll_rad",
+    "pitch_rad",
+    "yaw_rad",
+    "airspeed_mps",
+    "alpha_rad",
+    "beta_rad",
+    "vn_mps",
+    "ve_mps",
+    "vd_mps",
+];
 /// Density of the standard atmosphere at sea level, kg/m³.
 const SEA_LEVEL: f64 = 1.225;
 
@@ -43,6 +62,12 @@ struct Track {
 impl Track {
     fn limit_s(&self) -> f64 {
         if self.rate_hz > 0.0 { GAP_S.max(GAP_PERIODS / self.rate_hz) } else { GAP_S }
+    }
+
+    /// Whether it is measured much more slowly than rows `period` (s) apart.
+    fn is_sparse(&self, period: f64) -> bool {
+        let measured = self.rule.columns().iter().all(|c| MEASURED.contains(c));
+        measured && self.rate_hz > 0.0 && self.rate_hz * period < SPARSE
     }
 
     fn channel(&self) -> Channel {
@@ -91,8 +116,26 @@ pub(super) fn build(topics: &Topics, rules: &[Rule]) -> Table {
     let base = base.map(|t| t.times.clone()).unwrap_or_default();
     let mut rows: Vec<Sample> =
         base.iter().map(|t| Sample { time_s: *t, ..Sample::default() }).collect();
-    tracks.iter().for_each(|track| fill(&mut rows, track));
+    let period = period_s(&base);
     let mut notes: Vec<String> = Vec::new();
+    let mut sparse = Vec::new();
+    for track in &tracks {
+        if track.is_sparse(period) {
+            sparse.push((track, fill_sparse(&mut rows, track, period)));
+        } else {
+            fill(&mut rows, track);
+        }
+    }
+    if !sparse.is_empty() {
+        let slow = |(t, _): &(&Track, Vec<bool>)| {
+            format!("{} ({:.1} Hz)", t.rule.columns().join(", "), t.rate_hz)
+        };
+        let slow: Vec<String> = sparse.iter().map(slow).collect();
+        notes.push(format!(
+            "measured more slowly than the table's rows, in the rows of their own samples only: {}",
+            slow.join(", ")
+        ));
+    }
     for note in tracks.iter().filter_map(|t| t.rule.note.as_ref()) {
         if !notes.contains(note) {
             notes.push(note.clone());
@@ -101,6 +144,7 @@ pub(super) fn build(topics: &Topics, rules: &[Rule]) -> Table {
     if of("airspeed_mps").is_some_and(|t| t.rule.equivalent) {
         notes.push(make_true(&mut rows));
     }
+    sparse.iter().for_each(|(track, fresh)| hold(&mut rows, track, fresh));
     if missing.is_empty() {
         cut_ends(&mut rows, &mut notes);
     }
@@ -164,53 +208,122 @@ fn track(topics: &Topics, rule: &Rule) -> Option<Track> {
 }
 
 fn fill(rows: &mut [Sample], track: &Track) {
-    let limit = track.limit_s();
-    match &track.rule.fill {
-        Fill::Quaternion(_) => fill_attitude(rows, track, limit),
-        Fill::Sum { .. } | Fill::Density { .. } => {
-            let column = track.rule.columns()[0];
-            let Some(i) = index(column) else { return };
-            let place = COLUMNS[i].2;
-            let mut series = track.series[0].clone();
-            let wraps = is_wrapped(column) && is_angle(&series, column);
-            if wraps {
-                unwrap(&mut series);
+    let Some(reader) = Reader::new(track) else { return };
+    rows.iter_mut().for_each(|row| reader.put(row));
+}
+
+/// Fills the rows that follow the samples of `track`, rows `period` (s) apart; says which those are.
+fn fill_sparse(rows: &mut [Sample], track: &Track, period: f64) -> Vec<bool> {
+    let mut fresh = vec![false; rows.len()];
+    let Some(reader) = Reader::new(track) else { return fresh };
+    for t in &track.times {
+        // At or after the sample, where the next one is waited for.
+        let next = rows.partition_point(|row| row.time_s < t - SAME_S);
+        if rows.get(next).is_some_and(|row| row.time_s - t <= period) {
+            fresh[next] = true;
+        }
+    }
+    rows.iter_mut().zip(&fresh).filter(|(_, fresh)| **fresh).for_each(|(row, _)| reader.put(row));
+    fresh
+}
+
+/// Holds what every row needs in the rows of `track` that are not `fresh`.
+fn hold(rows: &mut [Sample], track: &Track, fresh: &[bool]) {
+    if !track.rule.columns().iter().any(|c| NEEDED.contains(c)) {
+        return;
+    }
+    let places: Vec<usize> = track.rule.columns().into_iter().filter_map(index).collect();
+    let mut last: Option<Sample> = None;
+    for (row, fresh) in rows.iter_mut().zip(fresh) {
+        let held = last.filter(|l| row.time_s - l.time_s <= track.limit_s());
+        if *fresh {
+            let whole = places.iter().all(|i| COLUMNS[*i].1(row).is_finite());
+            last = if whole { Some(*row) } else { last };
+        } else if let Some(held) = held {
+            places.iter().for_each(|i| *COLUMNS[*i].2(row) = COLUMNS[*i].1(&held));
+        }
+    }
+}
+
+/// A track made ready to be read at any time.
+struct Reader<'a> {
+    track: &'a Track,
+    series: Vec<Vec<f64>>,
+    /// The longest time that it is carried over, s.
+    limit: f64,
+    to: Target,
+}
+
+/// What a track's series become.
+enum Target {
+    Attitude,
+    Column { place: Place, held: bool, wraps: bool },
+}
+
+impl<'a> Reader<'a> {
+    fn new(track: &'a Track) -> Option<Reader<'a>> {
+        let mut series = track.series.clone();
+        let to = match &track.rule.fill {
+            Fill::Quaternion(_) => {
+                one_sided(&mut series);
+                Target::Attitude
             }
-            for row in rows.iter_mut() {
-                let at = At::new(row.time_s, &track.times);
-                let value = match is_held(column) {
-                    true => at.held(&series, &track.times, limit),
-                    false => at.between(&series, &track.times, limit),
+            Fill::Sum { .. } | Fill::Density { .. } => {
+                let column = track.rule.columns()[0];
+                let wraps = is_wrapped(column) && is_angle(&series[0], column);
+                if wraps {
+                    unwrap(&mut series[0]);
+                }
+                let place = COLUMNS[index(column)?].2;
+                Target::Column { place, held: is_held(column), wraps }
+            }
+        };
+        Some(Reader { track, series, limit: track.limit_s(), to })
+    }
+
+    fn put(&self, row: &mut Sample) {
+        let (times, limit) = (&self.track.times, self.limit);
+        let at = At::new(row.time_s, times);
+        match &self.to {
+            Target::Attitude => {
+                let q = [0, 1, 2, 3].map(|k| at.between(&self.series[k], times, limit));
+                if let Some(attitude) = euler(q) {
+                    row.attitude_rad = attitude;
+                }
+            }
+            Target::Column { place, held, wraps } => {
+                let value = match held {
+                    true => at.held(&self.series[0], times, limit),
+                    false => at.between(&self.series[0], times, limit),
                 };
-                *place(row) = if wraps { wrap(value) } else { value };
+                *place(row) = if *wraps { wrap(value) } else { value };
             }
         }
     }
 }
 
-fn fill_attitude(rows: &mut [Sample], track: &Track, limit: f64) {
-    let mut q = track.series.clone();
-    // q and −q are one attitude: neighbours on the same side of the sphere interpolate.
-    for i in 1..track.times.len() {
+/// Turns quaternions so that neighbours lie on one side of the sphere, as q and −q are one attitude.
+fn one_sided(q: &mut [Vec<f64>]) {
+    for i in 1..q[0].len() {
         let dot: f64 = q.iter().map(|s| s[i] * s[i - 1]).sum();
         if dot < 0.0 {
             q.iter_mut().for_each(|s| s[i] = -s[i]);
         }
     }
-    for row in rows.iter_mut() {
-        let at = At::new(row.time_s, &track.times);
-        let [w, x, y, z] = [0, 1, 2, 3].map(|k| at.between(&q[k], &track.times, limit));
-        let n = (w * w + x * x + y * y + z * z).sqrt();
-        if !(n > 0.5 && n < 2.0) {
-            continue;
-        }
-        let [w, x, y, z] = [w / n, x / n, y / n, z / n];
-        row.attitude_rad = [
-            (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
-            (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
-            (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
-        ];
+}
+
+/// Roll, pitch, yaw of a quaternion of about unit length.
+fn euler([w, x, y, z]: [f64; 4]) -> Option<[f64; 3]> {
+    let n = (w * w + x * x + y * y + z * z).sqrt();
+    if !(n > 0.5 && n < 2.0) {
+        return None;
     }
+    let [w, x, y, z] = [w / n, x / n, y / n, z / n];
+    Some([
+        (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
+        (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
+        (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+    ])
 }
 
 /// Where a time lies among a channel's times.
@@ -269,7 +382,7 @@ fn wrap(angle: f64) -> f64 {
 /// Turns equivalent into true airspeed; says by which density.
 fn make_true(rows: &mut [Sample]) -> String {
     let mut by = [0usize; 3];
-    for row in rows.iter_mut() {
+    for row in rows.iter_mut().filter(|row| row.airspeed_mps.is_finite()) {
         let (i, density) = if row.air_density_kgpm3 > 0.0 {
             (0, row.air_density_kgpm3)
         } else if row.altitude_m.is_finite() {

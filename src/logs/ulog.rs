@@ -10,6 +10,7 @@
 //! parameters. Parameter changes in flight overwrite the value.
 
 use std::collections::{BTreeMap, HashMap};
+use std::rc::Rc;
 
 use super::finding::Finding;
 use super::format::ULOG_MAGIC;
@@ -92,14 +93,39 @@ struct Field {
     offset: usize,
 }
 
-/// A message number's topic.
-struct Subscription {
-    key: (String, u16),
-    /// The fields, if the topic was asked for.
+/// Where the fields of a message stand.
+struct Layout {
     fields: Vec<Field>,
     /// Where `timestamp` and `timestamp_sample` stand.
     stamp: Option<(Kind, usize)>,
     sampled: Option<(Kind, usize)>,
+    /// Bytes of a whole record, without the padding at its end, which PX4 does not write.
+    size: usize,
+}
+
+impl Layout {
+    fn of(formats: &BTreeMap<String, String>, name: &str) -> Layout {
+        let mut fields = Vec::new();
+        flatten(formats, name, "", DEPTH, &mut 0, &mut fields);
+        let find = |n: &str| fields.iter().find(|f| f.name == n).map(|f| (f.kind, f.offset));
+        let pads =
+            |f: &&Field| f.name.rsplit('.').next().is_some_and(|last| last.starts_with("_padding"));
+        let last = fields.iter().rev().find(|f| !pads(f));
+        Layout {
+            stamp: find("timestamp"),
+            sampled: find("timestamp_sample"),
+            size: last.map_or(0, |f| f.offset + f.kind.size()),
+            fields,
+        }
+    }
+}
+
+/// A message number's topic.
+struct Subscription {
+    key: (String, u16),
+    /// The layout, if the topic was asked for.
+    layout: Option<Rc<Layout>>,
+    /// Its records, from the first one on.
     topic: Option<Topic>,
     count: usize,
 }
@@ -107,12 +133,15 @@ struct Subscription {
 #[derive(Default)]
 struct Reader {
     formats: BTreeMap<String, String>,
+    /// One for each topic that is asked for, however often it is subscribed to.
+    layouts: BTreeMap<String, Rc<Layout>>,
     subscriptions: HashMap<u16, Subscription>,
     out: Topics,
     dropout_ms: u64,
     dropouts: usize,
     orphans: usize,
     bad_fields: usize,
+    short: usize,
 }
 
 /// Reads what `wanted` names; everything else is counted.
@@ -189,23 +218,17 @@ impl Reader {
     fn subscribe(&mut self, body: &[u8], wanted: &dyn Fn(&str) -> bool) {
         let [instance, low, high, name @ ..] = body else { return };
         let name = String::from_utf8_lossy(name).into_owned();
-        let mut fields = Vec::new();
-        flatten(&self.formats, &name, "", DEPTH, &mut 0, &mut fields);
-        let find = |n: &str| fields.iter().find(|f| f.name == n).map(|f| (f.kind, f.offset));
-        let (stamp, sampled) = (find("timestamp"), find("timestamp_sample"));
-        if stamp.is_none() {
+        if !self.formats.contains_key(&name) {
             self.bad_fields += 1;
         }
-        let wants = wanted(&name);
-        if !wants {
-            fields.clear();
-        }
-        let topic = wants.then(|| Topic::new(fields.iter().map(|f| f.name.clone())));
+        let layout = wanted(&name).then(|| {
+            let known = self.layouts.entry(name.clone());
+            known.or_insert_with(|| Rc::new(Layout::of(&self.formats, &name))).clone()
+        });
         let number = u16::from_le_bytes([*low, *high]);
         let key = (name, u16::from(*instance));
-        let old = self
-            .subscriptions
-            .insert(number, Subscription { key, fields, stamp, sampled, topic, count: 0 });
+        let old =
+            self.subscriptions.insert(number, Subscription { key, layout, topic: None, count: 0 });
         if let Some(old) = old {
             self.keep(old);
         }
@@ -218,15 +241,23 @@ impl Reader {
             return;
         };
         subscription.count += 1;
-        let (body, Some(topic)) = (&body[2..], &mut subscription.topic) else { return };
-        let Some((kind, offset)) = subscription.stamp else { return };
-        let sampled = subscription.sampled.map_or(0.0, |(kind, offset)| kind.at(body, offset));
+        let (body, Some(layout)) = (&body[2..], &subscription.layout) else { return };
+        let Some((kind, offset)) = layout.stamp else { return };
+        // A record that is too short would be filled up with nothing at many times its size.
+        if body.len() < layout.size {
+            self.short += 1;
+            return;
+        }
+        let sampled = layout.sampled.map_or(0.0, |(kind, offset)| kind.at(body, offset));
         let micros = if sampled > 0.0 { sampled } else { kind.at(body, offset) };
         if !micros.is_finite() {
             return;
         }
+        let topic = subscription
+            .topic
+            .get_or_insert_with(|| Topic::new(layout.fields.iter().map(|f| f.name.clone())));
         topic.time_s.push(micros * 1e-6);
-        for (field, values) in subscription.fields.iter().zip(&mut topic.values) {
+        for (field, values) in layout.fields.iter().zip(&mut topic.values) {
             values.push(field.kind.at(body, field.offset));
         }
     }
@@ -253,6 +284,12 @@ impl Reader {
             self.out.findings.push(Finding::warning(format!(
                 "{} records of topics that the file does not declare were left out",
                 self.orphans + self.bad_fields
+            )));
+        }
+        if self.short > 0 {
+            self.out.findings.push(Finding::warning(format!(
+                "{} records are shorter than the file declares them and were left out",
+                self.short
             )));
         }
         self.out

@@ -140,11 +140,16 @@ impl File {
             integrator: self.integrator,
             residual: None,
             terms,
+            independent: 0,
             inputs: acting,
             coefficients,
         };
         model.settle();
-        Ok(model)
+        if model.body.is_physical() {
+            return Ok(model);
+        }
+        Err("its effects leave no positive mass, or jx·jz not above jxz²; give them smaller values"
+            .into())
     }
 }
 
@@ -157,7 +162,7 @@ impl BodyFile {
             jz: positive("rigid_body.jz_kgm2", &self.jz_kgm2, 100000.0)?,
             jxz: self.jxz_kgm2.value,
         };
-        if body.jx * body.jz > body.jxz * body.jxz {
+        if body.is_physical() {
             return Ok(body);
         }
         Err(format!(
@@ -215,8 +220,8 @@ fn effect(
         let (low, high) = c.bounds;
         if !(low..=high).contains(&number.value) {
             return Err(format!(
-                "effects.{id}.{} = {} is not physical: {} lies in {low}..{high}",
-                c.name, number.value, c.meaning
+                "effects.{id}.{} = {} is not physical: {} lies in {low}..{high} {}",
+                c.name, number.value, c.meaning, c.unit
             ));
         }
         if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {

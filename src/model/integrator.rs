@@ -36,8 +36,20 @@ impl<R> Default for Memory<R> {
 
 impl GreyBox {
     /// The state one [`STEP`] later, controls held, at `altitude` (m).
-    #[inline(always)]
     pub fn step<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        altitude: f64,
+        memory: &mut Memory<R>,
+    ) -> State<R> {
+        self.step_inlined(state, controls, altitude, memory)
+    }
+
+    /// [`step`](GreyBox::step) as part of its caller, for kernels compiled for several instruction
+    /// sets; elsewhere it only swells the program.
+    #[inline(always)]
+    pub fn step_inlined<R: Real>(
         &self,
         state: &State<R>,
         controls: &Controls<R>,
@@ -52,15 +64,20 @@ impl GreyBox {
 
     #[inline(always)]
     fn step_rk4<R: Real>(&self, s: &State<R>, controls: &Controls<R>, altitude: f64) -> State<R> {
-        let rate = |s: &State<R>| self.rate(s, controls, altitude);
-        let k1 = rate(s);
-        let k2 = rate(&s.advance(&k1, STEP / 2.0));
-        let k3 = rate(&s.advance(&k2, STEP / 2.0));
-        let k4 = rate(&s.advance(&k3, STEP));
-        s.advance(&k1, STEP / 6.0)
-            .advance(&k2, STEP / 3.0)
-            .advance(&k3, STEP / 3.0)
-            .advance(&k4, STEP / 6.0)
+        let (mut at, mut next) = (*s, *s);
+        // how far each slope is followed to the next one, and for how long it counts in the end, s
+        let stages = [
+            (STEP / 2.0, STEP / 6.0),
+            (STEP / 2.0, STEP / 3.0),
+            (STEP, STEP / 3.0),
+            (0.0, STEP / 6.0),
+        ];
+        for (reach, weight) in stages {
+            let slope = self.rate_inlined(&at, controls, altitude);
+            at = s.advance(&slope, reach);
+            next = next.advance(&slope, weight);
+        }
+        next
     }
 
     #[inline(always)]
@@ -72,14 +89,17 @@ impl GreyBox {
         memory: &mut Memory<R>,
     ) -> State<R> {
         let air = self.air(s, altitude);
-        let (mut acceleration, mut spin) = self.accelerations(s, controls, &air);
+        let (mut acceleration, mut spin) = self.accelerations_inlined(s, controls, &air);
         if let Some(residual) = &self.residual {
             // this scheme knows accelerations only: what was learned of φ̇ and θ̇ has no place in it
             let learned = residual.rate(s, controls);
             let push = rigid_body::acceleration_of(s, &air, &learned);
-            let turn = [learned.p, learned.q, learned.r];
-            acceleration = std::array::from_fn(|i| acceleration[i] + push[i]);
-            spin = std::array::from_fn(|i| spin[i] + turn[i]);
+            for (sum, part) in acceleration.iter_mut().zip(push) {
+                *sum += part;
+            }
+            for (sum, part) in spin.iter_mut().zip([learned.p, learned.q, learned.r]) {
+                *sum += part;
+            }
         }
         let (next, last) = advance_jsbsim(s, &air, acceleration, spin, memory.0);
         memory.0 = Some(last);
@@ -100,15 +120,19 @@ pub(crate) fn advance_jsbsim<R: Real>(
 ) -> (State<R>, Vector<R>) {
     let acceleration = rigid_body::body_to_horizon(s, acceleration);
     let velocity = rigid_body::body_to_horizon(s, rigid_body::air_velocity(s, air));
-    let last = last.unwrap_or(acceleration);
-    let velocity: Vector<R> = std::array::from_fn(|i| {
-        velocity[i] + acceleration[i].scale(1.5 * STEP) - last[i].scale(0.5 * STEP)
-    });
+    let last = match last {
+        Some(last) => last,
+        None => acceleration,
+    };
+    let velocity = [
+        adams_bashforth(velocity[0], acceleration[0], last[0]),
+        adams_bashforth(velocity[1], acceleration[1], last[1]),
+        adams_bashforth(velocity[2], acceleration[2], last[2]),
+    ];
     let (roll, pitch, turn) = euler_step_attitude(s);
-    let (sin, cos) = turn.sin_cos();
-    let to_new_heading = |[n, e, d]: Vector<R>| [n * cos + e * sin, e * cos - n * sin, d];
+    let turning = turn.sin_cos();
     let turned = State { roll, pitch, ..*s };
-    let [u, v, w] = rigid_body::horizon_to_body(&turned, to_new_heading(velocity));
+    let [u, v, w] = rigid_body::horizon_to_body(&turned, to_heading(velocity, turning));
     let airspeed = (u * u + v * v + w * w).sqrt();
     let next = State {
         roll,
@@ -120,7 +144,19 @@ pub(crate) fn advance_jsbsim<R: Real>(
         alpha: w.atan2(u),
         beta: (v / airspeed).asin(),
     };
-    (next, to_new_heading(acceleration))
+    (next, to_heading(acceleration, turning))
+}
+
+/// One component of velocity a step later, by Adams–Bashforth 2.
+#[inline(always)]
+fn adams_bashforth<R: Real>(velocity: R, acceleration: R, last: R) -> R {
+    velocity + acceleration.scale(1.5 * STEP) - last.scale(0.5 * STEP)
+}
+
+/// A horizontal-frame vector seen from a heading turned by the angle of this sine and cosine.
+#[inline(always)]
+fn to_heading<R: Real>([n, e, d]: Vector<R>, (sin, cos): (R, R)) -> Vector<R> {
+    [n * cos + e * sin, e * cos - n * sin, d]
 }
 
 /// Attitude after an explicit Euler step of the quaternion: roll, pitch, and the turn in heading.
@@ -160,8 +196,12 @@ pub struct Twin {
 impl Twin {
     /// An aircraft at `state` and `altitude` (m), actuators at zero.
     pub fn new(state: State, altitude: f64) -> Twin {
-        let actuators = Actuators::at_rest(&Controls::default());
-        let inputs = InputMemory::at_rest(&Controls::default());
+        Twin::at_rest(state, &Controls::default(), altitude)
+    }
+
+    /// An aircraft at `state` and `altitude` (m), actuators and what acts through them long at `controls`.
+    pub fn at_rest(state: State, controls: &Controls, altitude: f64) -> Twin {
+        let (actuators, inputs) = (Actuators::at_rest(controls), InputMemory::at_rest(controls));
         Twin { state, actuators, altitude, memory: Memory::default(), inputs }
     }
 

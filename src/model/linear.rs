@@ -17,7 +17,9 @@ pub struct Linear {
 
 /// Linearises one step of `model` about `trim` at `altitude` (m).
 ///
-/// The integrator's memory is taken as settled: its last acceleration equals the present one.
+/// The integrator's memory is taken as settled: its last acceleration equals the present one. The
+/// controls are those that act: what the model's effects on deflections (lag, delay, dead zone) make
+/// of the actuators' positions before is left out, as it has memory of its own.
 pub fn linearise(model: &GreyBox, trim: &Trim, altitude: f64) -> Linear {
     let x = trim.state.to_array();
     let z = [trim.controls.aileron, trim.controls.elevator, trim.controls.throttle];

@@ -1,16 +1,21 @@
 //! The grey box: a prior made of physical effects, its integrators, trim and linearisation.
 
+pub mod edit;
 mod file;
+mod forces;
 mod grey_box;
 mod integrator;
+mod join;
 mod linear;
 mod newton;
 pub mod residual;
 mod trim;
 
-pub use grey_box::{GreyBox, JoinError, Named};
-pub(crate) use integrator::advance_jsbsim;
+pub(crate) use forces::Starting;
+pub use grey_box::{GreyBox, Named};
 pub use integrator::{Integrator, Memory, STEP, Twin};
+pub(crate) use integrator::advance_jsbsim;
+pub use join::JoinError;
 pub use linear::{Linear, linearise};
 pub use residual::Residual;
 pub use trim::{Trim, TrimError};

@@ -23,14 +23,20 @@ impl<const N: usize, const FUSED: bool> Lanes<N, FUSED> {
     pub fn splat(x: f32) -> Self {
         Lanes([x; N])
     }
-    #[inline(always)]
-    fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        Lanes(std::array::from_fn(|i| f(self.0[i])))
-    }
-    #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        Lanes(std::array::from_fn(|i| f(self.0[i], other.0[i])))
-    }
+}
+
+/// `N` results of an expression in `i`. A loop rather than `std::array::from_fn`: a function that is
+/// not inlined leaves the vector instructions of whoever calls it.
+macro_rules! lanes {
+    ($i:ident => $value:expr) => {{
+        let mut all = [0.0; N];
+        let mut $i = 0;
+        while $i < N {
+            all[$i] = $value;
+            $i += 1;
+        }
+        Lanes(all)
+    }};
 }
 
 macro_rules! operator {
@@ -39,7 +45,7 @@ macro_rules! operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                self.zip(other, |a, b| a $op b)
+                lanes!(i => self.0[i] $op other.0[i])
             }
         }
     };
@@ -65,7 +71,7 @@ impl<const N: usize, const FUSED: bool> Neg for Lanes<N, FUSED> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        self.map(|a| -a)
+        lanes!(i => -self.0[i])
     }
 }
 
@@ -76,28 +82,28 @@ impl<const N: usize, const FUSED: bool> Real for Lanes<N, FUSED> {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        (self.map(|x| sin_cos(x).0), self.map(|x| sin_cos(x).1))
+        (lanes!(i => sin_cos(self.0[i]).0), lanes!(i => sin_cos(self.0[i]).1))
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
-        self.zip(x, atan2)
+        lanes!(i => atan2(self.0[i], x.0[i]))
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        self.map(f32::sqrt)
+        lanes!(i => self.0[i].sqrt())
     }
     #[inline(always)]
     fn exp(self) -> Self {
-        self.map(exp)
+        lanes!(i => exp(self.0[i]))
     }
     #[inline(always)]
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
-        Lanes(std::array::from_fn(|i| if a.0[i] < b.0[i] { then.0[i] } else { otherwise.0[i] }))
+        lanes!(i => if a.0[i] < b.0[i] { then.0[i] } else { otherwise.0[i] })
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         if FUSED {
-            return Lanes(std::array::from_fn(|i| self.0[i].mul_add(factor.0[i], addend.0[i])));
+            return lanes!(i => self.0[i].mul_add(factor.0[i], addend.0[i]));
         }
         self * factor + addend
     }

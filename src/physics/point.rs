@@ -2,7 +2,7 @@
 
 use crate::num::Real;
 use crate::physics::airframe::Geometry;
-use crate::physics::rigid_body::Vector;
+use crate::physics::rigid_body::{ForceAxes, Vector};
 use crate::physics::{Controls, State, Wrench};
 
 /// What the airflow is, worked out once for all effects.
@@ -24,12 +24,14 @@ pub struct AirData<R = f64> {
     pub q_hat: R,
     /// r̂ = br/2V.
     pub r_hat: R,
+    /// Altitude above mean sea level, m.
+    pub altitude: f64,
 }
 
 impl<R: Real> AirData<R> {
-    /// The airflow at `state` in air of `density` (kg/m³).
+    /// The airflow at `state` and `altitude` (m) in air of `density` (kg/m³).
     #[inline(always)]
-    pub fn new(state: &State<R>, density: R, geometry: &Geometry) -> Self {
+    pub fn new(state: &State<R>, density: R, altitude: f64, geometry: &Geometry) -> Self {
         let (sin_alpha, cos_alpha) = state.alpha.sin_cos();
         let (sin_beta, cos_beta) = state.beta.sin_cos();
         let per_2v = R::from_f64(0.5) / state.airspeed;
@@ -43,6 +45,7 @@ impl<R: Real> AirData<R> {
             p_hat: state.p * per_span,
             q_hat: state.q * per_chord,
             r_hat: state.r * per_span,
+            altitude,
         }
     }
 }
@@ -58,6 +61,8 @@ pub struct Point<'a, R = f64> {
     pub air: &'a AirData<R>,
     /// Wing area, span and chord.
     pub geometry: &'a Geometry,
+    /// Axes in which drag, side force and lift act.
+    pub axes: ForceAxes,
     /// What the effects that need only the point make; zero for those effects themselves.
     pub base: &'a Base<R>,
 }

@@ -21,6 +21,14 @@ pub struct RigidBody<R = f64> {
     pub jxz: R,
 }
 
+impl RigidBody {
+    /// Whether a body can have these figures: a positive mass, and a positive inertia about every axis.
+    pub fn is_physical(&self) -> bool {
+        let RigidBody { mass, jx, jy, jz, jxz } = *self;
+        mass > 0.0 && jx > 0.0 && jy > 0.0 && jz > 0.0 && jx * jz > jxz * jxz
+    }
+}
+
 impl<R: Copy> RigidBody<R> {
     /// Applies `f` to every figure.
     #[inline(always)]
@@ -65,12 +73,35 @@ pub fn body_force<R: Real>(wrench: &Wrench<R>, air: &AirData<R>, axes: ForceAxes
     ]
 }
 
+/// The drag, side force and lift (N) that together are `force` (N, body axes): the inverse of
+/// [`body_force`] without thrust.
+#[inline(always)]
+pub fn aerodynamic_force<R: Real>(
+    force: Vector<R>,
+    air: &AirData<R>,
+    axes: ForceAxes,
+) -> Vector<R> {
+    let [x, y, z] = force;
+    let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
+    let along = x * cos_alpha + z * sin_alpha;
+    let lift = x * sin_alpha - z * cos_alpha;
+    let (drag, side) = match axes {
+        ForceAxes::Stability => (-along, y),
+        ForceAxes::Wind => (-(along * cos_beta + y * sin_beta), y * cos_beta - along * sin_beta),
+    };
+    [drag, side, lift]
+}
+
 /// Gravity in body axes, m/s² (eq. 37).
 #[inline(always)]
 pub fn gravity_in_body<R: Real>(state: &State<R>, gravity: f64) -> Vector<R> {
     let (sin_roll, cos_roll) = state.roll.sin_cos();
     let (sin_pitch, cos_pitch) = state.pitch.sin_cos();
-    [-sin_pitch, cos_pitch * sin_roll, cos_pitch * cos_roll].map(|x| x.scale(gravity))
+    [
+        -sin_pitch.scale(gravity),
+        (cos_pitch * sin_roll).scale(gravity),
+        (cos_pitch * cos_roll).scale(gravity),
+    ]
 }
 
 /// Angular acceleration, rad/s² (eq. 10 with the Γ terms of \[BM12\] section 3.3).
@@ -245,7 +276,7 @@ mod tests {
     /// Eqs. (9), (11), (12) as printed, from the body velocities.
     #[test]
     fn collected_rates_equal_the_printed_equations() {
-        let air = AirData::new(&STATE, 1.156, &GEOMETRY);
+        let air = AirData::new(&STATE, 1.156, 600.0, &GEOMETRY);
         let acceleration = [1.5, -2.0, -7.0];
         let [u, v, w] = air_velocity(&STATE, &air);
         let (p, q, r) = (STATE.p, STATE.q, STATE.r);
@@ -304,7 +335,7 @@ mod tests {
 
     #[test]
     fn wind_axes_keep_drag_along_the_airflow() {
-        let air = AirData::new(&STATE, 1.156, &GEOMETRY);
+        let air = AirData::new(&STATE, 1.156, 600.0, &GEOMETRY);
         let mut wrench = Wrench::zero();
         wrench.add(Channel::Drag, 2.0);
         let force = body_force(&wrench, &air, ForceAxes::Wind);

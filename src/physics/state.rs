@@ -78,7 +78,15 @@ impl<R: Real> State<R> {
     /// `self + step · rate`, component by component.
     #[inline(always)]
     pub fn advance(&self, rate: &State<R>, step: f64) -> Self {
-        let (x, dx) = (self.to_array(), rate.to_array());
-        State::from_array(std::array::from_fn(|i| x[i] + dx[i].scale(step)))
+        State {
+            roll: self.roll + rate.roll.scale(step),
+            pitch: self.pitch + rate.pitch.scale(step),
+            airspeed: self.airspeed + rate.airspeed.scale(step),
+            p: self.p + rate.p.scale(step),
+            q: self.q + rate.q.scale(step),
+            r: self.r + rate.r.scale(step),
+            alpha: self.alpha + rate.alpha.scale(step),
+            beta: self.beta + rate.beta.scale(step),
+        }
     }
 }

@@ -57,6 +57,10 @@ impl<R: Real> Wrench<R> {
     /// `self` less `other`.
     #[inline(always)]
     pub fn minus(&self, other: &Self) -> Self {
-        Wrench(std::array::from_fn(|i| self.0[i] - other.0[i]))
+        let mut difference = *self;
+        for (a, b) in difference.0.iter_mut().zip(&other.0) {
+            *a -= *b;
+        }
+        difference
     }
 }

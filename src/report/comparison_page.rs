@@ -95,7 +95,7 @@ pub(super) fn keys(c: &Comparison) -> Vec<(String, Style)> {
     c.models.iter().enumerate().map(|(i, m)| (m.name.clone(), Style::nth(i))).collect()
 }
 
-fn unexplained(c: &Comparison) -> Figure {
+pub(super) fn unexplained(c: &Comparison) -> Figure {
     let share = |model: &ModelResult, id: ChannelId| {
         let of = model.channels.iter().find(|ch| ch.channel == id);
         of.map_or(f64::NAN, |ch| 100.0 * ch.unexplained_fraction)
@@ -128,7 +128,7 @@ fn growth_note(c: &Comparison) -> String {
     )
 }
 
-fn growth(c: &Comparison) -> Vec<Figure> {
+pub(super) fn growth(c: &Comparison) -> Vec<Figure> {
     let longest = c.models.iter().map(|m| &m.growth).max_by_key(|g| g.len());
     let Some(longest) = longest.filter(|g| !g.is_empty()) else { return Vec::new() };
     let curves = |title: &str, value: fn(&GrowthPoint) -> f64| {

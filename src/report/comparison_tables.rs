@@ -1,11 +1,9 @@
 //! The tables of a comparison: free-run errors, nuisances, notes, provenance.
 
 use super::comparison::ComparisonReport;
+use super::numbers::{NORMAL_95, interval, number, percent};
 use super::{Align, Choice, ChoiceOption, Figure, Section, Table};
 use crate::sysid::compare::{Comparison, HorizonScore, NuisanceResult, StateScore};
-
-/// Half width of a 95 % interval in standard deviations of a normal distribution.
-const NORMAL_95: f64 = 1.96;
 
 pub(super) fn summary(c: &Comparison) -> Section {
     let mut table = Table::new(
@@ -66,10 +64,6 @@ fn state_cells(s: &StateScore) -> Vec<String> {
     cells.push(number(s.theil_u));
     cells.extend([s.bias_share, s.variance_share, s.covariance_share].map(percent));
     cells
-}
-
-fn percent(share: f64) -> String {
-    if share.is_finite() { format!("{:.0}", 100.0 * share) } else { "–".into() }
 }
 
 /// A state's name and unit as people say them, and the factor from its SI unit.
@@ -153,7 +147,7 @@ fn nuisance_row(flight: &str, n: &NuisanceResult) -> Vec<String> {
         flight.to_string(),
         n.name.replace('_', " "),
         number(value),
-        format!("{} to {}", number(value - half), number(value + half)),
+        interval(value - half, value + half),
         unit.to_string(),
     ]
 }
@@ -196,18 +190,4 @@ pub(super) fn provenance(report: &ComparisonReport) -> Section {
     }
     push("Plots", "uPlot 1.6.32 (MIT)".into());
     Section::new("Provenance", "", vec![Figure::Table(table)])
-}
-
-/// Three significant digits; a dash for what is no number.
-fn number(value: f64) -> String {
-    if !value.is_finite() {
-        return "–".into();
-    }
-    let size = value.abs();
-    let text = match size {
-        0.0 => "0".into(),
-        _ if !(1e-4..1e6).contains(&size) => format!("{value:.2e}"),
-        _ => format!("{value:.*}", (2 - size.log10().floor() as i32).clamp(0, 6) as usize),
-    };
-    text.replace('-', "−")
 }

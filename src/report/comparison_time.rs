@@ -1,7 +1,8 @@
 //! Measured against predicted over time: telling stretches of the flights, then each as a whole.
 
+use super::comparison_page::channel_name;
 use super::{Choice, ChoiceOption, Figure, Panel, Section, Series, Style, TimeFigure};
-use crate::sysid::compare::{Comparison, FlightTrace, ModelTrace};
+use crate::sysid::compare::{ChannelId, ChannelTrace, Comparison, FlightTrace, ModelTrace};
 
 /// Length of a stretch, s: several free runs of the usual 3 s.
 const STRETCH_S: f64 = 30.0;
@@ -61,12 +62,19 @@ pub(super) fn section(c: &Comparison) -> Option<Section> {
     if options.is_empty() {
         return None;
     }
-    let note = format!(
+    let mut note = format!(
         "The model flies on the recorded actuators and is put back on the reconstructed state \
-         every {} s. Stretches of {STRETCH_S:.0} s are ranked by the error of {}.",
+         every {} s; forces and moments are averages over {} s. Stretches of {STRETCH_S:.0} s are \
+         ranked by the error of {}.",
         c.settings.start_every_s,
+        c.settings.kernel_s,
         c.models.first().map_or("the model", |m| &m.name)
     );
+    let left_out: Vec<&str> =
+        flown[drawn.len()..].iter().map(|f| c.flights[*f].name.as_str()).collect();
+    if !left_out.is_empty() {
+        note.push_str(&format!(" Not drawn as a whole: {}.", left_out.join(", ")));
+    }
     let choice = Choice { anchor: "time".into(), label: "Stretch".into(), options };
     Some(Section::new("Measured against predicted", &note, vec![Figure::Choice(choice)]))
 }
@@ -155,8 +163,56 @@ fn figure(c: &Comparison, flight: usize, rows: std::ops::Range<usize>, most: usi
     let mut figure = TimeFigure::default();
     // Steps up to a second are the drawing's; the segments' own rows break the lines.
     figure.add_track(&take(&trace.time_s, 1.0), f64::INFINITY, panels.collect());
+    if let (Some(first), Some(last)) =
+        (trace.time_s.get(rows.start), trace.time_s.get(rows.end - 1))
+    {
+        add_channels(&mut figure, c, flight, [*first, *last], most);
+    }
     if every > 1 {
         figure.notes.push(format!("One sample in {every} is drawn."));
     }
     figure
+}
+
+/// Adds the channels in weak form between two times (s), one panel each.
+fn add_channels(
+    figure: &mut TimeFigure,
+    c: &Comparison,
+    flight: usize,
+    [from, to]: [f64; 2],
+    most: usize,
+) {
+    let of = |id: ChannelId| -> Vec<(usize, &ChannelTrace)> {
+        let traces = c.models.iter().map(|m| m.traces.get(flight));
+        let own = traces.map(|t| t.and_then(|t| t.channels.iter().find(|t| t.channel == id)));
+        own.enumerate().filter_map(|(i, t)| Some((i, t?))).collect()
+    };
+    // All channels of a flight have the same windows.
+    let Some((_, any)) = ChannelId::ALL.into_iter().find_map(|id| of(id).first().copied()) else {
+        return;
+    };
+    let rows = thinned(any, [from, to], most);
+    let take = |list: &[f64]| -> Vec<f64> {
+        rows.iter().map(|i| list.get(*i).copied().unwrap_or(f64::NAN)).collect()
+    };
+    let panel = |id: ChannelId| {
+        let traces = of(id);
+        let (_, first) = traces.first()?;
+        let mut series = vec![Series::new("measured", Style::Measured, take(&first.measured))];
+        for (i, trace) in &traces {
+            series.push(Series::new(&c.models[*i].name, Style::nth(*i), take(&trace.predicted)));
+        }
+        Some(Panel::new(&channel_name(id), id.unit(), series))
+    };
+    let panels = ChannelId::ALL.into_iter().filter_map(panel).collect();
+    figure.add_track(&take(&any.time_s), f64::INFINITY, panels);
+}
+
+/// The windows between two times that are drawn: every nth, with those that break the curves.
+fn thinned(trace: &ChannelTrace, [from, to]: [f64; 2], most: usize) -> Vec<usize> {
+    let rows = 0..trace.time_s.len();
+    let inside: Vec<usize> = rows.filter(|i| (from..=to).contains(&trace.time_s[*i])).collect();
+    let every = inside.len().div_ceil(most).max(1);
+    let drawn = |(k, i): &(usize, &usize)| k.is_multiple_of(every) || trace.measured[**i].is_nan();
+    inside.iter().enumerate().filter(drawn).map(|(_, i)| *i).collect()
 }

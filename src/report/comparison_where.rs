@@ -12,8 +12,8 @@ pub(super) const ANCHOR: &str = "regimes";
 pub(super) fn regimes(c: &Comparison) -> Section {
     let options = by_channel(c, |id| panels(c, id).map(Figure::Intervals).into_iter().collect());
     let note = format!(
-        "Mean of measured less model in bins, with its 95 % interval by block bootstrap; a \
-         positive one means that the model is too low. Grey: fewer than {} independent samples.",
+        "Mean of measured less model in bins, with its 95 % interval by block bootstrap and the \
+         uncertainty of the sensor errors; a positive one means that the model is too low. Grey: fewer than {} independent samples.",
         c.settings.support
     );
     choice("Where it fails", &note, ANCHOR, options)

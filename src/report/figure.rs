@@ -4,7 +4,8 @@ use serde::Serialize;
 
 use super::html::escape;
 use super::{
-    Bars, Choice, Curves, Findings, HeatMap, Histogram, Intervals, Table, TimeFigure, XyFigure,
+    Bars, Choice, Curves, Evidence, Findings, Grid, HeatMap, Histogram, Intervals, Table,
+    TimeFigure, Whiskers, XyFigure,
 };
 
 /// One figure of a section.
@@ -32,6 +33,12 @@ pub enum Figure {
     HeatMap(HeatMap),
     /// Horizontal bars.
     Bars(Bars),
+    /// Bars against thresholds.
+    Evidence(Evidence),
+    /// Values with intervals.
+    Whiskers(Whiskers),
+    /// A table coloured by weight.
+    Grid(Grid),
 }
 
 /// How a verdict came out.

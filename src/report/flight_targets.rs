@@ -78,6 +78,7 @@ fn target_plane(report: &FlightReport) -> XyFigure {
     let reached = targets("target, tracked", Style::Second, XyMark::Circles, true);
     let missed = targets("target, not tracked", Style::Command, XyMark::Crosses, false);
     XyFigure {
+        bands: Vec::new(),
         title: "Roll and pitch plane".into(),
         x_label: "Roll (°)".into(),
         y_label: "Pitch (°)".into(),

@@ -2,8 +2,9 @@
 //!
 //! A [`Page`] is a title over [`Section`]s, a section holds [`Figure`]s in order, and
 //! [`Page::render`] turns them into one string with style, script and data inside.
-//! [`FlightReport`] is the page of one flight, [`ComparisonReport`] that of models against flights. The plots are drawn in the reader's browser by
-//! uPlot 1.6.32 (MIT, `assets/uPlot.LICENSE`), which is embedded.
+//! [`FlightReport`] is the page of one flight, [`ComparisonReport`] that of models against flights,
+//! [`DiagnosisReport`] that of what a model lacks. The plots are drawn in the reader's browser by uPlot
+//! 1.6.32 (MIT, `assets/uPlot.LICENSE`), which is embedded.
 //!
 //! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
 
@@ -16,20 +17,30 @@ mod comparison_time;
 mod comparison_where;
 mod curves;
 mod decimate;
+mod effect_page;
+mod diagnosis;
+mod diagnosis_page;
+mod diagnosis_proof;
+mod diagnosis_suspects;
+mod diagnosis_tables;
+mod evidence;
 mod figure;
 mod findings;
 mod flight;
 mod flight_page;
 mod flight_targets;
 mod flight_verdict;
+mod grid;
 mod heat_map;
 mod histogram;
 mod html;
 mod intervals;
 mod loop_timing;
+mod numbers;
 mod page;
 mod table;
 mod time_figure;
+mod whiskers;
 mod write;
 mod xy;
 
@@ -38,9 +49,14 @@ pub use choice::{Choice, ChoiceOption};
 pub use comparison::ComparisonReport;
 pub use comparison_page::comparison_page;
 pub use curves::Curves;
+pub use effect_page::{EffectReport, facts as effect_facts};
+pub use diagnosis::DiagnosisReport;
+pub use diagnosis_page::diagnosis_page;
+pub use evidence::{Evidence, EvidenceGroup, EvidenceRow};
 pub use figure::{Figure, Outcome, Rule, Style, Verdict};
 pub use findings::{Finding, Findings, Link};
 pub use flight::{Difficulty, Event, EventKind, FlightReport, Segment, SurfaceTravel};
+pub use grid::{Grid, GridCell, GridRow};
 pub use heat_map::{HeatCell, HeatMap};
 pub use histogram::Histogram;
 pub use intervals::{IntervalBins, IntervalPanel, Intervals};
@@ -48,5 +64,6 @@ pub use loop_timing::{Cycle, LoopTiming};
 pub use page::{Page, Section};
 pub use table::{Align, Column, Row, Table};
 pub use time_figure::{Band, Mark, Panel, Scale, Series, TimeFigure, Track};
+pub use whiskers::{Whisker, Whiskers};
 pub use write::{WriteError, write_new, write_over};
-pub use xy::{XyFigure, XyMark, XySeries};
+pub use xy::{XyBand, XyFigure, XyMark, XySeries};

@@ -123,6 +123,9 @@ impl Figure {
             Figure::Table(table) => table.html(),
             Figure::Findings(findings) => findings.html(),
             Figure::Bars(bars) => bars.html(),
+            Figure::Evidence(evidence) => evidence.html(),
+            Figure::Whiskers(whiskers) => whiskers.html(),
+            Figure::Grid(grid) => grid.html(),
             Figure::Choice(choice) => choice.html(data),
             Figure::Curves(figure) => {
                 data.push(plot_json("curves", script_json(figure)));

@@ -15,8 +15,26 @@ pub struct XyFigure {
     pub x_label: String,
     /// Name of the vertical axis, with its unit.
     pub y_label: String,
+    /// Shaded ranges behind what is drawn.
+    pub bands: Vec<XyBand>,
     /// What is drawn, in drawing order.
     pub series: Vec<XySeries>,
+}
+
+/// A shaded range over the horizontal axis.
+#[derive(Clone, Debug, Serialize)]
+pub struct XyBand {
+    /// Its name in the legend.
+    pub label: String,
+    /// Horizontal values, ascending.
+    #[serde(serialize_with = "compact")]
+    pub x: Vec<f64>,
+    /// Lower edge, as many values as horizontal ones.
+    #[serde(serialize_with = "compact")]
+    pub low: Vec<f64>,
+    /// Upper edge, likewise.
+    #[serde(serialize_with = "compact")]
+    pub high: Vec<f64>,
 }
 
 /// Points of one kind.
@@ -42,6 +60,10 @@ pub struct XySeries {
 pub enum XyMark {
     /// A thin line through them.
     Path,
+    /// A wide line through them.
+    Line,
+    /// Small filled points, where there are many.
+    Dots,
     /// Open circles.
     Circles,
     /// Crosses.

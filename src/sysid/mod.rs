@@ -1,6 +1,10 @@
 //! From flight logs to what is wrong with a model: reconstruct, compare, localise, rank, amend.
 
+pub mod amend;
 pub mod compare;
 pub mod diagnose;
+pub mod measurement_effects;
 pub mod reconstruct;
 pub mod reconstruction;
+pub mod signature;
+pub mod separation;

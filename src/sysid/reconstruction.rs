@@ -31,6 +31,9 @@ pub struct Segment {
 }
 
 /// An error of a sensor, or the wind, as estimated together with the path.
+///
+/// The wind is the steady one, about which gusts vary; its deviation holds how far a mean over the flight
+/// may be from it. The velocity through the air at an instant has the gust in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nuisance {
     /// What it is, for example `gyro_bias_p`, `alpha_bias`, `airspeed_scale`, `wind_north`.
@@ -54,9 +57,13 @@ pub struct Reconstruction {
     pub segments: Vec<Segment>,
     /// What was estimated along.
     pub nuisances: Vec<Nuisance>,
-    /// Standard deviations of the measurements' noise, in the order roll, pitch, airspeed, p, q, r,
-    /// alpha, beta (units of [`State`]).
+    /// Standard deviations of the noise of the measurements as logged, in the order roll, pitch,
+    /// airspeed, p, q, r, alpha, beta (units of [`State`]): the sensors', before smoothing.
     pub noise: [f64; 8],
+    /// Standard deviations of what is left of it in the states of [`Self::segments`], in the same order:
+    /// rates are the gyros' less their biases, not smoothed; the others err slowly, over tenths of
+    /// seconds. The constant part of the errors is in [`Self::nuisances`], not here.
+    pub left: [f64; 8],
     /// Standard deviation of the accelerometers' noise, m/s².
     pub force_noise: [f64; 3],
     /// What the reader must know: assumptions made, power lost, for example for want of a vane.

@@ -164,6 +164,7 @@ pub fn as_measured(name: &str, flight: &Flight, noise: Noise) -> Reconstruction 
         segments: vec![Segment { instants: flight.samples.iter().map(instant).collect() }],
         nuisances: Vec::new(),
         noise: noise.state,
+        left: noise.state,
         force_noise: [noise.force; 3],
         notes: Vec::new(),
     }

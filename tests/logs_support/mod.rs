@@ -170,6 +170,11 @@ pub fn dataflash(samples: &[Sample]) -> Vec<u8> {
 
 /// What the shim sends with what the companion answers, at a host clock of its own.
 pub fn tlog(samples: &[Sample]) -> Vec<u8> {
+    tlog_with(samples, 1)
+}
+
+/// The same with every `nth` GLOBAL_POSITION_INT only.
+pub fn tlog_with(samples: &[Sample], nth: usize) -> Vec<u8> {
     use mavlink::dialects::ardupilotmega::*;
     let mut out = Vec::new();
     for (i, s) in samples.iter().enumerate() {
@@ -247,7 +252,8 @@ pub fn tlog(samples: &[Sample]) -> Vec<u8> {
                 }),
             ),
         ];
-        for (component_id, message) in messages {
+        let skipped = usize::from(i % nth != 0);
+        for (component_id, message) in messages.into_iter().skip(skipped) {
             out.extend(stamp.to_be_bytes());
             let header = mavlink::MavHeader { system_id: 1, component_id, sequence: i as u8 };
             mavlink::write_v2_msg(&mut out, header, &message).unwrap();

@@ -1,8 +1,8 @@
 //! A made-up comparison: two models with two flights, one of them wrong in ways put in by hand.
 
 use greylag::sysid::compare::{
-    Bin, ChannelId, ChannelResult, Comparison, FlightResult, FlightTrace, GrowthPoint,
-    HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, RegimeBins,
+    Bin, ChannelId, ChannelResult, ChannelTrace, Comparison, FlightResult, FlightTrace,
+    GrowthPoint, HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, RegimeBins,
     RegimeVariable, Settings, StateScore,
 };
 
@@ -88,7 +88,11 @@ fn state(k: usize, t: f64) -> f64 {
 fn model(name: &str, size: f64, flights: &[FlightResult]) -> ModelResult {
     let traces = flights.iter().map(|f| ModelTrace {
         states: std::array::from_fn(|k| predicted(k, size, &f.trace)),
-        channels: Vec::new(),
+        channels: ChannelId::ALL[..6]
+            .iter()
+            .enumerate()
+            .map(|(i, id)| channel_trace(*id, i, size, &f.trace))
+            .collect(),
     });
     let channels: Vec<ChannelResult> =
         ChannelId::ALL[..6].iter().enumerate().map(|(i, id)| channel(*id, i, size)).collect();
@@ -99,6 +103,20 @@ fn model(name: &str, size: f64, flights: &[FlightResult]) -> ModelResult {
         growth: (1..=100).map(|i| growth(f64::from(i) * 0.1, size)).collect(),
         channels,
         traces: traces.collect(),
+    }
+}
+
+/// A channel in windows that overlap by half, 5.4 a second; the pause breaks it.
+fn channel_trace(id: ChannelId, index: usize, size: f64, flown: &FlightTrace) -> ChannelTrace {
+    let scale = [3.0, 5.0, 1.5, 0.2, 0.3, 0.15][index];
+    let rows = || (0..flown.time_s.len()).step_by(18);
+    let measured = |i: usize| scale * (1.0 + (0.4 * flown.time_s[i] + index as f64).sin());
+    let broken = |i: usize, x: f64| if flown.states[0][i].is_nan() { f64::NAN } else { x };
+    ChannelTrace {
+        channel: id,
+        time_s: rows().map(|i| flown.time_s[i]).collect(),
+        measured: rows().map(|i| broken(i, measured(i))).collect(),
+        predicted: rows().map(|i| broken(i, measured(i) * (1.0 - 0.3 * size))).collect(),
     }
 }
 

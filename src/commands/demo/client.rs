@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
-use super::schedule::{LEG_S, LEGS};
+use super::schedule::{Leg, Legs};
 use crate::link::autopilot::Mode;
 use crate::link::offboard::{ARM, Heard, OffboardClient, SET_MODE};
 
@@ -68,8 +68,12 @@ impl Client {
 
     /// Arms, enters offboard, flies every leg, and goes to hold. `watch` sees the view with the
     /// number of the leg and the seconds flown on it.
-    pub fn fly(&mut self, mut watch: impl FnMut(usize, f64, &View)) -> Result<Vec<(f64, String)>> {
-        self.aim(0);
+    pub fn fly(
+        &mut self,
+        legs: &Legs,
+        mut watch: impl FnMut(usize, f64, &View),
+    ) -> Result<Vec<(f64, String)>> {
+        legs.legs.first().into_iter().for_each(|leg| self.aim(leg));
         self.until(
             "a heartbeat and an attitude",
             |v| v.mode.is_some() && v.time_s > 0.0,
@@ -78,27 +82,27 @@ impl Client {
         self.until("arming", |v| v.armed && v.accepted == Some(ARM), |p| Some(p.arm()))?;
         let offboard = |v: &View| v.mode == Some(Mode::Offboard) && v.accepted == Some(SET_MODE);
         self.until("offboard mode", offboard, |p| Some(p.set_mode(Mode::Offboard)))?;
-        for leg in 0..LEGS.len() {
+        for (k, leg) in legs.legs.iter().enumerate() {
             self.aim(leg);
             let start = self.view.time_s;
             let begun = Instant::now();
-            while self.view.time_s - start < LEG_S {
+            while self.view.time_s - start < legs.seconds {
                 self.turn()?;
-                if begun.elapsed() > PATIENCE.mul_f64(3.0) {
+                if begun.elapsed() > PATIENCE.mul_f64(2.0) + Duration::from_secs_f64(legs.seconds) {
                     bail!("the companion has fallen silent: {}", self.last_words());
                 }
                 if self.view.mode != Some(Mode::Offboard) {
                     bail!("the companion left offboard: {}", self.last_words());
                 }
-                watch(leg, self.view.time_s - start, &self.view);
+                watch(k, self.view.time_s - start, &self.view);
             }
         }
         self.until("hold mode", |v| v.mode == Some(Mode::Hold), |p| Some(p.set_mode(Mode::Hold)))?;
         Ok(std::mem::take(&mut self.texts))
     }
 
-    fn aim(&mut self, leg: usize) {
-        self.target = (LEGS[leg].roll_deg.to_radians(), LEGS[leg].pitch_deg.to_radians());
+    fn aim(&mut self, leg: &Leg) {
+        self.target = (leg.roll_deg.to_radians(), leg.pitch_deg.to_radians());
     }
 
     /// Asks every half second until it is so.

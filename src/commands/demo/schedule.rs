@@ -1,5 +1,6 @@
 //! The schedule of the demonstration: which attitudes, for how long.
 
+use crate::control::schedule::Schedule;
 use crate::report::Difficulty;
 
 /// One attitude of the schedule.
@@ -28,4 +29,25 @@ pub const LEGS: [Leg; 6] = [
 
 const fn leg(roll_deg: f64, pitch_deg: f64, difficulty: Difficulty) -> Leg {
     Leg { roll_deg, pitch_deg, difficulty }
+}
+
+/// What the client asks for: legs of equal length.
+#[derive(Clone, Debug)]
+pub struct Legs {
+    /// The attitudes.
+    pub legs: Vec<Leg>,
+    /// The length of each, s.
+    pub seconds: f64,
+}
+
+impl Legs {
+    /// The demonstration's own.
+    pub fn demonstration() -> Legs {
+        Legs { legs: LEGS.to_vec(), seconds: LEG_S }
+    }
+
+    /// Wings level while the companion flies `schedule`, and a little longer.
+    pub fn during(schedule: &Schedule) -> Legs {
+        Legs { legs: vec![leg(0.0, 0.0, Difficulty::Easy)], seconds: schedule.duration() + 2.0 }
+    }
 }

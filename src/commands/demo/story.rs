@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
-use super::schedule::{LEGS, Leg};
+use super::schedule::Leg;
 use crate::control::Target;
 use crate::logs::csv::{self, Tolerance};
 use crate::logs::{Flight, Sample};
@@ -28,6 +28,8 @@ pub struct Teller<'a> {
     pub aircraft: &'a str,
     /// Seed of everything random.
     pub seed: u64,
+    /// The attitudes to be tracked; none in a flight test.
+    pub legs: &'a [Leg],
     /// What the companion said, with its time, s.
     pub texts: Vec<(f64, String)>,
 }
@@ -49,7 +51,7 @@ impl Teller<'_> {
                 .skip(1)
                 .fold("greylag".into(), |line, a| line + " " + &a),
             versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
-            segments: LEGS.iter().map(|leg| segment(leg, flight)).collect(),
+            segments: self.legs.iter().map(|leg| segment(leg, flight)).collect(),
             tolerance_rad: TOLERANCE_DEG.to_radians(),
             travel: SurfaceTravel { aileron_rad: deflection, elevator_rad: deflection },
             timing: Some(timing(&folder.join("flight.csv"))?),

@@ -88,6 +88,8 @@ fn returns(scene: &Scene, blocks: &[Block], out: &mut [Lanes<WIDTH>]) {
 /// The return of one block: actuators, model and reward in the order of the simulator.
 ///
 /// The integrator's memory starts empty: the first step of [`Integrator::Jsbsim`] is then Euler's.
+/// Effects on the deflections start at rest where the surfaces are: over the five steps a plan under
+/// a lag or a delay so believes in more of the present deflection than really acts.
 ///
 /// [`Integrator::Jsbsim`]: crate::model::Integrator::Jsbsim
 #[inline(always)]
@@ -112,12 +114,15 @@ fn rollout(scene: &Scene, block: &Block) -> Lanes<WIDTH> {
     let mut actuators = Actuators::from_observed(&observed, &previous, figures);
     let mut memory = Memory::default();
     // what acted before the tick is not observed: the surfaces are taken to have been where they are
-    let mut inputs = InputMemory::at_rest(&actuators.controls());
+    let mut inputs = (!model.acts_at_once()).then(|| InputMemory::at_rest(&actuators.controls()));
     let mut sum = Lanes::zero();
     let mut weight = 1.0;
     for [aileron, elevator, thrust] in block {
-        let controls = model.act(&actuators.controls(), &mut inputs);
-        state = model.step(&state, &controls, seen.altitude, &mut memory);
+        let mut controls = actuators.controls();
+        if let Some(inputs) = &mut inputs {
+            controls = model.act(&controls, inputs);
+        }
+        state = model.step_inlined(&state, &controls, seen.altitude, &mut memory);
         let throttle = (*thrust + lane(1.0)).scale(0.5);
         actuators.step(&Command { aileron: *aileron, elevator: *elevator, throttle }, figures);
         sum += task.reward(&state, target).scale(weight);

@@ -17,6 +17,7 @@ mod failsafe;
 mod limits;
 mod modes;
 mod parameters;
+mod programme;
 mod telemetry;
 mod texts;
 
@@ -25,11 +26,13 @@ pub use decision::{Decision, Plan, Request, Source};
 pub use limits::{Limits, TICK_S};
 pub use modes::mode_name;
 
+use crate::control::schedule::Schedule;
 use crate::control::{Controller, Observation, Target};
 use crate::link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
 use crate::link::vehicle::Telemetry;
 use crate::physics::{Command, Time};
 use estimate::{Estimate, Frame, RESTART, within};
+use programme::Programme;
 use texts::Texts;
 
 /// Least time between two lines about the same kind of trouble, s.
@@ -62,6 +65,7 @@ pub struct Pilot {
     fallback_engaged: bool,
     complaints: Complaints,
     load: f64,
+    programme: Option<Programme>,
 }
 
 /// What `observe` found, for `decide`.
@@ -119,7 +123,14 @@ impl Pilot {
             fallback_engaged: false,
             complaints: Complaints::default(),
             load: 0.0,
+            programme: None,
         })
+    }
+
+    /// Flies `schedule` in offboard in place of the client's attitudes, from each entry on. The client
+    /// still has to send setpoints: without them offboard ends as it always does.
+    pub fn follow(&mut self, schedule: Schedule) {
+        self.programme = Some(Programme::new(schedule));
     }
 
     /// Lets time pass to `now`: finds lost setpoints, lost sticks, a lost vehicle. To be called
@@ -247,7 +258,7 @@ impl Pilot {
             self.target = self.level_target();
             return Pending::Unusable;
         };
-        let (wish, throttle) = self.wish();
+        let (wish, throttle) = self.scheduled_wish(frame.time).unwrap_or_else(|| self.wish());
         self.target = self.limits.limit(wish, frame.state.airspeed);
         let Telemetry { time, mut state, actuators, altitude, .. } = frame;
         // Noise of a sensor at rest.
@@ -262,6 +273,16 @@ impl Pilot {
             },
             throttle,
         }
+    }
+
+    /// The target of the schedule, if one is flown at `now`.
+    fn scheduled_wish(&mut self, now: Time) -> Option<(Target, Option<f64>)> {
+        let programme = self.programme.as_mut()?;
+        if self.mode == Mode::Offboard && self.setpoint.is_some() {
+            return Some((programme.wish(now, &mut self.texts), None));
+        }
+        programme.stop();
+        None
     }
 
     /// The target of the mode, before the envelope, with the throttle if the mode sets it itself.
@@ -313,6 +334,9 @@ impl Pilot {
             Plan::Late => self.fall_back(seen, Source::Late),
             Plan::None => self.fall_back(seen, Source::Fallback),
         };
+        if let Some(programme) = &mut self.programme {
+            command = programme.excite(command);
+        }
         command.throttle =
             self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
         (command, source)

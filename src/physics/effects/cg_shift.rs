@@ -1,6 +1,6 @@
 //! A centre of gravity that is not where the model has it.
 
-use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -11,20 +11,27 @@ impl Effect for CgShift {
     const ID: &'static str = "cg_shift";
     const DESCRIPTION: &'static str = "The centre of gravity lies aft of where the model has it.";
     const FORMULA: &'static str = "m = −x f_z, n = x f_y; f without gravity, body axes";
-    const SOURCE: &'static str = "r × F with r = (x, 0, 0) from the centre of gravity forward to the model's";
-    const COEFFICIENTS: &'static [Coefficient] =
-        &[coefficient("x_m", "how far aft of the model's the centre of gravity is, m", (-0.5, 0.5))];
+    const SOURCE: &'static str =
+        "r × F with r = (x, 0, 0) from the centre of gravity forward to the model's";
+    const COEFFICIENTS: &'static [Coefficient] = &[coefficient(
+        "x_m",
+        "how far aft of the model's the centre of gravity is",
+        "m",
+        (-0.5, 0.5),
+    )];
     const NEEDS: Needs = Needs::Base;
     const ENTRY: Option<Entry> = Some(Entry {
-        look_alikes: &["pitch_break", "Cmalpha", "Cm0"],
+        channels: &[Channel::Pitch, Channel::Yaw],
+        look_alikes: &["pitch_break", "pitch_linear.Cmalpha", "pitch_linear.Cm0"],
         separated_by: "a skid: the same distance acts in pitch and in yaw",
+        example: &[0.02],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let [_, y, z] = at.base.force;
-        term(0, Channel::Pitch, -z);
-        term(0, Channel::Yaw, y);
+        terms.add(0, Channel::Pitch, -z);
+        terms.add(0, Channel::Yaw, y);
     }
 }

@@ -1,6 +1,6 @@
 //! Drag of flying sideways.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -13,15 +13,21 @@ impl Effect for DragBeta2 {
     const FORMULA: &'static str = "D = Q (CDβ |β| + CDβ² β²)";
     const SOURCE: &'static str = "Gryte18; JSBSim reading in params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] = &[
-        coefficient("CDbeta", "drag due to the magnitude of sideslip, 1/rad", (-0.5, 0.5)),
-        coefficient("CDbeta2", "drag due to the square of sideslip, 1/rad²", (0.0, 5.0)),
+        coefficient("CDbeta", "drag due to the magnitude of sideslip", "1/rad", (-0.5, 0.5)),
+        coefficient("CDbeta2", "drag due to the square of sideslip", "1/rad²", (0.0, 5.0)),
     ];
+    const ENTRY: Option<Entry> = Some(Entry {
+        channels: &[Channel::Drag],
+        look_alikes: &["drag_alpha2", "drag_linear.CD0"],
+        separated_by: "skids to both sides with the wings level",
+        example: &[0.0, 0.7],
+        starts: &[],
+    });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
-    ) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s;
-        term(0, Channel::Drag, q * at.state.beta.abs());
-        term(1, Channel::Drag, q * at.state.beta * at.state.beta);
+        terms.add(0, Channel::Drag, q * at.state.beta.abs());
+        terms.add(1, Channel::Drag, q * at.state.beta * at.state.beta);
     }
 }

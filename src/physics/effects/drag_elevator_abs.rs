@@ -1,6 +1,6 @@
 //! Drag of a deflected elevator, up or down alike.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -12,14 +12,19 @@ impl Effect for DragElevatorAbs {
     const DESCRIPTION: &'static str = "Drag due to the magnitude of the elevator deflection.";
     const FORMULA: &'static str = "D = Q CD|δe| |δe|";
     const SOURCE: &'static str = "JSBSim reading in params/x8/FACTS.md";
-    const COEFFICIENTS: &'static [Coefficient] = &[
-        coefficient("CDde", "drag due to the magnitude of elevator, 1/rad", (0.0, 0.5)),
-    ];
+    const COEFFICIENTS: &'static [Coefficient] =
+        &[coefficient("CDde", "drag due to the magnitude of elevator", "1/rad", (0.0, 0.5))];
+    const ENTRY: Option<Entry> = Some(Entry {
+        channels: &[Channel::Drag],
+        look_alikes: &["drag_alpha2", "drag_linear.CDde"],
+        separated_by: "an elevator multisine about trim: faster than incidence can follow",
+        example: &[0.3],
+        starts: &[],
+    });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
-    ) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s;
-        term(0, Channel::Drag, q * at.controls.elevator.abs());
+        terms.add(0, Channel::Drag, q * at.controls.elevator.abs());
     }
 }

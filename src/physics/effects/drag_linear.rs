@@ -1,6 +1,6 @@
 //! Drag that is linear in incidence, pitch rate and elevator.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -13,19 +13,18 @@ impl Effect for DragLinear {
     const FORMULA: &'static str = "D = Q (CD0 + CDα α + CDq q̂ + CDδe δe)";
     const SOURCE: &'static str = "GSFM26 eq. (40)";
     const COEFFICIENTS: &'static [Coefficient] = &[
-        coefficient("CD0", "drag coefficient at zero incidence", (0.0, 0.5)),
-        coefficient("CDalpha", "drag slope, 1/rad", (-1.0, 1.0)),
-        coefficient("CDq", "drag due to pitch rate", (-5.0, 5.0)),
-        coefficient("CDde", "drag due to signed elevator, 1/rad", (-0.5, 0.5)),
+        coefficient("CD0", "drag coefficient at zero incidence", "", (0.0, 0.5)),
+        coefficient("CDalpha", "drag slope", "1/rad", (-1.0, 1.0)),
+        coefficient("CDq", "drag due to pitch rate", "", (-5.0, 5.0)),
+        coefficient("CDde", "drag due to signed elevator", "1/rad", (-0.5, 0.5)),
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
-    ) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s;
-        term(0, Channel::Drag, q);
-        term(1, Channel::Drag, q * at.state.alpha);
-        term(2, Channel::Drag, q * at.air.q_hat);
-        term(3, Channel::Drag, q * at.controls.elevator);
+        terms.add(0, Channel::Drag, q);
+        terms.add(1, Channel::Drag, q * at.state.alpha);
+        terms.add(2, Channel::Drag, q * at.air.q_hat);
+        terms.add(3, Channel::Drag, q * at.controls.elevator);
     }
 }

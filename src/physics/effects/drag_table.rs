@@ -1,6 +1,6 @@
 //! Drag from a table over incidence.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -13,14 +13,13 @@ impl Effect for DragTable {
     const FORMULA: &'static str = "D = Q k CD(α)";
     const SOURCE: &'static str = "JSBSim table reading in params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] =
-        &[coefficient("k", "factor on the whole table", (0.0, 10.0))];
+        &[coefficient("k", "factor on the whole table", "", (0.0, 10.0))];
     const TABLE: Option<&'static str> = Some("CD");
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R),
-    ) {
+    fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         if let Some(table) = own.table {
-            term(0, Channel::Drag, at.air.q_s * table.at(at.state.alpha));
+            terms.add(0, Channel::Drag, at.air.q_s * table.at(at.state.alpha));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Surfaces whose moments do not grow in proportion to their deflection.
 
-use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -14,19 +14,21 @@ impl Effect for EffectivenessSaturation {
     const FORMULA: &'static str = "l = k l_δ δa², m = k m_δ δe²; l_δ, m_δ the linear moments";
     const SOURCE: &'static str = "Klein and Morelli, Aircraft System Identification, section 3.3";
     const COEFFICIENTS: &'static [Coefficient] =
-        &[coefficient("k_perrad2", "change of effectiveness, 1/rad²", (-10.0, 10.0))];
+        &[coefficient("k_perrad2", "change of effectiveness", "1/rad²", (-10.0, 10.0))];
     const NEEDS: Needs = Needs::Parts;
     const ENTRY: Option<Entry> = Some(Entry {
-        look_alikes: &["dead_zone", "Clda", "Cmde"],
+        channels: &[Channel::Roll, Channel::Pitch],
+        look_alikes: &["dead_zone", "roll_linear.Clda", "pitch_linear.Cmde"],
         separated_by: "large against small steps of aileron and elevator",
+        example: &[-2.0],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let (aileron, elevator) = (at.controls.aileron, at.controls.elevator);
         let of = |channel| at.base.deflected.get(channel);
-        term(0, Channel::Roll, of(Channel::Roll) * aileron * aileron);
-        term(0, Channel::Pitch, of(Channel::Pitch) * elevator * elevator);
+        terms.add(0, Channel::Roll, of(Channel::Roll) * aileron * aileron);
+        terms.add(0, Channel::Pitch, of(Channel::Pitch) * elevator * elevator);
     }
 }

@@ -1,6 +1,6 @@
 //! A product of inertia that differs from the model's.
 
-use super::{Coefficient, Effect, Entry, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::rigid_body::RigidBody;
 use crate::physics::{Channel, Point};
@@ -14,15 +14,17 @@ impl Effect for InertiaXz {
     const FORMULA: &'static str = "l = ΔJxz (ṙ + pq), n = ΔJxz (ṗ − qr), m = −ΔJxz (p² − r²)";
     const SOURCE: &'static str = "BM12 section 3.3, −Jxz in the inertia matrix";
     const COEFFICIENTS: &'static [Coefficient] =
-        &[coefficient("dJxz_kgm2", "addition to the product of inertia, kg m²", (-10.0, 10.0))];
+        &[coefficient("dJxz_kgm2", "addition to the product of inertia", "kg m²", (-10.0, 10.0))];
     const ENTRY: Option<Entry> = Some(Entry {
-        look_alikes: &["Cnda", "Cnp", "Clr"],
+        channels: &[Channel::Roll, Channel::Pitch, Channel::Yaw],
+        look_alikes: &["yaw_linear.Cnda", "yaw_linear.Cnp", "roll_linear.Clr"],
         separated_by: "fast rolls to both sides",
+        example: &[0.3],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(_: &Point<R>, _: Own, _: impl FnMut(usize, Channel, R)) {}
+    fn basis<R: Real>(_: &Point<R>, _: Own, _: &mut impl Terms<R>) {}
 
     fn change(coefficients: &[f64], body: &mut RigidBody) {
         body.jxz += coefficients[0];

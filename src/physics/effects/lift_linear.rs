@@ -1,6 +1,6 @@
 //! Lift that is linear in incidence, pitch rate and elevator.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -13,19 +13,18 @@ impl Effect for LiftLinear {
     const FORMULA: &'static str = "L = Q (CL0 + CLα α + CLq q̂ + CLδe δe)";
     const SOURCE: &'static str = "GSFM26 eq. (41)";
     const COEFFICIENTS: &'static [Coefficient] = &[
-        coefficient("CL0", "lift coefficient at zero incidence", (-1.0, 1.0)),
-        coefficient("CLalpha", "lift slope, 1/rad", (0.0, 10.0)),
-        coefficient("CLq", "lift due to pitch rate", (-20.0, 20.0)),
-        coefficient("CLde", "lift due to elevator, 1/rad", (-2.0, 2.0)),
+        coefficient("CL0", "lift coefficient at zero incidence", "", (-1.0, 1.0)),
+        coefficient("CLalpha", "lift slope", "1/rad", (0.0, 10.0)),
+        coefficient("CLq", "lift due to pitch rate", "", (-20.0, 20.0)),
+        coefficient("CLde", "lift due to elevator", "1/rad", (-2.0, 2.0)),
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
-    ) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s;
-        term(0, Channel::Lift, q);
-        term(1, Channel::Lift, q * at.state.alpha);
-        term(2, Channel::Lift, q * at.air.q_hat);
-        term(3, Channel::Lift, q * at.controls.elevator);
+        terms.add(0, Channel::Lift, q);
+        terms.add(1, Channel::Lift, q * at.state.alpha);
+        terms.add(2, Channel::Lift, q * at.air.q_hat);
+        terms.add(3, Channel::Lift, q * at.controls.elevator);
     }
 }

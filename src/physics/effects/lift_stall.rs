@@ -1,6 +1,6 @@
 //! Stall: lift that goes over from the linear law to that of a flat plate.
 
-use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -14,15 +14,22 @@ impl Effect for LiftStall {
     const FORMULA: &'static str = "L = k σ(α; α0, M) (Q 2 sign(α) sin²α cosα − L_still)";
     const SOURCE: &'static str = "BM12 eqs. (4.9), (4.10)";
     const COEFFICIENTS: &'static [Coefficient] = &[
-        coefficient("k", "share of the lift that stalls; 1 for all of it", (0.0, 1.5)),
-        coefficient("alpha0_rad", "angle of attack at which half the lift has gone over, rad", (0.05, 0.6)),
-        coefficient("M", "sharpness of the transition, 1/rad", (5.0, 500.0)),
+        coefficient("k", "share of the lift that stalls; 1 for all of it", "", (0.0, 1.5)),
+        coefficient(
+            "alpha0_rad",
+            "angle of attack at which half the lift has gone over",
+            "rad",
+            (0.05, 0.6),
+        ),
+        coefficient("M", "sharpness of the transition", "1/rad", (5.0, 500.0)),
     ];
     const SHAPE: usize = 2;
     const NEEDS: Needs = Needs::Parts;
     const ENTRY: Option<Entry> = Some(Entry {
-        look_alikes: &["drag_alpha2", "pitch_break", "CLalpha"],
+        channels: &[Channel::Lift],
+        look_alikes: &["drag_alpha2", "pitch_break", "lift_linear.CLalpha"],
         separated_by: "slow to an angle of attack well beyond the stall and push to the negative one",
+        example: &[1.0, 0.2, 50.0],
         starts: &[
             &[1.0, 0.12, 50.0],
             &[1.0, 0.16, 50.0],
@@ -34,7 +41,7 @@ impl Effect for LiftStall {
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         let &[alpha0, sharpness] = own.shape else { return };
         let alpha = at.state.alpha;
         // σ = (1 + e^−M(α−α0) + e^M(α+α0)) / ((1 + e^−M(α−α0)) (1 + e^M(α+α0))), the exponents held
@@ -47,6 +54,6 @@ impl Effect for LiftStall {
         let sign = R::where_less(alpha, R::zero(), -one, one);
         let (sin, cos) = (at.air.sin_alpha, at.air.cos_alpha);
         let plate = at.air.q_s * (sign * sin * sin * cos).scale(2.0);
-        term(0, Channel::Lift, blend * (plate - at.base.still.get(Channel::Lift)));
+        terms.add(0, Channel::Lift, blend * (plate - at.base.still.get(Channel::Lift)));
     }
 }

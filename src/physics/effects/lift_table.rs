@@ -1,6 +1,6 @@
 //! Lift from a table over incidence, stall included.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -13,14 +13,13 @@ impl Effect for LiftTable {
     const FORMULA: &'static str = "L = Q k CL(α)";
     const SOURCE: &'static str = "JSBSim table reading in params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] =
-        &[coefficient("k", "factor on the whole table", (0.0, 10.0))];
+        &[coefficient("k", "factor on the whole table", "", (0.0, 10.0))];
     const TABLE: Option<&'static str> = Some("CL");
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, own: Own, mut term: impl FnMut(usize, Channel, R),
-    ) {
+    fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         if let Some(table) = own.table {
-            term(0, Channel::Lift, at.air.q_s * table.at(at.state.alpha));
+            terms.add(0, Channel::Lift, at.air.q_s * table.at(at.state.alpha));
         }
     }
 }

@@ -14,8 +14,10 @@ use crate::physics::{Channel, Point};
 pub struct Coefficient {
     /// Its name in parameter files.
     pub name: &'static str,
-    /// What it is, with its unit.
+    /// What it is.
     pub meaning: &'static str,
+    /// Its unit; empty for a number without one.
+    pub unit: &'static str,
     /// The physically possible values.
     pub bounds: (f64, f64),
 }
@@ -24,10 +26,15 @@ pub struct Coefficient {
 pub(crate) const fn coefficient(
     name: &'static str,
     meaning: &'static str,
+    unit: &'static str,
     bounds: (f64, f64),
 ) -> Coefficient {
-    Coefficient { name, meaning, bounds }
+    Coefficient { name, meaning, unit, bounds }
 }
+
+/// Channels of the forces and moments that the air makes: all but thrust.
+const AERODYNAMIC: [Channel; 6] =
+    [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
 /// What an effect must be told besides the point itself.
 ///
@@ -57,13 +64,29 @@ pub struct Own<'a> {
 /// What the search for missing effects knows of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
-    /// Ids of effects, or names of coefficients, that it is easily mistaken for.
+    /// Channels in which it acts; empty for an effect on the deflections, which acts wherever they do.
+    /// A changed mass or inertia acts as if it were a force or moment in these.
+    pub channels: &'static [Channel],
+    /// What it is easily mistaken for: ids of effects, full names (`effect.coefficient`) of a prior's
+    /// coefficients, or a sensor's error in words.
     pub look_alikes: &'static [&'static str],
     /// The manoeuvre that tells it from them, in words.
     pub separated_by: &'static str,
+    /// Values of all coefficients at which the effect is plain to see on an aircraft like the X8; empty
+    /// for errors of the measurement.
+    pub example: &'static [f64],
     /// Values of all coefficients at which a search over shape constants starts; empty for an effect
-    /// that is linear in all of them.
+    /// that is linear in all of them, or whose constants must be known beforehand.
     pub starts: &'static [&'static [f64]],
+}
+
+/// What takes the terms that an effect reports.
+///
+/// A trait rather than a closure, because its one method can be made to be inlined: a planner's
+/// vector instructions end where a call begins.
+pub trait Terms<R> {
+    /// What one unit of the effect's coefficient `index` contributes to `channel`, N or N m.
+    fn add(&mut self, index: usize, channel: Channel, amount: R);
 }
 
 /// A physical effect that is linear in its coefficients, but for shape constants.
@@ -88,9 +111,8 @@ pub trait Effect {
     /// Its entry in the catalogue of effects that a model may lack; `None` for parts of a prior.
     const ENTRY: Option<Entry> = None;
 
-    /// Reports, through `term(index, channel, amount)`, what one unit of the coefficient `index`
-    /// contributes to a channel at `at`. Forces in N, moments in N m.
-    fn basis<R: Real>(at: &Point<R>, own: Own, term: impl FnMut(usize, Channel, R));
+    /// Reports to `terms` what one unit of each coefficient contributes to each channel at `at`.
+    fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>);
 
     /// Changes the rigid body by the effect's coefficients.
     fn change(_coefficients: &[f64], _body: &mut RigidBody) {}
@@ -151,15 +173,31 @@ macro_rules! effects {
                 match self { $(Kind::$type => $type::NEEDS,)* }
             }
 
-            /// [`Effect::basis`] of this effect.
+            /// [`Effect::basis`] of this effect if it needs only the point; else nothing. A sum over
+            /// such effects then holds no code of the others, which is half the time of a planner.
             #[inline(always)]
-            pub fn basis<R: Real>(
+            pub fn independent_basis<R: Real>(
                 self,
                 at: &Point<R>,
                 own: Own,
-                term: impl FnMut(usize, Channel, R),
+                terms: &mut impl Terms<R>,
             ) {
-                match self { $(Kind::$type => $type::basis(at, own, term),)* }
+                match self { $(Kind::$type => if matches!($type::NEEDS, Needs::Point) {
+                    $type::basis(at, own, terms)
+                },)* }
+            }
+
+            /// [`Effect::basis`] of this effect if it needs more than the point; else nothing.
+            #[inline(always)]
+            pub fn dependent_basis<R: Real>(
+                self,
+                at: &Point<R>,
+                own: Own,
+                terms: &mut impl Terms<R>,
+            ) {
+                match self { $(Kind::$type => if !matches!($type::NEEDS, Needs::Point) {
+                    $type::basis(at, own, terms)
+                },)* }
             }
 
             /// [`Effect::change`] of this effect.
@@ -191,10 +229,25 @@ effects! {
     drag_beta2::DragBeta2,
     drag_elevator_abs::DragElevatorAbs,
     lift_stall::LiftStall,
+    pitch_break::PitchBreak,
     cg_shift::CgShift,
-    inertia_xz::InertiaXz,
     unsteady_lift::UnsteadyLift,
+    thrust_decay::ThrustDecay,
+    thrust_scale::ThrustScale,
+    thrust_line_offset::ThrustLineOffset,
+    motor_torque::MotorTorque,
+    propeller_gyro::PropellerGyro,
+    propwash::Propwash,
+    aeroelastic_loss::AeroelasticLoss,
+    air_density::AirDensity,
+    mass_error::MassError,
+    inertia_xz::InertiaXz,
+    asymmetry::Asymmetry,
+    dihedral_alpha::DihedralAlpha,
+    roll_control_alpha::RollControlAlpha,
     effectiveness_saturation::EffectivenessSaturation,
+    ground_effect::GroundEffect,
+    external_load::ExternalLoad,
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Pitching moment that is linear in incidence, pitch rate and elevator.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -9,23 +9,23 @@ pub struct PitchLinear;
 
 impl Effect for PitchLinear {
     const ID: &'static str = "pitch_linear";
-    const DESCRIPTION: &'static str = "Pitching moment linear in angle of attack, pitch rate and elevator.";
+    const DESCRIPTION: &'static str =
+        "Pitching moment linear in angle of attack, pitch rate and elevator.";
     const FORMULA: &'static str = "m = Q c (Cm0 + Cmα α + Cmq q̂ + Cmδe δe)";
     const SOURCE: &'static str = "GSFM26 eq. (45)";
     const COEFFICIENTS: &'static [Coefficient] = &[
-        coefficient("Cm0", "pitching moment coefficient at zero incidence", (-0.5, 0.5)),
-        coefficient("Cmalpha", "longitudinal stiffness, 1/rad", (-5.0, 1.0)),
-        coefficient("Cmq", "pitch damping", (-50.0, 0.0)),
-        coefficient("Cmde", "elevator power, 1/rad", (-3.0, 0.0)),
+        coefficient("Cm0", "pitching moment coefficient at zero incidence", "", (-0.5, 0.5)),
+        coefficient("Cmalpha", "longitudinal stiffness", "1/rad", (-5.0, 1.0)),
+        coefficient("Cmq", "pitch damping", "", (-50.0, 0.0)),
+        coefficient("Cmde", "elevator power", "1/rad", (-3.0, 0.0)),
     ];
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
-    ) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let q = at.air.q_s.scale(at.geometry.chord);
-        term(0, Channel::Pitch, q);
-        term(1, Channel::Pitch, q * at.state.alpha);
-        term(2, Channel::Pitch, q * at.air.q_hat);
-        term(3, Channel::Pitch, q * at.controls.elevator);
+        terms.add(0, Channel::Pitch, q);
+        terms.add(1, Channel::Pitch, q * at.state.alpha);
+        terms.add(2, Channel::Pitch, q * at.air.q_hat);
+        terms.add(3, Channel::Pitch, q * at.controls.elevator);
     }
 }

@@ -1,6 +1,6 @@
 //! Thrust that is proportional to throttle, whatever the airspeed.
 
-use super::{Coefficient, Effect, Own, coefficient};
+use super::{Coefficient, Effect, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -13,11 +13,10 @@ impl Effect for ThrustLinear {
     const FORMULA: &'static str = "T = Cp δt";
     const SOURCE: &'static str = "GSFM26 eq. (38)";
     const COEFFICIENTS: &'static [Coefficient] =
-        &[coefficient("Cp_n", "thrust at full throttle, N", (0.0, 10_000.0))];
+        &[coefficient("Cp_n", "thrust at full throttle", "N", (0.0, 10_000.0))];
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R),
-    ) {
-        term(0, Channel::BodyX, at.controls.throttle);
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
+        terms.add(0, Channel::BodyX, at.controls.throttle);
     }
 }

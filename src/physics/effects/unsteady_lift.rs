@@ -1,6 +1,6 @@
 //! Lift that depends on how fast the angle of attack changes.
 
-use super::{Coefficient, Effect, Entry, Needs, Own, coefficient};
+use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -14,21 +14,28 @@ impl Effect for UnsteadyLift {
     const FORMULA: &'static str = "L = Q c/(2V) CLα̇ α̇, m = Q c²/(2V) Cmα̇ α̇";
     const SOURCE: &'static str = "Etkin and Reid, Dynamics of Flight, section 5.4";
     const COEFFICIENTS: &'static [Coefficient] = &[
-        coefficient("CLalphadot", "lift due to the rate of angle of attack", (-20.0, 20.0)),
-        coefficient("Cmalphadot", "pitching moment due to the rate of angle of attack", (-20.0, 20.0)),
+        coefficient("CLalphadot", "lift due to the rate of angle of attack", "", (-20.0, 20.0)),
+        coefficient(
+            "Cmalphadot",
+            "pitching moment due to the rate of angle of attack",
+            "",
+            (-20.0, 20.0),
+        ),
     ];
     const NEEDS: Needs = Needs::Rate;
     const ENTRY: Option<Entry> = Some(Entry {
-        look_alikes: &["CLq", "Cmq"],
+        channels: &[Channel::Lift, Channel::Pitch],
+        look_alikes: &["lift_linear.CLq", "pitch_linear.Cmq"],
         separated_by: "elevator doublets against steady pull-ups: α̇ and q then differ",
+        example: &[3.0, -1.5],
         starts: &[],
     });
 
     #[inline(always)]
-    fn basis<R: Real>(at: &Point<R>, _: Own, mut term: impl FnMut(usize, Channel, R)) {
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
         let chord = at.geometry.chord;
         let rate = at.base.rate.alpha.scale(0.5 * chord) / at.state.airspeed;
-        term(0, Channel::Lift, at.air.q_s * rate);
-        term(1, Channel::Pitch, (at.air.q_s * rate).scale(chord));
+        terms.add(0, Channel::Lift, at.air.q_s * rate);
+        terms.add(1, Channel::Pitch, (at.air.q_s * rate).scale(chord));
     }
 }

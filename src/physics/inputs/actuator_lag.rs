@@ -13,10 +13,12 @@ impl InputEffect for ActuatorLag {
     const FORMULA: &'static str = "τ ẏ = u − y, bilinear at 0.01 s";
     const SOURCE: &'static str = "JSBSim's lag_filter";
     const COEFFICIENTS: &'static [Coefficient; 1] =
-        &[coefficient("tau_s", "time constant, s", (0.0, 2.0))];
+        &[coefficient("tau_s", "time constant", "s", (0.0, 2.0))];
     const ENTRY: Entry = Entry {
+        channels: &[],
         look_alikes: &["time_delay", "rate_limit"],
         separated_by: "aileron and elevator above 2 Hz",
+        example: &[0.04],
         starts: &[&[0.01], &[0.02], &[0.04], &[0.08], &[0.16], &[0.32]],
     };
 

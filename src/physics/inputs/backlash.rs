@@ -9,14 +9,17 @@ pub struct Backlash;
 
 impl InputEffect for Backlash {
     const ID: &'static str = "backlash";
-    const DESCRIPTION: &'static str = "Play in the linkage: a surface that turns back first crosses it.";
+    const DESCRIPTION: &'static str =
+        "Play in the linkage: a surface that turns back first crosses it.";
     const FORMULA: &'static str = "y follows u at a distance of at most w/2";
     const SOURCE: &'static str = "JSBSim's hysteresis_width";
     const COEFFICIENTS: &'static [Coefficient; 1] =
-        &[coefficient("width_rad", "whole width of the play, rad", (0.0, 0.3))];
+        &[coefficient("width_rad", "whole width of the play", "rad", (0.0, 0.3))];
     const ENTRY: Entry = Entry {
+        channels: &[],
         look_alikes: &["dead_zone", "time_delay"],
         separated_by: "small against large doublets away from the centre",
+        example: &[0.02],
         starts: &[&[0.005], &[0.01], &[0.02], &[0.04], &[0.08]],
     };
 

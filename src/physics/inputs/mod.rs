@@ -1,7 +1,14 @@
 //! Effects between the actuators' measured positions and what acts on the air: one file each.
 //!
-//! They have memory and are not linear in their constant. To add one: write its file beside these
-//! and name it in the list at the end of this file.
+//! They have memory and are not linear in their constant. Several of one model act one after the other in
+//! the order of the list at the end of this file. To add one: write its file beside these and name it
+//! there.
+//!
+//! They take part wherever a model is stepped: free runs, imagined flights, the planner (which takes the
+//! surfaces to have been at rest, as it does not observe what acted before). Trim needs none of them but
+//! for the dead zone, which it leaves out; the linear model, and so the design of the
+//! LQI, leaves out all. The LQI's integrators take up what is constant in them; what a lag or delay costs
+//! is shown in `tests/effects_lqi.rs`.
 
 use crate::num::Real;
 use crate::physics::Controls;

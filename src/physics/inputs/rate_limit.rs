@@ -13,10 +13,12 @@ impl InputEffect for RateLimit {
     const FORMULA: &'static str = "|ẏ| ≤ r";
     const SOURCE: &'static str = "JSBSim's rate_limit";
     const COEFFICIENTS: &'static [Coefficient; 1] =
-        &[coefficient("rate_radps", "fastest movement, rad/s", (0.05, 1000.0))];
+        &[coefficient("rate_radps", "fastest movement", "rad/s", (0.05, 1000.0))];
     const ENTRY: Entry = Entry {
+        channels: &[],
         look_alikes: &["actuator_lag", "time_delay"],
         separated_by: "large against small doublets",
+        example: &[0.5],
         starts: &[&[8.0], &[4.0], &[2.0], &[1.0], &[0.5]],
     };
 

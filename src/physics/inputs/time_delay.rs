@@ -13,10 +13,12 @@ impl InputEffect for TimeDelay {
     const FORMULA: &'static str = "y(t) = u(t − T)";
     const SOURCE: &'static str = "a pure delay";
     const COEFFICIENTS: &'static [Coefficient; 1] =
-        &[coefficient("delay_s", "delay, s", (0.0, (PAST - 2) as f64 * STEP))];
+        &[coefficient("delay_s", "delay", "s", (0.0, (PAST - 2) as f64 * STEP))];
     const ENTRY: Entry = Entry {
+        channels: &[],
         look_alikes: &["actuator_lag", "clock_skew"],
         separated_by: "slow and fast aileron and elevator: the delay is the same for both",
+        example: &[0.05],
         starts: &[&[0.01], &[0.02], &[0.03], &[0.05], &[0.08], &[0.12]],
     };
 

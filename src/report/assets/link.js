@@ -8,6 +8,7 @@ function sample(kind, shape) {
   const line = `<line x1="0" x2="26" y1="6" y2="6" stroke="${ink}" stroke-width="${kind === "measured" ? 5 : 2}"${DASH[kind] ? ` stroke-dasharray="${DASH[kind].join(" ")}"` : ""}/>`;
   const drawn = {
     circles: `<circle cx="13" cy="6" r="4.5" fill="none" stroke="${ink}" stroke-width="2"/>`,
+    dots: `<circle cx="7" cy="7" r="2" fill="${ink}"/><circle cx="14" cy="4" r="2" fill="${ink}"/><circle cx="20" cy="8" r="2" fill="${ink}"/>`,
     crosses: `<path d="M9 2l8 8m0-8l-8 8" stroke="${ink}" stroke-width="2"/>`,
     band: '<rect width="26" height="12" style="fill:var(--band)"/>',
   }[shape] || line;

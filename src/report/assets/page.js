@@ -115,6 +115,24 @@ function histogramChart(host, data) {
 }
 
 const SHAPES = {
+  line(ctx, points) {
+    ctx.lineWidth = Math.max(2, 0.14 * rem()) * px();
+    ctx.beginPath();
+    let pen = false;
+    for (const p of points) {
+      if (p) pen ? ctx.lineTo(...p) : ctx.moveTo(...p);
+      pen = p != null;
+    }
+    ctx.stroke();
+  },
+  dots(ctx, points) {
+    ctx.globalAlpha = 0.55;
+    for (const p of points.filter(Boolean)) {
+      ctx.beginPath();
+      ctx.arc(...p, 1.8 * px(), 0, 7);
+      ctx.fill();
+    }
+  },
   path(ctx, points) {
     ctx.lineWidth = 1.2 * px();
     ctx.globalAlpha = 0.75;
@@ -152,16 +170,28 @@ function extent(lists) {
 }
 function xyChart(host, data) {
   const shown = data.series.map(() => true);
-  const [xr, yr] = [extent(data.series.map((s) => s.x)), extent(data.series.map((s) => s.y))];
+  const lists = [...data.series, ...data.bands.flatMap((b) => [{ x: b.x, y: b.low }, { x: b.x, y: b.high }])];
+  const [xr, yr] = [extent(lists.map((s) => s.x)), extent(lists.map((s) => s.y))];
+  const bands = (u) => clipped(u, (ctx) => data.bands.forEach((b) => {
+    ctx.fillStyle = style("band");
+    ctx.beginPath();
+    const at = (i, y) => y[i] != null && ctx.lineTo(u.valToPos(b.x[i], "x", true), u.valToPos(y[i], "y", true));
+    for (let i = 0; i < b.x.length; i++) at(i, b.high);
+    for (let i = b.x.length - 1; i >= 0; i--) at(i, b.low);
+    ctx.fill();
+  }));
   const draw = (u) => clipped(u, (ctx) => data.series.forEach((s, k) => {
     if (!shown[k]) return;
     ctx.save();
-    ctx.strokeStyle = style(s.style);
+    ctx.strokeStyle = ctx.fillStyle = style(s.style);
     SHAPES[s.mark](ctx, s.x.map((x, i) =>
       x == null || s.y[i] == null ? null : [u.valToPos(x, "x", true), u.valToPos(s.y[i], "y", true)]));
     ctx.restore();
   }));
-  legend(host, data.series.map((s) => ({ label: s.label, style: s.style, shape: s.mark })), (i) => {
+  legend(host, [
+    ...data.series.map((s) => ({ label: s.label, style: s.style, shape: s.mark })),
+    ...data.bands.map((b) => ({ label: b.label, shape: "band", fixed: true })),
+  ], (i) => {
     shown[i] = !shown[i];
     u.redraw();
     return shown[i];
@@ -178,7 +208,8 @@ function xyChart(host, data) {
       sideAxis({ label: data.y_label, labelSize: 1.4 * rem(), labelGap: 0 }),
     ],
     series: [{}, { paths: () => null, points: { show: false } }],
-    hooks: { draw: [draw] },
+    // The bands lie behind what is drawn, whatever the order of the hooks.
+    hooks: { draw: [bands, draw] },
     // uPlot scales to two invisible corners; the figure itself is drawn above.
   }, [xr, yr], host);
   return u;

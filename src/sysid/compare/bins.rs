@@ -1,6 +1,7 @@
 //! Mean residuals over the regime variables, each with its interval and its support.
 
 use super::bootstrap::{self, BLOCK_S, Block};
+use super::doubt::{self, NORMAL_95, Shift};
 use super::flight::Prepared;
 use super::names::{ChannelId, RegimeVariable};
 use super::result::{Bin, Map, MapCell, RegimeBins};
@@ -29,16 +30,20 @@ pub struct Residual {
     pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
     /// Independent samples that it stands for: the stride over the kernel's length.
     pub weight: f64,
+    /// How far one standard deviation of each of the flight's sensor errors moves it.
+    pub shift: Shift,
 }
 
-/// The finite residuals of `channel` over all flights; `series` holds a list a flight.
+/// The finite residuals of `channel` over all flights; `series` and `shifts` hold a list a flight.
 pub fn residuals(
     channel: ChannelId,
     flights: &[Prepared],
     series: &[Vec<Series>],
+    shifts: &[Vec<[Shift; ChannelId::ALL.len()]>],
 ) -> Vec<Residual> {
     let mut all: Vec<Residual> = Vec::new();
     let (mut block, mut last) = (0, None);
+    let place = ChannelId::ALL.iter().position(|id| *id == channel).unwrap_or_default();
     for (flight, (prepared, lists)) in flights.iter().zip(series).enumerate() {
         let Some(list) = lists.iter().find(|s| s.channel == channel) else { continue };
         let kernel = &prepared.kernel;
@@ -51,7 +56,8 @@ pub fn residuals(
             let (measured, value) = (list.measured[k], list.measured[k] - list.predicted[k]);
             if value.is_finite() {
                 let regime = window.regime;
-                all.push(Residual { value, measured, flight, block, regime, weight });
+                let shift = shifts[flight][k][place];
+                all.push(Residual { value, measured, flight, block, regime, weight, shift });
             }
         }
     }
@@ -63,17 +69,21 @@ pub fn independent<'a>(residuals: impl Iterator<Item = &'a Residual>) -> usize {
     residuals.map(|r| r.weight).sum::<f64>().floor() as usize
 }
 
-/// Mean residual and its interval; `path` names the bootstrap's random stream.
+/// Mean residual and its 95 % interval: block bootstrap, widened by what the sensor errors may be off;
+/// `path` names the bootstrap's random stream.
 pub fn mean_interval<'a>(
-    residuals: impl Iterator<Item = &'a Residual>,
+    residuals: impl Iterator<Item = &'a Residual> + Clone,
     seed: u64,
     path: &[u64],
 ) -> (f64, [f64; 2]) {
+    let doubt = NORMAL_95 * doubt::deviation(residuals.clone().map(|r| (r.flight, &r.shift)));
     let blocks = bootstrap::blocks(residuals.map(|r| (r.block, r.value)));
     let sum = blocks
         .iter()
         .fold(Block::default(), |a, b| Block { sum: a.sum + b.sum, count: a.count + b.count });
-    (sum.sum / sum.count, bootstrap::interval(&blocks, seed, path))
+    let mean = sum.sum / sum.count;
+    let [low, high] = bootstrap::interval(&blocks, seed, path);
+    (mean, [mean - (mean - low).hypot(doubt), mean + (high - mean).hypot(doubt)])
 }
 
 /// Bins over every variable that the flights vary.
@@ -284,7 +294,8 @@ mod tests {
             let mut regime = [0.0; 13];
             (regime[0], regime[12]) = (alpha, i as f64);
             let value = if alpha > 8.0 { 4.0 } else { 0.0 };
-            Residual { value, measured: 10.0, flight: 0, block: i / 5, regime, weight: 0.5 }
+            let shift = Shift::default();
+            Residual { value, measured: 10.0, flight: 0, block: i / 5, regime, weight: 0.5, shift }
         };
         let residuals: Vec<Residual> = (0..400).map(residual).collect();
         let found = all(&residuals, &[], 1, 0);

@@ -6,6 +6,7 @@
 
 mod bins;
 pub mod bootstrap;
+mod doubt;
 mod error;
 mod finding;
 pub mod flight;

@@ -205,7 +205,8 @@ pub struct Bin {
     pub label: String,
     /// Mean residual (measured − model), in the channel's unit.
     pub mean: f64,
-    /// Block-bootstrap 95 % interval of the mean.
+    /// 95 % interval of the mean: block bootstrap, widened by the uncertainty of the sensor errors that
+    /// the reconstruction took out.
     pub interval: [f64; 2],
     /// Mean of the measured channel, in its unit.
     pub measured: f64,
@@ -254,7 +255,7 @@ pub struct Regime {
     pub unit: &'static str,
     /// Mean residual (measured − model) there, in the channel's unit.
     pub mean: f64,
-    /// Block-bootstrap 95 % interval.
+    /// 95 % interval, likewise.
     pub interval: [f64; 2],
     /// The same relative to the measured mean there, in %, model − measured; NaN if the measured
     /// channel passes through zero there.

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::CompareError;
 use super::bins::{self, Residual, SUPPORT};
 use super::bootstrap::{BLOCK_S, RESAMPLES};
+use super::doubt::{self, Shift};
 use super::finding;
 use super::flight::Prepared;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
@@ -57,7 +58,7 @@ pub fn compare(
         .iter()
         .map(|model| {
             progress(&format!("comparing {} with {} flight(s)", model.name, prepared.len()));
-            one_model(model, &prepared, options)
+            one_model(model, &prepared, &used, options)
         })
         .collect::<Vec<_>>();
     Ok(Comparison {
@@ -144,13 +145,24 @@ fn short_of(flights: &[Prepared], horizons: &[f64]) -> Vec<String> {
         .collect()
 }
 
-fn one_model(model: &GreyBox, flights: &[Prepared], options: &Options) -> ModelResult {
+fn one_model(
+    model: &GreyBox,
+    flights: &[Prepared],
+    from: &[&Reconstruction],
+    options: &Options,
+) -> ModelResult {
     let (runs, paths) = free_run::fly(model, flights, &options.horizons_s);
     let series: Vec<Vec<Series>> = flights.par_iter().map(|f| weak::channels(model, f)).collect();
+    let shifts: Vec<Vec<[Shift; ChannelId::ALL.len()]>> = flights
+        .par_iter()
+        .zip(from)
+        .map(|(flight, from)| doubt::shifts(model, flight, &from.nuisances))
+        .collect();
+    let seen = Seen { flights, series: &series, shifts: &shifts };
     let channels: Vec<ChannelResult> = ChannelId::ALL
         .par_iter()
         .enumerate()
-        .filter_map(|(k, id)| channel(model, *id, k as u64, flights, &series, options.seed))
+        .filter_map(|(k, id)| channel(model, *id, k as u64, &seen, options.seed))
         .collect();
     let traces = paths.into_iter().zip(flights).zip(&series);
     let free_run: Vec<_> = options.horizons_s.iter().map(|h| runs.score(*h)).collect();
@@ -170,15 +182,21 @@ fn one_model(model: &GreyBox, flights: &[Prepared], options: &Options) -> ModelR
     }
 }
 
+/// The flights as one model sees them, a list a flight.
+struct Seen<'a> {
+    flights: &'a [Prepared],
+    series: &'a [Vec<Series>],
+    shifts: &'a [Vec<[Shift; ChannelId::ALL.len()]>],
+}
+
 fn channel(
     model: &GreyBox,
     id: ChannelId,
     number: u64,
-    flights: &[Prepared],
-    series: &[Vec<Series>],
+    &Seen { flights, series, shifts }: &Seen,
     seed: u64,
 ) -> Option<ChannelResult> {
-    let residuals = bins::residuals(id, flights, series);
+    let residuals = bins::residuals(id, flights, series, shifts);
     if residuals.is_empty() {
         return None;
     }

@@ -133,17 +133,9 @@ fn predicted_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
 }
 
 /// The inverse of [`rigid_body::body_force`]: D less thrust, L, Y.
-fn to_force_axes([x, y, z]: Vector<f64>, air: &AirData, axes: ForceAxes) -> Vector<f64> {
-    let along = x * air.cos_alpha + z * air.sin_alpha;
-    let lift = x * air.sin_alpha - z * air.cos_alpha;
-    match axes {
-        ForceAxes::Stability => [-along, lift, y],
-        ForceAxes::Wind => [
-            -(along * air.cos_beta + y * air.sin_beta),
-            lift,
-            y * air.cos_beta - along * air.sin_beta,
-        ],
-    }
+fn to_force_axes(force: Vector<f64>, air: &AirData, axes: ForceAxes) -> Vector<f64> {
+    let [drag, side, lift] = rigid_body::aerodynamic_force(force, air, axes);
+    [drag, lift, side]
 }
 
 /// Σ K (J Δω/Δt + ω × Jω), N m, with the model's inertia.
@@ -238,7 +230,7 @@ fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
 
 /// Predicted less what the state's noise moves of the measured side too: the forces turned by α and
 /// β, the gyroscopic moments.
-fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
+pub(super) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     let (force, measured) = (predicted_force(model, at), measured_force(model, at));
     let known = at.specific_force.iter().all(|f| f.is_finite());
     let force = std::array::from_fn(|k| force[k] - if known { measured[k] } else { 0.0 });

@@ -1,110 +1,251 @@
-//! Normal equations that are block-tridiagonal in time and bordered by constants.
-
-use nalgebra::{SMatrix, SVector};
-
-use super::nuisance::COUNT;
-
-/// Unknowns at an instant: three each of attitude, velocity over ground and gust.
-pub const NODE: usize = 9;
+//! Normal equations that are block-tridiagonal in time, bordered by constants.
+//!
+//! The right-hand side is carried as one more constant, the last column: what is eliminated of it is
+//! the solution, what remains in the corner's last place is the least sum of squares. Both ends of a
+//! stretch are eliminated towards its middle at once, which costs no more than one after the other.
 
 /// A square block of an instant's unknowns.
-pub type Block = SMatrix<f64, NODE, NODE>;
-/// An instant's unknowns by the constants.
-pub type Border = SMatrix<f64, NODE, COUNT>;
-/// An instant's unknowns.
-pub type NodeVector = SVector<f64, NODE>;
-/// The constants by the constants.
-pub type Corner = SMatrix<f64, COUNT, COUNT>;
-/// The constants.
-pub type CornerVector = SVector<f64, COUNT>;
+pub type Block<const N: usize> = [[f64; N]; N];
+/// An instant's unknowns by the constants, right-hand side last.
+pub type Wide<const N: usize, const W: usize> = [[f64; W]; N];
+/// The constants by the constants, right-hand side last.
+pub type Corner<const W: usize> = [[f64; W]; W];
 
-/// What one instant adds to the normal equations.
+/// Instants under which a stretch is not worth a second thread.
+const WORTH_A_THREAD: usize = 2000;
+
+/// The equations of one instant.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub struct Node<const N: usize, const W: usize> {
     /// Its own block.
-    pub own: Block,
-    /// Its coupling with the instant before: rows this one, columns the one before.
-    pub back: Block,
+    pub own: Block<N>,
     /// Its coupling with the constants.
-    pub border: Border,
-    /// Its right-hand side.
-    pub right: NodeVector,
+    pub rest: Wide<N, W>,
 }
 
-impl Row {
-    /// Nothing.
-    pub fn zero() -> Row {
-        Row {
-            own: Block::zeros(),
-            back: Block::zeros(),
-            border: Border::zeros(),
-            right: NodeVector::zeros(),
-        }
-    }
-}
-
-/// An instant after elimination: its unknowns are `constant − border · p − next · x₊₁`.
+/// What ties an instant to the next one.
 #[derive(Clone, Copy, Debug)]
-pub struct Eliminated {
-    next: Block,
-    border: Border,
-    constant: NodeVector,
+pub struct Link<const N: usize, const W: usize> {
+    /// Share of the first instant.
+    pub first: Node<N, W>,
+    /// Share of the second instant.
+    pub second: Node<N, W>,
+    /// Coupling: rows of the first, columns of the second instant.
+    pub coupling: Block<N>,
 }
 
-/// The constants' part of the normal equations, to which every stretch adds its share.
-#[derive(Clone, Debug)]
-pub struct Constants {
-    /// Information matrix.
-    pub matrix: Corner,
-    /// Right-hand side.
-    pub right: CornerVector,
-    /// Logarithm of the determinant of all that was eliminated.
+impl<const N: usize, const W: usize> Node<N, W> {
+    /// No equations.
+    pub const ZERO: Self = Node { own: [[0.0; N]; N], rest: [[0.0; W]; N] };
+
+    fn add(&mut self, other: &Self) {
+        add(&mut self.own, &other.own);
+        add(&mut self.rest, &other.rest);
+    }
+}
+
+/// What the elimination leaves for the constants.
+#[derive(Clone, Copy, Debug)]
+pub struct Left<const W: usize> {
+    /// Their equations; the sum of squares in the last place.
+    pub corner: Corner<W>,
+    /// Logarithm of the determinant of what was eliminated.
     pub log_det: f64,
-    /// Fall of the sum of squares through the eliminated unknowns.
-    pub fall: f64,
 }
 
-/// Eliminates the instants of a stretch one after another; `None` if a block is not positive.
-pub fn eliminate(rows: &[Row], constants: &mut Constants) -> Option<Vec<Eliminated>> {
-    let mut done: Vec<Eliminated> = Vec::with_capacity(rows.len());
-    let mut row = *rows.first()?;
-    for k in 0..rows.len() {
-        let factor = row.own.cholesky()?;
-        let next = match rows.get(k + 1) {
-            Some(after) => factor.solve(&after.back.transpose()),
-            None => Block::zeros(),
-        };
-        let (border, constant) = (factor.solve(&row.border), factor.solve(&row.right));
-        constants.matrix -= row.border.transpose() * border;
-        constants.right -= row.border.transpose() * constant;
-        constants.fall += row.right.dot(&constant);
-        constants.log_det += 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
-        done.push(Eliminated { next, border, constant });
-        if let Some(after) = rows.get(k + 1) {
-            row = Row {
-                own: after.own - after.back * next,
-                back: Block::zeros(),
-                border: after.border - after.back * border,
-                right: after.right - after.back * constant,
-            };
+impl<const W: usize> Left<W> {
+    /// Nothing yet.
+    pub const ZERO: Self = Left { corner: [[0.0; W]; W], log_det: 0.0 };
+
+    /// Adds what another part leaves.
+    pub fn add(&mut self, other: &Self) {
+        add(&mut self.corner, &other.corner);
+        self.log_det += other.log_det;
+    }
+}
+
+/// An instant after elimination: `factorᵀ x = rest · (−p, 1) − next · x'`, x' that of its neighbour
+/// nearer the middle.
+#[derive(Clone, Copy, Debug)]
+struct Eliminated<const N: usize, const W: usize> {
+    factor: Block<N>,
+    next: Block<N>,
+    rest: Wide<N, W>,
+}
+
+/// A stretch after elimination.
+#[derive(Clone, Debug)]
+pub struct Stretch<const N: usize, const W: usize> {
+    /// From the start to before the middle.
+    head: Vec<Eliminated<N, W>>,
+    middle: Eliminated<N, W>,
+    /// From the end to after the middle.
+    tail: Vec<Eliminated<N, W>>,
+}
+
+/// `into += xᵀ y`.
+pub fn add_gram<const R: usize, const A: usize, const B: usize>(
+    into: &mut [[f64; B]; A],
+    x: &[[f64; A]; R],
+    y: &[[f64; B]; R],
+) {
+    for (i, row) in into.iter_mut().enumerate() {
+        for (x, y) in x.iter().zip(y) {
+            for (sum, y) in row.iter_mut().zip(y) {
+                *sum += x[i] * y;
+            }
         }
     }
-    Some(done)
 }
 
-/// The unknowns of a stretch, given the constants.
-pub fn substitute(eliminated: &[Eliminated], constants: &CornerVector) -> Vec<NodeVector> {
-    let mut after = NodeVector::zeros();
-    let mut all: Vec<NodeVector> = eliminated
-        .iter()
-        .rev()
-        .map(|e| {
-            after = e.constant - e.border * constants - e.next * after;
-            after
-        })
-        .collect();
-    all.reverse();
-    all
+fn subtract_gram<const R: usize, const A: usize, const B: usize>(
+    into: &mut [[f64; B]; A],
+    x: &[[f64; A]; R],
+    y: &[[f64; B]; R],
+) {
+    for (i, row) in into.iter_mut().enumerate() {
+        for (x, y) in x.iter().zip(y) {
+            for (sum, y) in row.iter_mut().zip(y) {
+                *sum -= x[i] * y;
+            }
+        }
+    }
+}
+
+fn add<const A: usize, const B: usize>(into: &mut [[f64; B]; A], other: &[[f64; B]; A]) {
+    for (row, other) in into.iter_mut().zip(other) {
+        row.iter_mut().zip(other).for_each(|(x, y)| *x += y);
+    }
+}
+
+/// The lower triangle L with L Lᵀ = `a`; `None` if `a` is not positive.
+fn cholesky<const N: usize>(a: &Block<N>) -> Option<Block<N>> {
+    let mut l = [[0.0; N]; N];
+    for i in 0..N {
+        for j in 0..=i {
+            let dot: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            let left = a[i][j] - dot;
+            l[i][j] = if i == j { left.sqrt() } else { left / l[j][j] };
+        }
+        if !(l[i][i].is_finite() && l[i][i] > 0.0) {
+            return None;
+        }
+    }
+    Some(l)
+}
+
+/// Solves L y = `y` in place.
+fn forward<const N: usize, const W: usize>(l: &Block<N>, y: &mut Wide<N, W>) {
+    for i in 0..N {
+        let (done, rest) = y.split_at_mut(i);
+        let row = &mut rest[0];
+        for (by, done) in l[i].iter().zip(done.iter()) {
+            row.iter_mut().zip(done).for_each(|(x, d)| *x -= by * d);
+        }
+        let scale = l[i][i].recip();
+        row.iter_mut().for_each(|x| *x *= scale);
+    }
+}
+
+/// Eliminates one instant, coupled with one neighbour.
+fn one<const N: usize, const W: usize>(
+    node: &Node<N, W>,
+    coupling: &Block<N>,
+    neighbour: &mut Node<N, W>,
+    left: &mut Left<W>,
+) -> Option<Eliminated<N, W>> {
+    let factor = cholesky(&node.own)?;
+    let (mut next, mut rest) = (*coupling, node.rest);
+    forward(&factor, &mut next);
+    forward(&factor, &mut rest);
+    subtract_gram(&mut neighbour.own, &next, &next);
+    subtract_gram(&mut neighbour.rest, &next, &rest);
+    subtract_gram(&mut left.corner, &rest, &rest);
+    left.log_det += 2.0 * (0..N).map(|i| factor[i][i]).product::<f64>().ln();
+    Some(Eliminated { factor, next, rest })
+}
+
+fn transposed<const N: usize>(a: &Block<N>) -> Block<N> {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
+}
+
+/// Eliminates the instants `0..count` of a stretch; `None` if a block is not positive.
+///
+/// `instant(k, node, corner)` adds the equations of instant `k`, `link(k, corner)` makes those that
+/// tie it to the next one.
+pub fn eliminate<const N: usize, const W: usize>(
+    count: usize,
+    instant: impl Fn(usize, &mut Node<N, W>, &mut Corner<W>) + Sync,
+    link: impl Fn(usize, &mut Corner<W>) -> Link<N, W> + Sync,
+) -> Option<(Stretch<N, W>, Left<W>)> {
+    let middle = count / 2;
+    let head = || {
+        let (mut left, mut pending) = (Left::ZERO, Node::ZERO);
+        let mut done = Vec::with_capacity(middle);
+        for k in 0..middle {
+            let mut node = pending;
+            instant(k, &mut node, &mut left.corner);
+            let link = link(k, &mut left.corner);
+            node.add(&link.first);
+            pending = link.second;
+            done.push(one(&node, &link.coupling, &mut pending, &mut left)?);
+        }
+        Some((done, pending, left))
+    };
+    let tail = || {
+        let (mut left, mut pending) = (Left::ZERO, Node::ZERO);
+        let mut done = Vec::with_capacity(count - middle);
+        for k in (middle + 1..count).rev() {
+            let mut node = pending;
+            instant(k, &mut node, &mut left.corner);
+            let link = link(k - 1, &mut left.corner);
+            node.add(&link.second);
+            pending = link.first;
+            done.push(one(&node, &transposed(&link.coupling), &mut pending, &mut left)?);
+        }
+        Some((done, pending, left))
+    };
+    let (head, tail) =
+        if count < WORTH_A_THREAD { (head(), tail()) } else { rayon::join(head, tail) };
+    let ((head, mut node, mut left), (tail, from_tail, left_tail)) = (head?, tail?);
+    left.add(&left_tail);
+    node.add(&from_tail);
+    instant(middle, &mut node, &mut left.corner);
+    let none = [[0.0; N]; N];
+    let middle = one(&node, &none, &mut { Node::ZERO }, &mut left)?;
+    Some((Stretch { head, middle, tail }, left))
+}
+
+impl<const N: usize, const W: usize> Eliminated<N, W> {
+    fn solve(&self, by: &[f64; W], neighbour: &[f64; N]) -> [f64; N] {
+        let mut x: [f64; N] = std::array::from_fn(|i| {
+            let rest: f64 = self.rest[i].iter().zip(by).map(|(r, p)| r * p).sum();
+            let next: f64 = self.next[i].iter().zip(neighbour).map(|(n, x)| n * x).sum();
+            rest - next
+        });
+        for i in (0..N).rev() {
+            let dot: f64 = (i + 1..N).map(|j| self.factor[j][i] * x[j]).sum();
+            x[i] = (x[i] - dot) / self.factor[i][i];
+        }
+        x
+    }
+}
+
+impl<const N: usize, const W: usize> Stretch<N, W> {
+    /// The unknowns in order of time; `by` holds the constants with the sign turned, and one.
+    pub fn substitute(&self, by: &[f64; W]) -> Vec<[f64; N]> {
+        let middle = self.middle.solve(by, &[0.0; N]);
+        let walk = |side: &[Eliminated<N, W>]| {
+            let mut after = middle;
+            let step = |e: &Eliminated<N, W>| {
+                after = e.solve(by, &after);
+                after
+            };
+            side.iter().rev().map(step).collect::<Vec<_>>()
+        };
+        let (head, tail) = rayon::join(|| walk(&self.head), || walk(&self.tail));
+        head.into_iter().rev().chain([middle]).chain(tail).collect()
+    }
 }
 
 #[cfg(test)]
@@ -112,11 +253,13 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
-    /// The band solution against a dense one of the same system.
+    /// The band solution against a dense one of the same system, constants free or none.
     #[test]
     fn band_equals_dense() {
-        const N: usize = 4;
-        let size = N * NODE + COUNT;
+        const N: usize = 6;
+        const C: usize = 5;
+        const COUNT: usize = 7;
+        let size = COUNT * N + C;
         // residuals with pseudo-random coefficients, each touching two neighbours and the constants
         let mut seed = 1_u64;
         let mut random = || {
@@ -125,45 +268,62 @@ mod tests {
         };
         let mut dense = DMatrix::<f64>::identity(size, size);
         let mut right = DVector::<f64>::zeros(size);
-        for k in 0..N - 1 {
+        let mut links = vec![
+            Link {
+                first: Node::<N, { C + 1 }>::ZERO,
+                second: Node::ZERO,
+                coupling: [[0.0; N]; N]
+            };
+            COUNT - 1
+        ];
+        let mut corner = [[0.0; C + 1]; C + 1];
+        (0..C).for_each(|i| corner[i][i] = 1.0);
+        for k in 0..COUNT - 1 {
             for _ in 0..10 {
+                let mut draw = [[0.0; N]; 1].map(|row| row.map(|_| random()));
+                let first = draw;
+                draw = draw.map(|row| row.map(|_| random()));
+                let second = draw;
+                let rest = [[0.0; C + 1]; 1].map(|row| row.map(|_| random()));
                 let mut j = DVector::<f64>::zeros(size);
-                j.rows_mut(k * NODE, 2 * NODE).iter_mut().for_each(|x| *x = random());
-                j.rows_mut(N * NODE, COUNT).iter_mut().for_each(|x| *x = random());
+                for i in 0..N {
+                    j[k * N + i] = first[0][i];
+                    j[k * N + N + i] = second[0][i];
+                }
+                (0..C).for_each(|i| j[COUNT * N + i] = rest[0][i]);
                 dense += &j * j.transpose();
-                right += &j * random();
+                right += &j * rest[0][C];
+                let link = &mut links[k];
+                add_gram(&mut link.first.own, &first, &first);
+                add_gram(&mut link.second.own, &second, &second);
+                add_gram(&mut link.coupling, &first, &second);
+                add_gram(&mut link.first.rest, &first, &rest);
+                add_gram(&mut link.second.rest, &second, &rest);
+                add_gram(&mut corner, &rest, &rest);
             }
         }
-        let rows: Vec<Row> = (0..N)
-            .map(|k| Row {
-                own: dense.fixed_view::<NODE, NODE>(k * NODE, k * NODE).into(),
-                back: if k > 0 {
-                    dense.fixed_view::<NODE, NODE>(k * NODE, (k - 1) * NODE).into()
-                } else {
-                    Block::zeros()
-                },
-                border: dense.fixed_view::<NODE, COUNT>(k * NODE, N * NODE).into(),
-                right: right.fixed_rows::<NODE>(k * NODE).into(),
-            })
-            .collect();
-        let mut constants = Constants {
-            matrix: dense.fixed_view::<COUNT, COUNT>(N * NODE, N * NODE).into(),
-            right: right.fixed_rows::<COUNT>(N * NODE).into(),
-            log_det: 0.0,
-            fall: 0.0,
+        let instant = |_: usize, node: &mut Node<N, { C + 1 }>, _: &mut Corner<{ C + 1 }>| {
+            (0..N).for_each(|i| node.own[i][i] += 1.0);
         };
-        let eliminated = eliminate(&rows, &mut constants).unwrap();
-        let factor = constants.matrix.cholesky().unwrap();
-        let p = factor.solve(&constants.right);
-        let x = substitute(&eliminated, &p);
+        let (stretch, mut left) = eliminate(COUNT, instant, |k, _| links[k]).unwrap();
+        add(&mut left.corner, &corner);
+        let matrix = DMatrix::from_fn(C, C, |i, j| left.corner[i][j]);
+        let factor = matrix.cholesky().unwrap();
+        let b = DVector::from_fn(C, |i, _| left.corner[i][C]);
+        let p = factor.solve(&b);
+        let by = std::array::from_fn(|i| if i < C { -p[i] } else { 1.0 });
+        let x = stretch.substitute(&by);
         let reference = dense.clone().lu().solve(&right).unwrap();
-        for (k, node) in x.iter().enumerate().take(N) {
-            assert!((node - reference.fixed_rows::<NODE>(k * NODE)).norm() < 1e-12);
+        for (k, node) in x.iter().enumerate() {
+            for i in 0..N {
+                assert!((node[i] - reference[k * N + i]).abs() < 1e-11);
+            }
         }
-        assert!((p - reference.fixed_rows::<COUNT>(N * NODE)).norm() < 1e-12);
-        let fall = constants.fall + constants.right.dot(&p);
-        assert!((fall - right.dot(&reference)).abs() < 1e-12);
-        let log_det = constants.log_det + factor.determinant().ln();
+        assert!((p.clone() - reference.rows(COUNT * N, C)).norm() < 1e-11);
+        // what is left of the squares: Σ r² less the fall, here both of the dense system
+        let least = left.corner[C][C] - b.dot(&p);
+        assert!((least - (corner[C][C] - right.dot(&reference))).abs() < 1e-11);
+        let log_det = left.log_det + factor.determinant().ln();
         assert!((log_det - dense.determinant().ln()).abs() < 1e-10);
     }
 }

@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Timing;
-use super::band::{Block, Border, NodeVector};
+use super::band::{Block, Wide};
 use super::intake::Track;
-use super::nuisance::{EARTH, FORCE, GYRO, SKEW_FORCE, Values};
+use super::nuisance::{EARTH, FORCE, GYRO, INERTIAL, SKEW_FORCE, Values};
 use super::path::Path;
 use super::rotation::{cross, exp, log};
 
@@ -29,16 +29,34 @@ pub struct Drive {
     force_by_skew: Vec<Vector3<f64>>,
 }
 
-/// The difference between one sample carried on and the next one, and how it depends on both.
-pub struct Link {
-    /// Attitude (rad), velocity (m/s, body axes), gust (m/s, earth axes).
-    pub residual: NodeVector,
+/// Attitude and velocity, unknowns of every instant; the gust's three may follow.
+pub const MOTION: usize = 6;
+/// With the gust.
+pub const MOTION_AND_GUST: usize = 9;
+
+/// The difference between one sample carried on and the next one, and how it depends on both: rows
+/// of attitude (rad), velocity (m/s, body axes), gust (m/s, earth axes).
+pub struct Step<const N: usize, const D: usize> {
     /// By the first sample.
-    pub first: Block,
+    pub first: Block<N>,
     /// By the second sample.
-    pub second: Block,
-    /// By the constants.
-    pub constants: Border,
+    pub second: Block<N>,
+    /// By the constants that act between samples, then the difference itself with its sign turned:
+    /// the last `D` columns of the equations.
+    pub rest: Wide<N, D>,
+}
+
+/// Writes a 3 × 3 block.
+fn put<const N: usize, const W: usize>(
+    into: &mut [[f64; W]; N],
+    (row, column): (usize, usize),
+    block: &Matrix3<f64>,
+) {
+    for i in 0..3 {
+        for j in 0..3 {
+            into[row + i][column + j] = block[(i, j)];
+        }
+    }
 }
 
 impl Drive {
@@ -75,10 +93,17 @@ impl Drive {
         drive
     }
 
-    /// The link between samples `k` and `k + 1` of `path`.
+    /// The step from sample `k` to the next one along `path`.
     ///
-    /// The gust decays over [`GUST_TIME`].
-    pub fn link(&self, path: &Path, values: &Values, k: usize, step: f64, gravity: f64) -> Link {
+    /// The gust decays over [`GUST_TIME`]. With `D` = 1 the constants are held.
+    pub fn step<const N: usize, const D: usize>(
+        &self,
+        path: &Path,
+        values: &Values,
+        k: usize,
+        step: f64,
+        gravity: f64,
+    ) -> Step<N, D> {
         let body = path.attitude[k].transpose();
         let turned = body * path.attitude[k + 1];
         let attitude = log(&(exp(&(self.rate[k] * step)).transpose() * turned));
@@ -89,32 +114,35 @@ impl Drive {
         let gained = body * (path.velocity[k + 1] - v - (down + coriolis) * step);
         let bias = Vector3::from_column_slice(&values[FORCE..FORCE + 3]);
         let velocity = gained - (self.force[k] - bias) * step;
-        let mut link = Link {
-            residual: NodeVector::zeros(),
-            first: Block::zeros(),
-            second: Block::zeros(),
-            constants: Border::zeros(),
-        };
-        link.residual.fixed_rows_mut::<3>(0).copy_from(&attitude);
-        link.residual.fixed_rows_mut::<3>(3).copy_from(&velocity);
-        let (one, kept) = (Matrix3::identity(), gust_kept(step));
-        let gust = path.gust[k + 1] - path.gust[k] * kept;
-        link.residual.fixed_rows_mut::<3>(6).copy_from(&gust);
-        link.first.fixed_view_mut::<3, 3>(6, 6).copy_from(&(one * -kept));
-        link.second.fixed_view_mut::<3, 3>(6, 6).copy_from(&one);
-        link.first.fixed_view_mut::<3, 3>(0, 0).copy_from(&-turned.transpose());
-        link.second.fixed_view_mut::<3, 3>(0, 0).copy_from(&one);
-        link.first.fixed_view_mut::<3, 3>(3, 0).copy_from(&cross(&gained));
-        link.first.fixed_view_mut::<3, 3>(3, 3).copy_from(&-body);
-        link.second.fixed_view_mut::<3, 3>(3, 3).copy_from(&body);
-        link.constants.fixed_view_mut::<3, 3>(0, GYRO).copy_from(&(one * step));
-        link.constants.fixed_view_mut::<3, 3>(3, FORCE).copy_from(&(one * step));
-        for (place, axis) in [(EARTH, Vector3::x()), (EARTH + 1, Vector3::z())] {
-            let slope = body * axis.cross(&v) * (2.0 * step);
-            link.constants.fixed_view_mut::<3, 1>(3, place).copy_from(&slope);
+        let one = Matrix3::identity();
+        let mut link = Step { first: [[0.0; N]; N], second: [[0.0; N]; N], rest: [[0.0; D]; N] };
+        put(&mut link.first, (0, 0), &-turned.transpose());
+        put(&mut link.second, (0, 0), &one);
+        put(&mut link.first, (3, 0), &cross(&gained));
+        put(&mut link.first, (3, 3), &-body);
+        put(&mut link.second, (3, 3), &body);
+        for i in 0..3 {
+            link.rest[i][D - 1] = -attitude[i];
+            link.rest[3 + i][D - 1] = -velocity[i];
         }
-        let by_skew = self.force_by_skew[k] * -step;
-        link.constants.fixed_view_mut::<3, 1>(3, SKEW_FORCE).copy_from(&by_skew);
+        if N == MOTION_AND_GUST {
+            let kept = gust_kept(step);
+            let gust = path.gust[k + 1] - path.gust[k] * kept;
+            put(&mut link.first, (6, 6), &(one * -kept));
+            put(&mut link.second, (6, 6), &one);
+            (0..3).for_each(|i| link.rest[6 + i][D - 1] = -gust[i]);
+        }
+        if D > 1 {
+            put(&mut link.rest, (0, GYRO - INERTIAL), &(one * step));
+            put(&mut link.rest, (3, FORCE - INERTIAL), &(one * step));
+            for i in 0..3 {
+                link.rest[3 + i][SKEW_FORCE - INERTIAL] = self.force_by_skew[k][i] * -step;
+            }
+            for (place, axis) in [(EARTH, Vector3::x()), (EARTH + 1, Vector3::z())] {
+                let slope = body * axis.cross(&v) * (2.0 * step);
+                (0..3).for_each(|i| link.rest[3 + i][place - INERTIAL] = slope[i]);
+            }
+        }
         link
     }
 }

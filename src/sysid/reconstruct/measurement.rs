@@ -1,31 +1,43 @@
 //! The measured part: what the sensors show of the path, with their errors.
 
-use nalgebra::{RowSVector, SVector, Vector3};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
-use super::band::{Corner, CornerVector, NODE, Row};
+use super::band::{Corner, Node, add_gram};
 use super::channel::wrap;
 use super::intake::Track;
+use super::kinematics::MOTION_AND_GUST;
 use super::nuisance::{
-    ALPHA, BETA, COUNT, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_VANES, SKEW_VELOCITY, Values,
+    ALPHA, BETA, INERTIAL, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_VANES, SKEW_VELOCITY, Values,
     WIND,
 };
-use super::path::{CHANNELS, Path, SLOW};
-use super::rotation::{cross, euler_by_turn};
+use super::path::{CHANNELS, Path, SLOW, flow_angles};
+use super::rotation::{cross, euler_by_turn, to_euler};
 
-/// How a channel depends on the path at an instant and on the constants besides its delay.
-struct Slope {
-    node: RowSVector<f64, NODE>,
-    constants: SVector<f64, COUNT>,
+/// Columns of the constants that act at instants, right-hand side last.
+pub const AT: usize = INERTIAL + 1;
+/// How many further residuals the equations can be solved for at once.
+pub const OTHERS: usize = 16;
+/// Further residuals of a channel.
+pub type Others = [f64; OTHERS];
+
+/// The measurements of an instant against what its path should show; NaN where there is none.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    /// Measured less shown.
+    pub residual: [f64; CHANNELS],
+    /// How what should be shown changes with the delay, per s.
+    by_late: [f64; CHANNELS],
 }
 
-/// The constants' share in the normal equations, and the sum of squares.
-pub struct Sums<'a> {
-    /// Information.
-    pub matrix: &'a mut Corner,
-    /// Right-hand side.
-    pub right: &'a mut CornerVector,
-    /// Sum of weighted squares.
-    pub cost: &'a mut f64,
+impl Reading {
+    /// The same with other residuals where there are measurements.
+    pub fn with(mut self, residuals: [f64; CHANNELS]) -> Reading {
+        for (residual, other) in self.residual.iter_mut().zip(residuals) {
+            *residual = if residual.is_nan() { f64::NAN } else { other };
+        }
+        self
+    }
 }
 
 /// The delay that a channel is read with.
@@ -48,29 +60,49 @@ pub fn measured(track: &Track, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// Adds the measurements of `track` to the normal equations. `spread` holds the standard deviations
-/// of the channels; a residual beyond `bound` of them counts less. `residuals` receives every residual.
-#[expect(clippy::too_many_arguments, reason = "one call site; a struct would only rename them")]
-pub fn add(
-    track: &Track,
-    path: &Path,
-    values: &Values,
-    step: f64,
-    spread: &[f64; CHANNELS],
-    bound: f64,
-    rows: &mut [Row],
-    sums: &mut Sums,
-    residuals: &mut [Vec<f64>; CHANNELS],
-) {
-    let shown: Vec<[f64; CHANNELS]> = (0..path.len()).map(|k| path.shown(k)).collect();
-    for j in 1..path.len() - 1 {
-        let slopes = slopes(path, j, shown[j], values);
-        for (channel, slope) in slopes.iter().enumerate() {
-            let Some(slope) = slope else { continue };
+/// How airspeed, α and β change with the velocity through the air; `None` if it is slow.
+fn air_slopes(u: &Vector3<f64>) -> Option<Matrix3<f64>> {
+    let (v, plane) = (u.norm(), u.x.hypot(u.z));
+    (plane >= SLOW).then(|| {
+        let beta = (Vector3::y() - u * (u.y / (v * v))) / plane;
+        let p2 = plane * plane;
+        let alpha = Vector3::new(-u.z / p2, 0.0, u.x / p2);
+        Matrix3::from_columns(&[u / v, alpha, beta]).transpose()
+    })
+}
+
+/// What sensors without errors would show at sample `k`.
+fn shown(path: &Path, k: usize) -> [f64; CHANNELS] {
+    let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
+    let u = path.air_velocity(k);
+    let [alpha, beta] = flow_angles(&u);
+    let ground = path.velocity[k];
+    [roll, pitch, yaw, u.norm(), alpha, beta, ground.x, ground.y, ground.z]
+}
+
+/// How airspeed, α and β as measured change with a gust at sample `k`, earth axes.
+pub fn by_gust(path: &Path, k: usize, values: &Values) -> Option<Matrix3<f64>> {
+    let mut slopes = air_slopes(&path.air_velocity(k))?;
+    slopes.row_mut(0).scale_mut(1.0 + values[SCALE]);
+    Some(slopes * -path.attitude[k].transpose())
+}
+
+/// The readings at every sample of `track`, samples `step` (s) apart.
+pub fn readings(track: &Track, path: &Path, values: &Values, step: f64) -> Vec<Reading> {
+    let none = Reading { residual: [f64::NAN; CHANNELS], by_late: [0.0; CHANNELS] };
+    let n = path.len();
+    let shown: Vec<[f64; CHANNELS]> =
+        (0..n).into_par_iter().with_min_len(1000).map(|k| shown(path, k)).collect();
+    let read = |j: usize| {
+        let mut reading = none;
+        if j == 0 || j + 1 >= n {
+            return reading;
+        }
+        for channel in 0..CHANNELS {
             let late = values[skew_of(channel)] / step;
             let whole = late.round();
             let data = j as isize + whole as isize;
-            if data < 0 || data as usize >= path.len() {
+            if data < 0 || data as usize >= n {
                 continue;
             }
             let y = measured(track, channel, data as usize);
@@ -82,39 +114,14 @@ pub fn add(
             let (ahead, behind) =
                 (angle(shown[j + 1][channel] - h), angle(h - shown[j - 1][channel]));
             let (rate, bend, part) = ((ahead + behind) * 0.5, ahead - behind, whole - late);
-            let h = h + rate * part + 0.5 * bend * part * part;
-            let (h, gain) = with_errors(channel, h, values);
-            let residual = angle(y - h);
-            residuals[channel].push(residual);
-            let size = (residual / spread[channel]).abs();
-            let weight = (bound / size).min(1.0) / spread[channel].powi(2);
-            let mut constants = slope.constants;
-            constants[skew_of(channel)] = -gain * (rate + bend * part) / step;
-            accumulate(&mut rows[j], sums, &slope.node, &constants, residual, weight);
+            let (h, gain) =
+                with_errors(channel, h + rate * part + 0.5 * bend * part * part, values);
+            reading.residual[channel] = angle(y - h);
+            reading.by_late[channel] = -gain * (rate + bend * part) / step;
         }
-    }
-}
-
-fn accumulate(
-    row: &mut Row,
-    sums: &mut Sums,
-    node: &RowSVector<f64, NODE>,
-    constants: &SVector<f64, COUNT>,
-    residual: f64,
-    weight: f64,
-) {
-    let weighted = node.transpose() * weight;
-    row.own += weighted * node;
-    row.right += weighted * residual;
-    for place in 0..COUNT {
-        let by = constants[place];
-        if by != 0.0 {
-            row.border.column_mut(place).axpy(by, &weighted, 1.0);
-            sums.right[place] += weight * by * residual;
-            sums.matrix.column_mut(place).axpy(weight * by, constants, 1.0);
-        }
-    }
-    *sums.cost += weight * residual * residual;
+        reading
+    };
+    (0..n).into_par_iter().with_min_len(1000).map(read).collect()
 }
 
 /// What a sensor with its errors shows where one without shows `h`, and the gain from one to the other.
@@ -127,53 +134,113 @@ fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
     }
 }
 
-/// How every channel depends on the path at sample `k`; `None` where it says nothing.
-fn slopes(
+/// Adds the reading of sample `k` to the equations. `spread` holds the standard deviations of the
+/// channels; a residual beyond `bound` of them counts less. The first columns are `others`, further
+/// residuals of the sensors of the air; then come the constants that act at instants, none if `M` is 1.
+#[expect(clippy::too_many_arguments, reason = "one call site; a struct would only rename them")]
+pub fn add<const N: usize, const W: usize, const M: usize>(
+    path: &Path,
+    values: &Values,
+    k: usize,
+    reading: &Reading,
+    spread: &[f64; CHANNELS],
+    bound: f64,
+    others: Option<&[Others; 3]>,
+    node: &mut Node<N, W>,
+    corner: &mut Corner<W>,
+) {
+    if reading.residual.iter().all(|x| x.is_nan()) {
+        return;
+    }
+    let (by_node, by_constants) = slopes::<N, M>(path, k, values, reading);
+    let (mut nodes, mut rests) = ([[0.0; N]; CHANNELS], [[0.0; M]; CHANNELS]);
+    for channel in 0..CHANNELS {
+        let residual = reading.residual[channel];
+        let Some(slope) = by_node[channel].filter(|_| !residual.is_nan()) else { continue };
+        let size = (residual / spread[channel]).abs();
+        let weight = (bound / size).min(1.0).sqrt() / spread[channel];
+        nodes[channel] = slope.map(|x| x * weight);
+        rests[channel] = by_constants[channel].map(|x| x * weight);
+        rests[channel][M - 1] = residual * weight;
+        if let (3..6, Some(others)) = (channel, others) {
+            let columns = rests[channel].iter_mut().zip(&others[channel - 3]);
+            columns.for_each(|(x, other)| *x = other * weight);
+        }
+    }
+    add_gram(&mut node.own, &nodes, &nodes);
+    let mut coupling = [[0.0; M]; N];
+    add_gram(&mut coupling, &nodes, &rests);
+    for (row, coupling) in node.rest.iter_mut().zip(&coupling) {
+        spill(row, coupling);
+    }
+    let mut own = [[0.0; M]; M];
+    add_gram(&mut own, &rests, &rests);
+    for (i, own) in own.iter().enumerate() {
+        spill(&mut corner[if i + 1 == M { W - 1 } else { i }], own);
+    }
+}
+
+/// Adds the first columns and the last one to theirs.
+fn spill<const M: usize, const W: usize>(row: &mut [f64; W], part: &[f64; M]) {
+    row.iter_mut().zip(&part[..M - 1]).for_each(|(x, y)| *x += y);
+    row[W - 1] += part[M - 1];
+}
+
+/// How every channel depends on the path at sample `k`, `None` where it says nothing, and on the
+/// constants.
+#[expect(
+    clippy::type_complexity,
+    reason = "two tables by channel, taken apart at the one call site"
+)]
+fn slopes<const N: usize, const M: usize>(
     path: &Path,
     k: usize,
-    shown: [f64; CHANNELS],
     values: &Values,
-) -> [Option<Slope>; CHANNELS] {
+    reading: &Reading,
+) -> ([Option<[f64; N]>; CHANNELS], [[f64; M]; CHANNELS]) {
     let body = path.attitude[k].transpose();
     let u = path.air_velocity(k);
-    let (v, plane) = (u.norm(), u.x.hypot(u.z));
-    let by_turn = cross(&u);
-    let none = SVector::<f64, COUNT>::zeros();
-    let through = |g: Vector3<f64>, place: usize, by: f64| {
-        let mut node = RowSVector::<f64, NODE>::zeros();
-        node.fixed_columns_mut::<3>(0).copy_from(&(g.transpose() * by_turn));
-        let slope = g.transpose() * body;
-        node.fixed_columns_mut::<3>(3).copy_from(&slope);
-        node.fixed_columns_mut::<3>(6).copy_from(&-slope);
-        let mut constants = SVector::<f64, COUNT>::zeros();
-        constants.fixed_rows_mut::<3>(WIND).copy_from(&-slope.transpose());
-        constants[place] = by;
-        Slope { node, constants }
-    };
-    let euler = euler_by_turn([shown[0], shown[1], shown[2]]);
-    std::array::from_fn(|channel| match channel {
-        0..3 => euler.map(|euler| {
-            let mut node = RowSVector::<f64, NODE>::zeros();
-            node.fixed_columns_mut::<3>(0).copy_from(&euler.row(channel));
-            Slope { node, constants: none }
-        }),
-        3..6 if plane < SLOW => None,
-        3 => {
-            let gain = 1.0 + values[SCALE];
-            Some(through(u * (gain / v), SCALE, v))
+    let from = M.saturating_sub(AT);
+    let mut nodes = [None; CHANNELS];
+    let mut constants = [[0.0; M]; CHANNELS];
+    if let Some(euler) = euler_by_turn(&path.attitude[k]) {
+        for (channel, node) in nodes[..3].iter_mut().enumerate() {
+            let mut row = [0.0; N];
+            (0..3).for_each(|i| row[i] = euler[(channel, i)]);
+            *node = Some(row);
         }
-        4 => {
-            let g = Vector3::new(-u.z, 0.0, u.x) / (plane * plane);
-            Some(through(g, ALPHA, 1.0))
+    }
+    if let Some(mut slopes) = air_slopes(&u) {
+        slopes.row_mut(0).scale_mut(1.0 + values[SCALE]);
+        let (by_turn, by_velocity) = (slopes * cross(&u), slopes * body);
+        for i in 0..3 {
+            let mut row = [0.0; N];
+            for j in 0..3 {
+                row[j] = by_turn[(i, j)];
+                row[3 + j] = by_velocity[(i, j)];
+                if N == MOTION_AND_GUST {
+                    row[6 + j] = -by_velocity[(i, j)];
+                }
+                if M > 1 {
+                    constants[3 + i][from + WIND + j] = -by_velocity[(i, j)];
+                }
+            }
+            nodes[3 + i] = Some(row);
         }
-        5 => {
-            let g = (Vector3::new(0.0, 1.0, 0.0) - u * (u.y / (v * v))) / plane;
-            Some(through(g, BETA, 1.0))
+        if M > 1 {
+            constants[3][from + SCALE] = u.norm();
+            (constants[4][from + ALPHA], constants[5][from + BETA]) = (1.0, 1.0);
         }
-        _ => {
-            let mut node = RowSVector::<f64, NODE>::zeros();
-            node[channel - 3] = 1.0;
-            Some(Slope { node, constants: none })
+    }
+    for (channel, node) in nodes.iter_mut().enumerate().skip(6) {
+        let mut row = [0.0; N];
+        row[channel - 3] = 1.0;
+        *node = Some(row);
+    }
+    if M > 1 {
+        for (channel, row) in constants.iter_mut().enumerate() {
+            row[from + skew_of(channel)] = reading.by_late[channel];
         }
-    })
+    }
+    (nodes, constants)
 }

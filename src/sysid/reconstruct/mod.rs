@@ -6,18 +6,23 @@
 mod actuator_skew;
 mod band;
 mod channel;
+mod equations;
+mod gusts;
 mod intake;
 mod kinematics;
+mod levels;
 mod manoeuvres;
 mod measurement;
 mod noise;
-mod nuisance;
+pub(in crate::sysid) mod nuisance;
 mod outcome;
 mod path;
 mod rotation;
 mod smoother;
 
 pub use manoeuvres::{Kind as ManoeuvreKind, Manoeuvre, manoeuvres};
+
+use equations::Problem;
 
 use crate::logs::Flight;
 use crate::physics::airframe::ActuatorFigures;
@@ -144,6 +149,7 @@ pub enum ReconstructError {
 /// its sensors contradict one another.
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
-    let smoothed = smoother::smooth(&log, options)?;
-    Ok(outcome::assemble(log, smoothed, options))
+    let problem = Problem { log: &log, options, widths: nuisance::prior_widths(log.step) };
+    let found = smoother::smooth(&problem)?;
+    outcome::assemble(&problem, &found)
 }

@@ -4,32 +4,37 @@ use super::{Options, intake::Sensors};
 
 /// Number of constants.
 pub const COUNT: usize = 19;
-/// Place of the gyro biases p, q, r.
-pub const GYRO: usize = 0;
-/// Place of the accelerometer biases x, y, z.
-pub const FORCE: usize = 3;
 /// Place of the bias of the angle-of-attack vane.
-pub const ALPHA: usize = 6;
+pub const ALPHA: usize = 0;
 /// Place of the bias of the sideslip vane.
-pub const BETA: usize = 7;
+pub const BETA: usize = 1;
 /// Place of the airspeed scale less one: measured = (1 + scale) · true.
-pub const SCALE: usize = 8;
-/// Place of the wind north, east, down.
-pub const WIND: usize = 9;
+pub const SCALE: usize = 2;
+/// Place of the wind north, east, down: the steady part, about which gusts vary.
+pub const WIND: usize = 3;
 /// Place of the delay of the attitude behind the gyros.
-pub const SKEW_ATTITUDE: usize = 12;
-/// Place of the delay of the accelerometers.
-pub const SKEW_FORCE: usize = 13;
+pub const SKEW_ATTITUDE: usize = 6;
 /// Place of the delay of the airspeed.
-pub const SKEW_AIRSPEED: usize = 14;
+pub const SKEW_AIRSPEED: usize = 7;
 /// Place of the delay of the vanes.
-pub const SKEW_VANES: usize = 15;
+pub const SKEW_VANES: usize = 8;
 /// Place of the delay of the velocity over ground.
-pub const SKEW_VELOCITY: usize = 16;
-
+pub const SKEW_VELOCITY: usize = 9;
+/// The first of the constants that act between instants; those before it act at instants.
+pub const INERTIAL: usize = 10;
+/// Place of the gyro biases p, q, r.
+pub const GYRO: usize = 10;
+/// Place of the accelerometer biases x, y, z.
+pub const FORCE: usize = 13;
+/// Place of the delay of the accelerometers.
+pub const SKEW_FORCE: usize = 16;
 /// Place of the Earth's rate north and down, rad/s: a log without a latitude does not say them, and
 /// their Coriolis acceleration, 0.003 m/s² at 20 m/s, is twice what a minute's accelerometer bias is known to.
 pub const EARTH: usize = 17;
+
+/// The constants in the order in which they are handed out.
+pub const ORDER: [usize; COUNT] =
+    [10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 16, 7, 8, 9, 17, 18];
 
 /// Prior width of a clock skew, samples: ±1.5 samples are its 95 % interval.
 pub const SKEW_SAMPLES: f64 = 0.77;
@@ -39,12 +44,6 @@ pub type Values = [f64; COUNT];
 
 /// Names and units, by place.
 pub const NAMES: [(&str, &str); COUNT] = [
-    ("gyro_bias_p", "rad/s"),
-    ("gyro_bias_q", "rad/s"),
-    ("gyro_bias_r", "rad/s"),
-    ("accelerometer_bias_x", "m/s²"),
-    ("accelerometer_bias_y", "m/s²"),
-    ("accelerometer_bias_z", "m/s²"),
     ("alpha_bias", "rad"),
     ("beta_bias", "rad"),
     ("airspeed_scale", ""),
@@ -52,10 +51,16 @@ pub const NAMES: [(&str, &str); COUNT] = [
     ("wind_east", "m/s"),
     ("wind_down", "m/s"),
     ("skew_attitude", "s"),
-    ("skew_accelerometer", "s"),
     ("skew_airspeed", "s"),
     ("skew_vanes", "s"),
     ("skew_velocity", "s"),
+    ("gyro_bias_p", "rad/s"),
+    ("gyro_bias_q", "rad/s"),
+    ("gyro_bias_r", "rad/s"),
+    ("accelerometer_bias_x", "m/s²"),
+    ("accelerometer_bias_y", "m/s²"),
+    ("accelerometer_bias_z", "m/s²"),
+    ("skew_accelerometer", "s"),
     ("earth_rate_north", "rad/s"),
     ("earth_rate_down", "rad/s"),
 ];
@@ -80,7 +85,7 @@ pub fn concerned(place: usize, has: &Sensors) -> bool {
         ALPHA => has.alpha,
         BETA => has.beta,
         SKEW_VANES => has.alpha || has.beta,
-        FORCE..ALPHA | SKEW_FORCE => has.force,
+        FORCE..=SKEW_FORCE => has.force,
         SKEW_VELOCITY => has.velocity,
         EARTH.. => false,
         _ => true,

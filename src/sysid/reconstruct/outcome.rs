@@ -1,13 +1,15 @@
 //! The outcome: what the smoother found, as a reconstruction with its notes.
 
 use super::actuator_skew::{self, Skew};
+use super::channel::wrap;
+use super::equations::{Found, Problem, no_path};
 use super::intake::{Log, Track};
 use super::kinematics::shifted;
 use super::nuisance::{self, COUNT, FORCE, GYRO, SCALE, SKEW_FORCE, Values};
 use super::path::{Path, flow_angles};
 use super::rotation::to_euler;
-use super::smoother::Smoothed;
-use super::{ActuatorClock, Options};
+use super::{ActuatorClock, Options, ReconstructError};
+use crate::num::stream::stream;
 use crate::physics::{Controls, State};
 use crate::sysid::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
 
@@ -19,18 +21,23 @@ const ROUGH: f64 = 0.1;
 /// finds it leaves out.
 const CORRECTED: f64 = 0.25;
 
+/// Draws of the path's errors: their rms over a flight is then known to a few percent.
+const DRAWS: usize = 3;
+
 /// Puts together what is handed out.
-pub fn assemble(log: Log, smoothed: Smoothed, options: &Options) -> Reconstruction {
-    let mut segments: Vec<Segment> = log
-        .tracks
-        .iter()
-        .zip(&smoothed.paths)
-        .map(|(track, path)| segment(track, path, &smoothed.values, &log))
-        .collect();
+///
+/// # Errors
+/// [`ReconstructError::NoPath`] if the path's errors cannot be drawn.
+pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, ReconstructError> {
+    let Problem { log, options, .. } = *problem;
+    let mut segments = path_as_segments(log, found, &found.paths, None);
     let mut notes = log.notes.clone();
-    declare(&log, &smoothed, options, &mut notes);
-    let mut nuisances = nuisances(&log, &smoothed);
-    let skew = actuator_skew::estimate(&segments, log.step, options.timing);
+    declare(log, found, options, &mut notes);
+    let mut nuisances = nuisances(log, found);
+    let erring = draws(problem, found)?;
+    let left = left(&segments, &erring, &found.levels.gyro);
+    let gusts = found.levels.gusts;
+    let skew = actuator_skew::estimate(&segments, &erring, log.step, options.timing, gusts);
     let late = late_beyond_doubt(&skew, log.step);
     if late && options.actuators_clock == ActuatorClock::AsRecorded {
         notes.push(format!(
@@ -52,26 +59,77 @@ pub fn assemble(log: Log, smoothed: Smoothed, options: &Options) -> Reconstructi
         sd: skew.deviation,
         unit: "s",
     });
-    let l = &smoothed.levels;
+    let l = &found.levels;
     let m = &l.measured;
-    Reconstruction {
+    Ok(Reconstruction {
         name: options.name.clone(),
         step_s: log.step,
         segments,
         nuisances,
         noise: [m[0], m[1], m[3], l.gyro[0], l.gyro[1], l.gyro[2], m[4], m[5]],
+        left,
         force_noise: if log.has.force { l.force } else { [f64::NAN; 3] },
         notes,
-    }
+    })
 }
 
-fn segment(track: &Track, path: &Path, values: &Values, log: &Log) -> Segment {
+/// Flights with one more error each like those that the path has.
+fn draws(problem: &Problem, found: &Found) -> Result<Vec<Vec<Segment>>, ReconstructError> {
+    let mut random = stream(0, &[]);
+    let draw = |_| {
+        let erring = problem.erring(found, &mut random)?;
+        Some(path_as_segments(problem.log, found, &erring.paths, Some(&erring.gyro)))
+    };
+    let all: Option<Vec<_>> = (0..DRAWS).map(draw).collect();
+    all.ok_or_else(|| no_path(&problem.options.name, "the equations became singular"))
+}
+
+/// Root mean square of the errors drawn, in the order of the state.
+fn left(segments: &[Segment], erring: &[Vec<Segment>], gyro: &[f64; 3]) -> [f64; 8] {
+    let (mut squares, mut count) = ([0.0; 8], 0.0_f64);
+    for draw in erring {
+        let pairs = segments.iter().zip(draw);
+        for (a, b) in pairs.flat_map(|(a, b)| a.instants.iter().zip(&b.instants)) {
+            let (a, b) = (a.state.to_array(), b.state.to_array());
+            for (i, sum) in squares.iter_mut().enumerate() {
+                let error = if i == 0 { wrap(b[i] - a[i]) } else { b[i] - a[i] };
+                *sum += error * error;
+            }
+            count += 1.0;
+        }
+    }
+    let mut left = squares.map(|sum| (sum / count).sqrt());
+    left[3..6].copy_from_slice(gyro);
+    left
+}
+
+/// The tracks along `paths`, the rates with the gyros' noise `gyro` on top.
+fn path_as_segments(
+    log: &Log,
+    found: &Found,
+    paths: &[Path],
+    gyro: Option<&[Vec<[f64; 3]>]>,
+) -> Vec<Segment> {
+    let pairs = log.tracks.iter().zip(paths).enumerate();
+    pairs
+        .map(|(i, (track, path))| segment(track, path, &found.values, log, gyro.map(|g| &g[i][..])))
+        .collect()
+}
+
+fn segment(
+    track: &Track,
+    path: &Path,
+    values: &Values,
+    log: &Log,
+    gyro: Option<&[[f64; 3]]>,
+) -> Segment {
     let (force, _) = shifted(&track.force, values[SKEW_FORCE] / log.step);
     let instant = |k: usize| {
         let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
         let air = path.air_velocity(k);
         let [alpha, beta] = flow_angles(&air);
-        let [p, q, r] = std::array::from_fn(|i| track.rates[k][i] - values[GYRO + i]);
+        let noise = gyro.map_or([0.0; 3], |g| g[k]);
+        let [p, q, r] = std::array::from_fn(|i| track.rates[k][i] - values[GYRO + i] + noise[i]);
         Instant {
             time_s: track.start + k as f64 * log.step,
             state: State { roll, pitch, airspeed: air.norm(), p, q, r, alpha, beta },
@@ -112,8 +170,9 @@ fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
 }
 
 /// The constants that the log's sensors have, the airspeed scale as a factor.
-fn nuisances(log: &Log, smoothed: &Smoothed) -> Vec<Nuisance> {
-    (0..COUNT)
+fn nuisances(log: &Log, smoothed: &Found) -> Vec<Nuisance> {
+    nuisance::ORDER
+        .into_iter()
         .filter(|place| nuisance::concerned(*place, &log.has))
         .map(|place| {
             let (name, unit) = nuisance::NAMES[place];
@@ -128,7 +187,7 @@ fn nuisances(log: &Log, smoothed: &Smoothed) -> Vec<Nuisance> {
         .collect()
 }
 
-fn declare(log: &Log, smoothed: &Smoothed, options: &Options, notes: &mut Vec<String>) {
+fn declare(log: &Log, smoothed: &Found, options: &Options, notes: &mut Vec<String>) {
     let has = &log.has;
     let mut note = |when: bool, text: &str| {
         if when {

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::intake::Track;
+use super::kinematics::MOTION_AND_GUST;
 use super::rotation;
 
 /// Number of measured channels: roll, pitch, yaw, airspeed, α, β, velocity north, east, down.
@@ -86,6 +87,17 @@ impl Path {
         self.velocity.iter_mut().for_each(|v| *v += wind);
     }
 
+    /// Moves sample `k` by a turn (rad, body axes), a velocity and, if there are nine, a gust (m/s, earth
+    /// axes).
+    pub fn shift<const N: usize>(&mut self, k: usize, by: &[f64; N]) {
+        let three = |i: usize| Vector3::new(by[i], by[i + 1], by[i + 2]);
+        self.attitude[k] = rotation::orthonormal(&(self.attitude[k] * rotation::exp(&three(0))));
+        self.velocity[k] += three(3);
+        if N == MOTION_AND_GUST {
+            self.gust[k] += three(6);
+        }
+    }
+
     /// The number of samples.
     pub fn len(&self) -> usize {
         self.attitude.len()
@@ -94,16 +106,6 @@ impl Path {
     /// Velocity relative to the air in body axes at sample `k`, m/s.
     pub fn air_velocity(&self, k: usize) -> Vector3<f64> {
         self.attitude[k].transpose() * (self.velocity[k] - self.wind - self.gust[k])
-    }
-
-    /// What sensors without errors would show at sample `k`.
-    pub fn shown(&self, k: usize) -> [f64; CHANNELS] {
-        let [roll, pitch, yaw] = rotation::to_euler(&self.attitude[k]);
-        let u = self.air_velocity(k);
-        let v = u.norm();
-        let [alpha, beta] = flow_angles(&u);
-        let ground = self.velocity[k];
-        [roll, pitch, yaw, v, alpha, beta, ground.x, ground.y, ground.z]
     }
 }
 

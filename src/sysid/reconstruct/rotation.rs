@@ -49,11 +49,12 @@ pub fn to_euler(r: &Matrix3<f64>) -> [f64; 3] {
     [r.m32.atan2(r.m33), (-r.m31).clamp(-1.0, 1.0).asin(), r.m21.atan2(r.m11)]
 }
 
-/// How roll, pitch and yaw change with a small turn in body axes; `None` close to the vertical.
-pub fn euler_by_turn([roll, pitch, _]: [f64; 3]) -> Option<Matrix3<f64>> {
-    let ((sr, cr), (sp, cp)) = (roll.sin_cos(), pitch.sin_cos());
+/// How roll, pitch and yaw of a rotation change with a small turn in body axes; `None` close to the
+/// vertical.
+pub fn euler_by_turn(r: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let (sp, cp) = (-r.m31, r.m32.hypot(r.m33));
     (cp > 0.05).then(|| {
-        let tan = sp / cp;
+        let (sr, cr, tan) = (r.m32 / cp, r.m33 / cp, sp / cp);
         Matrix3::new(1.0, sr * tan, cr * tan, 0.0, cr, -sr, 0.0, sr / cp, cr / cp)
     })
 }
@@ -80,7 +81,7 @@ mod tests {
         let turn = Vector3::new(0.3, -0.2, 0.1);
         assert!((log(&exp(&turn)) - turn).norm() < 1e-14);
         // the derivative by differences of 1e-6, good to 1e-6
-        let jacobian = euler_by_turn(angles).unwrap();
+        let jacobian = euler_by_turn(&r).unwrap();
         for axis in 0..3 {
             let mut turn = Vector3::zeros();
             turn[axis] = 1e-6;

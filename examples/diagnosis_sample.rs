@@ -1,0 +1,29 @@
+//! Writes the report of a made-up diagnosis: `cargo run --example diagnosis_sample -- OUT.html`.
+
+#[path = "../tests/report_comparison/mod.rs"]
+mod report_comparison;
+#[path = "../tests/report_diagnosis/mod.rs"]
+mod report_diagnosis;
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use greylag::report::{DiagnosisReport, write_new};
+
+fn main() -> anyhow::Result<()> {
+    let out = std::env::args_os().nth(1).context("say where: diagnosis_sample OUT.html")?;
+    let failing = report_comparison::comparison(180.0);
+    let held_out = report_diagnosis::held_out(report_comparison::comparison(60.0));
+    let report = DiagnosisReport {
+        title: "Synthetic diagnosis".into(),
+        diagnosis: &report_diagnosis::diagnosis(),
+        failing: Some(&failing),
+        held_out: Some(&held_out),
+        model_file: "params/x8/prior.toml".into(),
+        log_files: vec!["train-1.csv".into(), "train-2.csv".into(), "train-3.ulg".into()],
+        command_line: "diagnosis_sample OUT.html".into(),
+        versions: Vec::new(),
+    };
+    write_new(&PathBuf::from(out), &report.page().render())?;
+    Ok(())
+}

@@ -1,0 +1,123 @@
+//! `greylag design`: the manoeuvre that tells two effects apart.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use comfy_table::{CellAlignment, Table};
+
+use crate::commands::files::{self, shipped};
+use crate::control::schedule::{Schedule, menu};
+use crate::control::{Kind, build};
+use crate::model::GreyBox;
+use crate::sim::design::{ENOUGH, Prospect, Suspect, prospects};
+
+/// Longest schedule that is written, s: beyond it the manoeuvre is repeated by hand.
+const LONGEST_S: f64 = 600.0;
+
+/// Options of `greylag design`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The model that lacks both effects.
+    #[arg(long, value_name = "FILE")]
+    model: PathBuf,
+    /// The two effects, by id.
+    #[arg(long, value_name = "ID", num_args = 2, required = true)]
+    between: Vec<String>,
+    /// Values of an effect's constants, in its own order, in place of typical ones (may be repeated).
+    #[arg(long, value_name = "ID=V,V…", allow_hyphen_values = true)]
+    values: Vec<String>,
+    /// Write the schedule, for `greylag fly --schedule`.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Replace the schedule if it exists.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Flies the menu in both imagined aircraft, prints what each manoeuvre would tell, writes the best.
+///
+/// # Errors
+/// If the model, an effect or the file cannot be used, or no manoeuvre tells the two apart.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let overwrite = arguments.force.into();
+    if let Some(path) = &arguments.out {
+        files::writable(path, overwrite)?;
+    }
+    let model = GreyBox::load(&shipped(&arguments.model))?;
+    let suspects = suspects(arguments)?;
+    let all = prospects(&model, build(Kind::Lqi, &model)?.as_ref(), &suspects)?;
+    println!("{}", table(&all));
+    let [a, b] = &suspects;
+    let best = all.first().and_then(|best| Some((best, best.seconds()?)));
+    let Some((best, seconds)) = best.filter(|(_, seconds)| *seconds < LONGEST_S) else {
+        bail!(
+            "no manoeuvre of the menu tells {} from {} within {LONGEST_S} s; name larger --values, or take both as one",
+            a.id,
+            b.id
+        );
+    };
+    let manoeuvre = menu::named(best.name).context("the menu has lost a manoeuvre")?;
+    let times = (seconds / best.duration_s).ceil().max(1.0) as usize;
+    println!(
+        "{}: {}\n{seconds:.1} s of it tell {} from {} (evidence {ENOUGH}); one pass takes {:.0} s",
+        best.name, manoeuvre.description, a.id, b.id, best.duration_s
+    );
+    if let Some(path) = &arguments.out {
+        files::write(path, &repeated(manoeuvre, times).to_toml(), overwrite)?;
+        println!(
+            "written to {} ({times} times); fly it with `greylag demo --schedule {}`",
+            path.display(),
+            path.display()
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn suspects(arguments: &Arguments) -> Result<[Suspect; 2]> {
+    let values = arguments.values.iter().map(|text| read(text)).collect::<Result<Vec<_>>>()?;
+    if let Some((id, _)) = values.iter().find(|(id, _)| !arguments.between.contains(id)) {
+        bail!("--values {id}=… names neither of the two effects of --between");
+    }
+    let suspect = |k: usize| {
+        let id = arguments.between[k].clone();
+        let given = values.iter().find(|(of, _)| *of == id).map(|(_, v)| v.clone());
+        Suspect { id, values: given.unwrap_or_default() }
+    };
+    Ok([suspect(0), suspect(1)])
+}
+
+/// Reads `id=1.0,2.0`.
+fn read(text: &str) -> Result<(String, Vec<f64>)> {
+    let wrong = || format!("--values {text}: write ID=VALUE,VALUE…, such as drag_alpha2=0.5");
+    let (id, values) = text.split_once('=').with_context(wrong)?;
+    let values: Result<Vec<f64>, _> = values.split(',').map(|v| v.trim().parse()).collect();
+    Ok((id.trim().into(), values.with_context(wrong)?))
+}
+
+fn repeated(manoeuvre: &menu::Manoeuvre, times: usize) -> Schedule {
+    (1..times).fold(manoeuvre.schedule(), |all, _| all.then(manoeuvre.schedule()))
+}
+
+fn table(all: &[Prospect]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["manoeuvre", "length s", "separation", "visible", "s needed"]);
+    table.column_iter_mut().skip(1).for_each(|c| c.set_cell_alignment(CellAlignment::Right));
+    let number = |x: Option<f64>| x.map_or("–".into(), |x| format!("{x:.0}"));
+    for prospect in all {
+        let [a, b] = prospect.separations;
+        let visible = a.zip(b).map(|(a, b)| a.visible.min(b.visible));
+        table.add_row([
+            prospect.name.into(),
+            format!("{:.0}", prospect.duration_s),
+            prospect.apart().map_or("leaves the bounds".into(), |x| format!("{x:.0}")),
+            number(visible),
+            prospect
+                .seconds()
+                .filter(|s| s.is_finite())
+                .map_or("–".into(), |s| format!("{s:.1}")),
+        ]);
+    }
+    table
+}

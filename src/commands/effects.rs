@@ -1,0 +1,190 @@
+//! `greylag effects`: the catalogue of physical effects.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use comfy_table::Table;
+
+use crate::commands::files::{self, shipped};
+use crate::model::GreyBox;
+use crate::physics::Channel;
+use crate::physics::effects::{self, Description};
+use crate::physics::inputs;
+use crate::report::{EffectReport, effect_facts};
+use crate::sysid::measurement_effects::MEASUREMENT_EFFECTS;
+use crate::sysid::signature::{SignatureError, signature};
+
+/// Options of `greylag effects`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(clap::Subcommand)]
+enum What {
+    /// Every effect in a line.
+    List,
+    /// All that is known of one effect; with --report, its signature drawn.
+    Show(Show),
+}
+
+#[derive(clap::Args)]
+struct Show {
+    /// The effect's id, as `greylag effects list` names it.
+    #[arg(value_parser = id(), hide_possible_values = true)]
+    id: &'static str,
+    /// Write the effect's page, one HTML file with its signature.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// The model that the signature is drawn on.
+    #[arg(long, default_value = "params/x8/jsbsim.toml")]
+    model: PathBuf,
+    /// Replace the page if it exists.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Where effects act, in the order of the list.
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    Forces,
+    Deflections,
+    Measurement,
+    Prior,
+}
+
+impl Place {
+    fn words(self) -> &'static str {
+        match self {
+            Place::Forces => "forces, moments or the body",
+            Place::Deflections => "deflections",
+            Place::Measurement => "measurement",
+            Place::Prior => "forces or moments, as part of a prior",
+        }
+    }
+}
+
+/// Every effect that the program knows.
+fn catalogue() -> Vec<(Place, Description)> {
+    let (missing, prior): (Vec<_>, Vec<_>) = effects::Kind::ALL
+        .iter()
+        .map(|kind| kind.describe())
+        .partition(|about| about.entry.is_some());
+    let inputs = inputs::Kind::ALL.iter().map(|kind| kind.describe());
+    let at = |place| move |about| (place, about);
+    missing
+        .into_iter()
+        .map(at(Place::Forces))
+        .chain(inputs.map(at(Place::Deflections)))
+        .chain(MEASUREMENT_EFFECTS.into_iter().map(at(Place::Measurement)))
+        .chain(prior.into_iter().map(at(Place::Prior)))
+        .collect()
+}
+
+/// An id of the catalogue; for any other, the parser names those that are like it.
+fn id() -> impl TypedValueParser<Value = &'static str> {
+    let ids: Vec<&'static str> = catalogue().iter().map(|(_, about)| about.id).collect();
+    PossibleValuesParser::new(ids.clone())
+        .try_map(move |id| ids.iter().copied().find(|known| *known == id).ok_or("no such effect"))
+}
+
+/// Prints the list or one entry; writes its page.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    match &arguments.what {
+        What::List => print!("{}", list()),
+        What::Show(show) => self::show(show)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list() -> String {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["effect", "acts on", "channels", "parameters", "what it is"]);
+    for (place, about) in catalogue() {
+        let unit = |unit: &str| if unit.is_empty() { "".into() } else { format!(" ({unit})") };
+        let parameters: Vec<String> =
+            about.coefficients.iter().map(|c| format!("{}{}", c.name, unit(c.unit))).collect();
+        table.add_row([
+            about.id.into(),
+            place.words().into(),
+            channels(place, &about),
+            parameters.join(", "),
+            about.description.to_owned(),
+        ]);
+    }
+    format!("{table}\n`greylag effects show ID` tells more of one; --report draws its signature.\n")
+}
+
+/// The letters of an effect's channels.
+fn channels(place: Place, about: &Description) -> String {
+    let letter = |channel: &Channel| match channel {
+        Channel::Drag => "D",
+        Channel::Lift => "L",
+        Channel::Side => "Y",
+        Channel::BodyX => "T",
+        Channel::Roll => "l",
+        Channel::Pitch => "m",
+        Channel::Yaw => "n",
+    };
+    match (place, about.entry) {
+        (Place::Deflections, _) => "all with deflections".into(),
+        (Place::Measurement, _) => "kinematics".into(),
+        (_, Some(entry)) => entry.channels.iter().map(letter).collect::<Vec<_>>().join(" "),
+        (_, None) => about.id.split('_').next().unwrap_or_default().into(),
+    }
+}
+
+fn show(show: &Show) -> Result<()> {
+    let found = catalogue().into_iter().find(|(_, about)| about.id == show.id);
+    let (place, about) = found.with_context(|| format!("there is no effect {}", show.id))?;
+    let channels = channels(place, &about);
+    println!("{}", about.id);
+    for [name, text] in effect_facts(&about, place.words(), &channels) {
+        println!("  {name:20} {text}");
+    }
+    println!("  parameters");
+    for c in about.coefficients {
+        let (low, high) = c.bounds;
+        println!("    {:18} {}; {low} to {high} {}", c.name, c.meaning, c.unit);
+    }
+    if let Some(table) = about.table {
+        println!("    {table:18} table over alpha_rad, which only a model file can give");
+    }
+    let Some(path) = &show.report else { return Ok(()) };
+    let overwrite = show.force.into();
+    files::writable(path, overwrite)?;
+    let model = GreyBox::load(&shipped(&show.model))?;
+    let values = example(&model, &about);
+    if values.is_empty() && place == Place::Prior {
+        bail!("model {} has no {}; name a model that has it (--model)", model.name, about.id);
+    }
+    let drawn = match signature(&model, &about, &values) {
+        Err(SignatureError::Measurement { .. }) => None,
+        other => Some(other?),
+    };
+    let report = EffectReport {
+        about,
+        channels,
+        place: place.words(),
+        signature: drawn.as_ref(),
+        model: model.name,
+        values,
+    };
+    files::write(path, &report.page().render(), overwrite)
+}
+
+/// The catalogue's example; for part of a prior, the values that the model has.
+fn example(model: &GreyBox, about: &Description) -> Vec<f64> {
+    match about.entry {
+        Some(entry) => entry.example.into(),
+        None => {
+            let own = format!("{}.", about.id);
+            let named = model.coefficients().iter();
+            named.filter(|c| c.name.starts_with(&own)).map(|c| c.value).collect()
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! `greylag mystery`: flights of an aircraft with an effect in it that its model lacks.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, anyhow, bail};
+use comfy_table::{CellAlignment, Table};
+use serde::{Deserialize, Serialize};
+
+use crate::control::{Kind, build};
+use crate::logs::csv;
+use crate::model::GreyBox;
+use crate::sim::missing::{Kind as MissingKind, Missing};
+use crate::sim::starting_model::starting_model;
+use crate::sim::trial::Trial;
+
+/// The model that flies as the simulator does, and its airframe.
+const REFERENCE: &str = include_str!("../../params/x8/jsbsim.toml");
+const AIRFRAME: &str = include_str!("../../params/x8/airframe.toml");
+/// The file of the answer.
+const SEALED: &str = "answer.sealed";
+/// The layout of the answer.
+const SCHEMA: &str = "greylag.mystery/1";
+
+/// Options of `greylag mystery`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// What everything is drawn from: the effect, the flights, the wind, the errors of model and sensors.
+    #[arg(long, required_unless_present = "open")]
+    seed: Option<u64>,
+    /// New folder for the logs, the model and the sealed answer.
+    #[arg(long, value_name = "DIR", required_unless_present = "open")]
+    out: Option<PathBuf>,
+    /// Hide this effect instead of one drawn from the seed; a wrong ID is answered with all there are.
+    #[arg(long, value_name = "ID")]
+    effect: Option<String>,
+    /// How much of it, in its own unit.
+    #[arg(long, requires = "effect", allow_negative_numbers = true)]
+    amplitude: Option<f64>,
+    /// Fly in MIL-spec turbulence: 3 light, 4 moderate.
+    #[arg(long, value_name = "1..7", value_parser = clap::value_parser!(u8).range(1..=7))]
+    turbulence_severity: Option<u8>,
+    /// Open the answer of a folder, beside what its diagnosis.json says.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "out", "effect", "turbulence_severity"])]
+    open: Option<PathBuf>,
+}
+
+/// What was hidden.
+#[derive(Debug, Deserialize, Serialize)]
+struct Answer {
+    schema: String,
+    seed: u64,
+    id: String,
+    amplitude: f64,
+    unit: String,
+    /// Names and values of the catalogue entry's constants.
+    parameters: Vec<(String, f64)>,
+}
+
+/// Makes a mystery, or opens one.
+///
+/// # Errors
+/// If the folder exists, the effect cannot be hidden or flown with, or there is no answer to open.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    match (&arguments.open, arguments.seed, &arguments.out) {
+        (Some(folder), _, _) => open(folder),
+        (None, Some(seed), Some(out)) => make(arguments, seed, out),
+        _ => bail!("give --seed and --out, or --open"),
+    }
+}
+
+fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
+    let parent = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if out.exists() {
+        bail!("{} exists; name another folder", out.display());
+    }
+    if !parent.is_dir() {
+        bail!("cannot create {}: name a folder in one that exists", out.display());
+    }
+    let missing = Missing::drawn(seed, arguments.effect.as_deref(), arguments.amplitude)?;
+    let trial =
+        Trial { seed, missing: vec![missing.clone()], turbulence: arguments.turbulence_severity };
+    // written beside it first: the folder is there complete, or not at all
+    let beside = tempfile::Builder::new().prefix(".mystery").tempdir_in(parent);
+    let beside = beside.with_context(|| format!("creating a folder in {}", parent.display()))?;
+    let (around, folder) = (beside.path(), beside.path().join("mystery"));
+    std::fs::create_dir(&folder).with_context(|| format!("creating {}", folder.display()))?;
+    put(around, "airframe.toml", AIRFRAME)?;
+    put(around, "reference.toml", REFERENCE)?;
+    let reference = GreyBox::load(&around.join("reference.toml"))?;
+    put(&folder, "airframe.toml", AIRFRAME)?;
+    let model = starting_model(REFERENCE, &format!("mystery-{seed}"), seed, &trial.missing);
+    put(&folder, "model.toml", &model.map_err(|why| anyhow!("making the model: {why}"))?)?;
+    GreyBox::load(&folder.join("model.toml"))?;
+    let logs = trial.fly(build(Kind::Lqi, &reference)?.as_ref())?;
+    for flight in logs.training.iter().chain(&logs.testing) {
+        csv::save(flight, &folder.join(&flight.name))?;
+    }
+    put(&folder, SEALED, &seal(&answer(seed, &missing))?)?;
+    put(&folder, "README.txt", &readme(out))?;
+    std::fs::rename(folder, out).with_context(|| format!("creating {}", out.display()))?;
+    println!(
+        "{}: three training flights, two test flights, a model that lacks something",
+        out.display()
+    );
+    println!("what to do is in {}", out.join("README.txt").display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn put(folder: &Path, name: &str, text: &str) -> Result<()> {
+    let path = folder.join(name);
+    std::fs::write(&path, text).with_context(|| format!("writing {}", path.display()))
+}
+
+fn answer(seed: u64, missing: &Missing) -> Answer {
+    let names = coefficient_names(missing.id);
+    let name = |k: usize| names.get(k).copied().unwrap_or("amplitude").to_owned();
+    Answer {
+        schema: SCHEMA.into(),
+        seed,
+        id: missing.id.into(),
+        amplitude: missing.amplitude,
+        unit: MissingKind::from_id(missing.id).map_or("", |kind| kind.unit).into(),
+        parameters: missing.values.iter().enumerate().map(|(k, v)| (name(k), *v)).collect(),
+    }
+}
+
+/// The names of the constants of the catalogue's effect `id`.
+fn coefficient_names(id: &str) -> Vec<&'static str> {
+    use crate::physics::{effects, inputs};
+    let known = effects::Kind::from_id(id).map(effects::Kind::describe);
+    let known = known.or_else(|| inputs::Kind::from_id(id).map(inputs::Kind::describe));
+    known.map_or(Vec::new(), |about| about.coefficients.iter().map(|c| c.name).collect())
+}
+
+/// JSON in hexadecimal digits: nobody reads it by accident.
+fn seal(answer: &Answer) -> Result<String> {
+    let mut out = String::new();
+    for line in serde_json::to_vec(answer)?.chunks(32) {
+        line.iter().for_each(|byte| {
+            let _ = write!(out, "{byte:02x}");
+        });
+        out.push('\n');
+    }
+    Ok(out)
+}
+
+fn unseal(text: &str) -> Option<Answer> {
+    let digits: Vec<u32> = text
+        .chars()
+        .filter(|c| !c.is_whitespace())
+        .map(|c| c.to_digit(16))
+        .collect::<Option<_>>()?;
+    let pairs = digits.chunks_exact(2).map(|pair| (16 * pair[0] + pair[1]) as u8);
+    serde_json::from_slice(&pairs.collect::<Vec<u8>>()).ok()
+}
+
+fn readme(out: &Path) -> String {
+    let d = out.display();
+    let train = format!("{d}/train-1.csv {d}/train-2.csv {d}/train-3.csv");
+    let test = format!("{d}/test-1.csv {d}/test-2.csv");
+    format!(
+        "The aircraft of these flights has an effect that model.toml lacks; its coefficients are off by\n\
+         some 15 % besides, and the sensors are noisy, biased and skewed in time. Find the effect:\n\n\
+         1. See where the model fails:\n\
+         \x20  greylag compare --model {d}/model.toml --log {train} --report {d}/compare.html\n\
+         2. Ask what is missing:\n\
+         \x20  greylag diagnose --model {d}/model.toml --log {train} --json {d}/diagnosis.json --report {d}/diagnosis.html\n\
+         3. Add it, and fit model and effect anew:\n\
+         \x20  greylag amend --model {d}/model.toml --log {train} --accept --out {d}/amended\n\
+         4. See the error fall on flights that the fit never saw:\n\
+         \x20  greylag compare --model {d}/model.toml {d}/amended/model.toml --log {test}\n\
+         5. Open the answer:\n\
+         \x20  greylag mystery --open {d}\n"
+    )
+}
+
+fn open(folder: &Path) -> Result<ExitCode> {
+    let path = folder.join(SEALED);
+    let sealed = std::fs::read_to_string(&path).with_context(|| {
+        format!("reading {}: name a folder that `greylag mystery` made", path.display())
+    })?;
+    let answer = unseal(&sealed).filter(|answer| answer.schema == SCHEMA).with_context(|| {
+        format!("{} holds no answer; make the mystery anew from its seed", path.display())
+    })?;
+    println!("hidden: {} = {} {}", answer.id, answer.amplitude, answer.unit);
+    let path = folder.join("diagnosis.json");
+    if !path.exists() {
+        println!("{} is not there: nothing to set beside it", path.display());
+        return Ok(ExitCode::SUCCESS);
+    }
+    let text = std::fs::read(&path).with_context(|| format!("reading {}", path.display()))?;
+    let said: serde_json::Value = serde_json::from_slice(&text)
+        .with_context(|| format!("{} is no diagnosis; write it anew", path.display()))?;
+    beside(&answer, &said);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Prints the answer beside the diagnosis.
+fn beside(answer: &Answer, said: &serde_json::Value) {
+    let none = Vec::new();
+    let effects = said["effects"].as_array().unwrap_or(&none);
+    let id = |effect: &serde_json::Value| effect["id"].as_str().unwrap_or("?").to_owned();
+    let asserted: Vec<String> = effects.iter().filter(|e| e["asserted"] == true).map(id).collect();
+    let found = if asserted.is_empty() { "nothing".into() } else { asserted.join(", ") };
+    println!("diagnosis: verdict {}, asserts {found}", said["verdict"].as_str().unwrap_or("?"));
+    let Some((rank, effect)) = effects.iter().enumerate().find(|(_, e)| id(e) == answer.id) else {
+        println!("{} is not among the candidates", answer.id);
+        return;
+    };
+    println!("{} is ranked {} of {}", answer.id, rank + 1, effects.len());
+    if let Some(alike) = effect["indistinguishable_from"].as_array().filter(|a| !a.is_empty()) {
+        let alike: Vec<_> = alike.iter().filter_map(|a| a.as_str()).collect();
+        println!("not to be told from {} with these flights", alike.join(", "));
+    }
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["parameter", "hidden", "found", "95 % interval"]);
+    table.column_iter_mut().skip(1).for_each(|c| c.set_cell_alignment(CellAlignment::Right));
+    for parameter in effect["parameters"].as_array().unwrap_or(&none) {
+        let name = parameter["name"].as_str().unwrap_or("?");
+        // names come as in model files, with or without the effect before them
+        let own = name.rsplit('.').next().unwrap_or(name);
+        let hidden = answer.parameters.iter().find(|(n, _)| n == own).map(|(_, v)| *v);
+        let number = |x: Option<f64>| x.map_or("–".into(), |x| format!("{x:.4}"));
+        let ci = &parameter["ci95"];
+        table.add_row([
+            name.to_owned(),
+            number(hidden),
+            number(parameter["value"].as_f64()),
+            format!("{} to {}", number(ci[0].as_f64()), number(ci[1].as_f64())),
+        ]);
+    }
+    println!("{table}");
+}

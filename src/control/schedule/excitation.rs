@@ -1,0 +1,163 @@
+//! What is added to a target or a command to make an aircraft show its dynamics.
+
+use std::f64::consts::TAU;
+
+use rand::RngExt;
+
+use crate::num::stream::stream;
+
+/// Lines of a multisine.
+const LINES: usize = 7;
+/// Time in which a multisine comes and goes, s: a step at its ends would be an excitation of its own.
+const FADE_S: f64 = 0.25;
+
+/// What is excited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Axis {
+    /// The aileron command, −1..1.
+    Aileron,
+    /// The elevator command, −1..1.
+    Elevator,
+    /// The throttle command, 0..1.
+    Throttle,
+    /// The roll target, rad.
+    Roll,
+    /// The pitch target, rad.
+    Pitch,
+    /// The airspeed target, m/s.
+    Airspeed,
+}
+
+impl Axis {
+    /// Every axis.
+    pub const ALL: [Axis; 6] =
+        [Axis::Aileron, Axis::Elevator, Axis::Throttle, Axis::Roll, Axis::Pitch, Axis::Airspeed];
+
+    /// Its name in schedule files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Axis::Aileron => "aileron",
+            Axis::Elevator => "elevator",
+            Axis::Throttle => "throttle",
+            Axis::Roll => "roll",
+            Axis::Pitch => "pitch",
+            Axis::Airspeed => "airspeed",
+        }
+    }
+}
+
+/// The shape of an excitation of amplitude one.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// +1 for `width` (s), or to the end of the step.
+    Step {
+        /// How long, s; infinite for the rest of the step.
+        width: f64,
+    },
+    /// +1, then −1, each for `width` (s).
+    Doublet {
+        /// How long each, s.
+        width: f64,
+    },
+    /// +1 for 3, −1 for 2, +1 for 1, −1 for 1 times `width` (s).
+    ThreeTwoOneOne {
+        /// The unit of time, s.
+        width: f64,
+    },
+    /// Sines from `low` to `high` (Hz) with random phases, of the power of one sine of amplitude 1.
+    Multisine {
+        /// Lowest frequency, Hz.
+        low: f64,
+        /// Highest frequency, Hz.
+        high: f64,
+        /// What frequencies and phases are drawn from; multisines of different seeds are independent.
+        seed: u64,
+        /// Angular frequency (rad/s) and phase (rad) of each line.
+        lines: Vec<[f64; 2]>,
+    },
+}
+
+impl Shape {
+    /// A multisine from `low` to `high` (Hz) drawn from `seed`.
+    pub fn multisine(low: f64, high: f64, seed: u64) -> Shape {
+        let mut random = stream(seed, &[3211]);
+        let lines = (0..LINES)
+            .map(|k| {
+                let place: f64 = (k as f64 + random.random::<f64>()) / LINES as f64;
+                [TAU * low * (high / low).powf(place), TAU * random.random::<f64>()]
+            })
+            .collect();
+        Shape::Multisine { low, high, seed, lines }
+    }
+}
+
+/// An excitation of one axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Excitation {
+    /// What is excited.
+    pub axis: Axis,
+    /// How far, in the axis's unit; negative begins the other way.
+    pub amplitude: f64,
+    /// When it begins, s after the step.
+    pub start: f64,
+    /// How it goes.
+    pub shape: Shape,
+    /// Share (0..=1) of the controller's reaction on this axis that is let through meanwhile: a good
+    /// controller undoes an excitation before the aircraft has moved.
+    pub authority: f64,
+}
+
+impl Excitation {
+    /// `shape` on `axis` with `amplitude` (the axis's unit), `start` (s) after its step began.
+    pub fn new(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Excitation {
+        Excitation { axis, amplitude, start, shape, authority: 1.0 }
+    }
+
+    /// The same with only a share `authority` (0..=1) of the controller's reaction.
+    pub fn against(self, authority: f64) -> Excitation {
+        Excitation { authority, ..self }
+    }
+
+    /// How long it lasts, s; infinite to the end of the step.
+    pub fn length(&self) -> f64 {
+        match self.shape {
+            Shape::Step { width } => width,
+            Shape::Doublet { width } => 2.0 * width,
+            Shape::ThreeTwoOneOne { width } => 7.0 * width,
+            Shape::Multisine { .. } => f64::INFINITY,
+        }
+    }
+
+    /// The farthest that it can go, in the axis's unit.
+    pub fn peak(&self) -> f64 {
+        match &self.shape {
+            Shape::Multisine { lines, .. } => self.amplitude.abs() * (lines.len() as f64).sqrt(),
+            _ => self.amplitude.abs(),
+        }
+    }
+
+    /// Its value `t` (s) after the start of a step of `duration` (s), while it lasts.
+    pub(super) fn at(&self, t: f64, duration: f64) -> Option<f64> {
+        let into = t - self.start;
+        if into < 0.0 || into >= self.length() {
+            return None;
+        }
+        let unit = match &self.shape {
+            Shape::Step { .. } => 1.0,
+            Shape::Doublet { width } => sign(into < *width),
+            Shape::ThreeTwoOneOne { width } => {
+                sign(into < 3.0 * width || (5.0 * width..6.0 * width).contains(&into))
+            }
+            Shape::Multisine { lines, .. } => {
+                let fade = (into.min(duration - t) / FADE_S).clamp(0.0, 1.0);
+                let sum: f64 = lines.iter().map(|[w, phase]| (w * into + phase).sin()).sum();
+                fade * sum / (lines.len() as f64).sqrt()
+            }
+        };
+        Some(self.amplitude * unit)
+    }
+}
+
+fn sign(up: bool) -> f64 {
+    if up { 1.0 } else { -1.0 }
+}

@@ -1,0 +1,170 @@
+//! A flight-test schedule: which attitudes and airspeeds to hold, with what excitation on top.
+//!
+//! A schedule is a pure function of time: [`Schedule::at`] gives the target with what is added to
+//! the controller's command. [`Scheduled`] flies one, [`Overlay`] is its law; [`menu`] names ready-made
+//! manoeuvres, [`flights`] draws whole flights; the file form is [`Schedule::load`] and [`Schedule::to_toml`].
+
+mod excitation;
+mod file;
+pub mod flights;
+pub mod menu;
+mod scheduled;
+
+pub use excitation::{Axis, Excitation, Shape};
+pub use file::ScheduleError;
+pub use scheduled::{Overlay, Scheduled};
+
+use crate::control::Target;
+use crate::physics::Command;
+
+/// Largest bank (degrees) that a schedule may ask for.
+pub const ROLL_MAX_DEG: f64 = 70.0;
+/// Largest pitch angle (degrees) that a schedule may ask for.
+pub const PITCH_MAX_DEG: f64 = 35.0;
+/// Slowest and fastest airspeed (m/s) that a schedule may ask for.
+pub const AIRSPEED_MPS: [f64; 2] = [5.0, 100.0];
+/// Longest schedule, s.
+pub const DURATION_MAX_S: f64 = 3600.0;
+
+/// One step: an attitude with an airspeed held for a while, and what is added meanwhile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// How long, s.
+    pub duration: f64,
+    /// What is held.
+    pub target: Target,
+    /// What is added, all at once.
+    pub excitations: Vec<Excitation>,
+}
+
+impl Step {
+    /// Holds `roll_deg`, `pitch_deg` and `airspeed_mps` for `duration_s`.
+    pub fn hold(duration_s: f64, roll_deg: f64, pitch_deg: f64, airspeed_mps: f64) -> Step {
+        let target = Target {
+            roll: roll_deg.to_radians(),
+            pitch: pitch_deg.to_radians(),
+            airspeed: airspeed_mps,
+        };
+        Step { duration: duration_s, target, excitations: Vec::new() }
+    }
+
+    /// The same step with `excitation` on top.
+    pub fn with(mut self, excitation: Excitation) -> Step {
+        self.excitations.push(excitation);
+        self
+    }
+}
+
+/// What a schedule asks for at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Demand {
+    /// The attitude and the airspeed to hold.
+    pub target: Target,
+    /// What is added to the controller's command.
+    pub added: Command,
+    /// Share (0..=1) of the controller's own reaction on aileron, elevator and throttle that is let
+    /// through, counted from its command when the excitation began.
+    pub authority: [f64; 3],
+}
+
+impl Demand {
+    /// `target` without excitation.
+    pub fn hold(target: Target) -> Demand {
+        Demand { target, added: Command::IDLE, authority: [1.0; 3] }
+    }
+}
+
+/// A flight-test schedule; after its end the wings are level.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schedule {
+    /// Its name.
+    pub name: String,
+    /// What it is for, in one sentence.
+    pub description: String,
+    steps: Vec<Step>,
+}
+
+impl Schedule {
+    /// A schedule of `steps`.
+    ///
+    /// # Errors
+    /// What is wrong with a step, by its number: a figure outside the bounds of this module.
+    pub fn new(
+        name: impl Into<String>,
+        description: impl Into<String>,
+        steps: Vec<Step>,
+    ) -> Result<Schedule, String> {
+        file::check(&steps)?;
+        Ok(Schedule { name: name.into(), description: description.into(), steps })
+    }
+
+    /// The steps.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// Its length, s.
+    pub fn duration(&self) -> f64 {
+        self.steps.iter().map(|step| step.duration).sum()
+    }
+
+    /// What is asked for at `t` (s after the start).
+    ///
+    /// Before the start it is the first step's target, after the end wings level at the last
+    /// airspeed, both without excitation.
+    pub fn at(&self, t: f64) -> Demand {
+        let mut begins = 0.0;
+        for step in &self.steps {
+            if t < begins + step.duration {
+                return within(step, t - begins);
+            }
+            begins += step.duration;
+        }
+        Demand::hold(self.after())
+    }
+
+    /// What is wanted after the end: wings level, nose on the horizon, the last airspeed.
+    pub fn after(&self) -> Target {
+        let airspeed = self.steps.last().map_or(f64::NAN, |step| step.target.airspeed);
+        Target { roll: 0.0, pitch: 0.0, airspeed }
+    }
+
+    /// The same schedule with every excitation of a surface or the throttle multiplied by `factor`
+    /// in 0..=1.
+    pub fn gentler(&self, factor: f64) -> Schedule {
+        let mut gentler = self.clone();
+        let commands = [Axis::Aileron, Axis::Elevator, Axis::Throttle];
+        let all = gentler.steps.iter_mut().flat_map(|step| &mut step.excitations);
+        all.filter(|e| commands.contains(&e.axis))
+            .for_each(|e| e.amplitude *= factor.clamp(0.0, 1.0));
+        gentler
+    }
+
+    /// This schedule, then `next`.
+    pub fn then(mut self, next: Schedule) -> Schedule {
+        self.steps.extend(next.steps);
+        self
+    }
+}
+
+/// What is asked for `t` (s) after the start of `step`.
+fn within(step: &Step, t: f64) -> Demand {
+    let mut demand = Demand::hold(step.target);
+    let Demand { target, added, authority } = &mut demand;
+    for excitation in &step.excitations {
+        let Some(value) = excitation.at(t, step.duration) else { continue };
+        let (sum, share) = match excitation.axis {
+            Axis::Aileron => (&mut added.aileron, Some(&mut authority[0])),
+            Axis::Elevator => (&mut added.elevator, Some(&mut authority[1])),
+            Axis::Throttle => (&mut added.throttle, Some(&mut authority[2])),
+            Axis::Roll => (&mut target.roll, None),
+            Axis::Pitch => (&mut target.pitch, None),
+            Axis::Airspeed => (&mut target.airspeed, None),
+        };
+        *sum += value;
+        if let Some(share) = share {
+            *share = share.min(excitation.authority);
+        }
+    }
+    demand
+}

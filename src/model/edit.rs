@@ -1,0 +1,190 @@
+//! Edits of a model file's text: new values, new effects, everything else as its author wrote it.
+
+use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
+
+/// Why a model file's text cannot be edited.
+#[derive(Debug, thiserror::Error)]
+pub enum EditError {
+    /// It is no TOML.
+    #[error("cannot edit the model file: {0}; `greylag compare` tells what is wrong with it")]
+    Syntax(#[from] toml_edit::TomlError),
+    /// A place is missing or is something else.
+    #[error("cannot edit the model file: {0} is not where a model file has it")]
+    Place(String),
+    /// An effect is there already.
+    #[error("cannot add {0} to the model file: it has that effect already")]
+    Present(String),
+}
+
+/// A number to write.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Number {
+    /// `effect.coefficient`.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Its standard deviation, in the unit of the value.
+    pub sd: Option<f64>,
+}
+
+/// What changes in a model file.
+#[derive(Clone, Debug, Default)]
+pub struct Edit {
+    /// The new name of the model.
+    pub name: String,
+    /// The airframe file, relative to the new model file.
+    pub airframe: String,
+    /// Coefficients that are there already.
+    pub changed: Vec<Number>,
+    /// Coefficients of effects that are new, those of one effect in a row, with the source of the
+    /// effect's formula.
+    pub added: Vec<(Number, String)>,
+    /// What they were fitted to, for their sources.
+    pub fitted_to: String,
+}
+
+impl Edit {
+    /// `text`, a model file, with the edit made; comments and everything else as they were.
+    ///
+    /// # Errors
+    /// The text is no model file, or has an effect already that would be added.
+    pub fn apply(&self, text: &str) -> Result<String, EditError> {
+        let mut document: DocumentMut = text.parse()?;
+        for (key, new) in [("name", &self.name), ("airframe", &self.airframe)] {
+            let old = document.get_mut(key).and_then(Item::as_value_mut);
+            replace(old.ok_or_else(|| EditError::Place(key.into()))?, new.as_str().into());
+        }
+        let place = || EditError::Place("effects".into());
+        let effects = document.get_mut("effects").ok_or_else(place)?;
+        let effects = effects.as_table_like_mut().ok_or_else(place)?;
+        for number in &self.changed {
+            self.change(effects, number)?;
+        }
+        let mut fresh = String::new();
+        for (number, source) in &self.added {
+            let (id, short) = split(&number.name)?;
+            if fresh != id {
+                if effects.contains_key(id) {
+                    return Err(EditError::Present(id.into()));
+                }
+                effects.insert(id, Item::Table(Table::new()));
+                fresh = id.into();
+            }
+            let table = effects.get_mut(id).and_then(Item::as_table_like_mut);
+            let table = table.ok_or_else(|| EditError::Place(id.into()))?;
+            let source = format!("greylag amend: added, {source}; fitted to {}", self.fitted_to);
+            table.insert(short, Item::Value(Value::InlineTable(sourced(number, &source))));
+        }
+        Ok(document.to_string())
+    }
+
+    fn change(&self, effects: &mut dyn TableLike, number: &Number) -> Result<(), EditError> {
+        let place = || EditError::Place(format!("effects.{}", number.name));
+        let (id, short) = split(&number.name)?;
+        let effect = effects.get_mut(id).and_then(Item::as_table_like_mut).ok_or_else(place)?;
+        let item = effect.get_mut(short).ok_or_else(place)?;
+        let table = item.as_table_like_mut().ok_or_else(place)?;
+        let old = table.get("source").and_then(Item::as_str).unwrap_or("no source");
+        let source = format!("{}; fitted to {}", original(old), self.fitted_to);
+        for (key, new) in [("value", number.value.into()), ("source", Value::from(source))] {
+            let old = table.get_mut(key).and_then(Item::as_value_mut).ok_or_else(place)?;
+            replace(old, new);
+        }
+        if let Some(sd) = number.sd {
+            table.insert("sd", Item::Value(sd.into()));
+        }
+        if let Some(inline) = item.as_inline_table_mut() {
+            inline.fmt();
+        }
+        Ok(())
+    }
+}
+
+/// The source of a coefficient, said to be amended once however often it was.
+fn original(source: &str) -> String {
+    let amended = "greylag amend: ";
+    let bare = source.strip_prefix(amended).and_then(|s| s.split("; fitted to ").next());
+    format!("{amended}{}", bare.unwrap_or(source))
+}
+
+fn split(name: &str) -> Result<(&str, &str), EditError> {
+    name.split_once('.').ok_or_else(|| EditError::Place(name.into()))
+}
+
+/// Puts `new` in the place of `old`, spaces and comments around it left alone.
+fn replace(old: &mut Value, mut new: Value) {
+    *new.decor_mut() = old.decor().clone();
+    *old = new;
+}
+
+fn sourced(number: &Number, source: &str) -> InlineTable {
+    let mut table = InlineTable::new();
+    table.insert("value", number.value.into());
+    if let Some(sd) = number.sd {
+        table.insert("sd", sd.into());
+    }
+    table.insert("source", source.into());
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r#"# about
+schema = 1
+name = "prior" # why
+airframe = "airframe.toml"
+
+[effects.lift_linear]
+# the slope
+CLalpha = { value = 4.0, source = "Gryte" } # measured
+CLq = { value = 3.87, source = "Gryte" }
+"#;
+
+    fn number(name: &str, value: f64, sd: Option<f64>) -> Number {
+        Number { name: name.into(), value, sd }
+    }
+
+    fn edit() -> Edit {
+        Edit {
+            name: "prior+lift_stall".into(),
+            airframe: "a.toml".into(),
+            changed: vec![number("lift_linear.CLalpha", 0.1 + 0.2, Some(0.01))],
+            added: vec![(number("lift_stall.k", 1.0, None), "BM12".into())],
+            fitted_to: "a.csv (sha256 01)".into(),
+        }
+    }
+
+    #[test]
+    fn comments_stay_and_numbers_return_to_the_bit() {
+        let text = edit().apply(TEXT).unwrap();
+        for kept in ["# about", "# why", "# the slope", "# measured", "CLq = { value = 3.87, "] {
+            assert!(text.contains(kept), "{kept} lost in\n{text}");
+        }
+        let read: toml::Table = toml::from_str(&text).unwrap();
+        let slope = &read["effects"]["lift_linear"]["CLalpha"];
+        assert_eq!(slope["value"].as_float(), Some(0.1 + 0.2));
+        assert_eq!(slope["sd"].as_float(), Some(0.01));
+        assert_eq!(
+            slope["source"].as_str(),
+            Some("greylag amend: Gryte; fitted to a.csv (sha256 01)")
+        );
+        assert_eq!(read["effects"]["lift_stall"]["k"]["value"].as_float(), Some(1.0));
+        // amended again, the source tells of the last fit only
+        let again = Edit { fitted_to: "b.csv".into(), added: Vec::new(), ..edit() };
+        let read: toml::Table = toml::from_str(&again.apply(&text).unwrap()).unwrap();
+        let source = read["effects"]["lift_linear"]["CLalpha"]["source"].as_str();
+        assert_eq!(source, Some("greylag amend: Gryte; fitted to b.csv"));
+    }
+
+    #[test]
+    fn what_is_not_there_or_there_already_is_said() {
+        let unknown = Edit { changed: vec![number("lift_linear.CLx", 1.0, None)], ..edit() };
+        assert!(unknown.apply(TEXT).unwrap_err().to_string().contains("lift_linear.CLx"));
+        let text = edit().apply(TEXT).unwrap();
+        assert!(matches!(edit().apply(&text), Err(EditError::Present(id)) if id == "lift_stall"));
+        assert!(matches!(edit().apply("= 1"), Err(EditError::Syntax(_))));
+        assert!(matches!(edit().apply("schema = 1"), Err(EditError::Place(_))));
+    }
+}

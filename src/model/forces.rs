@@ -1,0 +1,316 @@
+//! What the effects of a model make: forces and moments, accelerations, the state's rate.
+//!
+//! Effects that need only the point are summed first, in code that holds nothing else: a planner
+//! spends most of its time there. Only a model with other effects goes on to work out what those
+//! must be told, [`Base`].
+//!
+//! Functions named `…_inlined` become part of their caller, so that a kernel compiled for several
+//! instruction sets stays in its own; everyone else calls the plain ones, which are compiled once.
+
+use super::GreyBox;
+use super::grey_box::{Named, Term};
+use crate::num::Real;
+use crate::physics::effects::{Needs, Own, Terms};
+use crate::physics::point::Base;
+use crate::physics::rigid_body::{self, Vector};
+use crate::physics::{AirData, Channel, Controls, Point, State, Wrench};
+
+/// Passes over the effects that depend on the state's rate. Each brings the rate at least a factor of
+/// two closer within the bounds of `unsteady_lift`, a factor of ten at customary values.
+const RATE_PASSES: usize = 4;
+
+/// Where a model is asked: state, controls, airflow.
+#[derive(Clone, Copy)]
+struct Place<'a, R> {
+    state: &'a State<R>,
+    controls: &'a Controls<R>,
+    air: &'a AirData<R>,
+}
+
+/// The sum of terms times their coefficients.
+struct Sum<'a, R> {
+    coefficients: &'a [Named],
+    /// Place of the reporting effect's first coefficient.
+    first: usize,
+    wrench: Wrench<R>,
+}
+
+/// Terms handed on with the place of their coefficient in the whole model.
+struct Each<'a, F> {
+    first: usize,
+    term: &'a mut F,
+}
+
+/// Terms of an effect whose coefficients start at a given place in the model's list.
+pub(crate) trait Starting<R>: Terms<R> {
+    /// The terms that follow are of an effect whose first coefficient has this place.
+    fn start_at(&mut self, first: usize);
+}
+
+impl<R: Real> Terms<R> for Sum<'_, R> {
+    #[inline(always)]
+    fn add(&mut self, index: usize, channel: Channel, amount: R) {
+        let coefficient = self.coefficients[self.first + index].value;
+        self.wrench.add(channel, amount.scale(coefficient));
+    }
+}
+
+impl<R: Real, F: FnMut(usize, Channel, R)> Terms<R> for Each<'_, F> {
+    #[inline(always)]
+    fn add(&mut self, index: usize, channel: Channel, amount: R) {
+        (self.term)(self.first + index, channel, amount);
+    }
+}
+
+impl<R: Real> Starting<R> for Sum<'_, R> {
+    #[inline(always)]
+    fn start_at(&mut self, first: usize) {
+        self.first = first;
+    }
+}
+
+impl<R: Real, F: FnMut(usize, Channel, R)> Starting<R> for Each<'_, F> {
+    #[inline(always)]
+    fn start_at(&mut self, first: usize) {
+        self.first = first;
+    }
+}
+
+impl GreyBox {
+    /// Forces and moments of all effects.
+    pub fn wrench<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+    ) -> Wrench<R> {
+        self.wrench_inlined(state, controls, air)
+    }
+
+    #[inline(always)]
+    fn wrench_inlined<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+    ) -> Wrench<R> {
+        let place = Place { state, controls, air };
+        let wrench = self.independent_sum(&place);
+        if self.independent == self.terms.len() {
+            return wrench;
+        }
+        self.with_dependent(&place, wrench).1
+    }
+
+    /// What one unit of each coefficient contributes: calls `term` with its place in
+    /// [`coefficients`](GreyBox::coefficients), a channel and the amount in N or N m.
+    pub fn contributions<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+        mut term: impl FnMut(usize, Channel, R),
+    ) {
+        let place = Place { state, controls, air };
+        let mut each = Each { first: 0, term: &mut term };
+        self.independent_terms(&place, &mut each);
+        if self.independent < self.terms.len() {
+            let base = self.base(&place);
+            self.dependent_terms(&place, &base, &mut each);
+        }
+    }
+
+    /// What the effects are told that need more than the point.
+    fn base<R: Real>(&self, place: &Place<R>) -> Base<R> {
+        self.with_dependent(place, self.independent_sum(place)).0
+    }
+
+    /// Reports the effects that need only the point.
+    #[inline(always)]
+    fn independent_terms<R: Real>(&self, place: &Place<R>, terms: &mut impl Starting<R>) {
+        let base = Base::zero();
+        let at = self.point(place, &base);
+        for Term { kind, first, table, shape } in &self.terms[..self.independent] {
+            let own = Own { table: table.as_ref(), shape };
+            terms.start_at(*first);
+            kind.independent_basis(&at, own, terms);
+        }
+    }
+
+    /// Reports the effects that need more, which `base` gives.
+    #[inline(always)]
+    fn dependent_terms<R: Real>(
+        &self,
+        place: &Place<R>,
+        base: &Base<R>,
+        terms: &mut impl Starting<R>,
+    ) {
+        let at = self.point(place, base);
+        for Term { kind, first, table, shape } in &self.terms[self.independent..] {
+            let own = Own { table: table.as_ref(), shape };
+            terms.start_at(*first);
+            kind.dependent_basis(&at, own, terms);
+        }
+    }
+
+    #[inline(always)]
+    fn point<'a, R: Real>(&'a self, place: &Place<'a, R>, base: &'a Base<R>) -> Point<'a, R> {
+        let Place { state, controls, air } = *place;
+        Point { state, controls, air, geometry: &self.airframe.geometry, axes: self.axes, base }
+    }
+
+    /// The sum of the effects that need only the point.
+    #[inline(always)]
+    fn independent_sum<R: Real>(&self, place: &Place<R>) -> Wrench<R> {
+        let mut sum = self.sum_from(Wrench::zero());
+        self.independent_terms(place, &mut sum);
+        sum.wrench
+    }
+
+    #[inline(always)]
+    fn sum_from<R>(&self, wrench: Wrench<R>) -> Sum<'_, R> {
+        Sum { coefficients: &self.coefficients, first: 0, wrench }
+    }
+
+    /// What the other effects are told, where `independent` is the sum of those that need only the
+    /// point, with the sum of all.
+    #[inline(always)]
+    fn with_dependent<R: Real>(
+        &self,
+        place: &Place<R>,
+        independent: Wrench<R>,
+    ) -> (Base<R>, Wrench<R>) {
+        let needs = self.terms.last().map_or(Needs::Point, |term| term.kind.needs());
+        let mut base = Base::zero();
+        base.wrench = independent;
+        base.force = rigid_body::body_force(&base.wrench, place.air, self.axes);
+        if needs >= Needs::Parts {
+            let [centred, still] = self.parts(place);
+            base.deflected = base.wrench.minus(&centred);
+            base.still = still;
+        }
+        let mut passes = if needs >= Needs::Rate { RATE_PASSES } else { 0 };
+        loop {
+            let mut sum = self.sum_from(base.wrench);
+            self.dependent_terms(place, &base, &mut sum);
+            if passes == 0 {
+                return (base, sum.wrench);
+            }
+            passes -= 1;
+            let (acceleration, spin) =
+                self.accelerations_under(&sum.wrench, place.state, place.air);
+            base.rate = rigid_body::state_rate(place.state, place.air, acceleration, spin);
+        }
+    }
+
+    /// The sum of the effects that need only the point with the surfaces centred, then also without
+    /// body rates.
+    #[inline(always)]
+    fn parts<R: Real>(&self, place: &Place<R>) -> [Wrench<R>; 2] {
+        let zero = R::zero();
+        let controls = Controls { aileron: zero, elevator: zero, ..*place.controls };
+        let (mut state, mut air) = (*place.state, *place.air);
+        let mut sums = [Wrench::zero(); 2];
+        for sum in &mut sums {
+            *sum = self.independent_sum(&Place { state: &state, controls: &controls, air: &air });
+            (state.p, state.q, state.r) = (zero, zero, zero);
+            (air.p_hat, air.q_hat, air.r_hat) = (zero, zero, zero);
+        }
+        sums
+    }
+
+    /// Hands what the effects contribute that need only the point to `terms`, as part of its caller.
+    #[inline(always)]
+    pub(crate) fn report_independent<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+        terms: &mut impl Starting<R>,
+    ) {
+        self.independent_terms(&Place { state, controls, air }, terms);
+    }
+
+    /// [`accelerations`](GreyBox::accelerations) of the effects that need only the point, as part of
+    /// its caller: all of them where [`needs`](GreyBox::needs) says so.
+    #[inline(always)]
+    pub(crate) fn independent_accelerations<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+    ) -> (Vector<R>, Vector<R>) {
+        let wrench = self.independent_sum(&Place { state, controls, air });
+        self.accelerations_under(&wrench, state, air)
+    }
+
+    /// Linear acceleration (specific force plus gravity, body axes, m/s²) and angular acceleration
+    /// (rad/s²).
+    pub fn accelerations<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+    ) -> (Vector<R>, Vector<R>) {
+        self.accelerations_inlined(state, controls, air)
+    }
+
+    /// [`accelerations`](GreyBox::accelerations) as part of its caller.
+    #[inline(always)]
+    pub(super) fn accelerations_inlined<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+    ) -> (Vector<R>, Vector<R>) {
+        let wrench = self.wrench_inlined(state, controls, air);
+        self.accelerations_under(&wrench, state, air)
+    }
+
+    #[inline(always)]
+    fn accelerations_under<R: Real>(
+        &self,
+        wrench: &Wrench<R>,
+        state: &State<R>,
+        air: &AirData<R>,
+    ) -> (Vector<R>, Vector<R>) {
+        let body = self.body.map(R::from_f64);
+        let force = rigid_body::body_force(wrench, air, self.axes);
+        let gravity = rigid_body::gravity_in_body(state, self.atmosphere.gravity);
+        let acceleration = [
+            force[0] / body.mass + gravity[0],
+            force[1] / body.mass + gravity[1],
+            force[2] / body.mass + gravity[2],
+        ];
+        let moment =
+            [wrench.get(Channel::Roll), wrench.get(Channel::Pitch), wrench.get(Channel::Yaw)];
+        (acceleration, rigid_body::angular_acceleration(&body, state, moment))
+    }
+
+    /// The state's rate of change ṡ, per second, at `altitude` (m).
+    pub fn rate<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        altitude: f64,
+    ) -> State<R> {
+        self.rate_inlined(state, controls, altitude)
+    }
+
+    /// [`rate`](GreyBox::rate) as part of its caller.
+    #[inline(always)]
+    pub(super) fn rate_inlined<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        altitude: f64,
+    ) -> State<R> {
+        let air = self.air(state, altitude);
+        let (acceleration, spin) = self.accelerations_inlined(state, controls, &air);
+        let rate = rigid_body::state_rate(state, &air, acceleration, spin);
+        match &self.residual {
+            Some(residual) => rate.advance(&residual.rate(state, controls), 1.0),
+            None => rate,
+        }
+    }
+}

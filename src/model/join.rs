@@ -1,0 +1,134 @@
+//! How an effect joins a model, or why it cannot.
+
+use super::grey_box::Term;
+use super::{GreyBox, Named};
+use crate::physics::effects::{Coefficient, Description, Kind};
+use crate::physics::inputs;
+
+/// Why an effect cannot join a model.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum JoinError {
+    /// There is no such effect.
+    #[error(
+        "effect {id:?} is unknown to this program; `greylag effects list` names those it knows"
+    )]
+    Unknown {
+        /// The id asked for.
+        id: String,
+    },
+    /// The model has it already.
+    #[error("model {model} has the effect {id} already; refit its coefficients instead")]
+    Present {
+        /// The model.
+        model: String,
+        /// The effect.
+        id: &'static str,
+    },
+    /// It needs a table, which only a model file can give.
+    #[error("effect {id} needs a table {table} over alpha_rad; write it into the model file")]
+    Table {
+        /// The effect.
+        id: &'static str,
+        /// The table.
+        table: &'static str,
+    },
+    /// A value is not possible, or there are too few or too many.
+    #[error("effect {id} takes {expected}; the values {values:?} do not fit")]
+    Values {
+        /// The effect.
+        id: &'static str,
+        /// What it takes.
+        expected: String,
+        /// What was given.
+        values: Vec<f64>,
+    },
+    /// More input effects than a model can have.
+    #[error(
+        "model {model} has {most} effects between actuators and surfaces already, which is the most"
+    )]
+    Inputs {
+        /// The model.
+        model: String,
+        /// The most.
+        most: usize,
+    },
+    /// No body has the mass or the inertia that it would leave.
+    #[error(
+        "effect {id} with {values:?} would leave model {model} without a positive mass, or with jx·jz not above jxz²; join it with less"
+    )]
+    Body {
+        /// The model.
+        model: String,
+        /// The effect.
+        id: &'static str,
+        /// What was given.
+        values: Vec<f64>,
+    },
+}
+
+impl GreyBox {
+    /// Adds the effect `id` with `values` of its coefficients, in its own order.
+    ///
+    /// # Errors
+    /// The effect is unknown, there already or needs a table, or the values are not possible.
+    pub fn join(&mut self, id: &str, values: &[f64]) -> Result<(), JoinError> {
+        let (about, kind) = match (Kind::from_id(id), inputs::Kind::from_id(id)) {
+            (Some(kind), _) => (kind.describe(), Ok(kind)),
+            (_, Some(kind)) => (kind.describe(), Err(kind)),
+            _ => return Err(JoinError::Unknown { id: id.into() }),
+        };
+        self.may_join(&about, values)?;
+        let first = self.coefficients.len();
+        match kind {
+            Ok(kind) => {
+                self.stays_physical(kind, values)?;
+                self.terms.push(Term::new(kind, first, None));
+            }
+            Err(_) if self.inputs.len() == inputs::MOST => {
+                return Err(JoinError::Inputs { model: self.name.clone(), most: inputs::MOST });
+            }
+            Err(kind) => self.inputs.push((kind, first)),
+        }
+        self.coefficients.extend(about.coefficients.iter().zip(values).map(|(c, value)| Named {
+            name: format!("{id}.{}", c.name),
+            value: *value,
+            sd: None,
+        }));
+        self.settle();
+        Ok(())
+    }
+
+    fn may_join(&self, about: &Description, values: &[f64]) -> Result<(), JoinError> {
+        let id = about.id;
+        if self.has(id) {
+            return Err(JoinError::Present { model: self.name.clone(), id });
+        }
+        if let Some(table) = about.table {
+            return Err(JoinError::Table { id, table });
+        }
+        let possible = |(c, v): (&Coefficient, &f64)| (c.bounds.0..=c.bounds.1).contains(v);
+        let fits = values.len() == about.coefficients.len()
+            && about.coefficients.iter().zip(values).all(possible);
+        if fits {
+            return Ok(());
+        }
+        let expected: Vec<_> = about
+            .coefficients
+            .iter()
+            .map(|c| format!("{} in {}..{} {}", c.name, c.bounds.0, c.bounds.1, c.unit))
+            .map(|words| words.trim_end().to_owned())
+            .collect();
+        Err(JoinError::Values { id, expected: expected.join(", "), values: values.into() })
+    }
+
+    /// Refuses an effect that would leave a mass or an inertia that no body has.
+    fn stays_physical(&self, kind: Kind, values: &[f64]) -> Result<(), JoinError> {
+        let mut body = self.body;
+        kind.change(values, &mut body);
+        if body.is_physical() {
+            return Ok(());
+        }
+        let id = kind.describe().id;
+        Err(JoinError::Body { model: self.name.clone(), id, values: values.into() })
+    }
+}

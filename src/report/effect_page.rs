@@ -1,0 +1,126 @@
+//! The page of one effect: what the catalogue knows of it, with its signature drawn.
+
+use super::{Align, Figure, Page, Section, Style, Table, XyFigure, XyMark, XySeries};
+use crate::physics::effects::Description;
+use crate::sysid::signature::{MANOEUVRE, Pair, Signature};
+
+/// What the page of an effect shows.
+#[derive(Clone, Debug)]
+pub struct EffectReport<'a> {
+    /// The effect.
+    pub about: Description,
+    /// Its channels in words.
+    pub channels: String,
+    /// Where it acts: on the air and the body, on the deflections, on the measurement.
+    pub place: &'static str,
+    /// Its signature; `None` for an error of the measurement.
+    pub signature: Option<&'a Signature>,
+    /// The model that the signature is drawn on.
+    pub model: String,
+    /// The values of the coefficients that it is drawn at.
+    pub values: Vec<f64>,
+}
+
+impl EffectReport<'_> {
+    /// The page.
+    pub fn page(&self) -> Page {
+        let mut sections =
+            vec![Section::new("", "", vec![Figure::Table(self.facts())]), self.parameters()];
+        if let Some(signature) = self.signature {
+            let at = self.drawn_at();
+            if !signature.sweeps.is_empty() {
+                let note = format!(
+                    "One quantity changes at a time, from level flight with a little of everything: {at}."
+                );
+                sections.push(Section::new(
+                    "Along airflow and controls",
+                    &note,
+                    figures(&signature.sweeps),
+                ));
+            }
+            let note = format!("{MANOEUVRE} The same commands with the effect and without, {at}.");
+            sections.push(Section::new("In a manoeuvre", &note, figures(&signature.manoeuvre)));
+        }
+        Page {
+            title: format!("Effect {}", self.about.id),
+            subtitle: self.about.description.into(),
+            sections,
+        }
+    }
+
+    fn facts(&self) -> Table {
+        let mut table = Table::new(
+            "what the catalogue knows",
+            &[("", Align::Left), (self.about.id, Align::Left)],
+        );
+        for [name, text] in facts(&self.about, self.place, &self.channels) {
+            table.push([name, text]);
+        }
+        table
+    }
+
+    fn parameters(&self) -> Section {
+        let columns = [
+            ("parameter", Align::Left),
+            ("what it is", Align::Left),
+            ("unit", Align::Left),
+            ("least", Align::Right),
+            ("most", Align::Right),
+        ];
+        let mut table = Table::new("parameters with their physical bounds", &columns);
+        for c in self.about.coefficients {
+            let (low, high) = c.bounds;
+            let cells = [c.name, c.meaning, c.unit].map(String::from);
+            table.push(cells.into_iter().chain([low.to_string(), high.to_string()]));
+        }
+        Section::new("Parameters", "", vec![Figure::Table(table)])
+    }
+
+    fn drawn_at(&self) -> String {
+        let each = self.about.coefficients.iter().zip(&self.values);
+        let values: Vec<String> =
+            each.map(|(c, v)| format!("{} = {v} {}", c.name, c.unit).trim_end().into()).collect();
+        format!("model {}, {}", self.model, values.join(", "))
+    }
+}
+
+/// What the catalogue knows of an effect besides its parameters, as names and texts.
+pub fn facts(about: &Description, place: &str, channels: &str) -> Vec<[String; 2]> {
+    let mut rows = vec![
+        ["what it is".into(), about.description.into()],
+        ["acts on".into(), place.into()],
+        ["formula".into(), about.formula.into()],
+        ["source".into(), about.source.into()],
+        ["channels".into(), channels.into()],
+    ];
+    if let Some(entry) = about.entry {
+        rows.push(["easily mistaken for".into(), entry.look_alikes.join(", ")]);
+        rows.push(["told apart by".into(), entry.separated_by.into()]);
+    }
+    rows
+}
+
+fn figures(pairs: &[Pair]) -> Vec<Figure> {
+    let line = |pair: &Pair, label: &str, style, y: &[f64]| XySeries {
+        label: label.into(),
+        style,
+        mark: XyMark::Path,
+        x: pair.x.clone(),
+        y: y.to_vec(),
+    };
+    pairs
+        .iter()
+        .map(|pair| {
+            let without = line(pair, "without the effect", Style::Measured, &pair.without);
+            let with = line(pair, "with it", Style::Actual, &pair.with);
+            let bare = |label: &str| label.split(',').next().unwrap_or_default().to_owned();
+            Figure::Xy(XyFigure {
+                bands: Vec::new(),
+                title: format!("{} over {}", bare(pair.y_label), bare(pair.x_label)),
+                x_label: pair.x_label.into(),
+                y_label: pair.y_label.into(),
+                series: vec![without, with],
+            })
+        })
+        .collect()
+}

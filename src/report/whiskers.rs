@@ -1,0 +1,141 @@
+//! Values with their intervals, one a line, on one horizontal scale.
+
+use super::Style;
+use super::html::escape;
+use super::numbers::number;
+
+/// Room beside the outermost intervals, in the width of all of them.
+const ROOM: f64 = 0.06;
+
+/// Values with intervals.
+#[derive(Clone, Debug)]
+pub struct Whiskers {
+    /// What is shown.
+    pub title: String,
+    /// The unit of the scale.
+    pub unit: String,
+    /// Upright lines behind the values: where, in the unit, with what each stands for.
+    pub lines: Vec<(f64, String)>,
+    /// The values, top to bottom.
+    pub rows: Vec<Whisker>,
+}
+
+/// A value with its interval.
+#[derive(Clone, Debug)]
+pub struct Whisker {
+    /// What it is.
+    pub label: String,
+    /// How it is drawn.
+    pub style: Style,
+    /// The value, in the figure's unit; NaN if there is none.
+    pub value: f64,
+    /// The ends of its 95 % interval.
+    pub interval: [f64; 2],
+    /// The same in words.
+    pub text: String,
+}
+
+impl Whiskers {
+    /// The ends of the scale; `None` if nothing is finite.
+    fn scale(&self) -> Option<[f64; 2]> {
+        let values = self.rows.iter().flat_map(|r| [r.value, r.interval[0], r.interval[1]]);
+        let all = values.chain(self.lines.iter().map(|l| l.0)).filter(|v| v.is_finite());
+        let [low, high] =
+            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+        let width = high - low;
+        let room = if width > 0.0 { ROOM * width } else { low.abs().max(1.0) };
+        (low <= high && width.is_finite()).then_some([low - room, high + room])
+    }
+
+    pub(super) fn html(&self) -> String {
+        let [low, high] = self.scale().unwrap_or([0.0, 1.0]);
+        let place = |x: f64| (100.0 * (x - low) / (high - low)).clamp(0.0, 100.0);
+        let lines: String = self
+            .lines
+            .iter()
+            .filter(|l| l.0.is_finite())
+            .map(|l| format!("<i class=\"tick\" style=\"left:{:.2}%\"></i>", place(l.0)))
+            .collect();
+        let rows: String = self.rows.iter().map(|r| r.html(&place, &lines)).collect();
+        let legend: Vec<String> =
+            self.lines.iter().map(|(at, what)| format!("{what} {}", number(*at))).collect();
+        format!(
+            "<figure class=\"panel whiskers\"><figcaption><h3>{}</h3><span class=\"unit\">{}</span>\
+             </figcaption>\n<dl>\n{rows}<dt class=\"ends\"></dt><dd class=\"ends\">\
+             <span class=\"track\"><span>{}</span><span>{}</span><span>{}</span></span>\
+             <span class=\"value\"></span></dd></dl></figure>\n",
+            escape(&self.title),
+            escape(&self.unit),
+            number(low),
+            escape(&legend.join(", ")),
+            number(high)
+        )
+    }
+}
+
+impl Whisker {
+    fn html(&self, place: &dyn Fn(f64) -> f64, lines: &str) -> String {
+        let ink = self.style.name();
+        let mut marks = String::new();
+        if let [a, b] = self.interval
+            && a.is_finite()
+            && b.is_finite()
+        {
+            let (left, right) = (place(a.min(b)), place(a.max(b)));
+            marks.push_str(&format!(
+                "<i class=\"whisker\" style=\"left:{left:.2}%;width:{:.2}%;background:var(--{ink})\"></i>",
+                right - left
+            ));
+        }
+        if self.value.is_finite() {
+            marks.push_str(&format!(
+                "<i class=\"point\" style=\"left:{:.2}%;background:var(--{ink})\"></i>",
+                place(self.value)
+            ));
+        }
+        format!(
+            "<dt>{}</dt><dd><span class=\"track\">{lines}{marks}</span>\
+             <span class=\"value\">{}</span></dd>\n",
+            escape(&self.label),
+            escape(&self.text)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(value: f64, interval: [f64; 2]) -> Whisker {
+        Whisker { label: "a".into(), style: Style::Actual, value, interval, text: "t".into() }
+    }
+
+    #[test]
+    fn whiskers_stay_within_their_track_whatever_they_are() {
+        let rows = vec![
+            row(1.0, [0.0, 2.0]),
+            row(f64::NAN, [f64::NEG_INFINITY, 1.0]),
+            row(1e300, [-1e300, 1e308]),
+        ];
+        for rows in [rows.clone(), rows[1..2].to_vec(), Vec::new()] {
+            let lines = vec![(0.0, "none".into()), (f64::NAN, "odd".into())];
+            let html = Whiskers { title: "t".into(), unit: "u".into(), lines, rows }.html();
+            assert!(!html.contains("NaN") && !html.contains("inf"), "{html}");
+            for part in html.split("left:").skip(1) {
+                let left: f64 = part.split('%').next().unwrap().parse().unwrap();
+                assert!((0.0..=100.0).contains(&left));
+            }
+        }
+    }
+
+    #[test]
+    fn one_value_stands_in_the_middle() {
+        let figure = Whiskers {
+            title: "t".into(),
+            unit: String::new(),
+            lines: Vec::new(),
+            rows: vec![row(3.0, [3.0, 3.0])],
+        };
+        assert!(figure.html().contains("class=\"point\" style=\"left:50.00%"));
+    }
+}

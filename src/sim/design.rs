@@ -1,0 +1,240 @@
+//! Which manoeuvre tells two effects apart: the menu flown in models that have one or the other.
+
+use rayon::prelude::*;
+
+use crate::control::schedule::menu::{MENU, Manoeuvre};
+use crate::control::schedule::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
+use crate::control::{Controller, Observation, Target};
+use crate::model::{GreyBox, JoinError};
+use crate::physics::effects::{self, Description};
+use crate::physics::inputs::{self, InputMemory};
+use crate::physics::rigid_body;
+use crate::physics::{Controls, State};
+use crate::sim::instruments::{Group, Instruments};
+use crate::sim::missing::{Kind, Missing};
+use crate::sim::{Environment, Imagined};
+use crate::sysid::compare::CompareError;
+use crate::sysid::compare::flight::Prepared;
+use crate::sysid::reconstruction::{Instant, Reconstruction, Segment};
+use crate::sysid::separation::{Separation, separation};
+
+/// Evidence that settles which of two effects it is.
+pub const ENOUGH: f64 = 10.0;
+/// The step of the imagined aircraft, s.
+const STEP_S: f64 = 0.01;
+
+/// Why no manoeuvre can be designed.
+#[derive(Debug, thiserror::Error)]
+pub enum DesignError {
+    /// An effect cannot be put into the model.
+    #[error(transparent)]
+    Join(#[from] JoinError),
+    /// It is not known how large an effect may be.
+    #[error("how large {id} may be is not known; give its values (--values {id}=…)")]
+    Amplitude {
+        /// The effect.
+        id: String,
+    },
+    /// The two are the same.
+    #[error("{id} cannot be told from itself; name two effects")]
+    Same {
+        /// The effect.
+        id: String,
+    },
+    /// The imagined flights cannot be compared.
+    #[error("comparing imagined flights: {0}")]
+    Compare(#[from] CompareError),
+}
+
+/// One of the two effects.
+#[derive(Clone, Debug)]
+pub struct Suspect {
+    /// Its id.
+    pub id: String,
+    /// Values of its coefficients, in its own order; empty for clear ones.
+    pub values: Vec<f64>,
+}
+
+/// What a manoeuvre of the menu is expected to tell.
+#[derive(Clone, Debug)]
+pub struct Prospect {
+    /// Its name.
+    pub name: &'static str,
+    /// Its length, s.
+    pub duration_s: f64,
+    /// The separation when the first of the two is there, and when the second is; `None` if the
+    /// aircraft with it would leave its bounds.
+    pub separations: [Option<Separation>; 2],
+}
+
+impl Prospect {
+    /// The smaller of the two separations.
+    pub fn apart(&self) -> Option<f64> {
+        let [a, b] = self.separations;
+        Some(a?.apart.min(b?.apart))
+    }
+
+    /// Seconds of this manoeuvre for an evidence of [`ENOUGH`].
+    pub fn seconds(&self) -> Option<f64> {
+        self.apart().map(|apart| self.duration_s * ENOUGH / apart)
+    }
+}
+
+/// What the menu is expected to tell of `suspects`, both missing from `model`, the quickest first.
+///
+/// `controller` flies; noise is that of a small autopilot.
+///
+/// # Errors
+/// If an effect is unknown, there already, or its amplitude is not known.
+pub fn prospects(
+    model: &GreyBox,
+    controller: &dyn Controller,
+    suspects: &[Suspect; 2],
+) -> Result<Vec<Prospect>, DesignError> {
+    if suspects[0].id == suspects[1].id {
+        return Err(DesignError::Same { id: suspects[0].id.clone() });
+    }
+    let truths = [truth(model, &suspects[0])?, truth(model, &suspects[1])?];
+    let ways = [alternatives(model, &suspects[0])?, alternatives(model, &suspects[1])?];
+    let prospect = |manoeuvre: &Manoeuvre| -> Result<Prospect, DesignError> {
+        let schedule = manoeuvre.schedule();
+        let told = |k: usize| -> Result<Option<Separation>, DesignError> {
+            let flight = imagine(&truths[k], controller, &schedule)?;
+            Ok(flight.map(|f| separation(model, &truths[k], &ways[1 - k], &f)))
+        };
+        let separations = [told(0)?, told(1)?];
+        Ok(Prospect { name: manoeuvre.name, duration_s: schedule.duration(), separations })
+    };
+    let mut all = MENU.par_iter().map(prospect).collect::<Result<Vec<_>, _>>()?;
+    let seconds = |p: &Prospect| p.seconds().unwrap_or(f64::INFINITY);
+    all.sort_by(|a, b| seconds(a).total_cmp(&seconds(b)));
+    Ok(all)
+}
+
+/// `model` with the effect.
+fn truth(model: &GreyBox, suspect: &Suspect) -> Result<GreyBox, DesignError> {
+    let mut with = model.clone();
+    with.join(&suspect.id, &values(model, suspect)?)?;
+    Ok(with)
+}
+
+/// The values of its coefficients: those given, else clear ones, else the middle of those at which a
+/// search starts.
+fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
+    if !suspect.values.is_empty() {
+        return Ok(suspect.values.clone());
+    }
+    let id = suspect.id.as_str();
+    let Some(about) = describe(id) else {
+        // joining it says what is known
+        return Ok(model.clone().join(id, &[]).map(|()| Vec::new())?);
+    };
+    let clear = Kind::from_id(id).map(|Kind { clear: [low, high], .. }| 0.5 * (low + high));
+    let clear = clear.and_then(|amplitude| Missing::new(id, amplitude).ok());
+    if let Some(missing) = clear.filter(|missing| !missing.values.is_empty()) {
+        return Ok(missing.values);
+    }
+    let starts = about.entry.map_or(&[][..], |entry| entry.starts);
+    let middle = starts.get(starts.len() / 2).map(|middle| middle.to_vec());
+    middle.ok_or_else(|| DesignError::Amplitude { id: id.into() })
+}
+
+fn describe(id: &str) -> Option<Description> {
+    let known = effects::Kind::from_id(id).map(effects::Kind::describe);
+    known.or_else(|| inputs::Kind::from_id(id).map(inputs::Kind::describe))
+}
+
+/// The ways in which the effect may be fitted to data of `model`: for each set of shape constants `model` with one unit
+/// of each linear coefficient, or with the effect as a whole where it has none.
+///
+/// # Errors
+/// The effect is unknown, there already, or its size is not known.
+pub fn alternatives(model: &GreyBox, suspect: &Suspect) -> Result<Vec<Vec<GreyBox>>, DesignError> {
+    let own = values(model, suspect)?;
+    let about = describe(&suspect.id);
+    let starts = about.and_then(|about| about.entry).map_or(&[][..], |entry| entry.starts);
+    let linear = about.map_or(0, |about| about.coefficients.len() - about.shape);
+    let joined = |values: &[f64]| -> Result<GreyBox, DesignError> {
+        let mut with = model.clone();
+        with.join(&suspect.id, values)?;
+        Ok(with)
+    };
+    let one = |values: &[f64]| -> Result<Vec<GreyBox>, DesignError> {
+        if linear < 2 {
+            return Ok(vec![joined(values)?]);
+        }
+        let alone = |k: usize| {
+            let keep = |(i, v): (usize, &f64)| if i == k || i >= linear { *v } else { 0.0 };
+            joined(&values.iter().enumerate().map(keep).collect::<Vec<_>>())
+        };
+        (0..linear).filter(|k| values[*k] != 0.0).map(alone).collect()
+    };
+    let all = std::iter::once(own.as_slice()).chain(starts.iter().copied());
+    all.map(one).collect()
+}
+
+/// The flight that `truth` makes of `schedule`; `None` if it leaves the bounds of a schedule.
+fn imagine(
+    truth: &GreyBox,
+    controller: &dyn Controller,
+    schedule: &Schedule,
+) -> Result<Option<Prepared>, CompareError> {
+    let mut world = Imagined::new(truth.clone());
+    let mut pilot = Scheduled::new(controller.boxed_clone(), schedule.clone());
+    pilot.reset(0);
+    let Ok(mut seen) = world.reset() else { return Ok(None) };
+    let nobody = Target { roll: 0.0, pitch: 0.0, airspeed: f64::NAN };
+    let mut instants = Vec::new();
+    let mut memory = InputMemory::at_rest(&Controls::default());
+    for _ in 0..(schedule.duration() / STEP_S).round() as usize {
+        let State { roll, pitch, .. } = seen.state;
+        if roll.to_degrees().abs() > ROLL_MAX_DEG || pitch.to_degrees().abs() > PITCH_MAX_DEG {
+            return Ok(None);
+        }
+        instants.push(instant(truth, &seen, &mut memory));
+        let command = pilot.command(&seen, &nobody);
+        seen = match world.step(command) {
+            Ok(seen) => seen,
+            Err(_) => return Ok(None),
+        };
+    }
+    let noise = Instruments::NOISY.noise;
+    let sd = |group: Group| noise[group as usize];
+    let (attitude, gyro, vane) = (sd(Group::Attitude), sd(Group::Gyros), sd(Group::Vanes));
+    let noise = [attitude, attitude, sd(Group::Airspeed), gyro, gyro, gyro, vane, vane];
+    let force_noise = [sd(Group::Accelerometers); 3];
+    let flight = Reconstruction {
+        name: schedule.name.clone(),
+        step_s: STEP_S,
+        segments: vec![Segment { instants }],
+        nuisances: Vec::new(),
+        noise,
+        left: noise,
+        force_noise,
+        notes: Vec::new(),
+    };
+    let mut prepared = Prepared::new(&flight, 0.0)?;
+    // an imagined flight is free of noise; what is asked is what sensors would leave
+    (prepared.noise, prepared.force_noise) = (noise, force_noise);
+    Ok((!prepared.windows.is_empty()).then_some(prepared))
+}
+
+/// What a perfect log has of a moment, the specific force as `truth` makes it.
+fn instant(truth: &GreyBox, seen: &Observation, memory: &mut InputMemory) -> Instant {
+    let z = seen.actuators;
+    let controls = Controls { aileron: z.aileron, elevator: z.elevator, throttle: z.throttle };
+    let air = truth.air(&seen.state, seen.altitude);
+    let acting = truth.act(&controls, memory);
+    let wrench = truth.wrench(&seen.state, &acting, &air);
+    let force = rigid_body::body_force(&wrench, &air, truth.axes);
+    Instant {
+        time_s: seen.time.as_secs_f64(),
+        state: seen.state,
+        yaw: f64::NAN,
+        controls,
+        command: None,
+        specific_force: force.map(|f| f / truth.body.mass),
+        altitude: seen.altitude,
+        density: f64::NAN,
+    }
+}

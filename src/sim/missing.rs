@@ -1,0 +1,199 @@
+//! An effect that the aircraft in JSBSim has, and a model lacks.
+
+use greylag_sitl::hidden::{Hidden, HiddenError};
+use rand::RngExt;
+
+use crate::num::stream::{Stream, stream};
+
+/// Side drag that the aircraft's own file has, which a hidden amplitude adds to (`x8_facts.md`).
+const OWN_CDBETA: f64 = -0.0058;
+/// Likewise, over β².
+const OWN_CDBETA2: f64 = 0.1478;
+/// Likewise, over |δe|.
+const OWN_CDDE: f64 = 0.0633;
+
+/// Stream of what is drawn about missing effects.
+const DRAW: u64 = 80;
+
+/// One effect that can be missing.
+#[derive(Clone, Copy, Debug)]
+pub struct Kind {
+    /// Its id in the catalogue.
+    pub id: &'static str,
+    /// Unit of its amplitude, empty without one.
+    pub unit: &'static str,
+    /// Amplitudes that show in a few minutes of flight, and that the aircraft flies with.
+    pub clear: [f64; 2],
+    /// Whether the amplitude may as well be negative.
+    pub either_sign: bool,
+}
+
+const fn kind(id: &'static str, unit: &'static str, clear: [f64; 2]) -> Kind {
+    Kind { id, unit, clear, either_sign: false }
+}
+
+const fn both(id: &'static str, unit: &'static str, clear: [f64; 2]) -> Kind {
+    Kind { id, unit, clear, either_sign: true }
+}
+
+/// Every effect that can be missing.
+pub const KINDS: [Kind; 25] = [
+    kind("drag_alpha2", "1/rad²", [0.6, 1.2]),
+    kind("drag_beta2", "1/rad²", [0.5, 1.2]),
+    kind("drag_elevator_abs", "1/rad", [0.08, 0.16]),
+    kind("lift_stall", "", [1.0, 1.0]),
+    kind("pitch_break", "1/rad³", [-3.0, -1.5]),
+    both("cg_shift", "m", [0.008, 0.016]),
+    kind("unsteady_lift", "", [2.0, 4.0]),
+    kind("thrust_decay", "", [0.3, 0.5]),
+    kind("thrust_scale", "N", [-10.0, -8.0]),
+    both("thrust_line_offset", "m", [0.02, 0.04]),
+    both("motor_torque", "N m", [0.4, 1.0]),
+    both("propeller_gyro", "N m s", [0.04, 0.1]),
+    kind("propwash", "", [0.3, 0.6]),
+    kind("aeroelastic_loss", "", [0.1, 0.2]),
+    kind("actuator_lag", "s", [0.02, 0.05]),
+    kind("time_delay", "s", [0.02, 0.03]),
+    kind("dead_zone", "rad", [0.015, 0.035]),
+    kind("backlash", "rad", [0.02, 0.06]),
+    kind("rate_limit", "rad/s", [1.6, 2.4]),
+    kind("mass_error", "", [0.1, 0.2]),
+    both("inertia_xz", "kg m²", [0.06, 0.1]),
+    both("asymmetry", "", [0.002, 0.004]),
+    both("dihedral_alpha", "1/rad²", [0.3, 0.6]),
+    both("roll_control_alpha", "1/rad²", [0.3, 0.5]),
+    kind("effectiveness_saturation", "1/rad²", [-2.0, -1.0]),
+];
+
+impl Kind {
+    /// The effect of that id.
+    pub fn from_id(id: &str) -> Option<Kind> {
+        KINDS.iter().copied().find(|kind| kind.id == id)
+    }
+
+    /// A clear amplitude drawn from `seed`.
+    pub fn amplitude(&self, seed: u64) -> f64 {
+        let mut random = stream(seed, &[DRAW, 1]);
+        let [low, high] = self.clear;
+        let size = if low < high { random.random_range(low..high) } else { low };
+        let signed = if self.either_sign && random.random::<bool>() { -size } else { size };
+        self.allowed(rounded(signed))
+    }
+
+    /// The nearest amplitude that can be hidden: a delay is a whole number of steps.
+    pub fn allowed(&self, amplitude: f64) -> f64 {
+        if self.id == "time_delay" {
+            (100.0 * amplitude).round().max(1.0) / 100.0
+        } else {
+            amplitude
+        }
+    }
+}
+
+/// Four significant figures.
+pub(super) fn rounded(x: f64) -> f64 {
+    format!("{x:.3e}").parse().unwrap_or(x)
+}
+
+/// An effect that is missing from a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Missing {
+    /// Its id in the catalogue.
+    pub id: &'static str,
+    /// How much of it, in the unit of [`Kind::unit`].
+    pub amplitude: f64,
+    /// What JSBSim is given beyond its own file; nothing where the file has the effect.
+    pub hidden: Option<Hidden>,
+    /// What a model has to lose to lack it, by its id.
+    pub taken_out: Option<&'static str>,
+    /// The true values of the catalogue entry's coefficients; empty where it only comes close.
+    pub values: Vec<f64>,
+}
+
+/// Why an effect cannot be made to be missing.
+#[derive(Debug, thiserror::Error)]
+pub enum MissingError {
+    /// No such effect.
+    #[error("effect {id:?} cannot be hidden; those that can are {known}")]
+    Unknown {
+        /// What was asked for.
+        id: String,
+        /// What there is.
+        known: String,
+    },
+    /// The simulator does not take it.
+    #[error(transparent)]
+    Hidden(#[from] HiddenError),
+}
+
+impl Missing {
+    /// The effect `id`, so that the aircraft has `amplitude` of it in all.
+    ///
+    /// # Errors
+    /// If there is no such effect, or its amplitude is not one that can be hidden.
+    pub fn new(id: &str, amplitude: f64) -> Result<Missing, MissingError> {
+        let kind = Kind::from_id(id).ok_or_else(|| MissingError::Unknown {
+            id: id.into(),
+            known: KINDS.map(|kind| kind.id).join(", "),
+        })?;
+        let a = kind.allowed(amplitude);
+        // what the aircraft has of its own must go out of the model, and is part of the amplitude
+        let (own, taken_out) = match kind.id {
+            "drag_beta2" => (OWN_CDBETA2, Some("drag_beta2")),
+            "drag_elevator_abs" => (OWN_CDDE, Some("drag_elevator_abs")),
+            "lift_stall" => (0.0, Some("lift_table")),
+            _ => (0.0, None),
+        };
+        let hidden = match kind.id {
+            "lift_stall" => None,
+            id => Some(Hidden::new(id, a - own)?),
+        };
+        let values = match kind.id {
+            "drag_beta2" => vec![OWN_CDBETA, a],
+            "lift_stall" => Vec::new(),
+            "unsteady_lift" => vec![a, -0.5 * a],
+            "asymmetry" => vec![a; 3],
+            "roll_control_alpha" => vec![a, 0.0],
+            _ => vec![a],
+        };
+        Ok(Missing { id: kind.id, amplitude: a, hidden, taken_out, values })
+    }
+
+    /// An effect drawn from `seed`: any one, or `id`, with `amplitude` or one that shows clearly.
+    ///
+    /// # Errors
+    /// As [`Missing::new`].
+    pub fn drawn(
+        seed: u64,
+        id: Option<&str>,
+        amplitude: Option<f64>,
+    ) -> Result<Missing, MissingError> {
+        let mut random: Stream = stream(seed, &[DRAW]);
+        let any = KINDS[random.random_range(0..KINDS.len() as u32) as usize];
+        let id = id.unwrap_or(any.id);
+        let clear = Kind::from_id(id).map_or(0.0, |kind| kind.amplitude(seed));
+        Missing::new(id, amplitude.unwrap_or(clear))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use greylag_sitl::hidden::EFFECTS;
+
+    #[test]
+    fn whatever_the_simulator_can_hide_can_be_missing() {
+        for effect in &EFFECTS {
+            let kind = Kind::from_id(effect.id).unwrap_or_else(|| panic!("no {}", effect.id));
+            for seed in 0..20 {
+                let missing = Missing::drawn(seed, Some(kind.id), None).unwrap();
+                assert!(missing.hidden.is_some() && missing.amplitude != 0.0, "{missing:?}");
+            }
+        }
+        // the aircraft's own 0.1478 is part of what is asked for
+        let side = Missing::new("drag_beta2", 0.5).unwrap();
+        assert!((side.hidden.unwrap().amplitude() - 0.3522).abs() < 1e-12);
+        assert_eq!(Missing::new("time_delay", 0.0234).unwrap().amplitude, 0.02);
+        assert!(Missing::new("flutter", 1.0).unwrap_err().to_string().contains("dead_zone"));
+    }
+}

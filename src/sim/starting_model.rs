@@ -1,0 +1,97 @@
+//! The model that a search for missing effects starts from: wrong coefficients, and less in it.
+
+use std::fmt::Write;
+
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::num::stream::stream;
+use crate::sim::missing::{Missing, rounded};
+
+/// How wrong coefficients are: standard deviation as a share of the value, none beyond twice.
+pub const WRONG: f64 = 0.15;
+/// Stream of the errors.
+const DRAW: u64 = 81;
+/// Lift of the X8 between the stalls, in place of its table (CL over α from −4° to 7°).
+const CL0: f64 = 0.1119;
+/// Likewise its slope, 1/rad.
+const CLALPHA: f64 = 3.93;
+
+/// The text of a model file made of `reference` (a model file's text): named `name`, every
+/// coefficient off by [`WRONG`] as `seed` draws it, without what is `missing`.
+///
+/// # Errors
+/// If the reference is no model file.
+pub fn starting_model(
+    reference: &str,
+    name: &str,
+    seed: u64,
+    missing: &[Missing],
+) -> Result<String, String> {
+    let broken = |what: &str| format!("the reference model has no {what}; give a model file");
+    let mut file: toml::Table = toml::from_str(reference).map_err(|e| e.message().to_owned())?;
+    file.insert("name".into(), name.into());
+    let about = "A model whose coefficients are off by some 15 %, and which may lack an effect.";
+    file.insert("description".into(), about.into());
+    let effects = file.get_mut("effects").and_then(|e| e.as_table_mut());
+    let effects = effects.ok_or_else(|| broken("effects"))?;
+    for id in missing.iter().filter_map(|missing| missing.taken_out) {
+        effects.remove(id).ok_or_else(|| broken(id))?;
+        if id == "lift_table" {
+            let lift = effects.get_mut("lift_linear").and_then(|e| e.as_table_mut());
+            let lift = lift.ok_or_else(|| broken("lift_linear"))?;
+            set(lift, "CL0", CL0).ok_or_else(|| broken("lift_linear.CL0"))?;
+            set(lift, "CLalpha", CLALPHA).ok_or_else(|| broken("lift_linear.CLalpha"))?;
+        }
+    }
+    make_wrong(effects, seed);
+    Ok(text(&file))
+}
+
+fn set(effect: &mut toml::Table, name: &str, value: f64) -> Option<()> {
+    let number = effect.get_mut(name)?.as_table_mut()?;
+    number.insert("value".into(), value.into());
+    Some(())
+}
+
+/// Multiplies every coefficient by 1 + 0.15 of a normal draw; the draws go by the coefficients' names,
+/// so that what is taken out does not change the others.
+fn make_wrong(effects: &mut toml::Table, seed: u64) {
+    for (id, effect) in effects.iter_mut() {
+        let Some(effect) = effect.as_table_mut() else { continue };
+        for (name, entry) in effect.iter_mut() {
+            let Some(number) = entry.as_table_mut() else { continue };
+            // tables over α are not coefficients
+            let Some(value) = number.get("value").and_then(toml::Value::as_float) else { continue };
+            let path: Vec<u64> = format!("{id}.{name}").bytes().map(u64::from).collect();
+            let mut random = stream(seed, &[[DRAW].as_slice(), &path].concat());
+            let unit: f64 = StandardNormal.sample(&mut random);
+            let wrong = value * (1.0 + WRONG * unit.clamp(-2.0, 2.0));
+            number.insert("value".into(), rounded(wrong).into());
+            number.insert("source".into(), "a guess, good to some 15 %".into());
+        }
+    }
+}
+
+/// A model file in the order and with the one-line numbers of those that are shipped.
+fn text(file: &toml::Table) -> String {
+    let mut out = String::new();
+    let is_section = |value: &toml::Value| {
+        value.as_table().is_some_and(|t| t.values().any(|v| v.is_table() || v.is_array()))
+    };
+    let mut sections = vec![(String::new(), file)];
+    // the stack is emptied from its end
+    while let Some((path, table)) = sections.pop() {
+        let (below, here): (Vec<_>, Vec<_>) = table.iter().partition(|(_, v)| is_section(v));
+        if !path.is_empty() && !here.is_empty() {
+            let _ = writeln!(out, "\n[{path}]");
+        }
+        here.iter().for_each(|(key, value)| {
+            let _ = writeln!(out, "{key} = {value}");
+        });
+        let dot = if path.is_empty() { "" } else { "." };
+        for (key, value) in below.into_iter().rev() {
+            sections.extend(value.as_table().map(|t| (format!("{path}{dot}{key}"), t)));
+        }
+    }
+    out
+}

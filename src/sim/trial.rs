@@ -1,0 +1,89 @@
+//! One trial of finding what is missing: flights of an aircraft that has more than its model.
+
+use std::f64::consts::TAU;
+
+use greylag_sitl::air::{Air, Turbulence};
+use greylag_sitl::plant::PlantOptions;
+use rand::RngExt;
+
+use crate::control::Controller;
+use crate::control::schedule::{Schedule, flights};
+use crate::logs::Flight;
+use crate::num::stream::stream;
+use crate::sim::flight_test::{FlightTestError, fly_within_bounds};
+use crate::sim::instruments::Instruments;
+use crate::sim::missing::Missing;
+
+/// Stream of the wind.
+const WIND: u64 = 82;
+/// Strongest steady wind, m/s: a third of the airspeed.
+const WIND_MAX_MPS: f64 = 6.0;
+/// Wind 20 ft above ground of light turbulence, m/s (MIL-F-8785C).
+const LIGHT_20FT_MPS: f64 = 7.6;
+
+/// What is flown.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// What schedules, wind, instruments and noise are drawn from.
+    pub seed: u64,
+    /// What the aircraft has that its model lacks; none is a null.
+    pub missing: Vec<Missing>,
+    /// Severity of the turbulence, 1 to 7, if there is any.
+    pub turbulence: Option<u8>,
+}
+
+/// The logs of a trial.
+#[derive(Clone, Debug)]
+pub struct Logs {
+    /// Flights to fit on.
+    pub training: Vec<Flight>,
+    /// Flights to test on.
+    pub testing: Vec<Flight>,
+}
+
+impl Trial {
+    /// Flies the training and the test flights of the seed under `controller`, gentler where the
+    /// aircraft would leave its bounds, and logs them with instruments drawn for each flight.
+    ///
+    /// # Errors
+    /// If the aircraft cannot be built, or cannot be held inside its bounds.
+    pub fn fly(&self, controller: &dyn Controller) -> Result<Logs, FlightTestError> {
+        let training = flights::training(self.seed);
+        let testing = flights::testing(self.seed);
+        let all: Vec<&Schedule> = training.iter().chain(&testing).collect();
+        let logged = |(k, schedule): (usize, &&Schedule)| self.log(k, schedule, controller);
+        let mut logs = all.iter().enumerate().map(logged).collect::<Result<Vec<_>, _>>()?;
+        let testing = logs.split_off(training.len());
+        Ok(Logs { training: logs, testing })
+    }
+
+    /// The log of one schedule, the `k`-th flight of the trial.
+    fn log(
+        &self,
+        k: usize,
+        schedule: &Schedule,
+        controller: &dyn Controller,
+    ) -> Result<Flight, FlightTestError> {
+        let flown = fly_within_bounds(&self.plant(k), controller, schedule)?;
+        let seed = stream(self.seed, &[WIND, k as u64, 1]).random();
+        Ok(Instruments::drawn(seed).log(&flown, &format!("{}.csv", schedule.name), seed))
+    }
+
+    /// The aircraft in the air of the `k`-th flight.
+    fn plant(&self, k: usize) -> PlantOptions {
+        let mut random = stream(self.seed, &[WIND, k as u64]);
+        let (speed, course) =
+            (random.random_range(0.0..WIND_MAX_MPS), random.random_range(0.0..TAU));
+        let turbulence = |severity| Turbulence { wind_20ft_mps: LIGHT_20FT_MPS, severity };
+        PlantOptions {
+            hidden: self.missing.iter().filter_map(|missing| missing.hidden).collect(),
+            air: Air {
+                wind_ned_mps: [speed * course.cos(), speed * course.sin(), 0.0],
+                turbulence: self.turbulence.map(turbulence),
+                gusts: Vec::new(),
+            },
+            seed: random.random(),
+            ..PlantOptions::default()
+        }
+    }
+}

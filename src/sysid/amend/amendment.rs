@@ -1,0 +1,332 @@
+//! The amendment: the prior tuned, effects added one after the other, each judged on unseen flights.
+
+use super::error::AmendError;
+use super::flight::Flight;
+use super::output_error::{self, Fit, FitOptions};
+use super::parameters;
+use super::result::{AddedEffect, Amendment, Parameter, Settings};
+use crate::model::GreyBox;
+use crate::physics::effects::{Coefficient, Description};
+use crate::sysid::compare::{HorizonScore, free_run};
+use crate::sysid::reconstruction::{Reconstruction, Segment};
+
+/// Horizon at which improvement is judged, s.
+const JUDGED_AT_S: f64 = 5.0;
+/// Least share by which an effect must lower the error of unseen flights.
+const IMPROVED: f64 = 0.01;
+/// Standard deviations by which an effect's coefficient must exceed nought.
+const CLEAR: f64 = 1.96;
+/// Flights disagree if a flight's own estimate is this many standard deviations away…
+const DISAGREE: f64 = 4.0;
+/// …and by this share of the value.
+const DISAGREE_SHARE: f64 = 0.3;
+
+/// An effect to add.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Added {
+    /// Its id.
+    pub id: String,
+    /// Values of its coefficients near which to search, where known.
+    pub start: Option<Vec<f64>>,
+}
+
+/// What becomes of an effect that the data refuse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// It is left out of the model.
+    Left,
+    /// It stays in the model all the same.
+    Kept,
+}
+
+/// What an amendment is asked for.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Effects to add, in this order; none to tune the prior only.
+    pub effects: Vec<Added>,
+    /// What becomes of those that the data refuse.
+    pub refused: Refused,
+    /// Horizons of the free runs, s.
+    pub horizons_s: Vec<f64>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        let horizons_s = vec![1.0, 2.0, JUDGED_AT_S, 10.0];
+        Options { effects: Vec::new(), refused: Refused::Left, horizons_s }
+    }
+}
+
+/// An amendment with the models it is about.
+#[derive(Clone, Debug)]
+pub struct Amended {
+    /// The story.
+    pub amendment: Amendment,
+    /// The model with its prior tuned and the accepted effects.
+    pub model: GreyBox,
+    /// The model with its prior tuned alone.
+    pub tuned: GreyBox,
+}
+
+/// Fits `model` with the effects of `options` to `flights` and judges it on `held_out`; `progress`
+/// hears what is being done.
+///
+/// # Errors
+/// An effect cannot join the model, or the flights do not allow a fit.
+pub fn amend(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    held_out: &[Reconstruction],
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Amended, AmendError> {
+    for added in &options.effects {
+        joined(&mut model.clone(), added)?;
+    }
+    let slowest = 0.5 * model.airframe.envelope.airspeed_min_mps;
+    let ready = |all: &[Reconstruction]| {
+        all.iter().map(|f| Flight::new(f, slowest)).collect::<Result<Vec<_>, _>>()
+    };
+    let (train, test) = (ready(flights)?, ready(held_out)?);
+    let judge = Judge { test: &test, horizons_s: &options.horizons_s };
+    let tuned = output_error::fit(model, &train, &FitOptions::default(), progress)?;
+    let mut best = (tuned.clone(), judge.scores(&tuned.model));
+    let (given, before) = (judge.scores(model), best.1.clone());
+    let mut accepted: Vec<&Added> = Vec::new();
+    let mut effects = Vec::new();
+    for added in &options.effects {
+        accepted.push(added);
+        let fitted = with_effects(model, &accepted, &train, progress);
+        let (effect, kept) = judge.verdict(added, fitted, &best.1, options.refused)?;
+        match kept {
+            Some(kept) => best = kept,
+            None => drop(accepted.pop()),
+        }
+        effects.push(effect);
+    }
+    let (fit, after) = best;
+    let mut notes = fit.notes.clone();
+    notes.extend(contradictions(&fit.parameters));
+    let mut story = Amendment {
+        schema: "greylag.amend/1",
+        version: env!("CARGO_PKG_VERSION"),
+        model: model.name.clone(),
+        sentences: Vec::new(),
+        effects,
+        parameters: fit.parameters.clone(),
+        tuned: tuned.parameters.clone(),
+        flights: fit.flights.clone(),
+        held_out: held_out.iter().map(|f| f.name.clone()).collect(),
+        given,
+        before,
+        after,
+        notes,
+        settings: Settings {
+            lengths_s: FitOptions::default().lengths_s,
+            horizons_s: options.horizons_s.clone(),
+            judged_at_s: JUDGED_AT_S,
+        },
+    };
+    story.sentences = sentences(&story);
+    Ok(Amended { amendment: story, model: fit.model, tuned: tuned.model })
+}
+
+/// `model` with an effect more, at its start.
+fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendError> {
+    let start = match (&added.start, parameters::describe(&added.id)) {
+        (Some(start), _) => start.clone(),
+        (None, Some((about, _))) => usual_start(&about),
+        (None, None) => Vec::new(),
+    };
+    Ok(model.join(&added.id, &start)?)
+}
+
+/// The middle one of the catalogue's starts, else nought or what lies nearest to it within bounds.
+fn usual_start(about: &Description) -> Vec<f64> {
+    let starts = about.entry.map_or(&[][..], |e| e.starts);
+    let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);
+    let listed = starts.get(starts.len() / 2).map(|s| s.to_vec());
+    listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())
+}
+
+fn with_effects(
+    model: &GreyBox,
+    effects: &[&Added],
+    flights: &[Flight],
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Fit, AmendError> {
+    let mut model = model.clone();
+    for added in effects {
+        joined(&mut model, added)?;
+        model.name = format!("{}+{}", model.name, added.id);
+    }
+    let added = effects.iter().map(|a| a.id.clone()).collect();
+    output_error::fit(&model, flights, &FitOptions { added, ..FitOptions::default() }, progress)
+}
+
+/// What judges fits: flights that they have not seen.
+struct Judge<'a> {
+    test: &'a [Flight],
+    horizons_s: &'a [f64],
+}
+
+impl Judge<'_> {
+    fn scores(&self, model: &GreyBox) -> Vec<HorizonScore> {
+        let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
+        let (runs, _) = free_run::fly(model, &flights, self.horizons_s);
+        self.horizons_s.iter().map(|h| runs.score(*h)).collect()
+    }
+
+    /// What the data say of an effect, and the fit with it if it is kept.
+    #[allow(clippy::type_complexity)] // the fit travels with its scores
+    fn verdict(
+        &self,
+        added: &Added,
+        fitted: Result<Fit, AmendError>,
+        before: &[HorizonScore],
+        refused: Refused,
+    ) -> Result<(AddedEffect, Option<(Fit, Vec<HorizonScore>)>), AmendError> {
+        let about = parameters::describe(&added.id).map(|(about, _)| about);
+        let mut effect = AddedEffect {
+            id: added.id.clone(),
+            description: about.map_or("", |a| a.description),
+            refused: Vec::new(),
+            fly_next: about.and_then(|a| a.entry).map_or("", |e| e.separated_by).into(),
+        };
+        let fit = match fitted {
+            Ok(fit) => fit,
+            Err(why @ (AmendError::NotConverged { .. } | AmendError::Singular { .. })) => {
+                effect.refused.push(why.to_string());
+                return Ok((effect, None));
+            }
+            Err(why) => return Err(why),
+        };
+        let after = self.scores(&fit.model);
+        effect.refused = objections(&added.id, &fit.parameters);
+        if let (Some(a), Some(b)) = (judged(&after), judged(before))
+            && !(a < (1.0 - IMPROVED) * b)
+        {
+            effect.refused.push(format!(
+                "free runs of {JUDGED_AT_S} s on flights that the fit did not see come no closer \
+                 ({b:.5} without it, {a:.5} with it)"
+            ));
+        }
+        let kept = effect.refused.is_empty() || refused == Refused::Kept;
+        Ok((effect, kept.then_some((fit, after))))
+    }
+}
+
+/// The error at the horizon of judgement, if any run gets there.
+fn judged(scores: &[HorizonScore]) -> Option<f64> {
+    let reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= JUDGED_AT_S + 1e-9);
+    reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s)).map(|s| s.rmse_scaled)
+}
+
+/// Why the fitted coefficients of the effect `id` cannot be believed.
+fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
+    let own = |p: &&Parameter| p.added && p.name.split_once('.').is_some_and(|(own, _)| own == id);
+    let own: Vec<&Parameter> = parameters.iter().filter(own).collect();
+    let mut objections = Vec::new();
+    for p in own.iter().filter(|p| p.at_bound) {
+        objections.push(format!(
+            "{} ends at the bound {} of what is physically possible",
+            p.name, p.value
+        ));
+    }
+    if !own.is_empty() && own.iter().all(|p| p.value.abs() < CLEAR * p.sd) {
+        let all: Vec<String> =
+            own.iter().map(|p| format!("{} = {:.3e} ± {:.1e}", p.name, p.value, p.sd)).collect();
+        objections.push(format!("the interval holds nought: {}", all.join(", ")));
+    }
+    for p in own {
+        if let Some((flight, value)) = outlier(p) {
+            objections.push(format!(
+                "the flights contradict one another: {} is {:.3e} over all, {value:.3e} by {flight}",
+                p.name, p.value
+            ));
+        }
+    }
+    objections
+}
+
+/// A flight whose own estimate cannot be that of all.
+fn outlier(p: &Parameter) -> Option<(&str, f64)> {
+    let far = |value: f64, sd: f64| {
+        let off = (value - p.value).abs();
+        off > DISAGREE * sd.hypot(p.sd) && off > DISAGREE_SHARE * p.value.abs()
+    };
+    let found = p.by_flight.iter().find(|e| far(e.value, e.sd));
+    found.map(|e| (e.flight.as_str(), e.value))
+}
+
+fn contradictions(parameters: &[Parameter]) -> Vec<String> {
+    let named = parameters.iter().filter(|p| !p.added);
+    named
+        .filter_map(|p| {
+            let (flight, value) = outlier(p)?;
+            Some(format!(
+                "{} is {:.4} over all flights, but {value:.4} by {flight} alone: something differed \
+                 in that flight (loading, wind, damage); fit it apart, or fly it again",
+                p.name, p.value
+            ))
+        })
+        .collect()
+}
+
+fn sentences(story: &Amendment) -> Vec<String> {
+    let mut all = Vec::new();
+    let (given, before, after) =
+        (judged(&story.given), judged(&story.before), judged(&story.after));
+    let kept: Vec<&str> = story.effects.iter().map(|e| e.id.as_str()).filter(|id| {
+        story.parameters.iter().any(|p| p.added && p.name.starts_with(&format!("{id}.")))
+    }).collect();
+    if let (Some(given), Some(before), Some(after)) = (given, before, after) {
+        all.push(format!(
+            "On flights that the fit did not see, tuning the coefficients {} ({given:.5} to \
+             {before:.5} of the reference scale, free runs of {JUDGED_AT_S} s).",
+            change(given, before)
+        ));
+        if !kept.is_empty() {
+            all.push(format!(
+                "With {} as well {} ({before:.5} to {after:.5}).",
+                kept.join(" and "),
+                change(before, after)
+            ));
+        }
+    }
+    for effect in story.effects.iter().filter(|e| !e.refused.is_empty()) {
+        let verb = if kept.contains(&effect.id.as_str()) { "kept though refused" } else { "refused" };
+        let next = match effect.fly_next.as_str() {
+            "" => String::new(),
+            next => format!(" What would decide: {next}."),
+        };
+        all.push(format!("{} is {verb}: {}.{next}", effect.id, effect.refused.join("; ")));
+    }
+    all
+}
+
+fn change(from: f64, to: f64) -> String {
+    let percent = 100.0 * (1.0 - to / from);
+    match percent {
+        p if p >= 0.05 => format!("the error falls by {p:.1} %"),
+        p if p <= -0.05 => format!("the error rises by {:.1} %", -p),
+        _ => "the error stays as it is".into(),
+    }
+}
+
+/// The first two thirds of a flight to fit to, the last one to judge by.
+pub fn split(flight: &Reconstruction) -> [Reconstruction; 2] {
+    let total: usize = flight.segments.iter().map(|s| s.instants.len()).sum();
+    let mut left = total * 2 / 3;
+    let mut parts = [Vec::new(), Vec::new()];
+    for Segment { instants } in &flight.segments {
+        let (first, last) = instants.split_at(left.min(instants.len()));
+        left -= first.len();
+        for (part, piece) in parts.iter_mut().zip([first, last]) {
+            if !piece.is_empty() {
+                part.push(Segment { instants: piece.to_vec() });
+            }
+        }
+    }
+    parts.map(|segments| Reconstruction { segments, ..flight.clone() })
+}

@@ -1,0 +1,176 @@
+//! Equation error in weak form: a first fit that no poor start can lead astray.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::flight::Flight;
+use super::parameters::{self, Free};
+use crate::model::GreyBox;
+use crate::sysid::compare::ChannelId;
+use crate::sysid::compare::weak::{self, Series};
+
+/// Channels that tell of coefficients: the forces, where measured, and the moments.
+const CHANNELS: [ChannelId; 6] = [
+    ChannelId::Drag,
+    ChannelId::Lift,
+    ChannelId::Side,
+    ChannelId::Roll,
+    ChannelId::Pitch,
+    ChannelId::Yaw,
+];
+/// Iterations of one search.
+const ITERATIONS: usize = 5;
+/// Iterations before starts are compared.
+const TRIAL: usize = 2;
+/// Neighbouring windows overlap by half.
+const INDEPENDENT: f64 = 0.5;
+
+/// Values of the free coefficients from forces and moments in weak form, the best over the starts of
+/// the catalogue for shape constants of effects being added.
+pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f64> {
+    let starts = starts(free);
+    let trials = if starts.len() > 1 { TRIAL } else { 0 };
+    let tried: Vec<(f64, Vec<f64>)> =
+        starts.into_par_iter().map(|theta| search(model, free, flights, theta, trials)).collect();
+    let best = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let theta = best.map_or_else(|| free.iter().map(|f| f.prior).collect(), |(_, theta)| theta);
+    search(model, free, flights, theta, ITERATIONS).1
+}
+
+/// The model's own values, and those of the catalogue for the shape constants being added.
+fn starts(free: &[Free]) -> Vec<Vec<f64>> {
+    let mut starts: Vec<Vec<f64>> = vec![free.iter().map(|f| f.prior).collect()];
+    for (k, f) in free.iter().enumerate().filter(|(_, f)| f.added && !f.linear) {
+        let Some((id, short)) = f.name.split_once('.') else { continue };
+        let Some((about, _)) = parameters::describe(id) else { continue };
+        let entry = about.entry.map_or(&[][..], |e| e.starts);
+        let Some(place) = about.coefficients.iter().position(|c| c.name == short) else { continue };
+        let mut values: Vec<f64> = entry.iter().map(|s| s[place]).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        if values.len() > 1 {
+            let each = |value: &f64| starts.iter().map(|s| replaced(s, k, *value)).collect::<Vec<_>>();
+            starts = values.iter().flat_map(each).collect();
+        }
+    }
+    starts
+}
+
+fn replaced(values: &[f64], place: usize, value: f64) -> Vec<f64> {
+    let mut values = values.to_vec();
+    values[place] = value;
+    values
+}
+
+/// Residuals of the channels over all flights, one after the other: measured − predicted.
+struct Residuals {
+    values: Vec<f64>,
+    channel: Vec<usize>,
+}
+
+fn residuals(model: &GreyBox, flights: &[Flight]) -> Residuals {
+    let mut all = Residuals { values: Vec::new(), channel: Vec::new() };
+    for flight in flights {
+        let series = weak::channels(model, &flight.prepared);
+        for (k, id) in CHANNELS.iter().enumerate() {
+            let windows = flight.prepared.windows.len();
+            match series.iter().find(|s| s.channel == *id) {
+                Some(Series { measured, predicted, .. }) => {
+                    all.values.extend(measured.iter().zip(predicted).map(|(m, p)| m - p));
+                }
+                None => all.values.extend(std::iter::repeat_n(f64::NAN, windows)),
+            }
+            all.channel.extend(std::iter::repeat_n(k, windows));
+        }
+    }
+    all
+}
+
+/// Gauss–Newton from `theta`: cost and place.
+fn search(
+    model: &GreyBox,
+    free: &[Free],
+    flights: &[Flight],
+    mut theta: Vec<f64>,
+    iterations: usize,
+) -> (f64, Vec<f64>) {
+    let mut best = (f64::INFINITY, theta.clone());
+    for iteration in 0..=iterations {
+        let present = parameters::with(model, free, &theta);
+        let r = residuals(&present, flights);
+        let weights = weights(&r);
+        let cost = misfit(&r);
+        if cost < best.0 {
+            best = (cost, theta.clone());
+        }
+        if iteration == iterations {
+            break;
+        }
+        let Some(step) = step(&present, free, flights, &theta, &r, &weights) else { break };
+        for (k, f) in free.iter().enumerate() {
+            let change = step[k].clamp(-f.stride, f.stride);
+            theta[k] = (theta[k] + change).clamp(f.bounds.0, f.bounds.1);
+        }
+    }
+    best
+}
+
+/// Inverse variances of the channels' residuals.
+fn weights(r: &Residuals) -> [f64; 6] {
+    std::array::from_fn(|k| 1.0 / mean_square(r, k))
+}
+
+fn mean_square(r: &Residuals, channel: usize) -> f64 {
+    let own = r.values.iter().zip(&r.channel).filter(|(x, c)| **c == channel && x.is_finite());
+    let (sum, n) = own.fold((0.0, 0.0), |(s, n), (x, _)| (s + x * x, n + 1.0));
+    if n > 0.0 { sum / n } else { 1.0 }
+}
+
+/// The concentrated likelihood: Σ ln of the channels' mean squares.
+fn misfit(r: &Residuals) -> f64 {
+    (0..6).map(|k| mean_square(r, k).max(1e-12).ln()).sum()
+}
+
+fn step(
+    present: &GreyBox,
+    free: &[Free],
+    flights: &[Flight],
+    theta: &[f64],
+    r: &Residuals,
+    weights: &[f64; 6],
+) -> Option<DVector<f64>> {
+    let columns: Vec<weak::Columns> =
+        flights.iter().map(|f| weak::columns(present, &f.prepared)).collect();
+    let column = |(k, f): (usize, &Free)| {
+        let known = columns.iter().flat_map(|c| c.values[f.index].iter().flatten().copied());
+        let known: Vec<f64> = known.collect();
+        if f.linear && known.iter().any(|x| *x != 0.0) {
+            return known;
+        }
+        let (low, high, between) = parameters::beside(present, free, theta, k);
+        let low = low.map_or_else(|| r.values.clone(), |m| residuals(&m, flights).values);
+        let high = residuals(&high, flights).values;
+        low.iter().zip(high).map(|(a, b)| (a - b) / between).collect()
+    };
+    let j: Vec<Vec<f64>> = free.iter().enumerate().map(column).collect();
+    let weight = |row: usize| INDEPENDENT * weights[r.channel[row]];
+    let used: Vec<usize> = (0..r.values.len())
+        .filter(|row| r.values[*row].is_finite() && j.iter().all(|c| c[*row].is_finite()))
+        .collect();
+    let rooted = |row: usize, x: f64| weight(row).sqrt() * x;
+    let x = DMatrix::from_fn(used.len(), free.len(), |i, k| rooted(used[i], j[k][used[i]]));
+    let y = DVector::from_fn(used.len(), |i, _| rooted(used[i], r.values[used[i]]));
+    let mut information = x.tr_mul(&x);
+    let mut right = x.tr_mul(&y);
+    for (k, f) in free.iter().enumerate() {
+        information[(k, k)] += f.width.powi(-2);
+        right[k] -= (theta[k] - f.prior) * f.width.powi(-2);
+    }
+    let scale = information.diagonal().map(|d| d.sqrt().recip());
+    let scaled = DMatrix::from_fn(free.len(), free.len(), |a, b| {
+        information[(a, b)] * scale[a] * scale[b]
+    });
+    let mut step = scaled.cholesky()?.solve(&right.component_mul(&scale));
+    step.component_mul_assign(&scale);
+    Some(step)
+}

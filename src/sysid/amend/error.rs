@@ -1,0 +1,83 @@
+//! Why a model cannot be amended.
+
+use crate::model::JoinError;
+use crate::sysid::compare::CompareError;
+
+/// Why a model cannot be amended.
+#[derive(Debug, thiserror::Error)]
+pub enum AmendError {
+    /// An effect cannot join the model.
+    #[error("cannot amend the model: {0}")]
+    Effect(#[from] JoinError),
+    /// A flight cannot be put on the models' clock.
+    #[error("cannot amend the model: {0}")]
+    Flight(#[from] CompareError),
+    /// There is too little flight to fit to.
+    #[error(
+        "cannot fit {model}: {flown_s:.0} s in the air without gaps, where {needed_s:.0} s are the \
+         least; fly two or three flights of a minute with doublets on every control"
+    )]
+    TooLittle {
+        /// The model.
+        model: String,
+        /// Seconds flown.
+        flown_s: f64,
+        /// Seconds needed.
+        needed_s: f64,
+    },
+    /// Nothing may be changed.
+    #[error(
+        "cannot fit {model}: every coefficient is zero without a stated sd, so none may change; give \
+         the model file an sd for those in doubt"
+    )]
+    NothingFree {
+        /// The model.
+        model: String,
+    },
+    /// The flights say nothing of the coefficients.
+    #[error(
+        "cannot fit {model}: these flights tell no coefficient better than the model file does, for \
+         the aircraft hardly leaves trim; fly doublets or multisines on aileron, elevator and \
+         throttle, and turns at several speeds"
+    )]
+    NoExcitation {
+        /// The model.
+        model: String,
+    },
+    /// The search did not settle.
+    #[error(
+        "cannot fit {model}: the search had not settled after {iterations} iterations, the last \
+         change being {change:.2} standard deviations of {parameter}; leave out flights in which the \
+         aircraft spins or hits something, or fly more of what moves {parameter}"
+    )]
+    NotConverged {
+        /// The model.
+        model: String,
+        /// Iterations made.
+        iterations: usize,
+        /// Largest change of the last iteration in standard deviations.
+        change: f64,
+        /// The parameter that changed most.
+        parameter: String,
+    },
+    /// Free runs leave the flights at once.
+    #[error(
+        "cannot fit {model}: its free runs leave the flights within {reach_s:.1} s, too early to \
+         learn from; begin with a model closer to this aircraft, or check signs and units of the log"
+    )]
+    Diverges {
+        /// The model.
+        model: String,
+        /// How far runs get, s.
+        reach_s: f64,
+    },
+    /// The equations could not be solved.
+    #[error(
+        "cannot fit {model}: the equations have no solution that is a number; check the log for \
+         values that are not physical"
+    )]
+    Singular {
+        /// The model.
+        model: String,
+    },
+}

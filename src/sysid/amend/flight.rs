@@ -1,0 +1,55 @@
+//! A flight with what is left in doubt of its sensors.
+
+use crate::sysid::compare::CompareError;
+use crate::sysid::compare::flight::Prepared;
+use crate::sysid::reconstruction::Reconstruction;
+
+/// Constants of a flight's sensors that are estimated along.
+pub(super) const SENSORS: usize = 7;
+/// Place of the actuators' delay among them, s.
+pub(super) const SKEW: usize = 0;
+/// The state that each of the others offsets; the airspeed's is a share of it.
+pub(super) const OFFSETS: [usize; SENSORS - 1] = [2, 3, 4, 5, 6, 7];
+/// The airspeed among the eight states.
+pub(super) const AIRSPEED: usize = 2;
+
+/// Standard deviation of the actuators' clock against the gyros', s: that of ±1.5 samples, both of
+/// them late by 0 to 10 ms or the like.
+const SKEW_SD: f64 = 7.7e-3;
+/// What is left in doubt if the reconstruction does not say: share of the airspeed, body rates
+/// (rad/s), α and β (rad).
+const DOUBT: [f64; 6] = [0.003, 2e-4, 2e-4, 2e-4, 0.002, 0.002];
+/// Names of the reconstruction's constants, in that order.
+const NAMES: [&str; 6] =
+    ["airspeed_scale", "gyro_bias_p", "gyro_bias_q", "gyro_bias_r", "alpha_bias", "beta_bias"];
+
+/// A flight as the fit takes it.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    /// The flight on the models' clock, its deflections as recorded.
+    pub prepared: Prepared,
+    /// Standard deviations of the actuators' delay (s), the airspeed's scale (a share), the biases of
+    /// p, q, r (rad/s), α and β (rad) that the reconstruction has left.
+    pub doubt: [f64; SENSORS],
+}
+
+impl Flight {
+    /// Puts `flight` on the models' clock and keeps what was flown faster than `slowest` (m/s).
+    ///
+    /// # Errors
+    /// [`CompareError::Clock`] if it has no clock.
+    pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Flight, CompareError> {
+        let mut doubt = [SKEW_SD; SENSORS];
+        for (k, (name, default)) in NAMES.iter().zip(DOUBT).enumerate() {
+            let stated = flight.nuisances.iter().find(|n| n.name == *name).map(|n| n.sd);
+            let stated = stated.filter(|sd| sd.is_finite() && *sd > 0.0);
+            doubt[k + 1] = stated.unwrap_or(default).clamp(0.1 * default, 20.0 * default);
+        }
+        Ok(Flight { prepared: Prepared::new(flight, slowest)?, doubt })
+    }
+
+    /// Seconds flown.
+    pub fn seconds(&self) -> f64 {
+        self.prepared.sample_count() as f64 * self.prepared.dt
+    }
+}

@@ -1,0 +1,23 @@
+//! A model refitted to flights, effects added, by output error.
+//!
+//! The last steps of the shared note `missing_effects.md`: an equation-error fit brings the
+//! coefficients near, multi-step shooting finishes them, and flights that the fit never saw say what
+//! it was worth.
+
+
+mod amendment;
+mod equation_error;
+mod error;
+mod flight;
+mod interval;
+mod normal;
+pub mod output_error;
+mod parameters;
+mod result;
+mod shooting;
+
+pub use amendment::{Added, Amended, Options, Refused, amend, split};
+pub use error::AmendError;
+pub use flight::Flight;
+pub use output_error::{Fit, FitOptions};
+pub use result::{AddedEffect, Amendment, FittedFlight, FlightEstimate, Parameter, Settings};

@@ -1,0 +1,225 @@
+//! The normal equations of a shot, the errors of its initial state eliminated.
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+use super::flight::{AIRSPEED, Flight, OFFSETS, SENSORS, SKEW};
+use super::parameters::{self, Free};
+use super::shooting::{self, Shot};
+use crate::model::GreyBox;
+use crate::physics::Controls;
+
+/// Steps of derivatives in the initial state, in the units of the state.
+const STATE_STEP: [f64; 8] = [1e-5, 1e-5, 1e-3, 1e-4, 1e-4, 1e-4, 1e-5, 1e-5];
+/// Step of the derivative in the actuators' delay, s: half a sample, over which interpolation is
+/// smooth.
+const SKEW_STEP: f64 = 5e-3;
+
+/// Where the search stands.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    /// The free coefficients.
+    pub theta: Vec<f64>,
+    /// Sensors' constants of each flight.
+    pub sensors: Vec<[f64; SENSORS]>,
+    /// Error of each shot's initial state.
+    pub starts: Vec<[f64; 8]>,
+}
+
+/// How residuals are weighted.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weights {
+    /// Inverse variance of each state's residual times its samples that hang together.
+    pub output: [f64; 8],
+    /// Inverse variance of the initial state's errors.
+    pub start: [f64; 8],
+}
+
+/// What acts: a list a flight, a segment, a sample.
+pub(super) type Acting = Vec<Vec<Vec<Controls>>>;
+
+/// Models beside the present one in one coefficient.
+struct Variant {
+    /// The lower one; the present model if there is none.
+    low: Option<Side>,
+    high: Side,
+    /// Difference of the coefficient between them.
+    between: f64,
+}
+
+struct Side {
+    model: GreyBox,
+    /// What acts, where it differs from what acts under the present model.
+    acting: Option<Acting>,
+}
+
+/// The present model with what its derivatives need.
+pub(super) struct Neighbourhood {
+    pub model: GreyBox,
+    /// What acts under it.
+    pub acting: Acting,
+    variants: Vec<Variant>,
+    late: [Acting; 2],
+}
+
+/// What acts in every flight under `model`.
+pub(super) fn acting(
+    model: &GreyBox,
+    flights: &[Flight],
+    place: &Place,
+    later: f64,
+) -> Acting {
+    let one = |(f, s): (&Flight, &[f64; SENSORS])| {
+        shooting::acting(model, &f.prepared, s[SKEW] + later)
+    };
+    flights.iter().zip(&place.sensors).map(one).collect()
+}
+
+impl Neighbourhood {
+    /// The models around `place`.
+    pub fn new(base: &GreyBox, free: &[Free], flights: &[Flight], place: &Place) -> Neighbourhood {
+        let model = parameters::with(base, free, &place.theta);
+        let variant = |k: usize| {
+            let (low, high, between) = parameters::beside(base, free, &place.theta, k);
+            let side = |model: GreyBox| {
+                let acting = free[k].input.then(|| acting(&model, flights, place, 0.0));
+                Side { model, acting }
+            };
+            Variant { low: low.map(side), high: side(high), between }
+        };
+        Neighbourhood {
+            acting: acting(&model, flights, place, 0.0),
+            variants: (0..free.len()).map(variant).collect(),
+            late: [-SKEW_STEP, SKEW_STEP].map(|by| acting(&model, flights, place, by)),
+            model,
+        }
+    }
+}
+
+/// A shot's normal equations in the free coefficients and its flight's sensor constants.
+pub(super) struct Normal {
+    /// Information, after the initial state is eliminated.
+    pub information: DMatrix<f64>,
+    /// Gradient, likewise.
+    pub gradient: DVector<f64>,
+    /// Inverse information of the initial state, its coupling to the rest, its gradient.
+    inverse: SMatrix<f64, 8, 8>,
+    coupling: DMatrix<f64>,
+    start_gradient: SVector<f64, 8>,
+}
+
+impl Normal {
+    /// The best change of the initial state when the rest changes by `step`.
+    pub fn start_step(&self, step: &DVector<f64>) -> [f64; 8] {
+        let moved = self.coupling.transpose() * step;
+        let gradient = SVector::<f64, 8>::from_fn(|i, _| self.start_gradient[i] + moved[i]);
+        let step = -(self.inverse * gradient);
+        std::array::from_fn(|i| step[i])
+    }
+}
+
+/// Half the weighted sum of squares of a shot, errors of its initial state included.
+pub(super) fn cost(shot: &Shot, residuals: &[[f64; 8]], start: &[f64; 8], w: &Weights) -> f64 {
+    let square = |x: &[f64; 8], w: &[f64; 8]| (0..8).map(|k| w[k] * x[k] * x[k]).sum::<f64>();
+    let output: f64 = residuals.iter().map(|r| square(r, &w.output)).sum();
+    0.5 * (shot.weight * output + square(start, &w.start))
+}
+
+/// The run of a shot at `place`, as residuals.
+pub(super) fn run(
+    model: &GreyBox,
+    controls: &Acting,
+    flights: &[Flight],
+    shot: &Shot,
+    sensors: &[f64; SENSORS],
+    from: &[f64; 8],
+) -> Vec<[f64; 8]> {
+    let flight = &flights[shot.flight].prepared;
+    let start = shooting::start(shot, flight, sensors, from);
+    let path =
+        shooting::fly(model, flight, shot, &controls[shot.flight][shot.segment], start);
+    shooting::residuals(flight, shot, sensors, &path)
+}
+
+/// The normal equations of shot number `index`.
+pub(super) fn normal(
+    around: &Neighbourhood,
+    flights: &[Flight],
+    shot: &Shot,
+    index: usize,
+    place: &Place,
+    w: &Weights,
+) -> Normal {
+    let (sensors, from) = (&place.sensors[shot.flight], &place.starts[index]);
+    let fly = |model: &GreyBox, controls: &Acting, from: &[f64; 8]| {
+        run(model, controls, flights, shot, sensors, from)
+    };
+    let here = fly(&around.model, &around.acting, from);
+    let count = around.variants.len();
+    let rows = 8 * shot.steps;
+    let root: [f64; 8] = w.output.map(|x| (shot.weight * x).sqrt());
+    let mut j = DMatrix::<f64>::zeros(rows, count + SENSORS + 8);
+    let mut fill = |column: usize, low: &[[f64; 8]], high: &[[f64; 8]], between: f64| {
+        for (k, (a, b)) in low.iter().zip(high).enumerate() {
+            for (i, d) in shooting::error(a, b).iter().enumerate() {
+                j[(8 * k + i, column)] = root[i] * d / between;
+            }
+        }
+    };
+    for (column, v) in around.variants.iter().enumerate() {
+        let side = |s: &Side| fly(&s.model, s.acting.as_ref().unwrap_or(&around.acting), from);
+        let low = v.low.as_ref().map(side);
+        fill(column, low.as_ref().unwrap_or(&here), &side(&v.high), v.between);
+    }
+    let [low, high] = [0, 1].map(|side| fly(&around.model, &around.late[side], from));
+    fill(count + SKEW, &low, &high, 2.0 * SKEW_STEP);
+    for (i, step) in STATE_STEP.iter().enumerate() {
+        let mut moved = *from;
+        moved[i] += step;
+        let high = fly(&around.model, &around.acting, &moved);
+        fill(count + SENSORS + i, &here, &high, *step);
+    }
+    sensor_columns(&mut j, count, flights, shot, &root);
+    let r = DVector::from_fn(rows, |row, _| root[row % 8] * here[row / 8][row % 8]);
+    eliminate(&j, &r, from, w)
+}
+
+/// The offsets of the sensors: what they add, less what they take from the initial state.
+fn sensor_columns(
+    j: &mut DMatrix<f64>,
+    count: usize,
+    flights: &[Flight],
+    shot: &Shot,
+    root: &[f64; 8],
+) {
+    let segment = &flights[shot.flight].prepared.segments[shot.segment];
+    for (k, state) in OFFSETS.iter().enumerate() {
+        let unit = |i: usize| match *state {
+            AIRSPEED => segment[shot.start + i].state.airspeed,
+            _ => 1.0,
+        };
+        let (column, initial) = (count + SKEW + 1 + k, count + SENSORS + state);
+        for row in 0..j.nrows() {
+            let direct = if row % 8 == *state { root[*state] * unit(1 + row / 8) } else { 0.0 };
+            j[(row, column)] = direct - unit(0) * j[(row, initial)];
+        }
+    }
+}
+
+fn eliminate(j: &DMatrix<f64>, r: &DVector<f64>, from: &[f64; 8], w: &Weights) -> Normal {
+    let m = j.ncols() - 8;
+    let all = j.tr_mul(j);
+    let gradient = j.tr_mul(r);
+    let mut own = SMatrix::<f64, 8, 8>::from_fn(|a, b| all[(m + a, m + b)]);
+    let mut start_gradient = SVector::<f64, 8>::from_fn(|a, _| gradient[m + a]);
+    for k in 0..8 {
+        own[(k, k)] += w.start[k];
+        start_gradient[k] += w.start[k] * from[k];
+    }
+    // positive definite by the prior, unless a number is lost; then the search ends
+    let inverse = own.try_inverse().unwrap_or_else(|| SMatrix::from_element(f64::NAN));
+    let coupling = all.view((0, m), (m, 8)).into_owned();
+    let through = &coupling * inverse;
+    let information = all.view((0, 0), (m, m)) - &through * coupling.transpose();
+    let gradient = gradient.rows(0, m) - &through * start_gradient;
+    Normal { information, gradient, inverse, coupling, start_gradient }
+}

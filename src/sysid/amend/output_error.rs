@@ -1,0 +1,557 @@
+//! Output error by multi-step shooting: the coefficients whose free runs stay with the flights.
+//!
+//! Each shot starts from a reconstructed state whose error is an unknown of its own, eliminated from
+//! the normal equations; the sensors' remaining biases and the actuators' delay are unknowns of each
+//! flight. Residuals are weighted by their own variance and by how long they hang together, both
+//! estimated along. Priors are Gaussian, with [`Named::width`](crate::model::Named::width).
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::equation_error;
+use super::error::AmendError;
+use super::flight::{Flight, SENSORS};
+use super::interval;
+use super::normal::{self, Neighbourhood, Normal, Place, Weights};
+use super::parameters::{self, Free};
+use super::result::{FittedFlight, FlightEstimate, Parameter};
+use super::shooting::{self, Shot};
+use crate::model::GreyBox;
+use crate::num::statistics::quantile;
+
+/// Shortest flight to fit to, s.
+pub const LEAST_S: f64 = 10.0;
+/// Two-sided 95 % point of the normal distribution.
+const NORMAL_95: f64 = 1.96;
+/// Settled: no coefficient changes by more than this share of its standard deviation.
+const SETTLED: f64 = 0.03;
+/// Not settled, and so refused, if the last change exceeds this many standard deviations.
+const UNSETTLED: f64 = 0.5;
+/// Least standard deviations of residuals, in the units of the state: what the models' steps and the
+/// interpolation of deflections leave even without noise.
+const FLOOR: [f64; 8] = [5e-4, 5e-4, 0.01, 2e-3, 2e-3, 2e-3, 5e-4, 5e-4];
+/// Standard deviations of residuals assumed before any are known.
+const COARSE: [f64; 8] = [0.02, 0.02, 0.4, 0.05, 0.05, 0.05, 0.02, 0.02];
+/// Standard deviations of a reconstructed state's errors, at least.
+const START: [f64; 8] = [3e-3, 3e-3, 0.15, 5e-3, 5e-3, 5e-3, 3e-3, 3e-3];
+/// A shot whose mean square residual exceeds the typical one by this factor counts less.
+const OUTLYING: f64 = 6.0;
+/// A prior's width must shrink by this factor for a coefficient to count as learned.
+const LEARNED: f64 = 0.7;
+
+/// What a fit is asked for.
+#[derive(Clone, Debug)]
+pub struct FitOptions {
+    /// Ids of effects of the model that are new: their coefficients have no prior but their bounds.
+    pub added: Vec<String>,
+    /// Lengths of shots, s, one after the other.
+    pub lengths_s: Vec<f64>,
+    /// Iterations allowed for each length.
+    pub iterations: usize,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        FitOptions { added: Vec::new(), lengths_s: vec![1.0, 5.0], iterations: 12 }
+    }
+}
+
+/// A fitted model.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The model with the fitted coefficients.
+    pub model: GreyBox,
+    /// The coefficients that were free.
+    pub parameters: Vec<Parameter>,
+    /// What was found of each flight.
+    pub flights: Vec<FittedFlight>,
+    /// Standard deviations of the residuals, in the order and the units of the state.
+    pub residual_sd: [f64; 8],
+    /// Shots of the last length, and how many of them count less or were cut short.
+    pub shots: usize,
+    /// See `shots`.
+    pub weakened: usize,
+    /// Iterations made.
+    pub iterations: usize,
+    /// What the reader must know.
+    pub notes: Vec<String>,
+}
+
+/// Fits the free coefficients of `model` to `flights`; `progress` hears what is being done.
+///
+/// # Errors
+/// There is too little flight, nothing is free, nothing is excited, runs diverge at once, or the search
+/// does not settle.
+pub fn fit(
+    model: &GreyBox,
+    flights: &[Flight],
+    options: &FitOptions,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Fit, AmendError> {
+    let name = || model.name.clone();
+    let flown_s: f64 = flights.iter().map(Flight::seconds).sum();
+    if flown_s < LEAST_S {
+        return Err(AmendError::TooLittle { model: name(), flown_s, needed_s: LEAST_S });
+    }
+    let added: Vec<&str> = options.added.iter().map(String::as_str).collect();
+    let free = parameters::free(model, &added);
+    if free.is_empty() {
+        return Err(AmendError::NothingFree { model: name() });
+    }
+    progress(&format!("{}: equation error over {} flight(s)", model.name, flights.len()));
+    let theta = equation_error::start(model, &free, flights);
+    let mut search = Search::new(model, flights, free, theta);
+    for length_s in &options.lengths_s {
+        progress(&format!("{}: output error over {length_s} s", model.name));
+        search.shots_of(*length_s)?;
+        search.settle(options.iterations)?;
+    }
+    search.finish()
+}
+
+/// A search under way.
+struct Search<'a> {
+    base: &'a GreyBox,
+    flights: &'a [Flight],
+    free: Vec<Free>,
+    shots: Vec<Shot>,
+    /// Shots cut short because their runs leave the flight.
+    short: usize,
+    place: Place,
+    weights: Weights,
+    iterations: usize,
+    /// The last change in standard deviations, and of which coefficient.
+    change: (f64, usize),
+}
+
+/// The equations of all shots together.
+struct System {
+    shots: Vec<Normal>,
+    information: DMatrix<f64>,
+    gradient: DVector<f64>,
+    prior: DVector<f64>,
+}
+
+impl<'a> Search<'a> {
+    fn new(base: &'a GreyBox, flights: &'a [Flight], free: Vec<Free>, theta: Vec<f64>) -> Self {
+        let sensors = vec![[0.0; SENSORS]; flights.len()];
+        let inverse = |sd: [f64; 8]| sd.map(|x| x.powi(-2));
+        // samples of a coarse model's residual hang together for about a fifth of a second
+        let weights = Weights { output: inverse(COARSE).map(|w| w / 20.0), start: inverse(START) };
+        Search {
+            base,
+            flights,
+            free,
+            shots: Vec::new(),
+            short: 0,
+            place: Place { theta, sensors, starts: Vec::new() },
+            weights,
+            iterations: 0,
+            change: (f64::INFINITY, 0),
+        }
+    }
+
+    /// Cuts the flights anew and shortens the shots that the present model cannot follow.
+    fn shots_of(&mut self, length_s: f64) -> Result<(), AmendError> {
+        self.shots = shooting::cut(self.flights, length_s);
+        self.place.starts = vec![[0.0; 8]; self.shots.len()];
+        let model = parameters::with(self.base, &self.free, &self.place.theta);
+        let acting = normal::acting(&model, self.flights, &self.place, 0.0);
+        let reach: Vec<usize> = self
+            .shots
+            .par_iter()
+            .map(|shot| {
+                let flight = &self.flights[shot.flight].prepared;
+                let sensors = &self.place.sensors[shot.flight];
+                let start = shooting::start(shot, flight, sensors, &[0.0; 8]);
+                let controls = &acting[shot.flight][shot.segment];
+                shooting::fly(&model, flight, shot, controls, start).len()
+            })
+            .collect();
+        self.short = 0;
+        for (shot, reach) in self.shots.iter_mut().zip(&reach) {
+            if *reach < shot.steps {
+                // short of where it leaves, the run still tells something
+                shot.steps = reach * 3 / 4;
+                self.short += 1;
+            }
+        }
+        let worth = |shot: &Shot| {
+            shot.steps as f64 * self.flights[shot.flight].prepared.dt >= shooting::SHORTEST_S
+        };
+        let left = self.shots.iter().filter(|s| worth(s)).count();
+        if 2 * left < self.shots.len() {
+            let reach: Vec<f64> = self
+                .shots
+                .iter()
+                .zip(reach)
+                .map(|(s, r)| r as f64 * self.flights[s.flight].prepared.dt)
+                .collect();
+            let reach_s = quantile(&reach, 0.5);
+            return Err(AmendError::Diverges { model: self.base.name.clone(), reach_s });
+        }
+        self.shots.retain(worth);
+        self.place.starts.truncate(self.shots.len());
+        Ok(())
+    }
+
+    /// Iterates until nothing moves, weights included.
+    fn settle(&mut self, most: usize) -> Result<(), AmendError> {
+        let mut damping = 1e-4;
+        let mut since = 0;
+        for iteration in 0..most {
+            let system = self.system();
+            let moved = self.step(&system, &mut damping)?;
+            self.iterations += 1;
+            since += 1;
+            let settled = !moved || self.change.0 < SETTLED;
+            let close = self.change.0 < 1.0;
+            // weights follow once the coefficients are near, and never after every step
+            if settled && iteration > 0 && since > 1 {
+                let changed = self.reweigh();
+                if changed < 0.1 {
+                    break;
+                }
+                since = 0;
+            } else if close || iteration < 2 {
+                self.reweigh();
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets the weights by the present residuals; the largest relative change of a standard deviation.
+    fn reweigh(&mut self) -> f64 {
+        let residuals = self.residuals();
+        let mut changed = 0.0_f64;
+        let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
+        let old = self.weights.output;
+        for k in 0..8 {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (shot, r) in self.shots.iter().zip(&residuals) {
+                sum += shot.weight * square(r, k);
+                count += shot.weight * r.len() as f64;
+            }
+            let variance = (sum / count).max(FLOOR[k].powi(2));
+            let together = together(&residuals, k);
+            self.weights.output[k] = 1.0 / (variance * together);
+            changed = changed.max((self.weights.output[k] / old[k]).sqrt().ln().abs());
+        }
+        let mean = |r: &Vec<[f64; 8]>| {
+            let w = &self.weights.output;
+            (0..8).map(|k| w[k] * square(r, k)).sum::<f64>() / r.len() as f64
+        };
+        let means: Vec<f64> = residuals.iter().map(mean).collect();
+        let usual = OUTLYING * quantile(&means, 0.5);
+        for (shot, mean) in self.shots.iter_mut().zip(means) {
+            shot.weight = (usual / mean).min(1.0);
+        }
+        changed
+    }
+
+    fn residuals(&self) -> Vec<Vec<[f64; 8]>> {
+        self.residuals_at(&self.place)
+    }
+
+    fn residuals_at(&self, place: &Place) -> Vec<Vec<[f64; 8]>> {
+        let model = parameters::with(self.base, &self.free, &place.theta);
+        let acting = normal::acting(&model, self.flights, place, 0.0);
+        let one = |(shot, from): (&Shot, &[f64; 8])| {
+            normal::run(&model, &acting, self.flights, shot, &place.sensors[shot.flight], from)
+        };
+        self.shots.par_iter().zip(&place.starts).map(one).collect()
+    }
+
+    /// Half the sum of all squares.
+    fn cost(&self, place: &Place) -> f64 {
+        let residuals = self.residuals_at(place);
+        let data: f64 = (self.shots.iter().zip(&residuals).zip(&place.starts))
+            .map(|((shot, r), from)| normal::cost(shot, r, from, &self.weights))
+            .sum();
+        let (unknowns, prior) = (self.unknowns(place), self.prior());
+        data + 0.5 * unknowns.component_mul(&unknowns).dot(&prior)
+    }
+
+    /// Coefficients less their prior, then the sensors' constants flight by flight.
+    fn unknowns(&self, place: &Place) -> DVector<f64> {
+        let coefficients = self.free.iter().zip(&place.theta).map(|(f, x)| x - f.prior);
+        let all = coefficients.chain(place.sensors.iter().flatten().copied());
+        DVector::from_vec(all.collect())
+    }
+
+    /// Inverse prior variances of the unknowns.
+    fn prior(&self) -> DVector<f64> {
+        let coefficients = self.free.iter().map(|f| f.width);
+        let all = coefficients.chain(self.flights.iter().flat_map(|f| f.doubt));
+        DVector::from_vec(all.map(|sd| sd.powi(-2)).collect())
+    }
+
+    /// Where the unknowns of a shot's own equations stand among all.
+    fn places(&self, flight: usize) -> Vec<usize> {
+        let count = self.free.len();
+        let own = count + flight * SENSORS;
+        (0..count).chain(own..own + SENSORS).collect()
+    }
+
+    fn system(&self) -> System {
+        let around = Neighbourhood::new(self.base, &self.free, self.flights, &self.place);
+        let one = |(index, shot): (usize, &Shot)| {
+            normal::normal(&around, self.flights, shot, index, &self.place, &self.weights)
+        };
+        let shots: Vec<Normal> = self.shots.par_iter().enumerate().map(one).collect();
+        let prior = self.prior();
+        let mut information = DMatrix::from_diagonal(&prior);
+        let mut gradient = prior.component_mul(&self.unknowns(&self.place));
+        for (shot, normal) in self.shots.iter().zip(&shots) {
+            let places = self.places(shot.flight);
+            for (a, p) in places.iter().enumerate() {
+                gradient[*p] += normal.gradient[a];
+                for (b, q) in places.iter().enumerate() {
+                    information[(*p, *q)] += normal.information[(a, b)];
+                }
+            }
+        }
+        System { shots, information, gradient, prior }
+    }
+
+    /// One damped step; whether it moved.
+    fn step(&mut self, system: &System, damping: &mut f64) -> Result<bool, AmendError> {
+        let before = self.cost(&self.place);
+        for _ in 0..8 {
+            let step = self.solve(system, *damping)?;
+            let next = self.moved(system, &step);
+            if self.cost(&next) < before {
+                self.change = self.in_deviations(system, &step);
+                self.place = next;
+                *damping = (*damping / 10.0).max(1e-9);
+                return Ok(true);
+            }
+            *damping = (*damping * 10.0).max(1e-3);
+        }
+        self.change = self.in_deviations(system, &self.solve(system, 1e-9)?);
+        Ok(false)
+    }
+
+    /// The step that stays within bounds and strides.
+    fn solve(&self, system: &System, damping: f64) -> Result<DVector<f64>, AmendError> {
+        let singular = || AmendError::Singular { model: self.base.name.clone() };
+        let mut held: Vec<Option<f64>> = vec![None; system.gradient.len()];
+        let scale = system.information.diagonal().map(|d| d.sqrt().recip());
+        for _ in 0..=self.free.len() {
+            let mut matrix = system.information.clone();
+            let mut right = -&system.gradient;
+            for (k, known) in held.iter().enumerate().filter_map(|(k, h)| h.map(|h| (k, h))) {
+                right -= system.information.column(k) * known;
+                matrix.row_mut(k).fill(0.0);
+                matrix.column_mut(k).fill(0.0);
+                matrix[(k, k)] = system.information[(k, k)];
+            }
+            for (k, known) in held.iter().enumerate().filter_map(|(k, h)| h.map(|h| (k, h))) {
+                right[k] = system.information[(k, k)] * known;
+            }
+            // scaled to a unit diagonal, so that units do not matter
+            for (a, b) in (0..scale.len()).flat_map(|a| (0..scale.len()).map(move |b| (a, b))) {
+                matrix[(a, b)] *= scale[a] * scale[b];
+            }
+            right.component_mul_assign(&scale);
+            for k in 0..scale.len() {
+                matrix[(k, k)] += damping * f64::from(u8::from(held[k].is_none()));
+            }
+            let mut step = matrix.cholesky().ok_or_else(singular)?.solve(&right);
+            step.component_mul_assign(&scale);
+            let beyond = self.free.iter().enumerate().find_map(|(k, f)| {
+                let (low, high) = self.room(k, f);
+                let outside = step[k] < low - 1e-12 || step[k] > high + 1e-12;
+                (held[k].is_none() && outside).then(|| (k, step[k].clamp(low, high)))
+            });
+            match beyond {
+                Some((k, limit)) => held[k] = Some(limit),
+                None => return Ok(step),
+            }
+        }
+        Err(singular())
+    }
+
+    /// How far a coefficient may move.
+    fn room(&self, k: usize, f: &Free) -> (f64, f64) {
+        let here = self.place.theta[k];
+        ((f.bounds.0 - here).max(-f.stride), (f.bounds.1 - here).min(f.stride))
+    }
+
+    fn moved(&self, system: &System, step: &DVector<f64>) -> Place {
+        let mut next = self.place.clone();
+        let count = self.free.len();
+        for (k, f) in self.free.iter().enumerate() {
+            next.theta[k] = (next.theta[k] + step[k]).clamp(f.bounds.0, f.bounds.1);
+        }
+        for (flight, sensors) in next.sensors.iter_mut().enumerate() {
+            for (k, x) in sensors.iter_mut().enumerate() {
+                *x += step[count + flight * SENSORS + k];
+            }
+        }
+        for ((shot, normal), from) in
+            self.shots.iter().zip(&system.shots).zip(next.starts.iter_mut())
+        {
+            let places = self.places(shot.flight);
+            let own = DVector::from_iterator(places.len(), places.iter().map(|p| step[*p]));
+            let change = normal.start_step(&own);
+            from.iter_mut().zip(change).for_each(|(x, d)| *x += d);
+        }
+        next
+    }
+
+    /// The largest change of a coefficient in its standard deviations, and which.
+    fn in_deviations(&self, system: &System, step: &DVector<f64>) -> (f64, usize) {
+        let Some(cholesky) = system.information.clone().cholesky() else {
+            return (f64::INFINITY, 0);
+        };
+        let inverse = cholesky.inverse();
+        let change = |k: usize| step[k].abs() / inverse[(k, k)].sqrt();
+        let all = (0..self.free.len()).map(|k| (change(k), k));
+        all.fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a })
+    }
+
+    /// The fit as it stands, with intervals.
+    fn finish(self) -> Result<Fit, AmendError> {
+        let model_name = || self.base.name.clone();
+        if self.change.0 > UNSETTLED {
+            return Err(AmendError::NotConverged {
+                model: model_name(),
+                iterations: self.iterations,
+                change: self.change.0,
+                parameter: self.free[self.change.1].name.clone(),
+            });
+        }
+        let system = self.system();
+        let singular = || AmendError::Singular { model: model_name() };
+        let scores: Vec<DVector<f64>> = (self.shots.iter().zip(&system.shots))
+            .map(|(shot, normal)| {
+                let mut score = DVector::zeros(system.gradient.len());
+                for (a, p) in self.places(shot.flight).iter().enumerate() {
+                    score[*p] = normal.gradient[a];
+                }
+                score
+            })
+            .collect();
+        let sd = interval::covariance(&system.information, &system.prior, &scores)
+            .ok_or_else(singular)?
+            .sd;
+        let learned = |(k, f): (usize, &Free)| sd[k] < LEARNED * f.width;
+        if !self.free.iter().enumerate().any(learned) {
+            return Err(AmendError::NoExcitation { model: model_name() });
+        }
+        let by_flight = self.by_flight(&system);
+        let parameters = self.parameters(&sd, &by_flight);
+        let flights = self.flights.iter().zip(&self.place.sensors).enumerate();
+        let weakened = self.shots.iter().filter(|s| s.weight < 0.5).count() + self.short;
+        Ok(Fit {
+            model: parameters::with(self.base, &self.free, &self.place.theta),
+            parameters,
+            flights: flights
+                .map(|(k, (f, s))| {
+                    let at = self.free.len() + k * SENSORS;
+                    FittedFlight::new(&f.prepared.name, f.seconds(), s, &sd[at..at + SENSORS])
+                })
+                .collect(),
+            residual_sd: self.residual_sd(),
+            shots: self.shots.len(),
+            weakened,
+            iterations: self.iterations,
+            notes: self.notes(weakened),
+        })
+    }
+
+    fn parameters(&self, sd: &[f64], by_flight: &[Vec<FlightEstimate>]) -> Vec<Parameter> {
+        let one = |(k, f): (usize, &Free)| {
+            let value = self.place.theta[k];
+            let half = NORMAL_95 * sd[k];
+            let at = |bound: f64| (value - bound).abs() <= 1e-6 * (f.bounds.1 - f.bounds.0);
+            Parameter {
+                name: f.name.clone(),
+                meaning: f.meaning,
+                added: f.added,
+                prior: f.prior,
+                prior_sd: f.width,
+                value,
+                sd: sd[k],
+                ci95: [value - half, value + half],
+                at_bound: at(f.bounds.0) || at(f.bounds.1),
+                by_flight: by_flight[k].clone(),
+            }
+        };
+        self.free.iter().enumerate().map(one).collect()
+    }
+
+    /// What each flight alone would say, to first order: a step from the common optimum with that
+    /// flight's equations and the prior.
+    fn by_flight(&self, system: &System) -> Vec<Vec<FlightEstimate>> {
+        let count = self.free.len();
+        let mut all = vec![Vec::new(); count];
+        for (number, flight) in self.flights.iter().enumerate() {
+            let size = count + SENSORS;
+            let (mut information, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
+            let places = self.places(number);
+            let unknowns = self.unknowns(&self.place);
+            for (a, p) in places.iter().enumerate() {
+                information[(a, a)] = system.prior[*p];
+                gradient[a] = system.prior[*p] * unknowns[*p];
+            }
+            let own = self.shots.iter().zip(&system.shots).filter(|(s, _)| s.flight == number);
+            for (_, normal) in own {
+                information += &normal.information;
+                gradient += &normal.gradient;
+            }
+            let Some(cholesky) = information.cholesky() else { continue };
+            let inverse = cholesky.inverse();
+            let step = -(&inverse * gradient);
+            for (k, list) in all.iter_mut().enumerate() {
+                list.push(FlightEstimate {
+                    flight: flight.prepared.name.clone(),
+                    value: self.place.theta[k] + step[k],
+                    sd: inverse[(k, k)].sqrt(),
+                });
+            }
+        }
+        all
+    }
+
+    fn residual_sd(&self) -> [f64; 8] {
+        let residuals = self.residuals();
+        let count = residuals.iter().map(Vec::len).sum::<usize>() as f64;
+        let square = |k: usize| residuals.iter().flatten().map(|r| r[k] * r[k]).sum::<f64>();
+        std::array::from_fn(|k| (square(k) / count).sqrt())
+    }
+
+    fn notes(&self, weakened: usize) -> Vec<String> {
+        let mut notes = Vec::new();
+        if weakened > 0 {
+            notes.push(format!(
+                "{weakened} of {} shots stray far from the flight (stall, spin, gusts) and were cut \
+                 short or count less",
+                self.shots.len()
+            ));
+        }
+        notes
+    }
+}
+
+/// How many samples of state `k`'s residual hang together: the sum of its autocorrelation up to where
+/// that first falls below 0.05.
+fn together(residuals: &[Vec<[f64; 8]>], k: usize) -> f64 {
+    let product = |lag: usize| {
+        let pairs = residuals.iter().flat_map(|r| r.iter().zip(r.iter().skip(lag)));
+        pairs.fold((0.0, 0.0), |(sum, n), (a, b)| (sum + a[k] * b[k], n + 1.0))
+    };
+    let mean = |(sum, n): (f64, f64)| if n > 0.0 { sum / n } else { 0.0 };
+    let own = mean(product(0));
+    let longest = residuals.iter().map(Vec::len).max().unwrap_or(0);
+    let mut together = 1.0;
+    for lag in 1..longest {
+        let correlation = mean(product(lag)) / own;
+        if !(correlation > 0.05) {
+            break;
+        }
+        together += 2.0 * correlation;
+    }
+    together
+}

@@ -1,0 +1,125 @@
+//! The coefficients that a fit may change, with their priors, bounds and steps.
+
+use crate::model::GreyBox;
+use crate::physics::effects::{self, Description};
+use crate::physics::inputs;
+
+/// Coefficients of added effects that stay where they start: shares of a whole, which cannot be told
+/// from the shape beside them.
+const HELD: &[&str] = &["lift_stall.k"];
+/// Step of a derivative in a coefficient of the prior, as a share of its prior width.
+const STEP: f64 = 1e-3;
+/// Step of a derivative in a shape constant or that of an input effect, as a share of its value.
+const SHAPE_STEP: f64 = 0.02;
+/// Largest change of such a constant in one iteration, as a share of its value.
+const SHAPE_STRIDE: f64 = 0.4;
+
+/// A coefficient that the fit may change.
+#[derive(Clone, Debug)]
+pub(super) struct Free {
+    /// Its place in the model's list.
+    pub index: usize,
+    /// `effect.coefficient`.
+    pub name: String,
+    /// What it is, with its unit.
+    pub meaning: &'static str,
+    /// Value and standard deviation before the data is seen.
+    pub prior: f64,
+    pub width: f64,
+    /// The physically possible values.
+    pub bounds: (f64, f64),
+    /// Step of numerical derivatives.
+    pub step: f64,
+    /// Largest change in one iteration.
+    pub stride: f64,
+    /// Whether the model is linear in it.
+    pub linear: bool,
+    /// Whether it changes what acts for given measured deflections.
+    pub input: bool,
+    /// Whether it belongs to an effect that is being added.
+    pub added: bool,
+}
+
+/// What is known of the effect `id`, and whether it acts on inputs.
+pub(super) fn describe(id: &str) -> Option<(Description, bool)> {
+    let acts = effects::Kind::from_id(id).map(|k| (k.describe(), false));
+    acts.or_else(|| inputs::Kind::from_id(id).map(|k| (k.describe(), true)))
+}
+
+/// The coefficients of `model` that may change when `added` are the ids of new effects.
+///
+/// A coefficient of the prior is held if its width is zero; one of a new effect has no prior but its
+/// bounds.
+pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
+    let linear = model.linear();
+    let named = model.coefficients().iter().zip(linear).enumerate();
+    named
+        .filter_map(|(index, (c, linear))| {
+            let (id, short) = c.name.split_once('.')?;
+            let (about, input) = describe(id)?;
+            let coefficient = about.coefficients.iter().find(|k| k.name == short)?;
+            let added = added.contains(&id);
+            let (low, high) = coefficient.bounds;
+            let width = if added { high - low } else { c.width() };
+            if width <= 0.0 || (added && HELD.contains(&c.name.as_str())) {
+                return None;
+            }
+            let place = about.coefficients.iter().position(|k| k.name == short)?;
+            let starts = about.entry.map_or(&[][..], |e| e.starts);
+            let least = starts.iter().map(|s| s[place].abs()).fold(f64::INFINITY, f64::min);
+            let size = c.value.abs().max(if least.is_finite() { 0.5 * least } else { 0.0 });
+            let (step, stride) = match (linear, added) {
+                (true, true) => (1e-4 * width, f64::INFINITY),
+                (true, false) => (STEP * width, f64::INFINITY),
+                (false, _) => (SHAPE_STEP * size, SHAPE_STRIDE * size),
+            };
+            Some(Free {
+                index,
+                name: c.name.clone(),
+                meaning: coefficient.meaning,
+                prior: c.value,
+                width,
+                bounds: coefficient.bounds,
+                step: step.max(1e-9),
+                stride: stride.max(1e-9),
+                linear,
+                input,
+                added,
+            })
+        })
+        .collect()
+}
+
+/// `model` with the free coefficients at `values`.
+pub(super) fn with(model: &GreyBox, free: &[Free], values: &[f64]) -> GreyBox {
+    let mut all: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
+    for (f, value) in free.iter().zip(values) {
+        all[f.index] = *value;
+    }
+    let mut changed = model.clone();
+    changed.set_coefficients(&all);
+    changed
+}
+
+/// The models beside `values` in coefficient `place`, the difference between them: on both sides of it
+/// for what the model is not linear in, else one side and `None`, the present model.
+pub(super) fn beside(
+    model: &GreyBox,
+    free: &[Free],
+    values: &[f64],
+    place: usize,
+) -> (Option<GreyBox>, GreyBox, f64) {
+    let f = &free[place];
+    let at = |value: f64| {
+        let mut changed = values.to_vec();
+        changed[place] = value;
+        with(model, free, &changed)
+    };
+    let value = values[place];
+    let (low, high) = ((value - f.step).max(f.bounds.0), (value + f.step).min(f.bounds.1));
+    match f.linear {
+        true if high > value => (None, at(high), high - value),
+        true => (None, at(low), low - value),
+        false => (Some(at(low)), at(high), high - low),
+    }
+}

@@ -1,0 +1,171 @@
+//! Shots: short free runs from reconstructed states on recorded deflections.
+
+use std::f64::consts::{PI, TAU};
+
+use super::flight::{AIRSPEED, Flight, OFFSETS, SENSORS, SKEW};
+use crate::model::{GreyBox, Memory};
+use crate::physics::inputs::InputMemory;
+use crate::physics::{Controls, State};
+use crate::sysid::compare::flight::Prepared;
+use crate::sysid::reconstruction::Instant;
+
+/// A run whose scaled error exceeds this has left the flight.
+const LEFT: f64 = 0.7;
+/// Shortest shot worth flying, s.
+pub(super) const SHORTEST_S: f64 = 0.4;
+
+/// A stretch that the model flies freely.
+#[derive(Clone, Debug)]
+pub(super) struct Shot {
+    pub flight: usize,
+    pub segment: usize,
+    /// Its first sample in the segment.
+    pub start: usize,
+    /// Samples that it is compared on, those after the first.
+    pub steps: usize,
+    /// Weight, 1 for a shot that the model can follow.
+    pub weight: f64,
+}
+
+/// Cuts the flights into shots of about `length_s`.
+pub(super) fn cut(flights: &[Flight], length_s: f64) -> Vec<Shot> {
+    let mut shots = Vec::new();
+    for (flight, Flight { prepared, .. }) in flights.iter().enumerate() {
+        for (segment, instants) in prepared.segments.iter().enumerate() {
+            let steps = instants.len() - 1;
+            let pieces = ((steps as f64 * prepared.dt / length_s).round() as usize).max(1);
+            let edge = |k: usize| k * steps / pieces;
+            shots.extend((0..pieces).map(|k| Shot {
+                flight,
+                segment,
+                start: edge(k),
+                steps: edge(k + 1) - edge(k),
+                weight: 1.0,
+            }));
+        }
+    }
+    let long = |shot: &Shot| shot.steps as f64 * flights[shot.flight].prepared.dt >= SHORTEST_S;
+    shots.retain(long);
+    shots
+}
+
+/// The controls that act in each segment of a flight under `model`, the record being `late` (s).
+pub(super) fn acting(model: &GreyBox, flight: &Prepared, late: f64) -> Vec<Vec<Controls>> {
+    let place = late / flight.dt;
+    flight.segments.iter().map(|segment| act(model, segment, place, flight.substeps)).collect()
+}
+
+fn act(model: &GreyBox, segment: &[Instant], late: f64, substeps: usize) -> Vec<Controls> {
+    let at = |k: usize| if late == 0.0 { segment[k].controls } else { between(segment, k, late) };
+    let mut memory = InputMemory::at_rest(&at(0));
+    let one = |k: usize| {
+        let recorded = at(k);
+        if model.acts_at_once() {
+            return recorded;
+        }
+        (0..substeps).fold(recorded, |_, _| model.act(&recorded, &mut memory))
+    };
+    (0..segment.len()).map(one).collect()
+}
+
+/// The controls `late` samples after sample `k`, by cubic interpolation, whose slope in `late` has no
+/// steps.
+fn between(segment: &[Instant], k: usize, late: f64) -> Controls {
+    let last = segment.len() as f64 - 1.0;
+    let place = (k as f64 + late).clamp(0.0, last);
+    let (i, t) = (place.floor() as isize, place.fract());
+    let sample = |j: isize| &segment[(i + j).clamp(0, last as isize) as usize].controls;
+    let [a, b, c, d] = [-1, 0, 1, 2].map(sample);
+    let mix = |of: fn(&Controls) -> f64| {
+        let (a, b, c, d) = (of(a), of(b), of(c), of(d));
+        let bend = 2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a);
+        b + 0.5 * t * (c - a + t * bend)
+    };
+    Controls {
+        aileron: mix(|z| z.aileron),
+        elevator: mix(|z| z.elevator),
+        throttle: mix(|z| z.throttle),
+    }
+}
+
+/// What a flight's sensors add to the state, their constants being `sensors`.
+pub(super) fn offset(sensors: &[f64; SENSORS], state: &[f64; 8]) -> [f64; 8] {
+    let mut offset = [0.0; 8];
+    for (k, place) in OFFSETS.iter().enumerate() {
+        let unit = if *place == AIRSPEED { state[AIRSPEED] } else { 1.0 };
+        offset[*place] = sensors[SKEW + 1 + k] * unit;
+    }
+    offset
+}
+
+/// The state in which a shot starts: as reconstructed, less what the sensors add, plus `from`.
+pub(super) fn start(shot: &Shot, flight: &Prepared, sensors: &[f64; SENSORS], from: &[f64; 8]) -> [f64; 8] {
+    let measured = flight.segments[shot.segment][shot.start].state.to_array();
+    let offset = offset(sensors, &measured);
+    std::array::from_fn(|k| measured[k] - offset[k] + from[k])
+}
+
+/// The states of a run after each sample; shorter than the shot if it leaves the flight.
+pub(super) fn fly(
+    model: &GreyBox,
+    flight: &Prepared,
+    shot: &Shot,
+    controls: &[Controls],
+    start: [f64; 8],
+) -> Vec<[f64; 8]> {
+    let segment = &flight.segments[shot.segment];
+    let scale = model.scale();
+    let mut memory = Memory::default();
+    let advance = |k: usize, state: State, memory: &mut Memory| {
+        let altitude = segment[k].altitude;
+        (0..flight.substeps).fold(state, |s, _| model.step(&s, &controls[k], altitude, memory))
+    };
+    if let Some(before) = shot.start.checked_sub(1) {
+        // the integrator remembers the step before
+        advance(before, segment[before].state, &mut memory);
+    }
+    let mut state = State::from_array(start);
+    let mut path = Vec::with_capacity(shot.steps);
+    for k in shot.start..shot.start + shot.steps {
+        state = advance(k, state, &mut memory);
+        let now = state.to_array();
+        let error = error(&segment[k + 1].state.to_array(), &now);
+        let mean = error.iter().zip(&scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0;
+        // so written that a lost number ends the run too
+        if !(mean <= LEFT * LEFT) {
+            break;
+        }
+        path.push(now);
+    }
+    path
+}
+
+/// Predicted − measured; roll the short way round.
+pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
+    let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
+    error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
+    error
+}
+
+/// Predicted − measured after each sample of a shot, sensors' constants included; where a run has left
+/// the flight, its last error stays.
+pub(super) fn residuals(
+    flight: &Prepared,
+    shot: &Shot,
+    sensors: &[f64; SENSORS],
+    path: &[[f64; 8]],
+) -> Vec<[f64; 8]> {
+    let segment = &flight.segments[shot.segment];
+    let mut last = [LEFT; 8];
+    (0..shot.steps)
+        .map(|k| {
+            if let Some(predicted) = path.get(k) {
+                let measured = segment[shot.start + 1 + k].state.to_array();
+                let offset = offset(sensors, &measured);
+                let seen = std::array::from_fn(|i| predicted[i] + offset[i]);
+                last = error(&measured, &seen);
+            }
+            last
+        })
+        .collect()
+}

@@ -1,0 +1,99 @@
+//! What the uncertainty of a flight's sensor errors does to each channel's residual.
+//!
+//! A bias that the reconstruction took out too much or too little moves every window of its flight
+//! alike, so no bootstrap over windows sees it. The constants are taken as independent of one
+//! another, with the standard deviations that the reconstruction gives them.
+
+use super::flight::Prepared;
+use super::names::ChannelId;
+use super::weak;
+use crate::model::GreyBox;
+use crate::physics::State;
+use crate::sysid::reconstruction::{Instant, Nuisance};
+
+/// Half width of a 95 % interval in standard deviations of a normal distribution.
+pub const NORMAL_95: f64 = 1.96;
+
+/// The constants that move a residual, with what an error of one unit does to an instant.
+const CONSTANTS: [(&str, fn(&mut Instant, f64)); COUNT] = [
+    ("gyro_bias_p", |i, by| i.state.p += by),
+    ("gyro_bias_q", |i, by| i.state.q += by),
+    ("gyro_bias_r", |i, by| i.state.r += by),
+    ("accelerometer_bias_x", |i, by| i.specific_force[0] += by),
+    ("accelerometer_bias_y", |i, by| i.specific_force[1] += by),
+    ("accelerometer_bias_z", |i, by| i.specific_force[2] += by),
+    ("alpha_bias", |i, by| i.state.alpha += by),
+    ("beta_bias", |i, by| i.state.beta += by),
+    ("airspeed_scale", |i, by| i.state.airspeed *= 1.0 + by),
+];
+/// How many constants there are.
+pub const COUNT: usize = 9;
+
+/// How far one standard deviation of each constant moves a residual, in the channel's unit.
+pub type Shift = [f64; COUNT];
+
+/// The shifts of every channel's residual, `[window][channel]` in the order of [`ChannelId::ALL`].
+///
+/// Worked out at the middle of each window, where the kernel is heaviest. Zero for a constant that
+/// `nuisances` does not hold.
+pub fn shifts(
+    model: &GreyBox,
+    flight: &Prepared,
+    nuisances: &[Nuisance],
+) -> Vec<[Shift; ChannelId::ALL.len()]> {
+    let flight = &*flight.acting(model);
+    let sd = CONSTANTS.map(|(name, _)| {
+        let found = nuisances.iter().find(|n| n.name == name).map_or(0.0, |n| n.sd);
+        if found.is_finite() { found } else { 0.0 }
+    });
+    let of_window = |samples: &[Instant]| {
+        let at = &samples[samples.len() / 2];
+        let mut shifts = [[0.0; COUNT]; ChannelId::ALL.len()];
+        for (k, (_, change)) in CONSTANTS.iter().enumerate().filter(|(k, _)| sd[*k] > 0.0) {
+            let moved = |by: f64| {
+                let mut moved = Instant { state: State { ..at.state }, ..*at };
+                change(&mut moved, by);
+                weak::residual(model, &moved)
+            };
+            let (up, down) = (moved(sd[k]), moved(-sd[k]));
+            for (shift, (up, down)) in shifts.iter_mut().zip(up.iter().zip(down)) {
+                shift[k] = 0.5 * (up - down);
+            }
+        }
+        shifts
+    };
+    flight.windows.iter().map(|window| of_window(flight.samples(window))).collect()
+}
+
+/// Standard deviation that the constants bring into a mean of residuals, given their shifts with
+/// the flight of each: within a flight they add up, between flights they are independent.
+pub fn deviation<'a>(shifts: impl Iterator<Item = (usize, &'a Shift)>) -> f64 {
+    let mut sums: Vec<Shift> = Vec::new();
+    let mut count = 0.0;
+    for (flight, shift) in shifts {
+        if sums.len() <= flight {
+            sums.resize(flight + 1, [0.0; COUNT]);
+        }
+        sums[flight].iter_mut().zip(shift).for_each(|(sum, x)| *sum += x);
+        count += 1.0;
+    }
+    let square: f64 = sums.iter().flatten().map(|sum| (sum / count).powi(2)).sum();
+    if square.is_finite() { square.sqrt() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_flight_adds_up_and_several_average_out() {
+        let mut shift = [0.0; COUNT];
+        (shift[6], shift[8]) = (3.0, 4.0);
+        // Ten windows of one flight move together; two constants add in squares.
+        assert_eq!(deviation((0..10).map(|_| (0, &shift))), 5.0);
+        // Four flights with errors of their own: half of that.
+        let four = deviation((0..40).map(|i| (i % 4, &shift)));
+        assert!((four - 2.5).abs() < 1e-12, "{four}");
+        assert_eq!(deviation(std::iter::empty()), 0.0);
+    }
+}
