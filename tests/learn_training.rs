@@ -54,7 +54,8 @@ fn what_is_missing_goes_into_the_residual_and_into_the_files() {
     for integrator in [Integrator::Rk4, Integrator::Jsbsim] {
         let mut prior = model("prior");
         prior.integrator = integrator;
-        let truth = GreyBox { integrator, ..truth.clone() };
+        let mut truth = truth.clone();
+        truth.integrator = integrator;
         let held_out = [flight(&truth, &prior, 100, 600)];
         let recipe = Recipe { rate: 3e-3, ..recipe(3000) };
         let mut trainer = Trainer::new(recipe, &prior, tracks(&truth, &prior)).unwrap();

@@ -63,45 +63,83 @@ impl<R: Real> At<R> {
     /// The slope with respect to the state.
     #[inline(always)]
     pub fn slope(&self, model: &GreyBox, slopes: &Slopes<R>) -> [R; 8] {
-        transposed(&self.state.to_array(), |x| {
-            let fixed = |x: R| Dual { value: x, gradient: [R::zero(); 2] };
-            let Controls { aileron, elevator, throttle } = self.controls;
-            let [aileron, elevator, throttle] = [aileron, elevator, throttle].map(fixed);
-            let controls = Controls { aileron, elevator, throttle };
-            let at = At { state: State::from_array(x), controls, density: fixed(self.density) };
-            let said = at.ask(model);
-            let mut sum = [R::zero(); 2];
-            for i in 0..3 {
-                add(&mut sum, &said.acceleration[i], slopes.acceleration[i]);
-                add(&mut sum, &said.spin[i], slopes.spin[i]);
-            }
-            let rates = said.rate.to_array().into_iter().zip(slopes.rate.to_array());
-            rates.for_each(|(out, slope)| add(&mut sum, &out, slope));
-            sum
-        })
+        transposed(&self.state.to_array(), &Asked { model, at: self, slopes })
     }
 }
 
-/// Σ of slopes times derivatives with respect to each of `inputs`, two at a time: `part` makes the sum
-/// from the inputs with two directions marked.
+/// The prior as a function of the state, with the slopes with respect to what it says.
+struct Asked<'a, R> {
+    model: &'a GreyBox,
+    at: &'a At<R>,
+    slopes: &'a Slopes<R>,
+}
+
+impl<R: Real> Sloped<R, 8> for Asked<'_, R> {
+    #[inline(always)]
+    fn part(&self, x: [Dual<2, R>; 8]) -> [R; 2] {
+        let Controls { aileron, elevator, throttle } = self.at.controls;
+        let controls = Controls {
+            aileron: fixed(aileron),
+            elevator: fixed(elevator),
+            throttle: fixed(throttle),
+        };
+        let at = At { state: State::from_array(x), controls, density: fixed(self.at.density) };
+        let said = at.ask(self.model);
+        let slopes = self.slopes;
+        let mut sum = [R::zero(); 2];
+        for i in 0..3 {
+            add(&mut sum, &said.acceleration[i], slopes.acceleration[i]);
+            add(&mut sum, &said.spin[i], slopes.spin[i]);
+        }
+        for (out, slope) in said.rate.to_array().iter().zip(slopes.rate.to_array()) {
+            add(&mut sum, out, slope);
+        }
+        sum
+    }
+}
+
+/// A function of `N` inputs, with slopes with respect to its outputs.
+///
+/// A trait and not a closure, because its method can be made to be inlined: vector instructions end
+/// where a call begins.
+pub trait Sloped<R: Real, const N: usize> {
+    /// Σ over outputs of slope times derivative, in the two directions that the inputs mark.
+    fn part(&self, inputs: [Dual<2, R>; N]) -> [R; 2];
+}
+
+/// A number that does not move.
+#[inline(always)]
+pub fn fixed<R: Real>(x: R) -> Dual<2, R> {
+    Dual { value: x, gradient: [R::zero(); 2] }
+}
+
+/// Σ of slopes times derivatives with respect to each of `inputs`, two at a time.
 ///
 /// Two at a time and not all at once, because the compiler has to see the prior whole in each
 /// direction, and because what the network costs is far more.
 #[inline(always)]
 pub fn transposed<R: Real, const N: usize>(
     inputs: &[R; N],
-    part: impl Fn([Dual<2, R>; N]) -> [R; 2],
+    function: &impl Sloped<R, N>,
 ) -> [R; N] {
     let mut sums = [R::zero(); N];
-    let (zero, one) = (R::zero(), R::from_f64(1.0));
-    for first in (0..N).step_by(2) {
-        let mark = |i: usize| [if i == first { one } else { zero }, if i == first + 1 { one } else { zero }];
-        let marked = std::array::from_fn(|i| Dual { value: inputs[i], gradient: mark(i) });
-        let pair = part(marked);
-        sums[first] = pair[0];
-        if let Some(sum) = sums.get_mut(first + 1) {
-            *sum = pair[1];
+    let one = R::from_f64(1.0);
+    let mut first = 0;
+    while first < N {
+        let mut marked = [fixed(one); N];
+        for (marked, x) in marked.iter_mut().zip(inputs) {
+            marked.value = *x;
         }
+        marked[first].gradient[0] = one;
+        if first + 1 < N {
+            marked[first + 1].gradient[1] = one;
+        }
+        let pair = function.part(marked);
+        sums[first] = pair[0];
+        if first + 1 < N {
+            sums[first + 1] = pair[1];
+        }
+        first += 2;
     }
     sums
 }
@@ -123,8 +161,11 @@ impl<R: Packet> At<R> {
         let air = self.air(model);
         let body = model.body.map(R::from_f64);
         let (push, turn) = rigid_body::state_rate_transposed(&self.state, &air, &slopes.rate);
-        let push = std::array::from_fn(|i| push[i] + slopes.acceleration[i]);
-        let turn: Vector<R> = std::array::from_fn(|i| turn[i] + slopes.spin[i]);
+        let (mut push, mut turn) = (push, turn);
+        for i in 0..3 {
+            push[i] += slopes.acceleration[i];
+            turn[i] += slopes.spin[i];
+        }
         let wrench = rigid_body::accelerations_transposed(&body, &air, model.axes, push, turn);
         let mut tally =
             Tally { model, first: 0, wrench: &wrench, sums: &mut *sums, moment: [R::zero(); 3] };

@@ -2,7 +2,8 @@
 
 use crate::learn::network::Passes;
 use crate::learn::packet::Packet;
-use crate::learn::prior::{ALOFT, At, Said, Slopes, add, transposed};
+use crate::learn::prior::{ALOFT, At, Said, Sloped, Slopes, add, fixed, transposed};
+use crate::physics::airframe::Geometry;
 use crate::model::residual::Scales;
 use crate::model::{GreyBox, Integrator, STEP, advance_jsbsim};
 use crate::num::{Dual, Real};
@@ -127,8 +128,7 @@ fn nothing<R: Real>() -> State<R> {
 
 #[inline(always)]
 fn sum<R: Real>(a: &State<R>, b: &State<R>) -> State<R> {
-    let (a, b) = (a.to_array(), b.to_array());
-    State::from_array(std::array::from_fn(|i| a[i] + b[i]))
+    a.advance(b, 1.0)
 }
 
 /// A pass over one block.
@@ -192,11 +192,12 @@ impl<R: Packet> Pass<'_, R> {
     fn weighted(&self, x: [R; 8]) -> ([R; 8], R) {
         let weight = self.recorded.weight.unwrap_or(R::from_f64(1.0));
         let mut square = R::zero();
-        let half_slope = std::array::from_fn(|i| {
-            let y = (x[i] * weight).scale(1.0 / (self.scale[i] * self.scale[i]));
-            square += x[i] * y;
-            y
-        });
+        let mut half_slope = x;
+        for (x, scale) in half_slope.iter_mut().zip(self.scale) {
+            let y = (*x * weight).scale(1.0 / (scale * scale));
+            square += *x * y;
+            *x = y;
+        }
         (half_slope, square)
     }
 
@@ -204,9 +205,11 @@ impl<R: Packet> Pass<'_, R> {
     #[inline(always)]
     fn error(&self, step: usize, predicted: &State<R>) -> ([R; 8], R) {
         use std::f64::consts::{PI, TAU};
-        let (seen, predicted) = (self.recorded.states[step + 1], predicted.to_array());
-        let mut error: [R; 8] = std::array::from_fn(|i| predicted[i] - seen[i]);
-        let [half, turn] = [PI, TAU].map(R::from_f64);
+        let mut error = predicted.to_array();
+        for (error, seen) in error.iter_mut().zip(&self.recorded.states[step + 1]) {
+            *error -= *seen;
+        }
+        let (half, turn) = (R::from_f64(PI), R::from_f64(TAU));
         error[0] = R::where_less(half, error[0], error[0] - turn, error[0]);
         error[0] = R::where_less(error[0], -half, error[0] + turn, error[0]);
         self.weighted(error)
@@ -226,11 +229,13 @@ impl<R: Packet> Pass<'_, R> {
     #[inline(always)]
     fn direct(&self, step: usize, trace: &Trace<R>, of: &SumSlopes) -> [State<R>; 3] {
         let [prior, learned] = &trace.rates[step];
-        let double = |x: [R; 8], slope: f64| State::from_array(x.map(|y| y.scale(2.0 * slope)));
+        let error = State::from_array(self.error(step, &trace.ends[step]).0);
+        let prior = State::from_array(self.weighted(prior.to_array()).0);
+        let learned = State::from_array(self.weighted(learned.to_array()).0);
         [
-            double(self.error(step, &trace.ends[step]).0, of.error),
-            double(self.weighted(prior.to_array()).0, of.prior),
-            double(self.weighted(learned.to_array()).0, of.learned),
+            nothing().advance(&error, 2.0 * of.error),
+            nothing().advance(&prior, 2.0 * of.prior),
+            nothing().advance(&learned, 2.0 * of.learned),
         ]
     }
 
@@ -355,30 +360,20 @@ impl<R: Packet> Pass<'_, R> {
         inputs[..8].copy_from_slice(&at.state.to_array());
         inputs[8..11].copy_from_slice(acceleration);
         inputs[11..].copy_from_slice(memory);
-        let sums = transposed(&inputs, |x| {
-            let fixed = |x: R| Dual { value: x, gradient: [R::zero(); 2] };
-            let state = State::from_array(std::array::from_fn(|i| x[i]));
-            let air = AirData::new(&state, fixed(at.density), ALOFT, geometry);
-            let acceleration = std::array::from_fn(|i| x[8 + i]);
-            let memory = std::array::from_fn(|i| x[11 + i]);
-            let zero = [fixed(R::zero()); 3];
-            let (next, last) = advance_jsbsim(&state, &air, acceleration, zero, Some(memory));
-            let mut sum = [R::zero(); 2];
-            next.to_array().iter().zip(after.to_array()).for_each(|(out, s)| add(&mut sum, out, s));
-            last.iter().zip(remembered).for_each(|(out, s)| add(&mut sum, out, *s));
-            sum
-        });
-        let push: Vector<R> = std::array::from_fn(|i| sums[8 + i]);
-        let spin = [after.p, after.q, after.r].map(|s| s.scale(STEP));
+        let scheme = Scheme { geometry, density: at.density, after: after.to_array(), remembered };
+        let sums = transposed(&inputs, &scheme);
+        let [s0, s1, s2, s3, s4, s5, s6, s7, x, y, z, m0, m1, m2] = sums;
+        let push = [x, y, z];
+        let spin = [after.p.scale(STEP), after.q.scale(STEP), after.r.scale(STEP)];
         let plain = at.air(&self.subject.prior);
         let (through, learned) = push_back(&at.state, &plain, learned, &push, &spin);
-        let state = State::from_array(std::array::from_fn(|i| sums[i]));
+        let state = State::from_array([s0, s1, s2, s3, s4, s5, s6, s7]);
         Back {
             state: sum(&state, &through),
             learned,
             acceleration: push,
             spin,
-            memory: std::array::from_fn(|i| sums[11 + i]),
+            memory: [m0, m1, m2],
         }
     }
 
@@ -402,8 +397,10 @@ impl<R: Packet> Pass<'_, R> {
         }
         let (width, wide) = (network.trace(), network.slopes());
         let slot = (point - first) % CHUNK;
-        let learned = learned.to_array();
-        let output = std::array::from_fn(|i| learned[i].scale(scales.output[i]));
+        let mut output = learned.to_array();
+        for (slope, scale) in output.iter_mut().zip(&scales.output) {
+            *slope = slope.scale(*scale);
+        }
         let units = &trace.units[point * width..][..width];
         let input = network.backward(units, output, &mut trace.slopes[slot * wide..][..wide]);
         // the first six inputs are the state from airspeed on
@@ -450,8 +447,40 @@ fn pushed<R: Real>(
 ) -> (Vector<R>, Vector<R>) {
     let push = rigid_body::acceleration_of(state, air, learned);
     let turn = [learned.p, learned.q, learned.r];
-    let acceleration = std::array::from_fn(|i| said.acceleration[i] + push[i]);
-    (acceleration, std::array::from_fn(|i| said.spin[i] + turn[i]))
+    let (mut acceleration, mut spin) = (said.acceleration, said.spin);
+    for i in 0..3 {
+        acceleration[i] += push[i];
+        spin[i] += turn[i];
+    }
+    (acceleration, spin)
+}
+
+/// [`advance_jsbsim`] as a function of state, acceleration and memory, with the slopes with respect to
+/// what it makes.
+struct Scheme<'a, R> {
+    geometry: &'a Geometry,
+    density: R,
+    after: [R; 8],
+    remembered: &'a Vector<R>,
+}
+
+impl<R: Real> Sloped<R, 14> for Scheme<'_, R> {
+    #[inline(always)]
+    fn part(&self, x: [Dual<2, R>; 14]) -> [R; 2] {
+        let [s0, s1, s2, s3, s4, s5, s6, s7, x, y, z, m0, m1, m2] = x;
+        let state = State::from_array([s0, s1, s2, s3, s4, s5, s6, s7]);
+        let air = AirData::new(&state, fixed(self.density), ALOFT, self.geometry);
+        let still = [fixed(R::zero()); 3];
+        let (next, last) = advance_jsbsim(&state, &air, [x, y, z], still, Some([m0, m1, m2]));
+        let mut sum = [R::zero(); 2];
+        for (out, slope) in next.to_array().iter().zip(&self.after) {
+            add(&mut sum, out, *slope);
+        }
+        for (out, slope) in last.iter().zip(self.remembered) {
+            add(&mut sum, out, *slope);
+        }
+        sum
+    }
 }
 
 /// Slopes through [`pushed`], with respect to the state and to what was learned.

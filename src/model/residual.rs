@@ -130,14 +130,21 @@ impl Scales {
     pub fn inputs<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> [R; INPUTS] {
         let State { airspeed, p, q, r, alpha, beta, .. } = *state;
         let Controls { aileron, elevator, throttle } = *controls;
-        let x = [airspeed, p, q, r, alpha, beta, aileron, elevator, throttle];
-        std::array::from_fn(|i| (x[i] - R::from_f64(self.offset[i])).scale(self.factor[i]))
+        // plain loops here and in kernels: a closure that is not inlined leaves the vector instructions
+        let mut x = [airspeed, p, q, r, alpha, beta, aileron, elevator, throttle];
+        for (i, x) in x.iter_mut().enumerate() {
+            *x = (*x - R::from_f64(self.offset[i])).scale(self.factor[i]);
+        }
+        x
     }
 
     /// Rates from the network's outputs.
     #[inline(always)]
-    pub fn rate<R: Real>(&self, outputs: [R; OUTPUTS]) -> State<R> {
-        State::from_array(std::array::from_fn(|i| outputs[i].scale(self.output[i])))
+    pub fn rate<R: Real>(&self, mut outputs: [R; OUTPUTS]) -> State<R> {
+        for (x, scale) in outputs.iter_mut().zip(&self.output) {
+            *x = x.scale(*scale);
+        }
+        State::from_array(outputs)
     }
 }
 

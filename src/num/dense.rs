@@ -138,7 +138,9 @@ impl Dense {
             }
             std::mem::swap(&mut from, &mut to);
         }
-        std::array::from_fn(|i| from[..OUT][i])
+        let mut answer = [R::zero(); OUT];
+        answer.copy_from_slice(&from[..OUT]);
+        answer
     }
 }
 
@@ -165,13 +167,14 @@ impl Layer<'_> {
     #[inline(always)]
     fn columns<R: Real, const B: usize>(&self, first: usize, input: &[R], output: &mut [R]) {
         let outputs = output.len();
-        let number = |w: f32| R::from_f64(w.into());
-        let bias = &self.bias[first..first + B];
-        let mut sum: [R; B] = std::array::from_fn(|j| number(bias[j]));
+        let mut sum = [R::zero(); B];
+        for (sum, bias) in sum.iter_mut().zip(&self.bias[first..first + B]) {
+            *sum = R::from_f64((*bias).into());
+        }
         for (x, row) in input.iter().zip(self.weights.chunks_exact(outputs)) {
             let row = &row[first..first + B];
             for j in 0..B {
-                sum[j] = x.mul_add(number(row[j]), sum[j]);
+                sum[j] = x.mul_add(R::from_f64(row[j].into()), sum[j]);
             }
         }
         output[first..first + B].copy_from_slice(&sum);

@@ -294,7 +294,7 @@ mod tests {
 
     #[test]
     fn an_acceleration_of_rates_changes_the_state_at_these_rates() {
-        let air = AirData::new(&STATE, 1.156, &GEOMETRY);
+        let air = AirData::new(&STATE, 1.156, 600.0, &GEOMETRY);
         let wanted = State { airspeed: 1.5, alpha: -2.0, beta: 0.7, ..State::default() };
         let still = state_rate(&STATE, &air, [0.0; 3], [0.0; 3]);
         let moved = state_rate(&STATE, &air, acceleration_of(&STATE, &air, &wanted), [0.0; 3]);

@@ -33,6 +33,7 @@ pub fn flight(truth: &GreyBox, seen_by: &GreyBox, seed: u64, samples: usize) -> 
     Track::new(seen_by, rows.into_iter())
 }
 
+#[allow(dead_code, reason = "not every test needs it")]
 /// A network of two hidden layers that is far from silent.
 pub fn network(hidden: usize, size: f32) -> Dense {
     let mut rng = stream::stream(11, &[]);
