@@ -32,7 +32,8 @@ fn objective(prior: &GreyBox, penalty: Penalty) -> Objective {
 fn scene(integrator: Integrator) -> (GreyBox, Vec<Track>, Vec<Window>) {
     let mut prior = model("prior-severe");
     prior.integrator = integrator;
-    let tracks = vec![flight(&model("jsbsim"), &prior, 4, 200), flight(&model("jsbsim"), &prior, 5, 90)];
+    let tracks =
+        vec![flight(&model("jsbsim"), &prior, 4, 200), flight(&model("jsbsim"), &prior, 5, 90)];
     // a third block that is not full
     let window = |k: u32| Window { track: k % 2, start: 1 + 2 * k };
     (prior, tracks, (0..37).map(window).collect())
@@ -73,8 +74,7 @@ fn against_differences(integrator: Integrator, penalty: Penalty) {
     let objective = objective(&prior, penalty);
     let network = network(10, 0.3);
     let double = Arithmetic::Double;
-    let (_, gradient) =
-        gradient(&prior, network.clone(), &objective, &tracks, windows, double);
+    let (_, gradient) = gradient(&prior, network.clone(), &objective, &tracks, windows, double);
     let mut worst = 0.0_f64;
     let mut check = |name: &str, ours: f64, theirs: f64, size: f64| {
         // what differences of h = 1e-5 to 6e-5 leave out: h² of the third derivative, rounding over h
@@ -142,7 +142,7 @@ fn lanes_agree_with_double_precision() {
             gradient(&prior, network(16, 0.3), &objective, &tracks, &windows, arithmetic)
         };
         let (exact, expected) = run(Arithmetic::Double);
-        let mut sets = vec![Instructions::Baseline, Instructions::detect()];
+        let mut sets = vec![Instructions::detect()];
         #[cfg(target_arch = "x86_64")]
         if Instructions::detect() == Instructions::Avx512 {
             sets.push(Instructions::Avx2);

@@ -21,8 +21,8 @@ fn tracks(truth: &GreyBox, prior: &GreyBox) -> Vec<Track> {
 #[test]
 fn wrong_coefficients_are_found() {
     let (truth, prior) = (model("prior"), model("prior-severe"));
-    let names =
-        ["roll_linear.Clda", "roll_linear.Clp", "lift_linear.CLde", "drag_linear.CD0"].map(String::from);
+    let names = ["roll_linear.Clda", "roll_linear.Clp", "lift_linear.CLde", "drag_linear.CD0"]
+        .map(String::from);
     let changed: Vec<String> = truth
         .coefficients()
         .iter()
@@ -83,11 +83,8 @@ fn what_is_missing_goes_into_the_residual_and_into_the_files() {
 #[test]
 fn an_interrupted_training_ends_the_same_to_the_bit() {
     let (truth, prior) = (model("jsbsim"), model("prior-mild"));
-    let recipe = Recipe {
-        trainable: vec!["roll_linear.Clda".into(), JXZ.into()],
-        batch: 48,
-        ..recipe(90)
-    };
+    let recipe =
+        Recipe { trainable: vec!["roll_linear.Clda".into(), JXZ.into()], batch: 48, ..recipe(90) };
     let new = || Trainer::new(recipe.clone(), &prior, tracks(&truth, &prior)).unwrap();
     let mut whole = new();
     whole.run(1000).unwrap();

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
@@ -45,11 +45,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let planner = match (&arguments.model, arguments.round) {
         (None, 0) => None,
         (Some(path), 1..) => Some(control::build(Kind::Cem, &GreyBox::load(&shipped(path))?)?),
-        (None, _) => bail!("round {} is planned: give the model to plan with, --model", arguments.round),
+        (None, _) => {
+            bail!("round {} is planned: give the model to plan with, --model", arguments.round)
+        }
         (Some(_), _) => bail!("round 0 is random and takes no --model; give --round 1 or later"),
     };
     let folder = arguments.out.join(format!("round-{:02}", arguments.round));
-    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    std::fs::create_dir_all(&folder)
+        .with_context(|| format!("cannot make {}", folder.display()))?;
     let stop = Arc::new(AtomicBool::new(false));
     let seen = stop.clone();
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))?;

@@ -5,10 +5,10 @@ use nalgebra::{DMatrix, DVector};
 use crate::learn::windows::Track;
 use crate::model::GreyBox;
 use crate::num::{Dual, Real};
-use crate::physics::effects::Needs;
-use crate::physics::rigid_body::{self, RigidBody};
 use crate::physics::Wrench;
 use crate::physics::effects::Kind;
+use crate::physics::effects::Needs;
+use crate::physics::rigid_body::{self, RigidBody};
 
 /// The name under which the product of inertia is trainable.
 ///
@@ -111,7 +111,11 @@ impl Basis {
     ///
     /// # Errors
     /// If the model has none of a name, or it cannot be trained.
-    pub fn new(model: &GreyBox, names: &[String], tracks: &[Track]) -> Result<Basis, TrainableError> {
+    pub fn new(
+        model: &GreyBox,
+        names: &[String],
+        tracks: &[Track],
+    ) -> Result<Basis, TrainableError> {
         let known = trainable(model);
         let count = model.coefficients().len();
         let mut places = Vec::new();
@@ -150,7 +154,9 @@ impl Basis {
 
     /// Slopes with respect to the coordinates from those with respect to coefficients and Jxz.
     pub fn slopes(&self, all: &[f64]) -> Vec<f64> {
-        let of = |k: usize| self.places.iter().enumerate().map(move |(i, p)| self.turn[(i, k)] * all[*p]);
+        let of = |k: usize| {
+            self.places.iter().enumerate().map(move |(i, p)| self.turn[(i, k)] * all[*p])
+        };
         (0..self.len()).map(|k| of(k).sum()).collect()
     }
 
@@ -216,7 +222,8 @@ fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
         })
         .collect();
     let wrench = model.wrench(state, controls, &air);
-    let moment = [4, 5, 6].map(|c| Dual::<1>::from_f64(wrench.get(crate::physics::Channel::ALL[c])));
+    let moment =
+        [4, 5, 6].map(|c| Dual::<1>::from_f64(wrench.get(crate::physics::Channel::ALL[c])));
     let body: RigidBody<Dual<1>> = model.body.map(Dual::from_f64);
     let body = RigidBody { jxz: Dual::variable(model.body.jxz, 0), ..body };
     let spin = rigid_body::angular_acceleration(&body, &state.map(Dual::from_f64), moment);

@@ -93,11 +93,13 @@ impl Checkpoint {
     /// # Errors
     /// If the disk refuses.
     pub fn save(&self, path: &Path) -> Result<(), CheckpointError> {
-        let bytes = self
-            .to_bytes()
-            .map_err(|why| CheckpointError::Content { path: path.into(), why })?;
-        write_whole(path, &bytes)
-            .map_err(|why| CheckpointError::File { doing: "write", path: path.into(), why })
+        let bytes =
+            self.to_bytes().map_err(|why| CheckpointError::Content { path: path.into(), why })?;
+        write_whole(path, &bytes).map_err(|why| CheckpointError::File {
+            doing: "write",
+            path: path.into(),
+            why,
+        })
     }
 
     /// Reads one.
@@ -105,8 +107,11 @@ impl Checkpoint {
     /// # Errors
     /// If the file cannot be read or is none.
     pub fn load(path: &Path) -> Result<Checkpoint, CheckpointError> {
-        let bytes = std::fs::read(path)
-            .map_err(|why| CheckpointError::File { doing: "read", path: path.into(), why })?;
+        let bytes = std::fs::read(path).map_err(|why| CheckpointError::File {
+            doing: "read",
+            path: path.into(),
+            why,
+        })?;
         from_bytes(&bytes).map_err(|why| CheckpointError::Content { path: path.into(), why })
     }
 
@@ -154,7 +159,10 @@ fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
     };
     let double = |name: &str| -> Result<Vec<f64>, String> {
         let bytes = part(name, Dtype::F64)?;
-        Ok(bytes.chunks_exact(8).filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?))).collect())
+        Ok(bytes
+            .chunks_exact(8)
+            .filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?)))
+            .collect())
     };
     let network = part("network", Dtype::F32)?;
     Ok(Checkpoint {
@@ -164,7 +172,11 @@ fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
             .filter_map(|b| Some(f32::from_le_bytes(b.try_into().ok()?)))
             .collect(),
         coordinates: double("coordinates")?,
-        adam: Adam { mean: double("adam.mean")?, square: double("adam.square")?, steps: said.adam_steps },
+        adam: Adam {
+            mean: double("adam.mean")?,
+            square: double("adam.square")?,
+            steps: said.adam_steps,
+        },
         lambda: f64::from_bits(said.lambda_bits),
         update: said.update,
     })

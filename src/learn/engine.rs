@@ -10,7 +10,8 @@ use crate::num::Lanes;
 /// What an engine computes in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
-    /// Blocks of single-precision lanes in these instructions.
+    /// Blocks of single-precision lanes in these instructions. Where no multiply-add is fused (x86 from
+    /// before 2013) it is [`Double`](Arithmetic::Double).
     Lanes(Instructions),
     /// One rollout at a time in double precision: slow, for tests.
     Double,
@@ -23,7 +24,6 @@ pub struct Engine(Kind);
 #[derive(Clone, Debug)]
 enum Kind {
     Fused(Minibatch<Lanes<WIDTH, true>>),
-    Plain(Minibatch<Lanes<WIDTH>>),
     Double(Minibatch<f64>),
 }
 
@@ -34,10 +34,7 @@ impl Engine {
             Arithmetic::Lanes(set) if set.fused() => {
                 Kind::Fused(Minibatch::new(subject, windows, steps, set))
             }
-            Arithmetic::Lanes(set) => Kind::Plain(Minibatch::new(subject, windows, steps, set)),
-            Arithmetic::Double => {
-                Kind::Double(Minibatch::new(subject, windows, steps, Instructions::Baseline))
-            }
+            _ => Kind::Double(Minibatch::new(subject, windows, steps, Instructions::Baseline)),
         })
     }
 
@@ -56,7 +53,6 @@ impl Engine {
     ) -> (Loss, &Gradient) {
         match &mut self.0 {
             Kind::Fused(m) => m.step(subject, objective, tracks, windows, steps),
-            Kind::Plain(m) => m.step(subject, objective, tracks, windows, steps),
             Kind::Double(m) => m.step(subject, objective, tracks, windows, steps),
         }
     }
@@ -75,7 +71,6 @@ impl Engine {
     ) -> Loss {
         match &mut self.0 {
             Kind::Fused(m) => m.loss(subject, objective, tracks, windows, steps),
-            Kind::Plain(m) => m.loss(subject, objective, tracks, windows, steps),
             Kind::Double(m) => m.loss(subject, objective, tracks, windows, steps),
         }
     }

@@ -64,10 +64,13 @@ pub fn save(
     set("name", &name);
     set("description", &format!("{}, with what {} learned beside it.", model.name, origin.program));
     set("airframe", AIRFRAME);
-    set("integrator", match model.integrator {
-        Integrator::Rk4 => "rk4",
-        Integrator::Jsbsim => "jsbsim",
-    });
+    set(
+        "integrator",
+        match model.integrator {
+            Integrator::Rk4 => "rk4",
+            Integrator::Jsbsim => "jsbsim",
+        },
+    );
     set("residual", RESIDUAL);
     for name in trained {
         let value = model.coefficients().iter().find(|c| c.name == *name).map(|c| c.value);
@@ -80,7 +83,10 @@ pub fn save(
         let entry = entry.ok_or_else(|| wrong(format!("it has no {name}")))?;
         let before = entry.get("value").map(ToString::to_string).unwrap_or_default();
         entry.insert("value".into(), value.into());
-        let source = format!("learned from flights (data {}), from {before}", &origin.data[..12.min(origin.data.len())]);
+        let source = format!(
+            "learned from flights (data {}), from {before}",
+            &origin.data[..12.min(origin.data.len())]
+        );
         entry.insert("source".into(), source.into());
     }
     let text = toml::to_string(&table).map_err(|e| wrong(e.to_string()))?;

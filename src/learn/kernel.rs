@@ -38,11 +38,7 @@ impl Instructions {
     }
 
     /// [`Pass::forward`].
-    pub fn forward<R: Packet>(
-        self,
-        pass: &Pass<R>,
-        trace: &mut Trace<R>,
-    ) -> (Sums, R) {
+    pub fn forward<R: Packet>(self, pass: &Pass<R>, trace: &mut Trace<R>) -> (Sums, R) {
         match self {
             // SAFETY: `detect` has seen the processor's features
             #[cfg(target_arch = "x86_64")]

@@ -85,7 +85,8 @@ impl Gradient {
     }
 
     fn add(&mut self, other: &Gradient) {
-        let add = |sum: &mut [f64], part: &[f64]| sum.iter_mut().zip(part).for_each(|(s, p)| *s += p);
+        let add =
+            |sum: &mut [f64], part: &[f64]| sum.iter_mut().zip(part).for_each(|(s, p)| *s += p);
         add(&mut self.network, &other.network);
         add(&mut self.prior, &other.prior);
     }
@@ -122,7 +123,12 @@ impl<R: Packet> Minibatch<R> {
         let gradient = Gradient::zero(subject);
         let work = Work {
             windows: Vec::with_capacity(R::WIDTH),
-            recorded: Recorded { states: Vec::new(), controls: Vec::new(), density: Vec::new(), weight: None },
+            recorded: Recorded {
+                states: Vec::new(),
+                controls: Vec::new(),
+                density: Vec::new(),
+                weight: None,
+            },
             trace: Trace::new(subject, steps),
             gradient: gradient.clone(),
             sums: Sums::default(),

@@ -3,8 +3,8 @@
 use crate::learn::packet::Packet;
 use crate::model::{GreyBox, Starting};
 use crate::num::{Dual, Real};
-use crate::physics::rigid_body::{self, Vector};
 use crate::physics::effects::Terms;
+use crate::physics::rigid_body::{self, Vector};
 use crate::physics::{AirData, Channel, Controls, State, Wrench};
 
 /// Altitude given to the airflow, m: far from the ground. What air there is comes with the density.
@@ -171,10 +171,10 @@ impl<R: Packet> At<R> {
             Tally { model, first: 0, wrench: &wrench, sums: &mut *sums, moment: [R::zero(); 3] };
         model.report_independent(&self.state, &self.controls, &air, &mut tally);
         let moment = tally.moment;
-        let fixed = |x: R| Dual { value: x, gradient: [R::zero(); 1] };
         let mut dual = body.map(fixed);
         dual.jxz = Dual::variable(body.jxz, 0);
-        let spin = rigid_body::angular_acceleration(&dual, &self.state.map(fixed), moment.map(fixed));
+        let (state, moment) = (self.state.map(fixed), moment.map(fixed));
+        let spin = rigid_body::angular_acceleration(&dual, &state, moment);
         if let Some(last) = sums.last_mut() {
             for (spin, turn) in spin.iter().zip(turn) {
                 *last = spin.gradient[0].mul_add(turn, *last);

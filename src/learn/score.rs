@@ -33,17 +33,23 @@ pub fn free_run(model: &GreyBox, tracks: &[Track], horizons: &[usize]) -> Vec<Ho
 }
 
 fn horizon(model: &GreyBox, tracks: &[Track], steps: usize) -> Horizon {
-    let starts: Vec<Window> = windows(tracks, steps)
-        .into_iter()
-        .filter(|w| w.start as usize % EVERY == 1)
+    let starts: Vec<Window> =
+        windows(tracks, steps).into_iter().filter(|w| w.start as usize % EVERY == 1).collect();
+    let mut errors: Vec<f64> = starts
+        .par_iter()
+        .map(|w| run(model, &tracks[w.track as usize], w.start as usize, steps))
         .collect();
-    let mut errors: Vec<f64> =
-        starts.par_iter().map(|w| run(model, &tracks[w.track as usize], w.start as usize, steps)).collect();
     errors.sort_by(f64::total_cmp);
     let runs = errors.len();
     let mean = errors.iter().map(|e| e * e).sum::<f64>() / runs as f64;
     let lost = errors.iter().filter(|e| **e >= BOUND).count() as f64 / runs as f64;
-    Horizon { steps, runs, rms: mean.sqrt(), median: errors.get(runs / 2).copied().unwrap_or(f64::NAN), lost }
+    Horizon {
+        steps,
+        runs,
+        rms: mean.sqrt(),
+        median: errors.get(runs / 2).copied().unwrap_or(f64::NAN),
+        lost,
+    }
 }
 
 /// The error of one run from sample `start`.

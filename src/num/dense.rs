@@ -211,8 +211,7 @@ mod tests {
             let outputs = layer.bias.len();
             x = (0..outputs)
                 .map(|j| {
-                    let sum: f64 =
-                        (0..x.len())
+                    let sum: f64 = (0..x.len())
                         .map(|i| x[i] * f64::from(layer.weights[i * outputs + j]))
                         .sum();
                     let y = sum + f64::from(layer.bias[j]);

@@ -1,7 +1,7 @@
 //! Exploration: episodes flown in JSBSim to learn from, section IV-A of \[GSFM26\].
 
-use rand::{Rng, RngExt as _};
 use rand::seq::SliceRandom;
+use rand::{Rng, RngExt as _};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::control::{Controller, Observation, Target};

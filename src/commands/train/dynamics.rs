@@ -108,14 +108,20 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     std::fs::create_dir_all(&arguments.out)
         .with_context(|| format!("cannot make {}", arguments.out.display()))?;
     let samples: usize = learn.iter().map(|t| t.states.len()).sum();
-    eprintln!("learning from {} flights, {samples} samples; judging by {}", learn.len(), judge.len());
+    eprintln!(
+        "learning from {} flights, {samples} samples; judging by {}",
+        learn.len(),
+        judge.len()
+    );
     let mut trainer = Trainer::new(recipe, &prior, learn)?;
     for name in trainer.unseen() {
         eprintln!("the flights do not show {name} apart from others: it stays near its prior");
     }
     let kept = arguments.out.join(CHECKPOINT);
     if kept.exists() {
-        trainer.resume(Checkpoint::load(&kept)?).with_context(|| format!("cannot go on from {}", kept.display()))?;
+        trainer
+            .resume(Checkpoint::load(&kept)?)
+            .with_context(|| format!("cannot go on from {}", kept.display()))?;
         eprintln!("going on after {} updates", trainer.update());
     }
     if !train(&mut trainer, &kept)? {
@@ -228,7 +234,17 @@ fn coefficients(trainer: &Trainer) -> Table {
 fn horizons([prior, learned]: &[Vec<Horizon>; 2]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(["steps", "runs", "prior rms", "learned rms", "ratio", "prior median", "learned median", "ratio", "lost"]);
+    table.set_header([
+        "steps",
+        "runs",
+        "prior rms",
+        "learned rms",
+        "ratio",
+        "prior median",
+        "learned median",
+        "ratio",
+        "lost",
+    ]);
     for (p, l) in prior.iter().zip(learned) {
         table.add_row([
             p.steps.to_string(),

@@ -66,7 +66,9 @@ impl FlightArguments {
             bail!("there is nothing to learn from: give --log or --collect");
         }
         if tracks.len() < HELD_OUT {
-            notes.push("Too few flights to hold any out: the scores are of flights learned from.".into());
+            notes.push(
+                "Too few flights to hold any out: the scores are of flights learned from.".into(),
+            );
             return Ok(Flights { judge: tracks.clone(), learn: tracks, notes });
         }
         let (mut learn, mut judge) = (Vec::new(), Vec::new());
@@ -80,8 +82,9 @@ impl FlightArguments {
 /// The episodes below a folder of `greylag collect`, in the order of their names.
 fn collected(folder: &Path, model: &GreyBox) -> Result<Vec<Track>> {
     let list = |folder: &Path| -> Result<Vec<PathBuf>> {
-        let entries = std::fs::read_dir(folder)
-            .with_context(|| format!("cannot read {}; name a folder of `greylag collect`", folder.display()))?;
+        let entries = std::fs::read_dir(folder).with_context(|| {
+            format!("cannot read {}; name a folder of `greylag collect`", folder.display())
+        })?;
         let mut paths = entries.map(|e| Ok(e?.path())).collect::<std::io::Result<Vec<_>>>()?;
         paths.sort();
         Ok(paths)
