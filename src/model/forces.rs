@@ -220,6 +220,7 @@ impl GreyBox {
     }
 
     /// Hands what the effects contribute that need only the point to `terms`, as part of its caller.
+    #[cfg(feature = "learn")]
     #[inline(always)]
     pub(crate) fn report_independent<R: Real>(
         &self,
@@ -233,6 +234,7 @@ impl GreyBox {
 
     /// [`accelerations`](GreyBox::accelerations) of the effects that need only the point, as part of
     /// its caller: all of them where [`needs`](GreyBox::needs) says so.
+    #[cfg(feature = "learn")]
     #[inline(always)]
     pub(crate) fn independent_accelerations<R: Real>(
         &self,

@@ -11,9 +11,11 @@ mod newton;
 pub mod residual;
 mod trim;
 
+#[cfg(feature = "learn")]
 pub(crate) use forces::Starting;
 pub use grey_box::{GreyBox, Named};
 pub use integrator::{Integrator, Memory, STEP, Twin};
+#[cfg(feature = "learn")]
 pub(crate) use integrator::advance_jsbsim;
 pub use join::JoinError;
 pub use linear::{Linear, linearise};
