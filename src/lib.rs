@@ -29,6 +29,8 @@
 //! | 5, 19 (dynamics) | [`model::GreyBox::rate`] |
 //! | 7–12, 35 (rigid body) | [`physics::rigid_body`] |
 //! | 13 (CEM-MPC) | [`control::cem`] |
+//! | 19 (residual) | [`model::Residual`] |
+//! | 20, 22–24 (loss) | `learn::Objective` |
 //! | 21 (scale x_c) | [`model::GreyBox::scale`] |
 //! | 27 (actuator state) | [`physics::ActuatorState`], exact filters in [`physics::actuators`] |
 //! | 29 (action) | [`physics::Command`] |
@@ -62,5 +64,7 @@ pub mod flight;
 pub mod sysid;
 #[cfg(feature = "sitl")]
 pub mod sim;
+#[cfg(feature = "learn")]
+pub mod learn;
 pub mod report;
 pub mod commands;

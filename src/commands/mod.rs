@@ -2,6 +2,8 @@
 
 mod amend;
 mod choices;
+#[cfg(feature = "sitl")]
+mod collect;
 mod compare;
 #[cfg(feature = "sitl")]
 mod demo;
@@ -19,6 +21,8 @@ mod logs;
 mod mystery;
 #[cfg(feature = "sitl")]
 mod targets;
+#[cfg(feature = "learn")]
+mod train;
 
 use std::process::ExitCode;
 
@@ -37,6 +41,9 @@ struct Arguments {
 enum Command {
     /// Refit a model to flights and add missing effects to it, judged on flights it has not seen.
     Amend(amend::Arguments),
+    /// Explore in JSBSim, to have flights to learn from.
+    #[cfg(feature = "sitl")]
+    Collect(collect::Arguments),
     /// Compare models with flight logs: how far predictions stray, in which channel and regime.
     Compare(compare::Arguments),
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
@@ -62,6 +69,9 @@ enum Command {
     /// Write a target file.
     #[cfg(feature = "sitl")]
     Targets(targets::Arguments),
+    /// Learn from flights.
+    #[cfg(feature = "learn")]
+    Train(train::Arguments),
 }
 
 /// Runs the subcommand of the command line; what goes wrong is said in one line.
@@ -70,6 +80,8 @@ pub fn main() -> ExitCode {
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let result = match Arguments::parse().command {
         Command::Amend(arguments) => amend::run(&arguments),
+        #[cfg(feature = "sitl")]
+        Command::Collect(arguments) => collect::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Demo(arguments) => demo::run(&arguments),
@@ -85,6 +97,8 @@ pub fn main() -> ExitCode {
         Command::Mystery(arguments) => mystery::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Targets(arguments) => targets::run(&arguments),
+        #[cfg(feature = "learn")]
+        Command::Train(arguments) => train::run(&arguments),
     };
     result.unwrap_or_else(|error| {
         eprintln!("greylag: {error:#}");

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::grey_box::Term;
-use super::{GreyBox, Integrator, Named};
+use super::{GreyBox, Integrator, Named, Residual};
 use crate::num::Table;
 use crate::physics::Airframe;
 use crate::physics::airframe::{FileError, Sourced, check_schema, named, positive, toml_error};
@@ -26,6 +26,7 @@ struct File {
     force_axes: ForceAxes,
     rigid_body: BodyFile,
     air: AirFile,
+    residual: Option<String>,
     effects: toml::Table,
 }
 
@@ -90,7 +91,13 @@ impl GreyBox {
         check_schema(file.schema).map_err(content)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let airframe = Airframe::load(&folder.join(&file.airframe))?;
-        file.into_model(airframe).map_err(content)
+        let learned = file.residual.clone();
+        let mut model = file.into_model(airframe).map_err(content)?;
+        if let Some(name) = learned {
+            let read = Residual::load(&folder.join(name), &model.airframe, model.scale());
+            model.residual = Some(read.map_err(|e| content(e.to_string()))?.0);
+        }
+        Ok(model)
     }
 }
 
@@ -131,6 +138,7 @@ impl File {
             atmosphere: self.air.checked()?,
             axes: self.force_axes,
             integrator: self.integrator,
+            residual: None,
             terms,
             independent: 0,
             inputs: acting,

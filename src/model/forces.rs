@@ -42,7 +42,8 @@ struct Each<'a, F> {
 }
 
 /// Terms of an effect whose coefficients start at a given place in the model's list.
-trait Starting<R>: Terms<R> {
+pub(crate) trait Starting<R>: Terms<R> {
+    /// The terms that follow are of an effect whose first coefficient has this place.
     fn start_at(&mut self, first: usize);
 }
 
@@ -218,6 +219,33 @@ impl GreyBox {
         sums
     }
 
+    /// Hands what the effects contribute that need only the point to `terms`, as part of its caller.
+    #[cfg(feature = "learn")]
+    #[inline(always)]
+    pub(crate) fn report_independent<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+        terms: &mut impl Starting<R>,
+    ) {
+        self.independent_terms(&Place { state, controls, air }, terms);
+    }
+
+    /// [`accelerations`](GreyBox::accelerations) of the effects that need only the point, as part of
+    /// its caller: all of them where [`needs`](GreyBox::needs) says so.
+    #[cfg(feature = "learn")]
+    #[inline(always)]
+    pub(crate) fn independent_accelerations<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+    ) -> (Vector<R>, Vector<R>) {
+        let wrench = self.independent_sum(&Place { state, controls, air });
+        self.accelerations_under(&wrench, state, air)
+    }
+
     /// Linear acceleration (specific force plus gravity, body axes, m/s²) and angular acceleration
     /// (rad/s²).
     pub fn accelerations<R: Real>(
@@ -281,6 +309,10 @@ impl GreyBox {
     ) -> State<R> {
         let air = self.air(state, altitude);
         let (acceleration, spin) = self.accelerations_inlined(state, controls, &air);
-        rigid_body::state_rate(state, &air, acceleration, spin)
+        let rate = rigid_body::state_rate(state, &air, acceleration, spin);
+        match &self.residual {
+            Some(residual) => rate.advance(&residual.rate(state, controls), 1.0),
+            None => rate,
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The dynamics model: which effects act, with which coefficients, on which rigid body.
 
-use crate::model::Integrator;
+use crate::model::{Integrator, Residual};
 use crate::num::{Real, Table};
 use crate::physics::atmosphere::Atmosphere;
 use crate::physics::effects::{Description, Kind, Needs};
@@ -48,9 +48,8 @@ impl Term {
     }
 }
 
-/// ṡ = F_p(s, z; θ_p), eq. (5) of \[GSFM26\]: a sum of effects on a rigid body.
-///
-/// (The residual F_a of eq. (19) joins here.)
+/// ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: a sum of effects on a rigid body, with
+/// what was learned beside it.
 #[derive(Clone, Debug)]
 pub struct GreyBox {
     /// The model's name, from its file.
@@ -67,6 +66,8 @@ pub struct GreyBox {
     pub axes: ForceAxes,
     /// How it steps through time.
     pub integrator: Integrator,
+    /// What was learned beside the effects, F_a.
+    pub residual: Option<Residual>,
     /// Effects that need only the point come first, then by what they need.
     pub(super) terms: Vec<Term>,
     /// How many of the terms need only the point.
@@ -101,6 +102,22 @@ impl GreyBox {
         assert_eq!(values.len(), self.coefficients.len(), "a value for each coefficient");
         self.coefficients.iter_mut().zip(values).for_each(|(c, v)| c.value = *v);
         self.renew();
+    }
+
+    /// Changes mass and inertia; effects on them act on the new ones.
+    pub fn set_body(&mut self, body: RigidBody) {
+        self.bare_body = body;
+        self.renew();
+    }
+
+    /// Mass and inertia without the effects on them.
+    pub fn bare_body(&self) -> &RigidBody {
+        &self.bare_body
+    }
+
+    /// The most that one of the effects must be told.
+    pub fn needs(&self) -> Needs {
+        self.terms.last().map_or(Needs::Point, |term| term.kind.needs())
     }
 
     /// Whether the model has the effect `id`.

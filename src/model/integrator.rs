@@ -7,7 +7,7 @@ use crate::num::Real;
 use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
 use crate::physics::rigid_body::{self, Vector};
-use crate::physics::{Command, Controls, State};
+use crate::physics::{AirData, Command, Controls, State};
 
 /// The time step of control and simulation, s.
 pub const STEP: f64 = 0.01;
@@ -89,32 +89,62 @@ impl GreyBox {
         memory: &mut Memory<R>,
     ) -> State<R> {
         let air = self.air(s, altitude);
-        let (acceleration, spin) = self.accelerations_inlined(s, controls, &air);
-        let acceleration = rigid_body::body_to_horizon(s, acceleration);
-        let velocity = rigid_body::body_to_horizon(s, rigid_body::air_velocity(s, &air));
-        let last = memory.0.unwrap_or(acceleration);
-        let velocity = [
-            adams_bashforth(velocity[0], acceleration[0], last[0]),
-            adams_bashforth(velocity[1], acceleration[1], last[1]),
-            adams_bashforth(velocity[2], acceleration[2], last[2]),
-        ];
-        let (roll, pitch, turn) = euler_step_attitude(s);
-        let turning = turn.sin_cos();
-        memory.0 = Some(to_heading(acceleration, turning));
-        let turned = State { roll, pitch, ..*s };
-        let [u, v, w] = rigid_body::horizon_to_body(&turned, to_heading(velocity, turning));
-        let airspeed = (u * u + v * v + w * w).sqrt();
-        State {
-            roll,
-            pitch,
-            airspeed,
-            p: s.p + spin[0].scale(STEP),
-            q: s.q + spin[1].scale(STEP),
-            r: s.r + spin[2].scale(STEP),
-            alpha: w.atan2(u),
-            beta: (v / airspeed).asin(),
+        let (mut acceleration, mut spin) = self.accelerations_inlined(s, controls, &air);
+        if let Some(residual) = &self.residual {
+            // this scheme knows accelerations only: what was learned of φ̇ and θ̇ has no place in it
+            let learned = residual.rate(s, controls);
+            let push = rigid_body::acceleration_of(s, &air, &learned);
+            for (sum, part) in acceleration.iter_mut().zip(push) {
+                *sum += part;
+            }
+            for (sum, part) in spin.iter_mut().zip([learned.p, learned.q, learned.r]) {
+                *sum += part;
+            }
         }
+        let (next, last) = advance_jsbsim(s, &air, acceleration, spin, memory.0);
+        memory.0 = Some(last);
+        next
     }
+}
+
+/// The state one [`STEP`] later by [`Integrator::Jsbsim`] from accelerations in body axes (m/s²,
+/// rad/s²) and the last acceleration in the horizon frame, if there is one; and what is to be
+/// remembered in its place.
+#[inline(always)]
+pub(crate) fn advance_jsbsim<R: Real>(
+    s: &State<R>,
+    air: &AirData<R>,
+    acceleration: Vector<R>,
+    spin: Vector<R>,
+    last: Option<Vector<R>>,
+) -> (State<R>, Vector<R>) {
+    let acceleration = rigid_body::body_to_horizon(s, acceleration);
+    let velocity = rigid_body::body_to_horizon(s, rigid_body::air_velocity(s, air));
+    let last = match last {
+        Some(last) => last,
+        None => acceleration,
+    };
+    let velocity = [
+        adams_bashforth(velocity[0], acceleration[0], last[0]),
+        adams_bashforth(velocity[1], acceleration[1], last[1]),
+        adams_bashforth(velocity[2], acceleration[2], last[2]),
+    ];
+    let (roll, pitch, turn) = euler_step_attitude(s);
+    let turning = turn.sin_cos();
+    let turned = State { roll, pitch, ..*s };
+    let [u, v, w] = rigid_body::horizon_to_body(&turned, to_heading(velocity, turning));
+    let airspeed = (u * u + v * v + w * w).sqrt();
+    let next = State {
+        roll,
+        pitch,
+        airspeed,
+        p: s.p + spin[0].scale(STEP),
+        q: s.q + spin[1].scale(STEP),
+        r: s.r + spin[2].scale(STEP),
+        alpha: w.atan2(u),
+        beta: (v / airspeed).asin(),
+    };
+    (next, to_heading(acceleration, turning))
 }
 
 /// One component of velocity a step later, by Adams–Bashforth 2.

@@ -8,10 +8,16 @@ mod integrator;
 mod join;
 mod linear;
 mod newton;
+pub mod residual;
 mod trim;
 
+#[cfg(feature = "learn")]
+pub(crate) use forces::Starting;
 pub use grey_box::{GreyBox, Named};
 pub use integrator::{Integrator, Memory, STEP, Twin};
+#[cfg(feature = "learn")]
+pub(crate) use integrator::advance_jsbsim;
 pub use join::JoinError;
 pub use linear::{Linear, linearise};
+pub use residual::Residual;
 pub use trim::{Trim, TrimError};

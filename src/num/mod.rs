@@ -1,5 +1,6 @@
 //! Numbers: the scalar an equation is written over, the types that stand for it, and seeded streams.
 
+pub mod dense;
 mod dual;
 mod lanes;
 mod real;
@@ -7,6 +8,7 @@ mod table;
 pub mod statistics;
 pub mod stream;
 
+pub use dense::Dense;
 pub use dual::Dual;
 pub use lanes::Lanes;
 pub use real::Real;

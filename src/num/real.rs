@@ -50,6 +50,11 @@ pub trait Real:
     fn max(self, other: Self) -> Self {
         Self::where_less(self, other, other, self)
     }
+    /// `self · factor + addend`, rounded once or twice as the type says.
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        self * factor + addend
+    }
     /// Zero.
     #[inline(always)]
     fn zero() -> Self {

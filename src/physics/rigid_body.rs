@@ -160,6 +160,74 @@ pub fn state_rate<R: Real>(
     State { roll, pitch, airspeed, p: spin[0], q: spin[1], r: spin[2], alpha, beta }
 }
 
+/// The acceleration in body axes (m/s²) that changes airspeed, α and β at the rates of `rate`: what
+/// [`state_rate`] makes of acceleration, turned round.
+#[inline(always)]
+pub fn acceleration_of<R: Real>(
+    state: &State<R>,
+    air: &AirData<R>,
+    rate: &State<R>,
+) -> Vector<R> {
+    let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
+    let across = state.airspeed * rate.beta;
+    let forward = rate.airspeed * cos_beta - across * sin_beta;
+    let downward = state.airspeed * cos_beta * rate.alpha;
+    [
+        forward * cos_alpha - downward * sin_alpha,
+        rate.airspeed * sin_beta + across * cos_beta,
+        forward * sin_alpha + downward * cos_alpha,
+    ]
+}
+
+/// The transpose of [`state_rate`] in acceleration and spin: what a `slope` of anything with respect
+/// to the rates is with respect to acceleration (body axes) and angular acceleration.
+#[inline(always)]
+pub fn state_rate_transposed<R: Real>(
+    state: &State<R>,
+    air: &AirData<R>,
+    slope: &State<R>,
+) -> (Vector<R>, Vector<R>) {
+    let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
+    let across = slope.beta / state.airspeed;
+    let forward = cos_beta * slope.airspeed - sin_beta * across;
+    let downward = slope.alpha / (state.airspeed * cos_beta);
+    let acceleration = [
+        cos_alpha * forward - sin_alpha * downward,
+        sin_beta * slope.airspeed + cos_beta * across,
+        sin_alpha * forward + cos_alpha * downward,
+    ];
+    (acceleration, [slope.p, slope.q, slope.r])
+}
+
+/// The transpose of [`body_force`] and [`angular_acceleration`] in the wrench: what slopes with
+/// respect to acceleration (body axes) and angular acceleration are with respect to each channel.
+#[inline(always)]
+pub fn accelerations_transposed<R: Real>(
+    body: &RigidBody<R>,
+    air: &AirData<R>,
+    axes: ForceAxes,
+    acceleration: Vector<R>,
+    spin: Vector<R>,
+) -> Wrench<R> {
+    let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
+    let [x, y, z] = acceleration.map(|a| a / body.mass);
+    let along = cos_alpha * x + sin_alpha * z;
+    let (drag, side) = match axes {
+        ForceAxes::Stability => (-along, y),
+        ForceAxes::Wind => (-cos_beta * along - sin_beta * y, cos_beta * y - sin_beta * along),
+    };
+    let gamma = body.jx * body.jz - body.jxz * body.jxz;
+    let mut wrench = Wrench::zero();
+    wrench.add(Channel::Drag, drag);
+    wrench.add(Channel::Side, side);
+    wrench.add(Channel::Lift, sin_alpha * x - cos_alpha * z);
+    wrench.add(Channel::BodyX, x);
+    wrench.add(Channel::Roll, (body.jz * spin[0] + body.jxz * spin[2]) / gamma);
+    wrench.add(Channel::Pitch, spin[1] / body.jy);
+    wrench.add(Channel::Yaw, (body.jxz * spin[0] + body.jx * spin[2]) / gamma);
+    wrench
+}
+
 /// Rotates a vector from body axes to the local horizon turned with the heading (ψ = 0).
 #[inline(always)]
 pub fn body_to_horizon<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
@@ -222,6 +290,17 @@ mod tests {
         assert!((rate.airspeed - dva).abs() < 1e-12);
         assert!((rate.alpha - (u * dw - w * du) / (u * u + w * w)).abs() < 1e-12);
         assert!((rate.beta - (va * dv - v * dva) / (va * (va * va - v * v).sqrt())).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_acceleration_of_rates_changes_the_state_at_these_rates() {
+        let air = AirData::new(&STATE, 1.156, 600.0, &GEOMETRY);
+        let wanted = State { airspeed: 1.5, alpha: -2.0, beta: 0.7, ..State::default() };
+        let still = state_rate(&STATE, &air, [0.0; 3], [0.0; 3]);
+        let moved = state_rate(&STATE, &air, acceleration_of(&STATE, &air, &wanted), [0.0; 3]);
+        for (moved, wanted) in still.advance(&wanted, 1.0).to_array().iter().zip(moved.to_array()) {
+            assert!((moved - wanted).abs() < 1e-13);
+        }
     }
 
     /// Euler's equations J ω̇ + ω × Jω = M with the inertia matrix written out.

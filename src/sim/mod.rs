@@ -1,5 +1,6 @@
 //! Flying a controller and scoring it: environments, targets, episodes, evaluations, flight tests.
 
+pub mod collect;
 pub mod design;
 pub mod environment;
 pub mod episode;

@@ -1,0 +1,97 @@
+//! `greylag collect`: explore in JSBSim, to have flights to learn from.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use anyhow::{Context, Result, bail};
+use rayon::prelude::*;
+
+use greylag_sitl::plant_arguments::PlantArgs;
+
+use crate::commands::files::shipped;
+use crate::control::{self, Kind};
+use crate::logs::csv;
+use crate::model::GreyBox;
+use crate::sim::Simulator;
+use crate::sim::collect::{Place, explore};
+
+/// Options of `greylag collect`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Folder of the exploration; a round goes into a folder `round-NN` of its own.
+    #[arg(long)]
+    out: PathBuf,
+    /// The round: 0 is random, later ones are planned with CEM-MPC through `--model`, half, a quarter
+    /// and so on of their actions still random.
+    #[arg(long, default_value_t = 0)]
+    round: u32,
+    /// Episodes of 1000 steps; 175 in round 0, else 25, as in the paper.
+    #[arg(long)]
+    episodes: Option<u32>,
+    /// Model to plan with, the last one trained.
+    #[arg(long)]
+    model: Option<PathBuf>,
+    /// Seed of targets and actions.
+    #[arg(long, default_value_t = 1)]
+    seed: u32,
+    #[command(flatten)]
+    plant: PlantArgs,
+}
+
+/// Flies the episodes that are not there yet.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let planner = match (&arguments.model, arguments.round) {
+        (None, 0) => None,
+        (Some(path), 1..) => Some(control::build(Kind::Cem, &GreyBox::load(&shipped(path))?)?),
+        (None, _) => {
+            bail!("round {} is planned: give the model to plan with, --model", arguments.round)
+        }
+        (Some(_), _) => bail!("round 0 is random and takes no --model; give --round 1 or later"),
+    };
+    let folder = arguments.out.join(format!("round-{:02}", arguments.round));
+    std::fs::create_dir_all(&folder)
+        .with_context(|| format!("cannot make {}", folder.display()))?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let seen = stop.clone();
+    ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))?;
+    let count = arguments.episodes.unwrap_or(if arguments.round == 0 { 175 } else { 25 });
+    let plant = arguments.plant.options(arguments.seed);
+    Simulator::new(&plant)?;
+    let flown = AtomicU32::new(0);
+    (0..count).into_par_iter().try_for_each_init(
+        || (Simulator::new(&plant), planner.as_ref().map(|p| p.boxed_clone())),
+        |(simulator, planner), episode| -> Result<()> {
+            let path = folder.join(format!("episode-{episode:03}.csv"));
+            if stop.load(Ordering::Relaxed) || path.exists() {
+                return Ok(());
+            }
+            let simulator = simulator.as_mut().map_err(|e| anyhow::anyhow!("{e}"))?;
+            let place = Place { seed: arguments.seed.into(), round: arguments.round, episode };
+            let planner = planner.as_mut().map(|p| p.as_mut() as &mut dyn control::Controller);
+            let flight = explore(simulator, planner, &place)?;
+            save(&flight, &path)?;
+            let done = flown.fetch_add(1, Ordering::Relaxed) + 1;
+            if done % 25 == 0 {
+                eprintln!("{done} episodes flown");
+            }
+            Ok(())
+        },
+    )?;
+    let there = (0..count).filter(|e| folder.join(format!("episode-{e:03}.csv")).exists()).count();
+    println!("{} episodes flown, {there} of {count} in {}", flown.into_inner(), folder.display());
+    if stop.load(Ordering::Relaxed) {
+        eprintln!("interrupted; the same command flies the rest");
+        return Ok(ExitCode::from(130));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// An episode's file is there whole or not at all: what is there need not be flown again.
+fn save(flight: &crate::logs::Flight, path: &Path) -> Result<()> {
+    let part = path.with_extension("part");
+    let _ = std::fs::remove_file(&part);
+    csv::save(flight, &part)?;
+    std::fs::rename(&part, path).with_context(|| format!("cannot write {}", path.display()))
+}

@@ -1,0 +1,262 @@
+//! `greylag train dynamics`: learn a dynamics model.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use comfy_table::Table;
+use serde::Serialize;
+
+use super::flights::{FlightArguments, Flights};
+use crate::commands::files::{self, Overwrite, shipped};
+use crate::learn::score::{Horizon, free_run};
+use crate::learn::{Checkpoint, Criterion, Progress, Recipe, Trainer, export, trainable};
+use crate::model::{GreyBox, Integrator};
+
+/// Updates between two progress lines.
+const LINE: u64 = 500;
+/// Progress lines between two checkpoints.
+const KEEP: u64 = 4;
+/// Horizons of the score, steps.
+const HORIZONS: [usize; 4] = [1, 10, 100, 500];
+/// The file that a training goes on from.
+const CHECKPOINT: &str = "checkpoint.safetensors";
+
+/// Options of `greylag train dynamics`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The prior.
+    #[arg(long)]
+    prior: PathBuf,
+    #[command(flatten)]
+    flights: FlightArguments,
+    /// Leave the prior's coefficients as they are (the default).
+    #[arg(long, conflicts_with = "trainable")]
+    freeze: bool,
+    /// Coefficients to learn with the residual: full names (effect.name, rigid_body.jxz_kgm2) or `all`.
+    #[arg(long, num_args = 1.., value_delimiter = ',', value_name = "NAME")]
+    trainable: Vec<String>,
+    /// Step through time by this scheme and not the prior's: jsbsim for flights of the simulator.
+    #[arg(long, value_parser = ["rk4", "jsbsim"])]
+    integrator: Option<String>,
+    /// The loss: scaled (the paper's) or plain (x_c = 1, absolute penalty: APHYNITY's; PhIHP's with
+    /// --freeze).
+    #[arg(long, default_value = "scaled", value_parser = ["scaled", "plain"])]
+    loss: String,
+    /// Units of the residual's hidden layers.
+    #[arg(long, value_delimiter = ',', default_values_t = [64, 64])]
+    hidden: Vec<usize>,
+    /// Steps of a rollout; several share the updates in turn (a curriculum).
+    #[arg(long, value_delimiter = ',', default_values_t = [20])]
+    steps: Vec<usize>,
+    /// Rollouts in a minibatch.
+    #[arg(long, default_value_t = 64)]
+    batch: usize,
+    /// Updates in all.
+    #[arg(long, default_value_t = 20_000)]
+    updates: u64,
+    /// Learning rate at the start.
+    #[arg(long, default_value_t = 1e-3)]
+    rate: f64,
+    /// λ0 of the penalty's weight 1/λ.
+    #[arg(long, default_value_t = 1.0)]
+    lambda: f64,
+    /// τ, by which λ grows an update, times the normalised loss.
+    #[arg(long, default_value_t = 1.0)]
+    tau: f64,
+    /// Seed of the residual's start and of the minibatches.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for model, checkpoint and scores; a training found there goes on.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// The scores as JSON.
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'static str,
+    program: &'static str,
+    recipe: &'a Recipe,
+    data_sha256: &'a str,
+    unseen: &'a [String],
+    coefficients: Vec<Coefficient>,
+    prior: Vec<Horizon>,
+    learned: Vec<Horizon>,
+    notes: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Coefficient {
+    name: String,
+    before: f64,
+    after: f64,
+}
+
+/// Trains, prints what came of it, writes the model.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let path = shipped(&arguments.prior);
+    let mut prior = GreyBox::load(&path)?;
+    if let Some(scheme) = &arguments.integrator {
+        prior.integrator = if scheme == "rk4" { Integrator::Rk4 } else { Integrator::Jsbsim };
+    }
+    let recipe = arguments.recipe(&prior);
+    let Flights { learn, judge, notes } = arguments.flights.read(&prior)?;
+    std::fs::create_dir_all(&arguments.out)
+        .with_context(|| format!("cannot make {}", arguments.out.display()))?;
+    let samples: usize = learn.iter().map(|t| t.states.len()).sum();
+    eprintln!(
+        "learning from {} flights, {samples} samples; judging by {}",
+        learn.len(),
+        judge.len()
+    );
+    let mut trainer = Trainer::new(recipe, &prior, learn)?;
+    for name in trainer.unseen() {
+        eprintln!("the flights do not show {name} apart from others: it stays near its prior");
+    }
+    let kept = arguments.out.join(CHECKPOINT);
+    if kept.exists() {
+        trainer
+            .resume(Checkpoint::load(&kept)?)
+            .with_context(|| format!("cannot go on from {}", kept.display()))?;
+        eprintln!("going on after {} updates", trainer.update());
+    }
+    if !train(&mut trainer, &kept)? {
+        eprintln!("interrupted; the same command goes on from {}", kept.display());
+        return Ok(ExitCode::from(130));
+    }
+    let model = trainer.model()?;
+    let names: Vec<String> = trainer.coefficients().into_iter().map(|c| c.0).collect();
+    let origin = export::origin(&model, trainer.data(), trainer.recipe().seed);
+    export::save(&model, &path, &names, &origin, &arguments.out)?;
+    let scores = [&prior, &model].map(|m| free_run(m, &judge, &HORIZONS));
+    println!("{}", coefficients(&trainer));
+    println!("{}", horizons(&scores));
+    let [before, after] = scores;
+    let document = Document {
+        schema: "greylag.training/1",
+        program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+        recipe: trainer.recipe(),
+        data_sha256: trainer.data(),
+        unseen: trainer.unseen(),
+        coefficients: trainer
+            .coefficients()
+            .into_iter()
+            .map(|(name, before, after)| Coefficient { name, before, after })
+            .collect(),
+        prior: before,
+        learned: after,
+        notes,
+    };
+    let json = arguments.out.join("training.json");
+    files::write(&json, &(serde_json::to_string_pretty(&document)? + "\n"), Overwrite::Force)?;
+    println!("model in {}", arguments.out.join(export::MODEL).display());
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Arguments {
+    fn recipe(&self, prior: &GreyBox) -> Recipe {
+        let names = match self.trainable.as_slice() {
+            [all] if all == "all" => trainable(prior),
+            names => names.to_vec(),
+        };
+        Recipe {
+            hidden: self.hidden.clone(),
+            steps: self.steps.clone(),
+            batch: self.batch,
+            updates: self.updates,
+            rate: self.rate,
+            lambda: self.lambda,
+            tau: self.tau,
+            criterion: if self.loss == "plain" { Criterion::Plain } else { Criterion::Scaled },
+            trainable: names,
+            seed: self.seed,
+            ..Recipe::default()
+        }
+    }
+}
+
+/// Trains to the end; `false` if interrupted. The last good state is in the checkpoint either way.
+fn train(trainer: &mut Trainer, kept: &Path) -> Result<bool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let seen = stop.clone();
+    ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))?;
+    let mut lines = 0;
+    while !trainer.is_done() {
+        let start = Instant::now();
+        let before = trainer.update();
+        let progress = trainer.run(LINE).with_context(|| match kept.exists() {
+            true => format!("the last good state is in {}", kept.display()),
+            false => "no checkpoint was written yet".to_owned(),
+        })?;
+        let made = (trainer.update() - before) as f64;
+        println!("{}", line(&progress, trainer, 1e3 * start.elapsed().as_secs_f64() / made));
+        lines += 1;
+        let interrupted = stop.load(Ordering::Relaxed);
+        if lines % KEEP == 0 || interrupted || trainer.is_done() {
+            trainer.checkpoint().save(kept)?;
+        }
+        if interrupted && !trainer.is_done() {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+fn line(p: &Progress, trainer: &Trainer, ms: f64) -> String {
+    let ratio = p.loss.learned / p.loss.prior;
+    let mut text = format!(
+        "{:>7} n {:>3}  L/L_prior {:.5}  |Fa|/|Fp| {:.4}  lambda {:.1}  {ms:.1} ms",
+        p.update, p.steps, p.normalised, ratio, p.lambda
+    );
+    if p.loss.lost > 0 {
+        text += &format!("  {} rollouts lost", p.loss.lost);
+    }
+    for (name, _, now) in trainer.coefficients().iter().take(12) {
+        text += &format!("  {} {now:.4}", name.rsplit('.').next().unwrap_or(name));
+    }
+    text
+}
+
+fn coefficients(trainer: &Trainer) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["coefficient", "prior", "learned"]);
+    for (name, before, now) in trainer.coefficients() {
+        table.add_row([name, format!("{before:.5}"), format!("{now:.5}")]);
+    }
+    table
+}
+
+fn horizons([prior, learned]: &[Vec<Horizon>; 2]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header([
+        "steps",
+        "runs",
+        "prior rms",
+        "learned rms",
+        "ratio",
+        "prior median",
+        "learned median",
+        "ratio",
+        "lost",
+    ]);
+    for (p, l) in prior.iter().zip(learned) {
+        table.add_row([
+            p.steps.to_string(),
+            p.runs.to_string(),
+            format!("{:.2e}", p.rms),
+            format!("{:.2e}", l.rms),
+            format!("{:.4}", l.rms / p.rms),
+            format!("{:.2e}", p.median),
+            format!("{:.2e}", l.median),
+            format!("{:.4}", l.median / p.median),
+            format!("{:.1} % {:.1} %", 100.0 * p.lost, 100.0 * l.lost),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,111 @@
+//! The flights to learn from: recorded logs, and the rounds of `greylag collect`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use crate::commands::intake::LogArguments;
+use crate::learn::windows::Track;
+use crate::logs::csv::{self, Tolerance};
+use crate::model::{GreyBox, STEP};
+use crate::physics::{Controls, State};
+use crate::sysid::reconstruct::ActuatorClock;
+
+/// One track in so many is held out, where there are that many.
+const HELD_OUT: usize = 10;
+
+/// Where flights come from.
+#[derive(clap::Args)]
+pub struct FlightArguments {
+    #[command(flatten)]
+    logs: Option<LogArguments>,
+    /// Folders that `greylag collect` wrote; every round below them is read, its states as they are.
+    #[arg(long = "collect", num_args = 1..)]
+    folders: Vec<PathBuf>,
+}
+
+/// What there is to learn from.
+pub struct Flights {
+    /// Tracks to learn from.
+    pub learn: Vec<Track>,
+    /// Tracks to judge by; some of the others where there are few.
+    pub judge: Vec<Track>,
+    /// What the reader must know.
+    pub notes: Vec<String>,
+}
+
+impl FlightArguments {
+    /// Reads the flights as `model` sees them.
+    ///
+    /// # Errors
+    /// If nothing is given, or something cannot be read.
+    pub fn read(&self, model: &GreyBox) -> Result<Flights> {
+        let mut notes = Vec::new();
+        let mut tracks = Vec::new();
+        for folder in &self.folders {
+            tracks.extend(collected(folder, model)?);
+        }
+        if let Some(logs) = &self.logs {
+            let intake = logs.take_in(model, ActuatorClock::Estimated)?;
+            notes.extend(intake.notes);
+            for flight in &intake.flights {
+                if (flight.step_s / STEP - 1.0).abs() > 1e-3 {
+                    bail!(
+                        "{} has a sample every {:.4} s; learning takes logs of 100 Hz or more",
+                        flight.name,
+                        flight.step_s
+                    );
+                }
+                tracks.extend(flight.segments.iter().map(|segment| {
+                    let rows = segment.instants.iter().map(|i| (i.state, i.controls, i.altitude));
+                    Track::new(model, rows)
+                }));
+            }
+        }
+        if tracks.is_empty() {
+            bail!("there is nothing to learn from: give --log or --collect");
+        }
+        if tracks.len() < HELD_OUT {
+            notes.push(
+                "Too few flights to hold any out: the scores are of flights learned from.".into(),
+            );
+            return Ok(Flights { judge: tracks.clone(), learn: tracks, notes });
+        }
+        let (mut learn, mut judge) = (Vec::new(), Vec::new());
+        for (k, track) in tracks.into_iter().enumerate() {
+            if k % HELD_OUT == HELD_OUT - 1 { judge.push(track) } else { learn.push(track) }
+        }
+        Ok(Flights { learn, judge, notes })
+    }
+}
+
+/// The episodes below a folder of `greylag collect`, in the order of their names.
+fn collected(folder: &Path, model: &GreyBox) -> Result<Vec<Track>> {
+    let list = |folder: &Path| -> Result<Vec<PathBuf>> {
+        let entries = std::fs::read_dir(folder).with_context(|| {
+            format!("cannot read {}; name a folder of `greylag collect`", folder.display())
+        })?;
+        let mut paths = entries.map(|e| Ok(e?.path())).collect::<std::io::Result<Vec<_>>>()?;
+        paths.sort();
+        Ok(paths)
+    };
+    let mut tracks = Vec::new();
+    for round in list(folder)?.iter().filter(|p| p.is_dir()) {
+        for path in list(round)?.iter().filter(|p| p.extension().is_some_and(|e| e == "csv")) {
+            let flight = csv::load(path, Tolerance::Strict)?.flight;
+            let rows = flight.samples.iter().map(|s| {
+                let [roll, pitch, _] = s.attitude_rad;
+                let [p, q, r] = s.rates_radps;
+                let (airspeed, alpha, beta) = (s.airspeed_mps, s.alpha_rad, s.beta_rad);
+                let state = State { roll, pitch, airspeed, p, q, r, alpha, beta };
+                let (aileron, elevator) = (s.aileron_rad, s.elevator_rad);
+                (state, Controls { aileron, elevator, throttle: s.throttle }, s.altitude_m)
+            });
+            tracks.push(Track::new(model, rows));
+        }
+    }
+    if tracks.is_empty() {
+        bail!("{} has no episode; `greylag collect --out` writes them", folder.display());
+    }
+    Ok(tracks)
+}

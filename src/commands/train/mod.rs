@@ -1,0 +1,28 @@
+//! `greylag train`: learn from flights.
+
+mod dynamics;
+mod flights;
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+
+/// Options of `greylag train`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(clap::Subcommand)]
+enum What {
+    /// Learn a dynamics model: what a prior lacks, and its coefficients where asked for.
+    Dynamics(Box<dynamics::Arguments>),
+}
+
+/// Trains.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    match &arguments.what {
+        What::Dynamics(arguments) => dynamics::run(arguments),
+    }
+}

@@ -1,0 +1,59 @@
+//! Adam, the optimiser.
+
+/// Memory of Adam (Kingma and Ba, 2015, algorithm 1) for a list of parameters.
+///
+/// The crate burn has one. It is not used here: its parameters live in its tensors, and these are
+/// changed by a kernel of ours 500 times a second, to the bit the same after a resume; the two lines
+/// of the algorithm are less than what carries them over. A test holds it against a written-out case.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Adam {
+    /// Running means of the gradient.
+    pub mean: Vec<f64>,
+    /// Running means of its square.
+    pub square: Vec<f64>,
+    /// Steps made.
+    pub steps: u64,
+}
+
+const BETA: [f64; 2] = [0.9, 0.999];
+const EPSILON: f64 = 1e-8;
+
+impl Adam {
+    /// Adam for `count` parameters that has not moved yet.
+    pub fn new(count: usize) -> Adam {
+        Adam { mean: vec![0.0; count], square: vec![0.0; count], steps: 0 }
+    }
+
+    /// Begins a step.
+    pub fn begin(&mut self) {
+        self.steps += 1;
+    }
+
+    /// What parameter `place` moves by at learning rate `rate`, its gradient being `gradient`; to be
+    /// called once for each between two calls of [`begin`](Adam::begin).
+    pub fn move_of(&mut self, place: usize, gradient: f64, rate: f64) -> f64 {
+        let (m, v) = (&mut self.mean[place], &mut self.square[place]);
+        *m = BETA[0] * *m + (1.0 - BETA[0]) * gradient;
+        *v = BETA[1] * *v + (1.0 - BETA[1]) * gradient * gradient;
+        let steps = self.steps.min(1 << 20) as i32;
+        let [m, v] = [*m / (1.0 - BETA[0].powi(steps)), *v / (1.0 - BETA[1].powi(steps))];
+        -rate * m / (v.sqrt() + EPSILON)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moves_as_the_algorithm_says() {
+        let mut adam = Adam::new(1);
+        adam.begin();
+        // the first move is the learning rate, whatever the gradient
+        assert!((adam.move_of(0, 3.0, 0.1) + 0.1).abs() < 1e-9);
+        adam.begin();
+        // m = 0.9·0.3 − 0.1 = 0.17, over 0.19; v = 0.999·0.009 + 0.001 = 0.009991, over 0.001999
+        let expected = -0.1 * (0.17 / 0.19) / (0.009991_f64 / 0.001999).sqrt();
+        assert!((adam.move_of(0, -1.0, 0.1) - expected).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,203 @@
+//! Checkpoints: where a training stands, in a file that is there whole or not at all.
+
+use std::collections::HashMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+
+use crate::learn::adam::Adam;
+
+/// Where a training stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpoint {
+    /// Hash of recipe, prior and data.
+    pub identity: String,
+    /// The network's parameters.
+    pub network: Vec<f32>,
+    /// The prior's coordinates.
+    pub coordinates: Vec<f64>,
+    /// The optimiser.
+    pub adam: Adam,
+    /// λ of eq. (24).
+    pub lambda: f64,
+    /// Updates made.
+    pub update: u64,
+}
+
+/// Why a checkpoint cannot be used or written.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// The file cannot be read or written.
+    #[error("cannot {doing} {path}: {why}; check that its folder exists, can be written to and has room", path = path.display())]
+    File {
+        /// What was being done.
+        doing: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        why: std::io::Error,
+    },
+    /// It is no checkpoint.
+    #[error("{path} is no checkpoint of this program: {why}; remove it to begin anew", path = path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
+    /// It is one of another training.
+    #[error(
+        "the checkpoint is of a training with other options, another prior or other flights; give the same ones, or another --out"
+    )]
+    Other,
+}
+
+/// The numbers of a checkpoint that are no tensors, as the one entry of the metadata.
+#[derive(Serialize, Deserialize)]
+struct Said {
+    schema: String,
+    identity: String,
+    /// Bits of λ, so that nothing is lost in print.
+    lambda_bits: u64,
+    update: u64,
+    adam_steps: u64,
+}
+
+const SCHEMA: &str = "greylag.checkpoint/1";
+const METADATA: &str = "greylag";
+
+impl Checkpoint {
+    /// Whether it is of the training `identity` with so many parameters, `coordinates` of the prior's
+    /// among them.
+    ///
+    /// # Errors
+    /// If it is not.
+    pub fn fits(
+        &self,
+        identity: &str,
+        parameters: usize,
+        coordinates: usize,
+    ) -> Result<(), CheckpointError> {
+        let fits = self.identity == identity
+            && self.coordinates.len() == coordinates
+            && self.network.len() + coordinates == parameters
+            && self.adam.mean.len() == parameters
+            && self.adam.square.len() == parameters;
+        if fits { Ok(()) } else { Err(CheckpointError::Other) }
+    }
+
+    /// Writes it in place of any file at `path`; a reader sees the old one or the new one.
+    ///
+    /// # Errors
+    /// If the disk refuses.
+    pub fn save(&self, path: &Path) -> Result<(), CheckpointError> {
+        let bytes =
+            self.to_bytes().map_err(|why| CheckpointError::Content { path: path.into(), why })?;
+        write_whole(path, &bytes).map_err(|why| CheckpointError::File {
+            doing: "write",
+            path: path.into(),
+            why,
+        })
+    }
+
+    /// Reads one.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is none.
+    pub fn load(path: &Path) -> Result<Checkpoint, CheckpointError> {
+        let bytes = std::fs::read(path).map_err(|why| CheckpointError::File {
+            doing: "read",
+            path: path.into(),
+            why,
+        })?;
+        from_bytes(&bytes).map_err(|why| CheckpointError::Content { path: path.into(), why })
+    }
+
+    fn to_bytes(&self) -> Result<Vec<u8>, String> {
+        let double = |list: &[f64]| list.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+        let single: Vec<u8> = self.network.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let parts = [
+            ("network", Dtype::F32, self.network.len(), single),
+            ("coordinates", Dtype::F64, self.coordinates.len(), double(&self.coordinates)),
+            ("adam.mean", Dtype::F64, self.adam.mean.len(), double(&self.adam.mean)),
+            ("adam.square", Dtype::F64, self.adam.square.len(), double(&self.adam.square)),
+        ];
+        let views = parts
+            .iter()
+            .map(|(name, kind, count, bytes)| {
+                TensorView::new(*kind, vec![*count], bytes).map(|view| (*name, view))
+            })
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|e| e.to_string())?;
+        let said = Said {
+            schema: SCHEMA.into(),
+            identity: self.identity.clone(),
+            lambda_bits: self.lambda.to_bits(),
+            update: self.update,
+            adam_steps: self.adam.steps,
+        };
+        let said = serde_json::to_string(&said).map_err(|e| e.to_string())?;
+        let metadata = HashMap::from([(METADATA.to_owned(), said)]);
+        safetensors::serialize(views, Some(metadata)).map_err(|e| e.to_string())
+    }
+}
+
+fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
+    let said = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let said: Said = serde_json::from_str(said.ok_or("it has no metadata of ours")?)
+        .map_err(|e| e.to_string())?;
+    if said.schema != SCHEMA {
+        return Err(format!("its schema is {:?}, this program reads {SCHEMA}", said.schema));
+    }
+    let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
+    let part = |name: &str, kind: Dtype| match tensors.tensor(name) {
+        Ok(t) if t.dtype() == kind => Ok(t.data().to_vec()),
+        _ => Err(format!("it has no {name} of {kind:?}")),
+    };
+    let double = |name: &str| -> Result<Vec<f64>, String> {
+        let bytes = part(name, Dtype::F64)?;
+        Ok(bytes
+            .chunks_exact(8)
+            .filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?)))
+            .collect())
+    };
+    let network = part("network", Dtype::F32)?;
+    Ok(Checkpoint {
+        identity: said.identity,
+        network: network
+            .chunks_exact(4)
+            .filter_map(|b| Some(f32::from_le_bytes(b.try_into().ok()?)))
+            .collect(),
+        coordinates: double("coordinates")?,
+        adam: Adam {
+            mean: double("adam.mean")?,
+            square: double("adam.square")?,
+            steps: said.adam_steps,
+        },
+        lambda: f64::from_bits(said.lambda_bits),
+        update: said.update,
+    })
+}
+
+/// Writes a whole file beside `path`, then puts it in its place.
+pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".greylag-").suffix(".part");
+    // a temporary file is private by default; a model is as readable as the umask lets it be
+    #[cfg(unix)]
+    let everyone: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+    #[cfg(unix)]
+    builder.permissions(everyone);
+    let mut file = builder.tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|e| e.error)?;
+    Ok(())
+}

@@ -1,0 +1,113 @@
+//! The recipe of a training: what is minimised, over what, how long.
+
+use serde::{Deserialize, Serialize};
+
+use crate::learn::loss::Penalty;
+use crate::model::GreyBox;
+
+/// Whose loss is minimised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Criterion {
+    /// \[GSFM26\]: scaled by x_c, divided by the bare prior's error, ‖F_a‖/‖F_p‖ kept small.
+    Scaled,
+    /// APHYNITY's and PhIHP's: x_c = 1, not divided, ‖F_a‖ kept small. PhIHP leaves the prior frozen.
+    Plain,
+}
+
+impl Criterion {
+    /// The scale of errors and rates.
+    pub fn scale(self, model: &GreyBox) -> [f64; 8] {
+        match self {
+            Criterion::Scaled => model.scale(),
+            Criterion::Plain => [1.0; 8],
+        }
+    }
+
+    /// How the residual is kept small.
+    pub fn penalty(self) -> Penalty {
+        match self {
+            Criterion::Scaled => Penalty::Ratio,
+            Criterion::Plain => Penalty::Absolute,
+        }
+    }
+}
+
+/// Everything that decides what a training gives, but for data and prior.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    /// Units of the hidden layers of the residual.
+    pub hidden: Vec<usize>,
+    /// Lengths of the rollouts n, in steps: equal shares of the updates have each in turn.
+    pub steps: Vec<usize>,
+    /// Rollouts in a minibatch.
+    pub batch: usize,
+    /// Updates in all.
+    pub updates: u64,
+    /// Learning rate at the start; it falls as a cosine.
+    pub rate: f64,
+    /// Part of it that is left at the end.
+    pub rate_end: f64,
+    /// λ0 of eq. (24).
+    pub lambda: f64,
+    /// τ of eq. (24), by which λ grows an update.
+    pub tau: f64,
+    /// Whose loss.
+    pub criterion: Criterion,
+    /// Full names of the prior's coefficients that are trained; none for a frozen prior.
+    pub trainable: Vec<String>,
+    /// Seed of the network's start and of the minibatches.
+    pub seed: u64,
+}
+
+impl Default for Recipe {
+    fn default() -> Self {
+        Recipe {
+            hidden: vec![64, 64],
+            steps: vec![20],
+            batch: 64,
+            updates: 20_000,
+            rate: 1e-3,
+            rate_end: 0.01,
+            lambda: 1.0,
+            tau: 1.0,
+            criterion: Criterion::Scaled,
+            trainable: Vec::new(),
+            seed: 1,
+        }
+    }
+}
+
+impl Recipe {
+    /// What is wrong with it, if anything is.
+    pub fn fault(&self) -> Option<&'static str> {
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        if self.steps.is_empty() || self.steps.iter().any(|n| !(1..=500).contains(n)) {
+            return Some("rollouts must have 1 to 500 steps");
+        }
+        if !(1..=65_536).contains(&self.batch) || self.updates == 0 {
+            return Some("a minibatch must have 1 to 65536 rollouts, and there must be an update");
+        }
+        if !positive(self.rate) || !positive(self.rate_end) || !positive(self.lambda) {
+            return Some("learning rates and lambda must be positive");
+        }
+        if !(self.tau.is_finite() && self.tau >= 0.0) {
+            return Some("tau must not be negative");
+        }
+        None
+    }
+
+    /// The rollouts' length at an update.
+    pub fn steps_at(&self, update: u64) -> usize {
+        let place = update as u128 * self.steps.len() as u128 / u128::from(self.updates.max(1));
+        self.steps[(place as usize).min(self.steps.len() - 1)]
+    }
+
+    /// The learning rate at an update.
+    pub fn rate_at(&self, update: u64) -> f64 {
+        let done = update as f64 / self.updates as f64;
+        let cosine = 0.5 * (1.0 + (std::f64::consts::PI * done).cos());
+        self.rate * (self.rate_end + (1.0 - self.rate_end) * cosine)
+    }
+}

@@ -1,0 +1,343 @@
+//! The residual F_a(s, z; θ_a): a small network that adds what the prior lacks, eq. (19) of \[GSFM26\].
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use safetensors::SafeTensorError;
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::num::dense::DenseError;
+use crate::num::{Dense, Real};
+use crate::physics::{Airframe, Controls, State};
+
+/// Inputs of the network: V, p, q, r, α, β, then δa, δe, δt.
+///
+/// Roll and pitch are left out on purpose: attitude acts on the aircraft through gravity alone,
+/// which the prior has exactly, so that what is learned in one attitude holds in every other.
+pub const INPUTS: usize = 9;
+
+/// Outputs of the network: the rates of the state, in units of x_c a second.
+pub const OUTPUTS: usize = 8;
+
+/// The entry of the file's metadata that holds an [`Origin`] as JSON.
+const METADATA: &str = "greylag";
+
+/// A learned addition to the rates of a model's state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Residual {
+    network: Arc<Dense>,
+    scales: Scales,
+}
+
+/// Fixed scales of the network's inputs and outputs, from the airframe and not from data: inputs of
+/// order one over the envelope, outputs in x_c of eq. (21).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scales {
+    /// What is taken off each input.
+    pub offset: [f64; INPUTS],
+    /// What each input is multiplied with thereafter.
+    pub factor: [f64; INPUTS],
+    /// What each output is multiplied with: x_c.
+    pub output: [f64; OUTPUTS],
+}
+
+/// What a residual's file says of where it comes from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Origin {
+    /// Layout of the file: [`Origin::SCHEMA`].
+    pub schema: String,
+    /// Fingerprint of the airframe that it belongs to, see [`fingerprint`].
+    pub airframe: String,
+    /// SHA-256 of the training data, hexadecimal.
+    pub data: String,
+    /// Seed of the training.
+    pub seed: u64,
+    /// The program that trained it, with its version.
+    pub program: String,
+}
+
+/// Why a residual cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ResidualError {
+    /// The file cannot be read.
+    #[error("cannot read residual {path}: {why}; a model folder holds model.toml and residual.safetensors", path = path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        why: std::io::Error,
+    },
+    /// The file is no residual.
+    #[error("residual {path}: {why}; train it again with `greylag train dynamics`", path = path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
+    /// It was learned on another aircraft.
+    #[error("residual {path} was learned for another airframe than {airframe}; use the airframe file it came with, or train it again", path = path.display())]
+    Airframe {
+        /// The file.
+        path: PathBuf,
+        /// The airframe's name.
+        airframe: String,
+    },
+    /// The network has other inputs or outputs.
+    #[error("a residual takes a network of {INPUTS} inputs and {OUTPUTS} outputs, not {0:?}")]
+    Shape(Vec<usize>),
+    /// The numbers are no network.
+    #[error(transparent)]
+    Network(#[from] DenseError),
+}
+
+impl Origin {
+    /// The layout that this program reads and writes.
+    pub const SCHEMA: &'static str = "greylag.residual/1";
+}
+
+/// SHA-256 of what a residual depends on in an airframe: name, geometry and actuators.
+pub fn fingerprint(airframe: &Airframe) -> String {
+    hash(format!("{} {:?} {:?}", airframe.name, airframe.geometry, airframe.actuators).as_bytes())
+}
+
+/// SHA-256 in hexadecimal.
+pub fn hash(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+impl Scales {
+    /// The scales of an aircraft: airspeed about V0 by a quarter of it, rates by the part of x_c that
+    /// brisk flight has, angles by 0.2 rad (about the stall), deflections by their stop.
+    pub fn new(airframe: &Airframe, x_c: [f64; OUTPUTS]) -> Scales {
+        let [_, _, v0, p, q, r, _, _] = x_c;
+        let unit = [0.25 * v0, 0.1 * p, 0.02 * q, 0.05 * r, 0.2, 0.2];
+        let stop = airframe.actuators.deflection_max;
+        let mut factor = [1.0 / stop, 1.0 / stop, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        factor.rotate_right(6);
+        factor[..6].copy_from_slice(&unit.map(|u| 1.0 / u));
+        let mut offset = [0.0; INPUTS];
+        (offset[0], offset[8]) = (v0, 0.5);
+        Scales { offset, factor, output: x_c }
+    }
+
+    /// The network's inputs at a point.
+    #[inline(always)]
+    pub fn inputs<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> [R; INPUTS] {
+        let State { airspeed, p, q, r, alpha, beta, .. } = *state;
+        let Controls { aileron, elevator, throttle } = *controls;
+        // plain loops here and in kernels: a closure that is not inlined leaves the vector instructions
+        let mut x = [airspeed, p, q, r, alpha, beta, aileron, elevator, throttle];
+        for (i, x) in x.iter_mut().enumerate() {
+            *x = (*x - R::from_f64(self.offset[i])).scale(self.factor[i]);
+        }
+        x
+    }
+
+    /// Rates from the network's outputs.
+    #[inline(always)]
+    pub fn rate<R: Real>(&self, mut outputs: [R; OUTPUTS]) -> State<R> {
+        for (x, scale) in outputs.iter_mut().zip(&self.output) {
+            *x = x.scale(*scale);
+        }
+        State::from_array(outputs)
+    }
+}
+
+impl Residual {
+    /// A residual of `network` on an aircraft whose reference scale is `x_c`.
+    ///
+    /// # Errors
+    /// If the network has other inputs or outputs.
+    pub fn new(
+        network: Dense,
+        airframe: &Airframe,
+        x_c: [f64; OUTPUTS],
+    ) -> Result<Residual, ResidualError> {
+        let sizes = network.sizes();
+        if (sizes[0], sizes[sizes.len() - 1]) != (INPUTS, OUTPUTS) {
+            return Err(ResidualError::Shape(sizes.into()));
+        }
+        Ok(Residual { network: Arc::new(network), scales: Scales::new(airframe, x_c) })
+    }
+
+    /// The network.
+    pub fn network(&self) -> &Dense {
+        &self.network
+    }
+
+    /// What is added to the rates of the state, units of [`State`] a second.
+    #[inline(always)]
+    pub fn rate<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> State<R> {
+        self.scales.rate(self.network.evaluate(self.scales.inputs(state, controls)))
+    }
+
+    /// The file's content.
+    ///
+    /// # Errors
+    /// What the writer of the format says.
+    pub fn to_bytes(&self, origin: &Origin) -> Result<Vec<u8>, SafeTensorError> {
+        let little = |list: &[f32]| list.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+        let mut tensors = Vec::new();
+        for (k, layer) in self.network.layers().enumerate() {
+            let shape = [self.network.sizes()[k], self.network.sizes()[k + 1]];
+            tensors.push((format!("layers.{k}.weight"), shape.to_vec(), little(layer.weights)));
+            tensors.push((format!("layers.{k}.bias"), vec![shape[1]], little(layer.bias)));
+        }
+        let views = tensors
+            .iter()
+            .map(|(name, shape, bytes)| {
+                Ok((name.as_str(), TensorView::new(Dtype::F32, shape.clone(), bytes)?))
+            })
+            .collect::<Result<Vec<_>, SafeTensorError>>()?;
+        // one entry: the format writes several in no fixed order, and equal models are equal files
+        let said = serde_json::to_string(origin)?;
+        safetensors::serialize(views, Some(HashMap::from([(METADATA.to_owned(), said)])))
+    }
+
+    /// Reads the file of a residual for `airframe`, whose reference scale is `x_c`.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no residual, or one of another airframe.
+    pub fn load(
+        path: &Path,
+        airframe: &Airframe,
+        x_c: [f64; OUTPUTS],
+    ) -> Result<(Residual, Origin), ResidualError> {
+        let bytes =
+            std::fs::read(path).map_err(|why| ResidualError::Read { path: path.into(), why })?;
+        let content = |why: String| ResidualError::Content { path: path.into(), why };
+        let origin = origin(&bytes).map_err(content)?;
+        let network = network(&bytes).map_err(content)?;
+        if origin.airframe != fingerprint(airframe) {
+            let airframe = airframe.name.clone();
+            return Err(ResidualError::Airframe { path: path.into(), airframe });
+        }
+        Ok((Residual::new(network, airframe, x_c)?, origin))
+    }
+}
+
+/// The metadata of a file.
+fn origin(bytes: &[u8]) -> Result<Origin, String> {
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
+    let said = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let said = said.ok_or(format!("its metadata has no entry {METADATA}"))?;
+    let origin: Origin = serde_json::from_str(said).map_err(|e| format!("its metadata: {e}"))?;
+    match origin.schema.as_str() {
+        Origin::SCHEMA => Ok(origin),
+        other => Err(format!("its schema is {other:?}, this program reads {}", Origin::SCHEMA)),
+    }
+}
+
+/// The network of a file: `layers.0.weight`, `layers.0.bias` and so on.
+fn network(bytes: &[u8]) -> Result<Dense, String> {
+    let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
+    let (mut sizes, mut parameters) = (Vec::new(), Vec::new());
+    let layers = tensors.len() / 2;
+    for k in 0..layers {
+        for part in ["weight", "bias"] {
+            let name = format!("layers.{k}.{part}");
+            let tensor = tensors.tensor(&name).map_err(|_| format!("it has no tensor {name}"))?;
+            let outputs = match (part, tensor.shape()) {
+                ("weight", [inputs, outputs]) if sizes.last().is_none_or(|n| n == inputs) => {
+                    if sizes.is_empty() {
+                        sizes.push(*inputs);
+                    }
+                    *outputs
+                }
+                ("bias", [outputs]) if sizes.last() == Some(outputs) => *outputs,
+                (_, shape) => return Err(format!("tensor {name} has the shape {shape:?}")),
+            };
+            if tensor.dtype() != Dtype::F32 {
+                return Err(format!("tensor {name} is {:?}, not F32", tensor.dtype()));
+            }
+            if part == "weight" {
+                sizes.push(outputs);
+            }
+            let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+            parameters.extend(tensor.data().chunks_exact(4).map(number));
+        }
+    }
+    Dense::new(&sizes, parameters).map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::GreyBox;
+    use crate::num::stream;
+    use rand::RngExt;
+
+    fn model() -> GreyBox {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+        GreyBox::load(&folder.join("prior.toml")).unwrap()
+    }
+
+    fn residual(model: &GreyBox) -> Residual {
+        let mut rng = stream::stream(3, &[]);
+        let mut network = Dense::silent(&[INPUTS, 16, OUTPUTS], &mut rng).unwrap();
+        network.parameters_mut().iter_mut().for_each(|p| *p = rng.random_range(-0.3..0.3));
+        Residual::new(network, &model.airframe, model.scale()).unwrap()
+    }
+
+    fn origin_of(model: &GreyBox) -> Origin {
+        Origin {
+            schema: Origin::SCHEMA.into(),
+            airframe: fingerprint(&model.airframe),
+            data: hash(b"flights"),
+            seed: 7,
+            program: "greylag 0".into(),
+        }
+    }
+
+    #[test]
+    fn inputs_are_of_order_one_and_know_no_attitude() {
+        let model = model();
+        let scales = Scales::new(&model.airframe, model.scale());
+        let controls = Controls { aileron: 0.5235, elevator: -0.5235, throttle: 1.0 };
+        let stall = State { airspeed: 1.25 * 16.67, alpha: 0.2, beta: -0.2, ..State::NEUTRAL };
+        let there = scales.inputs(&stall, &controls);
+        for (x, expected) in there.iter().zip([1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0]) {
+            assert!((x - expected).abs() < 1e-12, "{there:?}");
+        }
+        assert_eq!(scales.inputs(&State { roll: 1.0, pitch: -1.0, ..stall }, &controls), there);
+    }
+
+    #[test]
+    fn files_give_the_same_residual_back_and_equal_ones_are_equal() {
+        let model = model();
+        let (residual, origin) = (residual(&model), origin_of(&model));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("residual.safetensors");
+        let bytes = residual.to_bytes(&origin).unwrap();
+        assert_eq!(bytes, residual.to_bytes(&origin).unwrap());
+        std::fs::write(&path, bytes).unwrap();
+        let (read, said) = Residual::load(&path, &model.airframe, model.scale()).unwrap();
+        assert_eq!((read, said), (residual, origin));
+    }
+
+    #[test]
+    fn files_of_another_airframe_or_cut_short_are_refused() {
+        let model = model();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("residual.safetensors");
+        let load = || Residual::load(&path, &model.airframe, model.scale());
+        assert!(matches!(load(), Err(ResidualError::Read { .. })));
+        let bytes = residual(&model).to_bytes(&origin_of(&model)).unwrap();
+        let foreign = Origin { airframe: hash(b"another"), ..origin_of(&model) };
+        std::fs::write(&path, residual(&model).to_bytes(&foreign).unwrap()).unwrap();
+        assert!(matches!(load(), Err(ResidualError::Airframe { .. })));
+        for length in (0..bytes.len()).step_by(97) {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert!(matches!(load(), Err(ResidualError::Content { .. })), "{length} bytes");
+        }
+        let newer = Origin { schema: "greylag.residual/2".into(), ..origin_of(&model) };
+        std::fs::write(&path, residual(&model).to_bytes(&newer).unwrap()).unwrap();
+        let said = load().unwrap_err().to_string();
+        assert!(said.contains("greylag.residual/2") && said.contains("train it again"), "{said}");
+    }
+}

@@ -1,0 +1,273 @@
+//! Dense networks with rectified linear units, evaluated over any [`Real`].
+
+use rand::Rng;
+use rand::RngExt;
+
+use super::Real;
+
+/// The widest layer that an evaluation has room for.
+pub const WIDEST: usize = 128;
+
+/// Outputs that are summed side by side, in registers.
+const BLOCK: usize = 16;
+
+/// A dense network: affine layers with max(0, ·) between them, none after the last.
+///
+/// All parameters lie in one list, layer after layer: the weights, `[in, out]` as the crate burn
+/// stores them, then the biases.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dense {
+    sizes: Vec<usize>,
+    parameters: Vec<f32>,
+}
+
+/// One affine layer, y = x W + b.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer<'a> {
+    /// W, `[in, out]`: the weights of one input lie together.
+    pub weights: &'a [f32],
+    /// b.
+    pub bias: &'a [f32],
+}
+
+/// Why numbers do not make a network.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DenseError {
+    /// Its layers cannot be evaluated.
+    #[error(
+        "a network of layers {0:?} cannot be used: it takes two or more, each of 1 to {WIDEST}"
+    )]
+    Sizes(Vec<usize>),
+    /// The list of parameters has another length.
+    #[error("a network of layers {sizes:?} has {expected} parameters, not {found}")]
+    Count {
+        /// The layers.
+        sizes: Vec<usize>,
+        /// Parameters it takes.
+        expected: usize,
+        /// Parameters given.
+        found: usize,
+    },
+    /// A parameter is no number.
+    #[error("parameter {0} of a network is not a finite number")]
+    NotFinite(usize),
+}
+
+/// Parameters of a network of layers `sizes`.
+fn count(sizes: &[usize]) -> usize {
+    sizes.windows(2).map(|s| (s[0] + 1) * s[1]).sum()
+}
+
+impl Dense {
+    /// A network of layers `sizes` (inputs first) with these parameters.
+    ///
+    /// # Errors
+    /// If they do not fit, or one is not finite.
+    pub fn new(sizes: &[usize], parameters: Vec<f32>) -> Result<Self, DenseError> {
+        let fits = |n: &usize| (1..=WIDEST).contains(n);
+        if sizes.len() < 2 || !sizes.iter().all(fits) {
+            return Err(DenseError::Sizes(sizes.into()));
+        }
+        let (expected, found) = (count(sizes), parameters.len());
+        if expected != found {
+            return Err(DenseError::Count { sizes: sizes.into(), expected, found });
+        }
+        match parameters.iter().position(|p| !p.is_finite()) {
+            Some(place) => Err(DenseError::NotFinite(place)),
+            None => Ok(Dense { sizes: sizes.into(), parameters }),
+        }
+    }
+
+    /// A network that answers zero to everything: hidden layers uniform in ±1/√in, as burn and
+    /// PyTorch start them, the last layer zero.
+    ///
+    /// # Errors
+    /// If `sizes` cannot be evaluated.
+    pub fn silent(sizes: &[usize], rng: &mut impl Rng) -> Result<Self, DenseError> {
+        let mut parameters = Vec::new();
+        for (k, s) in sizes.windows(2).enumerate() {
+            let bound = if k + 2 == sizes.len() { 0.0 } else { 1.0 / (s[0].max(1) as f64).sqrt() };
+            let draw = |_| (bound * rng.random_range(-1.0..1.0)) as f32;
+            parameters.extend((0..(s[0] + 1) * s[1]).map(draw));
+        }
+        Dense::new(sizes, parameters)
+    }
+
+    /// Units of each layer, inputs first.
+    pub fn sizes(&self) -> &[usize] {
+        &self.sizes
+    }
+
+    /// All parameters.
+    pub fn parameters(&self) -> &[f32] {
+        &self.parameters
+    }
+
+    /// All parameters, to be changed. Whoever writes keeps them finite.
+    pub fn parameters_mut(&mut self) -> &mut [f32] {
+        &mut self.parameters
+    }
+
+    /// The layers in order.
+    #[inline(always)]
+    pub fn layers(&self) -> impl Iterator<Item = Layer<'_>> {
+        let mut rest = &self.parameters[..];
+        self.sizes.windows(2).map(move |s| {
+            let (weights, after) = rest.split_at(s[0] * s[1]);
+            let (bias, after) = after.split_at(s[1]);
+            rest = after;
+            Layer { weights, bias }
+        })
+    }
+
+    /// The network's answer.
+    ///
+    /// # Panics
+    /// If the network has not `IN` inputs and `OUT` outputs.
+    #[inline(always)]
+    pub fn evaluate<R: Real, const IN: usize, const OUT: usize>(&self, input: [R; IN]) -> [R; OUT] {
+        let mut from = [R::zero(); WIDEST];
+        let mut to = [R::zero(); WIDEST];
+        from[..IN].copy_from_slice(&input);
+        let last = self.sizes.len() - 2;
+        for (k, layer) in self.layers().enumerate() {
+            let (inputs, outputs) = (self.sizes[k], self.sizes[k + 1]);
+            layer.apply(&from[..inputs], &mut to[..outputs]);
+            if k < last {
+                rectify(&mut to[..outputs]);
+            }
+            std::mem::swap(&mut from, &mut to);
+        }
+        let mut answer = [R::zero(); OUT];
+        answer.copy_from_slice(&from[..OUT]);
+        answer
+    }
+}
+
+impl Layer<'_> {
+    /// y = x W + b.
+    #[inline(always)]
+    pub fn apply<R: Real>(&self, input: &[R], output: &mut [R]) {
+        let mut first = 0;
+        while first + BLOCK <= output.len() {
+            self.columns::<R, BLOCK>(first, input, output);
+            first += BLOCK;
+        }
+        while first + BLOCK / 2 <= output.len() {
+            self.columns::<R, { BLOCK / 2 }>(first, input, output);
+            first += BLOCK / 2;
+        }
+        while first < output.len() {
+            self.columns::<R, 1>(first, input, output);
+            first += 1;
+        }
+    }
+
+    /// `B` outputs from `first` on.
+    #[inline(always)]
+    fn columns<R: Real, const B: usize>(&self, first: usize, input: &[R], output: &mut [R]) {
+        let outputs = output.len();
+        let mut sum = [R::zero(); B];
+        for (sum, bias) in sum.iter_mut().zip(&self.bias[first..first + B]) {
+            *sum = R::from_f64((*bias).into());
+        }
+        for (x, row) in input.iter().zip(self.weights.chunks_exact(outputs)) {
+            let row = &row[first..first + B];
+            for j in 0..B {
+                sum[j] = x.mul_add(R::from_f64(row[j].into()), sum[j]);
+            }
+        }
+        output[first..first + B].copy_from_slice(&sum);
+    }
+}
+
+/// max(0, ·) of every unit.
+#[inline(always)]
+pub fn rectify<R: Real>(units: &mut [R]) {
+    for unit in units {
+        *unit = unit.max(R::zero());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::{Dual, Lanes, stream};
+
+    /// A network none of whose layers is a multiple of the block.
+    fn network() -> Dense {
+        let mut network = Dense::silent(&[3, 21, 9, 2], &mut stream::stream(5, &[])).unwrap();
+        let mut rng = stream::stream(6, &[]);
+        let last = network.parameters().len() - 20;
+        network.parameters_mut()[last..].iter_mut().for_each(|p| *p = rng.random_range(-1.0..1.0));
+        network
+    }
+
+    /// The definition, written out.
+    fn by_hand(network: &Dense, input: [f64; 3]) -> Vec<f64> {
+        let mut x = input.to_vec();
+        let last = network.sizes().len() - 2;
+        for (k, layer) in network.layers().enumerate() {
+            let outputs = layer.bias.len();
+            x = (0..outputs)
+                .map(|j| {
+                    let sum: f64 = (0..x.len())
+                        .map(|i| x[i] * f64::from(layer.weights[i * outputs + j]))
+                        .sum();
+                    let y = sum + f64::from(layer.bias[j]);
+                    if k < last { y.max(0.0) } else { y }
+                })
+                .collect();
+        }
+        x
+    }
+
+    #[test]
+    fn answers_are_the_definition_over_every_scalar() {
+        let network = network();
+        for k in 0..20 {
+            let x = [0, 1, 2].map(|i| ((7 * k + i) as f64).sin());
+            let expected = by_hand(&network, x);
+            let plain: [f64; 2] = network.evaluate(x);
+            let lanes: [Lanes<4>; 2] = network.evaluate(x.map(Lanes::from_f64));
+            let fused: [Lanes<4, true>; 2] = network.evaluate(x.map(Lanes::from_f64));
+            for i in 0..2 {
+                // rounding of sums of 21 terms of order one
+                assert!((plain[i] - expected[i]).abs() < 1e-14);
+                for lane in [lanes[i].0[3], fused[i].0[0]] {
+                    assert!((f64::from(lane) - expected[i]).abs() < 3e-6);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_agree_with_central_differences() {
+        let network = network();
+        let x = [0.3, -0.8, 0.5];
+        let dual: [Dual<3>; 2] = network.evaluate([0, 1, 2].map(|i| Dual::variable(x[i], i)));
+        for (i, _) in x.iter().enumerate() {
+            let moved = |h: f64| {
+                let mut x = x;
+                x[i] += h;
+                network.evaluate::<f64, 3, 2>(x)
+            };
+            let (up, down) = (moved(1e-6), moved(-1e-6));
+            for o in 0..2 {
+                // piecewise linear: the difference quotient errs by rounding only
+                assert!((dual[o].gradient[i] - (up[o] - down[o]) / 2e-6).abs() < 1e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn starts_silent_and_refuses_what_does_not_fit() {
+        let network = Dense::silent(&[9, 64, 64, 8], &mut stream::stream(1, &[])).unwrap();
+        assert_eq!(network.evaluate([0.7_f64; 9]), [0.0_f64; 8]);
+        assert!(network.parameters()[..9 * 64].iter().all(|w| w.abs() <= 1.0 / 3.0 && *w != 0.0));
+        assert!(matches!(Dense::new(&[2, 1], vec![0.0; 2]), Err(DenseError::Count { .. })));
+        assert!(matches!(Dense::new(&[2], vec![]), Err(DenseError::Sizes(_))));
+        assert!(matches!(Dense::new(&[2, 129], vec![0.0; 387]), Err(DenseError::Sizes(_))));
+        assert_eq!(Dense::new(&[1, 1], vec![1.0, f32::NAN]), Err(DenseError::NotFinite(1)));
+    }
+}

@@ -1,0 +1,135 @@
+//! Training on flights imagined in a known model: what is missing is found, and found again.
+#![cfg(feature = "learn")]
+
+mod learn_support;
+
+use greylag::learn::score::free_run;
+use greylag::learn::windows::Track;
+use greylag::learn::{Checkpoint, Criterion, JXZ, Recipe, TrainError, Trainer, export};
+use greylag::model::{GreyBox, Integrator};
+use learn_support::{flight, model};
+
+fn recipe(updates: u64) -> Recipe {
+    Recipe { hidden: vec![16], steps: vec![4, 8], batch: 32, updates, ..Recipe::default() }
+}
+
+fn tracks(truth: &GreyBox, prior: &GreyBox) -> Vec<Track> {
+    (0..6).map(|seed| flight(truth, prior, seed, 300)).collect()
+}
+
+/// The coefficients of the severe prior come back when the flights are those of the true one.
+#[test]
+fn wrong_coefficients_are_found() {
+    let (truth, prior) = (model("prior"), model("prior-severe"));
+    let names = ["roll_linear.Clda", "roll_linear.Clp", "lift_linear.CLde", "drag_linear.CD0"]
+        .map(String::from);
+    let changed: Vec<String> = truth
+        .coefficients()
+        .iter()
+        .zip(prior.coefficients())
+        .filter(|(t, p)| t.value != p.value)
+        .map(|(t, _)| t.name.clone())
+        .collect();
+    assert!(names.iter().all(|n| changed.contains(n)));
+    let recipe = Recipe { trainable: changed, rate: 1e-2, ..recipe(1500) };
+    let mut trainer = Trainer::new(recipe, &prior, tracks(&truth, &prior)).unwrap();
+    assert!(trainer.unseen().is_empty());
+    let first = trainer.run(1).unwrap();
+    // the residual starts at zero, so the first minibatch is off as the bare prior is
+    assert!(first.loss.learned == 0.0 && (0.2..5.0).contains(&first.normalised), "{first:?}");
+    let last = trainer.run(1500).unwrap();
+    println!("{last:?}");
+    for (name, before, now) in trainer.coefficients() {
+        let value = truth.coefficients().iter().find(|c| c.name == name).unwrap().value;
+        println!("{name}: {before} -> {now}, true {value}");
+        // nothing else is wrong: what is left is the residual's share
+        assert!((now / value - 1.0).abs() < 0.02, "{name}");
+    }
+}
+
+/// What a frozen prior lacks is learned by the residual, and the model files carry it.
+#[test]
+fn what_is_missing_goes_into_the_residual_and_into_the_files() {
+    let truth = model("jsbsim");
+    for integrator in [Integrator::Rk4, Integrator::Jsbsim] {
+        let mut prior = model("prior");
+        prior.integrator = integrator;
+        let mut truth = truth.clone();
+        truth.integrator = integrator;
+        let held_out = [flight(&truth, &prior, 100, 600)];
+        let recipe = Recipe { rate: 3e-3, ..recipe(3000) };
+        let mut trainer = Trainer::new(recipe, &prior, tracks(&truth, &prior)).unwrap();
+        trainer.run(3000).unwrap();
+        let learned = trainer.model().unwrap();
+        let [before, after] = [&prior, &learned].map(|m| free_run(m, &held_out, &[1, 50]));
+        println!("{integrator:?}: {before:?} {after:?}");
+        // a small network in a few seconds: half the error, over 50 steps too
+        assert!(after[0].rms < 0.5 * before[0].rms && after[1].rms < 0.5 * before[1].rms);
+
+        let folder = tempfile::tempdir().unwrap();
+        let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior.toml");
+        let origin = export::origin(&learned, trainer.data(), 1);
+        export::save(&learned, &source, &[], &origin, folder.path()).unwrap();
+        let read = GreyBox::load(&folder.path().join(export::MODEL)).unwrap();
+        assert_eq!(read.residual, learned.residual);
+        assert_eq!(free_run(&read, &held_out, &[50]), free_run(&learned, &held_out, &[50]));
+        std::fs::remove_file(folder.path().join(export::RESIDUAL)).unwrap();
+        let said = GreyBox::load(&folder.path().join(export::MODEL)).unwrap_err().to_string();
+        assert!(said.contains("residual.safetensors"), "{said}");
+    }
+}
+
+/// A training that was interrupted and went on ends where one that was not does, to the bit.
+#[test]
+fn an_interrupted_training_ends_the_same_to_the_bit() {
+    let (truth, prior) = (model("jsbsim"), model("prior-mild"));
+    let recipe =
+        Recipe { trainable: vec!["roll_linear.Clda".into(), JXZ.into()], batch: 48, ..recipe(90) };
+    let new = || Trainer::new(recipe.clone(), &prior, tracks(&truth, &prior)).unwrap();
+    let mut whole = new();
+    whole.run(1000).unwrap();
+    assert!(whole.is_done());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint.safetensors");
+    // in the first length of rollouts, at its end, in the second
+    for stop in [7, 45, 77] {
+        let mut first = new();
+        first.run(stop).unwrap();
+        first.checkpoint().save(&path).unwrap();
+        let mut second = new();
+        second.resume(Checkpoint::load(&path).unwrap()).unwrap();
+        second.run(1000).unwrap();
+        assert_eq!(second.checkpoint(), whole.checkpoint(), "after {stop} updates");
+    }
+    // a checkpoint of another training is refused
+    let other = Recipe { seed: 2, ..recipe.clone() };
+    let mut other = Trainer::new(other, &prior, tracks(&truth, &prior)).unwrap();
+    let refused = other.resume(Checkpoint::load(&path).unwrap());
+    assert!(matches!(refused, Err(TrainError::Checkpoint(_))));
+    std::fs::write(&path, b"half a file").unwrap();
+    assert!(Checkpoint::load(&path).is_err());
+}
+
+#[test]
+fn what_cannot_be_trained_is_said_by_name() {
+    let (truth, prior) = (model("prior"), model("prior"));
+    let tracks = tracks(&truth, &prior);
+    let names = |name: &str| Recipe { trainable: vec![name.into()], ..recipe(10) };
+    let said = |recipe: Recipe, prior: &GreyBox, tracks: &[Track]| {
+        Trainer::new(recipe, prior, tracks.to_vec()).err().map(|e| e.to_string()).unwrap()
+    };
+    assert!(said(names("roll_linear.Clwrong"), &prior, &tracks).contains("Clwrong"));
+    let short = [Track { states: tracks[0].states[..5].to_vec(), ..tracks[0].clone() }];
+    assert!(said(recipe(10), &prior, &short).contains("samples"));
+    let mut shifted = prior.clone();
+    shifted.join("cg_shift", &[0.01]).unwrap();
+    assert!(said(recipe(10), &shifted, &tracks).contains("cg_shift"));
+    // an elevator that never moves leaves its own coefficients in the dark
+    let mut still = tracks;
+    still.iter_mut().for_each(|t| t.controls.iter_mut().for_each(|c| c.elevator = 0.0));
+    let trainer = Trainer::new(names("pitch_linear.Cmde"), &prior, still).unwrap();
+    assert_eq!(trainer.unseen(), ["pitch_linear.Cmde"]);
+    assert_eq!(trainer.coefficients()[0].1, trainer.coefficients()[0].2);
+    let plain = Recipe { criterion: Criterion::Plain, tau: -1.0, ..recipe(10) };
+    assert!(said(plain, &prior, &short).contains("tau"));
+}
