@@ -4,9 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use greylag::learn::windows::{Track, windows};
-use greylag::learn::{
-    Arithmetic, Engine, Instructions, Objective, Passes, Penalty, PriorSlopes, Subject,
-};
+use greylag::learn::{Arithmetic, Engine, Objective, Passes, Penalty, PriorSlopes, Subject};
 use greylag::model::residual::Scales;
 use greylag::model::{GreyBox, Integrator, Twin};
 use greylag::num::{Dense, stream};
@@ -47,7 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             };
             let objective =
                 Objective { scale: prior.scale(), penalty: Penalty::Ratio, unit: 1.0, lambda: 1.0 };
-            let arithmetic = Arithmetic::Lanes(Instructions::detect());
+            let arithmetic = Arithmetic::Lanes;
             let mut engine = Engine::new(&subject, BATCH, STEPS, arithmetic);
             let mut best = [f64::MAX; 2];
             for _ in 0..200 {
@@ -59,8 +57,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 best[1] = best[1].min(start.elapsed().as_secs_f64());
             }
             println!(
-                "{integrator:?}, prior {prior_slopes:?}, {:?}: forward {:.2} ms, step {:.2} ms",
-                Instructions::detect(),
+                "{integrator:?}, prior {prior_slopes:?}: forward {:.2} ms, step {:.2} ms",
                 1e3 * best[0],
                 1e3 * best[1]
             );

@@ -5,7 +5,7 @@ mod learn_support;
 
 use greylag::learn::windows::{Track, Window};
 use greylag::learn::{
-    Arithmetic, Engine, Gradient, Instructions, Objective, Passes, Penalty, PriorSlopes, Subject,
+    Arithmetic, Engine, Gradient, Objective, Passes, Penalty, PriorSlopes, Subject,
 };
 use greylag::model::residual::Scales;
 use greylag::model::{GreyBox, Integrator};
@@ -132,7 +132,7 @@ fn gradient_of_rollouts_in_the_simulators_scheme_is_that_of_central_differences(
     against_differences(Integrator::Jsbsim, Penalty::Absolute);
 }
 
-/// The gradient in lanes is that in f64, to single precision, in every instruction set.
+/// The gradient in lanes is that in f64, to single precision.
 #[test]
 fn lanes_agree_with_double_precision() {
     for integrator in [Integrator::Rk4, Integrator::Jsbsim] {
@@ -142,23 +142,16 @@ fn lanes_agree_with_double_precision() {
             gradient(&prior, network(16, 0.3), &objective, &tracks, &windows, arithmetic)
         };
         let (exact, expected) = run(Arithmetic::Double);
-        let mut sets = vec![Instructions::detect()];
-        #[cfg(target_arch = "x86_64")]
-        if Instructions::detect() == Instructions::Avx512 {
-            sets.push(Instructions::Avx2);
-        }
-        for set in sets {
-            let (loss, found) = run(Arithmetic::Lanes(set));
-            assert!((loss / exact - 1.0).abs() < 1e-4, "{set:?}: {loss} {exact}");
-            // single precision through 7 steps, against the largest slope of the group
-            let apart = |a: &[f64], b: &[f64]| {
-                let size = b.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-                a.iter().zip(b).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) / size
-            };
-            let errors =
-                [apart(&found.network, &expected.network), apart(&found.prior, &expected.prior)];
-            println!("{integrator:?}, {set:?}: network {:.1e}, prior {:.1e}", errors[0], errors[1]);
-            assert!(errors.iter().all(|e| *e < 1e-4));
-        }
+        let (loss, found) = run(Arithmetic::Lanes);
+        assert!((loss / exact - 1.0).abs() < 1e-4, "{loss} {exact}");
+        // single precision through 7 steps, against the largest slope of the group
+        let apart = |a: &[f64], b: &[f64]| {
+            let size = b.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            a.iter().zip(b).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) / size
+        };
+        let errors =
+            [apart(&found.network, &expected.network), apart(&found.prior, &expected.prior)];
+        println!("{integrator:?}: network {:.1e}, prior {:.1e}", errors[0], errors[1]);
+        assert!(errors.iter().all(|e| *e < 1e-4));
     }
 }

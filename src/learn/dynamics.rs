@@ -6,7 +6,6 @@ use crate::learn::adam::Adam;
 use crate::learn::basis::{self, Basis, TrainableError};
 use crate::learn::checkpoint::{Checkpoint, CheckpointError};
 use crate::learn::engine::{Arithmetic, Engine};
-use crate::learn::kernel::Instructions;
 use crate::learn::loss::{Loss, Objective};
 use crate::learn::network::Passes;
 use crate::learn::recipe::{Criterion, Recipe};
@@ -132,7 +131,7 @@ impl Trainer {
             prior_slopes: if basis.is_empty() { PriorSlopes::None } else { PriorSlopes::All },
         };
         let longest = recipe.steps.iter().copied().max().unwrap_or(1);
-        let arithmetic = Arithmetic::Lanes(Instructions::detect());
+        let arithmetic = Arithmetic::Lanes;
         let engine = Engine::new(&subject, recipe.batch, longest, arithmetic);
         let count = subject.network.network().parameters().len();
         let stage = Stage::new(&subject, &recipe, &tracks, recipe.steps_at(0))?;
@@ -341,7 +340,7 @@ impl Stage {
         }
         let some: Vec<Window> =
             all.iter().step_by(all.len().div_ceil(PRIOR_WINDOWS)).copied().collect();
-        let arithmetic = Arithmetic::Lanes(Instructions::detect());
+        let arithmetic = Arithmetic::Lanes;
         let mut engine = Engine::new(bare, some.len(), steps, arithmetic);
         let objective = Objective {
             scale: recipe.criterion.scale(&bare.prior),

@@ -1,18 +1,16 @@
 //! The engine: minibatches in the precision asked for, in the widest vectors there are.
 
-use crate::learn::kernel::Instructions;
+use crate::learn::kernel::{Double, Vectors, vectors};
 use crate::learn::loss::{Loss, Minibatch, Objective};
-use crate::learn::packet::WIDTH;
 use crate::learn::rollout::{Gradient, Subject};
 use crate::learn::windows::{Track, Window};
-use crate::num::Lanes;
 
 /// What an engine computes in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
-    /// Blocks of single-precision lanes in these instructions. Where no multiply-add is fused (x86 from
-    /// before 2013) it is [`Double`](Arithmetic::Double).
-    Lanes(Instructions),
+    /// Blocks of single-precision lanes. Where no multiply-add is fused (x86 from before 2013) it is
+    /// [`Double`](Arithmetic::Double).
+    Lanes,
     /// One rollout at a time in double precision: slow, for tests.
     Double,
 }
@@ -23,18 +21,18 @@ pub struct Engine(Kind);
 
 #[derive(Clone, Debug)]
 enum Kind {
-    Fused(Minibatch<Lanes<WIDTH, true>>),
-    Double(Minibatch<f64>),
+    Lanes(Minibatch<Vectors>),
+    Double(Minibatch<Double>),
 }
 
 impl Engine {
     /// An engine for minibatches of up to `windows` rollouts of up to `steps` steps.
     pub fn new(subject: &Subject, windows: usize, steps: usize, arithmetic: Arithmetic) -> Engine {
-        Engine(match arithmetic {
-            Arithmetic::Lanes(set) if set.fused() => {
-                Kind::Fused(Minibatch::new(subject, windows, steps, set))
+        Engine(match (arithmetic, vectors()) {
+            (Arithmetic::Lanes, Some(set)) => {
+                Kind::Lanes(Minibatch::new(subject, windows, steps, set))
             }
-            _ => Kind::Double(Minibatch::new(subject, windows, steps, Instructions::Baseline)),
+            _ => Kind::Double(Minibatch::new(subject, windows, steps, Double)),
         })
     }
 
@@ -52,7 +50,7 @@ impl Engine {
         steps: usize,
     ) -> (Loss, &Gradient) {
         match &mut self.0 {
-            Kind::Fused(m) => m.step(subject, objective, tracks, windows, steps),
+            Kind::Lanes(m) => m.step(subject, objective, tracks, windows, steps),
             Kind::Double(m) => m.step(subject, objective, tracks, windows, steps),
         }
     }
@@ -70,7 +68,7 @@ impl Engine {
         steps: usize,
     ) -> Loss {
         match &mut self.0 {
-            Kind::Fused(m) => m.loss(subject, objective, tracks, windows, steps),
+            Kind::Lanes(m) => m.loss(subject, objective, tracks, windows, steps),
             Kind::Double(m) => m.loss(subject, objective, tracks, windows, steps),
         }
     }

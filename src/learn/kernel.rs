@@ -1,105 +1,186 @@
-//! Passes compiled for the widest vectors that the processor has.
+//! Instruction sets: what a pass is made of, each part compiled once for each set.
+//!
+//! The prior is by far the largest part, so it is called and not inlined: what calls it is compiled for
+//! the same instructions, and two schemes through time share one copy of its value, its slopes and its
+//! coefficients' slopes.
 
-use crate::learn::packet::Packet;
+use crate::learn::packet::{Packet, WIDTH};
+use crate::learn::prior::{At, Said, Slopes};
 use crate::learn::rollout::{Gradient, Pass, SumSlopes, Sums, Trace};
+use crate::model::GreyBox;
+use crate::num::Lanes;
 
-/// The vector instructions that a pass is compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Instructions {
-    /// 512 bits.
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-    /// 256 bits with fused multiply-add.
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    /// What the target always has: NEON on aarch64.
-    Baseline,
-}
+/// Blocks of single-precision lanes with fused multiply-add.
+type Block = Lanes<WIDTH, true>;
 
-impl Instructions {
-    /// The widest that this processor has.
-    pub fn detect() -> Instructions {
-        #[cfg(target_arch = "x86_64")]
-        {
-            let fma = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-            if fma && is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
-                return Instructions::Avx512;
-            }
-            if fma {
-                return Instructions::Avx2;
-            }
-        }
-        Instructions::Baseline
-    }
-
-    /// Whether multiply-adds are fused in one instruction.
-    pub fn fused(self) -> bool {
-        self != Instructions::Baseline || cfg!(target_arch = "aarch64")
-    }
-
-    /// [`Pass::forward`].
-    pub fn forward<R: Packet>(self, pass: &Pass<R>, trace: &mut Trace<R>) -> (Sums, R) {
-        match self {
-            // SAFETY: `detect` has seen the processor's features
-            #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512 => unsafe { forward_avx512(pass, trace) },
-            // SAFETY: as above
-            #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2 => unsafe { forward_avx2(pass, trace) },
-            Instructions::Baseline => pass.forward(trace),
-        }
-    }
-
-    /// [`Pass::reverse`].
-    pub fn reverse<R: Packet>(
+/// A set of instructions with the numbers that it moves.
+pub trait InstructionSet: Copy + Send + Sync {
+    /// What a pass computes in.
+    type Number: Packet;
+    /// [`At::ask`].
+    fn ask(self, model: &GreyBox, at: &At<Self::Number>) -> Said<Self::Number>;
+    /// [`At::slope`].
+    fn slope(
         self,
-        pass: &Pass<R>,
-        trace: &mut Trace<R>,
+        model: &GreyBox,
+        at: &At<Self::Number>,
+        slopes: &Slopes<Self::Number>,
+    ) -> [Self::Number; 8];
+    /// [`At::coefficients`].
+    fn coefficients(
+        self,
+        model: &GreyBox,
+        at: &At<Self::Number>,
+        slopes: &Slopes<Self::Number>,
+        sums: &mut [Self::Number],
+    );
+    /// [`Pass::forward`].
+    fn forward(self, pass: &Pass<Self>, trace: &mut Trace<Self::Number>) -> (Sums, Self::Number);
+    /// [`Pass::reverse`].
+    fn reverse(
+        self,
+        pass: &Pass<Self>,
+        trace: &mut Trace<Self::Number>,
         of: &SumSlopes,
         gradient: &mut Gradient,
-    ) {
-        match self {
-            // SAFETY: `detect` has seen the processor's features
-            #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512 => unsafe { reverse_avx512(pass, trace, of, gradient) },
-            // SAFETY: as above
-            #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2 => unsafe { reverse_avx2(pass, trace, of, gradient) },
-            Instructions::Baseline => pass.reverse(trace, of, gradient),
+    );
+}
+
+/// One rollout at a time in double precision, in whatever the target always has: for tests.
+#[derive(Clone, Copy, Debug)]
+pub struct Double;
+
+/// Lanes in 256 bits with fused multiply-add.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy, Debug)]
+pub struct Avx2(());
+
+/// Lanes in what the target always has: NEON.
+#[cfg(target_arch = "aarch64")]
+#[derive(Clone, Copy, Debug)]
+pub struct Neon(());
+
+/// The lanes of this kind of processor.
+#[cfg(target_arch = "x86_64")]
+pub type Vectors = Avx2;
+/// The lanes of this kind of processor.
+#[cfg(target_arch = "aarch64")]
+pub type Vectors = Neon;
+/// Elsewhere no multiply-add is known to be fused.
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+pub type Vectors = Double;
+
+/// The lanes that this processor has; `None` where no multiply-add is fused (x86 from before 2013).
+#[cfg(target_arch = "x86_64")]
+pub fn vectors() -> Option<Vectors> {
+    (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")).then_some(Avx2(()))
+}
+
+/// The lanes that this processor has.
+#[cfg(target_arch = "aarch64")]
+pub fn vectors() -> Option<Vectors> {
+    Some(Neon(()))
+}
+
+/// None.
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+pub fn vectors() -> Option<Vectors> {
+    None
+}
+
+/// Implements [`InstructionSet`] by functions compiled with the given features.
+macro_rules! compiled {
+    ($set:ty, $number:ty $(, $features:literal)?) => {
+        impl InstructionSet for $set {
+            type Number = $number;
+
+            #[inline(always)]
+            fn ask(self, model: &GreyBox, at: &At<$number>) -> Said<$number> {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                fn compiled(model: &GreyBox, at: &At<$number>) -> Said<$number> {
+                    at.ask(model)
+                }
+                compiled!(call compiled(model, at) $($features)?)
+            }
+
+            #[inline(always)]
+            fn slope(
+                self,
+                model: &GreyBox,
+                at: &At<$number>,
+                slopes: &Slopes<$number>,
+            ) -> [$number; 8] {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                fn compiled(
+                    model: &GreyBox,
+                    at: &At<$number>,
+                    slopes: &Slopes<$number>,
+                ) -> [$number; 8] {
+                    at.slope(model, slopes)
+                }
+                compiled!(call compiled(model, at, slopes) $($features)?)
+            }
+
+            #[inline(always)]
+            fn coefficients(
+                self,
+                model: &GreyBox,
+                at: &At<$number>,
+                slopes: &Slopes<$number>,
+                sums: &mut [$number],
+            ) {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                fn compiled(
+                    model: &GreyBox,
+                    at: &At<$number>,
+                    slopes: &Slopes<$number>,
+                    sums: &mut [$number],
+                ) {
+                    at.coefficients(model, slopes, sums);
+                }
+                compiled!(call compiled(model, at, slopes, sums) $($features)?)
+            }
+
+            fn forward(self, pass: &Pass<$set>, trace: &mut Trace<$number>) -> (Sums, $number) {
+                $(#[target_feature(enable = $features)])?
+                fn compiled(pass: &Pass<$set>, trace: &mut Trace<$number>) -> (Sums, $number) {
+                    pass.forward(trace)
+                }
+                compiled!(call compiled(pass, trace) $($features)?)
+            }
+
+            fn reverse(
+                self,
+                pass: &Pass<$set>,
+                trace: &mut Trace<$number>,
+                of: &SumSlopes,
+                gradient: &mut Gradient,
+            ) {
+                $(#[target_feature(enable = $features)])?
+                fn compiled(
+                    pass: &Pass<$set>,
+                    trace: &mut Trace<$number>,
+                    of: &SumSlopes,
+                    gradient: &mut Gradient,
+                ) {
+                    pass.reverse(trace, of, gradient);
+                }
+                compiled!(call compiled(pass, trace, of, gradient) $($features)?)
+            }
         }
-    }
+    };
+    (call $function:ident($($argument:expr),*) $features:literal) => {
+        // SAFETY: a value of the set is made only where the processor has its features
+        unsafe { $function($($argument),*) }
+    };
+    (call $function:ident($($argument:expr),*)) => { $function($($argument),*) };
 }
 
+compiled!(Double, f64);
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl,avx2,fma")]
-fn forward_avx512<R: Packet>(pass: &Pass<R>, trace: &mut Trace<R>) -> (Sums, R) {
-    pass.forward(trace)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn forward_avx2<R: Packet>(pass: &Pass<R>, trace: &mut Trace<R>) -> (Sums, R) {
-    pass.forward(trace)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl,avx2,fma")]
-fn reverse_avx512<R: Packet>(
-    pass: &Pass<R>,
-    trace: &mut Trace<R>,
-    of: &SumSlopes,
-    gradient: &mut Gradient,
-) {
-    pass.reverse(trace, of, gradient);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn reverse_avx2<R: Packet>(
-    pass: &Pass<R>,
-    trace: &mut Trace<R>,
-    of: &SumSlopes,
-    gradient: &mut Gradient,
-) {
-    pass.reverse(trace, of, gradient);
-}
+compiled!(Avx2, Block, "avx2,fma");
+#[cfg(target_arch = "aarch64")]
+compiled!(Neon, Block);

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::learn::kernel::Instructions;
+use crate::learn::kernel::InstructionSet;
 use crate::learn::packet::Packet;
 use crate::learn::rollout::{Gradient, Pass, Recorded, Subject, SumSlopes, Sums, Trace};
 use crate::learn::windows::{Track, Window};
@@ -106,20 +106,15 @@ struct Work<R> {
 
 /// Memory for minibatches, taken once.
 #[derive(Clone, Debug)]
-pub struct Minibatch<R> {
-    works: Vec<Work<R>>,
-    instructions: Instructions,
+pub struct Minibatch<S: InstructionSet> {
+    works: Vec<Work<S::Number>>,
+    set: S,
     gradient: Gradient,
 }
 
-impl<R: Packet> Minibatch<R> {
+impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
     /// Room for `windows` rollouts of up to `steps` steps.
-    pub fn new(
-        subject: &Subject,
-        windows: usize,
-        steps: usize,
-        instructions: Instructions,
-    ) -> Self {
+    pub fn new(subject: &Subject, windows: usize, steps: usize, set: S) -> Self {
         let gradient = Gradient::zero(subject);
         let work = Work {
             windows: Vec::with_capacity(R::WIDTH),
@@ -134,7 +129,7 @@ impl<R: Packet> Minibatch<R> {
             sums: Sums::default(),
             good: 0,
         };
-        Minibatch { works: vec![work; windows.div_ceil(R::WIDTH)], instructions, gradient }
+        Minibatch { works: vec![work; windows.div_ceil(R::WIDTH)], set, gradient }
     }
 
     /// The loss of `windows` with its gradient.
@@ -153,12 +148,12 @@ impl<R: Packet> Minibatch<R> {
     ) -> (Loss, &Gradient) {
         let (loss, slopes) = self.fly(subject, objective, tracks, windows, steps);
         let blocks = windows.len().div_ceil(R::WIDTH);
-        let instructions = self.instructions;
+        let set = self.set;
         self.works[..blocks].par_iter_mut().for_each(|work| {
             work.gradient.clear();
             if work.good > 0 {
-                let pass = Pass { subject, recorded: &work.recorded, scale: &objective.scale };
-                instructions.reverse(&pass, &mut work.trace, &slopes, &mut work.gradient);
+                let pass = Pass { set, subject, recorded: &work.recorded, scale: &objective.scale };
+                set.reverse(&pass, &mut work.trace, &slopes, &mut work.gradient);
             }
         });
         self.gradient.clear();
@@ -194,12 +189,12 @@ impl<R: Packet> Minibatch<R> {
         let blocks = windows.chunks(R::WIDTH);
         assert!(blocks.len() <= self.works.len(), "room for every window");
         let count = blocks.len();
-        let instructions = self.instructions;
+        let set = self.set;
         self.works[..count].par_iter_mut().zip(windows.par_chunks(R::WIDTH)).for_each(
             |(work, windows)| {
                 work.windows.clear();
                 work.windows.extend_from_slice(windows);
-                work.fly(subject, objective, tracks, steps, instructions);
+                work.fly(subject, objective, tracks, steps, set);
             },
         );
         let mut sums = Sums::default();
@@ -224,7 +219,7 @@ impl<R: Packet> Work<R> {
         objective: &Objective,
         tracks: &[Track],
         steps: usize,
-        instructions: Instructions,
+        set: impl InstructionSet<Number = R>,
     ) {
         self.sums = Sums::default();
         loop {
@@ -233,8 +228,8 @@ impl<R: Packet> Work<R> {
                 return;
             }
             self.recorded.fill(tracks, &self.windows, steps);
-            let pass = Pass { subject, recorded: &self.recorded, scale: &objective.scale };
-            let (sums, finite) = instructions.forward(&pass, &mut self.trace);
+            let pass = Pass { set, subject, recorded: &self.recorded, scale: &objective.scale };
+            let (sums, finite) = set.forward(&pass, &mut self.trace);
             let mut lane = 0;
             self.windows.retain(|_| {
                 lane += 1;

@@ -21,7 +21,6 @@ pub use basis::{JXZ, TrainableError, trainable};
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use dynamics::{Progress, TrainError, Trainer};
 pub use engine::{Arithmetic, Engine};
-pub use kernel::Instructions;
 pub use loss::{Loss, Objective, Penalty};
 pub use network::Passes;
 pub use recipe::{Criterion, Recipe};

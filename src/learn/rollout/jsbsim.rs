@@ -1,6 +1,7 @@
 //! Rollouts by the scheme of JSBSim, which asks the model once a step and remembers the last time.
 
 use super::{Gradient, Pass, Place, SumSlopes, Trace, nothing, sum};
+use crate::learn::kernel::InstructionSet;
 use crate::learn::packet::Packet;
 use crate::learn::prior::{ALOFT, At, Said, Sloped, Slopes, add, fixed, transposed};
 use crate::model::{STEP, advance_jsbsim};
@@ -9,7 +10,7 @@ use crate::physics::airframe::Geometry;
 use crate::physics::rigid_body::{self, Vector};
 use crate::physics::{AirData, State};
 
-impl<R: Packet> Pass<'_, R> {
+impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
     #[inline(always)]
     pub(super) fn forward_jsbsim(&self, trace: &mut Trace<R>) -> [R; 3] {
         let mut totals = [R::zero(); 3];
@@ -20,7 +21,7 @@ impl<R: Packet> Pass<'_, R> {
             // this scheme knows accelerations only
             let zero = R::zero();
             let learned = State { roll: zero, pitch: zero, ..self.learned(&at, step, trace) };
-            let said = at.ask(&self.subject.prior);
+            let said = self.set.ask(&self.subject.prior, &at);
             let air = at.air(&self.subject.prior);
             let (acceleration, spin) = pushed(&said, &learned, &at.state, &air);
             trace.rates[step] = [said.rate, learned];

@@ -3,6 +3,7 @@
 mod jsbsim;
 mod rk4;
 
+use crate::learn::kernel::InstructionSet;
 use crate::learn::network::Passes;
 use crate::learn::packet::Packet;
 use crate::learn::prior::{At, Slopes};
@@ -129,16 +130,18 @@ fn sum<R: Real>(a: &State<R>, b: &State<R>) -> State<R> {
 }
 
 /// A pass over one block.
-pub struct Pass<'a, R> {
+pub struct Pass<'a, S: InstructionSet> {
+    /// The instructions it is compiled for.
+    pub set: S,
     /// The model.
     pub subject: &'a Subject,
     /// What was recorded.
-    pub recorded: &'a Recorded<R>,
+    pub recorded: &'a Recorded<S::Number>,
     /// The scale of errors and rates, eq. (21) or ones.
     pub scale: &'a [f64; 8],
 }
 
-impl<R: Packet> Pass<'_, R> {
+impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
     fn steps(&self) -> usize {
         self.recorded.controls.len() - 1
     }
@@ -250,9 +253,9 @@ impl<R: Packet> Pass<'_, R> {
         let Place { step, point, first } = place;
         let Subject { network, scales, .. } = self.subject;
         let at = self.at(step, trace.states[point]);
-        let mut slope = at.slope(&self.subject.prior, prior);
+        let mut slope = self.set.slope(&self.subject.prior, &at, prior);
         if self.subject.prior_slopes == PriorSlopes::All {
-            at.coefficients(&self.subject.prior, prior, &mut trace.coefficients);
+            self.set.coefficients(&self.subject.prior, &at, prior, &mut trace.coefficients);
         }
         let (width, wide) = (network.trace(), network.slopes());
         let slot = (point - first) % CHUNK;

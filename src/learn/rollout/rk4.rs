@@ -1,6 +1,7 @@
 //! Rollouts by the classical Runge–Kutta scheme.
 
 use super::{Gradient, Pass, Place, SumSlopes, Trace, nothing, sum};
+use crate::learn::kernel::InstructionSet;
 use crate::learn::packet::Packet;
 use crate::learn::prior::Slopes;
 use crate::model::STEP;
@@ -11,7 +12,7 @@ const WEIGHTS: [f64; 4] = [STEP / 6.0, STEP / 3.0, STEP / 3.0, STEP / 6.0];
 /// How far before each of the slopes the state is moved along the one before, in steps.
 const AHEAD: [f64; 4] = [0.0, STEP / 2.0, STEP / 2.0, STEP];
 
-impl<R: Packet> Pass<'_, R> {
+impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
     #[inline(always)]
     pub(super) fn forward_rk4(&self, trace: &mut Trace<R>) -> [R; 3] {
         let mut totals = [R::zero(); 3];
@@ -22,7 +23,7 @@ impl<R: Packet> Pass<'_, R> {
             for stage in 0..4 {
                 let at = self.at(step, start.advance(&rate, AHEAD[stage]));
                 let learned = self.learned(&at, 4 * step + stage, trace);
-                let prior = at.ask(&self.subject.prior).rate;
+                let prior = self.set.ask(&self.subject.prior, &at).rate;
                 if stage == 0 {
                     trace.rates[step] = [prior, learned];
                 }
