@@ -17,6 +17,13 @@ pub struct LogArguments {
     /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
     #[arg(long = "log", num_args = 1.., required = true)]
     pub paths: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+/// How logs are read.
+#[derive(Clone, clap::Args)]
+pub struct Reading {
     /// A TOML file that says where columns of the logs come from.
     #[arg(long)]
     mapping: Option<PathBuf>,
@@ -47,12 +54,27 @@ impl LogArguments {
     /// # Errors
     /// If the mapping cannot be read, or no log is left.
     pub fn take_in(&self, model: &GreyBox, clock: ActuatorClock) -> Result<Intake> {
+        self.reading.take_in(&self.paths, model, clock)
+    }
+}
+
+impl Reading {
+    /// As [`LogArguments::take_in`], of `paths`.
+    ///
+    /// # Errors
+    /// If the mapping cannot be read, or no log is left.
+    pub fn take_in(
+        &self,
+        paths: &[PathBuf],
+        model: &GreyBox,
+        clock: ActuatorClock,
+    ) -> Result<Intake> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
         let tolerance = if self.lenient { Tolerance::Lenient } else { Tolerance::Strict };
         let reading = logs::Options { tolerance, mapping };
         let mut intake = Intake::default();
-        for (k, (path, name)) in self.paths.iter().zip(names(&self.paths)).enumerate() {
-            eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, self.paths.len());
+        for (k, (path, name)) in paths.iter().zip(names(paths)).enumerate() {
+            eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
             match reconstruct_one(path, &name, &reading, model, clock) {
                 Ok((flight, findings)) => {
                     intake.flights.push(flight);

@@ -299,7 +299,8 @@ impl Trainer {
         };
         let (loss, gradient) =
             self.engine.step(&self.subject, &objective, &self.tracks, chosen, steps);
-        let rate = self.recipe.rate_at(self.update);
+        let (pace, waits) = (self.recipe.pace_at(self.update), self.recipe.waits_at(self.update));
+        let [rate, prior_rate] = [self.recipe.rate, self.recipe.prior_rate].map(|r| r * pace);
         self.update += 1;
         let slopes = self.basis.slopes(&gradient.prior);
         let mut every = gradient.network.iter().chain(&slopes);
@@ -308,20 +309,24 @@ impl Trainer {
         }
         let adam = &mut self.adam;
         adam.begin();
-        self.subject.network.update(|parameters| {
-            for (k, (p, g)) in parameters.iter_mut().zip(&gradient.network).enumerate() {
-                *p += adam.move_of(k, *g, rate) as f32;
-            }
-        });
+        if !waits {
+            self.subject.network.update(|parameters| {
+                for (k, (p, g)) in parameters.iter_mut().zip(&gradient.network).enumerate() {
+                    *p += adam.move_of(k, *g, rate) as f32;
+                }
+            });
+        }
         let first = gradient.network.len();
         for (k, (x, g)) in self.coordinates.iter_mut().zip(&slopes).enumerate() {
-            *x += adam.move_of(first + k, *g, rate);
+            *x += adam.move_of(first + k, *g, prior_rate);
         }
         if !slopes.is_empty() {
             self.basis.apply(&mut self.subject.prior, &self.coordinates);
         }
         let normalised = loss.prediction / unit;
-        self.lambda += self.recipe.tau * normalised;
+        if !waits {
+            self.lambda += self.recipe.tau * normalised;
+        }
         Ok(Some((loss, normalised)))
     }
 }

@@ -10,6 +10,7 @@ mod kernel;
 mod loss;
 mod network;
 mod packet;
+pub mod portrait;
 mod prior;
 mod recipe;
 mod rollout;

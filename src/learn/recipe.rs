@@ -49,6 +49,11 @@ pub struct Recipe {
     pub rate: f64,
     /// Part of it that is left at the end.
     pub rate_end: f64,
+    /// Learning rate of the prior's coordinates at the start. They count in the rates they make, a unit
+    /// being large: at the network's pace it would learn what they lack before they have moved.
+    pub prior_rate: f64,
+    /// Part of the updates, at the start, in which the prior moves alone.
+    pub prior_alone: f64,
     /// λ0 of eq. (24).
     pub lambda: f64,
     /// τ of eq. (24), by which λ grows an update.
@@ -70,6 +75,8 @@ impl Default for Recipe {
             updates: 20_000,
             rate: 1e-3,
             rate_end: 0.01,
+            prior_rate: 3e-2,
+            prior_alone: 0.1,
             lambda: 1.0,
             tau: 1.0,
             criterion: Criterion::Scaled,
@@ -89,8 +96,12 @@ impl Recipe {
         if !(1..=65_536).contains(&self.batch) || self.updates == 0 {
             return Some("a minibatch must have 1 to 65536 rollouts, and there must be an update");
         }
-        if !positive(self.rate) || !positive(self.rate_end) || !positive(self.lambda) {
+        let rates = [self.rate, self.rate_end, self.prior_rate, self.lambda];
+        if !rates.into_iter().all(positive) {
             return Some("learning rates and lambda must be positive");
+        }
+        if !(0.0..1.0).contains(&self.prior_alone) {
+            return Some("the part of the updates in which the prior moves alone lies in 0 to 1");
         }
         if !(self.tau.is_finite() && self.tau >= 0.0) {
             return Some("tau must not be negative");
@@ -104,10 +115,15 @@ impl Recipe {
         self.steps[(place as usize).min(self.steps.len() - 1)]
     }
 
-    /// The learning rate at an update.
-    pub fn rate_at(&self, update: u64) -> f64 {
+    /// What is left of the learning rates at an update.
+    pub fn pace_at(&self, update: u64) -> f64 {
         let done = update as f64 / self.updates as f64;
         let cosine = 0.5 * (1.0 + (std::f64::consts::PI * done).cos());
-        self.rate * (self.rate_end + (1.0 - self.rate_end) * cosine)
+        self.rate_end + (1.0 - self.rate_end) * cosine
+    }
+
+    /// Whether the residual waits at an update for the prior to come closer.
+    pub fn waits_at(&self, update: u64) -> bool {
+        !self.trainable.is_empty() && (update as f64) < self.prior_alone * self.updates as f64
     }
 }

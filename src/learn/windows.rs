@@ -58,7 +58,7 @@ const STEEPEST: f64 = 1.4;
 const SLOWEST: f64 = 5.0;
 
 /// Whether the eight variables describe the flight well there.
-fn regular(state: &State) -> bool {
+pub(super) fn regular(state: &State) -> bool {
     state.is_finite() && state.pitch.abs() < STEEPEST && state.airspeed > SLOWEST
 }
 

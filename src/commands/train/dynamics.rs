@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::flights::{FlightArguments, Flights};
 use crate::commands::files::{self, Overwrite, shipped};
+use crate::learn::portrait::{Portrait, portrait};
 use crate::learn::score::{Horizon, free_run};
 use crate::learn::{Checkpoint, Criterion, Progress, Recipe, Trainer, export, trainable};
 use crate::model::{GreyBox, Integrator};
@@ -61,6 +62,12 @@ pub struct Arguments {
     /// Learning rate at the start.
     #[arg(long, default_value_t = 1e-3)]
     rate: f64,
+    /// Learning rate of the prior's coefficients, in the rates they make.
+    #[arg(long, default_value_t = 3e-2)]
+    prior_rate: f64,
+    /// Part of the updates, at the start, in which the prior moves alone.
+    #[arg(long, default_value_t = 0.1)]
+    prior_alone: f64,
     /// λ0 of the penalty's weight 1/λ.
     #[arg(long, default_value_t = 1.0)]
     lambda: f64,
@@ -86,6 +93,7 @@ struct Document<'a> {
     coefficients: Vec<Coefficient>,
     prior: Vec<Horizon>,
     learned: Vec<Horizon>,
+    residual: Option<Portrait>,
     notes: Vec<String>,
 }
 
@@ -135,6 +143,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let scores = [&prior, &model].map(|m| free_run(m, &judge, &HORIZONS));
     println!("{}", coefficients(&trainer));
     println!("{}", horizons(&scores));
+    let residual = portrait(&model, &judge);
+    if let Some(portrait) = &residual {
+        println!("{}", shares(portrait));
+    }
     let [before, after] = scores;
     let document = Document {
         schema: "greylag.training/1",
@@ -149,6 +161,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             .collect(),
         prior: before,
         learned: after,
+        residual,
         notes,
     };
     let json = arguments.out.join("training.json");
@@ -169,6 +182,8 @@ impl Arguments {
             batch: self.batch,
             updates: self.updates,
             rate: self.rate,
+            prior_rate: self.prior_rate,
+            prior_alone: self.prior_alone,
             lambda: self.lambda,
             tau: self.tau,
             criterion: if self.loss == "plain" { Criterion::Plain } else { Criterion::Scaled },
@@ -219,6 +234,25 @@ fn line(p: &Progress, trainer: &Trainer, ms: f64) -> String {
         text += &format!("  {} {now:.4}", name.rsplit('.').next().unwrap_or(name));
     }
     text
+}
+
+/// What the residual adds, channel by channel.
+fn shares(portrait: &Portrait) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["rate of", "prior, x_c/s", "residual, x_c/s", "strongest at"]);
+    for share in &portrait.channels {
+        let place = share.strongest.as_ref().map_or(String::new(), |(over, [low, high])| {
+            format!("{over} {low:.0} to {high:.0}")
+        });
+        table.add_row([
+            share.channel.to_owned(),
+            format!("{:.4}", share.prior),
+            format!("{:.4}", share.learned),
+            place,
+        ]);
+    }
+    table
 }
 
 fn coefficients(trainer: &Trainer) -> Table {

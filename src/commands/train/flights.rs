@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-use crate::commands::intake::LogArguments;
+use crate::commands::intake::Reading;
 use crate::learn::windows::Track;
 use crate::logs::csv::{self, Tolerance};
 use crate::model::{GreyBox, STEP};
@@ -17,8 +17,11 @@ const HELD_OUT: usize = 10;
 /// Where flights come from.
 #[derive(clap::Args)]
 pub struct FlightArguments {
+    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+    #[arg(long = "log", num_args = 1..)]
+    logs: Vec<PathBuf>,
     #[command(flatten)]
-    logs: Option<LogArguments>,
+    reading: Reading,
     /// Folders that `greylag collect` wrote; every round below them is read, its states as they are.
     #[arg(long = "collect", num_args = 1..)]
     folders: Vec<PathBuf>,
@@ -45,8 +48,8 @@ impl FlightArguments {
         for folder in &self.folders {
             tracks.extend(collected(folder, model)?);
         }
-        if let Some(logs) = &self.logs {
-            let intake = logs.take_in(model, ActuatorClock::Estimated)?;
+        if !self.logs.is_empty() {
+            let intake = self.reading.take_in(&self.logs, model, ActuatorClock::Estimated)?;
             notes.extend(intake.notes);
             for flight in &intake.flights {
                 if (flight.step_s / STEP - 1.0).abs() > 1e-3 {
