@@ -202,7 +202,10 @@ fn a_client_over_tcp_is_served_like_any_other() {
 /// Flies 2000 steps in lockstep from the same start, armed from the first.
 fn lockstep_flight(kind: Kind) -> Vec<Answer> {
     let options = options(Pace::Lockstep);
-    let companion = Companion::with(&options, greylag::commands::fly::crew(kind, x8()).unwrap());
+    let companion = Companion::with(
+        &options,
+        greylag::commands::fly::crew(kind, x8(), std::path::Path::new("")).unwrap(),
+    );
     let mut vehicle = Vehicle::new(companion.vehicle());
     vehicle.step(Trouble::None, PATIENCE).unwrap();
     let mut client = Client::new(companion.client(0));
@@ -245,7 +248,7 @@ fn a_planner_that_is_always_late_leaves_the_fallback_flying_and_is_recorded() {
     let root = tempfile::tempdir().unwrap();
     let mut options = options(Pace::RealTime);
     options.record = Some(Place::Exactly(root.path().join("flight")));
-    let mut crew = greylag::commands::fly::crew(Kind::Lqi, x8()).unwrap();
+    let mut crew = greylag::commands::fly::crew(Kind::Lqi, x8(), std::path::Path::new("")).unwrap();
     (crew.controller, crew.seat) = (Box::new(Slow), Seat::Thread);
     let companion = Companion::with(&options, crew);
     let vehicle = Vehicle::new(companion.vehicle()).on_the_wall();

@@ -121,7 +121,8 @@ fn lost_numbers_are_not_flown_on() {
     let nan = greylag::physics::Command { aileron: f64::NAN, elevator: 0.0, throttle: 0.0 };
     assert!(imagined.step(nan).is_err());
     seen.state.airspeed = f64::NAN;
-    for kind in Kind::ALL {
+    // policies come from files and are held to the same in their own room
+    for kind in Kind::ALL.iter().filter(|kind| kind.needs() != control::Needs::Policy) {
         let mut controller = control::build(*kind, &model).unwrap();
         assert!(
             !controller.command(&seen, &target).is_finite(),

@@ -12,9 +12,9 @@ use serde::Serialize;
 use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::plant_arguments::PlantArgs;
 
-use crate::commands::choices;
 use crate::commands::files::{self, shipped};
-use crate::control::{self, Controller, Kind, Needs};
+use crate::commands::{choices, fly};
+use crate::control::{Controller, Kind, Needs};
 use crate::model::GreyBox;
 use crate::sim::evaluation::{Evaluation, evaluate};
 use crate::sim::{Group, TargetFile};
@@ -28,6 +28,9 @@ pub struct Arguments {
     /// Models that the controllers are designed from or plan with.
     #[arg(long = "model", num_args = 1.., default_values_os_t = [PathBuf::from("params/x8/jsbsim.toml")])]
     models: Vec<PathBuf>,
+    /// Folders of trained policies, for controllers that need one.
+    #[arg(long = "policy", value_name = "DIR", num_args = 1.., default_values_os_t = [PathBuf::from(fly::POLICY)])]
+    policies: Vec<PathBuf>,
     /// Targets to fly.
     #[arg(long, default_value = "params/targets.csv")]
     targets: PathBuf,
@@ -101,24 +104,34 @@ fn targets(arguments: &Arguments) -> Result<TargetFile> {
     Ok(targets)
 }
 
-/// A controller ready to fly, with the name of its model.
+/// A controller ready to fly, with the name of its model, or the folder of its policy.
 struct Entrant {
     kind: Kind,
     model: String,
     controller: Box<dyn Controller>,
 }
 
-/// Every controller on every model; one that needs no model enters once.
+/// Every controller on every model or policy that it may be built from; one that needs neither enters
+/// once.
 fn entrants(arguments: &Arguments) -> Result<Vec<Entrant>> {
     let load = |path: &PathBuf| GreyBox::load(&shipped(path));
     let models = arguments.models.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let (models, none) = (models.iter(), PathBuf::new());
+    let policies = || arguments.policies.iter();
     let mut entrants = Vec::new();
     for kind in &arguments.controllers {
-        let count = if kind.needs() == Needs::Model { models.len() } else { 1 };
-        for model in &models[..count] {
-            let name = if kind.needs() == Needs::Model { &model.name } else { "-" };
-            let controller = control::build(*kind, model)?;
-            entrants.push(Entrant { kind: *kind, model: name.into(), controller });
+        let sources: Vec<(&GreyBox, String, &PathBuf)> = match kind.needs() {
+            Needs::Model => models.clone().map(|m| (m, m.name.clone(), &none)).collect(),
+            Needs::Gains => models.clone().take(1).map(|m| (m, "-".into(), &none)).collect(),
+            Needs::Policy => models
+                .clone()
+                .take(1)
+                .flat_map(|m| policies().map(move |p| (m, p.display().to_string(), p)))
+                .collect(),
+        };
+        for (model, name, folder) in sources {
+            let controller = fly::controller(*kind, model, folder)?;
+            entrants.push(Entrant { kind: *kind, model: name, controller });
         }
     }
     Ok(entrants)

@@ -12,8 +12,9 @@ use crossbeam_channel::RecvTimeoutError;
 
 use crate::commands::choices;
 use crate::commands::files::shipped;
+use crate::control::policy::Agent;
 use crate::control::schedule::Schedule;
-use crate::control::{self, Controller, Kind, build};
+use crate::control::{self, Controller, Kind, Needs, Source, build};
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
 use crate::flight::runtime::{Crew, Event, Flight, Options, Pace, Seat};
@@ -21,6 +22,9 @@ use crate::link::address::Address;
 use crate::link::autopilot::Severity;
 use crate::model::GreyBox;
 use crate::physics::Airframe;
+
+/// The policy that is flown where no other is named.
+pub const POLICY: &str = "params/x8/policy";
 
 /// The arguments of `greylag fly`.
 #[derive(Args, Debug)]
@@ -37,6 +41,9 @@ pub struct Arguments {
     /// Model that the controller is designed from or plans with.
     #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
     model: PathBuf,
+    /// Folder of the trained policy, for controllers that need one.
+    #[arg(long, value_name = "DIR", default_value = POLICY)]
+    policy: PathBuf,
     /// Airframe file in place of the one that the model names.
     #[arg(long, value_name = "FILE")]
     airframe: Option<PathBuf>,
@@ -74,7 +81,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// has been started then.
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let model = model(&arguments.model, arguments.airframe.as_deref())?;
-    let mut crew = crew(arguments.controller, &model)?;
+    let mut crew = crew(arguments.controller, &model, &arguments.policy)?;
     if let Some(path) = &arguments.schedule {
         crew.pilot.follow(Schedule::load(path)?);
     }
@@ -122,12 +129,29 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
     Ok(model)
 }
 
-/// A pilot with its controllers: `kind` flies, an LQI of the same model is the fallback.
+/// The controller `kind` of `model`, with the policy in `folder` if it needs one.
 ///
 /// # Errors
-/// If the model does not allow a controller, or has no level flight.
-pub fn crew(kind: Kind, model: &GreyBox) -> anyhow::Result<Crew> {
-    let controller = build(kind, model)?;
+/// If the policy cannot be used, or the model does not allow the controller.
+pub fn controller(
+    kind: Kind,
+    model: &GreyBox,
+    folder: &Path,
+) -> anyhow::Result<Box<dyn Controller>> {
+    if kind.needs() != Needs::Policy {
+        return Ok(build(kind, model)?);
+    }
+    let agent = Agent::load(&shipped(folder), &model.airframe)?;
+    Ok(build(kind, Source { model, agent: Some(&agent) })?)
+}
+
+/// A pilot with its controllers: `kind` flies, with the policy in `folder` if it needs one; an LQI of
+/// the same model is the fallback.
+///
+/// # Errors
+/// If the policy cannot be used, the model does not allow a controller, or has no level flight.
+pub fn crew(kind: Kind, model: &GreyBox, folder: &Path) -> anyhow::Result<Crew> {
+    let controller = controller(kind, model, folder)?;
     // The design of an LQI takes a moment; it is not made twice.
     let fallback = if kind == Kind::Lqi { controller.boxed_clone() } else { fallback(model)? };
     let pilot = Pilot::new(Config::for_model(model)?, fallback)?;

@@ -3,11 +3,12 @@
 pub mod cem;
 pub mod lqi;
 pub mod pid;
+pub mod policy;
 pub mod schedule;
 pub mod task;
 mod registry;
 
-pub use registry::{Kind, Needs, Pace, SetupError, build};
+pub use registry::{Kind, Needs, Pace, SetupError, Source, build};
 
 use crate::physics::{ActuatorState, Command, State, Time};
 
@@ -29,13 +30,21 @@ pub struct Observation {
 
 /// What is wanted: the commanded attitude (φ*, θ*) and the airspeed V_a* to hold meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Target {
+pub struct Target<R = f64> {
     /// Commanded roll φ*, rad.
-    pub roll: f64,
+    pub roll: R,
     /// Commanded pitch θ*, rad.
-    pub pitch: f64,
+    pub pitch: R,
     /// Airspeed to hold as far as thrust allows, m/s.
-    pub airspeed: f64,
+    pub airspeed: R,
+}
+
+impl<R: Copy> Target<R> {
+    /// The target with every component read as another kind of number.
+    #[inline(always)]
+    pub fn map<S: Copy>(&self, mut f: impl FnMut(R) -> S) -> Target<S> {
+        Target { roll: f(self.roll), pitch: f(self.pitch), airspeed: f(self.airspeed) }
+    }
 }
 
 /// A control law, called every 10 ms of vehicle time. It never allocates, blocks or fails:

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::control::policy::{Agent, Policy};
 use crate::control::{Controller, cem, lqi, pid};
 use crate::model::GreyBox;
 
@@ -28,6 +29,30 @@ pub enum SetupError {
         /// Where it fails.
         pitch_deg: f64,
     },
+    /// The controller is a trained one, and none was given.
+    #[error("a controller that was trained needs its files; give their folder with --policy")]
+    Untrained,
+}
+
+/// What a controller may be built from.
+#[derive(Clone, Copy, Debug)]
+pub struct Source<'a> {
+    /// The model that it is designed from or plans with.
+    pub model: &'a GreyBox,
+    /// The networks of a trained policy.
+    pub agent: Option<&'a Agent>,
+}
+
+impl<'a> From<&'a GreyBox> for Source<'a> {
+    fn from(model: &'a GreyBox) -> Source<'a> {
+        Source { model, agent: None }
+    }
+}
+
+impl<'a> Source<'a> {
+    fn agent(&self) -> Result<&'a Agent, SetupError> {
+        self.agent.ok_or(SetupError::Untrained)
+    }
 }
 
 /// Where a controller has to run.
@@ -46,10 +71,12 @@ pub enum Needs {
     Gains,
     /// A model of the aircraft.
     Model,
+    /// The networks of a trained policy.
+    Policy,
 }
 
 macro_rules! controllers {
-    ($($kind:ident $name:literal $seat:ident $needs:ident $about:literal => |$model:ident| $build:expr),* $(,)?) => {
+    ($($kind:ident $name:literal $seat:ident $needs:ident $about:literal => |$from:ident| $build:expr),* $(,)?) => {
         /// A controller by name.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Kind { $(#[doc = $about] $kind,)* }
@@ -74,21 +101,27 @@ macro_rules! controllers {
             }
         }
 
-        /// Builds a controller; `model` is what it is designed from or plans with.
+        /// Builds a controller from what [`Kind::needs`] says; a model alone will do where no policy
+        /// is needed.
         ///
         /// # Errors
-        /// If the model does not allow the design.
-        pub fn build(kind: Kind, model: &GreyBox) -> Result<Box<dyn Controller>, SetupError> {
-            match kind { $(Kind::$kind => { let $model = model; Ok(Box::new($build)) })* }
+        /// If the model does not allow the design, or a policy is needed and there is none.
+        pub fn build<'a>(
+            kind: Kind,
+            source: impl Into<Source<'a>>,
+        ) -> Result<Box<dyn Controller>, SetupError> {
+            let source = source.into();
+            match kind { $(Kind::$kind => { let $from = source; Ok(Box::new($build)) })* }
         }
     };
 }
 
 controllers! {
-    Pid "pid" Immediate Gains "PID with the gains published with the simulator." => |_model| pid::Pid::new(pid::PUBLIC),
-    PidRetuned "pid-retuned" Immediate Gains "PID retuned, at a safer airspeed." => |_model| pid::Pid::new(pid::RETUNED),
-    Lqi "lqi" Immediate Model "Gain-scheduled LQI designed from the model." => |model| lqi::Lqi::new(model)?,
-    Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |model| cem::Cem::new(model, cem::Settings::PAPER),
+    Pid "pid" Immediate Gains "PID with the gains published with the simulator." => |_from| pid::Pid::new(pid::PUBLIC),
+    PidRetuned "pid-retuned" Immediate Gains "PID retuned, at a safer airspeed." => |_from| pid::Pid::new(pid::RETUNED),
+    Lqi "lqi" Immediate Model "Gain-scheduled LQI designed from the model." => |from| lqi::Lqi::new(from.model)?,
+    Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |from| cem::Cem::new(from.model, cem::Settings::PAPER),
+    Policy "policy" Immediate Policy "A trained policy alone." => |from| Policy::new(from.agent()?),
 }
 
 impl Kind {

@@ -37,10 +37,10 @@ impl Task {
 
     /// The reward of being in `state` when `target` is wanted: 0 at best.
     #[inline(always)]
-    pub fn reward<R: Real>(&self, state: &State<R>, target: &Target) -> R {
+    pub fn reward<R: Real>(&self, state: &State<R>, target: &Target<R>) -> R {
         #[inline(always)]
-        fn term<R: Real>(x: R, wanted: f64, scale: f64, cap: f64) -> R {
-            (x - R::from_f64(wanted)).abs().scale(1.0 / scale).min(R::from_f64(cap))
+        fn term<R: Real>(x: R, wanted: R, scale: f64, cap: f64) -> R {
+            (x - wanted).abs().scale(1.0 / scale).min(R::from_f64(cap))
         }
         -(term(state.roll, target.roll, self.roll_scale, self.roll_cap)
             + term(state.pitch, target.pitch, self.pitch_scale, self.pitch_cap)

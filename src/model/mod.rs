@@ -10,6 +10,7 @@ mod linear;
 mod newton;
 pub mod residual;
 mod trim;
+pub mod weights;
 
 #[cfg(feature = "learn")]
 pub(crate) use forces::Starting;

@@ -1,15 +1,14 @@
 //! The residual F_a(s, z; θ_a): a small network that adds what the prior lacks, eq. (19) of \[GSFM26\].
 
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use safetensors::SafeTensorError;
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::num::dense::DenseError;
+use crate::model::weights;
+use crate::num::dense::{DenseError, ON_STACK};
 use crate::num::{Dense, Real};
 use crate::physics::{Airframe, Controls, State};
 
@@ -21,9 +20,6 @@ pub const INPUTS: usize = 9;
 
 /// Outputs of the network: the rates of the state, in units of x_c a second.
 pub const OUTPUTS: usize = 8;
-
-/// The entry of the file's metadata that holds an [`Origin`] as JSON.
-const METADATA: &str = "greylag";
 
 /// A learned addition to the rates of a model's state.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,6 +86,9 @@ pub enum ResidualError {
     /// The network has other inputs or outputs.
     #[error("a residual takes a network of {INPUTS} inputs and {OUTPUTS} outputs, not {0:?}")]
     Shape(Vec<usize>),
+    /// A layer is too wide.
+    #[error("a residual's layers have up to {ON_STACK} units, not {0:?}; choose fewer")]
+    Wide(Vec<usize>),
     /// The numbers are no network.
     #[error(transparent)]
     Network(#[from] DenseError),
@@ -162,6 +161,9 @@ impl Residual {
         if (sizes[0], sizes[sizes.len() - 1]) != (INPUTS, OUTPUTS) {
             return Err(ResidualError::Shape(sizes.into()));
         }
+        if sizes.iter().any(|n| *n > ON_STACK) {
+            return Err(ResidualError::Wide(sizes.into()));
+        }
         Ok(Residual { network: Arc::new(network), scales: Scales::new(airframe, x_c) })
     }
 
@@ -181,22 +183,7 @@ impl Residual {
     /// # Errors
     /// What the writer of the format says.
     pub fn to_bytes(&self, origin: &Origin) -> Result<Vec<u8>, SafeTensorError> {
-        let little = |list: &[f32]| list.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
-        let mut tensors = Vec::new();
-        for (k, layer) in self.network.layers().enumerate() {
-            let shape = [self.network.sizes()[k], self.network.sizes()[k + 1]];
-            tensors.push((format!("layers.{k}.weight"), shape.to_vec(), little(layer.weights)));
-            tensors.push((format!("layers.{k}.bias"), vec![shape[1]], little(layer.bias)));
-        }
-        let views = tensors
-            .iter()
-            .map(|(name, shape, bytes)| {
-                Ok((name.as_str(), TensorView::new(Dtype::F32, shape.clone(), bytes)?))
-            })
-            .collect::<Result<Vec<_>, SafeTensorError>>()?;
-        // one entry: the format writes several in no fixed order, and equal models are equal files
-        let said = serde_json::to_string(origin)?;
-        safetensors::serialize(views, Some(HashMap::from([(METADATA.to_owned(), said)])))
+        weights::to_bytes(&self.network, origin)
     }
 
     /// Reads the file of a residual for `airframe`, whose reference scale is `x_c`.
@@ -212,7 +199,7 @@ impl Residual {
             std::fs::read(path).map_err(|why| ResidualError::Read { path: path.into(), why })?;
         let content = |why: String| ResidualError::Content { path: path.into(), why };
         let origin = origin(&bytes).map_err(content)?;
-        let network = network(&bytes).map_err(content)?;
+        let network = weights::network(&bytes).map_err(content)?;
         if origin.airframe != fingerprint(airframe) {
             let airframe = airframe.name.clone();
             return Err(ResidualError::Airframe { path: path.into(), airframe });
@@ -223,46 +210,11 @@ impl Residual {
 
 /// The metadata of a file.
 fn origin(bytes: &[u8]) -> Result<Origin, String> {
-    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
-    let said = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
-    let said = said.ok_or(format!("its metadata has no entry {METADATA}"))?;
-    let origin: Origin = serde_json::from_str(said).map_err(|e| format!("its metadata: {e}"))?;
+    let origin: Origin = weights::said(bytes)?;
     match origin.schema.as_str() {
         Origin::SCHEMA => Ok(origin),
         other => Err(format!("its schema is {other:?}, this program reads {}", Origin::SCHEMA)),
     }
-}
-
-/// The network of a file: `layers.0.weight`, `layers.0.bias` and so on.
-fn network(bytes: &[u8]) -> Result<Dense, String> {
-    let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
-    let (mut sizes, mut parameters) = (Vec::new(), Vec::new());
-    let layers = tensors.len() / 2;
-    for k in 0..layers {
-        for part in ["weight", "bias"] {
-            let name = format!("layers.{k}.{part}");
-            let tensor = tensors.tensor(&name).map_err(|_| format!("it has no tensor {name}"))?;
-            let outputs = match (part, tensor.shape()) {
-                ("weight", [inputs, outputs]) if sizes.last().is_none_or(|n| n == inputs) => {
-                    if sizes.is_empty() {
-                        sizes.push(*inputs);
-                    }
-                    *outputs
-                }
-                ("bias", [outputs]) if sizes.last() == Some(outputs) => *outputs,
-                (_, shape) => return Err(format!("tensor {name} has the shape {shape:?}")),
-            };
-            if tensor.dtype() != Dtype::F32 {
-                return Err(format!("tensor {name} is {:?}, not F32", tensor.dtype()));
-            }
-            if part == "weight" {
-                sizes.push(outputs);
-            }
-            let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-            parameters.extend(tensor.data().chunks_exact(4).map(number));
-        }
-    }
-    Dense::new(&sizes, parameters).map_err(|e| e.to_string())
 }
 
 #[cfg(test)]

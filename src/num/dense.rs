@@ -5,8 +5,11 @@ use rand::RngExt;
 
 use super::Real;
 
-/// The widest layer that an evaluation has room for.
-pub const WIDEST: usize = 128;
+/// The widest layer that a network may have.
+pub const WIDEST: usize = 512;
+
+/// The widest layer that [`Dense::evaluate`] has room for on the stack.
+pub const ON_STACK: usize = 128;
 
 /// Outputs that are summed side by side, in registers.
 const BLOCK: usize = 16;
@@ -28,6 +31,20 @@ pub struct Layer<'a> {
     pub weights: &'a [f32],
     /// b.
     pub bias: &'a [f32],
+}
+
+/// Room for the units of two layers: with it, evaluating a wide network takes no memory.
+#[derive(Clone, Debug)]
+pub struct Units<R> {
+    from: Vec<R>,
+    to: Vec<R>,
+}
+
+impl<R: Copy> Units<R> {
+    /// Room for any network, filled with `zero`.
+    pub fn new(zero: R) -> Units<R> {
+        Units { from: vec![zero; WIDEST], to: vec![zero; WIDEST] }
+    }
 }
 
 /// Why numbers do not make a network.
@@ -120,14 +137,28 @@ impl Dense {
         })
     }
 
+    /// A network as PyTorch and burn start it: all parameters of a layer uniform in ±1/√in.
+    ///
+    /// # Errors
+    /// If `sizes` cannot be evaluated.
+    pub fn uniform(sizes: &[usize], rng: &mut impl Rng) -> Result<Self, DenseError> {
+        let mut parameters = Vec::new();
+        for s in sizes.windows(2) {
+            let bound = 1.0 / (s[0].max(1) as f64).sqrt();
+            let draw = |_| (bound * rng.random_range(-1.0..1.0)) as f32;
+            parameters.extend((0..(s[0] + 1) * s[1]).map(draw));
+        }
+        Dense::new(sizes, parameters)
+    }
+
     /// The network's answer.
     ///
     /// # Panics
-    /// If the network has not `IN` inputs and `OUT` outputs.
+    /// If the network has not `IN` inputs and `OUT` outputs, or a layer wider than [`ON_STACK`].
     #[inline(always)]
     pub fn evaluate<R: Real, const IN: usize, const OUT: usize>(&self, input: [R; IN]) -> [R; OUT] {
-        let mut from = [R::zero(); WIDEST];
-        let mut to = [R::zero(); WIDEST];
+        let mut from = [R::zero(); ON_STACK];
+        let mut to = [R::zero(); ON_STACK];
         from[..IN].copy_from_slice(&input);
         let last = self.sizes.len() - 2;
         for (k, layer) in self.layers().enumerate() {
@@ -141,6 +172,53 @@ impl Dense {
         let mut answer = [R::zero(); OUT];
         answer.copy_from_slice(&from[..OUT]);
         answer
+    }
+
+    /// The network's answer, whatever its width, in `units`.
+    ///
+    /// # Panics
+    /// If `input` has another length than the network's first layer.
+    #[inline(always)]
+    pub fn evaluate_in<'a, R: Real>(&self, units: &'a mut Units<R>, input: &[R]) -> &'a [R] {
+        let Units { from, to } = units;
+        from[..self.sizes[0]].copy_from_slice(input);
+        let last = self.sizes.len() - 2;
+        for (k, layer) in self.layers().enumerate() {
+            let (inputs, outputs) = (self.sizes[k], self.sizes[k + 1]);
+            layer.apply(&from[..inputs], &mut to[..outputs]);
+            if k < last {
+                rectify(&mut to[..outputs]);
+            }
+            std::mem::swap(from, to);
+        }
+        &from[..self.sizes[last + 1]]
+    }
+
+    /// The network's answer to one input in single precision, side by side over the outputs of a layer:
+    /// for a network that is asked once a tick. Units at zero cost nothing.
+    ///
+    /// # Panics
+    /// As [`evaluate_in`](Dense::evaluate_in).
+    #[inline(always)]
+    pub fn evaluate_one<'a>(&self, units: &'a mut Units<f32>, input: &[f32]) -> &'a [f32] {
+        let Units { from, to: next } = units;
+        from[..self.sizes[0]].copy_from_slice(input);
+        let last = self.sizes.len() - 2;
+        for (k, layer) in self.layers().enumerate() {
+            let (inputs, outputs) = (self.sizes[k], self.sizes[k + 1]);
+            let to = &mut next[..outputs];
+            to.copy_from_slice(layer.bias);
+            for (x, row) in from[..inputs].iter().zip(layer.weights.chunks_exact(outputs)) {
+                if *x != 0.0 {
+                    to.iter_mut().zip(row).for_each(|(y, w)| *y += x * w);
+                }
+            }
+            if k < last {
+                to.iter_mut().for_each(|y| *y = if *y < 0.0 { 0.0 } else { *y });
+            }
+            std::mem::swap(from, next);
+        }
+        &from[..self.sizes[last + 1]]
     }
 }
 
@@ -242,6 +320,26 @@ mod tests {
     }
 
     #[test]
+    fn wide_networks_answer_in_a_room_of_their_own() {
+        let network = Dense::uniform(&[3, 300, 21, 2], &mut stream::stream(7, &[])).unwrap();
+        let (mut room, mut single) = (Units::new(0.0_f64), Units::new(0.0_f32));
+        let mut lanes = Units::new(Lanes::<4>::zero());
+        for k in 0..20 {
+            let x = [0, 1, 2].map(|i| ((5 * k + i) as f64).cos());
+            let expected = by_hand(&network, x);
+            let plain = network.evaluate_in(&mut room, &x);
+            let one = network.evaluate_one(&mut single, &x.map(|x| x as f32));
+            let lanes = network.evaluate_in(&mut lanes, &x.map(Lanes::from_f64));
+            for i in 0..2 {
+                // rounding of sums of 300 terms below one
+                assert!((plain[i] - expected[i]).abs() < 1e-14);
+                assert!((f64::from(one[i]) - expected[i]).abs() < 1e-6);
+                assert!((f64::from(lanes[i].0[2]) - expected[i]).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
     fn derivatives_agree_with_central_differences() {
         let network = network();
         let x = [0.3, -0.8, 0.5];
@@ -267,7 +365,7 @@ mod tests {
         assert!(network.parameters()[..9 * 64].iter().all(|w| w.abs() <= 1.0 / 3.0 && *w != 0.0));
         assert!(matches!(Dense::new(&[2, 1], vec![0.0; 2]), Err(DenseError::Count { .. })));
         assert!(matches!(Dense::new(&[2], vec![]), Err(DenseError::Sizes(_))));
-        assert!(matches!(Dense::new(&[2, 129], vec![0.0; 387]), Err(DenseError::Sizes(_))));
+        assert!(matches!(Dense::new(&[2, 513], vec![0.0; 1539]), Err(DenseError::Sizes(_))));
         assert_eq!(Dense::new(&[1, 1], vec![1.0, f32::NAN]), Err(DenseError::NotFinite(1)));
     }
 }

@@ -70,6 +70,14 @@ pub trait Real:
     fn clamp(self, low: f64, high: f64) -> Self {
         self.max(Self::from_f64(low)).min(Self::from_f64(high))
     }
+    /// The hyperbolic tangent, to 1e-7 absolute in single precision.
+    #[inline(always)]
+    fn tanh(self) -> Self {
+        let one = Self::from_f64(1.0);
+        // past ±20 it is ±1 in double precision too, and the exponential stays finite
+        let e = self.clamp(-20.0, 20.0).scale(2.0).exp();
+        (e - one) / (e + one)
+    }
     /// The inverse sine, for arguments in −1..1.
     #[inline(always)]
     fn asin(self) -> Self {

@@ -51,7 +51,7 @@ pub struct Companion {
 
 impl Companion {
     pub fn start(options: &Options) -> Self {
-        Companion::with(options, crew(Kind::Lqi, x8()).unwrap())
+        Companion::with(options, crew(Kind::Lqi, x8(), Path::new("")).unwrap())
     }
 
     pub fn with(options: &Options, crew: Crew) -> Self {

@@ -40,6 +40,9 @@ pub struct Arguments {
     /// Model that the controller is designed from or plans with.
     #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
     model: PathBuf,
+    /// Folder of the trained policy, for controllers that need one.
+    #[arg(long, value_name = "DIR", default_value = fly::POLICY)]
+    policy: PathBuf,
     /// Fly this flight-test schedule in place of the six attitudes.
     #[arg(long, value_name = "FILE")]
     schedule: Option<PathBuf>,
@@ -63,7 +66,7 @@ pub struct Arguments {
 /// If something cannot be opened, or the flight ends before the schedule does.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, None)?;
-    let mut crew = fly::crew(arguments.controller, &model)?;
+    let mut crew = fly::crew(arguments.controller, &model, &arguments.policy)?;
     let schedule = arguments.schedule.as_deref().map(Schedule::load).transpose()?;
     let legs = schedule.as_ref().map_or_else(Legs::demonstration, Legs::during);
     let tracked = if schedule.is_none() { legs.legs.as_slice() } else { &[] };

@@ -98,6 +98,7 @@ fn rollout(scene: &Scene, block: &Block) -> Lanes<WIDTH> {
     let figures = &model.airframe.actuators;
     let lane = Lanes::<WIDTH>::from_f64;
     let mut state: State<Lanes<WIDTH>> = seen.state.map(lane);
+    let target = target.map(lane);
     let z = &seen.actuators;
     let observed = ActuatorState {
         aileron: lane(z.aileron),
@@ -125,7 +126,7 @@ fn rollout(scene: &Scene, block: &Block) -> Lanes<WIDTH> {
         state = model.step_inlined(&state, &controls, seen.altitude, &mut memory);
         let throttle = (*thrust + lane(1.0)).scale(0.5);
         actuators.step(&Command { aileron: *aileron, elevator: *elevator, throttle }, figures);
-        sum += task.reward(&state, target).scale(weight);
+        sum += task.reward(&state, &target).scale(weight);
         weight *= task.discount;
     }
     sum

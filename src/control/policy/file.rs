@@ -1,0 +1,237 @@
+//! A policy's folder: `actor.safetensors`, `critic1.safetensors`, `critic2.safetensors`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use safetensors::SafeTensorError;
+use serde::{Deserialize, Serialize};
+
+use crate::control::policy::{Actor, Agent, Critic, ShapeError};
+use crate::model::residual::fingerprint;
+use crate::model::weights;
+use crate::num::Dense;
+use crate::physics::Airframe;
+
+/// The files of a folder, the actor last: where it is, the others are.
+const FILES: [&str; 3] = ["critic1.safetensors", "critic2.safetensors", "actor.safetensors"];
+
+/// What each of a policy's files says of where it comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Origin {
+    /// Layout of the files: [`Origin::SCHEMA`].
+    pub schema: String,
+    /// Fingerprint of the airframe that it flies, see [`fingerprint`].
+    pub airframe: String,
+    /// Name of the model it was trained in, or `jsbsim`.
+    pub model: String,
+    /// SHA-256 of that model's files, hexadecimal; empty for JSBSim.
+    pub model_sha256: String,
+    /// Seed of the training.
+    pub seed: u64,
+    /// Steps of the environment that it was trained for.
+    pub steps: u64,
+    /// Its evaluation at the end of training, if there was one.
+    pub evaluation: Option<Evaluated>,
+    /// The program that trained it, with its version.
+    pub program: String,
+}
+
+/// What a policy reached in JSBSim at the end of its training.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Evaluated {
+    /// Targets flown.
+    pub targets: usize,
+    /// Mean settled error on easy ones, degrees.
+    pub easy_deg: f64,
+    /// Mean settled error on hard ones, degrees.
+    pub hard_deg: f64,
+    /// Share of targets that were lost.
+    pub divergence_rate: f64,
+}
+
+/// Why a policy cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum AgentError {
+    /// A file cannot be read.
+    #[error("cannot read policy {path}: {why}; a policy folder holds {}", FILES.join(", "), path = path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        why: std::io::Error,
+    },
+    /// A file is none of a policy's.
+    #[error("policy {path}: {why}; train it again with `greylag train policy`", path = path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
+    /// It was trained for another aircraft.
+    #[error("policy {path} was trained for another airframe than {airframe}; fly it with the airframe of model {model}, or train one for this", path = path.display())]
+    Airframe {
+        /// The folder.
+        path: PathBuf,
+        /// The airframe's name.
+        airframe: String,
+        /// The model it was trained in.
+        model: String,
+    },
+    /// Its files are of several trainings.
+    #[error("policy {path}: its files come from different trainings; copy all of {} from one", FILES.join(", "), path = path.display())]
+    Mixed {
+        /// The folder.
+        path: PathBuf,
+    },
+}
+
+impl Origin {
+    /// The layout that this program reads and writes.
+    pub const SCHEMA: &'static str = "greylag.policy/1";
+}
+
+impl Agent {
+    /// The files of a folder in the order they are to be written, each with its name.
+    ///
+    /// # Errors
+    /// What the writer of the format says.
+    pub fn to_files(&self) -> Result<[(&'static str, Vec<u8>); 3], SafeTensorError> {
+        let [one, two] = &*self.critics;
+        let bytes = |network| weights::to_bytes(network, &self.origin);
+        Ok([
+            (FILES[0], bytes(one.network())?),
+            (FILES[1], bytes(two.network())?),
+            (FILES[2], bytes(self.actor.network())?),
+        ])
+    }
+
+    /// Reads the policy in `folder` for `airframe`.
+    ///
+    /// # Errors
+    /// A file is missing, none of a policy's, or of another airframe or training than the others.
+    pub fn load(folder: &Path, airframe: &Airframe) -> Result<Agent, AgentError> {
+        let [one, two, actor] = FILES.map(|name| read(&folder.join(name)));
+        let ((one, origin), (two, second), (actor, third)) = (one?, two?, actor?);
+        if origin != second || origin != third {
+            return Err(AgentError::Mixed { path: folder.into() });
+        }
+        if origin.airframe != fingerprint(airframe) {
+            let (path, airframe) = (folder.into(), airframe.name.clone());
+            return Err(AgentError::Airframe { path, airframe, model: origin.model });
+        }
+        let shape = |name: &str| {
+            let path = folder.join(name);
+            move |e: ShapeError| AgentError::Content { path, why: e.to_string() }
+        };
+        let critics = [
+            Critic::new(one).map_err(shape(FILES[0]))?,
+            Critic::new(two).map_err(shape(FILES[1]))?,
+        ];
+        let actor = Actor::new(actor).map_err(shape(FILES[2]))?;
+        Ok(Agent { actor: Arc::new(actor), critics: Arc::new(critics), origin })
+    }
+}
+
+/// The network of a file and what it says of itself.
+fn read(path: &Path) -> Result<(Dense, Origin), AgentError> {
+    let bytes = std::fs::read(path).map_err(|why| AgentError::Read { path: path.into(), why })?;
+    let content = |why: String| AgentError::Content { path: path.into(), why };
+    let origin: Origin = weights::said(&bytes).map_err(content)?;
+    if origin.schema != Origin::SCHEMA {
+        let why =
+            format!("its schema is {:?}, this program reads {}", origin.schema, Origin::SCHEMA);
+        return Err(content(why));
+    }
+    Ok((weights::network(&bytes).map_err(content)?, origin))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::policy::{ACTIONS, OBSERVATIONS};
+    use crate::num::stream;
+
+    fn airframe() -> Airframe {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+        Airframe::load(&folder.join("airframe.toml")).unwrap()
+    }
+
+    fn agent(seed: u64) -> Agent {
+        let mut rng = stream::stream(seed, &[]);
+        let mut network = |sizes: &[usize]| Dense::uniform(sizes, &mut rng).unwrap();
+        let actor = Actor::new(network(&[OBSERVATIONS, 20, ACTIONS])).unwrap();
+        let mut critic = || Critic::new(network(&[OBSERVATIONS + ACTIONS, 20, 1])).unwrap();
+        let origin = Origin {
+            schema: Origin::SCHEMA.into(),
+            airframe: fingerprint(&airframe()),
+            model: "x8".into(),
+            model_sha256: String::new(),
+            seed,
+            steps: 1000,
+            evaluation: Some(Evaluated {
+                targets: 24,
+                easy_deg: 0.1 + 0.2,
+                hard_deg: 1.0 / 3.0,
+                divergence_rate: 0.0,
+            }),
+            program: "greylag 0".into(),
+        };
+        let critics = Arc::new([critic(), critic()]);
+        Agent { actor: Arc::new(actor), critics, origin }
+    }
+
+    fn write(agent: &Agent, folder: &Path, keep: impl Fn(&str) -> bool) {
+        for (name, bytes) in agent.to_files().unwrap() {
+            if keep(name) {
+                std::fs::write(folder.join(name), bytes).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn a_folder_gives_the_same_policy_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let agent = agent(3);
+        write(&agent, folder.path(), |_| true);
+        assert_eq!(Agent::load(folder.path(), &airframe()).unwrap(), agent);
+    }
+
+    #[test]
+    fn what_is_missing_mixed_foreign_or_cut_short_is_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let load = || Agent::load(folder.path(), &airframe());
+        assert!(load().unwrap_err().to_string().contains("a policy folder holds critic1"));
+        write(&agent(3), folder.path(), |_| true);
+        write(&agent(4), folder.path(), |name| name.starts_with("actor"));
+        assert!(matches!(load(), Err(AgentError::Mixed { .. })));
+        let mut foreign = agent(3);
+        foreign.origin.airframe = "another".into();
+        write(&foreign, folder.path(), |_| true);
+        let said = load().unwrap_err().to_string();
+        assert!(said.contains("another airframe than") && said.contains("model x8"), "{said}");
+        let mut newer = agent(3);
+        newer.origin.schema = "greylag.policy/2".into();
+        write(&newer, folder.path(), |_| true);
+        assert!(load().unwrap_err().to_string().contains("greylag.policy/2"));
+        write(&agent(3), folder.path(), |_| true);
+        let path = folder.path().join("critic2.safetensors");
+        let bytes = std::fs::read(&path).unwrap();
+        for length in (0..bytes.len()).step_by(311) {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert!(matches!(load(), Err(AgentError::Content { .. })), "{length} bytes");
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut agent = agent(3);
+        Arc::make_mut(&mut agent.actor).network_mut().parameters_mut()[7] = f32::NAN;
+        write(&agent, folder.path(), |_| true);
+        let said = Agent::load(folder.path(), &airframe()).unwrap_err().to_string();
+        assert!(said.contains("parameter 7") && said.contains("actor.safetensors"), "{said}");
+    }
+}

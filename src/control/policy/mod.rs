@@ -1,0 +1,97 @@
+//! A trained policy: what it observes, its networks, its files, and the controller that flies it.
+//!
+//! Section IV-B of \[GSFM26\]. Training lives in `learn`; nothing of it is needed to fly.
+
+mod file;
+mod networks;
+pub mod observation;
+
+use std::sync::Arc;
+
+pub use file::{AgentError, Evaluated, Origin};
+pub use networks::{ACTIONS, Actor, Critic, ShapeError, command};
+pub use observation::{OBSERVATIONS, observe};
+
+use crate::control::{Controller, Observation, Target};
+use crate::num::dense::Units;
+use crate::physics::Command;
+
+/// The networks of a policy with what its files say of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Agent {
+    /// π.
+    pub actor: Arc<Actor>,
+    /// Q1, Q2.
+    pub critics: Arc<[Critic; 2]>,
+    /// Where it comes from.
+    pub origin: Origin,
+}
+
+/// The controller: the actor's answer at every tick.
+#[derive(Clone, Debug)]
+pub struct Policy {
+    actor: Arc<Actor>,
+    units: Units<f32>,
+}
+
+impl Policy {
+    /// The policy of `agent`.
+    pub fn new(agent: &Agent) -> Policy {
+        Policy::of(agent.actor.clone())
+    }
+
+    /// The policy of an actor.
+    pub fn of(actor: Arc<Actor>) -> Policy {
+        Policy { actor, units: Units::new(0.0) }
+    }
+}
+
+impl Controller for Policy {
+    fn name(&self) -> &'static str {
+        "policy"
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
+    }
+
+    fn reset(&mut self, _seed: u64) {}
+
+    fn command(&mut self, seen: &Observation, target: &Target) -> Command {
+        let observed = observe(&seen.state, &seen.actuators, target);
+        let action = self.actor.act_one(&mut self.units, &observed.map(|x| x as f32));
+        command(action.map(f64::from)).clamped()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::{Dense, stream};
+    use crate::physics::{ActuatorState, State, Time};
+
+    #[test]
+    fn commands_are_the_actors_and_a_lost_state_is_not_hidden() {
+        let network =
+            Dense::uniform(&[OBSERVATIONS, 300, 300, ACTIONS], &mut stream::stream(1, &[]));
+        let actor = Arc::new(Actor::new(network.unwrap()).unwrap());
+        let mut policy = Policy::of(actor.clone());
+        let mut seen = Observation {
+            time: Time::default(),
+            state: State { roll: 0.3, alpha: 0.1, ..State::NEUTRAL },
+            actuators: ActuatorState { aileron: 0.2, throttle: 0.4, ..ActuatorState::default() },
+            altitude: 600.0,
+            previous: [Command::IDLE; 2],
+        };
+        let target = Target { roll: 0.5, pitch: -0.2, airspeed: 16.67 };
+        let there = observe(&seen.state, &seen.actuators, &target);
+        let expected: Command = command(actor.act(&mut Units::new(0.0), &there));
+        let given = policy.command(&seen, &target);
+        // single against double precision over sums of 300 terms
+        assert!((given.aileron - expected.aileron).abs() < 1e-5);
+        assert!((given.elevator - expected.elevator).abs() < 1e-5);
+        assert!((given.throttle - expected.throttle).abs() < 1e-5);
+        seen.state.q = f64::NAN;
+        assert!(!policy.command(&seen, &target).is_finite());
+    }
+}

@@ -1,0 +1,172 @@
+//! The networks of a policy: the actor π and its critics Q.
+
+use crate::control::policy::OBSERVATIONS;
+use crate::num::dense::Units;
+use crate::num::{Dense, Real};
+use crate::physics::Command;
+
+/// Components of an action: aileron, elevator and throttle, each in −1..1 (eq. 29 of \[GSFM26\]).
+pub const ACTIONS: usize = 3;
+
+/// Why a network is none of a policy's.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{what} takes a network of {inputs} inputs and {outputs} outputs, not {found:?}")]
+pub struct ShapeError {
+    what: &'static str,
+    inputs: usize,
+    outputs: usize,
+    found: Vec<usize>,
+}
+
+/// π: from an observation to an action.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Actor {
+    network: Dense,
+}
+
+/// Q: from an observation and an action to the return expected from there on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Critic {
+    network: Dense,
+}
+
+/// Refuses a network that has not the inputs and outputs it takes.
+fn check(
+    what: &'static str,
+    inputs: usize,
+    outputs: usize,
+    network: Dense,
+) -> Result<Dense, ShapeError> {
+    let found = network.sizes();
+    if (found[0], found[found.len() - 1]) == (inputs, outputs) {
+        return Ok(network);
+    }
+    Err(ShapeError { what, inputs, outputs, found: found.into() })
+}
+
+/// The command that an action stands for; throttle = (a + 1)/2.
+#[inline(always)]
+pub fn command<R: Real>([aileron, elevator, thrust]: [R; ACTIONS]) -> Command<R> {
+    Command { aileron, elevator, throttle: (thrust + R::from_f64(1.0)).scale(0.5) }
+}
+
+impl Actor {
+    /// The actor of a network, tanh being added after its last layer.
+    ///
+    /// # Errors
+    /// If the network has other inputs or outputs.
+    pub fn new(network: Dense) -> Result<Actor, ShapeError> {
+        check("an actor", OBSERVATIONS, ACTIONS, network).map(|network| Actor { network })
+    }
+
+    /// The network, without the tanh.
+    pub fn network(&self) -> &Dense {
+        &self.network
+    }
+
+    /// The network, to be trained. Whoever writes keeps it finite.
+    pub fn network_mut(&mut self) -> &mut Dense {
+        &mut self.network
+    }
+
+    /// The action, in lanes or double precision.
+    #[inline(always)]
+    pub fn act<R: Real>(&self, units: &mut Units<R>, observed: &[R; OBSERVATIONS]) -> [R; ACTIONS] {
+        let answer = self.network.evaluate_in(units, observed);
+        [answer[0].tanh(), answer[1].tanh(), answer[2].tanh()]
+    }
+
+    /// The action of a single observation, in the widest vectors that the processor has; no operation
+    /// is fused or reordered between them, so all give the same numbers to the bit.
+    pub fn act_one(
+        &self,
+        units: &mut Units<f32>,
+        observed: &[f32; OBSERVATIONS],
+    ) -> [f32; ACTIONS] {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
+                // SAFETY: the processor has the features
+                return unsafe { self.act_avx512(units, observed) };
+            }
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: as above
+                return unsafe { self.act_avx2(units, observed) };
+            }
+        }
+        self.act_baseline(units, observed)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512vl")]
+    fn act_avx512(&self, units: &mut Units<f32>, observed: &[f32]) -> [f32; ACTIONS] {
+        self.act_baseline(units, observed)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn act_avx2(&self, units: &mut Units<f32>, observed: &[f32]) -> [f32; ACTIONS] {
+        self.act_baseline(units, observed)
+    }
+
+    #[inline(always)]
+    fn act_baseline(&self, units: &mut Units<f32>, observed: &[f32]) -> [f32; ACTIONS] {
+        let answer = self.network.evaluate_one(units, observed);
+        [answer[0].tanh(), answer[1].tanh(), answer[2].tanh()]
+    }
+}
+
+impl Critic {
+    /// The critic of a network.
+    ///
+    /// # Errors
+    /// If the network has other inputs or outputs.
+    pub fn new(network: Dense) -> Result<Critic, ShapeError> {
+        check("a critic", OBSERVATIONS + ACTIONS, 1, network).map(|network| Critic { network })
+    }
+
+    /// The network.
+    pub fn network(&self) -> &Dense {
+        &self.network
+    }
+
+    /// The discounted return expected after `action`, in units of the reward of eq. (30).
+    #[inline(always)]
+    pub fn value<R: Real>(
+        &self,
+        units: &mut Units<R>,
+        observed: &[R; OBSERVATIONS],
+        action: &[R; ACTIONS],
+    ) -> R {
+        let mut input = [R::zero(); OBSERVATIONS + ACTIONS];
+        input[..OBSERVATIONS].copy_from_slice(observed);
+        input[OBSERVATIONS..].copy_from_slice(action);
+        self.network.evaluate_in(units, &input)[0]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::stream;
+
+    #[test]
+    fn every_instruction_set_gives_the_same_action_to_the_bit() {
+        let sizes = [OBSERVATIONS, 300, 300, ACTIONS];
+        let actor =
+            Actor::new(Dense::uniform(&sizes, &mut stream::stream(2, &[])).unwrap()).unwrap();
+        let observed = std::array::from_fn(|i| (i as f32 * 0.7).sin());
+        let mut units = Units::new(0.0);
+        let widest = actor.act_one(&mut units, &observed);
+        assert_eq!(widest, actor.act_baseline(&mut units, &observed));
+        assert!(widest.iter().all(|a| a.abs() < 1.0 && *a != 0.0));
+    }
+
+    #[test]
+    fn networks_of_another_shape_are_refused() {
+        let network = || Dense::uniform(&[15, 8, 2], &mut stream::stream(2, &[])).unwrap();
+        let said = Actor::new(network()).unwrap_err().to_string();
+        assert!(said.contains("15 inputs and 3 outputs, not [15, 8, 2]"), "{said}");
+        assert!(Critic::new(network()).is_err());
+    }
+}

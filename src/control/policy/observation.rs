@@ -1,0 +1,66 @@
+//! What a policy observes: the fifteen numbers of eq. (28) of \[GSFM26\], of order one.
+
+use crate::control::Target;
+use crate::num::Real;
+use crate::physics::{ActuatorState, State};
+
+/// Numbers observed.
+pub const OBSERVATIONS: usize = 15;
+
+/// What each number is divided by, in the order of [`observe`]: rad, m/s and rad/s as they come, so
+/// that brisk flight, full deflection and the first error of a hard target are of order one.
+const UNIT: [f64; OBSERVATIONS] =
+    [1.0, 0.5, 4.0, 2.0, 1.0, 1.0, 0.2, 0.2, 0.5, 10.0, 0.5, 10.0, 0.5, 0.5, 0.25];
+
+/// The observation in lanes, double precision or dual numbers: the state φ θ V p q r α β, the actuators
+/// δa δ̇a δe δ̇e δt, then what is left to the target, φ* − φ and θ* − θ.
+///
+/// Departs from the paper: it observes φ* and θ* themselves. With φ and θ beside them both say the same;
+/// the difference is what has to vanish, and so is given at a scale of its own. Airspeed counts from
+/// 16.67 m/s, throttle from one half. The wanted airspeed is not observed: it is the same in every
+/// episode.
+#[inline(always)]
+pub fn observe<R: Real>(
+    state: &State<R>,
+    actuators: &ActuatorState<R>,
+    target: &Target<R>,
+) -> [R; OBSERVATIONS] {
+    let State { roll, pitch, airspeed, p, q, r, alpha, beta } = *state;
+    let ActuatorState { aileron, aileron_rate, elevator, elevator_rate, throttle } = *actuators;
+    let mut seen = [
+        roll,
+        pitch,
+        airspeed - R::from_f64(State::NEUTRAL.airspeed),
+        p,
+        q,
+        r,
+        alpha,
+        beta,
+        aileron,
+        aileron_rate,
+        elevator,
+        elevator_rate,
+        throttle - R::from_f64(0.5),
+        target.roll - roll,
+        target.pitch - pitch,
+    ];
+    for (x, unit) in seen.iter_mut().zip(&UNIT) {
+        *x = x.scale(1.0 / unit);
+    }
+    seen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hard_start_is_of_order_one_and_targets_are_seen_as_what_is_left() {
+        let target = Target { roll: 60_f64.to_radians(), pitch: -0.5, airspeed: 16.67 };
+        let start = observe(&State::NEUTRAL, &ActuatorState::default(), &target);
+        assert!(start.iter().all(|x| x.abs() < 2.2), "{start:?}");
+        assert_eq!(start[13..], [60_f64.to_radians() / 0.5, -2.0]);
+        let there = State { roll: target.roll, pitch: target.pitch, ..State::NEUTRAL };
+        assert_eq!(observe(&there, &ActuatorState::default(), &target)[13..], [0.0, 0.0]);
+    }
+}

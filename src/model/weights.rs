@@ -1,0 +1,82 @@
+//! Weights of a dense network as a safetensors file, with one entry of metadata.
+
+use std::collections::HashMap;
+
+use safetensors::SafeTensorError;
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::num::Dense;
+
+/// The entry of a file's metadata that holds what it says of itself, as JSON.
+const METADATA: &str = "greylag";
+
+/// A file's content: the layers of `network`, and `said` of it.
+///
+/// # Errors
+/// What the writer of the format says.
+pub fn to_bytes(network: &Dense, said: &impl Serialize) -> Result<Vec<u8>, SafeTensorError> {
+    let little = |list: &[f32]| list.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let mut tensors = Vec::new();
+    for (k, layer) in network.layers().enumerate() {
+        let shape = [network.sizes()[k], network.sizes()[k + 1]];
+        tensors.push((format!("layers.{k}.weight"), shape.to_vec(), little(layer.weights)));
+        tensors.push((format!("layers.{k}.bias"), vec![shape[1]], little(layer.bias)));
+    }
+    let views = tensors
+        .iter()
+        .map(|(name, shape, bytes)| {
+            Ok((name.as_str(), TensorView::new(Dtype::F32, shape.clone(), bytes)?))
+        })
+        .collect::<Result<Vec<_>, SafeTensorError>>()?;
+    // one entry: the format writes several in no fixed order, and equal networks are equal files
+    let said = serde_json::to_string(said)?;
+    safetensors::serialize(views, Some(HashMap::from([(METADATA.to_owned(), said)])))
+}
+
+/// What a file says of itself.
+///
+/// # Errors
+/// What is wrong with it, in words.
+pub fn said<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
+    let said = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let said = said.ok_or(format!("its metadata has no entry {METADATA}"))?;
+    serde_json::from_str(said).map_err(|e| format!("its metadata: {e}"))
+}
+
+/// The network of a file: `layers.0.weight`, `layers.0.bias` and so on.
+///
+/// # Errors
+/// What is wrong with it, in words.
+pub fn network(bytes: &[u8]) -> Result<Dense, String> {
+    let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
+    let (mut sizes, mut parameters) = (Vec::new(), Vec::new());
+    let layers = tensors.len() / 2;
+    for k in 0..layers {
+        for part in ["weight", "bias"] {
+            let name = format!("layers.{k}.{part}");
+            let tensor = tensors.tensor(&name).map_err(|_| format!("it has no tensor {name}"))?;
+            let outputs = match (part, tensor.shape()) {
+                ("weight", [inputs, outputs]) if sizes.last().is_none_or(|n| n == inputs) => {
+                    if sizes.is_empty() {
+                        sizes.push(*inputs);
+                    }
+                    *outputs
+                }
+                ("bias", [outputs]) if sizes.last() == Some(outputs) => *outputs,
+                (_, shape) => return Err(format!("tensor {name} has the shape {shape:?}")),
+            };
+            if tensor.dtype() != Dtype::F32 {
+                return Err(format!("tensor {name} is {:?}, not F32", tensor.dtype()));
+            }
+            if part == "weight" {
+                sizes.push(outputs);
+            }
+            let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+            parameters.extend(tensor.data().chunks_exact(4).map(number));
+        }
+    }
+    Dense::new(&sizes, parameters).map_err(|e| e.to_string())
+}
