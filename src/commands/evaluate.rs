@@ -123,6 +123,12 @@ fn entrants(arguments: &Arguments) -> Result<Vec<Entrant>> {
         let sources: Vec<(&GreyBox, String, &PathBuf)> = match kind.needs() {
             Needs::Model => models.clone().map(|m| (m, m.name.clone(), &none)).collect(),
             Needs::Gains => models.clone().take(1).map(|m| (m, "-".into(), &none)).collect(),
+            Needs::Both => models
+                .clone()
+                .flat_map(|m| {
+                    policies().map(move |p| (m, format!("{}, {}", m.name, p.display()), p))
+                })
+                .collect(),
             Needs::Policy => models
                 .clone()
                 .take(1)

@@ -138,7 +138,7 @@ pub fn controller(
     model: &GreyBox,
     folder: &Path,
 ) -> anyhow::Result<Box<dyn Controller>> {
-    if kind.needs() != Needs::Policy {
+    if !matches!(kind.needs(), Needs::Policy | Needs::Both) {
         return Ok(build(kind, model)?);
     }
     let agent = Agent::load(&shipped(folder), &model.airframe)?;

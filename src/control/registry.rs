@@ -53,6 +53,21 @@ impl<'a> Source<'a> {
     fn agent(&self) -> Result<&'a Agent, SetupError> {
         self.agent.ok_or(SetupError::Untrained)
     }
+
+    fn planner(&self, name: &'static str, settings: cem::Settings) -> Result<cem::Cem, SetupError> {
+        let aids = cem::Aids { agent: Some(self.agent()?.clone()), base: None };
+        Ok(cem::Cem::new(name, self.model, settings, aids))
+    }
+
+    fn planner_over_lqi(
+        &self,
+        name: &'static str,
+        settings: cem::Settings,
+    ) -> Result<cem::Cem, SetupError> {
+        let base = Some(lqi::Lqi::new(self.model)?);
+        let aids = cem::Aids { agent: Some(self.agent()?.clone()), base };
+        Ok(cem::Cem::new(name, self.model, settings, aids))
+    }
 }
 
 /// Where a controller has to run.
@@ -73,6 +88,8 @@ pub enum Needs {
     Model,
     /// The networks of a trained policy.
     Policy,
+    /// A model and a policy.
+    Both,
 }
 
 macro_rules! controllers {
@@ -120,7 +137,11 @@ controllers! {
     Pid "pid" Immediate Gains "PID with the gains published with the simulator." => |_from| pid::Pid::new(pid::PUBLIC),
     PidRetuned "pid-retuned" Immediate Gains "PID retuned, at a safer airspeed." => |_from| pid::Pid::new(pid::RETUNED),
     Lqi "lqi" Immediate Model "Gain-scheduled LQI designed from the model." => |from| lqi::Lqi::new(from.model)?,
-    Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |from| cem::Cem::new(from.model, cem::Settings::PAPER),
+    Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |from| cem::Cem::new("cem", from.model, cem::Settings::PAPER, cem::Aids::default()),
+    CemPolicy "cem-policy" Planned Both "CEM-MPC with the policy's proposals." => |from| from.planner("cem-policy", cem::Settings::POLICY)?,
+    CemCritic "cem-critic" Planned Both "CEM-MPC with the critics' value of the end." => |from| from.planner("cem-critic", cem::Settings::CRITICS)?,
+    Hybrid "hybrid" Planned Both "The hybrid controller: proposals and critics, eq. (26)." => |from| from.planner("hybrid", cem::Settings::HYBRID)?,
+    HybridLqi "hybrid-lqi" Planned Both "The hybrid where it is surely better than the model's LQI, which flies elsewhere." => |from| from.planner_over_lqi("hybrid-lqi", cem::Settings::HYBRID)?,
     Policy "policy" Immediate Policy "A trained policy alone." => |from| Policy::new(from.agent()?),
 }
 

@@ -4,6 +4,8 @@ mod design;
 mod riccati;
 mod schedule;
 
+use std::sync::Arc;
+
 use nalgebra::SVector;
 
 use crate::control::{Controller, Observation, SetupError, Target};
@@ -28,7 +30,7 @@ const AIRSPEED_KI: f64 = 0.05;
 /// The gain-scheduled LQI, designed from any model.
 #[derive(Clone, Debug)]
 pub struct Lqi {
-    schedule: Schedule,
+    schedule: Arc<Schedule>,
     deflection: f64,
     reference: Option<[f64; 2]>,
     integral: [f64; 2],
@@ -44,7 +46,7 @@ impl Lqi {
     /// If the model cannot be trimmed or stabilised at some attitude at any airspeed.
     pub fn new(model: &GreyBox) -> Result<Lqi, SetupError> {
         Ok(Lqi {
-            schedule: Schedule::new(model)?,
+            schedule: Arc::new(Schedule::new(model)?),
             deflection: model.airframe.actuators.deflection_max,
             reference: None,
             integral: [0.0; 2],
