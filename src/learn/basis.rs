@@ -106,6 +106,14 @@ pub fn values(model: &GreyBox) -> Vec<f64> {
     coefficients.chain([model.bare_body().jxz]).collect()
 }
 
+/// The present value of a coefficient, or of Jxz, by its full name.
+pub fn value(model: &GreyBox, name: &str) -> Option<f64> {
+    match name {
+        JXZ => Some(model.bare_body().jxz),
+        _ => model.coefficients().iter().find(|c| c.name == name).map(|c| c.value),
+    }
+}
+
 impl Basis {
     /// The coordinates of the coefficients `names` of `model` over `tracks`.
     ///

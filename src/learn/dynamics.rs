@@ -1,6 +1,7 @@
 //! Training of the dynamics model, section IV-A of \[GSFM26\].
 
 use rand::seq::SliceRandom;
+use serde::{Deserialize, Serialize};
 
 use crate::learn::adam::Adam;
 use crate::learn::basis::{self, Basis, TrainableError};
@@ -77,6 +78,34 @@ pub struct Progress {
     pub normalised: f64,
     /// λ.
     pub lambda: f64,
+}
+
+/// How a training stood at a moment, as its report shows it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Moment {
+    /// Updates made.
+    pub update: u64,
+    /// L_pred/L_prior, eq. (23).
+    pub normalised: f64,
+    /// ‖F_a‖/‖F_p‖.
+    pub ratio: f64,
+    /// λ.
+    pub lambda: f64,
+    /// The trained coefficients, in the order of [`Trainer::coefficients`].
+    pub coefficients: Vec<f64>,
+}
+
+/// A coefficient of the prior that was trained.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Learned {
+    /// Full name.
+    pub name: String,
+    /// Value at the start.
+    pub start: f64,
+    /// Value now.
+    pub value: f64,
+    /// The true value, where it is known.
+    pub truth: Option<f64>,
 }
 
 /// A training in progress.
@@ -218,13 +247,27 @@ impl Trainer {
         &self.basis.unseen
     }
 
-    /// The trained coefficients: full name, value at the start, value now.
-    pub fn coefficients(&self) -> Vec<(String, f64, f64)> {
+    /// The trained coefficients, with their true values if `truth` is given and has them.
+    pub fn coefficients(&self, truth: Option<&GreyBox>) -> Vec<Learned> {
         let (before, now) = (basis::values(&self.prior), basis::values(&self.subject.prior));
-        let name = |p: usize| {
-            self.prior.coefficients().get(p).map_or(basis::JXZ.to_owned(), |c| c.name.clone())
+        let learned = |p: &usize| {
+            let known = self.prior.coefficients().get(*p);
+            let name = known.map_or(basis::JXZ.to_owned(), |c| c.name.clone());
+            let truth = truth.and_then(|t| basis::value(t, &name));
+            Learned { name, start: before[*p], value: now[*p], truth }
         };
-        self.basis.places.iter().map(|p| (name(*p), before[*p], now[*p])).collect()
+        self.basis.places.iter().map(learned).collect()
+    }
+
+    /// How the training stands after `progress`.
+    pub fn moment(&self, progress: &Progress) -> Moment {
+        Moment {
+            update: progress.update,
+            normalised: progress.normalised,
+            ratio: progress.loss.learned / progress.loss.prior,
+            lambda: progress.lambda,
+            coefficients: self.coefficients(None).iter().map(|c| c.value).collect(),
+        }
     }
 
     /// The model as it is now.

@@ -20,7 +20,7 @@ pub mod windows;
 pub use adam::Adam;
 pub use basis::{JXZ, TrainableError, trainable};
 pub use checkpoint::{Checkpoint, CheckpointError};
-pub use dynamics::{Progress, TrainError, Trainer};
+pub use dynamics::{Learned, Moment, Progress, TrainError, Trainer};
 pub use engine::{Arithmetic, Engine};
 pub use loss::{Loss, Objective, Penalty};
 pub use network::Passes;

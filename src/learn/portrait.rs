@@ -62,11 +62,16 @@ pub struct Cell {
     pub beta_deg: f64,
     /// ‖F_a‖, 1/s.
     pub norm: f64,
+    /// Samples in it.
+    pub samples: usize,
 }
 
 /// The regime variables with their ranges: degrees, m/s.
 const REGIMES: [(&str, [f64; 2]); 3] =
     [("alpha_deg", [-15.0, 35.0]), ("beta_deg", [-30.0, 30.0]), ("airspeed_mps", [8.0, 38.0])];
+
+/// Half the width of a cell of the map over α and over β, degrees.
+pub const HALF_CELL_DEG: [f64; 2] = [25.0 / BINS as f64, 30.0 / BINS as f64];
 
 fn regime(state: &State) -> [f64; 3] {
     [state.alpha.to_degrees(), state.beta.to_degrees(), state.airspeed]
@@ -181,6 +186,7 @@ fn map(rows: &[Row]) -> Vec<Cell> {
                     alpha_deg: middle(a, REGIMES[0].1),
                     beta_deg: middle(b, REGIMES[1].1),
                     norm: (square / count).sqrt(),
+                    samples: *count as usize,
                 });
             }
         }

@@ -4,6 +4,7 @@ use sha2::{Digest, Sha256};
 
 use crate::learn::packet::Packet;
 use crate::learn::rollout::Recorded;
+use crate::logs::Flight;
 use crate::model::GreyBox;
 use crate::physics::inputs::InputMemory;
 use crate::physics::{Controls, State};
@@ -35,6 +36,19 @@ impl Track {
             track.density.push(model.atmosphere.density_at(altitude));
         }
         track
+    }
+
+    /// The track of a recorded flight whose states are known as they are, as `greylag collect` writes it.
+    pub fn of(model: &GreyBox, flight: &Flight) -> Track {
+        let rows = flight.samples.iter().map(|s| {
+            let [roll, pitch, _] = s.attitude_rad;
+            let [p, q, r] = s.rates_radps;
+            let (airspeed, alpha, beta) = (s.airspeed_mps, s.alpha_rad, s.beta_rad);
+            let state = State { roll, pitch, airspeed, p, q, r, alpha, beta };
+            let (aileron, elevator) = (s.aileron_rad, s.elevator_rad);
+            (state, Controls { aileron, elevator, throttle: s.throttle }, s.altitude_m)
+        });
+        Track::new(model, rows)
     }
 
     /// Where rollouts of `steps` steps can start: one sample is kept before, `steps` after.

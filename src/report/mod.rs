@@ -3,7 +3,8 @@
 //! A [`Page`] is a title over [`Section`]s, a section holds [`Figure`]s in order, and
 //! [`Page::render`] turns them into one string with style, script and data inside.
 //! [`FlightReport`] is the page of one flight, [`ComparisonReport`] that of models against flights,
-//! [`DiagnosisReport`] that of what a model lacks, [`AmendmentReport`] that of a model with it added. The plots are drawn in the reader's browser by uPlot
+//! [`DiagnosisReport`] that of what a model lacks, [`AmendmentReport`] that of a model with it added, `TrainingReport` that of a model that was learned.
+//! The plots are drawn in the reader's browser by uPlot
 //! 1.6.32 (MIT, `assets/uPlot.LICENSE`), which is embedded.
 //!
 //! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
@@ -42,6 +43,8 @@ mod numbers;
 mod page;
 mod table;
 mod time_figure;
+#[cfg(feature = "learn")]
+mod training_page;
 mod whiskers;
 mod write;
 mod xy;
@@ -68,6 +71,8 @@ pub use loop_timing::{Cycle, LoopTiming};
 pub use page::{Page, Section};
 pub use table::{Align, Column, Row, Table};
 pub use time_figure::{Band, Mark, Panel, Scale, Series, TimeFigure, Track};
+#[cfg(feature = "learn")]
+pub use training_page::TrainingReport;
 pub use whiskers::{Whisker, Whiskers};
 pub use write::{WriteError, write_new, write_over};
 pub use xy::{XyBand, XyFigure, XyMark, XySeries};

@@ -136,7 +136,7 @@ pub fn explore(
 }
 
 /// A row of the log: the state and what acts at an instant, and the command given then.
-fn sample(seen: &Observation, command: Option<&Command>, target: &Target) -> Sample {
+pub fn sample(seen: &Observation, command: Option<&Command>, target: &Target) -> Sample {
     let State { roll, pitch, airspeed, p, q, r, alpha, beta } = seen.state;
     let command = command.unwrap_or(&seen.previous[0]);
     Sample {

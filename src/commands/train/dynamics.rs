@@ -14,8 +14,11 @@ use super::flights::{FlightArguments, Flights};
 use crate::commands::files::{self, Overwrite, shipped};
 use crate::learn::portrait::{Portrait, portrait};
 use crate::learn::score::{Horizon, free_run};
-use crate::learn::{Checkpoint, Criterion, Progress, Recipe, Trainer, export, trainable};
+use crate::learn::{
+    Checkpoint, Criterion, Learned, Moment, Progress, Recipe, Trainer, export, trainable,
+};
 use crate::model::{GreyBox, Integrator};
+use crate::report::TrainingReport;
 
 /// Updates between two progress lines.
 const LINE: u64 = 500;
@@ -26,6 +29,11 @@ const HORIZONS: [usize; 4] = [1, 10, 100, 500];
 /// The file that a training goes on from.
 const CHECKPOINT: &str = "checkpoint.safetensors";
 
+/// How the training went so far, for its report.
+const HISTORY: &str = "history.json";
+/// The report.
+const REPORT: &str = "training.html";
+
 /// Options of `greylag train dynamics`.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -34,6 +42,10 @@ pub struct Arguments {
     prior: PathBuf,
     #[command(flatten)]
     flights: FlightArguments,
+    /// A model whose coefficients are the true ones, where they are known: to be shown beside the
+    /// learned ones.
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
     /// Leave the prior's coefficients as they are (the default).
     #[arg(long, conflicts_with = "trainable")]
     freeze: bool,
@@ -90,18 +102,12 @@ struct Document<'a> {
     recipe: &'a Recipe,
     data_sha256: &'a str,
     unseen: &'a [String],
-    coefficients: Vec<Coefficient>,
+    coefficients: &'a [Learned],
+    history: &'a [Moment],
     prior: Vec<Horizon>,
     learned: Vec<Horizon>,
     residual: Option<Portrait>,
     notes: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct Coefficient {
-    name: String,
-    before: f64,
-    after: f64,
 }
 
 /// Trains, prints what came of it, writes the model.
@@ -111,6 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(scheme) = &arguments.integrator {
         prior.integrator = if scheme == "rk4" { Integrator::Rk4 } else { Integrator::Jsbsim };
     }
+    let truth = arguments.truth.as_ref().map(|t| GreyBox::load(&shipped(t))).transpose()?;
     let recipe = arguments.recipe(&prior);
     let Flights { learn, judge, notes } = arguments.flights.read(&prior)?;
     std::fs::create_dir_all(&arguments.out)
@@ -132,16 +139,19 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             .with_context(|| format!("cannot go on from {}", kept.display()))?;
         eprintln!("going on after {} updates", trainer.update());
     }
-    if !train(&mut trainer, &kept)? {
+    let past = arguments.out.join(HISTORY);
+    let mut history = history(&past, trainer.update());
+    if !train(&mut trainer, &kept, &past, &mut history)? {
         eprintln!("interrupted; the same command goes on from {}", kept.display());
         return Ok(ExitCode::from(130));
     }
     let model = trainer.model()?;
-    let names: Vec<String> = trainer.coefficients().into_iter().map(|c| c.0).collect();
+    let learned = trainer.coefficients(truth.as_ref());
+    let names: Vec<String> = learned.iter().map(|c| c.name.clone()).collect();
     let origin = export::origin(&model, trainer.data(), trainer.recipe().seed);
     export::save(&model, &path, &names, &origin, &arguments.out)?;
     let scores = [&prior, &model].map(|m| free_run(m, &judge, &HORIZONS));
-    println!("{}", coefficients(&trainer));
+    println!("{}", coefficients(&learned));
     println!("{}", horizons(&scores));
     let residual = portrait(&model, &judge);
     if let Some(portrait) = &residual {
@@ -154,11 +164,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         recipe: trainer.recipe(),
         data_sha256: trainer.data(),
         unseen: trainer.unseen(),
-        coefficients: trainer
-            .coefficients()
-            .into_iter()
-            .map(|(name, before, after)| Coefficient { name, before, after })
-            .collect(),
+        coefficients: &learned,
+        history: &history,
         prior: before,
         learned: after,
         residual,
@@ -166,6 +173,27 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     };
     let json = arguments.out.join("training.json");
     files::write(&json, &(serde_json::to_string_pretty(&document)? + "\n"), Overwrite::Force)?;
+    let report = TrainingReport {
+        title: format!("{} learned from flights", prior.name),
+        subtitle: format!("{} updates over {samples} samples.", trainer.update()),
+        history: &history,
+        coefficients: &learned,
+        prior: &document.prior,
+        learned: &document.learned,
+        residual: document.residual.as_ref(),
+        notes: &document.notes,
+        provenance: vec![
+            ("Program".into(), document.program.into()),
+            ("Prior".into(), path.display().to_string()),
+            ("Data".into(), format!("SHA-256 {}", trainer.data())),
+            ("Recipe".into(), serde_json::to_string(trainer.recipe())?),
+            ("Command line".into(), std::env::args().collect::<Vec<_>>().join(" ")),
+            ("Plots".into(), "uPlot 1.6.32 (MIT)".into()),
+        ],
+    };
+    let page = arguments.out.join(REPORT);
+    files::write(&page, &report.page().render(), Overwrite::Force)?;
+    println!("report in {}", page.display());
     println!("model in {}", arguments.out.join(export::MODEL).display());
     Ok(ExitCode::SUCCESS)
 }
@@ -195,7 +223,12 @@ impl Arguments {
 }
 
 /// Trains to the end; `false` if interrupted. The last good state is in the checkpoint either way.
-fn train(trainer: &mut Trainer, kept: &Path) -> Result<bool> {
+fn train(
+    trainer: &mut Trainer,
+    kept: &Path,
+    past: &Path,
+    history: &mut Vec<Moment>,
+) -> Result<bool> {
     let stop = Arc::new(AtomicBool::new(false));
     let seen = stop.clone();
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))?;
@@ -209,9 +242,12 @@ fn train(trainer: &mut Trainer, kept: &Path) -> Result<bool> {
         })?;
         let made = (trainer.update() - before) as f64;
         println!("{}", line(&progress, trainer, 1e3 * start.elapsed().as_secs_f64() / made));
+        history.push(trainer.moment(&progress));
         lines += 1;
         let interrupted = stop.load(Ordering::Relaxed);
         if lines % KEEP == 0 || interrupted || trainer.is_done() {
+            // first what a checkpoint leaves out: more of it than the checkpoint knows does no harm
+            files::write(past, &serde_json::to_string(&history)?, Overwrite::Force)?;
             trainer.checkpoint().save(kept)?;
         }
         if interrupted && !trainer.is_done() {
@@ -219,6 +255,14 @@ fn train(trainer: &mut Trainer, kept: &Path) -> Result<bool> {
         }
     }
     Ok(true)
+}
+
+/// What was said of the training up to `update`; nothing if it cannot be read, for nothing depends on it.
+fn history(path: &Path, update: u64) -> Vec<Moment> {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let mut history: Vec<Moment> = serde_json::from_str(&text).unwrap_or_default();
+    history.retain(|m| m.update <= update);
+    history
 }
 
 fn line(p: &Progress, trainer: &Trainer, ms: f64) -> String {
@@ -230,8 +274,8 @@ fn line(p: &Progress, trainer: &Trainer, ms: f64) -> String {
     if p.loss.lost > 0 {
         text += &format!("  {} rollouts lost", p.loss.lost);
     }
-    for (name, _, now) in trainer.coefficients().iter().take(12) {
-        text += &format!("  {} {now:.4}", name.rsplit('.').next().unwrap_or(name));
+    for Learned { name, value, .. } in trainer.coefficients(None).iter().take(12) {
+        text += &format!("  {} {value:.4}", name.rsplit('.').next().unwrap_or(name));
     }
     text
 }
@@ -242,9 +286,10 @@ fn shares(portrait: &Portrait) -> Table {
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
     table.set_header(["rate of", "prior, x_c/s", "residual, x_c/s", "strongest at"]);
     for share in &portrait.channels {
-        let place = share.strongest.as_ref().map_or(String::new(), |(over, [low, high])| {
-            format!("{over} {low:.0} to {high:.0}")
-        });
+        let place = share
+            .strongest
+            .as_ref()
+            .map_or(String::new(), |(over, [low, high])| format!("{over} {low:.0} to {high:.0}"));
         table.add_row([
             share.channel.to_owned(),
             format!("{:.4}", share.prior),
@@ -255,12 +300,13 @@ fn shares(portrait: &Portrait) -> Table {
     table
 }
 
-fn coefficients(trainer: &Trainer) -> Table {
+fn coefficients(learned: &[Learned]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(["coefficient", "prior", "learned"]);
-    for (name, before, now) in trainer.coefficients() {
-        table.add_row([name, format!("{before:.5}"), format!("{now:.5}")]);
+    table.set_header(["coefficient", "prior", "learned", "true"]);
+    for Learned { name, start, value, truth } in learned {
+        let truth = truth.map_or("-".into(), |t| format!("{t:.5}"));
+        table.add_row([name.clone(), format!("{start:.5}"), format!("{value:.5}"), truth]);
     }
     table
 }

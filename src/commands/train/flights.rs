@@ -8,7 +8,6 @@ use crate::commands::intake::Reading;
 use crate::learn::windows::Track;
 use crate::logs::csv::{self, Tolerance};
 use crate::model::{GreyBox, STEP};
-use crate::physics::{Controls, State};
 use crate::sysid::reconstruct::ActuatorClock;
 
 /// One track in so many is held out, where there are that many.
@@ -96,15 +95,7 @@ fn collected(folder: &Path, model: &GreyBox) -> Result<Vec<Track>> {
     for round in list(folder)?.iter().filter(|p| p.is_dir()) {
         for path in list(round)?.iter().filter(|p| p.extension().is_some_and(|e| e == "csv")) {
             let flight = csv::load(path, Tolerance::Strict)?.flight;
-            let rows = flight.samples.iter().map(|s| {
-                let [roll, pitch, _] = s.attitude_rad;
-                let [p, q, r] = s.rates_radps;
-                let (airspeed, alpha, beta) = (s.airspeed_mps, s.alpha_rad, s.beta_rad);
-                let state = State { roll, pitch, airspeed, p, q, r, alpha, beta };
-                let (aileron, elevator) = (s.aileron_rad, s.elevator_rad);
-                (state, Controls { aileron, elevator, throttle: s.throttle }, s.altitude_m)
-            });
-            tracks.push(Track::new(model, rows));
+            tracks.push(Track::of(model, &flight));
         }
     }
     if tracks.is_empty() {

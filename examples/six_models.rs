@@ -1,0 +1,336 @@
+//! The six dynamics models of the paper by one recipe, with what they are compared to.
+//!
+//! Priors true, mild and severe, each frozen and trainable (section V-A of \[GSFM26\]); beside them the
+//! losses of PhIHP and APHYNITY, and a residual alone. All learn from the same flights: a random round,
+//! then rounds planned through the severe trainable model, retrained each time on everything.
+//!
+//! ```text
+//! cargo run --release --ignore-rust-version --example six_models -- --out target/six-models
+//! ```
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use clap::Parser;
+use comfy_table::Table;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use greylag::control::lqi::Lqi;
+use greylag::control::{self, Controller, Kind, Target};
+use greylag::learn::portrait::portrait;
+use greylag::learn::score::{Horizon, free_run};
+use greylag::learn::windows::Track;
+use greylag::learn::{Criterion, JXZ, Learned, Recipe, Trainer, export};
+use greylag::logs::{Flight, Sample};
+use greylag::model::{GreyBox, Integrator};
+use greylag::physics::State;
+use greylag::sim::collect::{Place, explore, sample};
+use greylag::sim::evaluation::{Evaluation, evaluate};
+use greylag::sim::{Episode, Group, Simulator, TargetFile};
+use greylag_sitl::plant::PlantOptions;
+
+/// Learns the six models, scores them, and prints the table.
+#[derive(Parser)]
+struct Arguments {
+    /// Folder for the models and the table as JSON.
+    #[arg(long)]
+    out: PathBuf,
+    /// Episodes of the random round; 175 in the paper.
+    #[arg(long, default_value_t = 175)]
+    episodes: u32,
+    /// Planned rounds of 25 episodes; five in the paper.
+    #[arg(long, default_value_t = 5)]
+    rounds: u32,
+    /// Updates of each training.
+    #[arg(long, default_value_t = 20_000)]
+    updates: u64,
+    /// Targets of each group for the held-out flights.
+    #[arg(long, default_value_t = 24)]
+    held_out: usize,
+    /// Seed of everything.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// Horizons of the free runs, steps.
+const HORIZONS: [usize; 4] = [1, 10, 100, 500];
+
+/// A way to learn a model.
+struct Way {
+    name: &'static str,
+    prior: &'static str,
+    trainable: bool,
+    criterion: Criterion,
+    /// Whether the residual learns alone, on a prior without forces.
+    alone: bool,
+}
+
+const fn way(name: &'static str, prior: &'static str, trainable: bool) -> Way {
+    Way { name, prior, trainable, criterion: Criterion::Scaled, alone: false }
+}
+
+const WAYS: [Way; 10] = [
+    way("true-frozen", "prior", false),
+    way("true-trainable", "prior", true),
+    way("mild-frozen", "prior-mild", false),
+    way("mild-trainable", "prior-mild", true),
+    way("severe-frozen", "prior-severe", false),
+    way("severe-trainable", "prior-severe", true),
+    way("as-printed-trainable", "prior-as-printed", true),
+    Way { criterion: Criterion::Plain, ..way("severe-phihp", "prior-severe", false) },
+    Way { criterion: Criterion::Plain, ..way("severe-aphynity", "prior-severe", true) },
+    Way { alone: true, ..way("residual-alone", "prior", false) },
+];
+
+/// A row of the table.
+#[derive(Serialize)]
+struct Row {
+    model: &'static str,
+    /// ‖F_a‖/‖F_p‖ over the held-out flights.
+    ratio: f64,
+    /// Median relative error of the trained coefficients, before and after; of those that were wrong.
+    coefficients: Option<[f64; 2]>,
+    learned: Vec<Learned>,
+    /// Free runs of the prior and of the model, easy then hard.
+    prior: [Vec<Horizon>; 2],
+    model_runs: [Vec<Horizon>; 2],
+    /// Settled error in degrees (easy, hard corners) and divergence rate of an LQI designed on it.
+    lqi: Option<[f64; 3]>,
+    training_s: f64,
+}
+
+fn main() -> Result<()> {
+    let arguments = Arguments::parse();
+    let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params");
+    let load = |name: &str| -> Result<(PathBuf, GreyBox)> {
+        let path = params.join(format!("x8/{name}.toml"));
+        let mut model = GreyBox::load(&path)?;
+        // the flights are the simulator's, and so is the scheme
+        model.integrator = Integrator::Jsbsim;
+        Ok((path, model))
+    };
+    std::fs::create_dir_all(&arguments.out)?;
+    let (_, reference) = load("jsbsim")?;
+    let held_out = held_out(&arguments, &reference)?;
+    let flights = explored(&arguments, &load("prior-severe")?.1)?;
+    let (_, truth) = load("prior")?;
+    let mut rows = Vec::new();
+    for way in &WAYS {
+        let (path, prior) = load(way.prior)?;
+        let start = Instant::now();
+        let trainer = trained(&arguments, way, &prior, &flights)?;
+        let training_s = start.elapsed().as_secs_f64();
+        let model = trainer.model()?;
+        let folder = arguments.out.join(way.name);
+        std::fs::create_dir_all(&folder)?;
+        if !way.alone {
+            let names: Vec<String> =
+                trainer.coefficients(None).into_iter().map(|c| c.name).collect();
+            let origin = export::origin(&model, trainer.data(), arguments.seed);
+            export::save(&model, &path, &names, &origin, &folder)?;
+        }
+        let lqi = steered(&model, &params.join("targets.csv"))?;
+        let score = |model: &GreyBox| {
+            [0, 1].map(|g| free_run(model, &tracks(model, &held_out[g]), &HORIZONS))
+        };
+        let learned = trainer.coefficients(Some(&truth));
+        let everything = held_out.concat();
+        rows.push(Row {
+            model: way.name,
+            ratio: portrait(&model, &tracks(&model, &everything)).map_or(0.0, |p| p.ratio),
+            coefficients: errors(&learned),
+            learned,
+            prior: score(&prior),
+            model_runs: score(&model),
+            lqi,
+            training_s,
+        });
+        println!("{}", table(&rows));
+    }
+    for row in &rows {
+        for Learned { name, start, value, truth } in &row.learned {
+            let truth = truth.unwrap_or(f64::NAN);
+            println!("{:22} {name:28} {start:9.5} -> {value:9.5}, true {truth:9.5}", row.model);
+        }
+    }
+    let json = arguments.out.join("six-models.json");
+    std::fs::write(&json, serde_json::to_string_pretty(&rows)? + "\n")
+        .with_context(|| format!("cannot write {}", json.display()))
+}
+
+/// Flights towards fresh targets, easy and hard, flown by an LQI on `reference`.
+fn held_out(arguments: &Arguments, reference: &GreyBox) -> Result<[Vec<Flight>; 2]> {
+    let targets = TargetFile::generate(9000 + arguments.seed);
+    let mut controller = Lqi::new(reference)?;
+    let mut simulator = Simulator::new(&PlantOptions::default())?;
+    let mut fly = |group: Group| -> Result<Vec<Flight>> {
+        let rows = targets.rows.iter().filter(|r| r.group == group).take(arguments.held_out);
+        rows.map(|row| {
+            let target = Target {
+                roll: row.roll_deg.to_radians(),
+                pitch: row.pitch_deg.to_radians(),
+                airspeed: State::NEUTRAL.airspeed,
+            };
+            let mut samples: Vec<Sample> = Vec::new();
+            let (environment, controller) =
+                (&mut simulator, &mut controller as &mut dyn Controller);
+            Episode { environment, controller, seed: 1 }
+                .fly(&target, |seen, command| samples.push(sample(seen, Some(command), &target)))?;
+            Ok(Flight::from(samples))
+        })
+        .collect()
+    };
+    Ok([fly(Group::Easy)?, fly(Group::HardCorners)?])
+}
+
+/// The exploration: a random round, then rounds planned through a model that learns from all before.
+fn explored(arguments: &Arguments, prior: &GreyBox) -> Result<Vec<Flight>> {
+    let mut flights = round(arguments, 0, arguments.episodes, None)?;
+    for k in 1..=arguments.rounds {
+        let trainer = trained(arguments, &way("explorer", "prior-severe", true), prior, &flights)?;
+        let planner = control::build(Kind::Cem, &trainer.model()?)?;
+        flights.extend(round(arguments, k, 25, Some(planner.as_ref()))?);
+        eprintln!("round {k}: {} flights", flights.len());
+    }
+    Ok(flights)
+}
+
+fn round(
+    arguments: &Arguments,
+    round: u32,
+    episodes: u32,
+    planner: Option<&dyn Controller>,
+) -> Result<Vec<Flight>> {
+    let start = || {
+        let planner = planner.map(|p| p.boxed_clone());
+        Simulator::new(&PlantOptions::default()).map(|simulator| (simulator, planner))
+    };
+    (0..episodes)
+        .into_par_iter()
+        .map_init(start, |worker, episode| {
+            let (simulator, planner) = worker.as_mut().map_err(|e| anyhow::anyhow!("{e}"))?;
+            let place = Place { seed: arguments.seed, round, episode };
+            let planner = planner.as_mut().map(|p| p.as_mut() as &mut dyn Controller);
+            Ok(explore(simulator, planner, &place)?)
+        })
+        .collect()
+}
+
+fn tracks(model: &GreyBox, flights: &[Flight]) -> Vec<Track> {
+    flights.iter().map(|flight| Track::of(model, flight)).collect()
+}
+
+fn trained(
+    arguments: &Arguments,
+    way: &Way,
+    prior: &GreyBox,
+    flights: &[Flight],
+) -> Result<Trainer> {
+    let mut prior = prior.clone();
+    if way.alone {
+        let none = vec![0.0; prior.coefficients().len()];
+        prior.set_coefficients(&none);
+    }
+    let trainable = if way.trainable { perturbed(way, &prior)? } else { Vec::new() };
+    let recipe = Recipe {
+        updates: arguments.updates,
+        trainable,
+        criterion: way.criterion,
+        seed: arguments.seed,
+        ..Recipe::default()
+    };
+    let tracks = tracks(&prior, flights);
+    let mut trainer = Trainer::new(recipe, &prior, tracks)?;
+    while !trainer.is_done() {
+        let p = trainer.run(arguments.updates.div_ceil(10))?;
+        let ratio = p.loss.learned / p.loss.prior;
+        eprintln!("{} {} L/L_prior {:.2e} |Fa|/|Fp| {ratio:.3}", way.name, p.update, p.normalised);
+    }
+    Ok(trainer)
+}
+
+/// What a trainable prior learns: what mild and severe have wrong; Jxz and the thrust for the one as
+/// printed.
+fn perturbed(way: &Way, prior: &GreyBox) -> Result<Vec<String>> {
+    if way.prior == "prior-as-printed" {
+        return Ok(vec![JXZ.into(), "thrust_linear.Cp_n".into()]);
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+    let [severe, truth] = [
+        GreyBox::load(&folder.join("prior-severe.toml"))?,
+        GreyBox::load(&folder.join("prior.toml"))?,
+    ];
+    let pairs = severe.coefficients().iter().zip(truth.coefficients());
+    let names = pairs.filter(|(s, t)| s.value != t.value).map(|(s, _)| s.name.clone());
+    let known = |name: &String| prior.coefficients().iter().any(|c| c.name == *name);
+    Ok(names.filter(known).collect())
+}
+
+fn errors(learned: &[Learned]) -> Option<[f64; 2]> {
+    let median = |get: &dyn Fn(&Learned) -> f64| {
+        let off = |l: &Learned| Some((get(l) / l.truth? - 1.0).abs());
+        let mut all: Vec<f64> = learned.iter().filter_map(off).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied()
+    };
+    Some([median(&|l| l.start)?, median(&|l| l.value)?])
+}
+
+/// Settled errors of an LQI designed on `model`: easy, hard corners, share lost; `None` if it has no
+/// design.
+fn steered(model: &GreyBox, targets: &Path) -> Result<Option<[f64; 3]>> {
+    let Ok(lqi) = Lqi::new(model) else { return Ok(None) };
+    let mut targets = TargetFile::load(targets)?;
+    targets.rows.retain(|r| r.group != Group::HardOutside);
+    let plant = PlantOptions::default();
+    let outcomes = evaluate(&plant, &|| lqi.boxed_clone(), &targets.rows, 1, &|| ())?;
+    let scores = Evaluation::new("lqi", &model.name, &targets.rows, &outcomes);
+    let mean = |name: &str| scores.score(name).map_or(f64::NAN, |s| s.mean_deg);
+    let lost = scores.score("all").map_or(f64::NAN, |s| s.divergence_rate);
+    Ok(Some([mean(Group::Easy.name()), mean(Group::HardCorners.name()), lost]))
+}
+
+fn table(rows: &[Row]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header([
+        "model",
+        "|Fa|/|Fp|",
+        "coef. error",
+        "1 easy",
+        "10",
+        "100",
+        "500",
+        "1 hard",
+        "10",
+        "100",
+        "500",
+        "LQI easy",
+        "hard",
+        "lost",
+        "s",
+    ]);
+    for row in rows {
+        let mut cells = vec![row.model.to_owned(), format!("{:.3}", row.ratio)];
+        cells.push(row.coefficients.map_or("-".into(), |[before, after]| {
+            format!("{:.0} -> {:.1} %", 100.0 * before, 100.0 * after)
+        }));
+        for (prior, model) in row.prior.iter().zip(&row.model_runs) {
+            // the model's root mean square error over the bare prior's
+            cells.extend(prior.iter().zip(model).map(|(p, m)| format!("{:.4}", m.rms / p.rms)));
+        }
+        match row.lqi {
+            Some([easy, hard, lost]) => cells.extend([
+                format!("{easy:.3}"),
+                format!("{hard:.3}"),
+                format!("{:.1} %", 100.0 * lost),
+            ]),
+            None => cells.extend(["none".into(), "none".into(), "-".into()]),
+        }
+        cells.push(format!("{:.0}", row.training_s));
+        table.add_row(cells);
+    }
+    table
+}
