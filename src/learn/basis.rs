@@ -160,6 +160,11 @@ impl Basis {
         self.len() == 0
     }
 
+    /// How far each coefficient moves with coordinate `k`, in the order of `places`.
+    pub fn column(&self, k: usize) -> impl Iterator<Item = f64> + '_ {
+        (0..self.turn.nrows()).map(move |i| self.turn[(i, k)])
+    }
+
     /// Slopes with respect to the coordinates from those with respect to coefficients and Jxz.
     pub fn slopes(&self, all: &[f64]) -> Vec<f64> {
         let of = |k: usize| {
@@ -210,7 +215,7 @@ fn gram(model: &GreyBox, places: &[usize], tracks: &[Track]) -> DMatrix<f64> {
 }
 
 /// ∂F_p/∂θ of every coefficient, then of Jxz, at a sample.
-fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
+pub(super) fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
     let (state, controls) = (&track.states[k], &track.controls[k]);
     let air = model.air(state, track.altitude[k]);
     let still = rigid_body::state_rate(state, &air, [0.0; 3], [0.0; 3]).to_array();
@@ -243,6 +248,9 @@ fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
 /// T with Tᵀ G T = 1 on the directions that the data sees, and who has no part in them.
 fn whiten(gram: &DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
     let n = gram.nrows();
+    if n == 0 {
+        return (gram.clone(), Vec::new());
+    }
     let size: Vec<f64> = (0..n).map(|i| gram[(i, i)].sqrt()).collect();
     let unit = |i: usize| if size[i] > 0.0 { 1.0 / size[i] } else { 0.0 };
     let correlation = DMatrix::from_fn(n, n, |i, j| gram[(i, j)] * unit(i) * unit(j));

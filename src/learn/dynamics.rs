@@ -7,9 +7,10 @@ use crate::learn::adam::Adam;
 use crate::learn::basis::{self, Basis, TrainableError};
 use crate::learn::checkpoint::{Checkpoint, CheckpointError};
 use crate::learn::engine::{Arithmetic, Engine};
+use crate::learn::equation_error;
 use crate::learn::loss::{Loss, Objective};
 use crate::learn::network::Passes;
-use crate::learn::recipe::{Criterion, Recipe};
+use crate::learn::recipe::{Criterion, Recipe, Start};
 use crate::learn::rollout::{PriorSlopes, Subject};
 use crate::learn::windows::{Track, Window, windows};
 use crate::model::residual::{INPUTS, OUTPUTS, ResidualError, Scales, fingerprint, hash};
@@ -153,21 +154,27 @@ impl Trainer {
         let sizes: Vec<usize> =
             [INPUTS].into_iter().chain(recipe.hidden.iter().copied()).chain([OUTPUTS]).collect();
         let network = Dense::silent(&sizes, &mut stream::stream(recipe.seed, &[START]))?;
-        let subject = Subject {
+        let mut subject = Subject {
             scales: Scales::new(&prior.airframe, prior.scale()),
             prior: prior.clone(),
             network: Passes::new(network),
             prior_slopes: if basis.is_empty() { PriorSlopes::None } else { PriorSlopes::All },
+        };
+        let coordinates = match recipe.start {
+            Start::AsGiven => vec![0.0; basis.len()],
+            Start::EquationError => equation_error::coordinates(&prior, &basis, &tracks),
         };
         let longest = recipe.steps.iter().copied().max().unwrap_or(1);
         let arithmetic = Arithmetic::Lanes;
         let engine = Engine::new(&subject, recipe.batch, longest, arithmetic);
         let count = subject.network.network().parameters().len();
         let stage = Stage::new(&subject, &recipe, &tracks, recipe.steps_at(0))?;
+        // the bare prior's error is that of the prior as given
+        basis.apply(&mut subject.prior, &coordinates);
         Ok(Trainer {
             data: crate::learn::windows::hash(&tracks),
             adam: Adam::new(count + basis.len()),
-            coordinates: vec![0.0; basis.len()],
+            coordinates,
             lambda: recipe.lambda,
             update: 0,
             recipe,
@@ -342,7 +349,7 @@ impl Trainer {
         };
         let (loss, gradient) =
             self.engine.step(&self.subject, &objective, &self.tracks, chosen, steps);
-        let (pace, waits) = (self.recipe.pace_at(self.update), self.recipe.waits_at(self.update));
+        let pace = self.recipe.pace_at(self.update);
         let [rate, prior_rate] = [self.recipe.rate, self.recipe.prior_rate].map(|r| r * pace);
         self.update += 1;
         let slopes = self.basis.slopes(&gradient.prior);
@@ -352,13 +359,11 @@ impl Trainer {
         }
         let adam = &mut self.adam;
         adam.begin();
-        if !waits {
-            self.subject.network.update(|parameters| {
-                for (k, (p, g)) in parameters.iter_mut().zip(&gradient.network).enumerate() {
-                    *p += adam.move_of(k, *g, rate) as f32;
-                }
-            });
-        }
+        self.subject.network.update(|parameters| {
+            for (k, (p, g)) in parameters.iter_mut().zip(&gradient.network).enumerate() {
+                *p += adam.move_of(k, *g, rate) as f32;
+            }
+        });
         let first = gradient.network.len();
         for (k, (x, g)) in self.coordinates.iter_mut().zip(&slopes).enumerate() {
             *x += adam.move_of(first + k, *g, prior_rate);
@@ -367,9 +372,7 @@ impl Trainer {
             self.basis.apply(&mut self.subject.prior, &self.coordinates);
         }
         let normalised = loss.prediction / unit;
-        if !waits {
-            self.lambda += self.recipe.tau * normalised;
-        }
+        self.lambda += self.recipe.tau * normalised;
         Ok(Some((loss, normalised)))
     }
 }

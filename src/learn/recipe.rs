@@ -33,6 +33,16 @@ impl Criterion {
     }
 }
 
+/// Where the trained coefficients start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// At the prior's, as in the paper.
+    AsGiven,
+    /// Where a robust regression on short windows puts them.
+    EquationError,
+}
+
 /// Everything that decides what a training gives, but for data and prior.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -52,8 +62,8 @@ pub struct Recipe {
     /// Learning rate of the prior's coordinates at the start. They count in the rates they make, a unit
     /// being large: at the network's pace it would learn what they lack before they have moved.
     pub prior_rate: f64,
-    /// Part of the updates, at the start, in which the prior moves alone.
-    pub prior_alone: f64,
+    /// Where the trained coefficients start.
+    pub start: Start,
     /// λ0 of eq. (24).
     pub lambda: f64,
     /// τ of eq. (24), by which λ grows an update.
@@ -75,8 +85,8 @@ impl Default for Recipe {
             updates: 20_000,
             rate: 1e-3,
             rate_end: 0.01,
-            prior_rate: 3e-2,
-            prior_alone: 0.1,
+            prior_rate: 3e-3,
+            start: Start::EquationError,
             lambda: 1.0,
             tau: 1.0,
             criterion: Criterion::Scaled,
@@ -100,9 +110,6 @@ impl Recipe {
         if !rates.into_iter().all(positive) {
             return Some("learning rates and lambda must be positive");
         }
-        if !(0.0..1.0).contains(&self.prior_alone) {
-            return Some("the part of the updates in which the prior moves alone lies in 0 to 1");
-        }
         if !(self.tau.is_finite() && self.tau >= 0.0) {
             return Some("tau must not be negative");
         }
@@ -120,10 +127,5 @@ impl Recipe {
         let done = update as f64 / self.updates as f64;
         let cosine = 0.5 * (1.0 + (std::f64::consts::PI * done).cos());
         self.rate_end + (1.0 - self.rate_end) * cosine
-    }
-
-    /// Whether the residual waits at an update for the prior to come closer.
-    pub fn waits_at(&self, update: u64) -> bool {
-        !self.trainable.is_empty() && (update as f64) < self.prior_alone * self.updates as f64
     }
 }

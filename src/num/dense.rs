@@ -235,6 +235,10 @@ impl Layer<'_> {
             self.columns::<R, { BLOCK / 2 }>(first, input, output);
             first += BLOCK / 2;
         }
+        while first + BLOCK / 4 <= output.len() {
+            self.columns::<R, { BLOCK / 4 }>(first, input, output);
+            first += BLOCK / 4;
+        }
         while first < output.len() {
             self.columns::<R, 1>(first, input, output);
             first += 1;

@@ -15,7 +15,7 @@ use crate::commands::files::{self, Overwrite, shipped};
 use crate::learn::portrait::{Portrait, portrait};
 use crate::learn::score::{Horizon, free_run};
 use crate::learn::{
-    Checkpoint, Criterion, Learned, Moment, Progress, Recipe, Trainer, export, trainable,
+    Checkpoint, Criterion, Learned, Moment, Progress, Recipe, Start, Trainer, export, trainable,
 };
 use crate::model::{GreyBox, Integrator};
 use crate::report::TrainingReport;
@@ -75,11 +75,12 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1e-3)]
     rate: f64,
     /// Learning rate of the prior's coefficients, in the rates they make.
-    #[arg(long, default_value_t = 3e-2)]
+    #[arg(long, default_value_t = 3e-3)]
     prior_rate: f64,
-    /// Part of the updates, at the start, in which the prior moves alone.
-    #[arg(long, default_value_t = 0.1)]
-    prior_alone: f64,
+    /// Where the trained coefficients start: where a robust regression puts them, or as-given, as in the
+    /// paper.
+    #[arg(long, default_value = "equation-error", value_parser = ["as-given", "equation-error"])]
+    start: String,
     /// λ0 of the penalty's weight 1/λ.
     #[arg(long, default_value_t = 1.0)]
     lambda: f64,
@@ -211,7 +212,7 @@ impl Arguments {
             updates: self.updates,
             rate: self.rate,
             prior_rate: self.prior_rate,
-            prior_alone: self.prior_alone,
+            start: if self.start == "as-given" { Start::AsGiven } else { Start::EquationError },
             lambda: self.lambda,
             tau: self.tau,
             criterion: if self.loss == "plain" { Criterion::Plain } else { Criterion::Scaled },

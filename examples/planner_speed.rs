@@ -1,0 +1,170 @@
+//! Times the planners on one core, beside the processor's own peak, and counts what they allocate.
+//!
+//! ```text
+//! cargo run --release --ignore-rust-version --no-default-features --example planner_speed
+//! ```
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use anyhow::Result;
+
+use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Origin};
+use greylag::control::{self, Kind, Observation, Source, Target};
+use greylag::model::residual::{INPUTS, OUTPUTS};
+use greylag::model::{GreyBox, Residual};
+use greylag::num::{Dense, stream};
+use greylag::physics::{ActuatorState, Command, State, Time};
+
+/// The system's allocator, which counts.
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call is handed on as it is
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: as the caller promises
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as the caller promises
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Ticks timed for each controller.
+const TICKS: usize = 400;
+
+fn main() -> Result<()> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+    let mut model = GreyBox::load(&folder.join("prior.toml"))?;
+    // a residual of the usual size; its weights do not change the time
+    let network = Dense::uniform(&[INPUTS, 64, 64, OUTPUTS], &mut stream::stream(1, &[]))?;
+    model.residual =
+        Some(Residual::new(network, &model.airframe, model.scale().map(|x| 1e-3 * x))?);
+    let agent = agent(&model)?;
+    let flops = peak();
+    println!("one core's peak, fused multiply-add in single precision: {:.0} GFLOP/s", flops / 1e9);
+    println!(
+        "{:>12} {:>10} {:>10} {:>10} {:>12}",
+        "controller", "p50 ms", "p99 ms", "p99.9 ms", "allocations"
+    );
+    for kind in [
+        Kind::Policy,
+        Kind::Lqi,
+        Kind::Cem,
+        Kind::CemPolicy,
+        Kind::CemCritic,
+        Kind::Hybrid,
+        Kind::HybridLqi,
+    ] {
+        let mut controller = control::build(kind, Source { model: &model, agent: Some(&agent) })?;
+        controller.reset(1);
+        let target = Target { roll: 0.6, pitch: 0.2, airspeed: State::NEUTRAL.airspeed };
+        let mut seen = Observation {
+            time: Time::default(),
+            state: State { alpha: 0.05, ..State::NEUTRAL },
+            actuators: ActuatorState::default(),
+            altitude: 600.0,
+            previous: [Command::IDLE; 2],
+        };
+        let mut times = Vec::with_capacity(TICKS);
+        controller.command(&seen, &target);
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        for tick in 0..TICKS {
+            seen.state.roll = 0.3 * (0.01 * tick as f64).sin();
+            let start = Instant::now();
+            std::hint::black_box(controller.command(&seen, &target));
+            times.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+        let allocated = ALLOCATIONS.load(Ordering::Relaxed) - before;
+        times.sort_by(f64::total_cmp);
+        let at = |q: f64| times[((TICKS - 1) as f64 * q).round() as usize];
+        println!(
+            "{:>12} {:10.3} {:10.3} {:10.3} {allocated:>12}",
+            kind.name(),
+            at(0.5),
+            at(0.99),
+            at(0.999)
+        );
+    }
+    Ok(())
+}
+
+/// Networks of Table VII's sizes.
+fn agent(model: &GreyBox) -> Result<Agent> {
+    let mut rng = stream::stream(2, &[]);
+    let mut network = |sizes: &[usize]| Dense::uniform(sizes, &mut rng);
+    let actor = Actor::new(network(&[OBSERVATIONS, 300, 300, ACTIONS])?)?;
+    let sizes = [OBSERVATIONS + ACTIONS, 200, 200, 200, 1];
+    let critics = [Critic::new(network(&sizes)?)?, Critic::new(network(&sizes)?)?];
+    let origin = Origin {
+        schema: Origin::SCHEMA.into(),
+        airframe: greylag::model::residual::fingerprint(&model.airframe),
+        model: model.name.clone(),
+        model_sha256: String::new(),
+        seed: 2,
+        steps: 0,
+        evaluation: None,
+        program: "greylag".into(),
+    };
+    Ok(Agent { actor: actor.into(), critics: critics.into(), origin })
+}
+
+/// Fused multiply-adds in single precision that one core makes in a second, times two.
+fn peak() -> f64 {
+    let best = |run: &dyn Fn() -> f64| (0..20).map(|_| run()).fold(0.0, f64::max);
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx512f") {
+        // SAFETY: the processor has the feature
+        return best(&|| unsafe { peak_avx512() });
+    }
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: the processor has the features
+        return best(&|| unsafe { peak_avx2() });
+    }
+    best(&|| chains::<4, 8>())
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx2,fma")]
+fn peak_avx512() -> f64 {
+    chains::<16, 12>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn peak_avx2() -> f64 {
+    chains::<8, 10>()
+}
+
+/// `C` independent chains of `N` lanes: enough to hide the latency of each.
+#[inline(always)]
+fn chains<const N: usize, const C: usize>() -> f64 {
+    const ROUNDS: usize = 1_000_000;
+    let factor = std::hint::black_box([0.999_f32; N]);
+    let mut sums = std::hint::black_box([[1.0_f32; N]; C]);
+    let start = Instant::now();
+    for _ in 0..ROUNDS {
+        let mut c = 0;
+        while c < C {
+            let mut i = 0;
+            while i < N {
+                sums[c][i] = sums[c][i].mul_add(factor[i], factor[i]);
+                i += 1;
+            }
+            c += 1;
+        }
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    std::hint::black_box(sums);
+    (2 * ROUNDS * N * C) as f64 / seconds
+}
