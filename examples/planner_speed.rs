@@ -15,7 +15,7 @@ use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Orig
 use greylag::control::{self, Kind, Observation, Source, Target};
 use greylag::model::residual::{INPUTS, OUTPUTS};
 use greylag::model::{GreyBox, Residual};
-use greylag::num::{Dense, stream};
+use greylag::num::{Dense, Lanes, Real, stream};
 use greylag::physics::{ActuatorState, Command, State, Time};
 
 /// The system's allocator, which counts.
@@ -150,17 +150,13 @@ fn peak_avx2() -> f64 {
 #[inline(always)]
 fn chains<const N: usize, const C: usize>() -> f64 {
     const ROUNDS: usize = 1_000_000;
-    let factor = std::hint::black_box([0.999_f32; N]);
-    let mut sums = std::hint::black_box([[1.0_f32; N]; C]);
+    let factor = Lanes::<N, true>::splat(std::hint::black_box(0.999));
+    let mut sums = [Lanes::<N, true>::splat(std::hint::black_box(1.0)); C];
     let start = Instant::now();
     for _ in 0..ROUNDS {
         let mut c = 0;
         while c < C {
-            let mut i = 0;
-            while i < N {
-                sums[c][i] = sums[c][i].mul_add(factor[i], factor[i]);
-                i += 1;
-            }
+            sums[c] = sums[c].mul_add(factor, factor);
             c += 1;
         }
     }

@@ -59,8 +59,9 @@ pub struct Recipe {
     pub rate: f64,
     /// Part of it that is left at the end.
     pub rate_end: f64,
-    /// Learning rate of the prior's coordinates at the start. They count in the rates they make, a unit
-    /// being large: at the network's pace it would learn what they lack before they have moved.
+    /// Learning rate of the prior's coordinates at the start; 0 holds them where they start. Moved along,
+    /// they make the residual as small as it can be in the mean square: what the prior lacks where it
+    /// lacks most, as a stall, then bends them.
     pub prior_rate: f64,
     /// Where the trained coefficients start.
     pub start: Start,
@@ -83,12 +84,12 @@ impl Default for Recipe {
             steps: vec![20],
             batch: 64,
             updates: 20_000,
-            rate: 1e-3,
+            rate: 3e-3,
             rate_end: 0.01,
-            prior_rate: 3e-3,
+            prior_rate: 0.0,
             start: Start::EquationError,
             lambda: 1.0,
-            tau: 1.0,
+            tau: 0.02,
             criterion: Criterion::Scaled,
             trainable: Vec::new(),
             seed: 1,
@@ -106,9 +107,11 @@ impl Recipe {
         if !(1..=65_536).contains(&self.batch) || self.updates == 0 {
             return Some("a minibatch must have 1 to 65536 rollouts, and there must be an update");
         }
-        let rates = [self.rate, self.rate_end, self.prior_rate, self.lambda];
-        if !rates.into_iter().all(positive) {
-            return Some("learning rates and lambda must be positive");
+        if ![self.rate, self.rate_end, self.lambda].into_iter().all(positive) {
+            return Some("the learning rate and lambda must be positive");
+        }
+        if !(self.prior_rate.is_finite() && self.prior_rate >= 0.0) {
+            return Some("the prior's learning rate must not be negative");
         }
         if !(self.tau.is_finite() && self.tau >= 0.0) {
             return Some("tau must not be negative");

@@ -47,6 +47,26 @@ impl<R: Copy> Units<R> {
     }
 }
 
+/// The layers of a network. A type of its own, so that walking them is inlined into kernels.
+#[derive(Clone, Debug)]
+pub struct Layers<'a> {
+    sizes: &'a [usize],
+    rest: &'a [f32],
+}
+
+impl<'a> Iterator for Layers<'a> {
+    type Item = Layer<'a>;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Layer<'a>> {
+        let [inputs, outputs, ..] = *self.sizes else { return None };
+        let (weights, after) = self.rest.split_at(inputs * outputs);
+        let (bias, after) = after.split_at(outputs);
+        (self.sizes, self.rest) = (&self.sizes[1..], after);
+        Some(Layer { weights, bias })
+    }
+}
+
 /// Why numbers do not make a network.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DenseError {
@@ -127,14 +147,8 @@ impl Dense {
 
     /// The layers in order.
     #[inline(always)]
-    pub fn layers(&self) -> impl Iterator<Item = Layer<'_>> {
-        let mut rest = &self.parameters[..];
-        self.sizes.windows(2).map(move |s| {
-            let (weights, after) = rest.split_at(s[0] * s[1]);
-            let (bias, after) = after.split_at(s[1]);
-            rest = after;
-            Layer { weights, bias }
-        })
+    pub fn layers(&self) -> Layers<'_> {
+        Layers { sizes: &self.sizes, rest: &self.parameters }
     }
 
     /// A network as PyTorch and burn start it: all parameters of a layer uniform in ±1/√in.
@@ -161,7 +175,9 @@ impl Dense {
         let mut to = [R::zero(); ON_STACK];
         from[..IN].copy_from_slice(&input);
         let last = self.sizes.len() - 2;
-        for (k, layer) in self.layers().enumerate() {
+        let mut layers = self.layers();
+        for k in 0..=last {
+            let Some(layer) = layers.next() else { break };
             let (inputs, outputs) = (self.sizes[k], self.sizes[k + 1]);
             layer.apply(&from[..inputs], &mut to[..outputs]);
             if k < last {
@@ -183,7 +199,9 @@ impl Dense {
         let Units { from, to } = units;
         from[..self.sizes[0]].copy_from_slice(input);
         let last = self.sizes.len() - 2;
-        for (k, layer) in self.layers().enumerate() {
+        let mut layers = self.layers();
+        for k in 0..=last {
+            let Some(layer) = layers.next() else { break };
             let (inputs, outputs) = (self.sizes[k], self.sizes[k + 1]);
             layer.apply(&from[..inputs], &mut to[..outputs]);
             if k < last {
@@ -250,14 +268,21 @@ impl Layer<'_> {
     fn columns<R: Real, const B: usize>(&self, first: usize, input: &[R], output: &mut [R]) {
         let outputs = output.len();
         let mut sum = [R::zero(); B];
-        for (sum, bias) in sum.iter_mut().zip(&self.bias[first..first + B]) {
-            *sum = R::from_f64((*bias).into());
+        let bias = &self.bias[first..first + B];
+        let mut j = 0;
+        while j < B {
+            sum[j] = R::from_f64(bias[j].into());
+            j += 1;
         }
-        for (x, row) in input.iter().zip(self.weights.chunks_exact(outputs)) {
-            let row = &row[first..first + B];
-            for j in 0..B {
+        let mut place = first;
+        for x in input {
+            let row = &self.weights[place..place + B];
+            let mut j = 0;
+            while j < B {
                 sum[j] = x.mul_add(R::from_f64(row[j].into()), sum[j]);
+                j += 1;
             }
+            place += outputs;
         }
         output[first..first + B].copy_from_slice(&sum);
     }

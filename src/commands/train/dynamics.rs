@@ -72,11 +72,12 @@ pub struct Arguments {
     #[arg(long, default_value_t = 20_000)]
     updates: u64,
     /// Learning rate at the start.
-    #[arg(long, default_value_t = 1e-3)]
-    rate: f64,
-    /// Learning rate of the prior's coefficients, in the rates they make.
     #[arg(long, default_value_t = 3e-3)]
-    prior_rate: f64,
+    rate: f64,
+    /// Learning rate of the prior's coefficients, in the rates they make: 0 holds them where they start
+    /// (the default after equation error; else 0.003).
+    #[arg(long)]
+    prior_rate: Option<f64>,
     /// Where the trained coefficients start: where a robust regression puts them, or as-given, as in the
     /// paper.
     #[arg(long, default_value = "equation-error", value_parser = ["as-given", "equation-error"])]
@@ -85,7 +86,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1.0)]
     lambda: f64,
     /// τ, by which λ grows an update, times the normalised loss.
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 0.02)]
     tau: f64,
     /// Seed of the residual's start and of the minibatches.
     #[arg(long, default_value_t = 1)]
@@ -205,14 +206,21 @@ impl Arguments {
             [all] if all == "all" => trainable(prior),
             names => names.to_vec(),
         };
+        let start = match self.start.as_str() {
+            "as-given" => Start::AsGiven,
+            _ => Start::EquationError,
+        };
         Recipe {
             hidden: self.hidden.clone(),
             steps: self.steps.clone(),
             batch: self.batch,
             updates: self.updates,
             rate: self.rate,
-            prior_rate: self.prior_rate,
-            start: if self.start == "as-given" { Start::AsGiven } else { Start::EquationError },
+            prior_rate: self.prior_rate.unwrap_or(match start {
+                Start::AsGiven => 3e-3,
+                Start::EquationError => 0.0,
+            }),
+            start,
             lambda: self.lambda,
             tau: self.tau,
             criterion: if self.loss == "plain" { Criterion::Plain } else { Criterion::Scaled },

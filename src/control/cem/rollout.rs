@@ -205,11 +205,12 @@ fn rollout<const FUSED: bool>(
             break;
         }
         let mut chosen = [Lanes::zero(); 3];
-        for ((chosen, given), advised) in chosen.iter_mut().zip(&mut block[step]).zip(advised) {
-            *chosen = Lanes(*given);
+        // plain loops: an iterator that is not inlined leaves the vector instructions
+        for i in 0..3 {
+            chosen[i] = Lanes(block[step][i]);
             if actions == Actions::Policy {
-                *chosen = (*chosen + advised).clamp(-1.0, 1.0);
-                *given = chosen.0;
+                chosen[i] = (chosen[i] + advised[i]).clamp(-1.0, 1.0);
+                block[step][i] = chosen[i].0;
             }
         }
         let mut controls = actuators.controls();

@@ -44,8 +44,10 @@ pub fn observe<R: Real>(
         target.roll - roll,
         target.pitch - pitch,
     ];
-    for (x, unit) in seen.iter_mut().zip(&UNIT) {
-        *x = x.scale(1.0 / unit);
+    let mut i = 0;
+    while i < OBSERVATIONS {
+        seen[i] = seen[i].scale(1.0 / UNIT[i]);
+        i += 1;
     }
     seen
 }

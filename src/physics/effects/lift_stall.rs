@@ -7,6 +7,12 @@ use crate::physics::{Channel, Point};
 /// Lift lost beyond the stall, blended as in \[BM12\] section 4.2.
 pub struct LiftStall;
 
+/// e^(x · sharpness), a function and not a closure, which would leave a kernel's vector instructions.
+#[inline(always)]
+fn power<R: Real>(x: R, sharpness: f64) -> R {
+    x.scale(sharpness).clamp(-40.0, 40.0).exp()
+}
+
 impl Effect for LiftStall {
     const ID: &'static str = "lift_stall";
     const DESCRIPTION: &'static str =
@@ -46,9 +52,8 @@ impl Effect for LiftStall {
         let alpha = at.state.alpha;
         // σ = (1 + e^−M(α−α0) + e^M(α+α0)) / ((1 + e^−M(α−α0)) (1 + e^M(α+α0))), the exponents held
         // where e stays finite in f32
-        let power = |x: R| x.scale(sharpness).clamp(-40.0, 40.0).exp();
-        let above = power(R::from_f64(alpha0) - alpha);
-        let below = power(R::from_f64(alpha0) + alpha);
+        let above = power(R::from_f64(alpha0) - alpha, sharpness);
+        let below = power(R::from_f64(alpha0) + alpha, sharpness);
         let one = R::from_f64(1.0);
         let blend = (one + above + below) / ((one + above) * (one + below));
         let sign = R::where_less(alpha, R::zero(), -one, one);
