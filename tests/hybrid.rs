@@ -1,0 +1,145 @@
+//! The hybrid controller: what proposes, what values, what flies where neither is sure.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use greylag::control::cem::{Aids, Cem, Settings};
+use greylag::control::lqi::Lqi;
+use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Origin, Policy};
+use greylag::control::{self, Controller, Kind, Observation, SetupError, Source, Target};
+use greylag::model::GreyBox;
+use greylag::num::{Dense, stream};
+use greylag::physics::{ActuatorState, Command, State, Time};
+
+fn model() -> GreyBox {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+    GreyBox::load(&path).unwrap()
+}
+
+/// A policy that nobody trained, its critics' answers being multiplied with `weight`.
+fn agent(model: &GreyBox, weight: f32) -> Agent {
+    let mut rng = stream::stream(5, &[]);
+    let mut network = |sizes: &[usize]| Dense::uniform(sizes, &mut rng).unwrap();
+    let actor = Actor::new(network(&[OBSERVATIONS, 40, 40, ACTIONS])).unwrap();
+    let mut critic = || {
+        let mut network = network(&[OBSERVATIONS + ACTIONS, 24, 1]);
+        let last = network.parameters().len() - 25;
+        network.parameters_mut()[last..].iter_mut().for_each(|p| *p *= weight);
+        Critic::new(network).unwrap()
+    };
+    let critics = [critic(), critic()];
+    let origin = Origin {
+        schema: Origin::SCHEMA.into(),
+        airframe: greylag::model::residual::fingerprint(&model.airframe),
+        model: model.name.clone(),
+        model_sha256: String::new(),
+        seed: 5,
+        steps: 0,
+        evaluation: None,
+        program: "test".into(),
+    };
+    Agent { actor: Arc::new(actor), critics: Arc::new(critics), origin }
+}
+
+fn seen() -> Observation {
+    Observation {
+        time: Time::default(),
+        state: State { roll: 0.1, alpha: 0.04, ..State::NEUTRAL },
+        actuators: ActuatorState { throttle: 0.3, ..ActuatorState::default() },
+        altitude: 600.0,
+        previous: [Command { throttle: 0.3, ..Command::IDLE }; 2],
+    }
+}
+
+const TARGET: Target = Target { roll: 0.5, pitch: 0.1, airspeed: 16.67 };
+
+fn near(a: &Command, b: &Command, tolerance: f64) -> bool {
+    let pairs = [(a.aileron, b.aileron), (a.elevator, b.elevator), (a.throttle, b.throttle)];
+    pairs.iter().all(|(x, y)| (x - y).abs() < tolerance)
+}
+
+/// Candidates that are all the policy's, without noise, leave nothing to choose.
+#[test]
+fn proposals_without_noise_are_the_policys_own_actions() {
+    let model = model();
+    let agent = agent(&model, 1.0);
+    let settings = Settings {
+        population: 16,
+        elites: 4,
+        iterations: 1,
+        proposals: 16,
+        noise: [0.0, 0.5],
+        ..Settings::HYBRID
+    };
+    let aids = Aids { agent: Some(agent.clone()), base: None };
+    let mut planner = Cem::new("hybrid", &model, settings, aids);
+    planner.reset(1);
+    let planned = planner.command(&seen(), &TARGET);
+    let alone = Policy::new(&agent).command(&seen(), &TARGET);
+    // single precision, and other orders of the sums
+    assert!(near(&planned, &alone, 1e-5), "{planned:?} {alone:?}");
+}
+
+/// The search leans the way that the critics say: with values a hundred times the reward's it chooses
+/// otherwise than without.
+#[test]
+fn critics_decide_when_they_say_more_than_the_reward() {
+    let model = model();
+    let command = |settings: Settings| {
+        let aids = Aids { agent: Some(agent(&model, 100.0)), base: None };
+        let mut planner = Cem::new("hybrid", &model, settings, aids);
+        planner.reset(1);
+        planner.command(&seen(), &TARGET)
+    };
+    let [without, with] = [Settings::POLICY, Settings::HYBRID].map(command);
+    assert!(!near(&without, &with, 0.05), "{without:?} {with:?}");
+    let weightless = command(Settings { alpha: Some(0.0), ..Settings::HYBRID });
+    assert_eq!(weightless, without);
+}
+
+/// The same seed gives the same commands, tick after tick, also after a reset and from a clone.
+#[test]
+fn flights_repeat_to_the_bit() {
+    let model = model();
+    let agent = agent(&model, 1.0);
+    let source = Source { model: &model, agent: Some(&agent) };
+    let mut planner = control::build(Kind::HybridLqi, source).unwrap();
+    let fly = |planner: &mut dyn Controller, seed| {
+        planner.reset(seed);
+        [0, 1, 2].map(|_| planner.command(&seen(), &TARGET))
+    };
+    let first = fly(planner.as_mut(), 7);
+    assert_eq!(fly(planner.boxed_clone().as_mut(), 7), first);
+    assert_eq!(fly(planner.as_mut(), 7), first);
+    assert!(first.iter().all(Command::is_finite));
+}
+
+/// Where the critics doubt more than the plan gains, the LQI flies; so it does where nothing can be
+/// planned at all.
+#[test]
+fn the_base_flies_where_the_search_is_not_sure() {
+    let model = model();
+    let lqi = Lqi::new(&model).unwrap();
+    let planner = |weight: f32| {
+        let aids = Aids { agent: Some(agent(&model, weight)), base: Some(lqi.clone()) };
+        Cem::new("hybrid-lqi", &model, Settings::HYBRID, aids)
+    };
+    let mut alone = lqi.clone();
+    alone.reset(1);
+    let expected = alone.command(&seen(), &TARGET);
+    // critics that lie thousands apart
+    let mut unsure = planner(1e6);
+    unsure.reset(1);
+    assert!(near(&unsure.command(&seen(), &TARGET), &expected, 1e-12));
+    let lost = Observation { state: State { q: f64::NAN, ..seen().state }, ..seen() };
+    let mut blind = planner(1.0);
+    blind.reset(1);
+    assert!(!blind.command(&lost, &TARGET).elevator.is_finite());
+}
+
+#[test]
+fn a_planner_without_its_policy_is_refused() {
+    let model = model();
+    let refused = control::build(Kind::Hybrid, &model);
+    assert!(matches!(refused, Err(SetupError::Untrained)));
+}
