@@ -1,0 +1,98 @@
+//! `greylag collect` and `greylag train dynamics`, as a user types them: explore, learn, look.
+#![cfg(all(feature = "learn", feature = "sitl"))]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn greylag(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_greylag")).args(arguments).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    text(&output.stdout) + &text(&output.stderr)
+}
+
+fn param(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8").join(name);
+    path.display().to_string()
+}
+
+#[test]
+fn exploring_then_learning_leaves_a_model_that_follows_better() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let collect = ["collect", "--out", &at("flights"), "--episodes", "12"];
+    let first = greylag(&collect);
+    assert!(first.status.success(), "{}", said(&first));
+    // what is there is not flown again
+    assert!(said(&greylag(&collect)).contains("0 episodes flown, 12 of 12"));
+    let prior = param("prior-severe.toml");
+    let (flights, out) = (at("flights"), at("learned"));
+    let train = |updates: &str| {
+        greylag(&[
+            "train",
+            "dynamics",
+            "--prior",
+            &prior,
+            "--truth",
+            &param("prior.toml"),
+            "--collect",
+            &flights,
+            "--integrator",
+            "jsbsim",
+            "--trainable",
+            "roll_linear.Clda,roll_linear.Clp,yaw_linear.Cnr",
+            "--hidden",
+            "16",
+            "--steps",
+            "8",
+            "--batch",
+            "32",
+            "--updates",
+            updates,
+            "--out",
+            &out,
+        ])
+    };
+    let learned = train("400");
+    assert!(learned.status.success(), "{}", said(&learned));
+    let json = std::fs::read_to_string(Path::new(&out).join("training.json")).unwrap();
+    let result: Value = serde_json::from_str(&json).unwrap();
+    // at ten steps: a small network and a few seconds of learning take off more than half
+    let rms = |which: &str| result[which][1]["rms"].as_f64().unwrap();
+    assert!(rms("learned") < 0.5 * rms("prior"), "{} of {}", rms("learned"), rms("prior"));
+    for c in result["coefficients"].as_array().unwrap() {
+        let [value, truth] = ["value", "truth"].map(|k| c[k].as_f64().unwrap());
+        // the regression on 11 minutes of noise-free flight; other coefficients stay wrong
+        assert!((value / truth - 1.0).abs() < 0.1, "{c}");
+    }
+    let page = std::fs::read_to_string(Path::new(&out).join("training.html")).unwrap();
+    assert!(page.contains("Error over the horizon") && page.contains("roll_linear.Clda"));
+    // the model goes wherever a model goes
+    let model = Path::new(&out).join("model.toml").display().to_string();
+    let log = Path::new(&flights).join("round-00/episode-003.csv").display().to_string();
+    let compared = greylag(&["compare", "--model", &model, "--log", &log]);
+    assert!(compared.status.success(), "{}", said(&compared));
+    // with other options it is another training, and what is there stays
+    let other = train("500");
+    assert!(!other.status.success());
+    assert!(said(&other).contains("another --out"), "{}", said(&other));
+}
+
+#[test]
+fn what_is_missing_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out").display().to_string();
+    let prior = param("prior.toml");
+    let nothing = greylag(&["train", "dynamics", "--prior", &prior, "--out", &out]);
+    assert!(said(&nothing).contains("give --log or --collect"), "{}", said(&nothing));
+    let empty = folder.path().display().to_string();
+    let none =
+        greylag(&["train", "dynamics", "--prior", &prior, "--collect", &empty, "--out", &out]);
+    assert!(said(&none).contains("has no episode"), "{}", said(&none));
+    let unplanned = greylag(&["collect", "--out", &out, "--round", "1"]);
+    assert!(said(&unplanned).contains("--model"), "{}", said(&unplanned));
+}
