@@ -122,22 +122,11 @@ fn agent(model: &GreyBox) -> Result<Agent> {
 fn peak() -> f64 {
     let best = |run: &dyn Fn() -> f64| (0..20).map(|_| run()).fold(0.0, f64::max);
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx512f") {
-        // SAFETY: the processor has the feature
-        return best(&|| unsafe { peak_avx512() });
-    }
-    #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // SAFETY: the processor has the features
         return best(&|| unsafe { peak_avx2() });
     }
     best(&|| chains::<4, 8>())
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx2,fma")]
-fn peak_avx512() -> f64 {
-    chains::<16, 12>()
 }
 
 #[cfg(target_arch = "x86_64")]
