@@ -15,7 +15,8 @@ use greylag_sitl::shim::{Address, Existing, Launch, Pace, ShimOptions, TruthFile
 #[derive(Debug, Parser)]
 #[command(name = "greylag-sitl", version)]
 pub struct Cli {
-    /// Where the companion is met: udpin:, udpout:, tcpin: or tcpout:, then HOST:PORT.
+    /// Where the companion is met: udpin:, udpout:, tcpin: or tcpout:, then HOST:PORT; or
+    /// serial:DEVICE:BAUD; or pty:NAME, a pseudo-terminal that the companion opens under that name.
     #[arg(long, value_name = "ADDRESS", default_value_t = ShimOptions::default_link())]
     link: Address,
     /// Step on the companion's answers alone, as fast as they come, instead of in real time.

@@ -25,7 +25,7 @@ use crate::physics::Airframe;
 /// The arguments of `greylag fly`.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// Link to the vehicle: udpin:, udpout:, tcpin: or tcpout:HOST:PORT.
+    /// Link to the vehicle: udpin:, udpout:, tcpin: or tcpout:HOST:PORT, or serial:DEVICE:BAUD.
     #[arg(long, value_name = "ADDRESS", default_value = "udpin:127.0.0.1:14600")]
     vehicle: Address,
     /// Link to clients; may be given several times.
@@ -173,7 +173,7 @@ fn show_events(flight: &Flight, vehicle: &Address) {
 fn line(event: &Event, vehicle: &Address) -> String {
     match event {
         Event::Text(text) => format!("[{}] {}", severity(text.severity), text.words),
-        Event::VehicleFound(peer) => format!("vehicle found at {}", peer.address),
+        Event::VehicleFound(peer) => format!("vehicle found at {peer}"),
         Event::NoVehicle => format!("no vehicle yet on {vehicle}; start one with `cargo sitl`"),
     }
 }

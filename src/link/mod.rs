@@ -53,6 +53,7 @@
 //!                 Arrival::Packet(packet) => clients.handle(now, packet.peer, &packet.bytes, pilot),
 //!                 Arrival::Opened(peer) => clients.welcome(now, peer),
 //!                 Arrival::Closed(peer) => clients.forget(peer),
+//!                 Arrival::Remark(remark) => eprintln!("{remark}"),
 //!             }
 //!         }
 //!         clients.poll(now, pilot);

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use super::flight::Over;
-use super::link::Address;
+use super::link::{Address, Transport};
 
 /// A change of state, told to the observer of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +35,10 @@ pub enum Event {
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Event::Open(link @ Address { transport: Transport::Pty, endpoint }, _) => write!(
+                f,
+                "link {link} is open; give the companion --vehicle serial:{endpoint}:921600"
+            ),
             Event::Open(link, Some(local)) => write!(f, "link {link} is open, here {local}"),
             Event::Open(link, None) => write!(f, "link {link} is open"),
             Event::Waiting(link) => {

@@ -17,7 +17,7 @@ use crate::flight::recorder::{Recorder, Row};
 use crate::link::autopilot::Severity;
 use crate::link::client::{Clients, Now};
 use crate::link::framing::Source;
-use crate::link::transport::{Arrival, Packet};
+use crate::link::transport::{Arrival, Packet, Remark};
 use crate::link::vehicle::{Faults, Order, Outputs, Sitl, Telemetry, Vehicle};
 use crate::logs::Sample;
 
@@ -109,8 +109,10 @@ impl Control {
     }
 
     fn take_vehicle(&mut self, arrival: Arrival) {
-        let Arrival::Packet(packet) = arrival else {
-            return;
+        let packet = match arrival {
+            Arrival::Packet(packet) => packet,
+            Arrival::Remark(remark) => return self.remark(&remark),
+            Arrival::Opened(_) | Arrival::Closed(_) => return,
         };
         // The vehicle is taken out for the time of the call, since each tick answers through it.
         let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
@@ -192,8 +194,14 @@ impl Control {
             }
             Arrival::Opened(peer) => self.clients.welcome(now, peer),
             Arrival::Closed(peer) => self.clients.forget(peer),
+            Arrival::Remark(remark) => self.remark(&remark),
         }
         self.send_to_clients();
+    }
+
+    /// Says something about a link to the ground stations, and to whoever shows events.
+    fn remark(&mut self, remark: &Remark) {
+        self.pilot.tell(Severity::Warning, &remark.to_string());
     }
 
     /// Does what is due at `host`.
