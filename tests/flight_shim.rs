@@ -7,16 +7,16 @@ mod shim_support;
 use std::time::Duration;
 
 use flight_support::*;
-use shim_support::{Shim, error_deg, parameter};
 use greylag::control::{Kind, Target, build};
 use greylag::flight::recorder::Place;
 use greylag::flight::runtime::{Pace, Summary};
 use greylag::logs::Sample;
 use greylag::logs::csv::{self, Tolerance};
 use greylag::sim::{Environment, Episode, Simulator};
-use greylag_sitl::plant::{PlantOptions, Start};
+use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::shim::{self, FrameFaults, Noise, ShimOptions};
 use mavlink::dialects::ardupilotmega::*;
+use shim_support::{Shim, error_deg, parameter};
 
 /// Targets in degrees: one of the easy box, one of the hard corners.
 const TARGETS: [(f64, f64); 2] = [(30.0, 10.0), (-55.0, -20.0)];

@@ -242,9 +242,11 @@ impl Network {
             Address::Serial { port: device, baud } => {
                 let wire = serial::Wire { port: device.clone(), baud: *baud };
                 let address = address.clone();
-                let stream = wire
-                    .open()
-                    .map_err(|fault| TransportError::Serial { address, option, fault })?;
+                let stream = wire.open().map_err(|fault| TransportError::Serial {
+                    address,
+                    option,
+                    fault,
+                })?;
                 serial::serve(port, wire, stream, outgoing);
                 (None, Some(peer::SERIAL))
             }

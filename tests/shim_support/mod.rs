@@ -1,8 +1,8 @@
 //! The shim on a thread of its own, and how well an attitude was held.
 #![allow(dead_code)] // each test that includes this module uses its part
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 use greylag::logs::Sample;
@@ -14,6 +14,7 @@ use mavlink::dialects::ardupilotmega::*;
 pub struct Shim {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<shim::Summary>,
+    told: Arc<Mutex<Vec<String>>>,
 }
 
 impl Shim {
@@ -29,12 +30,24 @@ impl Shim {
         change(&mut options);
         let stop = Arc::new(AtomicBool::new(false));
         let told = stop.clone();
-        let thread = std::thread::spawn(move || shim::run(&options, &told, &mut |_| {}).unwrap());
-        Shim { stop, thread }
+        let notices = Arc::new(Mutex::new(Vec::new()));
+        let heard = notices.clone();
+        let thread = std::thread::spawn(move || {
+            let mut hear = |notice: shim::Notice| {
+                heard.lock().unwrap().push(notice.event.to_string());
+            };
+            shim::run(&options, &told, &mut hear).unwrap()
+        });
+        Shim { stop, thread, told: notices }
     }
 
     pub fn is_flying(&self) -> bool {
         !self.thread.is_finished()
+    }
+
+    /// What the shim has told so far.
+    pub fn told(&self) -> Vec<String> {
+        self.told.lock().unwrap().clone()
     }
 
     pub fn end(self) -> shim::Summary {

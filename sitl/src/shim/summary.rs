@@ -28,6 +28,8 @@ pub enum Event {
     Paused,
     /// Lockstep: the answer has come after all.
     Resumed,
+    /// The played flight controller has changed its mode.
+    Mode(String),
     /// The clock was so late that it was set anew, by so much.
     Skipped(Duration),
 }
@@ -54,6 +56,7 @@ impl fmt::Display for Event {
                 "no answer for 1 s: simulated time stands still; the frame is repeated every second"
             ),
             Event::Resumed => write!(f, "answered: simulated time goes on"),
+            Event::Mode(mode) => write!(f, "mode {mode}"),
             Event::Skipped(by) => {
                 write!(
                     f,

@@ -122,9 +122,18 @@ mod tests {
 
     #[test]
     fn refuses_in_one_line_that_names_the_address() {
-        for text in ["", "udp:1.2.3.4:5", "udpin:14600", "udpin::5", "tcpin:h:65536", "udpout:h:0",
-            "serial:/dev/ttyUSB0", "serial:/dev/ttyUSB0:fast", "serial:/dev/ttyUSB0:0", "pty:"]
-        {
+        for text in [
+            "",
+            "udp:1.2.3.4:5",
+            "udpin:14600",
+            "udpin::5",
+            "tcpin:h:65536",
+            "udpout:h:0",
+            "serial:/dev/ttyUSB0",
+            "serial:/dev/ttyUSB0:fast",
+            "serial:/dev/ttyUSB0:0",
+            "pty:",
+        ] {
             let error = text.parse::<Address>().expect_err(text).to_string();
             assert!(error.contains(&format!("'{text}'")) && !error.contains('\n'), "{error}");
         }
