@@ -86,6 +86,7 @@ pub enum Notice {
 }
 
 /// A vehicle of one of the profiles.
+#[expect(clippy::large_enum_variant, reason = "a program has one of them, or two")]
 #[derive(Clone, Debug)]
 pub enum Vehicle {
     /// The simulator's shim.

@@ -9,7 +9,8 @@ const INT: u8 = 6;
 const REAL: u8 = 9;
 
 /// Name, value, type. PX4's are its defaults, but those that a companion has to have set.
-const PX4: [(&str, f64, u8); 12] = [
+const PX4: [(&str, f64, u8); 13] = [
+    ("PWM_MAIN_REV", 0.0, INT),
     ("MAV_SYS_ID", 1.0, INT),
     ("COM_RC_IN_MODE", 1.0, INT),
     ("COM_RC_LOSS_T", 0.5, REAL),
@@ -25,7 +26,9 @@ const PX4: [(&str, f64, u8); 12] = [
 ];
 
 /// ArduPilot's are of one radio's calibration, with a reversed pitch channel.
-const ARDUPILOT: [(&str, f64, u8); 24] = [
+const ARDUPILOT: [(&str, f64, u8); 26] = [
+    ("SERVO1_REVERSED", 0.0, INT),
+    ("SERVO2_REVERSED", 0.0, INT),
     ("SYSID_THISMAV", 1.0, INT),
     ("MAV_GCS_SYSID", 1.0, INT),
     ("SCHED_LOOP_RATE", 200.0, INT),

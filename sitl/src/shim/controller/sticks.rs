@@ -52,7 +52,11 @@ fn px4([x, y, z]: [i16; 3], parameters: &Table) -> Inputs {
     let stick = |thousandths: i16| f64::from(thousandths) / 1000.0;
     let roll = stick(y) * parameters.get("FW_MAN_R_SC") + parameters.get("TRIM_ROLL");
     let pitch = -stick(x) * parameters.get("FW_MAN_P_SC") + parameters.get("TRIM_PITCH");
-    Inputs { aileron: roll, elevator: -pitch, throttle: stick(z) }.clamped()
+    // One bit for each output. The played loops are right either way: what is played here is a
+    // mix-up between stick and surface.
+    let reversed = parameters.get("PWM_MAIN_REV") as u32;
+    let sign = |output: u32| if reversed >> output & 1 == 1 { -1.0 } else { 1.0 };
+    Inputs { aileron: sign(0) * roll, elevator: -sign(1) * pitch, throttle: stick(z) }.clamped()
 }
 
 /// Channels by their calibration: angles to 1/4500 of full travel, throttle to whole percents.
@@ -70,5 +74,11 @@ fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
     let throttle = ((f64::from(pulses[2]) - low) / (high - low)).clamp(0.0, 1.0);
     let throttle = (100.0 * throttle).trunc() / 100.0;
     // The pitch stick is positive nose up.
-    Inputs { aileron: angle(1), elevator: -angle(2), throttle }.clamped()
+    let sign = |name: &str| if parameters.get(name) == 1.0 { -1.0 } else { 1.0 };
+    Inputs {
+        aileron: sign("SERVO1_REVERSED") * angle(1),
+        elevator: -sign("SERVO2_REVERSED") * angle(2),
+        throttle,
+    }
+    .clamped()
 }

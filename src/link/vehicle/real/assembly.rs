@@ -40,6 +40,8 @@ pub(super) struct Assembly {
     actuators: Actuators,
     boot_ms: Option<u32>,
     last: Telemetry,
+    /// What the last state was made of, as bits: sensors that stand still give the same again.
+    shown: [u64; 13],
     pub(super) counts: VehicleCounts,
 }
 
@@ -56,6 +58,7 @@ impl Assembly {
             new_velocity: false,
             actuators: Actuators::at_rest(&Controls::default()),
             boot_ms: None,
+            shown: [0; 13],
             last: Telemetry {
                 time: Time::default(),
                 order: Order::First,
@@ -103,6 +106,11 @@ impl Assembly {
         None
     }
 
+    /// Body rates of the last state, rad/s.
+    pub(super) fn rates(&self) -> [f64; 3] {
+        [self.last.state.p, self.last.state.q, self.last.state.r]
+    }
+
     fn complete(
         &mut self,
         host: Duration,
@@ -133,7 +141,12 @@ impl Assembly {
         }
         self.fill_force(host, &mut next);
         let climb = self.fill_air(host, &mut next);
-        self.fill_incidence(host, &mut next, climb, step.as_secs_f64());
+        if self.stands_still(quaternion, rates) {
+            // The estimator would go on by itself, and hide from the pilot that nothing moves.
+            (next.state.alpha, next.state.beta) = (self.last.state.alpha, self.last.state.beta);
+        } else {
+            self.fill_incidence(host, &mut next, climb, step.as_secs_f64());
+        }
         let steps = (step.as_micros() as u64 + PERIOD_US / 2) / PERIOD_US;
         for _ in 0..steps.clamp(1, CATCH_UP) {
             self.actuators.step(command, &self.figures);
@@ -142,6 +155,16 @@ impl Assembly {
         self.counts.faulty += u64::from(!next.faults.is_empty());
         self.last = next;
         Some(next)
+    }
+
+    /// Whether every sensor shows to the bit what it showed at the last state.
+    fn stands_still(&mut self, quaternion: [f64; 4], rates: [f64; 3]) -> bool {
+        let force = self.specific_force.map_or([0.0; 3], |(_, force)| force);
+        let air = self.air.map_or([0.0; 3], |(_, air)| air);
+        let mut shown = [0; 13];
+        let values = quaternion.iter().chain(&rates).chain(&force).chain(&air);
+        shown.iter_mut().zip(values).for_each(|(to, x)| *to = x.to_bits());
+        std::mem::replace(&mut self.shown, shown) == shown
     }
 
     fn fill_force(&self, host: Duration, next: &mut Telemetry) {
