@@ -16,7 +16,7 @@ use greylag::link::vehicle::Authority;
 use greylag::logs::csv::{self, Tolerance};
 use greylag_sitl::shim::{self, Personality};
 use mavlink::dialects::ardupilotmega::*;
-use shim_support::{Shim, error_deg};
+use shim_support::{Shim, error_deg, parameter};
 use wire_support::Cable;
 
 use Authority::{Attitude, Surfaces};
@@ -60,6 +60,12 @@ impl Wired {
             assert!(Instant::now() < end, "{:?}", self.client.texts());
             std::thread::sleep(Duration::from_millis(300));
         }
+        // What is measured is the wire, not how long a busy machine keeps this test from running.
+        let mut patience = parameter("GL_OFFB_LOSS_S", 10.0);
+        if let MavMessage::PARAM_SET(m) = &mut patience {
+            m.target_component = 191;
+        }
+        self.client.send(&patience);
         self.client.setpoint(TARGET.0, TARGET.1);
         assert_eq!(self.client.mode(OFFBOARD), MavResult::MAV_RESULT_ACCEPTED);
     }
