@@ -141,6 +141,7 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<Options> {
         pace,
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
+        controller: None,
         deflection: model.airframe.actuators.deflection_max,
     })
 }

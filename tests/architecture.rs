@@ -13,6 +13,7 @@ const LAYERS: &[&str] = &[
 const HOMES: &[(&str, &[&str])] = &[
     ("mavlink", &["link"]),
     ("tokio", &["link", "flight/runtime"]),
+    ("tokio_serial", &["link"]),
     ("burn", &["learn"]),
     ("clap", &["commands"]),
     ("anyhow", &["commands"]),

@@ -2,11 +2,8 @@
 #![cfg(feature = "sitl")]
 
 mod flight_support;
+mod shim_support;
 
-use std::net::SocketAddr;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use flight_support::*;
@@ -16,47 +13,15 @@ use greylag::flight::runtime::{Pace, Summary};
 use greylag::logs::Sample;
 use greylag::logs::csv::{self, Tolerance};
 use greylag::sim::{Environment, Episode, Simulator};
-use greylag_sitl::plant::{PlantOptions, Start};
+use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::shim::{self, FrameFaults, Noise, ShimOptions};
 use mavlink::dialects::ardupilotmega::*;
+use shim_support::{Shim, error_deg, parameter};
 
 /// Targets in degrees: one of the easy box, one of the hard corners.
 const TARGETS: [(f64, f64); 2] = [(30.0, 10.0), (-55.0, -20.0)];
 /// How far the settled error over MAVLink may be from that in process, degrees (issue 2).
 const AGREEMENT_DEG: f64 = 0.05;
-
-/// The shim on a thread of its own.
-struct Shim {
-    stop: Arc<AtomicBool>,
-    thread: JoinHandle<shim::Summary>,
-}
-
-impl Shim {
-    fn start(
-        companion: SocketAddr,
-        pace: shim::Pace,
-        duration_s: f64,
-        change: impl FnOnce(&mut ShimOptions),
-    ) -> Self {
-        let mut options = ShimOptions::new(PlantOptions::default(), Start::NEUTRAL);
-        options.link = format!("udpout:{companion}").parse().unwrap();
-        (options.pace, options.duration_s) = (pace, Some(duration_s));
-        change(&mut options);
-        let stop = Arc::new(AtomicBool::new(false));
-        let told = stop.clone();
-        let thread = std::thread::spawn(move || shim::run(&options, &told, &mut |_| {}).unwrap());
-        Shim { stop, thread }
-    }
-
-    fn is_flying(&self) -> bool {
-        !self.thread.is_finished()
-    }
-
-    fn end(self) -> shim::Summary {
-        self.stop.store(true, Ordering::Relaxed);
-        self.thread.join().unwrap()
-    }
-}
 
 /// The settled error of an episode of the paper's protocol in process, LQI, degrees.
 fn settled_in_process(roll: f64, pitch: f64) -> f64 {
@@ -68,14 +33,8 @@ fn settled_in_process(roll: f64, pitch: f64) -> f64 {
     episode.fly(&target, |_, _| {}).unwrap().settled_deg
 }
 
-/// Mean of roll and pitch RMSE over samples, degrees.
-fn error_deg(samples: &[Sample], (roll, pitch): (f64, f64)) -> f64 {
-    let rmse = |axis: usize, wanted: f64| {
-        let sum: f64 =
-            samples.iter().map(|s| (s.attitude_rad[axis].to_degrees() - wanted).powi(2)).sum();
-        (sum / samples.len() as f64).sqrt()
-    };
-    (rmse(0, roll) + rmse(1, pitch)) / 2.0
+fn udp_to(companion: &Companion) -> String {
+    format!("udpout:{}", companion.vehicle())
 }
 
 /// Flies a target in OFFBOARD until the shim's flight is over; gives the flight's samples with
@@ -97,7 +56,7 @@ fn fly_with(
     let companion = Companion::start(&options);
     let their_pace =
         if pace == Pace::Lockstep { shim::Pace::Lockstep } else { shim::Pace::RealTime };
-    let shim = Shim::start(companion.vehicle(), their_pace, seconds, change);
+    let shim = Shim::start(&udp_to(&companion), their_pace, seconds, change);
     let mut client = Client::new(companion.client(0));
     // In lockstep a second of vehicle time is a few milliseconds: the setpoints may be rarer.
     client.send(&parameter("GL_OFFB_LOSS_S", 60.0));
@@ -113,16 +72,6 @@ fn fly_with(
         csv::load(&root.path().join("flight").join("flight.csv"), Tolerance::Strict).unwrap();
     assert_eq!((recorded.dropped, recorded.cut_short), (0, false));
     (recorded.flight.samples, summary, flown)
-}
-
-fn parameter(name: &str, value: f32) -> MavMessage {
-    MavMessage::PARAM_SET(PARAM_SET_DATA {
-        param_value: value,
-        target_system: 1,
-        target_component: 1,
-        param_id: name.into(),
-        param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
-    })
 }
 
 #[test]
@@ -154,7 +103,7 @@ fn in_real_time_an_attitude_is_flown_on_jsbsim() {
 fn ten_minutes_of_level_flight_are_not_taken_for_a_frozen_sensor() {
     // Windless and without noise nothing moves once HOLD has settled, but for the altitude.
     let companion = Companion::start(&options(Pace::Lockstep));
-    let shim = Shim::start(companion.vehicle(), shim::Pace::Lockstep, 600.0, |_| {});
+    let shim = Shim::start(&udp_to(&companion), shim::Pace::Lockstep, 600.0, |_| {});
     let mut client = Client::new(companion.client(0));
     client.wait("state", |m| matches!(m, MavMessage::ATTITUDE(a) if a.roll.is_finite()));
     assert_eq!(client.arm(), MavResult::MAV_RESULT_ACCEPTED);

@@ -55,8 +55,11 @@ fn a_port_in_use_is_one_line_and_nothing_is_started() {
 }
 
 #[test]
-fn a_serial_port_is_refused_with_what_to_use_instead() {
-    refused(&["--vehicle", "serial:/dev/ttyACM0:921600"], &["serial:/dev/ttyACM0:921600", "udpin"]);
+fn a_serial_port_that_cannot_be_had_is_one_line_with_the_remedy() {
+    let words = ["serial:/dev/no-such-port:921600", "no such device", "plug", "--vehicle"];
+    refused(&["--vehicle", "serial:/dev/no-such-port:921600"], &words);
+    // A file that is no port.
+    refused(&["--vehicle", "serial:/dev/null:921600"], &["/dev/null", "not a serial port"]);
 }
 
 #[test]

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser};
+use clap::{Args, Parser, ValueEnum};
 use greylag_sitl::error_arguments::{FaultArgs, SensorArgs};
 use greylag_sitl::plant::Start;
 use greylag_sitl::plant_arguments::PlantArgs;
-use greylag_sitl::shim::{Address, Existing, Launch, Pace, ShimOptions, TruthFile};
+use greylag_sitl::shim::{Address, Existing, Launch, Pace, Personality, ShimOptions, TruthFile};
 
 /// Flies an aircraft in JSBSim and plays its flight controller over MAVLink.
 ///
@@ -15,9 +15,17 @@ use greylag_sitl::shim::{Address, Existing, Launch, Pace, ShimOptions, TruthFile
 #[derive(Debug, Parser)]
 #[command(name = "greylag-sitl", version)]
 pub struct Cli {
-    /// Where the companion is met: udpin:, udpout:, tcpin: or tcpout:, then HOST:PORT.
+    /// Where the companion is met: udpin:, udpout:, tcpin: or tcpout:, then HOST:PORT; or
+    /// serial:DEVICE:BAUD; or pty:NAME, a pseudo-terminal that the companion opens under that name.
     #[arg(long, value_name = "ADDRESS", default_value_t = ShimOptions::default_link())]
     link: Address,
+    /// Play this flight stack, with its modes, rates, parameters and failsafes, instead of the
+    /// companion's own simulator link. It begins armed, in the air, flying by itself.
+    #[arg(long, value_name = "STACK", value_enum, conflicts_with = "lockstep")]
+    personality: Option<PersonalityName>,
+    /// Set a parameter of that stack (may be repeated).
+    #[arg(long, value_name = "NAME=VALUE", requires = "personality", value_parser = parameter)]
+    parameter: Vec<(String, f64)>,
     /// Step on the companion's answers alone, as fast as they come, instead of in real time.
     #[arg(long)]
     lockstep: bool,
@@ -44,6 +52,22 @@ pub struct Cli {
     sensors: SensorArgs,
     #[command(flatten)]
     faults: FaultArgs,
+}
+
+/// A flight stack to be played.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PersonalityName {
+    /// PX4, fixed wing.
+    Px4,
+    /// ArduPilot Plane.
+    Ardupilot,
+}
+
+/// Reads NAME=VALUE.
+fn parameter(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("write it as NAME=VALUE")?;
+    let value = value.trim().parse().map_err(|_| format!("{value} is not a number"))?;
+    Ok((name.trim().to_owned(), value))
 }
 
 /// The state at the start.
@@ -88,6 +112,11 @@ impl Cli {
             noise: self.sensors.noise(),
             bias: self.sensors.bias(),
             faults: self.faults.rule(),
+            personality: self.personality.map(|name| match name {
+                PersonalityName::Px4 => Personality::Px4,
+                PersonalityName::Ardupilot => Personality::Ardupilot,
+            }),
+            parameters: self.parameter.clone(),
         }
     }
 }

@@ -51,5 +51,11 @@ fn intent(options: &ShimOptions) -> String {
         Launch::WhenArmed => "held at the start until the companion arms",
         Launch::Immediate => "flying at once",
     };
-    format!("{} {pace}, {launch}; Ctrl-C ends it", options.plant.aircraft)
+    match options.personality {
+        Some(personality) => format!(
+            "{} flown by {personality} in real time, armed and in the air; Ctrl-C ends it",
+            options.plant.aircraft
+        ),
+        None => format!("{} {pace}, {launch}; Ctrl-C ends it", options.plant.aircraft),
+    }
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::Context;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use crossbeam_channel::RecvTimeoutError;
 
 use crate::commands::choices;
@@ -20,6 +20,7 @@ use crate::flight::recorder::Place;
 use crate::flight::runtime::{Crew, Event, Flight, Options, Pace, Seat};
 use crate::link::address::Address;
 use crate::link::autopilot::Severity;
+use crate::link::vehicle::{Authority, Profile, Stack};
 use crate::model::GreyBox;
 use crate::physics::Airframe;
 
@@ -29,9 +30,15 @@ pub const POLICY: &str = "params/x8/policy";
 /// The arguments of `greylag fly`.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// Link to the vehicle: udpin:, udpout:, tcpin: or tcpout:HOST:PORT.
+    /// Link to the vehicle: udpin:, udpout:, tcpin: or tcpout:HOST:PORT, or serial:DEVICE:BAUD.
     #[arg(long, value_name = "ADDRESS", default_value = "udpin:127.0.0.1:14600")]
     vehicle: Address,
+    /// What flies at the other end of the vehicle's link.
+    #[arg(long, value_name = "NAME", default_value = "sitl", value_enum)]
+    profile: ProfileName,
+    /// What a real flight controller is commanded: surfaces (MANUAL), or attitude (OFFBOARD, GUIDED).
+    #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
+    command: CommandName,
     /// Link to clients; may be given several times.
     #[arg(long = "client", value_name = "ADDRESS", default_values = ["udpin:0.0.0.0:14550", "udpout:127.0.0.1:14540"])]
     clients: Vec<Address>,
@@ -65,6 +72,55 @@ pub struct Arguments {
     /// End after this many seconds instead of at Ctrl-C.
     #[arg(long, value_name = "S", value_parser = seconds)]
     duration_s: Option<Duration>,
+}
+
+/// The vehicle's profile by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ProfileName {
+    /// The simulator's shim.
+    Sitl,
+    /// PX4, fixed wing.
+    Px4,
+    /// ArduPilot Plane.
+    Ardupilot,
+}
+
+/// What is commanded, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum CommandName {
+    /// Aileron, elevator, throttle.
+    Surfaces,
+    /// Roll, pitch, thrust.
+    Attitude,
+}
+
+impl ProfileName {
+    /// The stack of a real controller.
+    pub fn stack(self) -> Option<Stack> {
+        match self {
+            ProfileName::Sitl => None,
+            ProfileName::Px4 => Some(Stack::Px4),
+            ProfileName::Ardupilot => Some(Stack::Ardupilot),
+        }
+    }
+}
+
+impl CommandName {
+    /// The authority it means.
+    pub fn authority(self) -> Authority {
+        match self {
+            CommandName::Surfaces => Authority::Surfaces,
+            CommandName::Attitude => Authority::Attitude,
+        }
+    }
+}
+
+impl Arguments {
+    fn controller_profile(&self, model: &GreyBox) -> Option<Profile> {
+        let actuators = model.airframe.actuators;
+        let authority = self.command.authority();
+        self.profile.stack().map(|stack| Profile { stack, authority, actuators })
+    }
 }
 
 /// Reads a positive number of seconds.
@@ -113,6 +169,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Options {
         duration: arguments.duration_s,
         plan_deadline: Duration::from_millis(arguments.plan_deadline_ms),
         deflection: model.airframe.actuators.deflection_max,
+        controller: arguments.controller_profile(model),
     }
 }
 
@@ -197,7 +254,7 @@ fn show_events(flight: &Flight, vehicle: &Address) {
 fn line(event: &Event, vehicle: &Address) -> String {
     match event {
         Event::Text(text) => format!("[{}] {}", severity(text.severity), text.words),
-        Event::VehicleFound(peer) => format!("vehicle found at {}", peer.address),
+        Event::VehicleFound(peer) => format!("vehicle found at {peer}"),
         Event::NoVehicle => format!("no vehicle yet on {vehicle}; start one with `cargo sitl`"),
     }
 }

@@ -13,12 +13,16 @@ mod design;
 mod diagnose;
 #[cfg(feature = "sitl")]
 mod evaluate;
+#[cfg(feature = "sitl")]
+mod faults;
 mod files;
 pub mod fly;
 mod intake;
+mod link;
 mod logs;
 #[cfg(feature = "sitl")]
 mod mystery;
+mod replay;
 #[cfg(feature = "sitl")]
 mod targets;
 #[cfg(feature = "learn")]
@@ -59,13 +63,20 @@ enum Command {
     /// Score controllers on the target file, flown in JSBSim in this process.
     #[cfg(feature = "sitl")]
     Evaluate(evaluate::Arguments),
+    /// Fly many seeded flights under faults of link, sensors, clocks; judge them.
+    #[cfg(feature = "sitl")]
+    Faults(faults::Arguments),
     /// Fly a vehicle, serving ground stations and offboard programs.
     Fly(fly::Arguments),
+    /// Check the link to a flight controller.
+    Link(link::Arguments),
     /// Say what a flight log holds, or write it as a CSV table.
     Logs(logs::Arguments),
     /// Fly an aircraft that has an effect which its model lacks: data to find it in.
     #[cfg(feature = "sitl")]
     Mystery(mystery::Arguments),
+    /// Replay a recorded flight, and compare the pilot's commands bit by bit.
+    Replay(replay::Arguments),
     /// Write a target file.
     #[cfg(feature = "sitl")]
     Targets(targets::Arguments),
@@ -91,10 +102,14 @@ pub fn main() -> ExitCode {
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        #[cfg(feature = "sitl")]
+        Command::Faults(arguments) => faults::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),
+        Command::Link(arguments) => link::run(&arguments),
         Command::Logs(arguments) => logs::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Mystery(arguments) => mystery::run(&arguments),
+        Command::Replay(arguments) => replay::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Targets(arguments) => targets::run(&arguments),
         #[cfg(feature = "learn")]

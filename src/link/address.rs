@@ -26,8 +26,7 @@ pub enum Address {
     TcpIn(HostPort),
     /// Connect there, again and again.
     TcpOut(HostPort),
-    /// A serial port at a baud rate: its place is kept, opening it comes with the real flight
-    /// controllers.
+    /// A serial port at a baud rate.
     Serial {
         /// Device, such as `/dev/ttyACM0`.
         port: String,

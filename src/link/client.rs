@@ -19,9 +19,10 @@ use std::time::Duration;
 use super::autopilot::{Autopilot, Severity, Verdict};
 use super::framing::{Frame, FrameCounts, Frames, Source};
 use super::peer::PeerId;
+use super::vehicle::real::ONBOARD;
 use super::wire::Message;
 use super::wire::answer::{self, MissionResult};
-use super::wire::mode::{self, ModeRequest, Pulse};
+use super::wire::mode::{self, ModeRequest, Pulse, Role};
 use super::wire::request::{self, MissionStep, Recipient, Request};
 use super::wire::telemetry::Home;
 use crate::physics::Time;
@@ -58,6 +59,7 @@ pub struct Now {
 #[derive(Debug)]
 pub struct Clients {
     identity: Source,
+    role: Role,
     sessions: Vec<Session>,
     outbox: Outbox,
     pulse: Option<Pulse>,
@@ -77,6 +79,7 @@ impl Clients {
     pub fn new(identity: Source) -> Self {
         Clients {
             identity,
+            role: Role::Autopilot,
             sessions: Vec::with_capacity(MAX_SESSIONS),
             outbox: Outbox::default(),
             pulse: None,
@@ -90,6 +93,28 @@ impl Clients {
             next_summary: Duration::ZERO,
             bad_at_summary: 0,
         }
+    }
+
+    /// No clients yet; we are the onboard computer of a controller that is not heard yet: only what
+    /// is addressed to our component is ours, and nothing is streamed that nobody asked for.
+    pub fn onboard() -> Self {
+        let identity = Source { system: 1, component: ONBOARD };
+        Clients { role: Role::Onboard, ..Clients::new(identity) }
+    }
+
+    /// Takes the controller's system id as ours.
+    pub fn adopt(&mut self, system: u8) {
+        self.identity.system = system;
+    }
+
+    /// Who we are.
+    pub fn identity(&self) -> Source {
+        self.identity
+    }
+
+    /// All that are served.
+    pub fn peers(&self) -> impl Iterator<Item = PeerId> + '_ {
+        self.sessions.iter().map(|session| session.peer)
     }
 
     /// Serves a peer from now on without waiting for it to speak: the target of a `udpout:` link,
@@ -182,13 +207,19 @@ impl Clients {
             }
             self.sessions.remove(at);
         }
-        self.sessions.push(Session::new(peer, stay, now.host));
+        let mut session = Session::new(peer, stay, now.host);
+        if self.role == Role::Onboard {
+            // Group 0 is all that is streamed by default.
+            session.streams.set_group(0, None, now.host);
+        }
+        self.sessions.push(session);
         Some(self.sessions.len() - 1)
     }
 
     fn is_for_us(&self, to: Recipient) -> bool {
-        (to.system == 0 || to.system == self.identity.system)
-            && (to.component == 0 || to.component == self.identity.component)
+        let component = to.component == self.identity.component
+            || (to.component == 0 && self.role == Role::Autopilot);
+        (to.system == 0 || to.system == self.identity.system) && component
     }
 
     fn serve(

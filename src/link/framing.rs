@@ -162,6 +162,14 @@ fn examine(bytes: &[u8]) -> Candidate<'_> {
     })
 }
 
+/// What [`Frames`] finds.
+enum Piece<'a> {
+    /// A frame of a message that the dialect knows, its CRC right.
+    Known(Frame<'a>),
+    /// A plausible frame of a message that it does not know: to be forwarded, not read.
+    Unknown(&'a [u8]),
+}
+
 /// The frames of one datagram, in order.
 pub struct Frames<'a, 'c> {
     rest: &'a [u8],
@@ -209,10 +217,8 @@ fn ends_well(bytes: &[u8], len: usize) -> bool {
     bytes.get(len).is_none_or(|next| matches!(*next, STX_V1 | STX_V2))
 }
 
-impl<'a> Iterator for Frames<'a, '_> {
-    type Item = Frame<'a>;
-
-    fn next(&mut self) -> Option<Frame<'a>> {
+impl<'a> Frames<'a, '_> {
+    fn next_piece(&mut self) -> Option<Piece<'a>> {
         loop {
             let start = self.rest.iter().position(|b| matches!(*b, STX_V1 | STX_V2));
             self.rest = &self.rest[start.unwrap_or(self.rest.len())..];
@@ -228,12 +234,14 @@ impl<'a> Iterator for Frames<'a, '_> {
                     self.counts.good += 1;
                     self.frames_left -= 1;
                     self.rest = &self.rest[frame.bytes.len()..];
-                    return Some(frame);
+                    return Some(Piece::Known(frame));
                 }
                 Candidate::Unknown { len } if ends_well(self.rest, len) => {
                     self.counts.unknown += 1;
                     self.frames_left -= 1;
-                    self.rest = &self.rest[len..];
+                    let (unknown, rest) = self.rest.split_at(len);
+                    self.rest = rest;
+                    return Some(Piece::Unknown(unknown));
                 }
                 Candidate::Incomplete if self.waits => return None,
                 Candidate::Incomplete => {
@@ -249,6 +257,31 @@ impl<'a> Iterator for Frames<'a, '_> {
                     self.false_start();
                 }
             }
+        }
+    }
+}
+
+impl<'a> Iterator for Frames<'a, '_> {
+    type Item = Frame<'a>;
+
+    fn next(&mut self) -> Option<Frame<'a>> {
+        loop {
+            if let Piece::Known(frame) = self.next_piece()? {
+                return Some(frame);
+            }
+        }
+    }
+}
+
+/// Delivers every frame of some bytes as it came, those of unknown messages among them, each with
+/// what is known of it: what a router passes on unmodified.
+pub fn pieces<'a>(bytes: &'a [u8], mut deliver: impl FnMut(&'a [u8], Option<Frame<'a>>)) {
+    let mut counts = FrameCounts::default();
+    let mut frames = Frames::new(bytes, &mut counts);
+    while let Some(piece) = frames.next_piece() {
+        match piece {
+            Piece::Known(frame) => deliver(frame.bytes, Some(frame)),
+            Piece::Unknown(bytes) => deliver(bytes, None),
         }
     }
 }
@@ -279,9 +312,32 @@ impl StreamCutter {
         !self.pending.is_empty()
     }
 
+    /// [`StreamCutter::push`] for a router: delivers each frame's bytes, of unknown messages too.
+    pub fn push_pieces(&mut self, chunk: &[u8], deliver: impl FnMut(&[u8])) {
+        self.pending.extend_from_slice(chunk);
+        self.cut_pieces(true, deliver);
+    }
+
+    /// [`StreamCutter::flush`] for a router.
+    pub fn flush_pieces(&mut self, deliver: impl FnMut(&[u8])) {
+        self.cut_pieces(false, deliver);
+    }
+
     fn cut(&mut self, waits: bool, deliver: impl FnMut(Frame<'_>)) {
         let mut frames = Frames { waits, ..Frames::new(&self.pending, &mut self.counts) };
         frames.by_ref().for_each(deliver);
+        let left = frames.rest.len();
+        self.pending.drain(..self.pending.len() - left);
+    }
+
+    fn cut_pieces(&mut self, waits: bool, mut deliver: impl FnMut(&[u8])) {
+        let mut frames = Frames { waits, ..Frames::new(&self.pending, &mut self.counts) };
+        while let Some(piece) = frames.next_piece() {
+            match piece {
+                Piece::Known(frame) => deliver(frame.bytes),
+                Piece::Unknown(bytes) => deliver(bytes),
+            }
+        }
         let left = frames.rest.len();
         self.pending.drain(..self.pending.len() - left);
     }

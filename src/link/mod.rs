@@ -16,7 +16,7 @@
 //! use greylag::link::framing::Source;
 //! use greylag::link::peer::LinkId;
 //! use greylag::link::transport::{Arrival, Network};
-//! use greylag::link::vehicle::{Outputs, Sitl, Vehicle};
+//! use greylag::link::vehicle::{Demand, Outputs, Sitl, Vehicle};
 //! use greylag::physics::Time;
 //!
 //! fn serve(pilot: &mut dyn Autopilot) -> Result<(), Box<dyn std::error::Error>> {
@@ -42,7 +42,10 @@
 //!                 vehicle.handle(start.elapsed(), packet.peer, &packet.bytes, |t| newest = Some(t));
 //!                 if let Some(state) = newest {
 //!                     now.vehicle = state.time; // … and the pilot decides what to answer.
-//!                     vehicle_link.send(packet.peer, vehicle.command(state.time, Outputs::Disarmed));
+//!                     let demand =
+//!                         Demand { outputs: Outputs::Disarmed, attitude: [0.0; 2], fault: None };
+//!                     let frame = vehicle.answer(start.elapsed(), state.time, &demand);
+//!                     vehicle_link.send(packet.peer, frame);
 //!                 }
 //!             },
 //!             default(std::time::Duration::from_millis(10)) => {}
@@ -53,6 +56,7 @@
 //!                 Arrival::Packet(packet) => clients.handle(now, packet.peer, &packet.bytes, pilot),
 //!                 Arrival::Opened(peer) => clients.welcome(now, peer),
 //!                 Arrival::Closed(peer) => clients.forget(peer),
+//!                 Arrival::Remark(remark) => eprintln!("{remark}"),
 //!             }
 //!         }
 //!         clients.poll(now, pilot);
@@ -67,6 +71,7 @@ pub mod client;
 pub mod framing;
 pub mod offboard;
 pub mod peer;
+pub mod routing;
 pub mod transport;
 pub mod vehicle;
 mod wire;

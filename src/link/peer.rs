@@ -1,13 +1,16 @@
 //! Who is at the other end of a link.
 
 use std::fmt;
-use std::net::SocketAddr;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 /// A link of this program, numbered in the order of opening.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LinkId(pub u16);
 
-/// One correspondent on one link: a datagram's sender, or one TCP connection.
+/// The address of whoever is at the other end of a serial wire, which has none of its own.
+pub const SERIAL: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::UNSPECIFIED), 0);
+
+/// One correspondent on one link: a datagram's sender, one TCP connection, the end of a wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PeerId {
     /// The link it was heard on.
@@ -18,6 +21,9 @@ pub struct PeerId {
 
 impl fmt::Display for PeerId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} (link {})", self.address, self.link.0)
+        match self.address == SERIAL {
+            true => write!(f, "the end of the serial wire (link {})", self.link.0),
+            false => write!(f, "{} (link {})", self.address, self.link.0),
+        }
     }
 }

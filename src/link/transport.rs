@@ -1,9 +1,11 @@
-//! The sockets: every link of the program on one thread, with channels to the control thread.
+//! The sockets and ports: every link of the program on one thread, with channels to the control
+//! thread.
 //!
 //! What arrives goes into a bounded channel that the caller chooses for each link, so that the
 //! vehicle's traffic can be served before the clients'. What is sent goes into a bounded channel
 //! of the link. A full channel drops and counts; nothing here ever blocks its caller.
 
+mod serial;
 mod tcp;
 mod udp;
 
@@ -19,7 +21,8 @@ use tokio::runtime::{Builder, Handle};
 use tokio::sync::{mpsc, oneshot};
 
 use super::address::{Address, AddressError};
-use super::peer::{LinkId, PeerId};
+use super::peer::{self, LinkId, PeerId};
+pub use serial::SerialFault;
 
 /// Frames that may wait to be sent on one link.
 const OUTBOX: usize = 1024;
@@ -42,8 +45,33 @@ pub enum Arrival {
     Packet(Packet),
     /// A TCP connection is up: the peer may be spoken to before it says anything.
     Opened(PeerId),
-    /// A TCP connection is gone.
+    /// A TCP connection is gone, or a serial port.
     Closed(PeerId),
+    /// Something about the link itself that its user should know.
+    Remark(Remark),
+}
+
+/// What is to be said about a link.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum Remark {
+    /// The serial port has gone.
+    #[error("serial port {0} has gone: waiting for it to come back")]
+    Unplugged(String),
+    /// The serial port is there again.
+    #[error("serial port {0} is back")]
+    Replugged(String),
+    /// Bytes come, but no frame among them.
+    #[error(
+        "bytes arrive on {port}, but no MAVLink frame among them: {baud} is probably not the baud \
+         rate of the other end; set its port (SER_TEL2_BAUD on PX4, SERIAL2_BAUD on ArduPilot) or \
+         --vehicle to the same rate"
+    )]
+    Noise {
+        /// The device.
+        port: String,
+        /// The rate it is open at.
+        baud: u32,
+    },
 }
 
 /// Why a link cannot be opened.
@@ -72,12 +100,16 @@ pub enum TransportError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// Serial ports are not here yet.
-    #[error(
-        "opening {0}: serial links come with the real flight controllers; \
-         until then use udpin, udpout, tcpin or tcpout"
-    )]
-    Serial(Address),
+    /// The serial port cannot be opened.
+    #[error("opening {address}: {fault}; {option} names the port")]
+    Serial {
+        /// The address.
+        address: Address,
+        /// The command-line option it came from.
+        option: &'static str,
+        /// What is wrong with it.
+        fault: SerialFault,
+    },
     /// The thread could not be started.
     #[error("starting the network thread: {0}; close other programs and try again")]
     Thread(std::io::Error),
@@ -207,7 +239,17 @@ impl Network {
                 tcp::connect(port, to.resolve()?, outgoing);
                 (None, None)
             }
-            Address::Serial { .. } => return Err(TransportError::Serial(address.clone())),
+            Address::Serial { port: device, baud } => {
+                let wire = serial::Wire { port: device.clone(), baud: *baud };
+                let address = address.clone();
+                let stream = wire.open().map_err(|fault| TransportError::Serial {
+                    address,
+                    option,
+                    fault,
+                })?;
+                serial::serve(port, wire, stream, outgoing);
+                (None, Some(peer::SERIAL))
+            }
         };
         let target = target.map(|address| PeerId { link: id, address });
         Ok(Link { id, local, target, outbox, counters })
@@ -240,12 +282,12 @@ impl Link {
         self.id
     }
 
-    /// The address it is bound to; none for `tcpout:`.
+    /// The address it is bound to; none for `tcpout:` and `serial:`.
     pub fn local(&self) -> Option<SocketAddr> {
         self.local
     }
 
-    /// The peer to speak to unasked: the target of a `udpout:` link.
+    /// The peer to speak to unasked: the target of a `udpout:` link, the end of a serial wire.
     pub fn target(&self) -> Option<PeerId> {
         self.target
     }

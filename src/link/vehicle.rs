@@ -1,16 +1,19 @@
 //! The vehicle's side of the companion: state in, actuator commands out.
 //!
-//! There is one struct per vehicle profile behind [`Vehicle`]; `px4` and `ardupilot` will stand
-//! beside [`sitl`].
+//! Behind [`Vehicle`] stand the simulator's shim ([`sitl`]) and real flight controllers ([`real`]).
 
 pub mod limits;
+pub mod real;
 pub mod sitl;
 
 use std::time::Duration;
 
+use super::autopilot::Severity;
 use super::peer::PeerId;
 use crate::physics::{ActuatorState, State, Time};
 pub use limits::Faults;
+pub use real::Real;
+pub use real::profile::{Authority, Profile, Stack};
 pub use sitl::{Sitl, VehicleCounts};
 
 pub use super::wire::sitl::Outputs;
@@ -60,12 +63,36 @@ pub enum Order {
     Late,
 }
 
+/// What the pilot demands of the vehicle at a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Demand {
+    /// What goes to the actuators.
+    pub outputs: Outputs,
+    /// Roll and pitch that are wanted, rad, for a controller that is commanded attitudes.
+    pub attitude: [f64; 2],
+    /// Why the aircraft should go back to its controller, if it should.
+    pub fault: Option<&'static str>,
+}
+
+/// What a vehicle has to tell the pilot.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Notice {
+    /// A line for the ground stations.
+    Text(Severity, String),
+    /// The controller has the aircraft again, for this reason: engage no more until asked.
+    HandedBack(String),
+    /// The controller's system id, which becomes ours.
+    System(u8),
+}
+
 /// A vehicle of one of the profiles.
-// One variant today; `px4` and `ardupilot` come with the real flight controllers.
+#[expect(clippy::large_enum_variant, reason = "a program has one of them, or two")]
 #[derive(Clone, Debug)]
 pub enum Vehicle {
     /// The simulator's shim.
     Sitl(Sitl),
+    /// A real flight controller.
+    Real(Box<Real>),
 }
 
 impl Vehicle {
@@ -80,20 +107,39 @@ impl Vehicle {
     ) {
         match self {
             Vehicle::Sitl(sitl) => sitl.handle(host, peer, bytes, deliver),
+            Vehicle::Real(real) => real.handle(host, peer, bytes, deliver),
         }
     }
 
-    /// The frame that answers the state of `time`.
-    pub fn command(&mut self, time: Time, outputs: Outputs) -> Vec<u8> {
+    /// The frames that answer the state of `time`; none when there is nothing to say.
+    pub fn answer(&mut self, host: Duration, time: Time, demand: &Demand) -> Vec<u8> {
         match self {
-            Vehicle::Sitl(sitl) => sitl.command(time, outputs),
+            Vehicle::Sitl(sitl) => sitl.command(time, demand.outputs),
+            Vehicle::Real(real) => real.answer(host, time, demand),
         }
     }
 
-    /// The heartbeat, when one is due.
-    pub fn heartbeat(&mut self, host: Duration, outputs: Outputs) -> Option<Vec<u8>> {
+    /// What is to be sent besides answers, when something is due.
+    pub fn due(&mut self, host: Duration, outputs: Outputs) -> Option<Vec<u8>> {
         match self {
             Vehicle::Sitl(sitl) => sitl.heartbeat(host, outputs),
+            Vehicle::Real(real) => real.due(host),
+        }
+    }
+
+    /// Why the vehicle cannot be engaged now, if it cannot.
+    pub fn obstacle(&self) -> Option<String> {
+        match self {
+            Vehicle::Sitl(_) => None,
+            Vehicle::Real(real) => real.obstacle(),
+        }
+    }
+
+    /// The oldest notice that was not fetched.
+    pub fn take_notice(&mut self) -> Option<Notice> {
+        match self {
+            Vehicle::Sitl(_) => None,
+            Vehicle::Real(real) => real.take_notice(),
         }
     }
 
@@ -101,6 +147,7 @@ impl Vehicle {
     pub fn peer(&self) -> Option<PeerId> {
         match self {
             Vehicle::Sitl(sitl) => sitl.peer(),
+            Vehicle::Real(real) => real.peer(),
         }
     }
 
@@ -108,6 +155,7 @@ impl Vehicle {
     pub fn counts(&self) -> VehicleCounts {
         match self {
             Vehicle::Sitl(sitl) => sitl.counts(),
+            Vehicle::Real(real) => real.counts(),
         }
     }
 }

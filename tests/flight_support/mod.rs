@@ -40,6 +40,7 @@ pub fn options(pace: Pace) -> Options {
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
         deflection: x8().airframe.actuators.deflection_max,
+        controller: None,
     }
 }
 
@@ -365,6 +366,8 @@ pub struct Client {
     received: Receiver<MavMessage>,
     stop: Arc<AtomicBool>,
     pub log: Vec<MavMessage>,
+    /// The component that commands and setpoints go to; 0 is whoever is the autopilot.
+    pub component: u8,
 }
 
 impl Client {
@@ -376,7 +379,7 @@ impl Client {
         let stop = Arc::new(AtomicBool::new(false));
         let (listening, told) = (socket.clone(), stop.clone());
         std::thread::spawn(move || listen(&listening, &told, &deliver));
-        let client = Client { socket, received, stop, log: Vec::new() };
+        let client = Client { socket, received, stop, log: Vec::new(), component: 0 };
         client.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
             mavtype: MavType::MAV_TYPE_GCS,
             ..Default::default()
@@ -393,7 +396,13 @@ impl Client {
     }
 
     pub fn setpoint(&self, roll_deg: f64, pitch_deg: f64) {
-        self.send(&setpoint(roll_deg, pitch_deg));
+        let mut message = setpoint(roll_deg, pitch_deg);
+        if let MavMessage::SET_ATTITUDE_TARGET(m) = &mut message
+            && self.component != 0
+        {
+            m.target_component = self.component;
+        }
+        self.send(&message);
     }
 
     /// Takes in what has come, waiting until `wanted` is among it; panics after five seconds.
@@ -424,6 +433,7 @@ impl Client {
             param2,
             param3,
             target_system: 1,
+            target_component: self.component,
             ..Default::default()
         };
         self.send(&MavMessage::COMMAND_LONG(order));

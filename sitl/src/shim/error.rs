@@ -15,6 +15,16 @@ pub enum ShimError {
         /// The rule that is broken.
         rule: &'static str,
     },
+    /// A parameter that the played stack does not have.
+    #[error("the {stack} personality has no parameter {name}; it has {known}")]
+    Parameter {
+        /// The stack.
+        stack: &'static str,
+        /// The name.
+        name: String,
+        /// What it has.
+        known: String,
+    },
     /// The plant could not be built, or could not go on.
     #[error(transparent)]
     Plant(#[from] PlantError),

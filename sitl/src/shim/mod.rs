@@ -11,7 +11,10 @@
 //! ```
 
 mod answer;
+pub mod bench;
 pub mod codec;
+pub mod controller;
+mod distortion;
 mod error;
 mod faults;
 mod flight;
@@ -25,6 +28,7 @@ mod summary;
 mod telemetry;
 mod truth_log;
 
+pub use distortion::Distortion;
 pub use error::ShimError;
 pub use flight::Over;
 pub use link::{Address, AddressError, LinkError, Transport};
@@ -36,6 +40,8 @@ pub use telemetry::FULL_DEFLECTION_RAD;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use controller::FlightController;
+pub use controller::Personality;
 use faults::Faults;
 use flight::Flight;
 use link::{Link, Wait};
@@ -59,6 +65,10 @@ pub fn run(
     let link = Link::open(&options.link, wait)?;
     let mut flight = Flight::new(options)?;
     let mut faults = Faults::new(options.faults, options.seed);
+    if let Some(personality) = options.personality {
+        let mut controller = FlightController::with(personality, flight, &options.parameters)?;
+        return controller::real_time::fly(link, options, &mut controller, stop, observer);
+    }
     let mut session = Session::new(link, options.link.clone(), observer);
     let begun = Instant::now();
     let first_us = flight.shown_us();

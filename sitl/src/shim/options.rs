@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::controller::Personality;
 use super::error::ShimError;
 use super::link::{Address, Transport};
 use crate::plant::{PlantOptions, Start};
@@ -161,6 +162,10 @@ pub struct ShimOptions {
     pub bias: Bias,
     /// What befalls state frames.
     pub faults: FrameFaults,
+    /// Which flight stack to play; `None` speaks the profile `sitl`.
+    pub personality: Option<Personality>,
+    /// Parameters of the played stack that differ from its defaults.
+    pub parameters: Vec<(String, f64)>,
 }
 
 impl ShimOptions {
@@ -183,6 +188,8 @@ impl ShimOptions {
             noise: Noise::NONE,
             bias: Bias::default(),
             faults: FrameFaults::default(),
+            personality: None,
+            parameters: Vec::new(),
         }
     }
 
@@ -206,6 +213,10 @@ impl ShimOptions {
         demand(
             (0.0..=1.0).contains(&faults.late_probability),
             "the probability of a late frame must lie in 0..1",
+        )?;
+        demand(
+            self.personality.is_none() || self.pace == Pace::RealTime,
+            "a personality flies in real time, as the flight controller it plays does",
         )?;
         let bias = &self.bias;
         let mut biases = vec![bias.alpha_rad, bias.beta_rad, bias.airspeed_scale];

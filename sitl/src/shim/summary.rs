@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use super::flight::Over;
-use super::link::Address;
+use super::link::{Address, Transport};
 
 /// A change of state, told to the observer of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +28,8 @@ pub enum Event {
     Paused,
     /// Lockstep: the answer has come after all.
     Resumed,
+    /// The played flight controller has changed its mode.
+    Mode(String),
     /// The clock was so late that it was set anew, by so much.
     Skipped(Duration),
 }
@@ -35,6 +37,10 @@ pub enum Event {
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Event::Open(link @ Address { transport: Transport::Pty, endpoint }, _) => write!(
+                f,
+                "link {link} is open; give the companion --vehicle serial:{endpoint}:921600"
+            ),
             Event::Open(link, Some(local)) => write!(f, "link {link} is open, here {local}"),
             Event::Open(link, None) => write!(f, "link {link} is open"),
             Event::Waiting(link) => {
@@ -50,6 +56,7 @@ impl fmt::Display for Event {
                 "no answer for 1 s: simulated time stands still; the frame is repeated every second"
             ),
             Event::Resumed => write!(f, "answered: simulated time goes on"),
+            Event::Mode(mode) => write!(f, "mode {mode}"),
             Event::Skipped(by) => {
                 write!(
                     f,

@@ -100,7 +100,7 @@ pub fn encode_slow(
     }
 }
 
-fn imu(time_us: u64, measured: &Truth) -> HighresImu {
+pub(super) fn imu(time_us: u64, measured: &Truth) -> HighresImu {
     let [x, y, z] = measured.specific_force_mps2;
     let kelvin = measured.static_pressure_pa / (measured.air_density_kgpm3 * AIR);
     HighresImu {
@@ -119,7 +119,7 @@ fn imu(time_us: u64, measured: &Truth) -> HighresImu {
     }
 }
 
-fn hud(measured: &Truth) -> VfrHud {
+pub(super) fn hud(measured: &Truth) -> VfrHud {
     let [north, east, down] = measured.velocity_ned_mps;
     VfrHud {
         airspeed: measured.airspeed_mps as f32,
@@ -141,7 +141,7 @@ fn actuators(time_us: u64, measured: &Truth) -> ActuatorOutputStatus {
     ActuatorOutputStatus { time_usec: time_us, active: 5, actuator }
 }
 
-fn attitude(time_us: u64, measured: &Truth) -> AttitudeQuaternion {
+pub(super) fn attitude(time_us: u64, measured: &Truth) -> AttitudeQuaternion {
     let [w, x, y, z] = quaternion(measured.roll_rad, measured.pitch_rad, measured.yaw_rad);
     AttitudeQuaternion {
         time_boot_ms: (time_us / 1000) as u32,
@@ -170,7 +170,7 @@ fn quaternion(roll: f64, pitch: f64, yaw: f64) -> [f64; 4] {
     if q[0] < 0.0 { q.map(|x| -x) } else { q }
 }
 
-fn health() -> SysStatus {
+pub(super) fn health() -> SysStatus {
     SysStatus {
         onboard_control_sensors_present: SENSORS,
         onboard_control_sensors_enabled: SENSORS,
@@ -183,7 +183,7 @@ fn health() -> SysStatus {
     }
 }
 
-fn wind(time_us: u64, measured: &Truth) -> WindCov {
+pub(super) fn wind(time_us: u64, measured: &Truth) -> WindCov {
     let [north, east, down] = measured.wind_ned_mps;
     WindCov {
         time_usec: time_us,
@@ -195,7 +195,7 @@ fn wind(time_us: u64, measured: &Truth) -> WindCov {
     }
 }
 
-fn gps(time_us: u64, measured: &Truth) -> GpsRawInt {
+pub(super) fn gps(time_us: u64, measured: &Truth) -> GpsRawInt {
     let [north, east, _] = measured.velocity_ned_mps;
     let altitude = (measured.altitude_m * 1e3).round() as i32;
     GpsRawInt {
@@ -214,7 +214,7 @@ fn gps(time_us: u64, measured: &Truth) -> GpsRawInt {
     }
 }
 
-fn position(time_us: u64, measured: &Truth, home_m: f64) -> GlobalPositionInt {
+pub(super) fn position(time_us: u64, measured: &Truth, home_m: f64) -> GlobalPositionInt {
     let [north, east, down] = measured.velocity_ned_mps.map(|speed| (speed * 1e2).round() as i16);
     GlobalPositionInt {
         time_boot_ms: (time_us / 1000) as u32,

@@ -123,6 +123,7 @@ fn options(arguments: &Arguments, model: &crate::model::GreyBox) -> Result<Optio
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
         deflection: model.airframe.actuators.deflection_max,
+        controller: None,
     })
 }
 

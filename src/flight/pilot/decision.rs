@@ -2,6 +2,7 @@
 
 use crate::control::{Observation, Target};
 use crate::link::autopilot::Mode;
+use crate::link::vehicle::{Demand, Outputs};
 use crate::physics::{Command, Time};
 
 /// What a planner is asked for at a tick.
@@ -77,4 +78,22 @@ pub struct Decision {
     pub target: Target,
     /// Whether a failsafe is in force.
     pub failsafe: bool,
+}
+
+impl Decision {
+    /// What it asks of the vehicle. A real controller gets the aircraft back when the state cannot
+    /// be flown on, and when a failsafe is in force: it flies better blind than we do.
+    pub fn demand(&self) -> Demand {
+        let fault = match (self.source, self.failsafe) {
+            (Source::Level, _) => Some("the state of the vehicle cannot be flown on"),
+            (_, true) => Some("the client's setpoints, or the vehicle's state, were lost"),
+            _ => None,
+        };
+        let or_level = |x: f64| if x.is_finite() { x } else { 0.0 };
+        Demand {
+            outputs: if self.armed { Outputs::Armed(self.command) } else { Outputs::Disarmed },
+            attitude: [or_level(self.target.roll), or_level(self.target.pitch)],
+            fault: fault.filter(|_| self.armed),
+        }
+    }
 }

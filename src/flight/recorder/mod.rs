@@ -1,8 +1,9 @@
-//! The recorder: a thread of its own that writes `flight.csv` with `flight.tlog`.
+//! The recorder: a thread of its own that writes `flight.csv`, `flight.tlog`, `flight.calls`.
 //!
 //! Control hands entries over a bounded queue and never waits: what does not fit is dropped, with
 //! a count. A disk that fails ends the file, is told once, and the flight goes on.
 
+pub mod call;
 mod folder;
 mod row;
 
@@ -15,6 +16,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
+pub use call::Call;
 pub use folder::{Place, RecordError};
 pub use row::Row;
 
@@ -31,6 +33,7 @@ const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
 enum Entry {
     Row(Box<Row>),
     Bytes { unix_us: u64, bytes: Box<[u8]> },
+    Call(Call),
 }
 
 /// The handle that control holds.
@@ -55,7 +58,7 @@ pub struct Written {
 }
 
 impl Recorder {
-    /// Makes the folder, creates both files, starts the thread.
+    /// Makes the folder, creates its files, starts the thread.
     ///
     /// # Errors
     /// If the folder exists already, or something cannot be created.
@@ -63,20 +66,22 @@ impl Recorder {
         let folder = place.create()?;
         let csv = folder::create(&folder, "flight.csv")?;
         let tlog = folder::create(&folder, "flight.tlog")?;
-        Recorder::over(folder.clone(), csv, tlog)
+        let calls = folder::create(&folder, "flight.calls")?;
+        Recorder::over(folder.clone(), csv, tlog, calls)
             .map_err(|source| RecordError::File { path: folder, source })
     }
 
-    /// A recorder over any two writers.
+    /// A recorder over any three writers.
     fn over(
         folder: PathBuf,
         csv: impl Write + Send + 'static,
         tlog: impl Write + Send + 'static,
+        calls: impl Write + Send + 'static,
     ) -> std::io::Result<Self> {
         let (queue, entries) = bounded(QUEUE);
-        let (trouble, troubles) = bounded(2);
+        let (trouble, troubles) = bounded(3);
         let dropped = Arc::new(AtomicU64::new(0));
-        let mut files = Files::new(csv, tlog, trouble);
+        let mut files = Files::new(csv, tlog, calls, trouble);
         let work = move || files.run(&entries);
         let thread = std::thread::Builder::new().name("recorder".into()).spawn(work)?;
         Ok(Recorder { queue: Some(queue), dropped, troubles, thread: Some(thread), folder })
@@ -95,6 +100,11 @@ impl Recorder {
     /// Records a datagram, or whole frames of a stream, sent or received at `unix_us` (µs since 1970).
     pub fn bytes(&self, unix_us: u64, bytes: &[u8]) {
         self.hand_over(Entry::Bytes { unix_us, bytes: bytes.into() });
+    }
+
+    /// Records a call of the pilot.
+    pub fn call(&self, call: Call) {
+        self.hand_over(Entry::Call(call));
     }
 
     /// What has gone wrong since the last call; each file fails at most once.
@@ -153,15 +163,16 @@ impl<W> File<W> {
     }
 }
 
-/// The recorder's thread: both files and what they came to.
-struct Files<C: Write, T: Write> {
+/// The recorder's thread: its files and what they came to.
+struct Files<C: Write, T: Write, L: Write> {
     csv: File<Rows<BufWriter<C>>>,
     tlog: File<BufWriter<T>>,
+    calls: File<BufWriter<L>>,
     written: Written,
 }
 
-impl<C: Write, T: Write> Files<C, T> {
-    fn new(csv: C, tlog: T, trouble: Sender<String>) -> Self {
+impl<C: Write, T: Write, L: Write> Files<C, T, L> {
+    fn new(csv: C, tlog: T, calls: L, trouble: Sender<String>) -> Self {
         let mut text = File { name: "flight.csv", out: None, trouble: trouble.clone() };
         match Rows::new(BufWriter::new(csv), &Row::EXTRA) {
             Ok(rows) => text.out = Some(rows),
@@ -169,8 +180,11 @@ impl<C: Write, T: Write> Files<C, T> {
                 drop(text.trouble.try_send(format!("recording of flight.csv ended: {error}")))
             }
         }
-        let tlog = File { name: "flight.tlog", out: Some(BufWriter::new(tlog)), trouble };
-        Files { csv: text, tlog, written: Written::default() }
+        let tlog =
+            File { name: "flight.tlog", out: Some(BufWriter::new(tlog)), trouble: trouble.clone() };
+        let mut calls = File { name: "flight.calls", out: Some(BufWriter::new(calls)), trouble };
+        calls.attempt(|out| writeln!(out, "{}", call::HEADER));
+        Files { csv: text, tlog, calls, written: Written::default() }
     }
 
     fn run(&mut self, entries: &Receiver<Entry>) -> Written {
@@ -197,6 +211,10 @@ impl<C: Write, T: Write> Files<C, T> {
                 self.written.rows += u64::from(done);
                 self.written.dropped += u64::from(!done);
             }
+            Entry::Call(call) => {
+                let done = self.calls.attempt(|out| writeln!(out, "{call}"));
+                self.written.dropped += u64::from(!done);
+            }
             Entry::Bytes { unix_us, bytes } => {
                 for frame in Frames::new(bytes, &mut FrameCounts::default()) {
                     let done = self.tlog.attempt(|out| {
@@ -213,6 +231,7 @@ impl<C: Write, T: Write> Files<C, T> {
     fn flush(&mut self) {
         self.csv.attempt(Rows::flush);
         self.tlog.attempt(BufWriter::flush);
+        self.calls.attempt(BufWriter::flush);
     }
 }
 
@@ -312,14 +331,15 @@ mod tests {
     fn a_full_disk_is_told_once_and_control_is_not_disturbed() {
         // /dev/full refuses every write as a full disk does.
         let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-        let recorder = Recorder::over(PathBuf::from("nowhere"), full(), full()).unwrap();
+        let recorder = Recorder::over(PathBuf::from("nowhere"), full(), full(), full()).unwrap();
         for i in 0..1000 {
+            recorder.call(Call::Advance(Time::from_micros(i)));
             recorder.row(row(i));
             recorder.bytes(0, &frame());
         }
         std::thread::sleep(Duration::from_secs(1));
         let told: Vec<_> = std::iter::from_fn(|| recorder.trouble()).collect();
-        assert_eq!(told.len(), 2, "{told:?}");
+        assert_eq!(told.len(), 3, "{told:?}");
         assert!(
             told.iter().any(|t| t.contains("flight.csv"))
                 && told.iter().any(|t| t.contains("flight.tlog"))
@@ -347,7 +367,7 @@ mod tests {
     #[test]
     fn a_slow_disk_costs_rows_that_are_counted_and_no_time() {
         let stuck = || Stuck { hangs: Duration::from_secs(1) };
-        let recorder = Recorder::over(PathBuf::from("nowhere"), stuck(), stuck()).unwrap();
+        let recorder = Recorder::over(PathBuf::from("nowhere"), stuck(), stuck(), stuck()).unwrap();
         let before = Instant::now();
         // Twice the queue: nearly the half cannot be taken while the disk sleeps.
         (0..2 * QUEUE as u64).for_each(|i| recorder.row(row(i)));

@@ -13,12 +13,14 @@ use super::timing::Timing;
 use super::witness::Witness;
 use super::{Event, Options};
 use crate::flight::pilot::{Decision, Pilot, Plan};
-use crate::flight::recorder::{Recorder, Row};
-use crate::link::autopilot::Severity;
+use crate::flight::recorder::call::Planned;
+use crate::flight::recorder::{Call, Recorder, Row};
+use crate::link::autopilot::{Autopilot, Severity};
 use crate::link::client::{Clients, Now};
 use crate::link::framing::Source;
-use crate::link::transport::{Arrival, Packet};
-use crate::link::vehicle::{Faults, Order, Outputs, Sitl, Telemetry, Vehicle};
+use crate::link::routing::Router;
+use crate::link::transport::{Arrival, Packet, Remark};
+use crate::link::vehicle::{Faults, Notice, Order, Outputs, Real, Sitl, Telemetry, Vehicle};
 use crate::logs::Sample;
 
 /// Between two looks at what is due: heartbeats, streams, lost links.
@@ -38,6 +40,8 @@ pub(super) struct Control {
     planner: Planner,
     vehicle: Vehicle,
     clients: Clients,
+    /// Between clients and a real controller.
+    router: Option<Router>,
     ports: Ports,
     recorder: Option<Recorder>,
     events: Sender<Event>,
@@ -63,8 +67,15 @@ impl Control {
         Control {
             pilot,
             planner,
-            vehicle: Vehicle::Sitl(Sitl::new(AUTOPILOT.system, options.deflection)),
-            clients: Clients::new(AUTOPILOT),
+            vehicle: match options.controller {
+                None => Vehicle::Sitl(Sitl::new(AUTOPILOT.system, options.deflection)),
+                Some(profile) => Vehicle::Real(Box::new(Real::new(profile))),
+            },
+            clients: match options.controller {
+                None => Clients::new(AUTOPILOT),
+                Some(_) => Clients::onboard(),
+            },
+            router: options.controller.map(|_| Router::default()),
             ports,
             recorder,
             events,
@@ -109,8 +120,10 @@ impl Control {
     }
 
     fn take_vehicle(&mut self, arrival: Arrival) {
-        let Arrival::Packet(packet) = arrival else {
-            return;
+        let packet = match arrival {
+            Arrival::Packet(packet) => packet,
+            Arrival::Remark(remark) => return self.remark(&remark),
+            Arrival::Opened(_) | Arrival::Closed(_) => return,
         };
         // The vehicle is taken out for the time of the call, since each tick answers through it.
         let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
@@ -129,6 +142,15 @@ impl Control {
             self.tick(state, &packet);
         }
         self.record(&packet.bytes);
+        self.heed_vehicle();
+        if let Some(router) = &self.router {
+            for peer in self.clients.peers() {
+                let frames = router.to_client(&packet.bytes, peer);
+                if !frames.is_empty() {
+                    self.ports.send_to_client(peer, frames);
+                }
+            }
+        }
     }
 
     fn tick(&mut self, state: &Telemetry, packet: &Packet) {
@@ -140,15 +162,24 @@ impl Control {
         let plan =
             request.map_or(Plan::None, |request| self.planner.plan(&request, packet.arrived));
         let decision = self.pilot.decide(plan);
-        self.outputs =
-            if decision.armed { Outputs::Armed(decision.command) } else { Outputs::Disarmed };
-        let frame = self.vehicle.command(state.time, self.outputs);
-        let copy = self.recorder.is_some().then(|| frame.clone());
-        self.ports.vehicle.send(packet.peer, frame);
+        let demand = decision.demand();
+        self.outputs = demand.outputs;
+        let host = packet.arrived.saturating_duration_since(self.started);
+        let frame = self.vehicle.answer(host, state.time, &demand);
+        let copy = (self.recorder.is_some() && !frame.is_empty()).then(|| frame.clone());
+        if !frame.is_empty() {
+            self.ports.vehicle.send(packet.peer, frame);
+        }
         let latency = packet.arrived.elapsed();
         if let Some(frame) = copy {
             self.record(&frame);
         }
+        let planned = match plan {
+            Plan::Ready(command) => Planned::Ready(command),
+            Plan::Late => Planned::Late,
+            Plan::None => Planned::None,
+        };
+        self.note(Call::Tick(state.time, planned, decision.command));
         self.account(state, &decision, plan, packet, latency);
     }
 
@@ -178,34 +209,81 @@ impl Control {
         }
     }
 
+    /// Does what the vehicle has to tell.
+    fn heed_vehicle(&mut self) {
+        while let Some(notice) = self.vehicle.take_notice() {
+            match notice {
+                Notice::Text(severity, words) => self.pilot.tell(severity, &words),
+                Notice::System(system) => self.clients.adopt(system),
+                Notice::HandedBack(reason) => {
+                    let now = self.clock.at(Instant::now());
+                    self.note(Call::Disarm(now, true));
+                    // Its verdict cannot be a refusal: it is forced.
+                    let _ = self.pilot.disarm(now, true);
+                    let words = format!("handed back to the controller: {reason}");
+                    self.pilot.tell(Severity::Critical, &words);
+                }
+            }
+        }
+    }
+
+    /// Passes on to the controller what a client has sent it.
+    fn route(&mut self, host: Duration, packet: &Packet) {
+        let Some(router) = &mut self.router else { return };
+        router.learn(host, packet.peer, &packet.bytes);
+        let engaged = self.outputs != Outputs::Disarmed;
+        let frames = router.to_controller(&packet.bytes, self.clients.identity(), engaged);
+        if let Some(peer) = self.vehicle.peer().filter(|_| !frames.is_empty()) {
+            self.ports.vehicle.send(peer, frames);
+        }
+    }
+
     fn take_client(&mut self, arrival: Arrival) {
         let host = Instant::now();
         let now = self.now(host);
         match arrival {
             Arrival::Packet(packet) => {
+                self.route(now.host, &packet);
                 let mut pilot = Witness {
                     pilot: &mut self.pilot,
+                    vehicle: &self.vehicle,
+                    recorder: self.recorder.as_ref(),
                     hear: |event| drop(self.events.try_send(event)),
                 };
                 self.clients.handle(now, packet.peer, &packet.bytes, &mut pilot);
                 self.record(&packet.bytes);
             }
             Arrival::Opened(peer) => self.clients.welcome(now, peer),
-            Arrival::Closed(peer) => self.clients.forget(peer),
+            Arrival::Closed(peer) => {
+                self.clients.forget(peer);
+                self.router.iter_mut().for_each(|router| router.forget(peer));
+            }
+            Arrival::Remark(remark) => self.remark(&remark),
         }
         self.send_to_clients();
+    }
+
+    /// Says something about a link to the ground stations, and to whoever shows events.
+    fn remark(&mut self, remark: &Remark) {
+        self.pilot.tell(Severity::Warning, &remark.to_string());
     }
 
     /// Does what is due at `host`.
     fn poll(&mut self, host: Instant) {
         let now = self.now(host);
+        self.note(Call::Advance(now.vehicle));
         self.pilot.advance(now.vehicle);
         self.pilot.note_load(self.load);
         if let Some(trouble) = self.recorder.as_ref().and_then(Recorder::trouble) {
             self.pilot.tell(Severity::Warning, &trouble);
         }
-        let mut pilot =
-            Witness { pilot: &mut self.pilot, hear: |event| drop(self.events.try_send(event)) };
+        self.heed_vehicle();
+        let mut pilot = Witness {
+            pilot: &mut self.pilot,
+            vehicle: &self.vehicle,
+            recorder: self.recorder.as_ref(),
+            hear: |event| drop(self.events.try_send(event)),
+        };
         self.clients.poll(now, &mut pilot);
         self.send_to_clients();
         self.greet_vehicle(now.host);
@@ -215,12 +293,12 @@ impl Control {
         }
     }
 
-    /// Sends the heartbeat of the vehicle's link, when due and when there is somebody to hear it.
+    /// Sends what is due on the vehicle's link, when there is somebody to hear it.
     fn greet_vehicle(&mut self, host: Duration) {
         let Some(peer) = self.vehicle.peer().or(self.ports.vehicle.target()) else {
             return;
         };
-        if let Some(frame) = self.vehicle.heartbeat(host, self.outputs) {
+        if let Some(frame) = self.vehicle.due(host, self.outputs) {
             self.record(&frame);
             self.ports.vehicle.send(peer, frame);
         }
@@ -247,6 +325,12 @@ impl Control {
     fn record(&self, bytes: &[u8]) {
         if let Some(recorder) = &self.recorder {
             recorder.bytes(unix_us(), bytes);
+        }
+    }
+
+    fn note(&self, call: Call) {
+        if let Some(recorder) = &self.recorder {
+            recorder.call(call);
         }
     }
 

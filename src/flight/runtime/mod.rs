@@ -35,6 +35,7 @@ use crate::link::address::Address;
 use crate::link::autopilot::Text;
 use crate::link::peer::PeerId;
 use crate::link::transport::TransportError;
+use crate::link::vehicle::Profile;
 use control::Control;
 use planner::{Planner, Threaded};
 use ports::Ports;
@@ -59,6 +60,8 @@ pub struct Options {
     pub plan_deadline: Duration,
     /// Deflection at normalised 1, rad.
     pub deflection: f64,
+    /// How a real flight controller is flown; `None` is the simulator's shim.
+    pub controller: Option<Profile>,
 }
 
 impl Options {

@@ -1,38 +1,62 @@
-//! The pilot as clients see it, with an ear on the lines it says to them.
+//! The pilot as clients see it, with an ear on the lines it says to them, a note of each call.
 
 use super::Event;
 use crate::flight::pilot::Pilot;
+use crate::flight::recorder::{Call, Recorder};
 use crate::link::autopilot::{
     AttitudeSetpoint, Autopilot, Mode, Parameter, ParameterValue, Status, Sticks, Text, Verdict,
 };
+use crate::link::vehicle::Vehicle;
 use crate::physics::Time;
 
 /// Passes everything on to the pilot; each line for the ground stations becomes an event as well.
 pub(super) struct Witness<'a, F: FnMut(Event)> {
     pub(super) pilot: &'a mut Pilot,
+    pub(super) vehicle: &'a Vehicle,
+    pub(super) recorder: Option<&'a Recorder>,
     pub(super) hear: F,
+}
+
+impl<F: FnMut(Event)> Witness<'_, F> {
+    fn note(&self, call: Call) {
+        if let Some(recorder) = self.recorder {
+            recorder.call(call);
+        }
+    }
 }
 
 impl<F: FnMut(Event)> Autopilot for Witness<'_, F> {
     fn arm(&mut self, now: Time, force: bool) -> Verdict {
-        self.pilot.arm(now, force)
+        // What the controller needs is not a check that force can skip.
+        match self.vehicle.obstacle() {
+            Some(obstacle) => Verdict::Rejected(format!("arming refused: {obstacle}")),
+            None => {
+                self.note(Call::Arm(now, force));
+                self.pilot.arm(now, force)
+            }
+        }
     }
     fn disarm(&mut self, now: Time, force: bool) -> Verdict {
+        self.note(Call::Disarm(now, force));
         self.pilot.disarm(now, force)
     }
     fn set_mode(&mut self, now: Time, mode: Mode) -> Verdict {
+        self.note(Call::Mode(now, mode));
         self.pilot.set_mode(now, mode)
     }
     fn attitude_setpoint(&mut self, now: Time, setpoint: AttitudeSetpoint) {
+        self.note(Call::Setpoint(now, setpoint));
         self.pilot.attitude_setpoint(now, setpoint);
     }
     fn sticks(&mut self, now: Time, sticks: Sticks) {
+        self.note(Call::Sticks(now, sticks));
         self.pilot.sticks(now, sticks);
     }
     fn parameters(&self) -> &[Parameter] {
         self.pilot.parameters()
     }
     fn set_parameter(&mut self, index: usize, value: ParameterValue) -> Verdict {
+        self.note(Call::Parameter(index, value));
         self.pilot.set_parameter(index, value)
     }
     fn status(&self) -> Status {

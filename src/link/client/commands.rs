@@ -156,7 +156,7 @@ impl Clients {
         autopilot: &mut dyn Autopilot,
     ) -> Outcome {
         match id {
-            HEARTBEAT => Outcome::with(mode::heartbeat(&autopilot.status())),
+            HEARTBEAT => Outcome::with(mode::heartbeat(&autopilot.status(), self.role)),
             AUTOPILOT_VERSION => Outcome::with(answer::autopilot_version()),
             PROTOCOL_VERSION => Outcome::with(answer::protocol_version()),
             AVAILABLE_MODES => {

@@ -30,7 +30,7 @@ impl Clients {
             self.next_heartbeat = now.host + HEARTBEAT;
             self.pulse = pulse;
         }
-        let message = mode::heartbeat(status);
+        let message = mode::heartbeat(status, self.role);
         for session in &mut self.sessions {
             if everybody || !session.greeted {
                 session.greeted = true;

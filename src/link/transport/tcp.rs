@@ -106,14 +106,14 @@ async fn read(port: &Port, mut stream: OwnedReadHalf, peer: SocketAddr) {
         let mut whole = Vec::new();
         let len = match cutter.is_waiting() {
             true => timeout(PAUSE, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
-                cutter.flush(|frame| whole.extend_from_slice(frame.bytes));
+                cutter.flush_pieces(|frame| whole.extend_from_slice(frame));
                 Err(io::ErrorKind::TimedOut.into())
             }),
             false => stream.read(&mut chunk).await,
         };
         match len {
             Ok(0) => return,
-            Ok(len) => cutter.push(&chunk[..len], |frame| whole.extend_from_slice(frame.bytes)),
+            Ok(len) => cutter.push_pieces(&chunk[..len], |frame| whole.extend_from_slice(frame)),
             Err(e) if e.kind() == io::ErrorKind::TimedOut => {}
             Err(_) => return,
         }

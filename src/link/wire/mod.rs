@@ -1,6 +1,7 @@
 //! The one place that names MAVLink messages: from rust-mavlink's types to ours, never beyond.
 
 pub mod answer;
+pub mod controller;
 pub mod logged;
 pub mod mode;
 pub mod offboard;

@@ -106,8 +106,17 @@ impl Pulse {
     }
 }
 
-/// HEARTBEAT of a fixed-wing autopilot.
-pub fn heartbeat(status: &Status) -> Message {
+/// As what we appear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// The aircraft's autopilot.
+    Autopilot,
+    /// A computer beside the autopilot.
+    Onboard,
+}
+
+/// HEARTBEAT of a fixed-wing autopilot, or of the computer beside one.
+pub fn heartbeat(status: &Status, role: Role) -> Message {
     let pulse = Pulse::of(status);
     let state =
         [MavState::MAV_STATE_STANDBY, MavState::MAV_STATE_ACTIVE, MavState::MAV_STATE_CRITICAL]
@@ -116,8 +125,14 @@ pub fn heartbeat(status: &Status) -> Message {
             .unwrap_or(MavState::MAV_STATE_CRITICAL);
     Message::coded(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
         custom_mode: pulse.custom,
-        mavtype: MavType::MAV_TYPE_FIXED_WING,
-        autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+        mavtype: match role {
+            Role::Autopilot => MavType::MAV_TYPE_FIXED_WING,
+            Role::Onboard => MavType::MAV_TYPE_ONBOARD_CONTROLLER,
+        },
+        autopilot: match role {
+            Role::Autopilot => MavAutopilot::MAV_AUTOPILOT_GENERIC,
+            Role::Onboard => MavAutopilot::MAV_AUTOPILOT_INVALID,
+        },
         base_mode: MavModeFlag::from_bits_retain(pulse.base),
         system_status: state,
         mavlink_version: 3,

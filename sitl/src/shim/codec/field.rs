@@ -74,7 +74,7 @@ macro_rules! numbers {
     )*};
 }
 
-numbers!(u8, i8, u16, i16, u32, i32, u64, f32);
+numbers!(u8, i8, u16, i16, u32, i32, u64, i64, f32);
 
 impl<T: Field, const N: usize> Field for [T; N] {
     const SIZE: usize = N * T::SIZE;

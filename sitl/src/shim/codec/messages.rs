@@ -255,6 +255,166 @@ messages! {
         id: u8,
     }
 
+    /// PARAM_REQUEST_READ: a parameter is asked for.
+    ParamRequestRead = 20, crc_extra 214 {
+        /// Its index, −1 when it is asked for by name.
+        param_index: i16,
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// Its name, filled up with zeros.
+        param_id: [u8; 16],
+    }
+
+    /// PARAM_REQUEST_LIST: all parameters are asked for.
+    ParamRequestList = 21, crc_extra 159 {
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+    }
+
+    /// PARAM_VALUE: a parameter.
+    ParamValue = 22, crc_extra 220 {
+        /// Its value, cast or bytewise.
+        param_value: f32,
+        /// How many there are.
+        param_count: u16,
+        /// Its index.
+        param_index: u16,
+        /// Its name, filled up with zeros.
+        param_id: [u8; 16],
+        /// MAV_PARAM_TYPE.
+        param_type: u8,
+    }
+
+    /// PARAM_SET: a parameter is to be changed.
+    ParamSet = 23, crc_extra 168 {
+        /// The value, cast or bytewise.
+        param_value: f32,
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// Its name, filled up with zeros.
+        param_id: [u8; 16],
+        /// MAV_PARAM_TYPE.
+        param_type: u8,
+    }
+
+    /// SERVO_OUTPUT_RAW: pulse widths of the outputs.
+    ServoOutputRaw = 36, crc_extra 222 {
+        /// Time, µs, modulo 2³².
+        time_usec: u32,
+        /// Outputs 1 to 8, µs.
+        servo: [u16; 8],
+        /// Output port.
+        port: u8,
+        /// Outputs 9 to 16, µs (extension).
+        more: [u16; 8],
+    }
+
+    /// MANUAL_CONTROL: sticks of a joystick, in thousandths.
+    ManualControl = 69, crc_extra 243 {
+        /// Pitch, forward (nose down) is positive.
+        x: i16,
+        /// Roll, right is positive.
+        y: i16,
+        /// Throttle, 0..1000.
+        z: i16,
+        /// Yaw.
+        r: i16,
+        /// Buttons.
+        buttons: u16,
+        /// Addressed system.
+        target: u8,
+    }
+
+    /// RC_CHANNELS_OVERRIDE: pulse widths in place of a radio's.
+    RcChannelsOverride = 70, crc_extra 124 {
+        /// Channels 1 to 8, µs; 0 gives a channel back, 65535 leaves it.
+        channel: [u16; 8],
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+    }
+
+    /// COMMAND_LONG: a command.
+    CommandLong = 76, crc_extra 152 {
+        /// Its parameters.
+        param: [f32; 7],
+        /// MAV_CMD.
+        command: u16,
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// How often it was sent before.
+        confirmation: u8,
+    }
+
+    /// COMMAND_ACK: the answer to a command.
+    CommandAck = 77, crc_extra 143 {
+        /// MAV_CMD.
+        command: u16,
+        /// MAV_RESULT.
+        result: u8,
+        /// Progress, % (extension).
+        progress: u8,
+        /// More on the result (extension).
+        result_param2: i32,
+        /// Who sent the command (extension).
+        target_system: u8,
+        /// Who sent the command (extension).
+        target_component: u8,
+    }
+
+    /// SET_ATTITUDE_TARGET: an attitude to be flown.
+    SetAttitudeTarget = 82, crc_extra 49 {
+        /// Sender's time, ms.
+        time_boot_ms: u32,
+        /// NED→FRD, w first.
+        q: [f32; 4],
+        /// Body rates p, q, r, rad/s.
+        rates: [f32; 3],
+        /// Thrust, 0..1.
+        thrust: f32,
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// What is to be ignored: 1, 2, 4 rates, 64 thrust, 128 attitude.
+        type_mask: u8,
+    }
+
+    /// TIMESYNC: whose clock shows what.
+    TimeSync = 111, crc_extra 34 {
+        /// Time of the answering side, ns; 0 in a request.
+        tc1: i64,
+        /// Time of the asking side, ns.
+        ts1: i64,
+        /// Addressed system (extension).
+        target_system: u8,
+        /// Addressed component (extension).
+        target_component: u8,
+    }
+
+    /// STATUSTEXT: a line of words.
+    StatusText = 253, crc_extra 83 {
+        /// MAV_SEVERITY.
+        severity: u8,
+        /// The first half of its words, filled up with zeros.
+        text: [u8; 25],
+        /// The second half.
+        more: [u8; 25],
+        /// Number of a line in chunks (extension).
+        id: u16,
+        /// Number of the chunk (extension).
+        chunk_seq: u8,
+    }
+
     /// WIND_COV: wind.
     WindCov = 231, crc_extra 105 {
         /// Simulated time, µs.

@@ -1,4 +1,4 @@
-//! MAVLink 2 for the dozen messages of this link, written apart from the companion's codec.
+//! MAVLink 2 for the messages of this link, written apart from the companion's codec.
 //!
 //! The companion speaks through rust-mavlink; this codec shares no code with it, so that a slip in
 //! either shows as a disagreement between the two. It follows the serialisation guide of
@@ -13,7 +13,9 @@ mod parser;
 pub use field::{Field, Reader, Writer};
 pub use frame::{Encoder, Frame, Version, checksum};
 pub use messages::{
-    ActuatorOutputStatus, AoaSsa, AttitudeQuaternion, GlobalPositionInt, GpsRawInt, Heartbeat,
-    HighresImu, HilActuatorControls, Message, SysStatus, VfrHud, WindCov, crc_extra,
+    ActuatorOutputStatus, AoaSsa, AttitudeQuaternion, CommandAck, CommandLong, GlobalPositionInt,
+    GpsRawInt, Heartbeat, HighresImu, HilActuatorControls, ManualControl, Message,
+    ParamRequestList, ParamRequestRead, ParamSet, ParamValue, RcChannelsOverride, ServoOutputRaw,
+    SetAttitudeTarget, StatusText, SysStatus, TimeSync, VfrHud, WindCov, crc_extra,
 };
 pub use parser::Parser;

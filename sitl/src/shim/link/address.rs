@@ -14,10 +14,16 @@ pub enum Transport {
     TcpIn,
     /// Stream; connects, again and again until it succeeds.
     TcpOut,
+    /// Stream over a serial port, `DEVICE:BAUD`.
+    Serial,
+    /// Stream over a pseudo-terminal made here, which the companion opens under a given name.
+    Pty,
 }
 
 impl Transport {
-    const ALL: [(&'static str, Transport); 4] = [
+    const ALL: [(&'static str, Transport); 6] = [
+        ("serial", Transport::Serial),
+        ("pty", Transport::Pty),
         ("udpin", Transport::UdpIn),
         ("udpout", Transport::UdpOut),
         ("tcpin", Transport::TcpIn),
@@ -30,8 +36,17 @@ impl Transport {
 pub struct Address {
     /// Protocol and side.
     pub transport: Transport,
-    /// `host:port`, the host a name or a number.
+    /// `host:port`, the host a name or a number; `device:baud` of a serial port; the name of a
+    /// pseudo-terminal.
     pub endpoint: String,
+}
+
+impl Address {
+    /// Device and baud rate of a serial port.
+    pub(super) fn device(&self) -> (String, u32) {
+        let (device, baud) = self.endpoint.rsplit_once(':').unwrap_or((&self.endpoint, ""));
+        (device.to_owned(), baud.parse().unwrap_or(0))
+    }
 }
 
 impl fmt::Display for Address {
@@ -44,7 +59,7 @@ impl fmt::Display for Address {
 /// An address that cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "cannot read the link address '{given}': {fault}; write it like udpout:127.0.0.1:14600 (udpin, udpout, tcpin or tcpout, then host:port)"
+    "cannot read the link address '{given}': {fault}; write it like udpout:127.0.0.1:14600 (udpin, udpout, tcpin or tcpout, then host:port), serial:/dev/ttyUSB0:921600, or pty:NAME"
 )]
 pub struct AddressError {
     given: String,
@@ -62,9 +77,22 @@ impl FromStr for Address {
             .find(|(name, _)| *name == prefix)
             .map(|(_, transport)| *transport)
             .ok_or(fail("the transport is not known"))?;
+        if transport == Transport::Pty {
+            return match endpoint {
+                "" => Err(fail("the pseudo-terminal has no name")),
+                name => Ok(Address { transport, endpoint: name.to_owned() }),
+            };
+        }
         let (host, port) = endpoint.rsplit_once(':').ok_or(fail("it has no port"))?;
         if host.is_empty() {
             return Err(fail("it has no host"));
+        }
+        if transport == Transport::Serial {
+            let baud: u32 = port.parse().map_err(|_| fail("the baud rate is not a number"))?;
+            if baud == 0 {
+                return Err(fail("the baud rate must be positive"));
+            }
+            return Ok(Address { transport, endpoint: endpoint.to_owned() });
         }
         let port: u16 = port.parse().map_err(|_| fail("the port is not a number 0..65535"))?;
         if port == 0 && matches!(transport, Transport::UdpOut | Transport::TcpOut) {
@@ -80,16 +108,32 @@ mod tests {
 
     #[test]
     fn reads_what_it_writes() {
-        for text in ["udpin:0.0.0.0:14600", "udpout:localhost:1", "tcpin:[::1]:5760", "tcpout:h:9"]
-        {
+        for text in [
+            "udpin:0.0.0.0:14600",
+            "udpout:localhost:1",
+            "tcpin:[::1]:5760",
+            "tcpout:h:9",
+            "serial:/dev/ttyUSB0:921600",
+            "pty:near/end",
+        ] {
             assert_eq!(text.parse::<Address>().map(|a| a.to_string()).as_deref(), Ok(text));
         }
     }
 
     #[test]
     fn refuses_in_one_line_that_names_the_address() {
-        for text in ["", "udp:1.2.3.4:5", "udpin:14600", "udpin::5", "tcpin:h:65536", "udpout:h:0"]
-        {
+        for text in [
+            "",
+            "udp:1.2.3.4:5",
+            "udpin:14600",
+            "udpin::5",
+            "tcpin:h:65536",
+            "udpout:h:0",
+            "serial:/dev/ttyUSB0",
+            "serial:/dev/ttyUSB0:fast",
+            "serial:/dev/ttyUSB0:0",
+            "pty:",
+        ] {
             let error = text.parse::<Address>().expect_err(text).to_string();
             assert!(error.contains(&format!("'{text}'")) && !error.contains('\n'), "{error}");
         }

@@ -1,6 +1,7 @@
 //! The road to the companion: bytes out, bytes in, whatever happens to the peer.
 
 mod address;
+mod serial;
 mod tcp;
 mod udp;
 
@@ -10,6 +11,7 @@ use std::io;
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use serial::SerialLink;
 use tcp::TcpLink;
 use udp::UdpLink;
 
@@ -44,6 +46,16 @@ pub enum LinkError {
         /// The address as written.
         address: Address,
     },
+    /// A serial port or pseudo-terminal that cannot be had.
+    #[error("cannot open {address}: {source}; {remedy}")]
+    Serial {
+        /// The address as written.
+        address: Address,
+        /// What the system said.
+        source: io::Error,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// Anything else.
     #[error("cannot open {address}: {source}; check the address given with --link")]
     Open {
@@ -61,6 +73,19 @@ impl LinkError {
             io::ErrorKind::AddrInUse => LinkError::InUse { address },
             _ => LinkError::Open { address, source },
         }
+    }
+
+    fn serial(address: &Address, source: io::Error) -> Self {
+        let remedy = match source.kind() {
+            io::ErrorKind::AlreadyExists => "that name is taken: choose another, or remove it",
+            io::ErrorKind::PermissionDenied => {
+                "add your user to the group that owns the device (dialout), then log in again"
+            }
+            io::ErrorKind::NotFound => "plug the device in, or give the name that it has here",
+            io::ErrorKind::InvalidInput => "give a baud rate that the port knows, such as 921600",
+            _ => "stop other programs that use it, and check the name given with --link",
+        };
+        LinkError::Serial { address: address.clone(), source, remedy }
     }
 }
 
@@ -86,6 +111,8 @@ pub enum Link {
     Udp(UdpLink),
     /// A stream.
     Tcp(TcpLink),
+    /// A wire.
+    Serial(SerialLink),
 }
 
 impl Link {
@@ -94,6 +121,7 @@ impl Link {
         Ok(match address.transport {
             Transport::UdpIn | Transport::UdpOut => Link::Udp(UdpLink::open(address, wait)?),
             Transport::TcpIn | Transport::TcpOut => Link::Tcp(TcpLink::open(address, wait)?),
+            Transport::Serial | Transport::Pty => Link::Serial(SerialLink::open(address, wait)?),
         })
     }
 
@@ -102,6 +130,7 @@ impl Link {
         match self {
             Link::Udp(link) => link.local(),
             Link::Tcp(link) => link.local(),
+            Link::Serial(_) => None,
         }
     }
 
@@ -109,7 +138,7 @@ impl Link {
     pub fn peer(&self) -> Option<SocketAddr> {
         match self {
             Link::Udp(link) => link.peer(),
-            Link::Tcp(_) => None,
+            Link::Tcp(_) | Link::Serial(_) => None,
         }
     }
 
@@ -118,6 +147,7 @@ impl Link {
         match self {
             Link::Udp(link) => link.send(bytes),
             Link::Tcp(link) => link.send(bytes),
+            Link::Serial(link) => link.send(bytes),
         }
     }
 
@@ -126,6 +156,7 @@ impl Link {
         match self {
             Link::Udp(link) => link.receive(),
             Link::Tcp(link) => link.receive(),
+            Link::Serial(link) => link.receive(),
         }
     }
 
@@ -141,6 +172,8 @@ impl Link {
         match self {
             Link::Udp(link) => link.abandon(),
             Link::Tcp(link) => link.abandon(),
+            // A wire has one other end, whoever holds it.
+            Link::Serial(_) => {}
         }
     }
 }

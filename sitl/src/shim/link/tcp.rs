@@ -197,7 +197,7 @@ fn arrived(
 }
 
 /// Writes what it can of `unsent` and keeps the rest.
-fn flush(stream: &mut TcpStream, unsent: &mut Vec<u8>) -> io::Result<()> {
+pub(super) fn flush(stream: &mut impl Write, unsent: &mut Vec<u8>) -> io::Result<()> {
     while !unsent.is_empty() {
         match stream.write(unsent) {
             Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
@@ -211,7 +211,7 @@ fn flush(stream: &mut TcpStream, unsent: &mut Vec<u8>) -> io::Result<()> {
 }
 
 /// Whether an error only says that nothing can be done right now.
-fn is_lull(error: &io::Error) -> bool {
+pub(super) fn is_lull(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), WouldBlock | TimedOut | Interrupted)
 }

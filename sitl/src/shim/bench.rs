@@ -1,0 +1,106 @@
+//! The profile `sitl` without link or clock: bytes out, bytes in, one step a call.
+
+use super::answer::Answer;
+use super::codec::{Encoder, HilActuatorControls, Parser};
+use super::distortion::{Distorter, Distortion};
+use super::error::ShimError;
+use super::flight::{Flight, Over};
+use super::options::ShimOptions;
+use super::session::{COMPANION, SHIM};
+use super::telemetry::{StateFrame, encode_slow};
+use crate::plant::{Inputs, Truth};
+
+/// An answer older than this is not flown, µs: as in real time.
+const STALE_US: u64 = 500_000;
+
+/// The shim on a bench. It flies as in real time: on the newest answer that came within the step,
+/// else with the surfaces where they were commanded.
+pub struct Bench {
+    flight: Flight,
+    parser: Parser,
+    encoder: Encoder,
+    distorter: Distorter,
+    newest: Option<Answer>,
+    /// The newest time that was answered, of those shown.
+    answered_us: u64,
+    shown_us: u64,
+    measured: Truth,
+    inputs: Inputs,
+}
+
+impl Bench {
+    /// The aircraft at its start.
+    ///
+    /// # Errors
+    /// If the aircraft cannot be loaded.
+    pub fn new(options: &ShimOptions) -> Result<Self, ShimError> {
+        let (measured, inputs) = (Truth::default(), Inputs::default());
+        Ok(Bench {
+            flight: Flight::new(options)?,
+            parser: Parser::default(),
+            encoder: Encoder::new(SHIM.0, SHIM.1),
+            distorter: Distorter::default(),
+            newest: None,
+            answered_us: 0,
+            shown_us: 0,
+            measured,
+            inputs,
+        })
+    }
+
+    /// What is wrong with the sensors from now on.
+    pub fn distort(&mut self, distortion: Distortion) {
+        self.distorter.now = distortion;
+    }
+
+    /// Appends a state frame, with what else is due.
+    pub fn show(&mut self, out: &mut Vec<u8>) {
+        let (frame, measured) = self.flight.measure();
+        self.measured = measured;
+        let (time_us, shown) = self.distorter.apply(frame.time_us, measured);
+        self.shown_us = time_us;
+        encode_slow(time_us, &shown, self.flight.home_m(), &mut self.encoder, out);
+        StateFrame::new(time_us, &shown).encode(&mut self.encoder, out);
+    }
+
+    /// Takes bytes that have arrived.
+    pub fn hear(&mut self, bytes: &[u8]) {
+        let mut frames = Vec::new();
+        self.parser.stream(bytes, &mut |frame| frames.push(frame));
+        for frame in frames.iter().filter(|f| (f.system, f.component) == COMPANION) {
+            let message = frame.decode::<HilActuatorControls>();
+            let Some(answer) = message.and_then(|m| Answer::read(&m)) else { continue };
+            let age = self.shown_us.saturating_sub(answer.echo_us);
+            // A clock that was set back makes older times new again.
+            let newer = answer.echo_us > self.answered_us || self.shown_us < self.answered_us;
+            if answer.echo_us <= self.shown_us && age <= STALE_US && newer {
+                self.answered_us = answer.echo_us;
+                self.newest = Some(answer);
+            }
+        }
+    }
+
+    /// Flies one step.
+    ///
+    /// # Errors
+    /// If the plant cannot go on.
+    pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {
+        if let Some(answer) = self.newest.take() {
+            self.inputs = answer.inputs;
+            if answer.armed && !self.flight.is_launched() {
+                self.flight.launch();
+            }
+        }
+        self.flight.advance(self.inputs)
+    }
+
+    /// What was last measured, before it was distorted.
+    pub fn measured(&self) -> Truth {
+        self.measured
+    }
+
+    /// What the actuators are told.
+    pub fn inputs(&self) -> Inputs {
+        self.inputs
+    }
+}

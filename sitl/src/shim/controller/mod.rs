@@ -1,0 +1,423 @@
+//! A played flight controller: what PX4 or ArduPilot would do with what a companion sends.
+//!
+//! Bytes in, bytes out, ten milliseconds a step; no socket and no clock, so that a flight can be
+//! run in lockstep with a companion in the same process. What is played is what bears on a
+//! companion: identities, modes with their rules, streams on request, the parameter server, the
+//! sampling of sticks, time-outs, the stack's own attitude loops. Estimation is perfect but for the
+//! sensor errors of the options.
+
+mod law;
+mod modes;
+mod parameters;
+pub(super) mod real_time;
+mod sticks;
+mod streams;
+
+use std::fmt;
+
+use super::codec::{
+    CommandAck, CommandLong, Encoder, Frame, Heartbeat, ManualControl, ParamRequestList,
+    ParamRequestRead, ParamSet, Parser, RcChannelsOverride, SetAttitudeTarget, StatusText,
+    TimeSync,
+};
+use super::distortion::{Distorter, Distortion};
+use super::error::ShimError;
+use super::flight::{Flight, Over};
+use super::options::ShimOptions;
+use super::telemetry::StateFrame;
+use crate::plant::{Inputs, Truth};
+use law::Law;
+pub use modes::Mode;
+use parameters::Table;
+use sticks::Sticks;
+use streams::Streams;
+
+/// The system that the played controller is.
+pub const SYSTEM: u8 = 1;
+/// MAV_COMP_ID_AUTOPILOT1.
+const COMPONENT: u8 = 1;
+/// ArduPilot reads its channels every second step: 50 Hz.
+const SAMPLE_EVERY: u64 = 2;
+/// ArduPilot flies the last attitude for so long after the stream of targets has ended, s.
+const GUIDED_TIMEOUT_S: f64 = 3.0;
+
+/// A flight stack.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Personality {
+    /// PX4, fixed wing.
+    Px4,
+    /// ArduPilot Plane.
+    Ardupilot,
+}
+
+impl fmt::Display for Personality {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Personality::Px4 => "PX4",
+            Personality::Ardupilot => "ArduPilot",
+        })
+    }
+}
+
+/// What the played controller has counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Stick positions or overrides that were taken.
+    pub sticks: u64,
+    /// Attitude targets that were taken.
+    pub targets: u64,
+    /// Steering messages that were ignored: wrong sender, wrong mode of input.
+    pub ignored: u64,
+    /// Modes entered because the companion had fallen silent.
+    pub failsafes: u64,
+}
+
+/// An attitude to be flown, with its thrust.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Wish {
+    at_us: u64,
+    roll: f64,
+    pitch: f64,
+    thrust: Option<f64>,
+}
+
+/// The played flight controller with the aircraft it flies.
+pub struct FlightController {
+    personality: Personality,
+    flight: Flight,
+    parser: Parser,
+    encoder: Encoder,
+    streams: Streams,
+    parameters: Table,
+    law: Law,
+    distorter: Distorter,
+    sticks: Sticks,
+    wish: Option<Wish>,
+    mode: Mode,
+    armed: bool,
+    entered_us: u64,
+    steps: u64,
+    now_us: u64,
+    measured: Truth,
+    inputs: Inputs,
+    /// What waits to be sent with the next step.
+    waiting: Vec<u8>,
+    /// What was counted.
+    pub counts: Counts,
+}
+
+impl FlightController {
+    /// A controller that flies by itself, armed and in the air, with the options' aircraft.
+    ///
+    /// # Errors
+    /// If the aircraft cannot be loaded, or an option names a parameter that the stack has not.
+    pub fn new(personality: Personality, options: &ShimOptions) -> Result<Self, ShimError> {
+        FlightController::with(personality, Flight::new(options)?, &options.parameters)
+    }
+
+    pub(super) fn with(
+        personality: Personality,
+        mut flight: Flight,
+        changed: &[(String, f64)],
+    ) -> Result<Self, ShimError> {
+        flight.launch();
+        Ok(FlightController {
+            personality,
+            flight,
+            parser: Parser::default(),
+            encoder: Encoder::new(SYSTEM, COMPONENT),
+            streams: Streams::default(),
+            parameters: Table::new(personality, changed)?,
+            law: Law::default(),
+            distorter: Distorter::default(),
+            sticks: Sticks::default(),
+            wish: None,
+            mode: Mode::Hold,
+            armed: true,
+            entered_us: 0,
+            steps: 0,
+            now_us: 0,
+            measured: Truth::default(),
+            inputs: Inputs::default(),
+            waiting: Vec::new(),
+            counts: Counts::default(),
+        })
+    }
+
+    /// Measures, and appends to `out` what is to be sent now.
+    pub fn show(&mut self, out: &mut Vec<u8>) {
+        let (frame, measured) = self.flight.measure();
+        (self.now_us, self.measured) = (frame.time_us, measured);
+        out.append(&mut self.waiting);
+        if self.steps.is_multiple_of(100) {
+            let heartbeat = self.heartbeat();
+            self.encoder.encode(&heartbeat, out);
+        }
+        // The controller's own loops see what is right: only what is told can be wrong.
+        let (told_us, told) = self.distorter.apply(frame.time_us, measured);
+        let frame = StateFrame::new(told_us, &told);
+        self.streams.send(&frame, &told, self.flight.home_m(), &mut self.encoder, out);
+        self.steps += 1;
+    }
+
+    /// What is wrong with what the companion is told from now on.
+    pub fn distort(&mut self, distortion: Distortion) {
+        self.distorter.now = distortion;
+    }
+
+    /// Takes bytes that have arrived.
+    pub fn hear(&mut self, bytes: &[u8]) {
+        let mut frames = Vec::new();
+        self.parser.stream(bytes, &mut |frame| frames.push(frame));
+        frames.iter().for_each(|frame| self.take(frame));
+    }
+
+    /// Forgets a frame that has not come whole, as when the wire was cut.
+    pub fn restart_stream(&mut self) {
+        self.parser.restart();
+    }
+
+    /// Flies one step on what was heard.
+    ///
+    /// # Errors
+    /// If the plant cannot go on.
+    pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {
+        self.watch();
+        let inputs = self.command();
+        self.inputs = if self.armed { inputs } else { Inputs::default() };
+        self.flight.advance(self.inputs)
+    }
+
+    /// The mode in force.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// What the actuators were last told.
+    pub fn inputs(&self) -> Inputs {
+        self.inputs
+    }
+
+    /// What was last measured: the truth, without sensor errors in the options.
+    pub fn measured(&self) -> Truth {
+        self.measured
+    }
+
+    /// Simulated time of the last step, µs.
+    pub fn now_us(&self) -> u64 {
+        self.now_us
+    }
+
+    /// Disarms or arms, as a pilot at the controller would.
+    pub fn arm(&mut self, armed: bool) {
+        self.armed = armed;
+    }
+
+    /// Changes the mode by the pilot's hand.
+    pub fn set_mode(&mut self, mode: Mode) {
+        if self.mode != mode {
+            (self.mode, self.entered_us) = (mode, self.now_us);
+            self.law = Law::default();
+            let heartbeat = self.heartbeat();
+            self.encoder.encode(&heartbeat, &mut self.waiting);
+        }
+    }
+
+    pub(super) fn flight(&mut self) -> &mut Flight {
+        &mut self.flight
+    }
+
+    pub(super) fn bad_frames(&self) -> u64 {
+        self.parser.bad()
+    }
+
+    fn heartbeat(&self) -> Heartbeat {
+        Heartbeat {
+            custom_mode: self.mode.number(self.personality),
+            kind: 1,
+            autopilot: match self.personality {
+                Personality::Px4 => 12,
+                Personality::Ardupilot => 3,
+            },
+            // Custom mode enabled; armed.
+            base_mode: 1 | if self.armed { 128 } else { 0 },
+            system_status: if self.armed { 4 } else { 3 },
+            mavlink_version: 3,
+        }
+    }
+
+    fn take(&mut self, frame: &Frame) {
+        let for_us = |system: u8, component: u8| {
+            matches!(system, 0 | SYSTEM) && matches!(component, 0 | COMPONENT)
+        };
+        if let Some(m) =
+            frame.decode::<CommandLong>().filter(|m| for_us(m.target_system, m.target_component))
+        {
+            self.obey(frame, &m);
+        } else if let Some(m) = frame.decode::<ManualControl>() {
+            self.manual_control(&m);
+        } else if let Some(m) = frame.decode::<RcChannelsOverride>() {
+            self.channels_override(frame.system, &m);
+        } else if let Some(m) = frame.decode::<SetAttitudeTarget>() {
+            self.attitude_target(&m);
+        } else if let Some(m) = frame.decode::<ParamRequestRead>() {
+            self.parameters.read(&m, &mut self.encoder, &mut self.waiting);
+        } else if frame.decode::<ParamRequestList>().is_some() {
+            self.parameters.list(&mut self.encoder, &mut self.waiting);
+        } else if let Some(m) = frame.decode::<ParamSet>() {
+            self.parameters.set(&m, &mut self.encoder, &mut self.waiting);
+        } else if let Some(m) = frame.decode::<TimeSync>().filter(|m| m.tc1 == 0) {
+            let tc1 = self.now_us as i64 * 1000;
+            self.encoder.encode(&TimeSync { tc1, ..m }, &mut self.waiting);
+        }
+    }
+
+    fn obey(&mut self, frame: &Frame, m: &CommandLong) {
+        let result = match m.command {
+            176 => self.asked_for_mode(m.param[1], m.param[2]),
+            400 => {
+                self.armed = m.param[0] == 1.0;
+                0
+            }
+            511 => {
+                let limit = match self.personality {
+                    Personality::Px4 => 100.0,
+                    // A stream is sent at 0.8 of the scheduler's rate at most.
+                    Personality::Ardupilot => 0.8 * self.parameters.get("SCHED_LOOP_RATE"),
+                };
+                self.streams.set(m.param[0] as u32, m.param[1], limit)
+            }
+            // MAV_RESULT_UNSUPPORTED.
+            _ => 3,
+        };
+        let ack = CommandAck {
+            command: m.command,
+            result,
+            target_system: frame.system,
+            target_component: frame.component,
+            ..CommandAck::default()
+        };
+        self.encoder.encode(&ack, &mut self.waiting);
+    }
+
+    /// MAV_RESULT of a request for a mode.
+    fn asked_for_mode(&mut self, main: f32, sub: f32) -> u8 {
+        let Some(mode) = Mode::of(self.personality, main, sub) else { return 2 };
+        let refused = match mode {
+            // PX4 wants to see the stream first.
+            Mode::Manual => self.personality == Personality::Px4 && !self.sticks_alive(),
+            Mode::Guided => self.personality == Personality::Px4 && !self.wish_alive(),
+            Mode::Hold | Mode::Return => false,
+        };
+        if refused {
+            return 1;
+        }
+        self.set_mode(mode);
+        0
+    }
+
+    fn manual_control(&mut self, m: &ManualControl) {
+        // 0 and 4 of COM_RC_IN_MODE do not listen to MAVLink.
+        let listens = !matches!(self.parameters.get("COM_RC_IN_MODE") as i32, 0 | 4);
+        if self.personality == Personality::Px4 && listens && m.target == SYSTEM {
+            self.sticks.manual(self.now_us, m);
+            self.counts.sticks += 1;
+        } else {
+            self.counts.ignored += 1;
+        }
+    }
+
+    fn channels_override(&mut self, system: u8, m: &RcChannelsOverride) {
+        let ours = f64::from(system) == self.parameters.get("MAV_GCS_SYSID");
+        if self.personality == Personality::Ardupilot && ours && m.target_system == SYSTEM {
+            self.sticks.override_channels(self.now_us, m);
+            self.counts.sticks += 1;
+        } else {
+            self.counts.ignored += 1;
+        }
+    }
+
+    fn attitude_target(&mut self, m: &SetAttitudeTarget) {
+        let attitude = law::roll_and_pitch(m.q).filter(|_| m.type_mask & 128 == 0);
+        let guided = self.personality == Personality::Px4 || self.mode == Mode::Guided;
+        let Some([roll, pitch]) = attitude.filter(|_| m.target_system == SYSTEM) else {
+            self.counts.ignored += 1;
+            return;
+        };
+        if !guided {
+            self.counts.ignored += 1;
+            return;
+        }
+        let thrust = f64::from(m.thrust);
+        let thrust = (m.type_mask & 64 == 0 && thrust.is_finite()).then(|| thrust.clamp(0.0, 1.0));
+        self.wish = Some(Wish { at_us: self.now_us, roll, pitch, thrust });
+        self.counts.targets += 1;
+    }
+
+    fn sticks_alive(&self) -> bool {
+        let timeout = match self.personality {
+            Personality::Px4 => self.parameters.get("COM_RC_LOSS_T"),
+            Personality::Ardupilot => self.parameters.get("RC_OVERRIDE_TIME"),
+        };
+        self.sticks.age_s(self.now_us).is_some_and(|age| age <= timeout)
+    }
+
+    fn wish_alive(&self) -> bool {
+        let timeout = match self.personality {
+            Personality::Px4 => self.parameters.get("COM_OF_LOSS_T"),
+            Personality::Ardupilot => GUIDED_TIMEOUT_S,
+        };
+        self.wish.is_some_and(|wish| (self.now_us - wish.at_us) as f64 * 1e-6 <= timeout)
+    }
+
+    /// The stack's failsafes.
+    fn watch(&mut self) {
+        // A mode that has just been entered may wait for its first stick or target.
+        let settled = (self.now_us - self.entered_us) as f64 * 1e-6 > 0.5;
+        let lost = match (self.mode, self.personality) {
+            (Mode::Manual, _) => !self.sticks_alive(),
+            (Mode::Guided, Personality::Px4) => !self.wish_alive(),
+            _ => false,
+        };
+        if lost && settled {
+            self.counts.failsafes += 1;
+            let (mode, words): (_, &[u8]) = match (self.mode, self.personality) {
+                (Mode::Manual, Personality::Px4) => (Mode::Hold, b"Manual control lost"),
+                (Mode::Manual, Personality::Ardupilot) => (Mode::Return, b"Throttle failsafe on"),
+                _ => (Mode::Hold, b"Offboard control lost"),
+            };
+            let mut text = [0; 25];
+            text[..words.len()].copy_from_slice(words);
+            let line = StatusText { severity: 2, text, ..StatusText::default() };
+            self.encoder.encode(&line, &mut self.waiting);
+            self.set_mode(mode);
+        }
+    }
+
+    fn command(&mut self) -> Inputs {
+        if self.mode == Mode::Manual {
+            // Between two samples the channels stand as they stood.
+            let samples = match self.personality {
+                Personality::Px4 => true,
+                Personality::Ardupilot => self.steps.is_multiple_of(SAMPLE_EVERY),
+            };
+            return match samples {
+                true => self.sticks.inputs(self.personality, &self.parameters, self.inputs),
+                false => self.inputs,
+            };
+        }
+        let wish = self.wish.filter(|_| self.mode == Mode::Guided && self.wish_alive());
+        match wish {
+            Some(Wish { roll, pitch, thrust, .. }) => {
+                self.law.attitude(&self.measured, roll, pitch, thrust)
+            }
+            None => self.law.level(&self.measured),
+        }
+    }
+}
+
+impl fmt::Debug for FlightController {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} in {:?}", self.personality, self.mode)
+    }
+}

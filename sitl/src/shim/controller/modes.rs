@@ -1,0 +1,52 @@
+//! The modes of the played stacks, in their own numbers.
+
+use super::Personality;
+
+/// A mode, by what it does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// The sticks move the surfaces: MANUAL.
+    Manual,
+    /// Attitudes are flown: OFFBOARD, GUIDED.
+    Guided,
+    /// The controller flies by itself: HOLD, LOITER.
+    Hold,
+    /// The same, after a failsafe: RTL. (It flies level here; the way home is not played.)
+    Return,
+}
+
+impl Mode {
+    const ALL: [Mode; 4] = [Mode::Manual, Mode::Guided, Mode::Hold, Mode::Return];
+
+    /// Main and sub mode.
+    fn numbers(self, personality: Personality) -> (u32, u32) {
+        match (personality, self) {
+            (Personality::Px4, Mode::Manual) => (1, 0),
+            (Personality::Px4, Mode::Guided) => (6, 0),
+            (Personality::Px4, Mode::Hold) => (4, 3),
+            (Personality::Px4, Mode::Return) => (4, 5),
+            (Personality::Ardupilot, Mode::Manual) => (0, 0),
+            (Personality::Ardupilot, Mode::Guided) => (15, 0),
+            (Personality::Ardupilot, Mode::Hold) => (12, 0),
+            (Personality::Ardupilot, Mode::Return) => (11, 0),
+        }
+    }
+
+    /// `custom_mode` of the heartbeat.
+    pub(super) fn number(self, personality: Personality) -> u32 {
+        let (main, sub) = self.numbers(personality);
+        match personality {
+            Personality::Px4 => main << 16 | sub << 24,
+            Personality::Ardupilot => main,
+        }
+    }
+
+    /// The mode that DO_SET_MODE asks for.
+    pub(super) fn of(personality: Personality, main: f32, sub: f32) -> Option<Mode> {
+        Mode::ALL.into_iter().find(|mode| {
+            let (own_main, own_sub) = mode.numbers(personality);
+            let sub_fits = personality == Personality::Ardupilot || sub == own_sub as f32;
+            main == own_main as f32 && sub_fits
+        })
+    }
+}

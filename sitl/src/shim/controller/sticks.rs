@@ -1,0 +1,84 @@
+//! From sticks to actuators in MANUAL, as each stack does it.
+
+use super::Personality;
+use super::parameters::Table;
+use crate::plant::Inputs;
+use crate::shim::codec::{ManualControl, RcChannelsOverride};
+
+/// The sticks last heard.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sticks {
+    manual: Option<(u64, [i16; 3])>,
+    channels: Option<(u64, [u16; 3])>,
+}
+
+impl Sticks {
+    pub(super) fn manual(&mut self, now_us: u64, m: &ManualControl) {
+        self.manual = Some((now_us, [m.x, m.y, m.z]));
+    }
+
+    /// A channel of 0 goes back to the radio, which is switched off here.
+    pub(super) fn override_channels(&mut self, now_us: u64, m: &RcChannelsOverride) {
+        let [one, two, three, ..] = m.channel;
+        let given_back = [one, two, three].contains(&0);
+        self.channels = (!given_back).then_some((now_us, [one, two, three]));
+    }
+
+    /// Seconds since the sticks were last heard.
+    pub(super) fn age_s(&self, now_us: u64) -> Option<f64> {
+        let manual = self.manual.map(|(at, _)| at);
+        let channels = self.channels.map(|(at, _)| at);
+        manual.or(channels).map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
+    }
+
+    /// What the actuators are told; `standing` when no stick was ever heard.
+    pub(super) fn inputs(
+        &self,
+        personality: Personality,
+        parameters: &Table,
+        standing: Inputs,
+    ) -> Inputs {
+        match personality {
+            Personality::Px4 => self.manual.map_or(standing, |(_, s)| px4(s, parameters)),
+            Personality::Ardupilot => {
+                self.channels.map_or(standing, |(_, s)| ardupilot(s, parameters))
+            }
+        }
+    }
+}
+
+/// Manual torque setpoints: stick times scale plus trim; a nose-up torque is elevator up.
+fn px4([x, y, z]: [i16; 3], parameters: &Table) -> Inputs {
+    let stick = |thousandths: i16| f64::from(thousandths) / 1000.0;
+    let roll = stick(y) * parameters.get("FW_MAN_R_SC") + parameters.get("TRIM_ROLL");
+    let pitch = -stick(x) * parameters.get("FW_MAN_P_SC") + parameters.get("TRIM_PITCH");
+    // One bit for each output. The played loops are right either way: what is played here is a
+    // mix-up between stick and surface.
+    let reversed = parameters.get("PWM_MAIN_REV") as u32;
+    let sign = |output: u32| if reversed >> output & 1 == 1 { -1.0 } else { 1.0 };
+    Inputs { aileron: sign(0) * roll, elevator: -sign(1) * pitch, throttle: stick(z) }.clamped()
+}
+
+/// Channels by their calibration: angles to 1/4500 of full travel, throttle to whole percents.
+fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
+    let read = |channel: usize, name: &str| parameters.get(&format!("RC{channel}_{name}"));
+    let angle = |channel: usize| {
+        let pulse = f64::from(pulses[channel - 1]);
+        let trim = read(channel, "TRIM");
+        let end = if pulse > trim { read(channel, "MAX") } else { read(channel, "MIN") };
+        let share = (pulse - trim) / (end - trim).abs();
+        let sign = if read(channel, "REVERSED") == 1.0 { -1.0 } else { 1.0 };
+        (4500.0 * sign * share.clamp(-1.0, 1.0)).trunc() / 4500.0
+    };
+    let (low, high) = (read(3, "MIN"), read(3, "MAX"));
+    let throttle = ((f64::from(pulses[2]) - low) / (high - low)).clamp(0.0, 1.0);
+    let throttle = (100.0 * throttle).trunc() / 100.0;
+    // The pitch stick is positive nose up.
+    let sign = |name: &str| if parameters.get(name) == 1.0 { -1.0 } else { 1.0 };
+    Inputs {
+        aileron: sign("SERVO1_REVERSED") * angle(1),
+        elevator: -sign("SERVO2_REVERSED") * angle(2),
+        throttle,
+    }
+    .clamped()
+}

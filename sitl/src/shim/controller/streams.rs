@@ -1,0 +1,121 @@
+//! What the played controller sends by itself: nothing much until it is asked.
+
+use crate::plant::Truth;
+use crate::shim::codec::{AoaSsa, Encoder, ServoOutputRaw, VfrHud};
+use crate::shim::telemetry::{self, FRAME_US, FULL_DEFLECTION_RAD, StateFrame};
+
+/// Sea-level density of the standard atmosphere, kg/m³.
+const SEA_LEVEL: f64 = 1.225;
+
+/// A stream with the time between its messages, µs, and the next one's.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    id: u32,
+    interval_us: Option<u64>,
+    due_us: u64,
+}
+
+/// The streams, in the order in which they are looked at.
+#[derive(Clone, Debug)]
+pub(super) struct Streams {
+    rows: [Row; 8],
+    last_us: u64,
+}
+
+impl Default for Streams {
+    fn default() -> Self {
+        let row = |id, interval_us| Row { id, interval_us, due_us: 0 };
+        // The rates of a telemetry port that nobody has asked for more.
+        let rows = [
+            row(31, None),
+            row(105, None),
+            row(74, Some(250_000)),
+            row(11020, None),
+            row(36, None),
+            row(33, Some(500_000)),
+            row(231, None),
+            row(1, Some(1_000_000)),
+        ];
+        Streams { rows, last_us: 0 }
+    }
+}
+
+impl Streams {
+    /// SET_MESSAGE_INTERVAL: MAV_RESULT. Faster than `limit_hz`, or than the steps, is limited.
+    pub(super) fn set(&mut self, id: u32, interval_us: f32, limit_hz: f64) -> u8 {
+        let Some(row) = self.rows.iter_mut().find(|row| row.id == id) else {
+            // MAV_RESULT_UNSUPPORTED.
+            return 3;
+        };
+        let shortest = (1e6 / limit_hz).max(FRAME_US as f64);
+        row.interval_us = match interval_us {
+            us if us > 0.0 => Some((f64::from(us)).max(shortest) as u64),
+            _ => None,
+        };
+        0
+    }
+
+    /// Appends what is due.
+    pub(super) fn send(
+        &mut self,
+        frame: &StateFrame,
+        measured: &Truth,
+        home_m: f64,
+        encoder: &mut Encoder,
+        out: &mut Vec<u8>,
+    ) {
+        let now = frame.time_us;
+        if now + FRAME_US < self.last_us {
+            // The clock has been set back.
+            self.rows.iter_mut().for_each(|row| row.due_us = now);
+        }
+        self.last_us = now;
+        for row in &mut self.rows {
+            let Some(interval) = row.interval_us.filter(|_| now >= row.due_us) else { continue };
+            row.due_us = (row.due_us + interval).max(now.saturating_sub(interval) + 1);
+            encode(row.id, now, measured, home_m, encoder, out);
+        }
+    }
+}
+
+fn encode(
+    id: u32,
+    now: u64,
+    measured: &Truth,
+    home_m: f64,
+    encoder: &mut Encoder,
+    out: &mut Vec<u8>,
+) {
+    match id {
+        31 => encoder.encode(&telemetry::attitude(now, measured), out),
+        105 => encoder.encode(&telemetry::imu(now, measured), out),
+        74 => encoder.encode(&hud(measured), out),
+        11020 => encoder.encode(
+            &AoaSsa {
+                time_usec: now,
+                aoa: measured.alpha_rad.to_degrees() as f32,
+                ssa: measured.beta_rad.to_degrees() as f32,
+            },
+            out,
+        ),
+        36 => encoder.encode(&servos(now, measured), out),
+        33 => encoder.encode(&telemetry::position(now, measured, home_m), out),
+        231 => encoder.encode(&telemetry::wind(now, measured), out),
+        _ => encoder.encode(&telemetry::health(), out),
+    }
+}
+
+/// Both stacks show an equivalent airspeed.
+fn hud(measured: &Truth) -> VfrHud {
+    let equivalent = measured.airspeed_mps * (measured.air_density_kgpm3 / SEA_LEVEL).sqrt();
+    VfrHud { airspeed: equivalent as f32, ..telemetry::hud(measured) }
+}
+
+fn servos(now: u64, measured: &Truth) -> ServoOutputRaw {
+    let surface = |rad: f64| (1500.0 + 500.0 * rad / FULL_DEFLECTION_RAD).round() as u16;
+    let mut servo = [0; 8];
+    servo[0] = surface(measured.aileron_rad);
+    servo[1] = surface(measured.elevator_rad);
+    servo[2] = (1000.0 + 1000.0 * measured.throttle).round() as u16;
+    ServoOutputRaw { time_usec: now as u32, servo, ..ServoOutputRaw::default() }
+}

@@ -1,0 +1,135 @@
+//! The seeded mixture of faults of one flight: what befalls it, when, how badly.
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Flight before the first fault, s: a real controller is found and engaged meanwhile.
+pub const FIRST_S: f64 = 12.0;
+/// The last fault is over by then, s.
+pub const LAST_S: f64 = 42.0;
+
+/// Something that can go wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// Datagrams, or stretches of the stream, are lost.
+    Loss,
+    /// They come twice.
+    Duplication,
+    /// They overtake one another.
+    Reordering,
+    /// They come late, in spikes.
+    Delay,
+    /// Bits are flipped.
+    Corruption,
+    /// They are cut off.
+    Truncation,
+    /// Garbage and strange frames come ten times as often.
+    Flood,
+    /// Nothing comes: the plug is pulled.
+    Unplug,
+    /// Sensors show what they showed.
+    Frozen,
+    /// The airspeed tube is blocked.
+    Airspeed,
+    /// The angle of attack jumps.
+    Alpha,
+    /// The pitch rate is not a number.
+    NotANumber,
+    /// The vehicle's clock jumps forward.
+    Clock,
+    /// The vehicle starts again: its clock begins anew.
+    Reboot,
+    /// The client dies.
+    Client,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Kind; 15] = [
+        Kind::Loss,
+        Kind::Duplication,
+        Kind::Reordering,
+        Kind::Delay,
+        Kind::Corruption,
+        Kind::Truncation,
+        Kind::Flood,
+        Kind::Unplug,
+        Kind::Frozen,
+        Kind::Airspeed,
+        Kind::Alpha,
+        Kind::NotANumber,
+        Kind::Clock,
+        Kind::Reboot,
+        Kind::Client,
+    ];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Loss => "loss",
+            Kind::Duplication => "duplication",
+            Kind::Reordering => "reordering",
+            Kind::Delay => "delay spikes",
+            Kind::Corruption => "corruption",
+            Kind::Truncation => "truncation",
+            Kind::Flood => "flood",
+            Kind::Unplug => "unplug",
+            Kind::Frozen => "frozen sensors",
+            Kind::Airspeed => "airspeed blocked",
+            Kind::Alpha => "alpha jump",
+            Kind::NotANumber => "NaN rate",
+            Kind::Clock => "clock jump",
+            Kind::Reboot => "reboot",
+            Kind::Client => "client death",
+        }
+    }
+}
+
+/// A fault of a flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fault {
+    /// What.
+    pub kind: Kind,
+    /// From when, s.
+    pub from_s: f64,
+    /// Until when, s.
+    pub to_s: f64,
+    /// How badly, 0..1.
+    pub strength: f64,
+}
+
+impl Fault {
+    /// Whether it is in force at `now_s`.
+    pub fn acts(&self, now_s: f64) -> bool {
+        (self.from_s..self.to_s).contains(&now_s)
+    }
+}
+
+/// The faults of flight `seed`: one to three of them, at any time, so that they may overlap; every
+/// kind comes first in its turn.
+pub fn draw(seed: u64) -> Vec<Fault> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let count = random.random_range(1..=3);
+    let first = Kind::ALL[seed as usize % Kind::ALL.len()];
+    (0..count)
+        .map(|i| {
+            let kind = match i {
+                0 => first,
+                _ => Kind::ALL[random.random_range(0..Kind::ALL.len())],
+            };
+            one(kind, &mut random)
+        })
+        .collect()
+}
+
+fn one(kind: Kind, random: &mut impl Rng) -> Fault {
+    let from_s = random.random_range(FIRST_S..LAST_S - 8.0);
+    let length = match kind {
+        Kind::Unplug => random.random_range(0.1..4.0),
+        Kind::Reboot => random.random_range(0.5..2.0),
+        Kind::Clock => 0.01,
+        Kind::NotANumber | Kind::Frozen => random.random_range(0.02..4.0),
+        _ => random.random_range(1.0..8.0),
+    };
+    Fault { kind, from_s, to_s: from_s + length, strength: random.random() }
+}

@@ -1,0 +1,270 @@
+//! `greylag link`: what a link to a flight controller carries, and what it lacks.
+
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+use clap::{Args, Subcommand};
+use comfy_table::Table;
+use comfy_table::presets::NOTHING;
+use crossbeam_channel::{Receiver, bounded};
+
+use crate::commands::fly::{self, CommandName, ProfileName};
+use crate::link::address::Address;
+use crate::link::peer::LinkId;
+use crate::link::transport::{Arrival, Link, Network};
+use crate::link::vehicle::real::parameters::Standing;
+use crate::link::vehicle::{Profile, Real, Stack};
+use crate::physics::airframe::ActuatorFigures;
+
+/// How long a controller has to be heard.
+const PATIENCE: Duration = Duration::from_secs(4);
+/// Share of a serial port that state may take: what is left is for parameters, commands, routing.
+const BUDGET: f64 = 0.6;
+/// A stream below this share of its rate is missing.
+const ENOUGH: f64 = 0.8;
+
+/// The arguments of `greylag link`.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Measure rates, loss, jitter, latency; say what is missing, which parameters to set.
+    Check(Check),
+}
+
+/// The arguments of `greylag link check`.
+#[derive(Args)]
+struct Check {
+    /// Link to the flight controller, such as serial:/dev/ttyACM0:921600.
+    #[arg(long, value_name = "ADDRESS")]
+    vehicle: Address,
+    /// The stack to check for [default: the one that answers].
+    #[arg(long, value_name = "NAME", value_enum)]
+    profile: Option<ProfileName>,
+    /// What it shall be commanded.
+    #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
+    command: CommandName,
+    /// How long to measure.
+    #[arg(long, value_name = "S", default_value_t = 8, value_parser = clap::value_parser!(u64).range(4..=3600))]
+    seconds: u64,
+}
+
+/// Runs `greylag link …`.
+///
+/// # Errors
+/// If the link cannot be opened, or nobody answers on it.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let Command::Check(check) = &arguments.command;
+    let model = fly::model("params/x8/jsbsim.toml".as_ref(), None)?;
+    let mut ear = Ear::open(&check.vehicle)?;
+    let actuators = model.airframe.actuators;
+    let asked = check.profile.and_then(ProfileName::stack);
+    let stack = match asked {
+        Some(stack) => stack,
+        None => ear.find(check.command, actuators)?,
+    };
+    let profile = Profile { stack, authority: check.command.authority(), actuators };
+    println!("measuring {} for {} s …", check.vehicle, check.seconds);
+    let real = ear.listen(Real::new(profile), Duration::from_secs(check.seconds));
+    report(check, &real)
+}
+
+/// The open link.
+struct Ear {
+    started: Instant,
+    arrivals: Receiver<Arrival>,
+    link: Link,
+    remarks: Vec<String>,
+    _network: Network,
+}
+
+impl Ear {
+    fn open(address: &Address) -> Result<Ear> {
+        let network = Network::start()?;
+        let (to, arrivals) = bounded(1024);
+        let link = network.open(LinkId(0), address, "--vehicle", to)?;
+        let started = Instant::now();
+        Ok(Ear { started, arrivals, link, remarks: Vec::new(), _network: network })
+    }
+
+    /// The stack of whoever is there.
+    fn find(&mut self, command: CommandName, actuators: ActuatorFigures) -> Result<Stack> {
+        let authority = command.authority();
+        let guess = Profile { stack: Stack::Px4, authority, actuators };
+        let end = Instant::now() + PATIENCE;
+        let mut real = Real::new(guess);
+        while Instant::now() < end {
+            real = self.listen(real, Duration::from_millis(100));
+            if let Some((autopilot, _)) = real.controller() {
+                let Some(stack) = Stack::of(autopilot) else {
+                    bail!(
+                        "the controller is neither PX4 nor ArduPilot (MAV_AUTOPILOT {autopilot}): \
+                         connect one of these"
+                    );
+                };
+                return Ok(stack);
+            }
+        }
+        if let Some(remark) = self.remarks.first() {
+            bail!("{remark}");
+        }
+        bail!(
+            "no flight controller heard for {} s: check port, baud rate, and that its port speaks \
+             MAVLink (MAV_1_CONFIG on PX4, SERIAL2_PROTOCOL 2 on ArduPilot)",
+            PATIENCE.as_secs()
+        )
+    }
+
+    fn listen(&mut self, mut real: Real, duration: Duration) -> Real {
+        let end = Instant::now() + duration;
+        while Instant::now() < end {
+            match self.arrivals.recv_timeout(Duration::from_millis(5)) {
+                Ok(Arrival::Packet(packet)) => {
+                    let host = packet.arrived.saturating_duration_since(self.started);
+                    real.handle(host, packet.peer, &packet.bytes, |_| {});
+                }
+                Ok(Arrival::Remark(remark)) => self.remarks.push(remark.to_string()),
+                Ok(_) | Err(_) => {}
+            }
+            let peer = real.peer().or(self.link.target());
+            if let (Some(bytes), Some(peer)) = (real.due(self.started.elapsed()), peer) {
+                self.link.send(peer, bytes);
+            }
+        }
+        real
+    }
+}
+
+/// Prints what was found; fails when the profile cannot be flown.
+fn report(check: &Check, real: &Real) -> Result<ExitCode> {
+    let Some((autopilot, armed)) = real.controller() else {
+        bail!("the controller fell silent while it was measured: check cable and power");
+    };
+    let who = Stack::of(autopilot).map_or("unknown autopilot".into(), |stack| stack.to_string());
+    let state = if armed { "armed" } else { "disarmed" };
+    println!("controller  {who}, system {}, {state}", real.system().unwrap_or(0));
+    let mut missing = Vec::new();
+    if Stack::of(autopilot) != Some(real.profile().stack) {
+        missing.push(format!("the controller is {who}, not {}", real.profile().stack));
+    }
+    traffic(check, real, &mut missing);
+    latency(real);
+    streams(real, &mut missing);
+    parameters(real, &mut missing);
+    if missing.is_empty() {
+        println!("\n{} can be flown by {:?}", real.profile().stack, real.profile().authority);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("\nmissing for {} by {:?}:", real.profile().stack, real.profile().authority);
+    missing.iter().for_each(|line| println!("  {line}"));
+    Ok(ExitCode::FAILURE)
+}
+
+fn traffic(check: &Check, real: &Real, missing: &mut Vec<String>) {
+    let survey = real.survey();
+    let rate: f64 =
+        survey.messages().map(|(_, t)| t.mean_hz() * t.bytes as f64 / t.frames.max(1) as f64).sum();
+    let kilobits = |bytes: f64| bytes * 10.0 * 1e-3;
+    print!("received    {:.0} kbit/s (ten bits a byte on a wire)", kilobits(rate));
+    let wanted: f64 =
+        real.profile().stack.streams().iter().map(|s| s.hz * f64::from(s.bytes)).sum();
+    match check.vehicle {
+        Address::Serial { baud, .. } => {
+            let share = wanted * 10.0 / f64::from(baud);
+            println!(
+                "; the streams need {:.0} of {:.0} kbit/s, {:.0} %",
+                kilobits(wanted),
+                f64::from(baud) * 1e-3,
+                100.0 * share
+            );
+            if share > BUDGET {
+                missing.push(format!(
+                    "baud rate {baud} is too low for {:.0} kbit/s of state: set the port to 921600",
+                    kilobits(wanted)
+                ));
+            }
+        }
+        _ => println!("; the streams need {:.0}", kilobits(wanted)),
+    }
+    println!("loss        {:.2} % by sequence numbers", 100.0 * survey.loss());
+    let counts = real.counts().frames;
+    if counts.bad() > 0 {
+        println!("bad frames  {} ({} with a wrong CRC)", counts.bad(), counts.bad_crc);
+    }
+    if survey.loss() > 0.02 {
+        missing.push("more than 2 % of the frames are lost: check cable and flow control".into());
+    }
+}
+
+fn latency(real: &Real) {
+    let trips = real.survey().round_trips();
+    let at = |share: f64| {
+        let index = ((trips.len() - 1) as f64 * share).round() as usize;
+        trips[index].as_secs_f64() * 1e3
+    };
+    match trips.is_empty() {
+        true => println!("latency     TIMESYNC is not answered"),
+        false => println!(
+            "latency     TIMESYNC there and back: median {:.1}, 95 % {:.1}, longest {:.1} ms ({} trips)",
+            at(0.5),
+            at(0.95),
+            at(1.0),
+            trips.len()
+        ),
+    }
+}
+
+fn streams(real: &Real, missing: &mut Vec<String>) {
+    let mut table = Table::new();
+    table.load_style(NOTHING).set_header(["message", "wanted", "received", "jitter", ""]);
+    for stream in real.profile().stack.streams() {
+        let traffic = real.survey().messages().find(|(id, _)| *id == stream.id);
+        let (hz, jitter) = traffic.map_or((0.0, 0.0), |(_, t)| (t.hz, t.jitter_ms()));
+        let thin = hz < ENOUGH * stream.hz;
+        let verdict = match (thin, stream.needed) {
+            (false, _) => "",
+            (true, true) => "missing",
+            (true, false) => "missing, not needed",
+        };
+        if thin && stream.needed {
+            missing.push(format!(
+                "{} comes at {hz:.0} Hz instead of {:.0}: raise the port's data rate (MAV_1_RATE on \
+                 PX4), the baud rate, or SCHED_LOOP_RATE on ArduPilot",
+                stream.name, stream.hz
+            ));
+        }
+        table.add_row([
+            stream.name.to_owned(),
+            format!("{:.0} Hz", stream.hz),
+            format!("{hz:.1} Hz"),
+            format!("{jitter:.2} ms"),
+            verdict.to_owned(),
+        ]);
+    }
+    println!("\n{table}");
+    let named: Vec<u32> = real.profile().stack.streams().iter().map(|stream| stream.id).collect();
+    let others: Vec<String> = real
+        .survey()
+        .messages()
+        .filter(|(id, _)| !named.contains(id))
+        .map(|(id, traffic)| format!("{id} ({:.1} Hz)", traffic.mean_hz()))
+        .collect();
+    if !others.is_empty() {
+        println!("others by number: {}", others.join(", "));
+    }
+}
+
+fn parameters(real: &Real, missing: &mut Vec<String>) {
+    println!("\nparameters");
+    for (_, standing, words) in real.parameter_report() {
+        println!("  {words}");
+        if !matches!(standing, Standing::Good(_)) {
+            missing.push(words);
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! The companion without threads, sockets or a wall clock: bytes in, bytes out, time as an argument.
+//!
+//! The same pilot, vehicle session and controller as in [`runtime`](super::runtime), for campaigns
+//! that fly thousands of flights in one process, and for replays.
+
+use std::time::Duration;
+
+use crate::control::Controller;
+use crate::flight::pilot::{Decision, Pilot, Plan};
+use crate::flight::runtime::Crew;
+use crate::link::autopilot::{Autopilot, Severity, Text, Verdict};
+use crate::link::peer::{LinkId, PeerId, SERIAL};
+use crate::link::vehicle::{Notice, Order, Outputs, Telemetry, Vehicle};
+use crate::physics::Time;
+
+/// The peer that everything comes from.
+const WIRE: PeerId = PeerId { link: LinkId(0), address: SERIAL };
+/// Seed of the controller's random numbers, as in real flight.
+const SEED: u64 = 0;
+
+/// A companion on a desk.
+pub struct Desk {
+    pilot: Pilot,
+    controller: Box<dyn Controller>,
+    vehicle: Vehicle,
+    outputs: Outputs,
+    /// Host and vehicle time of the newest state.
+    anchor: Option<(Duration, Time)>,
+    /// Every line that was said to the ground stations.
+    pub texts: Vec<Text>,
+}
+
+impl Desk {
+    /// A companion at a vehicle that is not heard yet. The crew's controller flies in the loop,
+    /// wherever it would sit otherwise.
+    pub fn new(crew: Crew, vehicle: Vehicle) -> Self {
+        Desk {
+            pilot: crew.pilot,
+            controller: crew.controller,
+            vehicle,
+            outputs: Outputs::Disarmed,
+            anchor: None,
+            texts: Vec::new(),
+        }
+    }
+
+    /// Takes bytes that arrive at `host`, appends what is sent in answer to `out`, and shows each
+    /// state with what was decided on it.
+    pub fn hear(
+        &mut self,
+        host: Duration,
+        bytes: &[u8],
+        out: &mut Vec<u8>,
+        mut watch: impl FnMut(&Telemetry, &Decision),
+    ) {
+        let mut states = Vec::new();
+        self.vehicle.handle(host, WIRE, bytes, |state| states.push(state));
+        for state in states.iter().filter(|state| state.order != Order::Late) {
+            self.anchor = Some((host, state.time));
+            let request = self.pilot.observe(state.time, state);
+            let plan = request.map_or(Plan::None, |request| {
+                if request.engage {
+                    self.controller.reset(SEED);
+                }
+                Plan::Ready(self.controller.command(&request.observation, &request.target))
+            });
+            let decision = self.pilot.decide(plan);
+            let demand = decision.demand();
+            self.outputs = demand.outputs;
+            out.extend(self.vehicle.answer(host, state.time, &demand));
+            watch(state, &decision);
+        }
+        self.heed(host);
+    }
+
+    /// Does what is due at `host`, as every 10 ms in flight.
+    pub fn poll(&mut self, host: Duration, out: &mut Vec<u8>) {
+        let now = self.now(host);
+        self.pilot.advance(now);
+        out.extend(self.vehicle.due(host, self.outputs).unwrap_or_default());
+        self.heed(host);
+        self.texts.extend(std::iter::from_fn(|| self.pilot.take_text()));
+    }
+
+    fn heed(&mut self, host: Duration) {
+        while let Some(notice) = self.vehicle.take_notice() {
+            match notice {
+                Notice::Text(severity, words) => self.pilot.tell(severity, &words),
+                Notice::System(_) => {}
+                Notice::HandedBack(reason) => {
+                    // Its verdict cannot be a refusal: it is forced.
+                    let _ = self.pilot.disarm(self.now(host), true);
+                    let words = format!("handed back to the controller: {reason}");
+                    self.pilot.tell(Severity::Critical, &words);
+                }
+            }
+        }
+    }
+
+    /// Vehicle time at `host`: between states it goes on with the host's.
+    pub fn now(&self, host: Duration) -> Time {
+        self.anchor.map_or(Time::default(), |(at, time)| time.plus(host.saturating_sub(at)))
+    }
+
+    /// Arms, and so engages, as a client would.
+    pub fn arm(&mut self, host: Duration) -> Verdict {
+        match self.vehicle.obstacle() {
+            Some(obstacle) => Verdict::Rejected(obstacle),
+            None => self.pilot.arm(self.now(host), false),
+        }
+    }
+
+    /// The pilot, for a client's requests.
+    pub fn pilot(&mut self) -> &mut Pilot {
+        &mut self.pilot
+    }
+
+    /// The vehicle's session.
+    pub fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
+    }
+}

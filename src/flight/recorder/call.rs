@@ -1,0 +1,193 @@
+//! A call of the pilot as a line of `flight.calls`: with the vehicle's frames, all that it decided by.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::flight::pilot::mode_name;
+use crate::link::autopilot::{AttitudeSetpoint, Mode, ParameterValue, Sticks};
+use crate::physics::{Command, Time};
+
+/// The first line of the file.
+pub const HEADER: &str = "greylag-calls 1";
+
+/// What became of a request to plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Planned {
+    /// A command came in time.
+    Ready(Command),
+    /// None came in time.
+    Late,
+    /// Nobody was asked, or nobody could answer.
+    None,
+}
+
+/// One call. Numbers are written so that they read back to the bit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Call {
+    /// Time passed to this moment.
+    Advance(Time),
+    /// The state of this time was observed, with this plan, and answered by this command.
+    Tick(Time, Planned, Command),
+    /// Arming was asked for, by force or not.
+    Arm(Time, bool),
+    /// Disarming was asked for, by force or not.
+    Disarm(Time, bool),
+    /// A mode was asked for.
+    Mode(Time, Mode),
+    /// A setpoint came.
+    Setpoint(Time, AttitudeSetpoint),
+    /// Stick positions came.
+    Sticks(Time, Sticks),
+    /// A parameter was to be set.
+    Parameter(usize, ParameterValue),
+}
+
+/// The modes that can be asked for.
+const MODES: [Mode; 5] = [Mode::Manual, Mode::Hold, Mode::Return, Mode::Offboard, Mode::Stabilized];
+
+impl fmt::Display for Call {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let us = |time: &Time| time.as_micros();
+        match self {
+            Call::Advance(now) => write!(f, "advance {}", us(now)),
+            Call::Tick(time, planned, c) => {
+                write!(f, "tick {} {} {} {}", us(time), c.aileron, c.elevator, c.throttle)?;
+                match planned {
+                    Planned::Ready(p) if same(p, c) => write!(f, " ready"),
+                    Planned::Ready(p) => {
+                        write!(f, " ready {} {} {}", p.aileron, p.elevator, p.throttle)
+                    }
+                    Planned::Late => write!(f, " late"),
+                    Planned::None => write!(f, " none"),
+                }
+            }
+            Call::Arm(now, force) => write!(f, "arm {} {}", us(now), u8::from(*force)),
+            Call::Disarm(now, force) => write!(f, "disarm {} {}", us(now), u8::from(*force)),
+            Call::Mode(now, mode) => write!(f, "mode {} {}", us(now), mode_name(*mode)),
+            Call::Setpoint(now, s) => {
+                let thrust = s.thrust.map_or("-".to_owned(), |x| x.to_string());
+                write!(f, "setpoint {} {} {} {thrust}", us(now), s.roll, s.pitch)
+            }
+            Call::Sticks(now, s) => {
+                write!(f, "sticks {} {} {} {}", us(now), s.roll, s.pitch, s.throttle)
+            }
+            Call::Parameter(index, ParameterValue::Real(x)) => {
+                write!(f, "parameter {index} real {x}")
+            }
+            Call::Parameter(index, ParameterValue::Int(n)) => {
+                write!(f, "parameter {index} int {n}")
+            }
+        }
+    }
+}
+
+/// Whether two commands are equal to the bit.
+pub fn same(a: &Command, b: &Command) -> bool {
+    let bits = |c: &Command| [c.aileron, c.elevator, c.throttle].map(f64::to_bits);
+    bits(a) == bits(b)
+}
+
+/// A line that is no call.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is no call of the pilot; the file is damaged, or of a newer program")]
+pub struct CallError(String);
+
+impl FromStr for Call {
+    type Err = CallError;
+
+    fn from_str(line: &str) -> Result<Self, CallError> {
+        read(line).ok_or_else(|| CallError(line.chars().take(80).collect()))
+    }
+}
+
+fn read(line: &str) -> Option<Call> {
+    let words: Vec<&str> = line.split(' ').collect();
+    let number = |at: usize| words.get(at)?.parse::<f64>().ok();
+    let time = |at: usize| Some(Time::from_micros(words.get(at)?.parse().ok()?));
+    let flag = |at: usize| match *words.get(at)? {
+        "0" => Some(false),
+        "1" => Some(true),
+        _ => None,
+    };
+    let command = |at: usize| {
+        Some(Command { aileron: number(at)?, elevator: number(at + 1)?, throttle: number(at + 2)? })
+    };
+    Some(match *words.first()? {
+        "advance" => Call::Advance(time(1)?),
+        "tick" => {
+            let given = command(2)?;
+            let planned = match *words.get(5)? {
+                "ready" if words.len() > 6 => Planned::Ready(command(6)?),
+                "ready" => Planned::Ready(given),
+                "late" => Planned::Late,
+                "none" => Planned::None,
+                _ => return None,
+            };
+            Call::Tick(time(1)?, planned, given)
+        }
+        "arm" => Call::Arm(time(1)?, flag(2)?),
+        "disarm" => Call::Disarm(time(1)?, flag(2)?),
+        "mode" => {
+            let name = *words.get(2)?;
+            Call::Mode(time(1)?, MODES.into_iter().find(|mode| mode_name(*mode) == name)?)
+        }
+        "setpoint" => {
+            let thrust = match *words.get(4)? {
+                "-" => None,
+                _ => Some(number(4)?),
+            };
+            Call::Setpoint(
+                time(1)?,
+                AttitudeSetpoint { roll: number(2)?, pitch: number(3)?, thrust },
+            )
+        }
+        "sticks" => {
+            let sticks = Sticks { roll: number(2)?, pitch: number(3)?, throttle: number(4)? };
+            Call::Sticks(time(1)?, sticks)
+        }
+        "parameter" => {
+            let index = words.get(1)?.parse().ok()?;
+            let value = match *words.get(2)? {
+                "real" => ParameterValue::Real(words.get(3)?.parse().ok()?),
+                "int" => ParameterValue::Int(words.get(3)?.parse().ok()?),
+                _ => return None,
+            };
+            Call::Parameter(index, value)
+        }
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_call_reads_back_to_the_bit() {
+        let now = Time::from_micros(123_456_789);
+        let odd = Command { aileron: 0.1 + 0.2, elevator: -1.0 / 3.0, throttle: 5e-324 };
+        let setpoint = AttitudeSetpoint { roll: 0.3, pitch: -0.0, thrust: None };
+        for call in [
+            Call::Advance(now),
+            Call::Tick(now, Planned::Ready(odd), odd),
+            Call::Tick(now, Planned::Ready(Command::IDLE), odd),
+            Call::Tick(now, Planned::Late, odd),
+            Call::Tick(now, Planned::None, Command::IDLE),
+            Call::Arm(now, true),
+            Call::Disarm(now, false),
+            Call::Mode(now, Mode::Offboard),
+            Call::Setpoint(now, setpoint),
+            Call::Setpoint(now, AttitudeSetpoint { thrust: Some(0.7), ..setpoint }),
+            Call::Sticks(now, Sticks { roll: 0.1, pitch: 0.2, throttle: 0.3 }),
+            Call::Parameter(3, ParameterValue::Real(0.1)),
+            Call::Parameter(12, ParameterValue::Int(-1)),
+        ] {
+            let line = call.to_string();
+            assert_eq!(line.parse::<Call>().unwrap(), call, "{line}");
+            assert_eq!(line.parse::<Call>().unwrap().to_string(), line);
+        }
+        for bad in ["", "tick 1", "arm 1 2", "mode 1 SIDEWAYS", "advance -1", "dance 1"] {
+            assert!(bad.parse::<Call>().is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! The pilot on a recorded flight: the same calls, the same frames, so the same commands.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use crate::flight::pilot::Plan;
+use crate::flight::recorder::call::{Call, CallError, HEADER, Planned, same};
+use crate::flight::runtime::Crew;
+use crate::link::autopilot::Autopilot;
+use crate::link::framing::{FrameCounts, Frames, frame_len};
+use crate::link::peer::{LinkId, PeerId, SERIAL};
+use crate::link::vehicle::{Order, Telemetry, Vehicle};
+use crate::physics::{Command, Time};
+
+/// Seed of the controller's random numbers, as in flight.
+const SEED: u64 = 0;
+/// Differences that are kept to be shown.
+const SHOWN: usize = 10;
+
+/// Why a flight cannot be replayed.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// A file of the recording cannot be read.
+    #[error("reading {}: {source}; name a folder that `greylag fly` has recorded", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The calls are of another kind.
+    #[error("{} does not begin with `{HEADER}`: it was recorded by another version", path.display())]
+    Header {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A line in the middle cannot be read.
+    #[error("{}, line {line}: {source}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// Its number, from 1.
+        line: usize,
+        /// What is wrong with it.
+        source: CallError,
+    },
+}
+
+/// A tick that did not come out as it was recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// Time of the state.
+    pub time: Time,
+    /// What was recorded.
+    pub recorded: Command,
+    /// What came out.
+    pub replayed: Command,
+}
+
+/// What a replay came to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// Ticks replayed.
+    pub ticks: u64,
+    /// Commands that differ in any bit.
+    pub different: u64,
+    /// Plans of the controller that differ in any bit from the recorded ones.
+    pub plans_different: u64,
+    /// Ticks whose state is not in the telemetry: what follows one proves nothing.
+    pub without_state: u64,
+    /// The first differences.
+    pub differences: Vec<Difference>,
+    /// Whether the recording ends in the middle of something, as after a crash.
+    pub cut_short: bool,
+}
+
+/// The states of a recording, in their order.
+struct States {
+    vehicle: Vehicle,
+    bytes: Vec<u8>,
+    at: usize,
+    ready: VecDeque<(Duration, Telemetry)>,
+}
+
+impl States {
+    /// The state of `time`; those before it that nobody asks for are late ones.
+    fn next(&mut self, time: Time) -> Option<(Duration, Telemetry)> {
+        loop {
+            while let Some((host, state)) = self.ready.pop_front() {
+                if state.order != Order::Late && state.time == time {
+                    return Some((host, state));
+                }
+                if state.order != Order::Late && state.time > time {
+                    self.ready.push_front((host, state));
+                    return None;
+                }
+            }
+            self.read_one()?;
+        }
+    }
+
+    /// Reads one record: eight bytes of time, then a frame.
+    fn read_one(&mut self) -> Option<()> {
+        let stamp = u64::from_be_bytes(*self.bytes.get(self.at..)?.first_chunk()?);
+        let rest = self.bytes.get(self.at + 8..)?;
+        let len = frame_len(rest).filter(|len| *len <= rest.len())?;
+        let peer = PeerId { link: LinkId(0), address: SERIAL };
+        let host = Duration::from_micros(stamp);
+        let frame = &rest[..len];
+        let ours = Frames::new(frame, &mut FrameCounts::default())
+            .next()
+            .is_some_and(|f| f.source.component == 1 && f.id == 93);
+        let ready = &mut self.ready;
+        if !ours {
+            self.vehicle.handle(host, peer, frame, |state| ready.push_back((host, state)));
+        }
+        self.at += 8 + len;
+        Some(())
+    }
+}
+
+/// Replays the recording in `folder` with `crew` at `vehicle`, both as fresh as in flight.
+///
+/// # Errors
+/// If a file cannot be read, or is none of a recording.
+pub fn replay(folder: &Path, crew: Crew, vehicle: Vehicle) -> Result<Outcome, ReplayError> {
+    let file = |name: &str| folder.join(name);
+    let failed = |path: PathBuf| move |source| ReplayError::File { path, source };
+    let path = file("flight.calls");
+    let text = std::fs::read(&path).map_err(failed(path.clone()))?;
+    let text = String::from_utf8_lossy(&text).into_owned();
+    let tlog = file("flight.tlog");
+    let bytes = std::fs::read(&tlog).map_err(failed(tlog.clone()))?;
+    let states = States { vehicle, bytes, at: 0, ready: VecDeque::new() };
+    let mut replayed = Replayed { crew, states, outcome: Outcome::default() };
+    let mut lines = text.split_inclusive('\n').enumerate().peekable();
+    match lines.next() {
+        Some((_, first)) if first.trim_end() == HEADER => {}
+        _ => return Err(ReplayError::Header { path }),
+    }
+    while let Some((number, line)) = lines.next() {
+        let whole = line.ends_with('\n');
+        match line.trim_end().parse::<Call>() {
+            Ok(call) if whole => {
+                if !replayed.make(&call) {
+                    break;
+                }
+            }
+            _ if lines.peek().is_none() => replayed.outcome.cut_short = true,
+            Ok(_) => {}
+            Err(source) => return Err(ReplayError::Line { path, line: number + 1, source }),
+        }
+    }
+    Ok(replayed.outcome)
+}
+
+struct Replayed {
+    crew: Crew,
+    states: States,
+    outcome: Outcome,
+}
+
+impl Replayed {
+    /// Makes one call; `false` when the telemetry has ended. Verdicts were given in flight.
+    fn make(&mut self, call: &Call) -> bool {
+        let pilot = &mut self.crew.pilot;
+        match *call {
+            Call::Advance(now) => pilot.advance(now),
+            Call::Arm(now, force) => drop(pilot.arm(now, force)),
+            Call::Disarm(now, force) => drop(pilot.disarm(now, force)),
+            Call::Mode(now, mode) => drop(pilot.set_mode(now, mode)),
+            Call::Setpoint(now, setpoint) => pilot.attitude_setpoint(now, setpoint),
+            Call::Sticks(now, sticks) => pilot.sticks(now, sticks),
+            Call::Parameter(index, value) => drop(pilot.set_parameter(index, value)),
+            Call::Tick(time, planned, recorded) => return self.tick(time, planned, recorded),
+        }
+        true
+    }
+
+    fn tick(&mut self, time: Time, planned: Planned, recorded: Command) -> bool {
+        let Some((host, state)) = self.states.next(time) else {
+            self.outcome.without_state += 1;
+            // At the end of a recording that was cut the telemetry may end first.
+            let ended = self.states.at + 8 >= self.states.bytes.len();
+            self.outcome.cut_short |= ended;
+            return !ended;
+        };
+        let request = self.crew.pilot.observe(state.time, &state);
+        let own = request.map(|request| {
+            if request.engage {
+                self.crew.controller.reset(SEED);
+            }
+            self.crew.controller.command(&request.observation, &request.target)
+        });
+        let plan = match planned {
+            Planned::Ready(command) => {
+                let differs = own.is_none_or(|own| !same(&own, &command));
+                self.outcome.plans_different += u64::from(differs);
+                own.map_or(Plan::Ready(command), Plan::Ready)
+            }
+            Planned::Late => Plan::Late,
+            Planned::None => Plan::None,
+        };
+        let decision = self.crew.pilot.decide(plan);
+        // A real controller's session models the actuators by what it has sent.
+        self.states.vehicle.answer(host, state.time, &decision.demand());
+        self.outcome.ticks += 1;
+        if !same(&decision.command, &recorded) {
+            self.outcome.different += 1;
+            if self.outcome.differences.len() < SHOWN {
+                let replayed = decision.command;
+                self.outcome.differences.push(Difference { time, recorded, replayed });
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,241 @@
+//! Serial links: one peer at the other end of a wire that may be pulled at any time.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use tokio::io::{AsyncReadExt, AsyncWriteExt, ReadHalf, WriteHalf};
+use tokio::sync::mpsc::Receiver;
+use tokio::time::{sleep, timeout};
+use tokio_serial::{ErrorKind, SerialPort, SerialPortBuilderExt, SerialStream};
+
+use super::{Arrival, Port, Remark, count};
+use crate::link::framing::StreamCutter;
+use crate::link::peer::{self, PeerId};
+
+/// Bytes read at once.
+const CHUNK: usize = 1024;
+/// A frame that is not whole after this pause is given up.
+const PAUSE: Duration = Duration::from_millis(50);
+/// Between attempts to open a port that is gone.
+const RETRY: Duration = Duration::from_millis(200);
+/// A frame that the wire has not taken after this time is given up: the wire is stuck.
+const STALLED: Duration = Duration::from_secs(1);
+/// Frames that wait behind the one being written: older ones are of no use to an aircraft.
+const BACKLOG: usize = 16;
+/// So many bytes without one valid frame, over at least this time, are a wrong baud rate.
+const NOISE: (u64, Duration) = (400, Duration::from_secs(1));
+
+/// A serial port by name, at a baud rate.
+#[derive(Clone, Debug)]
+pub(super) struct Wire {
+    pub(super) port: String,
+    pub(super) baud: u32,
+}
+
+/// Why a port cannot be opened, with what to do about it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SerialFault {
+    /// There is no such device.
+    #[error("there is no such device; plug it in, or choose one of: {0}")]
+    Missing(String),
+    /// The user may not open it.
+    #[error(
+        "permission denied; add your user to the group that owns the device \
+         (`sudo usermod -aG dialout $USER`, on Arch `uucp`), then log in again"
+    )]
+    Permission,
+    /// Another program has it.
+    #[error(
+        "another program has it open; stop that program (often ModemManager or a ground station)"
+    )]
+    Busy,
+    /// The port does not do this rate.
+    #[error(
+        "it does not work at {0} baud; give a rate that it knows, such as 921600, 115200 or 57600"
+    )]
+    Baud(u32),
+    /// It is a file of another kind.
+    #[error("it is not a serial port; choose one of: {0}")]
+    NoPort(String),
+    /// Anything else.
+    #[error("{0}; check the cable, then the name of the device")]
+    Other(String),
+}
+
+/// The ports that the system lists, for an error's remedy.
+fn listed() -> String {
+    let names: Vec<String> = tokio_serial::available_ports()
+        .unwrap_or_default()
+        .into_iter()
+        .map(|port| port.port_name)
+        .filter(|name| !name.starts_with("/dev/ttyS"))
+        .collect();
+    if names.is_empty() { "(no serial device is plugged in)".into() } else { names.join(", ") }
+}
+
+impl Wire {
+    /// Opens the port.
+    pub(super) fn open(&self) -> Result<SerialStream, SerialFault> {
+        let stream = tokio_serial::new(&self.port, self.baud)
+            .open_native_async()
+            .map_err(|error| self.fault(&error))?;
+        match stream.baud_rate() {
+            Ok(baud) if baud != self.baud => Err(SerialFault::Baud(self.baud)),
+            _ => Ok(stream),
+        }
+    }
+
+    fn fault(&self, error: &tokio_serial::Error) -> SerialFault {
+        use std::io::ErrorKind as Io;
+        let words = error.to_string();
+        match error.kind() {
+            ErrorKind::Io(Io::NotFound) => SerialFault::Missing(listed()),
+            ErrorKind::Io(Io::PermissionDenied) => SerialFault::Permission,
+            ErrorKind::NoDevice if Path::new(&self.port).exists() => SerialFault::Busy,
+            ErrorKind::NoDevice => SerialFault::Missing(listed()),
+            ErrorKind::InvalidInput => SerialFault::Baud(self.baud),
+            _ if words.contains("ioctl") || words.contains("typewriter") => {
+                SerialFault::NoPort(listed())
+            }
+            _ => SerialFault::Other(words),
+        }
+    }
+}
+
+/// Serves the port, and opens it again whenever it goes.
+pub(super) fn serve(
+    port: Port,
+    wire: Wire,
+    first: SerialStream,
+    mut outgoing: Receiver<(std::net::SocketAddr, Vec<u8>)>,
+) {
+    tokio::spawn(async move {
+        let peer = port.peer(peer::SERIAL);
+        let mut stream = Some(first);
+        while let Some(open) = stream.take() {
+            port.announce(Arrival::Opened(peer)).await;
+            let (reading, writing) = tokio::io::split(open);
+            tokio::select! {
+                () = read(&port, reading, peer, &wire) => {}
+                ended = write(&port, writing, &mut outgoing) => if ended { return },
+            }
+            port.announce(Arrival::Closed(peer)).await;
+            port.announce(Arrival::Remark(Remark::Unplugged(wire.port.clone()))).await;
+            stream = wait_for(&port, &wire, &mut outgoing).await;
+        }
+    });
+}
+
+/// Tries until the port is there again; `None` when the link has ended. What is to be sent
+/// meanwhile is lost, with a count.
+async fn wait_for(
+    port: &Port,
+    wire: &Wire,
+    outgoing: &mut Receiver<(std::net::SocketAddr, Vec<u8>)>,
+) -> Option<SerialStream> {
+    loop {
+        sleep(RETRY).await;
+        loop {
+            match outgoing.try_recv() {
+                Ok(_) => count(&port.counters.send_failed),
+                Err(tokio::sync::mpsc::error::TryRecvError::Empty) => break,
+                Err(tokio::sync::mpsc::error::TryRecvError::Disconnected) => return None,
+            }
+        }
+        if let Ok(stream) = wire.open() {
+            port.announce(Arrival::Remark(Remark::Replugged(wire.port.clone()))).await;
+            return Some(stream);
+        }
+    }
+}
+
+/// Tells noise from frames.
+struct Ear {
+    since: Instant,
+    bytes: u64,
+    frames: u64,
+    told: bool,
+}
+
+impl Ear {
+    fn new() -> Self {
+        Ear { since: Instant::now(), bytes: 0, frames: 0, told: false }
+    }
+
+    /// Whether it is time to say that only noise comes.
+    fn hears_noise(&mut self, bytes: usize, frames: usize) -> bool {
+        self.bytes += bytes as u64;
+        self.frames += frames as u64;
+        if self.frames > 0 {
+            *self = Ear { told: self.told, ..Ear::new() };
+            return false;
+        }
+        let noise = self.bytes >= NOISE.0 && self.since.elapsed() >= NOISE.1 && !self.told;
+        self.told |= noise;
+        noise
+    }
+}
+
+/// Reads until the port goes.
+async fn read(port: &Port, mut stream: ReadHalf<SerialStream>, peer: PeerId, wire: &Wire) {
+    let mut cutter = StreamCutter::default();
+    let mut chunk = [0; CHUNK];
+    let mut ear = Ear::new();
+    loop {
+        let mut whole = Vec::new();
+        let mut keep = |frame: &[u8]| whole.extend_from_slice(frame);
+        let good = cutter.counts.good;
+        let len = match cutter.is_waiting() {
+            true => timeout(PAUSE, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
+                cutter.flush_pieces(&mut keep);
+                Err(std::io::ErrorKind::TimedOut.into())
+            }),
+            false => stream.read(&mut chunk).await,
+        };
+        let len = match len {
+            Ok(0) => return,
+            Ok(len) => {
+                cutter.push_pieces(&chunk[..len], &mut keep);
+                len
+            }
+            Err(e) if e.kind() == std::io::ErrorKind::TimedOut => 0,
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => 0,
+            Err(_) => return,
+        };
+        if ear.hears_noise(len, (cutter.counts.good - good) as usize) {
+            let remark = Remark::Noise { port: wire.port.clone(), baud: wire.baud };
+            port.announce(Arrival::Remark(remark)).await;
+        }
+        if !whole.is_empty() {
+            port.deliver(peer.address, whole);
+        }
+    }
+}
+
+/// Writes frames as they come, whole ones; `true` when the link's last sender is gone, `false`
+/// when the port is.
+async fn write(
+    port: &Port,
+    mut stream: WriteHalf<SerialStream>,
+    outgoing: &mut Receiver<(std::net::SocketAddr, Vec<u8>)>,
+) -> bool {
+    while let Some((_, mut frame)) = outgoing.recv().await {
+        while outgoing.len() > BACKLOG
+            && let Ok((_, newer)) = outgoing.try_recv()
+        {
+            count(&port.counters.outbox_full);
+            frame = newer;
+        }
+        // Never flushed: that waits for the last bit to have left the port.
+        match timeout(STALLED, stream.write_all(&frame)).await {
+            Ok(Ok(())) => count(&port.counters.sent),
+            Ok(Err(_)) => {
+                count(&port.counters.send_failed);
+                return false;
+            }
+            // Nobody takes bytes: a cut frame is on the wire, which its reader will drop.
+            Err(_) => count(&port.counters.send_failed),
+        }
+    }
+    true
+}

@@ -1,0 +1,228 @@
+//! Angle of attack and sideslip by an estimator, where the controller sends none.
+//!
+//! An extended Kalman filter of three states, the velocity relative to the air in body axes
+//! (u, v, w), driven by accelerometers, gyros, attitude (Beard & McLain \[BM12\], eq. 3.15):
+//!
+//! ```text
+//! u' = r v - q w - g sin θ         + ax
+//! v' = p w - r u + g cos θ sin φ   + ay
+//! w' = q u - p v + g cos θ cos φ   + az
+//! ```
+//!
+//! Three measurements hold it: the airspeed |(u, v, w)|; the climb rate, in air that rises and
+//! sinks about zero; and a sideslip that is zero in the mean, or, where wind and velocity over
+//! ground are told, the sideways velocity that follows from them. The state being a velocity, a
+//! constant wind cancels; a steady updraught of 1 m/s shows as w/V, 3° at 20 m/s.
+
+/// Gravity, m/s².
+const GRAVITY: f64 = 9.806;
+/// Standard deviation of what the accelerations do not explain (gusts, their own noise), m/s² in
+/// a step of 10 ms: light turbulence changes the air's velocity by about that.
+const PROCESS: f64 = 1.0;
+/// Standard deviation of the airspeed, m/s.
+const AIRSPEED: f64 = 0.5;
+/// Standard deviation of the climb rate as a measurement of the air-relative one, m/s.
+const CLIMB: f64 = 0.5;
+/// Standard deviation of a sideways velocity taken to be zero at every step, m/s: held against the
+/// process it draws the sideslip to zero within a few seconds, so that drifts end and turns show.
+const SIDEWAYS: f64 = 5.0;
+/// Standard deviation of the sideways velocity by wind and ground velocity, m/s: that of the wind.
+const SIDEWAYS_BY_WIND: f64 = 0.5;
+/// Slowest airspeed at which angles mean anything, m/s.
+const SLOWEST: f64 = 3.0;
+
+/// What the estimator is given at a state frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// Roll, pitch, yaw, rad.
+    pub attitude: [f64; 3],
+    /// p, q, r, rad/s.
+    pub rates: [f64; 3],
+    /// Specific force, m/s², FRD.
+    pub specific_force: [f64; 3],
+    /// True airspeed, m/s.
+    pub airspeed: f64,
+    /// Climb rate, m/s; NaN when not told.
+    pub climb: f64,
+    /// Velocity over ground, NED, m/s; NaN when it has not been told since the last update: an old
+    /// one has the wrong direction in a turn.
+    pub velocity: [f64; 3],
+    /// The air's velocity, NED, m/s; NaN when not told.
+    pub wind: [f64; 3],
+}
+
+/// The estimator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AirData {
+    /// u, v, w, m/s; none before the first measurement.
+    state: Option<[f64; 3]>,
+    covariance: [[f64; 3]; 3],
+}
+
+impl Default for AirData {
+    fn default() -> Self {
+        AirData { state: None, covariance: diagonal([1.0, 4.0, 4.0]) }
+    }
+}
+
+impl AirData {
+    /// Takes the next measurement in, `step` seconds after the last, and gives α and β, rad;
+    /// `None` below flying speed or when the measurement is not finite.
+    pub fn update(&mut self, m: &Measured, step: f64) -> Option<[f64; 2]> {
+        let needed =
+            m.attitude.iter().chain(&m.rates).chain(&m.specific_force).chain([&m.airspeed]);
+        if !needed.copied().all(f64::is_finite) || m.airspeed < SLOWEST {
+            *self = AirData::default();
+            return None;
+        }
+        // After a long gap the past means nothing.
+        if !(0.0..=0.5).contains(&step) {
+            *self = AirData::default();
+        }
+        if self.state.is_none() {
+            self.state = Some(beginning(m));
+        }
+        self.propagate(m, step.clamp(0.0, 0.5));
+        self.correct(m);
+        let [u, v, w] = self.state.filter(|x| x.iter().all(|x| x.is_finite()))?;
+        let speed = (u * u + v * v + w * w).sqrt().max(SLOWEST);
+        Some([w.atan2(u), (v / speed).clamp(-1.0, 1.0).asin()])
+    }
+
+    fn propagate(&mut self, m: &Measured, step: f64) {
+        let Some([u, v, w]) = self.state else { return };
+        let [p, q, r] = m.rates;
+        let [ax, ay, az] = m.specific_force;
+        let (sr, cr) = m.attitude[0].sin_cos();
+        let (sp, cp) = m.attitude[1].sin_cos();
+        let rate = [
+            r * v - q * w - GRAVITY * sp + ax,
+            p * w - r * u + GRAVITY * cp * sr + ay,
+            q * u - p * v + GRAVITY * cp * cr + az,
+        ];
+        self.state = Some([u + step * rate[0], v + step * rate[1], w + step * rate[2]]);
+        let f =
+            [[1.0, r * step, -q * step], [-r * step, 1.0, p * step], [q * step, -p * step, 1.0]];
+        let noise = (PROCESS * step).powi(2);
+        self.covariance = add(&product(&product(&f, &self.covariance), &transpose(&f)), noise);
+    }
+
+    fn correct(&mut self, m: &Measured) {
+        let Some([u, v, w]) = self.state else { return };
+        let speed = (u * u + v * v + w * w).sqrt().max(SLOWEST);
+        self.scalar([u / speed, v / speed, w / speed], m.airspeed - speed, AIRSPEED);
+        let (sr, cr) = m.attitude[0].sin_cos();
+        let (sp, cp) = m.attitude[1].sin_cos();
+        if m.climb.is_finite() {
+            let row = [sp, -sr * cp, -cr * cp];
+            self.scalar(row, m.climb - self.seen(row), CLIMB);
+        }
+        let sideways = [0.0, 1.0, 0.0];
+        let air = [0, 1, 2].map(|i| m.velocity[i] - m.wind[i]);
+        if air.iter().all(|x| x.is_finite()) {
+            // The second column of the rotation body → NED.
+            let (sy, cy) = m.attitude[2].sin_cos();
+            let side = [sr * sp * cy - cr * sy, sr * sp * sy + cr * cy, sr * cp];
+            let measured: f64 = side.iter().zip(air).map(|(a, b)| a * b).sum();
+            self.scalar(sideways, measured - self.seen(sideways), SIDEWAYS_BY_WIND);
+        }
+        self.scalar(sideways, -self.seen(sideways), SIDEWAYS);
+    }
+
+    fn seen(&self, row: [f64; 3]) -> f64 {
+        self.state.map_or(0.0, |x| row.iter().zip(x).map(|(a, b)| a * b).sum())
+    }
+
+    /// One scalar measurement: its row, its innovation, its standard deviation.
+    fn scalar(&mut self, row: [f64; 3], innovation: f64, deviation: f64) {
+        let Some(state) = &mut self.state else { return };
+        let p = self.covariance;
+        let cross: [f64; 3] = [0, 1, 2].map(|i| (0..3).map(|j| p[i][j] * row[j]).sum());
+        let spread: f64 =
+            row.iter().zip(cross).map(|(a, b)| a * b).sum::<f64>() + deviation * deviation;
+        // A glitch counts for no more than three of its standard deviations.
+        let limit = 3.0 * spread.sqrt();
+        let innovation = innovation.clamp(-limit, limit);
+        for i in 0..3 {
+            state[i] += cross[i] / spread * innovation;
+            for j in 0..3 {
+                self.covariance[i][j] -= cross[i] * cross[j] / spread;
+            }
+        }
+    }
+}
+
+/// Straight flight along the path that airspeed and climb rate make.
+fn beginning(m: &Measured) -> [f64; 3] {
+    let climb = if m.climb.is_finite() { m.climb } else { 0.0 };
+    let path = (climb / m.airspeed).clamp(-0.9, 0.9).asin();
+    let alpha = (m.attitude[1] - path).clamp(-0.2, 0.2);
+    [m.airspeed * alpha.cos(), 0.0, m.airspeed * alpha.sin()]
+}
+
+fn diagonal(d: [f64; 3]) -> [[f64; 3]; 3] {
+    [[d[0], 0.0, 0.0], [0.0, d[1], 0.0], [0.0, 0.0, d[2]]]
+}
+
+fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+fn transpose(a: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
+}
+
+fn add(a: &[[f64; 3]; 3], noise: f64) -> [[f64; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[i][j] + if i == j { noise } else { 0.0 }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Level flight at 20 m/s with an angle of attack of 3° and no wind.
+    fn level() -> Measured {
+        Measured {
+            attitude: [0.0, 3f64.to_radians(), 0.0],
+            rates: [0.0; 3],
+            specific_force: [
+                GRAVITY * 3f64.to_radians().sin(),
+                0.0,
+                -GRAVITY * 3f64.to_radians().cos(),
+            ],
+            airspeed: 20.0,
+            climb: 0.0,
+            velocity: [20.0, 0.0, 0.0],
+            wind: [0.0; 3],
+        }
+    }
+
+    #[test]
+    fn level_flight_shows_its_pitch_as_angle_of_attack() {
+        let mut air = AirData::default();
+        let mut last = [0.0; 2];
+        for _ in 0..500 {
+            last = air.update(&level(), 0.01).unwrap();
+        }
+        assert!((last[0].to_degrees() - 3.0).abs() < 0.05 && last[1].abs() < 1e-6, "{last:?}");
+    }
+
+    #[test]
+    fn a_constant_wind_from_the_side_is_no_sideslip() {
+        let mut air = AirData::default();
+        let windy = Measured { velocity: [20.0, 8.0, 0.0], wind: [0.0, 8.0, 0.0], ..level() };
+        let last = (0..500).filter_map(|_| air.update(&windy, 0.01)).last().unwrap();
+        assert!(last[1].to_degrees().abs() < 0.1, "{last:?}");
+    }
+
+    #[test]
+    fn garbage_gives_no_angles_and_is_forgotten() {
+        let mut air = AirData::default();
+        air.update(&level(), 0.01).unwrap();
+        let bad = Measured { specific_force: [f64::NAN, 0.0, 0.0], ..level() };
+        assert_eq!(air.update(&bad, 0.01), None);
+        assert_eq!(air.update(&Measured { airspeed: 0.0, ..level() }, 0.01), None);
+        assert!(air.update(&level(), 0.01).unwrap()[0].to_degrees() < 4.0);
+        assert!(air.update(&level(), f64::NAN).is_some());
+    }
+}

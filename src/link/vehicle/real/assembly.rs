@@ -1,0 +1,333 @@
+//! One state out of streams that come apart: each attitude completes one.
+
+use std::time::Duration;
+
+use super::air_data::{AirData, Measured};
+use crate::link::vehicle::{Faults, Order, Telemetry, VehicleCounts, limits};
+use crate::link::wire::controller::ControllerMessage;
+use crate::link::wire::setpoint::euler;
+use crate::physics::actuators::Actuators;
+use crate::physics::airframe::ActuatorFigures;
+use crate::physics::atmosphere::{Atmosphere, Density};
+use crate::physics::{Command, Controls, State, Time};
+
+/// Time between states, µs.
+const PERIOD_US: u64 = 10_000;
+/// A clock that falls back by more than this has started anew, ms; less is a late datagram.
+const RESTART_MS: i32 = 1000;
+/// Age at which a part of the state is no longer of this moment.
+const STALE: Duration = Duration::from_millis(300);
+/// Sea-level density of the standard atmosphere, which equivalent airspeed refers to, kg/m³.
+const SEA_LEVEL: f64 = 1.225;
+/// Steps of the actuators made up for after a gap: a fifth of a second, longer than any transient.
+const CATCH_UP: u64 = 20;
+
+/// The last value of a stream with its arrival, host clock.
+type Heard<T> = Option<(Duration, T)>;
+
+/// The streams of a controller put together.
+#[derive(Clone, Debug)]
+pub(super) struct Assembly {
+    figures: ActuatorFigures,
+    specific_force: Heard<[f64; 3]>,
+    density: Heard<f64>,
+    /// Equivalent airspeed, altitude, climb rate.
+    air: Heard<[f64; 3]>,
+    incidence: Heard<[f64; 2]>,
+    estimator: AirData,
+    /// Whether the velocity has been told since the estimator last saw it.
+    new_velocity: bool,
+    actuators: Actuators,
+    boot_ms: Option<u32>,
+    last: Telemetry,
+    /// What the last state was made of, as bits: sensors that stand still give the same again.
+    shown: [u64; 13],
+    pub(super) counts: VehicleCounts,
+}
+
+impl Assembly {
+    pub(super) fn new(figures: ActuatorFigures) -> Self {
+        let nan = f64::NAN;
+        Assembly {
+            figures,
+            specific_force: None,
+            density: None,
+            air: None,
+            incidence: None,
+            estimator: AirData::default(),
+            new_velocity: false,
+            actuators: Actuators::at_rest(&Controls::default()),
+            boot_ms: None,
+            shown: [0; 13],
+            last: Telemetry {
+                time: Time::default(),
+                order: Order::First,
+                faults: Faults::NONE,
+                state: State::NEUTRAL,
+                yaw: 0.0,
+                specific_force: [0.0, 0.0, -9.81],
+                actuators: Default::default(),
+                altitude: 0.0,
+                position: [nan; 2],
+                velocity: [nan; 3],
+                wind: [nan; 3],
+            },
+            counts: VehicleCounts::default(),
+        }
+    }
+
+    /// Takes a measurement; an attitude completes a state. `command` is what the actuators have
+    /// been told since the last state.
+    pub(super) fn take(
+        &mut self,
+        host: Duration,
+        message: &ControllerMessage,
+        command: &Command,
+    ) -> Option<Telemetry> {
+        match *message {
+            ControllerMessage::Imu { specific_force, density, .. } => {
+                self.specific_force = Some((host, specific_force));
+                self.density = Some((host, density)).filter(|_| density.is_finite());
+            }
+            ControllerMessage::Air { airspeed, altitude, climb } => {
+                self.air = Some((host, [airspeed, altitude, climb]));
+            }
+            ControllerMessage::Incidence(angles) => self.incidence = Some((host, angles)),
+            ControllerMessage::Position { position, velocity } if limits::position(position) => {
+                (self.last.position, self.last.velocity) = (position, velocity);
+                self.new_velocity = true;
+            }
+            ControllerMessage::Wind(wind) if limits::wind(wind) => self.last.wind = wind,
+            ControllerMessage::Attitude { boot_ms, quaternion, rates } => {
+                return self.complete(host, boot_ms, quaternion, rates, command);
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// Body rates of the last state, rad/s.
+    pub(super) fn rates(&self) -> [f64; 3] {
+        [self.last.state.p, self.last.state.q, self.last.state.r]
+    }
+
+    fn complete(
+        &mut self,
+        host: Duration,
+        boot_ms: u32,
+        quaternion: [f64; 4],
+        rates: [f64; 3],
+        command: &Command,
+    ) -> Option<Telemetry> {
+        if self.specific_force.is_none() || self.air.is_none() {
+            self.counts.incomplete += 1;
+            return None;
+        }
+        let (time, order) = self.order(boot_ms);
+        let step = time.since(self.last.time);
+        let mut next = Telemetry { time, order, faults: Faults::NONE, ..self.last };
+        if matches!(order, Order::Late | Order::Repeated) {
+            return Some(next);
+        }
+        match euler(quaternion) {
+            Ok((roll, pitch, yaw)) => {
+                (next.state.roll, next.state.pitch, next.yaw) = (roll, pitch, yaw);
+            }
+            Err(_) => next.faults.insert(Faults::ATTITUDE),
+        }
+        match limits::rates(rates) {
+            true => [next.state.p, next.state.q, next.state.r] = rates,
+            false => next.faults.insert(Faults::RATES),
+        }
+        self.fill_force(host, &mut next);
+        let climb = self.fill_air(host, &mut next);
+        if self.stands_still(quaternion, rates) {
+            // The estimator would go on by itself, and hide from the pilot that nothing moves.
+            (next.state.alpha, next.state.beta) = (self.last.state.alpha, self.last.state.beta);
+        } else {
+            self.fill_incidence(host, &mut next, climb, step.as_secs_f64());
+        }
+        let steps = (step.as_micros() as u64 + PERIOD_US / 2) / PERIOD_US;
+        for _ in 0..steps.clamp(1, CATCH_UP) {
+            self.actuators.step(command, &self.figures);
+        }
+        next.actuators = self.actuators.observed(&self.figures);
+        self.counts.faulty += u64::from(!next.faults.is_empty());
+        self.last = next;
+        Some(next)
+    }
+
+    /// Whether every sensor shows to the bit what it showed at the last state.
+    fn stands_still(&mut self, quaternion: [f64; 4], rates: [f64; 3]) -> bool {
+        let force = self.specific_force.map_or([0.0; 3], |(_, force)| force);
+        let air = self.air.map_or([0.0; 3], |(_, air)| air);
+        let mut shown = [0; 13];
+        let values = quaternion.iter().chain(&rates).chain(&force).chain(&air);
+        shown.iter_mut().zip(values).for_each(|(to, x)| *to = x.to_bits());
+        std::mem::replace(&mut self.shown, shown) == shown
+    }
+
+    fn fill_force(&self, host: Duration, next: &mut Telemetry) {
+        match fresh(self.specific_force, host).filter(|force| limits::specific_force(*force)) {
+            Some(force) => next.specific_force = force,
+            None => next.faults.insert(Faults::SPECIFIC_FORCE),
+        }
+    }
+
+    /// True airspeed and altitude; gives the climb rate.
+    fn fill_air(&self, host: Duration, next: &mut Telemetry) -> f64 {
+        let Some([equivalent, altitude, climb]) = fresh(self.air, host) else {
+            next.faults.insert(Faults::AIR);
+            return f64::NAN;
+        };
+        let standard = || standard_density(altitude);
+        let density = fresh(self.density, host).unwrap_or_else(standard);
+        let airspeed = equivalent * (SEA_LEVEL / density).sqrt();
+        match limits::air(airspeed, altitude) {
+            true => (next.state.airspeed, next.altitude) = (airspeed, altitude),
+            false => next.faults.insert(Faults::AIR),
+        }
+        climb
+    }
+
+    fn fill_incidence(&mut self, host: Duration, next: &mut Telemetry, climb: f64, step: f64) {
+        let told = fresh(self.incidence, host).filter(|[a, b]| limits::incidence(*a, *b));
+        let s = &next.state;
+        let measured = Measured {
+            attitude: [s.roll, s.pitch, next.yaw],
+            rates: [s.p, s.q, s.r],
+            specific_force: next.specific_force,
+            airspeed: s.airspeed,
+            climb,
+            velocity: match std::mem::take(&mut self.new_velocity) {
+                true => next.velocity,
+                false => [f64::NAN; 3],
+            },
+            wind: next.wind,
+        };
+        // Kept running beside what is told, to be there when that ends.
+        let estimated = self.estimator.update(&measured, step);
+        let whole = !next.faults.contains(Faults::SPECIFIC_FORCE);
+        match told.or(estimated.filter(|_| whole)) {
+            Some([alpha, beta]) => (next.state.alpha, next.state.beta) = (alpha, beta),
+            None => next.faults.insert(Faults::INCIDENCE),
+        }
+    }
+
+    /// Vehicle time past the wrap of its milliseconds after 49 days, and how it stands to the last.
+    fn order(&mut self, boot_ms: u32) -> (Time, Order) {
+        let first = Time::from_micros(1000 * u64::from(boot_ms));
+        let Some(before) = self.boot_ms else {
+            return self.start(boot_ms, first);
+        };
+        let passed = boot_ms.wrapping_sub(before) as i32;
+        let past =
+            |ms: u64| Time::from_micros(self.last.time.as_micros().saturating_sub(1000 * ms));
+        match passed {
+            ..0 if passed < -RESTART_MS => self.start(boot_ms, first),
+            ..0 => {
+                self.counts.late += 1;
+                (past(u64::from(passed.unsigned_abs())), Order::Late)
+            }
+            0 => {
+                self.counts.repeated += 1;
+                (self.last.time, Order::Repeated)
+            }
+            1.. => {
+                self.boot_ms = Some(boot_ms);
+                let us = 1000 * passed as u64;
+                let lost = ((us + PERIOD_US / 2) / PERIOD_US).saturating_sub(1);
+                self.counts.lost += lost;
+                self.counts.states += 1;
+                let time = Time::from_micros(self.last.time.as_micros() + us);
+                (time, Order::Next { lost: u32::try_from(lost).unwrap_or(u32::MAX) })
+            }
+        }
+    }
+
+    fn start(&mut self, boot_ms: u32, time: Time) -> (Time, Order) {
+        self.boot_ms = Some(boot_ms);
+        self.estimator = AirData::default();
+        self.counts.starts += 1;
+        self.counts.states += 1;
+        (time, Order::First)
+    }
+}
+
+fn fresh<T: Copy>(heard: Heard<T>, host: Duration) -> Option<T> {
+    heard.filter(|(at, _)| host.saturating_sub(*at) <= STALE).map(|(_, value)| value)
+}
+
+fn standard_density(altitude: f64) -> f64 {
+    let altitude = if altitude.is_finite() { altitude.clamp(-1000.0, 11_000.0) } else { 0.0 };
+    Atmosphere { density: Density::Standard, gravity: 9.806 }.density_at(altitude)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::Airframe;
+    use std::path::Path;
+
+    fn assembly() -> Assembly {
+        let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
+        Assembly::new(airframe.actuators)
+    }
+
+    fn attitude(boot_ms: u32) -> ControllerMessage {
+        ControllerMessage::Attitude { boot_ms, quaternion: [1.0, 0.0, 0.0, 0.0], rates: [0.0; 3] }
+    }
+
+    fn fed(assembly: &mut Assembly, host: Duration) {
+        let imu = ControllerMessage::Imu {
+            time: Time::default(),
+            specific_force: [0.0, 0.0, -9.81],
+            density: 1.0,
+        };
+        let air = ControllerMessage::Air { airspeed: 20.0, altitude: 600.0, climb: 0.0 };
+        assembly.take(host, &imu, &Command::IDLE);
+        assembly.take(host, &air, &Command::IDLE);
+    }
+
+    #[test]
+    fn milliseconds_wrap_after_49_days_without_a_step_in_time() {
+        let mut assembly = assembly();
+        let host = Duration::from_secs(1);
+        fed(&mut assembly, host);
+        let mut times = Vec::new();
+        for i in 0..10u32 {
+            let boot = (u32::MAX - 45).wrapping_add(10 * i);
+            let state = assembly.take(host, &attitude(boot), &Command::IDLE).unwrap();
+            times.push(state.time.as_micros());
+        }
+        assert!(times.windows(2).all(|w| w[1] - w[0] == 10_000), "{times:?}");
+        assert_eq!((assembly.counts.starts, assembly.counts.lost), (1, 0));
+    }
+
+    #[test]
+    fn a_clock_that_starts_again_is_a_new_start_and_a_late_frame_is_not() {
+        let mut assembly = assembly();
+        let host = Duration::from_secs(1);
+        fed(&mut assembly, host);
+        let orders: Vec<_> = [50_000, 50_010, 50_000, 50_030, 40]
+            .map(|ms| assembly.take(host, &attitude(ms), &Command::IDLE).unwrap().order)
+            .into();
+        let next = |lost| Order::Next { lost };
+        assert_eq!(orders, [Order::First, next(0), Order::Late, next(1), Order::First]);
+    }
+
+    #[test]
+    fn equivalent_airspeed_becomes_true_and_a_stale_one_a_fault() {
+        let mut assembly = assembly();
+        let host = Duration::from_secs(1);
+        assert!(assembly.take(host, &attitude(10), &Command::IDLE).is_none());
+        fed(&mut assembly, host);
+        let state = assembly.take(host, &attitude(20), &Command::IDLE).unwrap();
+        // √(1.225 / 1.0)
+        assert!((state.state.airspeed - 20.0 * 1.106_797).abs() < 1e-4);
+        assert!(state.faults.is_empty(), "{}", state.faults);
+        let late = host + STALE + Duration::from_millis(1);
+        let state = assembly.take(late, &attitude(30), &Command::IDLE).unwrap();
+        assert!(state.faults.contains(Faults::AIR) && state.faults.contains(Faults::INCIDENCE));
+    }
+}

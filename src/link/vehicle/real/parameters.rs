@@ -1,0 +1,196 @@
+//! The controller's parameters: read one by one, checked against what the profile needs.
+
+use std::time::Duration;
+
+use super::profile::{Need, Rule};
+
+/// Between two requests for the same parameter.
+const AGAIN: Duration = Duration::from_millis(400);
+/// Requests in flight at once: a slow link is not flooded.
+const AT_ONCE: usize = 4;
+/// Requests for one name before it counts as unknown to the controller.
+const TRIES: u32 = 5;
+/// Pulse widths that a channel can have, µs.
+const PULSE: std::ops::RangeInclusive<f64> = 800.0..=2200.0;
+
+/// What is known of one rule's parameter.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    rule: &'static Rule,
+    value: Option<(usize, f64)>,
+    tries: u32,
+    asked: Option<Duration>,
+}
+
+/// The parameters of a profile, as far as the controller has told them.
+#[derive(Clone, Debug)]
+pub struct Parameters {
+    entries: Vec<Entry>,
+}
+
+/// How a parameter stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Standing {
+    /// Not told yet.
+    Unread,
+    /// The controller does not answer for it.
+    Unknown,
+    /// As needed.
+    Good(f64),
+    /// Not as needed.
+    Bad(f64),
+}
+
+impl Parameters {
+    pub(super) fn new(rules: &'static [Rule]) -> Self {
+        let entry = |rule| Entry { rule, value: None, tries: 0, asked: None };
+        Parameters { entries: rules.iter().map(entry).collect() }
+    }
+
+    /// Forgets what was told, as when the controller has started anew.
+    pub(super) fn forget(&mut self) {
+        for entry in &mut self.entries {
+            (entry.value, entry.tries, entry.asked) = (None, 0, None);
+        }
+    }
+
+    /// The names to ask for at `host`.
+    pub(super) fn due(&mut self, host: Duration) -> Vec<&'static str> {
+        let mut names = Vec::new();
+        for entry in &mut self.entries {
+            let waits = entry.asked.is_some_and(|asked| host.saturating_sub(asked) < AGAIN);
+            let limit = TRIES * entry.rule.names.len() as u32;
+            if entry.value.is_some() || waits || entry.tries >= limit || names.len() >= AT_ONCE {
+                continue;
+            }
+            let turn = entry.tries as usize % entry.rule.names.len();
+            entry.tries += 1;
+            entry.asked = Some(host);
+            names.push(entry.rule.names[turn]);
+        }
+        names
+    }
+
+    /// Takes a value; values of parameters that nobody asked for are of no interest.
+    pub(super) fn take(&mut self, name: &str, value: f64) {
+        for entry in &mut self.entries {
+            if let Some(at) = entry.rule.names.iter().position(|known| *known == name) {
+                entry.value = Some((at, value));
+            }
+        }
+    }
+
+    /// The value of a parameter, once read.
+    pub(super) fn get(&self, name: &str) -> Option<f64> {
+        let entry = self.entries.iter().find(|entry| entry.rule.names.contains(&name))?;
+        entry.value.map(|(_, value)| value)
+    }
+
+    /// Each parameter by the name that the controller knows it by, with how it stands and the words
+    /// that say what to do.
+    pub fn report(&self, system: u8) -> Vec<(&'static str, Standing, String)> {
+        self.entries.iter().map(|entry| entry.report(system)).collect()
+    }
+
+    /// Why the profile cannot be flown with these parameters, each mismatch with its remedy.
+    pub(super) fn obstacle(&self, system: u8) -> Option<String> {
+        let report = self.report(system);
+        let unread = report.iter().filter(|(_, standing, _)| *standing == Standing::Unread).count();
+        if unread > 0 {
+            return Some(format!("still reading {unread} parameters from the controller"));
+        }
+        let bad: Vec<String> = report
+            .into_iter()
+            .filter(|(_, standing, _)| matches!(standing, Standing::Bad(_) | Standing::Unknown))
+            .map(|(.., words)| words)
+            .collect();
+        (!bad.is_empty()).then(|| bad.join("; "))
+    }
+}
+
+impl Entry {
+    fn standing(&self, system: u8) -> Standing {
+        let limit = TRIES * self.rule.names.len() as u32;
+        match self.value {
+            None if self.tries >= limit => Standing::Unknown,
+            None => Standing::Unread,
+            Some((_, value)) if self.rule.need.allows(value, system) => Standing::Good(value),
+            Some((_, value)) => Standing::Bad(value),
+        }
+    }
+
+    fn report(&self, system: u8) -> (&'static str, Standing, String) {
+        let name = self.rule.names[self.value.map_or(0, |(at, _)| at)];
+        let remedy =
+            if self.rule.need == Need::OurSystem { f64::from(system) } else { self.rule.remedy };
+        let standing = self.standing(system);
+        let words = match standing {
+            Standing::Good(value) => format!("{name} is {value}"),
+            Standing::Bad(value) => {
+                format!("{name} is {value}: set it to {remedy} ({})", self.rule.why)
+            }
+            Standing::Unread => format!("{name} is not read yet"),
+            Standing::Unknown => format!(
+                "{name} is unknown to the controller: its firmware is not one that this profile fits"
+            ),
+        };
+        (name, standing, words)
+    }
+}
+
+impl Need {
+    fn allows(self, value: f64, system: u8) -> bool {
+        match self {
+            Need::OneOf(values) => values.contains(&value),
+            Need::Between(low, high) => (low - 1e-6..=high + 1e-6).contains(&value),
+            Need::OurSystem => value == f64::from(system),
+            Need::Pulse => PULSE.contains(&value),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::profile::{Authority, Stack};
+    use super::*;
+
+    fn answered(change: impl Fn(&str) -> Option<f64>) -> Parameters {
+        let mut parameters = Parameters::new(Stack::Ardupilot.rules(Authority::Surfaces));
+        for step in 0..100 {
+            for name in parameters.due(AGAIN * step) {
+                let rule = Stack::Ardupilot.rules(Authority::Surfaces);
+                let rule = rule.iter().find(|rule| rule.names.contains(&name)).unwrap();
+                if let Some(value) =
+                    change(name).or((name != "MAV_GCS_SYSID").then_some(rule.remedy))
+                {
+                    parameters.take(name, value);
+                }
+            }
+        }
+        parameters
+    }
+
+    #[test]
+    fn the_remedies_themselves_are_accepted_by_an_older_name_too() {
+        let parameters = answered(|_| None);
+        assert_eq!(parameters.obstacle(1), None);
+        assert_eq!(parameters.get("MAV_GCS_SYSID"), Some(1.0));
+    }
+
+    #[test]
+    fn a_mismatch_is_said_with_the_value_to_set() {
+        let parameters = answered(|name| (name == "RC_OVERRIDE_TIME").then_some(3.0));
+        let words = parameters.obstacle(1).unwrap();
+        assert!(words.contains("RC_OVERRIDE_TIME is 3: set it to 0.5"), "{words}");
+        let words = parameters.obstacle(7).unwrap();
+        assert!(words.contains("SYSID_MYGCS is 1: set it to 7"), "{words}");
+    }
+
+    #[test]
+    fn a_controller_that_does_not_answer_is_named() {
+        let mut parameters = Parameters::new(Stack::Px4.rules(Authority::Attitude));
+        assert!(parameters.obstacle(1).unwrap().contains("still reading 2"));
+        (0..100).for_each(|step| drop(parameters.due(AGAIN * step)));
+        assert!(parameters.obstacle(1).unwrap().contains("COM_OF_LOSS_T is unknown"));
+    }
+}

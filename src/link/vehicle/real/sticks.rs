@@ -1,0 +1,142 @@
+//! Commands as sticks: thousandths for PX4, pulse widths for ArduPilot.
+
+use super::parameters::Parameters;
+use crate::physics::Command;
+
+/// Rounds to whole counts and carries what was cut off over to the next command, so that the mean
+/// of what is sent is what was meant.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rounding(f64);
+
+impl Rounding {
+    fn round(&mut self, wanted: f64, low: f64, high: f64) -> f64 {
+        let whole = (wanted + self.0).round().clamp(low, high);
+        // What a stop cuts off is not owed.
+        self.0 = (wanted + self.0 - whole).clamp(-0.5, 0.5);
+        whole
+    }
+}
+
+/// The roundings of aileron, elevator, throttle.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sticks([Rounding; 3]);
+
+/// A channel's pulse widths, µs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Channel {
+    low: f64,
+    centre: f64,
+    high: f64,
+    reversed: bool,
+}
+
+impl Channel {
+    /// The pulse for a deflection of −1..1, before rounding.
+    fn pulse(&self, deflection: f64) -> f64 {
+        let x = if self.reversed { -deflection } else { deflection };
+        let half = if x > 0.0 { self.high - self.centre } else { self.centre - self.low };
+        self.centre + half * x
+    }
+
+    /// The pulse for a throttle of 0..1, before rounding.
+    fn range(&self, throttle: f64) -> f64 {
+        let share = if self.reversed { 1.0 - throttle } else { throttle };
+        self.low + (self.high - self.low) * share
+    }
+}
+
+impl Sticks {
+    /// x (+ nose down), y (+ right) and z of MANUAL_CONTROL, in thousandths.
+    ///
+    /// PX4 in MANUAL: roll torque = y · FW_MAN_R_SC + TRIM_ROLL, pitch torque (nose up) =
+    /// −x · FW_MAN_P_SC + TRIM_PITCH.
+    pub(super) fn thousandths(&mut self, command: &Command, parameters: &Parameters) -> [i16; 3] {
+        let read = |name: &str, default: f64| parameters.get(name).unwrap_or(default);
+        let roll = (command.aileron - read("TRIM_ROLL", 0.0)) / read("FW_MAN_R_SC", 1.0);
+        let pitch = (command.elevator + read("TRIM_PITCH", 0.0)) / read("FW_MAN_P_SC", 1.0);
+        let [a, e, t] = &mut self.0;
+        [
+            e.round(1000.0 * pitch, -1000.0, 1000.0) as i16,
+            a.round(1000.0 * roll, -1000.0, 1000.0) as i16,
+            t.round(1000.0 * command.throttle, 0.0, 1000.0) as i16,
+        ]
+    }
+
+    /// Pulse widths of channels 1 to 3, µs, by RCn_MIN, RCn_TRIM, RCn_MAX, RCn_REVERSED.
+    ///
+    /// ArduPilot's pitch stick is positive nose up, against our elevator.
+    pub(super) fn pulses(&mut self, command: &Command, parameters: &Parameters) -> [u16; 3] {
+        let [one, two, three] = [1, 2, 3].map(|n| channel(n, parameters));
+        let wanted = [
+            one.pulse(command.aileron),
+            two.pulse(-command.elevator),
+            three.range(command.throttle),
+        ];
+        let channels = [one, two, three];
+        std::array::from_fn(|i| {
+            self.0[i].round(wanted[i], channels[i].low, channels[i].high) as u16
+        })
+    }
+}
+
+fn channel(number: usize, parameters: &Parameters) -> Channel {
+    let read =
+        |name: &str, default: f64| parameters.get(&format!("RC{number}_{name}")).unwrap_or(default);
+    let (low, high) = (read("MIN", 1100.0), read("MAX", 1900.0));
+    Channel {
+        low,
+        centre: read("TRIM", 1500.0).clamp(low, high.max(low)),
+        high: high.max(low),
+        reversed: read("REVERSED", 0.0) == 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::profile::{Authority, Stack};
+    use super::*;
+
+    #[test]
+    fn the_mean_of_what_is_sent_is_what_was_meant() {
+        let parameters = Parameters::new(Stack::Px4.rules(Authority::Surfaces));
+        let command = Command { aileron: 0.123_45, elevator: -0.067_89, throttle: 0.333_33 };
+        let mut sticks = Sticks::default();
+        let mut sums = [0.0; 3];
+        for _ in 0..1000 {
+            let sent = sticks.thousandths(&command, &parameters);
+            sums.iter_mut().zip(sent).for_each(|(sum, x)| *sum += f64::from(x));
+        }
+        for (sum, wanted) in sums.iter().zip([command.elevator, command.aileron, command.throttle])
+        {
+            // Half a count, carried over a thousand commands.
+            assert!((sum * 1e-6 - wanted).abs() < 1e-6, "{sum} for {wanted}");
+        }
+    }
+
+    #[test]
+    fn pulses_follow_the_channels_ends_trim_and_reversal() {
+        let mut parameters = Parameters::new(Stack::Ardupilot.rules(Authority::Surfaces));
+        for (name, value) in [
+            ("RC1_MIN", 1000.0),
+            ("RC1_TRIM", 1450.0),
+            ("RC1_MAX", 2000.0),
+            ("RC1_REVERSED", 1.0),
+            ("RC2_MIN", 1100.0),
+            ("RC2_TRIM", 1500.0),
+            ("RC2_MAX", 1900.0),
+            ("RC2_REVERSED", 0.0),
+            ("RC3_MIN", 1000.0),
+            ("RC3_MAX", 2000.0),
+            ("RC3_REVERSED", 0.0),
+        ] {
+            parameters.take(name, value);
+        }
+        let sent = |aileron: f64, elevator: f64, throttle: f64| {
+            Sticks::default().pulses(&Command { aileron, elevator, throttle }, &parameters)
+        };
+        assert_eq!(sent(0.0, 0.0, 0.0), [1450, 1500, 1000]);
+        // Right aileron on a reversed channel is a shorter pulse; elevator down is stick forward.
+        assert_eq!(sent(1.0, 1.0, 1.0), [1000, 1100, 2000]);
+        assert_eq!(sent(-1.0, -0.5, 0.25), [2000, 1700, 1250]);
+    }
+}

@@ -1,0 +1,308 @@
+//! The messages between the companion and a real flight controller.
+
+use mavlink::Message as _;
+use mavlink::dialects::ardupilotmega::{
+    AttitudeTargetTypemask, HEARTBEAT_DATA, MANUAL_CONTROL_DATA, MavAutopilot, MavMessage,
+    MavModeFlag, MavState, MavType, PARAM_REQUEST_READ_DATA, RC_CHANNELS_OVERRIDE_DATA,
+    SET_ATTITUDE_TARGET_DATA, TIMESYNC_DATA,
+};
+
+use super::fields::Fields;
+use super::{Frame, Message, decode, setpoint};
+use crate::link::framing::Source;
+use crate::physics::Time;
+
+/// MAV_CMD_DO_SET_MODE.
+pub const SET_MODE: u16 = 176;
+/// MAV_CMD_SET_MESSAGE_INTERVAL.
+const SET_MESSAGE_INTERVAL: u16 = 511;
+
+/// A message from a flight controller, in SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ControllerMessage {
+    /// HEARTBEAT.
+    Heartbeat {
+        /// MAV_AUTOPILOT: 12 is PX4, 3 ArduPilot, 8 nobody.
+        autopilot: u8,
+        /// Whether MAV_MODE_FLAG_SAFETY_ARMED is set.
+        armed: bool,
+        /// The stack's own number of its mode.
+        custom_mode: u32,
+    },
+    /// ATTITUDE_QUATERNION.
+    Attitude {
+        /// Time since boot, ms, modulo 2³².
+        boot_ms: u32,
+        /// NED→FRD, w first.
+        quaternion: [f64; 4],
+        /// p, q, r, rad/s.
+        rates: [f64; 3],
+    },
+    /// HIGHRES_IMU.
+    Imu {
+        /// Time of the measurement.
+        time: Time,
+        /// Specific force, m/s², FRD.
+        specific_force: [f64; 3],
+        /// Air density by static pressure and temperature, kg/m³; NaN when they are not given.
+        density: f64,
+    },
+    /// VFR_HUD.
+    Air {
+        /// Equivalent airspeed (calibrated, on PX4), m/s.
+        airspeed: f64,
+        /// Altitude above mean sea level, m.
+        altitude: f64,
+        /// Climb rate, m/s.
+        climb: f64,
+    },
+    /// AOA_SSA: angle of attack, sideslip, rad.
+    Incidence([f64; 2]),
+    /// GLOBAL_POSITION_INT.
+    Position {
+        /// Latitude and longitude, degrees.
+        position: [f64; 2],
+        /// Velocity over ground, NED, m/s.
+        velocity: [f64; 3],
+    },
+    /// WIND_COV, or ArduPilot's WIND: the air's velocity, NED, m/s.
+    Wind([f64; 3]),
+    /// COMMAND_ACK.
+    Ack {
+        /// MAV_CMD.
+        command: u16,
+        /// MAV_RESULT, 0 is accepted.
+        result: u8,
+    },
+    /// PARAM_VALUE, its value read as its type and the sender's habit say.
+    Parameter {
+        /// Its name.
+        name: String,
+        /// The field as a number: how ArduPilot sends integers.
+        cast: f64,
+        /// The field as the bytes of its type: how PX4 sends them.
+        bytewise: f64,
+    },
+    /// STATUSTEXT.
+    Text {
+        /// MAV_SEVERITY, 0 is the worst.
+        severity: u8,
+        /// The words of one chunk.
+        words: String,
+    },
+    /// A reply to TIMESYNC: our own time, ns, as we sent it.
+    TimeSync {
+        /// What we sent.
+        ours: i64,
+    },
+}
+
+/// Gas constant of dry air, J/(kg K).
+const AIR: f64 = 287.053;
+
+/// Decodes a frame from a flight controller; `None` for what no profile uses.
+pub fn read(frame: &Frame<'_>) -> Option<ControllerMessage> {
+    let fields = Fields(frame.payload);
+    match frame.id {
+        // By offset: their enumerations grow with every release.
+        0 => {
+            return Some(ControllerMessage::Heartbeat {
+                autopilot: fields.u8(5),
+                armed: fields.u8(6) & 128 != 0,
+                custom_mode: fields.u32(0),
+            });
+        }
+        22 => return Some(parameter(fields)),
+        77 => {
+            return Some(ControllerMessage::Ack { command: fields.u16(0), result: fields.u8(2) });
+        }
+        253 => {
+            let words: Vec<u8> =
+                fields.bytes::<50>(1).into_iter().take_while(|b| *b != 0).collect();
+            let words = String::from_utf8_lossy(&words).into_owned();
+            return Some(ControllerMessage::Text { severity: fields.u8(0), words });
+        }
+        _ => {}
+    }
+    measured(decode(frame)?)
+}
+
+fn parameter(fields: Fields<'_>) -> ControllerMessage {
+    let name: Vec<u8> = fields.bytes::<16>(8).into_iter().take_while(|b| *b != 0).collect();
+    let cast = f64::from(fields.f32(0));
+    let bytewise = match fields.u8(24) {
+        1 => f64::from(fields.u8(0)),
+        2 => f64::from(fields.u8(0) as i8),
+        3 => f64::from(fields.u16(0)),
+        4 => f64::from(fields.u16(0) as i16),
+        5 => f64::from(fields.u32(0)),
+        6 => f64::from(fields.i32(0)),
+        _ => cast,
+    };
+    ControllerMessage::Parameter {
+        name: String::from_utf8_lossy(&name).into_owned(),
+        cast,
+        bytewise,
+    }
+}
+
+fn measured(message: MavMessage) -> Option<ControllerMessage> {
+    let wide = |x: f32| f64::from(x);
+    Some(match message {
+        MavMessage::ATTITUDE_QUATERNION(m) => ControllerMessage::Attitude {
+            boot_ms: m.time_boot_ms,
+            quaternion: [m.q1, m.q2, m.q3, m.q4].map(wide),
+            rates: [m.rollspeed, m.pitchspeed, m.yawspeed].map(wide),
+        },
+        MavMessage::HIGHRES_IMU(m) => ControllerMessage::Imu {
+            time: Time::from_micros(m.time_usec),
+            specific_force: [m.xacc, m.yacc, m.zacc].map(wide),
+            density: density(wide(m.abs_pressure), wide(m.temperature)),
+        },
+        MavMessage::VFR_HUD(m) => ControllerMessage::Air {
+            airspeed: wide(m.airspeed),
+            altitude: wide(m.alt),
+            climb: wide(m.climb),
+        },
+        MavMessage::AOA_SSA(m) => {
+            ControllerMessage::Incidence([m.AOA, m.SSA].map(|x| wide(x).to_radians()))
+        }
+        MavMessage::GLOBAL_POSITION_INT(m) => ControllerMessage::Position {
+            position: [m.lat, m.lon].map(|x| f64::from(x) * 1e-7),
+            velocity: [m.vx, m.vy, m.vz].map(|x| f64::from(x) * 1e-2),
+        },
+        MavMessage::WIND_COV(m) => {
+            ControllerMessage::Wind([m.wind_x, m.wind_y, m.wind_z].map(wide))
+        }
+        MavMessage::WIND(m) => {
+            // The direction that it comes from.
+            let (sin, cos) = wide(m.direction).to_radians().sin_cos();
+            let speed = wide(m.speed);
+            ControllerMessage::Wind([-speed * cos, -speed * sin, wide(m.speed_z)])
+        }
+        // A reply carries the other side's time.
+        MavMessage::TIMESYNC(m) if m.tc1 != 0 => ControllerMessage::TimeSync { ours: m.ts1 },
+        _ => return None,
+    })
+}
+
+/// Air density by pressure (hPa) and temperature (°C), kg/m³; NaN outside the lower atmosphere.
+fn density(pressure: f64, temperature: f64) -> f64 {
+    let believable = (200.0..=1100.0).contains(&pressure) && (-80.0..=85.0).contains(&temperature);
+    if believable { 100.0 * pressure / (AIR * (temperature + 273.15)) } else { f64::NAN }
+}
+
+/// Whom a frame is for, as far as its message tells: system and component, 0 for all.
+pub fn recipient(frame: &Frame<'_>) -> (u8, u8) {
+    decode(frame).map_or((0, 0), |message| {
+        (message.target_system_id().unwrap_or(0), message.target_component_id().unwrap_or(0))
+    })
+}
+
+/// Whether a message steers: while we have the helm, others must not reach the controller.
+/// MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, SET_ATTITUDE_TARGET, SET_POSITION_TARGET_*.
+pub fn steers(id: u32) -> bool {
+    matches!(id, 69 | 70 | 82 | 84 | 86 | 139)
+}
+
+/// SETUP_SIGNING, which holds a secret key and is never passed on.
+pub const SETUP_SIGNING: u32 = 256;
+
+/// HEARTBEAT of an onboard computer.
+pub fn heartbeat(engaged: bool) -> Message {
+    Message::coded(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        custom_mode: 0,
+        mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+        base_mode: MavModeFlag::empty(),
+        system_status: match engaged {
+            true => MavState::MAV_STATE_ACTIVE,
+            false => MavState::MAV_STATE_STANDBY,
+        },
+        mavlink_version: 3,
+    }))
+}
+
+/// COMMAND_LONG, written by hand so that no enumeration limits its number.
+fn command(to: Source, number: u16, params: [f32; 3]) -> Message {
+    let mut payload = Vec::with_capacity(33);
+    params.iter().for_each(|p| payload.extend(p.to_le_bytes()));
+    payload.extend([0; 16]);
+    payload.extend(number.to_le_bytes());
+    payload.extend([to.system, to.component, 0]);
+    Message::raw(76, payload, 33)
+}
+
+/// Asks for a message every `interval_us` microseconds.
+pub fn message_interval(to: Source, id: u32, interval_us: f32) -> Message {
+    command(to, SET_MESSAGE_INTERVAL, [id as f32, interval_us, 0.0])
+}
+
+/// Asks for a mode: the stack's own number, and its sub mode where it has them.
+pub fn set_mode(to: Source, main: u8, sub: u8) -> Message {
+    // MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
+    command(to, SET_MODE, [1.0, f32::from(main), f32::from(sub)])
+}
+
+/// PARAM_REQUEST_READ by name.
+pub fn parameter_request(to: Source, name: &str) -> Message {
+    Message::coded(MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
+        param_index: -1,
+        target_system: to.system,
+        target_component: to.component,
+        param_id: name.into(),
+    }))
+}
+
+/// MANUAL_CONTROL: pitch (+ nose down), roll (+ right), throttle in thousandths.
+pub fn manual_control(to: Source, [x, y, z]: [i16; 3]) -> Message {
+    Message::coded(MavMessage::MANUAL_CONTROL(MANUAL_CONTROL_DATA {
+        x,
+        y,
+        z,
+        target: to.system,
+        ..MANUAL_CONTROL_DATA::DEFAULT
+    }))
+}
+
+/// RC_CHANNELS_OVERRIDE of the first three channels, µs; 0 gives a channel back to the radio.
+pub fn channels_override(to: Source, [one, two, three]: [u16; 3]) -> Message {
+    // 65535 leaves a channel alone.
+    let rest = u16::MAX;
+    Message::coded(MavMessage::RC_CHANNELS_OVERRIDE(RC_CHANNELS_OVERRIDE_DATA {
+        chan1_raw: one,
+        chan2_raw: two,
+        chan3_raw: three,
+        chan4_raw: rest,
+        chan5_raw: rest,
+        chan6_raw: rest,
+        chan7_raw: rest,
+        chan8_raw: rest,
+        target_system: to.system,
+        target_component: to.component,
+        ..RC_CHANNELS_OVERRIDE_DATA::DEFAULT
+    }))
+}
+
+/// SET_ATTITUDE_TARGET: roll and pitch (rad) at yaw zero, with thrust 0..1; rates are ignored.
+pub fn attitude_target(to: Source, time_ms: u32, [roll, pitch]: [f64; 2], thrust: f64) -> Message {
+    Message::coded(MavMessage::SET_ATTITUDE_TARGET(SET_ATTITUDE_TARGET_DATA {
+        time_boot_ms: time_ms,
+        target_system: to.system,
+        target_component: to.component,
+        type_mask: AttitudeTargetTypemask::from_bits_truncate(1 | 2 | 4),
+        q: setpoint::quaternion([roll, pitch, 0.0]).map(|x| x as f32),
+        thrust: thrust as f32,
+        ..SET_ATTITUDE_TARGET_DATA::DEFAULT
+    }))
+}
+
+/// TIMESYNC request with our time, ns.
+pub fn time_sync(ours: i64, to: Source) -> Message {
+    Message::coded(MavMessage::TIMESYNC(TIMESYNC_DATA {
+        tc1: 0,
+        ts1: ours,
+        target_system: to.system,
+        target_component: to.component,
+    }))
+}

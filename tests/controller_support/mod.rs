@@ -1,0 +1,135 @@
+//! A companion at a played flight controller, in lockstep in this process.
+#![allow(dead_code)] // each test that includes this module uses its part
+
+use std::time::Duration;
+
+use greylag::commands::fly::crew;
+use greylag::control::Kind;
+use greylag::flight::desk::Desk;
+use greylag::flight::pilot::Decision;
+use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
+use greylag::link::vehicle::{Authority, Profile, Real, Stack, Telemetry, Vehicle};
+use greylag_sitl::plant::{PlantOptions, Start, Truth};
+use greylag_sitl::shim::controller::FlightController;
+use greylag_sitl::shim::{Launch, Personality, ShimOptions};
+
+use crate::flight_support::x8;
+
+pub const STEP: Duration = Duration::from_millis(10);
+
+/// The profile that fits a personality.
+pub fn profile(personality: Personality, authority: Authority) -> Profile {
+    let stack = match personality {
+        Personality::Px4 => Stack::Px4,
+        Personality::Ardupilot => Stack::Ardupilot,
+    };
+    Profile { stack, authority, actuators: x8().airframe.actuators }
+}
+
+/// What the bench saw at one state.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    pub state: Telemetry,
+    pub truth: Truth,
+    pub decision: Decision,
+}
+
+pub struct Bench {
+    pub desk: Desk,
+    pub controller: FlightController,
+    pub host: Duration,
+    pub seen: Vec<Seen>,
+    /// Bytes on their way to the controller.
+    up: Vec<u8>,
+    /// The wire is cut.
+    pub cut: bool,
+}
+
+impl Bench {
+    pub fn new(
+        personality: Personality,
+        authority: Authority,
+        change: impl FnOnce(&mut ShimOptions),
+    ) -> Self {
+        let mut options = ShimOptions::new(PlantOptions::default(), Start::NEUTRAL);
+        options.launch = Launch::Immediate;
+        change(&mut options);
+        let vehicle = Vehicle::Real(Box::new(Real::new(profile(personality, authority))));
+        Bench {
+            desk: Desk::new(crew(Kind::Lqi, x8()).unwrap(), vehicle),
+            controller: FlightController::new(personality, &options).unwrap(),
+            host: Duration::from_secs(1),
+            seen: Vec::new(),
+            up: Vec::new(),
+            cut: false,
+        }
+    }
+
+    pub fn step(&mut self) {
+        let mut down = Vec::new();
+        self.controller.show(&mut down);
+        let truth = self.controller.measured();
+        if !self.cut {
+            let seen = &mut self.seen;
+            self.desk.hear(self.host, &down, &mut self.up, |state, decision| {
+                seen.push(Seen { state: *state, truth, decision: *decision });
+            });
+        }
+        self.desk.poll(self.host, &mut self.up);
+        let up = std::mem::take(&mut self.up);
+        if !self.cut {
+            self.controller.hear(&up);
+        }
+        assert_eq!(self.controller.fly().unwrap(), None, "the flight is over");
+        self.host += STEP;
+    }
+
+    pub fn run(&mut self, seconds: f64) {
+        (0..(seconds * 100.0) as usize).for_each(|_| self.step());
+    }
+
+    /// Arms the companion and enters OFFBOARD at an attitude.
+    pub fn engage(&mut self, roll_deg: f64, pitch_deg: f64) {
+        assert_eq!(self.desk.arm(self.host), Verdict::Accepted, "{:?}", self.texts());
+        self.wish(roll_deg, pitch_deg);
+        let now = self.desk.now(self.host);
+        assert_eq!(self.desk.pilot().set_mode(now, Mode::Offboard), Verdict::Accepted);
+    }
+
+    pub fn wish(&mut self, roll_deg: f64, pitch_deg: f64) {
+        let setpoint = AttitudeSetpoint {
+            roll: roll_deg.to_radians(),
+            pitch: pitch_deg.to_radians(),
+            thrust: None,
+        };
+        let now = self.desk.now(self.host);
+        self.desk.pilot().attitude_setpoint(now, setpoint);
+    }
+
+    /// Flies an attitude for some seconds, with setpoints at 10 Hz.
+    pub fn steer(&mut self, roll_deg: f64, pitch_deg: f64, seconds: f64) {
+        for _ in 0..(seconds * 10.0) as usize {
+            self.wish(roll_deg, pitch_deg);
+            self.run(0.1);
+        }
+    }
+
+    pub fn texts(&self) -> Vec<String> {
+        self.desk.texts.iter().map(|text| text.words.clone()).collect()
+    }
+
+    pub fn said(&self, words: &str) -> bool {
+        self.texts().iter().any(|text| text.contains(words))
+    }
+
+    /// Mean of roll and pitch RMSE of the truth over the last two seconds, degrees.
+    pub fn settled_deg(&self, roll_deg: f64, pitch_deg: f64) -> f64 {
+        let last = &self.seen[self.seen.len() - 200..];
+        let rmse = |error: &dyn Fn(&Truth) -> f64| {
+            let sum: f64 = last.iter().map(|seen| error(&seen.truth).powi(2)).sum();
+            (sum / last.len() as f64).sqrt()
+        };
+        0.5 * (rmse(&|t| t.roll_rad.to_degrees() - roll_deg)
+            + rmse(&|t| t.pitch_rad.to_degrees() - pitch_deg))
+    }
+}

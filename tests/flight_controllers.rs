@@ -1,0 +1,243 @@
+//! The companion at played PX4 and ArduPilot controllers, in lockstep in this process.
+#![cfg(feature = "sitl")]
+
+mod controller_support;
+mod flight_support;
+
+use controller_support::{Bench, STEP};
+use greylag::link::autopilot::Verdict;
+use greylag::link::vehicle::Authority;
+use greylag_sitl::air::{Air, Turbulence};
+use greylag_sitl::shim::controller::Mode;
+use greylag_sitl::shim::{Distortion, Noise, Personality};
+
+use Authority::{Attitude, Surfaces};
+use Personality::{Ardupilot, Px4};
+
+/// Roll and pitch in degrees: of the easy box, and one of the hard corners.
+const TARGETS: [(f64, f64); 3] = [(30.0, 10.0), (-20.0, -5.0), (-55.0, -20.0)];
+
+/// A bench that has read its controller's parameters, has its streams, flies by itself.
+fn ready(personality: Personality, authority: Authority) -> Bench {
+    let mut bench = Bench::new(personality, authority, |_| {});
+    bench.run(6.0);
+    bench
+}
+
+#[test]
+fn an_attitude_is_held_through_every_stack() {
+    // The bounds of issue 8: 0.3° through PX4's sticks at 100 Hz, 0.6° through ArduPilot's channels
+    // at 50 Hz, 0.1° when a controller of its own tracks the attitude. The hard corner is shown only.
+    for (personality, authority, bound) in [
+        (Px4, Surfaces, 0.3),
+        (Ardupilot, Surfaces, 0.6),
+        (Px4, Attitude, 0.1),
+        (Ardupilot, Attitude, 0.1),
+    ] {
+        for (i, (roll, pitch)) in TARGETS.into_iter().enumerate() {
+            let mut bench = ready(personality, authority);
+            bench.engage(roll, pitch);
+            bench.steer(roll, pitch, 14.0);
+            let settled = bench.settled_deg(roll, pitch);
+            println!("{personality} {authority:?} {roll}, {pitch}: settled error {settled:.4} deg");
+            assert!(bench.said("engaged"), "{:?}", bench.texts());
+            assert!(i == 2 || settled < bound, "{:?}", bench.texts());
+        }
+    }
+}
+
+#[test]
+fn angles_of_attack_and_sideslip_are_estimated() {
+    // Calm air with perfect sensors; then light turbulence with a wind of 7 m/s and noisy sensors.
+    for (name, rough) in [("calm", false), ("wind, turbulence, noise", true)] {
+        let mut bench = Bench::new(Px4, Surfaces, |options| {
+            if rough {
+                options.noise = Noise::REALISTIC;
+                options.plant.air = Air {
+                    wind_ned_mps: [5.0, -5.0, 0.0],
+                    turbulence: Some(Turbulence { wind_20ft_mps: 15.0, severity: 3 }),
+                    gusts: vec![],
+                };
+            }
+        });
+        bench.run(6.0);
+        bench.engage(0.0, 3.0);
+        for (roll, pitch) in [(0.0, 3.0), (40.0, 5.0), (-40.0, 10.0), (0.0, -10.0), (20.0, 0.0)] {
+            bench.steer(roll, pitch, 6.0);
+        }
+        let flown = &bench.seen[600..];
+        let rms = |error: &dyn Fn(usize) -> f64| {
+            ((0..flown.len()).map(|i| error(i).powi(2)).sum::<f64>() / flown.len() as f64).sqrt()
+        };
+        let alpha = rms(&|i| (flown[i].state.state.alpha - flown[i].truth.alpha_rad).to_degrees());
+        let beta = rms(&|i| (flown[i].state.state.beta - flown[i].truth.beta_rad).to_degrees());
+        println!(
+            "{name}: alpha rms {alpha:.2} deg, beta rms {beta:.2} deg over {} s",
+            flown.len() / 100
+        );
+        // What the LQI can bear, and a tenth of the range in the manoeuvres: 1° calm. In turbulence
+        // the vertical gusts themselves, 1 m/s in 20, are 3°, of which a filter sees a part.
+        let bound = if rough { 2.5 } else { 1.0 };
+        assert!(alpha < bound && beta < bound);
+    }
+}
+
+#[test]
+fn parameters_that_do_not_fit_are_said_with_the_value_to_set() {
+    for (personality, authority, name, value, words) in [
+        (Px4, Surfaces, "COM_RC_IN_MODE", 0.0, "COM_RC_IN_MODE is 0: set it to 1"),
+        (Px4, Surfaces, "FW_MAN_R_SC", 0.5, "FW_MAN_R_SC is 0.5: set it to 1"),
+        (Px4, Attitude, "COM_OF_LOSS_T", 5.0, "COM_OF_LOSS_T is 5: set it to 0.5"),
+        (Ardupilot, Surfaces, "MAV_GCS_SYSID", 255.0, "MAV_GCS_SYSID is 255: set it to 1"),
+        (Ardupilot, Surfaces, "RC_OVERRIDE_TIME", 3.0, "RC_OVERRIDE_TIME is 3: set it to 0.5"),
+        (Ardupilot, Attitude, "SCHED_LOOP_RATE", 50.0, "SCHED_LOOP_RATE is 50: set it to 200"),
+    ] {
+        let mut bench = Bench::new(personality, authority, |options| {
+            options.parameters = vec![(name.into(), value)];
+        });
+        bench.run(6.0);
+        let Verdict::Rejected(said) = bench.desk.arm(bench.host) else { panic!("{name} accepted") };
+        assert!(said.contains(words), "{said}");
+        bench.run(1.0);
+        assert_eq!(bench.controller.mode(), Mode::Hold, "{name}");
+    }
+}
+
+#[test]
+fn a_controller_of_another_stack_is_refused_by_name() {
+    let mut bench = Bench::new(Px4, Surfaces, |_| {});
+    bench.controller = Bench::new(Ardupilot, Surfaces, |_| {}).controller;
+    bench.run(3.0);
+    let Verdict::Rejected(said) = bench.desk.arm(bench.host) else { panic!() };
+    assert!(said.contains("ArduPilot: fly it with --profile ardupilot"), "{said}");
+}
+
+#[test]
+fn a_disarmed_controller_is_not_engaged() {
+    let mut bench = ready(Px4, Surfaces);
+    bench.controller.arm(false);
+    bench.run(2.0);
+    let Verdict::Rejected(said) = bench.desk.arm(bench.host) else { panic!() };
+    assert!(said.contains("not armed"), "{said}");
+}
+
+#[test]
+fn a_wire_that_is_cut_hands_the_aircraft_back_and_only_a_request_takes_it_again() {
+    for (personality, authority) in
+        [(Px4, Surfaces), (Ardupilot, Surfaces), (Px4, Attitude), (Ardupilot, Attitude)]
+    {
+        let mut bench = ready(personality, authority);
+        bench.engage(30.0, 5.0);
+        bench.steer(30.0, 5.0, 4.0);
+        bench.cut = true;
+        let cut = bench.host;
+        while !bench.said("handed back") {
+            bench.step();
+        }
+        let took = bench.host - cut;
+        println!("{personality} {authority:?}: handed back {took:?} after the cut");
+        // Issue 8: within half a second of a dead link.
+        assert!(took.as_secs_f64() <= 0.5);
+        bench.run(3.0);
+        // The controller's own failsafe, but for GUIDED, which ArduPilot leaves by itself never.
+        let mode = bench.controller.mode();
+        let guided = (personality, authority) == (Ardupilot, Attitude);
+        assert!(guided || matches!(mode, Mode::Hold | Mode::Return), "{mode:?}");
+        bench.cut = false;
+        bench.run(6.0);
+        assert_ne!(bench.controller.mode(), Mode::Manual);
+        let level = bench.controller.measured().roll_rad.to_degrees().abs();
+        assert!(level < 5.0, "{level}");
+        // It goes on when asked.
+        bench.engage(10.0, 3.0);
+        bench.steer(10.0, 3.0, 8.0);
+        assert!(bench.settled_deg(10.0, 3.0) < 0.6, "{:?}", bench.texts());
+    }
+}
+
+#[test]
+fn a_pilot_who_takes_the_aircraft_keeps_it() {
+    let mut bench = ready(Px4, Surfaces);
+    bench.engage(20.0, 5.0);
+    bench.steer(20.0, 5.0, 3.0);
+    bench.controller.set_mode(Mode::Return);
+    bench.run(2.0);
+    assert!(bench.said("left MANUAL"), "{:?}", bench.texts());
+    bench.steer(20.0, 5.0, 3.0);
+    assert_eq!(bench.controller.mode(), Mode::Return);
+}
+
+#[test]
+fn lost_setpoints_hand_the_aircraft_back() {
+    let mut bench = ready(Ardupilot, Surfaces);
+    bench.engage(20.0, 5.0);
+    bench.steer(20.0, 5.0, 3.0);
+    bench.run(3.0);
+    assert!(bench.said("setpoints lost") && bench.said("handed back"), "{:?}", bench.texts());
+    assert_eq!(bench.controller.mode(), Mode::Hold);
+}
+
+#[test]
+fn a_disarmed_companion_gives_the_aircraft_back_at_once() {
+    use greylag::link::autopilot::Autopilot;
+    let mut bench = ready(Px4, Surfaces);
+    bench.engage(20.0, 5.0);
+    bench.steer(20.0, 5.0, 2.0);
+    let now = bench.desk.now(bench.host);
+    assert_eq!(bench.desk.pilot().disarm(now, true), Verdict::Accepted);
+    let begun = bench.host;
+    while bench.controller.mode() != Mode::Hold {
+        bench.step();
+        assert!(bench.host - begun < 20 * STEP, "not handed back");
+    }
+}
+
+#[test]
+fn wrong_signs_are_found_gently_and_refused() {
+    for (personality, name, value, words) in [
+        (Px4, "PWM_MAIN_REV", 1.0, "rolls left"),
+        (Px4, "PWM_MAIN_REV", 2.0, "pitches up"),
+        (Ardupilot, "SERVO1_REVERSED", 1.0, "rolls left"),
+        (Ardupilot, "SERVO2_REVERSED", 1.0, "pitches up"),
+    ] {
+        let mut bench = Bench::new(personality, Surfaces, |options| {
+            options.parameters = vec![(name.into(), value)];
+            options.noise = Noise::REALISTIC;
+        });
+        bench.run(6.0);
+        bench.engage(0.0, 3.0);
+        let from = bench.seen.len();
+        bench.steer(0.0, 3.0, 3.0);
+        assert!(bench.said(words), "{name}: {:?}", bench.texts());
+        assert_eq!(bench.controller.mode(), Mode::Hold);
+        let worst = |angle: &dyn Fn(&controller_support::Seen) -> f64| {
+            bench.seen[from..].iter().map(|s| angle(s).to_degrees().abs()).fold(0.0, f64::max)
+        };
+        let (roll, pitch) = (worst(&|s| s.truth.roll_rad), worst(&|s| s.truth.pitch_rad));
+        println!(
+            "{personality} {name} {value}: {roll:.1} deg of roll, {pitch:.1} deg of pitch at most"
+        );
+        // Two opposite pulses of 0.15 s, then the controller has it again.
+        assert!(roll < 10.0 && pitch < 15.0);
+    }
+}
+
+#[test]
+fn sensors_that_stand_still_hand_the_aircraft_back() {
+    // Found by `greylag faults`: the estimator of the incidence went on by itself, so that the state
+    // never repeated, and the aircraft was rolled over.
+    for personality in [Px4, Ardupilot] {
+        let mut bench = Bench::new(personality, Surfaces, |o| o.noise = Noise::REALISTIC);
+        bench.run(6.0);
+        bench.engage(30.0, 5.0);
+        bench.steer(30.0, 5.0, 1.0);
+        bench.controller.distort(Distortion { frozen: true, ..Distortion::default() });
+        bench.steer(30.0, 5.0, 1.5);
+        bench.run(1.0);
+        assert!(bench.said("handed back"), "{:?}", bench.texts());
+        assert_eq!(bench.controller.mode(), Mode::Hold);
+        let worst = bench.seen.iter().map(|s| s.truth.roll_rad.abs()).fold(0.0, f64::max);
+        println!("{personality}: {:.0} deg of roll at most", worst.to_degrees());
+        assert!(worst.to_degrees() < 60.0);
+    }
+}
