@@ -73,7 +73,7 @@ impl Bench {
         let model = load(&text.map_err(|why| anyhow!("making the model: {why}"))?)?;
         let trial = Trial { seed: *seed, missing: missing.clone(), turbulence: None };
         let logs = trial.fly(self.controller.as_ref())?;
-        let testing = if case.part == "nulls" { &[][..] } else { &logs.testing };
+        let testing = if case.factor == 0.0 { &[][..] } else { &logs.testing };
         let all = |logs: &[Log]| logs.iter().map(|log| rebuilt(log, &model)).collect::<Result<_>>();
         let (training, testing) = (all(&logs.training)?, all(testing)?);
         Ok(Flown { model, training, testing, seconds: begun.elapsed().as_secs_f64() })
@@ -104,7 +104,7 @@ fn fill(record: &mut Record, case: &Case, flown: &Flown, bench: &Bench) -> Resul
     let answer = ask(&flown.model, &flown.training, case, bench.nulls)?;
     record.seconds.diagnose = begun.elapsed().as_secs_f64();
     answer.write_into(record);
-    if case.part == "nulls" {
+    if case.factor == 0.0 {
         return Ok(());
     }
     let begun = Instant::now();
