@@ -77,7 +77,10 @@ pub struct Record {
     pub minimum_detectable: BTreeMap<String, f64>,
     /// Parameters of true effects that were asserted.
     pub parameters: Vec<Found>,
-    /// Errors on held-out flights.
+    /// Effects that could not be fitted, with the reason.
+    #[serde(default)]
+    pub unfitted: Vec<String>,
+    /// Errors on held-out flights; none if the truth could not be fitted.
     pub held_out: Option<HeldOut>,
     /// How long it took.
     pub seconds: Seconds,

@@ -14,8 +14,9 @@ pub(super) const OFFSETS: [usize; SENSORS - 1] = [2, 3, 4, 5, 6, 7];
 /// The airspeed among the eight states.
 pub(super) const AIRSPEED: usize = 2;
 
-/// Least standard deviation of the actuators' clock, s.
-pub(super) const SKEW_LEAST: f64 = 3e-4;
+/// Least standard deviation of the actuators' clock as forces tell it, s (0.3 ms root mean square against the
+/// truth of simulated flights).
+pub(super) const SKEW_LEAST: f64 = 5e-4;
 /// Standard deviation of the actuators' clock against the gyros', s: that of ±1.5 samples, both of
 /// them late by 0 to 10 ms or the like.
 const SKEW_SD: f64 = 7.7e-3;

@@ -18,7 +18,7 @@ use super::result::{FittedFlight, FlightEstimate, Parameter};
 use super::shooting::{self, Shot};
 use crate::model::GreyBox;
 use crate::num::statistics::quantile;
-use crate::sysid::diagnose::clocks;
+use crate::sysid::diagnose::clocks::{self, Clocks};
 
 /// Shortest flight to fit to, s.
 pub const LEAST_S: f64 = 10.0;
@@ -110,14 +110,17 @@ pub fn fit(
         return Err(AmendError::NothingFree { model: name() });
     }
     progress(&format!("{}: equation error over {} flight(s)", model.name, flights.len()));
-    let theta = equation_error::start(model, &free, flights);
     let clocks = match free.iter().any(|f| f.input && f.added) {
         true => clocks(model, &free, flights),
         false => None,
     };
+    let theta = match &clocks {
+        Some(clocks) => values(&clocks.model, &free),
+        None => equation_error::start(model, &free, flights),
+    };
     let mut search = Search::new(model, flights, free, theta);
     if let Some(clocks) = clocks {
-        search.set_clocks(&clocks);
+        search.set_clocks(&clocks.late);
     }
     for (k, length_s) in options.lengths_s.iter().enumerate() {
         progress(&format!("{}: output error over {length_s} s", model.name));
@@ -132,10 +135,16 @@ pub fn fit(
 }
 
 /// The actuators' clocks with an effect on the deflections in the model, which free runs cannot tell from it.
-fn clocks(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Option<Vec<[f64; 2]>> {
+fn clocks(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Option<Clocks> {
     let given = free.iter().filter(|f| f.added).map(|f| f.index).min()?;
     let flights: Vec<_> = flights.iter().map(|f| (&f.prepared, &f.forces)).collect();
-    clocks::actuators_late(model, given, &flights)
+    clocks::clocks(model, given, &flights)
+}
+
+/// The free coefficients as `model` has them, within their bounds.
+fn values(model: &GreyBox, free: &[Free]) -> Vec<f64> {
+    let of = |f: &Free| model.coefficients()[f.index].value.clamp(f.bounds.0, f.bounds.1);
+    free.iter().map(of).collect()
 }
 
 /// A search under way.

@@ -31,14 +31,17 @@ impl Doubt {
     }
 }
 
-/// How late each flight's actuators are recorded, s, with its standard deviation, under `model`, whose first
-/// `given` coefficients have their prior widths and whose others have none; `None` if the flights do not hold
-/// the model at all.
-pub fn actuators_late(
-    model: &GreyBox,
-    given: usize,
-    flights: &[(&Prepared, &Doubt)],
-) -> Option<Vec<[f64; 2]>> {
+/// A model as forces and moments have it, with the clocks that go with it.
+pub struct Clocks {
+    /// The model with its coefficients fitted.
+    pub model: GreyBox,
+    /// How late each flight's actuators are recorded, s, with standard deviation.
+    pub late: Vec<[f64; 2]>,
+}
+
+/// Fits `model`, whose first `given` coefficients have their prior widths and whose others have none, together
+/// with the clocks of `flights`; `None` if they do not hold the model at all.
+pub fn clocks(model: &GreyBox, given: usize, flights: &[(&Prepared, &Doubt)]) -> Option<Clocks> {
     let problem = Problem {
         flights: flights.iter().map(|(flight, _)| (*flight).clone()).collect(),
         prior: model.coefficients().iter().take(given).map(|c| (c.value, c.width())).collect(),
@@ -53,5 +56,6 @@ pub fn actuators_late(
     let last = sensors::NAMES[SENSORS - 1];
     let p = &round.projected;
     let clocks = round.known.iter().enumerate().filter(|(_, known)| known.name.starts_with(last));
-    Some(clocks.map(|(k, _)| [p.tuned[k], p.covariance[(k, k)].max(0.0).sqrt()]).collect())
+    let late = clocks.map(|(k, _)| [p.tuned[k], p.covariance[(k, k)].max(0.0).sqrt()]).collect();
+    Some(Clocks { model: round.tuned(), late })
 }

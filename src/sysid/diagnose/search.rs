@@ -25,6 +25,9 @@ const CONTENDING_LIKENESS: f64 = 0.6;
 const CONTENDERS: usize = 4;
 /// Part of what is to be removed from its channels that an effect may leave there.
 const LEFT: f64 = 0.3;
+/// Precision of the formula of an effect that is not linear in its constants: whatever takes a smaller part of
+/// what such an effect took before may be no more than its error.
+const PRECISION: f64 = 2e-3;
 /// A candidate whose contribution is this much like another's can take its place.
 const RIVAL: f64 = 0.3;
 
@@ -51,6 +54,8 @@ pub struct Selected {
     pub refused: Vec<String>,
     /// Whether it takes too little of the error to matter, whatever else speaks against it.
     pub slight: bool,
+    /// Whether it is not linear in its constants.
+    pub curved: bool,
     /// What it added to the residual, fitted, flight by flight.
     pub contribution: Vec<super::gather::Column>,
 }
@@ -211,6 +216,13 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
             100.0 * SELECTED
         ));
     }
+    if let Some(earlier) = found.selected.iter().find(|s| s.curved && hides(s, score)) {
+        refused.push(format!(
+            "it takes less than {:.1} % of what {} took, whose formula is no more precise",
+            100.0 * PRECISION,
+            earlier.id
+        ));
+    }
     let by_flight = checks::by_flight(round, trial, score);
     let first = trial.points[score.point].free[0].0;
     if checks::contradict(score.values[first], &by_flight) {
@@ -228,8 +240,14 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
         channels: round.channels_of(score),
         refused,
         slight,
+        curved: trial.points[score.point].contribution.is_some(),
         contribution,
     })
+}
+
+/// Whether `score` may be an error of what has been selected before.
+fn hides(earlier: &Selected, score: &Score) -> bool {
+    score.fall < PRECISION * earlier.score.fall
 }
 
 /// `current` without the effect `id`, which `given` does not have either.
@@ -300,7 +318,6 @@ impl Found {
             let significant =
                 effect.channels.iter().any(|c| after.removable[*c] > after.threshold[*c]);
             let least = own(&after.removable);
-            eprintln!("JUDGE {} fall {:.0} before {:.0} after {:.0} thr {:.0} excess {:.0} -> {:.0} order {:?}", effect.id, effect.score.fall, own(&before.removable), least, own(&after.threshold), checks::excess(&self.first, &std::array::from_fn(|c| effect.channels.contains(&c))), checks::excess(round, &std::array::from_fn(|c| effect.channels.contains(&c))), checks::left(round, &effect.channels, effect.score.fall));
             let share = least / own(&before.removable).max(least + effect.score.fall).max(1.0);
             if significant && share > LEFT {
                 effect.refused.push(format!(
