@@ -98,7 +98,9 @@ fn main() -> Result<()> {
     if !arguments.table {
         let bench = Bench::new(arguments.simulated_nulls)?;
         // amplitudes of the other parts hang on what the nulls could have seen
-        for parts in [[Part::Nulls, Part::Probes].as_slice(), &[Part::Effects, Part::Without, Part::Pairs]] {
+        for parts in
+            [[Part::Nulls, Part::Probes].as_slice(), &[Part::Effects, Part::Without, Part::Pairs]]
+        {
             let done = record::load(&arguments.results)?;
             let seen = Seen::of(&done);
             let mut cases: Vec<Case> =

@@ -211,4 +211,13 @@ mod tests {
         assert_eq!(Missing::new("time_delay", 0.0234).unwrap().amplitude, 0.02);
         assert!(Missing::new("flutter", 1.0).unwrap_err().to_string().contains("dead_zone"));
     }
+
+    #[test]
+    fn clear_amplitudes_can_be_flown() {
+        for kind in KINDS.iter().filter(|kind| kind.id != "rate_limit") {
+            assert!(kind.clear.iter().all(|x| x.abs() <= kind.most()), "{}", kind.id);
+        }
+        let limit = Kind::from_id("rate_limit").unwrap();
+        assert!(limit.clear.iter().all(|x| *x >= limit.most()));
+    }
 }

@@ -622,8 +622,10 @@ impl<'a> Search<'a> {
     }
 
     fn notes(&self, weakened: usize, unsettled: &Option<String>) -> Vec<String> {
-        let mut notes: Vec<String> =
-            unsettled.iter().map(|why| format!("{why}; all intervals are widened by that")).collect();
+        let mut notes: Vec<String> = unsettled
+            .iter()
+            .map(|why| format!("{why}; all intervals are widened by that"))
+            .collect();
         if weakened > 0 {
             notes.push(format!(
                 "{weakened} of {} shots stray far from the flight (stall, spin, gusts) and were cut \

@@ -71,7 +71,12 @@ pub fn columns(
         .flat_map(|e| {
             let own = refined.iter().filter(|(id, _)| *id == e.about.id).map(|(_, v)| v.clone());
             let listed = starts(e).iter().map(|s| s.to_vec());
-            smaller(e).into_iter().chain(listed).chain(own).map(|values| (*e, values)).collect::<Vec<_>>()
+            smaller(e)
+                .into_iter()
+                .chain(listed)
+                .chain(own)
+                .map(|values| (*e, values))
+                .collect::<Vec<_>>()
         })
         .collect();
     let made: Vec<Option<Vec<Vec<Column>>>> =

@@ -19,10 +19,9 @@ const BOOTSTRAPS: u64 = 82;
 pub const ALIKE: f64 = 0.9;
 /// Nor those whose evidence is this close.
 pub const CLOSE: f64 = 10.0;
-/// Square of the noise per row as the tuned model leaves it where nothing is missing, 1 being what the rich fit
-/// leaves: that fit follows some of the noise, which stands in its columns too (1.15 to 1.35 in flights without
-/// a missing effect).
-const FEIGNED: f64 = 1.2;
+/// Squared error per row beyond the noise that the rich fit leaves in flights without a missing effect: that fit
+/// follows some of the noise, which stands in its columns too (0.15 to 0.35).
+const FEIGNED: f64 = 0.2;
 /// How much that may be off.
 const UNSURE: f64 = 0.2;
 /// Standard deviations of the noise's square beyond which what an effect leaves is no chance.
@@ -68,9 +67,9 @@ pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
 /// that is more than chance leaves; `fall` is what the effect took.
 pub fn left(round: &Round, channels: &[usize], fall: f64) -> Option<f64> {
     let own: [bool; 6] = std::array::from_fn(|c| channels.contains(&c));
-    let left = excess(round, &own);
-    // the square of white noise scatters by √(2n)
     let rows = rows(round, &own);
+    let left = excess(round, &own) - FEIGNED * rows;
+    // the square of white noise scatters by √(2n)
     let beyond_doubt = left > f64::max(DOUBT * (2.0 * rows).sqrt(), UNSURE * rows);
     beyond_doubt.then(|| left / (left + fall))
 }
@@ -81,7 +80,7 @@ pub fn excess(round: &Round, channels: &[bool; 6]) -> f64 {
     let of = |sums: &[(f64, usize); 6]| -> f64 {
         (0..6).filter(|c| channels[*c]).map(|c| sums[c].0).sum()
     };
-    blocks.map(of).sum::<f64>() - FEIGNED * rows(round, channels)
+    blocks.map(of).sum::<f64>() - rows(round, channels)
 }
 
 /// Rows in `channels`.

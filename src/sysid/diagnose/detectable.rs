@@ -149,7 +149,8 @@ fn operators(round: &Round, threshold: f64) -> Vec<(&'static str, f64)> {
         if open.is_empty() {
             break;
         }
-        let ratios = ratios(round, threshold, &open.iter().map(|k| &sought[*k]).collect::<Vec<_>>());
+        let ratios =
+            ratios(round, threshold, &open.iter().map(|k| &sought[*k]).collect::<Vec<_>>());
         let Some(ratios) = ratios else { break };
         open.iter().zip(ratios).for_each(|(k, ratio)| sought[*k].tried(ratio));
     }
@@ -182,4 +183,46 @@ fn ratios(round: &Round, threshold: f64, sought: &[&Sought]) -> Option<Vec<f64>>
         shown.map_or(0.0, |shown| 1.0 / (shown.alone * shown.needed(threshold)))
     };
     Some(sought.iter().enumerate().map(one).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::inputs::Kind;
+
+    /// Seeks the amount of the effect `id` whose evidence, a power of its size, is as much as needed at `amount`.
+    fn sought(id: &str, amount: f64, power: f64) -> Option<f64> {
+        let entry = Entry { about: Kind::from_id(id)?.describe(), operator: true };
+        let id = entry.about.id;
+        let trial = Trial { id, points: Vec::new(), support: 100.0, channels: [true; 6] };
+        let mut sought = Sought::new(&entry, &trial)?;
+        let size = sought.turned(amount);
+        for _ in 0..TRIED {
+            if sought.found.is_none() {
+                let ratio = (sought.size / size).powf(power);
+                sought.tried(ratio);
+            }
+        }
+        sought.amount()
+    }
+
+    #[test]
+    fn the_amount_is_found_however_fast_the_evidence_grows() {
+        // a lag beside a late clock grows with its square, a dead zone straight
+        for (id, amount) in [("actuator_lag", 2e-3), ("dead_zone", 1e-4), ("backlash", 0.1)] {
+            for power in [1.0, 2.0] {
+                let found = sought(id, amount, power).unwrap();
+                assert!((found / amount - 1.0).abs() < 1.1 * CLOSE, "{id}: {found} for {amount}");
+            }
+        }
+        // a lower limit is more of it
+        let found = sought("rate_limit", 3.0, 2.0).unwrap();
+        assert!((found / 3.0 - 1.0).abs() < 1.1 * CLOSE, "{found}");
+    }
+
+    #[test]
+    fn what_never_shows_has_no_amount() {
+        // its evidence is 1 % of what is needed at the largest lag there is
+        assert_eq!(sought("actuator_lag", 20.0, 2.0), None);
+    }
 }
