@@ -2,6 +2,7 @@
 
 use crate::sysid::compare::CompareError;
 use crate::sysid::compare::flight::Prepared;
+use crate::sysid::diagnose::clocks::Doubt;
 use crate::sysid::reconstruction::Reconstruction;
 
 /// Constants of a flight's sensors that are estimated along.
@@ -13,6 +14,9 @@ pub(super) const OFFSETS: [usize; SENSORS - 1] = [2, 3, 4, 5, 6, 7];
 /// The airspeed among the eight states.
 pub(super) const AIRSPEED: usize = 2;
 
+/// Least standard deviation of the actuators' clock as forces tell it, s (0.3 ms root mean square against the
+/// truth of simulated flights).
+pub(super) const SKEW_LEAST: f64 = 5e-4;
 /// Standard deviation of the actuators' clock against the gyros', s: that of ±1.5 samples, both of
 /// them late by 0 to 10 ms or the like.
 const SKEW_SD: f64 = 7.7e-3;
@@ -31,6 +35,8 @@ pub struct Flight {
     /// Standard deviations of the actuators' delay (s), the airspeed's scale (a share), the biases of
     /// p, q, r (rad/s), α and β (rad) that the reconstruction has left.
     pub doubt: [f64; SENSORS],
+    /// What forces and moments are judged by.
+    pub(super) forces: Doubt,
 }
 
 impl Flight {
@@ -45,7 +51,9 @@ impl Flight {
             let stated = stated.filter(|sd| sd.is_finite() && *sd > 0.0);
             doubt[k + 1] = stated.unwrap_or(default).clamp(0.1 * default, 20.0 * default);
         }
-        Ok(Flight { prepared: Prepared::new(flight, slowest)?, doubt })
+        let prepared = Prepared::new(flight, slowest)?;
+        let forces = Doubt::of(flight, prepared.dt);
+        Ok(Flight { prepared, doubt, forces })
     }
 
     /// Seconds flown.
