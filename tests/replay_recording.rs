@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use controller_support::profile;
 use flight_support::*;
-use greylag::commands::fly::crew;
+use greylag::commands::fly::{POLICY, crew};
 use greylag::control::Kind;
 use greylag::flight::recorder::Place;
 use greylag::flight::replay::{Outcome, replay};
@@ -26,7 +26,7 @@ use shim_support::Shim;
 
 /// Replays with a fresh LQI.
 fn again(folder: &Path, vehicle: Vehicle) -> Outcome {
-    replay(folder, crew(Kind::Lqi, x8()).unwrap(), vehicle).unwrap()
+    replay(folder, crew(Kind::Lqi, x8(), Path::new(POLICY)).unwrap(), vehicle).unwrap()
 }
 
 fn sitl() -> Vehicle {
@@ -65,7 +65,7 @@ fn a_flight_with_everything_in_it_replays_to_the_bit() {
     assert!(outcome.ticks > 500 && !outcome.cut_short, "{outcome:?}");
     assert_eq!((outcome.different, outcome.plans_different, outcome.without_state), (0, 0, 0));
     // Another controller gives other commands: the comparison can fail.
-    let other = replay(&folder, crew(Kind::PidRetuned, x8()).unwrap(), sitl()).unwrap();
+    let other = replay(&folder, crew(Kind::PidRetuned, x8(), Path::new(POLICY)).unwrap(), sitl()).unwrap();
     assert!(other.different > 300, "{other:?}");
 }
 

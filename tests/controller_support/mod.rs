@@ -1,9 +1,10 @@
 //! A companion at a played flight controller, in lockstep in this process.
 #![allow(dead_code)] // each test that includes this module uses its part
 
+use std::path::Path;
 use std::time::Duration;
 
-use greylag::commands::fly::crew;
+use greylag::commands::fly::{POLICY, crew};
 use greylag::control::Kind;
 use greylag::flight::desk::Desk;
 use greylag::flight::pilot::Decision;
@@ -56,7 +57,7 @@ impl Bench {
         change(&mut options);
         let vehicle = Vehicle::Real(Box::new(Real::new(profile(personality, authority))));
         Bench {
-            desk: Desk::new(crew(Kind::Lqi, x8()).unwrap(), vehicle),
+            desk: Desk::new(crew(Kind::Lqi, x8(), Path::new(POLICY)).unwrap(), vehicle),
             controller: FlightController::new(personality, &options).unwrap(),
             host: Duration::from_secs(1),
             seen: Vec::new(),
