@@ -5,7 +5,9 @@ mod learn_support;
 
 use greylag::learn::score::free_run;
 use greylag::learn::windows::Track;
-use greylag::learn::{Checkpoint, Criterion, JXZ, Learned, Recipe, Start, TrainError, Trainer, export};
+use greylag::learn::{
+    Checkpoint, Criterion, JXZ, Learned, Recipe, Start, TrainError, Trainer, export,
+};
 use greylag::model::{GreyBox, Integrator};
 use learn_support::{flight, model};
 

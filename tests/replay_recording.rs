@@ -65,7 +65,8 @@ fn a_flight_with_everything_in_it_replays_to_the_bit() {
     assert!(outcome.ticks > 500 && !outcome.cut_short, "{outcome:?}");
     assert_eq!((outcome.different, outcome.plans_different, outcome.without_state), (0, 0, 0));
     // Another controller gives other commands: the comparison can fail.
-    let other = replay(&folder, crew(Kind::PidRetuned, x8(), Path::new(POLICY)).unwrap(), sitl()).unwrap();
+    let other =
+        replay(&folder, crew(Kind::PidRetuned, x8(), Path::new(POLICY)).unwrap(), sitl()).unwrap();
     assert!(other.different > 300, "{other:?}");
 }
 

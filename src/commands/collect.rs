@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             let flight = explore(simulator, planner, &place)?;
             save(&flight, &path)?;
             let done = flown.fetch_add(1, Ordering::Relaxed) + 1;
-            if done % 25 == 0 {
+            if done.is_multiple_of(25) {
                 eprintln!("{done} episodes flown");
             }
             Ok(())

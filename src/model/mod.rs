@@ -15,9 +15,9 @@ pub mod weights;
 #[cfg(feature = "learn")]
 pub(crate) use forces::Starting;
 pub use grey_box::{GreyBox, Named};
-pub use integrator::{Integrator, Memory, STEP, Twin};
 #[cfg(feature = "learn")]
 pub(crate) use integrator::advance_jsbsim;
+pub use integrator::{Integrator, Memory, STEP, Twin};
 pub use join::JoinError;
 pub use linear::{Linear, linearise};
 pub use residual::Residual;

@@ -250,7 +250,8 @@ mod tests {
     fn inputs_are_of_order_one_and_know_no_attitude() {
         let model = model();
         let scales = Scales::new(&model.airframe, model.scale());
-        let controls = Controls { aileron: 0.5235, elevator: -0.5235, throttle: 1.0 };
+        let stop = model.airframe.actuators.deflection_max;
+        let controls = Controls { aileron: stop, elevator: -stop, throttle: 1.0 };
         let stall = State { airspeed: 1.25 * 16.67, alpha: 0.2, beta: -0.2, ..State::NEUTRAL };
         let there = scales.inputs(&stall, &controls);
         for (x, expected) in there.iter().zip([1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0]) {

@@ -163,11 +163,7 @@ pub fn state_rate<R: Real>(
 /// The acceleration in body axes (m/s²) that changes airspeed, α and β at the rates of `rate`: what
 /// [`state_rate`] makes of acceleration, turned round.
 #[inline(always)]
-pub fn acceleration_of<R: Real>(
-    state: &State<R>,
-    air: &AirData<R>,
-    rate: &State<R>,
-) -> Vector<R> {
+pub fn acceleration_of<R: Real>(state: &State<R>, air: &AirData<R>, rate: &State<R>) -> Vector<R> {
     let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
     let across = state.airspeed * rate.beta;
     let forward = rate.airspeed * cos_beta - across * sin_beta;

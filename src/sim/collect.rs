@@ -77,12 +77,12 @@ impl Wander {
         let mut rng = place.stream(ACTIONS);
         let size = rng.random_range(0.1..0.8);
         let throttle = rng.random_range(0.1..0.7);
-        Wander { held: place.episode % 2 == 0, size, throttle, now: [0.0; 3], rng }
+        Wander { held: place.episode.is_multiple_of(2), size, throttle, now: [0.0; 3], rng }
     }
 
     fn next(&mut self, step: usize) -> Command {
         let memory = if self.held { 0.0 } else { MEMORY };
-        if !self.held || step % HELD == 0 {
+        if !self.held || step.is_multiple_of(HELD) {
             for x in &mut self.now {
                 let drive: f64 = StandardNormal.sample(&mut self.rng);
                 *x = memory * *x + (1.0 - memory * memory).sqrt() * drive;
@@ -114,7 +114,7 @@ pub fn explore(
     let mut random = true;
     let mut samples = Vec::with_capacity(STEPS + 1);
     for step in 0..STEPS {
-        if step % HELD == 0 {
+        if step.is_multiple_of(HELD) {
             random = choices.random_bool(place.random_part());
         }
         let wandering = wander.next(step);

@@ -135,6 +135,7 @@ fn fly<const FUSED: bool>(
 ///
 /// [`Integrator::Jsbsim`]: crate::model::Integrator::Jsbsim
 #[inline(always)]
+#[expect(clippy::needless_range_loop, reason = "the last pass of the loop has no actions")]
 fn rollout<const FUSED: bool>(
     scene: &Scene,
     actions: Actions,
@@ -187,11 +188,12 @@ fn rollout<const FUSED: bool>(
         }
         let mut chosen = [Lanes::zero(); 3];
         // plain loops: an iterator that is not inlined leaves the vector instructions
+        let given = &mut block[step];
         for i in 0..3 {
-            chosen[i] = Lanes(block[step][i]);
+            chosen[i] = Lanes(given[i]);
             if actions == Actions::Policy {
                 chosen[i] = (chosen[i] + advised[i]).clamp(-1.0, 1.0);
-                block[step][i] = chosen[i].0;
+                given[i] = chosen[i].0;
             }
         }
         let mut controls = actuators.controls();
