@@ -37,7 +37,10 @@ fn imagine(model: GreyBox) {
     }
     let rate = f64::from(rounds * 64) / start.elapsed().as_secs_f64();
     let [episodes, lost] = world.episodes();
-    println!("imagined steps:   {:.2} million a second ({episodes} episodes, {lost} lost)", rate / 1e6);
+    println!(
+        "imagined steps:   {:.2} million a second ({episodes} episodes, {lost} lost)",
+        rate / 1e6
+    );
 }
 
 /// The time of one decision in flight.

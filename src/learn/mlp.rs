@@ -45,6 +45,11 @@ impl Mlp {
         Mlp { sizes: sizes.into(), layers: layers.collect() }
     }
 
+    /// Units of each layer, inputs first.
+    pub fn sizes(&self) -> &[usize] {
+        &self.sizes
+    }
+
     /// All parameters in the order of [`Dense`].
     pub fn parameters(&self) -> Vec<f32> {
         let mut all = Vec::new();
@@ -82,8 +87,7 @@ impl Mlp {
 
     /// The same network for gradients that go through it and stop at it.
     pub fn passed(&self) -> Mlp {
-        let pass =
-            |(w, b): &(Tensor<2>, Tensor<1>)| (w.clone().autodiff(), b.clone().autodiff());
+        let pass = |(w, b): &(Tensor<2>, Tensor<1>)| (w.clone().autodiff(), b.clone().autodiff());
         Mlp { sizes: self.sizes.clone(), layers: self.layers.iter().map(pass).collect() }
     }
 
@@ -117,6 +121,11 @@ impl Optimiser {
             move_one(&self.adam, self.rate, w, seen_w.grad_remove(gradients), state_w);
             move_one(&self.adam, self.rate, b, seen_b.grad_remove(gradients), state_b);
         }
+    }
+
+    /// The learning rate from now on.
+    pub fn set_rate(&mut self, rate: f64) {
+        self.rate = rate;
     }
 
     /// What it remembers.

@@ -4,6 +4,7 @@ mod adam;
 mod basis;
 mod checkpoint;
 mod dynamics;
+mod analytic;
 pub mod export;
 mod engine;
 mod kernel;
@@ -22,6 +23,7 @@ mod td3;
 pub mod windows;
 
 pub use adam::Adam;
+pub use analytic::{AnalyticProgress, AnalyticRecipe, AnalyticTrainer};
 pub use basis::{JXZ, TrainableError, trainable};
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub(crate) use checkpoint::write_whole;

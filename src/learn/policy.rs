@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use rand_distr::{Distribution, StandardNormal};
 use rand::RngExt as _;
+use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use crate::control::policy::{ACTIONS, Actor, Critic, ShapeError};
@@ -12,7 +12,7 @@ use crate::learn::replay::{Batch, Replay, Transition};
 use crate::learn::td3::{Hyperparameters, Standing, Td3};
 use crate::num::dense::{DenseError, Units};
 use crate::num::stream::{self, Stream};
-use crate::num::{Real, statistics};
+use crate::num::{Dense, Real, statistics};
 use crate::sim::Trouble;
 use crate::sim::imagined::{Block, Ended, Stepped, WIDTH};
 use crate::sim::world::World;
@@ -63,7 +63,9 @@ impl Default for PolicyRecipe {
 #[derive(Debug, thiserror::Error)]
 pub enum PolicyError {
     /// A loss is no number.
-    #[error("the loss of the critics is no longer a number after {0} steps; lower the learning rates")]
+    #[error(
+        "the loss of the critics is no longer a number after {0} steps; lower the learning rates"
+    )]
     Loss(u64),
     /// A network cannot be used.
     #[error("the networks: {0}")]
@@ -75,7 +77,9 @@ pub enum PolicyError {
     #[error("the world it is trained in: {0}")]
     World(#[from] Trouble),
     /// A checkpoint belongs to another training.
-    #[error("the checkpoint is of another training (other options, model or program); name another --out")]
+    #[error(
+        "the checkpoint is of another training (other options, model or program); name another --out"
+    )]
     Other,
 }
 
@@ -149,6 +153,16 @@ impl<W: World> PolicyTrainer<W> {
             losses: Vec::new(),
             rewards: Vec::new(),
         })
+    }
+
+    /// Takes over an actor; with a delay of 0 it is held, and what it is worth is learned.
+    ///
+    /// # Errors
+    /// If it has another shape than a policy's.
+    pub fn take(&mut self, network: &Dense) -> Result<(), PolicyError> {
+        self.td3.set_actor(network);
+        self.actor = Actor::new(network.clone())?;
+        Ok(())
     }
 
     /// Trains for about `steps` steps more, up to the recipe's; stops at every checkpoint.

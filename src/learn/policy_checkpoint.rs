@@ -123,9 +123,6 @@ fn from_bytes(bytes: &[u8]) -> Result<PolicyStanding, String> {
         targets: said.targets,
         remembered: said.remembered,
         replay: list("replay".into())?,
-        td3: Standing {
-            updates: said.updates,
-            networks: [network(0)?, network(1)?, network(2)?],
-        },
+        td3: Standing { updates: said.updates, networks: [network(0)?, network(1)?, network(2)?] },
     })
 }

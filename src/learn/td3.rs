@@ -33,7 +33,8 @@ pub struct Hyperparameters {
     pub actor_rate: f64,
     /// Learning rate of the critics.
     pub critic_rate: f64,
-    /// Updates of the critics for one of the actor, d.
+    /// Updates of the critics for one of the actor, d; 0 holds the actor, so that the critics learn what
+    /// it is worth.
     pub delay: u64,
     /// Standard deviation of the noise that smooths the target policy, σ.
     pub smoothing: f64,
@@ -160,8 +161,10 @@ impl Td3 {
         }
         self.updates += 1;
         // the actor, eq. (3), and the target networks, once in a while
-        if self.updates.is_multiple_of(self.settings.delay) {
-            self.improve(observed);
+        match self.settings.delay {
+            0 => self.follow(),
+            delay if self.updates.is_multiple_of(delay) => self.improve(observed),
+            _ => {}
         }
         Losses { critics: loss.into_scalar::<f32>() }
     }
@@ -174,6 +177,11 @@ impl Td3 {
         let loss = -self.critics[0].network.passed().forward(here).mean();
         let mut gradients = loss.backward();
         self.actor.optimiser.step(&mut self.actor.network, &followed, &mut gradients);
+        self.follow();
+    }
+
+    /// The target networks follow the others.
+    fn follow(&mut self) {
         for learner in self.critics.iter_mut().chain([&mut self.actor]) {
             learner.target.approach(&learner.network, self.settings.tau);
         }
@@ -181,12 +189,18 @@ impl Td3 {
 
     /// Clipped noise for the target policy.
     fn noise(&self, rows: usize, rng: &mut impl Rng) -> Vec<f32> {
-        let (deviation, clip) = (self.settings.smoothing as f32, self.settings.smoothing_clip as f32);
+        let (deviation, clip) =
+            (self.settings.smoothing as f32, self.settings.smoothing_clip as f32);
         let draw = |_| {
             let x: f32 = StandardNormal.sample(rng);
             (deviation * x).clamp(-clip, clip)
         };
         (0..rows * ACTIONS).map(draw).collect()
+    }
+
+    /// Takes over an actor.
+    pub fn set_actor(&mut self, network: &Dense) {
+        self.actor = Learner::new(network, self.settings.actor_rate, &self.device);
     }
 
     /// Updates made.

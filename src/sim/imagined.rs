@@ -229,7 +229,8 @@ impl Flock {
 /// A roll angle in −π..π that has moved by less than a turn.
 #[inline(always)]
 fn wrapped(roll: Block) -> Block {
-    let (half, turn) = (Block::from_f64(std::f64::consts::PI), Block::from_f64(std::f64::consts::TAU));
+    let (half, turn) =
+        (Block::from_f64(std::f64::consts::PI), Block::from_f64(std::f64::consts::TAU));
     let roll = Block::where_less(half, roll, roll - turn, roll);
     Block::where_less(roll, -half, roll + turn, roll)
 }

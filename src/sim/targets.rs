@@ -231,7 +231,10 @@ mod tests {
             let mut seen = [false; 25];
             for [roll, pitch] in cycle {
                 let bin = |x: f64, most: f64| ((x.to_degrees() / most + 1.0) * 2.5) as usize;
-                assert!(!std::mem::replace(&mut seen[bin(*pitch, 30.0) * 5 + bin(*roll, 60.0)], true));
+                assert!(!std::mem::replace(
+                    &mut seen[bin(*pitch, 30.0) * 5 + bin(*roll, 60.0)],
+                    true
+                ));
             }
         }
         let mut later = Stratified::new(3, 31, 0.0);

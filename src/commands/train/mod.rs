@@ -1,5 +1,6 @@
 //! `greylag train`: learn a model from flights, a policy from a model.
 
+mod analytic;
 mod dynamics;
 mod flights;
 mod policy;

@@ -11,13 +11,15 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow, bail};
 use serde::Serialize;
 
+use super::analytic;
 use crate::commands::files::{self, Overwrite, shipped};
-use crate::control::policy::{Agent, Evaluated, Origin};
+use crate::control::policy::{Actor, Agent, Evaluated, Origin};
 use crate::learn::{
-    Hyperparameters, PolicyProgress, PolicyRecipe, PolicyStanding, PolicyTrainer, write_whole,
+    AnalyticRecipe, Hyperparameters, PolicyProgress, PolicyRecipe, PolicyStanding, PolicyTrainer,
+    write_whole,
 };
-use crate::model::residual::{fingerprint, hash};
 use crate::model::GreyBox;
+use crate::model::residual::{fingerprint, hash};
 use crate::sim::imagined::Imagination;
 use crate::sim::targets::Stratified;
 use crate::sim::world::World;
@@ -37,6 +39,24 @@ pub struct Arguments {
     /// Where to train: model:DIR, model:FILE.toml, or jsbsim.
     #[arg(long = "env", value_name = "ENV")]
     environment: Place,
+    /// How: td3, or analytic (the slope of the reward through the model, then critics of the actor found).
+    #[arg(long, default_value = "td3", value_parser = ["td3", "analytic"])]
+    algorithm: String,
+    /// Updates of the analytic policy gradient.
+    #[arg(long, default_value_t = AnalyticRecipe::default().updates)]
+    updates: u64,
+    /// Steps of a window of the analytic policy gradient.
+    #[arg(long, default_value_t = AnalyticRecipe::default().window as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    window: u64,
+    /// Aircraft of the analytic policy gradient.
+    #[arg(long, default_value_t = AnalyticRecipe::default().instances as u64, value_parser = clap::value_parser!(u64).range(1..=4096))]
+    flock: u64,
+    /// Learning rate of the analytic policy gradient at the start.
+    #[arg(long, default_value_t = AnalyticRecipe::default().rate)]
+    climb: f64,
+    /// Price of a change of a command from step to step, by its square, in the analytic policy gradient.
+    #[arg(long, default_value_t = AnalyticRecipe::default().effort)]
+    effort: f64,
     /// Aircraft imagined at once.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=4096))]
     instances: u64,
@@ -118,6 +138,7 @@ struct Document<'a> {
     schema: &'static str,
     program: &'static str,
     command_line: String,
+    analytic: Option<&'a AnalyticRecipe>,
     recipe: &'a PolicyRecipe,
     best: &'a Origin,
 }
@@ -162,6 +183,8 @@ impl Arguments {
                 smoothing: self.smoothing,
                 exploration: self.exploration,
                 batch: self.batch as usize,
+                // the actor that was found is held while its critics are learned
+                delay: if self.is_analytic() { 0 } else { Hyperparameters::default().delay },
                 ..Hyperparameters::default()
             },
             steps: self.steps,
@@ -178,15 +201,40 @@ impl Arguments {
         }
     }
 
+    fn is_analytic(&self) -> bool {
+        self.algorithm == "analytic"
+    }
+
+    fn analytic(&self, seed: u64) -> Option<AnalyticRecipe> {
+        self.is_analytic().then(|| AnalyticRecipe {
+            actor: self.actor.clone(),
+            instances: self.flock as usize,
+            window: self.window as usize,
+            updates: self.updates,
+            rate: self.climb,
+            effort: self.effort,
+            corners: self.corners,
+            seed,
+            ..AnalyticRecipe::default()
+        })
+    }
+
     fn ground(&self) -> Result<Ground> {
-        let parts = [("--discount", self.discount), ("--tau", self.tau), ("--corners", self.corners)];
+        let parts =
+            [("--discount", self.discount), ("--tau", self.tau), ("--corners", self.corners)];
         for (name, value) in parts {
             if !(0.0..=1.0).contains(&value) || name == "--discount" && value == 1.0 {
                 bail!("{name} {value}: give a number from 0 to 1 (--discount below 1)");
             }
         }
-        let positive = [("--rate", self.rate), ("--exploration", self.exploration)];
-        for (name, value) in positive.into_iter().chain([("--smoothing", self.smoothing)]) {
+        let positive = [
+            ("--rate", self.rate),
+            ("--climb", self.climb),
+            ("--effort", self.effort),
+            ("--exploration", self.exploration),
+            ("--smoothing", self.smoothing),
+        ];
+        for (name, value) in positive {
             if !(value.is_finite() && value >= 0.0) {
                 bail!("{name} {value}: give a number that is not negative");
             }
@@ -202,6 +250,9 @@ impl Arguments {
             program: concat!("greylag ", env!("CARGO_PKG_VERSION")).into(),
         };
         let Place::Model(path) = &self.environment else {
+            if self.is_analytic() {
+                bail!("JSBSim has no slopes: --algorithm analytic takes --env model:DIR");
+            }
             if cfg!(not(feature = "sitl")) {
                 bail!("this program was built without JSBSim; train in model:DIR");
             }
@@ -234,7 +285,8 @@ impl Arguments {
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make {}", folder.display()))?;
         let targets = Stratified::new(seed, 0, self.corners);
-        let run = Run { folder, seed, evaluate: self.evaluate, ground, stop };
+        let analytic = self.analytic(seed);
+        let run = Run { folder, seed, evaluate: self.evaluate, ground, stop, analytic };
         let recipe = self.recipe(seed);
         match &ground.model {
             Some(model) => {
@@ -258,17 +310,28 @@ struct Run<'a> {
     evaluate: u64,
     ground: &'a Ground,
     stop: &'a AtomicBool,
+    analytic: Option<AnalyticRecipe>,
 }
 
 impl Run<'_> {
     fn train<W: World>(&self, recipe: PolicyRecipe, world: W) -> Result<bool> {
-        let what = serde_json::to_string(&recipe)? + &self.ground.origin.model_sha256;
+        // more steps of the same training are the same training
+        let of = PolicyRecipe { steps: 0, ..recipe.clone() };
+        let of = (of, &self.analytic, &self.ground.origin.model_sha256);
+        let what = serde_json::to_string(&of)?;
         let mut trainer = PolicyTrainer::new(recipe, world, hash(what.as_bytes()))?;
         let kept = self.folder.join(CHECKPOINT);
         if kept.exists() {
             let standing = PolicyStanding::load(&kept)?;
-            trainer.resume(standing).with_context(|| format!("going on from {}", kept.display()))?;
+            trainer
+                .resume(standing)
+                .with_context(|| format!("going on from {}", kept.display()))?;
             eprintln!("seed {}: going on after {} steps", self.seed, trainer.steps());
+        } else if let (Some(recipe), Some(model)) = (&self.analytic, &self.ground.model) {
+            let Some(actor) = analytic::climb(recipe, model, &self.folder, self.stop)? else {
+                return Ok(false);
+            };
+            trainer.take(actor.network())?;
         }
         let mut curve = Curve::open(&self.folder.join(CURVE), trainer.steps())?;
         let mut best = curve.best;
@@ -287,7 +350,8 @@ impl Run<'_> {
             println!("{:>8} {line}  {:.0} min left", self.seed, left / 60.0);
             warn(self.seed, &progress);
             let score = evaluated.map_or(-progress.reward, |e| e.easy_deg + e.hard_deg);
-            if score < best {
+            // a held actor scores the same while its critics become better
+            if score <= best {
                 best = score;
                 self.save(&trainer, progress.steps, evaluated)?;
             }
@@ -309,17 +373,18 @@ impl Run<'_> {
         steps: u64,
         evaluation: Option<Evaluated>,
     ) -> Result<()> {
-        let origin =
-            Origin { seed: self.seed, steps, evaluation, ..self.ground.origin.clone() };
+        let origin = Origin { seed: self.seed, steps, evaluation, ..self.ground.origin.clone() };
         let agent = Agent { actor: trainer.actor(), critics: trainer.critics()?, origin };
         for (name, bytes) in agent.to_files().map_err(|e| anyhow!("the policy's files: {e}"))? {
             let path = self.folder.join(name);
-            write_whole(&path, &bytes).with_context(|| format!("cannot write {}", path.display()))?;
+            write_whole(&path, &bytes)
+                .with_context(|| format!("cannot write {}", path.display()))?;
         }
         let document = Document {
             schema: "greylag.policy-training/1",
             program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
             command_line: files::command_line(),
+            analytic: self.analytic.as_ref(),
             recipe: trainer.recipe(),
             best: &agent.origin,
         };
@@ -367,12 +432,7 @@ impl Curve {
         Ok(Curve { file, best })
     }
 
-    fn add(
-        &mut self,
-        p: &PolicyProgress,
-        seconds: f64,
-        e: Option<&Evaluated>,
-    ) -> Result<String> {
+    fn add(&mut self, p: &PolicyProgress, seconds: f64, e: Option<&Evaluated>) -> Result<String> {
         let [easy, hard, lost] =
             e.map_or([f64::NAN; 3], |e| [e.easy_deg, e.hard_deg, e.divergence_rate]);
         let line = format!(
@@ -387,7 +447,7 @@ impl Curve {
 /// A tenth of the targets of a file that is not the one that policies are scored on, so that the choice
 /// of the best is no part of its score.
 #[cfg(feature = "sitl")]
-fn evaluation(actor: Arc<crate::control::policy::Actor>) -> Result<Option<Evaluated>> {
+pub fn evaluation(actor: Arc<Actor>) -> Result<Option<Evaluated>> {
     use crate::control::policy::Policy;
     use crate::sim::evaluation::{Evaluation, evaluate};
     use crate::sim::{Group, TargetFile};
@@ -409,6 +469,6 @@ fn evaluation(actor: Arc<crate::control::policy::Actor>) -> Result<Option<Evalua
 
 /// Without JSBSim there is none: the best policy is the one that earns most in its model.
 #[cfg(not(feature = "sitl"))]
-fn evaluation(_: Arc<crate::control::policy::Actor>) -> Result<Option<Evaluated>> {
+pub fn evaluation(_: Arc<Actor>) -> Result<Option<Evaluated>> {
     Ok(None)
 }
