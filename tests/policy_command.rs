@@ -47,6 +47,7 @@ fn a_training_that_cannot_be_is_refused_before_it_starts() {
     train(model, &["--discount", "1"], &["--discount"]);
     train(model, &["--rate=-1"], &["--rate", "not negative"]);
     train(model, &["--actor", "4096"], &["4096"]);
+    train("jsbsim", &["--algorithm", "analytic"], &["no slopes"]);
     assert!(!out.join("actor.safetensors").exists());
 }
 
