@@ -165,15 +165,15 @@ impl Imagination {
             self.instructions.advance(&self.model, &self.task, flock, action);
         let mut ended = [Ended::No; WIDTH];
         let mut anew = Block::zero();
-        for lane in 0..WIDTH {
-            flock.step[lane] += 1;
-            ended[lane] = match (outside.0[lane] > 0.0, flock.step[lane] >= STEPS) {
+        for (lane, (steps, how)) in flock.step.iter_mut().zip(&mut ended).enumerate() {
+            *steps += 1;
+            *how = match (outside.0[lane] > 0.0, *steps >= STEPS) {
                 (true, _) => Ended::Lost,
                 (_, true) => Ended::Time,
                 _ => continue,
             };
             anew.0[lane] = 1.0;
-            flock.step[lane] = 0;
+            *steps = 0;
         }
         if ended != [Ended::No; WIDTH] {
             flock.begin(anew, &self.neutral);

@@ -17,8 +17,8 @@ use crate::model::GreyBox;
 const LINE: u64 = 50;
 const COLUMNS: &str = "updates,steps,seconds,easy_deg,hard_deg,divergence_rate,reward,lost";
 
-/// Climbs the reward's slope in `model`; the curve goes into `folder`. Gives the actor that scored best,
-/// or `None` if interrupted: what takes minutes begins anew.
+/// Climbs the reward's slope in `model`; the curve goes into `folder`. Gives the last actor, the learning
+/// rate having fallen to nothing, or `None` if interrupted: what takes minutes begins anew.
 ///
 /// # Errors
 /// If a parameter is no longer finite or the curve cannot be written.
@@ -34,7 +34,6 @@ pub fn climb(
     writeln!(file, "{COLUMNS}").with_context(context)?;
     println!("{:>8} {COLUMNS}", "seed");
     let mut trainer = AnalyticTrainer::new(recipe.clone(), model.clone())?;
-    let mut best = (f64::INFINITY, Arc::new(trainer.actor()?));
     let (start, mut reward) = (Instant::now(), 0.0);
     for update in 1..=recipe.updates {
         let progress = trainer
@@ -45,7 +44,7 @@ pub fn climb(
             continue;
         }
         let actor = Arc::new(trainer.actor()?);
-        let e = evaluation(actor.clone())?;
+        let e = evaluation(actor)?;
         let [easy, hard, lost] =
             e.map_or([f64::NAN; 3], |e| [e.easy_deg, e.hard_deg, e.divergence_rate]);
         let seconds = start.elapsed().as_secs_f64();
@@ -57,14 +56,10 @@ pub fn climb(
         writeln!(file, "{line}").with_context(context)?;
         let left = seconds / update as f64 * (recipe.updates - update) as f64;
         println!("{:>8} {line}  {:.0} min left", recipe.seed, left / 60.0);
-        let score = e.map_or(-reward, |e| e.easy_deg + e.hard_deg);
-        if score < best.0 {
-            best = (score, actor);
-        }
         reward = 0.0;
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
     }
-    Ok(Some(best.1))
+    Ok(Some(Arc::new(trainer.actor()?)))
 }
