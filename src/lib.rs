@@ -62,7 +62,7 @@ pub mod link;
 pub mod logs;
 pub mod flight;
 pub mod sysid;
-#[cfg(feature = "sitl")]
+#[cfg(any(feature = "sitl", feature = "learn"))]
 pub mod sim;
 #[cfg(feature = "learn")]
 pub mod learn;

@@ -80,7 +80,7 @@ enum Command {
     /// Write a target file.
     #[cfg(feature = "sitl")]
     Targets(targets::Arguments),
-    /// Learn from flights.
+    /// Learn a model from flights, or a policy in a model.
     #[cfg(feature = "learn")]
     Train(train::Arguments),
 }

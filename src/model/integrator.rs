@@ -34,6 +34,27 @@ impl<R> Default for Memory<R> {
     }
 }
 
+impl<R: Real> Memory<R> {
+    /// What `then` remembers where `chosen` is above zero, else this; an empty memory gives way.
+    #[inline(always)]
+    pub fn replaced(&self, chosen: R, then: &Self) -> Self {
+        let (Some(mut all), Some(then)) = (self.0, then.0) else {
+            return if self.0.is_some() { *self } else { *then };
+        };
+        for (x, then) in all.iter_mut().zip(then) {
+            *x = R::where_less(R::zero(), chosen, then, *x);
+        }
+        Memory(Some(all))
+    }
+}
+
+impl<R: Copy> Memory<R> {
+    /// The memory with every number read as another kind.
+    pub fn map<S: Copy>(&self, f: impl FnMut(R) -> S) -> Memory<S> {
+        Memory(self.0.map(|last| last.map(f)))
+    }
+}
+
 impl GreyBox {
     /// The state one [`STEP`] later, controls held, at `altitude` (m).
     pub fn step<R: Real>(

@@ -111,6 +111,21 @@ impl<R: Real> SurfaceFilter<R> {
     }
 
     #[inline(always)]
+    fn replaced(&self, chosen: R, then: &Self) -> Self {
+        let pair = |old: [R; 2], new: [R; 2]| {
+            [
+                R::where_less(R::zero(), chosen, new[0], old[0]),
+                R::where_less(R::zero(), chosen, new[1], old[1]),
+            ]
+        };
+        SurfaceFilter {
+            input: pair(self.input, then.input),
+            output: pair(self.output, then.output),
+            clipped: pair(self.clipped, then.clipped),
+        }
+    }
+
+    #[inline(always)]
     fn rate(&self, figures: &ActuatorFigures) -> R {
         (self.clipped[0] - self.clipped[1]).scale(1.0 / figures.step)
     }
@@ -147,6 +162,18 @@ impl<R: Real> Actuators<R> {
             elevator: surface(state.elevator, state.elevator_rate, [new.elevator, old.elevator]),
             throttle_input: new.throttle,
             throttle: state.throttle,
+        }
+    }
+
+    /// The filters of `then` where `chosen` is above zero, else these.
+    #[inline(always)]
+    pub fn replaced(&self, chosen: R, then: &Self) -> Self {
+        let one = |old: R, new: R| R::where_less(R::zero(), chosen, new, old);
+        Actuators {
+            aileron: self.aileron.replaced(chosen, &then.aileron),
+            elevator: self.elevator.replaced(chosen, &then.elevator),
+            throttle_input: one(self.throttle_input, then.throttle_input),
+            throttle: one(self.throttle, then.throttle),
         }
     }
 

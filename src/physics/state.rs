@@ -89,4 +89,14 @@ impl<R: Real> State<R> {
             beta: self.beta + rate.beta.scale(step),
         }
     }
+
+    /// `then` where `chosen` is above zero, else `self`, component by component.
+    #[inline(always)]
+    pub fn replaced(&self, chosen: R, then: &State<R>) -> Self {
+        let (mut all, then) = (self.to_array(), then.to_array());
+        for (x, then) in all.iter_mut().zip(then) {
+            *x = R::where_less(R::zero(), chosen, then, *x);
+        }
+        State::from_array(all)
+    }
 }

@@ -1,18 +1,18 @@
 //! What a controller flies in: JSBSim, or a model imagined in its place.
 
-use greylag_sitl::plant::{Inputs, Plant, PlantError, PlantOptions, Start, Truth};
+#[cfg(feature = "sitl")]
+use greylag_sitl::plant::PlantError;
 
 use crate::control::Observation;
 use crate::model::{GreyBox, Twin};
-use crate::physics::{ActuatorState, Command, State, Time};
-
-/// Altitude at which an episode starts, m.
-pub const START_ALTITUDE: f64 = 600.0;
+use crate::physics::{Command, State, Time};
+use crate::sim::START_ALTITUDE;
 
 /// Why an environment cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub enum Trouble {
     /// The plant says so.
+    #[cfg(feature = "sitl")]
     #[error(transparent)]
     Plant(#[from] PlantError),
     /// A model's state is no longer a number.
@@ -38,73 +38,6 @@ pub trait Environment {
     /// # Errors
     /// If the aircraft has left the numbers.
     fn step(&mut self, command: Command) -> Result<Observation, Trouble>;
-}
-
-/// JSBSim.
-pub struct Simulator {
-    plant: Plant,
-    previous: [Command; 2],
-}
-
-impl Simulator {
-    /// Loads an aircraft.
-    ///
-    /// # Errors
-    /// If there is no such aircraft.
-    pub fn new(options: &PlantOptions) -> Result<Simulator, Trouble> {
-        Ok(Simulator { plant: Plant::new(options)?, previous: [Command::IDLE; 2] })
-    }
-
-    /// The seed of the turbulence from the next reset on.
-    pub fn reseed(&mut self, seed: u32) {
-        self.plant.reseed(seed);
-    }
-
-    /// The whole truth of the plant.
-    pub fn truth(&self) -> Truth {
-        self.plant.truth()
-    }
-
-    fn observe(&self, truth: &Truth) -> Observation {
-        Observation {
-            time: Time::from_micros((truth.time_s * 1e6).round() as u64),
-            state: State {
-                roll: truth.roll_rad,
-                pitch: truth.pitch_rad,
-                airspeed: truth.airspeed_mps,
-                p: truth.p_radps,
-                q: truth.q_radps,
-                r: truth.r_radps,
-                alpha: truth.alpha_rad,
-                beta: truth.beta_rad,
-            },
-            actuators: ActuatorState {
-                aileron: truth.aileron_rad,
-                aileron_rate: truth.aileron_rate_radps,
-                elevator: truth.elevator_rad,
-                elevator_rate: truth.elevator_rate_radps,
-                throttle: truth.throttle,
-            },
-            altitude: truth.altitude_m,
-            previous: self.previous,
-        }
-    }
-}
-
-impl Environment for Simulator {
-    fn reset(&mut self) -> Result<Observation, Trouble> {
-        self.previous = [Command::IDLE; 2];
-        let truth = self.plant.reset(&Start::NEUTRAL)?;
-        Ok(self.observe(&truth))
-    }
-
-    fn step(&mut self, command: Command) -> Result<Observation, Trouble> {
-        let command = command.clamped();
-        let Command { aileron, elevator, throttle } = command;
-        let truth = self.plant.step(Inputs { aileron, elevator, throttle })?;
-        self.previous = [command, self.previous[0]];
-        Ok(self.observe(&truth))
-    }
 }
 
 /// A model with the exact actuator filters as its state.

@@ -1,17 +1,36 @@
 //! Flying a controller and scoring it: environments, targets, episodes, evaluations, flight tests.
 
+#[cfg(feature = "sitl")]
 pub mod collect;
+#[cfg(feature = "sitl")]
 pub mod design;
 pub mod environment;
 pub mod episode;
+#[cfg(feature = "sitl")]
 pub mod evaluation;
+#[cfg(feature = "sitl")]
 pub mod flight_test;
+#[cfg(feature = "sitl")]
+pub mod flown;
+pub mod imagined;
+#[cfg(feature = "sitl")]
 pub mod instruments;
+#[cfg(feature = "sitl")]
 pub mod missing;
+#[cfg(feature = "sitl")]
+mod simulator;
+#[cfg(feature = "sitl")]
 pub mod starting_model;
 pub mod targets;
+#[cfg(feature = "sitl")]
 pub mod trial;
+pub mod world;
 
-pub use environment::{Environment, Imagined, Simulator, Trouble};
+pub use environment::{Environment, Imagined, Trouble};
 pub use episode::{Episode, Outcome};
+#[cfg(feature = "sitl")]
+pub use simulator::Simulator;
 pub use targets::{Group, TargetFile};
+
+/// Altitude at which an episode starts, m.
+pub const START_ALTITUDE: f64 = 600.0;

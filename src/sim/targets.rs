@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use rand::RngExt;
+use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 
 use crate::num::stream;
@@ -32,6 +33,61 @@ pub struct Row {
     pub roll_deg: f64,
     /// Commanded pitch, degrees.
     pub pitch_deg: f64,
+}
+
+/// Bins of roll and of pitch, each visited once before any is again (section IV-A of \[GSFM26\]).
+const BINS: usize = 5;
+/// Purpose of the random stream of [`Stratified`].
+const STRATIFIED: u64 = 241;
+
+/// Targets without end, stratified over 5 × 5 bins of the envelope of Table II.
+///
+/// Where it stands is a seed and a count, so that it can go on from a checkpoint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stratified {
+    seed: u64,
+    count: u64,
+    corners: f64,
+    bins: Vec<usize>,
+}
+
+impl Stratified {
+    /// Targets of `seed` after the first `count`; a part `corners` of them (0..1) lies in the hard
+    /// corners instead, which are 4 % of the envelope (0 is the paper's).
+    pub fn new(seed: u64, count: u64, corners: f64) -> Stratified {
+        Stratified { seed, count, corners, bins: Vec::new() }
+    }
+
+    /// Goes on after `count` targets, wherever it stands.
+    pub fn go_on_after(&mut self, count: u64) {
+        (self.count, self.bins) = (count, Vec::new());
+    }
+
+    /// Targets given so far.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The next commanded roll and pitch, rad.
+    pub fn next_target(&mut self) -> [f64; 2] {
+        let (cycle, place) = (self.count / 25, (self.count % 25) as usize);
+        if self.bins.is_empty() || place == 0 {
+            self.bins = (0..BINS * BINS).collect();
+            self.bins.shuffle(&mut stream::stream(self.seed, &[STRATIFIED, 0, cycle]));
+        }
+        let mut rng = stream::stream(self.seed, &[STRATIFIED, 1, self.count]);
+        self.count += 1;
+        let mut draw = || rng.random_range(0.0..1.0);
+        let within = |k: usize, x: f64| 2.0 * (k as f64 + x) / BINS as f64 - 1.0;
+        let bin = self.bins[place];
+        let (x, y) = (within(bin % BINS, draw()), within(bin / BINS, draw()));
+        let [roll, pitch]: [f64; 2] = if draw() < self.corners {
+            [x.signum() * (45.0 + 15.0 * draw()), y.signum() * (25.0 + 5.0 * draw())]
+        } else {
+            [60.0 * x, 30.0 * y]
+        };
+        [roll.to_radians(), pitch.to_radians()]
+    }
 }
 
 /// The target file: 140 easy, 100 hard in the corners, 100 hard outside the easy box.
@@ -165,6 +221,29 @@ mod tests {
     fn the_shipped_file_is_the_one_of_seed_1() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/targets.csv");
         assert_eq!(TargetFile::load(&path).unwrap(), TargetFile::generate(1));
+    }
+
+    #[test]
+    fn stratified_targets_visit_every_bin_before_any_again_and_go_on_where_they_stood() {
+        let mut targets = Stratified::new(3, 0, 0.0);
+        let all: Vec<_> = (0..75).map(|_| targets.next_target()).collect();
+        for cycle in all.chunks(25) {
+            let mut seen = [false; 25];
+            for [roll, pitch] in cycle {
+                let bin = |x: f64, most: f64| ((x.to_degrees() / most + 1.0) * 2.5) as usize;
+                assert!(!std::mem::replace(
+                    &mut seen[bin(*pitch, 30.0) * 5 + bin(*roll, 60.0)],
+                    true
+                ));
+            }
+        }
+        let mut later = Stratified::new(3, 31, 0.0);
+        assert_eq!(later.next_target(), all[31]);
+        let mut hard = Stratified::new(3, 0, 1.0);
+        for _ in 0..50 {
+            let [roll, pitch] = hard.next_target().map(f64::to_degrees);
+            assert!(Group::HardCorners.contains(roll, pitch), "{roll} {pitch}");
+        }
     }
 
     #[test]

@@ -1,7 +1,9 @@
-//! `greylag train`: learn from flights.
+//! `greylag train`: learn a model from flights, a policy from a model.
 
+mod analytic;
 mod dynamics;
 mod flights;
+mod policy;
 
 use std::process::ExitCode;
 
@@ -18,11 +20,14 @@ pub struct Arguments {
 enum What {
     /// Learn a dynamics model: what a prior lacks, and its coefficients where asked for.
     Dynamics(Box<dynamics::Arguments>),
+    /// Train a policy in a model, or in JSBSim.
+    Policy(Box<policy::Arguments>),
 }
 
 /// Trains.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
         What::Dynamics(arguments) => dynamics::run(arguments),
+        What::Policy(arguments) => policy::run(arguments),
     }
 }

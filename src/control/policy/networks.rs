@@ -2,11 +2,14 @@
 
 use crate::control::policy::OBSERVATIONS;
 use crate::num::dense::Units;
-use crate::num::{Dense, Real};
+use crate::num::{Dense, Lanes, Real};
 use crate::physics::Command;
 
 /// Components of an action: aileron, elevator and throttle, each in −1..1 (eq. 29 of \[GSFM26\]).
 pub const ACTIONS: usize = 3;
+
+/// Aircraft of a block.
+const WIDTH: usize = 16;
 
 /// Why a network is none of a policy's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -95,6 +98,31 @@ impl Actor {
             }
         }
         self.act_baseline(units, observed)
+    }
+
+    /// The actions of a block of aircraft. In 256 bits even where there are 512: with the wider ones the
+    /// compiler leaves this kernel scalar (measured: 1180 against 40 µs for two layers of 300).
+    pub fn act_block(
+        &self,
+        units: &mut Units<Lanes<WIDTH>>,
+        observed: &[Lanes<WIDTH>; OBSERVATIONS],
+    ) -> [Lanes<WIDTH>; ACTIONS] {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has the feature
+            return unsafe { self.block_avx2(units, observed) };
+        }
+        self.act(units, observed)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn block_avx2(
+        &self,
+        units: &mut Units<Lanes<WIDTH>>,
+        observed: &[Lanes<WIDTH>; OBSERVATIONS],
+    ) -> [Lanes<WIDTH>; ACTIONS] {
+        self.act(units, observed)
     }
 
     #[cfg(target_arch = "x86_64")]

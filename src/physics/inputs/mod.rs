@@ -78,6 +78,18 @@ impl<R: Real> InputMemory<R> {
         InputMemory([[Past::at_rest(controls.aileron), Past::at_rest(controls.elevator)]; MOST])
     }
 
+    /// What `then` remembers where `chosen` is above zero, else this.
+    pub fn replaced(&self, chosen: R, then: &Self) -> Self {
+        let one = |old: R, new: R| R::where_less(R::zero(), chosen, new, old);
+        let past = |old: &Past<R>, new: &Past<R>| Past {
+            output: one(old.output, new.output),
+            inputs: std::array::from_fn(|k| one(old.inputs[k], new.inputs[k])),
+        };
+        InputMemory(std::array::from_fn(|k| {
+            std::array::from_fn(|side| past(&self.0[k][side], &then.0[k][side]))
+        }))
+    }
+
     /// What acts now through the effect in `place` (below [`MOST`]) of a model's list.
     #[inline(always)]
     pub fn act(&mut self, place: usize, kind: Kind, constant: f64, z: &Controls<R>) -> Controls<R> {

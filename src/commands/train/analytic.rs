@@ -1,0 +1,65 @@
+//! The actor of `greylag train policy --algorithm analytic`.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+
+use super::policy::evaluation;
+use crate::control::policy::Actor;
+use crate::learn::{AnalyticRecipe, AnalyticTrainer};
+use crate::model::GreyBox;
+
+/// Updates between two evaluations.
+const LINE: u64 = 50;
+const COLUMNS: &str = "updates,steps,seconds,easy_deg,hard_deg,divergence_rate,reward,lost";
+
+/// Climbs the reward's slope in `model`; the curve goes into `folder`. Gives the last actor, the learning
+/// rate having fallen to nothing, or `None` if interrupted: what takes minutes begins anew.
+///
+/// # Errors
+/// If a parameter is no longer finite or the curve cannot be written.
+pub fn climb(
+    recipe: &AnalyticRecipe,
+    model: &GreyBox,
+    folder: &Path,
+    stop: &AtomicBool,
+) -> Result<Option<Arc<Actor>>> {
+    let path = folder.join("analytic.csv");
+    let context = || format!("cannot write {}", path.display());
+    let mut file = std::fs::File::create(&path).with_context(context)?;
+    writeln!(file, "{COLUMNS}").with_context(context)?;
+    println!("{:>8} {COLUMNS}", "seed");
+    let mut trainer = AnalyticTrainer::new(recipe.clone(), model.clone())?;
+    let (start, mut reward) = (Instant::now(), 0.0);
+    for update in 1..=recipe.updates {
+        let progress = trainer
+            .update()
+            .with_context(|| format!("the actor was lost after {update} updates; lower --climb"))?;
+        reward += progress.reward / LINE as f64;
+        if !update.is_multiple_of(LINE) && update != recipe.updates {
+            continue;
+        }
+        let actor = Arc::new(trainer.actor()?);
+        let e = evaluation(actor)?;
+        let [easy, hard, lost] =
+            e.map_or([f64::NAN; 3], |e| [e.easy_deg, e.hard_deg, e.divergence_rate]);
+        let seconds = start.elapsed().as_secs_f64();
+        let steps = update * (recipe.window * recipe.instances) as u64;
+        let line = format!(
+            "{update},{steps},{seconds:.0},{easy:.3},{hard:.3},{lost:.3},{reward:.5},{}",
+            progress.lost
+        );
+        writeln!(file, "{line}").with_context(context)?;
+        let left = seconds / update as f64 * (recipe.updates - update) as f64;
+        println!("{:>8} {line}  {:.0} min left", recipe.seed, left / 60.0);
+        reward = 0.0;
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+    }
+    Ok(Some(Arc::new(trainer.actor()?)))
+}

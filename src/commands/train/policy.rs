@@ -1,0 +1,474 @@
+//! `greylag train policy`: train a policy in a model or in JSBSim.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context, Result, anyhow, bail};
+use serde::Serialize;
+
+use super::analytic;
+use crate::commands::files::{self, Overwrite, shipped};
+use crate::control::policy::{Actor, Agent, Evaluated, Origin};
+use crate::learn::{
+    AnalyticRecipe, Hyperparameters, PolicyProgress, PolicyRecipe, PolicyStanding, PolicyTrainer,
+    write_whole,
+};
+use crate::model::GreyBox;
+use crate::model::residual::{fingerprint, hash};
+use crate::sim::imagined::Imagination;
+use crate::sim::targets::Stratified;
+use crate::sim::world::World;
+
+/// The file that a training goes on from.
+const CHECKPOINT: &str = "checkpoint.safetensors";
+/// The learning curve.
+const CURVE: &str = "curve.csv";
+const COLUMNS: &str =
+    "steps,updates,seconds,easy_deg,hard_deg,divergence_rate,loss,reward,episodes,lost";
+/// Part of the imagined episodes that may be lost before it is said to be too many.
+const MANY: f64 = 0.2;
+
+/// Options of `greylag train policy`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Where to train: model:DIR, model:FILE.toml, or jsbsim.
+    #[arg(long = "env", value_name = "ENV")]
+    environment: Place,
+    /// How: td3, or analytic (the slope of the reward through the model, then critics of the actor found).
+    #[arg(long, default_value = "td3", value_parser = ["td3", "analytic"])]
+    algorithm: String,
+    /// Updates of the analytic policy gradient.
+    #[arg(long, default_value_t = AnalyticRecipe::default().updates)]
+    updates: u64,
+    /// Steps of a window of the analytic policy gradient.
+    #[arg(long, default_value_t = AnalyticRecipe::default().window as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    window: u64,
+    /// Aircraft of the analytic policy gradient.
+    #[arg(long, default_value_t = AnalyticRecipe::default().instances as u64, value_parser = clap::value_parser!(u64).range(1..=4096))]
+    flock: u64,
+    /// Learning rate of the analytic policy gradient at the start.
+    #[arg(long, default_value_t = AnalyticRecipe::default().rate)]
+    climb: f64,
+    /// Price of a change of a command from step to step, by its square, in the analytic policy gradient.
+    #[arg(long, default_value_t = AnalyticRecipe::default().effort)]
+    effort: f64,
+    /// Aircraft imagined at once.
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=4096))]
+    instances: u64,
+    /// Policies to train, each with a seed of its own, from --seed on; they share the cores.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    seeds: u64,
+    /// Seed of the first.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Steps of the environment, all aircraft together; each has one update.
+    #[arg(long, default_value_t = 700_000)]
+    steps: u64,
+    /// Steps of random actions at the start.
+    #[arg(long, default_value_t = 10_000)]
+    warmup: u64,
+    /// Transitions remembered.
+    #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
+    replay: u64,
+    /// Units of the actor's hidden layers.
+    #[arg(long, value_delimiter = ',', default_values_t = [300, 300])]
+    actor: Vec<usize>,
+    /// Units of a critic's hidden layers.
+    #[arg(long, value_delimiter = ',', default_values_t = [200, 200, 200])]
+    critic: Vec<usize>,
+    /// Rows of a minibatch.
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..))]
+    batch: u64,
+    /// Rate at which the target networks follow.
+    #[arg(long, default_value_t = 0.05)]
+    tau: f64,
+    /// Learning rate of actor and critics.
+    #[arg(long, default_value_t = 3e-4)]
+    rate: f64,
+    /// Discount per step.
+    #[arg(long, default_value_t = 0.99)]
+    discount: f64,
+    /// Standard deviation of the noise that explores.
+    #[arg(long, default_value_t = 0.1)]
+    exploration: f64,
+    /// Standard deviation of the noise that smooths the target policy.
+    #[arg(long, default_value_t = 0.2)]
+    smoothing: f64,
+    /// Part of the targets that lie in the hard corners, 0 to 1; 0 is the paper's.
+    #[arg(long, default_value_t = 0.0)]
+    corners: f64,
+    /// Steps between two evaluations in JSBSim.
+    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
+    evaluate: u64,
+    /// Steps between two checkpoints.
+    #[arg(long, default_value_t = 50_000, value_parser = clap::value_parser!(u64).range(1..))]
+    checkpoint: u64,
+    /// Folder for the policy, its learning curve and the checkpoint (seed-N below it for several seeds);
+    /// a training found there goes on.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// What a policy is trained in.
+#[derive(Clone, Debug)]
+enum Place {
+    Model(PathBuf),
+    Simulator,
+}
+
+impl FromStr for Place {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Place, String> {
+        match text.split_once(':') {
+            Some(("model", path)) if !path.is_empty() => Ok(Place::Model(path.into())),
+            None if text == "jsbsim" => Ok(Place::Simulator),
+            _ => Err("give model:DIR, model:FILE.toml or jsbsim".into()),
+        }
+    }
+}
+
+/// What a run says of itself beside its curve.
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'static str,
+    program: &'static str,
+    command_line: String,
+    analytic: Option<&'a AnalyticRecipe>,
+    recipe: &'a PolicyRecipe,
+    best: &'a Origin,
+}
+
+/// Where a policy is trained, found to be whole.
+struct Ground {
+    model: Option<Arc<GreyBox>>,
+    origin: Origin,
+}
+
+/// Trains, prints the curve, writes the best policy.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let ground = arguments.ground()?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let told = stop.clone();
+    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))?;
+    println!("{:>8} {COLUMNS}", "seed");
+    let one = |seed: u64| arguments.train(&ground, seed, &stop);
+    let seeds = arguments.seed..arguments.seed + arguments.seeds;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(cores).build()?;
+    use rayon::prelude::*;
+    let seeds: Vec<u64> = seeds.collect();
+    let ended = pool.install(|| seeds.into_par_iter().map(one).collect::<Result<Vec<bool>>>())?;
+    if ended.contains(&false) {
+        eprintln!("interrupted; the same command goes on from the last checkpoint");
+        return Ok(ExitCode::from(130));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Arguments {
+    fn recipe(&self, seed: u64) -> PolicyRecipe {
+        PolicyRecipe {
+            td3: Hyperparameters {
+                actor: self.actor.clone(),
+                critic: self.critic.clone(),
+                discount: self.discount,
+                tau: self.tau,
+                actor_rate: self.rate,
+                critic_rate: self.rate,
+                smoothing: self.smoothing,
+                exploration: self.exploration,
+                batch: self.batch as usize,
+                // the actor that was found is held while its critics are learned
+                delay: if self.is_analytic() { 0 } else { Hyperparameters::default().delay },
+                ..Hyperparameters::default()
+            },
+            steps: self.steps,
+            warmup: self.warmup,
+            replay: self.replay as usize,
+            instances: if matches!(self.environment, Place::Simulator) {
+                1
+            } else {
+                self.instances as usize
+            },
+            corners: self.corners,
+            checkpoint: self.checkpoint,
+            seed,
+        }
+    }
+
+    fn is_analytic(&self) -> bool {
+        self.algorithm == "analytic"
+    }
+
+    fn analytic(&self, seed: u64) -> Option<AnalyticRecipe> {
+        self.is_analytic().then(|| AnalyticRecipe {
+            actor: self.actor.clone(),
+            instances: self.flock as usize,
+            window: self.window as usize,
+            updates: self.updates,
+            rate: self.climb,
+            effort: self.effort,
+            corners: self.corners,
+            seed,
+            ..AnalyticRecipe::default()
+        })
+    }
+
+    fn ground(&self) -> Result<Ground> {
+        let parts =
+            [("--discount", self.discount), ("--tau", self.tau), ("--corners", self.corners)];
+        for (name, value) in parts {
+            if !(0.0..=1.0).contains(&value) || name == "--discount" && value == 1.0 {
+                bail!("{name} {value}: give a number from 0 to 1 (--discount below 1)");
+            }
+        }
+        let positive = [
+            ("--rate", self.rate),
+            ("--climb", self.climb),
+            ("--effort", self.effort),
+            ("--exploration", self.exploration),
+            ("--smoothing", self.smoothing),
+        ];
+        for (name, value) in positive {
+            if !(value.is_finite() && value >= 0.0) {
+                bail!("{name} {value}: give a number that is not negative");
+            }
+        }
+        let origin = |airframe, model: &str, model_sha256| Origin {
+            schema: Origin::SCHEMA.into(),
+            airframe,
+            model: model.into(),
+            model_sha256,
+            seed: self.seed,
+            steps: 0,
+            evaluation: None,
+            program: concat!("greylag ", env!("CARGO_PKG_VERSION")).into(),
+        };
+        let Place::Model(path) = &self.environment else {
+            if self.is_analytic() {
+                bail!("JSBSim has no slopes: --algorithm analytic takes --env model:DIR");
+            }
+            if cfg!(not(feature = "sitl")) {
+                bail!("this program was built without JSBSim; train in model:DIR");
+            }
+            let airframe = GreyBox::load(&shipped(Path::new("params/x8/jsbsim.toml")))?.airframe;
+            return Ok(Ground {
+                model: None,
+                origin: origin(fingerprint(&airframe), "jsbsim", String::new()),
+            });
+        };
+        let mut path = shipped(path);
+        if path.is_dir() {
+            path = path.join("model.toml");
+        }
+        let model = GreyBox::load(&path)?;
+        let mut bytes = std::fs::read(&path)?;
+        if model.residual.is_some() {
+            let residual = path.with_file_name(crate::learn::export::RESIDUAL);
+            bytes.extend(std::fs::read(&residual).unwrap_or_default());
+        }
+        let origin = origin(fingerprint(&model.airframe), &model.name, hash(&bytes));
+        Ok(Ground { model: Some(Arc::new(model)), origin })
+    }
+
+    /// Trains the policy of one seed; `false` if interrupted.
+    fn train(&self, ground: &Ground, seed: u64, stop: &AtomicBool) -> Result<bool> {
+        let folder = match self.seeds {
+            1 => self.out.clone(),
+            _ => self.out.join(format!("seed-{seed}")),
+        };
+        std::fs::create_dir_all(&folder)
+            .with_context(|| format!("cannot make {}", folder.display()))?;
+        let targets = Stratified::new(seed, 0, self.corners);
+        let analytic = self.analytic(seed);
+        let run = Run { folder, seed, evaluate: self.evaluate, ground, stop, analytic };
+        let recipe = self.recipe(seed);
+        match &ground.model {
+            Some(model) => {
+                run.train(recipe, Imagination::new(model.clone(), self.instances as usize, targets))
+            }
+            #[cfg(feature = "sitl")]
+            None => {
+                let plant = greylag_sitl::plant::PlantOptions::default();
+                run.train(recipe, crate::sim::flown::Flown::new(&plant, targets)?)
+            }
+            #[cfg(not(feature = "sitl"))]
+            None => Err(anyhow!("this program was built without JSBSim")),
+        }
+    }
+}
+
+/// The training of one policy.
+struct Run<'a> {
+    folder: PathBuf,
+    seed: u64,
+    evaluate: u64,
+    ground: &'a Ground,
+    stop: &'a AtomicBool,
+    analytic: Option<AnalyticRecipe>,
+}
+
+impl Run<'_> {
+    fn train<W: World>(&self, recipe: PolicyRecipe, world: W) -> Result<bool> {
+        // more steps of the same training are the same training
+        let of = PolicyRecipe { steps: 0, ..recipe.clone() };
+        let of = (of, &self.analytic, &self.ground.origin.model_sha256);
+        let what = serde_json::to_string(&of)?;
+        let mut trainer = PolicyTrainer::new(recipe, world, hash(what.as_bytes()))?;
+        let kept = self.folder.join(CHECKPOINT);
+        if kept.exists() {
+            let standing = PolicyStanding::load(&kept)?;
+            trainer
+                .resume(standing)
+                .with_context(|| format!("going on from {}", kept.display()))?;
+            eprintln!("seed {}: going on after {} steps", self.seed, trainer.steps());
+        } else if let (Some(recipe), Some(model)) = (&self.analytic, &self.ground.model) {
+            let Some(actor) = analytic::climb(recipe, model, &self.folder, self.stop)? else {
+                return Ok(false);
+            };
+            trainer.take(actor.network())?;
+        }
+        let mut curve = Curve::open(&self.folder.join(CURVE), trainer.steps())?;
+        let mut best = curve.best;
+        let start = Instant::now();
+        let (first, goal) = (trainer.steps(), trainer.recipe().steps);
+        while trainer.steps() < goal {
+            let progress = trainer.run(self.evaluate).with_context(|| match kept.exists() {
+                true => format!("seed {}: the last good state is in {}", self.seed, kept.display()),
+                false => format!("seed {}: no checkpoint was written yet", self.seed),
+            })?;
+            let seconds = start.elapsed().as_secs_f64();
+            let evaluated = evaluation(trainer.actor())?;
+            let made = (progress.steps - first) as f64;
+            let left = seconds / made * goal.saturating_sub(progress.steps) as f64;
+            let line = curve.add(&progress, seconds, evaluated.as_ref())?;
+            println!("{:>8} {line}  {:.0} min left", self.seed, left / 60.0);
+            warn(self.seed, &progress);
+            let score = evaluated.map_or(-progress.reward, |e| e.easy_deg + e.hard_deg);
+            // a held actor scores the same while its critics become better
+            if score <= best {
+                best = score;
+                self.save(&trainer, progress.steps, evaluated)?;
+            }
+            if trainer.at_checkpoint() {
+                trainer.standing().save(&kept)?;
+            }
+            if self.stop.load(Ordering::Relaxed) && trainer.steps() < goal {
+                return Ok(false);
+            }
+        }
+        println!("{:>8} policy in {}", self.seed, self.folder.display());
+        Ok(true)
+    }
+
+    /// Writes the policy as it is now, the best so far.
+    fn save<W: World>(
+        &self,
+        trainer: &PolicyTrainer<W>,
+        steps: u64,
+        evaluation: Option<Evaluated>,
+    ) -> Result<()> {
+        let origin = Origin { seed: self.seed, steps, evaluation, ..self.ground.origin.clone() };
+        let agent = Agent { actor: trainer.actor(), critics: trainer.critics()?, origin };
+        for (name, bytes) in agent.to_files().map_err(|e| anyhow!("the policy's files: {e}"))? {
+            let path = self.folder.join(name);
+            write_whole(&path, &bytes)
+                .with_context(|| format!("cannot write {}", path.display()))?;
+        }
+        let document = Document {
+            schema: "greylag.policy-training/1",
+            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+            command_line: files::command_line(),
+            analytic: self.analytic.as_ref(),
+            recipe: trainer.recipe(),
+            best: &agent.origin,
+        };
+        let json = self.folder.join("training.json");
+        files::write(&json, &(serde_json::to_string_pretty(&document)? + "\n"), Overwrite::Force)
+    }
+}
+
+/// Says so if many episodes end outside the envelope.
+fn warn(seed: u64, progress: &PolicyProgress) {
+    let part = progress.lost as f64 / progress.episodes.max(1) as f64;
+    if progress.updates > 0 && part > MANY {
+        eprintln!(
+            "seed {seed}: {:.0} % of the episodes so far left the envelope of a state that can be \
+             believed (attitude, incidence, rates, airspeed); if that goes on, the model lacks flights \
+             near there: collect some and learn it again",
+            100.0 * part
+        );
+    }
+}
+
+/// The learning curve as a table on disk.
+struct Curve {
+    file: std::fs::File,
+    /// The best score that stands in it.
+    best: f64,
+}
+
+impl Curve {
+    /// The curve in `path` up to `steps`, to be gone on with.
+    fn open(path: &Path, steps: u64) -> Result<Curve> {
+        let old = std::fs::read_to_string(path).unwrap_or_default();
+        let (mut text, mut best) = (COLUMNS.to_owned() + "\n", f64::INFINITY);
+        for line in old.lines().skip(1) {
+            let cells: Vec<f64> =
+                line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
+            if cells.len() > 4 && cells[0] <= steps as f64 {
+                text += &format!("{line}\n");
+                best = best.min(cells[3] + cells[4]);
+            }
+        }
+        let context = || format!("cannot write {}", path.display());
+        let mut file = std::fs::File::create(path).with_context(context)?;
+        file.write_all(text.as_bytes()).with_context(context)?;
+        Ok(Curve { file, best })
+    }
+
+    fn add(&mut self, p: &PolicyProgress, seconds: f64, e: Option<&Evaluated>) -> Result<String> {
+        let [easy, hard, lost] =
+            e.map_or([f64::NAN; 3], |e| [e.easy_deg, e.hard_deg, e.divergence_rate]);
+        let line = format!(
+            "{},{},{seconds:.0},{easy:.3},{hard:.3},{lost:.3},{:.4},{:.4},{},{}",
+            p.steps, p.updates, p.loss, p.reward, p.episodes, p.lost
+        );
+        writeln!(self.file, "{line}").context("cannot write the learning curve")?;
+        Ok(line)
+    }
+}
+
+/// A tenth of the targets of a file that is not the one that policies are scored on, so that the choice
+/// of the best is no part of its score.
+#[cfg(feature = "sitl")]
+pub fn evaluation(actor: Arc<Actor>) -> Result<Option<Evaluated>> {
+    use crate::control::policy::Policy;
+    use crate::sim::evaluation::{Evaluation, evaluate};
+    use crate::sim::{Group, TargetFile};
+    const OTHER: u64 = 2;
+    let mut rows = TargetFile::generate(OTHER).rows;
+    rows.retain(|row| row.group != Group::HardOutside && row.number % 10 == row.number / 10 % 10);
+    let plant = greylag_sitl::plant::PlantOptions::default();
+    let make = || -> Box<dyn crate::control::Controller> { Box::new(Policy::of(actor.clone())) };
+    let outcomes = evaluate(&plant, &make, &rows, 1, &|| ())?;
+    let scores = Evaluation::new("policy", "-", &rows, &outcomes);
+    let mean = |group: &str| scores.score(group).map_or(f64::NAN, |s| s.mean_deg);
+    Ok(Some(Evaluated {
+        targets: rows.len(),
+        easy_deg: mean("easy"),
+        hard_deg: mean("hard_corners"),
+        divergence_rate: scores.score("all").map_or(f64::NAN, |s| s.divergence_rate),
+    }))
+}
+
+/// Without JSBSim there is none: the best policy is the one that earns most in its model.
+#[cfg(not(feature = "sitl"))]
+pub fn evaluation(_: Arc<Actor>) -> Result<Option<Evaluated>> {
+    Ok(None)
+}

@@ -1,0 +1,99 @@
+//! JSBSim as the world of one aircraft that a policy is trained in: the paper's first regime.
+
+use greylag_sitl::plant::PlantOptions;
+
+use crate::control::policy::{ACTIONS, OBSERVATIONS, command, observe};
+use crate::control::task::Task;
+use crate::control::{Observation, Target};
+use crate::num::{Lanes, Real};
+use crate::physics::State;
+use crate::sim::imagined::{Block, Ended, STEPS, Stepped, WIDTH, outside};
+use crate::sim::targets::Stratified;
+use crate::sim::world::World;
+use crate::sim::{Environment, Simulator, Trouble};
+
+/// One aircraft in JSBSim.
+pub struct Flown {
+    simulator: Simulator,
+    seen: Observation,
+    target: Target,
+    targets: Stratified,
+    step: u32,
+    lost: u64,
+}
+
+impl Flown {
+    /// An aircraft at the start, with the first of `targets`.
+    ///
+    /// # Errors
+    /// If JSBSim cannot be set up.
+    pub fn new(plant: &PlantOptions, targets: Stratified) -> Result<Flown, Trouble> {
+        let mut simulator = Simulator::new(plant)?;
+        let seen = simulator.reset()?;
+        let target = Target { roll: 0.0, pitch: 0.0, airspeed: State::NEUTRAL.airspeed };
+        let mut flown = Flown { simulator, seen, target, targets, step: 0, lost: 0 };
+        flown.begin()?;
+        Ok(flown)
+    }
+
+    fn begin(&mut self) -> Result<(), Trouble> {
+        let [roll, pitch] = self.targets.next_target();
+        self.target = Target { roll, pitch, ..self.target };
+        self.seen = self.simulator.reset()?;
+        self.step = 0;
+        Ok(())
+    }
+
+    fn observed(&self) -> [Block; OBSERVATIONS] {
+        observe(&self.seen.state, &self.seen.actuators, &self.target).map(Lanes::from_f64)
+    }
+}
+
+impl World for Flown {
+    fn instances(&self) -> usize {
+        1
+    }
+
+    fn observe(&self, _block: usize) -> [Block; OBSERVATIONS] {
+        self.observed()
+    }
+
+    fn step(&mut self, _block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble> {
+        // what leaves the numbers is lost where it was last seen
+        let left = match self.simulator.step(command(action.map(|x| x.0[0].into()))) {
+            Ok(seen) => {
+                self.seen = seen;
+                outside(&seen.state.map(Lanes::from_f64)).0[0] > 0.0
+            }
+            Err(_) => true,
+        };
+        self.step += 1;
+        let (state, target) = (self.seen.state.map(Block::from_f64), self.target);
+        let reward = Task::PAPER.reward(&state, &target.map(Lanes::from_f64));
+        let mut ended = [Ended::No; WIDTH];
+        ended[0] = match (left, self.step >= STEPS) {
+            (true, _) => Ended::Lost,
+            (_, true) => Ended::Time,
+            _ => Ended::No,
+        };
+        let stepped = Stepped { observed: self.observed(), reward, ended };
+        if ended[0] != Ended::No {
+            self.lost += u64::from(left);
+            self.begin()?;
+        }
+        Ok(stepped)
+    }
+
+    fn restart(&mut self, targets: u64) -> Result<(), Trouble> {
+        self.targets.go_on_after(targets);
+        self.begin()
+    }
+
+    fn targets(&self) -> u64 {
+        self.targets.count()
+    }
+
+    fn lost(&self) -> u64 {
+        self.lost
+    }
+}

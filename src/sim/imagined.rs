@@ -1,0 +1,313 @@
+//! Many imagined aircraft at once: a model flown in lanes, section IV-B of \[GSFM26\].
+
+use std::sync::Arc;
+
+use crate::control::Target;
+use crate::control::policy::{ACTIONS, OBSERVATIONS, command, observe};
+use crate::control::task::Task;
+use crate::model::{GreyBox, Memory};
+use crate::num::{Lanes, Real};
+use crate::physics::actuators::Actuators;
+use crate::physics::inputs::InputMemory;
+use crate::physics::{Controls, State};
+use crate::sim::START_ALTITUDE;
+use crate::sim::targets::Stratified;
+
+/// Aircraft that move together.
+pub const WIDTH: usize = 16;
+
+/// Steps of an imagined episode, as many as of a flown one.
+pub const STEPS: u32 = 1000;
+
+/// `WIDTH` numbers, one an aircraft.
+pub type Block = Lanes<WIDTH>;
+
+/// Beyond these the model is not believed and the episode ends: angles θ, α, β (rad), rates p, q, r
+/// (rad/s), airspeed (m/s).
+const ENVELOPE: Envelope =
+    Envelope { pitch: 1.48, incidence: 1.0, rate: 25.0, airspeed: [4.0, 60.0] };
+
+#[derive(Clone, Copy, Debug)]
+struct Envelope {
+    pitch: f64,
+    incidence: f64,
+    rate: f64,
+    airspeed: [f64; 2],
+}
+
+/// How an aircraft's step ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// The episode goes on.
+    No,
+    /// Its time is up: what follows would be worth as much as ever.
+    Time,
+    /// It left the envelope.
+    Lost,
+}
+
+/// What a step of one block gives, before those that ended begin anew.
+#[derive(Clone, Copy, Debug)]
+pub struct Stepped {
+    /// What is observed after it.
+    pub observed: [Block; OBSERVATIONS],
+    /// The reward of eq. (30).
+    pub reward: Block,
+    /// How it ended for each aircraft.
+    pub ended: [Ended; WIDTH],
+}
+
+/// Aircraft imagined by a model, each with its own target, filters and episode.
+///
+/// The actuators' exact filters are part of the state. The air density is that of the start: over an
+/// episode it would change by less than 1 %.
+#[derive(Clone, Debug)]
+pub struct Imagination {
+    model: Arc<GreyBox>,
+    task: Task,
+    instances: usize,
+    flocks: Vec<Flock>,
+    neutral: Flock,
+    targets: Stratified,
+    instructions: Instructions,
+    lost: u64,
+}
+
+/// One block of aircraft.
+#[derive(Clone, Debug)]
+struct Flock {
+    state: State<Block>,
+    actuators: Actuators<Block>,
+    memory: Memory<Block>,
+    inputs: Option<InputMemory<Block>>,
+    target: Target<Block>,
+    step: [u32; WIDTH],
+}
+
+impl Imagination {
+    /// `instances` aircraft that fly as `model` says, at the neutral start; `targets` gives each
+    /// episode's.
+    pub fn new(model: Arc<GreyBox>, instances: usize, targets: Stratified) -> Imagination {
+        let lane = Block::from_f64;
+        let (state, rest) = (State::NEUTRAL, Controls::default());
+        let mut memory = Memory::default();
+        // what the scheme remembers at the start is the acceleration there
+        model.step(&state, &rest, START_ALTITUDE, &mut memory);
+        let rest = Controls { aileron: lane(0.0), elevator: lane(0.0), throttle: lane(0.0) };
+        let neutral = Flock {
+            state: state.map(lane),
+            actuators: Actuators::at_rest(&rest),
+            memory: memory.map(lane),
+            inputs: (!model.acts_at_once()).then(|| InputMemory::at_rest(&rest)),
+            target: Target { roll: 0.0, pitch: 0.0, airspeed: state.airspeed }.map(lane),
+            step: [0; WIDTH],
+        };
+        let count = instances.div_ceil(WIDTH);
+        let mut imagination = Imagination {
+            model,
+            task: Task::PAPER,
+            instances,
+            flocks: vec![neutral.clone(); count],
+            neutral,
+            targets,
+            instructions: Instructions::detect(),
+            lost: 0,
+        };
+        imagination.restart(imagination.targets.count());
+        imagination
+    }
+
+    /// Begins all episodes anew, `targets` having been given before.
+    pub fn restart(&mut self, targets: u64) {
+        self.targets.go_on_after(targets);
+        for k in 0..self.flocks.len() {
+            self.flocks[k] = self.neutral.clone();
+            for lane in 0..WIDTH {
+                self.aim(k, lane);
+            }
+        }
+    }
+
+    /// Gives an aircraft its next target.
+    fn aim(&mut self, flock: usize, lane: usize) {
+        if flock * WIDTH + lane < self.instances {
+            let [roll, pitch] = self.targets.next_target();
+            let target = &mut self.flocks[flock].target;
+            (target.roll.0[lane], target.pitch.0[lane]) = (roll as f32, pitch as f32);
+        }
+    }
+
+    /// Aircraft there are.
+    pub fn instances(&self) -> usize {
+        self.instances
+    }
+
+    /// Blocks there are; lanes of the last beyond the instances are of no account.
+    pub fn blocks(&self) -> usize {
+        self.flocks.len()
+    }
+
+    /// Episodes begun, one for each target given, and those that ended outside the envelope.
+    pub fn episodes(&self) -> [u64; 2] {
+        [self.targets.count(), self.lost]
+    }
+
+    /// What the aircraft of a block observe now.
+    pub fn observe(&self, block: usize) -> [Block; OBSERVATIONS] {
+        let Flock { state, actuators, target, .. } = &self.flocks[block];
+        observe(state, &actuators.observed(&self.model.airframe.actuators), target)
+    }
+
+    /// One step of a block under `action`; aircraft whose episodes end begin anew afterwards.
+    pub fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Stepped {
+        let flock = &mut self.flocks[block];
+        let (observed, reward, outside) =
+            self.instructions.advance(&self.model, &self.task, flock, action);
+        let mut ended = [Ended::No; WIDTH];
+        let mut anew = Block::zero();
+        for (lane, (steps, how)) in flock.step.iter_mut().zip(&mut ended).enumerate() {
+            *steps += 1;
+            *how = match (outside.0[lane] > 0.0, *steps >= STEPS) {
+                (true, _) => Ended::Lost,
+                (_, true) => Ended::Time,
+                _ => continue,
+            };
+            anew.0[lane] = 1.0;
+            *steps = 0;
+        }
+        if ended != [Ended::No; WIDTH] {
+            flock.begin(anew, &self.neutral);
+            for (lane, how) in ended.iter().enumerate() {
+                if *how != Ended::No {
+                    let counts = block * WIDTH + lane < self.instances;
+                    self.lost += u64::from(counts && *how == Ended::Lost);
+                    self.aim(block, lane);
+                }
+            }
+        }
+        Stepped { observed, reward, ended }
+    }
+}
+
+impl Flock {
+    /// Puts the aircraft of `chosen` back to the start.
+    fn begin(&mut self, chosen: Block, neutral: &Flock) {
+        self.state = self.state.replaced(chosen, &neutral.state);
+        self.actuators = self.actuators.replaced(chosen, &neutral.actuators);
+        self.memory = self.memory.replaced(chosen, &neutral.memory);
+        if let (Some(inputs), Some(rest)) = (&mut self.inputs, &neutral.inputs) {
+            *inputs = inputs.replaced(chosen, rest);
+        }
+    }
+
+    /// A step in the order of the simulator: the state moves under the actuators as they are, then the
+    /// actuators take the command. Gives what is observed, the reward, and 1 where it is outside.
+    #[inline(always)]
+    fn advance(
+        &mut self,
+        model: &GreyBox,
+        task: &Task,
+        action: &[Block; ACTIONS],
+    ) -> ([Block; OBSERVATIONS], Block, Block) {
+        let figures = &model.airframe.actuators;
+        let mut controls = self.actuators.controls();
+        if let Some(inputs) = &mut self.inputs {
+            controls = model.act(&controls, inputs);
+        }
+        let next = model.step_inlined(&self.state, &controls, START_ALTITUDE, &mut self.memory);
+        self.state = State { roll: wrapped(next.roll), ..next };
+        let mut limited = *action;
+        for x in &mut limited {
+            *x = x.clamp(-1.0, 1.0);
+        }
+        self.actuators.step(&command(limited), figures);
+        let seen = observe(&self.state, &self.actuators.observed(figures), &self.target);
+        (seen, task.reward(&self.state, &self.target), outside(&self.state))
+    }
+}
+
+/// A roll angle in −π..π that has moved by less than a turn.
+#[inline(always)]
+fn wrapped(roll: Block) -> Block {
+    let (half, turn) =
+        (Block::from_f64(std::f64::consts::PI), Block::from_f64(std::f64::consts::TAU));
+    let roll = Block::where_less(half, roll, roll - turn, roll);
+    Block::where_less(roll, -half, roll + turn, roll)
+}
+
+/// 1 where a state is outside the envelope of an episode or no number, else 0.
+#[inline(always)]
+pub fn outside(state: &State<Block>) -> Block {
+    ENVELOPE.left(state)
+}
+
+impl Envelope {
+    /// 1 where a state is outside or no number, else 0.
+    #[inline(always)]
+    fn left(&self, s: &State<Block>) -> Block {
+        let inside = |x: Block, most: f64, others: Block| {
+            // the comparison is false for what is no number
+            Block::where_less(x.abs(), Block::from_f64(most), others, Block::zero())
+        };
+        let [slow, fast] = self.airspeed;
+        let middle = Block::from_f64(0.5 * (slow + fast));
+        let mut all = Block::from_f64(1.0);
+        all = inside(s.pitch, self.pitch, all);
+        all = inside(s.airspeed - middle, 0.5 * (fast - slow), all);
+        all = inside(s.alpha, self.incidence, all);
+        all = inside(s.beta, self.incidence, all);
+        all = inside(s.p, self.rate, all);
+        all = inside(s.q, self.rate, all);
+        all = inside(s.r, self.rate, all);
+        all = inside(s.roll, 10.0, all);
+        Block::from_f64(1.0) - all
+    }
+}
+
+/// The vector instructions a step is compiled for; all give the same numbers to the bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Instructions {
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    Baseline,
+}
+
+type Advanced = ([Block; OBSERVATIONS], Block, Block);
+
+impl Instructions {
+    fn detect() -> Instructions {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx2") {
+                return Instructions::Avx2;
+            }
+        }
+        Instructions::Baseline
+    }
+
+    fn advance(
+        self,
+        model: &GreyBox,
+        task: &Task,
+        flock: &mut Flock,
+        action: &[Block; ACTIONS],
+    ) -> Advanced {
+        match self {
+            // SAFETY: `detect` has seen the processor's features
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 => unsafe { advance_avx2(model, task, flock, action) },
+            Instructions::Baseline => flock.advance(model, task, action),
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn advance_avx2(
+    model: &GreyBox,
+    task: &Task,
+    flock: &mut Flock,
+    action: &[Block; ACTIONS],
+) -> Advanced {
+    flock.advance(model, task, action)
+}

@@ -1,0 +1,74 @@
+//! JSBSim as an environment.
+
+use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start, Truth};
+
+use crate::control::Observation;
+use crate::physics::{ActuatorState, Command, State, Time};
+use crate::sim::{Environment, Trouble};
+
+/// JSBSim.
+pub struct Simulator {
+    plant: Plant,
+    previous: [Command; 2],
+}
+
+impl Simulator {
+    /// Loads an aircraft.
+    ///
+    /// # Errors
+    /// If there is no such aircraft.
+    pub fn new(options: &PlantOptions) -> Result<Simulator, Trouble> {
+        Ok(Simulator { plant: Plant::new(options)?, previous: [Command::IDLE; 2] })
+    }
+
+    /// The seed of the turbulence from the next reset on.
+    pub fn reseed(&mut self, seed: u32) {
+        self.plant.reseed(seed);
+    }
+
+    /// The whole truth of the plant.
+    pub fn truth(&self) -> Truth {
+        self.plant.truth()
+    }
+
+    fn observe(&self, truth: &Truth) -> Observation {
+        Observation {
+            time: Time::from_micros((truth.time_s * 1e6).round() as u64),
+            state: State {
+                roll: truth.roll_rad,
+                pitch: truth.pitch_rad,
+                airspeed: truth.airspeed_mps,
+                p: truth.p_radps,
+                q: truth.q_radps,
+                r: truth.r_radps,
+                alpha: truth.alpha_rad,
+                beta: truth.beta_rad,
+            },
+            actuators: ActuatorState {
+                aileron: truth.aileron_rad,
+                aileron_rate: truth.aileron_rate_radps,
+                elevator: truth.elevator_rad,
+                elevator_rate: truth.elevator_rate_radps,
+                throttle: truth.throttle,
+            },
+            altitude: truth.altitude_m,
+            previous: self.previous,
+        }
+    }
+}
+
+impl Environment for Simulator {
+    fn reset(&mut self) -> Result<Observation, Trouble> {
+        self.previous = [Command::IDLE; 2];
+        let truth = self.plant.reset(&Start::NEUTRAL)?;
+        Ok(self.observe(&truth))
+    }
+
+    fn step(&mut self, command: Command) -> Result<Observation, Trouble> {
+        let command = command.clamped();
+        let Command { aileron, elevator, throttle } = command;
+        let truth = self.plant.step(Inputs { aileron, elevator, throttle })?;
+        self.previous = [command, self.previous[0]];
+        Ok(self.observe(&truth))
+    }
+}
