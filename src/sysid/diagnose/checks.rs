@@ -19,8 +19,8 @@ const BOOTSTRAPS: u64 = 82;
 pub const ALIKE: f64 = 0.9;
 /// Nor those whose evidence is this close.
 pub const CLOSE: f64 = 10.0;
-/// Squared error per row beyond the noise that the rich fit leaves in flights without a missing effect: that fit
-/// follows some of the noise, which stands in its columns too (0.15 to 0.35).
+/// Squared error per row beyond the noise that the rich fit leaves, in flights in which nothing is missing any
+/// more: that fit follows some of the noise, which stands in its columns too (0.15 to 0.35).
 const FEIGNED: f64 = 0.2;
 /// How much that may be off.
 const UNSURE: f64 = 0.2;

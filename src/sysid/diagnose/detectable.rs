@@ -18,8 +18,10 @@ use super::round::Round;
 const TRIED: usize = 8;
 /// Largest factor between one amount and the next.
 const STRIDE: f64 = 8.0;
-/// Power of the amount with which the evidence is taken to grow while nothing is known.
-const POWER: f64 = 3.0;
+/// Power of the amount with which what an effect shows is taken to grow while nothing is known,
+const POWER: f64 = 2.0;
+/// and between which powers two amounts may say it does.
+const POWERS: [f64; 2] = [0.5, 4.0];
 /// An amount whose evidence is within this share of the one sought is close enough.
 const CLOSE: f64 = 0.1;
 
@@ -79,6 +81,8 @@ struct Sought<'a> {
     hidden: Option<[f64; 2]>,
     /// The smallest that does.
     seen: Option<[f64; 2]>,
+    /// The one tried last.
+    last: Option<[f64; 2]>,
     found: Option<f64>,
 }
 
@@ -93,6 +97,7 @@ impl<'a> Sought<'a> {
             size: 0.0,
             hidden: None,
             seen: None,
+            last: None,
             found: None,
         };
         sought.size = sought.turned(starts.first()?[0]);
@@ -114,16 +119,23 @@ impl<'a> Sought<'a> {
             self.found = Some(self.size);
             return;
         }
+        let ratio = ratio.max(1e-6);
+        // at a bound, the same size is tried again
+        let other = self.last.filter(|[size, _]| *size != self.size);
+        let power = other.map_or(POWER, |[size, before]| {
+            ((ratio / before).ln() / (self.size / size).ln()).clamp(POWERS[0], POWERS[1])
+        });
+        self.last = Some([self.size, ratio]);
         let place = if ratio < 1.0 { &mut self.hidden } else { &mut self.seen };
-        *place = Some([self.size, ratio.max(1e-6)]);
+        *place = self.last;
         let next = match (self.hidden, self.seen) {
             (Some([a, low]), Some([b, high])) => {
                 let part = -low.ln() / (high / low).ln();
                 a * (b / a).powf(part.clamp(0.1, 0.9))
             }
             _ => {
-                let factor = ratio.max(1e-6).powf(-1.0 / POWER);
-                self.size * factor.clamp(1.0 / STRIDE, STRIDE)
+                let factor = ratio.powf(-1.0 / power).clamp(1.0 / STRIDE, STRIDE);
+                self.size * factor
             }
         };
         self.size = next.clamp(self.bounds[0], self.bounds[1]);
