@@ -193,36 +193,6 @@ fn a_disarmed_companion_gives_the_aircraft_back_at_once() {
 }
 
 #[test]
-fn wrong_signs_are_found_gently_and_refused() {
-    for (personality, name, value, words) in [
-        (Px4, "PWM_MAIN_REV", 1.0, "rolls left"),
-        (Px4, "PWM_MAIN_REV", 2.0, "pitches up"),
-        (Ardupilot, "SERVO1_REVERSED", 1.0, "rolls left"),
-        (Ardupilot, "SERVO2_REVERSED", 1.0, "pitches up"),
-    ] {
-        let mut bench = Bench::new(personality, Surfaces, |options| {
-            options.parameters = vec![(name.into(), value)];
-            options.noise = Noise::REALISTIC;
-        });
-        bench.run(6.0);
-        bench.engage(0.0, 3.0);
-        let from = bench.seen.len();
-        bench.steer(0.0, 3.0, 3.0);
-        assert!(bench.said(words), "{name}: {:?}", bench.texts());
-        assert_eq!(bench.controller.mode(), Mode::Hold);
-        let worst = |angle: &dyn Fn(&controller_support::Seen) -> f64| {
-            bench.seen[from..].iter().map(|s| angle(s).to_degrees().abs()).fold(0.0, f64::max)
-        };
-        let (roll, pitch) = (worst(&|s| s.truth.roll_rad), worst(&|s| s.truth.pitch_rad));
-        println!(
-            "{personality} {name} {value}: {roll:.1} deg of roll, {pitch:.1} deg of pitch at most"
-        );
-        // Two opposite pulses of 0.15 s, then the controller has it again.
-        assert!(roll < 10.0 && pitch < 15.0);
-    }
-}
-
-#[test]
 fn sensors_that_stand_still_hand_the_aircraft_back() {
     // Found by `greylag faults`: the estimator of the incidence went on by itself, so that the state
     // never repeated, and the aircraft was rolled over.

@@ -8,7 +8,6 @@ pub mod air_data;
 mod assembly;
 mod engagement;
 pub mod parameters;
-mod probe;
 pub mod profile;
 mod sticks;
 pub mod survey;
@@ -26,7 +25,6 @@ use crate::physics::{Command, Time};
 use assembly::Assembly;
 use engagement::{Engagement, Phase};
 use parameters::{Parameters, Standing};
-use probe::{Probe, Verdict};
 use profile::{Authority, Profile, Stack};
 use sticks::Sticks;
 use survey::Survey;
@@ -70,8 +68,6 @@ pub struct Real {
     assembly: Assembly,
     engagement: Engagement,
     sticks: Sticks,
-    /// The check of signs that follows engaging.
-    probe: Option<Probe>,
     /// What the actuators were last told.
     sent: Command,
     last_state: Option<Duration>,
@@ -97,7 +93,6 @@ impl Real {
             assembly: Assembly::new(profile.actuators),
             engagement: Engagement::new(),
             sticks: Sticks::default(),
-            probe: None,
             sent: Command::IDLE,
             last_state: None,
             states: 0,
@@ -248,7 +243,6 @@ impl Real {
         };
         let steered = self.profile.stack.steered(self.profile.authority);
         self.say(Severity::Notice, format!("engaged: the controller is in {}", steered.name));
-        self.probe = (self.profile.authority == Authority::Surfaces).then(Probe::default);
     }
 
     fn say(&mut self, severity: Severity, words: String) {
@@ -282,7 +276,7 @@ impl Real {
         }
         self.states += 1;
         if command.is_finite() {
-            self.sent = self.probed(command.clamped());
+            self.sent = command.clamped();
         } else {
             self.bad_commands += 1;
         }
@@ -304,20 +298,6 @@ impl Real {
             }
         };
         self.write(&message)
-    }
-
-    /// The command, or that of the check of signs while it lasts.
-    fn probed(&mut self, command: Command) -> Command {
-        let Some(probe) = &mut self.probe else { return command };
-        match probe.step(&command, self.assembly.rates()) {
-            Verdict::Running(pulse) => return pulse,
-            Verdict::Right => {
-                self.say(Severity::Info, "the aircraft answers with the right signs".into());
-            }
-            Verdict::Wrong(reason) => self.hand_back(reason.into()),
-        }
-        self.probe = None;
-        command
     }
 
     /// What is due at `host` besides answers: heartbeat, requests, the hand-back.

@@ -106,11 +106,6 @@ impl Assembly {
         None
     }
 
-    /// Body rates of the last state, rad/s.
-    pub(super) fn rates(&self) -> [f64; 3] {
-        [self.last.state.p, self.last.state.q, self.last.state.r]
-    }
-
     fn complete(
         &mut self,
         host: Duration,
