@@ -226,7 +226,7 @@ impl Sitl {
         }
     }
 
-    /// See [`super::Vehicle::command`]. A command that is not finite never leaves: the last finite
+    /// See [`super::Vehicle::answer`]. A command that is not finite never leaves: the last finite
     /// one does.
     pub fn command(&mut self, time: Time, outputs: Outputs) -> Vec<u8> {
         let outputs = match outputs {
@@ -246,7 +246,7 @@ impl Sitl {
         self.write(&wire::actuator_controls(time, outputs))
     }
 
-    /// See [`super::Vehicle::heartbeat`].
+    /// See [`super::Vehicle::due`].
     pub fn heartbeat(&mut self, host: Duration, outputs: Outputs) -> Option<Vec<u8>> {
         if host < self.next_heartbeat {
             return None;
