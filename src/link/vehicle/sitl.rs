@@ -226,7 +226,7 @@ impl Sitl {
         }
     }
 
-    /// See [`super::Vehicle::due`]. A command that is not finite never leaves: the last finite
+    /// See [`super::Vehicle::answer`]. A command that is not finite never leaves: the last finite
     /// one does.
     pub fn command(&mut self, time: Time, outputs: Outputs) -> Vec<u8> {
         let outputs = match outputs {
