@@ -75,14 +75,18 @@ impl AirData {
             *self = AirData::default();
             return None;
         }
-        // After a long gap the past means nothing.
-        if !(0.0..=0.5).contains(&step) {
-            *self = AirData::default();
-        }
+        // After a long gap, or one that is no number, the past means nothing.
+        let step = match (0.0..=0.5).contains(&step) {
+            true => step,
+            false => {
+                *self = AirData::default();
+                0.0
+            }
+        };
         if self.state.is_none() {
             self.state = Some(beginning(m));
         }
-        self.propagate(m, step.clamp(0.0, 0.5));
+        self.propagate(m, step);
         self.correct(m);
         let [u, v, w] = self.state.filter(|x| x.iter().all(|x| x.is_finite()))?;
         let speed = (u * u + v * v + w * w).sqrt().max(SLOWEST);
@@ -142,7 +146,8 @@ impl AirData {
             row.iter().zip(cross).map(|(a, b)| a * b).sum::<f64>() + deviation * deviation;
         // A glitch counts for no more than three of its standard deviations.
         let limit = 3.0 * spread.sqrt();
-        let innovation = innovation.clamp(-limit, limit);
+        // a limit that is no number holds nothing back, and must not end the program
+        let innovation = innovation.max(-limit).min(limit);
         for i in 0..3 {
             state[i] += cross[i] / spread * innovation;
             for j in 0..3 {

@@ -136,7 +136,8 @@ impl Assembly {
         }
         self.fill_force(host, &mut next);
         let climb = self.fill_air(host, &mut next);
-        if self.stands_still(quaternion, rates) {
+        // what is stale says nothing of standing still, and is a fault already
+        if self.stands_still(quaternion, rates) && next.faults.is_empty() {
             // The estimator would go on by itself, and hide from the pilot that nothing moves.
             (next.state.alpha, next.state.beta) = (self.last.state.alpha, self.last.state.beta);
         } else {
