@@ -33,9 +33,6 @@ use cases::{Case, Seen};
 use record::Record;
 use search::Bench;
 
-/// Flights that are flown to see how much of an effect could be seen.
-const PROBES: u64 = 8;
-
 /// Hides effects in JSBSim, looks for them, and prints the table.
 #[derive(Parser)]
 struct Arguments {
@@ -71,7 +68,6 @@ struct Arguments {
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
     Nulls,
-    Probes,
     Effects,
     Without,
     Pairs,
@@ -98,9 +94,7 @@ fn main() -> Result<()> {
     if !arguments.table {
         let bench = Bench::new(arguments.simulated_nulls)?;
         // amplitudes of the other parts hang on what the nulls could have seen
-        for parts in
-            [[Part::Nulls, Part::Probes].as_slice(), &[Part::Effects, Part::Without, Part::Pairs]]
-        {
+        for parts in [[Part::Nulls].as_slice(), &[Part::Effects, Part::Without, Part::Pairs]] {
             let done = record::load(&arguments.results)?;
             let seen = Seen::of(&done);
             let mut cases: Vec<Case> =
@@ -115,9 +109,7 @@ fn main() -> Result<()> {
 
 /// The cases of a part of the campaign, if it is asked for.
 fn list(arguments: &Arguments, part: Part, seen: &Seen) -> Vec<Case> {
-    // probes go with nulls
-    let asked = if part == Part::Probes { Part::Nulls } else { part };
-    if arguments.part != asked && arguments.part != Part::All {
+    if arguments.part != part && arguments.part != Part::All {
         return Vec::new();
     }
     let wanted =
@@ -126,7 +118,6 @@ fn list(arguments: &Arguments, part: Part, seen: &Seen) -> Vec<Case> {
     match part {
         // the nulls' seeds are apart from all others
         Part::Nulls => cases::nulls(0..arguments.nulls),
-        Part::Probes => cases::probes(PROBES),
         Part::Effects => cases::effects(seeds, seen, wanted),
         Part::Without => cases::without(seeds, seen, wanted),
         Part::Pairs => cases::pairs(seeds, seen, wanted),

@@ -2,7 +2,6 @@
 
 use crate::sysid::compare::CompareError;
 use crate::sysid::compare::flight::Prepared;
-use crate::sysid::diagnose::clocks::Doubt;
 use crate::sysid::reconstruction::Reconstruction;
 
 /// Constants of a flight's sensors that are estimated along.
@@ -14,9 +13,6 @@ pub(super) const OFFSETS: [usize; SENSORS - 1] = [2, 3, 4, 5, 6, 7];
 /// The airspeed among the eight states.
 pub(super) const AIRSPEED: usize = 2;
 
-/// Least standard deviation of the actuators' clock as forces tell it, s (0.3 ms root mean square against the
-/// truth of simulated flights).
-pub(super) const SKEW_LEAST: f64 = 5e-4;
 /// Standard deviation of the actuators' clock against the gyros', s: that of ±1.5 samples, both of
 /// them late by 0 to 10 ms or the like.
 const SKEW_SD: f64 = 7.7e-3;
@@ -35,8 +31,6 @@ pub struct Flight {
     /// Standard deviations of the actuators' delay (s), the airspeed's scale (a share), the biases of
     /// p, q, r (rad/s), α and β (rad) that the reconstruction has left.
     pub doubt: [f64; SENSORS],
-    /// What forces and moments are judged by.
-    pub(super) forces: Doubt,
 }
 
 impl Flight {
@@ -51,9 +45,7 @@ impl Flight {
             let stated = stated.filter(|sd| sd.is_finite() && *sd > 0.0);
             doubt[k + 1] = stated.unwrap_or(default).clamp(0.1 * default, 20.0 * default);
         }
-        let prepared = Prepared::new(flight, slowest)?;
-        let forces = Doubt::of(flight, prepared.dt);
-        Ok(Flight { prepared, doubt, forces })
+        Ok(Flight { prepared: Prepared::new(flight, slowest)?, doubt })
     }
 
     /// Seconds flown.

@@ -4,10 +4,8 @@ use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use rayon::prelude::*;
 
-use super::cells::{Cells, Placed};
-use super::noise::Noise;
-use super::projected::{Projected, scaled_inverse};
-use super::rank::{Draw, Point, Score, Trial, quadratic};
+use super::projected::scaled_inverse;
+use super::rank::{Draw, Score, Trial, quadratic};
 use super::round::Round;
 use crate::num::stream::stream;
 
@@ -19,13 +17,6 @@ const BOOTSTRAPS: u64 = 82;
 pub const ALIKE: f64 = 0.9;
 /// Nor those whose evidence is this close.
 pub const CLOSE: f64 = 10.0;
-/// Squared error per row beyond the noise that the rich fit leaves, in flights in which nothing is missing any
-/// more: that fit follows some of the noise, which stands in its columns too (0.15 to 0.35).
-const FEIGNED: f64 = 0.2;
-/// How much that may be off.
-const UNSURE: f64 = 0.2;
-/// Standard deviations of the noise's square beyond which what an effect leaves is no chance.
-const DOUBT: f64 = 5.0;
 /// Candidates that a bootstrap lets compete.
 const COMPETING: usize = 8;
 
@@ -63,33 +54,13 @@ pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     taken / excess(round, &trial.channels).max(taken).max(1.0)
 }
 
-/// Share of the squared error beyond noise in the channels of an effect that is left once it has joined, if
-/// that is more than chance leaves; `fall` is what the effect took.
-pub fn left(round: &Round, channels: &[usize], fall: f64) -> Option<f64> {
-    let own: [bool; 6] = std::array::from_fn(|c| channels.contains(&c));
-    let rows = rows(round, &own);
-    let left = excess(round, &own) - FEIGNED * rows;
-    // the square of white noise scatters by √(2n)
-    let beyond_doubt = left > f64::max(DOUBT * (2.0 * rows).sqrt(), UNSURE * rows);
-    beyond_doubt.then(|| left / (left + fall))
-}
-
 /// Squared whitened error beyond noise in `channels`.
 pub fn excess(round: &Round, channels: &[bool; 6]) -> f64 {
     let blocks = round.projected.by_channel.iter();
-    let of = |sums: &[(f64, usize); 6]| -> f64 {
-        (0..6).filter(|c| channels[*c]).map(|c| sums[c].0).sum()
+    let of = |sums: &[(f64, usize); 6]| {
+        (0..6).filter(|c| channels[*c]).map(|c| sums[c].0 - sums[c].1 as f64).sum::<f64>()
     };
-    blocks.map(of).sum::<f64>() - rows(round, channels)
-}
-
-/// Rows in `channels`.
-fn rows(round: &Round, channels: &[bool; 6]) -> f64 {
-    let blocks = round.projected.by_channel.iter();
-    let of = |sums: &[(f64, usize); 6]| -> usize {
-        (0..6).filter(|c| channels[*c]).map(|c| sums[c].1).sum()
-    };
-    blocks.map(of).sum::<usize>() as f64
+    blocks.map(of).sum()
 }
 
 /// What may be scaled in a contribution: each column of a linear candidate, a nonlinear one as a whole.
@@ -155,51 +126,39 @@ pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) ->
     wins as f64 / count.max(1) as f64
 }
 
-/// The first free coefficient as each flight alone has it, prior and sensors fitted anew, with its standard
-/// deviation; NaN where a flight does not tell.
+/// The first free coefficient as each flight alone has it, with its standard deviation; NaN where a flight
+/// does not tell.
 pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<[f64; 2]> {
-    (0..round.flights.len())
-        .map(|flight| one_flight(round, trial, score, flight).unwrap_or([f64::NAN; 2]))
-        .collect()
-}
-
-fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Option<[f64; 2]> {
-    let own: Vec<usize> =
-        (0..round.cells.list.len()).filter(|k| round.cells.list[*k].flight == flight).collect();
-    let rows = |k: &usize| round.cells.list[*k].windows.len() as f64;
-    let share = own.iter().map(rows).sum::<f64>()
-        / (0..round.cells.list.len()).map(|k| rows(&k)).sum::<f64>();
-    let cells = Cells {
-        list: own.iter().map(|k| round.cells.list[*k].clone()).collect(),
-        flight_of_block: round.cells.flight_of_block.clone(),
-    };
-    let residuals = own.iter().map(|k| round.noise.residuals[*k].clone()).collect();
-    let noise = Noise { whiteners: round.noise.whiteners.clone(), residuals };
-    // the candidate's columns alone, numbered anew
+    let p = &round.projected;
+    let last = p.width();
     let point = &trial.points[score.point];
-    let columns: Vec<usize> = point.free.iter().map(|f| f.1).chain(point.contribution).collect();
-    let (na, last) = (round.known.len(), round.known.len() + columns.len());
-    let mut shared: Vec<f64> = round.shared[..na].iter().map(|s| s * share).collect();
-    let mut placed: Placed =
-        round.placed[flight].iter().take_while(|(p, _)| *p < na).cloned().collect();
-    for (k, column) in columns.iter().enumerate() {
-        shared.push(share * round.shared.get(na + column).copied().unwrap_or(0.0));
-        let of = round.placed[flight].iter().find(|(p, _)| *p == na + column)?;
-        placed.push((na + k, of.1.clone()));
-    }
-    let residual = round.placed[flight].iter().find(|(p, _)| *p == round.last)?;
-    placed.push((last, residual.1.clone()));
-    let mut all = vec![Placed::new(); round.flights.len()];
-    all[flight] = placed;
-    let p = Projected::new(&cells, &all, last, &round.known, &noise, &shared)?;
-    let free = point.free.iter().enumerate().map(|(k, f)| (f.0, k, f.2)).collect();
-    let contribution = point.contribution.map(|_| point.free.len());
-    let point = Point { values: point.values.clone(), contribution, free };
+    let columns: Vec<usize> = point.free.iter().map(|f| f.1).collect();
     let first = point.free[0].0;
-    let alone = Trial { points: vec![point], ..trial.clone() };
-    let grams = p.grams();
-    let found = alone.score(&grams, &Draw::measured(&grams))?;
-    Some([found.values[first], found.deviations[first]])
+    // how much more the blocks scatter than the noise alone
+    let whole =
+        DMatrix::from_fn(columns.len(), columns.len(), |i, j| p.total[(columns[i], columns[j])]);
+    let alone = scaled_inverse(&whole).map_or(f64::NAN, |m| m[(0, 0)].sqrt());
+    let inflation = (score.deviations[first] / alone).max(1.0);
+    (0..round.flights.len())
+        .map(|flight| {
+            let own = (0..p.blocks.len()).filter(|b| round.cells.flight_of_block[*b] == flight);
+            let grams = p.resampled(own);
+            let gram = DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
+                grams.total[(columns[i], columns[j])]
+            });
+            let product = DVector::from_iterator(
+                columns.len(),
+                columns.iter().map(|c| {
+                    let known: f64 =
+                        score.weights.iter().map(|(d, w)| w * grams.total[(*c, *d)]).sum();
+                    grams.total[(*c, last)] - known
+                }),
+            );
+            let Some(inverse) = scaled_inverse(&gram) else { return [f64::NAN; 2] };
+            let step = &inverse * product;
+            [score.values[first] + step[0], inflation * inverse[(0, 0)].max(0.0).sqrt()]
+        })
+        .collect()
 }
 
 /// Whether flights contradict the common `value`: the other sign beyond doubt, or another amount beyond

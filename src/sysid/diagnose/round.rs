@@ -284,15 +284,9 @@ impl Round {
     /// their bounds.
     pub fn tuned(&self) -> GreyBox {
         let mut model = self.model.clone();
-        let linear = model.linear();
         let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
         for (k, place) in self.coefficients.iter().enumerate() {
-            let mut step = self.projected.tuned[k];
-            if !linear[*place] {
-                let reach = catalogue::REACH * values[*place].abs();
-                step = step.clamp(-reach, reach);
-            }
-            values[*place] += step;
+            values[*place] += self.projected.tuned[k];
             if *place >= self.given
                 && let Some((low, high)) = bounds(&model, *place)
             {
