@@ -20,6 +20,10 @@ fn param(name: &str) -> String {
     path.display().to_string()
 }
 
+/// What is wrong in the severe prior.
+const WRONG: &str = "lift_linear.CLde,drag_linear.CD0,drag_linear.CDalpha,side_force_linear.CYbeta,\
+    roll_linear.Clbeta,roll_linear.Clp,roll_linear.Clda,yaw_linear.Cnp,yaw_linear.Cnr";
+
 #[test]
 fn exploring_then_learning_leaves_a_model_that_follows_better() {
     let folder = tempfile::tempdir().unwrap();
@@ -44,7 +48,7 @@ fn exploring_then_learning_leaves_a_model_that_follows_better() {
             "--integrator",
             "jsbsim",
             "--trainable",
-            "roll_linear.Clda,roll_linear.Clp,yaw_linear.Cnr",
+            WRONG,
             "--hidden",
             "16",
             "--steps",
@@ -66,8 +70,9 @@ fn exploring_then_learning_leaves_a_model_that_follows_better() {
     assert!(rms("learned") < 0.5 * rms("prior"), "{} of {}", rms("learned"), rms("prior"));
     for c in result["coefficients"].as_array().unwrap() {
         let [value, truth] = ["value", "truth"].map(|k| c[k].as_f64().unwrap());
-        // the regression on 11 minutes of noise-free flight; other coefficients stay wrong
-        assert!((value / truth - 1.0).abs() < 0.1, "{c}");
+        let moment = ["roll", "yaw"].iter().any(|k| c["name"].as_str().unwrap().starts_with(k));
+        // two minutes of noise-free flight; lift and drag have a stall that the prior has not
+        assert!(!moment || (value / truth - 1.0).abs() < 0.05, "{c}");
     }
     let page = std::fs::read_to_string(Path::new(&out).join("training.html")).unwrap();
     assert!(page.contains("Error over the horizon") && page.contains("roll_linear.Clda"));
