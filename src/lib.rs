@@ -6,11 +6,14 @@
 //!
 //! ```text
 //! in flight   link ──► flight ──► link           flight ⇄ control ──► model ──► physics ──► num
-//!             bytes    100 Hz     bytes          (pilot)              (grey box) (effects)   (numbers)
+//!             bytes    100 Hz     bytes          (pilot)  LQI, policy (grey box) (effects)   (numbers)
+//!                                                         and planner
 //!
 //! on ground   logs ──► sysid ──► params ──► sim ──► report ──► fly again
-//!             flight   where it   TOML     episodes, figures
-//!                      fails               scores
+//!             flight   where it   TOML  ▲  episodes, figures
+//!                      fails            │  scores
+//!             logs ──► learn ───────────┘
+//!                      residual and prior, then actor and critics (safetensors)
 //! ```
 //!
 //! # One tick
@@ -32,7 +35,9 @@
 //! | 19 (residual) | [`model::Residual`] |
 //! | 20, 22–24 (loss) | `learn::Objective` |
 //! | 21 (scale x_c) | [`model::GreyBox::scale`] |
+//! | 26 (hybrid controller) | [`control::cem`] |
 //! | 27 (actuator state) | [`physics::ActuatorState`], exact filters in [`physics::actuators`] |
+//! | 28 (observation) | [`control::policy::observe`] |
 //! | 29 (action) | [`physics::Command`] |
 //! | 30 (reward) | [`control::task::Task`] |
 //! | 31–34 (air-relative velocity) | [`physics::rigid_body::air_velocity`] |
@@ -44,6 +49,7 @@
 //! | 42 (side force) | [`physics::effects::SideForceLinear`] |
 //! | 44–46 (moments) | [`physics::effects::RollLinear`], [`physics::effects::PitchLinear`], [`physics::effects::YawLinear`] |
 //! | Table II (targets) | `sim::targets` |
+//! | Table VII (TD3) | `learn::Hyperparameters` |
 //! | section V-E (protocol) | `sim::episode` |
 //!
 //! # Bibliography

@@ -78,11 +78,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .collect::<Result<Vec<_>>>()?;
     println!("{}", table(&evaluations));
     println!("all: easy with hard_corners, the targets of the paper's Table II");
+    println!("to 1°: median time after which roll and pitch stay within 1° of the target");
     if let Some(path) = &arguments.json {
         let document = Document {
             schema: "greylag.evaluation/1",
             program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
-            command_line: std::env::args().collect::<Vec<_>>().join(" "),
+            command_line: files::command_line(),
             seed: arguments.seed,
             targets: arguments.targets.display().to_string(),
             aircraft: &plant.aircraft,
@@ -183,6 +184,7 @@ fn table(evaluations: &[Evaluation]) -> Table {
         "median °",
         "IQM °",
         "max °",
+        "to 1°, s",
         "diverged %",
         "ms/step p50",
         "p99",
@@ -194,6 +196,7 @@ fn table(evaluations: &[Evaluation]) -> Table {
             let mut row =
                 vec![e.controller.clone(), e.model.clone(), s.targets.clone(), s.count.to_string()];
             row.extend([s.mean_deg, s.median_deg, s.iqm_deg, s.max_deg].map(|x| format!("{x:.3}")));
+            row.push(format!("{:.2}", s.settling_s));
             row.push(format!("{:.1}", 100.0 * s.divergence_rate));
             row.extend(cost.map(|x| format!("{x:.4}")));
             table.add_row(row);

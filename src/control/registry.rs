@@ -138,10 +138,11 @@ controllers! {
     PidRetuned "pid-retuned" Immediate Gains "PID retuned, at a safer airspeed." => |_from| pid::Pid::new(pid::RETUNED),
     Lqi "lqi" Immediate Model "Gain-scheduled LQI designed from the model." => |from| lqi::Lqi::new(from.model)?,
     Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |from| cem::Cem::new("cem", from.model, cem::Settings::PAPER, cem::Aids::default()),
+    Mppi "mppi" Planned Model "MPPI over the same five steps." => |from| cem::Cem::new("mppi", from.model, cem::Settings::MPPI, cem::Aids::default()),
     CemPolicy "cem-policy" Planned Both "CEM-MPC with the policy's proposals." => |from| from.planner("cem-policy", cem::Settings::POLICY)?,
     CemCritic "cem-critic" Planned Both "CEM-MPC with the critics' value of the end." => |from| from.planner("cem-critic", cem::Settings::CRITICS)?,
     Hybrid "hybrid" Planned Both "The hybrid controller: proposals and critics, eq. (26)." => |from| from.planner("hybrid", cem::Settings::HYBRID)?,
-    HybridLqi "hybrid-lqi" Planned Both "The hybrid where it is surely better than the model's LQI, which flies elsewhere." => |from| from.planner_over_lqi("hybrid-lqi", cem::Settings::HYBRID)?,
+    HybridLqi "hybrid-lqi" Planned Both "The hybrid over the model's LQI, which flies on behind each plan: offset-free." => |from| from.planner_over_lqi("hybrid-lqi", cem::Settings::OVER_LQI)?,
     Policy "policy" Immediate Policy "A trained policy alone." => |from| Policy::new(from.agent()?),
 }
 

@@ -22,6 +22,7 @@ mod replay;
 mod rollout;
 pub mod score;
 mod td3;
+mod valuation;
 pub mod windows;
 
 pub use adam::Adam;
@@ -39,3 +40,4 @@ pub use recipe::{Criterion, Recipe, Start};
 pub use replay::{Batch, Replay, Transition};
 pub use rollout::{Gradient, PriorSlopes, Subject};
 pub use td3::{Hyperparameters, Losses, Standing, Td3};
+pub use valuation::{Valuation, ValuationError, ValuationProgress, ValuationRecipe};

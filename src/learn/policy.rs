@@ -12,7 +12,7 @@ use crate::learn::replay::{Batch, Replay, Transition};
 use crate::learn::td3::{Hyperparameters, Standing, Td3};
 use crate::num::dense::{DenseError, Units};
 use crate::num::stream::{self, Stream};
-use crate::num::{Dense, Real, statistics};
+use crate::num::{Real, statistics};
 use crate::sim::Trouble;
 use crate::sim::imagined::{Block, Ended, Stepped, WIDTH};
 use crate::sim::world::World;
@@ -153,16 +153,6 @@ impl<W: World> PolicyTrainer<W> {
             losses: Vec::new(),
             rewards: Vec::new(),
         })
-    }
-
-    /// Takes over an actor; with a delay of 0 it is held, and what it is worth is learned.
-    ///
-    /// # Errors
-    /// If it has another shape than a policy's.
-    pub fn take(&mut self, network: &Dense) -> Result<(), PolicyError> {
-        self.td3.set_actor(network);
-        self.actor = Actor::new(network.clone())?;
-        Ok(())
     }
 
     /// Trains for about `steps` steps more, up to the recipe's; stops at every checkpoint.

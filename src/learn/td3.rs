@@ -33,8 +33,7 @@ pub struct Hyperparameters {
     pub actor_rate: f64,
     /// Learning rate of the critics.
     pub critic_rate: f64,
-    /// Updates of the critics for one of the actor, d; 0 holds the actor, so that the critics learn what
-    /// it is worth.
+    /// Updates of the critics for one of the actor, d.
     pub delay: u64,
     /// Standard deviation of the noise that smooths the target policy, σ.
     pub smoothing: f64,
@@ -161,10 +160,8 @@ impl Td3 {
         }
         self.updates += 1;
         // the actor, eq. (3), and the target networks, once in a while
-        match self.settings.delay {
-            0 => self.follow(),
-            delay if self.updates.is_multiple_of(delay) => self.improve(observed),
-            _ => {}
+        if self.updates.is_multiple_of(self.settings.delay) {
+            self.improve(observed);
         }
         Losses { critics: loss.into_scalar::<f32>() }
     }
@@ -196,11 +193,6 @@ impl Td3 {
             (deviation * x).clamp(-clip, clip)
         };
         (0..rows * ACTIONS).map(draw).collect()
-    }
-
-    /// Takes over an actor.
-    pub fn set_actor(&mut self, network: &Dense) {
-        self.actor = Learner::new(network, self.settings.actor_rate, &self.device);
     }
 
     /// Updates made.

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::control::{Controller, Observation, Target};
+use crate::model::STEP;
 use crate::physics::Command;
 use crate::sim::{Environment, Trouble};
 
@@ -15,11 +16,17 @@ pub const SETTLED: usize = 200;
 /// Settled error above which an episode counts as diverged, degrees (Table VIII).
 pub const DIVERGED_DEG: f64 = 10.0;
 
+/// Attitude error within which a target counts as reached, degrees.
+pub const REACHED_DEG: f64 = 1.0;
+
 /// What came of an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// Mean of roll and pitch RMSE over the last fifth, degrees; 180 if the aircraft was lost.
     pub settled_deg: f64,
+    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s; the whole episode's
+    /// if they never do.
+    pub settling_s: f64,
     /// Time that the controller needed for each step.
     pub cost: Vec<Duration>,
 }
@@ -48,6 +55,7 @@ impl Episode<'_> {
         self.controller.reset(self.seed);
         let mut cost = Vec::with_capacity(STEPS);
         let mut errors = Vec::with_capacity(SETTLED);
+        let mut away = 0;
         for step in 0..STEPS {
             let start = Instant::now();
             let command = self.controller.command(&seen, target);
@@ -55,14 +63,24 @@ impl Episode<'_> {
             watch(&seen, &command);
             seen = match self.environment.step(command) {
                 Ok(seen) => seen,
-                Err(_) => return Ok(Outcome { settled_deg: 180.0, cost }),
+                Err(_) => {
+                    return Ok(Outcome { settled_deg: 180.0, settling_s: seconds(STEPS), cost });
+                }
             };
+            let error = attitude_error_deg([seen.state.roll, seen.state.pitch], target);
+            if !error.iter().all(|e| e.abs() <= REACHED_DEG) {
+                away = step + 1;
+            }
             if step >= STEPS - SETTLED {
-                errors.push(attitude_error_deg([seen.state.roll, seen.state.pitch], target));
+                errors.push(error);
             }
         }
-        Ok(Outcome { settled_deg: settled_error_deg(&errors), cost })
+        Ok(Outcome { settled_deg: settled_error_deg(&errors), settling_s: seconds(away), cost })
     }
+}
+
+fn seconds(steps: usize) -> f64 {
+    steps as f64 * STEP
 }
 
 /// The settled error of \[GSFM26\] section V-E: the mean of roll and pitch RMSE, degrees, of
@@ -150,6 +168,14 @@ mod tests {
     #[test]
     fn angles_are_compared_the_shorter_way_round() {
         assert!((settled([359.0, 0.0], usize::MAX) - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_time_to_settle_ends_with_the_last_step_away() {
+        let mut environment = Fake { step: 0, settled: [0.5, -0.5], lost_at: usize::MAX };
+        let episode = Episode { environment: &mut environment, controller: &mut Idle, seed: 0 };
+        let outcome = episode.fly(&TARGET, |_, _| ()).unwrap();
+        assert!((outcome.settling_s - seconds(STEPS - SETTLED)).abs() < 1e-9);
     }
 
     #[test]

@@ -44,6 +44,8 @@ pub struct Score {
     pub iqm_deg: f64,
     /// Largest settled error, degrees.
     pub max_deg: f64,
+    /// Median of the time after which the attitude stays within 1° of the target, s.
+    pub settling_s: f64,
     /// Share of targets with more than 10° of settled error.
     pub divergence_rate: f64,
 }
@@ -99,9 +101,9 @@ pub fn evaluate(
 impl Evaluation {
     /// Sums up `outcomes` of `rows`.
     pub fn new(controller: &str, model: &str, rows: &[Row], outcomes: &[Outcome]) -> Evaluation {
-        let of = |wanted: &dyn Fn(Group) -> bool| -> Vec<f64> {
+        let of = |wanted: &dyn Fn(Group) -> bool| -> Vec<&Outcome> {
             let pairs = rows.iter().zip(outcomes).filter(|(row, _)| wanted(row.group));
-            pairs.map(|(_, outcome)| outcome.settled_deg).collect()
+            pairs.map(|(_, outcome)| outcome).collect()
         };
         let mut groups: Vec<Score> = Group::ALL
             .into_iter()
@@ -136,7 +138,9 @@ impl Evaluation {
 }
 
 impl Score {
-    fn new(targets: &str, errors: &[f64]) -> Score {
+    fn new(targets: &str, outcomes: &[&Outcome]) -> Score {
+        let errors: &[f64] = &outcomes.iter().map(|o| o.settled_deg).collect::<Vec<_>>();
+        let settling: Vec<f64> = outcomes.iter().map(|o| o.settling_s).collect();
         let diverged = errors.iter().filter(|e| **e > DIVERGED_DEG).count();
         Score {
             targets: targets.into(),
@@ -145,6 +149,7 @@ impl Score {
             median_deg: quantile(errors, 0.5),
             iqm_deg: interquartile_mean(errors),
             max_deg: quantile(errors, 1.0),
+            settling_s: quantile(&settling, 0.5),
             divergence_rate: diverged as f64 / errors.len() as f64,
         }
     }

@@ -47,9 +47,7 @@ impl Teller<'_> {
             controller: self.controller.into(),
             model: self.model.name.clone(),
             seed: Some(self.seed),
-            command_line: std::env::args()
-                .skip(1)
-                .fold("greylag".into(), |line, a| line + " " + &a),
+            command_line: files::command_line(),
             versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
             segments: self.legs.iter().map(|leg| segment(leg, flight)).collect(),
             tolerance_rad: TOLERANCE_DEG.to_radians(),

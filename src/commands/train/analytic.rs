@@ -9,12 +9,15 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 
 use super::policy::evaluation;
-use crate::control::policy::Actor;
-use crate::learn::{AnalyticRecipe, AnalyticTrainer};
+use crate::control::policy::{Actor, Critic};
+use crate::learn::{AnalyticRecipe, AnalyticTrainer, Valuation, ValuationRecipe};
 use crate::model::GreyBox;
+use crate::sim::imagined::Imagination;
 
 /// Updates between two evaluations.
 const LINE: u64 = 50;
+/// Updates of the critics between two lines.
+const CRITICS: u64 = 1000;
 const COLUMNS: &str = "updates,steps,seconds,easy_deg,hard_deg,divergence_rate,reward,lost";
 
 /// Climbs the reward's slope in `model`; the curve goes into `folder`. Gives the last actor, the learning
@@ -62,4 +65,31 @@ pub fn climb(
         }
     }
     Ok(Some(Arc::new(trainer.actor()?)))
+}
+
+/// Learns what `actor` is worth in `world`; `None` if interrupted.
+///
+/// # Errors
+/// If a parameter is no longer finite.
+pub fn value(
+    recipe: ValuationRecipe,
+    actor: &Actor,
+    world: Imagination,
+    stop: &AtomicBool,
+) -> Result<Option<[Critic; 2]>> {
+    let (seed, updates) = (recipe.seed, recipe.updates);
+    println!("{:>8} critics: updates,seconds,relative error", "seed");
+    let mut valuation = Valuation::new(recipe, world, actor.clone())?;
+    let start = Instant::now();
+    loop {
+        let progress = valuation.run(CRITICS)?;
+        let seconds = start.elapsed().as_secs_f64();
+        println!("{seed:>8} {},{seconds:.0},{:.3}", progress.updates, progress.error);
+        if progress.updates == updates {
+            return Ok(Some(valuation.critics()?));
+        }
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+    }
 }

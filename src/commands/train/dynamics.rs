@@ -189,7 +189,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             ("Prior".into(), path.display().to_string()),
             ("Data".into(), format!("SHA-256 {}", trainer.data())),
             ("Recipe".into(), serde_json::to_string(trainer.recipe())?),
-            ("Command line".into(), std::env::args().collect::<Vec<_>>().join(" ")),
+            ("Command line".into(), files::command_line()),
             ("Plots".into(), "uPlot 1.6.32 (MIT)".into()),
         ],
     };

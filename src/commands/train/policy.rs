@@ -13,10 +13,10 @@ use serde::Serialize;
 
 use super::analytic;
 use crate::commands::files::{self, Overwrite, shipped};
-use crate::control::policy::{Actor, Agent, Evaluated, Origin};
+use crate::control::policy::{Actor, Agent, Critic, Evaluated, Origin};
 use crate::learn::{
     AnalyticRecipe, Hyperparameters, PolicyProgress, PolicyRecipe, PolicyStanding, PolicyTrainer,
-    write_whole,
+    ValuationRecipe, write_whole,
 };
 use crate::model::GreyBox;
 use crate::model::residual::{fingerprint, hash};
@@ -42,6 +42,9 @@ pub struct Arguments {
     /// How: td3, or analytic (the slope of the reward through the model, then critics of the actor found).
     #[arg(long, default_value = "td3", value_parser = ["td3", "analytic"])]
     algorithm: String,
+    /// Updates of the critics of the actor that the analytic policy gradient found.
+    #[arg(long, default_value_t = ValuationRecipe::default().updates, value_parser = clap::value_parser!(u64).range(1..))]
+    valuation: u64,
     /// Updates of the analytic policy gradient.
     #[arg(long, default_value_t = AnalyticRecipe::default().updates)]
     updates: u64,
@@ -138,9 +141,16 @@ struct Document<'a> {
     schema: &'static str,
     program: &'static str,
     command_line: String,
-    analytic: Option<&'a AnalyticRecipe>,
-    recipe: &'a PolicyRecipe,
+    method: &'a Method<'a>,
     best: &'a Origin,
+}
+
+/// How a policy was found.
+#[derive(Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Method<'a> {
+    Td3(&'a PolicyRecipe),
+    Analytic { climb: &'a AnalyticRecipe, valuation: &'a ValuationRecipe },
 }
 
 /// Where a policy is trained, found to be whole.
@@ -183,8 +193,6 @@ impl Arguments {
                 smoothing: self.smoothing,
                 exploration: self.exploration,
                 batch: self.batch as usize,
-                // the actor that was found is held while its critics are learned
-                delay: if self.is_analytic() { 0 } else { Hyperparameters::default().delay },
                 ..Hyperparameters::default()
             },
             steps: self.steps,
@@ -205,8 +213,8 @@ impl Arguments {
         self.algorithm == "analytic"
     }
 
-    fn analytic(&self, seed: u64) -> Option<AnalyticRecipe> {
-        self.is_analytic().then(|| AnalyticRecipe {
+    fn analytic(&self, seed: u64) -> AnalyticRecipe {
+        AnalyticRecipe {
             actor: self.actor.clone(),
             instances: self.flock as usize,
             window: self.window as usize,
@@ -216,7 +224,18 @@ impl Arguments {
             corners: self.corners,
             seed,
             ..AnalyticRecipe::default()
-        })
+        }
+    }
+
+    fn valuation(&self, seed: u64) -> ValuationRecipe {
+        ValuationRecipe {
+            critic: self.critic.clone(),
+            updates: self.valuation,
+            instances: self.instances as usize,
+            discount: self.discount,
+            seed,
+            ..ValuationRecipe::default()
+        }
     }
 
     fn ground(&self) -> Result<Ground> {
@@ -285,10 +304,13 @@ impl Arguments {
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make {}", folder.display()))?;
         let targets = Stratified::new(seed, 0, self.corners);
-        let analytic = self.analytic(seed);
-        let run = Run { folder, seed, evaluate: self.evaluate, ground, stop, analytic };
+        let run = Run { folder, seed, evaluate: self.evaluate, ground, stop };
         let recipe = self.recipe(seed);
         match &ground.model {
+            Some(model) if self.is_analytic() => {
+                let world = Imagination::new(model.clone(), self.instances as usize, targets);
+                run.climb(&self.analytic(seed), self.valuation(seed), model, world)
+            }
             Some(model) => {
                 run.train(recipe, Imagination::new(model.clone(), self.instances as usize, targets))
             }
@@ -310,14 +332,35 @@ struct Run<'a> {
     evaluate: u64,
     ground: &'a Ground,
     stop: &'a AtomicBool,
-    analytic: Option<AnalyticRecipe>,
 }
 
 impl Run<'_> {
+    /// An actor up the reward's slope, then its critics.
+    fn climb(
+        &self,
+        recipe: &AnalyticRecipe,
+        valuation: ValuationRecipe,
+        model: &GreyBox,
+        world: Imagination,
+    ) -> Result<bool> {
+        let Some(actor) = analytic::climb(recipe, model, &self.folder, self.stop)? else {
+            return Ok(false);
+        };
+        let method = Method::Analytic { climb: recipe, valuation: &valuation.clone() };
+        let Some(critics) = analytic::value(valuation, &actor, world, self.stop)? else {
+            return Ok(false);
+        };
+        let steps = recipe.updates * (recipe.window * recipe.instances) as u64;
+        let evaluation = evaluation(actor.clone())?;
+        self.save(&method, actor, critics.into(), steps, evaluation)?;
+        println!("{:>8} policy in {}", self.seed, self.folder.display());
+        Ok(true)
+    }
+
     fn train<W: World>(&self, recipe: PolicyRecipe, world: W) -> Result<bool> {
         // more steps of the same training are the same training
         let of = PolicyRecipe { steps: 0, ..recipe.clone() };
-        let of = (of, &self.analytic, &self.ground.origin.model_sha256);
+        let of = (of, &self.ground.origin.model_sha256);
         let what = serde_json::to_string(&of)?;
         let mut trainer = PolicyTrainer::new(recipe, world, hash(what.as_bytes()))?;
         let kept = self.folder.join(CHECKPOINT);
@@ -327,11 +370,6 @@ impl Run<'_> {
                 .resume(standing)
                 .with_context(|| format!("going on from {}", kept.display()))?;
             eprintln!("seed {}: going on after {} steps", self.seed, trainer.steps());
-        } else if let (Some(recipe), Some(model)) = (&self.analytic, &self.ground.model) {
-            let Some(actor) = analytic::climb(recipe, model, &self.folder, self.stop)? else {
-                return Ok(false);
-            };
-            trainer.take(actor.network())?;
         }
         let mut curve = Curve::open(&self.folder.join(CURVE), trainer.steps())?;
         let mut best = curve.best;
@@ -350,10 +388,11 @@ impl Run<'_> {
             println!("{:>8} {line}  {:.0} min left", self.seed, left / 60.0);
             warn(self.seed, &progress);
             let score = evaluated.map_or(-progress.reward, |e| e.easy_deg + e.hard_deg);
-            // a held actor scores the same while its critics become better
             if score <= best {
                 best = score;
-                self.save(&trainer, progress.steps, evaluated)?;
+                let method = Method::Td3(trainer.recipe());
+                let (actor, critics) = (trainer.actor(), trainer.critics()?);
+                self.save(&method, actor, critics, progress.steps, evaluated)?;
             }
             if trainer.at_checkpoint() {
                 trainer.standing().save(&kept)?;
@@ -367,14 +406,16 @@ impl Run<'_> {
     }
 
     /// Writes the policy as it is now, the best so far.
-    fn save<W: World>(
+    fn save(
         &self,
-        trainer: &PolicyTrainer<W>,
+        method: &Method,
+        actor: Arc<Actor>,
+        critics: Arc<[Critic; 2]>,
         steps: u64,
         evaluation: Option<Evaluated>,
     ) -> Result<()> {
         let origin = Origin { seed: self.seed, steps, evaluation, ..self.ground.origin.clone() };
-        let agent = Agent { actor: trainer.actor(), critics: trainer.critics()?, origin };
+        let agent = Agent { actor, critics, origin };
         for (name, bytes) in agent.to_files().map_err(|e| anyhow!("the policy's files: {e}"))? {
             let path = self.folder.join(name);
             write_whole(&path, &bytes)
@@ -384,8 +425,7 @@ impl Run<'_> {
             schema: "greylag.policy-training/1",
             program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
             command_line: files::command_line(),
-            analytic: self.analytic.as_ref(),
-            recipe: trainer.recipe(),
+            method,
             best: &agent.origin,
         };
         let json = self.folder.join("training.json");

@@ -1,14 +1,15 @@
 //! Rollouts of many candidates at once, in the widest vectors that the processor has.
 
-use crate::control::policy::{Agent, OBSERVATIONS, command, observe};
+use crate::control::lqi::Ahead;
+use crate::control::policy::{ACTIONS, Agent, command, observe};
 use crate::control::task::Task;
 use crate::control::{Observation, Target};
-use crate::model::{GreyBox, Memory};
+use crate::model::{GreyBox, Memory, STEP};
 use crate::num::dense::Units;
 use crate::num::{Lanes, Real};
 use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
-use crate::physics::{ActuatorState, State};
+use crate::physics::{ActuatorState, Command, State};
 
 /// Candidates that move together.
 pub(super) const WIDTH: usize = 16;
@@ -30,6 +31,12 @@ pub(super) struct Scene<'a> {
     pub agent: Option<&'a Agent>,
     /// Weight α of what the critics say of the end, eq. (26); `None` leaves them out.
     pub alpha: Option<f64>,
+    /// What the integrator remembers.
+    pub memory: Memory,
+    /// What the state's rate has beside the model's.
+    pub disturbance: State,
+    /// The base that flies on behind a plan, and its throttle all along.
+    pub ahead: Option<&'a Ahead>,
 }
 
 /// Who chooses the actions of a block.
@@ -39,6 +46,8 @@ pub(super) enum Actions {
     Given,
     /// The policy does; the block holds what is added to its actions, and has the sums afterwards.
     Policy,
+    /// The base does; likewise.
+    Base,
 }
 
 /// What the candidates of a block are worth.
@@ -127,94 +136,148 @@ fn fly<const FUSED: bool>(
     }
 }
 
-/// The worth of one block: actuators, model and reward in the order of the simulator.
-///
-/// The integrator's memory starts empty: the first step of [`Integrator::Jsbsim`] is then Euler's.
-/// Effects on the deflections start at rest where the surfaces are: over the five steps a plan under
-/// a lag or a delay so believes in more of the present deflection than really acts.
-///
-/// [`Integrator::Jsbsim`]: crate::model::Integrator::Jsbsim
+/// One block of imagined aircraft on their way.
+struct Flight<const FUSED: bool> {
+    state: State<Lanes<WIDTH, FUSED>>,
+    actuators: Actuators<Lanes<WIDTH, FUSED>>,
+    previous: [Command<Lanes<WIDTH, FUSED>>; 2],
+    memory: Memory<Lanes<WIDTH, FUSED>>,
+    inputs: Option<InputMemory<Lanes<WIDTH, FUSED>>>,
+    target: Target<Lanes<WIDTH, FUSED>>,
+    disturbance: State<Lanes<WIDTH, FUSED>>,
+    sum: Lanes<WIDTH, FUSED>,
+    weight: f64,
+}
+
+impl<const FUSED: bool> Flight<FUSED> {
+    /// Effects on the deflections start at rest where the surfaces are: over the five steps a plan under
+    /// a lag or a delay so believes in more of the present deflection than really acts.
+    #[inline(always)]
+    fn new(scene: &Scene) -> Self {
+        let lane = Lanes::<WIDTH, FUSED>::from_f64;
+        let Scene { model, seen, target, .. } = scene;
+        let z = &seen.actuators;
+        let observed = ActuatorState {
+            aileron: lane(z.aileron),
+            aileron_rate: lane(z.aileron_rate),
+            elevator: lane(z.elevator),
+            elevator_rate: lane(z.elevator_rate),
+            throttle: lane(z.throttle),
+        };
+        let previous = seen.previous.map(|c| command_of(c, lane));
+        let actuators = Actuators::from_observed(&observed, &previous, &model.airframe.actuators);
+        let controls = actuators.controls();
+        Flight {
+            state: seen.state.map(lane),
+            actuators,
+            previous,
+            memory: scene.memory.map(lane),
+            // what acted before the tick is not observed
+            inputs: (!model.acts_at_once()).then(|| InputMemory::at_rest(&controls)),
+            target: target.map(lane),
+            disturbance: scene.disturbance.map(lane),
+            sum: Lanes::zero(),
+            weight: 1.0,
+        }
+    }
+
+    /// A step in the order of the simulator, and its reward.
+    #[inline(always)]
+    fn advance(&mut self, scene: &Scene, command: Command<Lanes<WIDTH, FUSED>>) {
+        let Scene { model, task, seen, .. } = scene;
+        let mut controls = self.actuators.controls();
+        if let Some(inputs) = &mut self.inputs {
+            controls = model.act(&controls, inputs);
+        }
+        self.state = model.step_inlined(&self.state, &controls, seen.altitude, &mut self.memory);
+        self.state = self.state.advance(&self.disturbance, STEP);
+        self.actuators.step(&command, &model.airframe.actuators);
+        self.previous = [command, self.previous[0]];
+        self.sum += task.reward(&self.state, &self.target).scale(self.weight);
+        self.weight *= task.discount;
+    }
+
+    #[inline(always)]
+    fn observed(&self, scene: &Scene) -> ActuatorState<Lanes<WIDTH, FUSED>> {
+        self.actuators.observed(&scene.model.airframe.actuators)
+    }
+}
+
+/// The worth of one block: a plan of five steps, and what follows it.
 #[inline(always)]
-#[expect(clippy::needless_range_loop, reason = "the last pass of the loop has no actions")]
 fn rollout<const FUSED: bool>(
     scene: &Scene,
     actions: Actions,
     block: &mut Block,
     units: &mut Units<Lanes<WIDTH, FUSED>>,
 ) -> Worth {
-    let Scene { model, task, seen, target, .. } = scene;
-    let figures = &model.airframe.actuators;
-    let lane = Lanes::<WIDTH, FUSED>::from_f64;
-    let mut state: State<Lanes<WIDTH, FUSED>> = seen.state.map(lane);
-    let z = &seen.actuators;
-    let observed = ActuatorState {
-        aileron: lane(z.aileron),
-        aileron_rate: lane(z.aileron_rate),
-        elevator: lane(z.elevator),
-        elevator_rate: lane(z.elevator_rate),
-        throttle: lane(z.throttle),
-    };
-    let previous = seen.previous.map(|c| command_of(c, lane));
-    let target = target.map(lane);
-    let mut actuators = Actuators::from_observed(&observed, &previous, figures);
-    let mut memory = Memory::default();
-    // what acted before the tick is not observed: the surfaces are taken to have been where they are
-    let mut inputs = (!model.acts_at_once()).then(|| InputMemory::at_rest(&actuators.controls()));
-    let mut sum = Lanes::zero();
-    let mut weight = 1.0;
-    let [mut worth, mut doubt] = [Lanes::<WIDTH, FUSED>::zero(); 2];
-    for step in 0..=HORIZON {
-        let asked = match step {
-            HORIZON => scene.alpha.is_some(),
-            _ => actions == Actions::Policy,
-        };
-        let mut advised = [Lanes::zero(); 3];
-        let mut view = [Lanes::zero(); OBSERVATIONS];
-        if let (true, Some(agent)) = (asked, scene.agent) {
-            view = observe(&state, &actuators.observed(figures), &target);
-            advised = agent.actor.act(units, &view);
-        }
-        if step == HORIZON {
-            worth = sum;
-            if let (Some(alpha), Some(agent)) = (scene.alpha, scene.agent) {
-                let first = agent.critics[0].value(units, &view, &advised);
-                let second = agent.critics[1].value(units, &view, &advised);
-                // a number that is lost stays lost
-                let least = first + (second - first).min(Lanes::zero());
-                worth += least.scale(alpha * weight);
-                doubt = (first - second).abs().scale(alpha * weight);
-            }
-            break;
-        }
-        let mut chosen = [Lanes::zero(); 3];
-        // plain loops: an iterator that is not inlined leaves the vector instructions
-        let given = &mut block[step];
-        for i in 0..3 {
-            chosen[i] = Lanes(given[i]);
-            if actions == Actions::Policy {
-                chosen[i] = (chosen[i] + advised[i]).clamp(-1.0, 1.0);
-                given[i] = chosen[i].0;
-            }
-        }
-        let mut controls = actuators.controls();
-        if let Some(inputs) = &mut inputs {
-            controls = model.act(&controls, inputs);
-        }
-        state = model.step_inlined(&state, &controls, seen.altitude, &mut memory);
-        actuators.step(&command(chosen), figures);
-        sum += task.reward(&state, &target).scale(weight);
-        weight *= task.discount;
+    let mut flight = Flight::<FUSED>::new(scene);
+    let mut reference = [Lanes::zero(); 2];
+    if let Some(ahead) = scene.ahead {
+        reference = [Lanes::from_f64(ahead.reference()[0]), Lanes::from_f64(ahead.reference()[1])];
     }
-    Worth { returns: worth.0, doubt: doubt.0 }
+    let steps = match scene.ahead {
+        Some(ahead) => ahead.steps(),
+        None => HORIZON,
+    };
+    // plain loops, and one place where the model is: an iterator that is not inlined leaves the vector
+    // instructions, a second copy of the model doubles what takes minutes to compile
+    let mut step = 0;
+    while step < steps {
+        let mut chosen = [Lanes::zero(); ACTIONS];
+        if step < HORIZON {
+            let given = &block[step];
+            chosen = [Lanes(given[0]), Lanes(given[1]), Lanes(given[2])];
+        } else if step == HORIZON && actions != Actions::Base {
+            reference = [flight.state.roll, flight.state.pitch];
+        }
+        if let (true, Actions::Policy, Some(agent)) = (step < HORIZON, actions, scene.agent) {
+            let view = observe(&flight.state, &flight.observed(scene), &flight.target);
+            let advised = agent.actor.act(units, &view);
+            let mut i = 0;
+            while i < ACTIONS {
+                chosen[i] = (chosen[i] + advised[i]).clamp(-1.0, 1.0);
+                i += 1;
+            }
+        }
+        let mut command = command(chosen);
+        if let Some(ahead) = scene.ahead {
+            let z = flight.observed(scene);
+            let base = ahead.command(step, &mut reference, &flight.state, &z, &flight.previous);
+            if actions == Actions::Base || step >= HORIZON {
+                command.aileron = (command.aileron + base.aileron).clamp(-1.0, 1.0);
+                command.elevator = (command.elevator + base.elevator).clamp(-1.0, 1.0);
+            }
+            // the base flies the throttle: what is planned is attitude
+            command.throttle = base.throttle;
+        }
+        if step < HORIZON {
+            let given = &mut block[step];
+            given[0] = command.aileron.0;
+            given[1] = command.elevator.0;
+            given[2] = (command.throttle.scale(2.0) - Lanes::splat(1.0)).0;
+        }
+        flight.advance(scene, command);
+        step += 1;
+    }
+    let mut doubt = Lanes::<WIDTH, FUSED>::zero();
+    if let (Some(alpha), Some(agent)) = (scene.alpha, scene.agent) {
+        let view = observe(&flight.state, &flight.observed(scene), &flight.target);
+        let advised = agent.actor.act(units, &view);
+        let first = agent.critics[0].value(units, &view, &advised);
+        let second = agent.critics[1].value(units, &view, &advised);
+        // a number that is lost stays lost
+        let least = first + (second - first).min(Lanes::zero());
+        flight.sum += least.scale(alpha * flight.weight);
+        doubt = (first - second).abs().scale(alpha * flight.weight);
+    }
+    Worth { returns: flight.sum.0, doubt: doubt.0 }
 }
 
 /// A command with every component read as another kind of number.
 #[inline(always)]
-fn command_of<R>(
-    c: crate::physics::Command,
-    number: impl Fn(f64) -> R,
-) -> crate::physics::Command<R> {
-    crate::physics::Command {
+fn command_of<R>(c: Command, number: impl Fn(f64) -> R) -> Command<R> {
+    Command {
         aileron: number(c.aileron),
         elevator: number(c.elevator),
         throttle: number(c.throttle),
@@ -224,7 +287,8 @@ fn command_of<R>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::{Command, Time};
+    use crate::control::cem::disturbance;
+    use crate::physics::Time;
     use std::path::Path;
 
     /// The same candidates are worth the same in every instruction set.
@@ -247,6 +311,9 @@ mod tests {
             target: &target,
             agent: None,
             alpha: None,
+            memory: Memory::default(),
+            disturbance: disturbance::NONE,
+            ahead: None,
         };
         let wave = |k: usize| std::array::from_fn(|i| ((k * 16 + i) as f32 * 0.37).sin());
         let mut blocks: [Block; 1] =

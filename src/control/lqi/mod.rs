@@ -1,17 +1,17 @@
 //! LQI: linear-quadratic attitude control with integral action, scheduled over the envelope.
 
+mod ahead;
 mod design;
 mod riccati;
 mod schedule;
 
 use std::sync::Arc;
 
-use nalgebra::SVector;
-
 use crate::control::{Controller, Observation, SetupError, Target};
 use crate::model::{GreyBox, STEP};
 use crate::physics::Command;
-use design::STATES;
+pub(crate) use ahead::Ahead;
+use ahead::{HOLD, Inner, Law};
 use schedule::Schedule;
 
 /// Largest rates of the reference, rad/s: commanded steps become ramps that the surfaces can
@@ -57,9 +57,7 @@ impl Lqi {
     /// Moves the reference towards the target, and returns it.
     fn follow(&mut self, seen: &Observation, target: &Target) -> [f64; 2] {
         let mut reference = self.reference.unwrap_or([seen.state.roll, seen.state.pitch]);
-        // too slow for the bank asked for: bank as far as the airspeed allows, and more with it
-        let part = self.schedule.tolerable_part(seen.state.airspeed, target.roll, target.pitch);
-        let wanted = [part * target.roll, target.pitch];
+        let wanted = self.wanted(seen, target);
         for ((x, wanted), rate) in reference.iter_mut().zip(wanted).zip([ROLL_RATE, PITCH_RATE]) {
             let step = ((wanted - *x) / ROUNDING).clamp(-rate, rate) * STEP;
             if step.is_finite() {
@@ -70,10 +68,45 @@ impl Lqi {
         reference
     }
 
+    /// The attitude that the reference moves to: too slow for the bank asked for, bank as far as the
+    /// airspeed allows, and more with it.
+    fn wanted(&self, seen: &Observation, target: &Target) -> [f64; 2] {
+        let part = self.schedule.tolerable_part(seen.state.airspeed, target.roll, target.pitch);
+        [part * target.roll, target.pitch]
+    }
+
+    /// The airspeed to hold (m/s): the target's, or what the attitude needs.
+    fn airspeed(&self, target: &Target) -> f64 {
+        self.schedule.comfortable_airspeed(target.roll, target.pitch).max(target.airspeed)
+    }
+
+    /// Writes into `ahead` how the LQI would fly on from `seen`.
+    pub(crate) fn look_ahead(&self, seen: &Observation, target: &Target, ahead: &mut Ahead) {
+        let mut follower = self.clone();
+        let now = [seen.state.roll, seen.state.pitch];
+        ahead.inner = Inner { reference: self.reference.unwrap_or(now), integral: self.integral };
+        ahead.wanted = self.wanted(seen, target);
+        ahead.airspeed = self.airspeed(target);
+        ahead.airspeed_integral = self.airspeed_integral;
+        ahead.deflection = self.deflection;
+        for law in &mut ahead.laws {
+            let [roll, pitch] = follower.follow(seen, target);
+            *law = self.schedule.at(seen.state.airspeed, roll, pitch).into();
+            for _ in 1..HOLD {
+                follower.follow(seen, target);
+            }
+        }
+    }
+
+    /// Takes over from another controller that has flown instead: the reference goes on from where the
+    /// aircraft is, the integrals from where they were.
+    pub(crate) fn hand_over(&mut self, before: &Lqi, seen: &Observation) {
+        self.integral = before.integral;
+        self.reference = Some([seen.state.roll, seen.state.pitch]);
+    }
+
     fn throttle(&mut self, seen: &Observation, target: &Target, feed_forward: f64) -> f64 {
-        let wanted =
-            self.schedule.comfortable_airspeed(target.roll, target.pitch).max(target.airspeed);
-        let error = wanted - seen.state.airspeed;
+        let error = self.airspeed(target) - seen.state.airspeed;
         let raw = feed_forward + AIRSPEED_KP * error + self.airspeed_integral;
         let outward = (raw > 1.0 && error > 0.0) || (raw < 0.0 && error < 0.0);
         if !outward && error.is_finite() {
@@ -100,42 +133,18 @@ impl Controller for Lqi {
 
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {
         let [roll, pitch] = self.follow(seen, target);
-        let (s, z) = (&seen.state, &seen.actuators);
-        let entry = self.schedule.at(s.airspeed, roll, pitch);
-        let [aileron, elevator] = entry.deflection;
-        let was = |position: f64, rate: f64| position - rate * STEP;
-        let sent = |command: f64| command * self.deflection;
-        let [new, old] = seen.previous;
-        let t = entry.steady;
-        let x = SVector::<f64, STATES>::from([
-            s.roll - roll,
-            s.pitch - pitch,
-            s.p - t[2],
-            s.q - t[3],
-            s.r - t[4],
-            s.alpha - t[5],
-            s.beta - t[6],
-            z.aileron - aileron,
-            was(z.aileron, z.aileron_rate) - aileron,
-            sent(new.aileron) - aileron,
-            sent(old.aileron) - aileron,
-            z.elevator - elevator,
-            was(z.elevator, z.elevator_rate) - elevator,
-            sent(new.elevator) - elevator,
-            sent(old.elevator) - elevator,
-            self.integral[0],
-            self.integral[1],
-        ]);
-        let mut u = -(entry.gain * x);
-        u[1] += STALL_GAIN * (s.alpha - STALL_ALPHA).max(0.0);
-        let raw = [(aileron + u[0]) / self.deflection, (elevator + u[1]) / self.deflection];
+        let law = Law::from(self.schedule.at(seen.state.airspeed, roll, pitch));
+        let inner = Inner { reference: [roll, pitch], integral: self.integral };
+        let raw =
+            law.surfaces(&inner, &seen.state, &seen.actuators, &seen.previous, self.deflection);
+        let error = [seen.state.roll - roll, seen.state.pitch - pitch];
         // conditional integration: an axis whose surface is at its stop does not wind up
         for axis in 0..2 {
-            if raw[axis].abs() < 1.0 && x[axis].is_finite() {
-                self.integral[axis] += x[axis] * STEP;
+            if raw[axis].abs() < 1.0 && error[axis].is_finite() {
+                self.integral[axis] += error[axis] * STEP;
             }
         }
-        let throttle = self.throttle(seen, target, entry.throttle);
+        let throttle = self.throttle(seen, target, law.throttle());
         Command { aileron: raw[0], elevator: raw[1], throttle }.clamped()
     }
 }
