@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::controller::Personality;
 use super::error::ShimError;
 use super::link::{Address, Transport};
+use super::px4_sim::Px4Options;
 use crate::plant::{PlantOptions, Start};
 
 /// What the shim's clock follows.
@@ -166,6 +167,8 @@ pub struct ShimOptions {
     pub personality: Option<Personality>,
     /// Parameters of the played stack that differ from its defaults.
     pub parameters: Vec<(String, f64)>,
+    /// Be the simulator of PX4 SITL instead; `None` speaks to a companion.
+    pub px4: Option<Px4Options>,
 }
 
 impl ShimOptions {
@@ -190,6 +193,7 @@ impl ShimOptions {
             faults: FrameFaults::default(),
             personality: None,
             parameters: Vec::new(),
+            px4: None,
         }
     }
 
@@ -218,6 +222,20 @@ impl ShimOptions {
             self.personality.is_none() || self.pace == Pace::RealTime,
             "a personality flies in real time, as the flight controller it plays does",
         )?;
+        if self.px4.is_some() {
+            demand(
+                self.link.transport == Transport::TcpIn,
+                "PX4 connects to its simulator by TCP: listen with tcpin:HOST:PORT",
+            )?;
+            demand(
+                self.personality.is_none(),
+                "PX4 itself flies through its simulator API: leave --personality out",
+            )?;
+            demand(
+                *faults == FrameFaults::default() && self.noise == Noise::NONE,
+                "the PX4 simulator API sends every message, with noise of its own (--px4-noise)",
+            )?;
+        }
         let bias = &self.bias;
         let mut biases = vec![bias.alpha_rad, bias.beta_rad, bias.airspeed_scale];
         biases.extend(bias.gyro_radps.iter().chain(&bias.accelerometer_mps2));

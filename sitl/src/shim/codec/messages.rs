@@ -211,7 +211,7 @@ messages! {
     HilActuatorControls = 93, crc_extra 47 {
         /// The time of the frame that is answered, µs.
         time_usec: u64,
-        /// Flags; unused here.
+        /// Bit 0: the sender is in lockstep; unused in the profile `sitl`.
         flags: u64,
         /// Aileron, elevator, throttle, then unused.
         controls: [f32; 16],
@@ -253,6 +253,112 @@ messages! {
         fields_updated: u16,
         /// Number of the sensor (extension).
         id: u8,
+    }
+
+    /// HIL_SENSOR: what a simulator's sensors show.
+    HilSensor = 107, crc_extra 108 {
+        /// Simulated time, µs.
+        time_usec: u64,
+        /// Specific force along body x, m/s².
+        xacc: f32,
+        /// Specific force along body y, m/s².
+        yacc: f32,
+        /// Specific force along body z, m/s².
+        zacc: f32,
+        /// p, rad/s.
+        xgyro: f32,
+        /// q, rad/s.
+        ygyro: f32,
+        /// r, rad/s.
+        zgyro: f32,
+        /// Magnetic field along body x, gauss.
+        xmag: f32,
+        /// Magnetic field along body y, gauss.
+        ymag: f32,
+        /// Magnetic field along body z, gauss.
+        zmag: f32,
+        /// Static pressure, hPa.
+        abs_pressure: f32,
+        /// Differential pressure, hPa.
+        diff_pressure: f32,
+        /// Pressure altitude, m.
+        pressure_alt: f32,
+        /// Air temperature, °C.
+        temperature: f32,
+        /// HIL_SENSOR_UPDATED_FLAGS: which fields are measured anew.
+        fields_updated: u32,
+        /// Number of the sensor (extension).
+        id: u8,
+    }
+
+    /// HIL_GPS: what a simulator's receiver shows.
+    HilGps = 113, crc_extra 124 {
+        /// Simulated time, µs.
+        time_usec: u64,
+        /// Latitude, 1e-7 degrees.
+        lat: i32,
+        /// Longitude, 1e-7 degrees.
+        lon: i32,
+        /// Altitude above mean sea level, mm.
+        alt: i32,
+        /// Horizontal accuracy, cm.
+        eph: u16,
+        /// Vertical accuracy, cm.
+        epv: u16,
+        /// Ground speed, cm/s.
+        vel: u16,
+        /// North, cm/s.
+        vn: i16,
+        /// East, cm/s.
+        ve: i16,
+        /// Down, cm/s.
+        vd: i16,
+        /// Course over ground, cdeg, 0..35999.
+        cog: u16,
+        /// GPS_FIX_TYPE.
+        fix_type: u8,
+        /// Satellites.
+        satellites_visible: u8,
+        /// Number of the receiver (extension).
+        id: u8,
+        /// Yaw, cdeg; 0 is not available (extension).
+        yaw: u16,
+    }
+
+    /// HIL_STATE_QUATERNION: a simulator's truth.
+    HilStateQuaternion = 115, crc_extra 4 {
+        /// Simulated time, µs.
+        time_usec: u64,
+        /// Rotation NED→FRD, w first.
+        attitude_quaternion: [f32; 4],
+        /// p, rad/s.
+        rollspeed: f32,
+        /// q, rad/s.
+        pitchspeed: f32,
+        /// r, rad/s.
+        yawspeed: f32,
+        /// Latitude, 1e-7 degrees.
+        lat: i32,
+        /// Longitude, 1e-7 degrees.
+        lon: i32,
+        /// Altitude above mean sea level, mm.
+        alt: i32,
+        /// North, cm/s.
+        vx: i16,
+        /// East, cm/s.
+        vy: i16,
+        /// Down, cm/s.
+        vz: i16,
+        /// Equivalent airspeed, cm/s.
+        ind_airspeed: u16,
+        /// True airspeed, cm/s.
+        true_airspeed: u16,
+        /// Specific force along body x, mG.
+        xacc: i16,
+        /// Specific force along body y, mG.
+        yacc: i16,
+        /// Specific force along body z, mG.
+        zacc: i16,
     }
 
     /// PARAM_REQUEST_READ: a parameter is asked for.

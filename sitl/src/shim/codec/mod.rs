@@ -14,7 +14,8 @@ pub use field::{Field, Reader, Writer};
 pub use frame::{Encoder, Frame, Version, checksum};
 pub use messages::{
     ActuatorOutputStatus, AoaSsa, AttitudeQuaternion, CommandAck, CommandLong, GlobalPositionInt,
-    GpsRawInt, Heartbeat, HighresImu, HilActuatorControls, ManualControl, Message,
+    GpsRawInt, Heartbeat, HighresImu, HilActuatorControls, HilGps, HilSensor, HilStateQuaternion,
+    ManualControl, Message,
     ParamRequestList, ParamRequestRead, ParamSet, ParamValue, RcChannelsOverride, ServoOutputRaw,
     SetAttitudeTarget, StatusText, SysStatus, TimeSync, VfrHud, WindCov, crc_extra,
 };
