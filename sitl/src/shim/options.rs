@@ -218,10 +218,6 @@ impl ShimOptions {
             (0.0..=1.0).contains(&faults.late_probability),
             "the probability of a late frame must lie in 0..1",
         )?;
-        demand(
-            self.personality.is_none() || self.pace == Pace::RealTime,
-            "a personality flies in real time, as the flight controller it plays does",
-        )?;
         if self.px4.is_some() {
             demand(
                 self.link.transport == Transport::TcpIn,
@@ -231,11 +227,18 @@ impl ShimOptions {
                 self.personality.is_none(),
                 "PX4 itself flies through its simulator API: leave --personality out",
             )?;
+            let FrameFaults { delay_ms, drop_probability, jitter_ms, late_probability, .. } =
+                faults;
+            let spared = [delay_ms, drop_probability, jitter_ms, late_probability];
             demand(
-                *faults == FrameFaults::default() && self.noise == Noise::NONE,
+                spared.into_iter().all(|&x| x == 0.0) && self.noise == Noise::NONE,
                 "the PX4 simulator API sends every message, with noise of its own (--px4-noise)",
             )?;
         }
+        demand(
+            self.personality.is_none() || self.pace == Pace::RealTime,
+            "a personality flies in real time, as the flight controller it plays does",
+        )?;
         let bias = &self.bias;
         let mut biases = vec![bias.alpha_rad, bias.beta_rad, bias.airspeed_scale];
         biases.extend(bias.gyro_radps.iter().chain(&bias.accelerometer_mps2));

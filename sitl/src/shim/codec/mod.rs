@@ -15,8 +15,8 @@ pub use frame::{Encoder, Frame, Version, checksum};
 pub use messages::{
     ActuatorOutputStatus, AoaSsa, AttitudeQuaternion, CommandAck, CommandLong, GlobalPositionInt,
     GpsRawInt, Heartbeat, HighresImu, HilActuatorControls, HilGps, HilSensor, HilStateQuaternion,
-    ManualControl, Message,
-    ParamRequestList, ParamRequestRead, ParamSet, ParamValue, RcChannelsOverride, ServoOutputRaw,
-    SetAttitudeTarget, StatusText, SysStatus, TimeSync, VfrHud, WindCov, crc_extra,
+    ManualControl, Message, ParamRequestList, ParamRequestRead, ParamSet, ParamValue,
+    RcChannelsOverride, ServoOutputRaw, SetAttitudeTarget, StatusText, SysStatus, TimeSync, VfrHud,
+    WindCov, crc_extra,
 };
 pub use parser::Parser;

@@ -37,8 +37,8 @@ impl fmt::Display for Px4Event {
         match self {
             Px4Event::Waiting(link) => write!(
                 f,
-                "waiting for PX4 on {link}; start it with PX4_SIM_MODEL=jsbsim_malolo in its \
-                 rootfs folder: PX4_SIMULATOR=jsbsim ../bin/px4"
+                "waiting for PX4 on {link}; start it in its source folder: PX4_SYS_AUTOSTART=1036 \
+                 PX4_SIM_MODEL=jsbsim_malolo build/px4_sitl_default/bin/px4"
             ),
             Px4Event::Connected(peer) => write!(f, "PX4 connected from {peer}"),
             Px4Event::Gone => write!(f, "PX4 gone: the aircraft is back at its start"),

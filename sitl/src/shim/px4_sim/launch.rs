@@ -44,8 +44,15 @@ impl Launcher {
         let plant = Plant::new(options)?;
         let (released, step_s) = (Truth::default(), options.step_s);
         let phase = Phase::Stand;
-        let mut launcher =
-            Launcher { plant, start: *start, at_once: launch, step_s, phase, released, shown: released };
+        let mut launcher = Launcher {
+            plant,
+            start: *start,
+            at_once: launch,
+            step_s,
+            phase,
+            released,
+            shown: released,
+        };
         launcher.begin_anew()?;
         Ok(launcher)
     }

@@ -155,7 +155,8 @@ pub struct Actuation {
 impl OutputMap {
     /// Reads an actuator message; `None` when an output that is used is not a finite number.
     pub fn read(&self, message: &HilActuatorControls) -> Option<Actuation> {
-        let (mut roll, mut pitch, mut throttle, mut limited) = (Mean::default(), Mean::default(), 0.0, false);
+        let (mut roll, mut pitch, mut throttle, mut limited) =
+            (Mean::default(), Mean::default(), 0.0, false);
         for Output { effector, place, sign } in &self.0 {
             let control = f64::from(message.controls[*place]);
             if !control.is_finite() {
@@ -229,7 +230,8 @@ mod tests {
         let plane = told(&plane, &[(6, -roll), (7, roll), (8, pitch), (5, 0.75)], 129);
         assert_eq!(plane.unwrap().inputs, inputs);
         // One channel, reversed.
-        let single = told("aileron=-1,elevator=2,throttle=3", &[(1, -roll), (2, pitch), (3, 0.75)], 129);
+        let single =
+            told("aileron=-1,elevator=2,throttle=3", &[(1, -roll), (2, pitch), (3, 0.75)], 129);
         assert_eq!(single.unwrap().inputs, inputs);
     }
 

@@ -155,9 +155,8 @@ impl Sensors {
         let east = degrees(draw(noise.gps_horizontal_m));
         let longitude = truth.longitude_deg + east / truth.latitude_deg.to_radians().cos();
         let altitude = truth.altitude_m + draw(noise.gps_altitude_m);
-        let velocity: [f64; 3] = std::array::from_fn(|i| {
-            truth.velocity_ned_mps[i] + draw(noise.gps_velocity_mps[i])
-        });
+        let velocity: [f64; 3] =
+            std::array::from_fn(|i| truth.velocity_ned_mps[i] + draw(noise.gps_velocity_mps[i]));
         let [vn, ve, vd] = velocity.map(|v| (v * 1e2).round() as i16);
         let course_deg = velocity[1].atan2(velocity[0]).to_degrees().rem_euclid(360.0);
         HilGps {
