@@ -1,0 +1,49 @@
+"""MAVProxy's command line through the routing companion: it flies the controller behind it."""
+
+import re
+
+import flight
+from flight import PITCH_DEG, ROLL_DEG, check, quaternion, say
+from mavproxy_console import MavProxy, Watcher
+
+# PX4's HOLD and OFFBOARD.
+HOLD, OFFBOARD = 4 << 16 | 3 << 24, 6 << 16
+
+
+def fly(proxy, watcher):
+    """Parameters of the controller, OFFBOARD, an attitude, HOLD."""
+    line = proxy.wait_for("Received", 20.0)
+    counts = re.search(r"Received (\d+) parameters", line)
+    check(counts is not None and int(counts[1]) == 13, f"not PX4's 13 parameters: {line}")
+    proxy.type("param show COM_OF_LOSS_T", "COM_OF_LOSS_T")
+    watcher.until_mode(HOLD)
+    # Without a stream of setpoints the controller refuses.
+    proxy.type("long DO_SET_MODE 1 6", "DO_SET_MODE: TEMPORARILY_REJECTED")
+    q = " ".join(f"{part:.7f}" for part in quaternion(ROLL_DEG, PITCH_DEG))
+    proxy.type(f"repeat add 0.1 attitude {q} 0.5", "thrust:0.5")
+    proxy.type("long DO_SET_MODE 1 6", "DO_SET_MODE: ACCEPTED")
+    watcher.until_mode(OFFBOARD)
+    watcher.until_attitude(ROLL_DEG, PITCH_DEG)
+    say("HOLD")
+    proxy.type("long DO_SET_MODE 1 4 3", "DO_SET_MODE: ACCEPTED")
+    watcher.until_mode(HOLD)
+    proxy.type("repeat clean")
+
+
+def main():
+    """Flies."""
+    arguments = flight.arguments(__doc__)
+    port, watched = flight.free_ports(2)
+    with flight.Flight(arguments, [f"tcpin:127.0.0.1:{port}"], "px4") as flown:
+        watcher = Watcher(f"udpin:127.0.0.1:{watched}")
+        proxy = MavProxy(f"tcp:127.0.0.1:{port}", f"udp:127.0.0.1:{watched}", flown.folder)
+        try:
+            fly(proxy, watcher)
+        finally:
+            proxy.process.stdin.close()
+            proxy.process.kill()
+            proxy.process.wait()
+        flown.end()
+
+
+flight.run(main, 150)
