@@ -433,6 +433,17 @@ fn the_messages_of_a_connecting_ground_station_agree_with_pymavlink() {
         },
     );
     agrees("message_interval", 24, MessageInterval { interval_us: -1, message_id: 31 });
+    let mut payload = [[0; 32]; 7];
+    payload[0][..6].copy_from_slice(&[8, 0, 3, 129, 1, 4]);
+    payload[0][12] = 7;
+    let mut more = [0; 27];
+    more[26] = 9;
+    let (target_system, target_component) = (255, 190);
+    agrees(
+        "file_transfer_protocol",
+        25,
+        FileTransferProtocol { target_network: 0, target_system, target_component, payload, more },
+    );
     let mut mode_name = [0; 32];
     mode_name[..6].copy_from_slice(b"Return");
     agrees(

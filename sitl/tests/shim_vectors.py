@@ -65,6 +65,8 @@ def messages(m):
             468000001, -71234567, 600123, 0.25, 0.5, 0.75, [1.0, 0.0, 0.0, 0.0], 1.5, 2.5, 3.5,
             80000)),
         ("message_interval", m.MAVLink_message_interval_message(31, -1)),
+        ("file_transfer_protocol", m.MAVLink_file_transfer_protocol_message(
+            0, 255, 190, [8, 0, 3, 129, 1, 4] + [0] * 6 + [7] + [0] * 237 + [9])),
     ]
 
 

@@ -14,9 +14,10 @@ from pymavlink import mavutil
 class MavProxy(flight.Program):
     """MAVProxy, with what is typed into it."""
 
-    def __init__(self, address, watcher, folder):
+    def __init__(self, address, watcher, folder, *options):
         program = pathlib.Path(sys.executable).parent / "mavproxy.py"
         command = [sys.executable, program, f"--master={address}", f"--out={watcher}", "--no-state"]
+        command += options
         super().__init__("mavproxy", command, stdin=subprocess.PIPE, cwd=folder)
 
     def type(self, line, answer=None, seconds=10.0):

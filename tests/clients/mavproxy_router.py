@@ -12,7 +12,8 @@ HOLD, OFFBOARD = 4 << 16 | 3 << 24, 6 << 16
 
 def fly(proxy, watcher):
     """Parameters of the controller, OFFBOARD, an attitude, HOLD."""
-    line = proxy.wait_for("Received", 20.0)
+    proxy.wait_for("Detected vehicle 1:1 ", 60.0)
+    line = proxy.type("param fetch", "Received", 30.0)
     counts = re.search(r"Received (\d+) parameters", line)
     check(counts is not None and int(counts[1]) == 13, f"not PX4's 13 parameters: {line}")
     proxy.type("param show COM_OF_LOSS_T", "COM_OF_LOSS_T")
@@ -36,7 +37,10 @@ def main():
     port, watched = flight.free_ports(2)
     with flight.Flight(arguments, [f"tcpin:127.0.0.1:{port}"], "px4") as flown:
         watcher = Watcher(f"udpin:127.0.0.1:{watched}")
-        proxy = MavProxy(f"tcp:127.0.0.1:{port}", f"udp:127.0.0.1:{watched}", flown.folder)
+        # MAVProxy takes whatever it hears first for its vehicle, also the companion.
+        target = ["--target-system=1", "--target-component=1"]
+        addresses = [f"tcp:127.0.0.1:{port}", f"udp:127.0.0.1:{watched}"]
+        proxy = MavProxy(*addresses, flown.folder, *target)
         try:
             fly(proxy, watcher)
         finally:
@@ -46,4 +50,4 @@ def main():
         flown.end()
 
 
-flight.run(main, 150)
+flight.run(main, 200)

@@ -66,7 +66,8 @@ async def fly_controller(system, telemetry):
     await offboard.set_attitude(Attitude(ROLL_DEG, PITCH_DEG, 0.0, 0.5))
     await offboard.start()
     await until(modes(), lambda m: m == FlightMode.OFFBOARD, "offboard in telemetry")
-    await settle(telemetry)
+    # The loops that the shim plays are not as fine as Greylag's.
+    await settle(telemetry, 1.0)
     say("offboard.stop, which asks for HOLD")
     await offboard.stop()
     await until(modes(), lambda m: m == FlightMode.HOLD, "hold in telemetry")

@@ -29,6 +29,13 @@ PROTOCOL_VERSION = 300
 ACCEPTED, UNSUPPORTED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_UNSUPPORTED
 
 
+def sender(message):
+    """System and component; of a message that pymavlink does not know they stand in its bytes."""
+    if isinstance(message, mavlink.MAVLink_unknown):
+        return message.data[5], message.data[6]
+    return message.get_srcSystem(), message.get_srcComponent()
+
+
 class GroundStation:
     """255/190, speaking to one component of system 1."""
 
@@ -48,8 +55,7 @@ class GroundStation:
                 self.next_heartbeat = time.monotonic() + 1.0
                 self.mav.heartbeat_send(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4)
             message = self.link.recv_match(blocking=True, timeout=0.05)
-            ours = message and (message.get_srcSystem(), message.get_srcComponent()) == (1, self.component)
-            if ours and wanted(message):
+            if message and sender(message) == (1, self.component) and wanted(message):
                 return message
         return None
 
@@ -68,7 +74,10 @@ class GroundStation:
         result = self.command(mavlink.MAV_CMD_REQUEST_MESSAGE, message_id, index)
         if result != ACCEPTED:
             return result
-        message = self.until(lambda m: m.get_msgId() == message_id, MESSAGE_S)
+        names = f"UNKNOWN_{message_id}"
+        message = self.until(
+            lambda m: m.get_msgId() == message_id or m.get_type() == names, MESSAGE_S
+        )
         check(message is not None, f"message {message_id} was accepted, but did not come")
         return message
 

@@ -429,6 +429,21 @@ messages! {
         mission_type: u8,
     }
 
+    /// FILE_TRANSFER_PROTOCOL: a step of MAVLink's FTP.
+    FileTransferProtocol = 110, crc_extra 84 {
+        /// Addressed network.
+        target_network: u8,
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// The first part of the payload: sequence number (2 bytes), session, opcode, size, the
+        /// opcode that is answered, burst, padding, offset (4 bytes), data.
+        payload: [[u8; 32]; 7],
+        /// The rest.
+        more: [u8; 27],
+    }
+
     /// AUTOPILOT_VERSION: what the stack is and can.
     AutopilotVersion = 148, crc_extra 178 {
         /// MAV_PROTOCOL_CAPABILITY bits.

@@ -14,11 +14,11 @@ pub use field::{Field, Reader, Writer};
 pub use frame::{Encoder, Frame, Version, checksum};
 pub use messages::{
     ActuatorOutputStatus, AoaSsa, AttitudeQuaternion, AutopilotVersion, AvailableModes, CommandAck,
-    CommandLong, GlobalPositionInt, GpsRawInt, Heartbeat, HighresImu, HilActuatorControls, HilGps,
-    HilSensor, HilStateQuaternion, HomePosition, ManualControl, Message, MessageInterval,
-    MissionAck, MissionClearAll, MissionCount, MissionRequest, MissionRequestInt,
-    MissionRequestList, ParamRequestList, ParamRequestRead, ParamSet, ParamValue, ProtocolVersion,
-    RcChannelsOverride, ServoOutputRaw, SetAttitudeTarget, StatusText, SysStatus, TimeSync, VfrHud,
-    WindCov, crc_extra,
+    CommandLong, FileTransferProtocol, GlobalPositionInt, GpsRawInt, Heartbeat, HighresImu,
+    HilActuatorControls, HilGps, HilSensor, HilStateQuaternion, HomePosition, ManualControl,
+    Message, MessageInterval, MissionAck, MissionClearAll, MissionCount, MissionRequest,
+    MissionRequestInt, MissionRequestList, ParamRequestList, ParamRequestRead, ParamSet,
+    ParamValue, ProtocolVersion, RcChannelsOverride, ServoOutputRaw, SetAttitudeTarget, StatusText,
+    SysStatus, TimeSync, VfrHud, WindCov, crc_extra,
 };
 pub use parser::Parser;

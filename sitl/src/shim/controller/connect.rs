@@ -3,9 +3,9 @@
 use super::modes::Mode;
 use super::{FlightController, Personality, SYSTEM};
 use crate::shim::codec::{
-    AutopilotVersion, AvailableModes, Frame, HomePosition, Message, MessageInterval, MissionAck,
-    MissionClearAll, MissionCount, MissionRequest, MissionRequestInt, MissionRequestList,
-    ProtocolVersion,
+    AutopilotVersion, AvailableModes, FileTransferProtocol, Frame, HomePosition, Message,
+    MessageInterval, MissionAck, MissionClearAll, MissionCount, MissionRequest, MissionRequestInt,
+    MissionRequestList, ProtocolVersion,
 };
 
 /// MAV_RESULT: accepted, denied, unsupported.
@@ -122,6 +122,29 @@ impl FlightController {
                 self.streams.send_once(id, now, &self.measured, home, &mut self.encoder, out);
             }
         }
+    }
+
+    /// FTP as a controller answers it that has no files: NAK, "unknown command".
+    pub(super) fn refuse_file(&mut self, frame: &Frame, m: &FileTransferProtocol) {
+        const ACK: u8 = 128;
+        const NAK: u8 = 129;
+        const UNKNOWN_COMMAND: u8 = 7;
+        let [low, high, session, opcode, ..] = m.payload[0];
+        // An answer is not to be answered.
+        if matches!(opcode, ACK | NAK) {
+            return;
+        }
+        let [low, high] = u16::from_le_bytes([low, high]).wrapping_add(1).to_le_bytes();
+        let mut payload = [[0; 32]; 7];
+        payload[0][..6].copy_from_slice(&[low, high, session, NAK, 1, opcode]);
+        payload[0][12] = UNKNOWN_COMMAND;
+        let answer = FileTransferProtocol {
+            target_system: frame.system,
+            target_component: frame.component,
+            payload,
+            ..FileTransferProtocol::default()
+        };
+        self.encoder.encode(&answer, &mut self.waiting);
     }
 
     /// The mission protocol as a controller answers it that holds no mission, fence or rally

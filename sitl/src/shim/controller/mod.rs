@@ -17,9 +17,9 @@ mod streams;
 use std::fmt;
 
 use super::codec::{
-    CommandAck, CommandLong, Encoder, Frame, Heartbeat, ManualControl, ParamRequestList,
-    ParamRequestRead, ParamSet, Parser, RcChannelsOverride, SetAttitudeTarget, StatusText,
-    TimeSync,
+    CommandAck, CommandLong, Encoder, FileTransferProtocol, Frame, Heartbeat, ManualControl,
+    ParamRequestList, ParamRequestRead, ParamSet, Parser, RcChannelsOverride, SetAttitudeTarget,
+    StatusText, TimeSync,
 };
 use super::distortion::{Distorter, Distortion};
 use super::error::ShimError;
@@ -279,6 +279,11 @@ impl FlightController {
             frame.decode::<ParamSet>().filter(|m| for_us(m.target_system, m.target_component))
         {
             self.parameters.set(&m, &mut self.encoder, &mut self.waiting);
+        } else if let Some(m) = frame
+            .decode::<FileTransferProtocol>()
+            .filter(|m| for_us(m.target_system, m.target_component))
+        {
+            self.refuse_file(frame, &m);
         } else if self.mission(frame) {
             // Answered.
         } else if let Some(m) = frame.decode::<TimeSync>().filter(|m| m.tc1 == 0) {
