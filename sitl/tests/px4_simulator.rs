@@ -200,7 +200,7 @@ fn lockstep_keeps_to_the_wall_clock_unless_it_is_told_to_hurry() {
     let mut px4 = Px4::boot(simulator.address);
     px4.step([0.0; 16]);
     let begun = Instant::now();
-    (0..250).for_each(|_| drop(px4.step([0.0; 16])));
+    px4.idle(250);
     let taken = begun.elapsed();
     // Never faster; slower by what the machine was busy with.
     assert!((0.98..2.0).contains(&taken.as_secs_f64()), "{taken:?} for a second");
@@ -211,7 +211,7 @@ fn lockstep_keeps_to_the_wall_clock_unless_it_is_told_to_hurry() {
 fn a_client_that_stops_answering_is_told_and_may_be_replaced() {
     let simulator = Simulator::start(hurried());
     let mut hung = Px4::boot(simulator.address);
-    (0..10).for_each(|_| drop(hung.step([0.0; 16])));
+    hung.idle(10);
     let begun = Instant::now();
     simulator.until(|e| *e == Px4Event::Stopped);
     assert!((0.5..4.0).contains(&begun.elapsed().as_secs_f64()), "{:?}", begun.elapsed());
@@ -224,7 +224,7 @@ fn a_client_that_stops_answering_is_told_and_may_be_replaced() {
     // Silent again; another takes its place.
     simulator.until(|e| *e == Px4Event::Stopped);
     let mut other = Px4::boot(simulator.address);
-    (0..10).for_each(|_| drop(other.step([0.0; 16])));
+    other.idle(10);
     simulator.stop();
 }
 
@@ -287,7 +287,7 @@ fn what_is_not_px4_is_said_once_and_a_wrong_protocol_is_not_flown() {
     other.heartbeat(MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
     let told = simulator.until(|e| matches!(e, Px4Event::Refused(_))).to_string();
     assert!(told.contains("not of PX4"), "{told}");
-    (0..30).for_each(|_| drop(other.step([0.0; 16])));
+    other.idle(30);
     let more = simulator.notices.try_iter().map(|n| n.event.to_string());
     assert!(more.filter(|words| words.contains("not of PX4")).count() == 0, "said once");
     let summary = simulator.stop();

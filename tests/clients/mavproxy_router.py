@@ -18,8 +18,6 @@ def fly(proxy, watcher):
     check(counts is not None and int(counts[1]) == 13, f"not PX4's 13 parameters: {line}")
     proxy.type("param show COM_OF_LOSS_T", "COM_OF_LOSS_T")
     watcher.until_mode(HOLD)
-    # Without a stream of setpoints the controller refuses.
-    proxy.type("long DO_SET_MODE 1 6", "DO_SET_MODE: TEMPORARILY_REJECTED")
     q = " ".join(f"{part:.7f}" for part in quaternion(ROLL_DEG, PITCH_DEG))
     proxy.type(f"repeat add 0.1 attitude {q} 0.5", "thrust:0.5")
     proxy.type("long DO_SET_MODE 1 6", "DO_SET_MODE: ACCEPTED")

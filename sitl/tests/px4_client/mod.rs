@@ -230,6 +230,13 @@ impl Px4 {
         shown
     }
 
+    /// Takes and answers so many steps without moving anything.
+    pub fn idle(&mut self, steps: usize) {
+        for _ in 0..steps {
+            self.step([0.0; 16]);
+        }
+    }
+
     /// Arms, and answers until JSBSim flies; the last step before it does.
     pub fn launch(&mut self) -> Shown {
         self.armed = true;
