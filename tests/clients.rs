@@ -134,6 +134,21 @@ fn mavproxy_flies_an_attitude_from_its_command_line() {
 }
 
 #[test]
+fn qgroundcontrol_connects_to_companion_and_controllers() {
+    fly("qgroundcontrol_connect.py");
+}
+
+#[test]
+fn pymavlink_flies_both_controllers_through_the_companion_beside_them() {
+    fly("pymavlink_router.py");
+}
+
+#[test]
+fn mavsdk_flies_a_controller_and_the_companion_beside_it() {
+    fly("mavsdk_router.py");
+}
+
+#[test]
 fn misbehaviour_over_real_sockets_neither_ends_the_companion_nor_moves_the_surfaces() {
     fly("pymavlink_trouble.py");
 }

@@ -6,7 +6,10 @@ use clap::{Args, Parser, ValueEnum};
 use greylag_sitl::error_arguments::{FaultArgs, SensorArgs};
 use greylag_sitl::plant::Start;
 use greylag_sitl::plant_arguments::PlantArgs;
-use greylag_sitl::shim::{Address, Existing, Launch, Pace, Personality, ShimOptions, TruthFile};
+use greylag_sitl::shim::{
+    Address, Existing, Launch, OutputMap, Pace, Personality, Px4Noise, Px4Options, ShimOptions,
+    TruthFile,
+};
 
 /// Flies an aircraft in JSBSim and plays its flight controller over MAVLink.
 ///
@@ -26,6 +29,8 @@ pub struct Cli {
     /// Set a parameter of that stack (may be repeated).
     #[arg(long, value_name = "NAME=VALUE", requires = "personality", value_parser = parameter)]
     parameter: Vec<(String, f64)>,
+    #[command(flatten)]
+    px4: Px4Args,
     /// Step on the companion's answers alone, as fast as they come, instead of in real time.
     #[arg(long)]
     lockstep: bool,
@@ -70,6 +75,47 @@ fn parameter(text: &str) -> Result<(String, f64), String> {
     Ok((name.trim().to_owned(), value))
 }
 
+/// The PX4 simulator API.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "PX4 simulator API (instead of a companion)")]
+struct Px4Args {
+    /// Be the simulator of stock PX4 SITL: HIL_SENSOR at 250 Hz, HIL_GPS at 10 Hz, lockstep. PX4
+    /// connects here; without ADDRESS that is tcpin:127.0.0.1:4560. The aircraft stands until PX4
+    /// is armed and opens the throttle, then a catapult brings it to its start.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = PX4_ADDRESS,
+          conflicts_with_all = ["link", "personality"])]
+    px4_sim: Option<Address>,
+    /// Which of PX4's outputs (PWM_MAIN_FUNCn) moves what: aileron, left-aileron, right-aileron,
+    /// elevator, left-elevon, right-elevon, throttle; a minus reverses.
+    #[arg(long, value_name = "WHAT=N,..", requires = "px4_sim", default_value_t)]
+    px4_outputs: OutputMap,
+    /// Sensor noise.
+    #[arg(long, value_name = "PRESET", requires = "px4_sim", default_value = "standard")]
+    px4_noise: Px4NoiseName,
+}
+
+/// Where PX4 looks for its simulator.
+const PX4_ADDRESS: &str = "tcpin:127.0.0.1:4560";
+
+/// A preset of sensor noise.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Px4NoiseName {
+    /// Perfect sensors.
+    None,
+    /// That of PX4's own simulators.
+    Standard,
+}
+
+impl Px4Args {
+    fn options(&self) -> Option<Px4Options> {
+        let noise = match self.px4_noise {
+            Px4NoiseName::None => Px4Noise::NONE,
+            Px4NoiseName::Standard => Px4Noise::STANDARD,
+        };
+        self.px4_sim.as_ref().map(|_| Px4Options { outputs: self.px4_outputs.clone(), noise })
+    }
+}
+
 /// The state at the start.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Start", allow_negative_numbers = true)]
@@ -98,7 +144,8 @@ impl Cli {
     /// What the command line asks for.
     pub fn options(&self) -> ShimOptions {
         ShimOptions {
-            link: self.link.clone(),
+            link: self.px4.px4_sim.as_ref().unwrap_or(&self.link).clone(),
+            px4: self.px4.options(),
             pace: if self.lockstep { Pace::Lockstep } else { Pace::RealTime },
             launch: if self.no_hold { Launch::Immediate } else { Launch::WhenArmed },
             duration_s: self.duration_s,

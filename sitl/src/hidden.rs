@@ -139,11 +139,13 @@ pub enum HiddenError {
     },
     /// The delay is not a whole number of steps.
     #[error(
-        "hidden effect time_delay: {amplitude} s is not a whole number of steps of 0.01 s; give a multiple"
+        "hidden effect time_delay: {amplitude} s is not a whole number of steps of {step_s} s; give a multiple"
     )]
     Delay {
         /// The delay, s.
         amplitude: f64,
+        /// Length of a step, s.
+        step_s: f64,
     },
     /// An effect is asked for twice.
     #[error("hidden effect {id} is given twice; give it once, with the sum")]
@@ -165,11 +167,12 @@ fn known() -> String {
     EFFECTS.iter().map(|effect| effect.id).collect::<Vec<_>>().join(", ")
 }
 
-/// The aircraft document `xml` with `effects` written into it.
+/// The aircraft document `xml`, to be flown in steps of `step_s`, with `effects` written into it.
 pub(crate) fn write_into(
     xml: &str,
     properties: &Properties,
     effects: &[Hidden],
+    step_s: f64,
 ) -> Result<String, HiddenError> {
     for (i, Hidden { effect, .. }) in effects.iter().enumerate() {
         if effects[..i].iter().any(|earlier| earlier.effect.id == effect.id) {
@@ -180,7 +183,7 @@ pub(crate) fn write_into(
     if acting.is_empty() {
         return Ok(xml.to_owned());
     }
-    let mut document = Document::new(xml, properties);
+    let mut document = Document::new(xml, properties, step_s);
     for Hidden { effect, amplitude } in acting {
         (effect.write)(&mut document, *amplitude)?;
     }
@@ -195,7 +198,7 @@ mod tests {
     fn nothing_hidden_leaves_the_aircraft_as_it_is_to_the_byte() {
         let plain = crate::aircraft::read(None, crate::aircraft::BUILT_IN_NAME).unwrap();
         let written =
-            |effects: &[Hidden]| write_into(&plain, &Properties::default(), effects).unwrap();
+            |effects: &[Hidden]| write_into(&plain, &Properties::default(), effects, 0.01).unwrap();
         assert_eq!(written(&[]), plain);
         let zeros: Vec<Hidden> = EFFECTS.iter().map(|e| Hidden::new(e.id, 0.0).unwrap()).collect();
         assert_eq!(written(&zeros), plain);

@@ -51,6 +51,9 @@ fn intent(options: &ShimOptions) -> String {
         Launch::WhenArmed => "held at the start until the companion arms",
         Launch::Immediate => "flying at once",
     };
+    if options.px4.is_some() {
+        return format!("{} as the simulator of PX4; Ctrl-C ends it", options.plant.aircraft);
+    }
     match options.personality {
         Some(personality) => format!(
             "{} flown by {personality} in real time, armed and in the air; Ctrl-C ends it",

@@ -1,4 +1,4 @@
-//! The plant: one aircraft flown by JSBSim in this process, 100 steps a second of its own time.
+//! The plant: one aircraft flown by JSBSim in this process, step by step in its own time.
 
 mod nodes;
 mod options;
@@ -10,11 +10,15 @@ use crate::air::AirError;
 use crate::aircraft;
 pub use crate::aircraft::AircraftError;
 use nodes::Nodes;
+pub(crate) use nodes::to_body;
 pub use options::{PlantOptions, Properties};
 pub use state::{FULL_DEFLECTION_RAD, Inputs, Start, Truth};
 
-/// Length of one step, s.
+/// Length of one step, s, unless the options say otherwise.
 pub const DT_S: f64 = 0.01;
+
+/// Steps that the integrators and filters are known to bear.
+const STEPS_S: std::ops::RangeInclusive<f64> = 0.001..=DT_S;
 
 /// Why the plant cannot fly on.
 #[derive(Debug, thiserror::Error)]
@@ -40,6 +44,12 @@ pub enum PlantError {
         "cannot start at {0:?}: give finite angles and rates, an airspeed from 0.1 to 1000 m/s and an altitude from -400 to 80000 m"
     )]
     Start(Start),
+    /// The step is too long or too short.
+    #[error("cannot fly in steps of {step_s} s: give 0.001 to 0.01 s")]
+    Step {
+        /// The step, s.
+        step_s: f64,
+    },
     /// A command is not a number; nothing was stepped.
     #[error("command {0:?} is not finite: nothing was stepped; send finite commands")]
     Inputs(Inputs),
@@ -91,8 +101,11 @@ impl Plant {
     pub fn new(options: &PlantOptions) -> Result<Self, PlantError> {
         let mut options = options.clone();
         options.air = options.air.checked()?;
+        if !(STEPS_S.contains(&options.step_s)) {
+            return Err(PlantError::Step { step_s: options.step_s });
+        }
         let mut fdm = Fdm::new().map_err(jsbsim("starting"))?;
-        fdm.set_dt(DT_S);
+        fdm.set_dt(options.step_s);
         let PlantOptions { aircraft_dir, aircraft, properties, hidden, .. } = &options;
         aircraft::load(&mut fdm, aircraft_dir.as_deref(), aircraft, properties, hidden)?;
         let nodes = Nodes::find(&fdm, &options)?;
@@ -122,7 +135,7 @@ impl Plant {
         self.accept(truth)
     }
 
-    /// Flies one step of [`DT_S`] with `inputs`, limited to their ranges.
+    /// Flies one step of [`PlantOptions::step_s`] with `inputs`, limited to their ranges.
     ///
     /// # Errors
     /// [`PlantError::Inputs`] when a command is not finite: nothing is stepped.
@@ -137,9 +150,10 @@ impl Plant {
         self.fdm.run().map_err(jsbsim("stepping"))?;
         self.steps += 1;
         let mut truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the state"))?;
-        truth.time_s = self.steps as f64 * DT_S;
-        truth.aileron_rate_radps = (truth.aileron_rad - self.truth.aileron_rad) / DT_S;
-        truth.elevator_rate_radps = (truth.elevator_rad - self.truth.elevator_rad) / DT_S;
+        let step_s = self.options.step_s;
+        truth.time_s = self.steps as f64 * step_s;
+        truth.aileron_rate_radps = (truth.aileron_rad - self.truth.aileron_rad) / step_s;
+        truth.elevator_rate_radps = (truth.elevator_rad - self.truth.elevator_rad) / step_s;
         self.accept(truth)
     }
 
@@ -202,11 +216,12 @@ impl Plant {
     }
 
     fn blow_due_gust(&mut self) -> Result<(), jsbsim::Error> {
-        let now = self.steps as f64 * DT_S;
+        let step_s = self.options.step_s;
+        let now = self.steps as f64 * step_s;
         let Some(gust) = self.options.air.gusts.get(self.next_gust) else {
             return Ok(());
         };
-        if now + 0.5 * DT_S < gust.start_s {
+        if now + 0.5 * step_s < gust.start_s {
             return Ok(());
         }
         self.next_gust += 1;

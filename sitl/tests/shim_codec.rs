@@ -301,3 +301,162 @@ fn the_checksum_is_mcrf4xx() {
     // CRC_EXTRA.
     assert_eq!(checksum(b"12345678", b'9'), 0x6F91);
 }
+
+#[test]
+fn the_simulators_messages_agree_with_pymavlink() {
+    agrees(
+        "hil_sensor",
+        13,
+        HilSensor {
+            time_usec: 50_000,
+            xacc: 0.5,
+            yacc: -0.25,
+            zacc: -9.75,
+            xgyro: 0.125,
+            ygyro: -0.375,
+            zgyro: 0.625,
+            xmag: 0.25,
+            ymag: 0.5,
+            zmag: 0.75,
+            abs_pressure: 943.25,
+            diff_pressure: 4.5,
+            pressure_alt: 600.5,
+            temperature: 11.5,
+            fields_updated: 0x1FFF,
+            id: 0,
+        },
+    );
+    agrees(
+        "hil_gps",
+        14,
+        HilGps {
+            time_usec: 60_000,
+            lat: 468_000_001,
+            lon: -71_234_567,
+            alt: 600_123,
+            eph: 90,
+            epv: 178,
+            vel: 1667,
+            vn: -1,
+            ve: 2,
+            vd: -3,
+            cog: 35_999,
+            fix_type: 3,
+            satellites_visible: 10,
+            id: 0,
+            yaw: 0,
+        },
+    );
+    agrees(
+        "hil_state_quaternion",
+        15,
+        HilStateQuaternion {
+            time_usec: 70_000,
+            attitude_quaternion: [0.5, -0.25, 0.125, 0.75],
+            rollspeed: 1.5,
+            pitchspeed: -2.5,
+            yawspeed: 3.5,
+            lat: 468_000_001,
+            lon: -71_234_567,
+            alt: 600_123,
+            vx: -1000,
+            vy: 1667,
+            vz: -200,
+            ind_airspeed: 1600,
+            true_airspeed: 1650,
+            xacc: 11,
+            yacc: -12,
+            zacc: -1000,
+        },
+    );
+}
+
+#[test]
+fn the_messages_of_a_connecting_ground_station_agree_with_pymavlink() {
+    let (target_system, target_component) = (1, 1);
+    agrees(
+        "mission_request",
+        16,
+        MissionRequest { seq: 7, target_system, target_component, mission_type: 2 },
+    );
+    agrees(
+        "mission_request_list",
+        17,
+        MissionRequestList { target_system, target_component, mission_type: 1 },
+    );
+    agrees(
+        "mission_count",
+        18,
+        MissionCount { count: 0, target_system: 255, target_component: 190, mission_type: 2 },
+    );
+    agrees(
+        "mission_clear_all",
+        19,
+        MissionClearAll { target_system, target_component, mission_type: 2 },
+    );
+    agrees(
+        "mission_ack",
+        20,
+        MissionAck { target_system: 255, target_component: 190, result: 13, mission_type: 1 },
+    );
+    agrees(
+        "mission_request_int",
+        21,
+        MissionRequestInt { seq: 7, target_system, target_component, mission_type: 2 },
+    );
+    agrees(
+        "autopilot_version",
+        22,
+        AutopilotVersion {
+            capabilities: 0xE054,
+            uid: 5,
+            flight_sw_version: 0x010F_00FF,
+            vendor_id: 3,
+            product_id: 4,
+            flight_custom_version: [1; 8],
+            os_custom_version: [2; 8],
+            uid2: [6; 18],
+            ..AutopilotVersion::default()
+        },
+    );
+    agrees(
+        "home_position",
+        23,
+        HomePosition {
+            latitude: 468_000_001,
+            longitude: -71_234_567,
+            altitude: 600_123,
+            local: [0.25, 0.5, 0.75],
+            q: [1.0, 0.0, 0.0, 0.0],
+            approach: [1.5, 2.5, 3.5],
+            time_usec: 80_000,
+        },
+    );
+    agrees("message_interval", 24, MessageInterval { interval_us: -1, message_id: 31 });
+    let mut payload = [[0; 32]; 7];
+    payload[0][..6].copy_from_slice(&[8, 0, 3, 129, 1, 4]);
+    payload[0][12] = 7;
+    let mut more = [0; 27];
+    more[26] = 9;
+    let (target_system, target_component) = (255, 190);
+    agrees(
+        "file_transfer_protocol",
+        25,
+        FileTransferProtocol { target_network: 0, target_system, target_component, payload, more },
+    );
+    let mut mode_name = [0; 32];
+    mode_name[..6].copy_from_slice(b"Return");
+    agrees(
+        "available_modes",
+        100,
+        AvailableModes {
+            custom_mode: 0x0504_0000,
+            properties: 0,
+            number_modes: 4,
+            mode_index: 2,
+            standard_mode: 5,
+            mode_name,
+            more: [0; 3],
+        },
+    );
+}

@@ -13,6 +13,7 @@ os.environ["MAVLINK20"] = "1"
 
 from pymavlink.dialects.v10 import ardupilotmega as one  # noqa: E402
 from pymavlink.dialects.v20 import ardupilotmega as two  # noqa: E402
+from pymavlink.dialects.v20 import development as newer  # noqa: E402
 
 
 def messages(m):
@@ -44,6 +45,35 @@ def messages(m):
         ("actuator_output_status", m.MAVLink_actuator_output_status_message(30000, 5, ramp32)),
         ("aoa_ssa", m.MAVLink_aoa_ssa_message(40000, 2.25, -1.75)),
         ("all_zero", m.MAVLink_aoa_ssa_message(0, 0.0, 0.0)),
+        ("hil_sensor", m.MAVLink_hil_sensor_message(
+            50000, 0.5, -0.25, -9.75, 0.125, -0.375, 0.625, 0.25, 0.5, 0.75, 943.25, 4.5, 600.5,
+            11.5, 0x1FFF, 0)),
+        ("hil_gps", m.MAVLink_hil_gps_message(
+            60000, 3, 468000001, -71234567, 600123, 90, 178, 1667, -1, 2, -3, 35999, 10, 0, 0)),
+        ("hil_state_quaternion", m.MAVLink_hil_state_quaternion_message(
+            70000, [0.5, -0.25, 0.125, 0.75], 1.5, -2.5, 3.5, 468000001, -71234567, 600123,
+            -1000, 1667, -200, 1600, 1650, 11, -12, -1000)),
+        ("mission_request", m.MAVLink_mission_request_message(1, 1, 7, 2)),
+        ("mission_request_list", m.MAVLink_mission_request_list_message(1, 1, 1)),
+        ("mission_count", m.MAVLink_mission_count_message(255, 190, 0, 2)),
+        ("mission_clear_all", m.MAVLink_mission_clear_all_message(1, 1, 2)),
+        ("mission_ack", m.MAVLink_mission_ack_message(255, 190, 13, 1)),
+        ("mission_request_int", m.MAVLink_mission_request_int_message(1, 1, 7, 2)),
+        ("autopilot_version", m.MAVLink_autopilot_version_message(
+            0xE054, 0x010F00FF, 0, 0, 0, [1] * 8, [0] * 8, [2] * 8, 3, 4, 5, [6] * 18)),
+        ("home_position", m.MAVLink_home_position_message(
+            468000001, -71234567, 600123, 0.25, 0.5, 0.75, [1.0, 0.0, 0.0, 0.0], 1.5, 2.5, 3.5,
+            80000)),
+        ("message_interval", m.MAVLink_message_interval_message(31, -1)),
+        ("file_transfer_protocol", m.MAVLink_file_transfer_protocol_message(
+            0, 255, 190, [8, 0, 3, 129, 1, 4] + [0] * 6 + [7] + [0] * 237 + [9])),
+    ]
+
+
+def later(m):
+    """What only newer dialects have."""
+    return [
+        ("available_modes", m.MAVLink_available_modes_message(4, 2, 5, 0x05040000, 0, b"Return")),
     ]
 
 
@@ -51,6 +81,10 @@ def main():
     link = two.MAVLink(None, srcSystem=1, srcComponent=200)
     for sequence, (name, message) in enumerate(messages(two)):
         link.seq = sequence
+        print(name, message.pack(link).hex())
+
+    link.seq = 100
+    for name, message in later(newer):
         print(name, message.pack(link).hex())
 
     # What a companion that speaks MAVLink 1 sends.

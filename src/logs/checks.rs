@@ -8,8 +8,9 @@ use super::Sample;
 use super::columns::COLUMNS;
 use super::finding::Finding;
 use super::phases::{self, Kind};
+use crate::physics::atmosphere::STANDARD_GRAVITY;
 
-const G: f64 = 9.80665;
+const G: f64 = STANDARD_GRAVITY;
 /// Rows below which nothing is said about units.
 const ENOUGH: usize = 50;
 const KMH: f64 = 3.6;

@@ -15,7 +15,7 @@ use super::load::Channel;
 use super::mapping::rule::Rule;
 use super::resample::{Reader, SAME_S};
 use super::topics::{Topics, period_s};
-use crate::physics::atmosphere::{Atmosphere, Density};
+use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 
 /// The longest time that a fast channel is carried over, s.
 const GAP_S: f64 = 0.1;
@@ -40,11 +40,6 @@ const MEASURED: [&str; 9] = [
     "ve_mps",
     "vd_mps",
 ];
-/// Density of the standard atmosphere at sea level, kg/m³.
-const SEA_LEVEL: f64 = 1.225;
-
-/// The standard atmosphere; gravity plays no part here.
-const STANDARD: Atmosphere = Atmosphere { density: Density::Standard, gravity: 9.80665 };
 
 /// A rule with its data.
 struct Track {
@@ -253,12 +248,12 @@ fn make_true(rows: &mut [Sample]) -> String {
         let (i, density) = if row.air_density_kgpm3 > 0.0 {
             (0, row.air_density_kgpm3)
         } else if row.altitude_m.is_finite() {
-            (1, STANDARD.density_at(row.altitude_m))
+            (1, standard_density(row.altitude_m))
         } else {
-            (2, SEA_LEVEL)
+            (2, SEA_LEVEL_DENSITY)
         };
         by[i] += 1;
-        row.airspeed_mps *= (SEA_LEVEL / density).sqrt();
+        row.airspeed_mps *= (SEA_LEVEL_DENSITY / density).sqrt();
     }
     format!(
         "true airspeed by logged density in {} rows, by the standard atmosphere at the logged altitude in {}, at sea level in {}",

@@ -111,10 +111,14 @@ class Program:
 
 
 class Flight:
-    """A companion with a shim, to be used in a `with` block; `clients` are --client addresses."""
+    """A companion with a shim, to be used in a `with` block; `clients` are --client addresses.
 
-    def __init__(self, arguments, clients):
-        self.arguments, self.clients = arguments, clients
+    With a `personality`, `px4` or `ardupilot`, the shim plays that flight controller, and the
+    companion is the onboard computer beside it that routes between it and the clients.
+    """
+
+    def __init__(self, arguments, clients, personality=None):
+        self.arguments, self.clients, self.personality = arguments, clients, personality
         self.shim = self.companion = None
 
     def __enter__(self):
@@ -132,6 +136,8 @@ class Flight:
         command = [self.arguments.greylag, "fly", "--vehicle", f"udpin:127.0.0.1:{self.vehicle_port}"]
         for client in self.clients:
             command += ["--client", client]
+        if self.personality:
+            command += ["--profile", self.personality]
         self.companion = Program("companion", [*command, "--record", self.recording])
         self.companion.wait_for("waiting for a vehicle", 30.0)
         self.start_shim()
@@ -144,14 +150,18 @@ class Flight:
 
     def start_shim(self):
         """Starts a shim, also in place of one that has died."""
-        self.shim = Program(
-            "shim", [self.arguments.sitl, "--link", f"udpout:127.0.0.1:{self.vehicle_port}"]
-        )
+        played = ["--personality", self.personality] if self.personality else []
+        link = f"udpout:127.0.0.1:{self.vehicle_port}"
+        self.shim = Program("shim", [self.arguments.sitl, "--link", link, *played])
 
-    def land(self):
-        """Ends both programs as Ctrl-C does, then looks at the recording."""
+    def end(self):
+        """Ends both programs as Ctrl-C does."""
         check(self.companion.end() == 0, "the companion did not end well")
         check(self.shim.end() == 0, "the shim did not end well")
+
+    def land(self):
+        """Ends both programs, then looks at the recording."""
+        self.end()
         self.check_surfaces()
 
     def rows(self):

@@ -31,14 +31,18 @@ class Offboard:
     order of an answer's parts does not matter.
     """
 
-    def __init__(self, address, component=mavlink.MAV_COMP_ID_MISSIONPLANNER):
+    def __init__(self, address, component=mavlink.MAV_COMP_ID_MISSIONPLANNER, pilot=(1, 1)):
+        self.pilot = pilot
         self.link = mavutil.mavlink_connection(address, source_system=255, source_component=component)
         self.mav = self.link.mav
         self.heard, self.since, self.target, self.last_setpoint = [], 0, None, None
         self.next_setpoint = self.next_heartbeat = 0.0
-        beat = self.until(lambda m: m.get_type() == "HEARTBEAT", "heartbeat")
-        sender = (beat.get_srcSystem(), beat.get_srcComponent())
-        check(sender == (1, 1), f"the heartbeat comes from {sender}, not from an autopilot")
+        self.until(self.beats, f"heartbeat of {pilot}")
+
+    def beats(self, message):
+        """Whether a message is a heartbeat of the autopilot that is spoken to."""
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        return message.get_type() == "HEARTBEAT" and sender == self.pilot
 
     def turn(self):
         """Sends what is due and takes in what has come, for a hundredth of a second at most."""
@@ -60,13 +64,13 @@ class Offboard:
             message = self.link.recv_match(blocking=False)
         return found
 
-    def setpoint(self, roll_deg, pitch_deg, to=(1, 1)):
+    def setpoint(self, roll_deg, pitch_deg, to=None):
         """One setpoint."""
         self.raw_setpoint(quaternion(roll_deg, pitch_deg), to)
 
-    def raw_setpoint(self, q, to=(1, 1), thrust=0.0, mask=ATTITUDE_ONLY):
+    def raw_setpoint(self, q, to=None, thrust=0.0, mask=ATTITUDE_ONLY):
         """One setpoint of any numbers."""
-        self.mav.set_attitude_target_send(0, *to, mask, q, 0, 0, 0, thrust)
+        self.mav.set_attitude_target_send(0, *(to or self.pilot), mask, q, 0, 0, 0, thrust)
 
     def mark(self):
         """What is waited for from now on has to come from now on."""
@@ -107,7 +111,7 @@ class Offboard:
         """Goes on until the heartbeat shows a mode."""
 
         def shows(message):
-            return message.get_type() == "HEARTBEAT" and message.custom_mode == custom_mode(mode)
+            return self.beats(message) and message.custom_mode == custom_mode(mode)
 
         return self.until(shows, f"heartbeat in mode {mode}", seconds)
 
@@ -115,14 +119,16 @@ class Offboard:
         """Sends a command and returns the result of its acknowledgement."""
         self.mark()
         padded = [*params, *[0.0] * (7 - len(params))]
-        self.mav.command_long_send(1, 1, number, 0, *padded)
+        self.mav.command_long_send(*self.pilot, number, 0, *padded)
         return self.acknowledged(number)
 
     def acknowledged(self, number):
         """The result of a command that has been sent."""
 
         def answers(message):
-            return message.get_type() == "COMMAND_ACK" and message.command == number
+            sender = (message.get_srcSystem(), message.get_srcComponent())
+            answer = message.get_type() == "COMMAND_ACK" and message.command == number
+            return answer and sender == self.pilot
 
         # Half a second is what mavlink.md allows.
         return self.until(answers, f"acknowledgement of command {number}", 0.5).result
@@ -132,9 +138,7 @@ class Offboard:
         result = self.command(ARM, 1)
         check(result == mavlink.MAV_RESULT_ACCEPTED, f"arming: result {result}")
         armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-        self.until(
-            lambda m: m.get_type() == "HEARTBEAT" and m.base_mode & armed, "heartbeat that is armed"
-        )
+        self.until(lambda m: self.beats(m) and m.base_mode & armed, "heartbeat that is armed")
 
     def engage(self, roll_deg, pitch_deg):
         """Sends setpoints and enters OFFBOARD."""

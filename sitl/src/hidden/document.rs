@@ -58,6 +58,8 @@ impl Surface {
 pub(super) struct Document<'a> {
     xml: String,
     properties: &'a Properties,
+    /// Length of a step, s.
+    pub(super) step_s: f64,
     components: String,
     passed: usize,
     factors: Vec<String>,
@@ -67,10 +69,11 @@ pub(super) struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    pub(super) fn new(xml: &str, properties: &'a Properties) -> Self {
+    pub(super) fn new(xml: &str, properties: &'a Properties, step_s: f64) -> Self {
         Document {
             xml: xml.to_owned(),
             properties,
+            step_s,
             components: String::new(),
             passed: 0,
             factors: Vec::new(),

@@ -3,7 +3,6 @@
 use super::document::{Axis, Surface};
 use super::expression::{abs, product, property, sum, value};
 use super::{Effect, HiddenError};
-use crate::plant::DT_S;
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
@@ -159,13 +158,13 @@ pub static EFFECTS: [Effect; 24] = [
     },
     Effect {
         id: "time_delay",
-        formula: "deflections act a later; a whole number of steps of 0.01 s",
+        formula: "deflections act a later; a whole number of steps",
         unit: "s",
         bounds: (0.0, 2.0),
         write: |d, a| {
-            let frames = (a / DT_S).round();
-            if frames < 1.0 || (a - frames * DT_S).abs() > 1e-9 {
-                return Err(HiddenError::Delay { amplitude: a });
+            let frames = (a / d.step_s).round();
+            if frames < 1.0 || (a - frames * d.step_s).abs() > 1e-9 {
+                return Err(HiddenError::Delay { amplitude: a, step_s: d.step_s });
             }
             // JSBSim's actuator delays by one frame less than it is told.
             let delay = format!("<delay type=\"frames\">{}</delay>", frames + 1.0);

@@ -2,7 +2,7 @@
 
 use jsbsim::{Error, Fdm, NodeId};
 
-use super::{DT_S, Inputs, PlantError, PlantOptions, Start, Truth};
+use super::{Inputs, PlantError, PlantOptions, Start, Truth};
 use crate::air::Gust;
 
 /// Metres per foot (exact).
@@ -150,7 +150,7 @@ impl Nodes {
             // The initial condition leaves rounding in the wind, and a direction with it.
             fdm.set_property("atmosphere/psiw-rad", 0.0)?;
         } else {
-            settle(fdm)?;
+            settle(fdm, options.step_s)?;
         }
         fdm.set_property("atmosphere/randomseed", scattered(options.seed))?;
         if let Some(turbulence) = options.air.turbulence {
@@ -212,20 +212,18 @@ impl Start {
         let (sin_alpha, cos_alpha) = self.alpha_rad.sin_cos();
         let (sin_beta, cos_beta) = self.beta_rad.sin_cos();
         let air = [cos_alpha * cos_beta, sin_beta, sin_alpha * cos_beta];
-        let wind = self.to_body(wind_ned);
+        let wind = to_body([self.roll_rad, self.pitch_rad, self.yaw_rad], wind_ned);
         std::array::from_fn(|i| self.airspeed_mps * air[i] + wind[i])
     }
+}
 
-    /// Turns a vector from north-east-down to forward-right-down.
-    fn to_body(self, [north, east, down]: [f64; 3]) -> [f64; 3] {
-        let (sin_roll, cos_roll) = self.roll_rad.sin_cos();
-        let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
-        let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
-        let (ahead, right) = (north * cos_yaw + east * sin_yaw, east * cos_yaw - north * sin_yaw);
-        let (x, below) =
-            (ahead * cos_pitch - down * sin_pitch, ahead * sin_pitch + down * cos_pitch);
-        [x, right * cos_roll + below * sin_roll, below * cos_roll - right * sin_roll]
-    }
+/// Turns a vector from north-east-down to forward-right-down, at the attitude `[roll, pitch, yaw]`.
+pub(crate) fn to_body(attitude: [f64; 3], [north, east, down]: [f64; 3]) -> [f64; 3] {
+    let [(sin_roll, cos_roll), (sin_pitch, cos_pitch), (sin_yaw, cos_yaw)] =
+        attitude.map(f64::sin_cos);
+    let (ahead, right) = (north * cos_yaw + east * sin_yaw, east * cos_yaw - north * sin_yaw);
+    let (x, below) = (ahead * cos_pitch - down * sin_pitch, ahead * sin_pitch + down * cos_pitch);
+    [x, right * cos_roll + below * sin_roll, below * cos_roll - right * sin_roll]
 }
 
 /// A seed for JSBSim, 0 to 2³¹ − 2, far from those of neighbouring seeds.
@@ -243,12 +241,12 @@ fn scattered(seed: u32) -> f64 {
 ///
 /// JSBSim's initial condition takes no vertical wind, so the wind is set after it; five frames
 /// fill the longest history (Adams-Bashforth 3 needs three of them).
-fn settle(fdm: &mut Fdm) -> Result<(), Error> {
+fn settle(fdm: &mut Fdm, step_s: f64) -> Result<(), Error> {
     fdm.set_dt(STILL_S);
     for _ in 0..5 {
         fdm.run()?;
     }
-    fdm.set_dt(DT_S);
+    fdm.set_dt(step_s);
     Ok(())
 }
 

@@ -26,6 +26,10 @@ pub struct PlantOptions {
     pub latitude_deg: f64,
     /// Longitude of the start, deg.
     pub longitude_deg: f64,
+    /// Length of one step, s: [`DT_S`](super::DT_S) unless something else is needed. JSBSim lays
+    /// out the actuators' filters for the step when it loads the aircraft, so another step is
+    /// another aircraft by a little (`sitl/tests/plant_step.rs` measures it).
+    pub step_s: f64,
 }
 
 impl Default for PlantOptions {
@@ -39,6 +43,7 @@ impl Default for PlantOptions {
             seed: 1,
             latitude_deg: 46.8,
             longitude_deg: 0.0,
+            step_s: super::DT_S,
         }
     }
 }

@@ -25,6 +25,19 @@ pub enum ShimError {
         /// What it has.
         known: String,
     },
+    /// A place without a known magnetic field.
+    #[error(
+        "the World Magnetic Model has no field at {latitude_deg}°, {longitude_deg}°, {altitude_m} m; \
+         start between -1 and 850 km"
+    )]
+    Magnetism {
+        /// Latitude, deg.
+        latitude_deg: f64,
+        /// Longitude, deg.
+        longitude_deg: f64,
+        /// Altitude, m.
+        altitude_m: f64,
+    },
     /// The plant could not be built, or could not go on.
     #[error(transparent)]
     Plant(#[from] PlantError),

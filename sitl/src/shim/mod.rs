@@ -21,6 +21,7 @@ mod flight;
 mod link;
 mod lockstep;
 mod options;
+mod px4_sim;
 mod realtime;
 mod sensors;
 mod session;
@@ -33,6 +34,7 @@ pub use error::ShimError;
 pub use flight::Over;
 pub use link::{Address, AddressError, LinkError, Transport};
 pub use options::{Bias, Existing, FrameFaults, Launch, Noise, Pace, ShimOptions, TruthFile};
+pub use px4_sim::{FIRST_US, OutputMap, OutputMapError, Px4Event, Px4Noise, Px4Options, STEP_US};
 pub use session::{COMPANION, SHIM};
 pub use summary::{Event, Latency, Notice, Summary};
 pub use telemetry::FULL_DEFLECTION_RAD;
@@ -62,6 +64,11 @@ pub fn run(
         Pace::Lockstep => Wait::Patient,
         Pace::RealTime => Wait::Never,
     };
+    if let Some(px4) = &options.px4 {
+        // A step is due every 4 ms, which is shorter than a patient wait.
+        let link = Link::open(&options.link, Wait::Never)?;
+        return px4_sim::fly(link, options, px4, stop, observer);
+    }
     let link = Link::open(&options.link, wait)?;
     let mut flight = Flight::new(options)?;
     let mut faults = Faults::new(options.faults, options.seed);

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::controller::Personality;
 use super::error::ShimError;
 use super::link::{Address, Transport};
+use super::px4_sim::Px4Options;
 use crate::plant::{PlantOptions, Start};
 
 /// What the shim's clock follows.
@@ -166,6 +167,8 @@ pub struct ShimOptions {
     pub personality: Option<Personality>,
     /// Parameters of the played stack that differ from its defaults.
     pub parameters: Vec<(String, f64)>,
+    /// Be the simulator of PX4 SITL instead; `None` speaks to a companion.
+    pub px4: Option<Px4Options>,
 }
 
 impl ShimOptions {
@@ -190,6 +193,7 @@ impl ShimOptions {
             faults: FrameFaults::default(),
             personality: None,
             parameters: Vec::new(),
+            px4: None,
         }
     }
 
@@ -214,6 +218,23 @@ impl ShimOptions {
             (0.0..=1.0).contains(&faults.late_probability),
             "the probability of a late frame must lie in 0..1",
         )?;
+        if self.px4.is_some() {
+            demand(
+                self.link.transport == Transport::TcpIn,
+                "PX4 connects to its simulator by TCP: listen with tcpin:HOST:PORT",
+            )?;
+            demand(
+                self.personality.is_none(),
+                "PX4 itself flies through its simulator API: leave --personality out",
+            )?;
+            let FrameFaults { delay_ms, drop_probability, jitter_ms, late_probability, .. } =
+                faults;
+            let spared = [delay_ms, drop_probability, jitter_ms, late_probability];
+            demand(
+                spared.into_iter().all(|&x| x == 0.0) && self.noise == Noise::NONE,
+                "the PX4 simulator API sends every message, with noise of its own (--px4-noise)",
+            )?;
+        }
         demand(
             self.personality.is_none() || self.pace == Pace::RealTime,
             "a personality flies in real time, as the flight controller it plays does",

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::flight::Over;
 use super::link::{Address, Transport};
+use super::px4_sim::Px4Event;
 
 /// A change of state, told to the observer of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,6 +31,8 @@ pub enum Event {
     Resumed,
     /// The played flight controller has changed its mode.
     Mode(String),
+    /// Something of a run against PX4.
+    Px4(Px4Event),
     /// The clock was so late that it was set anew, by so much.
     Skipped(Duration),
 }
@@ -57,6 +60,7 @@ impl fmt::Display for Event {
             ),
             Event::Resumed => write!(f, "answered: simulated time goes on"),
             Event::Mode(mode) => write!(f, "mode {mode}"),
+            Event::Px4(event) => event.fmt(f),
             Event::Skipped(by) => {
                 write!(
                     f,

@@ -157,7 +157,7 @@ pub(super) fn attitude(time_us: u64, measured: &Truth) -> AttitudeQuaternion {
 }
 
 /// The rotation NED→FRD of the Euler angles ZYX, w first, w ≥ 0.
-fn quaternion(roll: f64, pitch: f64, yaw: f64) -> [f64; 4] {
+pub(super) fn quaternion(roll: f64, pitch: f64, yaw: f64) -> [f64; 4] {
     let (sr, cr) = (0.5 * roll).sin_cos();
     let (sp, cp) = (0.5 * pitch).sin_cos();
     let (sy, cy) = (0.5 * yaw).sin_cos();

@@ -7,6 +7,7 @@
 use super::rule::Rule;
 use super::servos;
 use crate::logs::topics::{Topic, Topics};
+use crate::physics::atmosphere::STANDARD_GRAVITY;
 
 /// The messages that the rules use.
 pub const TOPICS: [&str; 15] = [
@@ -30,7 +31,7 @@ pub const TOPICS: [&str; 15] = [
 /// MAV_AUTOPILOT numbers of stacks whose VFR_HUD is not true airspeed.
 const EQUIVALENT: [f64; 2] = [3.0, 12.0];
 /// Milli-g, m/s².
-const MILLI_G: f64 = 9.80665e-3;
+const MILLI_G: f64 = STANDARD_GRAVITY / 1000.0;
 /// Deflection at normalised 1 of the shim's aircraft, rad.
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 const DEFLECTION: f64 = 0.5235;

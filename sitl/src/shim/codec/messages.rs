@@ -211,7 +211,7 @@ messages! {
     HilActuatorControls = 93, crc_extra 47 {
         /// The time of the frame that is answered, µs.
         time_usec: u64,
-        /// Flags; unused here.
+        /// Bit 0: the sender is in lockstep; unused in the profile `sitl`.
         flags: u64,
         /// Aileron, elevator, throttle, then unused.
         controls: [f32; 16],
@@ -253,6 +253,281 @@ messages! {
         fields_updated: u16,
         /// Number of the sensor (extension).
         id: u8,
+    }
+
+    /// HIL_SENSOR: what a simulator's sensors show.
+    HilSensor = 107, crc_extra 108 {
+        /// Simulated time, µs.
+        time_usec: u64,
+        /// Specific force along body x, m/s².
+        xacc: f32,
+        /// Specific force along body y, m/s².
+        yacc: f32,
+        /// Specific force along body z, m/s².
+        zacc: f32,
+        /// p, rad/s.
+        xgyro: f32,
+        /// q, rad/s.
+        ygyro: f32,
+        /// r, rad/s.
+        zgyro: f32,
+        /// Magnetic field along body x, gauss.
+        xmag: f32,
+        /// Magnetic field along body y, gauss.
+        ymag: f32,
+        /// Magnetic field along body z, gauss.
+        zmag: f32,
+        /// Static pressure, hPa.
+        abs_pressure: f32,
+        /// Differential pressure, hPa.
+        diff_pressure: f32,
+        /// Pressure altitude, m.
+        pressure_alt: f32,
+        /// Air temperature, °C.
+        temperature: f32,
+        /// HIL_SENSOR_UPDATED_FLAGS: which fields are measured anew.
+        fields_updated: u32,
+        /// Number of the sensor (extension).
+        id: u8,
+    }
+
+    /// HIL_GPS: what a simulator's receiver shows.
+    HilGps = 113, crc_extra 124 {
+        /// Simulated time, µs.
+        time_usec: u64,
+        /// Latitude, 1e-7 degrees.
+        lat: i32,
+        /// Longitude, 1e-7 degrees.
+        lon: i32,
+        /// Altitude above mean sea level, mm.
+        alt: i32,
+        /// Horizontal accuracy, cm.
+        eph: u16,
+        /// Vertical accuracy, cm.
+        epv: u16,
+        /// Ground speed, cm/s.
+        vel: u16,
+        /// North, cm/s.
+        vn: i16,
+        /// East, cm/s.
+        ve: i16,
+        /// Down, cm/s.
+        vd: i16,
+        /// Course over ground, cdeg, 0..35999.
+        cog: u16,
+        /// GPS_FIX_TYPE.
+        fix_type: u8,
+        /// Satellites.
+        satellites_visible: u8,
+        /// Number of the receiver (extension).
+        id: u8,
+        /// Yaw, cdeg; 0 is not available (extension).
+        yaw: u16,
+    }
+
+    /// HIL_STATE_QUATERNION: a simulator's truth.
+    HilStateQuaternion = 115, crc_extra 4 {
+        /// Simulated time, µs.
+        time_usec: u64,
+        /// Rotation NED→FRD, w first.
+        attitude_quaternion: [f32; 4],
+        /// p, rad/s.
+        rollspeed: f32,
+        /// q, rad/s.
+        pitchspeed: f32,
+        /// r, rad/s.
+        yawspeed: f32,
+        /// Latitude, 1e-7 degrees.
+        lat: i32,
+        /// Longitude, 1e-7 degrees.
+        lon: i32,
+        /// Altitude above mean sea level, mm.
+        alt: i32,
+        /// North, cm/s.
+        vx: i16,
+        /// East, cm/s.
+        vy: i16,
+        /// Down, cm/s.
+        vz: i16,
+        /// Equivalent airspeed, cm/s.
+        ind_airspeed: u16,
+        /// True airspeed, cm/s.
+        true_airspeed: u16,
+        /// Specific force along body x, mG.
+        xacc: i16,
+        /// Specific force along body y, mG.
+        yacc: i16,
+        /// Specific force along body z, mG.
+        zacc: i16,
+    }
+
+    /// MISSION_REQUEST: an item is asked for, in the old way.
+    MissionRequest = 40, crc_extra 230 {
+        /// Its number.
+        seq: u16,
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// MAV_MISSION_TYPE (extension).
+        mission_type: u8,
+    }
+
+    /// MISSION_REQUEST_LIST: how many items are there?
+    MissionRequestList = 43, crc_extra 132 {
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// MAV_MISSION_TYPE (extension).
+        mission_type: u8,
+    }
+
+    /// MISSION_COUNT: so many items are there, or are offered.
+    MissionCount = 44, crc_extra 221 {
+        /// Their number.
+        count: u16,
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// MAV_MISSION_TYPE (extension).
+        mission_type: u8,
+    }
+
+    /// MISSION_CLEAR_ALL: all items are to be forgotten.
+    MissionClearAll = 45, crc_extra 232 {
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// MAV_MISSION_TYPE (extension).
+        mission_type: u8,
+    }
+
+    /// MISSION_ACK: what came of a step of the mission protocol.
+    MissionAck = 47, crc_extra 153 {
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// MAV_MISSION_RESULT.
+        result: u8,
+        /// MAV_MISSION_TYPE (extension).
+        mission_type: u8,
+    }
+
+    /// MISSION_REQUEST_INT: an item is asked for.
+    MissionRequestInt = 51, crc_extra 196 {
+        /// Its number.
+        seq: u16,
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// MAV_MISSION_TYPE (extension).
+        mission_type: u8,
+    }
+
+    /// FILE_TRANSFER_PROTOCOL: a step of MAVLink's FTP.
+    FileTransferProtocol = 110, crc_extra 84 {
+        /// Addressed network.
+        target_network: u8,
+        /// Addressed system.
+        target_system: u8,
+        /// Addressed component.
+        target_component: u8,
+        /// The first part of the payload: sequence number (2 bytes), session, opcode, size, the
+        /// opcode that is answered, burst, padding, offset (4 bytes), data.
+        payload: [[u8; 32]; 7],
+        /// The rest.
+        more: [u8; 27],
+    }
+
+    /// AUTOPILOT_VERSION: what the stack is and can.
+    AutopilotVersion = 148, crc_extra 178 {
+        /// MAV_PROTOCOL_CAPABILITY bits.
+        capabilities: u64,
+        /// Unique number of the hardware.
+        uid: u64,
+        /// FLIGHT_SW_VERSION: major, minor, patch, kind.
+        flight_sw_version: u32,
+        /// Version of the middleware.
+        middleware_sw_version: u32,
+        /// Version of the operating system.
+        os_sw_version: u32,
+        /// Version of the board.
+        board_version: u32,
+        /// USB vendor.
+        vendor_id: u16,
+        /// USB product.
+        product_id: u16,
+        /// Hash of the flight software.
+        flight_custom_version: [u8; 8],
+        /// Hash of the middleware.
+        middleware_custom_version: [u8; 8],
+        /// Hash of the operating system.
+        os_custom_version: [u8; 8],
+        /// Longer unique number (extension).
+        uid2: [u8; 18],
+    }
+
+    /// HOME_POSITION: where home is.
+    HomePosition = 242, crc_extra 104 {
+        /// Latitude, 1e-7 degrees.
+        latitude: i32,
+        /// Longitude, 1e-7 degrees.
+        longitude: i32,
+        /// Altitude above mean sea level, mm.
+        altitude: i32,
+        /// Position in the local frame, m.
+        local: [f32; 3],
+        /// Orientation of the surface.
+        q: [f32; 4],
+        /// Way of approach, m.
+        approach: [f32; 3],
+        /// Time, µs (extension).
+        time_usec: u64,
+    }
+
+    /// MESSAGE_INTERVAL: how often a message is sent.
+    MessageInterval = 244, crc_extra 95 {
+        /// µs; −1 is never, 0 a message that is not sent here.
+        interval_us: i32,
+        /// The message.
+        message_id: u16,
+    }
+
+    /// PROTOCOL_VERSION: which MAVLink is spoken.
+    ProtocolVersion = 300, crc_extra 217 {
+        /// Version × 100.
+        version: u16,
+        /// Oldest, × 100.
+        min_version: u16,
+        /// Newest, × 100.
+        max_version: u16,
+        /// Hash of the specification.
+        spec_version_hash: [u8; 8],
+        /// Hash of the library.
+        library_version_hash: [u8; 8],
+    }
+
+    /// AVAILABLE_MODES: a mode that can be flown.
+    AvailableModes = 435, crc_extra 134 {
+        /// Its number in the stack.
+        custom_mode: u32,
+        /// MAV_MODE_PROPERTY bits.
+        properties: u32,
+        /// How many modes there are.
+        number_modes: u8,
+        /// Which this is, from 1.
+        mode_index: u8,
+        /// MAV_STANDARD_MODE.
+        standard_mode: u8,
+        /// The first part of its name, filled up with zeros.
+        mode_name: [u8; 32],
+        /// The rest.
+        more: [u8; 3],
     }
 
     /// PARAM_REQUEST_READ: a parameter is asked for.

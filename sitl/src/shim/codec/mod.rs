@@ -13,9 +13,12 @@ mod parser;
 pub use field::{Field, Reader, Writer};
 pub use frame::{Encoder, Frame, Version, checksum};
 pub use messages::{
-    ActuatorOutputStatus, AoaSsa, AttitudeQuaternion, CommandAck, CommandLong, GlobalPositionInt,
-    GpsRawInt, Heartbeat, HighresImu, HilActuatorControls, ManualControl, Message,
-    ParamRequestList, ParamRequestRead, ParamSet, ParamValue, RcChannelsOverride, ServoOutputRaw,
-    SetAttitudeTarget, StatusText, SysStatus, TimeSync, VfrHud, WindCov, crc_extra,
+    ActuatorOutputStatus, AoaSsa, AttitudeQuaternion, AutopilotVersion, AvailableModes, CommandAck,
+    CommandLong, FileTransferProtocol, GlobalPositionInt, GpsRawInt, Heartbeat, HighresImu,
+    HilActuatorControls, HilGps, HilSensor, HilStateQuaternion, HomePosition, ManualControl,
+    Message, MessageInterval, MissionAck, MissionClearAll, MissionCount, MissionRequest,
+    MissionRequestInt, MissionRequestList, ParamRequestList, ParamRequestRead, ParamSet,
+    ParamValue, ProtocolVersion, RcChannelsOverride, ServoOutputRaw, SetAttitudeTarget, StatusText,
+    SysStatus, TimeSync, VfrHud, WindCov, crc_extra,
 };
 pub use parser::Parser;

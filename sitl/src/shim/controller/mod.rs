@@ -6,6 +6,7 @@
 //! sampling of sticks, time-outs, the stack's own attitude loops. Estimation is perfect but for the
 //! sensor errors of the options.
 
+mod connect;
 mod law;
 mod modes;
 mod parameters;
@@ -16,9 +17,9 @@ mod streams;
 use std::fmt;
 
 use super::codec::{
-    CommandAck, CommandLong, Encoder, Frame, Heartbeat, ManualControl, ParamRequestList,
-    ParamRequestRead, ParamSet, Parser, RcChannelsOverride, SetAttitudeTarget, StatusText,
-    TimeSync,
+    CommandAck, CommandLong, Encoder, FileTransferProtocol, Frame, Heartbeat, ManualControl,
+    ParamRequestList, ParamRequestRead, ParamSet, Parser, RcChannelsOverride, SetAttitudeTarget,
+    StatusText, TimeSync,
 };
 use super::distortion::{Distorter, Distortion};
 use super::error::ShimError;
@@ -95,6 +96,8 @@ pub struct FlightController {
     wish: Option<Wish>,
     mode: Mode,
     armed: bool,
+    /// Latitude and longitude of the start, degrees.
+    home: Option<(f64, f64)>,
     entered_us: u64,
     steps: u64,
     now_us: u64,
@@ -134,6 +137,7 @@ impl FlightController {
             wish: None,
             mode: Mode::Hold,
             armed: true,
+            home: None,
             entered_us: 0,
             steps: 0,
             now_us: 0,
@@ -148,6 +152,7 @@ impl FlightController {
     pub fn show(&mut self, out: &mut Vec<u8>) {
         let (frame, measured) = self.flight.measure();
         (self.now_us, self.measured) = (frame.time_us, measured);
+        self.home.get_or_insert((measured.latitude_deg, measured.longitude_deg));
         out.append(&mut self.waiting);
         if self.steps.is_multiple_of(100) {
             let heartbeat = self.heartbeat();
@@ -260,12 +265,27 @@ impl FlightController {
             self.channels_override(frame.system, &m);
         } else if let Some(m) = frame.decode::<SetAttitudeTarget>() {
             self.attitude_target(&m);
-        } else if let Some(m) = frame.decode::<ParamRequestRead>() {
+        } else if let Some(m) = frame
+            .decode::<ParamRequestRead>()
+            .filter(|m| for_us(m.target_system, m.target_component))
+        {
             self.parameters.read(&m, &mut self.encoder, &mut self.waiting);
-        } else if frame.decode::<ParamRequestList>().is_some() {
+        } else if frame
+            .decode::<ParamRequestList>()
+            .is_some_and(|m| for_us(m.target_system, m.target_component))
+        {
             self.parameters.list(&mut self.encoder, &mut self.waiting);
-        } else if let Some(m) = frame.decode::<ParamSet>() {
+        } else if let Some(m) =
+            frame.decode::<ParamSet>().filter(|m| for_us(m.target_system, m.target_component))
+        {
             self.parameters.set(&m, &mut self.encoder, &mut self.waiting);
+        } else if let Some(m) = frame
+            .decode::<FileTransferProtocol>()
+            .filter(|m| for_us(m.target_system, m.target_component))
+        {
+            self.refuse_file(frame, &m);
+        } else if self.mission(frame) {
+            // Answered.
         } else if let Some(m) = frame.decode::<TimeSync>().filter(|m| m.tc1 == 0) {
             let tc1 = self.now_us as i64 * 1000;
             self.encoder.encode(&TimeSync { tc1, ..m }, &mut self.waiting);
@@ -273,7 +293,9 @@ impl FlightController {
     }
 
     fn obey(&mut self, frame: &Frame, m: &CommandLong) {
+        let requested = connect::requested(m.command, &m.param);
         let result = match m.command {
+            _ if requested.is_some() => requested.map_or(3, |r| self.grants(r)),
             176 => self.asked_for_mode(m.param[1], m.param[2]),
             400 => {
                 self.armed = m.param[0] == 1.0;
@@ -298,6 +320,9 @@ impl FlightController {
             ..CommandAck::default()
         };
         self.encoder.encode(&ack, &mut self.waiting);
+        if let Some(requested) = requested.filter(|_| result == 0) {
+            self.send_requested(requested);
+        }
     }
 
     /// MAV_RESULT of a request for a mode.

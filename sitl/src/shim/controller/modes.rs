@@ -1,6 +1,7 @@
 //! The modes of the played stacks, in their own numbers.
 
 use super::Personality;
+use crate::shim::codec::AvailableModes;
 
 /// A mode, by what it does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +17,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    const ALL: [Mode; 4] = [Mode::Manual, Mode::Guided, Mode::Hold, Mode::Return];
+    pub(super) const ALL: [Mode; 4] = [Mode::Manual, Mode::Guided, Mode::Hold, Mode::Return];
 
     /// Main and sub mode.
     fn numbers(self, personality: Personality) -> (u32, u32) {
@@ -38,6 +39,30 @@ impl Mode {
         match personality {
             Personality::Px4 => main << 16 | sub << 24,
             Personality::Ardupilot => main,
+        }
+    }
+
+    /// AVAILABLE_MODES of this mode, number `at` from 0.
+    pub(super) fn available(self, personality: Personality, at: usize) -> AvailableModes {
+        let (name, standard_mode) = match (personality, self) {
+            (_, Mode::Manual) => ("Manual", 0),
+            (Personality::Px4, Mode::Guided) => ("Offboard", 0),
+            (Personality::Ardupilot, Mode::Guided) => ("Guided", 0),
+            (Personality::Px4, Mode::Hold) => ("Hold", 0),
+            (Personality::Ardupilot, Mode::Hold) => ("Loiter", 0),
+            // MAV_STANDARD_MODE_SAFE_RECOVERY.
+            (_, Mode::Return) => ("Return", 5),
+        };
+        let mut mode_name = [0; 32];
+        mode_name[..name.len()].copy_from_slice(name.as_bytes());
+        AvailableModes {
+            custom_mode: self.number(personality),
+            properties: 0,
+            number_modes: Mode::ALL.len() as u8,
+            mode_index: at as u8 + 1,
+            standard_mode,
+            mode_name,
+            more: [0; 3],
         }
     }
 

@@ -55,6 +55,32 @@ impl Streams {
         0
     }
 
+    /// Whether it can be sent.
+    pub(super) fn knows(&self, id: u32) -> bool {
+        self.rows.iter().any(|row| row.id == id)
+    }
+
+    /// µs between messages; −1 when off, 0 when the message is not sent here.
+    pub(super) fn interval_us(&self, id: u32) -> i32 {
+        let row = self.rows.iter().find(|row| row.id == id);
+        row.map_or(0, |row| row.interval_us.map_or(-1, |us| us as i32))
+    }
+
+    /// Appends a message once.
+    pub(super) fn send_once(
+        &self,
+        id: u32,
+        now: u64,
+        measured: &Truth,
+        home_m: f64,
+        encoder: &mut Encoder,
+        out: &mut Vec<u8>,
+    ) {
+        if self.knows(id) {
+            encode(id, now, measured, home_m, encoder, out);
+        }
+    }
+
     /// Appends what is due.
     pub(super) fn send(
         &mut self,

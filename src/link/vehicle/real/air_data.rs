@@ -14,8 +14,8 @@
 //! ground are told, the sideways velocity that follows from them. The state being a velocity, a
 //! constant wind cancels; a steady updraught of 1 m/s shows as w/V, 3° at 20 m/s.
 
-/// Gravity, m/s².
-const GRAVITY: f64 = 9.806;
+use crate::physics::atmosphere::MIDDLE_GRAVITY;
+
 /// Standard deviation of what the accelerations do not explain (gusts, their own noise), m/s² in
 /// a step of 10 ms: light turbulence changes the air's velocity by about that.
 const PROCESS: f64 = 1.0;
@@ -100,9 +100,9 @@ impl AirData {
         let (sr, cr) = m.attitude[0].sin_cos();
         let (sp, cp) = m.attitude[1].sin_cos();
         let rate = [
-            r * v - q * w - GRAVITY * sp + ax,
-            p * w - r * u + GRAVITY * cp * sr + ay,
-            q * u - p * v + GRAVITY * cp * cr + az,
+            r * v - q * w - MIDDLE_GRAVITY * sp + ax,
+            p * w - r * u + MIDDLE_GRAVITY * cp * sr + ay,
+            q * u - p * v + MIDDLE_GRAVITY * cp * cr + az,
         ];
         self.state = Some([u + step * rate[0], v + step * rate[1], w + step * rate[2]]);
         let f =
@@ -191,9 +191,9 @@ mod tests {
             attitude: [0.0, 3f64.to_radians(), 0.0],
             rates: [0.0; 3],
             specific_force: [
-                GRAVITY * 3f64.to_radians().sin(),
+                MIDDLE_GRAVITY * 3f64.to_radians().sin(),
                 0.0,
-                -GRAVITY * 3f64.to_radians().cos(),
+                -MIDDLE_GRAVITY * 3f64.to_radians().cos(),
             ],
             airspeed: 20.0,
             climb: 0.0,

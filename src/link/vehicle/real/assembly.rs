@@ -8,7 +8,7 @@ use crate::link::wire::controller::ControllerMessage;
 use crate::link::wire::setpoint::euler;
 use crate::physics::actuators::Actuators;
 use crate::physics::airframe::ActuatorFigures;
-use crate::physics::atmosphere::{Atmosphere, Density};
+use crate::physics::atmosphere::{self, SEA_LEVEL_DENSITY};
 use crate::physics::{Command, Controls, State, Time};
 
 /// Time between states, µs.
@@ -17,8 +17,6 @@ const PERIOD_US: u64 = 10_000;
 const RESTART_MS: i32 = 1000;
 /// Age at which a part of the state is no longer of this moment.
 const STALE: Duration = Duration::from_millis(300);
-/// Sea-level density of the standard atmosphere, which equivalent airspeed refers to, kg/m³.
-const SEA_LEVEL: f64 = 1.225;
 /// Steps of the actuators made up for after a gap: a fifth of a second, longer than any transient.
 const CATCH_UP: u64 = 20;
 
@@ -178,7 +176,7 @@ impl Assembly {
         };
         let standard = || standard_density(altitude);
         let density = fresh(self.density, host).unwrap_or_else(standard);
-        let airspeed = equivalent * (SEA_LEVEL / density).sqrt();
+        let airspeed = equivalent * (SEA_LEVEL_DENSITY / density).sqrt();
         match limits::air(airspeed, altitude) {
             true => (next.state.airspeed, next.altitude) = (airspeed, altitude),
             false => next.faults.insert(Faults::AIR),
@@ -256,7 +254,7 @@ fn fresh<T: Copy>(heard: Heard<T>, host: Duration) -> Option<T> {
 
 fn standard_density(altitude: f64) -> f64 {
     let altitude = if altitude.is_finite() { altitude.clamp(-1000.0, 11_000.0) } else { 0.0 };
-    Atmosphere { density: Density::Standard, gravity: 9.806 }.density_at(altitude)
+    atmosphere::standard_density(altitude)
 }
 
 #[cfg(test)]

@@ -1,0 +1,174 @@
+//! One connected client: what it has said, what it is owed.
+
+use std::time::Instant;
+
+use super::clock::{Answers, Clock};
+use super::events::Px4Event;
+use super::outputs::{Actuation, OutputMap};
+use crate::shim::codec::{
+    CommandAck, CommandLong, Encoder, Frame, Heartbeat, HilActuatorControls, HilStateQuaternion,
+    Message, Parser, Version,
+};
+use crate::shim::session::SHIM;
+use crate::shim::summary::Summary;
+
+/// MAV_AUTOPILOT_PX4.
+const PX4: u8 = 12;
+/// MAV_CMD_SET_MESSAGE_INTERVAL.
+const SET_MESSAGE_INTERVAL: u16 = 511;
+/// The version of MAVLink's dialects that HEARTBEAT carries.
+const DIALECT: u8 = 3;
+
+const OLD_PROTOCOL: &str = "the client speaks MAVLink 1, PX4 speaks MAVLink 2 to its simulator: \
+                            its messages are not flown; update it";
+const OTHER_DIALECT: &str = "the client's HEARTBEAT has a MAVLink version other than 3: its \
+                             messages may mean something else; update it";
+const OTHER_STACK: &str = "the client's HEARTBEAT is not of PX4 (MAV_AUTOPILOT 12): its outputs \
+                           may mean something else; see --px4-outputs";
+
+/// A client.
+pub(super) struct Client {
+    pub(super) parser: Parser,
+    pub(super) encoder: Encoder,
+    clock: Clock,
+    /// Time of the first step that it was shown, µs.
+    pub(super) begun_us: u64,
+    /// The newest actuation that may be flown.
+    pub(super) actuation: Option<Actuation>,
+    /// Whether it has asked for lockstep.
+    pub(super) lockstep: bool,
+    /// Whether the step that was shown last is answered.
+    pub(super) answered: bool,
+    /// When an actuator message last came.
+    pub(super) heard: Option<Instant>,
+    /// Its silence has been told.
+    pub(super) silent: bool,
+    told: Vec<&'static str>,
+    state_interval_us: Option<u64>,
+    next_state_us: u64,
+}
+
+impl Client {
+    pub(super) fn new(begun_us: u64) -> Self {
+        Client {
+            parser: Parser::default(),
+            encoder: Encoder::new(SHIM.0, SHIM.1),
+            clock: Clock::default(),
+            begun_us,
+            actuation: None,
+            lockstep: false,
+            answered: false,
+            heard: None,
+            silent: false,
+            told: Vec::new(),
+            state_interval_us: None,
+            next_state_us: 0,
+        }
+    }
+
+    /// Takes a frame while the step of `shown_us` is the last that was shown; appends to `reply`
+    /// what is to be sent, to `events` what is to be told.
+    pub(super) fn take(
+        &mut self,
+        frame: &Frame,
+        shown_us: u64,
+        outputs: &OutputMap,
+        counts: &mut Summary,
+        reply: &mut Vec<u8>,
+        events: &mut Vec<Px4Event>,
+    ) {
+        if frame.version == Version::One {
+            counts.foreign_frames += 1;
+            self.refuse(OLD_PROTOCOL, events);
+        } else if let Some(message) = frame.decode::<HilActuatorControls>() {
+            match outputs.read(&message) {
+                Some(actuation) => self.actuate(actuation, shown_us, counts, events),
+                None => counts.unusable_answers += 1,
+            }
+        } else if let Some(beat) = frame.decode::<Heartbeat>() {
+            if beat.mavlink_version != DIALECT {
+                self.refuse(OTHER_DIALECT, events);
+            }
+            if beat.autopilot != PX4 {
+                self.refuse(OTHER_STACK, events);
+            }
+        } else if let Some(command) = frame.decode::<CommandLong>() {
+            let ack = self.obey(frame, &command);
+            self.encoder.encode(&ack, reply);
+        } else {
+            counts.foreign_frames += 1;
+        }
+    }
+
+    fn refuse(&mut self, why: &'static str, events: &mut Vec<Px4Event>) {
+        if !self.told.contains(&why) {
+            self.told.push(why);
+            events.push(Px4Event::Refused(why));
+        }
+    }
+
+    fn actuate(
+        &mut self,
+        actuation: Actuation,
+        shown_us: u64,
+        counts: &mut Summary,
+        events: &mut Vec<Px4Event>,
+    ) {
+        let before = self.clock;
+        let answers = self.clock.judge(actuation.time_us, self.begun_us, shown_us);
+        if before != self.clock && self.clock == Clock::Foreign {
+            events.push(Px4Event::ForeignClock);
+        }
+        match answers {
+            Answers::Nothing => {
+                counts.wrong_answers += 1;
+                return;
+            }
+            Answers::Present if self.answered => counts.repeated_answers += 1,
+            Answers::Present => self.answered = true,
+            Answers::Past if self.lockstep => {
+                counts.stale_answers += 1;
+                return;
+            }
+            Answers::Past => {}
+        }
+        if actuation.lockstep && !self.lockstep {
+            self.lockstep = true;
+            events.push(Px4Event::Lockstep);
+        }
+        counts.answers += 1;
+        counts.limited_answers += u64::from(actuation.limited);
+        self.heard = Some(Instant::now());
+        self.actuation = Some(actuation);
+        if std::mem::take(&mut self.silent) {
+            events.push(if self.lockstep { Px4Event::Resumed } else { Px4Event::Heard });
+        }
+    }
+
+    /// The only command that PX4 sends here asks for HIL_STATE_QUATERNION.
+    fn obey(&mut self, frame: &Frame, command: &CommandLong) -> CommandAck {
+        let interval_us = f64::from(command.param[1]);
+        let known = command.command == SET_MESSAGE_INTERVAL
+            && command.param[0] == HilStateQuaternion::ID as f32;
+        if known {
+            self.state_interval_us = (interval_us > 0.0).then_some(interval_us as u64);
+        }
+        CommandAck {
+            command: command.command,
+            // MAV_RESULT_ACCEPTED, _UNSUPPORTED.
+            result: if known { 0 } else { 3 },
+            target_system: frame.system,
+            target_component: frame.component,
+            ..CommandAck::default()
+        }
+    }
+
+    /// Whether HIL_STATE_QUATERNION is due; faster than the steps is every step.
+    pub(super) fn wants_state(&mut self, now_us: u64) -> bool {
+        let Some(interval) = self.state_interval_us.filter(|_| now_us >= self.next_state_us) else {
+            return false;
+        };
+        self.next_state_us = (self.next_state_us + interval).max(now_us + 1);
+        true
+    }
+}

@@ -1,0 +1,88 @@
+//! Which step an actuator message answers, by the controller's own clock.
+
+use super::{FIRST_US, STEP_US};
+
+/// How the controller's clock stands to the simulated one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Clock {
+    /// No message yet.
+    #[default]
+    Unknown,
+    /// It shows simulated time less so much, µs: nothing, or the time at which it was started, as
+    /// PX4 counts from the first HIL_SENSOR that it sees.
+    Behind(u64),
+    /// It shows something else: messages are counted instead, as Gazebo's plugin does.
+    Foreign,
+}
+
+/// Which step a message answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answers {
+    /// The one that was shown last.
+    Present,
+    /// An earlier one.
+    Past,
+    /// None that was shown.
+    Nothing,
+}
+
+impl Clock {
+    /// Judges a message of `time_us` after the steps from [`FIRST_US`] or later, `begun_us`, to
+    /// `shown_us`.
+    ///
+    /// Simulated time begins so late that the two ways of counting cannot be confused before it
+    /// has doubled.
+    pub fn judge(&mut self, time_us: u64, begun_us: u64, shown_us: u64) -> Answers {
+        if *self == Clock::Unknown {
+            *self = Clock::of(time_us, begun_us, shown_us);
+        }
+        let Clock::Behind(by_us) = *self else { return Answers::Present };
+        let step_us = time_us.saturating_add(by_us);
+        if step_us == shown_us {
+            Answers::Present
+        } else if (begun_us..shown_us).contains(&step_us) {
+            Answers::Past
+        } else {
+            Answers::Nothing
+        }
+    }
+
+    fn of(time_us: u64, begun_us: u64, shown_us: u64) -> Clock {
+        if !time_us.is_multiple_of(STEP_US) {
+            return Clock::Foreign;
+        }
+        match time_us {
+            at if (begun_us..=shown_us).contains(&at) => Clock::Behind(0),
+            since if since < FIRST_US && since <= shown_us - begun_us => Clock::Behind(begun_us),
+            _ => Clock::Foreign,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn px4_counts_from_the_first_sensor_message() {
+        let begun = FIRST_US + 40 * STEP_US;
+        let (mut clock, shown) = (Clock::default(), begun + 10 * STEP_US);
+        assert_eq!(clock.judge(9 * STEP_US, begun, shown), Answers::Past);
+        assert_eq!(clock, Clock::Behind(begun));
+        assert_eq!(clock.judge(10 * STEP_US, begun, shown), Answers::Present);
+        assert_eq!(clock.judge(11 * STEP_US, begun, shown), Answers::Nothing);
+        assert_eq!(clock.judge(u64::MAX, begun, shown), Answers::Nothing);
+    }
+
+    #[test]
+    fn a_clock_that_echoes_and_one_that_is_foreign() {
+        let (mut clock, shown) = (Clock::default(), FIRST_US + 10 * STEP_US);
+        assert_eq!(clock.judge(shown, FIRST_US, shown), Answers::Present);
+        assert_eq!(clock, Clock::Behind(0));
+        assert_eq!(clock.judge(shown - STEP_US, FIRST_US, shown), Answers::Past);
+        assert_eq!(clock.judge(7, FIRST_US, shown), Answers::Nothing);
+        let mut foreign = Clock::default();
+        assert_eq!(foreign.judge(1_763_000_000_123_457, FIRST_US, shown), Answers::Present);
+        assert_eq!(foreign, Clock::Foreign);
+    }
+}

@@ -1,0 +1,67 @@
+//! What a run against PX4 tells.
+
+use std::fmt;
+use std::net::SocketAddr;
+
+use crate::shim::link::Address;
+
+/// A change of state of a run against PX4.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Px4Event {
+    /// Nobody is connected.
+    Waiting(Address),
+    /// A client has connected.
+    Connected(SocketAddr),
+    /// The client has closed its connection: the aircraft is back at its start.
+    Gone,
+    /// The client is in lockstep: a step is made on its answer and never without.
+    Lockstep,
+    /// The client's times are of another clock: its messages are counted instead.
+    ForeignClock,
+    /// The catapult has been let go.
+    Catapult,
+    /// Lockstep: no answer for a second; simulated time stands still.
+    Stopped,
+    /// Lockstep: the answer has come after all.
+    Resumed,
+    /// Real time: no actuator message for a second; the outputs stay as they are.
+    Silent,
+    /// Real time: actuator messages come again.
+    Heard,
+    /// The client is not what this side speaks to; why, and what to do.
+    Refused(&'static str),
+}
+
+impl fmt::Display for Px4Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Px4Event::Waiting(link) => write!(
+                f,
+                "waiting for PX4 on {link}; start it in its source folder: PX4_SYS_AUTOSTART=1036 \
+                 PX4_SIM_MODEL=jsbsim_malolo build/px4_sitl_default/bin/px4"
+            ),
+            Px4Event::Connected(peer) => write!(f, "PX4 connected from {peer}"),
+            Px4Event::Gone => write!(f, "PX4 gone: the aircraft is back at its start"),
+            Px4Event::Lockstep => write!(f, "lockstep: a step is made on PX4's answer"),
+            Px4Event::ForeignClock => write!(
+                f,
+                "the actuator messages show another clock: they are counted as answers, whatever \
+                 their time"
+            ),
+            Px4Event::Catapult => write!(f, "armed with throttle: the catapult is let go"),
+            Px4Event::Stopped => write!(
+                f,
+                "no actuator message for 1 s: simulated time stands still until one comes; see \
+                 whether PX4 is stopped, or end it and start it again"
+            ),
+            Px4Event::Resumed => write!(f, "answered: simulated time goes on"),
+            Px4Event::Silent => write!(
+                f,
+                "no actuator message for 1 s: the outputs stay as they are; see whether PX4 is \
+                 stopped"
+            ),
+            Px4Event::Heard => write!(f, "actuator messages come again"),
+            Px4Event::Refused(why) => write!(f, "{why}"),
+        }
+    }
+}
