@@ -20,8 +20,7 @@ use crate::link::client::{Clients, Now};
 use crate::link::framing::Source;
 use crate::link::routing::Router;
 use crate::link::transport::{Arrival, Packet, Remark};
-use crate::link::vehicle::{Faults, Notice, Order, Outputs, Real, Sitl, Telemetry, Vehicle};
-use crate::logs::Sample;
+use crate::link::vehicle::{Notice, Order, Outputs, Real, Sitl, Telemetry, Vehicle};
 
 /// Between two looks at what is due: heartbeats, streams, lost links.
 const POLL: Duration = Duration::from_millis(10);
@@ -205,7 +204,7 @@ impl Control {
         self.load += LOAD_WEIGHT * (share - self.load);
         if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {
             let latency_us = latency.as_secs_f64() * 1e6;
-            recorder.row(Row { sample: sample(state, decision), decision: *decision, latency_us });
+            recorder.row(Row::new(state, decision, latency_us));
         }
     }
 
@@ -366,32 +365,4 @@ fn unix_us() -> u64 {
     SystemTime::now()
         .duration_since(SystemTime::UNIX_EPOCH)
         .map_or(0, |since| since.as_micros() as u64)
-}
-
-fn sample(state: &Telemetry, decision: &Decision) -> Sample {
-    let (s, z, c) = (&state.state, &state.actuators, &decision.command);
-    // A part with a fault still holds its last good value; in a log it is missing.
-    let known = |fault: Faults, x: f64| {
-        if state.faults.contains(fault) { f64::NAN } else { x }
-    };
-    Sample {
-        time_s: state.time.as_secs_f64(),
-        attitude_rad: [s.roll, s.pitch, state.yaw].map(|x| known(Faults::ATTITUDE, x)),
-        rates_radps: [s.p, s.q, s.r].map(|x| known(Faults::RATES, x)),
-        airspeed_mps: known(Faults::AIR, s.airspeed),
-        alpha_rad: known(Faults::INCIDENCE, s.alpha),
-        beta_rad: known(Faults::INCIDENCE, s.beta),
-        specific_force_mps2: state.specific_force.map(|x| known(Faults::SPECIFIC_FORCE, x)),
-        velocity_ned_mps: state.velocity,
-        altitude_m: known(Faults::AIR, state.altitude),
-        aileron_rad: known(Faults::ACTUATORS, z.aileron),
-        elevator_rad: known(Faults::ACTUATORS, z.elevator),
-        throttle: known(Faults::ACTUATORS, z.throttle),
-        aileron_cmd: c.aileron,
-        elevator_cmd: c.elevator,
-        throttle_cmd: c.throttle,
-        roll_target_rad: decision.target.roll,
-        pitch_target_rad: decision.target.pitch,
-        ..Sample::default()
-    }
 }

@@ -1,24 +1,27 @@
 //! One flight of 60 s under faults, in lockstep in this process.
 
+use std::io::{Error, ErrorKind, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use anyhow::{Context, Result};
-use greylag_sitl::plant::{PlantOptions, Start, Truth};
-use greylag_sitl::shim::bench::Bench;
-use greylag_sitl::shim::controller::{FlightController, Mode as TheirMode};
-use greylag_sitl::shim::{Distortion, Launch, Noise, Personality, ShimOptions};
+use greylag_sitl::plant::Inputs;
+use greylag_sitl::shim::{Distortion, ShimError};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
-use super::judge::{Finding, Judge};
+use super::judge::{Finding, Found, Judge, Plight};
 use super::mix::{Fault, Kind, draw};
+use super::opposite::{Aircraft, Opposite, vehicle};
 use super::wire::Wire;
-use crate::commands::fly::{POLICY, crew};
-use crate::control::Kind as ControllerKind;
+use crate::control::{Controller, Kind as ControllerKind, SetupError, build};
 use crate::flight::desk::Desk;
+use crate::flight::pilot::{ConfigError, Pilot};
+use crate::flight::recorder::Recorder;
 use crate::flight::runtime::Crew;
 use crate::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
-use crate::link::vehicle::{Authority, Profile, Real, Sitl, Stack, Vehicle};
+use crate::link::vehicle::Vehicle;
 use crate::model::GreyBox;
 
 /// Steps of a flight: 60 s.
@@ -37,42 +40,24 @@ const LEGS: [(f64, f64, f64); 6] = [
 /// A dead link must have handed the aircraft back after this time, s.
 const HAND_BACK_S: f64 = 0.5;
 
-/// What is at the other end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Opposite {
-    /// The simulator's shim.
-    Sitl,
-    /// PX4 by surfaces.
-    Px4,
-    /// PX4 by attitude.
-    Px4Attitude,
-    /// ArduPilot by channels.
-    Ardupilot,
-    /// ArduPilot by attitude.
-    ArdupilotAttitude,
-}
+/// Stream of the random numbers of a starved processor.
+const STARVED: u64 = 20;
 
-impl Opposite {
-    /// Its name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Opposite::Sitl => "sitl",
-            Opposite::Px4 => "px4",
-            Opposite::Px4Attitude => "px4-attitude",
-            Opposite::Ardupilot => "ardupilot",
-            Opposite::ArdupilotAttitude => "ardupilot-attitude",
-        }
-    }
-
-    fn personality(self) -> Option<(Personality, Authority)> {
-        match self {
-            Opposite::Sitl => None,
-            Opposite::Px4 => Some((Personality::Px4, Authority::Surfaces)),
-            Opposite::Px4Attitude => Some((Personality::Px4, Authority::Attitude)),
-            Opposite::Ardupilot => Some((Personality::Ardupilot, Authority::Surfaces)),
-            Opposite::ArdupilotAttitude => Some((Personality::Ardupilot, Authority::Attitude)),
-        }
-    }
+/// Why a flight cannot be flown.
+#[derive(Debug, thiserror::Error)]
+pub enum FaultsError {
+    /// The aircraft cannot be made.
+    #[error(transparent)]
+    Aircraft(#[from] ShimError),
+    /// The fallback cannot be built.
+    #[error(transparent)]
+    Fallback(#[from] SetupError),
+    /// The pilot refuses its settings.
+    #[error(transparent)]
+    Pilot(#[from] ConfigError),
+    /// The recorder's thread cannot be started.
+    #[error("starting the recorder of a flight: {0}; close other programs and try again")]
+    Recorder(#[from] std::io::Error),
 }
 
 /// A flight to be flown.
@@ -93,146 +78,96 @@ pub struct Report {
     pub case: Case,
     /// What befell it.
     pub faults: Vec<Fault>,
-    /// What was found wrong, with its time, s.
-    pub findings: Vec<(f64, Finding)>,
+    /// What was found wrong.
+    pub findings: Vec<Found>,
     /// What was said to the ground stations, with nothing left out.
     pub texts: Vec<String>,
-}
-
-/// The aircraft with what flies it.
-enum Aircraft {
-    Sitl(Box<Bench>),
-    Real(Box<FlightController>),
-}
-
-impl Aircraft {
-    fn new(case: &Case) -> Result<Self> {
-        let mut options = ShimOptions::new(PlantOptions::default(), Start::NEUTRAL);
-        options.seed = case.seed;
-        options.noise = Noise::REALISTIC;
-        Ok(match case.opposite.personality() {
-            None => Aircraft::Sitl(Box::new(Bench::new(&options)?)),
-            Some((personality, _)) => {
-                options.launch = Launch::Immediate;
-                Aircraft::Real(Box::new(FlightController::new(personality, &options)?))
-            }
-        })
-    }
-
-    fn show(&mut self, distortion: Distortion) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        match self {
-            Aircraft::Sitl(bench) => {
-                bench.distort(distortion);
-                bench.show(&mut bytes);
-            }
-            Aircraft::Real(controller) => {
-                controller.distort(distortion);
-                controller.show(&mut bytes);
-            }
-        }
-        bytes
-    }
-
-    fn truth(&self) -> Truth {
-        match self {
-            Aircraft::Sitl(bench) => bench.measured(),
-            Aircraft::Real(controller) => controller.measured(),
-        }
-    }
-
-    fn hear(&mut self, bytes: &[u8]) {
-        match self {
-            Aircraft::Sitl(bench) => bench.hear(bytes),
-            Aircraft::Real(controller) => controller.hear(bytes),
-        }
-    }
-
-    /// Flies a step; `false` when the flight has ended on the ground or outside the numbers.
-    fn fly(&mut self) -> bool {
-        let flown = match self {
-            Aircraft::Sitl(bench) => bench.fly(),
-            Aircraft::Real(controller) => controller.fly(),
-        };
-        matches!(flown, Ok(None))
-    }
-
-    /// Whether the companion has the surfaces, or the attitude.
-    fn is_steered(&self) -> bool {
-        match self {
-            Aircraft::Sitl(_) => true,
-            Aircraft::Real(c) => matches!(c.mode(), TheirMode::Manual | TheirMode::Guided),
-        }
-    }
 }
 
 /// A companion fresh from the works: the design of its controller is not made again.
 pub struct Works {
     crew: Crew,
+    fallback: Box<dyn Controller>,
     model: GreyBox,
 }
 
 impl Works {
-    /// The works for a controller.
+    /// The works that build companions with `crew`, for the aircraft of `model`; as in flight, the
+    /// fallback is an LQI.
     ///
     /// # Errors
-    /// If the model does not allow it.
-    pub fn new(controller: ControllerKind, model: &GreyBox) -> Result<Self> {
-        Ok(Works { crew: crew(controller, model, Path::new(POLICY))?, model: model.clone() })
+    /// If the model has no LQI.
+    pub fn new(crew: Crew, model: &GreyBox) -> Result<Self, FaultsError> {
+        let fallback = match crew.controller.name() == ControllerKind::Lqi.name() {
+            true => crew.controller.boxed_clone(),
+            false => build(ControllerKind::Lqi, model)?,
+        };
+        Ok(Works { crew, fallback, model: model.clone() })
     }
 
-    fn desk(&self, opposite: Opposite) -> Result<Desk> {
-        let fallback = crate::control::build(ControllerKind::PidRetuned, &self.model)?;
+    fn desk(&self, opposite: Opposite) -> Result<Desk, FaultsError> {
         let config = self.crew.pilot.config().clone();
-        let fallback = match self.crew.controller.name() {
-            // As in flight: an LQI is its own fallback.
-            "lqi" => self.crew.controller.boxed_clone(),
-            _ => fallback,
-        };
-        let pilot = crate::flight::pilot::Pilot::new(config, fallback)?;
+        let pilot = Pilot::new(config, self.fallback.boxed_clone())?;
         let controller = self.crew.controller.boxed_clone();
-        let vehicle = vehicle(opposite, &self.model);
-        Ok(Desk::new(Crew { pilot, controller, seat: self.crew.seat }, vehicle))
+        let crew = Crew { pilot, controller, seat: self.crew.seat };
+        Ok(Desk::new(crew, vehicle(opposite, &self.model)))
     }
 
     /// Flies `case`; a panic of the companion is a finding.
     ///
     /// # Errors
     /// If the aircraft cannot be loaded.
-    pub fn fly(&self, case: Case) -> Result<Report> {
+    pub fn fly(&self, case: Case) -> Result<Report, FaultsError> {
         let faults = draw(case.seed);
+        let mut desk = self.desk(case.opposite)?;
+        let disk = faults.iter().any(|f| f.kind == Kind::Disk).then(Disk::default);
+        if let Some(disk) = &disk {
+            let folder = std::path::PathBuf::new();
+            desk.record(Recorder::over(folder, disk.clone(), disk.clone(), disk.clone())?);
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(case.seed);
+        random.set_stream(STARVED);
         let mut flight = Flight {
-            aircraft: Aircraft::new(&case)?,
-            desk: self.desk(case.opposite)?,
+            aircraft: Aircraft::new(case.opposite, case.seed)?,
+            desk,
             down: Wire::new(case.seed, 0),
             up: Wire::new(case.seed, 1),
             judge: Judge::new(self.model.airframe.envelope),
             faults: faults.clone(),
+            random,
+            disk,
+            asleep_until: 0,
+            unread: Vec::new(),
+            flown: Inputs::default(),
             clock_us: 0,
             armed: false,
             dead_since: None,
         };
-        let flown = catch_unwind(AssertUnwindSafe(|| flight.fly()));
-        if flown.is_err() {
+        // What a panic leaves behind is only read, to be judged.
+        if catch_unwind(AssertUnwindSafe(|| flight.fly())).is_err() {
             flight.judge.note(0.0, Finding::Panic);
         }
-        flown.ok().transpose().context("flying a case")?;
         let texts = flight.desk.texts.iter().map(|text| text.words.clone()).collect();
         Ok(Report { case, faults, findings: flight.judge.findings(), texts })
     }
 }
 
-fn vehicle(opposite: Opposite, model: &GreyBox) -> Vehicle {
-    let actuators = model.airframe.actuators;
-    match opposite.personality() {
-        None => Vehicle::Sitl(Sitl::new(1, actuators.deflection_max)),
-        Some((personality, authority)) => {
-            let stack = match personality {
-                Personality::Px4 => Stack::Px4,
-                Personality::Ardupilot => Stack::Ardupilot,
-            };
-            Vehicle::Real(Box::new(Real::new(Profile { stack, authority, actuators })))
+/// A disk that is full from some moment on.
+#[derive(Clone, Debug, Default)]
+struct Disk {
+    full: Arc<AtomicBool>,
+}
+
+impl Write for Disk {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self.full.load(Ordering::Relaxed) {
+            true => Err(Error::from(ErrorKind::StorageFull)),
+            false => Ok(bytes.len()),
         }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
     }
 }
 
@@ -244,6 +179,14 @@ struct Flight {
     up: Wire,
     judge: Judge,
     faults: Vec<Fault>,
+    random: ChaCha8Rng,
+    disk: Option<Disk>,
+    /// The companion gets no processor before this step.
+    asleep_until: u64,
+    /// What has arrived meanwhile.
+    unread: Vec<Vec<u8>>,
+    /// What the actuators were told at the last step.
+    flown: Inputs,
     /// What jumps have added to the vehicle's clock, µs.
     clock_us: i64,
     armed: bool,
@@ -252,12 +195,11 @@ struct Flight {
 }
 
 impl Flight {
-    fn fly(&mut self) -> Result<()> {
+    fn fly(&mut self) {
         for step in 0..STEPS {
             let now_s = step as f64 * 0.01;
             if !self.step(step, now_s) {
-                self.judge.note(now_s, Finding::Crash);
-                return Ok(());
+                return self.judge.note(now_s, Finding::Crash);
             }
         }
         let end = STEPS as f64 * 0.01;
@@ -265,38 +207,86 @@ impl Flight {
         // Who was handed back flies level; who was not flies the client's last leg, or level.
         let pitch = truth.pitch_rad.to_degrees().clamp(-2.0, 6.0);
         self.judge.end(end, &truth, [0.0, pitch]);
-        Ok(())
+        self.hear_of_the_disk(end);
     }
 
     /// One step of 10 ms; `false` when the aircraft is lost.
     fn step(&mut self, step: u64, now_s: f64) -> bool {
         let acting: Vec<Fault> = self.faults.iter().filter(|f| f.acts(now_s)).copied().collect();
-        let host = Duration::from_secs(1) + Duration::from_millis(10 * step);
         let distortion = self.distortion(&acting, step);
         let bytes = self.aircraft.show(distortion);
         let rebooting = acting.iter().any(|fault| fault.kind == Kind::Reboot);
         if !rebooting && !bytes.is_empty() {
             self.down.send(step, bytes, &acting);
         }
-        let mut up = Vec::new();
-        let mut heard = false;
-        for batch in self.down.receive(step) {
-            heard = true;
-            let judge = &mut self.judge;
-            self.desk.hear(host, &batch, &mut up, |_, decision| judge.decision(now_s, decision));
-        }
-        self.client(step, now_s, host, &acting);
-        self.desk.poll(host, &mut up);
-        if !up.is_empty() {
-            self.up.send(step, up, &acting);
+        let arrived = self.down.receive(step);
+        self.watch_link(now_s, !arrived.is_empty());
+        self.unread.extend(arrived);
+        if step >= self.asleep_until {
+            self.companion(step, now_s, &acting);
+            self.asleep_until = step + self.nap(&acting);
         }
         for batch in self.up.receive(step) {
             self.aircraft.hear(&batch);
         }
-        self.watch_link(now_s, heard);
         let flies = self.aircraft.fly();
-        self.judge.aircraft(now_s, &self.aircraft.truth());
+        let plight = self.plight(&acting);
+        self.judge.aircraft(now_s, &self.aircraft.truth(), plight);
         flies
+    }
+
+    /// What the companion does when it has the processor.
+    fn companion(&mut self, step: u64, now_s: f64, acting: &[Fault]) {
+        let host = Duration::from_secs(1) + Duration::from_millis(10 * step);
+        let mut up = Vec::new();
+        for batch in std::mem::take(&mut self.unread) {
+            let judge = &mut self.judge;
+            self.desk.hear(host, &batch, &mut up, |_, decision| judge.decision(now_s, decision));
+        }
+        self.client(step, now_s, host, acting);
+        self.desk.poll(host, &mut up);
+        if !up.is_empty() {
+            self.up.send(step, up, acting);
+        }
+    }
+
+    /// Steps until the companion has the processor again.
+    fn nap(&mut self, acting: &[Fault]) -> u64 {
+        let starved = acting.iter().find(|fault| fault.kind == Kind::Starvation);
+        let Some(Fault { strength, .. }) = starved else { return 0 };
+        match self.random.random::<f64>() < 0.05 + 0.3 * strength {
+            // 20 ms to 300 ms without a single instruction.
+            true => self.random.random_range(2..=5 + (25.0 * strength) as u64),
+            false => 0,
+        }
+    }
+
+    /// In which plight the aircraft is at this step, through no fault of who steers it.
+    fn plight(&mut self, acting: &[Fault]) -> Plight {
+        let inputs = self.aircraft.inputs();
+        let same = std::mem::replace(&mut self.flown, inputs) == inputs;
+        let lied_to = |fault: &Fault| matches!(fault.kind, Kind::Airspeed | Kind::Alpha);
+        Plight {
+            unsteered: same && self.aircraft.is_steered(),
+            blind: matches!(self.aircraft, Aircraft::Sitl(_)) && self.judge.is_blind(),
+            misled: acting.iter().any(lied_to),
+        }
+    }
+
+    /// Waits until the recorder's thread has met the full disk, which has to be told.
+    fn hear_of_the_disk(&mut self, now_s: f64) {
+        if self.disk.as_ref().is_none_or(|disk| !disk.full.load(Ordering::Relaxed)) {
+            return;
+        }
+        let told = |desk: &Desk| desk.texts.iter().any(|t| t.words.contains("recording of flight"));
+        for _ in 0..300 {
+            self.desk.poll(Duration::from_secs(61), &mut Vec::new());
+            if told(&self.desk) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        self.judge.note(now_s, Finding::Untold);
     }
 
     /// The client: arms when it can, then sends its legs.
@@ -334,6 +324,9 @@ impl Flight {
                 Kind::Alpha => distortion.alpha_rad = 0.5 * (s - 0.5),
                 Kind::NotANumber => distortion.rate_not_a_number = true,
                 Kind::Clock => self.clock_us = (1e7 * s) as i64,
+                Kind::Disk => {
+                    self.disk.iter().for_each(|disk| disk.full.store(true, Ordering::Relaxed));
+                }
                 // Time begins anew.
                 Kind::Reboot => self.clock_us = -(10_000 * step as i64),
                 _ => {}
