@@ -137,3 +137,8 @@ fn mavproxy_flies_an_attitude_from_its_command_line() {
 fn misbehaviour_over_real_sockets_neither_ends_the_companion_nor_moves_the_surfaces() {
     fly("pymavlink_trouble.py");
 }
+
+#[test]
+fn signed_links_serve_who_has_the_key_and_nobody_else() {
+    fly("pymavlink_signing.py");
+}

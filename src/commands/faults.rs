@@ -148,7 +148,7 @@ fn show(report: &Report) {
         let (kind, s) = (f.kind.name(), f.strength);
         lines.push(format!("    {:6.2} to {:6.2} s: {kind}, strength {s:.2}", f.from_s, f.to_s));
     }
-    lines.extend(report.texts.iter().map(|text| format!("    said: {text}")));
+    lines.extend(report.texts.iter().map(|(at, words)| format!("    {at:6.2} s: said {words}")));
     println!("{}", lines.join("\n"));
 }
 
@@ -197,7 +197,7 @@ mod tests {
         let disk = Kind::ALL.iter().position(|kind| *kind == Kind::Disk).unwrap() as u64;
         let case = Case { seed: disk, controller: ControllerKind::Lqi, opposite: Opposite::Sitl };
         let report = works.fly(case).unwrap();
-        assert!(report.texts.iter().any(|t| t.contains("recording of flight")), "{report:?}");
+        assert!(report.texts.iter().any(|(_, t)| t.contains("recording of flight")), "{report:?}");
         assert!(!report.findings.iter().any(|f| f.finding == Finding::Untold));
     }
 }

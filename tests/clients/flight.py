@@ -111,10 +111,11 @@ class Program:
 
 
 class Flight:
-    """A companion with a shim, to be used in a `with` block; `clients` are --client addresses."""
+    """A companion with a shim, to be used in a `with` block; `clients` are --client addresses,
+    `options` what else is on the companion's command line."""
 
-    def __init__(self, arguments, clients):
-        self.arguments, self.clients = arguments, clients
+    def __init__(self, arguments, clients, options=()):
+        self.arguments, self.clients, self.options = arguments, clients, options
         self.shim = self.companion = None
 
     def __enter__(self):
@@ -132,6 +133,7 @@ class Flight:
         command = [self.arguments.greylag, "fly", "--vehicle", f"udpin:127.0.0.1:{self.vehicle_port}"]
         for client in self.clients:
             command += ["--client", client]
+        command += self.options
         self.companion = Program("companion", [*command, "--record", self.recording])
         self.companion.wait_for("waiting for a vehicle", 30.0)
         self.start_shim()

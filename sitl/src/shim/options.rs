@@ -166,6 +166,8 @@ pub struct ShimOptions {
     pub personality: Option<Personality>,
     /// Parameters of the played stack that differ from its defaults.
     pub parameters: Vec<(String, f64)>,
+    /// What the vehicle's clock shows at the start, s: near a wrap of a counter, to fly across it.
+    pub clock_start_s: f64,
 }
 
 impl ShimOptions {
@@ -190,6 +192,7 @@ impl ShimOptions {
             faults: FrameFaults::default(),
             personality: None,
             parameters: Vec::new(),
+            clock_start_s: 0.0,
         }
     }
 
@@ -217,6 +220,11 @@ impl ShimOptions {
         demand(
             self.personality.is_none() || self.pace == Pace::RealTime,
             "a personality flies in real time, as the flight controller it plays does",
+        )?;
+        // Ten thousand years, which still are whole microseconds.
+        demand(
+            (0.0..=3.2e11).contains(&self.clock_start_s),
+            "the clock must start at 0 s or later, and at 3.2e11 s at the latest",
         )?;
         let bias = &self.bias;
         let mut biases = vec![bias.alpha_rad, bias.beta_rad, bias.airspeed_scale];

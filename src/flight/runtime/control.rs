@@ -52,6 +52,7 @@ pub(super) struct Control {
     outputs: Outputs,
     load: f64,
     told_no_vehicle: bool,
+    told_refusals: bool,
 }
 
 impl Control {
@@ -86,6 +87,7 @@ impl Control {
             outputs: Outputs::Disarmed,
             load: 0.0,
             told_no_vehicle: false,
+            told_refusals: false,
         }
     }
 
@@ -120,7 +122,10 @@ impl Control {
 
     fn take_vehicle(&mut self, arrival: Arrival) {
         let packet = match arrival {
-            Arrival::Packet(packet) => packet,
+            Arrival::Packet(mut packet) => {
+                self.ports.sift(unix_us(), &mut packet);
+                packet
+            }
             Arrival::Remark(remark) => return self.remark(&remark),
             Arrival::Opened(_) | Arrival::Closed(_) => return,
         };
@@ -146,7 +151,7 @@ impl Control {
             for peer in self.clients.peers() {
                 let frames = router.to_client(&packet.bytes, peer);
                 if !frames.is_empty() {
-                    self.ports.send_to_client(peer, frames);
+                    self.ports.send_to_client(unix_us(), peer, frames);
                 }
             }
         }
@@ -167,7 +172,7 @@ impl Control {
         let frame = self.vehicle.answer(host, state.time, &demand);
         let copy = (self.recorder.is_some() && !frame.is_empty()).then(|| frame.clone());
         if !frame.is_empty() {
-            self.ports.vehicle.send(packet.peer, frame);
+            self.ports.send_to_vehicle(unix_us(), packet.peer, frame);
         }
         let latency = packet.arrived.elapsed();
         if let Some(frame) = copy {
@@ -233,7 +238,7 @@ impl Control {
         let engaged = self.outputs != Outputs::Disarmed;
         let frames = router.to_controller(&packet.bytes, self.clients.identity(), engaged);
         if let Some(peer) = self.vehicle.peer().filter(|_| !frames.is_empty()) {
-            self.ports.vehicle.send(peer, frames);
+            self.ports.send_to_vehicle(unix_us(), peer, frames);
         }
     }
 
@@ -241,7 +246,9 @@ impl Control {
         let host = Instant::now();
         let now = self.now(host);
         match arrival {
-            Arrival::Packet(packet) => {
+            Arrival::Packet(mut packet) => {
+                self.ports.sift(unix_us(), &mut packet);
+                self.tell_of_refusals();
                 self.route(now.host, &packet);
                 let mut pilot = Witness {
                     pilot: &mut self.pilot,
@@ -260,6 +267,16 @@ impl Control {
             Arrival::Remark(remark) => self.remark(&remark),
         }
         self.send_to_clients();
+    }
+
+    /// Says once that somebody does not sign, or not with our key.
+    fn tell_of_refusals(&mut self) {
+        let refused = self.ports.signing().map_or(0, |counts| counts.refused());
+        if refused > 0 && !self.told_refusals {
+            self.told_refusals = true;
+            let words = "frames without a right signature are refused: sign them with the key of --sign";
+            self.pilot.tell(Severity::Warning, words);
+        }
     }
 
     /// Says something about a link to the ground stations, and to whoever shows events.
@@ -294,12 +311,12 @@ impl Control {
 
     /// Sends what is due on the vehicle's link, when there is somebody to hear it.
     fn greet_vehicle(&mut self, host: Duration) {
-        let Some(peer) = self.vehicle.peer().or(self.ports.vehicle.target()) else {
+        let Some(peer) = self.vehicle.peer().or(self.ports.vehicle_target()) else {
             return;
         };
         if let Some(frame) = self.vehicle.due(host, self.outputs) {
             self.record(&frame);
-            self.ports.vehicle.send(peer, frame);
+            self.ports.send_to_vehicle(unix_us(), peer, frame);
         }
     }
 
@@ -317,7 +334,7 @@ impl Control {
             if let Some(recorder) = &self.recorder {
                 recorder.bytes(unix_us, &frame);
             }
-            self.ports.send_to_client(peer, frame);
+            self.ports.send_to_client(unix_us, peer, frame);
         }
     }
 
@@ -349,6 +366,7 @@ impl Control {
             duration_s: self.started.elapsed().as_secs_f64(),
             vehicle: self.vehicle.counts(),
             clients: self.clients.counts(),
+            signing: self.ports.signing(),
             timing: self.timing,
             recording,
         };

@@ -167,7 +167,7 @@ impl Real {
         from: Source,
         (autopilot, armed, custom_mode): (u8, bool, u32),
     ) {
-        let known = self.controller.filter(|c| host.saturating_sub(c.heard) < GONE);
+        let known = self.controller.filter(|c| host.saturating_sub(c.heard) <= GONE);
         if from.component != AUTOPILOT || autopilot == NO_AUTOPILOT {
             let ourselves = known.is_some_and(|c| c.system == from.system);
             if from.component == ONBOARD && ourselves {
@@ -200,8 +200,12 @@ impl Real {
         self.announce(was);
     }
 
-    /// A controller is heard for the first time, or again.
+    /// A controller is heard for the first time, or again: then nothing is known of it any more, not
+    /// even which way its channels run, and nobody steers by that.
     fn meet(&mut self, system: u8, autopilot: u8) {
+        if self.engagement.steers() {
+            self.hand_back("no heartbeat of the controller for 3 s".into());
+        }
         self.parameters.forget();
         self.survey = Survey::default();
         let stack = Stack::of(autopilot);

@@ -80,8 +80,8 @@ pub struct Report {
     pub faults: Vec<Fault>,
     /// What was found wrong.
     pub findings: Vec<Found>,
-    /// What was said to the ground stations, with nothing left out.
-    pub texts: Vec<String>,
+    /// What was said to the ground stations, with nothing left out: when, s, and what.
+    pub texts: Vec<(f64, String)>,
 }
 
 /// A companion fresh from the works: the design of its controller is not made again.
@@ -142,13 +142,13 @@ impl Works {
             clock_us: 0,
             armed: false,
             dead_since: None,
+            texts: Vec::new(),
         };
         // What a panic leaves behind is only read, to be judged.
         if catch_unwind(AssertUnwindSafe(|| flight.fly())).is_err() {
             flight.judge.note(0.0, Finding::Panic);
         }
-        let texts = flight.desk.texts.iter().map(|text| text.words.clone()).collect();
-        Ok(Report { case, faults, findings: flight.judge.findings(), texts })
+        Ok(Report { case, faults, findings: flight.judge.findings(), texts: flight.texts })
     }
 }
 
@@ -192,6 +192,7 @@ struct Flight {
     armed: bool,
     /// Since when nothing has come, while steering through a real controller.
     dead_since: Option<f64>,
+    texts: Vec<(f64, String)>,
 }
 
 impl Flight {
@@ -245,6 +246,7 @@ impl Flight {
         }
         self.client(step, now_s, host, acting);
         self.desk.poll(host, &mut up);
+        self.hear_texts(now_s);
         if !up.is_empty() {
             self.up.send(step, up, acting);
         }
@@ -273,15 +275,19 @@ impl Flight {
         }
     }
 
+    fn hear_texts(&mut self, now_s: f64) {
+        self.texts.extend(self.desk.texts.drain(..).map(|text| (now_s, text.words)));
+    }
+
     /// Waits until the recorder's thread has met the full disk, which has to be told.
     fn hear_of_the_disk(&mut self, now_s: f64) {
         if self.disk.as_ref().is_none_or(|disk| !disk.full.load(Ordering::Relaxed)) {
             return;
         }
-        let told = |desk: &Desk| desk.texts.iter().any(|t| t.words.contains("recording of flight"));
         for _ in 0..300 {
             self.desk.poll(Duration::from_secs(61), &mut Vec::new());
-            if told(&self.desk) {
+            self.hear_texts(now_s);
+            if self.texts.iter().any(|(_, words)| words.contains("recording of flight")) {
                 return;
             }
             std::thread::sleep(Duration::from_millis(10));
