@@ -23,6 +23,7 @@ use greylag::flight::desk::Desk;
 use greylag::flight::pilot::{Config, Pilot};
 use greylag::flight::runtime::{Crew, Flight, Options, Pace, Seat};
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
+use greylag::link::framing::{FrameCounts, Frames};
 use greylag::link::offboard::{Heard, OffboardClient};
 use greylag::link::vehicle::{Authority, Profile, Real, Sitl, Stack, Vehicle};
 use greylag::model::GreyBox;
@@ -39,6 +40,8 @@ const LEG_S: u64 = 30;
 const LEGS: [(f64, f64); 4] = [(0.0, 2.0), (35.0, 5.0), (0.0, 2.0), (-35.0, 0.0)];
 /// Growth of memory that is still flat, bytes: pages that a heap spreads over.
 const FLAT: u64 = 2 << 20;
+/// The message that tells the altitude, in its third word, m.
+const VFR_HUD: u32 = 74;
 /// Altitude bounds: outside them the pitch of the legs is corrected, m.
 const ALTITUDE_M: (f64, f64) = (300.0, 900.0);
 
@@ -276,12 +279,13 @@ fn steer(companion: std::net::SocketAddr, simulation: &Simulation) -> Result<(u6
     socket.set_read_timeout(Some(Duration::from_millis(20)))?;
     let (mut client, start) = (OffboardClient::default(), Instant::now());
     let (mut state, mut entered, mut due) = (None, 0, start);
+    let mut altitude = 600.0;
     let (mut ask_due, mut early, mut was) = (start + Duration::from_millis(200), None, false);
     while !simulation.is_finished() {
         let now = Instant::now();
         if now >= due {
             due = now + Duration::from_millis(20);
-            let (roll, pitch) = LEGS[start.elapsed().as_secs() as usize % LEGS.len()];
+            let (roll, pitch) = leg(start.elapsed().as_secs(), altitude);
             let time_ms = start.elapsed().as_millis() as u32;
             socket.send(&client.setpoint(time_ms, roll.to_radians(), pitch.to_radians()))?;
         }
@@ -299,6 +303,11 @@ fn steer(companion: std::net::SocketAddr, simulation: &Simulation) -> Result<(u6
         let mut datagram = [0; 2048];
         // A time-out is no news.
         let length = socket.recv(&mut datagram).unwrap_or(0);
+        for frame in Frames::new(&datagram[..length], &mut FrameCounts::default()) {
+            if let (VFR_HUD, Some(&[a, b, c, d])) = (frame.id, frame.payload.get(8..12)) {
+                altitude = f64::from(f32::from_le_bytes([a, b, c, d]));
+            }
+        }
         client.read(&datagram[..length], |heard| {
             if let Heard::Heartbeat { armed, mode } = heard {
                 state = Some((armed, mode));

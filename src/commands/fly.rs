@@ -17,9 +17,7 @@ use crate::control::schedule::Schedule;
 use crate::control::{self, Controller, Kind, Needs, Source, build};
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
-use crate::flight::runtime::{
-    Crew, Event, Flight, Options, Pace, Seat, Signing, VehicleLink,
-};
+use crate::flight::runtime::{Crew, Event, Flight, Options, Pace, Seat, Signing, VehicleLink};
 use crate::link::address::Address;
 use crate::link::autopilot::Severity;
 use crate::link::vehicle::{Authority, Profile, Stack};

@@ -112,7 +112,8 @@ impl Signer {
         out[from + 2] |= FLAG_SIGNED;
         // The checksum is affine in what it covers: the change of it does not depend on the
         // message's own extra byte, which is not known for every message.
-        let change = calculate_crc(&frame[1..end], 0) ^ calculate_crc(&out[from + 1..from + end], 0);
+        let change =
+            calculate_crc(&frame[1..end], 0) ^ calculate_crc(&out[from + 1..from + end], 0);
         let checksum = u16::from_le_bytes([frame[end], frame[end + 1]]) ^ change;
         out[from + end..].copy_from_slice(&checksum.to_le_bytes());
         out.push(link);

@@ -123,11 +123,9 @@ impl Ledger {
                 path.display()
             );
         }
-        let file = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(path)
-            .with_context(|| format!("opening {}; name a file that can be written", path.display()))?;
+        let file = OpenOptions::new().create(true).append(true).open(path).with_context(|| {
+            format!("opening {}; name a file that can be written", path.display())
+        })?;
         if file.metadata()?.len() > whole {
             file.set_len(whole)?;
         }

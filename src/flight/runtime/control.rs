@@ -274,7 +274,8 @@ impl Control {
         let refused = self.ports.signing().map_or(0, |counts| counts.refused());
         if refused > 0 && !self.told_refusals {
             self.told_refusals = true;
-            let words = "frames without a right signature are refused: sign them with the key of --sign";
+            let words =
+                "frames without a right signature are refused: sign them with the key of --sign";
             self.pilot.tell(Severity::Warning, words);
         }
     }

@@ -9,6 +9,7 @@ mod assembly;
 mod engagement;
 pub mod parameters;
 pub mod profile;
+mod pulse;
 mod sticks;
 pub mod survey;
 
@@ -26,6 +27,7 @@ use assembly::Assembly;
 use engagement::{Engagement, Phase};
 use parameters::{Parameters, Standing};
 use profile::{Authority, Profile, Stack};
+use pulse::Pulse;
 use sticks::Sticks;
 use survey::Survey;
 
@@ -71,6 +73,7 @@ pub struct Real {
     /// What the actuators were last told.
     sent: Command,
     last_state: Option<Duration>,
+    pulse: Pulse,
     states: u64,
     notices: VecDeque<Notice>,
     sequence: u8,
@@ -95,6 +98,7 @@ impl Real {
             sticks: Sticks::default(),
             sent: Command::IDLE,
             last_state: None,
+            pulse: Pulse::default(),
             states: 0,
             notices: VecDeque::new(),
             sequence: 0,
@@ -154,6 +158,7 @@ impl Real {
             message => {
                 let state = self.assembly.take(host, &message, &self.sent)?;
                 self.last_state = Some(host);
+                self.pulse.state();
                 return Some(state);
             }
         }
@@ -323,8 +328,11 @@ impl Real {
     /// The watchdog.
     fn watch(&mut self, host: Duration) {
         if !self.engagement.steers() {
-            return;
+            return self.pulse.rest();
         }
+        // A controller that tracks an attitude does not mind a slow companion.
+        let surfaces = self.profile.authority == Authority::Surfaces;
+        let scarce = self.pulse.cycle(host).filter(|_| surfaces);
         let age = |at: Duration| host.saturating_sub(at);
         let silent = self.controller.is_none_or(|c| age(c.heard) > GONE);
         let blind = self.last_state.is_none_or(|at| age(at) > BLIND);
@@ -333,6 +341,8 @@ impl Real {
             self.hand_back("no heartbeat of the controller for 3 s".into());
         } else if blind {
             self.hand_back("no state of the vehicle for 0.3 s".into());
+        } else if let Some(words) = scarce {
+            self.hand_back(words);
         } else if let Some(why) = self.engagement.overdue(host) {
             self.hand_back(format!("the controller did not go to {steered}: {why}"));
         }
