@@ -213,14 +213,14 @@ fn killed_beside_a_controller(seconds: f64) -> Killed {
     let killed = Instant::now();
     program.kill();
     let taken_over_s = wait_for_told(&shim, "mode Hold").as_secs_f64();
-    let again = Program::start_at(&root.path().join("two"), &["--profile", "px4"], vehicle);
+    let restarted = Program::start_at(&root.path().join("two"), &["--profile", "px4"], vehicle);
     // Long enough to find the controller, read its parameters, and do what it should not.
     std::thread::sleep(Duration::from_secs(3));
     assert_eq!(shim.told().last().map(String::as_str), Some("mode Hold"));
-    let mut client = again.client();
+    let mut client = restarted.client();
     engage_onboard(&mut client);
     wait_for_told(&shim, "mode Manual");
-    again.kill();
+    restarted.kill();
     let since = killed.elapsed().as_secs_f64();
     let flown = shim.end().simulated_s - since;
     let recorded = csv::load(&folder.join("flight.csv"), Tolerance::Strict).unwrap();
