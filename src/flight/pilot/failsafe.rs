@@ -5,7 +5,7 @@ use super::{Complaints, Pilot};
 use crate::link::autopilot::{Mode, Severity};
 use crate::physics::Time;
 
-/// Change of a command that a flying aircraft shows within half a second, in units of 0..1:
+/// Change of a command that a flying aircraft shows within a fifth of a second, in units of 0..1:
 /// 0.005 of aileron rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), which no sensor misses.
 const UNFELT_TRAVEL: f64 = 0.005;
 
