@@ -142,6 +142,7 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<Options> {
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
         controller: None,
+        signing: None,
         deflection: model.airframe.actuators.deflection_max,
     })
 }

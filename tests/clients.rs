@@ -152,3 +152,8 @@ fn mavsdk_flies_a_controller_and_the_companion_beside_it() {
 fn misbehaviour_over_real_sockets_neither_ends_the_companion_nor_moves_the_surfaces() {
     fly("pymavlink_trouble.py");
 }
+
+#[test]
+fn signed_links_serve_who_has_the_key_and_nobody_else() {
+    fly("pymavlink_signing.py");
+}

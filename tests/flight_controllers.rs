@@ -211,3 +211,29 @@ fn sensors_that_stand_still_hand_the_aircraft_back() {
         assert!(worst.to_degrees() < 60.0);
     }
 }
+
+#[test]
+fn a_controller_that_is_met_again_in_flight_has_the_aircraft() {
+    // Found by `greylag faults`: three heartbeats lost in a row, and the parameters were forgotten
+    // while the channels were driven on, by the wrong signs here.
+    for seconds in [2.0, 2.9, 3.5] {
+        let mut bench = Bench::new(Ardupilot, Surfaces, |options| {
+            let reversed = ["RC1_REVERSED", "RC2_REVERSED"];
+            options.parameters.extend(reversed.map(|name| (name.to_owned(), 1.0)));
+        });
+        bench.run(6.0);
+        bench.engage(30.0, 5.0);
+        bench.steer(30.0, 5.0, 2.0);
+        // The heartbeat that is due comes first, so that the gap is a whole number of seconds.
+        bench.heartless = true;
+        bench.steer(30.0, 5.0, seconds);
+        bench.heartless = false;
+        bench.steer(30.0, 5.0, 2.0);
+        let worst = bench.seen.iter().map(|s| s.truth.roll_rad.abs()).fold(0.0, f64::max);
+        println!("{seconds} s without a heartbeat: {:.0} deg of roll at most", worst.to_degrees());
+        assert!(worst.to_degrees() < 45.0, "{worst} {:?}", bench.texts());
+        let steers = bench.controller.mode() == Mode::Manual;
+        assert_ne!(steers, bench.said("handed back"), "{:?}", bench.texts());
+        assert!(steers == (seconds < 2.5) || seconds == 2.9, "{:?}", bench.texts());
+    }
+}

@@ -299,7 +299,7 @@ fn still(now: Time) -> Telemetry {
 }
 
 #[test]
-fn a_state_that_does_not_answer_to_the_commands_counts_as_lost_after_half_a_second() {
+fn a_state_that_does_not_answer_to_the_commands_counts_as_lost_after_a_fifth_of_a_second() {
     let mut flight = Flight::new();
     for _ in 0..200 {
         flight.now = flight.now.plus(TICK);
@@ -310,11 +310,11 @@ fn a_state_that_does_not_answer_to_the_commands_counts_as_lost_after_half_a_seco
     for i in 1..=60 {
         flight.now = flight.now.plus(TICK);
         let decision = flight.tick_with(still(flight.now));
-        // The first command leaves with the answer to the first frame; 50 ticks later nothing
+        // The first command leaves with the answer to the first frame; 20 ticks later nothing
         // has come of it.
         assert_eq!(
             decision.source,
-            if i <= 51 { Source::Planned } else { Source::Level },
+            if i <= 21 { Source::Planned } else { Source::Level },
             "tick {i}"
         );
     }

@@ -40,6 +40,9 @@ pub struct Cli {
     /// End after so much simulated flight; the time held at the start does not count.
     #[arg(long, value_name = "S")]
     duration_s: Option<f64>,
+    /// What the vehicle's clock shows at the start: 4294960 is seven seconds before its milliseconds wrap.
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    clock_start_s: f64,
     /// Seed of noise, frame faults and turbulence; equal seeds give equal flights in lockstep.
     #[arg(long, default_value_t = 1)]
     seed: u32,
@@ -164,6 +167,7 @@ impl Cli {
                 PersonalityName::Ardupilot => Personality::Ardupilot,
             }),
             parameters: self.parameter.clone(),
+            clock_start_s: self.clock_start_s,
         }
     }
 }

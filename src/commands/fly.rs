@@ -17,7 +17,7 @@ use crate::control::schedule::Schedule;
 use crate::control::{self, Controller, Kind, Needs, Source, build};
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
-use crate::flight::runtime::{Crew, Event, Flight, Options, Pace, Seat};
+use crate::flight::runtime::{Crew, Event, Flight, Options, Pace, Seat, Signing, VehicleLink};
 use crate::link::address::Address;
 use crate::link::autopilot::Severity;
 use crate::link::vehicle::{Authority, Profile, Stack};
@@ -42,6 +42,16 @@ pub struct Arguments {
     /// Link to clients; may be given several times.
     #[arg(long = "client", value_name = "ADDRESS", default_values = ["udpin:0.0.0.0:14550", "udpout:127.0.0.1:14540"])]
     clients: Vec<Address>,
+    /// Sign what is sent to clients, and refuse what is not signed, with the key in this file: 64
+    /// hexadecimal digits, readable by its owner alone.
+    #[arg(long, value_name = "FILE")]
+    sign: Option<PathBuf>,
+    /// Sign the vehicle's link as well.
+    #[arg(long, requires = "sign")]
+    sign_vehicle: bool,
+    /// A further link to clients, declared local: nothing is signed on it; may be given several times.
+    #[arg(long, value_name = "ADDRESS", requires = "sign")]
+    local: Vec<Address>,
     /// Controller.
     #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
     controller: Kind,
@@ -116,6 +126,16 @@ impl CommandName {
 }
 
 impl Arguments {
+    /// The links to clients, those declared local among them.
+    fn all_clients(&self) -> impl Iterator<Item = &Address> {
+        self.clients.iter().chain(&self.local)
+    }
+
+    fn signing(&self) -> Option<Signing> {
+        let vehicle = if self.sign_vehicle { VehicleLink::Signed } else { VehicleLink::Open };
+        self.sign.clone().map(|key| Signing { key, vehicle, local: self.local.clone() })
+    }
+
     fn controller_profile(&self, model: &GreyBox) -> Option<Profile> {
         let actuators = model.airframe.actuators;
         let authority = self.command.authority();
@@ -163,13 +183,14 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Options {
     };
     Options {
         vehicle: arguments.vehicle.clone(),
-        clients: arguments.clients.clone(),
+        clients: arguments.all_clients().cloned().collect(),
         record,
         pace: if arguments.lockstep { Pace::Lockstep } else { Pace::RealTime },
         duration: arguments.duration_s,
         plan_deadline: Duration::from_millis(arguments.plan_deadline_ms),
         deflection: model.airframe.actuators.deflection_max,
         controller: arguments.controller_profile(model),
+        signing: arguments.signing(),
     }
 }
 
@@ -229,7 +250,7 @@ fn fallback(model: &GreyBox) -> anyhow::Result<Box<dyn Controller>> {
 fn announce(arguments: &Arguments, flight: &Flight) {
     println!("controller {}, model {}", arguments.controller, arguments.model.display());
     println!("vehicle    {}", arguments.vehicle);
-    for client in &arguments.clients {
+    for client in arguments.all_clients() {
         println!("clients    {client}");
     }
     match &flight.recording {

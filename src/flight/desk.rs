@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use crate::control::Controller;
 use crate::flight::pilot::{Decision, Pilot, Plan};
+use crate::flight::recorder::{Recorder, Row};
 use crate::flight::runtime::Crew;
 use crate::link::autopilot::{Autopilot, Severity, Text, Verdict};
 use crate::link::peer::{LinkId, PeerId, SERIAL};
@@ -26,6 +27,7 @@ pub struct Desk {
     outputs: Outputs,
     /// Host and vehicle time of the newest state.
     anchor: Option<(Duration, Time)>,
+    recorder: Option<Recorder>,
     /// Every line that was said to the ground stations.
     pub texts: Vec<Text>,
 }
@@ -40,8 +42,14 @@ impl Desk {
             vehicle,
             outputs: Outputs::Disarmed,
             anchor: None,
+            recorder: None,
             texts: Vec::new(),
         }
+    }
+
+    /// Records from now on.
+    pub fn record(&mut self, recorder: Recorder) {
+        self.recorder = Some(recorder);
     }
 
     /// Takes bytes that arrive at `host`, appends what is sent in answer to `out`, and shows each
@@ -55,6 +63,9 @@ impl Desk {
     ) {
         let mut states = Vec::new();
         self.vehicle.handle(host, WIRE, bytes, |state| states.push(state));
+        if let Some(recorder) = &self.recorder {
+            recorder.bytes(host.as_micros() as u64, bytes);
+        }
         for state in states.iter().filter(|state| state.order != Order::Late) {
             self.anchor = Some((host, state.time));
             let request = self.pilot.observe(state.time, state);
@@ -68,6 +79,9 @@ impl Desk {
             let demand = decision.demand();
             self.outputs = demand.outputs;
             out.extend(self.vehicle.answer(host, state.time, &demand));
+            if let Some(recorder) = &self.recorder {
+                recorder.row(Row::new(state, &decision, 0.0));
+            }
             watch(state, &decision);
         }
         self.heed(host);
@@ -77,6 +91,9 @@ impl Desk {
     pub fn poll(&mut self, host: Duration, out: &mut Vec<u8>) {
         let now = self.now(host);
         self.pilot.advance(now);
+        if let Some(trouble) = self.recorder.as_ref().and_then(Recorder::trouble) {
+            self.pilot.tell(Severity::Warning, &trouble);
+        }
         out.extend(self.vehicle.due(host, self.outputs).unwrap_or_default());
         self.heed(host);
         self.texts.extend(std::iter::from_fn(|| self.pilot.take_text()));

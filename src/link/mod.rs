@@ -72,6 +72,7 @@ pub mod framing;
 pub mod offboard;
 pub mod peer;
 pub mod routing;
+pub mod signing;
 pub mod transport;
 pub mod vehicle;
 mod wire;

@@ -65,10 +65,13 @@ impl Router {
     }
 
     /// The frames of the controller's bytes that `peer` shall have: those for everybody, and those
-    /// for whoever was heard there.
+    /// for whoever was heard there; a key never.
     pub fn to_client(&self, bytes: &[u8], peer: PeerId) -> Vec<u8> {
         let mut on = Vec::new();
         pieces(bytes, |bytes, frame| {
+            if frame.as_ref().is_some_and(|frame| frame.id == wire::SETUP_SIGNING) {
+                return;
+            }
             let target = frame.as_ref().map_or((0, 0), wire::recipient);
             if self.is_there(target, peer) {
                 on.extend_from_slice(bytes);

@@ -86,8 +86,17 @@ impl GreyBox {
             why,
             example: "prior.toml",
         })?;
+        GreyBox::parse(&text, path)
+    }
+
+    /// Reads the text of a model file that lies, or would lie, at `path`.
+    ///
+    /// # Errors
+    /// As for [`GreyBox::load`].
+    pub fn parse(text: &str, path: &Path) -> Result<GreyBox, FileError> {
+        let what = "model file";
         let content = |why| FileError::Content { what, path: path.into(), why };
-        let file: File = toml::from_str(&text).map_err(|e| content(toml_error(&text, &e)))?;
+        let file: File = toml::from_str(text).map_err(|e| content(toml_error(text, &e)))?;
         check_schema(file.schema).map_err(content)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let airframe = Airframe::load(&folder.join(&file.airframe))?;

@@ -9,6 +9,8 @@ pub mod episode;
 #[cfg(feature = "sitl")]
 pub mod evaluation;
 #[cfg(feature = "sitl")]
+pub mod faults;
+#[cfg(feature = "sitl")]
 pub mod flight_test;
 #[cfg(feature = "sitl")]
 pub mod flown;

@@ -111,14 +111,16 @@ class Program:
 
 
 class Flight:
-    """A companion with a shim, to be used in a `with` block; `clients` are --client addresses.
+    """A companion with a shim, to be used in a `with` block; `clients` are --client addresses,
+    `options` what else is on the companion's command line.
 
     With a `personality`, `px4` or `ardupilot`, the shim plays that flight controller, and the
     companion is the onboard computer beside it that routes between it and the clients.
     """
 
-    def __init__(self, arguments, clients, personality=None):
-        self.arguments, self.clients, self.personality = arguments, clients, personality
+    def __init__(self, arguments, clients, personality=None, options=()):
+        self.arguments, self.clients = arguments, clients
+        self.personality, self.options = personality, options
         self.shim = self.companion = None
 
     def __enter__(self):
@@ -138,6 +140,7 @@ class Flight:
             command += ["--client", client]
         if self.personality:
             command += ["--profile", self.personality]
+        command += self.options
         self.companion = Program("companion", [*command, "--record", self.recording])
         self.companion.wait_for("waiting for a vehicle", 30.0)
         self.start_shim()

@@ -9,6 +9,7 @@ use greylag::control::Kind;
 use greylag::flight::desk::Desk;
 use greylag::flight::pilot::Decision;
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
+use greylag::link::framing::pieces;
 use greylag::link::vehicle::{Authority, Profile, Real, Stack, Telemetry, Vehicle};
 use greylag_sitl::plant::{PlantOptions, Start, Truth};
 use greylag_sitl::shim::controller::FlightController;
@@ -16,6 +17,7 @@ use greylag_sitl::shim::{Launch, Personality, ShimOptions};
 
 use crate::flight_support::x8;
 
+const HEARTBEAT: u32 = 0;
 pub const STEP: Duration = Duration::from_millis(10);
 
 /// The profile that fits a personality.
@@ -44,6 +46,8 @@ pub struct Bench {
     up: Vec<u8>,
     /// The wire is cut.
     pub cut: bool,
+    /// The controller's heartbeats do not come through.
+    pub heartless: bool,
 }
 
 impl Bench {
@@ -63,12 +67,22 @@ impl Bench {
             seen: Vec::new(),
             up: Vec::new(),
             cut: false,
+            heartless: false,
         }
     }
 
     pub fn step(&mut self) {
         let mut down = Vec::new();
         self.controller.show(&mut down);
+        if self.heartless {
+            let mut rest = Vec::new();
+            pieces(&down, |bytes, frame| {
+                if frame.is_none_or(|frame| frame.id != HEARTBEAT) {
+                    rest.extend_from_slice(bytes);
+                }
+            });
+            down = rest;
+        }
         let truth = self.controller.measured();
         if !self.cut {
             let seen = &mut self.seen;

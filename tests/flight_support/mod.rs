@@ -41,6 +41,7 @@ pub fn options(pace: Pace) -> Options {
         plan_deadline: Options::PLAN_DEADLINE,
         deflection: x8().airframe.actuators.deflection_max,
         controller: None,
+        signing: None,
     }
 }
 

@@ -2,6 +2,8 @@
 //! with rust-mavlink's own code.
 #![allow(dead_code)] // each test that includes this module uses its part
 
+pub mod hostile;
+
 use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::time::Duration;

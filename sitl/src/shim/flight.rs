@@ -43,14 +43,16 @@ impl Flight {
             Pace::RealTime => 0,
             Pace::Lockstep => (options.faults.delay_ms * 1e3 / FRAME_US as f64).ceil() as usize,
         };
+        let zero = (options.clock_start_s * 1e6) as u64 / FRAME_US * FRAME_US;
         // Time 0 is never shown: an answer that echoes 0 answers nothing.
-        let pending: VecDeque<_> = (1..=ahead as u64 + 1).map(|k| (k * FRAME_US, start)).collect();
+        let pending: VecDeque<_> =
+            (1..=ahead as u64 + 1).map(|k| (zero + k * FRAME_US, start)).collect();
         let steps = |seconds: f64| (seconds * 1e6 / FRAME_US as f64).round().max(1.0) as u64;
         Ok(Flight {
             plant,
             sensors: Sensors::new(options.noise, options.bias, options.seed),
             log: options.truth.as_ref().map(TruthLog::create).transpose()?,
-            time_us: (ahead as u64 + 1) * FRAME_US,
+            time_us: zero + (ahead as u64 + 1) * FRAME_US,
             pending,
             ahead,
             launched: options.launch == Launch::Immediate,

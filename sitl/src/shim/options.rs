@@ -169,6 +169,8 @@ pub struct ShimOptions {
     pub parameters: Vec<(String, f64)>,
     /// Be the simulator of PX4 SITL instead; `None` speaks to a companion.
     pub px4: Option<Px4Options>,
+    /// What the vehicle's clock shows at the start, s: near a wrap of a counter, to fly across it.
+    pub clock_start_s: f64,
 }
 
 impl ShimOptions {
@@ -194,6 +196,7 @@ impl ShimOptions {
             personality: None,
             parameters: Vec::new(),
             px4: None,
+            clock_start_s: 0.0,
         }
     }
 
@@ -238,6 +241,11 @@ impl ShimOptions {
         demand(
             self.personality.is_none() || self.pace == Pace::RealTime,
             "a personality flies in real time, as the flight controller it plays does",
+        )?;
+        // Ten thousand years, which still are whole microseconds.
+        demand(
+            (0.0..=3.2e11).contains(&self.clock_start_s),
+            "the clock must start at 0 s or later, and at 3.2e11 s at the latest",
         )?;
         let bias = &self.bias;
         let mut biases = vec![bias.alpha_rad, bias.beta_rad, bias.airspeed_scale];

@@ -124,6 +124,7 @@ fn options(arguments: &Arguments, model: &crate::model::GreyBox) -> Result<Optio
         plan_deadline: Options::PLAN_DEADLINE,
         deflection: model.airframe.actuators.deflection_max,
         controller: None,
+        signing: None,
     })
 }
 

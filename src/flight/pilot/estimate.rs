@@ -30,6 +30,7 @@ pub(super) struct Estimate {
     newest: Option<Time>,
     usable_at: Option<Time>,
     fresh_at: Option<Time>,
+    frozen: bool,
 }
 
 impl Estimate {
@@ -43,6 +44,7 @@ impl Estimate {
             return Frame::Defective(reason);
         }
         let frozen = self.last.is_some_and(|last| repeats(frame, &last));
+        self.frozen = frozen;
         self.last = Some(*frame);
         self.usable_at = Some(now);
         if frozen {
@@ -62,6 +64,11 @@ impl Estimate {
         if self.usable_at.is_some() {
             self.fresh_at = Some(now);
         }
+    }
+
+    /// Whether the last believable frame was equal to the one before.
+    pub(super) fn is_frozen(&self) -> bool {
+        self.frozen
     }
 
     pub(super) fn last(&self) -> Option<&Telemetry> {

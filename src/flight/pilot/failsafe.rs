@@ -5,9 +5,13 @@ use super::{Complaints, Pilot};
 use crate::link::autopilot::{Mode, Severity};
 use crate::physics::Time;
 
-/// Change of a command that a flying aircraft shows within half a second, in units of 0..1:
+/// Change of a command that a flying aircraft shows within a fifth of a second, in units of 0..1:
 /// 0.005 of aileron rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), which no sensor misses.
 const UNFELT_TRAVEL: f64 = 0.005;
+
+/// Sensors that stand still under commands that move are lost after this time, s: an aircraft that
+/// rolls as fast as it may rolls on by 20° meanwhile, and real sensors do not repeat to the bit.
+const FROZEN_LOSS_S: f64 = 0.2;
 
 impl Pilot {
     /// A state that stands still while nothing asks it to move is no fault: the vehicle waits for
@@ -25,8 +29,17 @@ impl Pilot {
         }
     }
 
+    /// Whether the state is fresh; `None` if there never was one.
+    pub(super) fn state_fresh(&self) -> Option<bool> {
+        let limit = match self.estimate.is_frozen() {
+            true => self.config.vehicle_loss_s.min(FROZEN_LOSS_S),
+            false => self.config.vehicle_loss_s,
+        };
+        self.estimate.fresh_within(self.clock, limit)
+    }
+
     pub(super) fn watch_vehicle(&mut self) {
-        let fresh = self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s);
+        let fresh = self.state_fresh();
         if fresh != Some(false) || self.vehicle_lost {
             return;
         }
@@ -40,9 +53,7 @@ impl Pilot {
     }
 
     pub(super) fn watch_return(&mut self) {
-        if self.vehicle_lost
-            && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true)
-        {
+        if self.vehicle_lost && self.state_fresh() == Some(true) {
             self.vehicle_lost = false;
             let words =
                 if self.armed { "vehicle link back: flying in HOLD" } else { "vehicle link back" };

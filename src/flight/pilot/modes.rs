@@ -69,8 +69,7 @@ impl Pilot {
     }
 
     pub(super) fn vehicle_alive(&self) -> bool {
-        !self.vehicle_lost
-            && self.estimate.fresh_within(self.clock, self.config.vehicle_loss_s) == Some(true)
+        !self.vehicle_lost && self.state_fresh() == Some(true)
     }
 
     fn airspeed(&self) -> f64 {

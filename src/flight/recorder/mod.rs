@@ -71,8 +71,11 @@ impl Recorder {
             .map_err(|source| RecordError::File { path: folder, source })
     }
 
-    /// A recorder over any three writers.
-    fn over(
+    /// A recorder over any three writers, in place of the files of `folder`.
+    ///
+    /// # Errors
+    /// If its thread cannot be started.
+    pub fn over(
         folder: PathBuf,
         csv: impl Write + Send + 'static,
         tlog: impl Write + Send + 'static,

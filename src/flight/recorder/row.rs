@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use crate::flight::pilot::{Decision, mode_name};
+use crate::link::vehicle::{Faults, Telemetry};
 use crate::logs::Sample;
 use crate::logs::csv::Rows;
 
@@ -22,6 +23,11 @@ impl Row {
     pub const EXTRA: [&'static str; 6] =
         ["airspeed_target_mps", "mode", "armed", "source", "failsafe", "latency_us"];
 
+    /// The row of a tick: a state with what was decided on it, after `latency_us` µs.
+    pub fn new(state: &Telemetry, decision: &Decision, latency_us: f64) -> Self {
+        Row { sample: sample(state, decision), decision: *decision, latency_us }
+    }
+
     pub(super) fn write<W: Write>(&self, out: &mut Rows<W>) -> std::io::Result<()> {
         let d = &self.decision;
         let digit = |flag: bool| if flag { "1" } else { "0" };
@@ -36,5 +42,33 @@ impl Row {
             &*latency,
         ];
         out.row(&self.sample, &extra)
+    }
+}
+
+fn sample(state: &Telemetry, decision: &Decision) -> Sample {
+    let (s, z, c) = (&state.state, &state.actuators, &decision.command);
+    // A part with a fault still holds its last good value; in a log it is missing.
+    let known = |fault: Faults, x: f64| {
+        if state.faults.contains(fault) { f64::NAN } else { x }
+    };
+    Sample {
+        time_s: state.time.as_secs_f64(),
+        attitude_rad: [s.roll, s.pitch, state.yaw].map(|x| known(Faults::ATTITUDE, x)),
+        rates_radps: [s.p, s.q, s.r].map(|x| known(Faults::RATES, x)),
+        airspeed_mps: known(Faults::AIR, s.airspeed),
+        alpha_rad: known(Faults::INCIDENCE, s.alpha),
+        beta_rad: known(Faults::INCIDENCE, s.beta),
+        specific_force_mps2: state.specific_force.map(|x| known(Faults::SPECIFIC_FORCE, x)),
+        velocity_ned_mps: state.velocity,
+        altitude_m: known(Faults::AIR, state.altitude),
+        aileron_rad: known(Faults::ACTUATORS, z.aileron),
+        elevator_rad: known(Faults::ACTUATORS, z.elevator),
+        throttle: known(Faults::ACTUATORS, z.throttle),
+        aileron_cmd: c.aileron,
+        elevator_cmd: c.elevator,
+        throttle_cmd: c.throttle,
+        roll_target_rad: decision.target.roll,
+        pitch_target_rad: decision.target.pitch,
+        ..Sample::default()
     }
 }

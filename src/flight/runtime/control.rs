@@ -20,8 +20,7 @@ use crate::link::client::{Clients, Now};
 use crate::link::framing::Source;
 use crate::link::routing::Router;
 use crate::link::transport::{Arrival, Packet, Remark};
-use crate::link::vehicle::{Faults, Notice, Order, Outputs, Real, Sitl, Telemetry, Vehicle};
-use crate::logs::Sample;
+use crate::link::vehicle::{Notice, Order, Outputs, Real, Sitl, Telemetry, Vehicle};
 
 /// Between two looks at what is due: heartbeats, streams, lost links.
 const POLL: Duration = Duration::from_millis(10);
@@ -53,6 +52,7 @@ pub(super) struct Control {
     outputs: Outputs,
     load: f64,
     told_no_vehicle: bool,
+    told_refusals: bool,
 }
 
 impl Control {
@@ -87,6 +87,7 @@ impl Control {
             outputs: Outputs::Disarmed,
             load: 0.0,
             told_no_vehicle: false,
+            told_refusals: false,
         }
     }
 
@@ -121,7 +122,10 @@ impl Control {
 
     fn take_vehicle(&mut self, arrival: Arrival) {
         let packet = match arrival {
-            Arrival::Packet(packet) => packet,
+            Arrival::Packet(mut packet) => {
+                self.ports.sift(unix_us(), &mut packet);
+                packet
+            }
             Arrival::Remark(remark) => return self.remark(&remark),
             Arrival::Opened(_) | Arrival::Closed(_) => return,
         };
@@ -147,7 +151,7 @@ impl Control {
             for peer in self.clients.peers() {
                 let frames = router.to_client(&packet.bytes, peer);
                 if !frames.is_empty() {
-                    self.ports.send_to_client(peer, frames);
+                    self.ports.send_to_client(unix_us(), peer, frames);
                 }
             }
         }
@@ -168,7 +172,7 @@ impl Control {
         let frame = self.vehicle.answer(host, state.time, &demand);
         let copy = (self.recorder.is_some() && !frame.is_empty()).then(|| frame.clone());
         if !frame.is_empty() {
-            self.ports.vehicle.send(packet.peer, frame);
+            self.ports.send_to_vehicle(unix_us(), packet.peer, frame);
         }
         let latency = packet.arrived.elapsed();
         if let Some(frame) = copy {
@@ -205,7 +209,7 @@ impl Control {
         self.load += LOAD_WEIGHT * (share - self.load);
         if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {
             let latency_us = latency.as_secs_f64() * 1e6;
-            recorder.row(Row { sample: sample(state, decision), decision: *decision, latency_us });
+            recorder.row(Row::new(state, decision, latency_us));
         }
     }
 
@@ -234,7 +238,7 @@ impl Control {
         let engaged = self.outputs != Outputs::Disarmed;
         let frames = router.to_controller(&packet.bytes, self.clients.identity(), engaged);
         if let Some(peer) = self.vehicle.peer().filter(|_| !frames.is_empty()) {
-            self.ports.vehicle.send(peer, frames);
+            self.ports.send_to_vehicle(unix_us(), peer, frames);
         }
     }
 
@@ -242,7 +246,9 @@ impl Control {
         let host = Instant::now();
         let now = self.now(host);
         match arrival {
-            Arrival::Packet(packet) => {
+            Arrival::Packet(mut packet) => {
+                self.ports.sift(unix_us(), &mut packet);
+                self.tell_of_refusals();
                 self.route(now.host, &packet);
                 let mut pilot = Witness {
                     pilot: &mut self.pilot,
@@ -261,6 +267,17 @@ impl Control {
             Arrival::Remark(remark) => self.remark(&remark),
         }
         self.send_to_clients();
+    }
+
+    /// Says once that somebody does not sign, or not with our key.
+    fn tell_of_refusals(&mut self) {
+        let refused = self.ports.signing().map_or(0, |counts| counts.refused());
+        if refused > 0 && !self.told_refusals {
+            self.told_refusals = true;
+            let words =
+                "frames without a right signature are refused: sign them with the key of --sign";
+            self.pilot.tell(Severity::Warning, words);
+        }
     }
 
     /// Says something about a link to the ground stations, and to whoever shows events.
@@ -295,12 +312,12 @@ impl Control {
 
     /// Sends what is due on the vehicle's link, when there is somebody to hear it.
     fn greet_vehicle(&mut self, host: Duration) {
-        let Some(peer) = self.vehicle.peer().or(self.ports.vehicle.target()) else {
+        let Some(peer) = self.vehicle.peer().or(self.ports.vehicle_target()) else {
             return;
         };
         if let Some(frame) = self.vehicle.due(host, self.outputs) {
             self.record(&frame);
-            self.ports.vehicle.send(peer, frame);
+            self.ports.send_to_vehicle(unix_us(), peer, frame);
         }
     }
 
@@ -318,7 +335,7 @@ impl Control {
             if let Some(recorder) = &self.recorder {
                 recorder.bytes(unix_us, &frame);
             }
-            self.ports.send_to_client(peer, frame);
+            self.ports.send_to_client(unix_us, peer, frame);
         }
     }
 
@@ -350,6 +367,7 @@ impl Control {
             duration_s: self.started.elapsed().as_secs_f64(),
             vehicle: self.vehicle.counts(),
             clients: self.clients.counts(),
+            signing: self.ports.signing(),
             timing: self.timing,
             recording,
         };
@@ -366,32 +384,4 @@ fn unix_us() -> u64 {
     SystemTime::now()
         .duration_since(SystemTime::UNIX_EPOCH)
         .map_or(0, |since| since.as_micros() as u64)
-}
-
-fn sample(state: &Telemetry, decision: &Decision) -> Sample {
-    let (s, z, c) = (&state.state, &state.actuators, &decision.command);
-    // A part with a fault still holds its last good value; in a log it is missing.
-    let known = |fault: Faults, x: f64| {
-        if state.faults.contains(fault) { f64::NAN } else { x }
-    };
-    Sample {
-        time_s: state.time.as_secs_f64(),
-        attitude_rad: [s.roll, s.pitch, state.yaw].map(|x| known(Faults::ATTITUDE, x)),
-        rates_radps: [s.p, s.q, s.r].map(|x| known(Faults::RATES, x)),
-        airspeed_mps: known(Faults::AIR, s.airspeed),
-        alpha_rad: known(Faults::INCIDENCE, s.alpha),
-        beta_rad: known(Faults::INCIDENCE, s.beta),
-        specific_force_mps2: state.specific_force.map(|x| known(Faults::SPECIFIC_FORCE, x)),
-        velocity_ned_mps: state.velocity,
-        altitude_m: known(Faults::AIR, state.altitude),
-        aileron_rad: known(Faults::ACTUATORS, z.aileron),
-        elevator_rad: known(Faults::ACTUATORS, z.elevator),
-        throttle: known(Faults::ACTUATORS, z.throttle),
-        aileron_cmd: c.aileron,
-        elevator_cmd: c.elevator,
-        throttle_cmd: c.throttle,
-        roll_target_rad: decision.target.roll,
-        pitch_target_rad: decision.target.pitch,
-        ..Sample::default()
-    }
 }

@@ -10,6 +10,7 @@
 
 mod clock;
 mod control;
+mod guard;
 mod planner;
 mod ports;
 mod summary;
@@ -25,6 +26,7 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, bounded};
 
 pub use clock::{PATIENCE, Pace};
+pub use guard::{Signing, SigningError, VehicleLink};
 pub use summary::Summary;
 pub use timing::{Histogram, Timing};
 
@@ -62,6 +64,8 @@ pub struct Options {
     pub deflection: f64,
     /// How a real flight controller is flown; `None` is the simulator's shim.
     pub controller: Option<Profile>,
+    /// How links are signed, if at all.
+    pub signing: Option<Signing>,
 }
 
 impl Options {
@@ -98,6 +102,9 @@ pub enum FlightError {
     /// The recording cannot be created.
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// Links cannot be signed.
+    #[error(transparent)]
+    Signing(#[from] SigningError),
     /// A thread cannot be started.
     #[error("starting the {0} thread: {1}; close other programs and try again")]
     Thread(&'static str, std::io::Error),

@@ -4,9 +4,11 @@ use std::net::SocketAddr;
 
 use crossbeam_channel::{Receiver, bounded};
 
-use super::Options;
+use super::guard::Guard;
+use super::{FlightError, Options};
 use crate::link::peer::{LinkId, PeerId};
-use crate::link::transport::{Arrival, Link, Network, TransportError};
+use crate::link::signing::SigningCounts;
+use crate::link::transport::{Arrival, Link, Network, Packet};
 
 /// Packets of the vehicle that may wait: two seconds, far beyond what control may stall.
 const VEHICLE_QUEUE: usize = 256;
@@ -15,8 +17,9 @@ const CLIENT_QUEUE: usize = 512;
 
 /// The open links with the channels of what arrives on them.
 pub(super) struct Ports {
-    pub(super) vehicle: Link,
+    vehicle: Link,
     pub(super) clients: Vec<Link>,
+    guard: Option<Guard>,
     pub(super) from_vehicle: Receiver<Arrival>,
     pub(super) from_clients: Receiver<Arrival>,
     // Dropped last: it closes the sockets.
@@ -25,7 +28,8 @@ pub(super) struct Ports {
 
 impl Ports {
     /// Opens all links, or none.
-    pub(super) fn open(options: &Options) -> Result<Self, TransportError> {
+    pub(super) fn open(options: &Options) -> Result<Self, FlightError> {
+        let guard = options.signing.as_ref().map(|s| Guard::open(s, options)).transpose()?;
         let network = Network::start()?;
         let (to_vehicle, from_vehicle) = bounded(VEHICLE_QUEUE);
         let (to_clients, from_clients) = bounded(CLIENT_QUEUE);
@@ -34,7 +38,7 @@ impl Ports {
             network.open(LinkId(1 + i as u16), address, "--client", to_clients.clone())
         };
         let clients = options.clients.iter().enumerate().map(open).collect::<Result<_, _>>()?;
-        Ok(Ports { vehicle, clients, from_vehicle, from_clients, _network: network })
+        Ok(Ports { vehicle, clients, guard, from_vehicle, from_clients, _network: network })
     }
 
     pub(super) fn vehicle_address(&self) -> Option<SocketAddr> {
@@ -45,10 +49,44 @@ impl Ports {
         self.clients.iter().map(Link::local).collect()
     }
 
+    /// The vehicle when it may be spoken to unasked.
+    pub(super) fn vehicle_target(&self) -> Option<PeerId> {
+        self.vehicle.target()
+    }
+
+    /// Sends frames to the vehicle.
+    pub(super) fn send_to_vehicle(&mut self, unix_us: u64, peer: PeerId, frames: Vec<u8>) {
+        let frames = self.signed(unix_us, peer.link, frames);
+        self.vehicle.send(peer, frames);
+    }
+
     /// Sends a frame to a client on the link where it was heard.
-    pub(super) fn send_to_client(&self, peer: PeerId, frame: Vec<u8>) {
-        if let Some(link) = self.clients.iter().find(|link| link.id() == peer.link) {
+    pub(super) fn send_to_client(&mut self, unix_us: u64, peer: PeerId, frame: Vec<u8>) {
+        let frame = self.signed(unix_us, peer.link, frame);
+        if let Some(link) = self.clients.iter().find(|link| link.id() == peer.link)
+            && !frame.is_empty()
+        {
             link.send(peer, frame);
         }
+    }
+
+    fn signed(&mut self, unix_us: u64, link: LinkId, bytes: Vec<u8>) -> Vec<u8> {
+        match &mut self.guard {
+            Some(guard) => guard.sign(unix_us, link, bytes),
+            None => bytes,
+        }
+    }
+
+    /// Takes out of a packet what is not to be believed.
+    pub(super) fn sift(&mut self, unix_us: u64, packet: &mut Packet) {
+        if let Some(guard) = &mut self.guard {
+            let bytes = std::mem::take(&mut packet.bytes);
+            packet.bytes = guard.believed(unix_us, packet.peer.link, bytes);
+        }
+    }
+
+    /// What became of signatures, where there are any.
+    pub(super) fn signing(&self) -> Option<SigningCounts> {
+        self.guard.as_ref().map(Guard::counts)
     }
 }

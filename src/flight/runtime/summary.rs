@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use super::timing::Timing;
 use crate::flight::recorder::Written;
 use crate::link::client::ClientCounts;
+use crate::link::signing::SigningCounts;
 use crate::link::vehicle::VehicleCounts;
 
 /// The end of a flight.
@@ -19,6 +20,8 @@ pub struct Summary {
     pub vehicle: VehicleCounts,
     /// What clients sent.
     pub clients: ClientCounts,
+    /// What became of signatures, where links are signed.
+    pub signing: Option<SigningCounts>,
     /// Loop timing.
     pub timing: Timing,
     /// Where the recording lies, with what it holds.
@@ -74,6 +77,13 @@ impl fmt::Display for Summary {
             c.refused_setpoints,
             c.for_others
         )?;
+        if let Some(s) = &self.signing {
+            write!(
+                f,
+                "\nsignatures: {} made, {} right; refused: {} frames without one, {} false, {} used before",
+                s.signed, s.believed, s.unsigned, s.forged, s.replayed
+            )?;
+        }
         if let Some((folder, w)) = &self.recording {
             write!(f, "\nrecorded {} rows, {} frames in {}", w.rows, w.frames, folder.display())?;
             if w.dropped > 0 {

@@ -9,6 +9,7 @@ mod assembly;
 mod engagement;
 pub mod parameters;
 pub mod profile;
+mod pulse;
 mod sticks;
 pub mod survey;
 
@@ -26,6 +27,7 @@ use assembly::Assembly;
 use engagement::{Engagement, Phase};
 use parameters::{Parameters, Standing};
 use profile::{Authority, Profile, Stack};
+use pulse::Pulse;
 use sticks::Sticks;
 use survey::Survey;
 
@@ -71,6 +73,7 @@ pub struct Real {
     /// What the actuators were last told.
     sent: Command,
     last_state: Option<Duration>,
+    pulse: Pulse,
     states: u64,
     notices: VecDeque<Notice>,
     sequence: u8,
@@ -95,6 +98,7 @@ impl Real {
             sticks: Sticks::default(),
             sent: Command::IDLE,
             last_state: None,
+            pulse: Pulse::default(),
             states: 0,
             notices: VecDeque::new(),
             sequence: 0,
@@ -154,6 +158,7 @@ impl Real {
             message => {
                 let state = self.assembly.take(host, &message, &self.sent)?;
                 self.last_state = Some(host);
+                self.pulse.state();
                 return Some(state);
             }
         }
@@ -167,7 +172,7 @@ impl Real {
         from: Source,
         (autopilot, armed, custom_mode): (u8, bool, u32),
     ) {
-        let known = self.controller.filter(|c| host.saturating_sub(c.heard) < GONE);
+        let known = self.controller.filter(|c| host.saturating_sub(c.heard) <= GONE);
         if from.component != AUTOPILOT || autopilot == NO_AUTOPILOT {
             let ourselves = known.is_some_and(|c| c.system == from.system);
             if from.component == ONBOARD && ourselves {
@@ -200,8 +205,12 @@ impl Real {
         self.announce(was);
     }
 
-    /// A controller is heard for the first time, or again.
+    /// A controller is heard for the first time, or again: then nothing is known of it any more, not
+    /// even which way its channels run, and nobody steers by that.
     fn meet(&mut self, system: u8, autopilot: u8) {
+        if self.engagement.steers() {
+            self.hand_back("no heartbeat of the controller for 3 s".into());
+        }
         self.parameters.forget();
         self.survey = Survey::default();
         let stack = Stack::of(autopilot);
@@ -319,8 +328,11 @@ impl Real {
     /// The watchdog.
     fn watch(&mut self, host: Duration) {
         if !self.engagement.steers() {
-            return;
+            return self.pulse.rest();
         }
+        // A controller that tracks an attitude does not mind a slow companion.
+        let surfaces = self.profile.authority == Authority::Surfaces;
+        let scarce = self.pulse.cycle(host).filter(|_| surfaces);
         let age = |at: Duration| host.saturating_sub(at);
         let silent = self.controller.is_none_or(|c| age(c.heard) > GONE);
         let blind = self.last_state.is_none_or(|at| age(at) > BLIND);
@@ -329,6 +341,8 @@ impl Real {
             self.hand_back("no heartbeat of the controller for 3 s".into());
         } else if blind {
             self.hand_back("no state of the vehicle for 0.3 s".into());
+        } else if let Some(words) = scarce {
+            self.hand_back(words);
         } else if let Some(why) = self.engagement.overdue(host) {
             self.hand_back(format!("the controller did not go to {steered}: {why}"));
         }

@@ -41,11 +41,15 @@ pub enum Kind {
     Reboot,
     /// The client dies.
     Client,
+    /// The companion gets no processor for stretches of up to 0.3 s: ticks come late, in bursts.
+    Starvation,
+    /// The disk is full: recording ends.
+    Disk,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 15] = [
+    pub const ALL: [Kind; 17] = [
         Kind::Loss,
         Kind::Duplication,
         Kind::Reordering,
@@ -61,6 +65,8 @@ impl Kind {
         Kind::Clock,
         Kind::Reboot,
         Kind::Client,
+        Kind::Starvation,
+        Kind::Disk,
     ];
 
     /// Its name in tables.
@@ -81,6 +87,8 @@ impl Kind {
             Kind::Clock => "clock jump",
             Kind::Reboot => "reboot",
             Kind::Client => "client death",
+            Kind::Starvation => "CPU starvation",
+            Kind::Disk => "disk full",
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use greylag_sitl::plant::Truth;
 
-use crate::flight::pilot::Decision;
+use crate::flight::pilot::{Decision, Source};
 use crate::physics::Command;
 use crate::physics::airframe::Envelope;
 
@@ -17,6 +17,10 @@ const ALTITUDE_LOSS_M: f64 = 200.0;
 const RECOVERED_DEG: f64 = 3.0;
 /// Rounding of a step of the surfaces.
 const ROUNDING: f64 = 1e-9;
+/// Steps of the actuators standing still that are a stretch in which nobody steers: 0.2 s.
+const UNSTEERED: u32 = 20;
+/// A plight of so long ago no longer explains anything, steps: 3 s.
+const MEMORY: u64 = 300;
 
 /// What was found wrong. Those of the companion itself are never excused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -39,11 +43,57 @@ pub enum Finding {
     Altitude,
     /// Not level, or not at its target, at the end.
     NotRecovered,
+    /// A disk was full, and it was not told.
+    Untold,
+}
+
+/// What an aircraft suffers that its companion cannot help.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Plight {
+    /// The actuators stand where they stood, since nothing new has arrived, and nobody else flies.
+    pub unsteered: bool,
+    /// There is no state to fly on, and nobody else to hand the aircraft to.
+    pub blind: bool,
+    /// A sensor lies within what an aircraft may show.
+    pub misled: bool,
+}
+
+/// What explains that an aircraft left its envelope.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Cause {
+    /// No command reached it for 0.2 s or more within the last 3 s.
+    Unsteered,
+    /// Without a state to fly on within the last 3 s, at a vehicle that cannot fly by itself.
+    Blind,
+    /// A sensor told a believable lie within the last 3 s.
+    Misled,
+}
+
+impl Cause {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Cause::Unsteered => "unsteered",
+            Cause::Blind => "blind",
+            Cause::Misled => "misled",
+        }
+    }
+}
+
+/// A finding with its circumstances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// When, s.
+    pub at_s: f64,
+    /// What.
+    pub finding: Finding,
+    /// What explains it, of those that may be explained: the aircraft's, not the companion's.
+    pub cause: Option<Cause>,
 }
 
 impl Finding {
     /// All of them.
-    pub const ALL: [Finding; 9] = [
+    pub const ALL: [Finding; 10] = [
         Finding::Panic,
         Finding::Command,
         Finding::Slew,
@@ -53,7 +103,14 @@ impl Finding {
         Finding::Airspeed,
         Finding::Altitude,
         Finding::NotRecovered,
+        Finding::Untold,
     ];
+
+    /// Whether it is the companion's own, which nothing excuses.
+    pub fn is_own(self) -> bool {
+        use Finding::*;
+        matches!(self, Panic | Command | Slew | SlowHandBack | Untold)
+    }
 
     /// Its name in tables.
     pub fn name(self) -> &'static str {
@@ -67,6 +124,7 @@ impl Finding {
             Finding::Airspeed => "airspeed",
             Finding::Altitude => "altitude",
             Finding::NotRecovered => "recovery",
+            Finding::Untold => "untold",
         }
     }
 }
@@ -77,25 +135,64 @@ pub struct Judge {
     envelope: Envelope,
     last: Option<Command>,
     start_m: Option<f64>,
-    findings: Vec<(f64, Finding)>,
+    findings: Vec<Found>,
+    steps: u64,
+    /// Steps for which nobody has steered by now.
+    unsteered: u32,
+    blind: bool,
+    /// The last step of each cause.
+    causes: [(Cause, Option<u64>); 3],
 }
 
 impl Judge {
     /// A judge by an envelope.
     pub fn new(envelope: Envelope) -> Self {
-        Judge { envelope, last: None, start_m: None, findings: Vec::new() }
+        Judge {
+            envelope,
+            last: None,
+            start_m: None,
+            findings: Vec::new(),
+            steps: 0,
+            unsteered: 0,
+            blind: false,
+            causes: [Cause::Unsteered, Cause::Blind, Cause::Misled].map(|cause| (cause, None)),
+        }
     }
 
     /// Notes a finding; the first of each kind counts.
-    pub fn note(&mut self, now_s: f64, finding: Finding) {
-        if !self.findings.iter().any(|(_, known)| *known == finding) {
-            self.findings.push((now_s, finding));
+    pub fn note(&mut self, at_s: f64, finding: Finding) {
+        if !self.findings.iter().any(|known| known.finding == finding) {
+            let cause = self.cause().filter(|_| !finding.is_own());
+            self.findings.push(Found { at_s, finding, cause });
+        }
+    }
+
+    /// The cause in force, or of the last seconds.
+    fn cause(&self) -> Option<Cause> {
+        let recent = |at: u64| self.steps - at < MEMORY;
+        self.causes.iter().find(|(_, at)| at.is_some_and(recent)).map(|(cause, _)| *cause)
+    }
+
+    /// Whether the last decision was made without a state to fly on.
+    pub fn is_blind(&self) -> bool {
+        self.blind
+    }
+
+    fn suffer(&mut self, plight: Plight) {
+        self.steps += 1;
+        self.unsteered = if plight.unsteered { self.unsteered + 1 } else { 0 };
+        let acting = [self.unsteered >= UNSTEERED, plight.blind, plight.misled];
+        for ((_, at), acts) in self.causes.iter_mut().zip(acting) {
+            if acts {
+                *at = Some(self.steps);
+            }
         }
     }
 
     /// Judges a decision.
     pub fn decision(&mut self, now_s: f64, decision: &Decision) {
         let c = decision.command;
+        self.blind = decision.source == Source::Level;
         let in_range = c.is_finite()
             && c.aileron.abs() <= 1.0
             && c.elevator.abs() <= 1.0
@@ -114,7 +211,8 @@ impl Judge {
     }
 
     /// Judges the aircraft.
-    pub fn aircraft(&mut self, now_s: f64, truth: &Truth) {
+    pub fn aircraft(&mut self, now_s: f64, truth: &Truth, plight: Plight) {
+        self.suffer(plight);
         let start = *self.start_m.get_or_insert(truth.altitude_m);
         let e = self.envelope;
         let (roll, pitch) = (truth.roll_rad.to_degrees(), truth.pitch_rad.to_degrees());
@@ -141,8 +239,8 @@ impl Judge {
         }
     }
 
-    /// What was found, with the time of each, s.
-    pub fn findings(self) -> Vec<(f64, Finding)> {
+    /// What was found.
+    pub fn findings(self) -> Vec<Found> {
         self.findings
     }
 }

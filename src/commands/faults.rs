@@ -1,0 +1,203 @@
+//! `greylag faults`: a campaign of seeded flights under faults, judged automatically.
+
+mod ledger;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::builder::PossibleValue;
+use clap::{Args, ValueEnum};
+use comfy_table::Table;
+use comfy_table::presets::NOTHING;
+use rayon::prelude::*;
+
+use crate::commands::choices;
+use crate::commands::fly::{self, POLICY, crew};
+use crate::control::Kind as ControllerKind;
+use crate::sim::faults::{Case, Cause, Kind, Opposite, Report, Works};
+use ledger::{Entry, Ledger};
+
+/// The arguments of `greylag faults`.
+#[derive(Args)]
+pub struct Arguments {
+    /// Flights with each controller at each opposite.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    flights: u64,
+    /// Seed of the first flight; the others follow.
+    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    first: u64,
+    /// Controllers.
+    #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["lqi"], value_parser = choices::controller())]
+    controller: Vec<ControllerKind>,
+    /// What is at the other end of the vehicle's link.
+    #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["sitl", "px4", "ardupilot"], value_enum)]
+    opposite: Vec<Opposite>,
+    /// Show what befell each flight with a finding, and what was said.
+    #[arg(long)]
+    show: bool,
+    /// Note each flight in this file, and do not fly again those that are there (of the same program).
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
+}
+
+impl ValueEnum for Opposite {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Opposite::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()).help(match self {
+            Opposite::Sitl => "The simulator's shim",
+            Opposite::Px4 => "PX4 by surfaces",
+            Opposite::Px4Attitude => "PX4 by attitude",
+            Opposite::Ardupilot => "ArduPilot by channels",
+            Opposite::ArdupilotAttitude => "ArduPilot by attitude",
+        }))
+    }
+}
+
+/// Flies the campaign; the exit status tells whether the companion itself never failed, with every
+/// aircraft that left its envelope explained.
+///
+/// # Errors
+/// If an aircraft or a controller cannot be made, or the file of `--resume` cannot be used.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let model = fly::model("params/x8/jsbsim.toml".as_ref(), None)?;
+    let ledger = arguments.resume.as_deref().map(Ledger::open).transpose()?;
+    let mut entries = Vec::new();
+    for &controller in &arguments.controller {
+        let works = Works::new(crew(controller, &model, POLICY.as_ref())?, &model)?;
+        let before = entries.len();
+        for &opposite in &arguments.opposite {
+            let seeds = arguments.first..arguments.first + arguments.flights;
+            let fly = |seed| -> Result<Entry> {
+                let case = Case { seed, controller, opposite };
+                if let Some(known) = ledger.as_ref().and_then(|ledger| ledger.find(&case)) {
+                    return Ok(known);
+                }
+                let report = works.fly(case)?;
+                if arguments.show && !report.findings.is_empty() {
+                    show(&report);
+                }
+                let entry = Entry::from(&report);
+                if let Some(ledger) = &ledger {
+                    ledger.note(&entry)?;
+                }
+                Ok(entry)
+            };
+            let flown: Result<Vec<Entry>> = seeds.into_par_iter().map(fly).collect();
+            entries.extend(flown?);
+        }
+        print_faults(controller, &arguments.opposite, &entries[before..]);
+    }
+    print_findings(&entries);
+    let failed = entries.iter().any(|entry| entry.findings.iter().any(|f| f.is_failure()));
+    Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// Fault against opposite: flights with that fault among theirs, of these the flights with a finding.
+fn print_faults(controller: ControllerKind, opposites: &[Opposite], entries: &[Entry]) {
+    println!("\n{}: findings of flights of 60 s with each fault", controller.name());
+    let mut table = Table::new();
+    table.load_style(NOTHING);
+    table.set_header(["fault"].into_iter().chain(opposites.iter().map(|o| o.name())));
+    for kind in Kind::ALL {
+        let cells = opposites.iter().map(|opposite| {
+            let with = entries.iter().filter(|e| {
+                e.opposite == opposite.name() && e.faults().iter().any(|f| f.kind == kind)
+            });
+            let (all, found) = with.fold((0, 0), |(all, found), e| {
+                (all + 1, found + usize::from(!e.findings.is_empty()))
+            });
+            if found == 0 { format!("· of {all}") } else { format!("{found} of {all}") }
+        });
+        table.add_row([kind.name().to_owned()].into_iter().chain(cells));
+    }
+    println!("{table}");
+}
+
+/// What was found, in numbers, then every flight with something that nothing explains.
+fn print_findings(entries: &[Entry]) {
+    println!("\n{} flights in all", entries.len());
+    let mut counts: BTreeMap<(&str, &str), u64> = BTreeMap::new();
+    for found in entries.iter().flat_map(|entry| &entry.findings) {
+        *counts.entry((&found.finding, found.standing())).or_default() += 1;
+    }
+    for ((finding, standing), count) in &counts {
+        println!("  {finding}, {standing}: {count}");
+    }
+    println!(
+        "of them, panic, command, slew, hand-back or untold: {}",
+        entries.iter().flat_map(|e| &e.findings).filter(|f| f.is_own()).count()
+    );
+    for entry in entries.iter().filter(|entry| entry.findings.iter().any(|f| f.is_failure())) {
+        println!("greylag faults {} --show", entry.options());
+    }
+}
+
+/// What befell a flight, and what was said.
+fn show(report: &Report) {
+    let mut lines = vec![format!("greylag faults {}", Entry::from(report).options())];
+    for f in &report.findings {
+        let cause = f.cause.map_or("", Cause::name);
+        lines.push(format!("    {:6.2} s: found {} {cause}", f.at_s, f.finding.name()));
+    }
+    for f in &report.faults {
+        let (kind, s) = (f.kind.name(), f.strength);
+        lines.push(format!("    {:6.2} to {:6.2} s: {kind}, strength {s:.2}", f.from_s, f.to_s));
+    }
+    lines.extend(report.texts.iter().map(|(at, words)| format!("    {at:6.2} s: said {words}")));
+    println!("{}", lines.join("\n"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::faults::Finding;
+
+    fn works() -> Works {
+        let model = fly::model("params/x8/jsbsim.toml".as_ref(), None).unwrap();
+        Works::new(crew(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap(), &model).unwrap()
+    }
+
+    #[test]
+    fn a_few_flights_with_every_fault_leave_the_companion_sound() {
+        let works = works();
+        // Each kind of fault comes first once in so many seeds; the opposites share them out.
+        for seed in 0..Kind::ALL.len() as u64 {
+            let opposite = Opposite::ALL[seed as usize % Opposite::ALL.len()];
+            let case = Case { seed, controller: ControllerKind::Lqi, opposite };
+            let report = works.fly(case).unwrap();
+            let entry = Entry::from(&report);
+            assert!(
+                !entry.findings.iter().any(|f| f.is_failure()),
+                "{}: {:?} {:?}",
+                entry.options(),
+                report.findings,
+                report.texts
+            );
+        }
+    }
+
+    #[test]
+    fn a_flight_repeats_from_its_seed() {
+        let works = works();
+        let case = Case { seed: 7, controller: ControllerKind::Lqi, opposite: Opposite::Px4 };
+        let [one, two] = [works.fly(case).unwrap(), works.fly(case).unwrap()];
+        assert_eq!(one.findings, two.findings);
+        assert_eq!(one.texts, two.texts);
+        assert!(!one.texts.is_empty());
+    }
+
+    #[test]
+    fn a_full_disk_is_told_and_flown_on_with() {
+        let works = works();
+        let disk = Kind::ALL.iter().position(|kind| *kind == Kind::Disk).unwrap() as u64;
+        let case = Case { seed: disk, controller: ControllerKind::Lqi, opposite: Opposite::Sitl };
+        let report = works.fly(case).unwrap();
+        assert!(report.texts.iter().any(|(_, t)| t.contains("recording of flight")), "{report:?}");
+        assert!(!report.findings.iter().any(|f| f.finding == Finding::Untold));
+    }
+}

@@ -1,0 +1,180 @@
+//! The file in which a campaign notes its flights, one JSON object a line, to go on from.
+
+use std::collections::HashMap;
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+
+use crate::sim::faults::{Case, Cause, Fault, Finding, Found, Report, draw};
+
+/// A flight that was flown. Its faults follow from its seed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    /// Who steered.
+    pub controller: String,
+    /// Through whom.
+    pub opposite: String,
+    /// The seed.
+    pub seed: u64,
+    /// What was found.
+    pub findings: Vec<Note>,
+}
+
+/// A finding as it is noted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Note {
+    /// When, s.
+    pub at_s: f64,
+    /// What.
+    pub finding: String,
+    /// What explains it.
+    pub cause: Option<String>,
+}
+
+impl From<&Report> for Entry {
+    fn from(report: &Report) -> Self {
+        let note = |f: &Found| Note {
+            at_s: f.at_s,
+            finding: f.finding.name().into(),
+            cause: f.cause.map(Cause::name).map(Into::into),
+        };
+        Entry {
+            controller: report.case.controller.name().into(),
+            opposite: report.case.opposite.name().into(),
+            seed: report.case.seed,
+            findings: report.findings.iter().map(note).collect(),
+        }
+    }
+}
+
+impl Entry {
+    /// What befell it.
+    pub fn faults(&self) -> Vec<Fault> {
+        draw(self.seed)
+    }
+
+    /// The options of `greylag faults` that fly it again.
+    pub fn options(&self) -> String {
+        format!(
+            "--controller {} --opposite {} --first {} --flights 1",
+            self.controller, self.opposite, self.seed
+        )
+    }
+
+    fn key(&self) -> (String, String, u64) {
+        (self.controller.clone(), self.opposite.clone(), self.seed)
+    }
+}
+
+impl Note {
+    /// Whether it is the companion's own, which nothing excuses.
+    pub fn is_own(&self) -> bool {
+        Finding::ALL.iter().any(|f| f.name() == self.finding && f.is_own())
+    }
+
+    /// What it is laid to.
+    pub fn standing(&self) -> &str {
+        match &self.cause {
+            Some(cause) => cause,
+            None if self.is_own() => "the companion's own",
+            None => "unexplained",
+        }
+    }
+
+    /// Whether it fails the campaign.
+    pub fn is_failure(&self) -> bool {
+        self.cause.is_none()
+    }
+}
+
+/// The flights of earlier runs, with the file that takes the new ones.
+pub struct Ledger {
+    known: HashMap<(String, String, u64), Entry>,
+    file: Mutex<File>,
+}
+
+impl Ledger {
+    /// Opens a file, or begins it. A last line that was cut off by a kill is flown again.
+    pub fn open(path: &Path) -> Result<Self> {
+        let mut known = HashMap::new();
+        let mut whole = 0;
+        if path.exists() {
+            let file = File::open(path).with_context(|| format!("reading {}", path.display()))?;
+            let mut lines = BufReader::new(file);
+            let mut line = String::new();
+            while lines.read_line(&mut line)? > 0 && line.ends_with('\n') {
+                let entry: Entry = serde_json::from_str(&line).with_context(|| {
+                    format!(
+                        "{} is not a file of `greylag faults --resume`; give another name",
+                        path.display()
+                    )
+                })?;
+                whole += line.len() as u64;
+                known.insert(entry.key(), entry);
+                line.clear();
+            }
+            ensure!(
+                whole > 0 || line.is_empty() || line.starts_with('{'),
+                "{} is not a file of `greylag faults --resume`; give another name",
+                path.display()
+            );
+        }
+        let file = OpenOptions::new().create(true).append(true).open(path).with_context(|| {
+            format!("opening {}; name a file that can be written", path.display())
+        })?;
+        if file.metadata()?.len() > whole {
+            file.set_len(whole)?;
+        }
+        Ok(Ledger { known, file: Mutex::new(file) })
+    }
+
+    /// What an earlier run found.
+    pub fn find(&self, case: &Case) -> Option<Entry> {
+        let key = (case.controller.name().to_owned(), case.opposite.name().to_owned(), case.seed);
+        self.known.get(&key).cloned()
+    }
+
+    /// Notes a flight.
+    pub fn note(&self, entry: &Entry) -> Result<()> {
+        let line = format!("{}\n", serde_json::to_string(entry)?);
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.write_all(line.as_bytes()).context("noting a flight; free some space")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_that_was_cut_off_is_dropped_and_the_rest_is_known() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("campaign");
+        let entry = Entry {
+            controller: "lqi".into(),
+            opposite: "px4".into(),
+            seed: 3,
+            findings: vec![Note { at_s: 1.5, finding: "attitude".into(), cause: None }],
+        };
+        Ledger::open(&path).unwrap().note(&entry).unwrap();
+        let mut file = OpenOptions::new().append(true).open(&path).unwrap();
+        file.write_all(br#"{"controller":"lq"#).unwrap();
+        let ledger = Ledger::open(&path).unwrap();
+        assert_eq!(ledger.known.values().collect::<Vec<_>>(), [&entry]);
+        ledger.note(&Entry { seed: 4, ..entry }).unwrap();
+        assert_eq!(Ledger::open(&path).unwrap().known.len(), 2);
+    }
+
+    #[test]
+    fn another_file_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("notes");
+        std::fs::write(&path, "something else").unwrap();
+        assert!(Ledger::open(&path).is_err());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "something else");
+    }
+}

@@ -1,0 +1,150 @@
+//! The key that signs, from a file that only its owner may read.
+
+use std::fmt;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// A key's bytes.
+const LENGTH: usize = 32;
+/// A file of more bytes than this is no key file.
+const LONGEST: u64 = 4096;
+
+/// A secret key. It shows itself to nobody.
+#[derive(Clone)]
+pub struct Key([u8; LENGTH]);
+
+impl fmt::Debug for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Key(secret)")
+    }
+}
+
+/// Why a key cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum KeyError {
+    /// The file cannot be read.
+    #[error("cannot read key file {}: {why}; make one: (umask 077; openssl rand -hex 32 > FILE)", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        why: std::io::Error,
+    },
+    /// Others may read the file.
+    #[error("key file {} may be read by others (mode {mode:03o}): chmod 600 it, then choose a new key", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// Its permissions.
+        mode: u32,
+    },
+    /// It holds something else.
+    #[error(
+        "key file {} does not hold 64 hexadecimal digits: make one with `openssl rand -hex 32`, or \
+         of a passphrase as MAVProxy does, with `printf %s PASSPHRASE | sha256sum | cut -c1-64`",
+        path.display()
+    )]
+    Content {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl Key {
+    /// A key of these bytes.
+    pub fn from_bytes(bytes: [u8; LENGTH]) -> Self {
+        Key(bytes)
+    }
+
+    pub(super) fn bytes(&self) -> &[u8; LENGTH] {
+        &self.0
+    }
+
+    /// Reads a key file: 64 hexadecimal digits, mode 0600 or less.
+    ///
+    /// # Errors
+    /// If it cannot be read, may be read by others, or holds something else.
+    pub fn load(path: &Path) -> Result<Self, KeyError> {
+        let failed = |why| KeyError::Read { path: path.into(), why };
+        let file = File::open(path).map_err(failed)?;
+        check_mode(&file, path)?;
+        let mut text = String::new();
+        let content = || KeyError::Content { path: path.into() };
+        file.take(LONGEST).read_to_string(&mut text).map_err(|why| match why.kind() {
+            std::io::ErrorKind::InvalidData => content(),
+            _ => failed(why),
+        })?;
+        digits(text.trim()).map(Key).ok_or_else(content)
+    }
+}
+
+/// 64 hexadecimal digits as bytes.
+fn digits(text: &str) -> Option<[u8; LENGTH]> {
+    if text.len() != 2 * LENGTH || !text.bytes().all(|b| b.is_ascii_hexdigit()) {
+        return None;
+    }
+    let mut bytes = [0; LENGTH];
+    for (i, byte) in bytes.iter_mut().enumerate() {
+        *byte = u8::from_str_radix(&text[2 * i..2 * i + 2], 16).ok()?;
+    }
+    Some(bytes)
+}
+
+#[cfg(unix)]
+fn check_mode(file: &File, path: &Path) -> Result<(), KeyError> {
+    use std::os::unix::fs::PermissionsExt;
+    let found = file.metadata().map_err(|why| KeyError::Read { path: path.into(), why })?;
+    match found.permissions().mode() & 0o777 {
+        mode if mode & 0o077 != 0 => Err(KeyError::Open { path: path.into(), mode }),
+        _ => Ok(()),
+    }
+}
+
+/// Elsewhere there are no such permissions to look at.
+#[cfg(not(unix))]
+fn check_mode(_: &File, _: &Path) -> Result<(), KeyError> {
+    Ok(())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    fn file(text: &str, mode: u32) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("key");
+        std::fs::write(&path, text).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
+        (folder, path)
+    }
+
+    #[test]
+    fn a_key_is_read_and_never_shown() {
+        let (_folder, path) = file(&format!("{}\n", "0aFf".repeat(16)), 0o600);
+        let key = Key::load(&path).unwrap();
+        assert_eq!(key.bytes()[..2], [0x0a, 0xff]);
+        assert_eq!(format!("{key:?}"), "Key(secret)");
+    }
+
+    #[test]
+    fn a_key_that_others_may_read_is_refused() {
+        let digits = "00".repeat(32);
+        for mode in [0o640, 0o604, 0o644] {
+            let (_folder, path) = file(&digits, mode);
+            let words = Key::load(&path).unwrap_err().to_string();
+            assert!(words.contains("chmod 600") && words.contains(&format!("{mode:o}")), "{words}");
+        }
+    }
+
+    #[test]
+    fn anything_but_64_digits_is_refused() {
+        // A digit too few, one too many, a passphrase, digits that are two bytes long.
+        for text in ["0".repeat(63), "0".repeat(65), "secret".into(), "ä".repeat(32)] {
+            let (_folder, path) = file(&text, 0o600);
+            assert!(matches!(Key::load(&path), Err(KeyError::Content { .. })), "{text}");
+        }
+        assert!(matches!(Key::load("nowhere".as_ref()), Err(KeyError::Read { .. })));
+    }
+}

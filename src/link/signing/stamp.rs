@@ -1,0 +1,134 @@
+//! The timestamp that outlives the program: beside the key, written every second by a thread.
+
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Between two writings.
+const EVERY: Duration = Duration::from_secs(1);
+/// What may have been used since the last writing: two seconds, in units of 10 µs.
+const MARGIN: u64 = 200_000;
+
+/// Why the timestamp cannot be kept.
+#[derive(Debug, thiserror::Error)]
+pub enum StampError {
+    /// The file cannot be read or written.
+    #[error("keeping the timestamp of signatures in {}: {why}; make its folder writable", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        why: std::io::Error,
+    },
+    /// It holds something else.
+    #[error("{} does not hold a timestamp of signatures: remove it, then choose a new key", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// The file, with the thread that writes it.
+#[derive(Debug)]
+pub struct StampFile {
+    shown: Arc<AtomicU64>,
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl StampFile {
+    /// Opens the file beside a key file, and gives the timestamp to go on from.
+    ///
+    /// # Errors
+    /// If it cannot be read or written, or holds something else.
+    pub fn open(key: &Path) -> Result<(Self, u64), StampError> {
+        let mut name = key.as_os_str().to_owned();
+        name.push(".stamp");
+        let path = PathBuf::from(name);
+        let failed = |why| StampError::File { path: path.clone(), why };
+        let last = match fs::read_to_string(&path) {
+            Ok(text) => {
+                text.trim().parse().map_err(|_| StampError::Content { path: path.clone() })?
+            }
+            Err(why) if why.kind() == ErrorKind::NotFound => 0,
+            Err(why) => return Err(failed(why)),
+        };
+        let next = if last == 0 { 0 } else { last + MARGIN };
+        write(&path, next).map_err(failed)?;
+        let shown = Arc::new(AtomicU64::new(next));
+        let (stop, stopped) = channel::<()>();
+        let (seen, place) = (shown.clone(), path.clone());
+        let thread = std::thread::Builder::new()
+            .name("stamp".into())
+            .spawn(move || {
+                let mut written = next;
+                loop {
+                    let ends = stopped.recv_timeout(EVERY) != Err(RecvTimeoutError::Timeout);
+                    let now = seen.load(Ordering::Relaxed);
+                    // A disk that is full for a while costs nothing: the next writing has it all.
+                    if now != written && write(&place, now).is_ok() {
+                        written = now;
+                    }
+                    if ends {
+                        return;
+                    }
+                }
+            })
+            .map_err(failed)?;
+        Ok((StampFile { shown, stop: Some(stop), thread: Some(thread) }, next))
+    }
+
+    /// Tells the newest timestamp, which is written within a second.
+    pub fn show(&self, stamp: u64) {
+        self.shown.store(stamp, Ordering::Relaxed);
+    }
+}
+
+impl Drop for StampFile {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        if let Some(thread) = self.thread.take() {
+            // A panic there has been reported by its own thread.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Writes the file anew, whole or not at all.
+fn write(path: &Path, stamp: u64) -> std::io::Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder)?;
+    writeln!(file, "{stamp}")?;
+    file.persist(path).map_err(|e| e.error)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_timestamp_goes_on_after_a_restart_beyond_all_that_was_used() {
+        let folder = tempfile::tempdir().unwrap();
+        let key = folder.path().join("key");
+        let (file, first) = StampFile::open(&key).unwrap();
+        assert_eq!(first, 0);
+        file.show(123_456_789);
+        drop(file);
+        let (_file, next) = StampFile::open(&key).unwrap();
+        assert_eq!(next, 123_456_789 + MARGIN);
+    }
+
+    #[test]
+    fn a_file_of_something_else_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("key.stamp"), "yesterday").unwrap();
+        let words = StampFile::open(&folder.path().join("key")).unwrap_err().to_string();
+        assert!(words.contains("does not hold a timestamp"), "{words}");
+    }
+}

@@ -1,0 +1,373 @@
+//! One flight of 60 s under faults, in lockstep in this process.
+
+use std::io::{Error, ErrorKind, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use greylag_sitl::plant::Inputs;
+use greylag_sitl::shim::{Distortion, ShimError};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::judge::{Finding, Found, Judge, Plight};
+use super::mix::{Fault, Kind, draw};
+use super::opposite::{Aircraft, Opposite, vehicle};
+use super::wire::Wire;
+use crate::control::{Controller, Kind as ControllerKind, SetupError, build};
+use crate::flight::desk::Desk;
+use crate::flight::pilot::{ConfigError, Pilot};
+use crate::flight::recorder::Recorder;
+use crate::flight::runtime::Crew;
+use crate::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
+use crate::link::vehicle::Vehicle;
+use crate::model::GreyBox;
+
+/// Steps of a flight: 60 s.
+const STEPS: u64 = 6000;
+/// Setpoints come at 10 Hz.
+const SETPOINT_EVERY: u64 = 10;
+/// What the client asks for, s, roll, pitch in degrees: turns both ways, a climb, a descent.
+const LEGS: [(f64, f64, f64); 6] = [
+    (0.0, 0.0, 3.0),
+    (12.0, 35.0, 5.0),
+    (20.0, -40.0, 3.0),
+    (28.0, 10.0, 12.0),
+    (36.0, 30.0, -3.0),
+    (44.0, 0.0, 3.0),
+];
+/// A dead link must have handed the aircraft back after this time, s.
+const HAND_BACK_S: f64 = 0.5;
+
+/// Stream of the random numbers of a starved processor.
+const STARVED: u64 = 20;
+
+/// Why a flight cannot be flown.
+#[derive(Debug, thiserror::Error)]
+pub enum FaultsError {
+    /// The aircraft cannot be made.
+    #[error(transparent)]
+    Aircraft(#[from] ShimError),
+    /// The fallback cannot be built.
+    #[error(transparent)]
+    Fallback(#[from] SetupError),
+    /// The pilot refuses its settings.
+    #[error(transparent)]
+    Pilot(#[from] ConfigError),
+    /// The recorder's thread cannot be started.
+    #[error("starting the recorder of a flight: {0}; close other programs and try again")]
+    Recorder(#[from] std::io::Error),
+}
+
+/// A flight to be flown.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    /// Its number, from which everything random follows.
+    pub seed: u64,
+    /// Who steers.
+    pub controller: ControllerKind,
+    /// Whom it steers through.
+    pub opposite: Opposite,
+}
+
+/// What came of it.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// The flight.
+    pub case: Case,
+    /// What befell it.
+    pub faults: Vec<Fault>,
+    /// What was found wrong.
+    pub findings: Vec<Found>,
+    /// What was said to the ground stations, with nothing left out: when, s, and what.
+    pub texts: Vec<(f64, String)>,
+}
+
+/// A companion fresh from the works: the design of its controller is not made again.
+pub struct Works {
+    crew: Crew,
+    fallback: Box<dyn Controller>,
+    model: GreyBox,
+}
+
+impl Works {
+    /// The works that build companions with `crew`, for the aircraft of `model`; as in flight, the
+    /// fallback is an LQI.
+    ///
+    /// # Errors
+    /// If the model has no LQI.
+    pub fn new(crew: Crew, model: &GreyBox) -> Result<Self, FaultsError> {
+        let fallback = match crew.controller.name() == ControllerKind::Lqi.name() {
+            true => crew.controller.boxed_clone(),
+            false => build(ControllerKind::Lqi, model)?,
+        };
+        Ok(Works { crew, fallback, model: model.clone() })
+    }
+
+    fn desk(&self, opposite: Opposite) -> Result<Desk, FaultsError> {
+        let config = self.crew.pilot.config().clone();
+        let pilot = Pilot::new(config, self.fallback.boxed_clone())?;
+        let controller = self.crew.controller.boxed_clone();
+        let crew = Crew { pilot, controller, seat: self.crew.seat };
+        Ok(Desk::new(crew, vehicle(opposite, &self.model)))
+    }
+
+    /// Flies `case`; a panic of the companion is a finding.
+    ///
+    /// # Errors
+    /// If the aircraft cannot be loaded.
+    pub fn fly(&self, case: Case) -> Result<Report, FaultsError> {
+        let faults = draw(case.seed);
+        let mut desk = self.desk(case.opposite)?;
+        let disk = faults.iter().any(|f| f.kind == Kind::Disk).then(Disk::default);
+        if let Some(disk) = &disk {
+            let folder = std::path::PathBuf::new();
+            desk.record(Recorder::over(folder, disk.clone(), disk.clone(), disk.clone())?);
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(case.seed);
+        random.set_stream(STARVED);
+        let mut flight = Flight {
+            aircraft: Aircraft::new(case.opposite, case.seed)?,
+            desk,
+            down: Wire::new(case.seed, 0),
+            up: Wire::new(case.seed, 1),
+            judge: Judge::new(self.model.airframe.envelope),
+            faults: faults.clone(),
+            random,
+            disk,
+            asleep_until: 0,
+            unread: Vec::new(),
+            flown: Inputs::default(),
+            clock_us: 0,
+            armed: false,
+            dead_since: None,
+            texts: Vec::new(),
+        };
+        // What a panic leaves behind is only read, to be judged.
+        if catch_unwind(AssertUnwindSafe(|| flight.fly())).is_err() {
+            flight.judge.note(0.0, Finding::Panic);
+        }
+        Ok(Report { case, faults, findings: flight.judge.findings(), texts: flight.texts })
+    }
+}
+
+/// A disk that is full from some moment on.
+#[derive(Clone, Debug, Default)]
+struct Disk {
+    full: Arc<AtomicBool>,
+}
+
+impl Write for Disk {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self.full.load(Ordering::Relaxed) {
+            true => Err(Error::from(ErrorKind::StorageFull)),
+            false => Ok(bytes.len()),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A flight under way.
+struct Flight {
+    aircraft: Aircraft,
+    desk: Desk,
+    down: Wire,
+    up: Wire,
+    judge: Judge,
+    faults: Vec<Fault>,
+    random: ChaCha8Rng,
+    disk: Option<Disk>,
+    /// The companion gets no processor before this step.
+    asleep_until: u64,
+    /// What has arrived meanwhile.
+    unread: Vec<Vec<u8>>,
+    /// What the actuators were told at the last step.
+    flown: Inputs,
+    /// What jumps have added to the vehicle's clock, µs.
+    clock_us: i64,
+    armed: bool,
+    /// Since when nothing has come, while steering through a real controller.
+    dead_since: Option<f64>,
+    texts: Vec<(f64, String)>,
+}
+
+impl Flight {
+    fn fly(&mut self) {
+        for step in 0..STEPS {
+            let now_s = step as f64 * 0.01;
+            if !self.step(step, now_s) {
+                return self.judge.note(now_s, Finding::Crash);
+            }
+        }
+        let end = STEPS as f64 * 0.01;
+        let truth = self.aircraft.truth();
+        // Who was handed back flies level; who was not flies the client's last leg, or level.
+        let pitch = truth.pitch_rad.to_degrees().clamp(-2.0, 6.0);
+        self.judge.end(end, &truth, [0.0, pitch]);
+        self.hear_of_the_disk(end);
+    }
+
+    /// One step of 10 ms; `false` when the aircraft is lost.
+    fn step(&mut self, step: u64, now_s: f64) -> bool {
+        let acting: Vec<Fault> = self.faults.iter().filter(|f| f.acts(now_s)).copied().collect();
+        let distortion = self.distortion(&acting, step);
+        let bytes = self.aircraft.show(distortion);
+        let rebooting = acting.iter().any(|fault| fault.kind == Kind::Reboot);
+        if !rebooting && !bytes.is_empty() {
+            self.down.send(step, bytes, &acting);
+        }
+        let arrived = self.down.receive(step);
+        self.watch_link(now_s, !arrived.is_empty());
+        self.unread.extend(arrived);
+        if step >= self.asleep_until {
+            self.companion(step, now_s, &acting);
+            self.asleep_until = step + self.nap(&acting);
+        }
+        for batch in self.up.receive(step) {
+            self.aircraft.hear(&batch);
+        }
+        let flies = self.aircraft.fly();
+        let plight = self.plight(&acting);
+        self.judge.aircraft(now_s, &self.aircraft.truth(), plight);
+        flies
+    }
+
+    /// What the companion does when it has the processor.
+    fn companion(&mut self, step: u64, now_s: f64, acting: &[Fault]) {
+        let host = Duration::from_secs(1) + Duration::from_millis(10 * step);
+        let mut up = Vec::new();
+        for batch in std::mem::take(&mut self.unread) {
+            let judge = &mut self.judge;
+            self.desk.hear(host, &batch, &mut up, |_, decision| judge.decision(now_s, decision));
+        }
+        self.client(step, now_s, host, acting);
+        self.desk.poll(host, &mut up);
+        self.hear_texts(now_s);
+        if !up.is_empty() {
+            self.up.send(step, up, acting);
+        }
+    }
+
+    /// Steps until the companion has the processor again.
+    fn nap(&mut self, acting: &[Fault]) -> u64 {
+        let starved = acting.iter().find(|fault| fault.kind == Kind::Starvation);
+        let Some(Fault { strength, .. }) = starved else { return 0 };
+        match self.random.random::<f64>() < 0.05 + 0.3 * strength {
+            // 20 ms to 300 ms without a single instruction.
+            true => self.random.random_range(2..=5 + (25.0 * strength) as u64),
+            false => 0,
+        }
+    }
+
+    /// In which plight the aircraft is at this step, through no fault of who steers it.
+    fn plight(&mut self, acting: &[Fault]) -> Plight {
+        let inputs = self.aircraft.inputs();
+        let same = std::mem::replace(&mut self.flown, inputs) == inputs;
+        let lied_to = |fault: &Fault| matches!(fault.kind, Kind::Airspeed | Kind::Alpha);
+        Plight {
+            unsteered: same && self.aircraft.is_steered(),
+            blind: matches!(self.aircraft, Aircraft::Sitl(_)) && self.judge.is_blind(),
+            misled: acting.iter().any(lied_to),
+        }
+    }
+
+    fn hear_texts(&mut self, now_s: f64) {
+        self.texts.extend(self.desk.texts.drain(..).map(|text| (now_s, text.words)));
+    }
+
+    /// Waits until the recorder's thread has met the full disk, which has to be told.
+    fn hear_of_the_disk(&mut self, now_s: f64) {
+        if self.disk.as_ref().is_none_or(|disk| !disk.full.load(Ordering::Relaxed)) {
+            return;
+        }
+        for _ in 0..300 {
+            self.desk.poll(Duration::from_secs(61), &mut Vec::new());
+            self.hear_texts(now_s);
+            if self.texts.iter().any(|(_, words)| words.contains("recording of flight")) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        self.judge.note(now_s, Finding::Untold);
+    }
+
+    /// The client: arms when it can, then sends its legs.
+    fn client(&mut self, step: u64, now_s: f64, host: Duration, acting: &[Fault]) {
+        if acting.iter().any(|fault| fault.kind == Kind::Client)
+            || !step.is_multiple_of(SETPOINT_EVERY)
+        {
+            return;
+        }
+        let (_, roll, pitch) =
+            LEGS.iter().rev().find(|(from, ..)| *from <= now_s).copied().unwrap_or(LEGS[0]);
+        let now = self.desk.now(host);
+        let setpoint =
+            AttitudeSetpoint { roll: roll.to_radians(), pitch: pitch.to_radians(), thrust: None };
+        if !self.armed {
+            self.armed = self.desk.arm(host) == Verdict::Accepted;
+            if self.armed {
+                self.desk.pilot().attitude_setpoint(now, setpoint);
+                // Refused at most because something is lost at this very moment: HOLD is flown.
+                let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
+            }
+        }
+        self.desk.pilot().attitude_setpoint(now, setpoint);
+    }
+
+    /// What the faults do to the sensors and the clock.
+    fn distortion(&mut self, acting: &[Fault], step: u64) -> Distortion {
+        let mut distortion = Distortion::default();
+        for fault in acting {
+            let s = fault.strength;
+            match fault.kind {
+                Kind::Frozen => distortion.frozen = true,
+                // What a tube that has iced up shows: the speed of that moment, or less and less.
+                Kind::Airspeed => distortion.airspeed_mps = Some(8.0 + 20.0 * s),
+                Kind::Alpha => distortion.alpha_rad = 0.5 * (s - 0.5),
+                Kind::NotANumber => distortion.rate_not_a_number = true,
+                Kind::Clock => self.clock_us = (1e7 * s) as i64,
+                Kind::Disk => {
+                    self.disk.iter().for_each(|disk| disk.full.store(true, Ordering::Relaxed));
+                }
+                // Time begins anew.
+                Kind::Reboot => self.clock_us = -(10_000 * step as i64),
+                _ => {}
+            }
+        }
+        distortion.clock_us = self.clock_us;
+        distortion
+    }
+
+    /// A link that is dead hands the aircraft back within half a second.
+    fn watch_link(&mut self, now_s: f64, heard: bool) {
+        let real = matches!(self.aircraft, Aircraft::Real(_));
+        let engaged = match self.desk.vehicle() {
+            Vehicle::Real(session) => session.is_engaged(),
+            Vehicle::Sitl(_) => false,
+        };
+        if heard || !real || !engaged || !self.aircraft.is_steered() {
+            self.dead_since = None;
+            return;
+        }
+        let since = *self.dead_since.get_or_insert(now_s);
+        if now_s - since > HAND_BACK_S {
+            self.judge.note(now_s, Finding::SlowHandBack);
+        }
+    }
+}
+
+impl std::fmt::Display for Case {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "--controller {} --opposite {} --first {} --flights 1",
+            self.controller.name(),
+            self.opposite.name(),
+            self.seed
+        )
+    }
+}

@@ -1,0 +1,146 @@
+//! What is at the other end of the vehicle's link: the shim, or a played flight controller.
+
+use greylag_sitl::plant::{Inputs, PlantOptions, Start, Truth};
+use greylag_sitl::shim::bench::Bench;
+use greylag_sitl::shim::controller::{FlightController, Mode};
+use greylag_sitl::shim::{Distortion, Launch, Noise, Personality, ShimError, ShimOptions};
+
+use crate::link::vehicle::{Authority, Profile, Real, Sitl, Stack, Vehicle};
+use crate::model::GreyBox;
+
+/// What is at the other end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Opposite {
+    /// The simulator's shim.
+    Sitl,
+    /// PX4 by surfaces.
+    Px4,
+    /// PX4 by attitude.
+    Px4Attitude,
+    /// ArduPilot by channels.
+    Ardupilot,
+    /// ArduPilot by attitude.
+    ArdupilotAttitude,
+}
+
+impl Opposite {
+    /// All of them.
+    pub const ALL: [Opposite; 5] = [
+        Opposite::Sitl,
+        Opposite::Px4,
+        Opposite::Px4Attitude,
+        Opposite::Ardupilot,
+        Opposite::ArdupilotAttitude,
+    ];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Opposite::Sitl => "sitl",
+            Opposite::Px4 => "px4",
+            Opposite::Px4Attitude => "px4-attitude",
+            Opposite::Ardupilot => "ardupilot",
+            Opposite::ArdupilotAttitude => "ardupilot-attitude",
+        }
+    }
+
+    fn personality(self) -> Option<(Personality, Authority)> {
+        match self {
+            Opposite::Sitl => None,
+            Opposite::Px4 => Some((Personality::Px4, Authority::Surfaces)),
+            Opposite::Px4Attitude => Some((Personality::Px4, Authority::Attitude)),
+            Opposite::Ardupilot => Some((Personality::Ardupilot, Authority::Surfaces)),
+            Opposite::ArdupilotAttitude => Some((Personality::Ardupilot, Authority::Attitude)),
+        }
+    }
+}
+
+/// The aircraft with what flies it.
+pub(super) enum Aircraft {
+    Sitl(Box<Bench>),
+    Real(Box<FlightController>),
+}
+
+impl Aircraft {
+    pub(super) fn new(opposite: Opposite, seed: u64) -> Result<Self, ShimError> {
+        let mut options = ShimOptions::new(PlantOptions::default(), Start::NEUTRAL);
+        options.seed = seed;
+        options.noise = Noise::REALISTIC;
+        Ok(match opposite.personality() {
+            None => Aircraft::Sitl(Box::new(Bench::new(&options)?)),
+            Some((personality, _)) => {
+                options.launch = Launch::Immediate;
+                Aircraft::Real(Box::new(FlightController::new(personality, &options)?))
+            }
+        })
+    }
+
+    pub(super) fn show(&mut self, distortion: Distortion) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        match self {
+            Aircraft::Sitl(bench) => {
+                bench.distort(distortion);
+                bench.show(&mut bytes);
+            }
+            Aircraft::Real(controller) => {
+                controller.distort(distortion);
+                controller.show(&mut bytes);
+            }
+        }
+        bytes
+    }
+
+    pub(super) fn truth(&self) -> Truth {
+        match self {
+            Aircraft::Sitl(bench) => bench.measured(),
+            Aircraft::Real(controller) => controller.measured(),
+        }
+    }
+
+    /// What the actuators are told.
+    pub(super) fn inputs(&self) -> Inputs {
+        match self {
+            Aircraft::Sitl(bench) => bench.inputs(),
+            Aircraft::Real(controller) => controller.inputs(),
+        }
+    }
+
+    pub(super) fn hear(&mut self, bytes: &[u8]) {
+        match self {
+            Aircraft::Sitl(bench) => bench.hear(bytes),
+            Aircraft::Real(controller) => controller.hear(bytes),
+        }
+    }
+
+    /// Flies a step; `false` when the flight has ended on the ground or outside the numbers.
+    pub(super) fn fly(&mut self) -> bool {
+        let flown = match self {
+            Aircraft::Sitl(bench) => bench.fly(),
+            Aircraft::Real(controller) => controller.fly(),
+        };
+        matches!(flown, Ok(None))
+    }
+
+    /// Whether the companion has the surfaces, or the attitude.
+    pub(super) fn is_steered(&self) -> bool {
+        match self {
+            Aircraft::Sitl(_) => true,
+            Aircraft::Real(c) => matches!(c.mode(), Mode::Manual | Mode::Guided),
+        }
+    }
+}
+
+/// The companion's side of the vehicle's link for `opposite`.
+pub(super) fn vehicle(opposite: Opposite, model: &GreyBox) -> Vehicle {
+    let actuators = model.airframe.actuators;
+    match opposite.personality() {
+        None => Vehicle::Sitl(Sitl::new(1, actuators.deflection_max)),
+        Some((personality, authority)) => {
+            let stack = match personality {
+                Personality::Px4 => Stack::Px4,
+                Personality::Ardupilot => Stack::Ardupilot,
+            };
+            Vehicle::Real(Box::new(Real::new(Profile { stack, authority, actuators })))
+        }
+    }
+}
