@@ -48,7 +48,9 @@ fn values_are_the_returns_flown() {
     for block in 0..unseen.blocks() {
         let mut push = [Block::zero(); ACTIONS];
         push.iter_mut().flat_map(|a| &mut a.0).for_each(|a| *a = rng.random_range(-1.0..1.0));
-        (0..8).for_each(|_| drop(unseen.step(block, &push)));
+        for _ in 0..8 {
+            unseen.step(block, &push);
+        }
         let start = unseen.observe(block);
         let action = actor.act_block(&mut units, &start);
         let said = critics[0].value(&mut units, &start, &action);

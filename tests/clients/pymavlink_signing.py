@@ -80,7 +80,7 @@ def main():
         key.write_text(KEY.hex() + "\n")
         key.chmod(0o600)
         options = ["--sign", str(key), "--local", f"udpin:127.0.0.1:{local}"]
-        with flight.Flight(arguments, [f"udpin:127.0.0.1:{port}"], options) as flown:
+        with flight.Flight(arguments, [f"udpin:127.0.0.1:{port}"], options=options) as flown:
             client = Signed(f"udpout:127.0.0.1:{port}")
             client.arm()
             client.engage(ROLL_DEG, PITCH_DEG)

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use super::schedule::Leg;
+use crate::commands::files;
 use crate::control::Target;
 use crate::logs::csv::{self, Tolerance};
 use crate::logs::{Flight, Sample};
