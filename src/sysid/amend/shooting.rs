@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::flight::{AIRSPEED, Flight, OFFSETS, SENSORS, SKEW};
+use super::flight::{AIRSPEED, BLUR, Flight, OFFSETS, SENSORS, SKEW};
 use crate::model::{GreyBox, Memory};
 use crate::physics::inputs::InputMemory;
 use crate::physics::{Controls, State};
@@ -49,14 +49,24 @@ pub(super) fn cut(flights: &[Flight], length_s: f64) -> Vec<Shot> {
     shots
 }
 
-/// The controls that act in each segment of a flight under `model`, the record being `late` (s).
-pub(super) fn acting(model: &GreyBox, flight: &Prepared, late: f64) -> Vec<Vec<Controls>> {
-    let place = late / flight.dt;
-    flight.segments.iter().map(|segment| act(model, segment, place, flight.substeps)).collect()
+/// The controls that act in each segment of a flight under `model`, the record being late and blurred as
+/// `sensors` say.
+pub(super) fn acting(
+    model: &GreyBox,
+    flight: &Prepared,
+    sensors: &[f64; SENSORS],
+) -> Vec<Vec<Controls>> {
+    let record = [sensors[SKEW] / flight.dt, sensors[BLUR]];
+    flight.segments.iter().map(|segment| act(model, segment, record, flight.substeps)).collect()
 }
 
-fn act(model: &GreyBox, segment: &[Instant], late: f64, substeps: usize) -> Vec<Controls> {
-    let at = |k: usize| if late == 0.0 { segment[k].controls } else { between(segment, k, late) };
+fn act(
+    model: &GreyBox,
+    segment: &[Instant],
+    [late, blur]: [f64; 2],
+    substeps: usize,
+) -> Vec<Controls> {
+    let at = |k: usize| between(segment, k, late, blur);
     let mut memory = InputMemory::at_rest(&at(0));
     let one = |k: usize| {
         let recorded = at(k);
@@ -69,8 +79,8 @@ fn act(model: &GreyBox, segment: &[Instant], late: f64, substeps: usize) -> Vec<
 }
 
 /// The controls `late` samples after sample `k`, by cubic interpolation, whose slope in `late` has no
-/// steps.
-fn between(segment: &[Instant], k: usize, late: f64) -> Controls {
+/// steps, less `blur` times the second difference, which a mean over that time has added.
+fn between(segment: &[Instant], k: usize, late: f64, blur: f64) -> Controls {
     let last = segment.len() as f64 - 1.0;
     let place = (k as f64 + late).clamp(0.0, last);
     let (i, t) = (place.floor() as isize, place.fract());
@@ -79,7 +89,8 @@ fn between(segment: &[Instant], k: usize, late: f64) -> Controls {
     let mix = |of: fn(&Controls) -> f64| {
         let (a, b, c, d) = (of(a), of(b), of(c), of(d));
         let bend = 2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a);
-        b + 0.5 * t * (c - a + t * bend)
+        let second = (1.0 - t) * (a - 2.0 * b + c) + t * (b - 2.0 * c + d);
+        b + 0.5 * t * (c - a + t * bend) - blur * second
     };
     Controls {
         aileron: mix(|z| z.aileron),
