@@ -52,13 +52,28 @@ impl Answer {
         record.asserted = effects.iter().filter(|c| c.asserted).map(id).collect();
         record.refused = effects.first().map_or_else(Vec::new, |c| c.refused.clone());
         let flights = effects.first().map_or(&[][..], |c| &c.by_flight);
-        record.by_flight = flights.iter().map(|f| [f.value, f.sd]).collect();
+        let flights = flights.iter().filter(|f| f.value.is_finite());
+        record.by_flight = flights.map(|f| [f.value, f.sd]).collect();
         record.evidence = effects.iter().take(KEPT).map(|c| [c.evidence, c.threshold]).collect();
         let told = effects.iter().enumerate().filter(|(k, c)| *k == 0 || c.asserted);
         record.alike = told.map(|(_, c)| (id(c), c.indistinguishable_from.clone())).collect();
         let least = |c: &Candidate| Some((c.id.clone(), c.minimum_detectable? * hidden(c)));
         record.minimum_detectable = effects.iter().filter_map(least).collect();
+        record.reached = reached(record);
     }
+}
+
+/// Amplitude as a multiple of what the diagnosis says that these flights would have shown, the smaller one of a
+/// pair; as it was wanted where the diagnosis does not say.
+fn reached(record: &Record) -> f64 {
+    let truth = record.truth.iter().zip(&record.amplitudes);
+    let multiples = truth.filter_map(|(id, amplitude)| {
+        let multiple = amplitude.abs() / record.minimum_detectable.get(id)?;
+        // a slower rate is more of it
+        Some(if id == "rate_limit" { multiple.recip() } else { multiple })
+    });
+    let known = multiples.filter(|m| m.is_finite()).fold(f64::INFINITY, f64::min);
+    if known.is_finite() { known } else { record.reached }
 }
 
 /// Standard deviation of the coefficient that is hidden as a multiple of that of the first one.

@@ -54,9 +54,9 @@ pub struct Record {
     pub truth: Vec<String>,
     /// How much of it.
     pub amplitudes: Vec<f64>,
-    /// The same as a multiple of the minimum detectable amplitude, as wanted.
+    /// The same as a multiple of the median minimum detectable amplitude of the nulls, as wanted.
     pub factor: f64,
-    /// And as it is; of a pair, the smaller one.
+    /// And as a multiple of what the case's own flights would have shown; of a pair, the smaller one.
     pub reached: f64,
     /// Why there is no answer, if there is none.
     pub failure: Option<String>,

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::cells::{Cells, Placed};
 use super::columns::combine;
 use super::noise::Noise;
-use super::projected::{Projected, scaled_inverse};
+use super::projected::{Known, Projected, scaled_inverse};
 use super::rank::{Draw, Point, Score, Trial, quadratic};
 use super::round::Round;
 use crate::num::stream::stream;
@@ -158,8 +158,10 @@ pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) ->
     wins as f64 / count.max(1) as f64
 }
 
-/// The first free coefficient as each flight alone has it, prior and sensors fitted anew, with its standard
-/// deviation; NaN where a flight does not tell.
+/// The first free coefficient as each flight has it, with its standard deviation; NaN where a flight does not
+/// tell. Sensors are each flight's own and fitted anew; the other coefficients are the aircraft's, and known
+/// as well as all flights together know them. A flight that hardly rolls cannot find them again: its balance
+/// of small moments holds as well with all of them too small, and noise in the columns has it so.
 pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<[f64; 2]> {
     (0..round.flights.len())
         .map(|flight| one_flight(round, trial, score, flight).unwrap_or([f64::NAN; 2]))
@@ -185,7 +187,8 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let mut with_residual = placed.clone();
     let residual = round.placed[flight].iter().find(|(p, _)| *p == round.last)?;
     with_residual[flight].push((last, residual.1.clone()));
-    let p = Projected::new(&cells, &with_residual, last, &round.known, &noise, &shared)?;
+    let known = together(round, score);
+    let p = Projected::new(&cells, &with_residual, last, &known, &noise, &shared)?;
     let free = point.free.iter().enumerate().map(|(k, f)| (f.0, k, f.2)).collect();
     let contribution = point.contribution.map(|_| point.free.len());
     let first = point.free[0].0;
@@ -208,6 +211,20 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let share = all[(0, 0)] / left[(0, 0)];
     let amounts = &left * grams.total.view((0, n), (n, 1)).column(0);
     (share > TOLD).then(|| [amounts[0], sd / share])
+}
+
+/// The known unknowns with the model's coefficients as all flights have them together with `score`'s effect.
+fn together(round: &Round, score: &Score) -> Vec<Known> {
+    let p = &round.projected;
+    let mut all = round.known.clone();
+    for (k, known) in all.iter_mut().take(round.coefficients.len()).enumerate() {
+        let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
+        // relative to all of the effect, as sure as its evidence
+        let astray = given.powi(2) / score.wald.max(1.0);
+        known.offset = p.tuned[k] - given;
+        known.width = (p.covariance[(k, k)].max(0.0) + astray).sqrt().min(known.width);
+    }
+    all
 }
 
 /// The known columns of one flight and the candidate columns `columns`, numbered anew; the other flights have

@@ -6,8 +6,8 @@
 
 use super::columns::SENSORS;
 use super::round::{Problem, Round};
-pub use super::sensors::BLURRED;
 use super::sensors;
+pub use super::sensors::BLURRED;
 use super::shared::{self, PathError};
 use crate::model::GreyBox;
 use crate::sysid::compare::flight::Prepared;
@@ -55,7 +55,8 @@ pub fn clocks(model: &GreyBox, given: usize, flights: &[(&Prepared, &Doubt)]) ->
         round = Round::new(&problem, round.tuned(), &[])?;
     }
     let p = &round.projected;
-    let clocks = round.known.iter().enumerate().filter(|(_, known)| known.name.starts_with(sensors::LATE));
+    let clocks =
+        round.known.iter().enumerate().filter(|(_, known)| known.name.starts_with(sensors::LATE));
     let late = clocks.map(|(k, _)| [p.tuned[k], p.covariance[(k, k)].max(0.0).sqrt()]).collect();
     Some(Clocks { model: round.tuned(), late })
 }

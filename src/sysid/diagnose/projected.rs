@@ -139,12 +139,7 @@ impl Projected {
 
     /// The Gram matrix that other columns in the places of these would have: of the candidates, less what they
     /// take from the known unknowns; `whiteners` by channel.
-    pub fn others(
-        &self,
-        cells: &Cells,
-        placed: &[Placed],
-        whiteners: &[Whitener],
-    ) -> DMatrix<f64> {
+    pub fn others(&self, cells: &Cells, placed: &[Placed], whiteners: &[Whitener]) -> DMatrix<f64> {
         let (na, ny) = (self.taken.nrows(), self.taken.ncols());
         let mut gram = DMatrix::zeros(ny, ny);
         for cell in &cells.list {
