@@ -50,10 +50,35 @@ impl Answer {
         record.verdict = format!("{:?}", self.said.verdict).to_lowercase();
         record.ranked = effects.iter().take(KEPT).map(id).collect();
         record.asserted = effects.iter().filter(|c| c.asserted).map(id).collect();
+        record.refused = effects.first().map_or_else(Vec::new, |c| c.refused.clone());
+        let flights = effects.first().map_or(&[][..], |c| &c.by_flight);
+        let flights = flights.iter().filter(|f| f.value.is_finite());
+        record.by_flight = flights.map(|f| [f.value, f.sd]).collect();
         record.evidence = effects.iter().take(KEPT).map(|c| [c.evidence, c.threshold]).collect();
         let told = effects.iter().enumerate().filter(|(k, c)| *k == 0 || c.asserted);
         record.alike = told.map(|(_, c)| (id(c), c.indistinguishable_from.clone())).collect();
-        let least = |c: &Candidate| Some((c.id.clone(), c.minimum_detectable?));
+        let least = |c: &Candidate| Some((c.id.clone(), c.minimum_detectable? * hidden(c)));
         record.minimum_detectable = effects.iter().filter_map(least).collect();
+        record.reached = reached(record);
     }
+}
+
+/// Amplitude as a multiple of what the diagnosis says that these flights would have shown, the smaller one of a
+/// pair; as it was wanted where the diagnosis does not say.
+fn reached(record: &Record) -> f64 {
+    let truth = record.truth.iter().zip(&record.amplitudes);
+    let multiples = truth.filter_map(|(id, amplitude)| {
+        let multiple = amplitude.abs() / record.minimum_detectable.get(id)?;
+        // a slower rate is more of it
+        Some(if id == "rate_limit" { multiple.recip() } else { multiple })
+    });
+    let known = multiples.filter(|m| m.is_finite()).fold(f64::INFINITY, f64::min);
+    if known.is_finite() { known } else { record.reached }
+}
+
+/// Standard deviation of the coefficient that is hidden as a multiple of that of the first one.
+fn hidden(c: &Candidate) -> f64 {
+    let place = if c.id == "drag_beta2" { 1 } else { 0 };
+    let width = |k: usize| c.parameters.get(k).map_or(f64::NAN, |p| p.ci95[1] - p.ci95[0]);
+    if place == 0 { 1.0 } else { width(place) / width(0) }
 }

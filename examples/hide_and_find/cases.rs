@@ -21,12 +21,14 @@ const ASSUMED: f64 = 0.1;
 /// One case.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// `nulls`, `effects`, `without` or `pairs`.
+    /// `nulls`, `probes`, `effects`, `without` or `pairs`.
     pub part: &'static str,
     /// What is missing.
     pub missing: Vec<Missing>,
-    /// Amplitude as a multiple of the minimum detectable one; 0 for nulls.
+    /// Amplitude as a multiple of the minimum detectable one, as wanted; 0 for nulls.
     pub factor: f64,
+    /// The same as it is: what cannot be flown is made smaller, and a delay is a whole number of steps.
+    pub reached: f64,
     /// Ids that the catalogue is robbed of.
     pub without: Vec<String>,
     /// What everything is drawn from.
@@ -47,14 +49,14 @@ impl Case {
     }
 }
 
-/// The minimum detectable amplitude of each effect: the median over the nulls.
+/// The minimum detectable amplitude of each effect: the median over nulls and probes.
 pub struct Seen(BTreeMap<String, f64>);
 
 impl Seen {
-    /// What the nulls among `records` say.
+    /// What the nulls and probes among `records` say.
     pub fn of(records: &[Record]) -> Seen {
         let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-        for record in records.iter().filter(|r| r.part == "nulls") {
+        for record in records.iter().filter(|r| r.part == "nulls" || r.part == "probes") {
             for (id, least) in &record.minimum_detectable {
                 all.entry(id.clone()).or_default().push(*least);
             }
@@ -62,60 +64,85 @@ impl Seen {
         Seen(all.into_iter().map(|(id, least)| (id, quantile(&least, 0.5))).collect())
     }
 
-    /// The amplitude of `factor` times the minimum detectable one, its sign drawn where it may have
-    /// either.
-    fn amplitude(&self, kind: &Kind, factor: f64, seed: u64) -> f64 {
+    /// The amplitude of `factor` times the minimum detectable one, as far as it can be flown, and what
+    /// multiple that is; its sign drawn where it may have either.
+    fn amplitude(&self, kind: &Kind, factor: f64, seed: u64) -> (f64, f64) {
         let [low, high] = kind.clear;
         let (largest, sign) = (low.abs().max(high.abs()), (low + high).signum());
         let least = self.0.get(kind.id).copied().filter(|x| x.is_finite() && *x > 0.0);
-        let size = match kind.id {
+        let (size, least) = match kind.id {
             // it cannot be hidden in part
-            "lift_stall" => return 1.0,
+            "lift_stall" => return (1.0, factor),
             // a slower rate is more of it
-            "rate_limit" => least.unwrap_or(largest / ASSUMED.sqrt()) / factor,
-            _ => factor * least.unwrap_or(ASSUMED * largest),
+            "rate_limit" => {
+                let least = least.unwrap_or(largest / ASSUMED.sqrt());
+                ((least / factor).max(kind.most()), least)
+            }
+            _ => {
+                let least = least.unwrap_or(ASSUMED * largest);
+                ((factor * least).min(kind.most()), least)
+            }
         };
         let flip = kind.either_sign && stream(seed, &[83]).random::<bool>();
-        kind.allowed(if flip { -sign * size } else { sign * size })
+        let amplitude = kind.allowed(if flip { -sign * size } else { sign * size });
+        let multiple = amplitude.abs() / least;
+        (amplitude, if kind.id == "rate_limit" { multiple.recip() } else { multiple })
     }
 
-    fn missing(&self, kind: &Kind, factor: f64, seed: u64) -> Option<Missing> {
-        Missing::new(kind.id, self.amplitude(kind, factor, seed)).ok()
+    /// The effect with the multiple of its minimum detectable amplitude that it has.
+    fn missing(&self, kind: &Kind, factor: f64, seed: u64) -> Option<(Missing, f64)> {
+        let (amplitude, reached) = self.amplitude(kind, factor, seed);
+        Some((Missing::new(kind.id, amplitude).ok()?, reached))
     }
 }
 
-/// Flights on which nothing is missing. In every other one aircraft and model both lack what the
-/// aircraft has of its own, so that all effects are candidates in some.
+/// Flights on which nothing is missing. In every other one aircraft and model both lack an effect that the
+/// aircraft has of its own, so that it is a candidate in some.
 pub fn nulls(seeds: Range<u64>) -> Vec<Case> {
     let absent = |id: &str| Missing::new(id, 0.0).ok();
-    let case = |seed: u64| Case {
-        part: "nulls",
-        missing: if seed.is_multiple_of(2) {
-            Vec::new()
-        } else {
-            ["drag_beta2", "drag_elevator_abs"].iter().filter_map(|id| absent(id)).collect()
-        },
-        factor: 0.0,
-        without: Vec::new(),
-        seed,
-    };
-    seeds.map(case).collect()
+    seeds
+        .map(|seed| {
+            let even = seed.is_multiple_of(2);
+            nothing("nulls", seed, if even { None } else { absent("drag_elevator_abs") })
+        })
+        .collect()
 }
 
-/// Each effect at each amplitude.
-pub fn effects(seeds: Range<u64>, seen: &Seen, wanted: impl Fn(&str) -> bool) -> Vec<Case> {
+/// Flights that tell how much of `drag_beta2` could have been seen. They are no nulls: the part of it that
+/// goes with |β| cannot be taken from the aircraft.
+pub fn probes(seeds: Range<u64>) -> Vec<Case> {
+    let absent = || Missing::new("drag_beta2", 0.0).ok();
+    seeds.map(|seed| nothing("probes", seed, absent())).collect()
+}
+
+fn nothing(part: &'static str, seed: u64, absent: Option<Missing>) -> Case {
+    let missing = absent.into_iter().collect();
+    Case { part, missing, factor: 0.0, reached: 0.0, without: Vec::new(), seed }
+}
+
+/// Each effect at each of the amplitudes `factors`.
+pub fn effects(
+    seeds: Range<u64>,
+    factors: &[f64],
+    seen: &Seen,
+    wanted: impl Fn(&str) -> bool,
+) -> Vec<Case> {
+    let mut factors = factors.to_vec();
+    factors.sort_by(|a, b| b.total_cmp(a));
     let mut all = Vec::new();
     for seed in seeds {
         for kind in KINDS.iter().filter(|kind| wanted(kind.id)) {
-            let factors = if kind.id == "lift_stall" { &FACTORS[2..] } else { &FACTORS };
-            for &factor in factors {
-                all.extend(seen.missing(kind, factor, seed).map(|missing| Case {
-                    part: "effects",
-                    missing: vec![missing],
-                    factor,
-                    without: Vec::new(),
-                    seed,
-                }));
+            // the largest first, so that what cannot be larger counts once, under the largest factor
+            let mut flown: Vec<f64> = Vec::new();
+            for &factor in &factors {
+                let Some((missing, reached)) = seen.missing(kind, factor, seed) else { continue };
+                if flown.contains(&missing.amplitude) {
+                    continue;
+                }
+                flown.push(missing.amplitude);
+                let missing = vec![missing];
+                let without = Vec::new();
+                all.push(Case { part: "effects", missing, factor, reached, without, seed });
             }
         }
     }
@@ -124,9 +151,8 @@ pub fn effects(seeds: Range<u64>, seen: &Seen, wanted: impl Fn(&str) -> bool) ->
 
 /// Each effect, clear to see, with a catalogue that does not have it.
 pub fn without(seeds: Range<u64>, seen: &Seen, wanted: impl Fn(&str) -> bool) -> Vec<Case> {
-    let clear = |case: &Case| case.factor == CLEAR;
     let robbed = |case: Case| Case { part: "without", without: case.truth(), ..case };
-    effects(seeds, seen, wanted).into_iter().filter(clear).map(robbed).collect()
+    effects(seeds, &[CLEAR], seen, wanted).into_iter().map(robbed).collect()
 }
 
 /// Pairs of effects, as many a seed as there are effects, each with another drawn from the seed.
@@ -141,7 +167,8 @@ pub fn pairs(seeds: Range<u64>, seen: &Seen, wanted: impl Fn(&str) -> bool) -> V
             if let [Some(a), Some(b)] = both {
                 all.push(Case {
                     part: "pairs",
-                    missing: vec![a, b],
+                    reached: a.1.min(b.1),
+                    missing: vec![a.0, b.0],
                     factor: CLEAR,
                     without: Vec::new(),
                     seed,

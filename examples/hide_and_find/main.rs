@@ -33,6 +33,9 @@ use cases::{Case, Seen};
 use record::Record;
 use search::Bench;
 
+/// Flights that are flown to see how much of an effect could be seen.
+const PROBES: u64 = 8;
+
 /// Hides effects in JSBSim, looks for them, and prints the table.
 #[derive(Parser)]
 struct Arguments {
@@ -45,6 +48,12 @@ struct Arguments {
     /// Null flights.
     #[arg(long, default_value_t = 100)]
     nulls: u64,
+    /// Seed of the first null flight and of the first that tells what could have been seen.
+    #[arg(long, default_value_t = 0)]
+    null_seed: u64,
+    /// Amplitudes of single effects, as multiples of the minimum detectable one.
+    #[arg(long, num_args = 1.., default_values_t = cases::FACTORS)]
+    factors: Vec<f64>,
     /// Nulls that each diagnosis simulates, in place of the usual number.
     #[arg(long)]
     simulated_nulls: Option<usize>,
@@ -68,6 +77,7 @@ struct Arguments {
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
     Nulls,
+    Probes,
     Effects,
     Without,
     Pairs,
@@ -94,7 +104,9 @@ fn main() -> Result<()> {
     if !arguments.table {
         let bench = Bench::new(arguments.simulated_nulls)?;
         // amplitudes of the other parts hang on what the nulls could have seen
-        for parts in [[Part::Nulls].as_slice(), &[Part::Effects, Part::Without, Part::Pairs]] {
+        for parts in
+            [[Part::Nulls, Part::Probes].as_slice(), &[Part::Effects, Part::Without, Part::Pairs]]
+        {
             let done = record::load(&arguments.results)?;
             let seen = Seen::of(&done);
             let mut cases: Vec<Case> =
@@ -109,16 +121,19 @@ fn main() -> Result<()> {
 
 /// The cases of a part of the campaign, if it is asked for.
 fn list(arguments: &Arguments, part: Part, seen: &Seen) -> Vec<Case> {
-    if arguments.part != part && arguments.part != Part::All {
+    // probes go with nulls
+    let asked = if part == Part::Probes { Part::Nulls } else { part };
+    if arguments.part != asked && arguments.part != Part::All {
         return Vec::new();
     }
     let wanted =
         |id: &str| arguments.effects.is_empty() || arguments.effects.iter().any(|e| e == id);
-    let seeds = arguments.seeds.0..arguments.seeds.1;
+    let (seeds, first) = (arguments.seeds.0..arguments.seeds.1, arguments.null_seed);
     match part {
         // the nulls' seeds are apart from all others
-        Part::Nulls => cases::nulls(0..arguments.nulls),
-        Part::Effects => cases::effects(seeds, seen, wanted),
+        Part::Nulls => cases::nulls(first..first + arguments.nulls),
+        Part::Probes => cases::probes(first..first + PROBES),
+        Part::Effects => cases::effects(seeds, &arguments.factors, seen, wanted),
         Part::Without => cases::without(seeds, seen, wanted),
         Part::Pairs => cases::pairs(seeds, seen, wanted),
         Part::All => Vec::new(),

@@ -48,14 +48,16 @@ pub struct Seconds {
 pub struct Record {
     /// The case's name.
     pub key: String,
-    /// `nulls`, `effects`, `without` or `pairs`.
+    /// `nulls`, `probes`, `effects`, `without` or `pairs`.
     pub part: String,
     /// What was missing.
     pub truth: Vec<String>,
     /// How much of it.
     pub amplitudes: Vec<f64>,
-    /// The same as a multiple of the minimum detectable amplitude.
+    /// The same as a multiple of the median minimum detectable amplitude of the nulls, as wanted.
     pub factor: f64,
+    /// And as a multiple of what the case's own flights would have shown; of a pair, the smaller one.
+    pub reached: f64,
     /// Why there is no answer, if there is none.
     pub failure: Option<String>,
     /// The answer in one word.
@@ -66,13 +68,22 @@ pub struct Record {
     pub asserted: Vec<String>,
     /// For each of those, and for the first, what cannot be told from it.
     pub alike: BTreeMap<String, Vec<String>>,
+    /// Why the first is not asserted; empty if it is.
+    #[serde(default)]
+    pub refused: Vec<String>,
+    /// First coefficient of the first candidate as each flight has it, with standard deviation.
+    #[serde(default)]
+    pub by_flight: Vec<[f64; 2]>,
     /// Evidence and threshold of the first ten.
     pub evidence: Vec<[f64; 2]>,
     /// Smallest amplitude of each candidate that would have shown.
     pub minimum_detectable: BTreeMap<String, f64>,
     /// Parameters of true effects that were asserted.
     pub parameters: Vec<Found>,
-    /// Errors on held-out flights.
+    /// Effects that could not be fitted, with the reason.
+    #[serde(default)]
+    pub unfitted: Vec<String>,
+    /// Errors on held-out flights; none if the truth could not be fitted.
     pub held_out: Option<HeldOut>,
     /// How long it took.
     pub seconds: Seconds,
@@ -87,6 +98,7 @@ impl Record {
             truth: case.truth(),
             amplitudes: case.missing.iter().map(|m| m.amplitude).collect(),
             factor: case.factor,
+            reached: case.reached,
             ..Record::default()
         }
     }

@@ -73,7 +73,7 @@ impl Bench {
         let model = load(&text.map_err(|why| anyhow!("making the model: {why}"))?)?;
         let trial = Trial { seed: *seed, missing: missing.clone(), turbulence: None };
         let logs = trial.fly(self.controller.as_ref())?;
-        let testing = if case.part == "nulls" { &[][..] } else { &logs.testing };
+        let testing = if case.factor == 0.0 { &[][..] } else { &logs.testing };
         let all = |logs: &[Log]| logs.iter().map(|log| rebuilt(log, &model)).collect::<Result<_>>();
         let (training, testing) = (all(&logs.training)?, all(testing)?);
         Ok(Flown { model, training, testing, seconds: begun.elapsed().as_secs_f64() })
@@ -104,7 +104,7 @@ fn fill(record: &mut Record, case: &Case, flown: &Flown, bench: &Bench) -> Resul
     let answer = ask(&flown.model, &flown.training, case, bench.nulls)?;
     record.seconds.diagnose = begun.elapsed().as_secs_f64();
     answer.write_into(record);
-    if case.part == "nulls" {
+    if case.factor == 0.0 {
         return Ok(());
     }
     let begun = Instant::now();
@@ -133,16 +133,19 @@ fn judge(record: &mut Record, case: &Case, flown: &Flown, answer: &Answer) -> Re
     starts.extend(answer.values.clone());
     for ids in [Vec::new(), truth.clone(), record.asserted.clone()] {
         if let Entry::Vacant(place) = fits.entry(sorted(ids)) {
-            let names = place.key().join(", ");
-            let fit = fit(&flown.model, place.key(), &starts, &flights);
-            place.insert(fit.with_context(|| format!("fitting with {names}"))?);
+            match fit(&flown.model, place.key(), &starts, &flights) {
+                Ok(fit) => drop(place.insert(fit)),
+                Err(why) => record.unfitted.push(format!("{}: {why:#}", place.key().join(", "))),
+            }
         }
     }
+    // an effect that cannot be fitted stays out of the model, as `amend` leaves it out
     let error = |ids: &[String]| {
-        let fit = fits.get(&sorted(ids.to_vec()));
-        fit.map_or(f64::NAN, |fit| held_out::error(&fit.model, &testing))
+        let fit = fits.get(&sorted(ids.to_vec())).or_else(|| fits.get(&Vec::new()));
+        held_out::error(fit.map_or(&flown.model, |fit| &fit.model), &testing)
     };
-    record.held_out = Some(HeldOut {
+    // without the truth's own fit there is nothing to compare with
+    record.held_out = fits.contains_key(&sorted(truth.clone())).then(|| HeldOut {
         tuned: error(&[]),
         amended: error(&record.asserted),
         oracle: error(&truth),

@@ -1,5 +1,7 @@
 //! The table of the campaign: what must be reached, what is aimed at, what was.
 
+use std::collections::BTreeMap;
+
 use comfy_table::{CellAlignment, Table};
 use greylag::num::statistics::quantile;
 
@@ -19,6 +21,7 @@ pub fn render(records: &[Record]) -> String {
         .iter()
         .filter_map(|r| Some(format!("{}: {}", r.key, r.failure.as_ref()?)))
         .collect();
+    out += &never_clear(records);
     reasons.truncate(20);
     reasons.iter().for_each(|reason| out += &format!("  {reason}\n"));
     let seconds: Vec<f64> = records.iter().map(|r| total(&r.seconds)).collect();
@@ -65,13 +68,15 @@ fn two(values: impl Iterator<Item = f64>, other: f64, unit: f64, places: usize) 
 }
 
 fn summary(records: &[Record]) -> Table {
-    // a case without an answer is not left out: it counts as not found
+    // a case without an answer is not left out: it counts as not found; one whose effect its flights hardly
+    // show is, by what the diagnosis itself says that they would show
     let part = |name: &'static str| move |r: &&Record| r.part == name;
     let effects: Vec<&Record> = records.iter().filter(part("effects")).collect();
-    let clear: Vec<&Record> = effects.iter().copied().filter(|r| r.factor >= EXPECTED).collect();
+    let visible = |r: &&Record| r.reached >= EXPECTED;
+    let clear: Vec<&Record> = effects.iter().copied().filter(visible).collect();
     let nulls: Vec<&Record> = records.iter().filter(part("nulls")).collect();
-    let robbed: Vec<&Record> = records.iter().filter(part("without")).collect();
-    let pairs: Vec<&Record> = records.iter().filter(part("pairs")).collect();
+    let robbed: Vec<&Record> = records.iter().filter(part("without")).filter(visible).collect();
+    let pairs: Vec<&Record> = records.iter().filter(part("pairs")).filter(visible).collect();
     let found = clear.iter().flat_map(|r| &r.parameters);
     let wrong_by = found.clone().map(|p| ((p.value - p.truth) / p.truth).abs());
     let covered = found.clone().filter(|p| (p.ci95[0]..=p.ci95[1]).contains(&p.truth)).count();
@@ -107,13 +112,13 @@ fn summary(records: &[Record]) -> Table {
         share(effects.iter().copied(), wrong),
     );
     row(
-        "abstains, truth not in the catalogue",
+        "abstains, truth (≥ 3 × minimum detectable) not in the catalogue",
         "80 %",
         "90 %",
         share(robbed, |r| r.failure.is_none() && r.asserted.is_empty()),
     );
     row(
-        "both of a pair found",
+        "both of a pair found (both ≥ 3 × minimum detectable)",
         "70 %",
         "85 %",
         share(pairs, |r| r.truth.iter().all(|id| r.names(id))),
@@ -147,6 +152,27 @@ fn summary(records: &[Record]) -> Table {
         two(special, 1.0, 1.0, 2),
     );
     table
+}
+
+/// Effects that cannot be flown at an amplitude at which they ought to be found, with what is reached.
+fn never_clear(records: &[Record]) -> String {
+    let mut most: BTreeMap<&str, f64> = BTreeMap::new();
+    for r in records.iter().filter(|r| r.part == "effects") {
+        if let Some(id) = r.truth.first() {
+            let best = most.entry(id).or_default();
+            *best = best.max(r.reached);
+        }
+    }
+    let few = most.iter().filter(|(_, reached)| **reached < EXPECTED);
+    let few: Vec<String> = few.map(|(id, reached)| format!("{id} {reached:.1}")).collect();
+    if few.is_empty() {
+        return String::new();
+    }
+    format!(
+        "not identifiable at what can be flown, beside sensors, clocks and the prior's widths (largest \
+         multiple of the minimum detectable): {}\n",
+        few.join(", ")
+    )
 }
 
 /// Whether the truth is ranked first.
@@ -197,15 +223,18 @@ fn by_effect(records: &[Record]) -> Table {
             if all.is_empty() { "–".into() } else { format!("{yes}/{}", all.len()) }
         };
         let all = effects.iter().filter(|r| r.truth.first() == Some(id));
-        let clear = all.clone().filter(|r| r.factor >= EXPECTED);
+        let clear = all.clone().filter(|r| r.reached >= EXPECTED);
         let errors = clear.clone().flat_map(|r| &r.parameters);
         let errors = errors.map(|p| ((p.value - p.truth) / p.truth).abs());
         let ratio = clear.clone().filter_map(|r| r.held_out.as_ref()).map(|h| h.amended / h.oracle);
         let amplitude =
-            own(1.0).chain(own(5.0)).next().and_then(|r| Some((r.factor, *r.amplitudes.first()?)));
+            own(1.0).chain(own(5.0)).next().and_then(|r| Some((r.reached, *r.amplitudes.first()?)));
         table.add_row([
             id.clone(),
-            amplitude.map_or("–".into(), |(factor, a)| format!("{:.3e}", a.abs() / factor)),
+            amplitude.map_or("–".into(), |(reached, a)| match id.as_str() {
+                "rate_limit" => format!("{:.3e}", a.abs() * reached),
+                _ => format!("{:.3e}", a.abs() / reached),
+            }),
             rate(1.0),
             rate(2.0),
             rate(5.0),

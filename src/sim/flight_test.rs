@@ -10,7 +10,7 @@ use crate::sim::{Environment, Simulator, Trouble};
 /// Factor by which a schedule is made gentler when an aircraft does not stay inside its bounds.
 const GENTLER: f64 = 0.75;
 /// Schedules tried before an aircraft is taken for one that cannot be flown.
-const TRIES: usize = 4;
+const TRIES: usize = 7;
 
 /// A flight as it was: the truth and the command of every step of 0.01 s.
 #[derive(Clone, Debug)]

@@ -81,6 +81,20 @@ impl Kind {
         self.allowed(rounded(signed))
     }
 
+    /// The size of the largest amplitude with which the aircraft is still flown as it is asked to; for a limit
+    /// to the rate, the lowest.
+    pub fn most(&self) -> f64 {
+        let largest = self.clear[0].abs().max(self.clear[1].abs());
+        match self.id {
+            "rate_limit" => self.clear[0],
+            // beyond it, the inertia is not that of a body
+            "inertia_xz" => largest,
+            // −29 N would be all the thrust there is
+            "thrust_scale" | "mass_error" => 2.0 * largest,
+            _ => 3.0 * largest,
+        }
+    }
+
     /// The nearest amplitude that can be hidden: a delay is a whole number of steps.
     pub fn allowed(&self, amplitude: f64) -> f64 {
         if self.id == "time_delay" {
@@ -196,5 +210,14 @@ mod tests {
         assert!((side.hidden.unwrap().amplitude() - 0.3522).abs() < 1e-12);
         assert_eq!(Missing::new("time_delay", 0.0234).unwrap().amplitude, 0.02);
         assert!(Missing::new("flutter", 1.0).unwrap_err().to_string().contains("dead_zone"));
+    }
+
+    #[test]
+    fn clear_amplitudes_can_be_flown() {
+        for kind in KINDS.iter().filter(|kind| kind.id != "rate_limit") {
+            assert!(kind.clear.iter().all(|x| x.abs() <= kind.most()), "{}", kind.id);
+        }
+        let limit = Kind::from_id("rate_limit").unwrap();
+        assert!(limit.clear.iter().all(|x| *x >= limit.most()));
     }
 }

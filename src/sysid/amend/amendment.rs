@@ -205,6 +205,7 @@ impl Judge<'_> {
         };
         let after = self.scores(&fit.model);
         effect.refused = objections(&added.id, &fit.parameters);
+        effect.refused.extend(fit.unsettled.clone());
         if let (Some(a), Some(b)) = (judged(&after), judged(before))
             && (a.is_nan() || a >= (1.0 - IMPROVED) * b)
         {

@@ -2,17 +2,24 @@
 
 use crate::sysid::compare::CompareError;
 use crate::sysid::compare::flight::Prepared;
+use crate::sysid::diagnose::clocks::{BLURRED, Doubt};
 use crate::sysid::reconstruction::Reconstruction;
 
 /// Constants of a flight's sensors that are estimated along.
-pub(super) const SENSORS: usize = 7;
+pub(super) const SENSORS: usize = 8;
 /// Place of the actuators' delay among them, s.
 pub(super) const SKEW: usize = 0;
-/// The state that each of the others offsets; the airspeed's is a share of it.
-pub(super) const OFFSETS: [usize; SENSORS - 1] = [2, 3, 4, 5, 6, 7];
+/// The state that each of those behind it offsets; the airspeed's is a share of it.
+pub(super) const OFFSETS: [usize; SENSORS - 2] = [2, 3, 4, 5, 6, 7];
+/// Place of the actuators' blur behind those: half the variance, in squared samples, of the time over which a
+/// recorded deflection is a mean.
+pub(super) const BLUR: usize = SENSORS - 1;
 /// The airspeed among the eight states.
 pub(super) const AIRSPEED: usize = 2;
 
+/// Least standard deviation of the actuators' clock as forces tell it, s (0.3 ms root mean square against the
+/// truth of simulated flights).
+pub(super) const SKEW_LEAST: f64 = 5e-4;
 /// Standard deviation of the actuators' clock against the gyros', s: that of ±1.5 samples, both of
 /// them late by 0 to 10 ms or the like.
 const SKEW_SD: f64 = 7.7e-3;
@@ -28,9 +35,11 @@ const NAMES: [&str; 6] =
 pub struct Flight {
     /// The flight on the models' clock, its deflections as recorded.
     pub prepared: Prepared,
-    /// Standard deviations of the actuators' delay (s), the airspeed's scale (a share), the biases of
-    /// p, q, r (rad/s), α and β (rad) that the reconstruction has left.
-    pub doubt: [f64; SENSORS],
+    /// Means and standard deviations of the actuators' delay (s), the airspeed's scale (a share), the biases
+    /// of p, q, r (rad/s), α and β (rad) that the reconstruction has left, and of the actuators' blur.
+    pub doubt: [[f64; 2]; SENSORS],
+    /// What forces and moments are judged by.
+    pub(super) forces: Doubt,
 }
 
 impl Flight {
@@ -39,13 +48,16 @@ impl Flight {
     /// # Errors
     /// [`CompareError::Clock`] if it has no clock.
     pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Flight, CompareError> {
-        let mut doubt = [SKEW_SD; SENSORS];
+        let mut doubt = [[0.0, SKEW_SD]; SENSORS];
+        doubt[BLUR] = BLURRED;
         for (k, (name, default)) in NAMES.iter().zip(DOUBT).enumerate() {
             let stated = flight.nuisances.iter().find(|n| n.name == *name).map(|n| n.sd);
             let stated = stated.filter(|sd| sd.is_finite() && *sd > 0.0);
-            doubt[k + 1] = stated.unwrap_or(default).clamp(0.1 * default, 20.0 * default);
+            doubt[k + 1][1] = stated.unwrap_or(default).clamp(0.1 * default, 20.0 * default);
         }
-        Ok(Flight { prepared: Prepared::new(flight, slowest)?, doubt })
+        let prepared = Prepared::new(flight, slowest)?;
+        let forces = Doubt::of(flight, prepared.dt);
+        Ok(Flight { prepared, doubt, forces })
     }
 
     /// Seconds flown.

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::flight::{AIRSPEED, Flight, OFFSETS, SENSORS, SKEW};
+use super::flight::{AIRSPEED, BLUR, Flight, OFFSETS, SENSORS, SKEW};
 use super::parameters::{self, Free};
 use super::shooting::{self, Shot};
 use crate::model::GreyBox;
@@ -13,6 +13,9 @@ const STATE_STEP: [f64; 8] = [1e-5, 1e-5, 1e-3, 1e-4, 1e-4, 1e-4, 1e-5, 1e-5];
 /// Step of the derivative in the actuators' delay, s: half a sample, over which interpolation is
 /// smooth.
 const SKEW_STEP: f64 = 5e-3;
+
+/// The same in their blur, squared samples.
+const BLUR_STEP: f64 = 0.05;
 
 /// Where the search stands.
 #[derive(Clone, Debug)]
@@ -59,12 +62,21 @@ pub(super) struct Neighbourhood {
     pub acting: Acting,
     variants: Vec<Variant>,
     late: [Acting; 2],
+    blurred: [Acting; 2],
 }
 
 /// What acts in every flight under `model`.
-pub(super) fn acting(model: &GreyBox, flights: &[Flight], place: &Place, later: f64) -> Acting {
-    let one =
-        |(f, s): (&Flight, &[f64; SENSORS])| shooting::acting(model, &f.prepared, s[SKEW] + later);
+pub(super) fn acting(model: &GreyBox, flights: &[Flight], place: &Place) -> Acting {
+    moved(model, flights, place, SKEW, 0.0)
+}
+
+/// The same with the sensors' constant `which` greater `by` so much.
+fn moved(model: &GreyBox, flights: &[Flight], place: &Place, which: usize, by: f64) -> Acting {
+    let one = |(f, s): (&Flight, &[f64; SENSORS])| {
+        let mut s = *s;
+        s[which] += by;
+        shooting::acting(model, &f.prepared, &s)
+    };
     flights.iter().zip(&place.sensors).map(one).collect()
 }
 
@@ -75,15 +87,16 @@ impl Neighbourhood {
         let variant = |k: usize| {
             let (low, high, between) = parameters::beside(base, free, &place.theta, k);
             let side = |model: GreyBox| {
-                let acting = free[k].input.then(|| acting(&model, flights, place, 0.0));
+                let acting = free[k].input.then(|| acting(&model, flights, place));
                 Side { model, acting }
             };
             Variant { low: low.map(side), high: side(high), between }
         };
         Neighbourhood {
-            acting: acting(&model, flights, place, 0.0),
+            acting: acting(&model, flights, place),
             variants: (0..free.len()).map(variant).collect(),
-            late: [-SKEW_STEP, SKEW_STEP].map(|by| acting(&model, flights, place, by)),
+            late: [-SKEW_STEP, SKEW_STEP].map(|by| moved(&model, flights, place, SKEW, by)),
+            blurred: [-BLUR_STEP, BLUR_STEP].map(|by| moved(&model, flights, place, BLUR, by)),
             model,
         }
     }
@@ -162,8 +175,12 @@ pub(super) fn jacobian(
         let low = v.low.as_ref().map(side);
         fill(column, low.as_ref().unwrap_or(&here), &side(&v.high), v.between);
     }
-    let [low, high] = [0, 1].map(|side| fly(&around.model, &around.late[side], from));
-    fill(count + SKEW, &low, &high, 2.0 * SKEW_STEP);
+    for (which, sides, step) in
+        [(SKEW, &around.late, SKEW_STEP), (BLUR, &around.blurred, BLUR_STEP)]
+    {
+        let [low, high] = [0, 1].map(|side| fly(&around.model, &sides[side], from));
+        fill(count + which, &low, &high, 2.0 * step);
+    }
     for (i, step) in STATE_STEP.iter().enumerate() {
         let mut moved = *from;
         moved[i] += step;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::equation_error;
 use super::error::AmendError;
-use super::flight::{Flight, SENSORS};
+use super::flight::{Flight, SENSORS, SKEW, SKEW_LEAST};
 use super::interval;
 use super::normal::{self, Neighbourhood, Normal, Place, Weights};
 use super::parameters::{self, Free};
@@ -18,6 +18,7 @@ use super::result::{FittedFlight, FlightEstimate, Parameter};
 use super::shooting::{self, Shot};
 use crate::model::GreyBox;
 use crate::num::statistics::quantile;
+use crate::sysid::diagnose::clocks::{self, Clocks};
 
 /// Shortest flight to fit to, s.
 pub const LEAST_S: f64 = 10.0;
@@ -31,8 +32,10 @@ const RENEWED: f64 = 0.1;
 const NEAR: f64 = 5.0;
 /// Most steps under the same derivatives.
 const INNER: usize = 6;
-/// Not settled, and so refused, if the last change exceeds this many standard deviations.
+/// Not settled if the last change exceeds this many standard deviations,
 const UNSETTLED: f64 = 0.5;
+/// and lost, so that nothing can be said of any coefficient, if it exceeds this many.
+const LOST: f64 = 5.0;
 /// Least standard deviations of residuals, in the units of the state: what the models' steps and the
 /// interpolation of deflections leave even without noise.
 const FLOOR: [f64; 8] = [5e-4, 5e-4, 0.01, 2e-3, 2e-3, 2e-3, 5e-4, 5e-4];
@@ -79,6 +82,8 @@ pub struct Fit {
     pub weakened: usize,
     /// Iterations made.
     pub iterations: usize,
+    /// What had not settled when the search ended, in words; its change widens all intervals.
+    pub unsettled: Option<String>,
     /// What the reader must know.
     pub notes: Vec<String>,
 }
@@ -105,8 +110,18 @@ pub fn fit(
         return Err(AmendError::NothingFree { model: name() });
     }
     progress(&format!("{}: equation error over {} flight(s)", model.name, flights.len()));
-    let theta = equation_error::start(model, &free, flights);
+    let clocks = match free.iter().any(|f| f.input && f.added) {
+        true => clocks(model, &free, flights),
+        false => None,
+    };
+    let theta = match &clocks {
+        Some(clocks) => values(&clocks.model, &free),
+        None => equation_error::start(model, &free, flights),
+    };
     let mut search = Search::new(model, flights, free, theta);
+    if let Some(clocks) = clocks {
+        search.set_clocks(&clocks.late);
+    }
     for (k, length_s) in options.lengths_s.iter().enumerate() {
         progress(&format!("{}: output error over {length_s} s", model.name));
         search.shots_of(*length_s)?;
@@ -117,6 +132,19 @@ pub fn fit(
         }
     }
     search.finish()
+}
+
+/// The actuators' clocks with an effect on the deflections in the model, which free runs cannot tell from it.
+fn clocks(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Option<Clocks> {
+    let given = free.iter().filter(|f| f.added).map(|f| f.index).min()?;
+    let flights: Vec<_> = flights.iter().map(|f| (&f.prepared, &f.forces)).collect();
+    clocks::clocks(model, given, &flights)
+}
+
+/// The free coefficients as `model` has them, within their bounds.
+fn values(model: &GreyBox, free: &[Free]) -> Vec<f64> {
+    let of = |f: &Free| model.coefficients()[f.index].value.clamp(f.bounds.0, f.bounds.1);
+    free.iter().map(of).collect()
 }
 
 /// A search under way.
@@ -130,6 +158,8 @@ struct Search<'a> {
     /// Shots cut short because their runs leave the flight.
     short: usize,
     place: Place,
+    /// Prior means and standard deviations of the sensors' constants of each flight.
+    expected: Vec<[[f64; 2]; SENSORS]>,
     weights: Weights,
     iterations: usize,
     /// The last change in standard deviations, and of which coefficient.
@@ -146,7 +176,8 @@ struct System {
 
 impl<'a> Search<'a> {
     fn new(base: &'a GreyBox, flights: &'a [Flight], free: Vec<Free>, theta: Vec<f64>) -> Self {
-        let sensors = vec![[0.0; SENSORS]; flights.len()];
+        let expected: Vec<_> = flights.iter().map(|f| f.doubt).collect();
+        let sensors = flights.iter().map(|f| f.doubt.map(|[mean, _]| mean)).collect();
         let inverse = |sd: [f64; 8]| sd.map(|x| x.powi(-2));
         // samples of a coarse model's residual hang together for about a fifth of a second
         let weights = Weights { output: inverse(COARSE).map(|w| w / 20.0), start: inverse(START) };
@@ -158,9 +189,19 @@ impl<'a> Search<'a> {
             jacobians: Vec::new(),
             short: 0,
             place: Place { theta, sensors, starts: Vec::new() },
+            expected,
             weights,
             iterations: 0,
             change: (f64::INFINITY, 0),
+        }
+    }
+
+    /// Begins with the actuators' clocks, late (s) with standard deviations, as they are known.
+    fn set_clocks(&mut self, clocks: &[[f64; 2]]) {
+        let flights = self.expected.iter_mut().zip(&mut self.place.sensors);
+        for ((expected, sensors), [late, sd]) in flights.zip(clocks) {
+            expected[SKEW] = [*late, sd.max(SKEW_LEAST)];
+            sensors[SKEW] = *late;
         }
     }
 
@@ -169,7 +210,7 @@ impl<'a> Search<'a> {
         self.shots = shooting::cut(self.flights, length_s);
         self.place.starts = vec![[0.0; 8]; self.shots.len()];
         let model = parameters::with(self.base, &self.free, &self.place.theta);
-        let acting = normal::acting(&model, self.flights, &self.place, 0.0);
+        let acting = normal::acting(&model, self.flights, &self.place);
         let reach: Vec<usize> = self
             .shots
             .par_iter()
@@ -276,7 +317,7 @@ impl<'a> Search<'a> {
 
     fn residuals_at(&self, place: &Place) -> Vec<Vec<[f64; 8]>> {
         let model = parameters::with(self.base, &self.free, &place.theta);
-        let acting = normal::acting(&model, self.flights, place, 0.0);
+        let acting = normal::acting(&model, self.flights, place);
         let one = |(shot, from): (&Shot, &[f64; 8])| {
             normal::run(&model, &acting, self.flights, shot, &place.sensors[shot.flight], from)
         };
@@ -296,14 +337,15 @@ impl<'a> Search<'a> {
     /// Coefficients less their prior, then the sensors' constants flight by flight.
     fn unknowns(&self, place: &Place) -> DVector<f64> {
         let coefficients = self.free.iter().zip(&place.theta).map(|(f, x)| x - f.prior);
-        let all = coefficients.chain(place.sensors.iter().flatten().copied());
+        let off = place.sensors.iter().flatten().zip(self.expected.iter().flatten());
+        let all = coefficients.chain(off.map(|(x, [mean, _])| x - mean));
         DVector::from_vec(all.collect())
     }
 
     /// Inverse prior variances of the unknowns.
     fn prior(&self) -> DVector<f64> {
         let coefficients = self.free.iter().map(|f| f.width);
-        let all = coefficients.chain(self.flights.iter().flat_map(|f| f.doubt));
+        let all = coefficients.chain(self.expected.iter().flatten().map(|[_, sd]| *sd));
         DVector::from_vec(all.map(|sd| sd.powi(-2)).collect())
     }
 
@@ -436,7 +478,7 @@ impl<'a> Search<'a> {
     /// The fit as it stands, with intervals.
     fn finish(self) -> Result<Fit, AmendError> {
         let model_name = || self.base.name.clone();
-        if self.change.0 > UNSETTLED {
+        if self.change.0.is_nan() || self.change.0 > LOST {
             return Err(AmendError::NotConverged {
                 model: model_name(),
                 iterations: self.iterations,
@@ -463,7 +505,9 @@ impl<'a> Search<'a> {
             return Err(AmendError::NoExcitation { model: model_name() });
         }
         let by_flight = self.by_flight(&system);
-        let wider = self.disagreement(&sd, &by_flight);
+        let unsettled = self.unsettled();
+        let astray = if unsettled.is_some() { self.change.0 } else { 0.0 };
+        let wider = self.disagreement(&sd, &by_flight).hypot(astray);
         let sd: Vec<f64> = sd.iter().map(|x| x * wider).collect();
         let parameters = self.parameters(&sd, &by_flight);
         let flights = self.flights.iter().zip(&self.place.sensors).enumerate();
@@ -481,7 +525,8 @@ impl<'a> Search<'a> {
             shots: self.shots.len(),
             weakened,
             iterations: self.iterations,
-            notes: self.notes(weakened),
+            notes: self.notes(weakened, &unsettled),
+            unsettled,
         })
     }
 
@@ -564,8 +609,24 @@ impl<'a> Search<'a> {
         std::array::from_fn(|k| (square(k) / count).sqrt())
     }
 
-    fn notes(&self, weakened: usize) -> Vec<String> {
-        let mut notes = Vec::new();
+    /// What had not settled, if anything.
+    fn unsettled(&self) -> Option<String> {
+        let (change, parameter) = (self.change.0, &self.free[self.change.1].name);
+        (change > UNSETTLED).then(|| {
+            format!(
+                "the search had not settled after {} iterations: {parameter} still moved by {change:.2} \
+                 standard deviations; leave out flights in which the aircraft spins or hits something, or \
+                 fly more of what moves {parameter}",
+                self.iterations
+            )
+        })
+    }
+
+    fn notes(&self, weakened: usize, unsettled: &Option<String>) -> Vec<String> {
+        let mut notes: Vec<String> = unsettled
+            .iter()
+            .map(|why| format!("{why}; all intervals are widened by that"))
+            .collect();
         if weakened > 0 {
             notes.push(format!(
                 "{weakened} of {} shots stray far from the flight (stall, spin, gusts) and were cut \

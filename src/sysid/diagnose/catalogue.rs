@@ -15,6 +15,9 @@ const MOVED: f64 = 0.02;
 /// Largest change of a shape constant that its linearisation is trusted with, as a share.
 pub const REACH: f64 = 0.35;
 
+/// Factor between places below the least start.
+const SMALLER: f64 = 2.5;
+
 /// An effect that may be missing.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
@@ -68,7 +71,12 @@ pub fn columns(
         .flat_map(|e| {
             let own = refined.iter().filter(|(id, _)| *id == e.about.id).map(|(_, v)| v.clone());
             let listed = starts(e).iter().map(|s| s.to_vec());
-            listed.chain(own).map(|values| (*e, values)).collect::<Vec<_>>()
+            smaller(e)
+                .into_iter()
+                .chain(listed)
+                .chain(own)
+                .map(|values| (*e, values))
+                .collect::<Vec<_>>()
         })
         .collect();
     let made: Vec<Option<Vec<Vec<Column>>>> =
@@ -88,6 +96,19 @@ pub fn columns(
 
 fn starts(entry: &Entry) -> &'static [&'static [f64]] {
     entry.about.entry.map_or(&[], |e| e.starts)
+}
+
+/// Places below the least start of an effect on the deflections, where good sensors may still see it.
+fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
+    let (Some(first), Some(last)) = (starts(entry).first(), starts(entry).last()) else {
+        return Vec::new();
+    };
+    if !entry.operator {
+        return Vec::new();
+    }
+    // the less of a limit, the higher it is
+    let factor = if first[0] < last[0] { 1.0 / SMALLER } else { SMALLER };
+    vec![vec![first[0] * factor.powi(2)], vec![first[0] * factor]]
 }
 
 /// Whether an effect is linear in all its constants.

@@ -4,8 +4,11 @@ use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use rayon::prelude::*;
 
-use super::projected::scaled_inverse;
-use super::rank::{Draw, Score, Trial, quadratic};
+use super::cells::{Cells, Placed};
+use super::columns::combine;
+use super::noise::Noise;
+use super::projected::{Known, Projected, scaled_inverse};
+use super::rank::{Draw, Point, Score, Trial, quadratic};
 use super::round::Round;
 use crate::num::stream::stream;
 
@@ -17,6 +20,15 @@ const BOOTSTRAPS: u64 = 82;
 pub const ALIKE: f64 = 0.9;
 /// Nor those whose evidence is this close.
 pub const CLOSE: f64 = 10.0;
+/// Squared error per row beyond the noise that the rich fit leaves, in flights in which nothing is missing any
+/// more: that fit follows some of the noise, which stands in its columns too (0.15 to 0.35).
+const FEIGNED: f64 = 0.2;
+/// How much that may be off.
+const UNSURE: f64 = 0.2;
+/// Standard deviations of the noise's square beyond which what an effect leaves is no chance.
+const DOUBT: f64 = 5.0;
+/// Least share of what a flight seems to tell that is more than the noise of its columns.
+const TOLD: f64 = 0.5;
 /// Candidates that a bootstrap lets compete.
 const COMPETING: usize = 8;
 
@@ -54,13 +66,33 @@ pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     taken / excess(round, &trial.channels).max(taken).max(1.0)
 }
 
+/// Share of the squared error beyond noise in the channels of an effect that is left once it has joined, if
+/// that is more than chance leaves; `fall` is what the effect took.
+pub fn left(round: &Round, channels: &[usize], fall: f64) -> Option<f64> {
+    let own: [bool; 6] = std::array::from_fn(|c| channels.contains(&c));
+    let rows = rows(round, &own);
+    let left = excess(round, &own) - FEIGNED * rows;
+    // the square of white noise scatters by √(2n)
+    let beyond_doubt = left > f64::max(DOUBT * (2.0 * rows).sqrt(), UNSURE * rows);
+    beyond_doubt.then(|| left / (left + fall))
+}
+
 /// Squared whitened error beyond noise in `channels`.
 pub fn excess(round: &Round, channels: &[bool; 6]) -> f64 {
     let blocks = round.projected.by_channel.iter();
-    let of = |sums: &[(f64, usize); 6]| {
-        (0..6).filter(|c| channels[*c]).map(|c| sums[c].0 - sums[c].1 as f64).sum::<f64>()
+    let of = |sums: &[(f64, usize); 6]| -> f64 {
+        (0..6).filter(|c| channels[*c]).map(|c| sums[c].0).sum()
     };
-    blocks.map(of).sum()
+    blocks.map(of).sum::<f64>() - rows(round, channels)
+}
+
+/// Rows in `channels`.
+fn rows(round: &Round, channels: &[bool; 6]) -> f64 {
+    let blocks = round.projected.by_channel.iter();
+    let of = |sums: &[(f64, usize); 6]| -> usize {
+        (0..6).filter(|c| channels[*c]).map(|c| sums[c].1).sum()
+    };
+    blocks.map(of).sum::<usize>() as f64
 }
 
 /// What may be scaled in a contribution: each column of a linear candidate, a nonlinear one as a whole.
@@ -126,39 +158,96 @@ pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) ->
     wins as f64 / count.max(1) as f64
 }
 
-/// The first free coefficient as each flight alone has it, with its standard deviation; NaN where a flight
-/// does not tell.
+/// The first free coefficient as each flight has it, with its standard deviation; NaN where a flight does not
+/// tell. Sensors are each flight's own and fitted anew; the other coefficients are the aircraft's, and known
+/// as well as all flights together know them. A flight that hardly rolls cannot find them again: its balance
+/// of small moments holds as well with all of them too small, and noise in the columns has it so.
 pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<[f64; 2]> {
-    let p = &round.projected;
-    let last = p.width();
-    let point = &trial.points[score.point];
-    let columns: Vec<usize> = point.free.iter().map(|f| f.1).collect();
-    let first = point.free[0].0;
-    // how much more the blocks scatter than the noise alone
-    let whole =
-        DMatrix::from_fn(columns.len(), columns.len(), |i, j| p.total[(columns[i], columns[j])]);
-    let alone = scaled_inverse(&whole).map_or(f64::NAN, |m| m[(0, 0)].sqrt());
-    let inflation = (score.deviations[first] / alone).max(1.0);
     (0..round.flights.len())
-        .map(|flight| {
-            let own = (0..p.blocks.len()).filter(|b| round.cells.flight_of_block[*b] == flight);
-            let grams = p.resampled(own);
-            let gram = DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
-                grams.total[(columns[i], columns[j])]
-            });
-            let product = DVector::from_iterator(
-                columns.len(),
-                columns.iter().map(|c| {
-                    let known: f64 =
-                        score.weights.iter().map(|(d, w)| w * grams.total[(*c, *d)]).sum();
-                    grams.total[(*c, last)] - known
-                }),
-            );
-            let Some(inverse) = scaled_inverse(&gram) else { return [f64::NAN; 2] };
-            let step = &inverse * product;
-            [score.values[first] + step[0], inflation * inverse[(0, 0)].max(0.0).sqrt()]
-        })
+        .map(|flight| one_flight(round, trial, score, flight).unwrap_or([f64::NAN; 2]))
         .collect()
+}
+
+fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Option<[f64; 2]> {
+    let own: Vec<usize> =
+        (0..round.cells.list.len()).filter(|k| round.cells.list[*k].flight == flight).collect();
+    let cells = Cells {
+        list: own.iter().map(|k| round.cells.list[*k].clone()).collect(),
+        flight_of_block: round.cells.flight_of_block.clone(),
+    };
+    let residuals = own.iter().map(|k| round.noise.residuals[*k].clone()).collect();
+    let noise = Noise { whiteners: round.noise.whiteners.clone(), residuals };
+    let point = &trial.points[score.point];
+    let columns: Vec<usize> = point.free.iter().map(|f| f.1).chain(point.contribution).collect();
+    let (na, last) = (round.known.len(), round.known.len() + columns.len());
+    let feigned = &round.shared[flight];
+    let mut shared: Vec<f64> = feigned[..na].to_vec();
+    shared.extend(columns.iter().map(|c| feigned.get(na + c).copied().unwrap_or(0.0)));
+    let placed = alone(&round.placed, flight, na, &columns);
+    let mut with_residual = placed.clone();
+    let residual = round.placed[flight].iter().find(|(p, _)| *p == round.last)?;
+    with_residual[flight].push((last, residual.1.clone()));
+    let known = together(round, score);
+    let p = Projected::new(&cells, &with_residual, last, &known, &noise, &shared)?;
+    let free = point.free.iter().enumerate().map(|(k, f)| (f.0, k, f.2)).collect();
+    let contribution = point.contribution.map(|_| point.free.len());
+    let first = point.free[0].0;
+    let point = Point { values: point.values.clone(), contribution, free };
+    let by_itself = Trial { points: vec![point], ..trial.clone() };
+    let grams = p.grams();
+    let found = by_itself.score(&grams, &Draw::measured(&grams))?;
+    let [value, sd] = [found.values[first], found.deviations[first]];
+    if contribution.is_some() {
+        return Some([value, sd]);
+    }
+    // of what moves the columns, the sensors' noise tells nothing: it only seems to be excitation
+    let disturbed = alone(&round.disturbed, flight, na, &columns);
+    let added = less(&disturbed, &placed);
+    let feint = p.others(&cells, &added, &noise.whiteners);
+    let n = columns.len();
+    let gram = grams.total.view((0, 0), (n, n)).into_owned();
+    let told = &gram - feint.view((0, 0), (n, n));
+    let (all, left) = (scaled_inverse(&gram)?, scaled_inverse(&told)?);
+    let share = all[(0, 0)] / left[(0, 0)];
+    let amounts = &left * grams.total.view((0, n), (n, 1)).column(0);
+    (share > TOLD).then(|| [amounts[0], sd / share])
+}
+
+/// The known unknowns with the model's coefficients as all flights have them together with `score`'s effect.
+fn together(round: &Round, score: &Score) -> Vec<Known> {
+    let p = &round.projected;
+    let mut all = round.known.clone();
+    for (k, known) in all.iter_mut().take(round.coefficients.len()).enumerate() {
+        let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
+        // relative to all of the effect, as sure as its evidence
+        let astray = given.powi(2) / score.wald.max(1.0);
+        known.offset = p.tuned[k] - given;
+        known.width = (p.covariance[(k, k)].max(0.0) + astray).sqrt().min(known.width);
+    }
+    all
+}
+
+/// The known columns of one flight and the candidate columns `columns`, numbered anew; the other flights have
+/// none.
+fn alone(placed: &[Placed], flight: usize, na: usize, columns: &[usize]) -> Vec<Placed> {
+    let own = &placed[flight];
+    let mut list: Placed = own.iter().take_while(|(p, _)| *p < na).cloned().collect();
+    for (k, column) in columns.iter().enumerate() {
+        let of = own.iter().find(|(p, _)| *p == na + column);
+        list.extend(of.map(|(_, column)| (na + k, column.clone())));
+    }
+    let mut all = vec![Placed::new(); placed.len()];
+    all[flight] = list;
+    all
+}
+
+/// The columns of `a` less those of `b` in the same places.
+fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
+    let of = |(a, b): (&Placed, &Placed)| {
+        let both = a.iter().filter_map(|(p, x)| Some((*p, x, &b.iter().find(|(q, _)| q == p)?.1)));
+        both.map(|(p, x, y)| (p, combine(&[x.clone(), y.clone()], &[1.0, -1.0]))).collect()
+    };
+    a.iter().zip(b).map(of).collect()
 }
 
 /// Whether flights contradict the common `value`: the other sign beyond doubt, or another amount beyond

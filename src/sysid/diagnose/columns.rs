@@ -12,8 +12,9 @@ use crate::sysid::compare::weak::{gyroscopic, inertia, to_force_axes};
 use crate::sysid::reconstruction::Instant;
 
 /// Columns of sensor errors: gyros p, q, r, α, β, share of the airspeed, accelerometers x, y, z, then
-/// lateness of α, β, airspeed, accelerometers and recorded actuators (s).
-pub const SENSORS: usize = 14;
+/// lateness of α, β, airspeed, accelerometers and recorded actuators (s), and how much the record of the
+/// actuators is a mean over time (half the variance of that time, squared samples).
+pub const SENSORS: usize = 15;
 
 /// A flight under a model.
 #[derive(Clone, Debug)]
@@ -39,7 +40,7 @@ impl Ready {
             .iter()
             .map(|s| s.iter().map(|at| local::local(model, at, &at.controls)).collect())
             .collect();
-        let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 5, |place, add| {
+        let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 6, |place, add| {
             // the end of a step of RK4 is close to its start
             let here = &locals[place.segment][place.index];
             let value = if place.at.time_s == acting.segments[place.segment][place.index].time_s {
@@ -75,6 +76,10 @@ impl Ready {
                 let slope = &here.slope[CONTROLS + i];
                 (0..CHANNELS).for_each(|c| add(1 + INPUTS + 7, c, -rate * slope[c]));
             }
+            for (i, bend) in bends(&acting, place.segment, place.index).iter().enumerate() {
+                let slope = &here.slope[CONTROLS + i];
+                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 8, c, bend * slope[c]));
+            }
             let force = differences(&acting, place.segment, place.index, |i| i.specific_force);
             if force.iter().all(|f| f.is_finite()) {
                 let force = to_force_axes(force.map(|f| -f * model.body.mass), &air, model.axes);
@@ -83,7 +88,7 @@ impl Ready {
         });
         let mut residual = std::mem::take(&mut columns[0]);
         add_spin(model, &acting, &mut residual);
-        let sensors = (1..=CONTROLS).chain(1 + INPUTS..1 + INPUTS + 8);
+        let sensors = (1..=CONTROLS).chain(1 + INPUTS..1 + INPUTS + 9);
         let sensors: Vec<Column> = sensors.map(|k| std::mem::take(&mut columns[k])).collect();
         let controls = locals
             .iter()
@@ -207,6 +212,15 @@ fn add_spin(model: &GreyBox, flight: &Prepared, residual: &mut Column) {
     for axis in 0..3 {
         join(&mut residual[3 + axis], moments.iter().map(|m| m[axis]).collect());
     }
+}
+
+/// Second differences of aileron, elevator and throttle.
+fn bends(flight: &Prepared, segment: usize, index: usize) -> [f64; 3] {
+    let instants = &flight.segments[segment];
+    let (before, after) = (index.saturating_sub(1), (index + 1).min(instants.len() - 1));
+    let of = |i: &Instant| [i.controls.aileron, i.controls.elevator, i.controls.throttle];
+    let [a, b, c] = [before, index, after].map(|i| of(&instants[i]));
+    [0, 1, 2].map(|k| a[k] - 2.0 * b[k] + c[k])
 }
 
 /// Rates of `of` by central differences, 1/s.

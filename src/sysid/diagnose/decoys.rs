@@ -63,7 +63,7 @@ fn evidence(round: &Round, names: &[(String, Trial)], lists: &[Vec<Column>]) -> 
         last,
         &round.known,
         &round.noise,
-        &round.shared[..na],
+        &round.shared()[..na],
     ) else {
         return Vec::new();
     };

@@ -17,13 +17,15 @@ use crate::sysid::compare::flight::Prepared;
 const FEATURES: u64 = 81;
 /// Cosines.
 const COSINES: usize = 40;
-/// What they are of: α, β, V, p, q, r, deflections and throttle now, deflections a while ago.
-const VARIABLES: usize = 11;
+/// What they are of: α, β, V, p, q, r, deflections and throttle now, deflections a while ago, the rate of α.
+const VARIABLES: usize = 12;
 /// How many they are: the variables themselves and the cosines.
 pub const COUNT: usize = VARIABLES + COSINES;
 /// Standard deviation of the cosines' frequencies, per standard deviation of a variable: features that
 /// bend about once over what was flown.
 const BEND: f64 = 0.5;
+/// Time over which the rate of α is taken, s: shorter, it would be noise.
+const SPAN_S: f64 = 0.06;
 /// How long ago the past deflections were, s.
 const AGO_S: f64 = 0.08;
 
@@ -78,6 +80,9 @@ fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES
     let instants = &flight.segments[segment];
     let i = &instants[index];
     let ago = &instants[index.saturating_sub((AGO_S / flight.dt).round() as usize)].controls;
+    let half = (0.5 * SPAN_S / flight.dt).round().max(1.0) as usize;
+    let (a, b) = (index.saturating_sub(half), (index + half).min(instants.len() - 1));
+    let rise = instants[b].state.alpha - instants[a].state.alpha;
     let (s, z) = (&i.state, &i.controls);
     [
         s.alpha,
@@ -91,6 +96,7 @@ fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES
         z.throttle,
         ago.aileron - z.aileron,
         ago.elevator - z.elevator,
+        rise / (flight.dt * (b - a).max(1) as f64),
     ]
 }
 

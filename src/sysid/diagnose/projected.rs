@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::cells::{Cells, Placed};
 use super::noise::Noise;
+use super::whiten::Whitener;
 
 /// A known unknown: a coefficient of the prior, or a sensor's error.
 #[derive(Clone, Debug)]
@@ -134,6 +135,19 @@ impl Projected {
     /// Number of candidate columns.
     pub fn width(&self) -> usize {
         self.total.ncols() - 1
+    }
+
+    /// The Gram matrix that other columns in the places of these would have: of the candidates, less what they
+    /// take from the known unknowns; `whiteners` by channel.
+    pub fn others(&self, cells: &Cells, placed: &[Placed], whiteners: &[Whitener]) -> DMatrix<f64> {
+        let (na, ny) = (self.taken.nrows(), self.taken.ncols());
+        let mut gram = DMatrix::zeros(ny, ny);
+        for cell in &cells.list {
+            let (places, z) = cell.matrix(&placed[cell.flight], &whiteners[cell.channel]);
+            let rows = project(&places, &z, na, ny, &self.taken);
+            gram.gemm_tr(1.0, &rows, &rows, 1.0);
+        }
+        gram
     }
 
     /// The Gram matrices of the data as they are.

@@ -1,7 +1,10 @@
 //! Every candidate as it is told: asserted ones first, then by evidence.
 
+use std::collections::BTreeMap;
+
 use super::checks;
 use super::curves;
+use super::detectable::detectable;
 use super::options::{Detail, Options};
 use super::rank::{Score, Trial};
 use super::result::{Candidate, FlightEstimate, Parameter};
@@ -20,9 +23,13 @@ const INTERVAL: f64 = 1.96;
 pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
     let (asserted, refused): (Vec<&Selected>, Vec<&Selected>) =
         found.selected.iter().partition(|s| s.refused.is_empty());
+    let round = found.round();
+    let least = least(found);
     let mut list: Vec<Candidate> =
         asserted.iter().chain(&refused).filter_map(|s| selected(found, s, options)).collect();
-    let round = found.round();
+    for candidate in &mut list {
+        candidate.minimum_detectable = least.get(candidate.id.as_str()).copied();
+    }
     for (place, (trial, score)) in found.scores.iter().enumerate() {
         let trial = &round.trials[*trial];
         if list.iter().any(|c| c.id == trial.id) {
@@ -30,6 +37,7 @@ pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
         }
         let Some(about) = describe(trial.id) else { continue };
         let mut candidate = open(found, trial, score, &about);
+        candidate.minimum_detectable = least.get(trial.id).copied();
         if round.at_bound(found.scores[place].0, score) {
             candidate
                 .refused
@@ -47,6 +55,15 @@ pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
         list.push(candidate);
     }
     list
+}
+
+/// The smallest amounts that would have shown, of those that have joined the model before they did.
+fn least(found: &Found) -> BTreeMap<&'static str, f64> {
+    let mut least = detectable(&found.first, found.threshold);
+    if let Some(last) = &found.last {
+        least.extend(detectable(last, found.threshold));
+    }
+    least
 }
 
 /// The largest standard deviation relative to its value, of a fitted contribution.
@@ -85,7 +102,7 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
         heldout_error_reduction: s.heldout,
         selected_in_bootstraps: s.selected,
         by_flight: flights(round, &s.by_flight),
-        minimum_detectable: detectable(&found.first, s.id, found.threshold),
+        minimum_detectable: None,
         refused: s.refused.clone(),
         curve,
     })
@@ -111,6 +128,11 @@ fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Can
     let parameters = (0..about.coefficients.len())
         .map(|k| parameter(about, k, score.values[k], score.deviations[k]))
         .collect();
+    // what is no more than chance says nothing flight by flight either
+    let by_flight = match score.evidence > found.threshold {
+        true => flights(round, &checks::by_flight(round, trial, score)),
+        false => Vec::new(),
+    };
     Candidate {
         id: trial.id.into(),
         description: about.description,
@@ -122,8 +144,8 @@ fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Can
         indistinguishable_from: Vec::new(),
         heldout_error_reduction: f64::NAN,
         selected_in_bootstraps: f64::NAN,
-        by_flight: flights(round, &checks::by_flight(round, trial, score)),
-        minimum_detectable: detectable(round, trial.id, found.threshold),
+        by_flight,
+        minimum_detectable: None,
         refused: Vec::new(),
         curve: None,
     }
@@ -152,26 +174,4 @@ fn flights(round: &Round, values: &[[f64; 2]]) -> Vec<FlightEstimate> {
         sd: *sd,
     };
     round.flights.iter().zip(values).map(of).collect()
-}
-
-/// The smallest amount of the first free coefficient whose evidence would have exceeded `threshold`, five
-/// times in six; `None` for shapes, of which there is no small amount.
-fn detectable(round: &Round, id: &str, threshold: f64) -> Option<f64> {
-    let trial = round.trials.iter().find(|t| t.id == id)?;
-    let point = trial.points.first()?;
-    if point.contribution.is_some() && point.free.len() != 1 {
-        return None;
-    }
-    let grams = round.projected.grams();
-    let null = super::rank::Draw {
-        total: nalgebra::DVector::zeros(round.projected.width()),
-        blocks: round.projected.noise.clone(),
-    };
-    let columns: Vec<usize> = point.free.iter().map(|f| f.1).collect();
-    let (alone, robust) = super::rank::deviations(&grams, &null, &columns)?;
-    let penalty = columns.len() as f64 * trial.support.max(2.0).ln();
-    let by_gain = (threshold.max(0.0) + penalty).sqrt() * alone;
-    let by_wald = threshold.max(0.0).sqrt() * robust;
-    let amount = by_gain.max(by_wald) + robust.max(alone);
-    amount.is_finite().then_some(amount)
 }

@@ -63,8 +63,11 @@ pub struct Round {
     /// The candidates as they are described.
     pub entries: Vec<Entry>,
     refined: Vec<(&'static str, Vec<f64>)>,
-    /// What noise that columns share with the residual feigns, by place.
-    pub shared: Vec<f64>,
+    /// What noise that columns share with the residual feigns, by place, flight by flight.
+    pub shared: Vec<Vec<f64>>,
+    /// The known columns and the linear candidates' of the flights with their noise once more, in the same
+    /// places.
+    pub disturbed: Vec<Placed>,
 }
 
 impl Round {
@@ -93,9 +96,9 @@ impl Round {
             Noise::estimate(&cells, &rich(&placed, known.len(), &made.trials), last)
         });
         let kept: Vec<Placed> = placed.iter().map(|l| up_to(l, last)).collect();
-        let shared =
+        let (shared, disturbed) =
             shared(&Setting { problem, model: &model, entries }, &cells, &kept, last, &noise);
-        let projected = Projected::new(&cells, &kept, last, &known, &noise, &shared)?;
+        let projected = Projected::new(&cells, &kept, last, &known, &noise, &sum(&shared))?;
         Some(Round {
             model,
             flights,
@@ -112,6 +115,7 @@ impl Round {
             entries: entries.to_vec(),
             refined: Vec::new(),
             shared,
+            disturbed,
         })
     }
 
@@ -152,7 +156,7 @@ impl Round {
             self.placed.iter().map(|l| up_to(l, count.saturating_sub(1))).collect();
         let last = place(&mut placed, count, &made, &self.flights);
         let Some(projected) =
-            Projected::new(&self.cells, &placed, last, &self.known, &self.noise, &self.shared)
+            Projected::new(&self.cells, &placed, last, &self.known, &self.noise, &self.shared())
         else {
             return false;
         };
@@ -163,6 +167,11 @@ impl Round {
         (self.placed, self.last, self.projected) = (placed, last, projected);
         self.trials = made.trials;
         true
+    }
+
+    /// What noise that columns share with the residual feigns over all flights, by place.
+    pub fn shared(&self) -> Vec<f64> {
+        sum(&self.shared)
     }
 
     fn scores(&self) -> Vec<(usize, Score)> {
@@ -284,9 +293,15 @@ impl Round {
     /// their bounds.
     pub fn tuned(&self) -> GreyBox {
         let mut model = self.model.clone();
+        let linear = model.linear();
         let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
         for (k, place) in self.coefficients.iter().enumerate() {
-            values[*place] += self.projected.tuned[k];
+            let mut step = self.projected.tuned[k];
+            if !linear[*place] {
+                let reach = catalogue::REACH * values[*place].abs();
+                step = step.clamp(-reach, reach);
+            }
+            values[*place] += step;
             if *place >= self.given
                 && let Some((low, high)) = bounds(&model, *place)
             {
@@ -336,9 +351,21 @@ struct Setting<'a> {
     entries: &'a [Entry],
 }
 
-/// What noise that columns share with the residual feigns: by place, of the known unknowns and the linear
-/// candidates, which stand in front.
-fn shared(of: &Setting, cells: &Cells, before: &[Placed], last: usize, noise: &Noise) -> Vec<f64> {
+/// The sum of lists of one length.
+fn sum(lists: &[Vec<f64>]) -> Vec<f64> {
+    let count = lists.first().map_or(0, Vec::len);
+    (0..count).map(|k| lists.iter().map(|list| list[k]).sum()).collect()
+}
+
+/// What noise that columns share with the residual feigns, flight by flight: by place, of the known unknowns
+/// and the linear candidates, which stand in front. With it, those columns with the noise once more.
+fn shared(
+    of: &Setting,
+    cells: &Cells,
+    before: &[Placed],
+    last: usize,
+    noise: &Noise,
+) -> (Vec<Vec<f64>>, Vec<Placed>) {
     let straight: Vec<Entry> =
         of.entries.iter().filter(|e| catalogue::straight(e)).copied().collect();
     let flights = disturbed(of.problem, of.model);
@@ -349,7 +376,7 @@ fn shared(of: &Setting, cells: &Cells, before: &[Placed], last: usize, noise: &N
     for list in &mut after {
         list.iter_mut().filter(|(p, _)| *p == end).for_each(|(p, _)| *p = last);
     }
-    shared::products(cells, before, &after, last, noise)
+    (shared::products(cells, before, &after, last, noise), after)
 }
 
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
@@ -385,7 +412,7 @@ fn known(problem: &Problem, model: &GreyBox, flights: &[Ready]) -> KnownColumns 
             known.push(Known {
                 name: format!("{} of flight {}", sensors::NAMES[i], k + 1),
                 width: problem.sensors[k][i],
-                offset: 0.0,
+                offset: sensors::mean(i),
             });
         }
     }

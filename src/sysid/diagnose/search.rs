@@ -16,15 +16,20 @@ pub const HELD_OUT: f64 = 0.1;
 /// Least share of bootstraps in which the effect, or one of its class, is the best.
 pub const SELECTED: f64 = 0.8;
 /// Passes of tuning after an effect has joined, which is where nonlinear ones settle.
-const SETTLING: usize = 2;
+const SETTLING: usize = 3;
 /// Candidates of this part of the best one's order contend with it,
 const CONTENDING: f64 = 0.2;
 /// if their contribution is this much like its own;
 const CONTENDING_LIKENESS: f64 = 0.6;
 /// so many at most.
 const CONTENDERS: usize = 4;
-/// Part of what a flexible model could remove that an effect may leave in its channels.
+/// Part of what is to be removed from its channels that an effect may leave there.
 const LEFT: f64 = 0.3;
+/// Precision of the formula of an effect that is not linear in its constants: whatever takes a smaller part of
+/// what such an effect took before may be no more than its error.
+const PRECISION: f64 = 2e-3;
+/// A candidate whose contribution is this much like another's can take its place.
+const RIVAL: f64 = 0.3;
 
 /// The candidate that a round selected, with its checks.
 #[derive(Clone, Debug)]
@@ -49,6 +54,8 @@ pub struct Selected {
     pub refused: Vec<String>,
     /// Whether it takes too little of the error to matter, whatever else speaks against it.
     pub slight: bool,
+    /// Whether it is not linear in its constants.
+    pub curved: bool,
     /// What it added to the residual, fitted, flight by flight.
     pub contribution: Vec<super::gather::Column>,
 }
@@ -196,14 +203,24 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
             100.0 * HELD_OUT
         ));
     }
-    let open: Vec<usize> =
-        found.scores.iter().map(|(t, _)| *t).filter(|t| !found.beaten.contains(t)).collect();
+    // what explains something else would be selected besides, not in its place
+    let rival = |(t, other): &&(usize, Score)| {
+        !found.beaten.contains(t) && checks::likeness(round, score, other).abs() > RIVAL
+    };
+    let open: Vec<usize> = found.scores.iter().filter(rival).map(|(t, _)| *t).collect();
     let selected = checks::selected(round, &open, &members, options.bootstraps);
     if selected < SELECTED && options.bootstraps > 0 {
         refused.push(format!(
             "it is the best in {:.0} % of the block bootstraps, under {:.0} %",
             100.0 * selected,
             100.0 * SELECTED
+        ));
+    }
+    if let Some(earlier) = found.selected.iter().find(|s| s.curved && hides(s, score)) {
+        refused.push(format!(
+            "it takes less than {:.1} % of what {} took, whose formula is no more precise",
+            100.0 * PRECISION,
+            earlier.id
         ));
     }
     let by_flight = checks::by_flight(round, trial, score);
@@ -223,8 +240,14 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
         channels: round.channels_of(score),
         refused,
         slight,
+        curved: trial.points[score.point].contribution.is_some(),
         contribution,
     })
+}
+
+/// Whether `score` may be an error of what has been selected before.
+fn hides(earlier: &Selected, score: &Score) -> bool {
+    score.fall < PRECISION * earlier.score.fall
 }
 
 /// `current` without the effect `id`, which `given` does not have either.
@@ -285,17 +308,27 @@ impl Found {
         true
     }
 
-    /// Refuses effects that leave in their own channels much of what a flexible model could remove.
+    /// Refuses effects that leave in their own channels much of what there is to remove: of what they take
+    /// themselves and what a flexible model could remove besides, or of what is more than noise.
     fn judge_remainder(&mut self) {
         let (before, after) = (&self.first_remainder, &self.remainder);
+        let round = self.last.as_ref().unwrap_or(&self.first);
         for effect in self.selected.iter_mut().filter(|s| s.refused.is_empty()) {
             let own = |of: &[f64; 6]| effect.channels.iter().map(|c| of[*c]).sum::<f64>();
             let significant =
                 effect.channels.iter().any(|c| after.removable[*c] > after.threshold[*c]);
-            let share = own(&after.removable) / own(&before.removable).max(1.0);
+            let least = own(&after.removable);
+            let share = least / own(&before.removable).max(least + effect.score.fall).max(1.0);
             if significant && share > LEFT {
                 effect.refused.push(format!(
                     "with it, a flexible model could still remove {:.0} % of what it could without",
+                    100.0 * share
+                ));
+            }
+            let left = checks::left(round, &effect.channels, effect.score.fall);
+            if let Some(share) = left.filter(|share| *share > LEFT) {
+                effect.refused.push(format!(
+                    "with it, {:.0} % of what its channels have beyond noise is still there",
                     100.0 * share
                 ));
             }

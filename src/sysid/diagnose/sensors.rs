@@ -18,15 +18,27 @@ pub const NAMES: [&str; SENSORS] = [
     "skew_beta",
     "skew_airspeed",
     "skew_accelerometer",
-    "skew_actuators",
+    LATE,
+    "blur_actuators",
 ];
+
+/// Name of the actuators' lateness.
+pub const LATE: &str = "skew_actuators";
 
 /// Least standard deviations: rad/s, rad, a share, m/s², s; a filter that knows only its own errors states
 /// less than it has.
-const FLOOR: [f64; SENSORS - 1] =
+const FLOOR: [f64; SENSORS - 2] =
     [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01, 5e-4, 5e-4, 2e-3, 5e-4];
 /// Prior width of the actuators' clock, samples: ±1.5 samples are its 95 % interval.
 const SKEW_SAMPLES: f64 = 0.77;
+/// Mean and standard deviation of the actuators' blur, squared samples: a record that is late by a part of a
+/// sample is anything between the value then and the mean of both samples beside it, which has 1/8.
+pub const BLURRED: [f64; 2] = [1.0 / 16.0, 1.0 / 24.0];
+
+/// What each is taken for before anything is fitted.
+pub fn mean(which: usize) -> f64 {
+    if which + 1 == SENSORS { BLURRED[0] } else { 0.0 }
+}
 
 /// Prior widths of the sensor errors of a flight whose samples are `dt` (s) apart.
 pub fn widths(flight: &Reconstruction, dt: f64) -> [f64; SENSORS] {
@@ -38,6 +50,7 @@ pub fn widths(flight: &Reconstruction, dt: f64) -> [f64; SENSORS] {
     };
     std::array::from_fn(|k| match FLOOR.get(k) {
         Some(floor) => stated(NAMES[k]).max(*floor),
-        None => SKEW_SAMPLES * dt,
+        None if NAMES[k] == LATE => SKEW_SAMPLES * dt,
+        None => BLURRED[1],
     })
 }

@@ -101,15 +101,15 @@ fn both_ways(x: &[f64], kept: f64) -> Vec<f64> {
 }
 
 /// Products of what a disturbance adds to the columns before `last` with what it adds to the residual in
-/// the place `last`; `before` and `after` have the same columns in the same places.
+/// the place `last`, flight by flight; `before` and `after` have the same columns in the same places.
 pub fn products(
     cells: &Cells,
     before: &[Placed],
     after: &[Placed],
     last: usize,
     noise: &Noise,
-) -> Vec<f64> {
-    let mut sums = vec![0.0; last];
+) -> Vec<Vec<f64>> {
+    let mut sums = vec![vec![0.0; last]; before.len()];
     for cell in &cells.list {
         let whitener = &noise.whiteners[cell.channel];
         let (places, old) = cell.matrix(&before[cell.flight], whitener);
@@ -124,7 +124,7 @@ pub fn products(
         };
         for place in places.iter().filter(|p| **p < last) {
             if let Some(added) = column(*place) {
-                sums[*place] += added.dot(&residual);
+                sums[cell.flight][*place] += added.dot(&residual);
             }
         }
     }
