@@ -1,6 +1,7 @@
 //! Policies on the command line: what cannot be used is said, by name.
 #![cfg(feature = "sitl")]
 
+#[cfg(feature = "learn")]
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use greylag::control::policy::{ACTIONS, Agent};
+use greylag::control::policy::{ACTIONS, Actor, Agent, Critic};
 use greylag::control::task::Task;
 use greylag::learn::{Valuation, ValuationRecipe};
 use greylag::model::GreyBox;
@@ -29,19 +29,11 @@ fn world(model: &Arc<GreyBox>, seed: u64, instances: usize) -> Imagination {
     Imagination::new(model.clone(), instances, Stratified::new(seed, 0, 0.3))
 }
 
-/// The critics order states off the actor's path as the returns flown from there do.
-#[test]
-fn values_are_the_returns_flown() {
-    let (model, agent) = ground();
-    let actor = agent.actor.as_ref();
-    let mut valuation = Valuation::new(recipe(), world(&model, 1, 64), actor.clone()).unwrap();
-    let first = valuation.run(100).unwrap();
-    let last = valuation.run(u64::MAX).unwrap();
-    assert!(last.error < 0.5 * first.error, "{first:?} {last:?}");
-    let critics = valuation.critics().unwrap();
-
-    // aircraft that the critics have not seen: pushed aside by a random action held for eight steps
-    let mut unseen = world(&model, 77, 4 * WIDTH);
+/// What a critic says of aircraft pushed off the actor's path, and what they earn from there: the
+/// correlation of the two over 64 aircraft, and their means.
+fn compare(model: &Arc<GreyBox>, actor: &Actor, critic: &Critic) -> (f64, [f64; 2]) {
+    // targets that no training had; a random action held for eight steps
+    let mut unseen = world(model, 77, 4 * WIDTH);
     let mut units = Units::new(Block::zero());
     let mut rng = stream::stream(9, &[]);
     let mut pairs = Vec::new();
@@ -53,7 +45,7 @@ fn values_are_the_returns_flown() {
         }
         let start = unseen.observe(block);
         let action = actor.act_block(&mut units, &start);
-        let said = critics[0].value(&mut units, &start, &action);
+        let said = critic.value(&mut units, &start, &action);
         let (mut earned, mut weight) = (Block::zero(), 1.0);
         for _ in 0..600 {
             let action = actor.act_block(&mut units, &unseen.observe(block));
@@ -62,18 +54,38 @@ fn values_are_the_returns_flown() {
             earned += stepped.reward.scale(weight);
             weight *= Task::PAPER.discount;
         }
-        pairs.extend(said.0.into_iter().zip(earned.0).map(|(a, b)| (f64::from(a), f64::from(b))));
+        pairs.extend(said.0.into_iter().zip(earned.0).map(|(a, b)| [f64::from(a), f64::from(b)]));
     }
-    let mean =
-        |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / pairs.len() as f64;
-    let (a, b) = (mean(&|p| p.0), mean(&|p| p.1));
-    let covariance = mean(&|p| (p.0 - a) * (p.1 - b));
-    let deviation = |x: f64| x.sqrt();
-    let correlation = covariance
-        / deviation(mean(&|p| (p.0 - a).powi(2)))
-        / deviation(mean(&|p| (p.1 - b).powi(2)));
-    assert!(correlation > 0.98, "{correlation}");
-    assert!((a / b - 1.0).abs() < 0.1, "{a} {b}");
+    let mean = |f: &dyn Fn(&[f64; 2]) -> f64| pairs.iter().map(f).sum::<f64>() / pairs.len() as f64;
+    let means = [mean(&|p| p[0]), mean(&|p| p[1])];
+    let product = |i: usize, j: usize| mean(&|p| (p[i] - means[i]) * (p[j] - means[j]));
+    (product(0, 1) / (product(0, 0) * product(1, 1)).sqrt(), means)
+}
+
+#[test]
+fn the_shipped_critics_say_what_is_flown() {
+    let (model, agent) = ground();
+    for critic in agent.critics.iter() {
+        let (correlation, [said, earned]) = compare(&model, &agent.actor, critic);
+        println!("correlation {correlation:.4}, said {said:.2}, earned {earned:.2}");
+        assert!(correlation > 0.98, "{correlation}");
+        assert!((said / earned - 1.0).abs() < 0.1, "{said} {earned}");
+    }
+}
+
+/// A tenth of the usual training with half the units: the order is there, the height not yet.
+#[test]
+fn values_become_the_returns_flown() {
+    let (model, agent) = ground();
+    let world = world(&model, 1, 64);
+    let mut valuation = Valuation::new(recipe(), world, agent.actor.as_ref().clone()).unwrap();
+    let first = valuation.run(100).unwrap();
+    let last = valuation.run(u64::MAX).unwrap();
+    assert!(last.error < 0.5 * first.error, "{first:?} {last:?}");
+    let (correlation, [said, earned]) =
+        compare(&model, &agent.actor, &valuation.critics().unwrap()[0]);
+    assert!(correlation > 0.9, "{correlation}");
+    assert!((said / earned - 1.0).abs() < 0.4, "{said} {earned}");
 }
 
 /// The same seed gives the same critics to the bit.
