@@ -35,7 +35,7 @@ use sensors::Sensors;
 
 /// One step, µs: 250 Hz.
 pub const STEP_US: u64 = 4_000;
-/// Simulated time of the first step, µs; not 0, see [`clock::Clock::judge`].
+/// Simulated time of the first step, µs; not 0, see the clock's judgement of an answer.
 pub const FIRST_US: u64 = 1_000_000_000;
 /// HIL_GPS comes every so many steps: 10 Hz.
 const GPS_EVERY: u64 = 25;
