@@ -149,6 +149,11 @@ fn mavsdk_flies_a_controller_and_the_companion_beside_it() {
 }
 
 #[test]
+fn mavproxy_flies_a_controller_through_the_companion() {
+    fly("mavproxy_router.py");
+}
+
+#[test]
 fn misbehaviour_over_real_sockets_neither_ends_the_companion_nor_moves_the_surfaces() {
     fly("pymavlink_trouble.py");
 }
