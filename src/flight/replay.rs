@@ -133,6 +133,10 @@ pub fn replay(folder: &Path, crew: Crew, vehicle: Vehicle) -> Result<Outcome, Re
     let tlog = file("flight.tlog");
     let bytes = std::fs::read(&tlog).map_err(failed(tlog.clone()))?;
     let states = States { vehicle, bytes, at: 0, ready: VecDeque::new() };
+    let mut crew = crew;
+    if states.vehicle.has_channels() {
+        crew.pilot.check_signs();
+    }
     let mut replayed = Replayed { crew, states, outcome: Outcome::default() };
     let mut lines = text.split_inclusive('\n').enumerate().peekable();
     match lines.next() {
@@ -169,6 +173,7 @@ impl Replayed {
             Call::Advance(now) => pilot.advance(now),
             Call::Arm(now, force) => drop(pilot.arm(now, force)),
             Call::Disarm(now, force) => drop(pilot.disarm(now, force)),
+            Call::Engaged(now) => pilot.engaged(now),
             Call::Mode(now, mode) => drop(pilot.set_mode(now, mode)),
             Call::Setpoint(now, setpoint) => pilot.attitude_setpoint(now, setpoint),
             Call::Sticks(now, sticks) => pilot.sticks(now, sticks),
