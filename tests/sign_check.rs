@@ -80,8 +80,10 @@ fn bench(personality: Personality, wiring: Wiring, weather: Weather, seed: u64) 
         options.parameters = wiring.parameters(personality);
         options.plant.air = Air {
             wind_ned_mps: [0.3 * weather.wind_mps, -0.3 * weather.wind_mps, 0.0],
-            turbulence: (weather.severity > 0)
-                .then_some(Turbulence { wind_20ft_mps: weather.wind_mps, severity: weather.severity }),
+            turbulence: (weather.severity > 0).then_some(Turbulence {
+                wind_20ft_mps: weather.wind_mps,
+                severity: weather.severity,
+            }),
             gusts: vec![],
         };
     });
@@ -173,39 +175,57 @@ fn a_controller_that_is_commanded_attitudes_is_not_checked() {
     assert!(bench.settled_deg(30.0, 5.0) < 0.1);
 }
 
-/// Seeds, from the environment: `SIGNS=100`.
+/// Numbers of one kind of flight.
+#[derive(Debug, Default)]
+struct Tally {
+    /// Verdicts that must never be: a wrong sign told of a right one, or a wrong sign passed.
+    false_verdicts: usize,
+    /// Right aircraft that were refused because nothing could be told.
+    untold: usize,
+    took_s: Vec<f64>,
+    departed_deg: f64,
+}
+
+impl Tally {
+    fn add(&mut self, wiring: Wiring, o: &Outcome) {
+        let told = o.texts.concat().contains("wrong sign");
+        let right = wiring == Wiring::Right;
+        self.false_verdicts += usize::from(if right { told } else { o.passed || !o.refused });
+        self.untold += usize::from(right && o.refused && !told);
+        self.took_s.push(o.took_s);
+        self.departed_deg = self.departed_deg.max(o.departed_deg);
+    }
+}
+
+/// Seeds of each kind from the environment: `SIGNS=300`.
 #[test]
-#[ignore = "a campaign of minutes: run it with --release, for README.md"]
+#[ignore = "a campaign of a minute, for README.md"]
 fn hundreds_of_checks_in_every_air() {
-    let seeds = std::env::var("SIGNS").ok().and_then(|n| n.parse().ok()).unwrap_or(20u64);
-    let mut failures = 0;
+    let seeds = std::env::var("SIGNS").ok().and_then(|n| n.parse().ok()).unwrap_or(100u64);
     for personality in [Px4, Ardupilot] {
         for (name, weather) in
             [("calm", CALM), ("noisy", NOISY), ("rough", ROUGH), ("severe", SEVERE)]
         {
             for wiring in WIRINGS {
-                let flown: Vec<(u64, Outcome)> = (0..seeds)
-                    .map(|seed| (seed, checked(&mut bench(personality, wiring, weather, seed))))
-                    .collect();
-                let right = wiring == Wiring::Right;
-                let good = |o: &Outcome| o.passed == right && o.refused != right;
-                for (seed, o) in flown.iter().filter(|(_, o)| !good(o) || o.departed_deg > DEPARTURE) {
-                    println!("   {personality} {name} {wiring:?} seed {seed}: {o:?}");
+                let mut tally = Tally::default();
+                for seed in 0..seeds {
+                    tally.add(wiring, &checked(&mut bench(personality, wiring, weather, seed)));
                 }
-                let bad = flown.iter().filter(|(_, o)| !good(o)).count();
-                failures += bad;
-                let named = flown.iter().filter(|(_, o)| o.texts.concat().contains("wrong sign")).count();
-                let mut took: Vec<f64> = flown.iter().map(|(_, o)| o.took_s).collect();
-                took.sort_by(f64::total_cmp);
-                let most = flown.iter().map(|(_, o)| o.departed_deg).fold(0.0, f64::max);
+                tally.took_s.sort_by(f64::total_cmp);
                 println!(
-                    "{personality} {name} {wiring:?}: {bad} of {seeds} wrong ({named} named a wrong sign); \
-                     verdict after {:.2} s (median), {:.2} s at most; departed by {most:.0} deg at most",
-                    took[took.len() / 2],
-                    took[took.len() - 1]
+                    "{personality} {name} {wiring:?}, {seeds} flights: {} false, {} untold; verdict after \
+                     {:.2} s (median), {:.2} s at most; departed by {:.0} deg at most",
+                    tally.false_verdicts,
+                    tally.untold,
+                    tally.took_s[tally.took_s.len() / 2],
+                    tally.took_s[tally.took_s.len() - 1],
+                    tally.departed_deg
                 );
+                assert_eq!(tally.false_verdicts, 0);
+                // Where gusts roll the aircraft as far as the pulses do, nothing may come of it.
+                assert!(tally.untold == 0 || weather == SEVERE);
+                assert!(tally.departed_deg < DEPARTURE);
             }
         }
     }
-    assert_eq!(failures, 0);
 }

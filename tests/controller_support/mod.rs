@@ -31,9 +31,8 @@ pub fn profile(personality: Personality, authority: Authority) -> Profile {
 
 /// An LQI with an LQI to fall back on; the design, which takes most of a bench's time, is made once.
 fn lqi() -> Crew {
-    static DESIGN: LazyLock<(Config, Box<dyn Controller>)> = LazyLock::new(|| {
-        (Config::for_model(x8()).unwrap(), build(Kind::Lqi, x8()).unwrap())
-    });
+    static DESIGN: LazyLock<(Config, Box<dyn Controller>)> =
+        LazyLock::new(|| (Config::for_model(x8()).unwrap(), build(Kind::Lqi, x8()).unwrap()));
     let (config, design) = &*DESIGN;
     let [controller, fallback] = [(), ()].map(|()| design.boxed_clone());
     let pilot = Pilot::new(config.clone(), fallback).unwrap();

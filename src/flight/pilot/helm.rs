@@ -24,7 +24,9 @@ impl Pilot {
                 Verdict::Open => {}
                 Verdict::Right([roll, pitch]) => self.texts.say(
                     Severity::Info,
-                    format!("signs are right: {roll:.1} and {pitch:.1} of the model's roll and pitch"),
+                    format!(
+                        "signs are right: {roll:.1} and {pitch:.1} of the model's roll and pitch"
+                    ),
                 ),
                 Verdict::Wrong(fault) => self.refused = Some(fault),
             }

@@ -205,7 +205,9 @@ impl Pilot {
                 Command { aileron: s.roll, elevator: s.pitch, throttle: s.throttle },
                 Source::Sticks,
             ),
-            Pending::Check { time, airspeed } => (self.check_command(time, airspeed), Source::Check),
+            Pending::Check { time, airspeed } => {
+                (self.check_command(time, airspeed), Source::Check)
+            }
             Pending::Fly { seen, throttle } => self.with_state(plan, &seen, throttle),
         };
         self.source = source;

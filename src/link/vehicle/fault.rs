@@ -37,7 +37,10 @@ impl Fault {
                     Axis::Roll => "it rolls left when the aileron is told right",
                     Axis::Pitch => "it pitches up when the elevator is told down",
                 };
-                format!("wrong sign: {what}; on the ground, in MANUAL, correct {}", setting(axis, stack))
+                format!(
+                    "wrong sign: {what}; on the ground, in MANUAL, correct {}",
+                    setting(axis, stack)
+                )
             }
             Fault::Unanswered(axis) => {
                 let (surface, other) = match axis {
@@ -49,9 +52,11 @@ impl Fault {
                      reversed makes {other} of it)"
                 )
             }
-            Fault::SignsUnknown => "the surfaces' signs could not be told: engage in level flight, \
+            Fault::SignsUnknown => {
+                "the surfaces' signs could not be told: engage in level flight, \
                                     in calmer air"
-                .into(),
+                    .into()
+            }
         }
     }
 }

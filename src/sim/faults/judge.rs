@@ -97,9 +97,7 @@ impl Cause {
         let lie = matches!(kind, Kind::Airspeed | Kind::Alpha);
         match self {
             Cause::Misled => lie,
-            Cause::Unsteered | Cause::Blind => {
-                !lie && !matches!(kind, Kind::Client | Kind::Disk)
-            }
+            Cause::Unsteered | Cause::Blind => !lie && !matches!(kind, Kind::Client | Kind::Disk),
         }
     }
 }
