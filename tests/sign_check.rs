@@ -170,7 +170,7 @@ fn a_controller_that_is_commanded_attitudes_is_not_checked() {
     let mut bench = Bench::new(Px4, Attitude, |_| {});
     bench.run(6.0);
     bench.engage(30.0, 5.0);
-    bench.steer(30.0, 5.0, 8.0);
+    bench.steer(30.0, 5.0, 14.0);
     assert!(!bench.said("signs"), "{:?}", bench.texts());
     assert!(bench.settled_deg(30.0, 5.0) < 0.1);
 }

@@ -1,4 +1,4 @@
-//! What the rates say of the surfaces: commands and rates of a check, with the fit of answers to them.
+//! What the rates say of the surfaces: the record of a check, with the fit of answers to it.
 
 use nalgebra::{Matrix3, Vector3};
 
