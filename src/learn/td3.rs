@@ -244,7 +244,7 @@ impl Td3 {
             learner.network = Mlp::new(&Dense::new(sizes, own)?, &self.device);
             learner.target = Mlp::new(&Dense::new(sizes, target)?, &self.device);
             let found = moments.mean.len();
-            if !learner.optimiser.remember(sizes, moments, &self.device) {
+            if !learner.optimiser.remember(moments) {
                 let expected = learner.network.parameters().len();
                 return Err(DenseError::Count { sizes: sizes.clone(), expected, found });
             }

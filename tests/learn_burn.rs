@@ -1,0 +1,109 @@
+//! The hand-written gradient of the rollout loss against burn's automatic one.
+#![cfg(feature = "learn")]
+
+#[path = "learn_support/in_burn.rs"]
+mod in_burn;
+mod learn_support;
+
+use burn::tensor::DType;
+use greylag::learn::windows::{Track, Window};
+use greylag::learn::{
+    Arithmetic, Engine, Gradient, Objective, Passes, Penalty, PriorSlopes, Subject,
+};
+use greylag::model::residual::Scales;
+use greylag::model::{GreyBox, Integrator};
+use greylag::num::Dense;
+use in_burn::{InBurn, Place, Rows};
+use learn_support::{flight, model, network};
+
+/// Steps of a rollout.
+const STEPS: usize = 6;
+
+struct Scene {
+    prior: GreyBox,
+    network: Dense,
+    objective: Objective,
+    tracks: Vec<Track>,
+    windows: Vec<Window>,
+}
+
+fn scene(integrator: Integrator) -> Scene {
+    let mut prior = model("prior-severe");
+    prior.integrator = integrator;
+    let tracks = vec![flight(&model("jsbsim"), &prior, 4, 200)];
+    let windows = (0..20).map(|k| Window { track: 0, start: 1 + 9 * k }).collect();
+    let objective =
+        Objective { scale: prior.scale(), penalty: Penalty::Ratio, unit: 0.02, lambda: 3.0 };
+    Scene { prior, network: network(12, 0.3), objective, tracks, windows }
+}
+
+fn by_hand(scene: &Scene, arithmetic: Arithmetic) -> (f64, Gradient) {
+    let subject = Subject {
+        scales: Scales::new(&scene.prior.airframe, scene.prior.scale()),
+        prior: scene.prior.clone(),
+        network: Passes::new(scene.network.clone()),
+        prior_slopes: PriorSlopes::All,
+    };
+    let Scene { objective, tracks, windows, .. } = scene;
+    let mut engine = Engine::new(&subject, windows.len(), STEPS, arithmetic);
+    let (loss, gradient) = engine.step(&subject, objective, tracks, windows, STEPS);
+    assert_eq!(loss.lost, 0);
+    (loss.objective, gradient.clone())
+}
+
+fn by_burn(scene: &Scene, precision: DType) -> (f64, Gradient) {
+    let place = Place::new(precision);
+    let scales = Scales::new(&scene.prior.airframe, scene.prior.scale());
+    let model = InBurn::new(&place, &scene.prior, &scales, &scene.network).followed();
+    let rows = Rows::new(&place, &scene.tracks, &scene.windows, STEPS).taped();
+    let objective = model.objective(&rows, &scene.objective);
+    let gradient = model.gradient(&objective.backward());
+    (objective.into_data().convert::<f64>().try_into_vec::<f64>().unwrap()[0], gradient)
+}
+
+/// What is learned, by groups: each layer's weights and biases, each coefficient of the prior, Jxz.
+fn groups(scene: &Scene, gradient: &Gradient) -> Vec<(String, Vec<f64>)> {
+    let mut rest = &gradient.network[..];
+    let mut all = Vec::new();
+    for (k, s) in scene.network.sizes().windows(2).enumerate() {
+        for (what, count) in [("weights", s[0] * s[1]), ("biases", s[1])] {
+            let (part, after) = rest.split_at(count);
+            all.push((format!("layer {k}, {what}"), part.to_vec()));
+            rest = after;
+        }
+    }
+    let names = scene.prior.coefficients().iter().map(|c| c.name.clone());
+    all.extend(names.chain(["Jxz".into()]).zip(gradient.prior.iter().map(|g| vec![*g])));
+    all
+}
+
+/// The largest difference in each group, relative to the group's largest slope.
+fn apart(scene: &Scene, ours: &Gradient, theirs: &Gradient, bound: f64) -> f64 {
+    let pairs = groups(scene, ours).into_iter().zip(groups(scene, theirs));
+    let mut worst = 0.0_f64;
+    for ((name, ours), (_, theirs)) in pairs {
+        let size = theirs.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        assert!(size > 0.0, "{name} has no slope");
+        let off = ours.iter().zip(&theirs).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) / size;
+        assert!(off < bound, "{name}: {off:.1e} apart");
+        worst = worst.max(off);
+    }
+    worst
+}
+
+#[test]
+fn gradient_is_that_of_burns_autodiff_in_every_group() {
+    for integrator in [Integrator::Rk4, Integrator::Jsbsim] {
+        let scene = scene(integrator);
+        let (expected, theirs) = by_burn(&scene, DType::F64);
+        let (exact, ours) = by_hand(&scene, Arithmetic::Double);
+        // the same sums in another order, 24 evaluations deep in double precision
+        assert!((exact / expected - 1.0).abs() < 1e-11, "{exact} by hand, {expected} by burn");
+        let double = apart(&scene, &ours, &theirs, 1e-9);
+        // what is asked for (issue 5), in the precision that training runs in
+        let (loss, ours) = by_hand(&scene, Arithmetic::Lanes);
+        assert!((loss / expected - 1.0).abs() < 1e-4, "{loss} by hand, {expected} by burn");
+        let lanes = apart(&scene, &ours, &theirs, 1e-4);
+        println!("{integrator:?}: double precision {double:.1e}, lanes {lanes:.1e}");
+    }
+}
