@@ -1,18 +1,19 @@
-//! The hand-written gradient of the rollout loss against burn's automatic one.
+//! What is written by hand against what burn makes of it: the rollout loss's gradient, Adam's step.
 #![cfg(feature = "learn")]
 
 #[path = "learn_support/in_burn.rs"]
 mod in_burn;
 mod learn_support;
 
-use burn::tensor::DType;
+use burn::optim::{AdamConfig, Optimizer};
+use burn::tensor::{DType, Device, Tensor, TensorData, activation};
 use greylag::learn::windows::{Track, Window};
 use greylag::learn::{
-    Arithmetic, Engine, Gradient, Objective, Passes, Penalty, PriorSlopes, Subject,
+    Arithmetic, Engine, Gradient, Mlp, Objective, Optimiser, Passes, Penalty, PriorSlopes, Subject,
 };
 use greylag::model::residual::Scales;
 use greylag::model::{GreyBox, Integrator};
-use greylag::num::Dense;
+use greylag::num::{Dense, stream};
 use in_burn::{InBurn, Place, Rows};
 use learn_support::{flight, model, network};
 
@@ -106,4 +107,46 @@ fn gradient_is_that_of_burns_autodiff_in_every_group() {
         let lanes = apart(&scene, &ours, &theirs, 1e-4);
         println!("{integrator:?}: double precision {double:.1e}, lanes {lanes:.1e}");
     }
+}
+
+/// Twenty steps of ours and of burn's end at the same parameters, to the bit.
+#[test]
+fn adam_is_burns_to_the_bit() {
+    let device = Device::flex();
+    let network = Dense::uniform(&[3, 7, 1], &mut stream::stream(8, &[])).unwrap();
+    let tensor = |numbers: Vec<f32>, shape: [usize; 2]| -> Tensor<2> {
+        Tensor::from_data(TensorData::new(numbers, shape), &device)
+    };
+    let rows = tensor((0..30).map(|k| (k as f32).sin()).collect(), [10, 3]);
+    let mut ours = Mlp::new(&network, &device);
+    let mut optimiser = Optimiser::new(&ours, 1e-2);
+    for _ in 0..20 {
+        let followed = ours.followed();
+        let answer = followed.forward(rows.clone().autodiff());
+        let mut gradients = (answer - 0.3).square().mean().backward();
+        optimiser.step(&mut ours, followed, &mut gradients);
+    }
+    let mut theirs: Vec<Tensor<2>> = network
+        .layers()
+        .flat_map(|layer| {
+            let width = layer.bias.len();
+            [layer.weights, layer.bias].map(|n| tensor(n.to_vec(), [n.len() / width, width]))
+        })
+        .collect();
+    let adam = AdamConfig::new().with_epsilon(1e-8).build();
+    let mut states = vec![None; theirs.len()];
+    for _ in 0..20 {
+        let leaves: Vec<_> = theirs.iter().map(|t| t.clone().autodiff().require_grad()).collect();
+        let [w1, b1, w2, b2] = leaves.clone().try_into().unwrap();
+        let hidden = activation::relu(rows.clone().autodiff().matmul(w1) + b1);
+        let gradients = (hidden.matmul(w2) + b2 - 0.3).square().mean().backward();
+        for ((own, leaf), state) in theirs.iter_mut().zip(&leaves).zip(&mut states) {
+            let slope = leaf.grad(&gradients).unwrap();
+            (*own, *state) = adam.step(1e-2, own.clone(), slope, state.take());
+        }
+    }
+    let theirs: Vec<f32> =
+        theirs.into_iter().flat_map(|t| t.into_data().try_into_vec::<f32>().unwrap()).collect();
+    assert_ne!(ours.parameters(), network.parameters());
+    assert_eq!(ours.parameters(), theirs);
 }

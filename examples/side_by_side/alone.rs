@@ -2,7 +2,6 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use anyhow::Result;
 use greylag::control::cem::{Aids, Cem, Settings};
@@ -18,7 +17,7 @@ use greylag::sim::targets::Stratified;
 
 use crate::problem::{self, Scoring};
 use crate::processor::{Operations, narrow_peak, peak, steps_per_second};
-use crate::{Timed, median};
+use crate::{Timed, clock, median};
 
 /// What one core of a Raspberry Pi 5 can do, FLOP/s: 2.4 GHz, two pipes of four fused multiply-adds.
 const PI_PEAK: f64 = 38.4e9;
@@ -40,13 +39,13 @@ pub fn updates() -> Result<impl FnMut(usize) -> Result<Timed>> {
     let mut rng = stream::stream(2, &[]);
     let mut batch = Batch::default();
     Ok(move |calls| {
-        let start = Instant::now();
+        let start = clock::now();
         for _ in 0..calls {
             replay.draw(&mut rng, 256, &mut batch);
             td3.update(&batch, &mut rng);
         }
         // every second update is of the actor, too: their mean counts
-        let mean = start.elapsed().as_secs_f64() / calls as f64;
+        let mean = (clock::now() - start) / calls as f64;
         Ok(Timed { seconds: vec![mean], value: 0.0 })
     })
 }
@@ -67,13 +66,13 @@ fn imagine(model: GreyBox) {
     let mut world = Imagination::new(Arc::new(model), 64, Stratified::new(1, 0, 0.0));
     let action = [Block::zero(); 3];
     let rounds = 20_000;
-    let start = Instant::now();
+    let start = clock::now();
     for _ in 0..rounds {
         for block in 0..world.blocks() {
             world.step(block, &action);
         }
     }
-    let rate = f64::from(rounds * 64) / start.elapsed().as_secs_f64();
+    let rate = f64::from(rounds * 64) / (clock::now() - start);
     println!("imagined steps: {:.1} million a second   asked: 1", rate / 1e6);
 }
 
@@ -91,17 +90,17 @@ fn act(width: usize) -> Result<()> {
         previous: [Command::IDLE; 2],
     };
     let target = Target { roll: 0.5, pitch: 0.1, airspeed: 16.67 };
-    let start = Instant::now();
+    let start = clock::now();
     for _ in 0..20_000 {
         seen.state.roll = 0.1 * policy.command(&seen, &target).aileron;
     }
-    let one = 1e6 * start.elapsed().as_secs_f64() / 2e4;
+    let one = 1e6 * (clock::now() - start) / 2e4;
     let (mut units, mut x) = (Units::new(Block::zero()), [Block::from_f64(0.1); 15]);
-    let start = Instant::now();
+    let start = clock::now();
     for _ in 0..2_000 {
         x[0] = actor.act_block(&mut units, &x)[0];
     }
-    let block = 1e6 * start.elapsed().as_secs_f64() / 2e3;
+    let block = 1e6 * (clock::now() - start) / 2e3;
     println!(
         "policy of 2 × {width}: {one:.2} us a step   asked: 10; in lanes {block:.2} us for 16"
     );
@@ -148,9 +147,9 @@ fn estimate(scorings: &[Scoring]) -> Result<()> {
         let mut planner = Cem::new("hybrid", &problem.model, Settings::HYBRID, aids).narrow();
         planner.reset(1);
         let tick = |_| {
-            let start = Instant::now();
+            let start = clock::now();
             std::hint::black_box(planner.command(&problem.seen, &problem.target));
-            start.elapsed().as_secs_f64()
+            clock::now() - start
         };
         let time = 1e3 * median((0..40).map(tick).collect());
         println!(

@@ -1,7 +1,5 @@
 //! burn's part: the rollout loss by its autodiff, plans scored in its tensors.
 
-use std::time::Instant;
-
 use anyhow::Result;
 use burn::tensor::DType;
 use greylag::control::policy::ACTIONS;
@@ -11,26 +9,26 @@ use greylag::learn::Mlp;
 use greylag::model::{Integrator, STEP};
 use greylag::physics::State;
 
-use crate::Timed;
 use crate::in_burn::{Column, InBurn, Octet, Place, Rows, columns};
 use crate::problem::{PLANS, Rollouts, STEPS, Scoring};
+use crate::{Timed, clock};
 
 /// A training step: forward, and backward on a new tape.
 pub fn rollouts(problem: &Rollouts) -> impl FnMut(usize) -> Result<Timed> {
     let place = Place::new(DType::F32);
     let bare = InBurn::new(&place, &problem.prior, &problem.scales(), &problem.network);
-    let (tracks, windows) = (problem.tracks.clone(), problem.windows.clone());
+    let rows = Rows::new(&place, &problem.tracks, &problem.windows, STEPS);
     let objective = problem.objective;
     move |calls| {
         let mut timed = Timed::default();
         for _ in 0..calls {
-            let start = Instant::now();
-            let rows = Rows::new(&place, &tracks, &windows, STEPS).taped();
+            let start = clock::now();
+            let rows = rows.clone().taped();
             let model = bare.followed();
             let loss = model.objective(&rows, &objective);
             let gradients = loss.backward();
             std::hint::black_box(model.gradient(&gradients));
-            timed.seconds.push(start.elapsed().as_secs_f64());
+            timed.seconds.push(clock::now() - start);
             timed.value = loss.into_scalar::<f32>().into();
         }
         Ok(timed)
@@ -74,10 +72,10 @@ pub fn scoring(problem: &Scoring) -> impl FnMut(usize) -> Result<Timed> + '_ {
     move |calls| {
         let mut timed = Timed::default();
         for _ in 0..calls {
-            let start = Instant::now();
+            let start = clock::now();
             let worth = scorer.worth(problem);
             let numbers = worth.into_data().try_into_vec::<f32>().expect("numbers");
-            timed.seconds.push(start.elapsed().as_secs_f64());
+            timed.seconds.push(clock::now() - start);
             timed.value = numbers.iter().map(|x| f64::from(*x)).sum::<f64>() / PLANS as f64;
         }
         Ok(timed)

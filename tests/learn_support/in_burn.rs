@@ -61,6 +61,7 @@ pub struct InBurn {
 }
 
 /// Windows of tracks, a row each.
+#[derive(Clone)]
 pub struct Rows {
     states: Vec<Column>,
     controls: Vec<Triple>,
