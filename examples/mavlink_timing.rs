@@ -5,7 +5,8 @@
 //! ```
 //! It flies a minute in real time, then five minutes of flight in lockstep, prints what it
 //! measured, and ends with an error when a wanted figure is missed. An idle machine is part of
-//! the measurement.
+//! the measurement. `--controller hybrid` flies a planner, whose plans are counted; `--load 2` keeps two
+//! threads busy meanwhile: plans may be late then, the attitude has to be held.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::path::Path;
@@ -16,8 +17,9 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
+use clap::Parser;
 use greylag::commands::fly;
-use greylag::control::{Kind, Target, build};
+use greylag::control::{self, Kind, Target, build};
 use greylag::flight::pilot::{Config, Pilot};
 use greylag::flight::recorder::Place;
 use greylag::flight::runtime::{Crew, Flight, Options, Pace, Seat, Summary};
@@ -40,8 +42,12 @@ const LOCKSTEP_S: f64 = 300.0;
 /// Cycles of an episode in process, with how many at its end the settled error is taken over.
 const EPISODE: usize = 1000;
 const SETTLED: usize = 200;
-/// Longest p99 from a state frame to its command, µs.
+/// Longest p99 from a state frame to its command, µs, of a controller in the loop.
 const P99_US: f64 = 2000.0;
+/// Longest median and p99.9 of a planner, µs.
+const PLAN_US: [f64; 2] = [5000.0, 10_000.0];
+/// Largest roll or pitch error on a loaded machine once the target has been flown for ten seconds, degrees.
+const HELD_DEG: f64 = 2.0;
 /// How far the settled error may be from that in process, degrees.
 const AGREEMENT_DEG: f64 = 0.05;
 /// Least ratio of lockstep to real time.
@@ -54,28 +60,39 @@ struct Flown {
     shim: shim::Summary,
 }
 
-fn main() -> Result<ExitCode> {
-    let model = fly::model(Path::new("params/x8/jsbsim.toml"), None)?;
-    let in_process = settled_in_process(&model)?;
-    println!("target {ROLL_DEG} / {PITCH_DEG} deg, LQI, JSBSim; in process {in_process:.4} deg\n");
-    let real = flight(&model, Pace::RealTime, REAL_TIME_S)?;
-    let lockstep = flight(&model, Pace::Lockstep, LOCKSTEP_S)?;
+/// Real-time figures through MAVLink.
+#[derive(Parser)]
+struct Arguments {
+    /// Controller that flies.
+    #[arg(long, default_value = "lqi")]
+    controller: Kind,
+    /// Threads that are kept busy meanwhile.
+    #[arg(long, default_value_t = 0)]
+    load: usize,
+}
 
-    let timing = &real.companion.timing;
-    let p99 = timing.latency.quantile_us(0.99);
-    // Late answers, frames that did not come, steps that the shim made without a new answer.
-    let missed = timing.missed + real.companion.vehicle.lost + real.shim.unanswered_steps;
-    let (real_error, lockstep_error) = (settled(&real.samples)?, settled(&lockstep.samples)?);
-    let speed = lockstep.shim.flown_s / lockstep.shim.wall_s;
-    let near = |errors: [f64; 2]| errors.iter().all(|e| (e - in_process).abs() <= AGREEMENT_DEG);
-    let told = |[early, late]: [f64; 2]| format!("{early:.4} deg after 10 s, {late:.4} at the end");
-    let verdicts = [
-        (missed == 0, format!("real time: {missed} cycles missed of {}", timing.latency.count())),
-        (p99 <= P99_US, format!("real time: state to command p99 {p99:.0} us of {P99_US:.0}")),
-        (near(real_error), format!("real time: settled {}", told(real_error))),
-        (near(lockstep_error), format!("lockstep: settled {}", told(lockstep_error))),
-        (speed >= SPEED, format!("lockstep: {speed:.0} times real time, {SPEED:.0} wanted")),
-    ];
+fn main() -> Result<ExitCode> {
+    let Arguments { controller: kind, load } = Arguments::parse();
+    let model = fly::model(Path::new("params/x8/jsbsim.toml"), None)?;
+    let in_process = settled_in_process(kind, &model)?;
+    println!(
+        "target {ROLL_DEG} / {PITCH_DEG} deg, {kind}, JSBSim; in process {in_process:.4} deg; {load} busy \
+         threads\n"
+    );
+    let busy = Busy::start(load)?;
+    let real = flight(kind, &model, Pace::RealTime, REAL_TIME_S)?;
+    drop(busy);
+    let mut verdicts = real_time(&real, kind, load, in_process)?;
+    if load == 0 {
+        let lockstep = flight(kind, &model, Pace::Lockstep, LOCKSTEP_S)?;
+        let speed = lockstep.shim.flown_s / lockstep.shim.wall_s;
+        let errors = settled(&lockstep.samples)?;
+        verdicts.push((near(errors, in_process), format!("lockstep: settled {}", told(errors))));
+        if kind.pace() == control::Pace::Immediate {
+            let words = format!("lockstep: {speed:.0} times real time, {SPEED:.0} wanted");
+            verdicts.push((speed >= SPEED, words));
+        }
+    }
     for (reached, words) in &verdicts {
         println!("{:>6}  {words}", if *reached { "ok" } else { "MISSED" });
     }
@@ -83,10 +100,89 @@ fn main() -> Result<ExitCode> {
     Ok(if all { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
+fn near(errors: [f64; 2], in_process: f64) -> bool {
+    errors.iter().all(|e| (e - in_process).abs() <= AGREEMENT_DEG)
+}
+
+fn told([early, late]: [f64; 2]) -> String {
+    format!("{early:.4} deg after 10 s, {late:.4} at the end")
+}
+
+/// What is wanted of the flight in real time, and whether it was reached.
+fn real_time(
+    real: &Flown,
+    kind: Kind,
+    load: usize,
+    in_process: f64,
+) -> Result<Vec<(bool, String)>> {
+    let timing = &real.companion.timing;
+    let count = timing.latency.count();
+    if load > 0 {
+        let worst = worst_held(&real.samples)?;
+        let words = format!(
+            "{load} busy threads: worst error {worst:.3} deg of {HELD_DEG}; {} plans late, {} cycles late of \
+             {count}",
+            timing.late_plans, timing.missed
+        );
+        return Ok(vec![(worst <= HELD_DEG, words)]);
+    }
+    // Late answers, frames that did not come, steps that the shim made without a new answer.
+    let missed = timing.missed + real.companion.vehicle.lost + real.shim.unanswered_steps;
+    let quantile = |q: f64| timing.latency.quantile_us(q);
+    let (p50, p99, p999) = (quantile(0.5), quantile(0.99), quantile(0.999));
+    let late = timing.late_plans;
+    let in_time = match kind.pace() {
+        control::Pace::Immediate => {
+            (p99 <= P99_US, format!("real time: state to command p99 {p99:.0} us of {P99_US:.0}"))
+        }
+        control::Pace::Planned => (
+            p50 <= PLAN_US[0] && p999 <= PLAN_US[1] && late == 0,
+            format!(
+                "real time: state to command p50 {p50:.0}, p99.9 {p999:.0} us; {late} plans late"
+            ),
+        ),
+    };
+    let errors = settled(&real.samples)?;
+    Ok(vec![
+        (missed == 0, format!("real time: {missed} cycles missed of {count}")),
+        in_time,
+        (near(errors, in_process), format!("real time: settled {}", told(errors))),
+    ])
+}
+
+/// Threads that do nothing but work.
+struct Busy {
+    stop: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Busy {
+    fn start(count: usize) -> Result<Busy> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let threads = (0..count).map(|_| {
+            let told = stop.clone();
+            let work = move || while !told.load(Ordering::Relaxed) {};
+            thread::Builder::new().name("busy".into()).spawn(work)
+        });
+        let threads = threads.collect::<Result<_, _>>()?;
+        Ok(Busy { stop, threads })
+    }
+}
+
+impl Drop for Busy {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            // a thread that only loops has nothing to tell
+            let _ = thread.join();
+        }
+    }
+}
+
 /// The settled error of the same target flown from neutral in process, degrees.
-fn settled_in_process(model: &GreyBox) -> Result<f64> {
+fn settled_in_process(kind: Kind, model: &GreyBox) -> Result<f64> {
     let mut simulator = Simulator::new(&PlantOptions::default())?;
-    let mut controller = build(Kind::Lqi, model)?;
+    let mut controller = fly::controller(kind, model, Path::new(fly::POLICY), &[])?;
     let target =
         Target { roll: ROLL_DEG.to_radians(), pitch: PITCH_DEG.to_radians(), airspeed: 20.0 };
     let episode = Episode { environment: &mut simulator, controller: controller.as_mut(), seed: 0 };
@@ -96,10 +192,25 @@ fn settled_in_process(model: &GreyBox) -> Result<f64> {
 /// The settled error, degrees: at the end of the first ten seconds on the target, as in an
 /// episode, then at the end of the flight.
 fn settled(samples: &[Sample]) -> Result<[f64; 2]> {
-    let on_target = |s: &Sample| (s.roll_target_rad.to_degrees() - ROLL_DEG).abs() < 1e-3;
-    let first = samples.iter().position(on_target).context("the target was never flown")?;
+    let first = begun(samples)?;
     let episode = samples.get(first..first + EPISODE).context("the flight was too short")?;
     Ok([episode, samples].map(error_at_end))
+}
+
+/// The first cycle on the target.
+fn begun(samples: &[Sample]) -> Result<usize> {
+    let on_target = |s: &Sample| (s.roll_target_rad.to_degrees() - ROLL_DEG).abs() < 1e-3;
+    samples.iter().position(on_target).context("the target was never flown")
+}
+
+/// The largest error of roll or pitch from ten seconds after the target was given, degrees.
+fn worst_held(samples: &[Sample]) -> Result<f64> {
+    let held = samples.get(begun(samples)? + EPISODE..).context("the flight was too short")?;
+    let errors = held.iter().map(|s| {
+        let [roll, pitch] = [s.attitude_rad[0], s.attitude_rad[1]].map(f64::to_degrees);
+        (roll - ROLL_DEG).abs().max((pitch - PITCH_DEG).abs())
+    });
+    Ok(errors.fold(0.0, f64::max))
 }
 
 /// Mean of roll and pitch RMSE over the last cycles, degrees.
@@ -113,12 +224,12 @@ fn error_at_end(samples: &[Sample]) -> f64 {
 }
 
 /// Flies the target in OFFBOARD until the shim has flown `seconds`.
-fn flight(model: &GreyBox, pace: Pace, seconds: f64) -> Result<Flown> {
+fn flight(kind: Kind, model: &GreyBox, pace: Pace, seconds: f64) -> Result<Flown> {
     let room = tempfile::tempdir()?;
     let folder = room.path().join("flight");
     let stop = Arc::new(AtomicBool::new(false));
     let options = options(model, pace, &folder)?;
-    let companion = Flight::start(&options, crew(model, pace)?, stop.clone())?;
+    let companion = Flight::start(&options, crew(kind, model, pace)?, stop.clone())?;
     let vehicle = companion.vehicle.context("no vehicle link")?;
     let client = companion.clients.first().copied().flatten().context("no client link")?;
     let simulator = simulate(vehicle, pace, seconds, stop.clone())?;
@@ -147,16 +258,20 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<Options> {
     })
 }
 
-/// LQI in the loop. In lockstep the aircraft's seconds are milliseconds of the client's, so that
+/// The controller with an LQI as its fallback. In lockstep the aircraft's seconds are milliseconds of the client's, so that
 /// it may be silent for longer of them.
-fn crew(model: &GreyBox, pace: Pace) -> Result<Crew> {
+fn crew(kind: Kind, model: &GreyBox, pace: Pace) -> Result<Crew> {
     let mut config = Config::for_model(model)?;
     if pace == Pace::Lockstep {
         config.offboard_loss_s = 60.0;
     }
-    let controller = build(Kind::Lqi, model)?;
-    let pilot = Pilot::new(config, controller.boxed_clone())?;
-    Ok(Crew { pilot, controller, seat: Seat::Loop })
+    let controller = fly::controller(kind, model, Path::new(fly::POLICY), &[])?;
+    let pilot = Pilot::new(config, build(Kind::Lqi, model)?)?;
+    let seat = match kind.pace() {
+        control::Pace::Planned => Seat::Thread,
+        control::Pace::Immediate => Seat::Loop,
+    };
+    Ok(Crew { pilot, controller, seat })
 }
 
 type Simulation = JoinHandle<Result<shim::Summary, shim::ShimError>>;

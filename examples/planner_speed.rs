@@ -69,7 +69,8 @@ fn main() -> Result<()> {
         Kind::Hybrid,
         Kind::HybridLqi,
     ] {
-        let mut controller = control::build(kind, Source { model: &model, agent: Some(&agent) })?;
+        let mut controller =
+            control::build(kind, Source { model: &model, agent: Some(&agent), changes: &[] })?;
         controller.reset(1);
         let target = Target { roll: 0.6, pitch: 0.2, airspeed: State::NEUTRAL.airspeed };
         let mut seen = Observation {

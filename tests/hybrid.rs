@@ -102,7 +102,7 @@ fn critics_decide_when_they_say_more_than_the_reward() {
 fn flights_repeat_to_the_bit() {
     let model = model();
     let agent = agent(&model, 1.0);
-    let source = Source { model: &model, agent: Some(&agent) };
+    let source = Source { model: &model, agent: Some(&agent), changes: &[] };
     let mut planner = control::build(Kind::HybridLqi, source).unwrap();
     let fly = |planner: &mut dyn Controller, seed| {
         planner.reset(seed);
@@ -112,6 +112,37 @@ fn flights_repeat_to_the_bit() {
     assert_eq!(fly(planner.boxed_clone().as_mut(), 7), first);
     assert_eq!(fly(planner.as_mut(), 7), first);
     assert!(first.iter().all(Command::is_finite));
+}
+
+/// What was seen in a flight, seen again, gives the same commands, under each set of instructions by itself.
+#[cfg(feature = "sitl")]
+#[test]
+fn flights_replay_to_the_bit_under_each_set_of_instructions() {
+    use greylag::sim::{Environment, Simulator};
+    let model = model();
+    let agent = agent(&model, 1.0);
+    let plant = greylag_sitl::plant::PlantOptions::default();
+    for kind in [Kind::Hybrid, Kind::HybridLqi] {
+        for text in ["instructions=widest", "instructions=portable"] {
+            let changes = [text.parse().unwrap()];
+            let source = Source { model: &model, agent: Some(&agent), changes: &changes };
+            let mut planner = control::build(kind, source).unwrap();
+            let mut simulator = Simulator::new(&plant).unwrap();
+            let mut now = simulator.reset().unwrap();
+            planner.reset(9);
+            let mut flight = Vec::new();
+            for _ in 0..60 {
+                let command = planner.command(&now, &TARGET);
+                flight.push((now, command));
+                now = simulator.step(command).unwrap();
+            }
+            let mut again = control::build(kind, source).unwrap();
+            again.reset(9);
+            for (tick, (seen, command)) in flight.iter().enumerate() {
+                assert_eq!(again.command(seen, &TARGET), *command, "{kind}, {text}, tick {tick}");
+            }
+        }
+    }
 }
 
 /// MPPI that follows the best candidate alone is the cross-entropy method with one elite.
@@ -139,7 +170,7 @@ fn flown(kind: Kind, model: &str, [roll_deg, pitch_deg]: [f64; 2]) -> greylag::s
     let model = GreyBox::load(&params.join(model)).unwrap();
     let agent = agent(&model, 1.0);
     let mut controller =
-        control::build(kind, Source { model: &model, agent: Some(&agent) }).unwrap();
+        control::build(kind, Source { model: &model, agent: Some(&agent), changes: &[] }).unwrap();
     let plant = greylag_sitl::plant::PlantOptions::default();
     let mut simulator = Simulator::new(&plant).unwrap();
     let (environment, controller) = (&mut simulator, controller.as_mut());
@@ -204,4 +235,63 @@ fn a_planner_without_its_policy_is_refused() {
     let model = model();
     let refused = control::build(Kind::Hybrid, &model);
     assert!(matches!(refused, Err(SetupError::Untrained)));
+}
+
+/// The same of iLQR, sooner still where the aircraft can be turned fast.
+#[cfg(feature = "sitl")]
+#[test]
+fn ilqr_is_exact_on_a_model_that_is_and_on_one_that_is_not() {
+    for (model, target, most) in
+        [("jsbsim.toml", [25.0, -5.0], 0.01), ("prior-mild.toml", [-50.0, -27.0], 0.05)]
+    {
+        let flight = flown(Kind::Ilqr, model, target);
+        assert!(flight.settled_deg < most, "{model} {target:?}: {} °", flight.settled_deg);
+    }
+}
+
+/// A plan starts from where the aircraft is; without a number to start from the LQI answers.
+#[test]
+fn ilqr_repeats_to_the_bit_and_hands_over_to_the_lqi() {
+    let model = model();
+    let mut planner = control::build(Kind::Ilqr, &model).unwrap();
+    let fly = |planner: &mut dyn Controller| {
+        planner.reset(1);
+        [0, 1, 2].map(|_| planner.command(&seen(), &TARGET))
+    };
+    let first = fly(planner.as_mut());
+    assert_eq!(fly(planner.boxed_clone().as_mut()), first);
+    assert!(first.iter().all(Command::is_finite));
+    let sight = planner.insight(&seen()).unwrap();
+    assert_eq!(sight.chosen[0], [seen().state.roll, seen().state.pitch]);
+    let lost = Observation { state: State { q: f64::NAN, ..seen().state }, ..seen() };
+    let mut lqi = Lqi::new(&model).unwrap();
+    planner.reset(1);
+    lqi.reset(1);
+    let (ours, theirs) = (planner.command(&lost, &TARGET), lqi.command(&lost, &TARGET));
+    assert_eq!(ours.throttle, theirs.throttle);
+    assert!(!ours.elevator.is_finite() && !theirs.elevator.is_finite());
+}
+
+/// What was flown is among what a reader is shown, and starts at the aircraft.
+#[test]
+fn what_the_planner_saw_can_be_told() {
+    let model = model();
+    let agent = agent(&model, 1.0);
+    for (kind, steps) in [(Kind::Hybrid, 5), (Kind::HybridLqi, 80)] {
+        let source = Source { model: &model, agent: Some(&agent), changes: &[] };
+        let mut planner = control::build(kind, source).unwrap();
+        planner.reset(1);
+        planner.command(&seen(), &TARGET);
+        let told = planner.insight(&seen()).unwrap();
+        assert!(told.candidates.len() >= 8 && told.phases.len() == 4);
+        for path in told.candidates.iter().chain([&told.chosen]) {
+            assert_eq!(path.len(), steps + 1);
+            assert_eq!(path[0], [seen().state.roll, seen().state.pitch]);
+        }
+        let spread = |axis: usize| {
+            let ends = told.candidates.iter().map(|path| path[5][axis]);
+            ends.clone().fold(f64::MIN, f64::max) - ends.fold(f64::MAX, f64::min)
+        };
+        assert!(spread(0) > 1e-4 && spread(1) > 1e-4);
+    }
 }

@@ -14,10 +14,16 @@ use greylag_sitl::plant_arguments::PlantArgs;
 
 use crate::commands::files::{self, shipped};
 use crate::commands::{choices, fly};
-use crate::control::{Controller, Kind, Needs};
+use crate::control::cem::Change;
+use crate::control::{Controller, Kind, Needs, Target};
 use crate::model::GreyBox;
+use crate::physics::State;
+use crate::report::EvaluationReport;
+use crate::sim::episode::STEPS;
 use crate::sim::evaluation::{Evaluation, evaluate};
-use crate::sim::{Group, TargetFile};
+use crate::sim::published::published;
+use crate::sim::tracking::{Tracking, track};
+use crate::sim::{Group, Simulator, TargetFile};
 
 /// Options of `greylag evaluate`.
 #[derive(clap::Args)]
@@ -31,6 +37,9 @@ pub struct Arguments {
     /// Folders of trained policies, for controllers that need one.
     #[arg(long = "policy", value_name = "DIR", num_args = 1.., default_values_os_t = [PathBuf::from(fly::POLICY)])]
     policies: Vec<PathBuf>,
+    /// Settings of the planners in other than their usual size, as KEY=VALUE.
+    #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
+    changes: Vec<Change>,
     /// Targets to fly.
     #[arg(long, default_value = "params/targets.csv")]
     targets: PathBuf,
@@ -45,7 +54,10 @@ pub struct Arguments {
     /// Write the scores as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Replace the JSON file if it exists.
+    /// Write the scores beside the paper's, single flights and what the planners saw as an HTML page.
+    #[arg(long, value_name = "OUT.html")]
+    report: Option<PathBuf>,
+    /// Replace the JSON file and the page if they exist.
     #[arg(long)]
     force: bool,
 }
@@ -65,7 +77,7 @@ struct Document<'a> {
 /// Flies, prints the table, writes the JSON.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    if let Some(path) = &arguments.json {
+    for path in arguments.json.iter().chain(&arguments.report) {
         files::writable(path, overwrite)?;
     }
     let targets = targets(arguments)?;
@@ -78,6 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .collect::<Result<Vec<_>>>()?;
     println!("{}", table(&evaluations));
     println!("all: easy with hard_corners, the targets of the paper's Table II");
+    println!("paper's mean: Table XI, true frozen prior, ten policies");
     println!("to 1°: median time after which roll and pitch stay within 1° of the target");
     if let Some(path) = &arguments.json {
         let document = Document {
@@ -91,7 +104,50 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         };
         files::write(path, &(serde_json::to_string_pretty(&document)? + "\n"), overwrite)?;
     }
+    if let Some(path) = &arguments.report {
+        let flights = flights(&entrants, &plant)?;
+        files::write(path, &page(arguments, &evaluations, &flights), overwrite)?;
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Roll and pitch, degrees, of the paper's Figures 7 to 9.
+const SHOWN: [[f64; 2]; 3] = [[-58.0, -21.0], [55.0, 28.0], [20.0, 10.0]];
+
+/// Flies every controller to the targets that are shown.
+fn flights(entrants: &[Entrant], plant: &PlantOptions) -> Result<Vec<(Target, Vec<Tracking>)>> {
+    let mut simulator = Simulator::new(plant)?;
+    let mut all = Vec::new();
+    for [roll, pitch] in SHOWN.map(|angles| angles.map(f64::to_radians)) {
+        let target = Target { roll, pitch, airspeed: State::NEUTRAL.airspeed };
+        let flown = entrants.iter().map(|e| {
+            let mut controller = e.controller.boxed_clone();
+            track(&mut simulator, controller.as_mut(), &target, STEPS)
+        });
+        all.push((target, flown.collect::<Result<Vec<_>, _>>()?));
+    }
+    Ok(all)
+}
+
+fn page(
+    arguments: &Arguments,
+    evaluations: &[Evaluation],
+    flights: &[(Target, Vec<Tracking>)],
+) -> String {
+    let provenance = [
+        ("targets", arguments.targets.display().to_string()),
+        ("seed", arguments.seed.to_string()),
+        ("planner", format!("{:?}", arguments.changes)),
+        ("command", files::command_line()),
+        ("program", concat!("greylag ", env!("CARGO_PKG_VERSION")).into()),
+    ];
+    let report = EvaluationReport {
+        subtitle: format!("Flown in JSBSim, targets of {}", arguments.targets.display()),
+        evaluations,
+        flights,
+        provenance: provenance.map(|(k, v)| (k.into(), v)).to_vec(),
+    };
+    report.page().render()
 }
 
 fn targets(arguments: &Arguments) -> Result<TargetFile> {
@@ -137,7 +193,7 @@ fn entrants(arguments: &Arguments) -> Result<Vec<Entrant>> {
                 .collect(),
         };
         for (model, name, folder) in sources {
-            let controller = fly::controller(*kind, model, folder)?;
+            let controller = fly::controller(*kind, model, folder, &arguments.changes)?;
             entrants.push(Entrant { kind: *kind, model: name, controller });
         }
     }
@@ -180,9 +236,10 @@ fn table(evaluations: &[Evaluation]) -> Table {
         "model",
         "targets",
         "n",
-        "mean °",
+        "mean ° [95 %]",
+        "paper's mean °",
         "median °",
-        "IQM °",
+        "IQM ° [95 %]",
         "max °",
         "to 1°, s",
         "diverged %",
@@ -195,7 +252,13 @@ fn table(evaluations: &[Evaluation]) -> Table {
             let cost = [e.ms_per_step.p50, e.ms_per_step.p99, e.ms_per_step.p999];
             let mut row =
                 vec![e.controller.clone(), e.model.clone(), s.targets.clone(), s.count.to_string()];
-            row.extend([s.mean_deg, s.median_deg, s.iqm_deg, s.max_deg].map(|x| format!("{x:.3}")));
+            let interval = |x: f64, [low, high]: [f64; 2]| format!("{x:.3} [{low:.3}, {high:.3}]");
+            row.push(interval(s.mean_deg, s.mean_ci95_deg));
+            let paper = published(&e.controller, &s.targets);
+            row.push(paper.map_or_else(|| "–".into(), |p| format!("{:.2}", p.mean_deg.value)));
+            row.push(format!("{:.3}", s.median_deg));
+            row.push(interval(s.iqm_deg, s.iqm_ci95_deg));
+            row.push(format!("{:.3}", s.max_deg));
             row.push(format!("{:.2}", s.settling_s));
             row.push(format!("{:.1}", 100.0 * s.divergence_rate));
             row.extend(cost.map(|x| format!("{x:.4}")));

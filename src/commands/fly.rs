@@ -12,6 +12,7 @@ use crossbeam_channel::RecvTimeoutError;
 
 use crate::commands::choices;
 use crate::commands::files::shipped;
+use crate::control::cem::Change;
 use crate::control::policy::Agent;
 use crate::control::schedule::Schedule;
 use crate::control::{self, Controller, Kind, Needs, Source, build};
@@ -215,12 +216,13 @@ pub fn controller(
     kind: Kind,
     model: &GreyBox,
     folder: &Path,
+    changes: &[Change],
 ) -> anyhow::Result<Box<dyn Controller>> {
     if !matches!(kind.needs(), Needs::Policy | Needs::Both) {
-        return Ok(build(kind, model)?);
+        return Ok(build(kind, Source { model, agent: None, changes })?);
     }
     let agent = Agent::load(&shipped(folder), &model.airframe)?;
-    Ok(build(kind, Source { model, agent: Some(&agent) })?)
+    Ok(build(kind, Source { model, agent: Some(&agent), changes })?)
 }
 
 /// A pilot with its controllers: `kind` flies, with the policy in `folder` if it needs one; an LQI of
@@ -229,7 +231,7 @@ pub fn controller(
 /// # Errors
 /// If the policy cannot be used, the model does not allow a controller, or has no level flight.
 pub fn crew(kind: Kind, model: &GreyBox, folder: &Path) -> anyhow::Result<Crew> {
-    let controller = controller(kind, model, folder)?;
+    let controller = controller(kind, model, folder, &[])?;
     // The design of an LQI takes a moment; it is not made twice.
     let fallback = if kind == Kind::Lqi { controller.boxed_clone() } else { fallback(model)? };
     let pilot = Pilot::new(Config::for_model(model)?, fallback)?;

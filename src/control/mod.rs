@@ -1,6 +1,9 @@
 //! Controllers: from what is observed and what is wanted to a command, once every 10 ms.
 
 pub mod cem;
+mod disturbance;
+pub mod ilqr;
+pub mod insight;
 pub mod lqi;
 pub mod pid;
 pub mod policy;
@@ -9,6 +12,8 @@ pub mod task;
 mod registry;
 
 pub use registry::{Kind, Needs, Pace, SetupError, Source, build};
+
+use insight::Insight;
 
 use crate::physics::{ActuatorState, Command, State, Time};
 
@@ -59,6 +64,10 @@ pub trait Controller: Send + Sync {
     fn reset(&mut self, seed: u64);
     /// The command for this tick.
     fn command(&mut self, seen: &Observation, target: &Target) -> Command;
+    /// What the last command, for `seen`, was chosen from; `None` of a controller that does not plan.
+    fn insight(&self, _seen: &Observation) -> Option<Insight> {
+        None
+    }
     /// Another controller like this one, for another core; the design is not made again.
     fn boxed_clone(&self) -> Box<dyn Controller>;
 }

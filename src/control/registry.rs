@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::control::policy::{Agent, Policy};
-use crate::control::{Controller, cem, lqi, pid};
+use crate::control::{Controller, cem, ilqr, lqi, pid};
 use crate::model::GreyBox;
 
 /// Why a controller cannot be built.
@@ -41,11 +41,13 @@ pub struct Source<'a> {
     pub model: &'a GreyBox,
     /// The networks of a trained policy.
     pub agent: Option<&'a Agent>,
+    /// What a planner searches with in other than the usual size.
+    pub changes: &'a [cem::Change],
 }
 
 impl<'a> From<&'a GreyBox> for Source<'a> {
     fn from(model: &'a GreyBox) -> Source<'a> {
-        Source { model, agent: None }
+        Source { model, agent: None, changes: &[] }
     }
 }
 
@@ -54,9 +56,9 @@ impl<'a> Source<'a> {
         self.agent.ok_or(SetupError::Untrained)
     }
 
+    /// A planner of those settings with the changes asked for.
     fn planner(&self, name: &'static str, settings: cem::Settings) -> Result<cem::Cem, SetupError> {
-        let aids = cem::Aids { agent: Some(self.agent()?.clone()), base: None };
-        Ok(cem::Cem::new(name, self.model, settings, aids))
+        self.planner_over(None, name, settings)
     }
 
     fn planner_over_lqi(
@@ -64,9 +66,18 @@ impl<'a> Source<'a> {
         name: &'static str,
         settings: cem::Settings,
     ) -> Result<cem::Cem, SetupError> {
-        let base = Some(lqi::Lqi::new(self.model)?);
-        let aids = cem::Aids { agent: Some(self.agent()?.clone()), base };
-        Ok(cem::Cem::new(name, self.model, settings, aids))
+        self.planner_over(Some(lqi::Lqi::new(self.model)?), name, settings)
+    }
+
+    fn planner_over(
+        &self,
+        base: Option<lqi::Lqi>,
+        name: &'static str,
+        settings: cem::Settings,
+    ) -> Result<cem::Cem, SetupError> {
+        let settings = settings.with(self.changes);
+        let agent = if settings.needs_policy() { Some(self.agent()?.clone()) } else { None };
+        Ok(cem::Cem::new(name, self.model, settings, cem::Aids { agent, base }))
     }
 }
 
@@ -137,8 +148,9 @@ controllers! {
     Pid "pid" Immediate Gains "PID with the gains published with the simulator." => |_from| pid::Pid::new(pid::PUBLIC),
     PidRetuned "pid-retuned" Immediate Gains "PID retuned, at a safer airspeed." => |_from| pid::Pid::new(pid::RETUNED),
     Lqi "lqi" Immediate Model "Gain-scheduled LQI designed from the model." => |from| lqi::Lqi::new(from.model)?,
-    Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |from| cem::Cem::new("cem", from.model, cem::Settings::PAPER, cem::Aids::default()),
-    Mppi "mppi" Planned Model "MPPI over the same five steps." => |from| cem::Cem::new("mppi", from.model, cem::Settings::MPPI, cem::Aids::default()),
+    Ilqr "ilqr" Planned Model "iLQR over half a second, beside the model's LQI: offset-free." => |from| ilqr::Ilqr::new(from.model, lqi::Lqi::new(from.model)?),
+    Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |from| from.planner("cem", cem::Settings::PAPER)?,
+    Mppi "mppi" Planned Model "MPPI over the same five steps." => |from| from.planner("mppi", cem::Settings::MPPI)?,
     CemPolicy "cem-policy" Planned Both "CEM-MPC with the policy's proposals." => |from| from.planner("cem-policy", cem::Settings::POLICY)?,
     CemCritic "cem-critic" Planned Both "CEM-MPC with the critics' value of the end." => |from| from.planner("cem-critic", cem::Settings::CRITICS)?,
     Hybrid "hybrid" Planned Both "The hybrid controller: proposals and critics, eq. (26)." => |from| from.planner("hybrid", cem::Settings::HYBRID)?,

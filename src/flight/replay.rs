@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use crate::flight::pilot::Plan;
+use crate::control::Controller;
+use crate::flight::pilot::{Plan, Request};
 use crate::flight::recorder::call::{Call, CallError, HEADER, Planned, same};
 use crate::flight::runtime::Crew;
 use crate::link::autopilot::Autopilot;
@@ -125,6 +126,23 @@ impl States {
 /// # Errors
 /// If a file cannot be read, or is none of a recording.
 pub fn replay(folder: &Path, crew: Crew, vehicle: Vehicle) -> Result<Outcome, ReplayError> {
+    replay_watched(folder, crew, vehicle, &mut |_, _, _| ())
+}
+
+/// What sees every planned tick of a replay: its time, what the controller was asked, and the controller
+/// after its answer.
+pub type Watch<'a> = dyn FnMut(Time, &Request, &dyn Controller) + 'a;
+
+/// The same under the eyes of `watch`.
+///
+/// # Errors
+/// As [`replay`].
+pub fn replay_watched(
+    folder: &Path,
+    crew: Crew,
+    vehicle: Vehicle,
+    watch: &mut Watch,
+) -> Result<Outcome, ReplayError> {
     let file = |name: &str| folder.join(name);
     let failed = |path: PathBuf| move |source| ReplayError::File { path, source };
     let path = file("flight.calls");
@@ -133,7 +151,7 @@ pub fn replay(folder: &Path, crew: Crew, vehicle: Vehicle) -> Result<Outcome, Re
     let tlog = file("flight.tlog");
     let bytes = std::fs::read(&tlog).map_err(failed(tlog.clone()))?;
     let states = States { vehicle, bytes, at: 0, ready: VecDeque::new() };
-    let mut replayed = Replayed { crew, states, outcome: Outcome::default() };
+    let mut replayed = Replayed { crew, states, watch, outcome: Outcome::default() };
     let mut lines = text.split_inclusive('\n').enumerate().peekable();
     match lines.next() {
         Some((_, first)) if first.trim_end() == HEADER => {}
@@ -155,13 +173,14 @@ pub fn replay(folder: &Path, crew: Crew, vehicle: Vehicle) -> Result<Outcome, Re
     Ok(replayed.outcome)
 }
 
-struct Replayed {
+struct Replayed<'w, 'f> {
+    watch: &'w mut Watch<'f>,
     crew: Crew,
     states: States,
     outcome: Outcome,
 }
 
-impl Replayed {
+impl Replayed<'_, '_> {
     /// Makes one call; `false` when the telemetry has ended. Verdicts were given in flight.
     fn make(&mut self, call: &Call) -> bool {
         let pilot = &mut self.crew.pilot;
@@ -191,7 +210,9 @@ impl Replayed {
             if request.engage {
                 self.crew.controller.reset(SEED);
             }
-            self.crew.controller.command(&request.observation, &request.target)
+            let command = self.crew.controller.command(&request.observation, &request.target);
+            (self.watch)(time, &request, self.crew.controller.as_ref());
+            command
         });
         let plan = match planned {
             Planned::Ready(command) => {

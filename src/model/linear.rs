@@ -21,8 +21,18 @@ pub struct Linear {
 /// controls are those that act: what the model's effects on deflections (lag, delay, dead zone) make
 /// of the actuators' positions before is left out, as it has memory of its own.
 pub fn linearise(model: &GreyBox, trim: &Trim, altitude: f64) -> Linear {
-    let x = trim.state.to_array();
-    let z = [trim.controls.aileron, trim.controls.elevator, trim.controls.throttle];
+    linearise_step(model, &trim.state, &trim.controls, altitude)
+}
+
+/// The same about any state, steady or not.
+pub fn linearise_step(
+    model: &GreyBox,
+    state: &State,
+    controls: &Controls,
+    altitude: f64,
+) -> Linear {
+    let x = state.to_array();
+    let z = [controls.aileron, controls.elevator, controls.throttle];
     let state = State::from_array(std::array::from_fn(|i| Dual::<11>::variable(x[i], i)));
     let [aileron, elevator, throttle] = std::array::from_fn(|i| Dual::variable(z[i], 8 + i));
     let controls = Controls { aileron, elevator, throttle };

@@ -19,6 +19,6 @@ pub use grey_box::{GreyBox, Named};
 pub(crate) use integrator::advance_jsbsim;
 pub use integrator::{Integrator, Memory, STEP, Twin};
 pub use join::JoinError;
-pub use linear::{Linear, linearise};
+pub use linear::{Linear, linearise, linearise_step};
 pub use residual::Residual;
 pub use trim::{Trim, TrimError};

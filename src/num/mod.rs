@@ -1,5 +1,6 @@
 //! Numbers: the scalar an equation is written over, the types that stand for it, and seeded streams.
 
+pub mod bootstrap;
 pub mod dense;
 mod dual;
 mod lanes;

@@ -204,5 +204,12 @@ pub(super) fn flight_by_flight<'a>(
         .collect();
     rows.push(row("all flights", Style::Actual, value, ends));
     let legend = "dashed: none of it".into();
-    Whiskers { title, unit: unit.into(), lines: vec![0.0], legend, rows }
+    Whiskers {
+        title,
+        unit: unit.into(),
+        scale: super::Scale::Linear,
+        lines: vec![0.0],
+        legend,
+        rows,
+    }
 }

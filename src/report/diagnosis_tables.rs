@@ -53,6 +53,7 @@ pub(super) fn tuned(tuned: &[Tuned]) -> Section {
     let figure = Whiskers {
         title: "Prior to tuned".into(),
         unit: "in standard deviations of the prior".into(),
+        scale: super::Scale::Linear,
         lines: vec![-2.0, 0.0, 2.0],
         legend: "dashed: the prior and ± 2".into(),
         rows: sorted.iter().map(|t| tuned_row(t)).collect(),

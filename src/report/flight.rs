@@ -1,5 +1,6 @@
 //! What a flight report is made from.
 
+use super::Sight;
 use super::{LoopTiming, Page, flight_page};
 use crate::logs::Flight;
 use crate::sysid::compare::Comparison;
@@ -33,6 +34,8 @@ pub struct FlightReport<'a> {
     pub events: Vec<Event>,
     /// How well the model predicts this flight; `None` when they were not compared.
     pub comparison: Option<Comparison>,
+    /// What the planner saw at some ticks; empty when none flew.
+    pub sights: Vec<Sight>,
 }
 
 /// Deflections at a command of +1.

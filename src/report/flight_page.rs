@@ -5,8 +5,8 @@ use super::flight::FlightReport;
 use super::flight_targets;
 use super::flight_verdict::{degrees, duration_s, verdict};
 use super::{
-    Align, Band, Figure, Histogram, LoopTiming, Mark, Page, Panel, Rule, Scale, Section, Series,
-    Style, Table, TimeFigure,
+    Align, Band, Choice, ChoiceOption, Figure, Histogram, LoopTiming, Mark, Page, Panel, Rule,
+    Scale, Section, Series, Sight, Style, Table, TimeFigure, sight,
 };
 use crate::logs::Sample;
 
@@ -21,6 +21,9 @@ pub(super) fn page(report: &FlightReport) -> Page {
     sections.extend(report.timing.as_ref().map(|t| loop_timing(report, t)));
     if !report.segments.is_empty() {
         sections.push(flight_targets::section(report));
+    }
+    if !report.sights.is_empty() {
+        sections.push(sights(report));
     }
     sections.extend(report.comparison.as_ref().map(comparison_page::short_section));
     if !report.events.is_empty() {
@@ -79,6 +82,25 @@ fn attitude(report: &FlightReport) -> Section {
         ),
         vec![Figure::Time(time_figure(report, panels))],
     )
+}
+
+fn sights(report: &FlightReport) -> Section {
+    let option = |sight: &Sight| {
+        let [roll, pitch] = sight.target.map(f64::to_degrees);
+        ChoiceOption {
+            name: format!("{roll:.0}°, {pitch:.0}° at {:.1} s", sight.time_s),
+            figures: sight.fans().to_vec(),
+        }
+    };
+    let choice = Choice {
+        anchor: "sights".into(),
+        label: "Moment".into(),
+        options: report.sights.iter().map(option).collect(),
+    };
+    let note = "A moment after each command: some of the candidates of the last iteration and what was flown, \
+                in the planner's own model. Found by replaying the recording.";
+    let table = Figure::Table(sight::phases(&report.sights));
+    Section::new("What the planner saw", note, vec![Figure::Choice(choice), table])
 }
 
 fn to_degrees(rad: &[f64]) -> Vec<f64> {

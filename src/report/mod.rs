@@ -3,7 +3,8 @@
 //! A [`Page`] is a title over [`Section`]s, a section holds [`Figure`]s in order, and
 //! [`Page::render`] turns them into one string with style, script and data inside.
 //! [`FlightReport`] is the page of one flight, [`ComparisonReport`] that of models against flights,
-//! [`DiagnosisReport`] that of what a model lacks, [`AmendmentReport`] that of a model with it added, `TrainingReport` that of a model that was learned.
+//! [`DiagnosisReport`] that of what a model lacks, [`AmendmentReport`] that of a model with it added, `TrainingReport`
+//! that of a model that was learned, `EvaluationReport` that of controllers side by side.
 //! The plots are drawn in the reader's browser by uPlot
 //! 1.6.32 (MIT, `assets/uPlot.LICENSE`), which is embedded.
 //!
@@ -26,6 +27,8 @@ mod diagnosis_page;
 mod diagnosis_proof;
 mod diagnosis_suspects;
 mod diagnosis_tables;
+#[cfg(feature = "sitl")]
+mod evaluation_page;
 mod evidence;
 mod figure;
 mod findings;
@@ -41,6 +44,7 @@ mod intervals;
 mod loop_timing;
 mod numbers;
 mod page;
+mod sight;
 mod table;
 mod time_figure;
 #[cfg(feature = "learn")]
@@ -59,6 +63,8 @@ pub use curves::Curves;
 pub use diagnosis::DiagnosisReport;
 pub use diagnosis_page::diagnosis_page;
 pub use effect_page::{EffectReport, facts as effect_facts};
+#[cfg(feature = "sitl")]
+pub use evaluation_page::EvaluationReport;
 pub use evidence::{Evidence, EvidenceGroup, EvidenceRow};
 pub use figure::{Figure, Outcome, Rule, Style, Verdict};
 pub use findings::{Finding, Findings, Link};
@@ -69,6 +75,7 @@ pub use histogram::Histogram;
 pub use intervals::{IntervalBins, IntervalPanel, Intervals};
 pub use loop_timing::{Cycle, LoopTiming};
 pub use page::{Page, Section};
+pub use sight::Sight;
 pub use table::{Align, Column, Row, Table};
 pub use time_figure::{Band, Mark, Panel, Scale, Series, TimeFigure, Track};
 #[cfg(feature = "learn")]

@@ -1,8 +1,8 @@
 //! Values with their intervals, one a line, on one horizontal scale.
 
-use super::Style;
 use super::html::escape;
 use super::numbers::number;
+use super::{Scale, Style};
 
 /// Room beside the outermost intervals, in the width of all of them.
 const ROOM: f64 = 0.06;
@@ -14,6 +14,8 @@ pub struct Whiskers {
     pub title: String,
     /// The unit of the scale.
     pub unit: String,
+    /// How values become places; what is not positive stands at the floor of a scale by decades.
+    pub scale: Scale,
     /// Where upright lines stand behind the values, in the unit.
     pub lines: Vec<f64>,
     /// What the lines stand for.
@@ -38,10 +40,20 @@ pub struct Whisker {
 }
 
 impl Whiskers {
+    /// A value on the scale.
+    fn on_scale(&self, x: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => x,
+            Scale::Log { .. } if x.is_nan() => x,
+            Scale::Log { floor } => x.max(floor).log10(),
+        }
+    }
+
     /// The ends of the scale; `None` if nothing is finite.
-    fn scale(&self) -> Option<[f64; 2]> {
+    fn ends(&self) -> Option<[f64; 2]> {
         let values = self.rows.iter().flat_map(|r| [r.value, r.interval[0], r.interval[1]]);
-        let all = values.chain(self.lines.iter().copied()).filter(|v| v.is_finite());
+        let all = values.chain(self.lines.iter().copied()).map(|v| self.on_scale(v));
+        let all = all.filter(|v| v.is_finite());
         let [low, high] =
             all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
         let width = high - low;
@@ -50,8 +62,12 @@ impl Whiskers {
     }
 
     pub(super) fn html(&self) -> String {
-        let [low, high] = self.scale().unwrap_or([0.0, 1.0]);
-        let place = |x: f64| (100.0 * (x - low) / (high - low)).clamp(0.0, 100.0);
+        let [low, high] = self.ends().unwrap_or([0.0, 1.0]);
+        let place = |x: f64| (100.0 * (self.on_scale(x) - low) / (high - low)).clamp(0.0, 100.0);
+        let shown = |x: f64| match self.scale {
+            Scale::Linear => number(x),
+            Scale::Log { .. } => number(10f64.powf(x)),
+        };
         let lines: String = self
             .lines
             .iter()
@@ -66,9 +82,9 @@ impl Whiskers {
              <span class=\"value\"></span></dd></dl></figure>\n",
             escape(&self.title),
             escape(&self.unit),
-            number(low),
+            shown(low),
             escape(&self.legend),
-            number(high)
+            shown(high)
         )
     }
 }
@@ -117,9 +133,13 @@ mod tests {
             row(f64::NAN, [f64::NEG_INFINITY, 1.0]),
             row(1e300, [-1e300, 1e308]),
         ];
-        for rows in [rows.clone(), rows[1..2].to_vec(), Vec::new()] {
+        let scales = [Scale::Linear, Scale::Log { floor: 1e-3 }];
+        let all = [rows.clone(), rows[1..2].to_vec(), Vec::new()];
+        for (rows, scale) in all.into_iter().flat_map(|r| scales.map(|s| (r.clone(), s))) {
             let (lines, legend) = (vec![0.0, f64::NAN], "none".into());
-            let html = Whiskers { title: "t".into(), unit: "u".into(), lines, legend, rows }.html();
+            let (title, unit) = ("t".into(), "u".into());
+            let figure = Whiskers { title, unit, scale, lines, legend, rows };
+            let html = figure.html();
             assert!(!html.contains("NaN") && !html.contains("inf"), "{html}");
             for part in html.split("left:").skip(1) {
                 let left: f64 = part.split('%').next().unwrap().parse().unwrap();
@@ -133,6 +153,7 @@ mod tests {
         let figure = Whiskers {
             title: "t".into(),
             unit: String::new(),
+            scale: Scale::Linear,
             lines: Vec::new(),
             legend: String::new(),
             rows: vec![row(3.0, [3.0, 3.0])],

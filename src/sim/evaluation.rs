@@ -9,11 +9,14 @@ use serde::Serialize;
 
 use crate::control::{Controller, Target};
 use crate::num::statistics::{interquartile_mean, mean, quantile};
-use crate::num::stream;
+use crate::num::{bootstrap, stream};
 use crate::physics::State;
 use crate::sim::episode::DIVERGED_DEG;
 use crate::sim::targets::Row;
 use crate::sim::{Episode, Group, Outcome, Simulator, Trouble};
+
+/// Seed of the intervals' resamples: the same scores have the same intervals.
+const SEED: u64 = 95;
 
 /// What a controller reached on the targets.
 #[derive(Clone, Debug, Serialize)]
@@ -38,16 +41,26 @@ pub struct Score {
     pub count: usize,
     /// Mean settled error, degrees.
     pub mean_deg: f64,
+    /// Its 95 % interval over the targets, as of the others (bootstrap).
+    pub mean_ci95_deg: [f64; 2],
     /// Median settled error, degrees.
     pub median_deg: f64,
+    /// Its 95 % interval.
+    pub median_ci95_deg: [f64; 2],
     /// Interquartile mean of the settled error, degrees.
     pub iqm_deg: f64,
+    /// Its 95 % interval.
+    pub iqm_ci95_deg: [f64; 2],
+    /// Smallest settled error, degrees.
+    pub min_deg: f64,
     /// Largest settled error, degrees.
     pub max_deg: f64,
     /// Median of the time after which the attitude stays within 1° of the target, s.
     pub settling_s: f64,
     /// Share of targets with more than 10° of settled error.
     pub divergence_rate: f64,
+    /// Its 95 % interval.
+    pub divergence_ci95: [f64; 2],
 }
 
 /// Quantiles of the time a controller needs for one step, ms.
@@ -141,16 +154,25 @@ impl Score {
     fn new(targets: &str, outcomes: &[&Outcome]) -> Score {
         let errors: &[f64] = &outcomes.iter().map(|o| o.settled_deg).collect::<Vec<_>>();
         let settling: Vec<f64> = outcomes.iter().map(|o| o.settling_s).collect();
-        let diverged = errors.iter().filter(|e| **e > DIVERGED_DEG).count();
+        let diverged = |errors: &[f64]| {
+            errors.iter().filter(|e| **e > DIVERGED_DEG).count() as f64 / errors.len() as f64
+        };
+        let median = |errors: &[f64]| quantile(errors, 0.5);
+        let ci95 = |statistic: &dyn Fn(&[f64]) -> f64| bootstrap::interval(errors, SEED, statistic);
         Score {
             targets: targets.into(),
             count: errors.len(),
             mean_deg: mean(errors),
-            median_deg: quantile(errors, 0.5),
+            mean_ci95_deg: ci95(&mean),
+            median_deg: median(errors),
+            median_ci95_deg: ci95(&median),
             iqm_deg: interquartile_mean(errors),
+            iqm_ci95_deg: ci95(&interquartile_mean),
+            min_deg: quantile(errors, 0.0),
             max_deg: quantile(errors, 1.0),
             settling_s: quantile(&settling, 0.5),
-            divergence_rate: diverged as f64 / errors.len() as f64,
+            divergence_rate: diverged(errors),
+            divergence_ci95: ci95(&diverged),
         }
     }
 }

@@ -23,7 +23,11 @@ pub mod missing;
 mod simulator;
 #[cfg(feature = "sitl")]
 pub mod starting_model;
+#[cfg(feature = "sitl")]
+pub mod published;
 pub mod targets;
+#[cfg(feature = "sitl")]
+pub mod tracking;
 #[cfg(feature = "sitl")]
 pub mod trial;
 pub mod world;

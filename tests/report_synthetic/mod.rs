@@ -98,6 +98,7 @@ pub fn report(flight: &Flight) -> FlightReport<'_> {
         timing: Some(timing(flight)),
         events: events(),
         comparison: None,
+        sights: Vec::new(),
     }
 }
 

@@ -21,11 +21,12 @@ use greylag_sitl::shim::{self, ShimOptions};
 use crate::commands::choices;
 use crate::commands::files::Overwrite;
 use crate::commands::{files, fly};
-use crate::control::Kind;
 use crate::control::schedule::Schedule;
+use crate::control::{self, Kind};
 use crate::flight::recorder::Place;
 use crate::flight::runtime::{Flight, Options, Pace};
 use crate::link::address::Address;
+use crate::link::vehicle::{Sitl, Vehicle};
 use crate::report::FlightReport;
 use client::{Client, View};
 use schedule::Legs;
@@ -35,7 +36,7 @@ use story::{TOLERANCE_DEG, Teller};
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Controller that flies.
-    #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
+    #[arg(long, value_name = "NAME", default_value = "hybrid-lqi", value_parser = choices::controller())]
     controller: Kind,
     /// Model that the controller is designed from or plans with.
     #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
@@ -66,16 +67,17 @@ pub struct Arguments {
 /// If something cannot be opened, or the flight ends before the schedule does.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, None)?;
-    let mut crew = fly::crew(arguments.controller, &model, &arguments.policy)?;
+    let crew = || fly::crew(arguments.controller, &model, &arguments.policy);
+    let mut flying = crew()?;
     let schedule = arguments.schedule.as_deref().map(Schedule::load).transpose()?;
     let legs = schedule.as_ref().map_or_else(Legs::demonstration, Legs::during);
     let tracked = if schedule.is_none() { legs.legs.as_slice() } else { &[] };
-    schedule.into_iter().for_each(|schedule| crew.pilot.follow(schedule));
+    schedule.iter().for_each(|schedule| flying.pilot.follow(schedule.clone()));
     // an aircraft that cannot fly is found before anything is opened or written
     let plant = arguments.plant.options(arguments.seed);
     Plant::new(&plant)?.reset(&Start::NEUTRAL)?;
     let stop = Arc::new(AtomicBool::new(false));
-    let flight = Flight::start(&options(arguments, &model)?, crew, stop.clone())?;
+    let flight = Flight::start(&options(arguments, &model)?, flying, stop.clone())?;
     let folder = flight.recording.clone().context("the demonstration records")?;
     let companion = flight.clients.first().copied().flatten().context("no client link")?;
     let vehicle = flight.vehicle.context("no vehicle link")?;
@@ -95,6 +97,13 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let simulated = simulator.join().map_err(|_| anyhow!("the shim's thread has died"))?;
     println!("{summary}");
     println!("{}", simulated?);
+    let mut sights = Vec::new();
+    if arguments.controller.pace() == control::Pace::Planned {
+        let mut again = crew()?;
+        schedule.iter().for_each(|schedule| again.pilot.follow(schedule.clone()));
+        let vehicle = Vehicle::Sitl(Sitl::new(1, model.airframe.actuators.deflection_max));
+        sights = story::sights(&folder, again, vehicle)?;
+    }
     let teller = Teller {
         controller: arguments.controller.name(),
         seed: arguments.seed.into(),
@@ -102,6 +111,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         aircraft: &plant.aircraft,
         legs: tracked,
         texts: flown?,
+        sights,
     };
     let recorded = story::read(&folder)?;
     let report = teller.tell(&folder, &recorded)?;

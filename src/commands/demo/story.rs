@@ -7,10 +7,15 @@ use anyhow::{Context, Result};
 use super::schedule::Leg;
 use crate::commands::files;
 use crate::control::Target;
+use crate::flight::replay::replay_watched;
+use crate::flight::runtime::Crew;
+use crate::link::vehicle::Vehicle;
 use crate::logs::csv::{self, Tolerance};
 use crate::logs::{Flight, Sample};
 use crate::model::GreyBox;
-use crate::report::{Cycle, Event, EventKind, FlightReport, LoopTiming, Segment, SurfaceTravel};
+use crate::report::{
+    Cycle, Event, EventKind, FlightReport, LoopTiming, Segment, Sight, SurfaceTravel,
+};
 use crate::sim::episode::{attitude_error_deg, settled_error_deg};
 use crate::sysid::compare::{self, Comparison};
 use crate::sysid::reconstruct;
@@ -33,6 +38,8 @@ pub struct Teller<'a> {
     pub legs: &'a [Leg],
     /// What the companion said, with its time, s.
     pub texts: Vec<(f64, String)>,
+    /// What the planner saw.
+    pub sights: Vec<Sight>,
 }
 
 impl Teller<'_> {
@@ -56,6 +63,7 @@ impl Teller<'_> {
             timing: Some(timing(&folder.join("flight.csv"))?),
             events: self.texts.iter().map(event).collect(),
             comparison: self.compared(flight),
+            sights: self.sights.clone(),
         })
     }
 }
@@ -76,6 +84,28 @@ impl Teller<'_> {
             .map_err(|e| told(&e))
             .ok()
     }
+}
+
+/// Ticks after a command at which the planner's sight is told: the search has begun to move the aircraft.
+const TOLD_AFTER: usize = 20;
+
+/// What the planner of `crew` saw a moment after each command: the recording in `folder` is replayed, which
+/// also says whether its commands come out to the bit.
+pub fn sights(folder: &Path, crew: Crew, vehicle: Vehicle) -> Result<Vec<Sight>> {
+    let mut all = Vec::new();
+    let (mut target, mut ticks) = ([f64::NAN; 2], 0);
+    let outcome = replay_watched(folder, crew, vehicle, &mut |time, request, controller| {
+        let now = [request.target.roll, request.target.pitch];
+        (target, ticks) = if now == target { (now, ticks + 1) } else { (now, 0) };
+        if ticks == TOLD_AFTER
+            && let Some(insight) = controller.insight(&request.observation)
+        {
+            all.push(Sight { time_s: time.as_secs_f64(), target, insight });
+        }
+    })?;
+    let (ticks, different) = (outcome.ticks, outcome.different);
+    println!("replayed: {} of {ticks} commands equal to the bit", ticks - different);
+    Ok(all)
 }
 
 /// The recorded flight of `folder`.

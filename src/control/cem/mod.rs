@@ -1,12 +1,18 @@
 //! CEM-MPC, section III-D of \[GSFM26\], with the policy's proposals and the critics' values that make
 //! it the hybrid controller of section IV-C.
 
-mod disturbance;
+mod fan;
 mod rollout;
+mod settings;
+
+use std::cmp::Ordering;
+use std::time::{Duration, Instant};
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::control::disturbance::{self, Disturbance};
+use crate::control::insight::Insight;
 use crate::control::lqi::{Ahead, Lqi};
 use crate::control::policy::Agent;
 use crate::control::task::Task;
@@ -14,87 +20,8 @@ use crate::control::{Controller, Observation, Target};
 use crate::model::GreyBox;
 use crate::num::stream;
 use crate::physics::Command;
-use disturbance::Disturbance;
 use rollout::{Actions, Block, HORIZON, Machine, Scene, WIDTH, Worth};
-
-/// How the candidates of an iteration make the next distribution.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Update {
-    /// Mean and deviation of the K best: the cross-entropy method.
-    Elites(usize),
-    /// Mean and deviation of all, weighted with exp(return / λ): MPPI (Williams et al., 2017), λ in units
-    /// of the return.
-    Weighted(f64),
-}
-
-/// Size of the search.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Candidates per iteration N, a multiple of 16.
-    pub population: usize,
-    /// What becomes of them.
-    pub update: Update,
-    /// Iterations I.
-    pub iterations: usize,
-    /// Standard deviation of the first iteration, in units of the action.
-    pub spread: f64,
-    /// Candidates of the first iteration that the policy proposes, a multiple of 16; the first of them
-    /// without noise.
-    pub proposals: usize,
-    /// Standard deviation of the noise on the others, and where it is cut off.
-    pub noise: [f64; 2],
-    /// Weight α of the critics' value of the end, eq. (26).
-    pub alpha: Option<f64>,
-    /// Steps in all that a plan is flown in the model, the base flying from the sixth on; without a
-    /// base there are five.
-    pub steps: usize,
-    /// What a plan must be worth beside the base's to be flown, in units of the return.
-    pub margin: f64,
-    /// Time constant (s) with which what the model leaves unexplained is estimated; `None`: it is not.
-    pub disturbance: Option<f64>,
-}
-
-impl Settings {
-    /// CEM-MPC alone. H = 5 is the paper's; N, K, I are not given there: 1024 rollouts a step in all.
-    pub const PAPER: Settings = Settings {
-        population: 256,
-        update: Update::Elites(16),
-        iterations: 4,
-        spread: 1.0,
-        proposals: 0,
-        noise: [0.2, 0.5],
-        alpha: None,
-        steps: HORIZON,
-        margin: 0.0,
-        disturbance: None,
-    };
-    /// CEM + π.
-    pub const POLICY: Settings = Settings { proposals: 32, ..Settings::PAPER };
-    /// CEM + Q.
-    pub const CRITICS: Settings = Settings { alpha: Some(1.0), ..Settings::PAPER };
-    /// The hybrid controller.
-    pub const HYBRID: Settings = Settings { alpha: Some(1.0), ..Settings::POLICY };
-    /// MPPI over the same rollouts.
-    pub const MPPI: Settings = Settings { update: Update::Weighted(0.01), ..Settings::PAPER };
-    /// The hybrid controller over an LQI, which flies on behind each plan: that is what the end is
-    /// worth, in place of critics. Offset-free.
-    ///
-    /// The margin is 0.12° of attitude error over all steps: less is the search's noise, and a plan that is
-    /// flown for it takes the LQI's integrals out of the loop (at 0.002 hard targets settle at 0.04°, at
-    /// 0.05 at 0.001°).
-    pub const OVER_LQI: Settings = Settings {
-        population: 128,
-        update: Update::Elites(12),
-        iterations: 3,
-        spread: 0.3,
-        proposals: 16,
-        noise: [0.1, 0.3],
-        alpha: None,
-        steps: 80,
-        margin: 5e-2,
-        disturbance: Some(0.3),
-    };
-}
+pub use settings::{Change, ChangeError, Instructions, Settings, Start, Update};
 
 /// What a search may lean on.
 #[derive(Clone, Debug, Default)]
@@ -132,10 +59,29 @@ pub struct Cem {
     blocks: Vec<Block>,
     worth: Vec<Worth>,
     order: Vec<(f32, u32)>,
-    /// The plan of the last tick, if it was the search's.
+    /// The plan of the last tick, if it was the search's, and for how many ticks it has been flown.
     last: Option<Plan>,
+    age: usize,
+    kept: Vec<Plan>,
+    spent: Spent,
     seed: u64,
     tick: u64,
+}
+
+/// Time spent in a tick.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spent {
+    prepare: Duration,
+    draw: Duration,
+    fly: Duration,
+    refit: Duration,
+}
+
+impl Spent {
+    fn phases(&self) -> Vec<(&'static str, Duration)> {
+        let Spent { prepare, draw, fly, refit } = *self;
+        vec![("prepare", prepare), ("draw", draw), ("fly", fly), ("refit", refit)]
+    }
 }
 
 /// The controller that flies where the search finds nothing better, and what it would do next.
@@ -151,8 +97,10 @@ impl Cem {
     /// # Panics
     /// If the settings ask for a policy or its critics and `aids` has none.
     pub fn new(name: &'static str, model: &GreyBox, settings: Settings, aids: Aids) -> Cem {
-        let leans = settings.proposals > 0 || settings.alpha.is_some();
-        assert!(!leans || aids.agent.is_some(), "a search that leans on a policy is given one");
+        assert!(
+            !settings.needs_policy() || aids.agent.is_some(),
+            "a search that leans on a policy is given one"
+        );
         let count = settings.population.div_ceil(WIDTH);
         let steps = settings.steps.max(HORIZON);
         Cem {
@@ -162,11 +110,17 @@ impl Cem {
             agent: aids.agent,
             base: aids.base.map(|lqi| Base { lqi, ahead: Ahead::new(steps) }),
             disturbance: settings.disturbance.map(Disturbance::new),
-            machine: Machine::detect(),
+            machine: match settings.instructions {
+                Instructions::Widest => Machine::detect(),
+                Instructions::Portable => Machine::baseline(),
+            },
             blocks: vec![[[[0.0; WIDTH]; 3]; HORIZON]; count],
             worth: vec![Worth::NONE; count],
             order: Vec::with_capacity(count * WIDTH),
             last: None,
+            age: 0,
+            kept: Vec::with_capacity(WIDTH),
+            spent: Spent::default(),
             seed: 0,
             tick: 0,
         }
@@ -181,20 +135,29 @@ impl Cem {
 
     /// Draws the candidates of an iteration into the blocks from `first` on.
     fn sample(&mut self, rng: &mut impl Rng, first: usize, mean: &Plan, spread: &Plan) {
+        let begun = Instant::now();
+        let old = self.settings.persistence;
+        let new = (1.0 - old * old).sqrt();
         for block in &mut self.blocks[first..] {
-            for ((actions, mean), spread) in block.iter_mut().zip(mean).zip(spread) {
-                for ((lanes, m), s) in actions.iter_mut().zip(mean).zip(spread) {
-                    for x in lanes {
+            let mut noise = [[0.0; WIDTH]; 3];
+            for h in 0..HORIZON {
+                for c in 0..3 {
+                    for i in 0..WIDTH {
                         let normal: f64 = StandardNormal.sample(rng);
-                        *x = (m + s * normal).clamp(-1.0, 1.0) as f32;
+                        let part = if h == 0 { [0.0, 1.0] } else { [old, new] };
+                        noise[c][i] = part[0] * noise[c][i] + part[1] * normal;
+                        let x = mean[h][c] + spread[h][c] * noise[c][i];
+                        block[h][c][i] = x.clamp(-1.0, 1.0) as f32;
                     }
                 }
             }
         }
+        self.spent.draw += begun.elapsed();
     }
 
     /// Draws the noise on the proposals of the blocks from `first` up to `end`; the first lane has none.
     fn sample_noise(&mut self, rng: &mut impl Rng, [first, end]: [usize; 2]) {
+        let begun = Instant::now();
         let [deviation, most] = self.settings.noise;
         for (b, block) in self.blocks[first..end].iter_mut().enumerate() {
             for lanes in block.iter_mut().flatten() {
@@ -205,6 +168,7 @@ impl Cem {
                 }
             }
         }
+        self.spent.draw += begun.elapsed();
     }
 
     /// Flies the blocks from `first` up to `end`.
@@ -215,6 +179,7 @@ impl Cem {
         actions: Actions,
         [first, end]: [usize; 2],
     ) {
+        let begun = Instant::now();
         let scene = Scene {
             model: &self.model,
             task: &Task::PAPER,
@@ -228,6 +193,7 @@ impl Cem {
         };
         let (blocks, worth) = (&mut self.blocks[first..end], &mut self.worth[first..end]);
         self.machine.fly(&scene, actions, blocks, worth);
+        self.spent.fly += begun.elapsed();
     }
 
     /// A candidate with its worth.
@@ -242,6 +208,13 @@ impl Cem {
     /// Mean and standard deviation of the candidates' actions, as the update weighs them, with the best
     /// of them; `None` if too few stay finite.
     fn refit(&mut self) -> Option<(Plan, Plan, Valued)> {
+        let begun = Instant::now();
+        let refitted = self.refitted();
+        self.spent.refit += begun.elapsed();
+        refitted
+    }
+
+    fn refitted(&mut self) -> Option<(Plan, Plan, Valued)> {
         self.order.clear();
         for (b, worth) in self.worth.iter().enumerate() {
             for (i, &value) in worth.returns.iter().enumerate() {
@@ -250,8 +223,6 @@ impl Cem {
                 self.order.push((value, (b * WIDTH + i) as u32));
             }
         }
-        // ties go to the lower index, so the order is the same everywhere
-        let better = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
         let &best = self.order.iter().min_by(|a, b| better(a, b))?;
         let count = match self.settings.update {
             Update::Elites(count) => count.clamp(1, self.order.len()),
@@ -294,21 +265,43 @@ impl Cem {
     fn search(&mut self, seen: &Observation, target: &Target) -> Option<Plan> {
         let mut rng = stream::stream(self.seed, &[self.tick]);
         self.tick += 1;
-        let mut mean = [[0.0; 3]; HORIZON];
-        let mut spread = [[self.settings.spread; 3]; HORIZON];
         let all = self.blocks.len();
-        for iteration in 0..self.settings.iterations {
-            let mut first = 0;
-            if iteration == 0 {
-                first = self.settings.proposals.div_ceil(WIDTH).min(all);
-                self.sample_noise(&mut rng, [0, first]);
-                self.fly(seen, target, Actions::Policy, [0, first]);
-            }
+        let mut first = self.settings.proposals.div_ceil(WIDTH).min(all);
+        self.sample_noise(&mut rng, [0, first]);
+        self.fly(seen, target, Actions::Policy, [0, first]);
+        let mut mean = match (self.settings.start, &self.last) {
+            (Start::Policy, _) => self.candidate(0).plan,
+            (Start::Last, Some(last)) => shifted(last),
+            _ => [[0.0; 3]; HORIZON],
+        };
+        let mut spread = [[self.settings.spread; 3]; HORIZON];
+        for _ in 0..self.settings.iterations {
             self.sample(&mut rng, first, &mean, &spread);
+            for k in 0..self.kept.len() {
+                let plan = self.kept[k];
+                self.put(0, k, &plan);
+            }
             self.fly(seen, target, Actions::Given, [first, all]);
             (mean, spread, _) = self.refit()?;
+            self.keep();
+            first = 0;
         }
+        self.kept.clear();
         Some(mean)
+    }
+
+    /// Keeps the best candidates for the next iteration.
+    fn keep(&mut self) {
+        let count = self.settings.kept.min(self.order.len());
+        self.kept.clear();
+        if count == 0 {
+            return;
+        }
+        self.order.select_nth_unstable_by(count - 1, better);
+        for k in 0..count {
+            let plan = self.candidate(self.order[k].1 as usize).plan;
+            self.kept.push(plan);
+        }
     }
 
     /// The best plan around the base's, if it is worth more than the base's by the margin and by what
@@ -359,7 +352,9 @@ impl Cem {
 
     /// The base's command, or that of a plan that is surely better.
     fn over_base(&mut self, mut base: Base, seen: &Observation, target: &Target) -> Command {
+        let begun = Instant::now();
         base.lqi.look_ahead(seen, target, &mut base.ahead);
+        self.spent.prepare += begun.elapsed();
         let before = base.lqi.clone();
         let alone = base.lqi.command(seen, target);
         self.base = Some(base);
@@ -367,11 +362,16 @@ impl Cem {
         match (self.last, &mut self.base) {
             (Some(plan), Some(base)) => {
                 base.lqi.hand_over(&before, seen);
-                Command { throttle: alone.throttle, ..flown(&plan) }
+                Command { throttle: alone.throttle, ..flown(&plan[0]) }
             }
             _ => alone,
         }
     }
+}
+
+/// The better of two candidates first; ties go to the lower index, so the order is the same everywhere.
+fn better(a: &(f32, u32), b: &(f32, u32)) -> Ordering {
+    b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
 }
 
 /// A plan a tick later, its last action held.
@@ -379,9 +379,12 @@ fn shifted(plan: &Plan) -> Plan {
     std::array::from_fn(|h| plan[(h + 1).min(HORIZON - 1)])
 }
 
-/// The command that a plan begins with.
-fn flown(plan: &Plan) -> Command {
-    let [aileron, elevator, thrust] = plan[0];
+/// The command of a planner that has no plan.
+const LOST: Command = Command { aileron: f64::NAN, elevator: f64::NAN, throttle: f64::NAN };
+
+/// The command of an action.
+fn flown([aileron, elevator, thrust]: &Action) -> Command {
+    let [aileron, elevator, thrust] = [*aileron, *elevator, *thrust];
     Command { aileron, elevator, throttle: (thrust + 1.0) / 2.0 }.clamped()
 }
 
@@ -396,21 +399,32 @@ impl Controller for Cem {
 
     fn reset(&mut self, seed: u64) {
         (self.seed, self.tick) = (seed, 0);
-        self.last = None;
+        (self.last, self.age) = (None, 0);
         self.disturbance = self.settings.disturbance.map(Disturbance::new);
         if let Some(base) = &mut self.base {
             base.lqi.reset(seed);
         }
     }
 
+    fn insight(&self, seen: &Observation) -> Option<Insight> {
+        Some(self.told(seen))
+    }
+
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {
+        self.spent = Spent::default();
+        let begun = Instant::now();
         if let Some(disturbance) = &mut self.disturbance {
             disturbance.update(&self.model, seen);
         }
+        self.spent.prepare = begun.elapsed();
         if let Some(base) = self.base.take() {
             return self.over_base(base, seen, target);
         }
+        self.age += 1;
+        if self.last.is_none() || self.age >= self.settings.chunk {
+            (self.last, self.age) = (self.search(seen, target), 0);
+        }
         // said by a command that is no number: whoever flies has a fallback
-        flown(&self.search(seen, target).unwrap_or([[f64::NAN; 3]; HORIZON]))
+        self.last.map_or(LOST, |plan| flown(&plan[self.age]))
     }
 }

@@ -287,7 +287,7 @@ fn command_of<R>(c: Command, number: impl Fn(f64) -> R) -> Command<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::cem::disturbance;
+    use crate::control::disturbance;
     use crate::physics::Time;
     use std::path::Path;
 

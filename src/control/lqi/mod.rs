@@ -27,6 +27,15 @@ const STALL_GAIN: f64 = 3.0;
 const AIRSPEED_KP: f64 = 0.3;
 const AIRSPEED_KI: f64 = 0.05;
 
+/// Where an LQI flies to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Goal {
+    /// Roll and pitch, rad, as far as the airspeed allows.
+    pub attitude: [f64; 2],
+    /// p q r α β of the steady flight there, rad/s and rad.
+    pub steady: [f64; 5],
+}
+
 /// The gain-scheduled LQI, designed from any model.
 #[derive(Clone, Debug)]
 pub struct Lqi {
@@ -78,6 +87,13 @@ impl Lqi {
     /// The airspeed to hold (m/s): the target's, or what the attitude needs.
     fn airspeed(&self, target: &Target) -> f64 {
         self.schedule.comfortable_airspeed(target.roll, target.pitch).max(target.airspeed)
+    }
+
+    /// Where it flies to from `seen`.
+    pub(crate) fn goal(&self, seen: &Observation, target: &Target) -> Goal {
+        let attitude @ [roll, pitch] = self.wanted(seen, target);
+        let [_, _, steady @ ..] = self.schedule.at(seen.state.airspeed, roll, pitch).steady;
+        Goal { attitude, steady }
     }
 
     /// Writes into `ahead` how the LQI would fly on from `seen`.

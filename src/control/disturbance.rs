@@ -10,12 +10,12 @@ use crate::physics::State;
 use crate::physics::actuators::Actuators;
 
 /// No disturbance.
-pub(super) const NONE: State =
+pub(crate) const NONE: State =
     State { roll: 0.0, pitch: 0.0, airspeed: 0.0, p: 0.0, q: 0.0, r: 0.0, alpha: 0.0, beta: 0.0 };
 
 /// Its estimate.
 #[derive(Clone, Debug)]
-pub(super) struct Disturbance {
+pub(crate) struct Disturbance {
     /// Time constant of the estimate, s.
     time_constant: f64,
     last: Option<Observation>,

@@ -1,0 +1,69 @@
+//! The last search, told: its candidates flown one by one in the model.
+
+use super::rollout::{HORIZON, WIDTH};
+use super::{Cem, Plan, flown};
+use crate::control::Observation;
+use crate::control::insight::{Insight, Path};
+use crate::model::STEP;
+use crate::physics::Command;
+use crate::physics::actuators::Actuators;
+use crate::physics::inputs::InputMemory;
+
+/// Candidates told, spread over all.
+const TOLD: usize = 48;
+
+impl Cem {
+    /// What the tick that was planned from `seen` had before it. It flies some thousand steps, and
+    /// allocates.
+    pub(super) fn told(&self, seen: &Observation) -> Insight {
+        let all = self.blocks.len() * WIDTH;
+        let every = all.div_ceil(TOLD).max(1);
+        let plans = (0..all).step_by(every).map(|index| self.candidate(index).plan);
+        Insight {
+            candidates: plans.map(|plan| self.path(seen, Some(&plan))).collect(),
+            chosen: self.path(seen, self.last.as_ref()),
+            searched: self.last.is_some(),
+            phases: self.spent.phases(),
+        }
+    }
+
+    /// The path of a plan, or without one that of the base.
+    fn path(&self, seen: &Observation, plan: Option<&Plan>) -> Path {
+        let model = &self.model;
+        let figures = &model.airframe.actuators;
+        let ahead = self.base.as_ref().map(|base| &base.ahead);
+        let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);
+        let mut state = seen.state;
+        let mut previous = seen.previous;
+        let mut memory = self.disturbance.as_ref().map(|d| d.memory()).unwrap_or_default();
+        let rate = self.disturbance.as_ref().map(|d| d.rate());
+        let mut inputs = InputMemory::at_rest(&actuators.controls());
+        let mut reference = ahead.map_or([0.0; 2], |ahead| ahead.reference());
+        let steps = ahead.map_or(HORIZON, |ahead| ahead.steps());
+        let mut path = vec![[state.roll, state.pitch]];
+        for step in 0..steps {
+            let planned = plan.filter(|_| step < HORIZON).map(|plan| flown(&plan[step]));
+            if step == HORIZON && plan.is_some() {
+                reference = [state.roll, state.pitch];
+            }
+            let behind = ahead.map(|ahead| {
+                let z = actuators.observed(figures);
+                ahead.command(step, &mut reference, &state, &z, &previous)
+            });
+            let command = match (planned, behind) {
+                (Some(c), Some(base)) => Command { throttle: base.throttle, ..c },
+                (Some(c), None) | (None, Some(c)) => c,
+                (None, None) => break,
+            };
+            let controls = model.act(&actuators.controls(), &mut inputs);
+            state = model.step(&state, &controls, seen.altitude, &mut memory);
+            if let Some(rate) = &rate {
+                state = state.advance(rate, STEP);
+            }
+            actuators.step(&command, figures);
+            previous = [command, previous[0]];
+            path.push([state.roll, state.pitch]);
+        }
+        path
+    }
+}

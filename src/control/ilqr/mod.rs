@@ -1,0 +1,130 @@
+//! iLQR: the plan over half a second that the model's exact derivatives lead to.
+//!
+//! Differential dynamic programming without second derivatives of the model (Todorov and Li, ACC 2005;
+//! Tassa, Mansard and Todorov, ICRA 2014, for limited commands), one iteration a tick from the last plan,
+//! which is the real-time iteration of Diehl et al. (2002). Throttle and the attitude that the airspeed
+//! allows are the LQI's, and what the model leaves unexplained is taken into it: no steady error.
+
+mod problem;
+mod solve;
+
+use crate::control::disturbance::Disturbance;
+use crate::control::insight::{Insight, Path};
+use crate::control::lqi::{Ahead, Lqi};
+use crate::control::{Controller, Observation, Target};
+use crate::model::GreyBox;
+use crate::physics::Command;
+use problem::{Problem, Trajectory};
+use solve::Solver;
+
+/// Steps planned ahead.
+const STEPS: usize = 50;
+
+/// Time constant (s) of the estimate of what the model leaves unexplained.
+const DISTURBANCE_S: f64 = 0.3;
+
+/// Aileron and elevator in units of the largest deflection.
+type Surfaces = [f64; 2];
+
+/// The planner. It takes no memory after it is built.
+#[derive(Clone, Debug)]
+pub struct Ilqr {
+    model: GreyBox,
+    lqi: Lqi,
+    ahead: Ahead,
+    disturbance: Disturbance,
+    desk: Desk,
+}
+
+impl Ilqr {
+    /// A planner through `model`, beside the LQI that it is given.
+    pub fn new(model: &GreyBox, lqi: Lqi) -> Ilqr {
+        Ilqr {
+            model: model.clone(),
+            lqi,
+            ahead: Ahead::new(STEPS),
+            disturbance: Disturbance::new(DISTURBANCE_S),
+            desk: Desk { solver: Solver::new(), plan: None, flown: Trajectory::new() },
+        }
+    }
+}
+
+/// What is kept from tick to tick.
+#[derive(Clone, Debug)]
+struct Desk {
+    solver: Solver,
+    /// The plan of the last tick.
+    plan: Option<[Surfaces; STEPS]>,
+    flown: Trajectory,
+}
+
+impl Desk {
+    /// The plan of this tick; `None` if no plan stays finite.
+    fn improve(&mut self, problem: &Problem, lqi: &[Surfaces; STEPS]) -> Option<[Surfaces; STEPS]> {
+        let mut start = *lqi;
+        let mut cost = problem.fly(&start, &mut self.flown);
+        if let Some(last) = &self.plan {
+            let mut shifted = *last;
+            shifted.rotate_left(1);
+            shifted[STEPS - 1] = shifted[STEPS - 2];
+            let found = problem.fly(&shifted, self.solver.spare());
+            // a comparison with what is no number is false
+            if found < cost || !cost.is_finite() {
+                (start, cost) = (shifted, found);
+                self.solver.swap(&mut self.flown);
+            }
+        }
+        cost.is_finite().then(|| self.solver.iterate(problem, start, cost, &mut self.flown))
+    }
+}
+
+impl Controller for Ilqr {
+    fn name(&self) -> &'static str {
+        "ilqr"
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
+    }
+
+    fn reset(&mut self, seed: u64) {
+        self.lqi.reset(seed);
+        self.disturbance = Disturbance::new(DISTURBANCE_S);
+        self.desk.plan = None;
+    }
+
+    fn insight(&self, _seen: &Observation) -> Option<Insight> {
+        let path: Path = self.desk.flown.states().map(|s| [s.roll, s.pitch]).collect();
+        Some(Insight {
+            candidates: Vec::new(),
+            chosen: path,
+            searched: self.desk.plan.is_some(),
+            phases: Vec::new(),
+        })
+    }
+
+    fn command(&mut self, seen: &Observation, target: &Target) -> Command {
+        self.disturbance.update(&self.model, seen);
+        self.lqi.look_ahead(seen, target, &mut self.ahead);
+        let before = self.lqi.clone();
+        let alone = self.lqi.command(seen, target);
+        let problem = Problem {
+            model: &self.model,
+            seen,
+            goal: self.lqi.goal(seen, target),
+            throttle: alone.throttle,
+            memory: self.disturbance.memory(),
+            disturbance: self.disturbance.rate(),
+        };
+        let lqi = problem.follow(&self.ahead);
+        self.desk.plan = self.desk.improve(&problem, &lqi);
+        match self.desk.plan {
+            Some(plan) => {
+                self.lqi.hand_over(&before, seen);
+                let [aileron, elevator] = plan[0];
+                Command { aileron, elevator, throttle: alone.throttle }.clamped()
+            }
+            None => alone,
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! One iteration: back along the trajectory for slopes and gains, forward for a better plan.
+
+use nalgebra::{Matrix2, SMatrix, Vector2};
+
+use super::problem::{Problem, STATES, Square, Trajectory, Vector};
+use super::{STEPS, Surfaces};
+
+/// How a command answers to a state beside the trajectory.
+type Gain = SMatrix<f64, 2, STATES>;
+
+/// Parts of the step that are tried, the largest first.
+const PARTS: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
+
+/// Gains and open-loop changes with their memory.
+#[derive(Clone, Debug)]
+pub(super) struct Solver {
+    gains: Vec<Gain>,
+    changes: Vec<Vector2<f64>>,
+    spare: Trajectory,
+}
+
+impl Solver {
+    pub fn new() -> Solver {
+        Solver {
+            gains: vec![Gain::zeros(); STEPS],
+            changes: vec![Vector2::zeros(); STEPS],
+            spare: Trajectory::new(),
+        }
+    }
+
+    /// Memory for another trajectory.
+    pub fn spare(&mut self) -> &mut Trajectory {
+        &mut self.spare
+    }
+
+    /// Changes places with the spare one.
+    pub fn swap(&mut self, trajectory: &mut Trajectory) {
+        std::mem::swap(&mut self.spare, trajectory);
+    }
+
+    /// The best of the tried steps from `plan`, which costs `cost` along `trajectory`; `plan` if none is
+    /// better. `trajectory` is that of the answer.
+    pub fn iterate(
+        &mut self,
+        problem: &Problem,
+        plan: [Surfaces; STEPS],
+        cost: f64,
+        trajectory: &mut Trajectory,
+    ) -> [Surfaces; STEPS] {
+        if self.back(problem, &plan, trajectory).is_none() {
+            return plan;
+        }
+        for part in PARTS {
+            let (gains, changes) = (&self.gains, &self.changes);
+            let (better, found) = problem.fly_with(&mut self.spare, |step, now| {
+                let answer = changes[step] * part + gains[step] * now.less(trajectory, step);
+                [plan[step][0] + answer[0], plan[step][1] + answer[1]]
+            });
+            if found < cost {
+                self.swap(trajectory);
+                return better;
+            }
+        }
+        plan
+    }
+
+    /// Fills gains and changes; `None` if a number is lost.
+    fn back(
+        &mut self,
+        problem: &Problem,
+        plan: &[Surfaces; STEPS],
+        trajectory: &Trajectory,
+    ) -> Option<()> {
+        let (mut slope, curvature) = problem.stage_terms(trajectory, STEPS);
+        let mut value = Square::from_diagonal(&curvature);
+        let ([aileron, elevator], unit) = problem.last_commands();
+        let weight = problem.move_weight();
+        for step in (0..STEPS).rev() {
+            let (a, b) = problem.linear(trajectory, step);
+            let va = value * a;
+            let vb = value * b;
+            let mut q_x: Vector = a.tr_mul(&slope);
+            let mut q_u: Vector2<f64> = b.tr_mul(&slope);
+            let mut q_xx: Square = a.tr_mul(&va);
+            let mut q_ux: Gain = b.tr_mul(&va);
+            let mut q_uu: Matrix2<f64> = b.tr_mul(&vb);
+            // the cost of moving a command from the last one, which is among the states
+            let x = trajectory.at(step);
+            let now = [x[aileron] / unit, x[elevator] / unit];
+            for (c, at) in [aileron, elevator].into_iter().enumerate() {
+                let moved = plan[step][c] - now[c];
+                q_u[c] += weight * moved;
+                q_uu[(c, c)] += weight;
+                q_x[at] -= weight * moved / unit;
+                q_xx[(at, at)] += weight / (unit * unit);
+                q_ux[(c, at)] -= weight / unit;
+            }
+            let (change, gain) = limited(&q_u, &q_uu, &q_ux, plan[step])?;
+            if step > 0 {
+                let (stage, curvature) = problem.stage_terms(trajectory, step);
+                let answered = q_uu * change + q_u;
+                slope = q_x + stage + gain.tr_mul(&answered) + q_ux.tr_mul(&change);
+                let cross = gain.tr_mul(&q_ux);
+                value = q_xx + gain.tr_mul(&(q_uu * gain)) + cross + cross.transpose();
+                for i in 0..STATES {
+                    value[(i, i)] += curvature[i];
+                }
+            }
+            (self.gains[step], self.changes[step]) = (gain, change);
+        }
+        Some(())
+    }
+}
+
+/// The best change within −1..1 of the commands, and its answer to the state: a command at its limit does
+/// not answer (Tassa et al. 2014, for two commands).
+fn limited(
+    slope: &Vector2<f64>,
+    curvature: &Matrix2<f64>,
+    cross: &Gain,
+    now: Surfaces,
+) -> Option<(Vector2<f64>, Gain)> {
+    let mut held: [Option<f64>; 2] = [None; 2];
+    // each pass holds one more
+    for _ in 0..3 {
+        let mut change = Vector2::zeros();
+        let mut gain = Gain::zeros();
+        match held {
+            [None, None] => {
+                let inverse = curvature.try_inverse()?;
+                (change, gain) = (-(inverse * slope), -(inverse * cross));
+            }
+            [Some(x), Some(y)] => change = Vector2::new(x, y),
+            [Some(x), None] | [None, Some(x)] => {
+                let (fixed, open) = if held[0].is_some() { (0, 1) } else { (1, 0) };
+                let bent = curvature[(open, open)];
+                change[fixed] = x;
+                change[open] = -(slope[open] + curvature[(open, fixed)] * x) / bent;
+                for j in 0..STATES {
+                    gain[(open, j)] = -cross[(open, j)] / bent;
+                }
+            }
+        }
+        if !change.iter().chain(gain.iter()).all(|x| x.is_finite()) {
+            return None;
+        }
+        let mut met = true;
+        for c in 0..2 {
+            let wanted = now[c] + change[c];
+            if held[c].is_none() && wanted.abs() > 1.0 {
+                held[c] = Some(wanted.signum() - now[c]);
+                met = false;
+            }
+        }
+        if met {
+            return Some((change, gain));
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The change that costs least within the limits, found by a grid.
+    #[test]
+    fn limits_are_kept_at_the_least_cost() {
+        let curvature = Matrix2::new(2.0, 0.6, 0.6, 1.0);
+        for slope in [[0.5, -0.3], [6.0, -0.3], [6.0, 8.0], [-5.0, 0.1]] {
+            let slope = Vector2::from(slope);
+            let now = [0.2, -0.4];
+            let (change, _) = limited(&slope, &curvature, &Gain::zeros(), now).unwrap();
+            let cost = |d: &Vector2<f64>| (0.5 * (d.transpose() * curvature * d))[0] + slope.dot(d);
+            let grid = (0..=200).flat_map(|i| (0..=200).map(move |j| (i, j)));
+            let least = grid
+                .map(|(i, j)| {
+                    let at = |k: i32| f64::from(k) * 0.01 - 1.0;
+                    cost(&Vector2::new(at(i) - now[0], at(j) - now[1]))
+                })
+                .fold(f64::INFINITY, f64::min);
+            assert!(cost(&change) <= least + 1e-3, "{slope:?} {change:?}");
+            assert!((0..2).all(|c| (now[c] + change[c]).abs() <= 1.0 + 1e-12));
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! The page of an evaluation: scores beside the paper's, how targets were reached, what planners saw.
+
+use super::Align::{Left, Right};
+use super::numbers::number;
+use super::sight::{Sight, phases};
+use super::{
+    Band, Choice, ChoiceOption, Figure, Page, Panel, Scale, Section, Series, Style, Table,
+    TimeFigure, Whisker, Whiskers,
+};
+use crate::control::Target;
+use crate::model::STEP;
+use crate::sim::evaluation::{Evaluation, Score};
+use crate::sim::published::{Published, Value, published};
+use crate::sim::tracking::{Tracking, seconds};
+
+/// An evaluation's story, with where it came from.
+#[derive(Clone, Debug)]
+pub struct EvaluationReport<'a> {
+    /// A line under the title.
+    pub subtitle: String,
+    /// What each controller reached.
+    pub evaluations: &'a [Evaluation],
+    /// Single flights: the target, and one flight for each of the evaluations.
+    pub flights: &'a [(Target, Vec<Tracking>)],
+    /// Things and their values: files, options.
+    pub provenance: Vec<(String, String)>,
+}
+
+impl EvaluationReport<'_> {
+    /// The page of the evaluation.
+    pub fn page(&self) -> Page {
+        let mut sections = vec![self.intervals(), self.scores()];
+        if !self.flights.is_empty() {
+            sections.push(self.tracking());
+            sections.extend(self.sight());
+        }
+        sections.push(self.provenance());
+        Page { title: "Controllers".into(), subtitle: self.subtitle.clone(), sections }
+    }
+
+    fn groups(&self) -> Vec<&str> {
+        let Some(first) = self.evaluations.first() else { return Vec::new() };
+        first.groups.iter().map(|score| score.targets.as_str()).collect()
+    }
+
+    /// Each evaluation's score of a group, with its name.
+    fn scores_of<'a>(&'a self, group: &'a str) -> impl Iterator<Item = (String, &'a Score)> {
+        self.evaluations.iter().filter_map(move |e| Some((label(e), e.score(group)?)))
+    }
+
+    fn intervals(&self) -> Section {
+        let figures = self.groups().into_iter().map(|group| {
+            let mut rows = Vec::new();
+            for (evaluation, (name, score)) in self.evaluations.iter().zip(self.scores_of(group)) {
+                let ours = Value { value: score.iqm_deg, ci95: score.iqm_ci95_deg };
+                rows.push(whisker(name, Style::Actual, ours));
+                if let Some(p) = published(&evaluation.controller, group) {
+                    let name = format!("{} in the paper", p.controller);
+                    rows.push(whisker(name, Style::Measured, p.iqm_deg));
+                }
+            }
+            Figure::Whiskers(Whiskers {
+                title: group.replace('_', " "),
+                unit: "settled error, °, interquartile mean".into(),
+                scale: Scale::Log { floor: 1e-4 },
+                lines: Vec::new(),
+                legend: String::new(),
+                rows,
+            })
+        });
+        let note = "Interquartile mean of the settled error (mean of roll and pitch RMSE over the last fifth \
+                    of ten seconds) with its 95 % bootstrap interval, over the targets here, over ten \
+                    policies in the paper (Table XI: true frozen prior). A decade is a decade.";
+        Section::new("Settled error", note, figures.collect())
+    }
+
+    fn scores(&self) -> Section {
+        let columns = [
+            ("Controller", Left),
+            ("Targets", Left),
+            ("n", Right),
+            ("Median (°)", Right),
+            ("IQM (°)", Right),
+            ("Mean (°)", Right),
+            ("Paper's mean (°)", Right),
+            ("Least, most (°)", Right),
+            ("To 1° (s)", Right),
+            ("Diverged (%)", Right),
+            ("Paper's (%)", Right),
+            ("ms a step: median, p99.9", Right),
+            ("Paper's", Right),
+        ];
+        let mut table = Table::new("Scores", &columns);
+        for e in self.evaluations {
+            for s in &e.groups {
+                let paper = published(&e.controller, &s.targets);
+                let of = |get: &dyn Fn(&Published) -> String| paper.map_or_else(|| "–".into(), get);
+                table.push([
+                    label(e),
+                    s.targets.replace('_', " "),
+                    s.count.to_string(),
+                    with_interval(s.median_deg, s.median_ci95_deg),
+                    with_interval(s.iqm_deg, s.iqm_ci95_deg),
+                    with_interval(s.mean_deg, s.mean_ci95_deg),
+                    of(&|p| with_interval(p.mean_deg.value, p.mean_deg.ci95)),
+                    format!("{}, {}", number(s.min_deg), number(s.max_deg)),
+                    number(s.settling_s),
+                    with_interval(100.0 * s.divergence_rate, s.divergence_ci95.map(|x| 100.0 * x)),
+                    of(&|p| with_interval(p.diverged_percent.value, p.diverged_percent.ci95)),
+                    format!("{}, {}", number(e.ms_per_step.p50), number(e.ms_per_step.p999)),
+                    of(&|p| number(p.ms_per_step)),
+                ]);
+            }
+        }
+        let note = "95 % bootstrap intervals in brackets. The paper's: Table XI, divergence of Table VIII \
+                    (all six models), time of Table V.";
+        Section::new("Scores", note, vec![Figure::Table(table)])
+    }
+
+    fn tracking(&self) -> Section {
+        let option = |(target, flights): &(Target, Vec<Tracking>)| {
+            let time: Vec<f64> =
+                (0..flights.first().map_or(0, |f| f.attitude.len())).map(seconds).collect();
+            let panel = |axis: usize, title: &str, wanted: f64| {
+                let mut series = vec![Series::new(
+                    "command",
+                    Style::Command,
+                    vec![wanted.to_degrees(); time.len()],
+                )];
+                for (k, (e, flight)) in self.evaluations.iter().zip(flights).enumerate() {
+                    let values =
+                        flight.attitude.iter().map(|angles| angles[axis].to_degrees()).collect();
+                    series.push(Series::new(&label(e), Style::nth(k), values));
+                }
+                let band = Band { around: 0, half_width: 5.0, label: "±5°".into() };
+                Panel { bands: vec![band], ..Panel::new(title, "°", series) }
+            };
+            let mut figure = TimeFigure::default();
+            let panels = vec![panel(0, "Roll", target.roll), panel(1, "Pitch", target.pitch)];
+            figure.add_track(&time, 10.0 * STEP, panels);
+            ChoiceOption { name: name(target), figures: vec![Figure::Time(figure)] }
+        };
+        let choice = Choice {
+            anchor: "tracking".into(),
+            label: "Target".into(),
+            options: self.flights.iter().map(option).collect(),
+        };
+        let note =
+            "Ten seconds from level flight towards the targets of the paper's Figures 7 to 9.";
+        Section::new("On the way", note, vec![Figure::Choice(choice)])
+    }
+
+    /// What the planners saw on their way to the targets; none if no planner flew.
+    fn sight(&self) -> Option<Section> {
+        let mut options = Vec::new();
+        for (target, flights) in self.flights {
+            for (e, flight) in self.evaluations.iter().zip(flights) {
+                if flight.insights.is_empty() {
+                    continue;
+                }
+                let sights: Vec<Sight> = flight
+                    .insights
+                    .iter()
+                    .map(|(step, insight)| Sight {
+                        time_s: seconds(*step),
+                        target: [target.roll, target.pitch],
+                        insight: insight.clone(),
+                    })
+                    .collect();
+                let mut figures: Vec<Figure> = sights.iter().flat_map(Sight::fans).collect();
+                figures.push(Figure::Table(phases(&sights)));
+                let name = format!("{}, {}", label(e), name(target));
+                options.push(ChoiceOption { name, figures });
+            }
+        }
+        if options.is_empty() {
+            return None;
+        }
+        let choice = Choice { anchor: "sight".into(), label: "Planner".into(), options };
+        let note = "Some of the candidates of the last iteration and the plan that was flown, in the planner's \
+                    own model, at three moments; then the time that the parts of those ticks took.";
+        Some(Section::new("What the planner saw", note, vec![Figure::Choice(choice)]))
+    }
+
+    fn provenance(&self) -> Section {
+        let mut table = Table::new("Provenance", &[("Thing", Left), ("Value", Left)]);
+        self.provenance.iter().for_each(|(k, v)| table.push([k.clone(), v.clone()]));
+        Section::new("Provenance", "", vec![Figure::Table(table)])
+    }
+}
+
+/// A controller with what it flies by.
+fn label(e: &Evaluation) -> String {
+    if e.model == "-" { e.controller.clone() } else { format!("{} ({})", e.controller, e.model) }
+}
+
+fn name(target: &Target) -> String {
+    let [roll, pitch] = [target.roll, target.pitch].map(f64::to_degrees);
+    format!("roll {roll:.0}°, pitch {pitch:.0}°")
+}
+
+fn with_interval(value: f64, [low, high]: [f64; 2]) -> String {
+    format!("{} [{}, {}]", number(value), number(low), number(high))
+}
+
+fn whisker(label: String, style: Style, Value { value, ci95 }: Value) -> Whisker {
+    Whisker { label, style, value, interval: ci95, text: with_interval(value, ci95) }
+}

@@ -1,0 +1,78 @@
+//! What a planner saw ahead: candidates and plan as they fan out, and the time of a tick's parts.
+
+use super::Align::Right;
+use super::numbers::number;
+use super::{Figure, Style, Table, XyFigure, XyMark, XySeries};
+use crate::control::insight::{Insight, Path};
+use crate::model::STEP;
+
+/// A tick of a planner that is shown.
+#[derive(Clone, Debug)]
+pub struct Sight {
+    /// When, s, on the clock of the page.
+    pub time_s: f64,
+    /// Commanded roll and pitch, rad.
+    pub target: [f64; 2],
+    /// What it saw.
+    pub insight: Insight,
+}
+
+impl Sight {
+    /// Roll and pitch of the candidates and of what was flown.
+    pub(super) fn fans(&self) -> [Figure; 2] {
+        [self.fan(0, "Roll"), self.fan(1, "Pitch")]
+    }
+
+    fn fan(&self, axis: usize, angle: &str) -> Figure {
+        let line = |path: &Path| -> [Vec<f64>; 2] {
+            let x = (0..path.len()).map(|k| self.time_s + k as f64 * STEP);
+            let y = path.iter().map(|angles| angles[axis].to_degrees());
+            // a number that is not finite ends the line
+            [x.chain([f64::NAN]).collect(), y.chain([f64::NAN]).collect()]
+        };
+        let mut all = [Vec::new(), Vec::new()];
+        for path in &self.insight.candidates {
+            let [x, y] = line(path);
+            all[0].extend(x);
+            all[1].extend(y);
+        }
+        let [x, y] = all;
+        let [chosen_x, chosen_y] = line(&self.insight.chosen);
+        let chosen = if self.insight.searched { "plan flown" } else { "the LQI flies" };
+        let ends = [self.time_s, self.time_s + (self.insight.chosen.len() - 1) as f64 * STEP];
+        let series =
+            |label: &str, style, mark, x, y| XySeries { label: label.into(), style, mark, x, y };
+        Figure::Xy(XyFigure {
+            title: format!("{angle} seen ahead at {:.2} s", self.time_s),
+            x_label: "Time (s)".into(),
+            y_label: format!("{angle} (°)"),
+            bands: Vec::new(),
+            series: vec![
+                series("candidates", Style::Measured, XyMark::Path, x, y),
+                series(
+                    "command",
+                    Style::Command,
+                    XyMark::Path,
+                    ends.to_vec(),
+                    vec![self.target[axis].to_degrees(); 2],
+                ),
+                series(chosen, Style::Actual, XyMark::Line, chosen_x, chosen_y),
+            ],
+        })
+    }
+}
+
+/// Time of the parts of ticks, ms.
+pub(super) fn phases<'a>(sights: impl IntoIterator<Item = &'a Sight>) -> Table {
+    let mut sights = sights.into_iter().peekable();
+    let mut columns = vec![("At (s)", Right)];
+    if let Some(first) = sights.peek() {
+        columns.extend(first.insight.phases.iter().map(|(name, _)| (*name, Right)));
+    }
+    let mut table = Table::new("Time of the parts of a tick, ms", &columns);
+    for sight in sights {
+        let parts = sight.insight.phases.iter().map(|(_, spent)| number(spent.as_secs_f64() * 1e3));
+        table.push(std::iter::once(number(sight.time_s)).chain(parts));
+    }
+    table
+}

@@ -1,0 +1,57 @@
+//! Single flights for looking at: attitude over time, and what a planner saw at chosen moments.
+
+use crate::control::insight::Insight;
+use crate::control::{Controller, Target};
+use crate::model::STEP;
+use crate::physics::Command;
+use crate::sim::{Environment, Trouble};
+
+/// Steps into the flight after which the planner is asked what it saw.
+pub const ASKED: [usize; 3] = [10, 50, 150];
+
+/// A flight towards one target.
+#[derive(Clone, Debug)]
+pub struct Tracking {
+    /// Roll and pitch, rad, at every step; NaN once the aircraft is lost.
+    pub attitude: Vec<[f64; 2]>,
+    /// The commands.
+    pub commands: Vec<Command>,
+    /// The planner's sight at [`ASKED`]: step, and what it saw.
+    pub insights: Vec<(usize, Insight)>,
+}
+
+/// Flies `steps` steps towards `target`.
+///
+/// # Errors
+/// If the environment cannot be reset. A loss on the way ends the flight.
+pub fn track(
+    environment: &mut dyn Environment,
+    controller: &mut dyn Controller,
+    target: &Target,
+    steps: usize,
+) -> Result<Tracking, Trouble> {
+    let mut seen = environment.reset()?;
+    controller.reset(1);
+    let mut flight = Tracking { attitude: Vec::new(), commands: Vec::new(), insights: Vec::new() };
+    for step in 0..steps {
+        let command = controller.command(&seen, target);
+        flight.attitude.push([seen.state.roll, seen.state.pitch]);
+        flight.commands.push(command);
+        if ASKED.contains(&step)
+            && let Some(insight) = controller.insight(&seen)
+        {
+            flight.insights.push((step, insight));
+        }
+        match environment.step(command) {
+            Ok(next) => seen = next,
+            Err(_) => break,
+        }
+    }
+    flight.attitude.resize(steps, [f64::NAN; 2]);
+    Ok(flight)
+}
+
+/// Seconds of a step.
+pub fn seconds(step: usize) -> f64 {
+    step as f64 * STEP
+}
