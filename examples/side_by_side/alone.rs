@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::Result;
-use greylag::control::cem::{Aids, Cem, Settings};
+use greylag::control::cem::{Aids, Cem, Instructions, Settings};
 use greylag::control::policy::{Actor, Policy};
 use greylag::control::{Controller, Observation, Target};
 use greylag::learn::{Batch, Hyperparameters, Replay, Td3, Transition};
@@ -144,7 +144,8 @@ fn estimate(scorings: &[Scoring]) -> Result<()> {
     );
     for problem in scorings {
         let aids = Aids { agent: Some(problem.agent.clone()), base: None };
-        let mut planner = Cem::new("hybrid", &problem.model, Settings::HYBRID, aids).narrow();
+        let settings = Settings { instructions: Instructions::Portable, ..Settings::HYBRID };
+        let mut planner = Cem::new("hybrid", &problem.model, settings, aids);
         planner.reset(1);
         let tick = |_| {
             let start = clock::now();

@@ -117,7 +117,7 @@ fn train(problem: &Rollouts) -> impl FnMut(usize) -> Result<Timed> + '_ {
 
 /// A tick of our planner: sampling and refitting included, its rollouts in four turns.
 fn plan(problem: &Scoring) -> Result<impl FnMut(usize) -> Result<Timed> + '_> {
-    let source = Source { model: &problem.model, agent: Some(&problem.agent) };
+    let source = Source { model: &problem.model, agent: Some(&problem.agent), changes: &[] };
     let mut controller = control::build(Kind::Hybrid, source)?;
     controller.reset(1);
     Ok(move |calls| {

@@ -126,13 +126,6 @@ impl Cem {
         }
     }
 
-    /// The same planner in the instructions that the target always has, to be measured beside others:
-    /// vectors of four, on x86 without fused multiply-adds.
-    pub fn narrow(mut self) -> Cem {
-        self.machine = Machine::baseline();
-        self
-    }
-
     /// Draws the candidates of an iteration into the blocks from `first` on.
     fn sample(&mut self, rng: &mut impl Rng, first: usize, mean: &Plan, spread: &Plan) {
         let begun = Instant::now();
