@@ -1,7 +1,8 @@
 //! The grey box with its rollout loss in tensors of burn, against which kernels written by hand are held.
 //!
 //! Every quantity is a column of the batch, `[rows, 1]`; the linear effects of the X8's priors are one
-//! product of features with a matrix of coefficients.
+//! product of features with a matrix of coefficients. Nothing is divided by a number: the slope of that is rounded
+//! to single precision in burn 0.22, whatever the tensor's.
 
 use burn::tensor::{DType, Device, Gradients, Tensor, TensorData};
 use greylag::learn::windows::{Track, Window};
@@ -262,10 +263,11 @@ impl InBurn {
         let gravity = self.model.atmosphere.gravity;
         let push =
             lift.clone() * sa.clone() - drag.clone() * ca.clone() + throttle * self.thrust.clone();
-        let x = push / body.mass - sp.clone() * gravity;
-        let y = side / body.mass + sr.clone() * cp.clone() * gravity;
-        let z = (drag * sa.clone() + lift * ca.clone()) / -body.mass
-            + cr.clone() * cp.clone() * gravity;
+        let per_mass = 1.0 / body.mass;
+        let x = push * per_mass - sp.clone() * gravity;
+        let y = side * per_mass + sr.clone() * cp.clone() * gravity;
+        let z =
+            (drag * sa.clone() + lift * ca.clone()) * -per_mass + cr.clone() * cp.clone() * gravity;
         let spin = self.spin([&l, &m, &n], [&p, &q, &r]);
         let turn = (sr.clone() * q.clone() + cr.clone() * r.clone()) / cp;
         let forward = x.clone() * ca.clone() + z.clone() * sa.clone();
@@ -298,7 +300,7 @@ impl InBurn {
         let yaw = n.clone() - qr * jxz.clone() + pq * (body.jx - body.jy);
         [
             (roll.clone() * body.jz + yaw.clone() * jxz.clone()) / gamma.clone(),
-            pitch / body.jy,
+            pitch * (1.0 / body.jy),
             (roll * jxz + yaw * body.jx) / gamma,
         ]
     }
@@ -311,14 +313,14 @@ impl InBurn {
             Integrator::Rk4 => self.fly_rk4(rows),
             Integrator::Jsbsim => self.fly_jsbsim(rows),
         };
-        let points = (rows.states[0].dims()[0] * flown.len()) as f64;
+        let per_point = 1.0 / (rows.states[0].dims()[0] * flown.len()) as f64;
         let square = |x: Column| (x * per_scale.clone()).square().sum();
         let mut total: Option<[Tensor<1>; 3]> = None;
         for (k, (state, prior, learned)) in flown.into_iter().enumerate() {
             let mut off = Vec::from(state);
             off[0] = off[0].clone() - rows.states[k + 2].clone().narrow(1, 0, 1);
             // the short way round; the number of turns has no slope
-            off[0] = off[0].clone() - (off[0].clone().detach() / TAU).round() * TAU;
+            off[0] = off[0].clone() - (off[0].clone().detach() * (1.0 / TAU)).round() * TAU;
             let [first, rest] = [off.remove(0), Tensor::cat(off, 1)];
             let rest = rest - rows.states[k + 2].clone().narrow(1, 1, 7);
             let part = [
@@ -336,8 +338,8 @@ impl InBurn {
             });
         }
         let [error, prior, learned] = total.expect("a step at least");
-        let ratio = (learned / points).sqrt() / (prior / points).sqrt();
-        error / (points * objective.unit) + ratio / objective.lambda
+        let ratio = (learned * per_point).sqrt() / (prior * per_point).sqrt();
+        error * (per_point / objective.unit) + ratio * (1.0 / objective.lambda)
     }
 
     /// The state a step later, with F_p and F_a at its start.
