@@ -91,9 +91,11 @@ fn critics_decide_when_they_say_more_than_the_reward() {
         planner.reset(1);
         planner.command(&seen(), &TARGET)
     };
-    let [without, with] = [Settings::POLICY, Settings::HYBRID].map(command);
+    // a wide search, so that the critics have something to choose from
+    let valued = |alpha| Settings { alpha: Some(alpha), ..Settings::POLICY };
+    let [without, with] = [Settings::POLICY, valued(1.0)].map(command);
     assert!(!near(&without, &with, 0.05), "{without:?} {with:?}");
-    let weightless = command(Settings { alpha: Some(0.0), ..Settings::HYBRID });
+    let weightless = command(valued(0.0));
     assert_eq!(weightless, without);
 }
 
@@ -237,7 +239,7 @@ fn a_planner_without_its_policy_is_refused() {
     assert!(matches!(refused, Err(SetupError::Untrained)));
 }
 
-/// The same of iLQR, sooner still where the aircraft can be turned fast.
+/// iLQR leaves no steady error either.
 #[cfg(feature = "sitl")]
 #[test]
 fn ilqr_is_exact_on_a_model_that_is_and_on_one_that_is_not() {

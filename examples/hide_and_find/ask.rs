@@ -51,6 +51,8 @@ impl Answer {
         record.ranked = effects.iter().take(KEPT).map(id).collect();
         record.asserted = effects.iter().filter(|c| c.asserted).map(id).collect();
         record.refused = effects.first().map_or_else(Vec::new, |c| c.refused.clone());
+        let refused = effects.iter().filter(|c| !c.refused.is_empty());
+        record.refusals = refused.map(|c| (id(c), c.refused.clone())).collect();
         let flights = effects.first().map_or(&[][..], |c| &c.by_flight);
         let flights = flights.iter().filter(|f| f.value.is_finite());
         record.by_flight = flights.map(|f| [f.value, f.sd]).collect();

@@ -71,6 +71,9 @@ pub struct Record {
     /// Why the first is not asserted; empty if it is.
     #[serde(default)]
     pub refused: Vec<String>,
+    /// Why an effect that was examined is not asserted.
+    #[serde(default)]
+    pub refusals: BTreeMap<String, Vec<String>>,
     /// First coefficient of the first candidate as each flight has it, with standard deviation.
     #[serde(default)]
     pub by_flight: Vec<[f64; 2]>,

@@ -96,8 +96,16 @@ impl Settings {
     pub const POLICY: Settings = Settings { proposals: 32, ..Settings::PAPER };
     /// CEM + Q.
     pub const CRITICS: Settings = Settings { alpha: Some(1.0), ..Settings::PAPER };
-    /// The hybrid controller.
-    pub const HYBRID: Settings = Settings { alpha: Some(1.0), ..Settings::POLICY };
+    /// The hybrid controller. It searches close to the policy's plan: critics are right to a few per cent of a
+    /// return, and the wider the search, the more of what it finds is their error (at a spread of 1 about the
+    /// middle of the range, with proposals spread by 0.2, it is worse than the policy it plans with).
+    pub const HYBRID: Settings = Settings {
+        alpha: Some(1.0),
+        start: Start::Policy,
+        spread: 0.02,
+        noise: [0.02, 0.06],
+        ..Settings::POLICY
+    };
     /// MPPI over the same rollouts.
     pub const MPPI: Settings = Settings { update: Update::Weighted(0.01), ..Settings::PAPER };
     /// The hybrid controller over an LQI, which flies on behind each plan: that is what the end is

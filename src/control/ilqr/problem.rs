@@ -24,15 +24,16 @@ pub(super) type Vector = SVector<f64, STATES>;
 /// How commands act.
 pub(super) type Input = SMatrix<f64, STATES, 2>;
 
-// What is as bad as the others' (Bryson).
+// What is as bad as the others' (Bryson). Of a few tried on every seventh target these settle as soon as any
+// and are the steadiest in moderate turbulence.
 /// Attitude error, rad.
 const ATTITUDE: f64 = 0.05;
 /// Body rates beside those of the steady turn, rad/s.
-const RATE: f64 = 1.0;
+const RATE: f64 = 2.0;
 /// Sideslip beside the steady one, rad.
 const SIDESLIP: f64 = 0.3;
 /// A step of the command, in units of the largest deflection.
-const MOVE: f64 = 0.15;
+const MOVE: f64 = 0.3;
 /// Incidence (rad) above which it costs, and its excess that is as bad.
 const STALL: [f64; 2] = [0.16, 0.02];
 /// What the last state costs, in stages.
