@@ -29,21 +29,41 @@ fn done(command: &mut Command) -> Result<(), String> {
     }
 }
 
-/// The Python of the environment, or why there is none. Threads of this test wait for one
-/// another; another test program that makes the same environment is waited for at a file lock.
-fn python() -> &'static Result<PathBuf, String> {
-    static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
-    PYTHON.get_or_init(|| {
-        let folder = profile_folder().parent().unwrap().join("clients-venv");
-        let lock = File::create(folder.with_extension("lock")).map_err(|e| e.to_string())?;
-        lock.lock().map_err(|e| e.to_string())?;
-        environment(&folder)
-    })
+/// A Python environment: its folder below target/, what is installed into it, its Python once it is there.
+struct Environment {
+    folder: &'static str,
+    requirements: &'static str,
+    python: OnceLock<Result<PathBuf, String>>,
+}
+
+static CLIENTS: Environment = Environment {
+    folder: "clients-venv",
+    requirements: "requirements.txt",
+    python: OnceLock::new(),
+};
+/// MAVSDK 3 has the name of MAVSDK 4.
+static MAVSDK_3: Environment = Environment {
+    folder: "clients-mavsdk3-venv",
+    requirements: "requirements-mavsdk3.txt",
+    python: OnceLock::new(),
+};
+
+impl Environment {
+    /// Its Python, or why there is none. Threads of this test wait for one another; another test
+    /// program that makes the same environment is waited for at a file lock.
+    fn python(&self) -> &Result<PathBuf, String> {
+        self.python.get_or_init(|| {
+            let folder = profile_folder().parent().unwrap().join(self.folder);
+            let lock = File::create(folder.with_extension("lock")).map_err(|e| e.to_string())?;
+            lock.lock().map_err(|e| e.to_string())?;
+            environment(&folder, self.requirements)
+        })
+    }
 }
 
 /// Makes the environment unless it is there with the same requirements.
-fn environment(folder: &Path) -> Result<PathBuf, String> {
-    let requirements = Path::new(SCRIPTS).join("requirements.txt");
+fn environment(folder: &Path, requirements: &str) -> Result<PathBuf, String> {
+    let requirements = Path::new(SCRIPTS).join(requirements);
     let wanted = fs::read_to_string(&requirements).unwrap();
     // Written last, so that what was begun and not finished is begun again.
     let installed = folder.join("installed.txt");
@@ -88,9 +108,14 @@ fn shim() -> &'static Path {
     })
 }
 
-/// Flies a script.
+/// Flies a script in the clients' environment.
 fn fly(script: &str) {
-    let python = match python() {
+    fly_in(&CLIENTS, script);
+}
+
+/// Flies a script.
+fn fly_in(environment: &Environment, script: &str) {
+    let python = match environment.python() {
         Ok(python) => python,
         Err(reason) if std::env::var_os("GREYLAG_REQUIRE_CLIENTS").is_some_and(|v| v == "1") => {
             panic!("{script} needs python3 with venv, and PyPI: {reason}")
@@ -146,6 +171,16 @@ fn pymavlink_flies_both_controllers_through_the_companion_beside_them() {
 #[test]
 fn mavsdk_flies_a_controller_and_the_companion_beside_it() {
     fly("mavsdk_router.py");
+}
+
+#[test]
+fn mavsdk_3_flies_a_controller_and_the_companion_beside_it() {
+    fly_in(&MAVSDK_3, "mavsdk3_router.py");
+}
+
+#[test]
+fn mavproxy_flies_a_controller_through_the_companion() {
+    fly("mavproxy_router.py");
 }
 
 #[test]

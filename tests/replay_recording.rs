@@ -228,6 +228,8 @@ fn killed_beside_a_controller(seconds: f64) -> Killed {
     let real = Vehicle::Real(Box::new(Real::new(profile(Personality::Px4, Authority::Surfaces))));
     let outcome = again(&folder, real);
     assert!(outcome.ticks > 100, "{outcome:?}");
+    // The check of signs, too, is decided by the pilot.
+    assert_eq!((outcome.different, outcome.plans_different), (0, 0), "{outcome:?}");
     Killed { missing_s: flown - last, taken_over_s }
 }
 

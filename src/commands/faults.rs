@@ -157,6 +157,13 @@ mod tests {
     use super::*;
     use crate::sim::faults::Finding;
 
+    /// Runs a test with a stack for the LQI's design on all cores, whose dual numbers are large where nothing is
+    /// optimised away.
+    fn roomy(test: fn()) {
+        let pool = rayon::ThreadPoolBuilder::new().stack_size(16 << 20).build().unwrap();
+        pool.install(test);
+    }
+
     fn works() -> Works {
         let model = fly::model("params/x8/jsbsim.toml".as_ref(), None).unwrap();
         Works::new(crew(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap(), &model).unwrap()
@@ -164,40 +171,50 @@ mod tests {
 
     #[test]
     fn a_few_flights_with_every_fault_leave_the_companion_sound() {
-        let works = works();
-        // Each kind of fault comes first once in so many seeds; the opposites share them out.
-        for seed in 0..Kind::ALL.len() as u64 {
-            let opposite = Opposite::ALL[seed as usize % Opposite::ALL.len()];
-            let case = Case { seed, controller: ControllerKind::Lqi, opposite };
-            let report = works.fly(case).unwrap();
-            let entry = Entry::from(&report);
-            assert!(
-                !entry.findings.iter().any(|f| f.is_failure()),
-                "{}: {:?} {:?}",
-                entry.options(),
-                report.findings,
-                report.texts
-            );
-        }
+        roomy(|| {
+            let works = works();
+            // Each kind of fault comes first once in so many seeds; the opposites share them out.
+            for seed in 0..Kind::ALL.len() as u64 {
+                let opposite = Opposite::ALL[seed as usize % Opposite::ALL.len()];
+                let case = Case { seed, controller: ControllerKind::Lqi, opposite };
+                let report = works.fly(case).unwrap();
+                let entry = Entry::from(&report);
+                assert!(
+                    !entry.findings.iter().any(|f| f.is_failure()),
+                    "{}: {:?} {:?}",
+                    entry.options(),
+                    report.findings,
+                    report.texts
+                );
+            }
+        });
     }
 
     #[test]
     fn a_flight_repeats_from_its_seed() {
-        let works = works();
-        let case = Case { seed: 7, controller: ControllerKind::Lqi, opposite: Opposite::Px4 };
-        let [one, two] = [works.fly(case).unwrap(), works.fly(case).unwrap()];
-        assert_eq!(one.findings, two.findings);
-        assert_eq!(one.texts, two.texts);
-        assert!(!one.texts.is_empty());
+        roomy(|| {
+            let works = works();
+            let case = Case { seed: 7, controller: ControllerKind::Lqi, opposite: Opposite::Px4 };
+            let [one, two] = [works.fly(case).unwrap(), works.fly(case).unwrap()];
+            assert_eq!(one.findings, two.findings);
+            assert_eq!(one.texts, two.texts);
+            assert!(!one.texts.is_empty());
+        });
     }
 
     #[test]
     fn a_full_disk_is_told_and_flown_on_with() {
-        let works = works();
-        let disk = Kind::ALL.iter().position(|kind| *kind == Kind::Disk).unwrap() as u64;
-        let case = Case { seed: disk, controller: ControllerKind::Lqi, opposite: Opposite::Sitl };
-        let report = works.fly(case).unwrap();
-        assert!(report.texts.iter().any(|(_, t)| t.contains("recording of flight")), "{report:?}");
-        assert!(!report.findings.iter().any(|f| f.finding == Finding::Untold));
+        roomy(|| {
+            let works = works();
+            let disk = Kind::ALL.iter().position(|kind| *kind == Kind::Disk).unwrap() as u64;
+            let case =
+                Case { seed: disk, controller: ControllerKind::Lqi, opposite: Opposite::Sitl };
+            let report = works.fly(case).unwrap();
+            assert!(
+                report.texts.iter().any(|(_, t)| t.contains("recording of flight")),
+                "{report:?}"
+            );
+            assert!(!report.findings.iter().any(|f| f.finding == Finding::Untold));
+        });
     }
 }

@@ -36,8 +36,12 @@ impl Desk {
     /// A companion at a vehicle that is not heard yet. The crew's controller flies in the loop,
     /// wherever it would sit otherwise.
     pub fn new(crew: Crew, vehicle: Vehicle) -> Self {
+        let mut pilot = crew.pilot;
+        if vehicle.has_channels() {
+            pilot.check_signs();
+        }
         Desk {
-            pilot: crew.pilot,
+            pilot,
             controller: crew.controller,
             vehicle,
             outputs: Outputs::Disarmed,
@@ -104,6 +108,7 @@ impl Desk {
             match notice {
                 Notice::Text(severity, words) => self.pilot.tell(severity, &words),
                 Notice::System(_) => {}
+                Notice::Engaged => self.pilot.engaged(self.now(host)),
                 Notice::HandedBack(reason) => {
                     // Its verdict cannot be a refusal: it is forced.
                     let _ = self.pilot.disarm(self.now(host), true);

@@ -151,6 +151,10 @@ pub fn replay_watched(
     let tlog = file("flight.tlog");
     let bytes = std::fs::read(&tlog).map_err(failed(tlog.clone()))?;
     let states = States { vehicle, bytes, at: 0, ready: VecDeque::new() };
+    let mut crew = crew;
+    if states.vehicle.has_channels() {
+        crew.pilot.check_signs();
+    }
     let mut replayed = Replayed { crew, states, watch, outcome: Outcome::default() };
     let mut lines = text.split_inclusive('\n').enumerate().peekable();
     match lines.next() {
@@ -188,6 +192,7 @@ impl Replayed<'_, '_> {
             Call::Advance(now) => pilot.advance(now),
             Call::Arm(now, force) => drop(pilot.arm(now, force)),
             Call::Disarm(now, force) => drop(pilot.disarm(now, force)),
+            Call::Engaged(now) => pilot.engaged(now),
             Call::Mode(now, mode) => drop(pilot.set_mode(now, mode)),
             Call::Setpoint(now, setpoint) => pilot.attitude_setpoint(now, setpoint),
             Call::Sticks(now, sticks) => pilot.sticks(now, sticks),

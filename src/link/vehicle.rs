@@ -2,6 +2,7 @@
 //!
 //! Behind [`Vehicle`] stand the simulator's shim ([`sitl`]) and real flight controllers ([`real`]).
 
+mod fault;
 pub mod limits;
 pub mod real;
 pub mod sitl;
@@ -11,6 +12,7 @@ use std::time::Duration;
 use super::autopilot::Severity;
 use super::peer::PeerId;
 use crate::physics::{ActuatorState, State, Time};
+pub use fault::{Axis, Fault};
 pub use limits::Faults;
 pub use real::Real;
 pub use real::profile::{Authority, Profile, Stack};
@@ -71,7 +73,7 @@ pub struct Demand {
     /// Roll and pitch that are wanted, rad, for a controller that is commanded attitudes.
     pub attitude: [f64; 2],
     /// Why the aircraft should go back to its controller, if it should.
-    pub fault: Option<&'static str>,
+    pub fault: Option<Fault>,
 }
 
 /// What a vehicle has to tell the pilot.
@@ -79,6 +81,8 @@ pub struct Demand {
 pub enum Notice {
     /// A line for the ground stations.
     Text(Severity, String),
+    /// The controller has given us the helm.
+    Engaged,
     /// The controller has the aircraft again, for this reason: engage no more until asked.
     HandedBack(String),
     /// The controller's system id, which becomes ours.
@@ -124,6 +128,15 @@ impl Vehicle {
         match self {
             Vehicle::Sitl(sitl) => sitl.heartbeat(host, outputs),
             Vehicle::Real(real) => real.due(host),
+        }
+    }
+
+    /// Whether what we command reaches the surfaces through a controller's channels, whose signs
+    /// have to be found out.
+    pub fn has_channels(&self) -> bool {
+        match self {
+            Vehicle::Sitl(_) => false,
+            Vehicle::Real(real) => real.profile().authority == Authority::Surfaces,
         }
     }
 

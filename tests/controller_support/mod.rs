@@ -1,13 +1,13 @@
 //! A companion at a played flight controller, in lockstep in this process.
 #![allow(dead_code)] // each test that includes this module uses its part
 
-use std::path::Path;
+use std::sync::LazyLock;
 use std::time::Duration;
 
-use greylag::commands::fly::{POLICY, crew};
-use greylag::control::Kind;
+use greylag::control::{Controller, Kind, build};
 use greylag::flight::desk::Desk;
-use greylag::flight::pilot::Decision;
+use greylag::flight::pilot::{Config, Decision, Pilot};
+use greylag::flight::runtime::{Crew, Seat};
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 use greylag::link::framing::pieces;
 use greylag::link::vehicle::{Authority, Profile, Real, Stack, Telemetry, Vehicle};
@@ -27,6 +27,16 @@ pub fn profile(personality: Personality, authority: Authority) -> Profile {
         Personality::Ardupilot => Stack::Ardupilot,
     };
     Profile { stack, authority, actuators: x8().airframe.actuators }
+}
+
+/// An LQI with an LQI to fall back on; the design, which takes most of a bench's time, is made once.
+fn lqi() -> Crew {
+    static DESIGN: LazyLock<(Config, Box<dyn Controller>)> =
+        LazyLock::new(|| (Config::for_model(x8()).unwrap(), build(Kind::Lqi, x8()).unwrap()));
+    let (config, design) = &*DESIGN;
+    let [controller, fallback] = [(), ()].map(|()| design.boxed_clone());
+    let pilot = Pilot::new(config.clone(), fallback).unwrap();
+    Crew { pilot, controller, seat: Seat::Loop }
 }
 
 /// What the bench saw at one state.
@@ -61,7 +71,7 @@ impl Bench {
         change(&mut options);
         let vehicle = Vehicle::Real(Box::new(Real::new(profile(personality, authority))));
         Bench {
-            desk: Desk::new(crew(Kind::Lqi, x8(), Path::new(POLICY)).unwrap(), vehicle),
+            desk: Desk::new(lqi(), vehicle),
             controller: FlightController::new(personality, &options).unwrap(),
             host: Duration::from_secs(1),
             seen: Vec::new(),

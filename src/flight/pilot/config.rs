@@ -1,5 +1,6 @@
 //! The numbers a pilot flies by: the airframe's envelope, times, slew limits, level trim.
 
+use super::signs::Answers;
 use crate::model::{GreyBox, Trim, TrimError};
 use crate::physics::airframe::Envelope;
 
@@ -30,6 +31,8 @@ pub struct Config {
     pub disarm_airspeed_max_mps: f64,
     /// Level trim, by rising airspeed.
     pub trim: Vec<TrimPoint>,
+    /// What the model answers to the surfaces, to check their signs by.
+    pub answers: Option<Answers>,
 }
 
 /// Where OFFBOARD takes its throttle from (parameter GL_THRUST_SRC).
@@ -67,7 +70,8 @@ impl Config {
             ((envelope.airspeed_max_mps - envelope.airspeed_min_mps) / TRIM_SPACING) as usize;
         // Airspeeds at which the model has no level trim are left to their neighbours.
         let speeds = (0..=count).map(|i| envelope.airspeed_min_mps + i as f64 * TRIM_SPACING);
-        let config = Config::new(envelope, speeds.filter_map(|v| row(v).ok()).collect());
+        let mut config = Config::new(envelope, speeds.filter_map(|v| row(v).ok()).collect());
+        config.answers = Some(Answers::of(model, envelope.airspeed_cruise_mps)?);
         config.check()?;
         Ok(config)
     }
@@ -88,6 +92,7 @@ impl Config {
             // Below every airspeed at which a fixed-wing aircraft of this class flies.
             disarm_airspeed_max_mps: 8.0,
             trim,
+            answers: None,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::control::{Observation, Target};
 use crate::link::autopilot::Mode;
-use crate::link::vehicle::{Demand, Outputs};
+use crate::link::vehicle::{Demand, Fault, Outputs};
 use crate::physics::{Command, Time};
 
 /// What a planner is asked for at a tick.
@@ -42,6 +42,8 @@ pub enum Source {
     Level,
     /// The sticks'.
     Sticks,
+    /// The check of signs: level trim, with small pulses.
+    Check,
     /// Nobody: disarmed, all outputs zero.
     Disarmed,
 }
@@ -56,6 +58,7 @@ impl Source {
             Source::Held => "held",
             Source::Level => "level",
             Source::Sticks => "sticks",
+            Source::Check => "check",
             Source::Disarmed => "disarmed",
         }
     }
@@ -78,6 +81,8 @@ pub struct Decision {
     pub target: Target,
     /// Whether a failsafe is in force.
     pub failsafe: bool,
+    /// What the check of signs has found wrong, until the aircraft has gone back.
+    pub refused: Option<Fault>,
 }
 
 impl Decision {
@@ -85,9 +90,9 @@ impl Decision {
     /// be flown on, and when a failsafe is in force: it flies better blind than we do.
     pub fn demand(&self) -> Demand {
         let fault = match (self.source, self.failsafe) {
-            (Source::Level, _) => Some("the state of the vehicle cannot be flown on"),
-            (_, true) => Some("the client's setpoints, or the vehicle's state, were lost"),
-            _ => None,
+            (Source::Level, _) => Some(Fault::State),
+            (_, true) => Some(Fault::Lost),
+            _ => self.refused,
         };
         let or_level = |x: f64| if x.is_finite() { x } else { 0.0 };
         Demand {

@@ -14,10 +14,12 @@ mod decision;
 
 mod estimate;
 mod failsafe;
+mod helm;
 mod limits;
 mod modes;
 mod parameters;
 mod programme;
+mod signs;
 mod telemetry;
 mod texts;
 
@@ -25,14 +27,16 @@ pub use config::{Config, ConfigError, ThrustSource, TrimPoint};
 pub use decision::{Decision, Plan, Request, Source};
 pub use limits::{Limits, TICK_S};
 pub use modes::mode_name;
+pub use signs::Answers;
 
 use crate::control::schedule::Schedule;
 use crate::control::{Controller, Observation, Target};
 use crate::link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
-use crate::link::vehicle::Telemetry;
+use crate::link::vehicle::{Fault, Telemetry};
 use crate::physics::{Command, Time};
 use estimate::{Estimate, Frame, RESTART, within};
 use programme::Programme;
+use signs::Check;
 use texts::Texts;
 
 /// Least time between two lines about the same kind of trouble, s.
@@ -66,6 +70,10 @@ pub struct Pilot {
     complaints: Complaints,
     load: f64,
     programme: Option<Programme>,
+    /// The check of the surfaces' signs, where there is one.
+    check: Option<Check>,
+    /// What the check has found wrong.
+    refused: Option<Fault>,
 }
 
 /// What `observe` found, for `decide`.
@@ -75,6 +83,7 @@ enum Pending {
     Repeated,
     Unusable,
     Sticks(Sticks),
+    Check { time: Time, airspeed: f64 },
     Fly { seen: Observation, throttle: Option<f64> },
 }
 
@@ -124,6 +133,8 @@ impl Pilot {
             complaints: Complaints::default(),
             load: 0.0,
             programme: None,
+            check: None,
+            refused: None,
         })
     }
 
@@ -131,6 +142,20 @@ impl Pilot {
     /// still has to send setpoints: without them offboard ends as it always does.
     pub fn follow(&mut self, schedule: Schedule) {
         self.programme = Some(Programme::new(schedule));
+    }
+
+    /// Checks the surfaces' signs from now on, whenever the helm is taken: for a vehicle whose channels
+    /// may be mixed up. Without the model's answers in the settings nothing can be checked.
+    pub fn check_signs(&mut self) {
+        self.check = self.config.answers.clone().map(Check::new);
+    }
+
+    /// The vehicle's controller has given us the helm, if it is one to give it.
+    pub fn engaged(&mut self, now: Time) {
+        self.advance(now);
+        if let Some(check) = &mut self.check {
+            check.begin(self.in_force);
+        }
     }
 
     /// Lets time pass to `now`: finds lost setpoints, lost sticks, a lost vehicle. To be called
@@ -180,6 +205,9 @@ impl Pilot {
                 Command { aileron: s.roll, elevator: s.pitch, throttle: s.throttle },
                 Source::Sticks,
             ),
+            Pending::Check { time, airspeed } => {
+                (self.check_command(time, airspeed), Source::Check)
+            }
             Pending::Fly { seen, throttle } => self.with_state(plan, &seen, throttle),
         };
         self.source = source;
@@ -188,6 +216,9 @@ impl Pilot {
         }
         self.in_force =
             if self.armed { self.limits.slew(self.in_force, wanted) } else { Command::IDLE };
+        if let (Pending::Check { time, .. }, Some(check)) = (self.pending, &mut self.check) {
+            check.told(time, self.in_force);
+        }
         self.decision()
     }
 
@@ -225,6 +256,7 @@ impl Pilot {
             mode: self.mode,
             target: self.target,
             failsafe: self.failsafe(),
+            refused: self.refused,
         }
     }
 
@@ -249,6 +281,9 @@ impl Pilot {
         self.target = nobody;
         if !self.armed {
             return Pending::Disarmed;
+        }
+        if let Some(pending) = self.check_helm(quality) {
+            return pending;
         }
         if let (Mode::Manual, Some((_, sticks))) = (self.mode, self.sticks) {
             return Pending::Sticks(sticks);

@@ -89,6 +89,10 @@ impl Autopilot for Pilot {
         self.armed = true;
         self.setpoint_lost = false;
         self.forget_controllers();
+        self.refused = None;
+        if let Some(check) = &mut self.check {
+            check.await_helm();
+        }
         // Up to now the aircraft may have been standing still.
         self.estimate.refresh(now);
         self.texts.say(Severity::Notice, format!("armed, {}", mode_name(self.mode)));
@@ -106,6 +110,10 @@ impl Autopilot for Pilot {
             self.texts.say(Severity::Notice, "disarmed");
         }
         self.armed = false;
+        self.refused = None;
+        if let Some(check) = &mut self.check {
+            check.rest();
+        }
         self.setpoint_lost = false;
         self.in_force = Command::IDLE;
         if self.mode == Mode::Offboard {
@@ -170,7 +178,7 @@ impl Autopilot for Pilot {
         let nan = f64::NAN;
         let seen = self.estimate.last();
         let target = match self.source {
-            Source::Disarmed | Source::Sticks => [nan; 2],
+            Source::Disarmed | Source::Sticks | Source::Check => [nan; 2],
             _ => [self.target.roll, self.target.pitch],
         };
         Status {

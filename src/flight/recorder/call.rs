@@ -32,6 +32,8 @@ pub enum Call {
     Arm(Time, bool),
     /// Disarming was asked for, by force or not.
     Disarm(Time, bool),
+    /// The controller gave the helm over.
+    Engaged(Time),
     /// A mode was asked for.
     Mode(Time, Mode),
     /// A setpoint came.
@@ -63,6 +65,7 @@ impl fmt::Display for Call {
             }
             Call::Arm(now, force) => write!(f, "arm {} {}", us(now), u8::from(*force)),
             Call::Disarm(now, force) => write!(f, "disarm {} {}", us(now), u8::from(*force)),
+            Call::Engaged(now) => write!(f, "engaged {}", us(now)),
             Call::Mode(now, mode) => write!(f, "mode {} {}", us(now), mode_name(*mode)),
             Call::Setpoint(now, s) => {
                 let thrust = s.thrust.map_or("-".to_owned(), |x| x.to_string());
@@ -127,6 +130,7 @@ fn read(line: &str) -> Option<Call> {
         }
         "arm" => Call::Arm(time(1)?, flag(2)?),
         "disarm" => Call::Disarm(time(1)?, flag(2)?),
+        "engaged" => Call::Engaged(time(1)?),
         "mode" => {
             let name = *words.get(2)?;
             Call::Mode(time(1)?, MODES.into_iter().find(|mode| mode_name(*mode) == name)?)
@@ -175,6 +179,7 @@ mod tests {
             Call::Tick(now, Planned::None, Command::IDLE),
             Call::Arm(now, true),
             Call::Disarm(now, false),
+            Call::Engaged(now),
             Call::Mode(now, Mode::Offboard),
             Call::Setpoint(now, setpoint),
             Call::Setpoint(now, AttitudeSetpoint { thrust: Some(0.7), ..setpoint }),

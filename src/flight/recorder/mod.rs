@@ -267,6 +267,7 @@ mod tests {
             mode: Mode::Offboard,
             target: Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 },
             failsafe: false,
+            refused: None,
         };
         Row { sample, decision, latency_us: 123.4 }
     }

@@ -58,19 +58,23 @@ pub(super) struct Control {
 impl Control {
     pub(super) fn new(
         options: &Options,
-        pilot: Pilot,
+        mut pilot: Pilot,
         planner: Planner,
         ports: Ports,
         recorder: Option<Recorder>,
         events: Sender<Event>,
     ) -> Self {
+        let vehicle = match options.controller {
+            None => Vehicle::Sitl(Sitl::new(AUTOPILOT.system, options.deflection)),
+            Some(profile) => Vehicle::Real(Box::new(Real::new(profile))),
+        };
+        if vehicle.has_channels() {
+            pilot.check_signs();
+        }
         Control {
             pilot,
             planner,
-            vehicle: match options.controller {
-                None => Vehicle::Sitl(Sitl::new(AUTOPILOT.system, options.deflection)),
-                Some(profile) => Vehicle::Real(Box::new(Real::new(profile))),
-            },
+            vehicle,
             clients: match options.controller {
                 None => Clients::new(AUTOPILOT),
                 Some(_) => Clients::onboard(),
@@ -219,6 +223,11 @@ impl Control {
             match notice {
                 Notice::Text(severity, words) => self.pilot.tell(severity, &words),
                 Notice::System(system) => self.clients.adopt(system),
+                Notice::Engaged => {
+                    let now = self.clock.at(Instant::now());
+                    self.note(Call::Engaged(now));
+                    self.pilot.engaged(now);
+                }
                 Notice::HandedBack(reason) => {
                     let now = self.clock.at(Instant::now());
                     self.note(Call::Disarm(now, true));

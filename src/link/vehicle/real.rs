@@ -252,6 +252,7 @@ impl Real {
         };
         let steered = self.profile.stack.steered(self.profile.authority);
         self.say(Severity::Notice, format!("engaged: the controller is in {}", steered.name));
+        self.notices.push_back(Notice::Engaged);
     }
 
     fn say(&mut self, severity: Severity, words: String) {
@@ -278,7 +279,7 @@ impl Real {
             return Vec::new();
         };
         if let Some(fault) = demand.fault.filter(|_| self.engagement.steers()) {
-            self.hand_back(fault.into());
+            self.hand_back(fault.words(self.profile.stack));
         }
         if self.controller.is_some() {
             self.engagement.begin(host);

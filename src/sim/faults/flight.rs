@@ -11,7 +11,7 @@ use greylag_sitl::shim::{Distortion, ShimError};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::judge::{Finding, Found, Judge, Plight};
+use super::judge::{Cause, Finding, Found, Judge, Plight};
 use super::mix::{Fault, Kind, draw};
 use super::opposite::{Aircraft, Opposite, vehicle};
 use super::wire::Wire;
@@ -113,12 +113,28 @@ impl Works {
         Ok(Desk::new(crew, vehicle(opposite, &self.model)))
     }
 
-    /// Flies `case`; a panic of the companion is a finding.
+    /// Flies `case`; a panic of the companion is a finding. What an aircraft did is laid to a cause if it
+    /// was in that plight, and does not do it when the same flight is flown without the faults of that kind.
     ///
     /// # Errors
     /// If the aircraft cannot be loaded.
     pub fn fly(&self, case: Case) -> Result<Report, FaultsError> {
-        let faults = draw(case.seed);
+        let mut report = self.fly_under(case, draw(case.seed))?;
+        for cause in Cause::ALL {
+            if !report.findings.iter().any(|found| found.is_open_to(cause)) {
+                continue;
+            }
+            let rest = report.faults.iter().filter(|fault| !cause.is_of(fault.kind));
+            let without = self.fly_under(case, rest.copied().collect())?;
+            for found in report.findings.iter_mut().filter(|found| found.is_open_to(cause)) {
+                let still = without.findings.iter().any(|other| other.finding == found.finding);
+                found.cause = (!still).then_some(cause);
+            }
+        }
+        Ok(report)
+    }
+
+    fn fly_under(&self, case: Case, faults: Vec<Fault>) -> Result<Report, FaultsError> {
         let mut desk = self.desk(case.opposite)?;
         let disk = faults.iter().any(|f| f.kind == Kind::Disk).then(Disk::default);
         if let Some(disk) = &disk {

@@ -2,6 +2,7 @@
 
 use greylag_sitl::plant::Truth;
 
+use super::mix::Kind;
 use crate::flight::pilot::{Decision, Source};
 use crate::physics::Command;
 use crate::physics::airframe::Envelope;
@@ -19,8 +20,10 @@ const RECOVERED_DEG: f64 = 3.0;
 const ROUNDING: f64 = 1e-9;
 /// Steps of the actuators standing still that are a stretch in which nobody steers: 0.2 s.
 const UNSTEERED: u32 = 20;
-/// A plight of so long ago no longer explains anything, steps: 3 s.
+/// A plight of so long ago no longer explains anything, steps. Bank and pitch are arrested within half a
+/// second once somebody steers again; airspeed and altitude take longer to come back.
 const MEMORY: u64 = 300;
+const MEMORY_OF_ATTITUDE: u64 = 100;
 
 /// What was found wrong. Those of the companion itself are never excused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -61,21 +64,40 @@ pub struct Plight {
 /// What explains that an aircraft left its envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
-    /// No command reached it for 0.2 s or more within the last 3 s.
+    /// No command reached it for 0.2 s or more, a moment ago.
     Unsteered,
-    /// Without a state to fly on within the last 3 s, at a vehicle that cannot fly by itself.
+    /// Without a state to fly on a moment ago, at a vehicle that cannot fly by itself.
     Blind,
-    /// A sensor told a believable lie within the last 3 s.
+    /// A sensor told a believable lie a moment ago.
     Misled,
 }
 
+impl Found {
+    /// Whether `cause` might explain it, and nothing else does yet.
+    pub(super) fn is_open_to(&self, cause: Cause) -> bool {
+        self.cause.is_none() && self.suspects.contains(&Some(cause))
+    }
+}
+
 impl Cause {
+    /// All of them.
+    pub const ALL: [Cause; 3] = [Cause::Unsteered, Cause::Blind, Cause::Misled];
+
     /// Its name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Cause::Unsteered => "unsteered",
             Cause::Blind => "blind",
             Cause::Misled => "misled",
+        }
+    }
+
+    /// Whether it is the doing of faults of `kind`.
+    pub fn is_of(self, kind: Kind) -> bool {
+        let lie = matches!(kind, Kind::Airspeed | Kind::Alpha);
+        match self {
+            Cause::Misled => lie,
+            Cause::Unsteered | Cause::Blind => !lie && !matches!(kind, Kind::Client | Kind::Disk),
         }
     }
 }
@@ -89,6 +111,8 @@ pub struct Found {
     pub finding: Finding,
     /// What explains it, of those that may be explained: the aircraft's, not the companion's.
     pub cause: Option<Cause>,
+    /// What might have, by the moment alone.
+    pub suspects: [Option<Cause>; 3],
 }
 
 impl Finding {
@@ -155,22 +179,23 @@ impl Judge {
             steps: 0,
             unsteered: 0,
             blind: false,
-            causes: [Cause::Unsteered, Cause::Blind, Cause::Misled].map(|cause| (cause, None)),
+            causes: Cause::ALL.map(|cause| (cause, None)),
         }
     }
 
     /// Notes a finding; the first of each kind counts.
     pub fn note(&mut self, at_s: f64, finding: Finding) {
         if !self.findings.iter().any(|known| known.finding == finding) {
-            let cause = self.cause().filter(|_| !finding.is_own());
-            self.findings.push(Found { at_s, finding, cause });
+            let suspects = if finding.is_own() { [None; 3] } else { self.suspects(finding) };
+            self.findings.push(Found { at_s, finding, cause: None, suspects });
         }
     }
 
-    /// The cause in force, or of the last seconds.
-    fn cause(&self) -> Option<Cause> {
-        let recent = |at: u64| self.steps - at < MEMORY;
-        self.causes.iter().find(|(_, at)| at.is_some_and(recent)).map(|(cause, _)| *cause)
+    /// The causes in force, or of a moment ago.
+    fn suspects(&self, finding: Finding) -> [Option<Cause>; 3] {
+        let memory = if finding == Finding::Attitude { MEMORY_OF_ATTITUDE } else { MEMORY };
+        let recent = |at: u64| self.steps - at < memory;
+        self.causes.map(|(cause, at)| at.is_some_and(recent).then_some(cause))
     }
 
     /// Whether the last decision was made without a state to fly on.

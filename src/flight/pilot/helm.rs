@@ -1,0 +1,50 @@
+//! The pilot while nobody may steer yet: the check of signs, from arming to its verdict.
+
+use super::estimate::Frame;
+use super::signs::Verdict;
+use super::{Pending, Pilot};
+use crate::link::autopilot::Severity;
+use crate::physics::{Command, Time};
+
+impl Pilot {
+    /// Takes the state into the check of signs, if there is one; what is pending while it lasts.
+    pub(super) fn check_helm(&mut self, quality: Frame) -> Option<Pending> {
+        if self.refused.is_none() && !self.check.as_ref()?.is_open() {
+            return None;
+        }
+        let usable = matches!(quality, Frame::Usable | Frame::Frozen) && !self.vehicle_lost;
+        let Some(frame) = self.estimate.last().copied().filter(|_| usable) else {
+            return Some(Pending::Unusable);
+        };
+        let airspeed = frame.state.airspeed.max(0.0);
+        let level = self.level_at(airspeed);
+        let check = self.check.as_mut()?;
+        if check.is_open() {
+            match check.see(frame.time, &frame.state, level) {
+                Verdict::Open => {}
+                Verdict::Right([roll, pitch]) => self.texts.say(
+                    Severity::Info,
+                    format!(
+                        "signs are right: {roll:.1} and {pitch:.1} of the model's roll and pitch"
+                    ),
+                ),
+                Verdict::Wrong(fault) => self.refused = Some(fault),
+            }
+        }
+        let open = self.refused.is_some() || self.check.as_ref()?.is_open();
+        open.then_some(Pending::Check { time: frame.time, airspeed })
+    }
+
+    /// The command while nobody may steer.
+    pub(super) fn check_command(&self, time: Time, airspeed: f64) -> Command {
+        let pulsed = self.check.as_ref().and_then(|check| check.command(time));
+        pulsed.unwrap_or_else(|| self.level_at(airspeed))
+    }
+
+    /// What holds the aircraft level at an airspeed, m/s.
+    fn level_at(&self, airspeed: f64) -> Command {
+        let trim = self.config.trim_at(airspeed);
+        let throttle = self.limits.protect(trim.throttle, airspeed);
+        Command { aileron: 0.0, elevator: trim.elevator, throttle }
+    }
+}

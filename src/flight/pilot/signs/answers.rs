@@ -1,0 +1,81 @@
+//! What the model answers to a small step of each surface.
+
+use crate::model::{GreyBox, Trim, TrimError, Twin};
+use crate::physics::{Command, Controls};
+
+/// States for which an answer is known, the one on which the step is commanded included: 0.4 s, by
+/// when the roll has settled; the short period, which has nearly done so, goes on with the last.
+const SPAN: usize = 41;
+/// Step of a command, of −1..1: small enough to be linear, large beside the rounding.
+const STEP: f64 = 0.01;
+/// Altitude of the start, m: a thousand metres change an answer by a tenth.
+const ALTITUDE: f64 = 600.0;
+
+/// Roll rate after a step of the aileron command by one, pitch rate after one of the elevator
+/// command, rad/s, state by state of 10 ms, from level flight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answers {
+    roll: [f64; SPAN],
+    pitch: [f64; SPAN],
+}
+
+impl Answers {
+    /// The answers of `model` in level flight at `airspeed` (m/s).
+    ///
+    /// # Errors
+    /// If the model cannot fly level there.
+    pub fn of(model: &GreyBox, airspeed: f64) -> Result<Answers, TrimError> {
+        let trim = Trim::level(model, airspeed, ALTITUDE)?;
+        let Controls { aileron, elevator, throttle } = trim.controls;
+        let full = model.airframe.actuators.deflection_max;
+        let command = Command { aileron: aileron / full, elevator: elevator / full, throttle };
+        let rates = |command: Command| {
+            let mut twin = Twin::at_rest(trim.state, &trim.controls, ALTITUDE);
+            let mut rates = [[0.0; 2]; SPAN];
+            for rates in &mut rates {
+                *rates = [twin.state.p, twin.state.q];
+                twin.step(model, &command);
+            }
+            rates
+        };
+        let undisturbed = rates(command);
+        let [rolled, pitched] = [
+            rates(Command { aileron: command.aileron + STEP, ..command }),
+            rates(Command { elevator: command.elevator + STEP, ..command }),
+        ];
+        let answer = |after: &[[f64; 2]; SPAN], axis: usize| {
+            std::array::from_fn(|k| (after[k][axis] - undisturbed[k][axis]) / STEP)
+        };
+        Ok(Answers { roll: answer(&rolled, 0), pitch: answer(&pitched, 1) })
+    }
+
+    /// How much the rate of `axis` (0 roll, 1 pitch) has changed `states` after a step by one, rad/s.
+    pub(super) fn after(&self, axis: usize, states: isize) -> f64 {
+        let answer = if axis == 0 { &self.roll } else { &self.pitch };
+        match usize::try_from(states) {
+            Ok(states) => answer[states.min(SPAN - 1)],
+            Err(_) => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn the_aileron_rolls_and_the_elevator_pitches_as_the_simulator_has_it() {
+        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let answers = Answers::of(&model, 20.0).unwrap();
+        // A command shows in the surfaces of the next state, in the rates of the one after.
+        assert_eq!([answers.after(0, -1), answers.after(0, 0), answers.after(0, 1)], [0.0; 3]);
+        // Steady roll: Clδa δa · 2 V / (b |Clp|) = 0.1202 · 0.5235 · 40 / (2.1 · 0.4042) = 2.97 rad/s,
+        // of which sideslip, the product of inertia, the yaw rate take half back.
+        let roll = answers.after(0, 20);
+        assert!(roll > 1.0 && roll < 3.0, "{roll}");
+        // q̇ = ½ρV² S c Cmδe δe / Jy = −43 rad/s² at first: −0.9 rad/s after two states.
+        let pitch = answers.after(1, 4);
+        assert!(pitch < -0.5 && pitch > -2.0, "{pitch}");
+    }
+}

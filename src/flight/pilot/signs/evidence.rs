@@ -1,0 +1,110 @@
+//! What the rates say of the surfaces: the record of a check, with the fit of answers to it.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::answers::Answers;
+
+/// States by which the way through link and controller may be longer than through the simulator's.
+const LATENESS: isize = 9;
+/// Fewer changes of a rate than this say nothing.
+const LEAST: usize = 14;
+/// Correlation of one leftover with the next that is believed at most.
+const LIKENESS: f64 = 0.9;
+/// The controller had given the helm over by so many states before we heard of it.
+const UNHEARD: isize = 2;
+
+/// The answer that fits best: a multiple of the model's, with its standard error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fit {
+    /// 1 is the model's answer, −1 its opposite.
+    pub gain: f64,
+    /// Standard error of the gain.
+    pub error: f64,
+    /// Mean square of what is left of the changes of the rate, (rad/s)².
+    misfit: f64,
+}
+
+impl Fit {
+    /// How sure the sign is, in standard errors.
+    pub(super) fn certainty(&self) -> f64 {
+        self.gain / self.error
+    }
+}
+
+/// The record of a check, state by state of 10 ms from its beginning.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Evidence {
+    /// Roll and pitch rate, rad/s; none of a state that did not come.
+    rates: Vec<Option<[f64; 2]>>,
+    /// Changes of aileron and elevator command: the state on which they were commanded, by how much.
+    changes: [Vec<(isize, f64)>; 2],
+}
+
+impl Evidence {
+    /// Notes the rates of the state `index`.
+    pub(super) fn rates(&mut self, index: usize, rates: [f64; 2]) {
+        if index >= self.rates.len() {
+            self.rates.resize(index + 1, None);
+            self.rates[index] = Some(rates);
+        }
+    }
+
+    /// Notes that the command of `axis` was changed on the state `index`.
+    pub(super) fn change(&mut self, axis: usize, index: usize, by: f64) {
+        if by != 0.0 {
+            self.changes[axis].push((index as isize, by));
+        }
+    }
+
+    /// What fits roll and pitch best, with the same lateness for both.
+    pub(super) fn fit(&self, answers: &Answers) -> Option<[Fit; 2]> {
+        let both = (0..=LATENESS)
+            .filter_map(|late| Some([self.axis(answers, 0, late)?, self.axis(answers, 1, late)?]));
+        let misfit =
+            |fits: &[Fit; 2]| fits[0].misfit.max(1e-12).ln() + fits[1].misfit.max(1e-12).ln();
+        both.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))
+    }
+
+    /// Least squares of the changes of a rate from state to state: gusts, which wander, are nearly
+    /// white in them; by how much they are not, the standard error is made larger. Beside the answer to
+    /// what was commanded there is one to the step that the surfaces made when the helm went over,
+    /// of unknown size, and a constant.
+    fn axis(&self, answers: &Answers, axis: usize, late: isize) -> Option<Fit> {
+        let answered = |state: isize| -> f64 {
+            let terms = self.changes[axis].iter();
+            terms.map(|(at, by)| by * answers.after(axis, state - at - late)).sum()
+        };
+        let taken = |state: isize| answers.after(axis, state + UNHEARD - late);
+        let rows = || {
+            self.rates.windows(2).enumerate().filter_map(|(state, pair)| {
+                let [Some(before), Some(after)] = pair else { return None };
+                let now = state as isize + 1;
+                let step = [answered(now) - answered(now - 1), taken(now) - taken(now - 1)];
+                Some((Vector3::new(step[0], step[1], 1.0), after[axis] - before[axis]))
+            })
+        };
+        let (mut normal, mut right, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0);
+        for (x, y) in rows() {
+            normal += x * x.transpose();
+            right += x * y;
+            count += 1;
+        }
+        if count < LEAST {
+            return None;
+        }
+        let inverse = normal.try_inverse().filter(|inverse| inverse[(0, 0)] > 0.0)?;
+        let solution = inverse * right;
+        let (mut square, mut product, mut last) = (1e-12, 0.0, 0.0);
+        for (x, y) in rows() {
+            let left = y - solution.dot(&x);
+            square += left * left;
+            product += left * last;
+            last = left;
+        }
+        let misfit = square / (count - 3) as f64;
+        let likeness = (product / square).clamp(0.0, LIKENESS);
+        let error = (misfit * inverse[(0, 0)] * (1.0 + likeness) / (1.0 - likeness)).sqrt();
+        let fit = Fit { gain: solution[0], error, misfit };
+        (fit.gain.is_finite() && error.is_finite() && error > 0.0).then_some(fit)
+    }
+}

@@ -1,0 +1,271 @@
+//! The gentle check of signs: does the aircraft answer to the surfaces as the model does?
+//!
+//! A real controller's own loops may be right, and yet a channel, a reversal or a mixer between our
+//! commands and the surfaces be wrong. So nobody steers at first when a controller gives the helm over: the
+//! surfaces stand at level trim, with small pulses of aileron and elevator on them, at different
+//! times. Rates are compared with what the model answers to these pulses, with its sign and without;
+//! pulses are not made by what the air does, so that gusts cannot be taken for an answer for long.
+//! It ends as soon as both answers are certain, commonly in 0.3 s; pulses grow as long as they are not.
+
+mod answers;
+mod evidence;
+
+pub use answers::Answers;
+use evidence::{Evidence, Fit};
+
+use crate::link::vehicle::{Axis, Fault};
+use crate::physics::{Command, State, Time};
+
+/// Pulses of each round, normalised deflection: 0.06 is 1.9° for the X8, which rolls it at 9 °/s.
+const PULSES: [f64; 3] = [0.06, 0.1, 0.15];
+/// The pulses of a round, each of [`LENGTH`]: what they do to the attitude they undo again.
+const PATTERN: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
+/// States that a pulse lasts.
+const LENGTH: usize = 12;
+/// The elevator's pulses begin by so many states later than the aileron's.
+const OFFSET: usize = 6;
+/// States of a round.
+const ROUND: usize = PATTERN.len() * LENGTH + 2 * OFFSET;
+/// A sign is certain from so many standard errors on: it is asked anew at every state.
+const CERTAIN: f64 = 6.0;
+/// A sign is not told before its surface has gone the other way and been answered: one edge may
+/// meet one gust.
+const SEEN: [usize; 2] = [LENGTH + ANSWERED, OFFSET + LENGTH + ANSWERED];
+const ANSWERED: usize = 7;
+/// An answer is at least this share of the model's: a model may be wrong by much, but not so.
+const ANSWER: f64 = 0.1;
+/// Change of bank or pitch during the check beyond which it is given up, rad: 20°.
+const DEPARTED: f64 = 20.0 * std::f64::consts::PI / 180.0;
+
+/// What came of a state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Verdict {
+    /// It goes on.
+    Open,
+    /// Both surfaces do what they should: multiples of the model's answers.
+    Right([f64; 2]),
+    /// The aircraft has to go back.
+    Wrong(Fault),
+}
+
+/// How a check began.
+#[derive(Clone, Copy, Debug)]
+struct Begun {
+    at: Time,
+    /// Roll and pitch, rad.
+    attitude: [f64; 2],
+    /// What the pulses are added to.
+    level: Command,
+}
+
+/// Where a check stands.
+#[derive(Clone, Debug)]
+enum Stage {
+    /// Nothing is to be checked: nobody steers, or it has passed.
+    Rest,
+    /// Somebody wants to steer; the helm has not been given over.
+    Waiting,
+    /// The helm is ours, the first state since may be to come.
+    Running { begun: Option<Begun>, evidence: Evidence, last: Command },
+}
+
+/// The check of one aircraft, made anew whenever the helm is taken.
+#[derive(Clone, Debug)]
+pub(super) struct Check {
+    answers: Answers,
+    stage: Stage,
+}
+
+impl Check {
+    /// A check against the model's `answers`.
+    pub(super) fn new(answers: Answers) -> Self {
+        Check { answers, stage: Stage::Rest }
+    }
+
+    /// Somebody wants to steer.
+    pub(super) fn await_helm(&mut self) {
+        self.stage = Stage::Waiting;
+    }
+
+    /// Nobody steers any more.
+    pub(super) fn rest(&mut self) {
+        self.stage = Stage::Rest;
+    }
+
+    /// The helm is ours: `in_force` is what the surfaces were last told.
+    pub(super) fn begin(&mut self, in_force: Command) {
+        if matches!(self.stage, Stage::Waiting) {
+            let evidence = Evidence::default();
+            self.stage = Stage::Running { begun: None, evidence, last: in_force };
+        }
+    }
+
+    /// Whether nobody may steer yet.
+    pub(super) fn is_open(&self) -> bool {
+        !matches!(self.stage, Stage::Rest)
+    }
+
+    /// Takes in the state of `now`; `level` is what holds the aircraft level.
+    pub(super) fn see(&mut self, now: Time, state: &State, level: Command) -> Verdict {
+        let Stage::Running { begun, evidence, .. } = &mut self.stage else { return Verdict::Open };
+        let attitude = [state.roll, state.pitch];
+        let begun = begun.get_or_insert(Begun { at: now, attitude, level });
+        let index = begun.index(now);
+        evidence.rates(index, [state.p, state.q]);
+        let verdict = match evidence.fit(&self.answers) {
+            Some(fits) => judged(&fits, index),
+            None => Verdict::Open,
+        };
+        let departed = (0..2).any(|i| (attitude[i] - begun.attitude[i]).abs() > DEPARTED);
+        let verdict = match verdict {
+            Verdict::Open if departed => Verdict::Wrong(Fault::SignsUnknown),
+            verdict => verdict,
+        };
+        if verdict != Verdict::Open {
+            self.stage = Stage::Rest;
+        }
+        verdict
+    }
+
+    /// The command on the state of `now`, if the helm is ours: level, with pulses.
+    pub(super) fn command(&self, now: Time) -> Option<Command> {
+        let Stage::Running { begun: Some(begun), .. } = &self.stage else { return None };
+        let index = begun.index(now) as isize;
+        Some(Command {
+            aileron: begun.level.aileron + pulse(index),
+            elevator: begun.level.elevator + pulse(index - OFFSET as isize),
+            throttle: begun.level.throttle,
+        })
+    }
+
+    /// Notes what the surfaces are told on the state of `now`.
+    pub(super) fn told(&mut self, now: Time, command: Command) {
+        let Stage::Running { begun: Some(begun), evidence, last } = &mut self.stage else { return };
+        let index = begun.index(now);
+        evidence.change(0, index, command.aileron - last.aileron);
+        evidence.change(1, index, command.elevator - last.elevator);
+        *last = command;
+    }
+}
+
+impl Begun {
+    /// States of 10 ms since then.
+    fn index(&self, now: Time) -> usize {
+        ((now.since(self.at).as_micros() as usize) + 5000) / 10_000
+    }
+}
+
+/// The pulse on a state, counted from where the pulses of its surface begin.
+fn pulse(index: isize) -> f64 {
+    let Ok(index) = usize::try_from(index) else { return 0.0 };
+    let (round, within) = (index / ROUND, index % ROUND);
+    match (PULSES.get(round), PATTERN.get(within / LENGTH)) {
+        (Some(size), Some(sign)) => size * sign,
+        _ => 0.0,
+    }
+}
+
+/// The verdict on the fits after the state `index`.
+fn judged(fits: &[Fit; 2], index: usize) -> Verdict {
+    let certain = |axis: usize| {
+        let fit = &fits[axis];
+        index >= SEEN[axis] && fit.certainty().abs() > CERTAIN && fit.gain.abs() > ANSWER
+    };
+    for (axis, name) in [Axis::Roll, Axis::Pitch].into_iter().enumerate() {
+        if certain(axis) && fits[axis].gain < 0.0 {
+            return Verdict::Wrong(Fault::Reversed(name));
+        }
+    }
+    if (0..2).all(certain) {
+        return Verdict::Right(fits.map(|fit| fit.gain));
+    }
+    if index < PULSES.len() * ROUND {
+        return Verdict::Open;
+    }
+    // What was not certain after all rounds: too little of an answer, or too much of the air's.
+    let dead = |fit: &Fit| fit.gain + 3.0 * fit.error < 0.5;
+    match (dead(&fits[0]), dead(&fits[1])) {
+        (true, _) => Verdict::Wrong(Fault::Unanswered(Axis::Roll)),
+        (false, true) => Verdict::Wrong(Fault::Unanswered(Axis::Pitch)),
+        (false, false) => Verdict::Wrong(Fault::SignsUnknown),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{GreyBox, Trim, Twin};
+    use std::collections::VecDeque;
+    use std::path::Path;
+
+    /// The verdict on the model itself, `late` states away, when `wired` lies between commands and
+    /// surfaces; with the states it took.
+    fn verdict(late: usize, wired: impl Fn([f64; 2]) -> [f64; 2]) -> (Verdict, u64) {
+        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let full = model.airframe.actuators.deflection_max;
+        let trim = Trim::level(&model, 20.0, 600.0).unwrap();
+        let (elevator, throttle) = (trim.controls.elevator / full, trim.controls.throttle);
+        let level = Command { aileron: 0.0, elevator, throttle };
+        let mut check = Check::new(Answers::of(&model, 22.0).unwrap());
+        let mut twin = Twin::at_rest(trim.state, &trim.controls, 600.0);
+        let mut wire = VecDeque::from(vec![level; late]);
+        check.await_helm();
+        assert_eq!(check.command(Time::default()), None);
+        check.begin(level);
+        // The helm has gone over before it is heard.
+        for _ in 0..2 {
+            let [aileron, elevator] = wired([level.aileron, level.elevator]);
+            twin.step(&model, &Command { aileron, elevator, throttle });
+        }
+        for k in 0..1000 {
+            let now = Time::from_micros(5_000_000 + 10_000 * k);
+            match check.see(now, &twin.state, level) {
+                Verdict::Open => {}
+                verdict => return (verdict, k),
+            }
+            let command = check.command(now).unwrap();
+            check.told(now, command);
+            wire.push_back(command);
+            let command = wire.pop_front().unwrap();
+            let [aileron, elevator] = wired([command.aileron, command.elevator]);
+            twin.step(&model, &Command { aileron, elevator, throttle });
+        }
+        panic!("it does not end")
+    }
+
+    #[test]
+    fn right_signs_pass_however_late_the_commands_arrive() {
+        // To 60 ms: a serial line with a controller that samples its channels at 50 Hz has half of it.
+        for late in 0..=6 {
+            let (verdict, states) = verdict(late, |surfaces| surfaces);
+            let Verdict::Right(gains) = verdict else { panic!("{late}: {verdict:?}") };
+            // The answers are those of 22 m/s, the aircraft flies at 20: 0.8 of the force.
+            assert!(gains.iter().all(|gain| (0.5..1.2).contains(gain)), "{late}: {gains:?}");
+            assert!(states < ROUND as u64, "{late}: after {states}");
+        }
+    }
+
+    #[test]
+    fn wrong_signs_are_named() {
+        for late in [0, 3, 6] {
+            let roll = verdict(late, |[aileron, elevator]| [-aileron, elevator]).0;
+            assert_eq!(roll, Verdict::Wrong(Fault::Reversed(Axis::Roll)), "{late}");
+            let pitch = verdict(late, |[aileron, elevator]| [aileron, -elevator]).0;
+            // A reversed trim alone throws the nose up, and it may be given up before it is told.
+            let named = pitch == Verdict::Wrong(Fault::Reversed(Axis::Pitch));
+            assert!(named || pitch == Verdict::Wrong(Fault::SignsUnknown), "{late}: {pitch:?}");
+        }
+    }
+
+    #[test]
+    fn surfaces_that_do_nothing_or_something_else_are_refused() {
+        let trim = 0.131;
+        let (dead, _) = verdict(2, |[_, elevator]| [0.0, elevator]);
+        assert_eq!(dead, Verdict::Wrong(Fault::Unanswered(Axis::Roll)));
+        let (dead, _) = verdict(2, |[aileron, _]| [aileron, trim]);
+        assert_eq!(dead, Verdict::Wrong(Fault::Unanswered(Axis::Pitch)));
+        // The left of two elevons reversed: what should roll pitches, and the other way round.
+        let (mixed, _) = verdict(2, |[aileron, elevator]| [elevator - trim, aileron + trim]);
+        assert!(matches!(mixed, Verdict::Wrong(_)), "{mixed:?}");
+    }
+}
