@@ -4,6 +4,10 @@
 //! cargo run --release --ignore-rust-version --no-default-features --example planner_speed
 //! ```
 
+#[allow(dead_code, reason = "not every example needs all of it")]
+#[path = "side_by_side/processor.rs"]
+mod processor;
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -15,7 +19,7 @@ use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Orig
 use greylag::control::{self, Kind, Observation, Source, Target};
 use greylag::model::residual::{INPUTS, OUTPUTS};
 use greylag::model::{GreyBox, Residual};
-use greylag::num::{Dense, Lanes, Real, stream};
+use greylag::num::{Dense, stream};
 use greylag::physics::{ActuatorState, Command, State, Time};
 
 /// The system's allocator, which counts.
@@ -50,7 +54,7 @@ fn main() -> Result<()> {
     model.residual =
         Some(Residual::new(network, &model.airframe, model.scale().map(|x| 1e-3 * x))?);
     let agent = agent(&model)?;
-    let flops = peak();
+    let flops = processor::peak();
     println!("one core's peak, fused multiply-add in single precision: {:.0} GFLOP/s", flops / 1e9);
     println!(
         "{:>12} {:>10} {:>10} {:>10} {:>12}",
@@ -117,40 +121,4 @@ fn agent(model: &GreyBox) -> Result<Agent> {
         program: "greylag".into(),
     };
     Ok(Agent { actor: actor.into(), critics: critics.into(), origin })
-}
-
-/// Fused multiply-adds in single precision that one core makes in a second, times two.
-fn peak() -> f64 {
-    let best = |run: &dyn Fn() -> f64| (0..20).map(|_| run()).fold(0.0, f64::max);
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-        // SAFETY: the processor has the features
-        return best(&|| unsafe { peak_avx2() });
-    }
-    best(&|| chains::<4, 8>())
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn peak_avx2() -> f64 {
-    chains::<8, 10>()
-}
-
-/// `C` independent chains of `N` lanes: enough to hide the latency of each.
-#[inline(always)]
-fn chains<const N: usize, const C: usize>() -> f64 {
-    const ROUNDS: usize = 1_000_000;
-    let factor = Lanes::<N, true>::splat(std::hint::black_box(0.999));
-    let mut sums = [Lanes::<N, true>::splat(std::hint::black_box(1.0)); C];
-    let start = Instant::now();
-    for _ in 0..ROUNDS {
-        let mut c = 0;
-        while c < C {
-            sums[c] = sums[c].mul_add(factor, factor);
-            c += 1;
-        }
-    }
-    let seconds = start.elapsed().as_secs_f64();
-    std::hint::black_box(sums);
-    (2 * ROUNDS * N * C) as f64 / seconds
 }

@@ -442,7 +442,7 @@ impl AnalyticTrainer {
         let part = self.update as f64 / self.recipe.updates.max(1) as f64;
         let fall = 0.5 * (1.0 + (std::f64::consts::PI * part.min(1.0)).cos());
         self.optimiser.set_rate(self.recipe.rate * (0.01 + 0.99 * fall));
-        self.optimiser.step(&mut self.actor, &followed, &mut gradients);
+        self.optimiser.step(&mut self.actor, followed, &mut gradients);
     }
 
     fn rows(&self, numbers: &[f32], width: usize) -> Tensor<2> {

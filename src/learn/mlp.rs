@@ -1,6 +1,5 @@
 //! A dense network in burn, with its optimiser.
 
-use burn::optim::{Adam, AdamConfig, AdamState, AdaptiveMomentumState, Optimizer};
 use burn::tensor::{Device, Gradients, Tensor, TensorData, activation};
 
 use crate::num::Dense;
@@ -13,13 +12,36 @@ pub struct Mlp {
     layers: Vec<(Tensor<2>, Tensor<1>)>,
 }
 
-/// Adam for one network.
-#[derive(Clone)]
+/// Adam for one network, in one pass over each of its tensors.
+///
+/// burn's own makes a dozen passes, each into memory that it takes anew, which at the sizes of Table VII is
+/// a tenth of an update of TD3. The operations here are burn's in burn's order, so that the numbers are
+/// the same to the bit; a test holds them to that.
+#[derive(Clone, Debug)]
 pub struct Optimiser {
-    adam: Adam,
     rate: f64,
-    states: Vec<(Option<AdamState<2>>, Option<AdamState<1>>)>,
+    steps: u64,
+    /// Mean and square for the weights and the biases of each layer.
+    layers: Vec<[Moment; 2]>,
 }
+
+/// Running means of a tensor's gradient and of its square.
+#[derive(Clone, Debug)]
+struct Moment {
+    mean: Vec<f32>,
+    square: Vec<f32>,
+}
+
+/// What all parameters of a step share.
+struct Pace {
+    rate: f32,
+    /// Correction of the mean over that of the root of the square.
+    ahead: f32,
+    epsilon: f32,
+}
+
+const BETA: [f32; 2] = [0.9, 0.999];
+const EPSILON: f32 = 1e-8;
 
 /// What an optimiser remembers: its steps, then mean and square of the gradient in the order of a
 /// network's parameters.
@@ -93,11 +115,31 @@ impl Mlp {
 
     /// Moves each parameter the part `tau` of the way to `other`'s.
     pub fn approach(&mut self, other: &Mlp, tau: f64) {
-        for ((w, b), (to_w, to_b)) in self.layers.iter_mut().zip(&other.layers) {
-            *w = w.clone() * (1.0 - tau) + to_w.clone() * tau;
-            *b = b.clone() * (1.0 - tau) + to_b.clone() * tau;
-        }
+        let [stay, go] = [(1.0 - tau) as f32, tau as f32];
+        let layers = std::mem::take(&mut self.layers).into_iter().zip(&other.layers);
+        let between = |own: &mut [f32], other: &[f32]| {
+            own.iter_mut().zip(other).for_each(|(own, other)| *own = *own * stay + *other * go);
+        };
+        self.layers = layers
+            .map(|((w, b), (to_w, to_b))| {
+                (changed(w, to_w.clone(), between), changed(b, to_b.clone(), between))
+            })
+            .collect();
     }
+}
+
+/// A tensor after `change` has seen its numbers with those of another of its shape.
+fn changed<const D: usize>(
+    tensor: Tensor<D>,
+    other: Tensor<D>,
+    change: impl FnOnce(&mut [f32], &[f32]),
+) -> Tensor<D> {
+    let device = tensor.device();
+    let (mut own, other) = (tensor.into_data(), other.into_data());
+    if let (Ok(own), Ok(other)) = (own.as_mut_slice::<f32>(), other.as_slice::<f32>()) {
+        change(own, other);
+    }
+    Tensor::from_data(own, &device)
 }
 
 /// Appends a tensor's numbers.
@@ -110,17 +152,28 @@ fn append<const D: usize>(all: &mut Vec<f32>, tensor: Tensor<D>) {
 impl Optimiser {
     /// Adam for `network` at learning rate `rate`; ε is 1e-8, not burn's 1e-5.
     pub fn new(network: &Mlp, rate: f64) -> Optimiser {
-        let adam = AdamConfig::new().with_epsilon(1e-8).build();
-        Optimiser { adam, rate, states: vec![(None, None); network.layers.len()] }
+        let zeros = |n: usize| Moment { mean: vec![0.0; n], square: vec![0.0; n] };
+        let layers = network.sizes.windows(2).map(|s| [zeros(s[0] * s[1]), zeros(s[1])]);
+        Optimiser { rate, steps: 0, layers: layers.collect() }
     }
 
     /// Moves `network` against the gradients that its `followed` copy has in `gradients`.
-    pub fn step(&mut self, network: &mut Mlp, followed: &Mlp, gradients: &mut Gradients) {
-        let layers = network.layers.iter_mut().zip(&followed.layers).zip(&mut self.states);
-        for (((w, b), (seen_w, seen_b)), (state_w, state_b)) in layers {
-            move_one(&self.adam, self.rate, w, seen_w.grad_remove(gradients), state_w);
-            move_one(&self.adam, self.rate, b, seen_b.grad_remove(gradients), state_b);
-        }
+    pub fn step(&mut self, network: &mut Mlp, followed: Mlp, gradients: &mut Gradients) {
+        self.steps += 1;
+        let pace = Pace::of(self.steps, self.rate);
+        // the copy shares the parameters' memory: with it gone they are moved where they are
+        let slopes: Vec<_> = followed
+            .layers
+            .into_iter()
+            .map(|(w, b)| (w.grad_remove(gradients), b.grad_remove(gradients)))
+            .collect();
+        let layers = std::mem::take(&mut network.layers).into_iter().zip(slopes);
+        network.layers = layers
+            .zip(&mut self.layers)
+            .map(|(((w, b), (slope_w, slope_b)), [of_w, of_b])| {
+                (of_w.step(w, slope_w, &pace), of_b.step(b, slope_b, &pace))
+            })
+            .collect();
     }
 
     /// The learning rate from now on.
@@ -130,53 +183,70 @@ impl Optimiser {
 
     /// What it remembers.
     pub fn moments(&self) -> Moments {
-        let mut all = Moments::default();
-        for (w, b) in &self.states {
-            if let (Some(w), Some(b)) = (w, b) {
-                all.steps = w.momentum.time as u64;
-                append(&mut all.mean, w.momentum.moment_1.clone());
-                append(&mut all.mean, b.momentum.moment_1.clone());
-                append(&mut all.square, w.momentum.moment_2.clone());
-                append(&mut all.square, b.momentum.moment_2.clone());
-            }
+        if self.steps == 0 {
+            return Moments::default();
         }
-        all
+        let all = || self.layers.iter().flatten();
+        Moments {
+            steps: self.steps,
+            mean: all().flat_map(|m| m.mean.iter().copied()).collect(),
+            square: all().flat_map(|m| m.square.iter().copied()).collect(),
+        }
     }
 
-    /// Remembers what `moments` says of a network of layers `sizes`; `false` if it is of another.
-    pub fn remember(&mut self, sizes: &[usize], moments: Moments, device: &Device) -> bool {
+    /// Remembers what `moments` says; `false` if it is of another network.
+    pub fn remember(&mut self, moments: Moments) -> bool {
         if moments.steps == 0 {
             return moments.mean.is_empty() && moments.square.is_empty();
         }
-        let [Ok(mean), Ok(square)] =
-            [moments.mean, moments.square].map(|numbers| Dense::new(sizes, numbers))
-        else {
+        let count: usize = self.layers.iter().flatten().map(|m| m.mean.len()).sum();
+        if [moments.mean.len(), moments.square.len()] != [count; 2] {
             return false;
-        };
-        let (mean, square) = (Mlp::new(&mean, device), Mlp::new(&square, device));
-        let time = moments.steps as usize;
-        self.states = mean
-            .layers
-            .into_iter()
-            .zip(square.layers)
-            .map(|((w1, b1), (w2, b2))| {
-                let w = AdamState::new(AdaptiveMomentumState::new(time, w1, w2));
-                (Some(w), Some(AdamState::new(AdaptiveMomentumState::new(time, b1, b2))))
-            })
-            .collect();
+        }
+        let mut first = 0;
+        for m in self.layers.iter_mut().flatten() {
+            let place = first..first + m.mean.len();
+            m.mean.copy_from_slice(&moments.mean[place.clone()]);
+            m.square.copy_from_slice(&moments.square[place.clone()]);
+            first = place.end;
+        }
+        self.steps = moments.steps;
         true
     }
 }
 
-fn move_one<const D: usize>(
-    adam: &Adam,
-    rate: f64,
-    parameter: &mut Tensor<D>,
-    gradient: Option<Tensor<D>>,
-    state: &mut Option<AdamState<D>>,
-) {
-    if let Some(gradient) = gradient {
-        let (moved, next) = adam.step(rate, parameter.clone(), gradient, state.take());
-        (*parameter, *state) = (moved, next);
+impl Pace {
+    fn of(steps: u64, rate: f64) -> Pace {
+        let steps = steps as i32;
+        let root = (1.0 - BETA[1].powi(steps)).sqrt();
+        Pace {
+            rate: rate as f32,
+            ahead: root / (1.0 - BETA[0].powi(steps)),
+            epsilon: EPSILON * root,
+        }
+    }
+}
+
+impl Moment {
+    /// `parameter` moved against its `slope`.
+    fn step<const D: usize>(
+        &mut self,
+        parameter: Tensor<D>,
+        slope: Option<Tensor<D>>,
+        pace: &Pace,
+    ) -> Tensor<D> {
+        match slope {
+            Some(slope) => changed(parameter, slope, |own, slope| self.follow(own, slope, pace)),
+            None => parameter,
+        }
+    }
+
+    fn follow(&mut self, parameters: &mut [f32], slopes: &[f32], pace: &Pace) {
+        let moments = self.mean.iter_mut().zip(&mut self.square);
+        for ((p, g), (m, v)) in parameters.iter_mut().zip(slopes).zip(moments) {
+            *m = *m * BETA[0] + g * (1.0 - BETA[0]);
+            *v = *v * BETA[1] + g * g * (1.0 - BETA[1]);
+            *p -= *m * pace.ahead / (v.sqrt() + pace.epsilon) * pace.rate;
+        }
     }
 }

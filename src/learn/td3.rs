@@ -155,7 +155,7 @@ impl Td3 {
             [0, 1].map(|k| (followed[k].forward(here.clone()) - wanted.clone()).square().mean());
         let loss = one + two;
         let mut gradients = loss.backward();
-        for (critic, followed) in self.critics.iter_mut().zip(&followed) {
+        for (critic, followed) in self.critics.iter_mut().zip(followed) {
             critic.optimiser.step(&mut critic.network, followed, &mut gradients);
         }
         self.updates += 1;
@@ -173,7 +173,7 @@ impl Td3 {
         let here = Tensor::cat(vec![observed, action], 1);
         let loss = -self.critics[0].network.passed().forward(here).mean();
         let mut gradients = loss.backward();
-        self.actor.optimiser.step(&mut self.actor.network, &followed, &mut gradients);
+        self.actor.optimiser.step(&mut self.actor.network, followed, &mut gradients);
         self.follow();
     }
 
@@ -244,7 +244,7 @@ impl Td3 {
             learner.network = Mlp::new(&Dense::new(sizes, own)?, &self.device);
             learner.target = Mlp::new(&Dense::new(sizes, target)?, &self.device);
             let found = moments.mean.len();
-            if !learner.optimiser.remember(sizes, moments, &self.device) {
+            if !learner.optimiser.remember(moments) {
                 let expected = learner.network.parameters().len();
                 return Err(DenseError::Count { sizes: sizes.clone(), expected, found });
             }

@@ -313,7 +313,7 @@ impl<W: World> Valuation<W> {
             let mut gradients = loss.backward();
             sum += f64::from(loss.into_scalar::<f32>()) / 2.0;
             optimiser.set_rate(self.recipe.rate * (0.01 + 0.99 * fall));
-            optimiser.step(critic, &followed, &mut gradients);
+            optimiser.step(critic, followed, &mut gradients);
         }
         Ok(sum)
     }

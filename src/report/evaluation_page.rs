@@ -132,7 +132,7 @@ impl EvaluationReport<'_> {
                         flight.attitude.iter().map(|angles| angles[axis].to_degrees()).collect();
                     series.push(Series::new(&label(e), Style::nth(k), values));
                 }
-                let band = Band { around: 0, half_width: 5.0, label: "±5°".into() };
+                let band = Band { around: 0, half_width: 5.0, label: "within".into() };
                 Panel { bands: vec![band], ..Panel::new(title, "°", series) }
             };
             let mut figure = TimeFigure::default();
@@ -205,4 +205,61 @@ fn with_interval(value: f64, [low, high]: [f64; 2]) -> String {
 
 fn whisker(label: String, style: Style, Value { value, ci95 }: Value) -> Whisker {
     Whisker { label, style, value, interval: ci95, text: with_interval(value, ci95) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::insight::Insight;
+    use crate::sim::targets::Row;
+    use crate::sim::{Group, Outcome};
+    use std::time::Duration;
+
+    fn evaluated(controller: &str, settled_deg: f64) -> Evaluation {
+        let groups = [Group::Easy, Group::HardCorners];
+        let row = |(n, group)| Row { number: n, group, roll_deg: 10.0, pitch_deg: 5.0 };
+        let rows: Vec<Row> = (1..).zip(groups.into_iter().cycle()).take(8).map(row).collect();
+        let outcome =
+            Outcome { settled_deg, settling_s: 0.5, cost: vec![Duration::from_micros(300)] };
+        Evaluation::new(controller, "exact <model>", &rows, &vec![outcome; 8])
+    }
+
+    /// Every controller stands with its interval, the paper's beside it, and a lost aircraft draws nothing
+    /// that is no number.
+    #[test]
+    fn the_page_has_ours_and_the_papers() {
+        let evaluations = [evaluated("hybrid", 0.25), evaluated("lqi", 1e-7)];
+        let insight = Insight {
+            candidates: vec![vec![[0.1, 0.2], [f64::NAN, 0.3]]],
+            chosen: vec![[0.1, 0.2], [0.15, 0.25]],
+            searched: true,
+            phases: vec![("fly", Duration::from_micros(900))],
+        };
+        let flown = |insights| Tracking {
+            attitude: vec![[0.1, 0.2], [f64::NAN; 2]],
+            commands: Vec::new(),
+            insights,
+        };
+        let target = Target { roll: 0.5, pitch: 0.1, airspeed: 16.67 };
+        let flights = [(target, vec![flown(vec![(10, insight)]), flown(Vec::new())])];
+        let page = EvaluationReport {
+            subtitle: "Flown in JSBSim".into(),
+            evaluations: &evaluations,
+            flights: &flights,
+            provenance: vec![("seed".into(), "1".into())],
+        };
+        let html = page.page().render();
+        for part in [
+            "hybrid (exact &lt;model&gt;)",
+            "hybrid in the paper",
+            "0.44 [0.41, 0.49]",
+            "Roll seen ahead at 0.10 s",
+            "plan flown",
+            "roll 29°, pitch 6°",
+        ] {
+            assert!(html.contains(part), "{part}");
+        }
+        assert!(!html.contains("lqi in the paper"));
+        assert!(!html.contains("inf%") && !html.contains("NaN%"));
+    }
 }

@@ -151,10 +151,10 @@ impl Problem<'_> {
         let mut plan = [[0.0; 2]; STEPS];
         let mut cost = 0.0;
         self.note(&flight, 0, out);
-        for step in 0..STEPS {
+        for (step, place) in plan.iter_mut().enumerate() {
             let before = flight.previous[0];
             let chosen = choose(step, out).map(|x| x.clamp(-1.0, 1.0));
-            plan[step] = chosen;
+            *place = chosen;
             self.advance(&mut flight, chosen);
             self.note(&flight, step + 1, out);
             let moved = [chosen[0] - before.aileron, chosen[1] - before.elevator];

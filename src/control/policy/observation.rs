@@ -9,7 +9,7 @@ pub const OBSERVATIONS: usize = 15;
 
 /// What each number is divided by, in the order of [`observe`]: rad, m/s and rad/s as they come, so
 /// that brisk flight, full deflection and the first error of a hard target are of order one.
-const UNIT: [f64; OBSERVATIONS] =
+pub const UNIT: [f64; OBSERVATIONS] =
     [1.0, 0.5, 4.0, 2.0, 1.0, 1.0, 0.2, 0.2, 0.5, 10.0, 0.5, 10.0, 0.5, 0.5, 0.25];
 
 /// The observation in lanes, double precision or dual numbers: the state φ θ V p q r α β, the actuators

@@ -1,0 +1,208 @@
+//! What the processor could do at best, and what the prior asks of it.
+
+use std::cell::Cell;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::time::Instant;
+
+use greylag::model::{GreyBox, Memory};
+use greylag::num::{Lanes, Real};
+use greylag::physics::{Controls, State};
+
+/// Fused multiply-adds in single precision that one core makes in a second, times two.
+pub fn peak() -> f64 {
+    let best = |run: &dyn Fn() -> f64| (0..20).map(|_| run()).fold(0.0, f64::max);
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: the processor has the features
+        return best(&|| unsafe { peak_avx2() });
+    }
+    best(&|| chains::<4, 8, { cfg!(target_arch = "aarch64") }>())
+}
+
+/// The same in vectors of four, as NEON has: multiplications with additions where none is fused.
+pub fn narrow_peak() -> f64 {
+    let run = chains::<4, 12, { cfg!(target_arch = "aarch64") }>;
+    (0..20).map(|_| run()).fold(0.0, f64::max)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn peak_avx2() -> f64 {
+    chains::<8, 10, true>()
+}
+
+/// `C` independent chains of `N` lanes: enough to hide the latency of each.
+#[inline(always)]
+fn chains<const N: usize, const C: usize, const FUSED: bool>() -> f64 {
+    const ROUNDS: usize = 1_000_000;
+    let factor = Lanes::<N, FUSED>::splat(std::hint::black_box(0.999));
+    let mut sums = [Lanes::<N, FUSED>::splat(std::hint::black_box(1.0)); C];
+    let start = Instant::now();
+    for _ in 0..ROUNDS {
+        let mut c = 0;
+        while c < C {
+            sums[c] = sums[c].mul_add(factor, factor);
+            c += 1;
+        }
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    std::hint::black_box(sums);
+    (2 * ROUNDS * N * C) as f64 / seconds
+}
+
+thread_local! {
+    static COUNTS: Cell<Operations> = const { Cell::new(Operations::NONE) };
+}
+
+/// Operations that were made.
+#[derive(Clone, Copy, Debug)]
+pub struct Operations {
+    /// Additions, subtractions, multiplications.
+    pub simple: u64,
+    /// Fused multiply-adds.
+    pub fused: u64,
+    /// Divisions and square roots.
+    pub divisions: u64,
+    /// Sines with their cosines.
+    pub sines: u64,
+}
+
+/// Additions and multiplications of a sine with its cosine as lanes make them, comparisons left out.
+const SINE: u64 = 32;
+
+impl Operations {
+    const NONE: Operations = Operations { simple: 0, fused: 0, divisions: 0, sines: 0 };
+
+    /// Floating-point operations, a division being one.
+    pub fn all(&self) -> u64 {
+        self.simple + 2 * self.fused + self.divisions + SINE * self.sines
+    }
+
+    /// Of a step of `model` from `state`.
+    pub fn of_step(model: &GreyBox, state: &State, controls: &Controls) -> Operations {
+        let state = state.map(Counted);
+        let controls = Controls {
+            aileron: Counted(controls.aileron),
+            elevator: Counted(controls.elevator),
+            throttle: Counted(controls.throttle),
+        };
+        COUNTS.set(Operations::NONE);
+        std::hint::black_box(model.step(&state, &controls, 600.0, &mut Memory::default()));
+        COUNTS.get()
+    }
+}
+
+/// A number that counts what is done with it.
+#[derive(Clone, Copy, Debug)]
+struct Counted(f64);
+
+fn count(kind: impl Fn(&mut Operations) -> &mut u64) {
+    let mut counts = COUNTS.get();
+    *kind(&mut counts) += 1;
+    COUNTS.set(counts);
+}
+
+macro_rules! counted {
+    ($trait:ident, $method:ident, $op:tt, $kind:ident) => {
+        impl $trait for Counted {
+            type Output = Counted;
+            fn $method(self, other: Counted) -> Counted {
+                count(|c| &mut c.$kind);
+                Counted(self.0 $op other.0)
+            }
+        }
+    };
+}
+counted!(Add, add, +, simple);
+counted!(Sub, sub, -, simple);
+counted!(Mul, mul, *, simple);
+counted!(Div, div, /, divisions);
+
+impl AddAssign for Counted {
+    fn add_assign(&mut self, other: Counted) {
+        *self = *self + other;
+    }
+}
+impl SubAssign for Counted {
+    fn sub_assign(&mut self, other: Counted) {
+        *self = *self - other;
+    }
+}
+// a change of sign is no arithmetic: it goes into the operation that follows
+impl Neg for Counted {
+    type Output = Counted;
+    fn neg(self) -> Counted {
+        Counted(-self.0)
+    }
+}
+
+impl Real for Counted {
+    fn from_f64(x: f64) -> Counted {
+        Counted(x)
+    }
+    fn sin_cos(self) -> (Counted, Counted) {
+        count(|c| &mut c.sines);
+        let (s, c) = self.0.sin_cos();
+        (Counted(s), Counted(c))
+    }
+    fn atan2(self, x: Counted) -> Counted {
+        Counted(self.0.atan2(x.0))
+    }
+    fn sqrt(self) -> Counted {
+        count(|c| &mut c.divisions);
+        Counted(self.0.sqrt())
+    }
+    fn exp(self) -> Counted {
+        Counted(self.0.exp())
+    }
+    fn where_less(a: Counted, b: Counted, then: Counted, otherwise: Counted) -> Counted {
+        if a.0 < b.0 { then } else { otherwise }
+    }
+    fn mul_add(self, factor: Counted, addend: Counted) -> Counted {
+        count(|c| &mut c.fused);
+        Counted(self.0 * factor.0 + addend.0)
+    }
+}
+
+/// Aircraft that move together.
+const WIDTH: usize = 16;
+/// How many blocks of them there are.
+const BLOCKS: usize = 64;
+
+/// Steps of `model` that one core makes in a second, in lanes.
+pub fn steps_per_second(model: &GreyBox, state: &State, controls: &Controls) -> f64 {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: the processor has the features
+        return unsafe { steps_avx2(model, state, controls) };
+    }
+    steps::<{ cfg!(target_arch = "aarch64") }>(model, state, controls)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn steps_avx2(model: &GreyBox, state: &State, controls: &Controls) -> f64 {
+    steps::<true>(model, state, controls)
+}
+
+#[inline(always)]
+fn steps<const FUSED: bool>(model: &GreyBox, state: &State, controls: &Controls) -> f64 {
+    const ROUNDS: usize = 100;
+    let lane = Lanes::<WIDTH, FUSED>::from_f64;
+    let mut states = [state.map(lane); BLOCKS];
+    let controls = Controls {
+        aileron: lane(controls.aileron),
+        elevator: lane(controls.elevator),
+        throttle: lane(controls.throttle),
+    };
+    let mut memory = Memory::default();
+    let start = Instant::now();
+    for _ in 0..ROUNDS {
+        for state in &mut states {
+            *state = model.step_inlined(state, &controls, 600.0, &mut memory);
+        }
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    std::hint::black_box(&states);
+    (ROUNDS * WIDTH * BLOCKS) as f64 / seconds
+}
