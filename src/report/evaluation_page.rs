@@ -252,7 +252,7 @@ mod tests {
         for part in [
             "hybrid (exact &lt;model&gt;)",
             "hybrid in the paper",
-            "0.44 [0.41, 0.49]",
+            "0.440 [0.410, 0.490]",
             "Roll seen ahead at 0.10 s",
             "plan flown",
             "roll 29°, pitch 6°",

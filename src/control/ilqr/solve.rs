@@ -113,50 +113,40 @@ impl Solver {
 }
 
 /// The best change within −1..1 of the commands, and its answer to the state: a command at its limit does
-/// not answer (Tassa et al. 2014, for two commands).
+/// not answer (Tassa et al. 2014, for two commands, whose sides can all be tried).
 fn limited(
     slope: &Vector2<f64>,
     curvature: &Matrix2<f64>,
     cross: &Gain,
     now: Surfaces,
 ) -> Option<(Vector2<f64>, Gain)> {
-    let mut held: [Option<f64>; 2] = [None; 2];
-    // each pass holds one more
-    for _ in 0..3 {
+    let inverse = curvature.try_inverse()?;
+    let (free, gain) = (-(inverse * slope), -(inverse * cross));
+    if !free.iter().chain(gain.iter()).all(|x| x.is_finite()) {
+        return None;
+    }
+    if (0..2).all(|c| (now[c] + free[c]).abs() <= 1.0) {
+        return Some((free, gain));
+    }
+    let cost = |d: &Vector2<f64>| (0.5 * d.transpose() * curvature * d)[0] + slope.dot(d);
+    let mut best = (f64::INFINITY, Vector2::zeros(), Gain::zeros());
+    for (fixed, limit) in [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)] {
+        let open = 1 - fixed;
+        let bent = curvature[(open, open)];
         let mut change = Vector2::zeros();
+        change[fixed] = limit - now[fixed];
+        let wanted = -(slope[open] + curvature[(open, fixed)] * change[fixed]) / bent;
+        change[open] = wanted.clamp(-1.0 - now[open], 1.0 - now[open]);
         let mut gain = Gain::zeros();
-        match held {
-            [None, None] => {
-                let inverse = curvature.try_inverse()?;
-                (change, gain) = (-(inverse * slope), -(inverse * cross));
-            }
-            [Some(x), Some(y)] => change = Vector2::new(x, y),
-            [Some(x), None] | [None, Some(x)] => {
-                let (fixed, open) = if held[0].is_some() { (0, 1) } else { (1, 0) };
-                let bent = curvature[(open, open)];
-                change[fixed] = x;
-                change[open] = -(slope[open] + curvature[(open, fixed)] * x) / bent;
-                for j in 0..STATES {
-                    gain[(open, j)] = -cross[(open, j)] / bent;
-                }
-            }
+        if change[open] == wanted {
+            gain.row_mut(open).copy_from(&(-cross.row(open) / bent));
         }
-        if !change.iter().chain(gain.iter()).all(|x| x.is_finite()) {
-            return None;
-        }
-        let mut met = true;
-        for c in 0..2 {
-            let wanted = now[c] + change[c];
-            if held[c].is_none() && wanted.abs() > 1.0 {
-                held[c] = Some(wanted.signum() - now[c]);
-                met = false;
-            }
-        }
-        if met {
-            return Some((change, gain));
+        let cost = cost(&change);
+        if cost < best.0 {
+            best = (cost, change, gain);
         }
     }
-    None
+    best.0.is_finite().then_some((best.1, best.2))
 }
 
 #[cfg(test)]
