@@ -10,6 +10,19 @@ from mavproxy_console import MavProxy, Watcher
 HOLD, OFFBOARD = 4 << 16 | 3 << 24, 6 << 16
 
 
+def patient(proxy, watcher):
+    """Has PX4 wait ten seconds for setpoints; typed again where MAVProxy has not heard of it in time."""
+    is_set = lambda m: m.param_id == "COM_OF_LOSS_T" and m.param_value == 10.0
+    for attempt in range(4):
+        proxy.type("param set COM_OF_LOSS_T 10")
+        try:
+            return watcher.until("PARAM_VALUE", is_set, "echo of COM_OF_LOSS_T")
+        except flight.Failure as failure:
+            if attempt == 3:
+                raise
+            say(f"{failure}: again")
+
+
 def fly(proxy, watcher):
     """Parameters of the controller, OFFBOARD, an attitude, HOLD."""
     proxy.wait_for("Detected vehicle 1:1 ", 60.0)
@@ -17,9 +30,7 @@ def fly(proxy, watcher):
     counts = re.search(r"Received (\d+) parameters", line)
     check(counts is not None and int(counts[1]) == 13, f"not PX4's 13 parameters: {line}")
     # A busy machine does not let MAVProxy repeat itself within PX4's half second; what is tested is the way.
-    proxy.type("param set COM_OF_LOSS_T 10")
-    patient = "PARAM_VALUE", lambda m: m.param_id == "COM_OF_LOSS_T" and m.param_value == 10.0
-    watcher.until(*patient, "echo of COM_OF_LOSS_T")
+    patient(proxy, watcher)
     watcher.until_mode(HOLD)
     q = " ".join(f"{part:.7f}" for part in quaternion(ROLL_DEG, PITCH_DEG))
     proxy.type(f"repeat add 0.1 attitude {q} 0.5", "thrust:0.5")
