@@ -258,8 +258,8 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<Options> {
     })
 }
 
-/// The controller with an LQI as its fallback. In lockstep the aircraft's seconds are milliseconds of the client's, so that
-/// it may be silent for longer of them.
+/// The controller with an LQI as its fallback. In lockstep the aircraft's seconds are milliseconds of the
+/// client's, so that it may be silent for longer of them.
 fn crew(kind: Kind, model: &GreyBox, pace: Pace) -> Result<Crew> {
     let mut config = Config::for_model(model)?;
     if pace == Pace::Lockstep {

@@ -80,6 +80,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     for path in arguments.json.iter().chain(&arguments.report) {
         files::writable(path, overwrite)?;
     }
+    if !arguments.changes.is_empty() && !arguments.controllers.iter().any(|k| k.searches()) {
+        let searching: Vec<&str> =
+            Kind::ALL.iter().filter(|k| k.searches()).map(|k| k.name()).collect();
+        bail!(
+            "--planner changes the settings of a search, and none of the controllers has one; evaluate one \
+             of {} or leave --planner out",
+            searching.join(", ")
+        );
+    }
     let targets = targets(arguments)?;
     let plant = arguments.plant.options(arguments.seed);
     // everything that can be wrong is found before the first flight

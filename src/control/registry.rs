@@ -159,6 +159,11 @@ controllers! {
 }
 
 impl Kind {
+    /// Whether it searches with [`cem::Settings`], so that a [`cem::Change`] tells.
+    pub fn searches(self) -> bool {
+        self.pace() == Pace::Planned && self != Kind::Ilqr
+    }
+
     fn names() -> String {
         Kind::ALL.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ")
     }

@@ -70,7 +70,7 @@ impl EvaluationReport<'_> {
         });
         let note = "Interquartile mean of the settled error (mean of roll and pitch RMSE over the last fifth \
                     of ten seconds) with its 95 % bootstrap interval, over the targets here, over ten \
-                    policies in the paper (Table XI: true frozen prior). A decade is a decade.";
+                    policies in the paper (Table XI: true frozen prior), on a scale of decades.";
         Section::new("Settled error", note, figures.collect())
     }
 
@@ -235,11 +235,7 @@ mod tests {
             searched: true,
             phases: vec![("fly", Duration::from_micros(900))],
         };
-        let flown = |insights| Tracking {
-            attitude: vec![[0.1, 0.2], [f64::NAN; 2]],
-            commands: Vec::new(),
-            insights,
-        };
+        let flown = |insights| Tracking { attitude: vec![[0.1, 0.2], [f64::NAN; 2]], insights };
         let target = Target { roll: 0.5, pitch: 0.1, airspeed: 16.67 };
         let flights = [(target, vec![flown(vec![(10, insight)]), flown(Vec::new())])];
         let page = EvaluationReport {

@@ -3,7 +3,6 @@
 use crate::control::insight::Insight;
 use crate::control::{Controller, Target};
 use crate::model::STEP;
-use crate::physics::Command;
 use crate::sim::{Environment, Trouble};
 
 /// Steps into the flight after which the planner is asked what it saw.
@@ -14,8 +13,6 @@ pub const ASKED: [usize; 3] = [10, 50, 150];
 pub struct Tracking {
     /// Roll and pitch, rad, at every step; NaN once the aircraft is lost.
     pub attitude: Vec<[f64; 2]>,
-    /// The commands.
-    pub commands: Vec<Command>,
     /// The planner's sight at [`ASKED`]: step, and what it saw.
     pub insights: Vec<(usize, Insight)>,
 }
@@ -32,11 +29,10 @@ pub fn track(
 ) -> Result<Tracking, Trouble> {
     let mut seen = environment.reset()?;
     controller.reset(1);
-    let mut flight = Tracking { attitude: Vec::new(), commands: Vec::new(), insights: Vec::new() };
+    let mut flight = Tracking { attitude: Vec::new(), insights: Vec::new() };
     for step in 0..steps {
         let command = controller.command(&seen, target);
         flight.attitude.push([seen.state.roll, seen.state.pitch]);
-        flight.commands.push(command);
         if ASKED.contains(&step)
             && let Some(insight) = controller.insight(&seen)
         {

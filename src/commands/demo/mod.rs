@@ -102,7 +102,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         let mut again = crew()?;
         schedule.iter().for_each(|schedule| again.pilot.follow(schedule.clone()));
         let vehicle = Vehicle::Sitl(Sitl::new(1, model.airframe.actuators.deflection_max));
-        sights = story::sights(&folder, again, vehicle)?;
+        // the flight is told even if the planner's sight cannot be
+        sights = story::sights(&folder, again, vehicle).unwrap_or_else(|why| {
+            eprintln!("the report does not show what the planner saw: {why:#}");
+            Vec::new()
+        });
     }
     let teller = Teller {
         controller: arguments.controller.name(),

@@ -92,6 +92,7 @@ const TOLD_AFTER: usize = 20;
 /// What the planner of `crew` saw a moment after each command: the recording in `folder` is replayed, which
 /// also says whether its commands come out to the bit.
 pub fn sights(folder: &Path, crew: Crew, vehicle: Vehicle) -> Result<Vec<Sight>> {
+    println!("replaying the recording, to show what the planner saw");
     let mut all = Vec::new();
     let (mut target, mut ticks) = ([f64::NAN; 2], 0);
     let outcome = replay_watched(folder, crew, vehicle, &mut |time, request, controller| {

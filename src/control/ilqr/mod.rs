@@ -60,9 +60,8 @@ struct Desk {
 
 impl Desk {
     /// The plan of this tick; `None` if no plan stays finite.
-    fn improve(&mut self, problem: &Problem, lqi: &[Surfaces; STEPS]) -> Option<[Surfaces; STEPS]> {
-        let mut start = *lqi;
-        let mut cost = problem.fly(&start, &mut self.flown);
+    fn improve(&mut self, problem: &Problem, lqi: &Ahead) -> Option<[Surfaces; STEPS]> {
+        let (mut start, mut cost) = problem.follow(lqi, &mut self.flown);
         if let Some(last) = &self.plan {
             let mut shifted = *last;
             shifted.rotate_left(1);
@@ -116,8 +115,7 @@ impl Controller for Ilqr {
             memory: self.disturbance.memory(),
             disturbance: self.disturbance.rate(),
         };
-        let lqi = problem.follow(&self.ahead);
-        self.desk.plan = self.desk.improve(&problem, &lqi);
+        self.desk.plan = self.desk.improve(&problem, &self.ahead);
         match self.desk.plan {
             Some(plan) => {
                 self.lqi.hand_over(&before, seen);

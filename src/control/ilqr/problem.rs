@@ -141,11 +141,30 @@ impl Problem<'_> {
         self.fly_with(out, |step, _| plan[step]).1
     }
 
-    /// Flies what `choose` says at each step, given where the aircraft is; the plan and its cost.
+    /// Flies what `choose` says at each step, given the trajectory up to there; the plan and its cost.
     pub fn fly_with(
         &self,
         out: &mut Trajectory,
         mut choose: impl FnMut(usize, &Trajectory) -> Surfaces,
+    ) -> ([Surfaces; STEPS], f64) {
+        self.fly_choosing(out, |step, _, trajectory| choose(step, trajectory))
+    }
+
+    /// Flies the LQI's own way on; its plan and what that costs.
+    pub fn follow(&self, ahead: &Ahead, out: &mut Trajectory) -> ([Surfaces; STEPS], f64) {
+        let figures = &self.model.airframe.actuators;
+        let mut reference = ahead.reference();
+        self.fly_choosing(out, |step, flight, _| {
+            let z = flight.actuators.observed(figures);
+            let c = ahead.command(step, &mut reference, &flight.state, &z, &flight.previous);
+            [c.aileron, c.elevator]
+        })
+    }
+
+    fn fly_choosing(
+        &self,
+        out: &mut Trajectory,
+        mut choose: impl FnMut(usize, &Flight, &Trajectory) -> Surfaces,
     ) -> ([Surfaces; STEPS], f64) {
         let mut flight = self.start();
         let mut plan = [[0.0; 2]; STEPS];
@@ -153,7 +172,7 @@ impl Problem<'_> {
         self.note(&flight, 0, out);
         for (step, place) in plan.iter_mut().enumerate() {
             let before = flight.previous[0];
-            let chosen = choose(step, out).map(|x| x.clamp(-1.0, 1.0));
+            let chosen = choose(step, &flight, out).map(|x| x.clamp(-1.0, 1.0));
             *place = chosen;
             self.advance(&mut flight, chosen);
             self.note(&flight, step + 1, out);
@@ -162,20 +181,6 @@ impl Problem<'_> {
             cost += self.stage(&flight.state) * if step + 1 == STEPS { LAST } else { 1.0 };
         }
         (plan, cost)
-    }
-
-    /// The LQI's own way on.
-    pub fn follow(&self, ahead: &Ahead) -> [Surfaces; STEPS] {
-        let figures = &self.model.airframe.actuators;
-        let mut flight = self.start();
-        let mut reference = ahead.reference();
-        std::array::from_fn(|step| {
-            let z = flight.actuators.observed(figures);
-            let c = ahead.command(step, &mut reference, &flight.state, &z, &flight.previous);
-            let chosen = [c.aileron, c.elevator];
-            self.advance(&mut flight, chosen);
-            chosen
-        })
     }
 
     /// Each weighed residual of a state, with its place in the state; stall only where there is any.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::LONGEST;
 use super::answers::Answers;
 
 /// States by which the way through link and controller may be longer than through the simulator's.
@@ -41,9 +42,9 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// Notes the rates of the state `index`.
+    /// Notes the rates of the state `index`; one of after the check is none of it, and takes no memory.
     pub(super) fn rates(&mut self, index: usize, rates: [f64; 2]) {
-        if index >= self.rates.len() {
+        if (self.rates.len()..=LONGEST).contains(&index) {
             self.rates.resize(index + 1, None);
             self.rates[index] = Some(rates);
         }

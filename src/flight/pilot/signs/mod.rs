@@ -26,6 +26,8 @@ const LENGTH: usize = 12;
 const OFFSET: usize = 6;
 /// States of a round.
 const ROUND: usize = PATTERN.len() * LENGTH + 2 * OFFSET;
+/// The state by which a check has ended.
+const LONGEST: usize = PULSES.len() * ROUND;
 /// A sign is certain from so many standard errors on: it is asked anew at every state.
 const CERTAIN: f64 = 6.0;
 /// A sign is not told before its surface has gone the other way and been answered: one edge may
@@ -114,6 +116,8 @@ impl Check {
         evidence.rates(index, [state.p, state.q]);
         let verdict = match evidence.fit(&self.answers) {
             Some(fits) => judged(&fits, index),
+            // states that were lost, or a clock that has jumped ahead
+            None if index >= LONGEST => Verdict::Wrong(Fault::SignsUnknown),
             None => Verdict::Open,
         };
         let departed = (0..2).any(|i| (attitude[i] - begun.attitude[i]).abs() > DEPARTED);
@@ -179,7 +183,7 @@ fn judged(fits: &[Fit; 2], index: usize) -> Verdict {
     if (0..2).all(certain) {
         return Verdict::Right(fits.map(|fit| fit.gain));
     }
-    if index < PULSES.len() * ROUND {
+    if index < LONGEST {
         return Verdict::Open;
     }
     // What was not certain after all rounds: too little of an answer, or too much of the air's.
@@ -267,5 +271,26 @@ mod tests {
         // The left of two elevons reversed: what should roll pitches, and the other way round.
         let (mixed, _) = verdict(2, |[aileron, elevator]| [elevator - trim, aileron + trim]);
         assert!(matches!(mixed, Verdict::Wrong(_)), "{mixed:?}");
+    }
+
+    /// A clock that jumps, at the first states or later, ends the check; it neither lasts for ever at level
+    /// trim nor takes memory for the states that never were.
+    #[test]
+    fn a_clock_that_jumps_ahead_ends_the_check() {
+        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        for before in [1, 30] {
+            let mut check = Check::new(Answers::of(&model, 22.0).unwrap());
+            check.await_helm();
+            check.begin(Command::IDLE);
+            for k in 0..before {
+                let now = Time::from_micros(10_000 * k);
+                assert_eq!(check.see(now, &State::NEUTRAL, Command::IDLE), Verdict::Open);
+                check.told(now, check.command(now).unwrap());
+            }
+            let later = Time::from_micros(u64::MAX / 2);
+            let verdict = check.see(later, &State::NEUTRAL, Command::IDLE);
+            assert!(matches!(verdict, Verdict::Wrong(_)), "{before}: {verdict:?}");
+            assert!(!check.is_open());
+        }
     }
 }
