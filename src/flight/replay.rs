@@ -97,13 +97,27 @@ impl States {
                     return None;
                 }
             }
-            self.read_one()?;
+            self.read_packet()?;
         }
     }
 
+    /// The stamp of the next record.
+    fn stamp(&self) -> Option<u64> {
+        Some(u64::from_be_bytes(*self.bytes.get(self.at..)?.first_chunk()?))
+    }
+
+    /// Reads the frames of one packet, which share its stamp: all of them are handed over before any state
+    /// is answered, as in flight.
+    fn read_packet(&mut self) -> Option<()> {
+        let (stamp, mut read) = (self.stamp()?, None);
+        while self.stamp() == Some(stamp) && self.read_one(stamp).is_some() {
+            read = Some(());
+        }
+        read
+    }
+
     /// Reads one record: eight bytes of time, then a frame.
-    fn read_one(&mut self) -> Option<()> {
-        let stamp = u64::from_be_bytes(*self.bytes.get(self.at..)?.first_chunk()?);
+    fn read_one(&mut self, stamp: u64) -> Option<()> {
         let rest = self.bytes.get(self.at + 8..)?;
         let len = frame_len(rest).filter(|len| *len <= rest.len())?;
         let peer = PeerId { link: LinkId(0), address: SERIAL };

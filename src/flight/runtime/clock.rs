@@ -30,6 +30,11 @@ impl Clock {
         Clock { pace, anchor: None }
     }
 
+    /// How the vehicle's time passes.
+    pub(super) fn pace(&self) -> Pace {
+        self.pace
+    }
+
     /// A state of vehicle time `time` arrived at `arrived`.
     pub(super) fn set(&mut self, arrived: Instant, time: Time) {
         self.anchor = Some((arrived, time));

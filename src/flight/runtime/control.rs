@@ -1,13 +1,14 @@
 //! The control thread: one loop that answers state frames, then serves clients.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Sender, select_biased};
 
-use super::clock::Clock;
+use super::clock::{Clock, Pace};
 use super::planner::Planner;
 use super::ports::Ports;
+use super::stamps::{Stamps, unix_us};
 use super::summary::Summary;
 use super::timing::Timing;
 use super::witness::Witness;
@@ -43,6 +44,7 @@ pub(super) struct Control {
     router: Option<Router>,
     ports: Ports,
     recorder: Option<Recorder>,
+    stamps: Stamps,
     events: Sender<Event>,
     clock: Clock,
     timing: Timing,
@@ -71,6 +73,7 @@ impl Control {
         if vehicle.has_channels() {
             pilot.check_signs();
         }
+        let started = Instant::now();
         Control {
             pilot,
             planner,
@@ -82,10 +85,11 @@ impl Control {
             router: options.controller.map(|_| Router::default()),
             ports,
             recorder,
+            stamps: Stamps::since(started),
             events,
             clock: Clock::new(options.pace),
             timing: Timing::default(),
-            started: Instant::now(),
+            started,
             duration: options.duration,
             last_arrival: None,
             outputs: Outputs::Disarmed,
@@ -133,6 +137,7 @@ impl Control {
             Arrival::Remark(remark) => return self.remark(&remark),
             Arrival::Opened(_) | Arrival::Closed(_) => return,
         };
+        self.record(packet.arrived, &packet.bytes);
         // The vehicle is taken out for the time of the call, since each tick answers through it.
         let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
         let mut places = states.iter_mut();
@@ -149,7 +154,6 @@ impl Control {
         for state in states.iter().flatten() {
             self.tick(state, &packet);
         }
-        self.record(&packet.bytes);
         self.heed_vehicle();
         if let Some(router) = &self.router {
             for peer in self.clients.peers() {
@@ -180,7 +184,7 @@ impl Control {
         }
         let latency = packet.arrived.elapsed();
         if let Some(frame) = copy {
-            self.record(&frame);
+            self.record(Instant::now(), &frame);
         }
         let planned = match plan {
             Plan::Ready(command) => Planned::Ready(command),
@@ -207,7 +211,10 @@ impl Control {
             self.timing.interval.note(packet.arrived.saturating_duration_since(last));
         }
         self.timing.latency.note(latency);
-        self.timing.missed += u64::from(latency > CYCLE);
+        self.timing.missed += u64::from(match self.clock.pace() {
+            Pace::RealTime => latency > CYCLE,
+            Pace::Lockstep => state.order == Order::Repeated,
+        });
         self.timing.late_plans += u64::from(plan == Plan::Late);
         let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
         self.load += LOAD_WEIGHT * (share - self.load);
@@ -266,7 +273,7 @@ impl Control {
                     hear: |event| drop(self.events.try_send(event)),
                 };
                 self.clients.handle(now, packet.peer, &packet.bytes, &mut pilot);
-                self.record(&packet.bytes);
+                self.record(packet.arrived, &packet.bytes);
             }
             Arrival::Opened(peer) => self.clients.welcome(now, peer),
             Arrival::Closed(peer) => {
@@ -325,7 +332,7 @@ impl Control {
             return;
         };
         if let Some(frame) = self.vehicle.due(host, self.outputs) {
-            self.record(&frame);
+            self.record(Instant::now(), &frame);
             self.ports.send_to_vehicle(unix_us(), peer, frame);
         }
     }
@@ -342,15 +349,16 @@ impl Control {
         let unix_us = unix_us();
         for (peer, frame) in self.clients.drain() {
             if let Some(recorder) = &self.recorder {
-                recorder.bytes(unix_us, &frame);
+                recorder.bytes(self.stamps.of(Instant::now()), &frame);
             }
             self.ports.send_to_client(unix_us, peer, frame);
         }
     }
 
-    fn record(&self, bytes: &[u8]) {
+    /// Records a packet that arrived, or left, at `host`.
+    fn record(&mut self, host: Instant, bytes: &[u8]) {
         if let Some(recorder) = &self.recorder {
-            recorder.bytes(unix_us(), bytes);
+            recorder.bytes(self.stamps.of(host), bytes);
         }
     }
 
@@ -387,10 +395,3 @@ impl Control {
 
 /// States in one packet at most: a TCP chunk of 1024 bytes holds four.
 const STATES_PER_PACKET: usize = 8;
-
-/// Microseconds since 1970, as `.tlog` counts them.
-fn unix_us() -> u64 {
-    SystemTime::now()
-        .duration_since(SystemTime::UNIX_EPOCH)
-        .map_or(0, |since| since.as_micros() as u64)
-}

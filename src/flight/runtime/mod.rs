@@ -13,6 +13,7 @@ mod control;
 mod guard;
 mod planner;
 mod ports;
+mod stamps;
 mod summary;
 mod timing;
 mod witness;

@@ -51,7 +51,7 @@ impl fmt::Display for Summary {
         if t.latency.count() > 0 {
             writeln!(
                 f,
-                "state to command: p50 {:.0}, p99 {:.0}, p99.9 {:.0}, longest {:.0} microseconds; {} beyond 10 ms",
+                "state to command: p50 {:.0}, p99 {:.0}, p99.9 {:.0}, longest {:.0} microseconds; {} cycles missed",
                 t.latency.quantile_us(0.5),
                 t.latency.quantile_us(0.99),
                 t.latency.quantile_us(0.999),

@@ -60,7 +60,8 @@ pub struct Timing {
     pub latency: Histogram,
     /// Between the arrivals of two state frames.
     pub interval: Histogram,
-    /// Answers that took longer than a cycle of 10 ms.
+    /// Cycles without their answer: in real time those whose answer took longer than 10 ms; in lockstep,
+    /// where the vehicle's time stands until it is there, those whose state had to be sent again.
     pub missed: u64,
     /// Plans that came after their deadline.
     pub late_plans: u64,
