@@ -72,6 +72,66 @@ fn a_flight_with_everything_in_it_replays_to_the_bit() {
     assert!(other.different > 300, "{other:?}");
 }
 
+fn real(personality: Personality, authority: Authority) -> Vehicle {
+    Vehicle::Real(Box::new(Real::new(profile(personality, authority))))
+}
+
+/// Flies beside a played controller from its check of signs on, recorded in `folder`; gives what was said.
+fn flown_beside(personality: Personality, folder: &Path) -> String {
+    let companion = Companion::start(&Options {
+        record: Some(Place::Exactly(folder.to_owned())),
+        controller: Some(profile(personality, Authority::Surfaces)),
+        ..options(Pace::RealTime)
+    });
+    let link = format!("udpout:{}", companion.vehicle());
+    let shim = Shim::start(&link, shim::Pace::RealTime, 600.0, |options| {
+        options.personality = Some(personality);
+        options.noise = Noise::REALISTIC;
+    });
+    let mut client = Client::new(companion.client(0));
+    engage_onboard(&mut client);
+    client.setpoint(20.0, 5.0);
+    client.mode(OFFBOARD);
+    client.steer(20.0, 5.0, 3.0);
+    client.catch_up();
+    shim.end();
+    println!("{}", companion.end());
+    client.texts().join("\n")
+}
+
+/// What is left of a recording without the lines that say when the controller gave the helm over.
+fn without_the_helm(folder: &Path, to: &Path) {
+    std::fs::create_dir(to).unwrap();
+    std::fs::copy(folder.join("flight.tlog"), to.join("flight.tlog")).unwrap();
+    let calls = std::fs::read_to_string(folder.join("flight.calls")).unwrap();
+    let left = calls.split_inclusive('\n').filter(|line| !line.starts_with("engaged"));
+    std::fs::write(to.join("flight.calls"), left.collect::<String>()).unwrap();
+}
+
+#[test]
+fn a_flight_with_a_check_of_signs_replays_to_the_bit() {
+    for personality in [Personality::Px4, Personality::Ardupilot] {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("flight");
+        // A machine that stands still for 0.3 s has the aircraft handed back before anything is checked.
+        let said = flown_beside(personality, &folder);
+        assert!(said.contains("signs are right"), "{said}");
+        let outcome = again(&folder, real(personality, Authority::Surfaces));
+        println!("{personality}: {outcome:?}");
+        assert!(outcome.ticks > 300 && !outcome.cut_short, "{outcome:?}");
+        assert_eq!((outcome.different, outcome.plans_different, outcome.without_state), (0, 0, 0));
+        // A replay that checks nothing, as where attitudes are commanded, gives other commands.
+        let unchecked = again(&folder, real(personality, Authority::Attitude));
+        println!("without the check: {unchecked:?}");
+        assert!(unchecked.different > 20, "{unchecked:?}");
+        // A check that never begins is never over: without the helm it is level flight to the end.
+        let waiting = root.path().join("waiting");
+        without_the_helm(&folder, &waiting);
+        let waiting = again(&waiting, real(personality, Authority::Surfaces));
+        assert!(waiting.different > 200, "{waiting:?}");
+    }
+}
+
 /// A port that was free a moment ago.
 fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
@@ -225,9 +285,10 @@ fn killed_beside_a_controller(seconds: f64) -> Killed {
     let flown = shim.end().simulated_s - since;
     let recorded = csv::load(&folder.join("flight.csv"), Tolerance::Strict).unwrap();
     let last = recorded.flight.samples.last().unwrap().time_s;
-    let real = Vehicle::Real(Box::new(Real::new(profile(Personality::Px4, Authority::Surfaces))));
-    let outcome = again(&folder, real);
+    let outcome = again(&folder, real(Personality::Px4, Authority::Surfaces));
     assert!(outcome.ticks > 100, "{outcome:?}");
+    // The check of signs, too, is decided by the pilot.
+    assert_eq!((outcome.different, outcome.plans_different), (0, 0), "{outcome:?}");
     Killed { missing_s: flown - last, taken_over_s }
 }
 

@@ -37,6 +37,15 @@ struct Wired {
 
 impl Wired {
     fn start(personality: Personality, authority: Authority) -> Self {
+        Wired::miswired(personality, authority, &[])
+    }
+
+    /// With parameters of the controller that nobody reads, and that turn surfaces round.
+    fn miswired(
+        personality: Personality,
+        authority: Authority,
+        parameters: &[(&str, f64)],
+    ) -> Self {
         let cable = Cable::new(BAUD);
         let folder = tempfile::tempdir().unwrap();
         let companion = Companion::start(&Options {
@@ -47,19 +56,25 @@ impl Wired {
         });
         let shim = Shim::start(&cable.controller(), shim::Pace::RealTime, 600.0, |options| {
             options.personality = Some(personality);
+            options.parameters = parameters.iter().map(|(name, x)| ((*name).into(), *x)).collect();
         });
         let mut client = Client::new(companion.client(0));
         client.component = 191;
         Wired { cable, companion, shim, client, folder }
     }
 
-    /// Arms the companion as soon as it lets itself be armed, and enters OFFBOARD.
-    fn engage(&mut self) {
+    /// Arms the companion as soon as it lets itself be armed.
+    fn arm(&mut self) {
         let end = Instant::now() + Duration::from_secs(20);
         while self.client.arm() != MavResult::MAV_RESULT_ACCEPTED {
             assert!(Instant::now() < end, "{:?}", self.client.texts());
             std::thread::sleep(Duration::from_millis(300));
         }
+    }
+
+    /// Arms the companion, and enters OFFBOARD.
+    fn engage(&mut self) {
+        self.arm();
         // What is measured is the wire, not how long a busy machine keeps this test from running.
         let mut patience = parameter("GL_OFFB_LOSS_S", 10.0);
         if let MavMessage::PARAM_SET(m) = &mut patience {
@@ -117,6 +132,55 @@ fn attitude_through_px4() {
 #[test]
 fn attitude_through_ardupilot() {
     assert!(settled(Ardupilot, Attitude) < 0.1);
+}
+
+/// Bank or pitch that a wrong sign may cause before the controller has the aircraft again, degrees.
+const DEPARTURE: f64 = 30.0;
+
+/// Flies a controller whose surface is reversed; what was said. `None` if the machine stood still.
+fn refused(personality: Personality, reversed: (&str, f64)) -> Option<String> {
+    let mut wired = Wired::miswired(personality, Surfaces, &[reversed]);
+    wired.arm();
+    // For two seconds after the hand-back the client goes on asking, to no avail.
+    wired.client.setpoint(TARGET.0, TARGET.1);
+    let _ = wired.client.mode(OFFBOARD);
+    wired.client.steer(TARGET.0, TARGET.1, 4.0);
+    wired.client.catch_up();
+    let (said, told) = (wired.client.texts().concat(), wired.shim.told());
+    wired.shim.end();
+    wired.companion.end();
+    if said.contains("no state of the vehicle for 0.3 s") {
+        return None;
+    }
+    assert_eq!(told.iter().filter(|event| *event == "mode Manual").count(), 1, "{told:?}");
+    assert_eq!(told.last().map(String::as_str), Some("mode Hold"), "{told:?}");
+    let file = wired.folder.path().join("flight/flight.csv");
+    let samples = csv::load(&file, Tolerance::Strict).unwrap().flight.samples;
+    let departed = samples.iter().flat_map(|s| [s.attitude_rad[0], s.attitude_rad[1]]);
+    let departed = departed.fold(0.0f64, |most, angle| most.max(angle.to_degrees().abs()));
+    // Surfaces were told something for as long as the check lasted, and nothing since.
+    let moved = samples.iter().filter(|s| s.aileron_cmd != 0.0).count();
+    let level = samples.last().unwrap().attitude_rad[0].to_degrees().abs();
+    println!(
+        "{personality}: surfaces told something on {moved} states, departed {departed:.1} deg; {said}"
+    );
+    assert!((1..200).contains(&moved) && departed < DEPARTURE && level < 5.0, "{moved} {level}");
+    Some(said)
+}
+
+#[test]
+fn a_wrong_sign_is_refused_with_the_remedy_and_the_aircraft_handed_back() {
+    for (personality, reversed, words) in [
+        (Px4, ("PWM_MAIN_REV", 1.0), ["it rolls left", "CA_SV_CSn_TRQ_R or PWM_MAIN_REV"]),
+        (Ardupilot, ("SERVO2_REVERSED", 1.0), ["it pitches up", "RC2_REVERSED or SERVOn_REVERSED"]),
+    ] {
+        let said = (0..3).find_map(|_| refused(personality, reversed));
+        let said = said.expect("a machine that lets it fly");
+        for words in words.into_iter().chain(["wrong sign", "handed back to the controller"]) {
+            assert!(said.contains(words), "{words} in {said}");
+        }
+        assert!(!said.contains("signs are right"), "{said}");
+    }
 }
 
 #[test]
