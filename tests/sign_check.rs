@@ -180,6 +180,8 @@ fn a_controller_that_is_commanded_attitudes_is_not_checked() {
 struct Tally {
     /// Wrong signs that were not refused.
     missed: usize,
+    /// Wrong signs that were refused without being named.
+    unnamed: usize,
     /// Right signs of which it was told that they are wrong.
     slandered: usize,
     /// Right signs that were refused because nothing could be told.
@@ -193,6 +195,7 @@ impl Tally {
         let told = o.texts.concat().contains("wrong sign");
         let right = wiring == Wiring::Right;
         self.missed += usize::from(!right && (o.passed || !o.refused));
+        self.unnamed += usize::from(!right && o.refused && !told);
         self.slandered += usize::from(right && told);
         self.untold += usize::from(right && o.refused && !told);
         self.took_s.push(o.took_s);
@@ -216,9 +219,10 @@ fn hundreds_of_checks_in_every_air() {
                 }
                 tally.took_s.sort_by(f64::total_cmp);
                 println!(
-                    "{personality} {name} {wiring:?}, {seeds} flights: {} missed, {} slandered, {} untold; verdict after \
-                     {:.2} s (median), {:.2} s at most; departed by {:.0} deg at most",
+                    "{personality} {name} {wiring:?}, {seeds} flights: {} missed, {} unnamed, {} slandered, {} untold; verdict \
+                     after {:.2} s (median), {:.2} s at most; departed by {:.0} deg at most",
                     tally.missed,
+                    tally.unnamed,
                     tally.slandered,
                     tally.untold,
                     tally.took_s[tally.took_s.len() / 2],
