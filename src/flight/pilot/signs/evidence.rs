@@ -1,5 +1,7 @@
 //! What the rates say of the surfaces: the record of a check, with the fit of answers to it.
 
+use std::ops::RangeInclusive;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::LONGEST;
@@ -11,8 +13,9 @@ const LATENESS: isize = 9;
 const LEAST: usize = 14;
 /// Correlation of one leftover with the next that is believed at most.
 const LIKENESS: f64 = 0.9;
-/// The controller had given the helm over by so many states before we heard of it.
-const UNHEARD: isize = 2;
+/// States by which the surfaces had been taken over before the first state of the check: its telling comes
+/// down the same wire as the states; when the controller looks at its channels makes it sooner or later.
+const TAKEN: RangeInclusive<isize> = -2..=4;
 
 /// The answer that fits best: a multiple of the model's, with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,31 +60,43 @@ impl Evidence {
         }
     }
 
-    /// What fits roll and pitch best, with the same lateness for both.
+    /// What fits roll and pitch best, with the same lateness and the same handing over for both.
     pub(super) fn fit(&self, answers: &Answers) -> Option<[Fit; 2]> {
-        let both = (0..=LATENESS)
-            .filter_map(|late| Some([self.axis(answers, 0, late)?, self.axis(answers, 1, late)?]));
+        let both = (0..=LATENESS).flat_map(|late| {
+            let answered = [0, 1].map(|axis| self.answered(answers, axis, late));
+            TAKEN.filter_map(move |taken| {
+                let [roll, pitch] = &answered;
+                Some([self.axis(answers, 0, roll, taken)?, self.axis(answers, 1, pitch, taken)?])
+            })
+        });
         let misfit =
             |fits: &[Fit; 2]| fits[0].misfit.max(1e-12).ln() + fits[1].misfit.max(1e-12).ln();
         both.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))
     }
 
-    /// Least squares of the changes of a rate from state to state: gusts, which wander, are nearly
-    /// white in them; by how much they are not, the standard error is made larger. Beside the answer to
-    /// what was commanded there is one to the step that the surfaces made when the helm went over,
-    /// of unknown size, and a constant.
-    fn axis(&self, answers: &Answers, axis: usize, late: isize) -> Option<Fit> {
-        let answered = |state: isize| -> f64 {
+    /// By how much the rate of `axis` changes from each state to the next, answering to what was commanded.
+    fn answered(&self, answers: &Answers, axis: usize, late: isize) -> Vec<f64> {
+        let at = |state: isize| -> f64 {
             let terms = self.changes[axis].iter();
             terms.map(|(at, by)| by * answers.after(axis, state - at - late)).sum()
         };
-        let taken = |state: isize| answers.after(axis, state + UNHEARD - late);
+        let states: Vec<f64> = (0..self.rates.len() as isize).map(at).collect();
+        states.windows(2).map(|pair| pair[1] - pair[0]).collect()
+    }
+
+    /// Least squares of the changes of a rate from state to state: gusts, which wander, are nearly
+    /// white in them; by how much they are not, the standard error is made larger. Beside the answer to
+    /// what was commanded there is one to the step that the surfaces made when the helm went over,
+    /// of unknown size, `taken` states before the first, and a constant.
+    fn axis(&self, answers: &Answers, axis: usize, answered: &[f64], taken: isize) -> Option<Fit> {
+        let to_step = |state: isize| answers.after(axis, state + taken);
         let rows = || {
-            self.rates.windows(2).enumerate().filter_map(|(state, pair)| {
+            let states = self.rates.windows(2).zip(answered).enumerate();
+            states.filter_map(|(state, (pair, answered))| {
                 let [Some(before), Some(after)] = pair else { return None };
                 let now = state as isize + 1;
-                let step = [answered(now) - answered(now - 1), taken(now) - taken(now - 1)];
-                Some((Vector3::new(step[0], step[1], 1.0), after[axis] - before[axis]))
+                let row = Vector3::new(*answered, to_step(now) - to_step(now - 1), 1.0);
+                Some((row, after[axis] - before[axis]))
             })
         };
         let (mut normal, mut right, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0);

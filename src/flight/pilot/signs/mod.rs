@@ -205,6 +205,15 @@ mod tests {
     /// The verdict on the model itself, `late` states away, when `wired` lies between commands and
     /// surfaces; with the states it took.
     fn verdict(late: usize, wired: impl Fn([f64; 2]) -> [f64; 2]) -> (Verdict, u64) {
+        verdict_after(2, late, wired)
+    }
+
+    /// The same when the helm went over `unheard` states before that is heard.
+    fn verdict_after(
+        unheard: usize,
+        late: usize,
+        wired: impl Fn([f64; 2]) -> [f64; 2],
+    ) -> (Verdict, u64) {
         let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
         let full = model.airframe.actuators.deflection_max;
         let trim = Trim::level(&model, 20.0, 600.0).unwrap();
@@ -216,8 +225,7 @@ mod tests {
         check.await_helm();
         assert_eq!(check.command(Time::default()), None);
         check.begin(level);
-        // The helm has gone over before it is heard.
-        for _ in 0..2 {
+        for _ in 0..unheard {
             let [aileron, elevator] = wired([level.aileron, level.elevator]);
             twin.step(&model, &Command { aileron, elevator, throttle });
         }
@@ -254,10 +262,13 @@ mod tests {
         for late in [0, 3, 6] {
             let roll = verdict(late, |[aileron, elevator]| [-aileron, elevator]).0;
             assert_eq!(roll, Verdict::Wrong(Fault::Reversed(Axis::Roll)), "{late}");
-            let pitch = verdict(late, |[aileron, elevator]| [aileron, -elevator]).0;
-            // A reversed trim alone throws the nose up, and it may be given up before it is told.
-            let named = pitch == Verdict::Wrong(Fault::Reversed(Axis::Pitch));
-            assert!(named || pitch == Verdict::Wrong(Fault::SignsUnknown), "{late}: {pitch:?}");
+            // A reversed trim throws the nose up before any pulse, sooner or later.
+            for unheard in 0..=4 {
+                let (pitch, _) =
+                    verdict_after(unheard, late, |[aileron, elevator]| [aileron, -elevator]);
+                let named = pitch == Verdict::Wrong(Fault::Reversed(Axis::Pitch));
+                assert!(named, "{late}, {unheard}: {pitch:?}");
+            }
         }
     }
 
