@@ -15,7 +15,7 @@ const LEAST: usize = 14;
 const LIKENESS: f64 = 0.9;
 /// States by which the surfaces had been taken over before the first state of the check: its telling comes
 /// down the same wire as the states; when the controller looks at its channels makes it sooner or later.
-const TAKEN: RangeInclusive<isize> = -2..=4;
+const TAKEN: RangeInclusive<isize> = -1..=2;
 
 /// The answer that fits best: a multiple of the model's, with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]

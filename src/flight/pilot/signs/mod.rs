@@ -29,7 +29,7 @@ const ROUND: usize = PATTERN.len() * LENGTH + 2 * OFFSET;
 /// The state by which a check has ended.
 const LONGEST: usize = PULSES.len() * ROUND;
 /// A sign is certain from so many standard errors on: it is asked anew at every state.
-const CERTAIN: f64 = 6.0;
+const CERTAIN: f64 = 7.0;
 /// A sign is not told before its surface has gone the other way and been answered: one edge may
 /// meet one gust.
 const SEEN: [usize; 2] = [LENGTH + ANSWERED, OFFSET + LENGTH + ANSWERED];
