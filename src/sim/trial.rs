@@ -48,13 +48,21 @@ impl Trial {
     /// # Errors
     /// If the aircraft cannot be built, or cannot be held inside its bounds.
     pub fn fly(&self, controller: &dyn Controller) -> Result<Logs, FlightTestError> {
-        let training = flights::training(self.seed);
+        let training = self.training(controller)?;
         let testing = flights::testing(self.seed);
-        let all: Vec<&Schedule> = training.iter().chain(&testing).collect();
-        let logged = |(k, schedule): (usize, &&Schedule)| self.log(k, schedule, controller);
-        let mut logs = all.iter().enumerate().map(logged).collect::<Result<Vec<_>, _>>()?;
-        let testing = logs.split_off(training.len());
-        Ok(Logs { training: logs, testing })
+        let logged =
+            |(k, schedule): (usize, &Schedule)| self.log(training.len() + k, schedule, controller);
+        let testing = testing.iter().enumerate().map(logged).collect::<Result<_, _>>()?;
+        Ok(Logs { training, testing })
+    }
+
+    /// The flights to fit on alone.
+    ///
+    /// # Errors
+    /// As [`Self::fly`].
+    pub fn training(&self, controller: &dyn Controller) -> Result<Vec<Flight>, FlightTestError> {
+        let schedules = flights::training(self.seed);
+        schedules.iter().enumerate().map(|(k, s)| self.log(k, s, controller)).collect()
     }
 
     /// The log of one schedule, the `k`-th flight of the trial.

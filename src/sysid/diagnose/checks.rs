@@ -20,15 +20,17 @@ const BOOTSTRAPS: u64 = 82;
 pub const ALIKE: f64 = 0.9;
 /// Nor those whose evidence is this close.
 pub const CLOSE: f64 = 10.0;
-/// Squared error per row beyond the noise that the rich fit leaves, in flights in which nothing is missing any
-/// more: that fit follows some of the noise, which stands in its columns too (0.15 to 0.35).
-const FEIGNED: f64 = 0.2;
-/// How much that may be off.
-const UNSURE: f64 = 0.2;
+/// Squared error per row by which the level of the noise may be off: with nothing missing, −0.03 to 0.07.
+const UNSURE: f64 = 0.1;
 /// Standard deviations of the noise's square beyond which what an effect leaves is no chance.
-const DOUBT: f64 = 5.0;
+const DOUBT: f64 = 4.0;
 /// Least share of what a flight seems to tell that is more than the noise of its columns.
 const TOLD: f64 = 0.5;
+/// Prior standard deviations by which the model's own figures are wrong, if a candidate in their place is more
+/// than an error of the prior,
+const STRAIN: f64 = 5.0;
+/// and the least share of what it takes that this strain is.
+const RELIEF: f64 = 0.9;
 /// Candidates that a bootstrap lets compete.
 const COMPETING: usize = 8;
 
@@ -66,15 +68,33 @@ pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     taken / excess(round, &trial.channels).max(taken).max(1.0)
 }
 
-/// Share of the squared error beyond noise in the channels of an effect that is left once it has joined, if
-/// that is more than chance leaves; `fall` is what the effect took.
-pub fn left(round: &Round, channels: &[usize], fall: f64) -> Option<f64> {
-    let own: [bool; 6] = std::array::from_fn(|c| channels.contains(&c));
-    let rows = rows(round, &own);
-    let left = excess(round, &own) - FEIGNED * rows;
-    // the square of white noise scatters by √(2n)
-    let beyond_doubt = left > f64::max(DOUBT * (2.0 * rows).sqrt(), UNSURE * rows);
-    beyond_doubt.then(|| left / (left + fall))
+/// What a model leaves beyond noise.
+#[derive(Clone, Debug)]
+pub struct Beyond {
+    excess: [f64; 6],
+    rows: [f64; 6],
+}
+
+impl Beyond {
+    /// Of the model of `round`, which has no candidates: a fit with the columns of all of them follows the
+    /// noise that stands in these, and leaves down to half of it in the moments.
+    pub fn of(round: &Round) -> Beyond {
+        let only = |c: usize| std::array::from_fn(|k| k == c);
+        Beyond {
+            excess: std::array::from_fn(|c| excess(round, &only(c))),
+            rows: std::array::from_fn(|c| rows(round, &only(c))),
+        }
+    }
+
+    /// The share that is left in `channels` beside `fall`, which an effect took from them, if that is more than
+    /// chance leaves.
+    pub fn share(&self, channels: &[usize], fall: f64) -> Option<f64> {
+        let own = |of: &[f64; 6]| channels.iter().map(|c| of[*c]).sum::<f64>();
+        let (left, rows) = (own(&self.excess), own(&self.rows));
+        // the square of white noise scatters by √(2n)
+        let beyond_doubt = left > f64::max(DOUBT * (2.0 * rows).sqrt(), UNSURE * rows);
+        beyond_doubt.then(|| left / (left + fall))
+    }
 }
 
 /// Squared whitened error beyond noise in `channels`.
@@ -101,6 +121,16 @@ fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
         None => score.weights.iter().map(|(c, _)| vec![(*c, 1.0)]).collect(),
         Some(_) => vec![score.weights.clone()],
     }
+}
+
+/// Whether `score` is the model's own figure by another name: what it takes is the strain of coefficients that
+/// the data has pulled far from their prior, and hardly any of the error, which they take as well.
+pub fn relieves(round: &Round, score: &Score) -> bool {
+    let prior = &round.projected.prior;
+    let last = round.projected.width();
+    let linear: f64 = score.weights.iter().map(|(c, w)| w * prior[(*c, last)]).sum();
+    let relief = 2.0 * linear - quadratic(&score.weights, &score.weights, prior);
+    relief > STRAIN.powi(2) && relief > RELIEF * score.fall
 }
 
 /// How much the contributions of two scores are alike: the correlation of what they add to the residual.

@@ -2,7 +2,7 @@
 
 use super::catalogue::{self, Columns, Entry};
 use super::cells::{Cells, Placed};
-use super::columns::{Ready, combine};
+use super::columns::{Ready, SENSORS, combine};
 use super::features;
 use super::gather::Column;
 use super::noise::Noise;
@@ -15,6 +15,8 @@ use crate::sysid::compare::flight::Prepared;
 
 /// Times a nonlinear candidate is linearised anew where it fits best.
 const REFINEMENTS: usize = 3;
+/// Times that the clocks' second order is taken anew.
+const CURVATURES: usize = 2;
 /// A nonlinear candidate is worth it if it takes this part of what the best one takes,
 const WORTH: f64 = 0.2;
 /// or if its evidence is this close to the best.
@@ -85,7 +87,7 @@ impl Round {
     ) -> Option<Round> {
         let flights: Vec<Ready> = problem.flights.iter().map(|f| Ready::new(&model, f)).collect();
         let cells = Cells::new(&flights);
-        let (known, coefficients, mut placed) = known(problem, &model, &flights);
+        let (mut known, coefficients, mut placed) = known(problem, &model, &flights);
         let features = features::features(&model, &flights, problem.seed);
         let made = catalogue::columns(&model, &flights, entries, &[]);
         let last = place(&mut placed, known.len(), &made, &flights);
@@ -98,7 +100,12 @@ impl Round {
         let kept: Vec<Placed> = placed.iter().map(|l| up_to(l, last)).collect();
         let (shared, disturbed) =
             shared(&Setting { problem, model: &model, entries }, &cells, &kept, last, &noise);
-        let projected = Projected::new(&cells, &kept, last, &known, &noise, &sum(&shared))?;
+        let shares = sum(&shared);
+        let mut projected = Projected::new(&cells, &kept, last, &known, &noise, &shares)?;
+        for _ in 0..CURVATURES {
+            curved(problem, &mut known, &projected);
+            projected = Projected::new(&cells, &kept, last, &known, &noise, &shares)?;
+        }
         Some(Round {
             model,
             flights,
@@ -417,6 +424,22 @@ fn known(problem: &Problem, model: &GreyBox, flights: &[Ready]) -> KnownColumns 
         }
     }
     (known, coefficients, placed)
+}
+
+/// Expects of every flight's blur what its clock adds to it: a record of u that is late by λ samples is
+/// u − λu' + ½λ²u'', and the clock's column holds the first order alone. Without the second, a delay of a
+/// sample that the clock takes for its own leaves a curvature that only a lag explains.
+fn curved(problem: &Problem, known: &mut [Known], projected: &Projected) {
+    let first = known.len().saturating_sub(problem.flights.len() * SENSORS);
+    for (k, flight) in problem.flights.iter().enumerate() {
+        let own = first + k * SENSORS;
+        let (late, blur) = (own + sensors::LATE_PLACE, own + sensors::BLUR_PLACE);
+        let samples = projected.tuned[late] / flight.dt;
+        let unsure = projected.covariance[(late, late)].max(0.0).sqrt() / flight.dt;
+        let [mean, sd] = sensors::BLURRED;
+        known[blur].offset = mean - 0.5 * samples * samples;
+        known[blur].width = sd.hypot(samples * unsure);
+    }
 }
 
 /// The physical bounds of a coefficient.

@@ -54,6 +54,8 @@ pub struct Selected {
     pub refused: Vec<String>,
     /// Whether it takes too little of the error to matter, whatever else speaks against it.
     pub slight: bool,
+    /// Whether it is a figure of the model's own by another name, so that what is left says nothing of it.
+    pub relieves: bool,
     /// Whether it is not linear in its constants.
     pub curved: bool,
     /// What it added to the residual, fitted, flight by flight.
@@ -70,6 +72,8 @@ pub struct Found {
     pub last: Option<Round>,
     /// The same of the last round.
     pub remainder: Remainder,
+    /// What the model of the last round leaves beyond noise; `None` if that is the first one.
+    pub beyond: Option<checks::Beyond>,
     /// Scores of the last round.
     pub scores: Vec<(usize, Score)>,
     /// Best evidence in the null flights of the first round.
@@ -78,6 +82,8 @@ pub struct Found {
     pub threshold: f64,
     /// Trials of the last round that lost against the first one once both had settled.
     pub beaten: Vec<usize>,
+    /// Trials of the last round that were as good as the first one once both had settled.
+    pub level: Vec<usize>,
     /// Asserted effects in the order of selection, then the one refused, if there is one.
     pub selected: Vec<Selected>,
 }
@@ -110,14 +116,17 @@ pub fn search(
         first,
         first_remainder,
         last: None,
+        beyond: None,
         scores,
         nulls,
         threshold,
         beaten: Vec::new(),
+        level: Vec::new(),
         selected: Vec::new(),
     };
     while found.selected.len() < MOST {
         found.beaten.clear();
+        found.level.clear();
         run_off(problem, &mut found);
         let Some(winner) = examine(&found, options) else { break };
         let passed = winner.refused.is_empty();
@@ -132,7 +141,8 @@ pub fn search(
 }
 
 /// Puts the best of several close contenders first, each joined to the model and settled under one noise, and
-/// takes those out that lose clearly: a linearisation at the model without them does not tell them apart.
+/// tells those that lose clearly from those that are as good: a linearisation at the model without them does
+/// not tell them apart.
 fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
     let round = found.last.as_ref().unwrap_or(&found.first);
     let (_, best) = found.scores.first()?;
@@ -167,14 +177,13 @@ fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
     let errors: Vec<(usize, f64)> =
         contend.iter().map(|k| (*k, error(k).unwrap_or(f64::INFINITY))).collect();
     let (winner, least) = *errors.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let beaten: Vec<usize> = errors
-        .iter()
-        .filter(|(k, e)| *k != winner && *e > least + checks::CLOSE)
-        .map(|(k, _)| found.scores[*k].0)
-        .collect();
+    let others = errors.iter().filter(|(k, _)| *k != winner);
+    let (beaten, level): (Vec<_>, Vec<_>) = others.partition(|(_, e)| *e > least + checks::CLOSE);
+    let trials = |of: Vec<&(usize, f64)>| of.iter().map(|(k, _)| found.scores[*k].0).collect();
+    let (beaten, level) = (trials(beaten), trials(level));
     let first = found.scores.remove(winner);
     found.scores.insert(0, first);
-    found.beaten = beaten;
+    (found.beaten, found.level) = (beaten, level);
     Some(())
 }
 
@@ -192,10 +201,15 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
     }
     let mut class = checks::class(round, &found.scores, 0);
     class.retain(|k| !found.beaten.contains(&found.scores[*k].0));
+    // settled, they are as good: how they did where the model was linearised without them says no more
+    let level = (1..found.scores.len()).filter(|k| found.level.contains(&found.scores[*k].0));
+    let level: Vec<usize> = level.filter(|k| !class.contains(k)).collect();
+    class.extend(level);
     let members: Vec<usize> =
         std::iter::once(*place).chain(class.iter().map(|k| found.scores[*k].0)).collect();
     let heldout = checks::heldout_reduction(round, trial, score);
-    let slight = heldout < HELD_OUT || heldout.is_nan();
+    let relieves = checks::relieves(round, score);
+    let slight = (heldout < HELD_OUT || heldout.is_nan()) && !relieves;
     if slight {
         refused.push(format!(
             "it takes {:.0} % of the error on held-out segments, under {:.0} %",
@@ -240,6 +254,7 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
         channels: round.channels_of(score),
         refused,
         slight,
+        relieves,
         curved: trial.points[score.point].contribution.is_some(),
         contribution,
     })
@@ -298,6 +313,8 @@ impl Found {
                 break;
             }
         }
+        let Some(settled) = Round::new(problem, model.clone(), &[]) else { return false };
+        self.beyond = Some(checks::Beyond::of(&settled));
         let open: Vec<Entry> = entries.iter().filter(|e| !model.has(e.about.id)).copied().collect();
         let Some(mut round) = Round::new(problem, model, &open) else { return false };
         self.scores = round.rank();
@@ -312,8 +329,8 @@ impl Found {
     /// themselves and what a flexible model could remove besides, or of what is more than noise.
     fn judge_remainder(&mut self) {
         let (before, after) = (&self.first_remainder, &self.remainder);
-        let round = self.last.as_ref().unwrap_or(&self.first);
-        for effect in self.selected.iter_mut().filter(|s| s.refused.is_empty()) {
+        let told = self.selected.iter_mut().filter(|s| s.refused.is_empty() && !s.relieves);
+        for effect in told {
             let own = |of: &[f64; 6]| effect.channels.iter().map(|c| of[*c]).sum::<f64>();
             let significant =
                 effect.channels.iter().any(|c| after.removable[*c] > after.threshold[*c]);
@@ -325,7 +342,8 @@ impl Found {
                     100.0 * share
                 ));
             }
-            let left = checks::left(round, &effect.channels, effect.score.fall);
+            let beyond = self.beyond.as_ref();
+            let left = beyond.and_then(|b| b.share(&effect.channels, effect.score.fall));
             if let Some(share) = left.filter(|share| *share > LEFT) {
                 effect.refused.push(format!(
                     "with it, {:.0} % of what its channels have beyond noise is still there",

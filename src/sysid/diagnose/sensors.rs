@@ -24,6 +24,10 @@ pub const NAMES: [&str; SENSORS] = [
 
 /// Name of the actuators' lateness.
 pub const LATE: &str = "skew_actuators";
+/// Its place in [`NAMES`].
+pub const LATE_PLACE: usize = SENSORS - 2;
+/// Place of the actuators' blur.
+pub const BLUR_PLACE: usize = SENSORS - 1;
 
 /// Least standard deviations: rad/s, rad, a share, m/s², s; a filter that knows only its own errors states
 /// less than it has.
@@ -37,7 +41,7 @@ pub const BLURRED: [f64; 2] = [1.0 / 16.0, 1.0 / 24.0];
 
 /// What each is taken for before anything is fitted.
 pub fn mean(which: usize) -> f64 {
-    if which + 1 == SENSORS { BLURRED[0] } else { 0.0 }
+    if which == BLUR_PLACE { BLURRED[0] } else { 0.0 }
 }
 
 /// Prior widths of the sensor errors of a flight whose samples are `dt` (s) apart.
