@@ -99,6 +99,13 @@ fn an_effect_on_the_deflections_is_named() {
     found("dead_zone", 0.025, 0.1, 3);
 }
 
+/// The three training flights of a trial.
+fn trained(seed: u64, missing: Vec<Missing>) -> Vec<Reconstruction> {
+    let trial = Trial { seed, missing, turbulence: None };
+    let logs = trial.training(control::build(Kind::Lqi, &exact()).unwrap().as_ref()).unwrap();
+    logs.iter().map(rebuilt).collect()
+}
+
 /// What a case of the benchmark asserts: three flights under `id`, and a model without it, as
 /// `examples/hide_and_find` has them.
 fn benchmark(id: &str, amplitude: f64, seed: u64) -> Vec<(String, f64)> {
@@ -109,11 +116,8 @@ fn benchmark(id: &str, amplitude: f64, seed: u64) -> Vec<(String, f64)> {
     std::fs::copy(folder.join("airframe.toml"), start.path().join("airframe.toml")).unwrap();
     let path = start.path().join("model.toml");
     std::fs::write(&path, starting_model(&reference, "start", seed, &missing).unwrap()).unwrap();
-    let trial = Trial { seed, missing, turbulence: None };
-    let logs = trial.training(control::build(Kind::Lqi, &exact()).unwrap().as_ref()).unwrap();
-    let flights: Vec<Reconstruction> = logs.iter().map(rebuilt).collect();
     let model = GreyBox::load(&path).unwrap();
-    let found = diagnose(&model, &flights, &Options::default(), &|_| {}).unwrap();
+    let found = diagnose(&model, &trained(seed, missing), &Options::default(), &|_| {}).unwrap();
     println!("{:#?}", found.sentences);
     let asserted = found.effects.iter().filter(|e| e.asserted);
     asserted.map(|e| (e.id.to_string(), e.parameters[0].value)).collect()
@@ -190,8 +194,7 @@ fn what_cannot_be_diagnosed_is_said() {
 fn the_prior_as_printed_has_its_thrust_and_its_inertia_wrong() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior-as-printed.toml");
     let printed = GreyBox::load(&path).unwrap();
-    let flights = flown(7, &[]);
-    let found = diagnose(&printed, &flights, &Options::default(), &|_| {}).unwrap();
+    let found = diagnose(&printed, &trained(5, Vec::new()), &Options::default(), &|_| {}).unwrap();
     println!("{:#?}", found.sentences);
     let of = |id: &str| {
         let effect = found.effects.iter().find(|e| e.id == id).unwrap();
