@@ -155,7 +155,8 @@ fn estimate(c: &Candidate) -> String {
 }
 
 fn channels(diagnosis: &Diagnosis) -> Table {
-    let mut table = table(["channel", "unexplained, tuned", "with the effects", "worst regime"]);
+    let mut table =
+        table(["channel", "unexplained, tuned", "with the effects", "goes with", "worst regime"]);
     for column in table.column_iter_mut().skip(1).take(2) {
         column.set_cell_alignment(CellAlignment::Right);
     }
@@ -164,6 +165,7 @@ fn channels(diagnosis: &Diagnosis) -> Table {
             c.channel.clone(),
             format!("{:.3} %", 100.0 * c.tuned_unexplained_fraction),
             format!("{:.3} %", 100.0 * c.unexplained_fraction),
+            c.left_with.clone().unwrap_or("–".into()),
             c.worst_regime.clone().unwrap_or("–".into()),
         ]);
     }

@@ -165,10 +165,13 @@ fn left(d: &Diagnosis) -> Figure {
 
 fn worst(d: &Diagnosis) -> Figure {
     use super::Align::Left;
-    let mut table = Table::new("Worst regime", &[("Channel", Left), ("What is left", Left)]);
+    let columns = [("Channel", Left), ("What is left", Left), ("Goes with", Left)];
+    let mut table = Table::new("Worst regime", &columns);
     for channel in &d.channels {
-        if let Some(sentence) = &channel.worst_regime {
-            table.push([channel_of(&channel.channel), sentence.clone()]);
+        if channel.worst_regime.is_some() || channel.left_with.is_some() {
+            let text = |of: &Option<String>| of.clone().unwrap_or("–".into());
+            let (worst, term) = (text(&channel.worst_regime), text(&channel.left_with));
+            table.push([channel_of(&channel.channel), worst, term]);
         }
     }
     Figure::Table(table)

@@ -216,6 +216,7 @@ pub fn diagnosis() -> Diagnosis {
             "L" => Some("lift is 24 ± 3 % too high for α > 12°, 96 samples, all 3 flights".into()),
             _ => None,
         },
+        left_with: (channel == "L").then(|| "α²".into()),
     };
     let measured = |flight: &str, id: &str, value, sd, unit: &str, asserted| Measurement {
         flight: flight.into(),

@@ -215,7 +215,7 @@ fn add_spin(model: &GreyBox, flight: &Prepared, residual: &mut Column) {
 }
 
 /// Second differences of aileron, elevator and throttle.
-fn bends(flight: &Prepared, segment: usize, index: usize) -> [f64; 3] {
+pub fn bends(flight: &Prepared, segment: usize, index: usize) -> [f64; 3] {
     let instants = &flight.segments[segment];
     let (before, after) = (index.saturating_sub(1), (index + 1).min(instants.len() - 1));
     let of = |i: &Instant| [i.controls.aileron, i.controls.elevator, i.controls.throttle];

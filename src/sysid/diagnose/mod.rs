@@ -33,6 +33,7 @@ mod run;
 mod search;
 mod sensors;
 mod sentences;
+mod shape;
 mod shared;
 mod shares;
 mod whiten;

@@ -132,6 +132,11 @@ impl Projected {
         })
     }
 
+    /// Number of rows, channel by channel.
+    pub fn rows_by_channel(&self) -> [f64; 6] {
+        std::array::from_fn(|c| self.by_channel.iter().map(|of| of[c].1 as f64).sum())
+    }
+
     /// Number of candidate columns.
     pub fn width(&self) -> usize {
         self.total.ncols() - 1

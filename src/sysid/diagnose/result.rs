@@ -139,6 +139,8 @@ pub struct ChannelLeft {
     pub unexplained_fraction: f64,
     /// The worst regime in one sentence, where there is one.
     pub worst_regime: Option<String>,
+    /// The product of states that what is left goes with most, where more is left than chance leaves.
+    pub left_with: Option<String>,
 }
 
 /// A sensor's error or the wind in one flight.

@@ -124,7 +124,7 @@ fn verdict(found: &Found) -> Verdict {
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;
     if found.selected.iter().any(|s| s.refused.is_empty()) {
         Verdict::Effect
-    } else if found.selected.iter().any(|s| !s.slight) || significant {
+    } else if found.selected.iter().any(|s| !s.slight) || significant || found.has_shape() {
         Verdict::Unexplained
     } else {
         Verdict::Adequate

@@ -7,7 +7,9 @@ use super::options::Options;
 use super::rank::Score;
 use super::remainder::{Remainder, remainder};
 use super::round::{Problem, Round};
+use super::shape::{Shape, shape};
 use crate::model::GreyBox;
+use crate::physics::inputs::Kind;
 
 /// Most effects that are asserted together.
 const MOST: usize = 6;
@@ -25,6 +27,8 @@ const CONTENDING_LIKENESS: f64 = 0.6;
 const CONTENDERS: usize = 4;
 /// Part of what is to be removed from its channels that an effect may leave there.
 const LEFT: f64 = 0.3;
+/// The same of what products of the states take beside it: right ones leave less than 0.02.
+const SHAPELESS: f64 = 0.1;
 /// Precision of the formula of an effect that is not linear in its constants: whatever takes a smaller part of
 /// what such an effect took before may be no more than its error.
 const PRECISION: f64 = 2e-3;
@@ -74,6 +78,8 @@ pub struct Found {
     pub remainder: Remainder,
     /// What the model of the last round leaves beyond noise; `None` if that is the first one.
     pub beyond: Option<checks::Beyond>,
+    /// What products of the states take of what it leaves; `None` if they cannot be fitted.
+    pub shape: Option<Shape>,
     /// Scores of the last round.
     pub scores: Vec<(usize, Score)>,
     /// Best evidence in the null flights of the first round.
@@ -106,6 +112,7 @@ pub fn search(
     let tuned = Round::new(problem, model.clone(), &[])?.tuned();
     let entries = catalogue::candidates(model, &options.without);
     progress(&format!("ranking {} candidate effects", entries.len()));
+    let shape = shape(&Round::new(problem, tuned.clone(), &[])?, options.nulls);
     let mut first = Round::new(problem, tuned, &entries)?;
     let scores = first.rank();
     let nulls = nulls::best(&first.projected, &first.trials, options.seed, options.nulls);
@@ -117,6 +124,7 @@ pub fn search(
         first_remainder,
         last: None,
         beyond: None,
+        shape,
         scores,
         nulls,
         threshold,
@@ -315,6 +323,7 @@ impl Found {
         }
         let Some(settled) = Round::new(problem, model.clone(), &[]) else { return false };
         self.beyond = Some(checks::Beyond::of(&settled));
+        self.shape = shape(&settled, options.nulls);
         let open: Vec<Entry> = entries.iter().filter(|e| !model.has(e.about.id)).copied().collect();
         let Some(mut round) = Round::new(problem, model, &open) else { return false };
         self.scores = round.rank();
@@ -350,7 +359,36 @@ impl Found {
                     100.0 * share
                 ));
             }
+            let Some(shape) = &self.shape else { continue };
+            let beside = shape.beside(&effect.channels, effect.score.fall);
+            if let Some((share, term)) = beside.filter(|(share, _)| *share > SHAPELESS) {
+                effect.refused.push(format!(
+                    "with it, products of the states, {term} above all, still explain {:.0} % of what is \
+                     missing: its formula has another shape",
+                    100.0 * share
+                ));
+            }
+            if Kind::from_id(effect.id).is_some() && shape.bends() {
+                effect.refused.push(
+                    "with it, second derivatives of the surfaces still explain part of what is missing: \
+                     what acts on them takes another course in time"
+                        .into(),
+                );
+            }
         }
+        // what was found beside an effect that is not there is no more sure than that
+        let Some(first) = self.selected.iter().position(|s| !s.refused.is_empty()) else { return };
+        let (refused, later) = self.selected.split_at_mut(first + 1);
+        for effect in later.iter_mut().filter(|s| s.refused.is_empty()) {
+            effect
+                .refused
+                .push(format!("it was found beside {}, which is refused", refused[first].id));
+        }
+    }
+
+    /// Whether what is left goes with products of states more than chance does.
+    pub fn has_shape(&self) -> bool {
+        self.shape.as_ref().is_some_and(|shape| (0..6).any(|c| shape.term(c).is_some()))
     }
 
     /// Share of the squared error beyond noise under the tuned model that a flexible model could still

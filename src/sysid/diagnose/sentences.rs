@@ -27,11 +27,15 @@ pub fn sentences(
         )),
         Verdict::Unexplained => said.push(format!(
             "Something is missing, and no effect of the catalogue is it: a flexible model could remove \
-             {:.0} % of the error beyond noise{}.",
+             {:.0} % of the error beyond noise on flights that it was not fitted on{}.",
             100.0 * found.learnable(),
             best_of(effects)
         )),
     }
+    said.extend(channels.iter().filter_map(|c| {
+        let term = c.left_with.as_ref()?;
+        Some(format!("More than noise is left in {}: it goes with {term} above all.", c.channel))
+    }));
     if verdict == Verdict::Effect && found.remainder.total > found.remainder.total_threshold {
         said.push(format!(
             "Beside that, a flexible model could remove {:.1} % of what the tuned model left beyond noise, \

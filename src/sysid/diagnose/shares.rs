@@ -49,6 +49,7 @@ pub fn channels(found: &Found) -> Vec<ChannelLeft> {
             tuned_unexplained_fraction: share(&before),
             unexplained_fraction: share(&after),
             worst_regime: worst(found.round(), &after, k),
+            left_with: found.shape.as_ref().and_then(|shape| shape.term(k)),
         });
     }
     list
