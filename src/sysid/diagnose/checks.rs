@@ -108,11 +108,8 @@ pub fn excess(round: &Round, channels: &[bool; 6]) -> f64 {
 
 /// Rows in `channels`.
 fn rows(round: &Round, channels: &[bool; 6]) -> f64 {
-    let blocks = round.projected.by_channel.iter();
-    let of = |sums: &[(f64, usize); 6]| -> usize {
-        (0..6).filter(|c| channels[*c]).map(|c| sums[c].1).sum()
-    };
-    blocks.map(of).sum::<usize>() as f64
+    let all = round.projected.rows_by_channel();
+    (0..6).filter(|c| channels[*c]).map(|c| all[c]).sum()
 }
 
 /// What may be scaled in a contribution: each column of a linear candidate, a nonlinear one as a whole.

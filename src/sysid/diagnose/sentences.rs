@@ -26,9 +26,8 @@ pub fn sentences(
             best_of(effects)
         )),
         Verdict::Unexplained => said.push(format!(
-            "Something is missing, and no effect of the catalogue is it: a flexible model could remove \
-             {:.0} % of the error beyond noise on flights that it was not fitted on{}.",
-            100.0 * found.learnable(),
+            "Something is missing, and no effect of the catalogue is it{}{}.",
+            removable(found),
             best_of(effects)
         )),
     }
@@ -99,6 +98,18 @@ fn asserted(c: &Candidate) -> String {
         );
     }
     text
+}
+
+/// What a flexible model could remove, if it is more than chance.
+fn removable(found: &Found) -> String {
+    match found.remainder.total > found.remainder.total_threshold {
+        true => format!(
+            ": a flexible model could remove {:.0} % of the error beyond noise on flights that it was not \
+             fitted on",
+            100.0 * found.learnable()
+        ),
+        false => String::new(),
+    }
 }
 
 fn best_of(effects: &[Candidate]) -> String {
