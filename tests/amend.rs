@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 
 use amend_support::{Manoeuvres, errors, flight, fly, off, sensors};
 use greylag::logs::csv;
-use greylag::model::GreyBox;
+use greylag::model::{GreyBox, Integrator};
 use greylag::sysid::amend::{Added, AmendError, Options, amend};
 use greylag::sysid::reconstruction::Reconstruction;
 
@@ -32,15 +32,60 @@ fn validate_a_hidden_lag_is_measured_and_the_error_falls() {
     assert!((tau.value / 0.05 - 1.0).abs() < 0.05, "{tau:?}");
     assert!(tau.sd > 0.0 && tau.sd < 0.1 * tau.value, "{tau:?}");
     assert!(story.effects[0].refused.is_empty(), "{:?}", story.effects);
-    let at_5s = |scores: &[greylag::sysid::compare::HorizonScore]| {
-        scores.iter().find(|s| s.horizon_s == 5.0).unwrap().rmse_scaled
-    };
     // against the model as given and against the tuned one: a lag of 50 ms is most of what is left
     assert!(at_5s(&story.before) < 0.5 * at_5s(&story.given));
     assert!(at_5s(&story.after) < 0.5 * at_5s(&story.before));
     // what was 15 % wrong is right again where these flights tell: roll damping drives every roll
     let clp = story.parameters.iter().find(|p| p.name == "roll_linear.Clp").unwrap();
     assert!((clp.value / -0.4042 - 1.0).abs() < 0.05, "{clp:?}");
+}
+
+fn at_5s(scores: &[greylag::sysid::compare::HorizonScore]) -> f64 {
+    scores.iter().find(|s| s.horizon_s == 5.0).unwrap().rmse_scaled
+}
+
+/// JSBSim steps by a scheme of its own, its forces act in wind axes.
+#[test]
+fn validate_an_integrator_that_no_coefficient_makes_up_for_is_replaced() {
+    let mut model = sensors::model();
+    model.integrator = Integrator::Rk4;
+    let all = flights("", 41);
+    let options = Options { conventions: true, ..Options::default() };
+    let found = amend(&model, &all[..2], &all[2..], &options, &|_| ()).unwrap();
+    let story = &found.amendment;
+    story.sentences.iter().for_each(|s| println!("{s}"));
+    let tried: Vec<_> = story.conventions.iter().map(|t| (t.from, t.to, t.kept)).collect();
+    assert_eq!(tried, [("rk4", "jsbsim", true), ("wind", "stability", false)]);
+    assert_eq!(found.model.integrator, Integrator::Jsbsim);
+    assert!(at_5s(&story.after) < 0.9 * at_5s(&story.before));
+}
+
+/// A model whose lift has a hump between 4° and 8° that the aircraft lacks: no formula's shape.
+#[test]
+fn validate_a_curve_takes_up_what_no_formula_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+    std::fs::copy(params.join("airframe.toml"), folder.path().join("airframe.toml")).unwrap();
+    let text = std::fs::read_to_string(params.join("jsbsim.toml")).unwrap();
+    let mut humped = text.clone();
+    for (table, hump) in [
+        ("-0.0001, 0.1308, 0.2146", "-0.0001, 0.0698132, 0.1047198, 0.1308, 0.1396263, 0.2146"),
+        ("0.1119, 0.6222, 0.896", "0.1119, 0.384449, 0.570529, 0.634843, 0.651038, 0.896"),
+    ] {
+        assert!(humped.contains(table));
+        humped = humped.replace(table, hump);
+    }
+    let path = folder.path().join("humped.toml");
+    std::fs::write(&path, humped).unwrap();
+    let model = GreyBox::load(&path).unwrap();
+    let all = flights("", 44);
+    let found = amend(&model, &all[..2], &all[2..], &added("lift_curve"), &|_| ()).unwrap();
+    let story = &found.amendment;
+    story.sentences.iter().for_each(|s| println!("{s}"));
+    assert!(story.effects[0].refused.is_empty(), "{:?}", story.effects[0].refused);
+    assert!(at_5s(&story.after) < 0.5 * at_5s(&story.before));
+    let hump = story.parameters.iter().find(|p| p.name == "lift_curve.CL_p6").unwrap();
+    assert!((hump.value + 0.05).abs() < 0.01, "{hump:?}");
 }
 
 #[test]

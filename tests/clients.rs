@@ -4,6 +4,8 @@
 //! target folder, which the first test to need it makes. Without Python or PyPI the tests say so
 //! and pass; with `GREYLAG_REQUIRE_CLIENTS=1` they fail instead.
 
+mod real_time;
+
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -85,18 +87,23 @@ fn environment(folder: &Path, requirements: &str) -> Result<PathBuf, String> {
 }
 
 /// The shim's program. `cargo test --workspace` builds it beside ours; a test of this package
-/// alone does not, so it is asked for here: with the same packages and features, so that it costs
-/// nothing when it is there.
+/// alone does not, so it is asked for here: as a test of the whole workspace with the same
+/// features, so that nothing is built anew.
 fn shim() -> &'static Path {
     static SHIM: OnceLock<PathBuf> = OnceLock::new();
     SHIM.get_or_init(|| {
         let mut cargo = Command::new(env!("CARGO"));
         cargo
-            .args(["build", "--quiet", "--ignore-rust-version", "--workspace"])
-            .args(["--no-default-features", "--features", "greylag/sitl"])
-            .args(["--bin", "greylag-sitl", "--target-dir"])
+            .args(["test", "--no-run", "--quiet", "--ignore-rust-version", "--workspace"])
+            .args(["--test", "shim_program", "--features", "greylag/sitl", "--target-dir"])
             .arg(profile_folder().parent().unwrap())
             .current_dir(env!("CARGO_MANIFEST_DIR"));
+        if cfg!(feature = "learn") {
+            cargo.args(["--features", "greylag/learn"]);
+        }
+        if !cfg!(feature = "default") {
+            cargo.arg("--no-default-features");
+        }
         // The profile of a folder is its name, but for `dev`.
         match profile_folder().file_name().and_then(|name| name.to_str()) {
             Some("debug") => {}
@@ -128,11 +135,17 @@ fn fly_in(environment: &Environment, script: &str) {
             return;
         }
     };
+    let shim = shim();
+    real_time::in_real_time(script, || flown(python, script, shim));
+}
+
+/// Flies a script once, with the Python and the shim given.
+fn flown(python: &Path, script: &str, shim: &Path) {
     let folder = tempfile::tempdir().unwrap();
     let Output { status, stdout, stderr } = Command::new(python)
         .arg(Path::new(SCRIPTS).join(script))
         .args(["--greylag", GREYLAG, "--sitl"])
-        .arg(shim())
+        .arg(shim)
         // No __pycache__ among the sources.
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .current_dir(folder.path())

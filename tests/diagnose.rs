@@ -232,4 +232,8 @@ fn the_prior_as_printed_has_its_thrust_and_its_inertia_wrong() {
     let jxz = 0.9343 + of("inertia_xz");
     assert!((jxz / -0.9343 - 1.0).abs() < 0.05, "{jxz}");
     assert!(of("lift_stall") > 0.0);
+    assert!(of("drag_elevator_abs") > 0.0);
+    // −|CYβ| β² stand in the drag of a model whose side force is not turned with the wind
+    let named = |id: &str| found.effects.iter().any(|e| e.id == id && e.asserted);
+    assert!(named("drag_alpha2") && named("drag_beta2"), "{:#?}", found.sentences);
 }

@@ -1,6 +1,7 @@
 //! The whole companion over real sockets: a scripted vehicle on one side, clients on the other.
 
 mod flight_support;
+mod real_time;
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -35,7 +36,6 @@ fn land(companion: Companion, vehicle: WallVehicle) -> Vehicle {
     vehicle
 }
 
-#[test]
 fn an_attitude_is_flown_and_setpoint_loss_ends_level_in_hold() {
     let (companion, vehicle, mut client) = in_offboard();
     client.steer(20.0, 5.0, 6.0);
@@ -57,7 +57,6 @@ fn an_attitude_is_flown_and_setpoint_loss_ends_level_in_hold() {
     assert!(vehicle.state().roll.to_degrees().abs() < 0.5, "{:?}", vehicle.state());
 }
 
-#[test]
 fn a_lost_vehicle_is_told_and_flown_in_hold_when_it_is_back() {
     let (companion, vehicle, mut client) = in_offboard();
     client.steer(20.0, 5.0, 2.0);
@@ -72,7 +71,6 @@ fn a_lost_vehicle_is_told_and_flown_in_hold_when_it_is_back() {
     assert!(vehicle.state().roll.to_degrees().abs() < 1.0, "{:?}", vehicle.state());
 }
 
-#[test]
 fn a_vehicle_whose_rates_are_not_numbers_is_held_level_and_told() {
     let (companion, vehicle, mut client) = in_offboard();
     client.steer(20.0, 5.0, 1.0);
@@ -90,7 +88,6 @@ fn a_vehicle_whose_rates_are_not_numbers_is_held_level_and_told() {
     );
 }
 
-#[test]
 fn setpoints_of_garbage_move_nothing_and_do_not_keep_offboard_alive() {
     let (companion, vehicle, mut client) = in_offboard();
     client.steer(20.0, 5.0, 3.0);
@@ -112,7 +109,6 @@ fn setpoints_of_garbage_move_nothing_and_do_not_keep_offboard_alive() {
     land(companion, vehicle);
 }
 
-#[test]
 fn garbage_and_a_flood_from_both_sides_delay_no_answer_and_move_no_surface() {
     let (companion, vehicle, client) = in_offboard();
     client.steer(20.0, 5.0, 3.0);
@@ -150,7 +146,6 @@ fn garbage_and_a_flood_from_both_sides_delay_no_answer_and_move_no_surface() {
     );
 }
 
-#[test]
 fn a_second_client_watches_and_a_restarted_one_takes_over() {
     let (companion, vehicle, client) = in_offboard();
     let mut second = Client::new(companion.client(0));
@@ -174,7 +169,6 @@ fn a_second_client_watches_and_a_restarted_one_takes_over() {
     assert!((roll - 15.0).abs() < 1.0, "{roll}");
 }
 
-#[test]
 fn a_client_over_tcp_is_served_like_any_other() {
     let companion = Companion::start(&options(Pace::RealTime));
     let mut vehicle = Vehicle::new(companion.vehicle());
@@ -269,3 +263,13 @@ fn a_planner_that_is_always_late_leaves_the_fallback_flying_and_is_recorded() {
     // The tlog holds both sides' traffic: at least a state frame's five messages with its answer.
     assert!(written.frames >= 6 * written.rows, "{written:?}");
 }
+
+real_time::tests!(
+    an_attitude_is_flown_and_setpoint_loss_ends_level_in_hold,
+    a_lost_vehicle_is_told_and_flown_in_hold_when_it_is_back,
+    a_vehicle_whose_rates_are_not_numbers_is_held_level_and_told,
+    setpoints_of_garbage_move_nothing_and_do_not_keep_offboard_alive,
+    garbage_and_a_flood_from_both_sides_delay_no_answer_and_move_no_surface,
+    a_second_client_watches_and_a_restarted_one_takes_over,
+    a_client_over_tcp_is_served_like_any_other,
+);

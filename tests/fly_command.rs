@@ -1,6 +1,7 @@
 //! `greylag fly` as a user runs it: the real program, its words and its exit status.
 
 mod flight_support;
+mod real_time;
 
 use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;
@@ -112,7 +113,6 @@ fn interrupt(child: &Child) {
     assert!(status.success());
 }
 
-#[test]
 fn a_flight_is_announced_told_summed_up_and_recorded_until_ctrl_c() {
     let folder = tempfile::tempdir().unwrap();
     let [vehicle_port, client_port] = free_ports();
@@ -167,3 +167,5 @@ fn a_duration_ends_the_flight_by_itself() {
     assert!(output.status.success() && said.contains("flew 0.5 s: 0 states"), "{said}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+real_time::tests!(a_flight_is_announced_told_summed_up_and_recorded_until_ctrl_c,);

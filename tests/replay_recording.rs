@@ -3,6 +3,7 @@
 
 mod controller_support;
 mod flight_support;
+mod real_time;
 mod shim_support;
 
 use std::io::{BufRead, BufReader};
@@ -35,7 +36,6 @@ fn sitl() -> Vehicle {
     Vehicle::Sitl(Sitl::new(1, x8().airframe.actuators.deflection_max))
 }
 
-#[test]
 fn a_flight_with_everything_in_it_replays_to_the_bit() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("flight");
@@ -108,7 +108,6 @@ fn without_the_helm(folder: &Path, to: &Path) {
     std::fs::write(to.join("flight.calls"), left.collect::<String>()).unwrap();
 }
 
-#[test]
 fn a_flight_with_a_check_of_signs_replays_to_the_bit() {
     for personality in [Personality::Px4, Personality::Ardupilot] {
         let root = tempfile::tempdir().unwrap();
@@ -212,7 +211,6 @@ fn killed_after(seconds: f64) -> f64 {
     flown - last
 }
 
-#[test]
 fn after_a_kill_the_log_is_readable_up_to_the_last_second() {
     // Moments spread over the recorder's interval of half a second.
     for i in 0..8 {
@@ -317,7 +315,6 @@ fn kill(count: usize, at_once: usize, seed: u64) {
     assert!(taken_over <= 1.5, "{taken_over}");
 }
 
-#[test]
 fn after_a_kill_the_controller_takes_over_and_a_restart_waits_to_be_asked() {
     kill(3, 3, 1);
 }
@@ -327,3 +324,10 @@ fn after_a_kill_the_controller_takes_over_and_a_restart_waits_to_be_asked() {
 fn after_a_hundred_kills_beside_a_controller_it_is_the_same() {
     kill(100, 6, 2);
 }
+
+real_time::tests!(
+    a_flight_with_everything_in_it_replays_to_the_bit,
+    a_flight_with_a_check_of_signs_replays_to_the_bit,
+    after_a_kill_the_log_is_readable_up_to_the_last_second,
+    after_a_kill_the_controller_takes_over_and_a_restart_waits_to_be_asked,
+);

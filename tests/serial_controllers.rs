@@ -3,6 +3,7 @@
 
 mod controller_support;
 mod flight_support;
+mod real_time;
 mod shim_support;
 mod wire_support;
 
@@ -114,22 +115,18 @@ fn flown(personality: Personality, authority: Authority) -> Option<f64> {
 
 // The bounds are those of issue 8.
 
-#[test]
 fn surfaces_through_px4() {
     assert!(settled(Px4, Surfaces) < 0.3);
 }
 
-#[test]
 fn surfaces_through_ardupilot() {
     assert!(settled(Ardupilot, Surfaces) < 0.6);
 }
 
-#[test]
 fn attitude_through_px4() {
     assert!(settled(Px4, Attitude) < 0.1);
 }
 
-#[test]
 fn attitude_through_ardupilot() {
     assert!(settled(Ardupilot, Attitude) < 0.1);
 }
@@ -168,7 +165,6 @@ fn refused(personality: Personality, reversed: (&str, f64)) -> Option<String> {
     Some(said)
 }
 
-#[test]
 fn a_wrong_sign_is_refused_with_the_remedy_and_the_aircraft_handed_back() {
     for (personality, reversed, words) in [
         (Px4, ("PWM_MAIN_REV", 1.0), ["it rolls left", "CA_SV_CSn_TRQ_R or PWM_MAIN_REV"]),
@@ -183,7 +179,6 @@ fn a_wrong_sign_is_refused_with_the_remedy_and_the_aircraft_handed_back() {
     }
 }
 
-#[test]
 fn a_plug_that_is_pulled_hands_the_aircraft_back_and_nothing_is_taken_again() {
     let mut wired = Wired::start(Px4, Surfaces);
     wired.engage();
@@ -210,3 +205,12 @@ fn a_plug_that_is_pulled_hands_the_aircraft_back_and_nothing_is_taken_again() {
     wired.shim.end();
     wired.companion.end();
 }
+
+real_time::tests!(
+    surfaces_through_px4,
+    surfaces_through_ardupilot,
+    attitude_through_px4,
+    attitude_through_ardupilot,
+    a_wrong_sign_is_refused_with_the_remedy_and_the_aircraft_handed_back,
+    a_plug_that_is_pulled_hands_the_aircraft_back_and_nothing_is_taken_again,
+);

@@ -2,6 +2,7 @@
 #![cfg(feature = "sitl")]
 
 mod flight_support;
+mod real_time;
 mod shim_support;
 mod wire_support;
 
@@ -48,7 +49,6 @@ impl Wired {
     }
 }
 
-#[test]
 fn an_attitude_is_flown_over_the_wire() {
     let mut wired = Wired::start();
     // What is measured is the wire, not how long a busy machine keeps this test from running.
@@ -70,7 +70,6 @@ fn an_attitude_is_flown_over_the_wire() {
     assert!(settled < 0.1, "{settled}");
 }
 
-#[test]
 fn a_plug_that_is_pulled_in_a_turn_levels_the_aircraft_and_comes_back() {
     let mut wired = Wired::start();
     wired.client.engage(40.0, 5.0);
@@ -95,7 +94,6 @@ fn a_plug_that_is_pulled_in_a_turn_levels_the_aircraft_and_comes_back() {
     assert!(last[0].to_degrees().abs() < 2.0, "{last:?}");
 }
 
-#[test]
 fn a_wrong_baud_rate_is_recognised_and_said() {
     let cable = Cable::new(BAUD);
     let vehicle = cable.companion_at(115_200).parse().unwrap();
@@ -118,3 +116,9 @@ fn a_wrong_baud_rate_is_recognised_and_said() {
     shim.end();
     companion.end();
 }
+
+real_time::tests!(
+    an_attitude_is_flown_over_the_wire,
+    a_plug_that_is_pulled_in_a_turn_levels_the_aircraft_and_comes_back,
+    a_wrong_baud_rate_is_recognised_and_said,
+);

@@ -1,6 +1,8 @@
 //! The PX4 simulator API: rates, lockstep, reconnection, clients that are not what they should be.
 
 mod px4_client;
+#[path = "../../tests/real_time/mod.rs"]
+mod real_time;
 
 use std::io::Read;
 use std::net::TcpStream;
@@ -163,7 +165,6 @@ fn each_output_acts_with_its_sign() {
     assert_eq!(one(15, -1.0), neutral);
 }
 
-#[test]
 fn without_lockstep_time_is_the_walls() {
     let mut options = hurried();
     options.pace = Pace::RealTime;
@@ -192,7 +193,6 @@ fn without_lockstep_time_is_the_walls() {
     simulator.stop();
 }
 
-#[test]
 fn lockstep_keeps_to_the_wall_clock_unless_it_is_told_to_hurry() {
     let mut options = hurried();
     options.pace = Pace::RealTime;
@@ -207,7 +207,6 @@ fn lockstep_keeps_to_the_wall_clock_unless_it_is_told_to_hurry() {
     simulator.stop();
 }
 
-#[test]
 fn a_client_that_stops_answering_is_told_and_may_be_replaced() {
     let simulator = Simulator::start(hurried());
     let mut hung = Px4::boot(simulator.address);
@@ -338,3 +337,9 @@ fn the_program_waits_for_px4_and_names_bad_options() {
     let said = String::from_utf8_lossy(&said);
     assert!(said.contains("waiting for PX4") && said.contains("PX4_SYS_AUTOSTART"), "{said}");
 }
+
+real_time::tests!(
+    without_lockstep_time_is_the_walls,
+    lockstep_keeps_to_the_wall_clock_unless_it_is_told_to_hurry,
+    a_client_that_stops_answering_is_told_and_may_be_replaced,
+);

@@ -1,5 +1,7 @@
 //! Real time over real sockets: the wall clock rules, whatever the companion does.
 
+#[path = "../../tests/real_time/mod.rs"]
+mod real_time;
 mod shim_companion;
 
 use std::time::{Duration, Instant};
@@ -9,7 +11,6 @@ use shim_companion::*;
 
 const STEP_US: u64 = 10_000;
 
-#[test]
 fn sends_a_hundred_frames_a_second_without_drift() {
     let (mut companion, link) = listening();
     let shim = Shim::start(real_time(&link));
@@ -33,7 +34,6 @@ fn sends_a_hundred_frames_a_second_without_drift() {
     assert!(summary.latency.count() + 3 >= summary.answers, "every answer's delay is measured");
 }
 
-#[test]
 fn time_runs_without_anybody_there() {
     // Nobody listens on the port: every datagram is refused.
     let (companion, link) = listening();
@@ -46,7 +46,6 @@ fn time_runs_without_anybody_there() {
     assert_eq!((summary.answers, summary.flown_s), (0, 0.0), "held until armed");
 }
 
-#[test]
 fn a_silent_companion_leaves_the_surfaces_where_they_are_commanded() {
     let (mut companion, link) = listening();
     let at = companion.address().to_string();
@@ -70,7 +69,6 @@ fn a_silent_companion_leaves_the_surfaces_where_they_are_commanded() {
     assert!(summary.unanswered_steps >= 200, "{} steps alone", summary.unanswered_steps);
 }
 
-#[test]
 fn stale_wrong_and_repeated_answers_are_not_flown() {
     let (mut companion, link) = listening();
     let shim = Shim::start(real_time(&link));
@@ -108,7 +106,6 @@ fn stale_wrong_and_repeated_answers_are_not_flown() {
     );
 }
 
-#[test]
 fn a_flood_of_answers_costs_no_frame() {
     let (mut companion, link) = listening();
     let shim = Shim::start(real_time(&link));
@@ -127,7 +124,6 @@ fn a_flood_of_answers_costs_no_frame() {
     assert!(summary.bad_frames >= 950, "{}", summary.bad_frames);
 }
 
-#[test]
 fn frames_are_delayed_and_dropped_as_asked() {
     let (mut companion, link) = listening();
     let mut options = real_time(&link);
@@ -153,7 +149,6 @@ fn frames_are_delayed_and_dropped_as_asked() {
     assert_eq!(summary.wrong_answers + summary.stale_answers, 0, "{summary}");
 }
 
-#[test]
 fn over_tcp_a_companion_that_does_not_read_costs_no_cycle() {
     let shim = Shim::start(real_time("tcpin:127.0.0.1:0"));
     let mut companion = Companion::tcp_out(shim.address());
@@ -171,7 +166,6 @@ fn over_tcp_a_companion_that_does_not_read_costs_no_cycle() {
     assert!(summary.frames >= 220, "{summary}");
 }
 
-#[test]
 fn late_frames_hold_up_those_behind_them_and_none_is_lost() {
     let (mut companion, link) = listening();
     let mut options = real_time(&link);
@@ -212,3 +206,14 @@ fn a_minute_of_real_time() {
     println!("{summary}");
     assert_eq!(summary.late_cycles, 0, "cycles that began more than 2 ms late");
 }
+
+real_time::tests!(
+    sends_a_hundred_frames_a_second_without_drift,
+    time_runs_without_anybody_there,
+    a_silent_companion_leaves_the_surfaces_where_they_are_commanded,
+    stale_wrong_and_repeated_answers_are_not_flown,
+    a_flood_of_answers_costs_no_frame,
+    frames_are_delayed_and_dropped_as_asked,
+    over_tcp_a_companion_that_does_not_read_costs_no_cycle,
+    late_frames_hold_up_those_behind_them_and_none_is_lost,
+);

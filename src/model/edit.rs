@@ -39,6 +39,8 @@ pub struct Edit {
     /// Coefficients of effects that are new, those of one effect in a row, with the source of the
     /// effect's formula.
     pub added: Vec<(Number, String)>,
+    /// Texts that stand in place of what the file has: keys, the last of them below the others.
+    pub replaced: Vec<(&'static [&'static str], &'static str)>,
     /// What they were fitted to, for their sources.
     pub fitted_to: String,
 }
@@ -53,6 +55,17 @@ impl Edit {
         for (key, new) in [("name", &self.name), ("airframe", &self.airframe)] {
             let old = document.get_mut(key).and_then(Item::as_value_mut);
             replace(old.ok_or_else(|| EditError::Place(key.into()))?, new.as_str().into());
+        }
+        for (keys, new) in &self.replaced {
+            let place = || EditError::Place(keys.join("."));
+            let (last, tables) = keys.split_last().ok_or_else(place)?;
+            let mut table: &mut dyn TableLike = document.as_table_mut();
+            for key in tables {
+                let next = table.get_mut(key).and_then(Item::as_table_like_mut);
+                table = next.ok_or_else(place)?;
+            }
+            let old = table.get_mut(last).and_then(Item::as_value_mut);
+            replace(old.ok_or_else(place)?, (*new).into());
         }
         let place = || EditError::Place("effects".into());
         let effects = document.get_mut("effects").ok_or_else(place)?;
@@ -136,6 +149,9 @@ schema = 1
 name = "prior" # why
 airframe = "airframe.toml"
 
+[air]
+density = { kgpm3 = 1.2 } # at home
+
 [effects.lift_linear]
 # the slope
 CLalpha = { value = 4.0, source = "Gryte" } # measured
@@ -152,6 +168,7 @@ CLq = { value = 3.87, source = "Gryte" }
             airframe: "a.toml".into(),
             changed: vec![number("lift_linear.CLalpha", 0.1 + 0.2, Some(0.01))],
             added: vec![(number("lift_stall.k", 1.0, None), "BM12".into())],
+            replaced: vec![(&["air", "density"], "standard")],
             fitted_to: "a.csv (sha256 01)".into(),
         }
     }
@@ -159,7 +176,14 @@ CLq = { value = 3.87, source = "Gryte" }
     #[test]
     fn comments_stay_and_numbers_return_to_the_bit() {
         let text = edit().apply(TEXT).unwrap();
-        for kept in ["# about", "# why", "# the slope", "# measured", "CLq = { value = 3.87, "] {
+        for kept in [
+            "# about",
+            "# why",
+            "density = \"standard\" # at home",
+            "# the slope",
+            "# measured",
+            "CLq = { value = 3.87, ",
+        ] {
             assert!(text.contains(kept), "{kept} lost in\n{text}");
         }
         let read: toml::Table = toml::from_str(&text).unwrap();

@@ -68,6 +68,7 @@ pub fn amendment() -> Amendment {
                 fly_next: "a push-over at fixed elevator".into(),
             },
         ],
+        conventions: Vec::new(),
         parameters: vec![
             parameter("lift_linear.CLalpha", false, [4.02, 0.6, 4.4, 0.05]),
             parameter("drag_linear.CD0", false, [0.0254, 0.004, 0.0381, 0.0004]),

@@ -28,7 +28,7 @@ const IN_DOUBT: u8 = 2;
 /// Options of `greylag amend`.
 #[derive(clap::Args)]
 #[command(
-    group = clap::ArgGroup::new("what").required(true),
+    group = clap::ArgGroup::new("what").required(true).multiple(true),
     after_help = "Exit status: 0 done, 1 nothing was written, 2 written, but an effect was refused, a log was left out or flights contradict one another."
 )]
 pub struct Arguments {
@@ -44,12 +44,16 @@ pub struct Arguments {
     /// Add the effects that a diagnosis of these logs asserts.
     #[arg(long, group = "what")]
     accept: bool,
-    /// Add these effects of the catalogue, in this order.
+    /// Add these effects of the catalogue, in this order; with --accept after those that are asserted.
     #[arg(long = "effect", value_name = "ID", num_args = 1.., group = "what")]
     effects: Vec<String>,
     /// Add nothing: fit the model's own coefficients.
-    #[arg(long, group = "what")]
+    #[arg(long, group = "what", conflicts_with_all = ["accept", "effects"])]
     tune_only: bool,
+    /// Also try the model's other conventions (integrator, axes of the forces, the standard atmosphere), and
+    /// take those with which flights that the fit has not seen are flown clearly better.
+    #[arg(long)]
+    conventions: bool,
     /// Write effects into the model that the data refuse.
     #[arg(long)]
     accept_anyway: bool,
@@ -110,6 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     };
     let options = amend::Options {
         effects: wanted(arguments, &model, &flights)?,
+        conventions: arguments.conventions,
         refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
         ..amend::Options::default()
     };
@@ -175,19 +180,22 @@ fn wanted(
     model: &GreyBox,
     flights: &[Reconstruction],
 ) -> Result<Vec<Added>> {
-    if !arguments.accept {
-        let named = |id: &String| Added { id: id.clone(), start: None };
-        return Ok(arguments.effects.iter().map(named).collect());
+    let mut all = Vec::new();
+    if arguments.accept {
+        let options = diagnose::Options::default();
+        let diagnosis = diagnose(model, flights, &options, &|doing| eprintln!("{doing}"))?;
+        all.extend(diagnosis.effects.iter().filter(|c| c.asserted).map(accepted));
+        if all.is_empty() {
+            let said = diagnosis.sentences.join(" ");
+            bail!("the diagnosis asserts no effect, so there is none to accept; it says: {said}");
+        }
     }
-    let options = diagnose::Options::default();
-    let diagnosis = diagnose(model, flights, &options, &|doing| eprintln!("{doing}"))?;
-    let asserted: Vec<Added> =
-        diagnosis.effects.iter().filter(|c| c.asserted).map(accepted).collect();
-    if asserted.is_empty() {
-        let said = diagnosis.sentences.join(" ");
-        bail!("the diagnosis asserts no effect, so there is none to accept; it says: {said}");
+    for id in &arguments.effects {
+        if all.iter().all(|added: &Added| added.id != *id) {
+            all.push(Added { id: id.clone(), start: None });
+        }
     }
-    Ok(asserted)
+    Ok(all)
 }
 
 /// An asserted effect, to be searched for near where the diagnosis has it.

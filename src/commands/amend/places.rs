@@ -10,7 +10,7 @@ use crate::commands::files::{self, Overwrite};
 use crate::model::GreyBox;
 use crate::model::edit::{Edit, Number};
 use crate::physics::catalogue;
-use crate::sysid::amend::{Amended, Amendment};
+use crate::sysid::amend::{Amended, Amendment, Convention};
 
 /// Characters of a file's SHA-256 that sources carry.
 const PREFIX: usize = 12;
@@ -145,6 +145,7 @@ fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) 
     };
     let all = amended.model.coefficients();
     let changed = all.iter().filter(|c| fitted.iter().any(|p| p.name == c.name && !p.added));
+    let taken = amended.amendment.conventions.iter().filter(|t| t.kept);
     let logs: Vec<String> = logs.iter().map(short).collect();
     let name = match known == all.len() {
         true => format!("{}-tuned", before.name),
@@ -155,6 +156,7 @@ fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) 
         name: if name.len() <= NAME { name } else { shortened },
         airframe,
         changed: changed.map(number).collect(),
+        replaced: taken.map(|t| (t.convention.key(), t.to)).collect(),
         added: all.iter().filter(|c| new(&c.name)).map(|c| (number(c), source(&c.name))).collect(),
         fitted_to: logs.join(", "),
     }
@@ -165,8 +167,11 @@ fn short(log: &Hashed) -> String {
     format!("{name} (sha256 {})", &log.sha256[..PREFIX])
 }
 
-/// A coefficient that is not the same to the bit.
+/// A coefficient that is not the same to the bit, or a convention that is not the same.
 fn differs(read: &GreyBox, meant: &GreyBox) -> Option<String> {
+    if let Some(other) = Convention::ALL.into_iter().find(|c| c.of(read) != c.of(meant)) {
+        return Some(other.key().join("."));
+    }
     if read.coefficients().len() != meant.coefficients().len() {
         return Some("number of coefficients".into());
     }

@@ -18,16 +18,22 @@ pub enum Pace {
 /// an unanswered frame after one second.
 pub const PATIENCE: Duration = Duration::from_millis(1200);
 
+/// Most of a silence that counts between two looks at the link: a companion that was held up itself has not
+/// listened meanwhile.
+const LISTENED: Duration = Duration::from_millis(100);
+
 /// Maps the host's clock to the vehicle's.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clock {
     pace: Pace,
     anchor: Option<(Instant, Time)>,
+    /// Silence since the anchor that was listened to, and until when.
+    listened: (Duration, Option<Instant>),
 }
 
 impl Clock {
     pub(super) fn new(pace: Pace) -> Self {
-        Clock { pace, anchor: None }
+        Clock { pace, anchor: None, listened: (Duration::ZERO, None) }
     }
 
     /// How the vehicle's time passes.
@@ -38,6 +44,12 @@ impl Clock {
     /// A state of vehicle time `time` arrived at `arrived`.
     pub(super) fn set(&mut self, arrived: Instant, time: Time) {
         self.anchor = Some((arrived, time));
+        self.listened = (Duration::ZERO, Some(arrived));
+    }
+
+    /// The link is looked at, at `host`.
+    pub(super) fn listen(&mut self, host: Instant) {
+        self.listened = (self.silence(host), Some(host));
     }
 
     /// Vehicle time at `host`; zero before the first state.
@@ -45,11 +57,17 @@ impl Clock {
         let Some((arrived, time)) = self.anchor else {
             return Time::default();
         };
-        let silence = host.saturating_duration_since(arrived);
         match self.pace {
-            Pace::RealTime => time.plus(silence),
-            Pace::Lockstep => time.plus(silence.saturating_sub(PATIENCE)),
+            Pace::RealTime => time.plus(host.saturating_duration_since(arrived)),
+            Pace::Lockstep => time.plus(self.silence(host).saturating_sub(PATIENCE)),
         }
+    }
+
+    /// How long the vehicle has been silent at `host` while somebody listened.
+    fn silence(&self, host: Instant) -> Duration {
+        let (silence, until) = self.listened;
+        let since = until.map_or(Duration::ZERO, |until| host.saturating_duration_since(until));
+        silence + since.min(LISTENED)
     }
 }
 
@@ -70,7 +88,14 @@ mod tests {
         }
         let mut clock = Clock::new(Pace::Lockstep);
         clock.set(start, time(5000));
+        for look in 1..=170 {
+            clock.listen(later(10 * look));
+        }
         // Half a second beyond the patience the pilot finds the link lost.
         assert_eq!(clock.at(later(1700)), time(5500));
+        // A companion that stood still for five seconds has not heard five seconds of silence.
+        assert_eq!(clock.at(later(6700)), time(5600));
+        clock.set(later(6700), time(5010));
+        assert_eq!(clock.at(later(9000)), time(5010));
     }
 }

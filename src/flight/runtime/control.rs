@@ -303,6 +303,7 @@ impl Control {
 
     /// Does what is due at `host`.
     fn poll(&mut self, host: Instant) {
+        self.clock.listen(host);
         let now = self.now(host);
         self.note(Call::Advance(now.vehicle));
         self.pilot.advance(now.vehicle);

@@ -142,63 +142,109 @@ mod tests {
         Request { observation, target: Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 }, engage }
     }
 
-    /// A controller that takes its time, whose throttle counts its engagements.
+    /// A controller whose first plans wait until they are let go. Its throttle counts its engagements, its
+    /// aileron its plans.
     #[derive(Clone)]
-    struct Slow {
-        takes: Vec<Duration>,
+    struct Held {
+        begun: Sender<()>,
+        gate: Receiver<()>,
+        waits: Vec<bool>,
         engaged: f64,
+        planned: f64,
     }
 
-    impl Controller for Slow {
+    impl Controller for Held {
         fn boxed_clone(&self) -> Box<dyn Controller> {
             Box::new(self.clone())
         }
         fn name(&self) -> &'static str {
-            "slow"
+            "held"
         }
         fn reset(&mut self, _seed: u64) {
             self.engaged += 0.1;
         }
         fn command(&mut self, _: &Observation, _: &Target) -> Command {
-            std::thread::sleep(self.takes.pop().unwrap_or_default());
-            Command { throttle: self.engaged, ..Command::IDLE }
+            self.planned += 0.1;
+            self.begun.send(()).unwrap();
+            if self.waits.pop().unwrap_or_default() {
+                self.gate.recv().unwrap();
+            }
+            Command { throttle: self.engaged, aileron: self.planned, ..Command::IDLE }
         }
     }
 
-    fn threaded(pace: Pace, takes_ms: &[u64]) -> Threaded {
-        let takes = takes_ms.iter().rev().map(|ms| Duration::from_millis(*ms)).collect();
-        // 50 ms instead of 8, so that a busy machine does not decide the test.
-        Threaded::start(Box::new(Slow { takes, engaged: 0.0 }), Duration::from_millis(50), pace)
-            .unwrap()
+    /// A planner, what tells that a plan is begun, and what lets one that waits go.
+    struct Bench {
+        planner: Threaded,
+        begun: Receiver<()>,
+        go: Sender<()>,
+    }
+
+    impl Bench {
+        /// `waits`: which plans wait, the first first.
+        fn new(pace: Pace, waits: &[bool]) -> Bench {
+            let ((begun, told), (go, gate)) = (bounded(9), bounded(9));
+            let waits = waits.iter().rev().copied().collect();
+            let controller = Held { begun, gate, waits, engaged: 0.0, planned: 0.0 };
+            let planner = Threaded::start(Box::new(controller), Duration::ZERO, pace).unwrap();
+            Bench { planner, begun: told, go }
+        }
+
+        /// A plan that nothing holds up, however slow the machine.
+        fn in_time(&mut self, engage: bool) -> Plan {
+            self.planner.deadline = Duration::from_secs(60);
+            self.planner.plan(&any_request(engage), Instant::now())
+        }
+
+        fn too_late(&mut self, engage: bool) {
+            self.planner.deadline = Duration::from_millis(5);
+            assert_eq!(self.planner.plan(&any_request(engage), Instant::now()), Plan::Late);
+        }
+
+        /// Waits for plans that came too late.
+        fn done(&self, plans: usize) {
+            while self.planner.plans.len() < plans {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
+
+    fn ready(throttle: f64, aileron: f64) -> Plan {
+        Plan::Ready(Command { throttle, aileron, ..Command::IDLE })
     }
 
     #[test]
     fn a_plan_that_misses_its_tick_is_never_used_at_a_later_one() {
-        let mut planner = threaded(Pace::RealTime, &[0, 200]);
-        let engaged = Plan::Ready(Command { throttle: 0.1, ..Command::IDLE });
-        assert_eq!(planner.plan(&any_request(true), Instant::now()), engaged);
-        let before = Instant::now();
-        assert_eq!(planner.plan(&any_request(false), before), Plan::Late);
-        assert!(before.elapsed() < Duration::from_millis(150));
-        std::thread::sleep(Duration::from_millis(300));
-        assert_eq!(planner.plan(&any_request(false), Instant::now()), engaged);
+        let mut bench = Bench::new(Pace::RealTime, &[false, true]);
+        assert_eq!(bench.in_time(true), ready(0.1, 0.1));
+        bench.too_late(false);
+        bench.go.send(()).unwrap();
+        bench.done(1);
+        assert_eq!(bench.in_time(false), ready(0.1, 0.1 + 0.1 + 0.1));
     }
 
     #[test]
     fn an_engagement_during_a_late_plan_is_told_afterwards() {
-        let mut planner = threaded(Pace::RealTime, &[300]);
-        assert_eq!(planner.plan(&any_request(true), Instant::now()), Plan::Late);
+        let mut bench = Bench::new(Pace::RealTime, &[true]);
+        bench.too_late(true);
+        bench.begun.recv().unwrap();
         // This one waits in the queue, the next finds the queue full.
-        assert_eq!(planner.plan(&any_request(false), Instant::now()), Plan::Late);
-        assert_eq!(planner.plan(&any_request(true), Instant::now()), Plan::Late);
-        std::thread::sleep(Duration::from_millis(400));
-        let twice = Plan::Ready(Command { throttle: 0.2, ..Command::IDLE });
-        assert_eq!(planner.plan(&any_request(false), Instant::now()), twice);
+        bench.too_late(false);
+        bench.too_late(true);
+        bench.go.send(()).unwrap();
+        bench.done(2);
+        assert_eq!(bench.in_time(false), ready(0.2, 0.1 + 0.1 + 0.1));
     }
 
     #[test]
     fn in_lockstep_the_plan_is_waited_for() {
-        let mut planner = threaded(Pace::Lockstep, &[120]);
-        assert!(matches!(planner.plan(&any_request(false), Instant::now()), Plan::Ready(_)));
+        let mut bench = Bench::new(Pace::Lockstep, &[true]);
+        let go = bench.go.clone();
+        std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(50));
+            go.send(()).unwrap();
+        });
+        let plan = bench.planner.plan(&any_request(false), Instant::now());
+        assert_eq!(plan, ready(0.0, 0.1));
     }
 }

@@ -139,6 +139,8 @@ pub struct Description {
     pub entry: Option<Entry>,
 }
 
+mod curve;
+
 macro_rules! effects {
     ($($module:ident :: $type:ident),* $(,)?) => {
         $(mod $module; pub use $module::$type;)*
@@ -225,6 +227,8 @@ effects! {
     thrust_linear::ThrustLinear,
     lift_table::LiftTable,
     drag_table::DragTable,
+    lift_curve::LiftCurve,
+    drag_curve::DragCurve,
     drag_alpha2::DragAlpha2,
     drag_beta2::DragBeta2,
     drag_elevator_abs::DragElevatorAbs,

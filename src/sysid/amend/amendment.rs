@@ -1,5 +1,6 @@
 //! The amendment: the prior tuned, effects added one after the other, each judged on unseen flights.
 
+use super::conventions::{CLEARLY, Convention, Tried};
 use super::error::AmendError;
 use super::flight::Flight;
 use super::output_error::{self, Fit, FitOptions};
@@ -16,6 +17,10 @@ const JUDGED_AT_S: f64 = 5.0;
 const IMPROVED: f64 = 0.01;
 /// Standard deviations by which an effect's coefficient must exceed nought.
 const CLEAR: f64 = 1.96;
+/// The same for effects with more coefficients than three, one of which exceeds that by chance.
+const CLEAR_OF_MANY: f64 = 3.0;
+/// Times that all effects are asked for at most.
+const ROUNDS: usize = 3;
 /// Flights disagree if a flight's own estimate is this many standard deviations away…
 const DISAGREE: f64 = 4.0;
 /// …and by this share of the value.
@@ -48,12 +53,14 @@ pub struct Options {
     pub refused: Refused,
     /// Horizons of the free runs, s.
     pub horizons_s: Vec<f64>,
+    /// Whether the model's other conventions are tried too.
+    pub conventions: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
         let horizons_s = vec![1.0, 2.0, JUDGED_AT_S, 10.0];
-        Options { effects: Vec::new(), refused: Refused::Left, horizons_s }
+        Options { effects: Vec::new(), refused: Refused::Left, horizons_s, conventions: false }
     }
 }
 
@@ -89,22 +96,33 @@ pub fn amend(
     };
     let (train, test) = (ready(flights)?, ready(held_out)?);
     let judge = Judge { test: &test, horizons_s: &options.horizons_s };
-    let tuned = output_error::fit(model, &train, &FitOptions::default(), progress)?;
-    let mut best = (tuned.clone(), judge.scores(&tuned.model));
-    let (given, before) = (judge.scores(model), best.1.clone());
-    let mut accepted: Vec<&Added> = Vec::new();
-    let mut effects = Vec::new();
-    for added in &options.effects {
-        accepted.push(added);
-        let fitted = with_effects(model, &accepted, &train, progress);
-        let (effect, kept) = judge.verdict(added, fitted, &best.1, options.refused)?;
-        match kept {
-            Some(kept) => best = kept,
-            None => drop(accepted.pop()),
+    let of = |model: &GreyBox| selected(model, &options.effects, &train, &judge, options, progress);
+    let given = judge.scores(model);
+    let mut best = of(model)?;
+    let (tuned, before) = best.tuned.clone();
+    let mut conventions = Vec::new();
+    if options.conventions {
+        let mut base = model.clone();
+        for convention in Convention::ALL {
+            let Some(other) = convention.other(&base) else { continue };
+            let (from, to) = (convention.of(&base), convention.of(&other));
+            progress(&format!("{}: {to} instead of {from}", model.name));
+            let tried = match of(&other) {
+                Ok(tried) => Some(tried),
+                Err(why) if failed(&why) => None,
+                Err(why) => return Err(why),
+            };
+            let error = |of: &Selection| judged(&of.after).unwrap_or(f64::NAN);
+            let errors = [error(&best), tried.as_ref().map_or(f64::NAN, error)];
+            let better = tried
+                .filter(|t| t.fit.unsettled.is_none() && errors[1] < (1.0 - CLEARLY) * errors[0]);
+            conventions.push(Tried { convention, from, to, error: errors, kept: better.is_some() });
+            if let Some(better) = better {
+                (best, base) = (better, other);
+            }
         }
-        effects.push(effect);
     }
-    let (fit, after) = best;
+    let Selection { fit, after, effects, .. } = best;
     let mut notes = fit.notes.clone();
     notes.extend(contradictions(&fit.parameters));
     let mut story = Amendment {
@@ -113,6 +131,7 @@ pub fn amend(
         model: model.name.clone(),
         sentences: Vec::new(),
         effects,
+        conventions,
         parameters: fit.parameters.clone(),
         tuned: tuned.parameters.clone(),
         flights: fit.flights.clone(),
@@ -129,6 +148,54 @@ pub fn amend(
     };
     story.sentences = sentences(&story);
     Ok(Amended { amendment: story, model: fit.model, tuned: tuned.model })
+}
+
+/// A model with those of some effects that the flights bear out.
+struct Selection {
+    /// Tuned without any.
+    tuned: (Fit, Vec<HorizonScore>),
+    fit: Fit,
+    after: Vec<HorizonScore>,
+    effects: Vec<AddedEffect>,
+}
+
+/// Adds `effects` to `model` one after the other. One that was refused while something else was missing is
+/// asked for again once that has joined.
+fn selected(
+    model: &GreyBox,
+    effects: &[Added],
+    train: &[Flight],
+    judge: &Judge,
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Selection, AmendError> {
+    let tuned = output_error::fit(model, train, &FitOptions::default(), progress)?;
+    let scores = judge.scores(&tuned.model);
+    let mut best = (tuned.clone(), scores.clone());
+    let mut accepted: Vec<&Added> = Vec::new();
+    // each with the number of effects beside which it was asked for
+    let mut verdicts: Vec<Option<(AddedEffect, usize)>> = vec![None; effects.len()];
+    for _ in 0..ROUNDS {
+        for (added, verdict) in effects.iter().zip(&mut verdicts) {
+            let beside = accepted.len();
+            if verdict.as_ref().is_some_and(|(e, asked)| e.refused.is_empty() || *asked == beside) {
+                continue;
+            }
+            if accepted.iter().any(|a| a.id == added.id) {
+                continue;
+            }
+            accepted.push(added);
+            let fitted = with_effects(model, &accepted, train, progress);
+            let (effect, kept) = judge.verdict(added, fitted, &best.1, options.refused)?;
+            match kept {
+                Some(kept) => best = kept,
+                None => drop(accepted.pop()),
+            }
+            *verdict = Some((effect, beside));
+        }
+    }
+    let effects = verdicts.into_iter().flatten().map(|(effect, _)| effect).collect();
+    Ok(Selection { tuned: (tuned, scores), fit: best.0, after: best.1, effects })
 }
 
 /// `model` with an effect more, at its start.
@@ -197,7 +264,7 @@ impl Judge<'_> {
         };
         let fit = match fitted {
             Ok(fit) => fit,
-            Err(why @ (AmendError::NotConverged { .. } | AmendError::Singular { .. })) => {
+            Err(why) if failed(&why) => {
                 effect.refused.push(why.to_string());
                 return Ok((effect, None));
             }
@@ -219,6 +286,11 @@ impl Judge<'_> {
     }
 }
 
+/// Whether a fit failed at what was asked of it rather than at the flights.
+fn failed(why: &AmendError) -> bool {
+    matches!(why, AmendError::NotConverged { .. } | AmendError::Singular { .. })
+}
+
 /// The error at the horizon of judgement, if any run gets there.
 fn judged(scores: &[HorizonScore]) -> Option<f64> {
     let reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= JUDGED_AT_S + 1e-9);
@@ -236,7 +308,8 @@ fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
             p.name, p.value
         ));
     }
-    if !own.is_empty() && own.iter().all(|p| p.value.abs() < CLEAR * p.sd) {
+    let clear = if own.len() > 3 { CLEAR_OF_MANY } else { CLEAR };
+    if !own.is_empty() && own.iter().all(|p| p.value.abs() < clear * p.sd) {
         let all: Vec<String> =
             own.iter().map(|p| format!("{} = {:.3e} ± {:.1e}", p.name, p.value, p.sd)).collect();
         objections.push(format!("the interval holds nought: {}", all.join(", ")));
@@ -302,6 +375,16 @@ fn sentences(story: &Amendment) -> Vec<String> {
                 change(before, after)
             ));
         }
+    }
+    for Tried { convention, from, to, error: [a, b], kept } in &story.conventions {
+        let key = convention.key().join(".");
+        let said = if *kept { "is taken instead of" } else { "does not replace" };
+        let found = if b.is_nan() {
+            "no fit with it holds that long".into()
+        } else {
+            format!("{} ({a:.5} to {b:.5})", change(*a, *b))
+        };
+        all.push(format!("{key} {to} {said} {from}: {found}."));
     }
     for effect in story.effects.iter().filter(|e| !e.refused.is_empty()) {
         let verb =

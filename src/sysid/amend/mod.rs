@@ -5,6 +5,7 @@
 //! it was worth.
 
 mod amendment;
+mod conventions;
 mod equation_error;
 mod error;
 mod flight;
@@ -16,6 +17,7 @@ mod result;
 mod shooting;
 
 pub use amendment::{Added, Amended, Options, Refused, amend, contradictions, split};
+pub use conventions::{Convention, Tried};
 pub use error::AmendError;
 pub use flight::Flight;
 pub use output_error::{Fit, FitOptions};

@@ -8,6 +8,10 @@ use crate::physics::inputs;
 /// Coefficients of added effects that stay where they start: shares of a whole, which cannot be told
 /// from the shape beside them.
 const HELD: &[&str] = &["lift_stall.k"];
+/// Effects that correct others by what no formula says: heights where little was flown stay small,
+const SLIGHT: &[&str] = &["lift_curve", "drag_curve"];
+/// for their prior is this share of what is possible.
+const SLIGHT_SHARE: f64 = 0.1;
 /// Step of a derivative in a coefficient of the prior, as a share of its prior width.
 const STEP: f64 = 1e-3;
 /// Step of a derivative in a shape constant or that of an input effect, as a share of its value.
@@ -49,7 +53,7 @@ pub(super) fn describe(id: &str) -> Option<(Description, bool)> {
 /// The coefficients of `model` that may change when `added` are the ids of new effects.
 ///
 /// A coefficient of the prior is held if its width is zero; one of a new effect has no prior but its
-/// bounds.
+/// bounds, or a share of them.
 pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
     let linear = model.linear();
     let named = model.coefficients().iter().zip(linear).enumerate();
@@ -60,7 +64,8 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
             let coefficient = about.coefficients.iter().find(|k| k.name == short)?;
             let added = added.contains(&id);
             let (low, high) = coefficient.bounds;
-            let width = if added { high - low } else { c.width() };
+            let share = if SLIGHT.contains(&id) { SLIGHT_SHARE } else { 1.0 };
+            let width = if added { share * (high - low) } else { c.width() };
             if width <= 0.0 || (added && HELD.contains(&c.name.as_str())) {
                 return None;
             }

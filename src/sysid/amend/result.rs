@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::conventions::Tried;
 use super::flight::SENSORS;
 use crate::sysid::compare::HorizonScore;
 
@@ -108,6 +109,8 @@ pub struct Amendment {
     pub sentences: Vec<String>,
     /// The effects that were asked for.
     pub effects: Vec<AddedEffect>,
+    /// The conventions that were tried.
+    pub conventions: Vec<Tried>,
     /// Every coefficient that was free, with the effects.
     pub parameters: Vec<Parameter>,
     /// The prior's coefficients when tuned without the effects.

@@ -10,7 +10,6 @@ use super::gather::{Column, gather};
 use super::local::CHANNELS;
 use crate::model::{GreyBox, Integrator};
 use crate::num::stream::{Stream, stream};
-use crate::physics::State;
 use crate::sysid::compare::flight::Prepared;
 
 /// Random stream of the features.
@@ -37,15 +36,13 @@ struct Cosine {
 
 /// The features of every flight; the same in all channels, each times the dynamic pressure.
 pub fn features(model: &GreyBox, flights: &[Ready], seed: u64) -> Vec<Vec<Column>> {
-    let spread = spread(flights);
+    let spread = spread(flights, variables);
     let mut random = stream(seed, &[FEATURES]);
     let cosines: Vec<Cosine> = (0..COSINES).map(|_| cosine(&mut random)).collect();
     let of = |flight: &Ready| {
         let one = gather(&flight.acting, Integrator::Jsbsim, COUNT, |place, add| {
-            let raw = variables(&flight.acting, place.segment, place.index);
-            let z: [f64; VARIABLES] =
-                std::array::from_fn(|k| (raw[k] - spread[k][0]) / spread[k][1]);
-            let pressure = pressure(model, &place.at.state, place.at.altitude);
+            let z = standard(variables(&flight.acting, place.segment, place.index), &spread);
+            let pressure = model.air(&place.at.state, place.at.altitude).q_s;
             // forces weigh by samples, moments by steps: the two sides of a window
             for channel in [0, 3] {
                 for (k, z) in z.iter().enumerate() {
@@ -72,10 +69,6 @@ fn cosine(random: &mut Stream) -> Cosine {
     Cosine { frequency, phase: TAU * random.random::<f64>() }
 }
 
-fn pressure(model: &GreyBox, state: &State, altitude: f64) -> f64 {
-    model.air(state, altitude).q_s
-}
-
 fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES] {
     let instants = &flight.segments[segment];
     let i = &instants[index];
@@ -100,14 +93,18 @@ fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES
     ]
 }
 
-/// Mean and standard deviation of each variable over all flights.
-fn spread(flights: &[Ready]) -> [[f64; 2]; VARIABLES] {
-    let (mut sum, mut square, mut count) = ([0.0; VARIABLES], [0.0; VARIABLES], 0.0);
+/// Mean and standard deviation over all flights of each of the variables that `of` takes from a flight, a
+/// segment and an index.
+pub fn spread<const N: usize>(
+    flights: &[Ready],
+    of: impl Fn(&Prepared, usize, usize) -> [f64; N],
+) -> [[f64; 2]; N] {
+    let (mut sum, mut square, mut count) = ([0.0; N], [0.0; N], 0.0);
     for flight in flights {
         for (segment, instants) in flight.acting.segments.iter().enumerate() {
             for index in 0..instants.len() {
-                let x = variables(&flight.acting, segment, index);
-                for k in 0..VARIABLES {
+                let x = of(&flight.acting, segment, index);
+                for k in 0..N {
                     sum[k] += x[k];
                     square[k] += x[k] * x[k];
                 }
@@ -119,4 +116,9 @@ fn spread(flights: &[Ready]) -> [[f64; 2]; VARIABLES] {
         let mean = sum[k] / count;
         [mean, (square[k] / count - mean * mean).max(0.0).sqrt().max(1e-6)]
     })
+}
+
+/// `raw` less its mean, in standard deviations.
+pub fn standard<const N: usize>(raw: [f64; N], spread: &[[f64; 2]; N]) -> [f64; N] {
+    std::array::from_fn(|k| (raw[k] - spread[k][0]) / spread[k][1])
 }

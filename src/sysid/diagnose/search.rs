@@ -27,7 +27,8 @@ const CONTENDING_LIKENESS: f64 = 0.6;
 const CONTENDERS: usize = 4;
 /// Part of what is to be removed from its channels that an effect may leave there.
 const LEFT: f64 = 0.3;
-/// The same of what products of the states take beside it: right ones leave less than 0.02.
+/// The same of what products of the states take beside it: right ones leave less than 0.02, but for
+/// `unsteady_lift`, whose formula is not what the simulator has.
 const SHAPELESS: f64 = 0.1;
 /// Precision of the formula of an effect that is not linear in its constants: whatever takes a smaller part of
 /// what such an effect took before may be no more than its error.
@@ -54,6 +55,8 @@ pub struct Selected {
     pub by_flight: Vec<[f64; 2]>,
     /// Channels, the one with most of it first.
     pub channels: Vec<usize>,
+    /// What it took of the squared whitened error, channel by channel.
+    pub taken: [f64; 6],
     /// Why it is not asserted; empty if it is.
     pub refused: Vec<String>,
     /// Whether it takes too little of the error to matter, whatever else speaks against it.
@@ -260,6 +263,7 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
         selected,
         by_flight,
         channels: round.channels_of(score),
+        taken: round.taken_by(score),
         refused,
         slight,
         relieves,
@@ -338,6 +342,9 @@ impl Found {
     /// themselves and what a flexible model could remove besides, or of what is more than noise.
     fn judge_remainder(&mut self) {
         let (before, after) = (&self.first_remainder, &self.remainder);
+        let real = |s: &&Selected| s.refused.is_empty() && !s.relieves;
+        let taken: Vec<(&'static str, [f64; 6])> =
+            self.selected.iter().filter(real).map(|s| (s.id, s.taken)).collect();
         let told = self.selected.iter_mut().filter(|s| s.refused.is_empty() && !s.relieves);
         for effect in told {
             let own = |of: &[f64; 6]| effect.channels.iter().map(|c| of[*c]).sum::<f64>();
@@ -360,7 +367,11 @@ impl Found {
                 ));
             }
             let Some(shape) = &self.shape else { continue };
-            let beside = shape.beside(&effect.channels, effect.score.fall);
+            // several effects of a channel leave what they leave together
+            let others = taken.iter().filter(|(id, _)| *id != effect.id);
+            let others: f64 =
+                others.map(|(_, of)| effect.channels.iter().map(|c| of[*c]).sum::<f64>()).sum();
+            let beside = shape.beside(&effect.channels, effect.score.fall + others.max(0.0));
             if let Some((share, term)) = beside.filter(|(share, _)| *share > SHAPELESS) {
                 effect.refused.push(format!(
                     "with it, products of the states, {term} above all, still explain {:.0} % of what is \

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::cells::Placed;
 use super::columns::{Ready, bends};
+use super::features::{spread, standard};
 use super::gather::{Column, gather};
 use super::local::CHANNELS;
 use super::nulls;
@@ -16,8 +17,7 @@ use super::projected::{Projected, scaled_inverse};
 use super::round::Round;
 use crate::model::{GreyBox, Integrator};
 use crate::num::statistics::mean;
-use crate::physics::Controls;
-use crate::sysid::reconstruction::Instant;
+use crate::sysid::compare::flight::Prepared;
 
 /// States and deflections whose products are the terms.
 const NAMES: [&str; 9] = ["α", "β", "V", "p", "q", "r", "δa", "δe", "throttle"];
@@ -64,7 +64,7 @@ impl Shape {
         self.left_in(&[channel], ALARM).map(|_| name(self.channels[channel].most))
     }
 
-    /// The share that the terms take in `channels` beside `fall`, which an effect took from them, if that is
+    /// The share that the terms take in `channels` beside `fall`, which effects took from them, if that is
     /// more than chance, with the term that takes most.
     pub fn beside(&self, channels: &[usize], fall: f64) -> Option<(f64, String)> {
         let left = self.left_in(channels, UNSURE)?;
@@ -83,8 +83,9 @@ impl Shape {
             channels.iter().map(|c| of(&self.channels[*c])).sum()
         };
         let left = sum(&|c| c.left);
+        let rows = sum(&|c| c.rows);
         let chance = DOUBT * sum(&|c| c.doubt.powi(2)).sqrt();
-        (left > chance.max(unsure * sum(&|c| c.rows))).then_some(left)
+        (rows > 0.0 && left > chance.max(unsure * rows)).then_some(left)
     }
 }
 
@@ -93,7 +94,7 @@ impl Shape {
 pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     let na = round.known.len();
     let last = na + CHANNELS * TERMS;
-    let spread = spread(&round.flights);
+    let spread = spread(&round.flights, variables);
     let place = |(known, flight): (&Placed, &Ready)| {
         let mut list: Placed = known.iter().take_while(|(p, _)| *p < na).cloned().collect();
         let own = terms(&round.model, flight, &spread).into_iter().enumerate();
@@ -148,8 +149,7 @@ fn taken(
 /// The terms of `flight`, those of one channel after those of the other, each times the dynamic pressure.
 fn terms(model: &GreyBox, flight: &Ready, spread: &[[f64; 2]; NAMES.len()]) -> Vec<Column> {
     let sides = gather(&flight.acting, Integrator::Jsbsim, TERMS, |place, add| {
-        let raw = variables(place.at, place.controls);
-        let z: Variables = std::array::from_fn(|k| (raw[k] - spread[k][0]) / spread[k][1]);
+        let z = standard(variables(&flight.acting, place.segment, place.index), spread);
         let pressure = model.air(&place.at.state, place.at.altitude).q_s;
         let bends = bends(&flight.acting, place.segment, place.index);
         // forces weigh by samples, moments by steps: the two sides of a window
@@ -186,20 +186,8 @@ fn name(term: usize) -> String {
     }
 }
 
-type Variables = [f64; NAMES.len()];
-
-fn variables(at: &Instant, z: &Controls) -> Variables {
-    let s = &at.state;
+fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; NAMES.len()] {
+    let at = &flight.segments[segment][index];
+    let (s, z) = (&at.state, &at.controls);
     [s.alpha, s.beta, s.airspeed, s.p, s.q, s.r, z.aileron, z.elevator, z.throttle]
-}
-
-/// Mean and standard deviation of each variable over all flights.
-fn spread(flights: &[Ready]) -> [[f64; 2]; NAMES.len()] {
-    let all = flights.iter().flat_map(|f| f.acting.segments.iter().flatten());
-    let all: Vec<Variables> = all.map(|i| variables(i, &i.controls)).collect();
-    std::array::from_fn(|k| {
-        let middle = mean(&all.iter().map(|x| x[k]).collect::<Vec<_>>());
-        let square = mean(&all.iter().map(|x| (x[k] - middle).powi(2)).collect::<Vec<_>>());
-        [middle, square.sqrt().max(1e-6)]
-    })
 }

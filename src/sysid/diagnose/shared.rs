@@ -39,9 +39,9 @@ pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
 }
 
 /// `flight` with noise of its inertial sensors, its vanes and its airspeed once more, as they go through the
-/// smoother of its path.
-pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, number: usize) -> Prepared {
-    let mut random = stream(seed, &[DISTURBANCE, number as u64]);
+/// smoother of its path; `which` are the flight's number and that of the draw.
+pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, which: [usize; 2]) -> Prepared {
+    let mut random = stream(seed, &[DISTURBANCE, which[0] as u64, which[1] as u64]);
     let mut unit = || -> f64 { StandardNormal.sample(&mut random) };
     let mut out = flight.clone();
     for segment in &mut out.segments {

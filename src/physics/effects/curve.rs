@@ -1,0 +1,91 @@
+//! Curves over the angle of attack: sums of hats, so that they are linear in their heights.
+//!
+//! Two knots of the grid stay at nought, else a straight line would be told twice: by the curve, and by the
+//! coefficients `CL0` and `CLalpha` (`CD0`) of the effects it stands beside.
+
+use super::Terms;
+use crate::num::Real;
+use crate::physics::Channel;
+
+/// The first place of the grid, °.
+const FIRST_DEG: f64 = -8.0;
+/// Distance between places, °.
+const SPACING_DEG: f64 = 2.0;
+/// Places: from −8° to 20°.
+const PLACES: usize = 15;
+/// Places at which a curve is nought, 0° and 4°: where an aircraft flies most.
+const NOUGHT: [usize; 2] = [4, 6];
+
+/// Coefficients of a curve: its height over every other place, as `CL_m8` or `CL_p20`.
+macro_rules! heights {
+    ($letter:literal, $bounds:expr) => {
+        super::curve::heights!($letter, $bounds,
+            "m8" "−8", "m6" "−6", "m4" "−4", "m2" "−2", "p2" "2", "p6" "6", "p8" "8", "p10" "10",
+            "p12" "12", "p14" "14", "p16" "16", "p18" "18", "p20" "20")
+    };
+    ($letter:literal, $bounds:expr, $($name:literal $degrees:literal),*) => {
+        &[$(super::coefficient(
+            concat!($letter, "_", $name),
+            concat!("what ", $letter, " is more at α = ", $degrees, "°"),
+            "",
+            $bounds,
+        )),*]
+    };
+}
+pub(super) use heights;
+
+/// Reports to `terms` each hat over `alpha` (rad) times `amount`; beyond its ends a curve stays level.
+///
+/// A call, unlike all other effects: in line, the hats would fill a planner's kernels, also of models that
+/// have no curve.
+#[inline(never)]
+pub(super) fn hats<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Terms<R>) {
+    let places =
+        alpha.scale(1.0_f64.to_degrees() / SPACING_DEG) - R::from_f64(FIRST_DEG / SPACING_DEG);
+    let place = places.clamp(0.0, (PLACES - 1) as f64);
+    for (k, own) in (0..PLACES).filter(|k| !NOUGHT.contains(k)).enumerate() {
+        let away = (place - R::from_f64(own as f64)).abs();
+        terms.add(k, channel, amount * (R::from_f64(1.0) - away).max(R::zero()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::effects::Effect;
+
+    const KNOTS: usize = PLACES - NOUGHT.len();
+
+    struct Heights([f64; KNOTS]);
+
+    impl Terms<f64> for Heights {
+        fn add(&mut self, index: usize, _: Channel, amount: f64) {
+            self.0[index] += amount;
+        }
+    }
+
+    fn at(degrees: f64) -> [f64; KNOTS] {
+        let mut heights = Heights([0.0; KNOTS]);
+        hats(degrees.to_radians(), 1.0, Channel::Lift, &mut heights);
+        heights.0
+    }
+
+    #[test]
+    fn hats_share_the_way_between_knots_and_end_level() {
+        let names = super::super::LiftCurve::COEFFICIENTS.iter().map(|c| c.name);
+        let names: Vec<&str> = names.collect();
+        assert_eq!(names.len(), KNOTS);
+        let share =
+            |degrees: f64, name: &str| at(degrees)[names.iter().position(|n| *n == name).unwrap()];
+        // −1° lies half way between −2° and 0°, where the curve is nought
+        assert!((share(-1.0, "CL_m2") - 0.5).abs() < 1e-12);
+        assert!((share(9.5, "CL_p10") - 0.75).abs() < 1e-12);
+        let all = |degrees: f64| at(degrees).iter().sum::<f64>();
+        for (degrees, sum) in
+            [(-30.0, 1.0), (-1.0, 0.5), (0.0, 0.0), (3.5, 0.25), (4.0, 0.0), (90.0, 1.0)]
+        {
+            assert!((all(degrees) - sum).abs() < 1e-12, "{degrees}");
+        }
+        assert_eq!(share(90.0, "CL_p20"), 1.0);
+    }
+}

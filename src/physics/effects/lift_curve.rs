@@ -1,0 +1,22 @@
+//! Lift as flown: what no formula says of it.
+
+use super::{Coefficient, Effect, Own, Terms, curve};
+use crate::num::Real;
+use crate::physics::{Channel, Point};
+
+/// What the lift has more than the other effects say, as a curve over the angle of attack.
+pub struct LiftCurve;
+
+impl Effect for LiftCurve {
+    const ID: &'static str = "lift_curve";
+    const DESCRIPTION: &'static str =
+        "Lift as flown: what it is more than the other effects say, over angle of attack.";
+    const FORMULA: &'static str = "L = Q Σ CLk max(0, 1 − |α − αk| / 2°)";
+    const SOURCE: &'static str = "piecewise linear, knots every 2°, nought at 0° and 4°";
+    const COEFFICIENTS: &'static [Coefficient] = curve::heights!("CL", (-0.5, 0.5));
+
+    #[inline(always)]
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
+        curve::hats(at.state.alpha, at.air.q_s, Channel::Lift, terms);
+    }
+}
