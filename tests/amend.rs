@@ -78,7 +78,8 @@ fn validate_a_curve_takes_up_what_no_formula_says() {
     let path = folder.path().join("humped.toml");
     std::fs::write(&path, humped).unwrap();
     let model = GreyBox::load(&path).unwrap();
-    let all = flights("", 44);
+    let all: Vec<Reconstruction> =
+        (44..47).map(|k| flight("", 30.0, Manoeuvres::Stalls, k)).collect();
     let found = amend(&model, &all[..2], &all[2..], &added("lift_curve"), &|_| ()).unwrap();
     let story = &found.amendment;
     story.sentences.iter().for_each(|s| println!("{s}"));
