@@ -610,7 +610,8 @@ fn storm(seed: u64) -> (Vec<Command>, [usize; 8]) {
                     .all(|x| x.is_finite())
             );
         }
-        let plan = [Plan::Ready(dice.command()), Plan::Late, Plan::None][dice.below(3) as usize];
+        let plans = [Plan::Ready(dice.command()), Plan::Late, Plan::Busy, Plan::None];
+        let plan = plans[dice.below(4) as usize];
         let decision = pilot.decide(plan);
         check(last.as_ref(), &decision, 0.2, 0.05);
         last = Some(decision);

@@ -15,10 +15,10 @@ use std::time::{Duration, Instant};
 use controller_support::profile;
 use flight_support::*;
 use greylag::commands::fly::{POLICY, crew};
-use greylag::control::Kind;
+use greylag::control::{Controller, Kind, Observation, Target};
 use greylag::flight::recorder::Place;
 use greylag::flight::replay::{Outcome, replay};
-use greylag::flight::runtime::{Options, Pace};
+use greylag::flight::runtime::{Options, Pace, Seat};
 use greylag::link::vehicle::{Authority, Real, Sitl, Vehicle};
 use greylag::logs::csv::{self, Tolerance};
 use greylag_sitl::shim::{self, Noise, Personality};
@@ -70,6 +70,73 @@ fn a_flight_with_everything_in_it_replays_to_the_bit() {
     let other =
         replay(&folder, crew(Kind::PidRetuned, x8(), Path::new(POLICY)).unwrap(), sitl()).unwrap();
     assert!(other.different > 300, "{other:?}");
+}
+
+/// An LQI that remembers how often it was asked, and now and then takes many ticks.
+struct Sluggish {
+    lqi: Box<dyn Controller>,
+    asked: u32,
+    slow: bool,
+}
+
+impl Sluggish {
+    fn new(slow: bool) -> Sluggish {
+        Sluggish {
+            lqi: crew(Kind::Lqi, x8(), Path::new(POLICY)).unwrap().controller,
+            asked: 0,
+            slow,
+        }
+    }
+}
+
+impl Controller for Sluggish {
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(Sluggish { lqi: self.lqi.boxed_clone(), ..*self })
+    }
+    fn name(&self) -> &'static str {
+        "sluggish"
+    }
+    fn reset(&mut self, seed: u64) {
+        self.lqi.reset(seed);
+        self.asked = 0;
+    }
+    fn command(&mut self, seen: &Observation, target: &Target) -> greylag::physics::Command {
+        self.asked += 1;
+        if self.slow && self.asked % 40 == 39 {
+            std::thread::sleep(Duration::from_millis(80));
+        }
+        let mut command = self.lqi.command(seen, target);
+        command.aileron += 1e-3 * f64::from(self.asked % 100);
+        command
+    }
+}
+
+/// Requests that a planner never heard of, being at an earlier one, are not made in the replay either.
+#[test]
+fn a_flight_whose_planner_is_busy_at_times_replays_to_the_bit() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("flight");
+    let crewed = |slow: bool, seat: Seat| {
+        let mut crew = crew(Kind::Lqi, x8(), Path::new(POLICY)).unwrap();
+        (crew.controller, crew.seat) = (Box::new(Sluggish::new(slow)), seat);
+        crew
+    };
+    let record = Some(Place::Exactly(folder.clone()));
+    let options = Options { record, ..options(Pace::RealTime) };
+    let companion = Companion::with(&options, crewed(true, Seat::Thread));
+    let link = format!("udpout:{}", companion.vehicle());
+    let shim = Shim::start(&link, shim::Pace::RealTime, 600.0, |_| ());
+    let mut client = Client::new(companion.client(0));
+    client.engage(20.0, 5.0);
+    client.steer(20.0, 5.0, 3.0);
+    shim.end();
+    println!("{}", companion.end());
+    let calls = std::fs::read_to_string(folder.join("flight.calls")).unwrap();
+    assert!(calls.lines().filter(|line| line.ends_with(" busy")).count() > 5);
+    let outcome = replay(&folder, crewed(false, Seat::Loop), sitl()).unwrap();
+    println!("{outcome:?}");
+    assert!(outcome.ticks > 200 && !outcome.cut_short, "{outcome:?}");
+    assert_eq!((outcome.different, outcome.plans_different, outcome.without_state), (0, 0, 0));
 }
 
 fn real(personality: Personality, authority: Authority) -> Vehicle {

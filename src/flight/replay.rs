@@ -169,7 +169,8 @@ pub fn replay_watched(
     if states.vehicle.has_channels() {
         crew.pilot.check_signs();
     }
-    let mut replayed = Replayed { crew, states, watch, outcome: Outcome::default() };
+    let outcome = Outcome::default();
+    let mut replayed = Replayed { crew, states, watch, outcome, owed: false };
     let mut lines = text.split_inclusive('\n').enumerate().peekable();
     match lines.next() {
         Some((_, first)) if first.trim_end() == HEADER => {}
@@ -196,6 +197,8 @@ struct Replayed<'w, 'f> {
     crew: Crew,
     states: States,
     outcome: Outcome,
+    /// An engagement that the planner had not been told of, because it was busy.
+    owed: bool,
 }
 
 impl Replayed<'_, '_> {
@@ -225,7 +228,13 @@ impl Replayed<'_, '_> {
             return !ended;
         };
         let request = self.crew.pilot.observe(state.time, &state);
-        let own = request.map(|request| {
+        let told = request.filter(|_| planned != Planned::Busy);
+        if told.is_none() {
+            self.owed |= request.is_some_and(|request| request.engage);
+        }
+        let own = told.map(|request| {
+            let engage = request.engage || std::mem::take(&mut self.owed);
+            let request = Request { engage, ..request };
             if request.engage {
                 self.crew.controller.reset(SEED);
             }
@@ -240,6 +249,7 @@ impl Replayed<'_, '_> {
                 own.map_or(Plan::Ready(command), Plan::Ready)
             }
             Planned::Late => Plan::Late,
+            Planned::Busy => Plan::Busy,
             Planned::None => Plan::None,
         };
         let decision = self.crew.pilot.decide(plan);

@@ -23,6 +23,8 @@ pub enum Plan {
     Ready(Command),
     /// A planner exists, but its command did not come in time.
     Late,
+    /// A planner exists, but was at an earlier request and has not heard of this one.
+    Busy,
     /// No planner was asked.
     None,
 }

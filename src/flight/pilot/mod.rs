@@ -366,7 +366,7 @@ impl Pilot {
                 }
                 self.fall_back(seen, Source::Fallback)
             }
-            Plan::Late => self.fall_back(seen, Source::Late),
+            Plan::Late | Plan::Busy => self.fall_back(seen, Source::Late),
             Plan::None => self.fall_back(seen, Source::Fallback),
         };
         if let Some(programme) = &mut self.programme {

@@ -17,6 +17,8 @@ pub enum Planned {
     Ready(Command),
     /// None came in time.
     Late,
+    /// None came, for the planner was at an earlier request and never heard of this one.
+    Busy,
     /// Nobody was asked, or nobody could answer.
     None,
 }
@@ -60,6 +62,7 @@ impl fmt::Display for Call {
                         write!(f, " ready {} {} {}", p.aileron, p.elevator, p.throttle)
                     }
                     Planned::Late => write!(f, " late"),
+                    Planned::Busy => write!(f, " busy"),
                     Planned::None => write!(f, " none"),
                 }
             }
@@ -123,6 +126,7 @@ fn read(line: &str) -> Option<Call> {
                 "ready" if words.len() > 6 => Planned::Ready(command(6)?),
                 "ready" => Planned::Ready(given),
                 "late" => Planned::Late,
+                "busy" => Planned::Busy,
                 "none" => Planned::None,
                 _ => return None,
             };
@@ -176,6 +180,7 @@ mod tests {
             Call::Tick(now, Planned::Ready(odd), odd),
             Call::Tick(now, Planned::Ready(Command::IDLE), odd),
             Call::Tick(now, Planned::Late, odd),
+            Call::Tick(now, Planned::Busy, odd),
             Call::Tick(now, Planned::None, Command::IDLE),
             Call::Arm(now, true),
             Call::Disarm(now, false),

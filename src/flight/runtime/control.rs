@@ -189,6 +189,7 @@ impl Control {
         let planned = match plan {
             Plan::Ready(command) => Planned::Ready(command),
             Plan::Late => Planned::Late,
+            Plan::Busy => Planned::Busy,
             Plan::None => Planned::None,
         };
         self.note(Call::Tick(state.time, planned, decision.command));
@@ -215,7 +216,7 @@ impl Control {
             Pace::RealTime => latency > CYCLE,
             Pace::Lockstep => state.order == Order::Repeated,
         });
-        self.timing.late_plans += u64::from(plan == Plan::Late);
+        self.timing.late_plans += u64::from(matches!(plan, Plan::Late | Plan::Busy));
         let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
         self.load += LOAD_WEIGHT * (share - self.load);
         if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {

@@ -89,7 +89,7 @@ impl Threaded {
         };
         if requests.try_send((self.tick, Request { engage, ..*request })).is_err() {
             self.owed = engage;
-            return Plan::Late;
+            return Plan::Busy;
         }
         self.owed = false;
         self.wait(arrived)
@@ -196,9 +196,10 @@ mod tests {
             self.planner.plan(&any_request(engage), Instant::now())
         }
 
-        fn too_late(&mut self, engage: bool) {
+        /// A plan that is not waited for.
+        fn too_late(&mut self, engage: bool) -> Plan {
             self.planner.deadline = Duration::from_millis(5);
-            assert_eq!(self.planner.plan(&any_request(engage), Instant::now()), Plan::Late);
+            self.planner.plan(&any_request(engage), Instant::now())
         }
 
         /// Waits for plans that came too late.
@@ -217,7 +218,7 @@ mod tests {
     fn a_plan_that_misses_its_tick_is_never_used_at_a_later_one() {
         let mut bench = Bench::new(Pace::RealTime, &[false, true]);
         assert_eq!(bench.in_time(true), ready(0.1, 0.1));
-        bench.too_late(false);
+        assert_eq!(bench.too_late(false), Plan::Late);
         bench.go.send(()).unwrap();
         bench.done(1);
         assert_eq!(bench.in_time(false), ready(0.1, 0.1 + 0.1 + 0.1));
@@ -226,11 +227,11 @@ mod tests {
     #[test]
     fn an_engagement_during_a_late_plan_is_told_afterwards() {
         let mut bench = Bench::new(Pace::RealTime, &[true]);
-        bench.too_late(true);
+        assert_eq!(bench.too_late(true), Plan::Late);
         bench.begun.recv().unwrap();
         // This one waits in the queue, the next finds the queue full.
-        bench.too_late(false);
-        bench.too_late(true);
+        assert_eq!(bench.too_late(false), Plan::Late);
+        assert_eq!(bench.too_late(true), Plan::Busy);
         bench.go.send(()).unwrap();
         bench.done(2);
         assert_eq!(bench.in_time(false), ready(0.2, 0.1 + 0.1 + 0.1));
