@@ -89,6 +89,40 @@ fn validate_a_curve_takes_up_what_no_formula_says() {
     assert!((hump.value + 0.05).abs() < 0.01, "{hump:?}");
 }
 
+/// The prior as one reads it off the paper, thrust in pounds and Jxz with the other sign, under the simulator's own
+/// conventions: with every effect that it lacks, and curves for what the formula of the stall leaves.
+#[test]
+fn validate_the_prior_as_printed_ends_close_to_the_simulators_model() {
+    let shipped = |name: &str| {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+        GreyBox::load(&folder.join(name)).unwrap()
+    };
+    let exact = shipped("jsbsim.toml");
+    let mut printed = shipped("prior-as-printed.toml");
+    (printed.integrator, printed.axes) = (exact.integrator, exact.axes);
+    printed.atmosphere.density = exact.atmosphere.density;
+    let all: Vec<Reconstruction> =
+        (51..55).map(|k| flight("", 40.0, Manoeuvres::Stalls, k)).collect();
+    let effects =
+        "inertia_xz lift_stall drag_elevator_abs drag_alpha2 drag_beta2 lift_curve".split(' ');
+    let effects = effects.map(|id| Added { id: id.into(), start: None }).collect();
+    let options = Options { effects, ..Options::default() };
+    let found = amend(&printed, &all[..3], &all[3..], &options, &|_| ()).unwrap();
+    let story = &found.amendment;
+    story.sentences.iter().chain(&story.notes).for_each(|s| println!("{s}"));
+    assert!(story.effects.iter().all(|e| e.joined), "{:?}", story.effects);
+    let tuned = amend(&exact, &all[..3], &all[3..], &Options::default(), &|_| ()).unwrap();
+    let least = at_5s(&tuned.amendment.after);
+    println!("error {:.5}, the simulator's own model {least:.5}", at_5s(&story.after));
+    assert!(at_5s(&story.after) < 0.02 * at_5s(&story.given), "{}", at_5s(&story.after));
+    // 2.7 times were measured with these three flights; seven and the curve of the drag come closer (README)
+    assert!(at_5s(&story.after) < 4.0 * least, "{} beside {least}", at_5s(&story.after));
+    // what the slips were
+    let value = |name: &str| story.parameters.iter().find(|p| p.name == name).unwrap().value;
+    assert!((value("thrust_linear.Cp_n") / 26.246 - 1.0).abs() < 0.01);
+    assert!((value("inertia_xz.dJxz_kgm2") / -1.8686 - 1.0).abs() < 0.01);
+}
+
 #[test]
 fn an_effect_that_is_not_there_is_refused() {
     let all = flights("", 11);

@@ -3,12 +3,16 @@
 use std::path::Path;
 
 use greylag::model::{GreyBox, JoinError};
-use greylag::physics::Controls;
 use greylag::physics::State;
+use greylag::physics::{Channel, Controls};
 
 fn model() -> GreyBox {
+    shipped("jsbsim")
+}
+
+fn shipped(name: &str) -> GreyBox {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
-    GreyBox::load(&folder.join("jsbsim.toml")).unwrap()
+    GreyBox::load(&folder.join(name).with_extension("toml")).unwrap()
 }
 
 /// Joins, and asserts that a refusal leaves the model as it was.
@@ -42,8 +46,7 @@ fn what_cannot_join_is_refused_and_changes_nothing() {
 
 #[test]
 fn an_effect_with_a_table_needs_a_file() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
-    let mut m = GreyBox::load(&folder.join("prior.toml")).unwrap();
+    let mut m = shipped("prior");
     assert!(matches!(refused(&mut m, "lift_table", &[1.0]), JoinError::Table { .. }));
 }
 
@@ -82,4 +85,57 @@ fn coefficients_of_a_joined_effect_are_its_own() {
     m.join("lift_stall", &[1.0, 0.2, 50.0]).unwrap();
     let linear: Vec<_> = m.coefficients().iter().zip(m.linear()).rev().take(3).collect();
     assert_eq!(linear.iter().map(|(_, l)| *l).collect::<Vec<_>>(), [false, false, true]);
+}
+
+#[test]
+fn what_an_effect_replaces_is_nought_and_held() {
+    let mut model = shipped("prior");
+    let signed = |model: &GreyBox| {
+        let named = model.coefficients().iter().find(|c| c.name == "drag_linear.CDde").unwrap();
+        (named.value, named.width())
+    };
+    assert!(signed(&model).0 > 0.0 && signed(&model).1 > 0.0);
+    assert_eq!(model.replaced("drag_linear.CDde"), None);
+    model.join("drag_elevator_abs", &[0.06]).unwrap();
+    assert_eq!(signed(&model), (0.0, 0.0));
+    assert_eq!(model.replaced("drag_linear.CDde"), Some("drag_elevator_abs"));
+    assert_eq!(model.replaced("drag_linear.CD0"), None);
+    // a file that has both has them for a reason
+    model.set_coefficient("drag_linear.CDde", 0.03);
+    assert_eq!(model.replaced("drag_linear.CDde"), None);
+}
+
+#[test]
+fn an_inertia_that_overshoots_joins_as_far_as_a_body_bears() {
+    let start = shipped("prior-as-printed");
+    // +0.9343 less 1.99 would be −1.056, and 1.0404 that of a rod
+    assert!(matches!(start.clone().join("inertia_xz", &[-1.99]), Err(JoinError::Body { .. })));
+    let mut joined = start.clone();
+    joined.join_most("inertia_xz", &[-1.99]).unwrap();
+    let room = |m: &GreyBox| 1.0 - m.body.jxz * m.body.jxz / (m.body.jx * m.body.jz);
+    assert!(joined.body.jxz < -0.95, "{}", joined.body.jxz);
+    assert!(room(&joined) >= room(&start) / 3.0, "{}", room(&joined));
+    // what a body bears joins as it is
+    let mut exact = start.clone();
+    exact.join_most("inertia_xz", &[-1.8686]).unwrap();
+    assert_eq!(exact.body.jxz, 0.9343 - 1.8686);
+    let values = exact.join_most("thrust_scale", &[f64::NAN]);
+    assert!(matches!(values, Err(JoinError::Values { .. })));
+}
+
+/// A stall puts a flat plate in the place of the lift; what a curve adds to that stays.
+#[test]
+fn a_curve_of_lift_counts_beyond_the_stall() {
+    let mut stalled = shipped("prior");
+    stalled.join("lift_stall", &[1.0, 0.26, 42.0]).unwrap();
+    let lift = |model: &GreyBox| {
+        let state = State { alpha: 20_f64.to_radians(), ..State::NEUTRAL };
+        let air = model.air(&state, 600.0);
+        (model.wrench(&state, &Controls::default(), &air).get(Channel::Lift), air.q_s)
+    };
+    let mut curved = stalled.clone();
+    curved.join("lift_curve", &[0.0; 18]).unwrap();
+    curved.set_coefficient("lift_curve.CL_p20", 0.08);
+    let ((before, _), (after, q_s)) = (lift(&stalled), lift(&curved));
+    assert!((after - before - 0.08 * q_s).abs() < 1e-9, "{before} {after}");
 }

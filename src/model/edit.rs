@@ -39,6 +39,8 @@ pub struct Edit {
     /// Coefficients of effects that are new, those of one effect in a row, with the source of the
     /// effect's formula.
     pub added: Vec<(Number, String)>,
+    /// Coefficients that become nought, each with the effect that stands in its place.
+    pub dropped: Vec<(String, &'static str)>,
     /// Texts that stand in place of what the file has: keys, the last of them below the others.
     pub replaced: Vec<(&'static [&'static str], &'static str)>,
     /// What they were fitted to, for their sources.
@@ -73,6 +75,9 @@ impl Edit {
         for number in &self.changed {
             self.change(effects, number)?;
         }
+        for (name, by) in &self.dropped {
+            drop_coefficient(effects, name, by)?;
+        }
         let mut fresh = String::new();
         for (number, source) in &self.added {
             let (id, short) = split(&number.name)?;
@@ -93,9 +98,7 @@ impl Edit {
 
     fn change(&self, effects: &mut dyn TableLike, number: &Number) -> Result<(), EditError> {
         let place = || EditError::Place(format!("effects.{}", number.name));
-        let (id, short) = split(&number.name)?;
-        let effect = effects.get_mut(id).and_then(Item::as_table_like_mut).ok_or_else(place)?;
-        let item = effect.get_mut(short).ok_or_else(place)?;
+        let item = entry(effects, &number.name)?;
         let table = item.as_table_like_mut().ok_or_else(place)?;
         let old = table.get("source").and_then(Item::as_str).unwrap_or("no source");
         let source = format!("{}; fitted to {}", original(old), self.fitted_to);
@@ -111,6 +114,28 @@ impl Edit {
         }
         Ok(())
     }
+}
+
+/// The entry of the coefficient `name`.
+fn entry<'a>(effects: &'a mut dyn TableLike, name: &str) -> Result<&'a mut Item, EditError> {
+    let (id, short) = split(name)?;
+    let effect = effects.get_mut(id).and_then(Item::as_table_like_mut);
+    let item = effect.and_then(|effect| effect.get_mut(short));
+    item.ok_or_else(|| EditError::Place(format!("effects.{name}")))
+}
+
+/// Makes the coefficient `name` nought for the sake of the effect `by`.
+fn drop_coefficient(effects: &mut dyn TableLike, name: &str, by: &str) -> Result<(), EditError> {
+    let place = || EditError::Place(format!("effects.{name}"));
+    let item = entry(effects, name)?;
+    let table = item.as_table_like_mut().ok_or_else(place)?;
+    let source = format!("greylag amend: nought, {by} stands in its place");
+    for (key, new) in [("value", 0.0.into()), ("source", Value::from(source))] {
+        let old = table.get_mut(key).and_then(Item::as_value_mut).ok_or_else(place)?;
+        replace(old, new);
+    }
+    table.remove("sd");
+    Ok(())
 }
 
 /// The source of a coefficient, said to be amended once however often it was.
@@ -155,7 +180,7 @@ density = { kgpm3 = 1.2 } # at home
 [effects.lift_linear]
 # the slope
 CLalpha = { value = 4.0, source = "Gryte" } # measured
-CLq = { value = 3.87, source = "Gryte" }
+CLq = { value = 3.87, sd = 0.1, source = "Gryte" } # damps
 "#;
 
     fn number(name: &str, value: f64, sd: Option<f64>) -> Number {
@@ -168,6 +193,7 @@ CLq = { value = 3.87, source = "Gryte" }
             airframe: "a.toml".into(),
             changed: vec![number("lift_linear.CLalpha", 0.1 + 0.2, Some(0.01))],
             added: vec![(number("lift_stall.k", 1.0, None), "BM12".into())],
+            dropped: vec![("lift_linear.CLq".into(), "lift_table")],
             replaced: vec![(&["air", "density"], "standard")],
             fitted_to: "a.csv (sha256 01)".into(),
         }
@@ -182,7 +208,7 @@ CLq = { value = 3.87, source = "Gryte" }
             "density = \"standard\" # at home",
             "# the slope",
             "# measured",
-            "CLq = { value = 3.87, ",
+            "# damps",
         ] {
             assert!(text.contains(kept), "{kept} lost in\n{text}");
         }
@@ -194,6 +220,11 @@ CLq = { value = 3.87, source = "Gryte" }
             slope["source"].as_str(),
             Some("greylag amend: Gryte; fitted to a.csv (sha256 01)")
         );
+        let dropped = &read["effects"]["lift_linear"]["CLq"];
+        assert_eq!(dropped["value"].as_float(), Some(0.0));
+        assert!(dropped.get("sd").is_none());
+        let source = dropped["source"].as_str();
+        assert_eq!(source, Some("greylag amend: nought, lift_table stands in its place"));
         assert_eq!(read["effects"]["lift_stall"]["k"]["value"].as_float(), Some(1.0));
         // amended again, the source tells of the last fit only
         let again = Edit { fitted_to: "b.csv".into(), added: Vec::new(), ..edit() };

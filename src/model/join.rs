@@ -67,7 +67,8 @@ pub enum JoinError {
 }
 
 impl GreyBox {
-    /// Adds the effect `id` with `values` of its coefficients, in its own order.
+    /// Adds the effect `id` with `values` of its coefficients, in its own order. What it stands in the place of
+    /// becomes nought, and stays so in a fit.
     ///
     /// # Errors
     /// The effect is unknown, there already or needs a table, or the values are not possible.
@@ -94,7 +95,43 @@ impl GreyBox {
             value: *value,
             sd: None,
         }));
+        for c in self.coefficients.iter_mut().filter(|c| about.replaces.contains(&c.name.as_str()))
+        {
+            (c.value, c.sd) = (0.0, None);
+        }
         self.settle();
+        Ok(())
+    }
+
+    /// The effect in whose favour the coefficient `name` is nought, if there is one.
+    pub fn replaced(&self, name: &str) -> Option<&'static str> {
+        let gone = self.coefficients.iter().any(|c| c.name == name && c.value == 0.0);
+        self.effects().find(|about| gone && about.replaces.contains(&name)).map(|about| about.id)
+    }
+
+    /// [`join`](GreyBox::join) with the largest share of `values`, in hundredths, with which the body
+    /// [may become](crate::physics::rigid_body::RigidBody::may_become) what they make of it: all of them, but for an
+    /// estimate of mass or inertia that overshoots.
+    ///
+    /// # Errors
+    /// As [`join`](GreyBox::join).
+    pub fn join_most(&mut self, id: &str, values: &[f64]) -> Result<(), JoinError> {
+        let share = |percent: u32| {
+            let mut with = self.clone();
+            let scaled: Vec<f64> = values.iter().map(|v| 0.01 * f64::from(percent) * v).collect();
+            with.join(id, if percent == 100 { values } else { &scaled })?;
+            Ok(with)
+        };
+        let all = share(100);
+        let fits = |with: &GreyBox| self.body.may_become(&with.body);
+        *self = match all {
+            Ok(with) if fits(&with) => with,
+            Ok(_) | Err(JoinError::Body { .. }) => {
+                let less = (1..100).rev().filter_map(|percent| share(percent).ok()).find(fits);
+                less.map_or(all, Ok)?
+            }
+            Err(why) => return Err(why),
+        };
         Ok(())
     }
 

@@ -27,6 +27,14 @@ impl RigidBody {
         let RigidBody { mass, jx, jy, jz, jxz } = *self;
         mass > 0.0 && jx > 0.0 && jy > 0.0 && jz > 0.0 && jx * jz > jxz * jxz
     }
+
+    /// Whether an iteration may go from this body to `next`: to one that is a body and has kept a third of its mass
+    /// and of what separates its inertia from that of a rod. A longer step from a wrong inertia ends where the
+    /// accelerations are all but infinite.
+    pub fn may_become(&self, next: &RigidBody) -> bool {
+        let room = |b: &RigidBody| 1.0 - b.jxz * b.jxz / (b.jx * b.jz);
+        next.is_physical() && 3.0 * next.mass >= self.mass && 3.0 * room(next) >= room(self)
+    }
 }
 
 impl<R: Copy> RigidBody<R> {

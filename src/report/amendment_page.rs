@@ -98,7 +98,7 @@ fn effects(a: &Amendment) -> Section {
         if !e.refused.is_empty() {
             text.push(format!("to decide, fly: {}", e.fly_next));
         }
-        let added = if e.refused.is_empty() { "yes" } else { "no" };
+        let added = if e.joined { "yes" } else { "no" };
         table.push([e.id.clone(), added.to_string(), text.join("; ")]);
     }
     match table.rows.is_empty() {

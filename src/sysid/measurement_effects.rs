@@ -128,6 +128,7 @@ const fn measured(entry: &Entry) -> Description {
         coefficients: &[],
         shape: 0,
         table: None,
+        replaces: &[],
         entry: Some(*entry),
     }
 }

@@ -58,12 +58,14 @@ pub fn amendment() -> Amendment {
             AddedEffect {
                 id: "lift_stall".into(),
                 description: "Lift falls off beyond the stall angle.",
+                joined: true,
                 refused: Vec::new(),
                 fly_next: String::new(),
             },
             AddedEffect {
                 id: "drag_alpha2".into(),
                 description: "Drag grows with the square of the angle of attack.",
+                joined: false,
                 refused: vec!["it lowers the error on flights unseen by 2 % only".into()],
                 fly_next: "a push-over at fixed elevator".into(),
             },

@@ -50,8 +50,8 @@ pub struct Arguments {
     /// Add nothing: fit the model's own coefficients.
     #[arg(long, group = "what", conflicts_with_all = ["accept", "effects"])]
     tune_only: bool,
-    /// Also try the model's other conventions (integrator, axes of the forces, the standard atmosphere), and
-    /// take those with which flights that the fit has not seen are flown clearly better.
+    /// Also try the model's other conventions (integrator, axes of the forces, the standard atmosphere), and take
+    /// those that the flights bear out, the atmosphere unless they deny it.
     #[arg(long)]
     conventions: bool,
     /// Write effects into the model that the data refuse.
@@ -125,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     in_doubt |= story.effects.iter().any(|e| !e.refused.is_empty());
     in_doubt |= !amend::contradictions(&story.parameters).is_empty();
     print(story);
-    let all_refused = !story.effects.is_empty() && !story.parameters.iter().any(|p| p.added);
+    let all_refused = !story.effects.is_empty() && !story.effects.iter().any(|e| e.joined);
     if all_refused {
         bail!(
             "no effect was accepted, so nothing was written; --tune-only writes the tuned model, \

@@ -156,6 +156,7 @@ fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) 
         name: if name.len() <= NAME { name } else { shortened },
         airframe,
         changed: changed.map(number).collect(),
+        dropped: amended.dropped(),
         replaced: taken.map(|t| (t.convention.key(), t.to)).collect(),
         added: all.iter().filter(|c| new(&c.name)).map(|c| (number(c), source(&c.name))).collect(),
         fitted_to: logs.join(", "),

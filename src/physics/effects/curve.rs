@@ -11,8 +11,8 @@ use crate::physics::Channel;
 const FIRST_DEG: f64 = -8.0;
 /// Distance between places, °.
 const SPACING_DEG: f64 = 2.0;
-/// Places: from −8° to 20°.
-const PLACES: usize = 15;
+/// Places: from −8° to 30°.
+const PLACES: usize = 20;
 /// Places at which a curve is nought, 0° and 4°: where an aircraft flies most.
 const NOUGHT: [usize; 2] = [4, 6];
 
@@ -21,7 +21,8 @@ macro_rules! heights {
     ($letter:literal, $bounds:expr) => {
         super::curve::heights!($letter, $bounds,
             "m8" "−8", "m6" "−6", "m4" "−4", "m2" "−2", "p2" "2", "p6" "6", "p8" "8", "p10" "10",
-            "p12" "12", "p14" "14", "p16" "16", "p18" "18", "p20" "20")
+            "p12" "12", "p14" "14", "p16" "16", "p18" "18", "p20" "20", "p22" "22", "p24" "24",
+            "p26" "26", "p28" "28", "p30" "30")
     };
     ($letter:literal, $bounds:expr, $($name:literal $degrees:literal),*) => {
         &[$(super::coefficient(
@@ -86,6 +87,6 @@ mod tests {
         {
             assert!((all(degrees) - sum).abs() < 1e-12, "{degrees}");
         }
-        assert_eq!(share(90.0, "CL_p20"), 1.0);
+        assert_eq!(share(90.0, "CL_p30"), 1.0);
     }
 }

@@ -1,6 +1,6 @@
 //! Lift as flown: what no formula says of it.
 
-use super::{Coefficient, Effect, Own, Terms, curve};
+use super::{Coefficient, Effect, Needs, Own, Terms, curve};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
@@ -10,10 +10,12 @@ pub struct LiftCurve;
 impl Effect for LiftCurve {
     const ID: &'static str = "lift_curve";
     const DESCRIPTION: &'static str =
-        "Lift as flown: what it is more than the other effects say, over angle of attack.";
+        "Lift as flown: what it is more than the other effects say, stall included, over angle of attack.";
     const FORMULA: &'static str = "L = Q Σ CLk max(0, 1 − |α − αk| / 2°)";
     const SOURCE: &'static str = "piecewise linear, knots every 2°, nought at 0° and 4°";
     const COEFFICIENTS: &'static [Coefficient] = curve::heights!("CL", (-0.5, 0.5));
+    /// Else a stall would take away what the curve adds beyond it.
+    const NEEDS: Needs = Needs::Base;
 
     #[inline(always)]
     fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {

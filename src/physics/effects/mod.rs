@@ -108,6 +108,8 @@ pub trait Effect {
     const TABLE: Option<&'static str> = None;
     /// What it must be told.
     const NEEDS: Needs = Needs::Point;
+    /// Full names of coefficients in whose place it stands: they are nought in a model that it joins.
+    const REPLACES: &'static [&'static str] = &[];
     /// Its entry in the catalogue of effects that a model may lack; `None` for parts of a prior.
     const ENTRY: Option<Entry> = None;
 
@@ -135,6 +137,8 @@ pub struct Description {
     pub shape: usize,
     /// [`Effect::TABLE`].
     pub table: Option<&'static str>,
+    /// [`Effect::REPLACES`].
+    pub replaces: &'static [&'static str],
     /// [`Effect::ENTRY`].
     pub entry: Option<Entry>,
 }
@@ -166,6 +170,7 @@ macro_rules! effects {
                     coefficients: $type::COEFFICIENTS,
                     shape: $type::SHAPE,
                     table: $type::TABLE,
+                    replaces: $type::REPLACES,
                     entry: $type::ENTRY,
                 },)* }
             }

@@ -127,6 +127,7 @@ macro_rules! inputs {
                     coefficients: $type::COEFFICIENTS,
                     shape: 1,
                     table: None,
+                    replaces: &[],
                     entry: Some($type::ENTRY),
                 },)* }
             }

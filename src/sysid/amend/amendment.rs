@@ -1,6 +1,6 @@
 //! The amendment: the prior tuned, effects added one after the other, each judged on unseen flights.
 
-use super::conventions::{CLEARLY, Convention, Tried};
+use super::conventions::{Convention, Tried, closer};
 use super::error::AmendError;
 use super::flight::Flight;
 use super::output_error::{self, Fit, FitOptions};
@@ -15,6 +15,9 @@ use crate::sysid::reconstruction::{Reconstruction, Segment};
 const JUDGED_AT_S: f64 = 5.0;
 /// Least share by which an effect must lower the error of unseen flights.
 const IMPROVED: f64 = 0.01;
+/// An effect that lowers it to less than this share joins though the search has not settled with it: others may be
+/// needed for that.
+const SETTLED_OR_NOT: f64 = 0.5;
 /// Standard deviations by which an effect's coefficient must exceed nought.
 const CLEAR: f64 = 1.96;
 /// The same for effects with more coefficients than three, one of which exceeds that by chance.
@@ -75,6 +78,20 @@ pub struct Amended {
     pub tuned: GreyBox,
 }
 
+impl Amended {
+    /// Coefficients that are nought for the sake of an effect that has joined, each with that effect.
+    pub fn dropped(&self) -> Vec<(String, &'static str)> {
+        dropped(&self.tuned, &self.model)
+    }
+}
+
+/// Coefficients of `before` that an effect of `after` stands in the place of.
+fn dropped(before: &GreyBox, after: &GreyBox) -> Vec<(String, &'static str)> {
+    let still = |name: &str| before.replaced(name).is_none();
+    let named = before.coefficients().iter().filter(|c| still(&c.name));
+    named.filter_map(|c| Some((c.name.clone(), after.replaced(&c.name)?))).collect()
+}
+
 /// Fits `model` with the effects of `options` to `flights` and judges it on `held_out`; `progress`
 /// hears what is being done.
 ///
@@ -96,34 +113,24 @@ pub fn amend(
     };
     let (train, test) = (ready(flights)?, ready(held_out)?);
     let judge = Judge { test: &test, horizons_s: &options.horizons_s };
-    let of = |model: &GreyBox| selected(model, &options.effects, &train, &judge, options, progress);
+    let ask = Ask { options, train: &train, judge: &judge, progress };
     let given = judge.scores(model);
-    let mut best = of(model)?;
+    let best = ask.selected(model)?;
     let (tuned, before) = best.tuned.clone();
-    let mut conventions = Vec::new();
-    if options.conventions {
-        let mut base = model.clone();
-        for convention in Convention::ALL {
-            let Some(other) = convention.other(&base) else { continue };
-            let (from, to) = (convention.of(&base), convention.of(&other));
-            progress(&format!("{}: {to} instead of {from}", model.name));
-            let tried = match of(&other) {
-                Ok(tried) => Some(tried),
-                Err(why) if failed(&why) => None,
-                Err(why) => return Err(why),
-            };
-            let error = |of: &Selection| judged(&of.after).unwrap_or(f64::NAN);
-            let errors = [error(&best), tried.as_ref().map_or(f64::NAN, error)];
-            let better = tried
-                .filter(|t| t.fit.unsettled.is_none() && errors[1] < (1.0 - CLEARLY) * errors[0]);
-            conventions.push(Tried { convention, from, to, error: errors, kept: better.is_some() });
-            if let Some(better) = better {
-                (best, base) = (better, other);
-            }
-        }
-    }
+    let (best, conventions) = match options.conventions {
+        true => ask.with_conventions(model, best)?,
+        false => (best, Vec::new()),
+    };
     let Selection { fit, after, effects, .. } = best;
     let mut notes = fit.notes.clone();
+    notes.extend(
+        dropped(&tuned.model, &fit.model)
+            .iter()
+            .map(|(name, by)| format!("{name} is nought: {by} stands in its place.")),
+    );
+    notes.extend(parameters::taken_over(&fit.model).map(|(of, by)| {
+        format!("The shape constants of {of} stay as they were fitted without {by}, which can take up whatever they could.")
+    }));
     notes.extend(contradictions(&fit.parameters));
     let mut story = Amendment {
         schema: "greylag.amend/1",
@@ -151,51 +158,144 @@ pub fn amend(
 }
 
 /// A model with those of some effects that the flights bear out.
+#[derive(Clone)]
 struct Selection {
     /// Tuned without any.
     tuned: (Fit, Vec<HorizonScore>),
     fit: Fit,
     after: Vec<HorizonScore>,
+    /// The effects that joined, in order.
+    accepted: Vec<Added>,
+    /// What became of all.
     effects: Vec<AddedEffect>,
 }
 
-/// Adds `effects` to `model` one after the other. One that was refused while something else was missing is
-/// asked for again once that has joined.
-fn selected(
-    model: &GreyBox,
-    effects: &[Added],
-    train: &[Flight],
-    judge: &Judge,
-    options: &Options,
-    progress: &(dyn Fn(&str) + Sync),
-) -> Result<Selection, AmendError> {
-    let tuned = output_error::fit(model, train, &FitOptions::default(), progress)?;
-    let scores = judge.scores(&tuned.model);
-    let mut best = (tuned.clone(), scores.clone());
-    let mut accepted: Vec<&Added> = Vec::new();
-    // each with the number of effects beside which it was asked for
-    let mut verdicts: Vec<Option<(AddedEffect, usize)>> = vec![None; effects.len()];
-    for _ in 0..ROUNDS {
-        for (added, verdict) in effects.iter().zip(&mut verdicts) {
-            let beside = accepted.len();
-            if verdict.as_ref().is_some_and(|(e, asked)| e.refused.is_empty() || *asked == beside) {
-                continue;
+/// What is asked for, and of which flights.
+struct Ask<'a> {
+    options: &'a Options,
+    train: &'a [Flight],
+    judge: &'a Judge<'a>,
+    progress: &'a (dyn Fn(&str) + Sync),
+}
+
+impl Ask<'_> {
+    /// Adds the effects to `model` one after the other. One that was refused while something else was missing is
+    /// asked for again once that has joined.
+    fn selected(&self, model: &GreyBox) -> Result<Selection, AmendError> {
+        let Options { effects, refused, .. } = self.options;
+        let tuned = output_error::fit(model, self.train, &FitOptions::default(), self.progress)?;
+        let scores = self.judge.scores(&tuned.model);
+        let mut best = (tuned.clone(), scores.clone());
+        let mut accepted: Vec<&Added> = Vec::new();
+        // each with the number of effects beside which it was asked for
+        let mut verdicts: Vec<Option<(AddedEffect, usize)>> = vec![None; effects.len()];
+        for _ in 0..ROUNDS {
+            for (added, verdict) in effects.iter().zip(&mut verdicts) {
+                let beside = accepted.len();
+                if verdict.as_ref().is_some_and(|(e, asked)| e.joined || *asked == beside)
+                    || accepted.iter().any(|a| a.id == added.id)
+                {
+                    continue;
+                }
+                accepted.push(added);
+                let fitted = self.with_effects(model, &accepted, &best.0.model);
+                let (effect, kept) = self.judge.verdict(added, fitted, &best.1, *refused)?;
+                match kept {
+                    Some(kept) => best = kept,
+                    None => drop(accepted.pop()),
+                }
+                *verdict = Some((effect, beside));
             }
-            if accepted.iter().any(|a| a.id == added.id) {
-                continue;
-            }
-            accepted.push(added);
-            let fitted = with_effects(model, &accepted, train, progress);
-            let (effect, kept) = judge.verdict(added, fitted, &best.1, options.refused)?;
-            match kept {
-                Some(kept) => best = kept,
-                None => drop(accepted.pop()),
-            }
-            *verdict = Some((effect, beside));
         }
+        let effects = verdicts.into_iter().flatten().map(|(effect, _)| effect).collect();
+        let accepted = accepted.into_iter().cloned().collect();
+        Ok(Selection { tuned: (tuned, scores), fit: best.0, after: best.1, accepted, effects })
     }
-    let effects = verdicts.into_iter().flatten().map(|(effect, _)| effect).collect();
-    Ok(Selection { tuned: (tuned, scores), fit: best.0, after: best.1, effects })
+
+    /// Tries the other conventions of `model`, whose selection is `best`, one after the other, and what was not
+    /// borne out again once another has been taken.
+    fn with_conventions(
+        &self,
+        model: &GreyBox,
+        mut best: Selection,
+    ) -> Result<(Selection, Vec<Tried>), AmendError> {
+        let mut base = model.clone();
+        // each with the number of others beside which it was tried
+        let mut verdicts: [Option<(Tried, usize)>; Convention::ALL.len()] = Default::default();
+        for _ in 0..ROUNDS {
+            for (k, convention) in Convention::ALL.into_iter().enumerate() {
+                let beside = verdicts.iter().flatten().filter(|(t, _)| t.kept).count();
+                if verdicts[k].as_ref().is_some_and(|(t, asked)| t.kept || *asked == beside) {
+                    continue;
+                }
+                let Some(other) = convention.other(&base) else { continue };
+                let (from, to) = (convention.of(&base), convention.of(&other));
+                (self.progress)(&format!("{}: {to} instead of {from}", model.name));
+                let tried = self.under(&other, &best)?;
+                let closer = tried.as_ref().map_or(f64::NAN, |t| closer(&best.fit, &t.fit));
+                let error = [best.error(), tried.as_ref().map_or(f64::NAN, Selection::error)];
+                let taken = tried.filter(|t| {
+                    let settled = t.fit.unsettled.is_none() || error[1] < SETTLED_OR_NOT * error[0];
+                    settled && convention.is_borne_out(closer, error)
+                });
+                let kept = taken.is_some();
+                let told = Tried { convention, from, to, error, closer, kept };
+                verdicts[k] = Some((told, beside));
+                if let Some(taken) = taken {
+                    (best, base) = (taken, other);
+                }
+            }
+        }
+        Ok((best, verdicts.into_iter().flatten().map(|(told, _)| told).collect()))
+    }
+
+    /// `other`, a model under another convention, with the effects that joined already; all are asked for anew
+    /// only where that promises something.
+    fn under(&self, other: &GreyBox, best: &Selection) -> Result<Option<Selection>, AmendError> {
+        let joined: Vec<&Added> = best.accepted.iter().collect();
+        let same = settled(self.with_effects(other, &joined, &best.fit.model))?.map(|fit| {
+            let after = self.judge.scores(&fit.model);
+            Selection { fit, after, ..best.clone() }
+        });
+        let promises = |s: &Selection| s.error() < best.error() || closer(&best.fit, &s.fit) > 0.0;
+        let anew = match same.as_ref().is_some_and(promises) {
+            true => settled(self.selected(other))?,
+            false => None,
+        };
+        Ok(same.into_iter().chain(anew).min_by(|a, b| a.error().total_cmp(&b.error())))
+    }
+
+    /// Fits `model` with `effects`, which begin where `near` has them, if it does.
+    fn with_effects(
+        &self,
+        model: &GreyBox,
+        effects: &[&Added],
+        near: &GreyBox,
+    ) -> Result<Fit, AmendError> {
+        let mut model = model.clone();
+        for added in effects {
+            let own = format!("{}.", added.id);
+            let fitted = near.coefficients().iter().filter(|c| c.name.starts_with(&own));
+            let fitted: Vec<f64> = fitted.map(|c| c.value).collect();
+            // a curve's prior is where it begins
+            let start = match fitted.is_empty() || parameters::SLIGHT.contains(&added.id.as_str()) {
+                true => added.start.clone(),
+                false => Some(fitted),
+            };
+            joined(&mut model, &Added { id: added.id.clone(), start })?;
+            model.name = format!("{}+{}", model.name, added.id);
+        }
+        let added = effects.iter().map(|a| a.id.clone()).collect();
+        let options = FitOptions { added, ..FitOptions::default() };
+        output_error::fit(&model, self.train, &options, self.progress)
+    }
+}
+
+impl Selection {
+    /// The error of unseen flights by which it is judged; NaN if no run gets there.
+    fn error(&self) -> f64 {
+        judged(&self.after).unwrap_or(f64::NAN)
+    }
 }
 
 /// `model` with an effect more, at its start.
@@ -205,7 +305,7 @@ fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendError> {
         (None, Some((about, _))) => usual_start(&about),
         (None, None) => Vec::new(),
     };
-    Ok(model.join(&added.id, &start)?)
+    Ok(model.join_most(&added.id, &start)?)
 }
 
 /// The middle one of the catalogue's starts, else nought or what lies nearest to it within bounds.
@@ -214,21 +314,6 @@ fn usual_start(about: &Description) -> Vec<f64> {
     let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);
     let listed = starts.get(starts.len() / 2).map(|s| s.to_vec());
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())
-}
-
-fn with_effects(
-    model: &GreyBox,
-    effects: &[&Added],
-    flights: &[Flight],
-    progress: &(dyn Fn(&str) + Sync),
-) -> Result<Fit, AmendError> {
-    let mut model = model.clone();
-    for added in effects {
-        joined(&mut model, added)?;
-        model.name = format!("{}+{}", model.name, added.id);
-    }
-    let added = effects.iter().map(|a| a.id.clone()).collect();
-    output_error::fit(&model, flights, &FitOptions { added, ..FitOptions::default() }, progress)
 }
 
 /// What judges fits: flights that they have not seen.
@@ -259,6 +344,7 @@ impl Judge<'_> {
         let mut effect = AddedEffect {
             id: added.id.clone(),
             description: about.map_or("", |a| a.description),
+            joined: false,
             refused: Vec::new(),
             fly_next: about.and_then(|a| a.entry).map_or("", |e| e.separated_by).into(),
         };
@@ -272,8 +358,11 @@ impl Judge<'_> {
         };
         let after = self.scores(&fit.model);
         effect.refused = objections(&added.id, &fit.parameters);
-        effect.refused.extend(fit.unsettled.clone());
-        if let (Some(a), Some(b)) = (judged(&after), judged(before))
+        let errors = judged(&after).zip(judged(before));
+        if !errors.is_some_and(|(a, b)| a < SETTLED_OR_NOT * b) {
+            effect.refused.extend(fit.unsettled.clone());
+        }
+        if let Some((a, b)) = errors
             && (a.is_nan() || a >= (1.0 - IMPROVED) * b)
         {
             effect.refused.push(format!(
@@ -281,8 +370,18 @@ impl Judge<'_> {
                  ({b:.5} without it, {a:.5} with it)"
             ));
         }
-        let kept = effect.refused.is_empty() || refused == Refused::Kept;
-        Ok((effect, kept.then_some((fit, after))))
+        effect.joined = effect.refused.is_empty() || refused == Refused::Kept;
+        let kept = effect.joined.then_some((fit, after));
+        Ok((effect, kept))
+    }
+}
+
+/// What a fit came to; `None` if it failed at what was asked of it.
+fn settled<T>(of: Result<T, AmendError>) -> Result<Option<T>, AmendError> {
+    match of {
+        Ok(of) => Ok(Some(of)),
+        Err(why) if failed(&why) => Ok(None),
+        Err(why) => Err(why),
     }
 }
 
@@ -354,14 +453,8 @@ fn sentences(story: &Amendment) -> Vec<String> {
     let mut all = Vec::new();
     let (given, before, after) =
         (judged(&story.given), judged(&story.before), judged(&story.after));
-    let kept: Vec<&str> = story
-        .effects
-        .iter()
-        .map(|e| e.id.as_str())
-        .filter(|id| {
-            story.parameters.iter().any(|p| p.added && p.name.starts_with(&format!("{id}.")))
-        })
-        .collect();
+    let joined = story.effects.iter().filter(|e| e.joined);
+    let kept: Vec<&str> = joined.map(|e| e.id.as_str()).collect();
     if let (Some(given), Some(before), Some(after)) = (given, before, after) {
         all.push(format!(
             "On flights that the fit did not see, {} once the coefficients are tuned ({given:.5} to \
@@ -369,20 +462,28 @@ fn sentences(story: &Amendment) -> Vec<String> {
             change(given, before)
         ));
         if !kept.is_empty() {
+            let joined = kept.iter().map(|id| (*id).to_owned());
+            let taken = story.conventions.iter().filter(|t| t.kept);
+            let taken = taken.map(|t| format!("{} {}", t.convention.key().join("."), t.to));
             all.push(format!(
                 "With {} as well {} ({before:.5} to {after:.5}).",
-                kept.join(" and "),
+                joined.chain(taken).collect::<Vec<_>>().join(" and "),
                 change(before, after)
             ));
         }
     }
-    for Tried { convention, from, to, error: [a, b], kept } in &story.conventions {
+    for Tried { convention, from, to, error: [a, b], closer, kept } in &story.conventions {
         let key = convention.key().join(".");
         let said = if *kept { "is taken instead of" } else { "does not replace" };
         let found = if b.is_nan() {
             "no fit with it holds that long".into()
         } else {
-            format!("{} ({a:.5} to {b:.5})", change(*a, *b))
+            format!(
+                "{} ({a:.5} to {b:.5}), and the fit's own flights are followed {} by {:.1} standard errors",
+                change(*a, *b),
+                if *closer > 0.0 { "more closely" } else { "less closely" },
+                closer.abs()
+            )
         };
         all.push(format!("{key} {to} {said} {from}: {found}."));
     }

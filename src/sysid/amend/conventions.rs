@@ -2,13 +2,43 @@
 
 use serde::Serialize;
 
+use super::normal::Weights;
+use super::output_error::{Fit, Left};
 use crate::model::{GreyBox, Integrator};
 use crate::physics::atmosphere::Density;
 use crate::physics::rigid_body::ForceAxes;
 
-/// Least share by which another convention must lower the error of unseen flights: it is no effect of the
-/// aircraft, so a little is not enough.
-pub(super) const CLEARLY: f64 = 0.1;
+/// Standard errors of the difference between two fits that are clear.
+const CLEARLY: f64 = 3.0;
+/// Share of the error of unseen flights that is much.
+const MUCH: f64 = 0.1;
+
+/// By how many standard errors `other` follows the shots more closely than `fit`: the mean difference of the shots'
+/// costs, two (Akaike's) off for each coefficient more, over the scatter of these differences (Vuong 1989). Each
+/// fit's weights suit itself, so the costs are means by both. Nought if fewer than three shots are in both.
+pub(super) fn closer(fit: &Fit, other: &Fit) -> f64 {
+    let cost = |left: &Left| -> f64 {
+        let weigh = |squares: &[f64; 8], weights: &[f64; 8]| -> f64 {
+            squares.iter().zip(weights).map(|(x, w)| x * w).sum()
+        };
+        let by = |w: &Weights| weigh(&left.output, &w.output) + weigh(&left.start, &w.start);
+        0.5 * (by(&fit.weights) + by(&other.weights))
+    };
+    let fall = |a: &Left| {
+        let b = other.left.iter().find(|b| b.shot == a.shot)?;
+        Some(cost(a) - cost(b))
+    };
+    let falls: Vec<f64> = fit.left.iter().filter_map(fall).collect();
+    let count = falls.len() as f64;
+    let mean = falls.iter().sum::<f64>() / count;
+    let more = other.parameters.len() as f64 - fit.parameters.len() as f64;
+    let scatter = falls.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    if falls.len() < 3 || scatter == 0.0 {
+        0.0
+    } else {
+        (mean - 2.0 * more / count) / (scatter / count).sqrt()
+    }
+}
 
 /// A convention that a model file states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -54,6 +84,20 @@ impl Convention {
         }
     }
 
+    /// Whether the other one is taken if the fit's own flights are followed `closer` by so many standard errors
+    /// with it, and the error of unseen flights goes from the first of `error` to the second. Steps and axes are the
+    /// simulator's or the author's choice, which the flights must bear out; air does thin with height, which they
+    /// must not deny.
+    pub(super) fn is_borne_out(self, closer: f64, error: [f64; 2]) -> bool {
+        let fall = 1.0 - error[1] / error[0];
+        match self {
+            Convention::Integrator | Convention::ForceAxes => {
+                (closer > 0.0 && fall > MUCH) || (closer > CLEARLY && fall > 0.0)
+            }
+            Convention::Density => closer > -CLEARLY && fall > -MUCH,
+        }
+    }
+
     /// `model` with the other one; `None` if there is none to try.
     pub(super) fn other(self, model: &GreyBox) -> Option<GreyBox> {
         let mut other = model.clone();
@@ -89,6 +133,8 @@ pub struct Tried {
     /// Error of unseen flights at the horizon of judgement before and with it, all coefficients refitted;
     /// NaN where no run gets there or the fit fails.
     pub error: [f64; 2],
+    /// Standard errors by which the fit follows its own flights more closely; NaN where it fails.
+    pub closer: f64,
     /// Whether the amended model has it.
     pub kept: bool,
 }

@@ -34,7 +34,7 @@ const NEAR: f64 = 5.0;
 const INNER: usize = 6;
 /// Not settled if the last change exceeds this many standard deviations,
 const UNSETTLED: f64 = 0.5;
-/// and lost, so that nothing can be said of any coefficient, if it exceeds this many.
+/// and lost, so that nothing can be said of any coefficient, if it exceeds this many and was made.
 const LOST: f64 = 5.0;
 /// Least standard deviations of residuals, in the units of the state: what the models' steps and the
 /// interpolation of deflections leave even without noise.
@@ -80,12 +80,27 @@ pub struct Fit {
     pub shots: usize,
     /// See `shots`.
     pub weakened: usize,
+    /// What each shot of the last length leaves.
+    pub(super) left: Vec<Left>,
+    /// What weighs it.
+    pub(super) weights: Weights,
     /// Iterations made.
     pub iterations: usize,
     /// What had not settled when the search ended, in words; its change widens all intervals.
     pub unsettled: Option<String>,
     /// What the reader must know.
     pub notes: Vec<String>,
+}
+
+/// What a shot leaves.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Left {
+    /// Flight, segment and first sample.
+    pub shot: [usize; 3],
+    /// Sum of the squared residuals of each state.
+    pub output: [f64; 8],
+    /// Squared errors of the initial state.
+    pub start: [f64; 8],
 }
 
 /// Fits the free coefficients of `model` to `flights`; `progress` hears what is being done.
@@ -164,6 +179,9 @@ struct Search<'a> {
     iterations: usize,
     /// The last change in standard deviations, and of which coefficient.
     change: (f64, usize),
+    /// Whether that change was only wanted: no part of it lowers the cost, as where a run that stalls or does not
+    /// makes the cost jump.
+    stuck: bool,
 }
 
 /// The equations of all shots together.
@@ -193,6 +211,7 @@ impl<'a> Search<'a> {
             weights,
             iterations: 0,
             change: (f64::INFINITY, 0),
+            stuck: false,
         }
     }
 
@@ -260,6 +279,7 @@ impl<'a> Search<'a> {
             for inner in 0..INNER {
                 let system = self.system();
                 let moved = self.step(&system, &mut damping)?;
+                self.stuck = !moved;
                 self.iterations += 1;
                 if inner == 0 {
                     first = self.change.0;
@@ -478,7 +498,7 @@ impl<'a> Search<'a> {
     /// The fit as it stands, with intervals.
     fn finish(self) -> Result<Fit, AmendError> {
         let model_name = || self.base.name.clone();
-        if self.change.0.is_nan() || self.change.0 > LOST {
+        if self.change.0.is_nan() || (self.change.0 > LOST && !self.stuck) {
             return Err(AmendError::NotConverged {
                 model: model_name(),
                 iterations: self.iterations,
@@ -509,6 +529,8 @@ impl<'a> Search<'a> {
         let astray = if unsettled.is_some() { self.change.0 } else { 0.0 };
         let wider = self.disagreement(&sd, &by_flight).hypot(astray);
         let sd: Vec<f64> = sd.iter().map(|x| x * wider).collect();
+        let mut by_flight = by_flight;
+        by_flight.iter_mut().flatten().for_each(|e| e.sd *= wider);
         let parameters = self.parameters(&sd, &by_flight);
         let flights = self.flights.iter().zip(&self.place.sensors).enumerate();
         let weakened = self.shots.iter().filter(|s| s.weight < 0.5).count() + self.short;
@@ -524,6 +546,8 @@ impl<'a> Search<'a> {
             residual_sd: self.residual_sd(),
             shots: self.shots.len(),
             weakened,
+            left: self.left(),
+            weights: self.weights,
             iterations: self.iterations,
             notes: self.notes(weakened, &unsettled),
             unsettled,
@@ -600,6 +624,18 @@ impl<'a> Search<'a> {
             }
         }
         if count > 0.0 { f64::max(1.0, (sum / count).sqrt()) } else { 1.0 }
+    }
+
+    fn left(&self) -> Vec<Left> {
+        let residuals = self.residuals();
+        let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
+        let shots = self.shots.iter().zip(&residuals).zip(&self.place.starts);
+        let one = |((shot, r), from): ((&Shot, &Vec<[f64; 8]>), &[f64; 8])| Left {
+            shot: [shot.flight, shot.segment, shot.start],
+            output: std::array::from_fn(|k| square(r, k)),
+            start: from.map(|x| x * x),
+        };
+        shots.map(one).collect()
     }
 
     fn residual_sd(&self) -> [f64; 8] {

@@ -9,9 +9,12 @@ use crate::physics::inputs;
 /// from the shape beside them.
 const HELD: &[&str] = &["lift_stall.k"];
 /// Effects that correct others by what no formula says: heights where little was flown stay small,
-const SLIGHT: &[&str] = &["lift_curve", "drag_curve"];
+pub(super) const SLIGHT: &[&str] = &["lift_curve", "drag_curve"];
 /// for their prior is this share of what is possible.
 const SLIGHT_SHARE: f64 = 0.1;
+/// Such an effect with the one whose shape it takes over: the constants of that formula stay as they are, since
+/// the curve can take up whatever they could.
+const TAKES_OVER: &[(&str, &str)] = &[("lift_curve", "lift_stall")];
 /// Step of a derivative in a coefficient of the prior, as a share of its prior width.
 const STEP: f64 = 1e-3;
 /// Step of a derivative in a shape constant or that of an input effect, as a share of its value.
@@ -53,7 +56,7 @@ pub(super) fn describe(id: &str) -> Option<(Description, bool)> {
 /// The coefficients of `model` that may change when `added` are the ids of new effects.
 ///
 /// A coefficient of the prior is held if its width is zero; one of a new effect has no prior but its
-/// bounds, or a share of them.
+/// bounds, or a share of them. Constants of a formula whose shape a curve takes over are held.
 pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
     let linear = model.linear();
     let named = model.coefficients().iter().zip(linear).enumerate();
@@ -66,7 +69,9 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
             let (low, high) = coefficient.bounds;
             let share = if SLIGHT.contains(&id) { SLIGHT_SHARE } else { 1.0 };
             let width = if added { share * (high - low) } else { c.width() };
-            if width <= 0.0 || (added && HELD.contains(&c.name.as_str())) {
+            let taken_over = taken_over(model).any(|(of, _)| of == id);
+            let held = (added && HELD.contains(&c.name.as_str())) || (taken_over && !linear);
+            if width <= 0.0 || held {
                 return None;
             }
             let place = about.coefficients.iter().position(|k| k.name == short)?;
@@ -93,6 +98,12 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
             })
         })
         .collect()
+}
+
+/// Effects of `model` whose shape constants are held, each with the curve that takes their shape over.
+pub(super) fn taken_over(model: &GreyBox) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let both = TAKES_OVER.iter().filter(|(by, of)| model.has(by) && model.has(of));
+    both.map(|(by, of)| (*of, *by))
 }
 
 /// `model` with the free coefficients at `values`.

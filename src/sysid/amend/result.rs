@@ -79,6 +79,8 @@ pub struct AddedEffect {
     pub id: String,
     /// What it is, in one sentence.
     pub description: &'static str,
+    /// Whether the amended model has it.
+    pub joined: bool,
     /// Why the data refuse it; empty if they do not.
     pub refused: Vec<String>,
     /// What to fly so that the data decide.

@@ -63,7 +63,7 @@ pub fn columns(
     refined: &[(&str, Vec<f64>)],
 ) -> Columns {
     let mut all = Columns { trials: Vec::new(), columns: vec![Vec::new(); flights.len()] };
-    let (straight, curved): (Vec<&Entry>, Vec<&Entry>) =
+    let (straight, curved): (Vec<Entry>, Vec<Entry>) =
         entries.iter().partition(|e| starts(e).is_empty());
     all.add_linear(model, flights, &straight);
     let places: Vec<(&Entry, Vec<f64>)> = curved
@@ -75,13 +75,13 @@ pub fn columns(
                 .into_iter()
                 .chain(listed)
                 .chain(own)
-                .map(|values| (*e, values))
+                .map(|values| (e, values))
                 .collect::<Vec<_>>()
         })
         .collect();
     let made: Vec<Option<Vec<Vec<Column>>>> =
         places.par_iter().map(|(e, values)| curved_columns(model, flights, e, values)).collect();
-    for e in curved {
+    for e in &curved {
         let mut trial =
             Trial { id: e.about.id, points: Vec::new(), support: 0.0, channels: [false; 6] };
         for ((of, values), made) in places.iter().zip(&made) {
@@ -116,6 +116,24 @@ pub fn straight(entry: &Entry) -> bool {
     starts(entry).is_empty()
 }
 
+/// `model` with all of `entries` that can join it, at nought or what lies nearest to it, and these with their values.
+pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec<f64>)>) {
+    let mut everything = model.clone();
+    let mut joined = Vec::new();
+    for e in entries {
+        let nearest = |(low, high): (f64, f64)| 0.0_f64.clamp(low, high);
+        let values: Vec<f64> = e.about.coefficients.iter().map(|c| nearest(c.bounds)).collect();
+        if everything.join(e.about.id, &values).is_ok() {
+            joined.push((*e, values));
+        }
+    }
+    // what some of them would replace is still there
+    for c in model.coefficients() {
+        everything.set_coefficient(&c.name, c.value);
+    }
+    (everything, joined)
+}
+
 /// Coefficients that a search leaves free: all but gains that are one in every start.
 pub fn free(entry: &Entry) -> Vec<usize> {
     let linear = entry.about.coefficients.len() - entry.about.shape;
@@ -128,20 +146,8 @@ pub fn free(entry: &Entry) -> Vec<usize> {
 
 impl Columns {
     /// One model with all of `entries` at zero gives the columns of all in one pass.
-    fn add_linear(&mut self, model: &GreyBox, flights: &[Ready], entries: &[&Entry]) {
-        let mut everything = model.clone();
-        let mut joined = Vec::new();
-        for e in entries {
-            let values: Vec<f64> = e
-                .about
-                .coefficients
-                .iter()
-                .map(|c| 0.0_f64.clamp(c.bounds.0, c.bounds.1))
-                .collect();
-            if everything.join(e.about.id, &values).is_ok() {
-                joined.push((*e, values));
-            }
-        }
+    fn add_linear(&mut self, model: &GreyBox, flights: &[Ready], entries: &[Entry]) {
+        let (everything, joined) = with_all(model, entries);
         let wanted = model.coefficients().len()..everything.coefficients().len();
         for (list, flight) in self.columns.iter_mut().zip(flights) {
             list.extend(flight.linear(&everything, wanted.clone()));

@@ -196,6 +196,11 @@ fn join(a: &mut Vec<f64>, b: Vec<f64>) {
     }
 }
 
+/// Whether mass or inertia of `model` depend on its coefficient `index`.
+pub fn of_body(model: &GreyBox, index: usize) -> bool {
+    changed_body(model, index).is_some()
+}
+
 /// The body that `model` has with the coefficient `index` moved, and by how much, if it changes it.
 fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
     const MOVED: f64 = 1e-3;

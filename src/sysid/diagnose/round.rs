@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::catalogue::{self, Columns, Entry};
 use super::cells::{Cells, Placed};
-use super::columns::{Ready, SENSORS, combine};
+use super::columns::{Ready, SENSORS, combine, of_body};
 use super::features;
 use super::gather::Column;
 use super::noise::Noise;
@@ -92,7 +92,9 @@ impl Round {
     ) -> Option<Round> {
         let flights: Vec<Ready> = problem.flights.iter().map(|f| Ready::new(&model, f)).collect();
         let cells = Cells::new(&flights);
-        let (mut known, coefficients, mut placed) = known(problem, &model, &flights);
+        let own = 0..model.coefficients().len();
+        let linear = flights.iter().map(|f| f.linear(&model, own.clone())).collect();
+        let (mut known, coefficients, mut placed) = known(problem, &model, &flights, linear);
         let features = features::features(&model, &flights, problem.seed);
         let made = catalogue::columns(&model, &flights, entries, &[]);
         let last = place(&mut placed, known.len(), &made, &flights);
@@ -327,6 +329,25 @@ impl Round {
             }
         }
         model.set_coefficients(&values);
+        if self.model.body.may_become(&model.body) {
+            return model;
+        }
+        let of_body: Vec<usize> =
+            self.coefficients.iter().copied().filter(|k| of_body(&self.model, *k)).collect();
+        let given: Vec<f64> = self.model.coefficients().iter().map(|c| c.value).collect();
+        let less = (0..100).rev().map(|percent| {
+            let mut less = values.clone();
+            for k in &of_body {
+                less[*k] = given[*k] + 0.01 * f64::from(percent) * (values[*k] - given[*k]);
+            }
+            less
+        });
+        for values in less {
+            model.set_coefficients(&values);
+            if self.model.body.may_become(&model.body) {
+                break;
+            }
+        }
         model
     }
 }
@@ -389,10 +410,18 @@ fn shared(
 ) -> (Vec<Vec<f64>>, Vec<Placed>) {
     let straight: Vec<Entry> =
         of.entries.iter().filter(|e| catalogue::straight(e)).copied().collect();
+    let everything = catalogue::with_all(of.model, &straight).0;
     let drawn = |draw: usize| {
         let flights = disturbed(of.problem, of.model, draw);
-        let (known, _, mut after) = known(of.problem, of.model, &flights);
-        let made = catalogue::columns(of.model, &flights, &straight, &[]);
+        // the model's own columns and the candidates' in one pass
+        let (mut columns, mut candidates) = (Vec::new(), Vec::new());
+        for flight in &flights {
+            let mut all = flight.linear(&everything, 0..everything.coefficients().len());
+            candidates.push(all.split_off(of.model.coefficients().len()));
+            columns.push(all);
+        }
+        let (known, _, mut after) = known(of.problem, of.model, &flights, columns);
+        let made = Columns { trials: Vec::new(), columns: candidates };
         let end = place(&mut after, known.len(), &made, &flights);
         // the residual stands where it stands before
         for list in &mut after {
@@ -414,22 +443,27 @@ fn shared(
 
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
 
-/// The known unknowns and their columns: free coefficients, then the sensors of each flight.
-fn known(problem: &Problem, model: &GreyBox, flights: &[Ready]) -> KnownColumns {
+/// The known unknowns and their columns: free coefficients, whose columns `linear_columns` has where the model is linear in
+/// them, then the sensors of each flight.
+fn known(
+    problem: &Problem,
+    model: &GreyBox,
+    flights: &[Ready],
+    linear_columns: Vec<Vec<Column>>,
+) -> KnownColumns {
     let (mut known, mut coefficients) = (Vec::new(), Vec::new());
     let mut placed: Vec<Placed> = vec![Vec::new(); flights.len()];
     let linear = model.linear();
-    let count = model.coefficients().len();
-    let columns: Vec<Vec<Column>> = flights.iter().map(|f| f.linear(model, 0..count)).collect();
     for (index, named) in model.coefficients().iter().enumerate() {
         // a shape constant that has joined is not moved farther than its linearisation reaches
         let joined =
             if linear[index] { f64::INFINITY } else { catalogue::REACH * named.value.abs() };
         let (value, width) = problem.prior.get(index).copied().unwrap_or((named.value, joined));
-        if width <= 0.0 || !searched(model, index) {
+        let held = width <= 0.0 || model.replaced(&named.name).is_some();
+        if held || !searched(model, index) {
             continue;
         }
-        for ((list, flight), columns) in placed.iter_mut().zip(flights).zip(&columns) {
+        for ((list, flight), columns) in placed.iter_mut().zip(flights).zip(&linear_columns) {
             let column = match linear[index] {
                 true => columns[index].clone(),
                 false => tangent(model, flight, index),

@@ -175,7 +175,7 @@ fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
     let error = |k: &usize| {
         let (trial, score) = &found.scores[*k];
         let mut model = round.with(score);
-        model.join(round.trials[*trial].id, &score.values).ok()?;
+        model.join_most(round.trials[*trial].id, &score.values).ok()?;
         let mut left = f64::INFINITY;
         for _ in 0..=SETTLING {
             let settled = Round::under(problem, model, &[], Some(&round.noise))?;
@@ -291,7 +291,10 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
         // what it had is possible again
         let _ = model.join(effect, &own(effect));
     }
-    for c in current.coefficients() {
+    for c in current.coefficients().iter().filter(|c| {
+        // what it replaced is there again
+        current.replaced(&c.name) != Some(id)
+    }) {
         model.set_coefficient(&c.name, c.value);
     }
     model
@@ -309,7 +312,7 @@ impl Found {
     ) -> bool {
         let Some(winner) = self.selected.last().cloned() else { return false };
         let mut model = self.round().with(&winner.score);
-        if model.join(winner.id, &winner.score.values).is_err() {
+        if model.join_most(winner.id, &winner.score.values).is_err() {
             return false;
         }
         for _ in 0..SETTLING {

@@ -7,6 +7,7 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use super::cells::{Cells, Placed};
+use super::gather::Column;
 use super::noise::Noise;
 use crate::num::stream::stream;
 use crate::sysid::compare::flight::Prepared;
@@ -101,7 +102,7 @@ fn both_ways(x: &[f64], kept: f64) -> Vec<f64> {
 }
 
 /// Products of what a disturbance adds to the columns before `last` with what it adds to the residual in
-/// the place `last`, flight by flight; `before` and `after` have the same columns in the same places.
+/// the place `last`, flight by flight; columns in the same place in `before` and `after` are the same one.
 pub fn products(
     cells: &Cells,
     before: &[Placed],
@@ -109,24 +110,30 @@ pub fn products(
     last: usize,
     noise: &Noise,
 ) -> Vec<Vec<f64>> {
+    let added: Vec<Placed> = before.iter().zip(after).map(|(b, a)| differences(b, a)).collect();
     let mut sums = vec![vec![0.0; last]; before.len()];
     for cell in &cells.list {
-        let whitener = &noise.whiteners[cell.channel];
-        let (places, old) = cell.matrix(&before[cell.flight], whitener);
-        let (same, new) = cell.matrix(&after[cell.flight], whitener);
-        let column = |place: usize| {
-            let (i, j) =
-                (places.iter().position(|p| *p == place)?, same.iter().position(|p| *p == place)?);
-            Some(new.column(j) - old.column(i))
-        };
-        let Some(residual) = column(last).filter(|r| r.iter().all(|x| x.is_finite())) else {
+        let (places, columns) = cell.matrix(&added[cell.flight], &noise.whiteners[cell.channel]);
+        let Some(residual) = places.iter().position(|p| *p == last) else { continue };
+        let residual = columns.column(residual);
+        if residual.iter().any(|x| !x.is_finite()) {
             continue;
-        };
-        for place in places.iter().filter(|p| **p < last) {
-            if let Some(added) = column(*place) {
-                sums[cell.flight][*place] += added.dot(&residual);
+        }
+        for (place, column) in places.iter().zip(columns.column_iter()) {
+            if *place < last {
+                sums[cell.flight][*place] += column.dot(&residual);
             }
         }
     }
     sums
+}
+
+/// `after` less `before`, place by place; channels that one of them lacks stay empty.
+fn differences(before: &Placed, after: &Placed) -> Placed {
+    let of = |(place, new): &(usize, Column)| {
+        let (_, old) = before.iter().find(|(p, _)| p == place)?;
+        let channel = |c: usize| new[c].iter().zip(&old[c]).map(|(a, b)| a - b).collect();
+        Some((*place, std::array::from_fn(channel)))
+    };
+    after.iter().filter_map(of).collect()
 }
