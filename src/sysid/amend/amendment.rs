@@ -187,8 +187,18 @@ impl Ask<'_> {
         let scores = self.judge.scores(&tuned.model);
         let mut best = (tuned.clone(), scores.clone());
         let mut accepted: Vec<&Added> = Vec::new();
-        // each with the number of effects beside which it was asked for
+        // each with the number of effects beside which it was asked for, 0 for those that joined together
         let mut verdicts: Vec<Option<(AddedEffect, usize)>> = vec![None; effects.len()];
+        if let Some((together, kept)) = self.together(model, &best)? {
+            for (added, verdict) in effects.iter().zip(&mut verdicts) {
+                if together.iter().any(|t| t.id == added.id) {
+                    accepted.push(added);
+                    let effect = AddedEffect { joined: true, ..AddedEffect::asked_for(&added.id) };
+                    *verdict = Some((effect, 0));
+                }
+            }
+            best = kept;
+        }
         for _ in 0..ROUNDS {
             for (added, verdict) in effects.iter().zip(&mut verdicts) {
                 let beside = accepted.len();
@@ -210,6 +220,32 @@ impl Ask<'_> {
         let effects = verdicts.into_iter().flatten().map(|(effect, _)| effect).collect();
         let accepted = accepted.into_iter().cloned().collect();
         Ok(Selection { tuned: (tuned, scores), fit: best.0, after: best.1, accepted, effects })
+    }
+
+    /// Those of the effects that a diagnosis found together, fitted together, less those that the flights refuse
+    /// even so, if unseen flights are flown better with them: one of them alone may be lost beside a gross error
+    /// that another mends. `None` if there are not two.
+    fn together(
+        &self,
+        model: &GreyBox,
+        best: &Kept,
+    ) -> Result<Option<(Vec<&Added>, Kept)>, AmendError> {
+        let mut all: Vec<&Added> =
+            self.options.effects.iter().filter(|a| a.start.is_some()).collect();
+        while all.len() > 1 {
+            let Some(fit) = settled(self.with_effects(model, &all, &best.0.model))? else { break };
+            let borne_out = |a: &&Added| objections(&a.id, &fit.parameters).is_empty();
+            let left: Vec<&Added> = all.iter().copied().filter(borne_out).collect();
+            if left.len() < all.len() {
+                all = left;
+                continue;
+            }
+            let after = self.judge.scores(&fit.model);
+            let errors = judged(&after).zip(judged(&best.1));
+            let better = errors.is_some_and(|(a, b)| a < (1.0 - IMPROVED) * b);
+            return Ok(better.then_some((all, (fit, after))));
+        }
+        Ok(None)
     }
 
     /// Tries the other conventions of `model`, whose selection is `best`, one after the other, and what was not
@@ -316,6 +352,20 @@ fn usual_start(about: &Description) -> Vec<f64> {
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())
 }
 
+impl AddedEffect {
+    /// The effect `id`, nothing said of it yet.
+    fn asked_for(id: &str) -> AddedEffect {
+        let about = parameters::describe(id).map(|(about, _)| about);
+        AddedEffect {
+            id: id.into(),
+            description: about.map_or("", |a| a.description),
+            joined: false,
+            refused: Vec::new(),
+            fly_next: about.and_then(|a| a.entry).map_or("", |e| e.separated_by).into(),
+        }
+    }
+}
+
 /// What judges fits: flights that they have not seen.
 struct Judge<'a> {
     test: &'a [Flight],
@@ -340,14 +390,7 @@ impl Judge<'_> {
         before: &[HorizonScore],
         refused: Refused,
     ) -> Result<(AddedEffect, Option<Kept>), AmendError> {
-        let about = parameters::describe(&added.id).map(|(about, _)| about);
-        let mut effect = AddedEffect {
-            id: added.id.clone(),
-            description: about.map_or("", |a| a.description),
-            joined: false,
-            refused: Vec::new(),
-            fly_next: about.and_then(|a| a.entry).map_or("", |e| e.separated_by).into(),
-        };
+        let mut effect = AddedEffect::asked_for(&added.id);
         let fit = match fitted {
             Ok(fit) => fit,
             Err(why) if failed(&why) => {
