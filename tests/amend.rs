@@ -123,6 +123,28 @@ fn validate_the_prior_as_printed_ends_close_to_the_simulators_model() {
     assert!((value("inertia_xz.dJxz_kgm2") / -1.8686 - 1.0).abs() < 0.01);
 }
 
+/// A thrust in pounds is the model's own coefficient; told as an effect beside it, it is told twice, and what hangs on
+/// the thrust is lost in its interval.
+#[test]
+fn what_the_model_says_itself_is_not_told_twice() {
+    let mut model = sensors::model();
+    model.set_coefficient("thrust_linear.Cp_n", 5.9);
+    // the drag that goes with α² is in a table of this model, and more of it in the aircraft
+    let all: Vec<Reconstruction> =
+        (61..64).map(|k| flight("drag_alpha2=0.8", 30.0, Manoeuvres::Usual, k)).collect();
+    let with = |id: &str, start: f64| Added { id: id.into(), start: Some(vec![start]) };
+    let effects = vec![with("drag_alpha2", 0.5), with("thrust_scale", 20.0)];
+    let options = Options { effects, ..Options::default() };
+    let found = amend(&model, &all[..2], &all[2..], &options, &|_| ()).unwrap();
+    let story = &found.amendment;
+    story.sentences.iter().for_each(|s| println!("{s}"));
+    let joined = |id: &str| story.effects.iter().find(|e| e.id == id).unwrap().joined;
+    assert!(!joined("thrust_scale") && joined("drag_alpha2"), "{:?}", story.effects);
+    let value = |name: &str| story.parameters.iter().find(|p| p.name == name).unwrap().value;
+    assert!((value("thrust_linear.Cp_n") / 26.246 - 1.0).abs() < 0.02);
+    assert!((value("drag_alpha2.CDalpha2") / 0.8 - 1.0).abs() < 0.05);
+}
+
 #[test]
 fn an_effect_that_is_not_there_is_refused() {
     let all = flights("", 11);

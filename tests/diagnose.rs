@@ -237,3 +237,18 @@ fn the_prior_as_printed_has_its_thrust_and_its_inertia_wrong() {
     let named = |id: &str| found.effects.iter().any(|e| e.id == id && e.asserted);
     assert!(named("drag_alpha2") && named("drag_beta2"), "{:#?}", found.sentences);
 }
+
+/// The same where the accelerations of a model with the wrong sign in Jxz are too far off: on these flights they make
+/// too little of it, and of each flight something else.
+#[test]
+fn an_inertia_of_the_wrong_sign_is_found_where_the_models_accelerations_mislead() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior-as-printed.toml");
+    let printed = GreyBox::load(&path).unwrap();
+    let found = diagnose(&printed, &trained(63, Vec::new()), &Options::default(), &|_| {}).unwrap();
+    println!("{:#?}", found.sentences);
+    let effect = found.effects.iter().find(|e| e.id == "inertia_xz").unwrap();
+    assert!(effect.asserted, "{:?}", effect.refused);
+    let jxz = 0.9343 + effect.parameters[0].value;
+    assert!((jxz / -0.9343 - 1.0).abs() < 0.05, "{jxz}");
+    assert!(found.effects.iter().any(|e| e.id == "lift_stall" && e.asserted));
+}

@@ -134,7 +134,7 @@ fn a_curve_of_lift_counts_beyond_the_stall() {
         (model.wrench(&state, &Controls::default(), &air).get(Channel::Lift), air.q_s)
     };
     let mut curved = stalled.clone();
-    curved.join("lift_curve", &[0.0; 18]).unwrap();
+    curved.join("lift_curve", &[0.0; 23]).unwrap();
     curved.set_coefficient("lift_curve.CL_p20", 0.08);
     let ((before, _), (after, q_s)) = (lift(&stalled), lift(&curved));
     assert!((after - before - 0.08 * q_s).abs() < 1e-9, "{before} {after}");

@@ -40,6 +40,7 @@ fn parameter(name: &str, added: bool, [prior, prior_sd, value, sd]: [f64; 4]) ->
         } else {
             Vec::new()
         },
+        same_as: None,
     }
 }
 

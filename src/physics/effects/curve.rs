@@ -9,19 +9,22 @@ use crate::physics::Channel;
 
 /// The first place of the grid, °.
 const FIRST_DEG: f64 = -8.0;
-/// Distance between places, °.
+/// Distance between places, °,
 const SPACING_DEG: f64 = 2.0;
+/// and half that between these angles, °, where lift breaks.
+const FINE_DEG: (f64, f64) = (10.0, 20.0);
 /// Places: from −8° to 30°.
-const PLACES: usize = 20;
+const PLACES: usize = 25;
 /// Places at which a curve is nought, 0° and 4°: where an aircraft flies most.
 const NOUGHT: [usize; 2] = [4, 6];
 
-/// Coefficients of a curve: its height over every other place, as `CL_m8` or `CL_p20`.
+/// Coefficients of a curve: its height at every other place, as `CL_m8` or `CL_p20`.
 macro_rules! heights {
     ($letter:literal, $bounds:expr) => {
         super::curve::heights!($letter, $bounds,
             "m8" "−8", "m6" "−6", "m4" "−4", "m2" "−2", "p2" "2", "p6" "6", "p8" "8", "p10" "10",
-            "p12" "12", "p14" "14", "p16" "16", "p18" "18", "p20" "20", "p22" "22", "p24" "24",
+            "p11" "11", "p12" "12", "p13" "13", "p14" "14", "p15" "15", "p16" "16", "p17" "17",
+            "p18" "18", "p19" "19", "p20" "20", "p22" "22", "p24" "24",
             "p26" "26", "p28" "28", "p30" "30")
     };
     ($letter:literal, $bounds:expr, $($name:literal $degrees:literal),*) => {
@@ -41,8 +44,9 @@ pub(super) use heights;
 /// have no curve.
 #[inline(never)]
 pub(super) fn hats<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Terms<R>) {
-    let places =
-        alpha.scale(1.0_f64.to_degrees() / SPACING_DEG) - R::from_f64(FIRST_DEG / SPACING_DEG);
+    let degrees = alpha.scale(1.0_f64.to_degrees());
+    let fine = degrees.clamp(FINE_DEG.0, FINE_DEG.1) - R::from_f64(FINE_DEG.0);
+    let places = (degrees + fine - R::from_f64(FIRST_DEG)).scale(1.0 / SPACING_DEG);
     let place = places.clamp(0.0, (PLACES - 1) as f64);
     for (k, own) in (0..PLACES).filter(|k| !NOUGHT.contains(k)).enumerate() {
         let away = (place - R::from_f64(own as f64)).abs();
@@ -81,6 +85,9 @@ mod tests {
         // −1° lies half way between −2° and 0°, where the curve is nought
         assert!((share(-1.0, "CL_m2") - 0.5).abs() < 1e-12);
         assert!((share(9.5, "CL_p10") - 0.75).abs() < 1e-12);
+        assert!((share(10.5, "CL_p10") - 0.5).abs() < 1e-12 && share(11.5, "CL_p10") == 0.0);
+        assert!((share(19.5, "CL_p20") - 0.5).abs() < 1e-12);
+        assert!((share(21.0, "CL_p20") - 0.5).abs() < 1e-12);
         let all = |degrees: f64| at(degrees).iter().sum::<f64>();
         for (degrees, sum) in
             [(-30.0, 1.0), (-1.0, 0.5), (0.0, 0.0), (3.5, 0.25), (4.0, 0.0), (90.0, 1.0)]

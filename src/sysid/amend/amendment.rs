@@ -179,26 +179,38 @@ struct Ask<'a> {
 }
 
 impl Ask<'_> {
-    /// Adds the effects to `model` one after the other. One that was refused while something else was missing is
-    /// asked for again once that has joined.
+    /// The effects that `model` bears out: those that a diagnosis found together, then the others.
     fn selected(&self, model: &GreyBox) -> Result<Selection, AmendError> {
-        let Options { effects, refused, .. } = self.options;
         let tuned = output_error::fit(model, self.train, &FitOptions::default(), self.progress)?;
         let scores = self.judge.scores(&tuned.model);
-        let mut best = (tuned.clone(), scores.clone());
-        let mut accepted: Vec<&Added> = Vec::new();
-        // each with the number of effects beside which it was asked for, 0 for those that joined together
-        let mut verdicts: Vec<Option<(AddedEffect, usize)>> = vec![None; effects.len()];
-        if let Some((together, kept)) = self.together(model, &best)? {
-            for (added, verdict) in effects.iter().zip(&mut verdicts) {
-                if together.iter().any(|t| t.id == added.id) {
-                    accepted.push(added);
-                    let effect = AddedEffect { joined: true, ..AddedEffect::asked_for(&added.id) };
-                    *verdict = Some((effect, 0));
-                }
-            }
-            best = kept;
+        let mut first = Selection {
+            tuned: (tuned.clone(), scores.clone()),
+            fit: tuned,
+            after: scores,
+            accepted: Vec::new(),
+            effects: Vec::new(),
+        };
+        if let Some((together, kept)) = self.together(model, &first.tuned)? {
+            first.accepted = together.into_iter().cloned().collect();
+            (first.fit, first.after) = kept;
         }
+        self.rest(model, first)
+    }
+
+    /// Asks for what `so_far`, a selection of effects of `model`, does not have, one after the other. One that was
+    /// refused while something else was missing is asked for again once that has joined.
+    fn rest(&self, model: &GreyBox, so_far: Selection) -> Result<Selection, AmendError> {
+        let Options { effects, refused, .. } = self.options;
+        let mut best = (so_far.fit, so_far.after);
+        let mut accepted: Vec<&Added> = so_far.accepted.iter().collect();
+        // each with the number of effects beside which it was asked for, 0 for those that have joined
+        let verdict = |added: &Added| {
+            let told = so_far.effects.iter().find(|e| e.id == added.id && e.joined);
+            let joined = || AddedEffect { joined: true, ..AddedEffect::asked_for(&added.id) };
+            let has = so_far.accepted.iter().any(|a| a.id == added.id);
+            has.then(|| (told.cloned().unwrap_or_else(joined), 0))
+        };
+        let mut verdicts: Vec<Option<(AddedEffect, usize)>> = effects.iter().map(verdict).collect();
         for _ in 0..ROUNDS {
             for (added, verdict) in effects.iter().zip(&mut verdicts) {
                 let beside = accepted.len();
@@ -219,7 +231,7 @@ impl Ask<'_> {
         }
         let effects = verdicts.into_iter().flatten().map(|(effect, _)| effect).collect();
         let accepted = accepted.into_iter().cloned().collect();
-        Ok(Selection { tuned: (tuned, scores), fit: best.0, after: best.1, accepted, effects })
+        Ok(Selection { tuned: so_far.tuned, fit: best.0, after: best.1, accepted, effects })
     }
 
     /// Those of the effects that a diagnosis found together, fitted together, less those that the flights refuse
@@ -232,18 +244,36 @@ impl Ask<'_> {
     ) -> Result<Option<(Vec<&Added>, Kept)>, AmendError> {
         let mut all: Vec<&Added> =
             self.options.effects.iter().filter(|a| a.start.is_some()).collect();
+        let mut doubles = true;
         while all.len() > 1 {
-            let Some(fit) = settled(self.with_effects(model, &all, &best.0.model))? else { break };
-            let borne_out = |a: &&Added| objections(&a.id, &fit.parameters).is_empty();
-            let left: Vec<&Added> = all.iter().copied().filter(borne_out).collect();
+            let fitted = |all: &[&Added]| -> Result<Option<Kept>, AmendError> {
+                let fit = settled(self.with_effects(model, all, &best.0.model))?;
+                Ok(fit.map(|fit| {
+                    let scores = self.judge.scores(&fit.model);
+                    (fit, scores)
+                }))
+            };
+            let Some(kept) = fitted(&all)? else { break };
+            let without = |out: &dyn Fn(&str) -> bool| -> Vec<&Added> {
+                all.iter().copied().filter(|a| !out(&a.id)).collect()
+            };
+            // what the model itself can say is not told twice, which would widen all intervals
+            if std::mem::take(&mut doubles) {
+                let fewer = without(&|id| doubled(id, &kept.0.parameters));
+                if fewer.len() < all.len()
+                    && let Some(other) = fitted(&fewer)?
+                    && !better(&kept.1, &other.1)
+                {
+                    all = fewer;
+                    continue;
+                }
+            }
+            let left = without(&|id| !objections(id, &kept.0.parameters).is_empty());
             if left.len() < all.len() {
                 all = left;
                 continue;
             }
-            let after = self.judge.scores(&fit.model);
-            let errors = judged(&after).zip(judged(&best.1));
-            let better = errors.is_some_and(|(a, b)| a < (1.0 - IMPROVED) * b);
-            return Ok(better.then_some((all, (fit, after))));
+            return Ok(better(&kept.1, &best.1).then_some((all, kept)));
         }
         Ok(None)
     }
@@ -285,20 +315,20 @@ impl Ask<'_> {
         Ok((best, verdicts.into_iter().flatten().map(|(told, _)| told).collect()))
     }
 
-    /// `other`, a model under another convention, with the effects that joined already; all are asked for anew
+    /// `other`, a model under another convention, with the effects that joined already; the rest are asked for again
     /// only where that promises something.
     fn under(&self, other: &GreyBox, best: &Selection) -> Result<Option<Selection>, AmendError> {
         let joined: Vec<&Added> = best.accepted.iter().collect();
-        let same = settled(self.with_effects(other, &joined, &best.fit.model))?.map(|fit| {
-            let after = self.judge.scores(&fit.model);
-            Selection { fit, after, ..best.clone() }
-        });
-        let promises = |s: &Selection| s.error() < best.error() || closer(&best.fit, &s.fit) > 0.0;
-        let anew = match same.as_ref().is_some_and(promises) {
-            true => settled(self.selected(other))?,
-            false => None,
+        let Some(fit) = settled(self.with_effects(other, &joined, &best.fit.model))? else {
+            return Ok(None);
         };
-        Ok(same.into_iter().chain(anew).min_by(|a, b| a.error().total_cmp(&b.error())))
+        let after = self.judge.scores(&fit.model);
+        let same = Selection { fit, after, ..best.clone() };
+        let promises = same.error() < best.error() || closer(&best.fit, &same.fit) > 0.0;
+        match promises {
+            true => self.rest(other, same).map(Some),
+            false => Ok(Some(same)),
+        }
     }
 
     /// Fits `model` with `effects`, which begin where `near` has them, if it does.
@@ -439,10 +469,27 @@ fn judged(scores: &[HorizonScore]) -> Option<f64> {
     reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s)).map(|s| s.rmse_scaled)
 }
 
+/// Whether the error falls from `before` to `after` by more than is nothing.
+fn better(after: &[HorizonScore], before: &[HorizonScore]) -> bool {
+    judged(after).zip(judged(before)).is_some_and(|(a, b)| a < (1.0 - IMPROVED) * b)
+}
+
+/// Whether coefficients of the model itself say nearly the same as all of the effect `id`.
+fn doubled(id: &str, parameters: &[Parameter]) -> bool {
+    let mut own = own(id, parameters).peekable();
+    own.peek().is_some() && own.all(|p| p.same_as.is_some())
+}
+
+/// The coefficients of the added effect `id`.
+fn own<'a>(id: &'a str, parameters: &'a [Parameter]) -> impl Iterator<Item = &'a Parameter> {
+    let of =
+        move |p: &&Parameter| p.added && p.name.split_once('.').is_some_and(|(own, _)| own == id);
+    parameters.iter().filter(of)
+}
+
 /// Why the fitted coefficients of the effect `id` cannot be believed.
 fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
-    let own = |p: &&Parameter| p.added && p.name.split_once('.').is_some_and(|(own, _)| own == id);
-    let own: Vec<&Parameter> = parameters.iter().filter(own).collect();
+    let own: Vec<&Parameter> = own(id, parameters).collect();
     let mut objections = Vec::new();
     for p in own.iter().filter(|p| p.at_bound) {
         objections.push(format!(

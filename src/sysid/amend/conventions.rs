@@ -8,8 +8,8 @@ use crate::model::{GreyBox, Integrator};
 use crate::physics::atmosphere::Density;
 use crate::physics::rigid_body::ForceAxes;
 
-/// Standard errors of the difference between two fits that are clear.
-const CLEARLY: f64 = 3.0;
+/// Standard errors of the difference between two fits that are clear (two-sided 95 %, as Vuong has it).
+const CLEARLY: f64 = 1.96;
 /// Share of the error of unseen flights that is much.
 const MUCH: f64 = 0.1;
 

@@ -6,6 +6,16 @@ use nalgebra::{DMatrix, DVector};
 pub(super) struct Covariance {
     /// Standard deviations, in the order of the unknowns.
     pub sd: Vec<f64>,
+    /// The inverse information.
+    inverse: DMatrix<f64>,
+}
+
+impl Covariance {
+    /// How two unknowns' errors go together.
+    pub fn correlation(&self, a: usize, b: usize) -> f64 {
+        let of = |a: usize, b: usize| self.inverse[(a, b)];
+        of(a, b) / (of(a, a) * of(b, b)).sqrt()
+    }
 }
 
 /// The covariance at the optimum: `information` with the prior's, whose diagonal is `prior`, and the
@@ -27,5 +37,5 @@ pub(super) fn covariance(
     }
     let sandwich = &inverse * meat * &inverse;
     let sd = (0..inverse.nrows()).map(|k| inverse[(k, k)].max(sandwich[(k, k)]).sqrt()).collect();
-    Some(Covariance { sd })
+    Some(Covariance { sd, inverse })
 }

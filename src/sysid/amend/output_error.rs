@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::equation_error;
 use super::error::AmendError;
 use super::flight::{Flight, SENSORS, SKEW, SKEW_LEAST};
-use super::interval;
+use super::interval::{self, Covariance};
 use super::normal::{self, Neighbourhood, Normal, Place, Weights};
 use super::parameters::{self, Free};
 use super::result::{FittedFlight, FlightEstimate, Parameter};
@@ -47,6 +47,8 @@ const START: [f64; 8] = [3e-3, 3e-3, 0.15, 5e-3, 5e-3, 5e-3, 3e-3, 3e-3];
 const OUTLYING: f64 = 6.0;
 /// A prior's width must shrink by this factor for a coefficient to count as learned.
 const LEARNED: f64 = 0.7;
+/// Coefficients whose errors go together more closely than this say the same.
+const SAME: f64 = 0.9;
 
 /// What a fit is asked for.
 #[derive(Clone, Debug)]
@@ -517,9 +519,9 @@ impl<'a> Search<'a> {
                 score
             })
             .collect();
-        let sd = interval::covariance(&system.information, &system.prior, &scores)
-            .ok_or_else(singular)?
-            .sd;
+        let covariance = interval::covariance(&system.information, &system.prior, &scores)
+            .ok_or_else(singular)?;
+        let sd = &covariance.sd;
         let learned = |(k, f): (usize, &Free)| sd[k] < LEARNED * f.width;
         if !self.free.iter().enumerate().any(learned) {
             return Err(AmendError::NoExcitation { model: model_name() });
@@ -527,11 +529,11 @@ impl<'a> Search<'a> {
         let by_flight = self.by_flight(&system);
         let unsettled = self.unsettled();
         let astray = if unsettled.is_some() { self.change.0 } else { 0.0 };
-        let wider = self.disagreement(&sd, &by_flight).hypot(astray);
+        let wider = self.disagreement(sd, &by_flight).hypot(astray);
         let sd: Vec<f64> = sd.iter().map(|x| x * wider).collect();
         let mut by_flight = by_flight;
         by_flight.iter_mut().flatten().for_each(|e| e.sd *= wider);
-        let parameters = self.parameters(&sd, &by_flight);
+        let parameters = self.parameters(&sd, &by_flight, &covariance);
         let flights = self.flights.iter().zip(&self.place.sensors).enumerate();
         let weakened = self.shots.iter().filter(|s| s.weight < 0.5).count() + self.short;
         Ok(Fit {
@@ -554,7 +556,18 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn parameters(&self, sd: &[f64], by_flight: &[Vec<FlightEstimate>]) -> Vec<Parameter> {
+    fn parameters(
+        &self,
+        sd: &[f64],
+        by_flight: &[Vec<FlightEstimate>],
+        covariance: &Covariance,
+    ) -> Vec<Parameter> {
+        let same = |k: usize| {
+            let own = self.free.iter().enumerate().filter(|(_, f)| !f.added);
+            let all = own.map(|(j, f)| (covariance.correlation(k, j).abs(), &f.name));
+            let closest = all.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(c, _)| *c > SAME);
+            closest.map(|(_, name)| name.clone())
+        };
         let one = |(k, f): (usize, &Free)| {
             let value = self.place.theta[k];
             let half = NORMAL_95 * sd[k];
@@ -570,6 +583,7 @@ impl<'a> Search<'a> {
                 ci95: [value - half, value + half],
                 at_bound: at(f.bounds.0) || at(f.bounds.1),
                 by_flight: by_flight[k].clone(),
+                same_as: if f.added { same(k) } else { None },
             }
         };
         self.free.iter().enumerate().map(one).collect()

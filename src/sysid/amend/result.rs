@@ -29,6 +29,9 @@ pub struct Parameter {
     pub at_bound: bool,
     /// What each flight alone says of it, to first order.
     pub by_flight: Vec<FlightEstimate>,
+    /// The coefficient of the model itself that says nearly the same as this one of an added effect (errors
+    /// correlated beyond 0.9), if there is one.
+    pub same_as: Option<String>,
 }
 
 /// One flight's say on a coefficient.

@@ -223,7 +223,9 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let by_itself = Trial { points: vec![point], ..trial.clone() };
     let grams = p.grams();
     let found = by_itself.score(&grams, &Draw::measured(&grams))?;
-    let [value, sd] = [found.values[first], found.deviations[first]];
+    // what the flight leaves beyond noise, as another effect that is missing does, may lie anywhere
+    let misfit = misfit(&p, &trial.channels, found.fall);
+    let [value, sd] = [found.values[first], misfit * found.deviations[first]];
     if contribution.is_some() {
         return Some([value, sd]);
     }
@@ -238,6 +240,15 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let share = all[(0, 0)] / left[(0, 0)];
     let amounts = &left * grams.total.view((0, n), (n, 1)).column(0);
     (share > TOLD).then(|| [amounts[0], sd / share])
+}
+
+/// By how much what is left in `channels` once a candidate has taken `fall` exceeds the noise, at least 1.
+fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
+    let own = |of: &[(f64, usize); 6]| (0..6).filter(|c| channels[*c]).map(|c| of[c]).collect();
+    let all: Vec<Vec<(f64, usize)>> = p.by_channel.iter().map(own).collect();
+    let square: f64 = all.iter().flatten().map(|(square, _)| square).sum();
+    let rows: usize = all.iter().flatten().map(|(_, rows)| rows).sum();
+    ((square - fall) / rows.max(1) as f64).max(1.0).sqrt()
 }
 
 /// The known unknowns with the model's coefficients as all flights have them together with `score`'s effect.

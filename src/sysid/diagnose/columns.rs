@@ -29,6 +29,8 @@ pub struct Ready {
     pub sensors: Vec<Column>,
     /// Derivatives of the prediction by aileron, elevator and throttle, segment by sample.
     controls: Vec<Vec<[[f64; CHANNELS]; 3]>>,
+    /// The model that says how the aircraft accelerates, if it is another one.
+    accelerating: Option<GreyBox>,
 }
 
 impl Ready {
@@ -96,7 +98,13 @@ impl Ready {
                 s.iter().map(|l| [0, 1, 2].map(|i| l.slope[CONTROLS + i].map(|x| -x))).collect()
             })
             .collect();
-        Ready { measured: flight.clone(), acting, residual, sensors, controls }
+        let accelerating = None;
+        Ready { measured: flight.clone(), acting, residual, sensors, controls, accelerating }
+    }
+
+    /// With accelerations of another model in the columns of mass and inertia.
+    pub fn accelerating_as(self, model: Option<&GreyBox>) -> Ready {
+        Ready { accelerating: model.cloned(), ..self }
     }
 
     /// What one unit of each of the coefficients `wanted` of `model`, a model that has the effects of
@@ -136,17 +144,18 @@ impl Ready {
         columns
     }
 
-    /// What a step of `step` to `body` adds to the residual, by one unit. The accelerations are the
+    /// What a step of `step` to `body` adds to the residual, by one unit. The accelerations are a
     /// model's: measured ones share the residual's noise.
     fn body(&self, model: &GreyBox, body: &RigidBody, step: f64) -> Column {
         let old = &model.body;
+        let model = self.accelerating.as_ref().unwrap_or(model);
         let mut columns = gather(&self.acting, model.integrator, 1, |place, add| {
             let state = &place.at.state;
             let air = model.air(state, place.at.altitude);
             let wrench = model.wrench(state, place.controls, &air);
             let force = rigid_body::body_force(&wrench, &air, model.axes);
             let force = to_force_axes(force, &air, model.axes);
-            let heavier = body.mass / old.mass - 1.0;
+            let heavier = (body.mass - old.mass) / model.body.mass;
             (0..3).for_each(|c| add(0, c, -force[c] * heavier / step));
             let (_, spin) = model.accelerations(state, place.controls, &air);
             let moment = |body: &RigidBody| {

@@ -41,6 +41,15 @@ pub struct Problem {
     pub seed: u64,
 }
 
+/// What a round takes from elsewhere.
+#[derive(Clone, Copy, Default)]
+pub struct Beside<'a> {
+    /// The noise, if it is not estimated anew.
+    pub noise: Option<&'a Noise>,
+    /// The model by whose accelerations mass and inertia act, if its own are too far off.
+    pub accelerating: Option<&'a GreyBox>,
+}
+
 /// A model linearised.
 pub struct Round {
     /// The model.
@@ -80,17 +89,19 @@ pub struct Round {
 impl Round {
     /// `model` with `entries` as candidates; `None` if the flights do not hold it at all.
     pub fn new(problem: &Problem, model: GreyBox, entries: &[Entry]) -> Option<Round> {
-        Round::under(problem, model, entries, None)
+        Round::beside(problem, model, entries, Beside::default())
     }
 
-    /// The same under the noise of another round.
-    pub fn under(
+    /// The same with what another round or model knows.
+    pub fn beside(
         problem: &Problem,
         model: GreyBox,
         entries: &[Entry],
-        noise: Option<&Noise>,
+        beside: Beside,
     ) -> Option<Round> {
-        let flights: Vec<Ready> = problem.flights.iter().map(|f| Ready::new(&model, f)).collect();
+        let Beside { noise, accelerating } = beside;
+        let ready = |f: &Prepared| Ready::new(&model, f).accelerating_as(accelerating);
+        let flights: Vec<Ready> = problem.flights.iter().map(ready).collect();
         let cells = Cells::new(&flights);
         let own = 0..model.coefficients().len();
         let linear = flights.iter().map(|f| f.linear(&model, own.clone())).collect();
@@ -105,8 +116,13 @@ impl Round {
             Noise::estimate(&cells, &rich(&placed, known.len(), &made.trials), last)
         });
         let kept: Vec<Placed> = placed.iter().map(|l| up_to(l, last)).collect();
-        let (shared, disturbed) =
-            shared(&Setting { problem, model: &model, entries }, &cells, &kept, last, &noise);
+        let (shared, disturbed) = shared(
+            &Setting { problem, model: &model, entries, accelerating },
+            &cells,
+            &kept,
+            last,
+            &noise,
+        );
         let shares = sum(&shared);
         let mut projected = Projected::new(&cells, &kept, last, &known, &noise, &shares)?;
         for _ in 0..CURVATURES {
@@ -375,12 +391,13 @@ fn rich(placed: &[Placed], count: usize, trials: &[Trial]) -> Vec<Placed> {
     placed.iter().map(keep).collect()
 }
 
-/// The flights with the noise number `draw` once more, under `model`.
-fn disturbed(problem: &Problem, model: &GreyBox, draw: usize) -> Vec<Ready> {
-    let flights = problem.flights.iter().zip(&problem.path).enumerate();
+/// The flights with the noise number `draw` once more.
+fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
+    let flights = of.problem.flights.iter().zip(&of.problem.path).enumerate();
     flights
         .map(|(k, (f, path))| {
-            Ready::new(model, &shared::disturbed(f, path, problem.seed, [k, draw]))
+            let flight = shared::disturbed(f, path, of.problem.seed, [k, draw]);
+            Ready::new(of.model, &flight).accelerating_as(of.accelerating)
         })
         .collect()
 }
@@ -390,6 +407,7 @@ struct Setting<'a> {
     problem: &'a Problem,
     model: &'a GreyBox,
     entries: &'a [Entry],
+    accelerating: Option<&'a GreyBox>,
 }
 
 /// The sum of lists of one length.
@@ -412,7 +430,7 @@ fn shared(
         of.entries.iter().filter(|e| catalogue::straight(e)).copied().collect();
     let everything = catalogue::with_all(of.model, &straight).0;
     let drawn = |draw: usize| {
-        let flights = disturbed(of.problem, of.model, draw);
+        let flights = disturbed(of, draw);
         // the model's own columns and the candidates' in one pass
         let (mut columns, mut candidates) = (Vec::new(), Vec::new());
         for flight in &flights {
