@@ -212,12 +212,17 @@ fn what_cannot_be_diagnosed_is_said() {
     assert!(said.contains("elevator") && said.contains("fly"), "{said}");
 }
 
+/// The prior with its tables' slips.
+fn printed() -> GreyBox {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior-as-printed.toml");
+    GreyBox::load(&path).unwrap()
+}
+
 /// The aircraft as it is, the two slips one really makes: the thrust in pounds, which the fit can mend within its
 /// own coefficient, is named as well, for it is 23 of its standard deviations away; the inertia by its sign.
 #[test]
 fn the_prior_as_printed_has_its_thrust_and_its_inertia_wrong() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior-as-printed.toml");
-    let printed = GreyBox::load(&path).unwrap();
+    let printed = printed();
     let found = diagnose(&printed, &trained(5, Vec::new()), &Options::default(), &|_| {}).unwrap();
     println!("{:#?}", found.sentences);
     let of = |id: &str| {
@@ -242,9 +247,8 @@ fn the_prior_as_printed_has_its_thrust_and_its_inertia_wrong() {
 /// too little of it, and of each flight something else.
 #[test]
 fn an_inertia_of_the_wrong_sign_is_found_where_the_models_accelerations_mislead() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior-as-printed.toml");
-    let printed = GreyBox::load(&path).unwrap();
-    let found = diagnose(&printed, &trained(63, Vec::new()), &Options::default(), &|_| {}).unwrap();
+    let found =
+        diagnose(&printed(), &trained(63, Vec::new()), &Options::default(), &|_| {}).unwrap();
     println!("{:#?}", found.sentences);
     let effect = found.effects.iter().find(|e| e.id == "inertia_xz").unwrap();
     assert!(effect.asserted, "{:?}", effect.refused);

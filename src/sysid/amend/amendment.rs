@@ -3,31 +3,18 @@
 use super::conventions::{Convention, Tried, closer};
 use super::error::AmendError;
 use super::flight::Flight;
+use super::judge::{self, JUDGED_AT_S, Judge, Kept, SETTLED_OR_NOT, settled};
 use super::output_error::{self, Fit, FitOptions};
 use super::parameters;
-use super::result::{AddedEffect, Amendment, Parameter, Settings};
+use super::result::{AddedEffect, Amendment, Settings};
+use super::story;
 use crate::model::GreyBox;
 use crate::physics::effects::{Coefficient, Description};
-use crate::sysid::compare::{HorizonScore, free_run};
+use crate::sysid::compare::HorizonScore;
 use crate::sysid::reconstruction::{Reconstruction, Segment};
 
-/// Horizon at which improvement is judged, s.
-const JUDGED_AT_S: f64 = 5.0;
-/// Least share by which an effect must lower the error of unseen flights.
-const IMPROVED: f64 = 0.01;
-/// An effect that lowers it to less than this share joins though the search has not settled with it: others may be
-/// needed for that.
-const SETTLED_OR_NOT: f64 = 0.5;
-/// Standard deviations by which an effect's coefficient must exceed nought.
-const CLEAR: f64 = 1.96;
-/// The same for effects with more coefficients than three, one of which exceeds that by chance.
-const CLEAR_OF_MANY: f64 = 3.0;
 /// Times that all effects are asked for at most.
 const ROUNDS: usize = 3;
-/// Flights disagree if a flight's own estimate is this many standard deviations away…
-const DISAGREE: f64 = 4.0;
-/// …and by this share of the value.
-const DISAGREE_SHARE: f64 = 0.3;
 
 /// An effect to add.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,8 +118,8 @@ pub fn amend(
     notes.extend(parameters::taken_over(&fit.model).map(|(of, by)| {
         format!("The shape constants of {of} stay as they were fitted without {by}, which can take up whatever they could.")
     }));
-    notes.extend(contradictions(&fit.parameters));
-    let mut story = Amendment {
+    notes.extend(judge::contradictions(&fit.parameters));
+    let mut amendment = Amendment {
         schema: "greylag.amend/1",
         version: env!("CARGO_PKG_VERSION"),
         model: model.name.clone(),
@@ -153,8 +140,8 @@ pub fn amend(
             judged_at_s: JUDGED_AT_S,
         },
     };
-    story.sentences = sentences(&story);
-    Ok(Amended { amendment: story, model: fit.model, tuned: tuned.model })
+    amendment.sentences = story::sentences(&amendment);
+    Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
 }
 
 /// A model with those of some effects that the flights bear out.
@@ -192,6 +179,8 @@ impl Ask<'_> {
         };
         if let Some((together, kept)) = self.together(model, &first.tuned)? {
             first.accepted = together.into_iter().cloned().collect();
+            let joined = first.accepted.iter().map(|a| AddedEffect::asked_for(&a.id));
+            first.effects = joined.map(|e| AddedEffect { joined: true, ..e }).collect();
             (first.fit, first.after) = kept;
         }
         self.rest(model, first)
@@ -206,9 +195,7 @@ impl Ask<'_> {
         // each with the number of effects beside which it was asked for, 0 for those that have joined
         let verdict = |added: &Added| {
             let told = so_far.effects.iter().find(|e| e.id == added.id && e.joined);
-            let joined = || AddedEffect { joined: true, ..AddedEffect::asked_for(&added.id) };
-            let has = so_far.accepted.iter().any(|a| a.id == added.id);
-            has.then(|| (told.cloned().unwrap_or_else(joined), 0))
+            told.map(|told| (told.clone(), 0))
         };
         let mut verdicts: Vec<Option<(AddedEffect, usize)>> = effects.iter().map(verdict).collect();
         for _ in 0..ROUNDS {
@@ -244,36 +231,38 @@ impl Ask<'_> {
     ) -> Result<Option<(Vec<&Added>, Kept)>, AmendError> {
         let mut all: Vec<&Added> =
             self.options.effects.iter().filter(|a| a.start.is_some()).collect();
-        let mut doubles = true;
+        let fitted = |all: &[&Added]| -> Result<Option<Kept>, AmendError> {
+            let fit = settled(self.with_effects(model, all, &best.0.model))?;
+            Ok(fit.map(|fit| {
+                let scores = self.judge.scores(&fit.model);
+                (fit, scores)
+            }))
+        };
+        if all.len() < 2 {
+            return Ok(None);
+        }
+        let Some(mut kept) = fitted(&all)? else { return Ok(None) };
+        // what the model itself can say is not told twice, which would widen all intervals
+        let mut fewer = all.clone();
+        fewer.retain(|a| !judge::doubled(&a.id, &kept.0.parameters));
+        if fewer.len() < all.len()
+            && let Some(other) = fitted(&fewer)?
+            && !judge::better(&kept.1, &other.1)
+        {
+            (all, kept) = (fewer, other);
+        }
         while all.len() > 1 {
-            let fitted = |all: &[&Added]| -> Result<Option<Kept>, AmendError> {
-                let fit = settled(self.with_effects(model, all, &best.0.model))?;
-                Ok(fit.map(|fit| {
-                    let scores = self.judge.scores(&fit.model);
-                    (fit, scores)
-                }))
-            };
-            let Some(kept) = fitted(&all)? else { break };
-            let without = |out: &dyn Fn(&str) -> bool| -> Vec<&Added> {
-                all.iter().copied().filter(|a| !out(&a.id)).collect()
-            };
-            // what the model itself can say is not told twice, which would widen all intervals
-            if std::mem::take(&mut doubles) {
-                let fewer = without(&|id| doubled(id, &kept.0.parameters));
-                if fewer.len() < all.len()
-                    && let Some(other) = fitted(&fewer)?
-                    && !better(&kept.1, &other.1)
-                {
-                    all = fewer;
-                    continue;
-                }
+            let mut left = all.clone();
+            left.retain(|a| judge::objections(&a.id, &kept.0.parameters).is_empty());
+            if left.len() == all.len() {
+                return Ok(judge::better(&kept.1, &best.1).then_some((all, kept)));
             }
-            let left = without(&|id| !objections(id, &kept.0.parameters).is_empty());
-            if left.len() < all.len() {
-                all = left;
-                continue;
+            all = left;
+            if all.len() < 2 {
+                break;
             }
-            return Ok(better(&kept.1, &best.1).then_some((all, kept)));
+            let Some(other) = fitted(&all)? else { break };
+            kept = other;
         }
         Ok(None)
     }
@@ -360,7 +349,7 @@ impl Ask<'_> {
 impl Selection {
     /// The error of unseen flights by which it is judged; NaN if no run gets there.
     fn error(&self) -> f64 {
-        judged(&self.after).unwrap_or(f64::NAN)
+        judge::judged(&self.after).unwrap_or(f64::NAN)
     }
 }
 
@@ -380,222 +369,6 @@ fn usual_start(about: &Description) -> Vec<f64> {
     let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);
     let listed = starts.get(starts.len() / 2).map(|s| s.to_vec());
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())
-}
-
-impl AddedEffect {
-    /// The effect `id`, nothing said of it yet.
-    fn asked_for(id: &str) -> AddedEffect {
-        let about = parameters::describe(id).map(|(about, _)| about);
-        AddedEffect {
-            id: id.into(),
-            description: about.map_or("", |a| a.description),
-            joined: false,
-            refused: Vec::new(),
-            fly_next: about.and_then(|a| a.entry).map_or("", |e| e.separated_by).into(),
-        }
-    }
-}
-
-/// What judges fits: flights that they have not seen.
-struct Judge<'a> {
-    test: &'a [Flight],
-    horizons_s: &'a [f64],
-}
-
-/// A fit that is kept, with its scores.
-type Kept = (Fit, Vec<HorizonScore>);
-
-impl Judge<'_> {
-    fn scores(&self, model: &GreyBox) -> Vec<HorizonScore> {
-        let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
-        let (runs, _) = free_run::fly(model, &flights, self.horizons_s);
-        self.horizons_s.iter().map(|h| runs.score(*h)).collect()
-    }
-
-    /// What the data say of an effect, and the fit with it if it is kept.
-    fn verdict(
-        &self,
-        added: &Added,
-        fitted: Result<Fit, AmendError>,
-        before: &[HorizonScore],
-        refused: Refused,
-    ) -> Result<(AddedEffect, Option<Kept>), AmendError> {
-        let mut effect = AddedEffect::asked_for(&added.id);
-        let fit = match fitted {
-            Ok(fit) => fit,
-            Err(why) if failed(&why) => {
-                effect.refused.push(why.to_string());
-                return Ok((effect, None));
-            }
-            Err(why) => return Err(why),
-        };
-        let after = self.scores(&fit.model);
-        effect.refused = objections(&added.id, &fit.parameters);
-        let errors = judged(&after).zip(judged(before));
-        if !errors.is_some_and(|(a, b)| a < SETTLED_OR_NOT * b) {
-            effect.refused.extend(fit.unsettled.clone());
-        }
-        if let Some((a, b)) = errors
-            && (a.is_nan() || a >= (1.0 - IMPROVED) * b)
-        {
-            effect.refused.push(format!(
-                "free runs of {JUDGED_AT_S} s on flights that the fit did not see come no closer \
-                 ({b:.5} without it, {a:.5} with it)"
-            ));
-        }
-        effect.joined = effect.refused.is_empty() || refused == Refused::Kept;
-        let kept = effect.joined.then_some((fit, after));
-        Ok((effect, kept))
-    }
-}
-
-/// What a fit came to; `None` if it failed at what was asked of it.
-fn settled<T>(of: Result<T, AmendError>) -> Result<Option<T>, AmendError> {
-    match of {
-        Ok(of) => Ok(Some(of)),
-        Err(why) if failed(&why) => Ok(None),
-        Err(why) => Err(why),
-    }
-}
-
-/// Whether a fit failed at what was asked of it rather than at the flights.
-fn failed(why: &AmendError) -> bool {
-    matches!(why, AmendError::NotConverged { .. } | AmendError::Singular { .. })
-}
-
-/// The error at the horizon of judgement, if any run gets there.
-fn judged(scores: &[HorizonScore]) -> Option<f64> {
-    let reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= JUDGED_AT_S + 1e-9);
-    reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s)).map(|s| s.rmse_scaled)
-}
-
-/// Whether the error falls from `before` to `after` by more than is nothing.
-fn better(after: &[HorizonScore], before: &[HorizonScore]) -> bool {
-    judged(after).zip(judged(before)).is_some_and(|(a, b)| a < (1.0 - IMPROVED) * b)
-}
-
-/// Whether coefficients of the model itself say nearly the same as all of the effect `id`.
-fn doubled(id: &str, parameters: &[Parameter]) -> bool {
-    let mut own = own(id, parameters).peekable();
-    own.peek().is_some() && own.all(|p| p.same_as.is_some())
-}
-
-/// The coefficients of the added effect `id`.
-fn own<'a>(id: &'a str, parameters: &'a [Parameter]) -> impl Iterator<Item = &'a Parameter> {
-    let of =
-        move |p: &&Parameter| p.added && p.name.split_once('.').is_some_and(|(own, _)| own == id);
-    parameters.iter().filter(of)
-}
-
-/// Why the fitted coefficients of the effect `id` cannot be believed.
-fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
-    let own: Vec<&Parameter> = own(id, parameters).collect();
-    let mut objections = Vec::new();
-    for p in own.iter().filter(|p| p.at_bound) {
-        objections.push(format!(
-            "{} ends at the bound {} of what is physically possible",
-            p.name, p.value
-        ));
-    }
-    let clear = if own.len() > 3 { CLEAR_OF_MANY } else { CLEAR };
-    if !own.is_empty() && own.iter().all(|p| p.value.abs() < clear * p.sd) {
-        let all: Vec<String> =
-            own.iter().map(|p| format!("{} = {:.3e} ± {:.1e}", p.name, p.value, p.sd)).collect();
-        objections.push(format!("the interval holds nought: {}", all.join(", ")));
-    }
-    for p in own {
-        if let Some((flight, value)) = outlier(p) {
-            objections.push(format!(
-                "the flights contradict one another: {} is {:.3e} over all, {value:.3e} by {flight}",
-                p.name, p.value
-            ));
-        }
-    }
-    objections
-}
-
-/// A flight whose own estimate cannot be that of all.
-fn outlier(p: &Parameter) -> Option<(&str, f64)> {
-    let far = |value: f64, sd: f64| {
-        let off = (value - p.value).abs();
-        off > DISAGREE * sd.hypot(p.sd) && off > DISAGREE_SHARE * p.value.abs()
-    };
-    let found = p.by_flight.iter().find(|e| far(e.value, e.sd));
-    found.map(|e| (e.flight.as_str(), e.value))
-}
-
-/// Coefficients that one flight sees clearly otherwise than all flights together, in words.
-pub fn contradictions(parameters: &[Parameter]) -> Vec<String> {
-    let named = parameters.iter().filter(|p| !p.added);
-    named
-        .filter_map(|p| {
-            let (flight, value) = outlier(p)?;
-            Some(format!(
-                "{} is {:.4} over all flights, but {value:.4} by {flight} alone: something differed \
-                 in that flight (loading, wind, damage); fit it apart, or fly it again",
-                p.name, p.value
-            ))
-        })
-        .collect()
-}
-
-fn sentences(story: &Amendment) -> Vec<String> {
-    let mut all = Vec::new();
-    let (given, before, after) =
-        (judged(&story.given), judged(&story.before), judged(&story.after));
-    let joined = story.effects.iter().filter(|e| e.joined);
-    let kept: Vec<&str> = joined.map(|e| e.id.as_str()).collect();
-    if let (Some(given), Some(before), Some(after)) = (given, before, after) {
-        all.push(format!(
-            "On flights that the fit did not see, {} once the coefficients are tuned ({given:.5} to \
-             {before:.5} of the reference scale, free runs of {JUDGED_AT_S} s).",
-            change(given, before)
-        ));
-        if !kept.is_empty() {
-            let joined = kept.iter().map(|id| (*id).to_owned());
-            let taken = story.conventions.iter().filter(|t| t.kept);
-            let taken = taken.map(|t| format!("{} {}", t.convention.key().join("."), t.to));
-            all.push(format!(
-                "With {} as well {} ({before:.5} to {after:.5}).",
-                joined.chain(taken).collect::<Vec<_>>().join(" and "),
-                change(before, after)
-            ));
-        }
-    }
-    for Tried { convention, from, to, error: [a, b], closer, kept } in &story.conventions {
-        let key = convention.key().join(".");
-        let said = if *kept { "is taken instead of" } else { "does not replace" };
-        let found = if b.is_nan() {
-            "no fit with it holds that long".into()
-        } else {
-            format!(
-                "{} ({a:.5} to {b:.5}), and the fit's own flights are followed {} by {:.1} standard errors",
-                change(*a, *b),
-                if *closer > 0.0 { "more closely" } else { "less closely" },
-                closer.abs()
-            )
-        };
-        all.push(format!("{key} {to} {said} {from}: {found}."));
-    }
-    for effect in story.effects.iter().filter(|e| !e.refused.is_empty()) {
-        let verb =
-            if kept.contains(&effect.id.as_str()) { "kept though refused" } else { "refused" };
-        let next = match effect.fly_next.as_str() {
-            "" => String::new(),
-            next => format!(" What would decide: {next}."),
-        };
-        all.push(format!("{} is {verb}: {}.{next}", effect.id, effect.refused.join("; ")));
-    }
-    all
-}
-
-fn change(from: f64, to: f64) -> String {
-    let percent = 100.0 * (1.0 - to / from);
-    match percent {
-        p if p >= 0.05 => format!("the error falls by {p:.1} %"),
-        p if p <= -0.05 => format!("the error rises by {:.1} %", -p),
-        _ => "the error stays as it is".into(),
-    }
 }
 
 /// The first two thirds of a flight to fit to, the last one to judge by.

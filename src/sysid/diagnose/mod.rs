@@ -33,6 +33,7 @@ mod run;
 mod search;
 mod sensors;
 mod sentences;
+mod settling;
 mod shape;
 mod shared;
 mod shares;

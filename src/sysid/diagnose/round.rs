@@ -101,10 +101,10 @@ impl Round {
     ) -> Option<Round> {
         let Beside { noise, accelerating } = beside;
         let ready = |f: &Prepared| Ready::new(&model, f).accelerating_as(accelerating);
-        let flights: Vec<Ready> = problem.flights.iter().map(ready).collect();
+        let flights: Vec<Ready> = problem.flights.par_iter().map(ready).collect();
         let cells = Cells::new(&flights);
         let own = 0..model.coefficients().len();
-        let linear = flights.iter().map(|f| f.linear(&model, own.clone())).collect();
+        let linear = flights.par_iter().map(|f| f.linear(&model, own.clone())).collect();
         let (mut known, coefficients, mut placed) = known(problem, &model, &flights, linear);
         let features = features::features(&model, &flights, problem.seed);
         let made = catalogue::columns(&model, &flights, entries, &[]);
@@ -393,7 +393,7 @@ fn rich(placed: &[Placed], count: usize, trials: &[Trial]) -> Vec<Placed> {
 
 /// The flights with the noise number `draw` once more.
 fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
-    let flights = of.problem.flights.iter().zip(&of.problem.path).enumerate();
+    let flights = of.problem.flights.par_iter().zip(&of.problem.path).enumerate();
     flights
         .map(|(k, (f, path))| {
             let flight = shared::disturbed(f, path, of.problem.seed, [k, draw]);
@@ -432,12 +432,12 @@ fn shared(
     let drawn = |draw: usize| {
         let flights = disturbed(of, draw);
         // the model's own columns and the candidates' in one pass
-        let (mut columns, mut candidates) = (Vec::new(), Vec::new());
-        for flight in &flights {
-            let mut all = flight.linear(&everything, 0..everything.coefficients().len());
-            candidates.push(all.split_off(of.model.coefficients().len()));
-            columns.push(all);
-        }
+        let all = |flight: &Ready| {
+            let mut own = flight.linear(&everything, 0..everything.coefficients().len());
+            let candidates = own.split_off(of.model.coefficients().len());
+            (own, candidates)
+        };
+        let (columns, candidates) = flights.par_iter().map(all).unzip();
         let (known, _, mut after) = known(of.problem, of.model, &flights, columns);
         let made = Columns { trials: Vec::new(), columns: candidates };
         let end = place(&mut after, known.len(), &made, &flights);

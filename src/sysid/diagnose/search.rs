@@ -2,11 +2,11 @@
 
 use super::catalogue::{self, Entry};
 use super::checks;
-use super::nulls;
 use super::options::Options;
 use super::rank::Score;
 use super::remainder::{Remainder, remainder};
-use super::round::{Beside, Problem, Round};
+use super::round::{Problem, Round};
+use super::settling::{Ranked, SETTLING, ranked, settled};
 use super::shape::{Shape, shape};
 use crate::model::GreyBox;
 use crate::physics::inputs::Kind;
@@ -17,8 +17,6 @@ const MOST: usize = 6;
 pub const HELD_OUT: f64 = 0.1;
 /// Least share of bootstraps in which the effect, or one of its class, is the best.
 pub const SELECTED: f64 = 0.8;
-/// Passes of tuning after an effect has joined, which is where nonlinear ones settle.
-const SETTLING: usize = 3;
 /// Candidates of this part of the best one's order contend with it,
 const CONTENDING: f64 = 0.2;
 /// if their contribution is this much like its own;
@@ -33,9 +31,6 @@ const SHAPELESS: f64 = 0.1;
 /// Precision of the formula of an effect that is not linear in its constants: whatever takes a smaller part of
 /// what such an effect took before may be no more than its error.
 const PRECISION: f64 = 2e-3;
-/// A change of mass or inertia that settles farther from where it was found than this share of it was found by
-/// the accelerations of a model that is too far off.
-const ASTRAY: f64 = 0.1;
 /// A candidate whose contribution is this much like another's can take its place.
 const RIVAL: f64 = 0.3;
 
@@ -152,68 +147,6 @@ pub fn search(
     Some(found)
 }
 
-/// A round with its scores.
-struct Ranked {
-    round: Round,
-    scores: Vec<(usize, Score)>,
-    /// Best evidence in null flights.
-    nulls: Vec<f64>,
-    threshold: f64,
-}
-
-/// Ranks the candidates of `round`, those of mass and inertia by better accelerations if its own are too far off.
-fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
-    let rank = |mut round: Round| {
-        let scores = round.rank();
-        let nulls = nulls::best(&round.projected, &round.trials, options.seed, options.nulls);
-        let threshold = nulls::threshold(&nulls, options.level);
-        Ranked { round, scores, nulls, threshold }
-    };
-    let ranked = rank(round);
-    match accelerated(problem, &ranked) {
-        Some(round) => rank(round),
-        None => ranked,
-    }
-}
-
-/// The round with the accelerations of its model once the best change of mass or inertia has joined and settled;
-/// `None` if none is called for. Where the inertia is grossly wrong the model's accelerations are, and so are the
-/// columns that are made of them: each flight has its own amount then, and all too little.
-fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
-    let Ranked { round, scores, threshold, .. } = ranked;
-    let of_body = |trial: usize, score: &Score| {
-        let mut model = round.with(score);
-        let before = model.body;
-        model.join_most(round.trials[trial].id, &score.values).ok()?;
-        (model.body != before).then_some(model)
-    };
-    let mut told = scores.iter().filter(|(_, s)| s.evidence > *threshold);
-    let (trial, score, model) = told.find_map(|(k, s)| Some((*k, s, of_body(*k, s)?)))?;
-    let (model, _) = settled(problem, round, model)?;
-    let trial = &round.trials[trial];
-    let first = trial.points[score.point].free[0].0;
-    let entry = round.entries.iter().find(|e| e.about.id == trial.id)?;
-    let name = format!("{}.{}", trial.id, entry.about.coefficients[first].name);
-    let value = model.coefficients().iter().find(|c| c.name == name)?.value;
-    let astray = (value - score.values[first]).abs() > ASTRAY * value.abs();
-    let beside = Beside { accelerating: Some(&model), ..Beside::default() };
-    let anew = || Round::beside(problem, round.model.clone(), &round.entries, beside);
-    if astray { anew() } else { None }
-}
-
-/// `model` settled under the noise of `round`, and the squared error that it leaves.
-fn settled(problem: &Problem, round: &Round, mut model: GreyBox) -> Option<(GreyBox, f64)> {
-    let mut left = f64::INFINITY;
-    for _ in 0..=SETTLING {
-        let beside = Beside { noise: Some(&round.noise), ..Beside::default() };
-        let settled = Round::beside(problem, model, &[], beside)?;
-        let last = settled.projected.width();
-        left = settled.projected.total[(last, last)];
-        model = settled.tuned();
-    }
-    Some((model, left))
-}
-
 /// Puts the best of several close contenders first, each joined to the model and settled under one noise, and
 /// tells those that lose clearly from those that are as good: a linearisation at the model without them does
 /// not tell them apart.
@@ -239,7 +172,7 @@ fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
         let (trial, score) = &found.scores[*k];
         let mut model = round.with(score);
         model.join_most(round.trials[*trial].id, &score.values).ok()?;
-        Some(settled(problem, round, model)?.1)
+        Some(settled(problem, round, model, 1 + SETTLING)?.1)
     };
     let errors: Vec<(usize, f64)> =
         contend.iter().map(|k| (*k, error(k).unwrap_or(f64::INFINITY))).collect();

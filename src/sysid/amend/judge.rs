@@ -1,0 +1,198 @@
+//! What decides whether an effect joins: flights that the fit has not seen, and what the fit says of its coefficients.
+
+use super::amendment::{Added, Refused};
+use super::error::AmendError;
+use super::flight::Flight;
+use super::output_error::Fit;
+use super::parameters;
+use super::result::{AddedEffect, Parameter};
+use crate::model::GreyBox;
+use crate::sysid::compare::{HorizonScore, free_run};
+
+/// Horizon at which improvement is judged, s.
+pub const JUDGED_AT_S: f64 = 5.0;
+/// Least share by which an effect must lower the error of unseen flights.
+const IMPROVED: f64 = 0.01;
+/// An effect that lowers it to less than this share joins though the search has not settled with it: others may be
+/// needed for that.
+pub const SETTLED_OR_NOT: f64 = 0.5;
+/// Standard deviations by which an effect's coefficient must exceed nought.
+const CLEAR: f64 = 1.96;
+/// The same for effects with more coefficients than three, one of which exceeds that by chance.
+const CLEAR_OF_MANY: f64 = 3.0;
+/// Flights disagree if a flight's own estimate is this many standard deviations away…
+const DISAGREE: f64 = 4.0;
+/// …and by this share of the value.
+const DISAGREE_SHARE: f64 = 0.3;
+
+impl AddedEffect {
+    /// The effect `id`, nothing said of it yet.
+    pub fn asked_for(id: &str) -> AddedEffect {
+        let about = parameters::describe(id).map(|(about, _)| about);
+        AddedEffect {
+            id: id.into(),
+            description: about.map_or("", |a| a.description),
+            joined: false,
+            refused: Vec::new(),
+            fly_next: about.and_then(|a| a.entry).map_or("", |e| e.separated_by).into(),
+        }
+    }
+}
+
+/// What judges fits: flights that they have not seen.
+pub struct Judge<'a> {
+    /// The flights.
+    pub test: &'a [Flight],
+    /// Horizons of the free runs, s; that of judgement is the longest up to `JUDGED_AT_S`.
+    pub horizons_s: &'a [f64],
+}
+
+/// A fit that is kept, with its scores.
+pub type Kept = (Fit, Vec<HorizonScore>);
+
+impl Judge<'_> {
+    /// Free runs of `model` over the flights, one score for each horizon.
+    pub fn scores(&self, model: &GreyBox) -> Vec<HorizonScore> {
+        let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
+        let (runs, _) = free_run::fly(model, &flights, self.horizons_s);
+        self.horizons_s.iter().map(|h| runs.score(*h)).collect()
+    }
+
+    /// What the data say of an effect, and the fit with it if it is kept.
+    pub fn verdict(
+        &self,
+        added: &Added,
+        fitted: Result<Fit, AmendError>,
+        before: &[HorizonScore],
+        refused: Refused,
+    ) -> Result<(AddedEffect, Option<Kept>), AmendError> {
+        let mut effect = AddedEffect::asked_for(&added.id);
+        let fit = match fitted {
+            Ok(fit) => fit,
+            Err(why) if failed(&why) => {
+                effect.refused.push(why.to_string());
+                return Ok((effect, None));
+            }
+            Err(why) => return Err(why),
+        };
+        let after = self.scores(&fit.model);
+        effect.refused = objections(&added.id, &fit.parameters);
+        let errors = judged(&after).zip(judged(before));
+        if !errors.is_some_and(|(a, b)| a < SETTLED_OR_NOT * b) {
+            effect.refused.extend(fit.unsettled.clone());
+        }
+        if let Some((a, b)) = errors
+            && (a.is_nan() || a >= (1.0 - IMPROVED) * b)
+        {
+            effect.refused.push(format!(
+                "free runs of {JUDGED_AT_S} s on flights that the fit did not see come no closer \
+                 ({b:.5} without it, {a:.5} with it){}",
+                said_by_the_model(&added.id, &fit.parameters)
+            ));
+        }
+        effect.joined = effect.refused.is_empty() || refused == Refused::Kept;
+        let kept = effect.joined.then_some((fit, after));
+        Ok((effect, kept))
+    }
+}
+
+/// What a fit came to; `None` if it failed at what was asked of it.
+pub fn settled<T>(of: Result<T, AmendError>) -> Result<Option<T>, AmendError> {
+    match of {
+        Ok(of) => Ok(Some(of)),
+        Err(why) if failed(&why) => Ok(None),
+        Err(why) => Err(why),
+    }
+}
+
+/// Whether a fit failed at what was asked of it rather than at the flights.
+fn failed(why: &AmendError) -> bool {
+    matches!(why, AmendError::NotConverged { .. } | AmendError::Singular { .. })
+}
+
+/// The error at the horizon of judgement, if any run gets there.
+pub fn judged(scores: &[HorizonScore]) -> Option<f64> {
+    let reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= JUDGED_AT_S + 1e-9);
+    reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s)).map(|s| s.rmse_scaled)
+}
+
+/// Whether the error falls from `before` to `after` by more than is nothing.
+pub fn better(after: &[HorizonScore], before: &[HorizonScore]) -> bool {
+    judged(after).zip(judged(before)).is_some_and(|(a, b)| a < (1.0 - IMPROVED) * b)
+}
+
+/// Whether coefficients of the model itself say nearly the same as all of the effect `id`.
+pub fn doubled(id: &str, parameters: &[Parameter]) -> bool {
+    let mut own = own(id, parameters).peekable();
+    own.peek().is_some() && own.all(|p| p.same_as.is_some())
+}
+
+/// Which coefficients of the model itself say what the effect `id` says, in words; empty if none do.
+fn said_by_the_model(id: &str, parameters: &[Parameter]) -> String {
+    if !doubled(id, parameters) {
+        return String::new();
+    }
+    let mut said: Vec<&str> = own(id, parameters).filter_map(|p| p.same_as.as_deref()).collect();
+    said.sort_unstable();
+    said.dedup();
+    format!(", for {} of the model itself can say nearly the same", said.join(", "))
+}
+
+/// The coefficients of the added effect `id`.
+fn own<'a>(id: &'a str, parameters: &'a [Parameter]) -> impl Iterator<Item = &'a Parameter> {
+    let of =
+        move |p: &&Parameter| p.added && p.name.split_once('.').is_some_and(|(own, _)| own == id);
+    parameters.iter().filter(of)
+}
+
+/// Why the fitted coefficients of the effect `id` cannot be believed.
+pub fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
+    let own: Vec<&Parameter> = own(id, parameters).collect();
+    let mut objections = Vec::new();
+    for p in own.iter().filter(|p| p.at_bound) {
+        objections.push(format!(
+            "{} ends at the bound {} of what is physically possible",
+            p.name, p.value
+        ));
+    }
+    let clear = if own.len() > 3 { CLEAR_OF_MANY } else { CLEAR };
+    if !own.is_empty() && own.iter().all(|p| p.value.abs() < clear * p.sd) {
+        let all: Vec<String> =
+            own.iter().map(|p| format!("{} = {:.3e} ± {:.1e}", p.name, p.value, p.sd)).collect();
+        objections.push(format!("the interval holds nought: {}", all.join(", ")));
+    }
+    for p in own {
+        if let Some((flight, value)) = outlier(p) {
+            objections.push(format!(
+                "the flights contradict one another: {} is {:.3e} over all, {value:.3e} by {flight}",
+                p.name, p.value
+            ));
+        }
+    }
+    objections
+}
+
+/// A flight whose own estimate cannot be that of all.
+fn outlier(p: &Parameter) -> Option<(&str, f64)> {
+    let far = |value: f64, sd: f64| {
+        let off = (value - p.value).abs();
+        off > DISAGREE * sd.hypot(p.sd) && off > DISAGREE_SHARE * p.value.abs()
+    };
+    let found = p.by_flight.iter().find(|e| far(e.value, e.sd));
+    found.map(|e| (e.flight.as_str(), e.value))
+}
+
+/// Coefficients that one flight sees clearly otherwise than all flights together, in words.
+pub fn contradictions(parameters: &[Parameter]) -> Vec<String> {
+    let named = parameters.iter().filter(|p| !p.added);
+    named
+        .filter_map(|p| {
+            let (flight, value) = outlier(p)?;
+            Some(format!(
+                "{} is {:.4} over all flights, but {value:.4} by {flight} alone: something differed \
+                 in that flight (loading, wind, damage); fit it apart, or fly it again",
+                p.name, p.value
+            ))
+        })
+        .collect()
+}

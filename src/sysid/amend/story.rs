@@ -1,0 +1,65 @@
+//! An amendment told in sentences.
+
+use super::conventions::Tried;
+use super::judge::{JUDGED_AT_S, judged};
+use super::result::Amendment;
+
+/// The amendment in words: what became of the error, of the conventions, and of every effect.
+pub fn sentences(story: &Amendment) -> Vec<String> {
+    let mut all = Vec::new();
+    let (given, before, after) =
+        (judged(&story.given), judged(&story.before), judged(&story.after));
+    let joined = story.effects.iter().filter(|e| e.joined);
+    let kept: Vec<&str> = joined.map(|e| e.id.as_str()).collect();
+    if let (Some(given), Some(before), Some(after)) = (given, before, after) {
+        all.push(format!(
+            "On flights that the fit did not see, {} once the coefficients are tuned ({given:.5} to \
+             {before:.5} of the reference scale, free runs of {JUDGED_AT_S} s).",
+            change(given, before)
+        ));
+        if !kept.is_empty() {
+            let joined = kept.iter().map(|id| (*id).to_owned());
+            let taken = story.conventions.iter().filter(|t| t.kept);
+            let taken = taken.map(|t| format!("{} {}", t.convention.key().join("."), t.to));
+            all.push(format!(
+                "With {} as well {} ({before:.5} to {after:.5}).",
+                joined.chain(taken).collect::<Vec<_>>().join(" and "),
+                change(before, after)
+            ));
+        }
+    }
+    for Tried { convention, from, to, error: [a, b], closer, kept } in &story.conventions {
+        let key = convention.key().join(".");
+        let said = if *kept { "is taken instead of" } else { "does not replace" };
+        let found = if b.is_nan() {
+            "no fit with it holds that long".into()
+        } else {
+            format!(
+                "{} ({a:.5} to {b:.5}), and the fit's own flights are followed {} by {:.1} standard errors",
+                change(*a, *b),
+                if *closer > 0.0 { "more closely" } else { "less closely" },
+                closer.abs()
+            )
+        };
+        all.push(format!("{key} {to} {said} {from}: {found}."));
+    }
+    for effect in story.effects.iter().filter(|e| !e.refused.is_empty()) {
+        let verb =
+            if kept.contains(&effect.id.as_str()) { "kept though refused" } else { "refused" };
+        let next = match effect.fly_next.as_str() {
+            "" => String::new(),
+            next => format!(" What would decide: {next}."),
+        };
+        all.push(format!("{} is {verb}: {}.{next}", effect.id, effect.refused.join("; ")));
+    }
+    all
+}
+
+fn change(from: f64, to: f64) -> String {
+    let percent = 100.0 * (1.0 - to / from);
+    match percent {
+        p if p >= 0.05 => format!("the error falls by {p:.1} %"),
+        p if p <= -0.05 => format!("the error rises by {:.1} %", -p),
+        _ => "the error stays as it is".into(),
+    }
+}
