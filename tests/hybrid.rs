@@ -71,7 +71,7 @@ fn proposals_without_noise_are_the_policys_own_actions() {
         noise: [0.0, 0.5],
         ..Settings::HYBRID
     };
-    let aids = Aids { agent: Some(agent.clone()), base: None };
+    let aids = Aids { agent: Some(agent.clone()), base: None, ilqr: None };
     let mut planner = Cem::new("hybrid", &model, settings, aids);
     planner.reset(1);
     let planned = planner.command(&seen(), &TARGET);
@@ -86,7 +86,7 @@ fn proposals_without_noise_are_the_policys_own_actions() {
 fn critics_decide_when_they_say_more_than_the_reward() {
     let model = model();
     let command = |settings: Settings| {
-        let aids = Aids { agent: Some(agent(&model, 100.0)), base: None };
+        let aids = Aids { agent: Some(agent(&model, 100.0)), base: None, ilqr: None };
         let mut planner = Cem::new("hybrid", &model, settings, aids);
         planner.reset(1);
         planner.command(&seen(), &TARGET)
@@ -215,7 +215,7 @@ fn the_base_flies_where_the_search_is_not_sure() {
     let model = model();
     let lqi = Lqi::new(&model).unwrap();
     let planner = |weight: f32| {
-        let aids = Aids { agent: Some(agent(&model, weight)), base: Some(lqi.clone()) };
+        let aids = Aids { agent: Some(agent(&model, weight)), base: Some(lqi.clone()), ilqr: None };
         let settings = Settings { alpha: Some(1.0), ..Settings::OVER_LQI };
         Cem::new("hybrid-lqi", &model, settings, aids)
     };

@@ -48,23 +48,23 @@ fn flown(kind: Kind, personality: Personality, seed: u64) -> [f64; LEGS.len()] {
     })
 }
 
-/// Seeds from the environment: `SEEDS=4`. `hybrid-lqi` beside ArduPilot is printed without a bound: its model knows
-/// nothing of the way through the channels, and now and then it oscillates.
+/// Seeds from the environment: `SEEDS=4`. A hybrid that did not know the slew limit oscillated beside ArduPilot (0.7° and
+/// 1.0° in two legs of 25), whose channels are sampled at 50 Hz.
 #[test]
 #[ignore = "two minutes of planning: SEEDS=4 cargo test --release … --test planners_beside_controllers -- --ignored --nocapture"]
 fn attitudes_are_held_through_channels() {
     let seeds = std::env::var("SEEDS").ok().and_then(|n| n.parse().ok()).unwrap_or(2u64);
-    for (kind, personality, bounded) in [
-        (Kind::Lqi, Ardupilot, true),
-        (Kind::Ilqr, Ardupilot, true),
-        (Kind::HybridLqi, Px4, true),
-        (Kind::HybridLqi, Ardupilot, false),
+    for (kind, personality) in [
+        (Kind::Lqi, Ardupilot),
+        (Kind::Ilqr, Ardupilot),
+        (Kind::HybridLqi, Px4),
+        (Kind::HybridLqi, Ardupilot),
     ] {
         for seed in 0..seeds {
             let errors = flown(kind, personality, seed);
             println!("{} {personality} seed {seed}: {errors:.2?} deg", kind.name());
             // Noise alone makes 0.3°.
-            assert!(!bounded || errors.iter().all(|e| *e < 1.0));
+            assert!(errors.iter().all(|e| *e < 0.5));
         }
     }
 }

@@ -143,7 +143,7 @@ fn estimate(scorings: &[Scoring]) -> Result<()> {
         PI_PEAK / 1e9
     );
     for problem in scorings {
-        let aids = Aids { agent: Some(problem.agent.clone()), base: None };
+        let aids = Aids { agent: Some(problem.agent.clone()), base: None, ilqr: None };
         let settings = Settings { instructions: Instructions::Portable, ..Settings::HYBRID };
         let mut planner = Cem::new("hybrid", &problem.model, settings, aids);
         planner.reset(1);

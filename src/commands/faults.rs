@@ -118,7 +118,7 @@ fn print_faults(controller: ControllerKind, opposites: &[Opposite], entries: &[E
     println!("{table}");
 }
 
-/// What was found, in numbers, then every flight with something that nothing explains.
+/// What was found, in numbers, then every flight with something that nothing explains, or no fault.
 fn print_findings(entries: &[Entry]) {
     println!("\n{} flights in all", entries.len());
     let mut counts: BTreeMap<(&str, &str), u64> = BTreeMap::new();
@@ -155,6 +155,9 @@ fn show(report: &Report) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::{Controller, Observation, Target};
+    use crate::flight::runtime::Crew;
+    use crate::physics::Command;
     use crate::sim::faults::Finding;
 
     /// Runs a test with a stack for the LQI's design on all cores, whose dual numbers are large where nothing is
@@ -199,6 +202,42 @@ mod tests {
             assert_eq!(one.findings, two.findings);
             assert_eq!(one.texts, two.texts);
             assert!(!one.texts.is_empty());
+        });
+    }
+
+    /// Rolls as far as it goes, whatever is wanted.
+    #[derive(Clone)]
+    struct Hardover;
+
+    impl Controller for Hardover {
+        fn name(&self) -> &'static str {
+            "hardover"
+        }
+
+        fn boxed_clone(&self) -> Box<dyn Controller> {
+            Box::new(self.clone())
+        }
+
+        fn reset(&mut self, _: u64) {}
+
+        fn command(&mut self, _: &Observation, _: &Target) -> Command {
+            Command { aileron: 1.0, elevator: 0.0, throttle: 0.5 }
+        }
+    }
+
+    #[test]
+    fn what_a_controller_does_without_any_fault_is_laid_to_no_fault() {
+        roomy(|| {
+            let model = fly::model("params/x8/jsbsim.toml".as_ref(), None).unwrap();
+            let lqi = crew(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap();
+            let hardover = Crew { controller: Box::new(Hardover), ..lqi };
+            let works = Works::new(hardover, &model).unwrap();
+            let case = Case { seed: 0, controller: ControllerKind::Lqi, opposite: Opposite::Sitl };
+            let report = works.fly(case).unwrap();
+            let entry = Entry::from(&report);
+            let rolled = entry.findings.iter().find(|f| f.finding == "attitude").unwrap();
+            assert_eq!(rolled.standing(), "by itself", "{:?}", entry.findings);
+            assert!(rolled.is_failure());
         });
     }
 

@@ -77,7 +77,9 @@ impl<'a> Source<'a> {
     ) -> Result<cem::Cem, SetupError> {
         let settings = settings.with(self.changes);
         let agent = if settings.needs_policy() { Some(self.agent()?.clone()) } else { None };
-        Ok(cem::Cem::new(name, self.model, settings, cem::Aids { agent, base }))
+        let ilqr = base.clone().filter(|_| settings.ilqr);
+        let ilqr = ilqr.map(|lqi| ilqr::Ilqr::new(self.model, lqi));
+        Ok(cem::Cem::new(name, self.model, settings, cem::Aids { agent, base, ilqr }))
     }
 }
 

@@ -85,9 +85,9 @@ impl Note {
         }
     }
 
-    /// Whether it fails the campaign.
+    /// Whether it fails the campaign: nothing explains it, or the controller did it without any fault.
     pub fn is_failure(&self) -> bool {
-        self.cause.is_none()
+        self.cause.as_deref().is_none_or(|cause| cause == Cause::Itself.name())
     }
 }
 

@@ -1,6 +1,6 @@
 //! The last search, told: its candidates flown one by one in the model.
 
-use super::rollout::{HORIZON, WIDTH};
+use super::rollout::{HORIZON, WIDTH, slewed};
 use super::{Cem, Plan, flown};
 use crate::control::Observation;
 use crate::control::insight::{Insight, Path};
@@ -54,6 +54,10 @@ impl Cem {
                 (Some(c), Some(base)) => Command { throttle: base.throttle, ..c },
                 (Some(c), None) | (None, Some(c)) => c,
                 (None, None) => break,
+            };
+            let command = match ahead {
+                Some(_) => slewed(command, &previous[0], &model.airframe),
+                None => command,
             };
             let controls = model.act(&actuators.controls(), &mut inputs);
             state = model.step(&state, &controls, seen.altitude, &mut memory);

@@ -12,6 +12,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::control::disturbance::{self, Disturbance};
+use crate::control::ilqr::Ilqr;
 use crate::control::insight::Insight;
 use crate::control::lqi::{Ahead, Lqi};
 use crate::control::policy::Agent;
@@ -30,6 +31,8 @@ pub struct Aids {
     pub agent: Option<Agent>,
     /// The controller whose plan is flown where the search finds none that is surely better.
     pub base: Option<Lqi>,
+    /// The planner whose plan is a candidate beside the base's.
+    pub ilqr: Option<Ilqr>,
 }
 
 /// An action in the paper's units: aileron, elevator and throttle in −1..1 (eq. 29).
@@ -54,6 +57,7 @@ pub struct Cem {
     settings: Settings,
     agent: Option<Agent>,
     base: Option<Base>,
+    ilqr: Option<Ilqr>,
     disturbance: Option<Disturbance>,
     machine: Machine,
     blocks: Vec<Block>,
@@ -109,6 +113,7 @@ impl Cem {
             settings,
             agent: aids.agent,
             base: aids.base.map(|lqi| Base { lqi, ahead: Ahead::new(steps) }),
+            ilqr: aids.ilqr,
             disturbance: settings.disturbance.map(Disturbance::new),
             machine: match settings.instructions {
                 Instructions::Widest => Machine::detect(),
@@ -299,7 +304,12 @@ impl Cem {
 
     /// The best plan around the base's, if it is worth more than the base's by the margin and by what
     /// the critics doubt of either.
-    fn search_around_base(&mut self, seen: &Observation, target: &Target) -> Option<Plan> {
+    fn search_around_base(
+        &mut self,
+        seen: &Observation,
+        target: &Target,
+        advised: Option<Plan>,
+    ) -> Option<Plan> {
         let mut rng = stream::stream(self.seed, &[self.tick]);
         self.tick += 1;
         let all = self.blocks.len();
@@ -315,8 +325,10 @@ impl Cem {
         let mut best = base;
         for _ in 0..self.settings.iterations {
             self.sample(&mut rng, first, &mean, &spread);
-            if let (true, Some(last)) = (first == proposed && first < all, self.last) {
-                self.put(first, 0, &shifted(&last));
+            if first == proposed && first < all {
+                for (lane, plan) in [self.last.as_ref().map(shifted), advised].iter().enumerate() {
+                    plan.iter().for_each(|plan| self.put(first, lane, plan));
+                }
             }
             self.fly(seen, target, Actions::Given, [first, all]);
             let found;
@@ -351,7 +363,10 @@ impl Cem {
         let before = base.lqi.clone();
         let alone = base.lqi.command(seen, target);
         self.base = Some(base);
-        self.last = self.search_around_base(seen, target);
+        // the base's throttle takes the place of what stands here
+        let action = |[aileron, elevator]: [f64; 2]| [aileron, elevator, 0.0];
+        let advised = self.ilqr.as_mut().and_then(|ilqr| ilqr.plan(seen, target));
+        self.last = self.search_around_base(seen, target, advised.map(|plan| plan.map(action)));
         match (self.last, &mut self.base) {
             (Some(plan), Some(base)) => {
                 base.lqi.hand_over(&before, seen);
@@ -396,6 +411,9 @@ impl Controller for Cem {
         self.disturbance = self.settings.disturbance.map(Disturbance::new);
         if let Some(base) = &mut self.base {
             base.lqi.reset(seed);
+        }
+        if let Some(ilqr) = &mut self.ilqr {
+            ilqr.reset(seed);
         }
     }
 

@@ -9,7 +9,7 @@ use crate::num::dense::Units;
 use crate::num::{Lanes, Real};
 use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
-use crate::physics::{ActuatorState, Command, State};
+use crate::physics::{ActuatorState, Airframe, Command, State};
 
 /// Candidates that move together.
 pub(super) const WIDTH: usize = 16;
@@ -250,6 +250,7 @@ fn rollout<const FUSED: bool>(
             }
             // the base flies the throttle: what is planned is attitude
             command.throttle = base.throttle;
+            command = slewed(command, &flight.previous[0], &scene.model.airframe);
         }
         if step < HORIZON {
             let given = &mut block[step];
@@ -272,6 +273,23 @@ fn rollout<const FUSED: bool>(
         doubt = (first - second).abs().scale(alpha * flight.weight);
     }
     Worth { returns: flight.sum.0, doubt: doubt.0 }
+}
+
+/// `command` with its surfaces as far from the `last` one as the airframe's slew limit lets them go in a step: whoever
+/// flies a plan keeps to it, and a plan that does not know it oscillates once the channels are late as well.
+#[inline(always)]
+pub(super) fn slewed<R: Real>(
+    command: Command<R>,
+    last: &Command<R>,
+    airframe: &Airframe,
+) -> Command<R> {
+    let reach = R::from_f64(airframe.envelope.surface_slew_per_s * STEP);
+    let within = |x: R, from: R| x.max(from - reach).min(from + reach);
+    Command {
+        aileron: within(command.aileron, last.aileron),
+        elevator: within(command.elevator, last.elevator),
+        ..command
+    }
 }
 
 /// A command with every component read as another kind of number.

@@ -67,6 +67,8 @@ pub struct Settings {
     pub chunk: usize,
     /// What a plan must be worth beside the base's to be flown, in units of the return.
     pub margin: f64,
+    /// Whether iLQR's plan is among the candidates; it needs a base.
+    pub ilqr: bool,
     /// Time constant (s) with which what the model leaves unexplained is estimated; `None`: it is not.
     pub disturbance: Option<f64>,
     /// What flies the candidates.
@@ -89,6 +91,7 @@ impl Settings {
         steps: HORIZON,
         chunk: 1,
         margin: 0.0,
+        ilqr: false,
         disturbance: None,
         instructions: Instructions::Widest,
     };
@@ -169,6 +172,8 @@ pub enum Change {
     Chunk(usize),
     /// [`Settings::margin`].
     Margin(f64),
+    /// [`Settings::ilqr`].
+    Ilqr(bool),
     /// [`Settings::disturbance`].
     Disturbance(Option<f64>),
     /// [`Settings::instructions`].
@@ -192,6 +197,7 @@ impl Change {
             Change::Steps(steps) => Settings { steps, ..s },
             Change::Chunk(chunk) => Settings { chunk, ..s },
             Change::Margin(margin) => Settings { margin, ..s },
+            Change::Ilqr(ilqr) => Settings { ilqr, ..s },
             Change::Disturbance(disturbance) => Settings { disturbance, ..s },
             Change::Instructions(instructions) => Settings { instructions, ..s },
         }
@@ -203,8 +209,8 @@ impl Change {
 #[error(
     "{text:?} changes no setting of the planner: {why}; give KEY=VALUE with population, elites, \
      temperature, iterations, start (neutral, policy, last), spread, persistence, kept, proposals, noise, \
-     alpha (or none), steps, chunk, margin, disturbance (s, or none), \
-     instructions (widest, portable)"
+     alpha (or none), steps, chunk, margin, ilqr (yes, no), \
+     disturbance (s, or none), instructions (widest, portable)"
 )]
 pub struct ChangeError {
     text: String,
@@ -254,6 +260,11 @@ fn parse(text: &str) -> Result<Change, String> {
         "steps" => Change::Steps(count([HORIZON, 500])?),
         "chunk" => Change::Chunk(count([1, HORIZON])?),
         "margin" => Change::Margin(number([0.0, 1e3])?),
+        "ilqr" => Change::Ilqr(match value {
+            "yes" => true,
+            "no" => false,
+            _ => return Err(format!("{value:?} is neither yes nor no")),
+        }),
         "instructions" => Change::Instructions(match value {
             "widest" => Instructions::Widest,
             "portable" => Instructions::Portable,

@@ -49,6 +49,18 @@ impl Ilqr {
     }
 }
 
+impl Ilqr {
+    /// The first `N` steps (50 at most) of this tick's plan, aileron and elevator; `None` if none stays finite.
+    pub(crate) fn plan<const N: usize>(
+        &mut self,
+        seen: &Observation,
+        target: &Target,
+    ) -> Option<[Surfaces; N]> {
+        self.command(seen, target);
+        self.desk.plan.map(|plan| std::array::from_fn(|step| plan[step]))
+    }
+}
+
 /// What is kept from tick to tick.
 #[derive(Clone, Debug)]
 struct Desk {

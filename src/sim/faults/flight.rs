@@ -114,13 +114,14 @@ impl Works {
     }
 
     /// Flies `case`; a panic of the companion is a finding. What an aircraft did is laid to a cause if it
-    /// was in that plight, and does not do it when the same flight is flown without the faults of that kind.
+    /// was in that plight, and does not do it when the same flight is flown without the faults of that kind; to none
+    /// of them if it does it without any.
     ///
     /// # Errors
     /// If the aircraft cannot be loaded.
     pub fn fly(&self, case: Case) -> Result<Report, FaultsError> {
         let mut report = self.fly_under(case, draw(case.seed))?;
-        for cause in Cause::ALL {
+        for cause in Cause::OF_FAULTS {
             if !report.findings.iter().any(|found| found.is_open_to(cause)) {
                 continue;
             }
@@ -129,6 +130,14 @@ impl Works {
             for found in report.findings.iter_mut().filter(|found| found.is_open_to(cause)) {
                 let still = without.findings.iter().any(|other| other.finding == found.finding);
                 found.cause = (!still).then_some(cause);
+            }
+        }
+        let open = |found: &Found| found.cause.is_none() && !found.finding.is_own();
+        if report.findings.iter().any(open) {
+            let spared = self.fly_under(case, Vec::new())?;
+            for found in report.findings.iter_mut().filter(|found| open(found)) {
+                let same = spared.findings.iter().any(|other| other.finding == found.finding);
+                found.cause = same.then_some(Cause::Itself);
             }
         }
         Ok(report)

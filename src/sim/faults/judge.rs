@@ -70,6 +70,8 @@ pub enum Cause {
     Blind,
     /// A sensor told a believable lie a moment ago.
     Misled,
+    /// None of the faults: the same flight without any has it too.
+    Itself,
 }
 
 impl Found {
@@ -80,8 +82,8 @@ impl Found {
 }
 
 impl Cause {
-    /// All of them.
-    pub const ALL: [Cause; 3] = [Cause::Unsteered, Cause::Blind, Cause::Misled];
+    /// Those that faults bring about.
+    pub const OF_FAULTS: [Cause; 3] = [Cause::Unsteered, Cause::Blind, Cause::Misled];
 
     /// Its name in tables.
     pub fn name(self) -> &'static str {
@@ -89,6 +91,7 @@ impl Cause {
             Cause::Unsteered => "unsteered",
             Cause::Blind => "blind",
             Cause::Misled => "misled",
+            Cause::Itself => "by itself",
         }
     }
 
@@ -98,6 +101,7 @@ impl Cause {
         match self {
             Cause::Misled => lie,
             Cause::Unsteered | Cause::Blind => !lie && !matches!(kind, Kind::Client | Kind::Disk),
+            Cause::Itself => false,
         }
     }
 }
@@ -179,7 +183,7 @@ impl Judge {
             steps: 0,
             unsteered: 0,
             blind: false,
-            causes: Cause::ALL.map(|cause| (cause, None)),
+            causes: Cause::OF_FAULTS.map(|cause| (cause, None)),
         }
     }
 
