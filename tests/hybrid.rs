@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use greylag::control::cem::{Aids, Cem, Settings, Update};
+use greylag::control::ilqr::Ilqr;
 use greylag::control::lqi::Lqi;
 use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Origin, Policy};
 use greylag::control::{self, Controller, Kind, Observation, SetupError, Source, Target};
@@ -230,6 +231,34 @@ fn the_base_flies_where_the_search_is_not_sure() {
     let mut blind = planner(1.0);
     blind.reset(1);
     assert!(!blind.command(&lost, &TARGET).elevator.is_finite());
+}
+
+/// Whoever flies a plan moves the surfaces no faster than the airframe says, so neither does the plan.
+#[test]
+fn a_plan_keeps_to_the_slew_limit() {
+    let mut model = model();
+    let agent = agent(&model, 1.0);
+    let mut flown = |per_s: f64, ilqr: bool| {
+        model.airframe.envelope.surface_slew_per_s = per_s;
+        let lqi = Lqi::new(&model).unwrap();
+        let ilqr = ilqr.then(|| Ilqr::new(&model, lqi.clone()));
+        let aids = Aids { agent: Some(agent.clone()), base: Some(lqi), ilqr };
+        let mut planner = Cem::new("hybrid-lqi", &model, Settings::OVER_LQI, aids);
+        let mut fly = || {
+            planner.reset(1);
+            let command = planner.command(&seen(), &TARGET);
+            (command, planner.insight(&seen()).unwrap().searched)
+        };
+        let flown = fly();
+        assert_eq!(fly(), flown);
+        flown
+    };
+    for ilqr in [false, true] {
+        let (slow, planned) = flown(20.0, ilqr);
+        assert!(planned && slow.aileron.abs() < 0.2 + 1e-6 && slow.elevator.abs() < 0.2 + 1e-6);
+        let (fast, planned) = flown(200.0, ilqr);
+        assert!(planned && fast.aileron > 0.3, "{fast:?}");
+    }
 }
 
 #[test]
