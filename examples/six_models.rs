@@ -47,12 +47,36 @@ struct Arguments {
     /// Updates of each training.
     #[arg(long, default_value_t = 20_000)]
     updates: u64,
+    /// Units of the hidden layers of the residual.
+    #[arg(long, value_delimiter = ',', default_values_t = [64, 64])]
+    hidden: Vec<usize>,
+    /// Models to learn, by the names of the table; all of them without it.
+    #[arg(long, num_args = 1.., value_name = "NAME")]
+    models: Vec<String>,
     /// Targets of each group for the held-out flights.
     #[arg(long, default_value_t = 24)]
     held_out: usize,
     /// Seed of everything.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+}
+
+impl Arguments {
+    fn wants(&self, way: &Way) -> bool {
+        self.models.is_empty() || self.models.iter().any(|name| name == way.name)
+    }
+
+    /// Names of models that there are none of.
+    fn check(&self) -> Result<()> {
+        let unknown = self.models.iter().find(|name| WAYS.iter().all(|way| way.name != **name));
+        let names: Vec<&str> = WAYS.iter().map(|way| way.name).collect();
+        match unknown {
+            Some(name) => {
+                anyhow::bail!("there is no model {name:?}; there are {}", names.join(", "))
+            }
+            None => Ok(()),
+        }
+    }
 }
 
 /// Horizons of the free runs, steps.
@@ -118,6 +142,7 @@ struct Row {
 
 fn main() -> Result<()> {
     let arguments = Arguments::parse();
+    arguments.check()?;
     let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params");
     let load = |name: &str| -> Result<(PathBuf, GreyBox)> {
         let path = params.join(format!("x8/{name}.toml"));
@@ -132,7 +157,7 @@ fn main() -> Result<()> {
     let flights = explored(&arguments, &load("prior-severe")?.1)?;
     let (_, truth) = load("prior")?;
     let mut rows = Vec::new();
-    for way in &WAYS {
+    for way in WAYS.iter().filter(|way| arguments.wants(way)) {
         let (path, prior) = load(way.prior)?;
         let start = Instant::now();
         let trainer = trained(&arguments, way, &prior, &flights)?;
@@ -251,6 +276,7 @@ fn trained(
     let trainable = if way.trainable { perturbed(way, &prior)? } else { Vec::new() };
     let recipe = Recipe {
         updates: arguments.updates,
+        hidden: arguments.hidden.clone(),
         trainable,
         criterion: way.criterion,
         start: way.start,

@@ -171,7 +171,7 @@ fn flown(kind: Kind, model: &str, [roll_deg, pitch_deg]: [f64; 2]) -> greylag::s
     use greylag::sim::{Episode, Simulator};
     let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
     let model = GreyBox::load(&params.join(model)).unwrap();
-    let agent = agent(&model, 1.0);
+    let agent = Agent::load(&params.join("policy"), &model.airframe).unwrap();
     let mut controller =
         control::build(kind, Source { model: &model, agent: Some(&agent), changes: &[] }).unwrap();
     let plant = greylag_sitl::plant::PlantOptions::default();
@@ -182,8 +182,8 @@ fn flown(kind: Kind, model: &str, [roll_deg, pitch_deg]: [f64; 2]) -> greylag::s
     Episode { environment, controller, seed: 1 }.fly(&target, |_, _| ()).unwrap()
 }
 
-/// The search settles sooner than the LQI that it is built over, and then leaves it alone. (On easy
-/// targets: 0.83 s in the median of 140, the LQI 0.97 s. On the hard ones it does not.)
+/// The search settles sooner than the LQI that it is built over, and then leaves it alone. (Median of 140 easy
+/// targets: 0.73 s, the LQI 0.97 s; of 100 hard ones 1.80 s and 2.03 s.)
 #[cfg(feature = "sitl")]
 #[test]
 fn the_hybrid_over_the_lqi_is_sooner_there_and_as_exact() {
@@ -243,7 +243,9 @@ fn a_plan_keeps_to_the_slew_limit() {
         let lqi = Lqi::new(&model).unwrap();
         let ilqr = ilqr.then(|| Ilqr::new(&model, lqi.clone()));
         let aids = Aids { agent: Some(agent.clone()), base: Some(lqi), ilqr };
-        let mut planner = Cem::new("hybrid-lqi", &model, Settings::OVER_LQI, aids);
+        // every plan that is worth more than the base's is flown
+        let settings = Settings { margin: 0.0, ..Settings::OVER_LQI };
+        let mut planner = Cem::new("hybrid-lqi", &model, settings, aids);
         let mut fly = || {
             planner.reset(1);
             let command = planner.command(&seen(), &TARGET);
@@ -254,10 +256,11 @@ fn a_plan_keeps_to_the_slew_limit() {
         flown
     };
     for ilqr in [false, true] {
-        let (slow, planned) = flown(20.0, ilqr);
-        assert!(planned && slow.aileron.abs() < 0.2 + 1e-6 && slow.elevator.abs() < 0.2 + 1e-6);
-        let (fast, planned) = flown(200.0, ilqr);
-        assert!(planned && fast.aileron > 0.3, "{fast:?}");
+        let (free, planned) = flown(200.0, ilqr);
+        assert!(planned && free.aileron > 0.1, "{free:?}");
+        let (slow, planned) = flown(2.0, ilqr);
+        let most = 0.02 + 1e-6;
+        assert!(planned && slow.aileron.abs() < most && slow.elevator.abs() < most, "{slow:?}");
     }
 }
 
