@@ -1,9 +1,10 @@
 //! The six dynamics models of the paper by one recipe, with what they are compared to.
 //!
 //! Priors true, mild and severe, each frozen and trainable (section V-A of \[GSFM26\]); beside them the
-//! losses of PhIHP and APHYNITY, the prior moved along with the residual from where it was given (the
-//! paper's way; ours fits it by equation error and holds it), and a residual alone. All learn from the same flights: a random round,
-//! then rounds planned through the severe trainable model, retrained each time on everything.
+//! losses of PhIHP and APHYNITY, the prior moved along with the residual from where it was given (ours fits
+//! it by equation error and holds it), the paper's way (moved along, all rollouts counting alike; ours weighs
+//! them), and a residual alone. All learn from the same flights: a random round, then rounds planned through
+//! the severe trainable model, retrained each time on everything.
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version --example six_models -- --out target/six-models
@@ -53,7 +54,7 @@ struct Arguments {
     /// Models to learn, by the names of the table; all of them without it.
     #[arg(long, num_args = 1.., value_name = "NAME")]
     models: Vec<String>,
-    /// Targets of each group for the held-out flights.
+    /// Held-out flights of each kind.
     #[arg(long, default_value_t = 24)]
     held_out: usize,
     /// Seed of everything.
@@ -82,6 +83,9 @@ impl Arguments {
 /// Horizons of the free runs, steps.
 const HORIZONS: [usize; 4] = [1, 10, 100, 500];
 
+/// Seeds of what is held out begin here.
+const HELD_OUT: u64 = 9000;
+
 /// A way to learn a model.
 struct Way {
     name: &'static str,
@@ -92,6 +96,8 @@ struct Way {
     start: Start,
     /// Whether the residual learns alone, on a prior without forces.
     alone: bool,
+    /// Whether all rollouts count alike, as in the papers.
+    alike: bool,
 }
 
 const fn way(name: &'static str, prior: &'static str, trainable: bool) -> Way {
@@ -102,10 +108,11 @@ const fn way(name: &'static str, prior: &'static str, trainable: bool) -> Way {
         criterion: Criterion::Scaled,
         start: Start::EquationError,
         alone: false,
+        alike: false,
     }
 }
 
-const WAYS: [Way; 11] = [
+const WAYS: [Way; 13] = [
     way("true-frozen", "prior", false),
     way("true-trainable", "prior", true),
     way("mild-frozen", "prior-mild", false),
@@ -114,8 +121,11 @@ const WAYS: [Way; 11] = [
     way("severe-trainable", "prior-severe", true),
     way("as-printed-trainable", "prior-as-printed", true),
     Way { start: Start::AsGiven, ..way("severe-joint", "prior-severe", true) },
-    Way { criterion: Criterion::Plain, ..way("severe-phihp", "prior-severe", false) },
+    Way { alike: true, ..way("true-paper", "prior", false) },
+    Way { alike: true, start: Start::AsGiven, ..way("severe-paper", "prior-severe", true) },
+    Way { alike: true, criterion: Criterion::Plain, ..way("severe-phihp", "prior-severe", false) },
     Way {
+        alike: true,
         criterion: Criterion::Plain,
         start: Start::AsGiven,
         ..way("severe-aphynity", "prior-severe", true)
@@ -132,9 +142,9 @@ struct Row {
     /// Median relative error of the trained coefficients, before and after; of those that were wrong.
     coefficients: Option<[f64; 2]>,
     learned: Vec<Learned>,
-    /// Free runs of the prior and of the model, easy then hard.
-    prior: [Vec<Horizon>; 2],
-    model_runs: [Vec<Horizon>; 2],
+    /// Free runs of the prior and of the model: easy, hard, random actions with stalls.
+    prior: [Vec<Horizon>; 3],
+    model_runs: [Vec<Horizon>; 3],
     /// Settled error in degrees (easy, hard corners) and divergence rate of an LQI designed on it.
     lqi: Option<[f64; 3]>,
     training_s: f64,
@@ -154,7 +164,15 @@ fn main() -> Result<()> {
     std::fs::create_dir_all(&arguments.out)?;
     let (_, reference) = load("jsbsim")?;
     let held_out = held_out(&arguments, &reference)?;
+    let start = Instant::now();
     let flights = explored(&arguments, &load("prior-severe")?.1)?;
+    let transitions: usize = flights.iter().map(|f| f.samples.len() - 1).sum();
+    println!(
+        "{transitions} transitions of {} flights in {} rounds, trained after each, in {:.0} s",
+        flights.len(),
+        arguments.rounds + 1,
+        start.elapsed().as_secs_f64()
+    );
     let (_, truth) = load("prior")?;
     let mut rows = Vec::new();
     for way in WAYS.iter().filter(|way| arguments.wants(way)) {
@@ -173,7 +191,7 @@ fn main() -> Result<()> {
         }
         let lqi = steered(&model, &params.join("targets.csv"))?;
         let score = |model: &GreyBox| {
-            [0, 1].map(|g| free_run(model, &tracks(model, &held_out[g]), &HORIZONS))
+            [0, 1, 2].map(|g| free_run(model, &tracks(model, &held_out[g]), &HORIZONS))
         };
         let learned = trainer.coefficients(Some(&truth));
         let everything = held_out.concat();
@@ -189,6 +207,7 @@ fn main() -> Result<()> {
         });
         println!("{}", table(&rows));
     }
+    beside(&rows);
     for row in &rows {
         for Learned { name, start, value, truth } in &row.learned {
             let truth = truth.unwrap_or(f64::NAN);
@@ -200,9 +219,23 @@ fn main() -> Result<()> {
         .with_context(|| format!("cannot write {}", json.display()))
 }
 
-/// Flights towards fresh targets, easy and hard, flown by an LQI on `reference`.
-fn held_out(arguments: &Arguments, reference: &GreyBox) -> Result<[Vec<Flight>; 2]> {
-    let targets = TargetFile::generate(9000 + arguments.seed);
+/// How far each model is off after 100 steps, over how far the first is.
+fn beside(rows: &[Row]) {
+    let off = |row: &Row| row.model_runs.each_ref().map(|runs| runs[2].rms);
+    let Some(first) = rows.first() else { return };
+    for row in rows {
+        let [easy, hard, random]: [f64; 3] = std::array::from_fn(|g| off(row)[g] / off(first)[g]);
+        println!(
+            "{:22} after {} steps {easy:.2} easy, {hard:.2} hard, {random:.2} random times the error of {}",
+            row.model, HORIZONS[2], first.model
+        );
+    }
+}
+
+/// Flights towards fresh targets, easy and hard, flown by an LQI on `reference`; and as many under random
+/// actions, which stall.
+fn held_out(arguments: &Arguments, reference: &GreyBox) -> Result<[Vec<Flight>; 3]> {
+    let targets = TargetFile::generate(HELD_OUT + arguments.seed);
     let mut controller = Lqi::new(reference)?;
     let mut simulator = Simulator::new(&PlantOptions::default())?;
     let mut fly = |group: Group| -> Result<Vec<Flight>> {
@@ -222,7 +255,15 @@ fn held_out(arguments: &Arguments, reference: &GreyBox) -> Result<[Vec<Flight>; 
         })
         .collect()
     };
-    Ok([fly(Group::Easy)?, fly(Group::HardCorners)?])
+    let (easy, hard) = (fly(Group::Easy)?, fly(Group::HardCorners)?);
+    let places = (0..arguments.held_out as u32).map(|episode| Place {
+        seed: HELD_OUT + arguments.seed,
+        round: 0,
+        episode,
+    });
+    let stalled: Result<Vec<Flight>, _> =
+        places.map(|place| explore(&mut simulator, None, &place)).collect();
+    Ok([easy, hard, stalled?])
 }
 
 /// The exploration: a random round, then rounds planned through a model that learns from all before.
@@ -277,6 +318,7 @@ fn trained(
     let recipe = Recipe {
         updates: arguments.updates,
         hidden: arguments.hidden.clone(),
+        floor: if way.alike { None } else { Recipe::default().floor },
         trainable,
         criterion: way.criterion,
         start: way.start,
@@ -347,6 +389,10 @@ fn table(rows: &[Row]) -> Table {
         "100",
         "500",
         "1 hard",
+        "10",
+        "100",
+        "500",
+        "1 random",
         "10",
         "100",
         "500",

@@ -32,7 +32,7 @@ fn scene(integrator: Integrator) -> Scene {
     let mut prior = model("prior-severe");
     prior.integrator = integrator;
     let tracks = vec![flight(&model("jsbsim"), &prior, 4, 200)];
-    let windows = (0..20).map(|k| Window { track: 0, start: 1 + 9 * k }).collect();
+    let windows = (0..20).map(|k| Window { track: 0, start: 1 + 9 * k, weight: 1.0 }).collect();
     let objective =
         Objective { scale: prior.scale(), penalty: Penalty::Ratio, unit: 0.02, lambda: 3.0 };
     Scene { prior, network: network(12, 0.3), objective, tracks, windows }

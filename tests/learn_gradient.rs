@@ -35,7 +35,8 @@ fn scene(integrator: Integrator) -> (GreyBox, Vec<Track>, Vec<Window>) {
     let tracks =
         vec![flight(&model("jsbsim"), &prior, 4, 200), flight(&model("jsbsim"), &prior, 5, 90)];
     // a third block that is not full
-    let window = |k: u32| Window { track: k % 2, start: 1 + 2 * k };
+    let window =
+        |k: u32| Window { track: k % 2, start: 1 + 2 * k, weight: 1.0 + 0.5 * f64::from(k % 3) };
     (prior, tracks, (0..37).map(window).collect())
 }
 

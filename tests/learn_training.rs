@@ -9,7 +9,7 @@ use greylag::learn::{
     Checkpoint, Criterion, JXZ, Learned, Recipe, Start, TrainError, Trainer, export,
 };
 use greylag::model::{GreyBox, Integrator};
-use learn_support::{flight, model};
+use learn_support::{flight, model, moved};
 
 fn recipe(updates: u64) -> Recipe {
     Recipe { hidden: vec![16], steps: vec![4, 8], batch: 32, updates, ..Recipe::default() }
@@ -60,9 +60,46 @@ fn wrong_coefficients_are_found() {
     };
     let (before, after) = (median(&|l| l.start), median(&|l| l.value));
     println!("median error {before} -> {after}");
-    // the residual takes what the coefficients have not taken yet: they move the right way, a fifth of it
-    // (0.91 to 0.76) where equation error has them within 0.02, which is why that is the default
-    assert!(after < before, "{before} -> {after}");
+    assert!(after < 0.1 * before, "{before} -> {after}");
+}
+
+/// The prior as printed has the product of inertia with the wrong sign and its thrust in pounds; its drag
+/// lacks what the simulator's table has, which is not to be taken for thrust.
+#[test]
+fn thrust_is_told_from_a_drag_that_is_too_small() {
+    let [truth, prior] = ["jsbsim", "prior-as-printed"].map(|name| {
+        let mut model = model(name);
+        // its spin over a window is a sum, not an integral to be approximated
+        model.integrator = Integrator::Jsbsim;
+        model
+    });
+    let names = vec![JXZ.into(), "thrust_linear.Cp_n".into()];
+    let recipe = Recipe { trainable: names, ..recipe(10) };
+    let trainer = Trainer::new(recipe, &prior, tracks(&truth, &prior)).unwrap();
+    for Learned { name, value, truth, .. } in trainer.coefficients(Some(&model("prior"))) {
+        let off = value / truth.unwrap() - 1.0;
+        println!("{name} {value} {off}");
+        assert!(off.abs() < 0.03, "{name} {value}");
+    }
+}
+
+/// Where the prior errs little the residual is good as well, though a stall is all of the mean square.
+#[test]
+fn quiet_flight_is_learned_beside_stalls() {
+    let (truth, prior) = (model("jsbsim"), model("prior"));
+    let quiet = |seed| moved(&truth, &prior, seed, 300, 0.03);
+    let held_out: Vec<Track> = (100..103).map(quiet).collect();
+    let off = |floor: Option<f64>| {
+        let recipe = Recipe { floor, steps: vec![8], ..recipe(3000) };
+        let wild = (0..6).map(|seed| moved(&truth, &prior, seed, 1000, 0.8));
+        let tracks: Vec<Track> = wild.chain((10..14).map(quiet)).collect();
+        let mut trainer = Trainer::new(recipe, &prior, tracks).unwrap();
+        trainer.run(3000).unwrap();
+        let [one] = free_run(&trainer.model().unwrap(), &held_out, &[50])[..] else { panic!() };
+        println!("{floor:?}: {one:?}");
+        one.rms
+    };
+    assert!(off(Recipe::default().floor) < 0.7 * off(None));
 }
 
 /// What a frozen prior lacks is learned by the residual, and the model files carry it.
@@ -148,6 +185,8 @@ fn what_cannot_be_trained_is_said_by_name() {
     let trainer = Trainer::new(names("pitch_linear.Cmde"), &prior, still).unwrap();
     assert_eq!(trainer.unseen(), ["pitch_linear.Cmde"]);
     assert_eq!(trainer.coefficients(None)[0].start, trainer.coefficients(None)[0].value);
+    let none = Recipe { floor: Some(0.0), ..recipe(10) };
+    assert!(said(none, &prior, &short).contains("floor"));
     let plain = Recipe { criterion: Criterion::Plain, tau: -1.0, ..recipe(10) };
     assert!(said(plain, &prior, &short).contains("tau"));
 }

@@ -353,7 +353,7 @@ impl AnalyticTrainer {
     fn reward(&self, next: &Aircraft, target: &Target) -> [f32; NUMBERS] {
         let task = Task::PAPER;
         let slope = |x: f64, scale: f64, cap: f64| {
-            let steep = (x / self.recipe.rounding).clamp(-1.0, 1.0) / scale;
+            let steep = (x / self.recipe.rounding.max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0) / scale;
             if x.abs() / scale < cap { -steep } else { -0.1 * steep }
         };
         let s = &next.state;

@@ -5,10 +5,11 @@ use nalgebra::{DMatrix, DVector};
 use crate::learn::windows::Track;
 use crate::model::GreyBox;
 use crate::num::{Dual, Real};
-use crate::physics::Wrench;
 use crate::physics::effects::Kind;
 use crate::physics::effects::Needs;
+use crate::physics::point::AirData;
 use crate::physics::rigid_body::{self, RigidBody};
+use crate::physics::{Channel, State, Wrench};
 
 /// The name under which the product of inertia is trainable.
 ///
@@ -218,31 +219,31 @@ fn gram(model: &GreyBox, places: &[usize], tracks: &[Track]) -> DMatrix<f64> {
 pub(super) fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
     let (state, controls) = (&track.states[k], &track.controls[k]);
     let air = model.air(state, track.altitude[k]);
-    let still = rigid_body::state_rate(state, &air, [0.0; 3], [0.0; 3]).to_array();
     let mut wrenches = vec![Wrench::zero(); model.coefficients().len()];
     model.contributions(state, controls, &air, |i, channel, x| wrenches[i].add(channel, x));
-    let none = crate::physics::State { p: 0.0, q: 0.0, r: 0.0, ..*state };
-    let mut columns: Vec<[f64; 8]> = wrenches
-        .iter()
-        .map(|wrench| {
-            let force = rigid_body::body_force(wrench, &air, model.axes);
-            let moment = [4, 5, 6].map(|c| wrench.get(crate::physics::Channel::ALL[c]));
-            // at rest the gyroscopic terms vanish and the spin is linear in the moment
-            let spin = rigid_body::angular_acceleration(&model.body, &none, moment);
-            let push = force.map(|f| f / model.body.mass);
-            let rate = rigid_body::state_rate(state, &air, push, spin).to_array();
-            std::array::from_fn(|i| rate[i] - still[i])
-        })
-        .collect();
+    let mut columns: Vec<[f64; 8]> =
+        wrenches.iter().map(|wrench| rate_of(model, state, &air, wrench)).collect();
     let wrench = model.wrench(state, controls, &air);
-    let moment =
-        [4, 5, 6].map(|c| Dual::<1>::from_f64(wrench.get(crate::physics::Channel::ALL[c])));
+    let moment = [4, 5, 6].map(|c| Dual::<1>::from_f64(wrench.get(Channel::ALL[c])));
     let body: RigidBody<Dual<1>> = model.body.map(Dual::from_f64);
     let body = RigidBody { jxz: Dual::variable(model.body.jxz, 0), ..body };
     let spin = rigid_body::angular_acceleration(&body, &state.map(Dual::from_f64), moment);
     let [p, q, r] = spin.map(|s| s.gradient[0]);
     columns.push([0.0, 0.0, 0.0, p, q, r, 0.0, 0.0]);
     columns
+}
+
+/// The rates that a wrench alone makes of the state.
+pub(super) fn rate_of(model: &GreyBox, state: &State, air: &AirData, wrench: &Wrench) -> [f64; 8] {
+    let still = rigid_body::state_rate(state, air, [0.0; 3], [0.0; 3]).to_array();
+    let none = State { p: 0.0, q: 0.0, r: 0.0, ..*state };
+    let force = rigid_body::body_force(wrench, air, model.axes);
+    let moment = [4, 5, 6].map(|c| wrench.get(Channel::ALL[c]));
+    // at rest the gyroscopic terms vanish and the spin is linear in the moment
+    let spin = rigid_body::angular_acceleration(&model.body, &none, moment);
+    let push = force.map(|f| f / model.body.mass);
+    let rate = rigid_body::state_rate(state, air, push, spin).to_array();
+    std::array::from_fn(|i| rate[i] - still[i])
 }
 
 /// T with Tᵀ G T = 1 on the directions that the data sees, and who has no part in them.

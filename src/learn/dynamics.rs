@@ -1,6 +1,7 @@
 //! Training of the dynamics model, section IV-A of \[GSFM26\].
 
 use rand::seq::SliceRandom;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::learn::adam::Adam;
@@ -12,6 +13,7 @@ use crate::learn::loss::{Loss, Objective};
 use crate::learn::network::Passes;
 use crate::learn::recipe::{Criterion, Recipe, Start};
 use crate::learn::rollout::{PriorSlopes, Subject};
+use crate::learn::score::off_after;
 use crate::learn::windows::{Track, Window, windows};
 use crate::model::residual::{INPUTS, OUTPUTS, ResidualError, Scales, fingerprint, hash};
 use crate::model::{GreyBox, Residual};
@@ -115,6 +117,8 @@ pub struct Trainer {
     tracks: Vec<Track>,
     data: String,
     prior: GreyBox,
+    /// The prior with its coefficients as the training starts from.
+    begun: GreyBox,
     basis: Basis,
     subject: Subject,
     engine: Engine,
@@ -168,9 +172,11 @@ impl Trainer {
         let arithmetic = Arithmetic::Lanes;
         let engine = Engine::new(&subject, recipe.batch, longest, arithmetic);
         let count = subject.network.network().parameters().len();
-        let stage = Stage::new(&subject, &recipe, &tracks, recipe.steps_at(0))?;
-        // the bare prior's error is that of the prior as given
+        // what the residual has to learn is what this prior leaves, which may be much less than the
+        // prior as given: measured by that one, all of it would be less than the penalty
         basis.apply(&mut subject.prior, &coordinates);
+        let begun = subject.prior.clone();
+        let stage = Stage::new(&subject, &recipe, &tracks, recipe.steps_at(0))?;
         Ok(Trainer {
             data: crate::learn::windows::hash(&tracks),
             adam: Adam::new(count + basis.len()),
@@ -180,6 +186,7 @@ impl Trainer {
             recipe,
             tracks,
             prior,
+            begun,
             basis,
             subject,
             engine,
@@ -335,7 +342,7 @@ impl Trainer {
         let steps = self.recipe.steps_at(self.update);
         if steps != self.stage.steps {
             let mut bare = self.subject.clone();
-            bare.prior = self.prior.clone();
+            bare.prior = self.begun.clone();
             bare.network.update(|p| p.fill(0.0));
             self.stage = Stage::new(&bare, &self.recipe, &self.tracks, steps)?;
         }
@@ -385,9 +392,12 @@ impl Stage {
         tracks: &[Track],
         steps: usize,
     ) -> Result<Stage, TrainError> {
-        let all = windows(tracks, steps);
+        let mut all = windows(tracks, steps);
         if all.is_empty() {
             return Err(TrainError::Data(steps + 2));
+        }
+        if let Some(floor) = recipe.floor {
+            weigh(&mut all, &bare.prior, tracks, steps, floor);
         }
         let some: Vec<Window> =
             all.iter().step_by(all.len().div_ceil(PRIOR_WINDOWS)).copied().collect();
@@ -424,4 +434,16 @@ impl Stage {
         }
         &self.order[place * batch..][..batch]
     }
+}
+
+/// Weighs `all` as [`Recipe::floor`] says; the mean of the weights is 1.
+fn weigh(all: &mut [Window], model: &GreyBox, tracks: &[Track], steps: usize, floor: f64) {
+    let mut weights: Vec<f64> =
+        all.par_iter().map(|w| off_after(model, tracks, w, steps).powi(2)).collect();
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+    // a prior without any error has nothing to be measured by
+    let unit = mean(&weights).max(f64::MIN_POSITIVE);
+    weights.iter_mut().for_each(|w| *w = 1.0 / (*w / unit + floor * floor));
+    let unit = mean(&weights);
+    all.iter_mut().zip(weights).for_each(|(window, w)| window.weight = w / unit);
 }

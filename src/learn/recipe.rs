@@ -71,6 +71,10 @@ pub struct Recipe {
     pub tau: f64,
     /// Whose loss.
     pub criterion: Criterion,
+    /// Count each rollout by 1/(e² + floor²), e being how far the prior is off at its end, in root mean
+    /// squares over the rollouts: the residual is then as good where the prior errs little as where it
+    /// errs most, as in a stall. All count alike without it, as in the paper.
+    pub floor: Option<f64>,
     /// Full names of the prior's coefficients that are trained; none for a frozen prior.
     pub trainable: Vec<String>,
     /// Seed of the network's start and of the minibatches.
@@ -91,6 +95,7 @@ impl Default for Recipe {
             lambda: 1.0,
             tau: 0.02,
             criterion: Criterion::Scaled,
+            floor: Some(0.1),
             trainable: Vec::new(),
             seed: 1,
         }
@@ -112,6 +117,9 @@ impl Recipe {
         }
         if !(self.prior_rate.is_finite() && self.prior_rate >= 0.0) {
             return Some("the prior's learning rate must not be negative");
+        }
+        if !self.floor.is_none_or(positive) {
+            return Some("the floor of a rollout's error must be positive");
         }
         if !(self.tau.is_finite() && self.tau >= 0.0) {
             return Some("tau must not be negative");

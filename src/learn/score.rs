@@ -35,10 +35,8 @@ pub fn free_run(model: &GreyBox, tracks: &[Track], horizons: &[usize]) -> Vec<Ho
 fn horizon(model: &GreyBox, tracks: &[Track], steps: usize) -> Horizon {
     let starts: Vec<Window> =
         windows(tracks, steps).into_iter().filter(|w| w.start as usize % EVERY == 1).collect();
-    let mut errors: Vec<f64> = starts
-        .par_iter()
-        .map(|w| run(model, &tracks[w.track as usize], w.start as usize, steps))
-        .collect();
+    let mut errors: Vec<f64> =
+        starts.par_iter().map(|w| off_after(model, tracks, w, steps)).collect();
     errors.sort_by(f64::total_cmp);
     let runs = errors.len();
     let mean = errors.iter().map(|e| e * e).sum::<f64>() / runs as f64;
@@ -52,8 +50,10 @@ fn horizon(model: &GreyBox, tracks: &[Track], steps: usize) -> Horizon {
     }
 }
 
-/// The error of one run from sample `start`.
-fn run(model: &GreyBox, track: &Track, start: usize, steps: usize) -> f64 {
+/// The error of one run after `steps` steps from `window` on: the root mean square over the states of
+/// (ŝ − s)/x_c, 1 at most.
+pub(super) fn off_after(model: &GreyBox, tracks: &[Track], window: &Window, steps: usize) -> f64 {
+    let (track, start) = (&tracks[window.track as usize], window.start as usize);
     let mut memory = Memory::default();
     let advance = |k: usize, state, memory: &mut Memory| {
         model.step(&state, &track.controls[k], track.altitude[k], memory)

@@ -58,12 +58,14 @@ impl Track {
 }
 
 /// The start of a rollout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
     /// The track's number.
     pub track: u32,
     /// The sample's number in it, 1 at least.
     pub start: u32,
+    /// What it counts in the loss; 1 in the paper's.
+    pub weight: f64,
 }
 
 /// Steepest pitch at which Euler angles still move slowly, rad: beyond it they have a pole.
@@ -93,7 +95,11 @@ pub fn windows(tracks: &[Track], steps: usize) -> Vec<Window> {
             .collect();
         let good = |start: &usize| runs[start + steps] >= steps + 2;
         let starts = t.starts(steps).filter(good);
-        all.extend(starts.map(|start| Window { track: track as u32, start: start as u32 }));
+        all.extend(starts.map(|start| Window {
+            track: track as u32,
+            start: start as u32,
+            weight: 1.0,
+        }));
     }
     all
 }
@@ -125,7 +131,7 @@ impl<R: Packet> Recorded<R> {
         let of = |lane: usize| windows.get(lane).unwrap_or(&windows[0]);
         let pick = |k: usize, get: &dyn Fn(&Track, usize) -> f64| {
             R::gather(|lane| {
-                let Window { track, start } = *of(lane);
+                let Window { track, start, .. } = *of(lane);
                 get(&tracks[track as usize], start as usize - 1 + k)
             })
         };
@@ -143,7 +149,7 @@ impl<R: Packet> Recorded<R> {
             ]);
             self.density.push(pick(k, &|t, s| t.density[s]));
         }
-        let counts = |lane: usize| if lane < windows.len() { 1.0 } else { 0.0 };
+        let counts = |lane: usize| windows.get(lane).map_or(0.0, |w| w.weight);
         self.weight = Some(R::gather(counts));
     }
 }

@@ -16,13 +16,18 @@ pub fn model(name: &str) -> GreyBox {
 
 /// A flight of `truth` under random commands held for a quarter of a second, as `seen_by` has it.
 pub fn flight(truth: &GreyBox, seen_by: &GreyBox, seed: u64, samples: usize) -> Track {
+    moved(truth, seen_by, seed, samples, 0.3)
+}
+
+/// The same, elevons moving by up to `size` of what they can.
+pub fn moved(truth: &GreyBox, seen_by: &GreyBox, seed: u64, samples: usize, size: f64) -> Track {
     let mut rng = stream::stream(seed, &[]);
     let mut twin = Twin::new(State { airspeed: 18.0, ..State::NEUTRAL }, 600.0);
     let mut command = Command::IDLE;
     let rows: Vec<_> = (0..samples)
         .map(|k| {
             if k % 25 == 0 {
-                let [aileron, elevator] = [0.3, 0.3].map(|w| rng.random_range(-w..w));
+                let [aileron, elevator] = [size, size].map(|w| rng.random_range(-w..w));
                 command = Command { aileron, elevator, throttle: rng.random_range(0.0..1.0) };
             }
             let row = (twin.state, twin.actuators.controls(), twin.altitude);

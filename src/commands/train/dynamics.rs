@@ -59,6 +59,11 @@ pub struct Arguments {
     /// --freeze).
     #[arg(long, default_value = "scaled", value_parser = ["scaled", "plain"])]
     loss: String,
+    /// Count each rollout by 1/(e² + FLOOR²), e being how far the prior is off at its end, in root mean
+    /// squares: the residual is then as good where the prior errs little. With `inf` all count alike,
+    /// as in the paper (and by default with --loss plain).
+    #[arg(long, value_name = "FLOOR")]
+    floor: Option<f64>,
     /// Units of the residual's hidden layers.
     #[arg(long, value_delimiter = ',', default_values_t = [64, 64])]
     hidden: Vec<usize>,
@@ -224,6 +229,11 @@ impl Arguments {
             lambda: self.lambda,
             tau: self.tau,
             criterion: if self.loss == "plain" { Criterion::Plain } else { Criterion::Scaled },
+            floor: match self.floor {
+                None if self.loss == "plain" => None,
+                None => Recipe::default().floor,
+                Some(floor) => Some(floor).filter(|f| *f != f64::INFINITY),
+            },
             trainable: names,
             seed: self.seed,
             ..Recipe::default()

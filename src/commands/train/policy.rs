@@ -57,6 +57,9 @@ pub struct Arguments {
     /// Learning rate of the analytic policy gradient at the start.
     #[arg(long, default_value_t = AnalyticRecipe::default().rate)]
     climb: f64,
+    /// Errors of roll and pitch (rad) below which the analytic policy gradient rounds the reward off.
+    #[arg(long, default_value_t = AnalyticRecipe::default().rounding)]
+    rounding: f64,
     /// Price of a change of a command from step to step, by its square, in the analytic policy gradient.
     #[arg(long, default_value_t = AnalyticRecipe::default().effort)]
     effort: f64,
@@ -221,6 +224,7 @@ impl Arguments {
             updates: self.updates,
             rate: self.climb,
             effort: self.effort,
+            rounding: self.rounding,
             corners: self.corners,
             seed,
             ..AnalyticRecipe::default()
@@ -249,6 +253,7 @@ impl Arguments {
         let positive = [
             ("--rate", self.rate),
             ("--climb", self.climb),
+            ("--rounding", self.rounding),
             ("--effort", self.effort),
             ("--exploration", self.exploration),
             ("--smoothing", self.smoothing),

@@ -47,7 +47,7 @@ pub struct Recorded<R> {
     pub controls: Vec<[R; 3]>,
     /// Air density from the step before the start on, kg/m³.
     pub density: Vec<R>,
-    /// 1 for a rollout that counts, 0 for one that fills the block up.
+    /// What each rollout counts; 0 for one that fills the block up.
     pub weight: Option<R>,
 }
 
