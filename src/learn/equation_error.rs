@@ -139,15 +139,14 @@ impl Fit<'_> {
         let air = model.air(state, altitude);
         let State { alpha, beta, .. } = *state;
         let terms: [f64; TERMS] = [1.0, alpha, alpha * alpha, alpha.powi(3), beta * beta];
-        let of = |channel: &Channel| {
-            let channel = *channel;
+        let of = |channel: Channel| {
             terms.map(|term| {
                 let mut wrench = Wrench::zero();
                 wrench.add(channel, air.q_s * term);
                 rate_of(model, state, &air, &wrench)
             })
         };
-        self.along.iter().flat_map(of).collect()
+        self.along.iter().flat_map(|channel| of(*channel)).collect()
     }
 }
 
