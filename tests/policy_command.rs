@@ -94,6 +94,12 @@ fn a_short_training_leaves_a_policy_that_flies_and_goes_on() {
     let mut other = train.to_vec();
     *other.iter_mut().find(|a| **a == "8").unwrap() = "9";
     refused(&other, &["another training"]);
+    let page = Path::new(out).join("policy.html");
+    assert!(std::fs::read_to_string(page).unwrap().contains("Settled error, easy targets"));
+    let curves = greylag(&["train", "curves", out, out]);
+    let said = String::from_utf8_lossy(&curves.stdout).into_owned();
+    assert!(curves.status.success() && said.matches("3008").count() >= 2, "{said}");
+    refused(&["train", "curves", folder.path().to_str().unwrap()], &["curve.csv", "--out"]);
     let flown =
         greylag(&["evaluate", "--controller", "policy", "--policy", out, "--group", "easy"]);
     assert!(flown.status.success() && String::from_utf8_lossy(&flown.stdout).contains("policy"));

@@ -3,6 +3,7 @@
 mod adam;
 mod basis;
 mod checkpoint;
+pub mod curve;
 mod dynamics;
 mod analytic;
 pub mod export;

@@ -77,6 +77,7 @@ fn before_and_after(a: &Amendment) -> Section {
         y_label: "RMSE / x_c".into(),
         x: horizons.clone(),
         series: series.collect(),
+        ..Curves::default()
     };
     if table.rows.is_empty() {
         return Section::default();

@@ -144,6 +144,7 @@ pub(super) fn growth(c: &Comparison) -> Vec<Figure> {
             y_label: "Error / x_c".into(),
             x: longest.iter().map(|p| p.time_s).collect(),
             series: series.collect(),
+            ..Curves::default()
         })
     };
     vec![

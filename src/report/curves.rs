@@ -1,12 +1,12 @@
-//! Lines of a positive quantity over another, the height by decades.
+//! Lines of a quantity over another, the height by decades or evenly.
 
 use serde::Serialize;
 
 use super::Series;
 use super::html::{compact, escape};
 
-/// Lines over one horizontal quantity, on a vertical scale of decades.
-#[derive(Clone, Debug, Serialize)]
+/// Lines over one horizontal quantity.
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Curves {
     /// What is shown.
     #[serde(skip)]
@@ -18,8 +18,25 @@ pub struct Curves {
     /// Horizontal values, ascending.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
-    /// The lines; one value for each horizontal one, what is not positive is a gap.
+    /// The lines; one value for each horizontal one, what the scale has no height for is a gap.
     pub series: Vec<Series>,
+    /// Shaded ranges around lines, such as the least and the most of several seeds.
+    pub ranges: Vec<Range>,
+    /// Heights evenly instead of by decades.
+    pub linear: bool,
+}
+
+/// A shaded range in the colour of a line.
+#[derive(Clone, Debug, Serialize)]
+pub struct Range {
+    /// Index of the line among the series.
+    pub of: usize,
+    /// Lower edge, as many values as horizontal ones.
+    #[serde(serialize_with = "compact")]
+    pub low: Vec<f64>,
+    /// Upper edge, likewise.
+    #[serde(serialize_with = "compact")]
+    pub high: Vec<f64>,
 }
 
 impl Curves {

@@ -4,7 +4,7 @@
 //! [`Page::render`] turns them into one string with style, script and data inside.
 //! [`FlightReport`] is the page of one flight, [`ComparisonReport`] that of models against flights,
 //! [`DiagnosisReport`] that of what a model lacks, [`AmendmentReport`] that of a model with it added, `TrainingReport`
-//! that of a model that was learned, `EvaluationReport` that of controllers side by side.
+//! that of a model that was learned, `LearningReport` that of policies being learned, `EvaluationReport` that of controllers side by side.
 //! The plots are drawn in the reader's browser by uPlot
 //! 1.6.32 (MIT, `assets/uPlot.LICENSE`), which is embedded.
 //!
@@ -41,6 +41,8 @@ mod heat_map;
 mod histogram;
 mod html;
 mod intervals;
+#[cfg(feature = "learn")]
+mod learning_page;
 mod loop_timing;
 mod numbers;
 mod page;
@@ -59,7 +61,7 @@ pub use bars::{BarGroup, Bars};
 pub use choice::{Choice, ChoiceOption};
 pub use comparison::ComparisonReport;
 pub use comparison_page::comparison_page;
-pub use curves::Curves;
+pub use curves::{Curves, Range};
 pub use diagnosis::DiagnosisReport;
 pub use diagnosis_page::diagnosis_page;
 pub use effect_page::{EffectReport, facts as effect_facts};
@@ -73,6 +75,8 @@ pub use grid::{Grid, GridCell, GridRow};
 pub use heat_map::{HeatCell, HeatMap};
 pub use histogram::Histogram;
 pub use intervals::{IntervalBins, IntervalPanel, Intervals};
+#[cfg(feature = "learn")]
+pub use learning_page::{LearningReport, Training};
 pub use loop_timing::{Cycle, LoopTiming};
 pub use page::{Page, Section};
 pub use sight::Sight;

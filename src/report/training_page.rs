@@ -57,6 +57,7 @@ impl TrainingReport<'_> {
                 Series::new("bare prior", Style::nth(0), rms(self.prior)),
                 Series::new("learned", Style::nth(1), rms(self.learned)),
             ],
+            ..Curves::default()
         };
         let columns = [
             ("Steps", Right),
@@ -93,6 +94,7 @@ impl TrainingReport<'_> {
                 y_label: label.into(),
                 x: self.history.iter().map(|m| m.update as f64).collect(),
                 series: vec![Series::new(label, Style::nth(0), values)],
+                ..Curves::default()
             })
         };
         if self.history.is_empty() {

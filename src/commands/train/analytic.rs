@@ -1,6 +1,5 @@
 //! The actor of `greylag train policy --algorithm analytic`.
 
-use std::io::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,8 +7,9 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use super::policy::evaluation;
+use super::policy::{evaluation, reached};
 use crate::control::policy::{Actor, Critic};
+use crate::learn::curve::{CURVE, CurveFile, CurvePoint};
 use crate::learn::{AnalyticRecipe, AnalyticTrainer, Valuation, ValuationRecipe};
 use crate::model::GreyBox;
 use crate::sim::imagined::Imagination;
@@ -18,7 +18,6 @@ use crate::sim::imagined::Imagination;
 const LINE: u64 = 50;
 /// Updates of the critics between two lines.
 const CRITICS: u64 = 1000;
-const COLUMNS: &str = "updates,steps,seconds,easy_deg,hard_deg,divergence_rate,reward,lost";
 
 /// Climbs the reward's slope in `model`; the curve goes into `folder`. Gives the last actor, the learning
 /// rate having fallen to nothing, or `None` if interrupted: what takes minutes begins anew.
@@ -31,11 +30,9 @@ pub fn climb(
     folder: &Path,
     stop: &AtomicBool,
 ) -> Result<Option<Arc<Actor>>> {
-    let path = folder.join("analytic.csv");
+    let path = folder.join(CURVE);
     let context = || format!("cannot write {}", path.display());
-    let mut file = std::fs::File::create(&path).with_context(context)?;
-    writeln!(file, "{COLUMNS}").with_context(context)?;
-    println!("{:>8} {COLUMNS}", "seed");
+    let mut curve = CurveFile::open(&path, 0).with_context(context)?;
     let mut trainer = AnalyticTrainer::new(recipe.clone(), model.clone())?;
     let (start, mut reward) = (Instant::now(), 0.0);
     for update in 1..=recipe.updates {
@@ -47,18 +44,21 @@ pub fn climb(
             continue;
         }
         let actor = Arc::new(trainer.actor()?);
-        let e = evaluation(actor)?;
-        let [easy, hard, lost] =
-            e.map_or([f64::NAN; 3], |e| [e.easy_deg, e.hard_deg, e.divergence_rate]);
         let seconds = start.elapsed().as_secs_f64();
         let steps = update * (recipe.window * recipe.instances) as u64;
-        let line = format!(
-            "{update},{steps},{seconds:.0},{easy:.3},{hard:.3},{lost:.3},{reward:.5},{}",
-            progress.lost
-        );
-        writeln!(file, "{line}").with_context(context)?;
+        let point = CurvePoint {
+            steps,
+            updates: update,
+            seconds,
+            loss: f64::NAN,
+            reward,
+            episodes: steps / recipe.episode as u64,
+            lost: progress.lost,
+            ..reached(evaluation(actor)?)
+        };
+        curve.add(point).with_context(context)?;
         let left = seconds / update as f64 * (recipe.updates - update) as f64;
-        println!("{:>8} {line}  {:.0} min left", recipe.seed, left / 60.0);
+        println!("{:>8} {}  {:.0} min left", recipe.seed, point.line(), left / 60.0);
         reward = 0.0;
         if stop.load(Ordering::Relaxed) {
             return Ok(None);

@@ -1,6 +1,7 @@
 //! `greylag train`: learn a model from flights, a policy from a model.
 
 mod analytic;
+mod curves;
 mod dynamics;
 mod flights;
 mod policy;
@@ -22,6 +23,8 @@ enum What {
     Dynamics(Box<dynamics::Arguments>),
     /// Train a policy in a model, or in JSBSim.
     Policy(Box<policy::Arguments>),
+    /// Draw the learning curves of policies side by side.
+    Curves(curves::Arguments),
 }
 
 /// Trains.
@@ -29,5 +32,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
         What::Dynamics(arguments) => dynamics::run(arguments),
         What::Policy(arguments) => policy::run(arguments),
+        What::Curves(arguments) => curves::run(arguments),
     }
 }

@@ -1,6 +1,5 @@
 //! `greylag train policy`: train a policy in a model or in JSBSim.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -11,9 +10,10 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow, bail};
 use serde::Serialize;
 
-use super::analytic;
+use super::{analytic, curves};
 use crate::commands::files::{self, Overwrite, shipped};
 use crate::control::policy::{Actor, Agent, Critic, Evaluated, Origin};
+use crate::learn::curve::{COLUMNS, CURVE, CurveFile, CurvePoint};
 use crate::learn::{
     AnalyticRecipe, Hyperparameters, PolicyProgress, PolicyRecipe, PolicyStanding, PolicyTrainer,
     ValuationRecipe, write_whole,
@@ -26,10 +26,8 @@ use crate::sim::world::World;
 
 /// The file that a training goes on from.
 const CHECKPOINT: &str = "checkpoint.safetensors";
-/// The learning curve.
-const CURVE: &str = "curve.csv";
-const COLUMNS: &str =
-    "steps,updates,seconds,easy_deg,hard_deg,divergence_rate,loss,reward,episodes,lost";
+/// The page of the learning curves.
+const REPORT: &str = "policy.html";
 /// Part of the imagined episodes that may be lost before it is said to be too many.
 const MANY: f64 = 0.2;
 
@@ -175,7 +173,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(cores).build()?;
     use rayon::prelude::*;
     let seeds: Vec<u64> = seeds.collect();
-    let ended = pool.install(|| seeds.into_par_iter().map(one).collect::<Result<Vec<bool>>>())?;
+    let ended = pool.install(|| seeds.into_par_iter().map(one).collect::<Result<Vec<bool>>>());
+    let page = arguments.out.join(REPORT);
+    match curves::draw(&arguments.out, &page) {
+        Ok(()) => println!("report in {}", page.display()),
+        // a training that failed at its start has said so
+        Err(error) if ended.is_ok() => eprintln!("no learning curves were drawn: {error:#}"),
+        Err(_) => (),
+    }
+    let ended = ended?;
     if ended.contains(&false) {
         eprintln!("interrupted; the same command goes on from the last checkpoint");
         return Ok(ExitCode::from(130));
@@ -376,8 +382,10 @@ impl Run<'_> {
                 .with_context(|| format!("going on from {}", kept.display()))?;
             eprintln!("seed {}: going on after {} steps", self.seed, trainer.steps());
         }
-        let mut curve = Curve::open(&self.folder.join(CURVE), trainer.steps())?;
-        let mut best = curve.best;
+        let path = self.folder.join(CURVE);
+        let context = || format!("cannot write {}", path.display());
+        let mut curve = CurveFile::open(&path, trainer.steps()).with_context(context)?;
+        let (mut best, before) = (curve.best(), curve.seconds());
         let start = Instant::now();
         let (first, goal) = (trainer.steps(), trainer.recipe().steps);
         while trainer.steps() < goal {
@@ -389,12 +397,21 @@ impl Run<'_> {
             let evaluated = evaluation(trainer.actor())?;
             let made = (progress.steps - first) as f64;
             let left = seconds / made * goal.saturating_sub(progress.steps) as f64;
-            let line = curve.add(&progress, seconds, evaluated.as_ref())?;
-            println!("{:>8} {line}  {:.0} min left", self.seed, left / 60.0);
+            let point = CurvePoint {
+                steps: progress.steps,
+                updates: progress.updates,
+                seconds: before + seconds,
+                loss: progress.loss,
+                reward: progress.reward,
+                episodes: progress.episodes,
+                lost: progress.lost,
+                ..reached(evaluated)
+            };
+            curve.add(point).with_context(context)?;
+            println!("{:>8} {}  {:.0} min left", self.seed, point.line(), left / 60.0);
             warn(self.seed, &progress);
-            let score = evaluated.map_or(-progress.reward, |e| e.easy_deg + e.hard_deg);
-            if score <= best {
-                best = score;
+            if point.badness() <= best {
+                best = point.badness();
                 let method = Method::Td3(trainer.recipe());
                 let (actor, critics) = (trainer.actor(), trainer.critics()?);
                 self.save(&method, actor, critics, progress.steps, evaluated)?;
@@ -451,42 +468,11 @@ fn warn(seed: u64, progress: &PolicyProgress) {
     }
 }
 
-/// The learning curve as a table on disk.
-struct Curve {
-    file: std::fs::File,
-    /// The best score that stands in it.
-    best: f64,
-}
-
-impl Curve {
-    /// The curve in `path` up to `steps`, to be gone on with.
-    fn open(path: &Path, steps: u64) -> Result<Curve> {
-        let old = std::fs::read_to_string(path).unwrap_or_default();
-        let (mut text, mut best) = (COLUMNS.to_owned() + "\n", f64::INFINITY);
-        for line in old.lines().skip(1) {
-            let cells: Vec<f64> =
-                line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
-            if cells.len() > 4 && cells[0] <= steps as f64 {
-                text += &format!("{line}\n");
-                best = best.min(cells[3] + cells[4]);
-            }
-        }
-        let context = || format!("cannot write {}", path.display());
-        let mut file = std::fs::File::create(path).with_context(context)?;
-        file.write_all(text.as_bytes()).with_context(context)?;
-        Ok(Curve { file, best })
-    }
-
-    fn add(&mut self, p: &PolicyProgress, seconds: f64, e: Option<&Evaluated>) -> Result<String> {
-        let [easy, hard, lost] =
-            e.map_or([f64::NAN; 3], |e| [e.easy_deg, e.hard_deg, e.divergence_rate]);
-        let line = format!(
-            "{},{},{seconds:.0},{easy:.3},{hard:.3},{lost:.3},{:.4},{:.4},{},{}",
-            p.steps, p.updates, p.loss, p.reward, p.episodes, p.lost
-        );
-        writeln!(self.file, "{line}").context("cannot write the learning curve")?;
-        Ok(line)
-    }
+/// A point of the curve that says what was reached, and nothing else.
+pub fn reached(e: Option<Evaluated>) -> CurvePoint {
+    let [easy_deg, hard_deg, divergence_rate] =
+        e.map_or([f64::NAN; 3], |e| [e.easy_deg, e.hard_deg, e.divergence_rate]);
+    CurvePoint { easy_deg, hard_deg, divergence_rate, ..CurvePoint::default() }
 }
 
 /// A tenth of the targets of a file that is not the one that policies are scored on, so that the choice

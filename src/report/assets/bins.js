@@ -195,33 +195,53 @@ function heatChart(host, data) {
   return u;
 }
 
-// ---- lines by decades ----
+// ---- lines over a quantity, by decades or evenly ----
 
 function curvesChart(host, data) {
-  const values = data.series.map((s) => s.values.map((v) => (v > 0 ? v : null)));
+  const height = (v) => (v != null && (data.linear || v > 0) ? v : null);
+  const values = data.series.map((s) => s.values.map(height));
   const outputs = legend(host, data.series.map((s) => ({ label: s.label, style: s.style })), (i) => {
     u.setSeries(i + 1, { show: !u.series[i + 1].show });
     return u.series[i + 1].show;
   });
-  const all = values.flat().filter((v) => v != null);
+  const edges = data.ranges.flatMap((r) => [...r.low, ...r.high].map(height));
+  const all = [...values.flat(), ...edges].filter((v) => v != null);
   const [low, high] = all.length ? [Math.min(...all), Math.max(...all)] : [0.1, 1];
-  const yr = [low / 1.4, Math.max(high * 1.4, low * 4)];
+  const yr = data.linear ? padded(low, high) : [low / 1.4, Math.max(high * 1.4, low * 4)];
+  const drawRange = (ctx, u, { of, low, high }) => {
+    ctx.fillStyle = style(data.series[of].style);
+    ctx.globalAlpha = 0.16;
+    let run = [];
+    const close = () => {
+      ctx.beginPath();
+      for (const i of run) ctx.lineTo(u.valToPos(data.x[i], "x", true), u.valToPos(high[i], "y", true));
+      for (const i of run.reverse()) ctx.lineTo(u.valToPos(data.x[i], "x", true), u.valToPos(low[i], "y", true));
+      ctx.fill();
+      run = [];
+    };
+    data.x.forEach((x, i) => (height(low[i]) == null || height(high[i]) == null ? close() : run.push(i)));
+    close();
+    ctx.globalAlpha = 1;
+  };
   const tell = (k) => data.series.forEach((s, i) => {
     outputs[i].textContent = k == null || k < 0 ? "" : show(s.values[k]) || "no data";
   });
   const u = new uPlot({
     ...size(host), padding: [0.5 * rem(), 0.6 * rem(), 0, 0], legend: { show: false },
     cursor: { y: false, drag: { x: false, y: false }, points: { size: 6 } },
-    scales: { x: { time: false, range: (u, a, b) => [Math.min(0, a), b] }, y: { distr: 3, log: 10, range: () => yr } },
+    scales: { x: { time: false, range: (u, a, b) => [Math.min(0, a), b] }, y: { ...(data.linear ? {} : { distr: 3, log: 10 }), range: () => yr } },
     axes: [
       axis({ size: 1.7 * rem(), values: showTicks, space: 3.5 * rem(), label: data.x_label, labelSize: 1.4 * rem(), labelGap: 0 }),
-      sideAxis({ splits: decadesFine, values: (u, s) => s.map((v) => (v == null ? "" : v < 0.001 ? signed(v.toExponential(0)) : showChosen(v))), filter: (u, s) => s, label: data.y_label, labelSize: 1.4 * rem(), labelGap: 0 }),
+      sideAxis(data.linear ? { label: data.y_label, labelSize: 1.4 * rem(), labelGap: 0 } : { splits: decadesFine, values: (u, s) => s.map((v) => (v == null ? "" : v < 0.001 ? signed(v.toExponential(0)) : showChosen(v))), filter: (u, s) => s, label: data.y_label, labelSize: 1.4 * rem(), labelGap: 0 }),
     ],
     series: [{}, ...data.series.map((s) => ({
       label: s.label, stroke: style(s.style), dash: DASH[s.style], width: Math.max(2, 0.12 * rem()),
       points: { show: data.x.length < 40, size: 5, fill: style(s.style) }, pxAlign: 0,
     }))],
-    hooks: { setCursor: [(u) => tell(u.cursor.left >= 0 ? u.cursor.idx : null)] },
+    hooks: {
+      drawAxes: [(u) => clipped(u, (ctx) => data.ranges.filter((r) => u.series[r.of + 1].show).forEach((r) => drawRange(ctx, u, r)))],
+      setCursor: [(u) => tell(u.cursor.left >= 0 ? u.cursor.idx : null)],
+    },
   }, [data.x, ...values], host);
   tapping(u);
   stepping(host, data.x.length, (i) => {

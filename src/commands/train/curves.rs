@@ -1,0 +1,112 @@
+//! `greylag train curves`: the learning curves of trainings side by side.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use comfy_table::Table;
+
+use crate::commands::files::{self, Overwrite};
+use crate::learn::curve::{self, CURVE};
+use crate::report::{LearningReport, Training};
+
+/// The folder of one seed of several begins so.
+const SEED: &str = "seed-";
+
+/// Options of `greylag train curves`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Folders that `greylag train policy` wrote, each of one seed or of several.
+    #[arg(required = true)]
+    folders: Vec<PathBuf>,
+    /// Also draw the curves as an HTML page.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Replace the page if it is there.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Prints where the trainings came to, draws their curves.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let overwrite = Overwrite::from(arguments.force);
+    if let Some(path) = &arguments.report {
+        files::writable(path, overwrite)?;
+    }
+    let trainings =
+        arguments.folders.iter().map(|f| training(f)).collect::<Result<Vec<Training>>>()?;
+    let report = report("Learning curves", &trainings);
+    let table = report.table();
+    let mut printed = Table::new();
+    printed.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    printed.set_header(table.columns.iter().map(|c| &c.title));
+    printed.add_rows(table.rows.iter().map(|row| &row.cells));
+    println!("{printed}");
+    if let Some(path) = &arguments.report {
+        files::write(path, &report.page().render(), overwrite)?;
+        println!("report in {}", path.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Draws the curves of the training in `folder` into `page`.
+pub fn draw(folder: &Path, page: &Path) -> Result<()> {
+    let trainings = [training(folder)?];
+    let report = report("Training of a policy", &trainings);
+    files::write(page, &report.page().render(), Overwrite::Force)
+}
+
+fn report<'a>(title: &str, trainings: &'a [Training]) -> LearningReport<'a> {
+    let seeds = trainings.iter().map(|t| t.seeds.len()).sum::<usize>();
+    LearningReport {
+        title: title.into(),
+        subtitle: format!("Trainings: {}; policies: {seeds}.", trainings.len()),
+        trainings,
+        provenance: vec![
+            ("Program".into(), concat!("greylag ", env!("CARGO_PKG_VERSION")).into()),
+            ("Command".into(), files::command_line()),
+        ],
+    }
+}
+
+/// The curves in `folder`, or in the folders of its seeds.
+fn training(folder: &Path) -> Result<Training> {
+    let name = folder
+        .file_name()
+        .map_or_else(|| folder.display().to_string(), |n| n.to_string_lossy().into());
+    let mut seeds = Vec::new();
+    if folder.join(CURVE).exists() {
+        seeds.push((0, folder.to_owned()));
+    } else {
+        let entries =
+            folder.read_dir().with_context(|| format!("cannot read {}", folder.display()))?;
+        for entry in entries {
+            let entry = entry?;
+            let seed = entry
+                .file_name()
+                .to_string_lossy()
+                .strip_prefix(SEED)
+                .and_then(|s| s.parse::<u64>().ok());
+            seeds.extend(
+                seed.filter(|_| entry.path().join(CURVE).exists()).map(|s| (s, entry.path())),
+            );
+        }
+    }
+    seeds.sort();
+    let mut read = Vec::new();
+    for (seed, folder) in seeds {
+        let points = curve::read(&folder.join(CURVE))?;
+        let seed = if seed == 0 { "–".into() } else { seed.to_string() };
+        if !points.is_empty() {
+            read.push((seed, points));
+        }
+    }
+    if read.is_empty() {
+        bail!(
+            "{} holds no learning curve ({CURVE}, or {SEED}N/{CURVE} with an evaluation): name a folder \
+             that `greylag train policy --out` wrote",
+            folder.display()
+        );
+    }
+    Ok(Training { name, seeds: read })
+}

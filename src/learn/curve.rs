@@ -1,0 +1,243 @@
+//! The learning curve of a policy: what it reached in JSBSim, evaluation by evaluation, as a table on disk.
+
+use std::fs::File;
+use std::io::Write as _;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::num::statistics::{interquartile_mean, quantile};
+
+/// The name of a curve's file.
+pub const CURVE: &str = "curve.csv";
+/// The names of its columns.
+pub const COLUMNS: &str =
+    "steps,updates,seconds,easy_deg,hard_deg,divergence_rate,loss,reward,episodes,lost";
+/// Part of the way from the first error to the least at which a curve has its knee.
+const KNEE: f64 = 0.9;
+
+/// One evaluation; what was not measured is NaN.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CurvePoint {
+    /// Steps of the environment so far, all aircraft together.
+    pub steps: u64,
+    /// Updates so far.
+    pub updates: u64,
+    /// Time so far, over all sessions, s.
+    pub seconds: f64,
+    /// Mean settled error on easy targets, degrees.
+    pub easy_deg: f64,
+    /// Mean settled error on hard ones, degrees.
+    pub hard_deg: f64,
+    /// Share of the targets that were lost.
+    pub divergence_rate: f64,
+    /// Mean loss of the critics.
+    pub loss: f64,
+    /// Mean reward of a step of the training.
+    pub reward: f64,
+    /// Episodes begun so far.
+    pub episodes: u64,
+    /// Of them, ended outside the envelope of a believable state.
+    pub lost: u64,
+}
+
+impl CurvePoint {
+    /// Its line of the table.
+    pub fn line(&self) -> String {
+        format!(
+            "{},{},{:.0},{:.3},{:.3},{:.3},{:.4},{:.5},{},{}",
+            self.steps,
+            self.updates,
+            self.seconds,
+            self.easy_deg,
+            self.hard_deg,
+            self.divergence_rate,
+            self.loss,
+            self.reward,
+            self.episodes,
+            self.lost
+        )
+    }
+
+    /// Both errors together, by which the best is chosen; without JSBSim, what it failed to earn.
+    pub fn badness(&self) -> f64 {
+        let error = self.easy_deg + self.hard_deg;
+        if error.is_nan() { -self.reward } else { error }
+    }
+}
+
+/// Why a curve cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[error("reading the learning curve {path}: {source}")]
+pub struct CurveError {
+    path: String,
+    source: csv::Error,
+}
+
+/// The points of the curve in `path`.
+///
+/// # Errors
+/// If there is no such file, or a line of it is not a point.
+pub fn read(path: &Path) -> Result<Vec<CurvePoint>, CurveError> {
+    let rows = csv::Reader::from_path(path).and_then(|mut file| file.deserialize().collect());
+    rows.map_err(|source| CurveError { path: path.display().to_string(), source })
+}
+
+/// Index of the best point; of equals, the last.
+pub fn best(points: &[CurvePoint]) -> Option<usize> {
+    (0..points.len()).rev().min_by(|a, b| points[*a].badness().total_cmp(&points[*b].badness()))
+}
+
+/// The first point that has made nine tenths of the way from the first error to the best.
+pub fn knee(points: &[CurvePoint]) -> Option<&CurvePoint> {
+    let (first, best) = (points.first()?.badness(), points[best(points)?].badness());
+    points.iter().find(|p| p.badness() <= first - KNEE * (first - best))
+}
+
+/// A quantity of several curves over another: its interquartile mean (Agarwal et al. 2021), least and most.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// The middle of the seeds.
+    pub middle: Vec<f64>,
+    /// The least of them.
+    pub low: Vec<f64>,
+    /// The most.
+    pub high: Vec<f64>,
+}
+
+/// The spread over `curves` of what `get` says of a point, at each of the places `at` of the quantity
+/// `over`, linear between two points; NaN where a curve has not begun or has ended.
+pub fn spread(
+    curves: &[&[CurvePoint]],
+    over: impl Fn(&CurvePoint) -> f64,
+    get: impl Fn(&CurvePoint) -> f64,
+    at: &[f64],
+) -> Spread {
+    let mut spread = Spread::default();
+    for &x in at {
+        let value = |points: &&[CurvePoint]| {
+            let after = points.partition_point(|p| over(p) < x);
+            let (Some(b), a) = (points.get(after), &points[after.saturating_sub(1)]) else {
+                return f64::NAN;
+            };
+            match (over(b) == x, after) {
+                (true, _) => get(b),
+                (false, 0) => f64::NAN,
+                _ => get(a) + (get(b) - get(a)) * (x - over(a)) / (over(b) - over(a)),
+            }
+        };
+        let values: Vec<f64> = curves.iter().map(value).collect();
+        let whole = values.iter().all(|v| v.is_finite());
+        let of = |f: &dyn Fn(&[f64]) -> f64| if whole { f(&values) } else { f64::NAN };
+        spread.middle.push(of(&interquartile_mean));
+        spread.low.push(of(&|v| quantile(v, 0.0)));
+        spread.high.push(of(&|v| quantile(v, 1.0)));
+    }
+    spread
+}
+
+/// A curve on disk that grows.
+pub struct CurveFile {
+    file: File,
+    points: Vec<CurvePoint>,
+}
+
+impl CurveFile {
+    /// The curve in `path` up to `steps`, to be gone on with; begun if there is none.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn open(path: &Path, steps: u64) -> std::io::Result<CurveFile> {
+        let mut points = read(path).unwrap_or_default();
+        points.retain(|p| p.steps <= steps);
+        let mut file = File::create(path)?;
+        writeln!(file, "{COLUMNS}")?;
+        for point in &points {
+            writeln!(file, "{}", point.line())?;
+        }
+        Ok(CurveFile { file, points })
+    }
+
+    /// Its points.
+    pub fn points(&self) -> &[CurvePoint] {
+        &self.points
+    }
+
+    /// The least badness so far; infinite before the first.
+    pub fn best(&self) -> f64 {
+        best(&self.points).map_or(f64::INFINITY, |i| self.points[i].badness())
+    }
+
+    /// Seconds that the sessions before this one took.
+    pub fn seconds(&self) -> f64 {
+        self.points.last().map_or(0.0, |p| p.seconds)
+    }
+
+    /// Adds a point.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn add(&mut self, point: CurvePoint) -> std::io::Result<()> {
+        self.points.push(point);
+        writeln!(self.file, "{}", point.line())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(steps: u64, easy_deg: f64) -> CurvePoint {
+        CurvePoint {
+            steps,
+            updates: steps,
+            seconds: steps as f64,
+            easy_deg,
+            hard_deg: 0.0,
+            divergence_rate: 0.0,
+            loss: f64::NAN,
+            reward: -0.1,
+            episodes: 3,
+            lost: 1,
+        }
+    }
+
+    #[test]
+    fn a_curve_is_read_as_it_was_written_and_goes_on_from_its_checkpoint() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(CURVE);
+        let mut file = CurveFile::open(&path, 0).unwrap();
+        assert!(file.best().is_infinite() && file.seconds() == 0.0);
+        for (steps, error) in [(10, 8.0), (20, 2.0), (30, 1.0)] {
+            file.add(point(steps, error)).unwrap();
+        }
+        drop(file);
+        let again = CurveFile::open(&path, 20).unwrap();
+        assert_eq!([again.best(), again.seconds()], [2.0, 20.0]);
+        let read = read(&path).unwrap();
+        assert!(read.len() == 2 && read[1].easy_deg == 2.0 && read[1].loss.is_nan());
+        std::fs::write(&path, "steps\nmany\n").unwrap();
+        assert!(super::read(&path).unwrap_err().to_string().contains("curve.csv"));
+    }
+
+    #[test]
+    fn the_knee_is_where_nine_tenths_of_the_way_are_made() {
+        let points = [(1, 11.0), (2, 3.0), (3, 1.9), (4, 1.0), (5, 1.5)].map(|(s, e)| point(s, e));
+        assert_eq!(knee(&points).unwrap().steps, 3);
+        assert_eq!(best(&points), Some(3));
+        assert!(knee(&[]).is_none());
+    }
+
+    #[test]
+    fn seeds_spread_where_all_of_them_have_been() {
+        let curves = [
+            vec![point(0, 4.0), point(10, 2.0)],
+            vec![point(0, 8.0), point(5, 6.0), point(10, 4.0)],
+        ];
+        let curves = curves.each_ref().map(Vec::as_slice);
+        let spread = spread(&curves, |p| p.seconds, |p| p.easy_deg, &[0.0, 5.0, 10.0, 11.0]);
+        assert_eq!(spread.middle[..3], [6.0, 4.5, 3.0]);
+        assert_eq!((spread.low[1], spread.high[1]), (3.0, 6.0));
+        assert!(spread.middle[3].is_nan());
+    }
+}

@@ -1,0 +1,218 @@
+//! The page of learning curves: how far trainings of policies came, over steps and over time.
+
+use super::Align::{Left, Right};
+use super::curves::Range;
+use super::numbers::{number, percent};
+use super::{Choice, ChoiceOption, Curves, Figure, Page, Section, Series, Style, Table};
+use crate::learn::curve::{CurvePoint, best, knee, spread};
+
+/// A training of one or several seeds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Training {
+    /// What tells it from others.
+    pub name: String,
+    /// Each seed's name and evaluations, in order; none is without evaluations.
+    pub seeds: Vec<(String, Vec<CurvePoint>)>,
+}
+
+/// Trainings side by side, like Figure 2 of the paper.
+#[derive(Clone, Debug)]
+pub struct LearningReport<'a> {
+    /// Title of the page.
+    pub title: String,
+    /// A line under it.
+    pub subtitle: String,
+    /// The trainings.
+    pub trainings: &'a [Training],
+    /// Things and their values: commands, files.
+    pub provenance: Vec<(String, String)>,
+}
+
+/// A quantity of an evaluation with the title of its figure and the name of its axis.
+struct Quantity {
+    title: &'static str,
+    label: &'static str,
+    linear: bool,
+    get: fn(&CurvePoint) -> f64,
+}
+
+const QUANTITIES: [Quantity; 4] = [
+    Quantity {
+        title: "Settled error, easy targets",
+        label: "Error (°)",
+        linear: false,
+        get: |p| p.easy_deg,
+    },
+    Quantity {
+        title: "Settled error, hard targets (corners)",
+        label: "Error (°)",
+        linear: false,
+        get: |p| p.hard_deg,
+    },
+    Quantity {
+        title: "Reward while training",
+        label: "Reward of a step",
+        linear: true,
+        get: |p| p.reward,
+    },
+    Quantity {
+        title: "Targets lost",
+        label: "Lost (%)",
+        linear: true,
+        get: |p| 100.0 * p.divergence_rate,
+    },
+];
+
+impl LearningReport<'_> {
+    /// The page of the trainings.
+    pub fn page(&self) -> Page {
+        let over = [
+            ("Steps", self.figures("Thousand steps", |p| p.steps as f64 / 1000.0)),
+            ("Time", self.figures("Minutes", |p| p.seconds / 60.0)),
+        ];
+        let options = over.map(|(name, figures)| ChoiceOption { name: name.into(), figures });
+        let choice =
+            Choice { anchor: "over".into(), label: "Over".into(), options: options.into() };
+        let note = "The policy as it is at each evaluation, flown in JSBSim on targets that are none of \
+                    those it is scored on at last. Lines: interquartile mean of the seeds; shaded: their \
+                    least and most.";
+        let ends = "TD3 keeps its policy with the least error, the analytic gradient its last. The knee is \
+                    where nine tenths of the way from the first error to the least are made.";
+        let mut provenance = Table::new("Provenance", &[("Item", Left), ("Value", Left)]);
+        self.provenance
+            .iter()
+            .for_each(|(item, value)| provenance.push([item.clone(), value.clone()]));
+        let sections = vec![
+            Section::new("Learning curves", note, vec![Figure::Choice(choice)]),
+            Section::new("Where they came to", ends, vec![Figure::Table(self.table())]),
+            Section::new("Provenance", "", vec![Figure::Table(provenance)]),
+        ];
+        Page { title: self.title.clone(), subtitle: self.subtitle.clone(), sections }
+    }
+
+    fn figures(&self, label: &str, over: fn(&CurvePoint) -> f64) -> Vec<Figure> {
+        let points = self.trainings.iter().flat_map(|t| &t.seeds).flat_map(|(_, points)| points);
+        let mut x: Vec<f64> = points.map(over).collect();
+        x.sort_by(f64::total_cmp);
+        x.dedup();
+        let figure = |quantity: &Quantity| {
+            let mut figure = Curves {
+                title: quantity.title.into(),
+                x_label: label.into(),
+                y_label: quantity.label.into(),
+                x: x.clone(),
+                linear: quantity.linear,
+                ..Curves::default()
+            };
+            for (k, training) in self.trainings.iter().enumerate() {
+                let curves: Vec<&[CurvePoint]> =
+                    training.seeds.iter().map(|(_, points)| points.as_slice()).collect();
+                let spread = spread(&curves, over, quantity.get, &x);
+                figure.series.push(Series::new(&training.name, Style::nth(k), spread.middle));
+                if curves.len() > 1 {
+                    figure.ranges.push(Range { of: k, low: spread.low, high: spread.high });
+                }
+            }
+            let seen = figure.series.iter().flat_map(|s| &s.values);
+            seen.into_iter().any(|v| v.is_finite()).then_some(Figure::Curves(figure))
+        };
+        QUANTITIES.iter().filter_map(figure).collect()
+    }
+
+    /// Where each seed of each training came to.
+    pub fn table(&self) -> Table {
+        let columns = [
+            ("Training", Left),
+            ("Seed", Left),
+            ("Steps", Right),
+            ("Minutes", Right),
+            ("Best after", Right),
+            ("Easy (°)", Right),
+            ("Hard (°)", Right),
+            ("Lost (%)", Right),
+            ("Knee at step", Right),
+            ("Knee (min)", Right),
+            ("Episodes lost (%)", Right),
+        ];
+        let mut table = Table::new("Trainings", &columns);
+        for training in self.trainings {
+            for (seed, points) in &training.seeds {
+                let (Some(last), Some(b), Some(k)) = (points.last(), best(points), knee(points))
+                else {
+                    continue;
+                };
+                let b = points[b];
+                table.push([
+                    training.name.clone(),
+                    seed.clone(),
+                    last.steps.to_string(),
+                    number(last.seconds / 60.0),
+                    b.steps.to_string(),
+                    number(b.easy_deg),
+                    number(b.hard_deg),
+                    percent(b.divergence_rate),
+                    k.steps.to_string(),
+                    number(k.seconds / 60.0),
+                    percent(last.lost as f64 / last.episodes as f64),
+                ]);
+            }
+        }
+        table
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(steps: [u64; 3], easy: [f64; 3]) -> Vec<CurvePoint> {
+        let point = |(&steps, &easy_deg): (&u64, &f64)| CurvePoint {
+            steps,
+            updates: steps,
+            seconds: 60.0 * steps as f64,
+            easy_deg,
+            hard_deg: 0.0,
+            divergence_rate: 0.0,
+            loss: 0.0,
+            reward: -0.1,
+            episodes: 10,
+            lost: 1,
+        };
+        steps.iter().zip(&easy).map(point).collect()
+    }
+
+    #[test]
+    fn trainings_of_several_seeds_have_ranges_and_a_row_a_seed() {
+        let two = Training {
+            name: "two".into(),
+            seeds: vec![
+                ("1".into(), points([1, 2, 3], [8.0, 4.0, 1.0])),
+                ("2".into(), points([1, 2, 3], [6.0, 2.0, 3.0])),
+            ],
+        };
+        let one = Training {
+            name: "one".into(),
+            seeds: vec![("1".into(), points([2, 4, 6], [9.0, 3.0, 2.0]))],
+        };
+        let trainings = [two, one];
+        let report = LearningReport {
+            title: "Curves".into(),
+            subtitle: String::new(),
+            trainings: &trainings,
+            provenance: Vec::new(),
+        };
+        let figures = report.figures("Minutes", |p| p.seconds / 60.0);
+        let Figure::Curves(easy) = &figures[0] else { panic!("{figures:?}") };
+        assert_eq!(easy.x, [1.0, 2.0, 3.0, 4.0, 6.0]);
+        assert_eq!(easy.series[0].values[..3], [7.0, 3.0, 2.0]);
+        assert_eq!(
+            (easy.ranges.len(), easy.ranges[0].low[2], easy.ranges[0].high[2]),
+            (1, 1.0, 3.0)
+        );
+        assert_eq!(easy.series[1].values[1..], [9.0, 6.0, 3.0, 2.0]);
+        let table = report.table();
+        assert_eq!(table.rows.len(), 3);
+        assert_eq!(table.rows[1].cells[4..6], ["2", "2.00"]);
+        assert!(report.page().render().contains("Learning curves"));
+    }
+}
