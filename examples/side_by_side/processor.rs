@@ -5,38 +5,49 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use std::time::Instant;
 
 use greylag::model::{GreyBox, Memory};
-use greylag::num::{Lanes, Real};
+#[cfg(target_arch = "x86_64")]
+use greylag::num::{Avx2, Avx512};
+use greylag::num::{BASE_FUSED, Base, Packed, ROW, Real};
 use greylag::physics::{Controls, State};
 
 /// Fused multiply-adds in single precision that one core makes in a second, times two.
 pub fn peak() -> f64 {
     let best = |run: &dyn Fn() -> f64| (0..20).map(|_| run()).fold(0.0, f64::max);
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+    if is_x86_feature_detected!("avx512f") {
+        // SAFETY: the processor has the feature
+        return best(&|| unsafe { peak_avx512() });
+    } else if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // SAFETY: the processor has the features
         return best(&|| unsafe { peak_avx2() });
     }
-    best(&|| chains::<4, 8, { cfg!(target_arch = "aarch64") }>())
+    best(&|| chains::<Base<BASE_FUSED>, 3>())
 }
 
 /// The same in vectors of four, as NEON has: multiplications with additions where none is fused.
 pub fn narrow_peak() -> f64 {
-    let run = chains::<4, 12, { cfg!(target_arch = "aarch64") }>;
+    let run = chains::<Base<BASE_FUSED>, 3>;
     (0..20).map(|_| run()).fold(0.0, f64::max)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn peak_avx512() -> f64 {
+    chains::<Avx512<true>, 12>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn peak_avx2() -> f64 {
-    chains::<8, 10, true>()
+    chains::<Avx2<true>, 5>()
 }
 
-/// `C` independent chains of `N` lanes: enough to hide the latency of each.
+/// `C` independent chains of blocks: enough to hide the latency of each.
 #[inline(always)]
-fn chains<const N: usize, const C: usize, const FUSED: bool>() -> f64 {
+fn chains<R: Packed, const C: usize>() -> f64 {
     const ROUNDS: usize = 1_000_000;
-    let factor = Lanes::<N, FUSED>::splat(std::hint::black_box(0.999));
-    let mut sums = [Lanes::<N, FUSED>::splat(std::hint::black_box(1.0)); C];
+    let factor = R::from_f64(std::hint::black_box(0.999));
+    let mut sums = [R::from_f64(std::hint::black_box(1.0)); C];
     let start = Instant::now();
     for _ in 0..ROUNDS {
         let mut c = 0;
@@ -46,8 +57,10 @@ fn chains<const N: usize, const C: usize, const FUSED: bool>() -> f64 {
         }
     }
     let seconds = start.elapsed().as_secs_f64();
-    std::hint::black_box(sums);
-    (2 * ROUNDS * N * C) as f64 / seconds
+    for sum in sums {
+        std::hint::black_box(sum.unpack(0));
+    }
+    (2 * ROUNDS * ROW * C) as f64 / seconds
 }
 
 thread_local! {
@@ -68,7 +81,7 @@ pub struct Operations {
 }
 
 /// Additions and multiplications of a sine with its cosine as lanes make them, comparisons left out.
-const SINE: u64 = 32;
+const SINE: u64 = 26;
 
 impl Operations {
     const NONE: Operations = Operations { simple: 0, fused: 0, divisions: 0, sines: 0 };
@@ -164,31 +177,38 @@ impl Real for Counted {
     }
 }
 
-/// Aircraft that move together.
-const WIDTH: usize = 16;
-/// How many blocks of them there are.
+/// Blocks of aircraft that are stepped in turns.
 const BLOCKS: usize = 64;
 
 /// Steps of `model` that one core makes in a second, in lanes.
 pub fn steps_per_second(model: &GreyBox, state: &State, controls: &Controls) -> f64 {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+    if is_x86_feature_detected!("avx512f") {
+        // SAFETY: the processor has the feature
+        return unsafe { steps_avx512(model, state, controls) };
+    } else if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // SAFETY: the processor has the features
         return unsafe { steps_avx2(model, state, controls) };
     }
-    steps::<{ cfg!(target_arch = "aarch64") }>(model, state, controls)
+    steps::<Base<BASE_FUSED>>(model, state, controls)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn steps_avx512(model: &GreyBox, state: &State, controls: &Controls) -> f64 {
+    steps::<Avx512<true>>(model, state, controls)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn steps_avx2(model: &GreyBox, state: &State, controls: &Controls) -> f64 {
-    steps::<true>(model, state, controls)
+    steps::<Avx2<true>>(model, state, controls)
 }
 
 #[inline(always)]
-fn steps<const FUSED: bool>(model: &GreyBox, state: &State, controls: &Controls) -> f64 {
+fn steps<R: Packed>(model: &GreyBox, state: &State, controls: &Controls) -> f64 {
     const ROUNDS: usize = 100;
-    let lane = Lanes::<WIDTH, FUSED>::from_f64;
+    let lane = R::from_f64;
     let mut states = [state.map(lane); BLOCKS];
     let controls = Controls {
         aileron: lane(controls.aileron),
@@ -203,6 +223,8 @@ fn steps<const FUSED: bool>(model: &GreyBox, state: &State, controls: &Controls)
         }
     }
     let seconds = start.elapsed().as_secs_f64();
-    std::hint::black_box(&states);
-    (ROUNDS * WIDTH * BLOCKS) as f64 / seconds
+    for state in &states {
+        std::hint::black_box(state.roll.unpack(0));
+    }
+    (ROUNDS * ROW * BLOCKS) as f64 / seconds
 }

@@ -12,9 +12,10 @@ use crate::control::Target;
 use crate::control::policy::{ACTIONS, Actor, OBSERVATIONS, command, observe};
 use crate::control::task::Task;
 use crate::learn::{Mlp, Optimiser};
+use crate::model::block::Block;
 use crate::model::{GreyBox, Memory};
 use crate::num::dense::{DenseError, Units};
-use crate::num::{Dense, Dual, Lanes, Real, stream};
+use crate::num::{Dense, Dual, Real, stream};
 use crate::physics::actuators::Actuators;
 use crate::physics::{ActuatorState, Command, Controls, State};
 use crate::sim::START_ALTITUDE;
@@ -290,7 +291,6 @@ impl AnalyticTrainer {
 
     /// State and memory a step later; their slopes go into `next`.
     fn motion(&self, aircraft: &Aircraft, next: &mut [[f32; INPUTS]; NUMBERS]) -> Aircraft {
-        type Block = Lanes<16>;
         let at: Aircraft<Block> = aircraft.map(|place, x| {
             let mut lanes = Block::from_f64(x);
             if let Some(k) = MOVED.iter().position(|m| m.0 == place) {
@@ -300,7 +300,7 @@ impl AnalyticTrainer {
         });
         let mut memory = at.memory;
         let controls = at.actuators.controls();
-        let state = self.model.step(&at.state, &controls, START_ALTITUDE, &mut memory);
+        let state = self.model.step_block(&at.state, &controls, START_ALTITUDE, &mut memory);
         let after = Aircraft { state, memory, ..at };
         let (before, all) = (at.to_array(), after.to_array());
         for row in (0..8).chain(18..21) {

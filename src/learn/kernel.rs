@@ -4,14 +4,14 @@
 //! the same instructions, and two schemes through time share one copy of its value, its slopes and its
 //! coefficients' slopes.
 
-use crate::learn::packet::{Packet, WIDTH};
+use crate::learn::packet::Packet;
 use crate::learn::prior::{At, Said, Slopes};
 use crate::learn::rollout::{Gradient, Pass, SumSlopes, Sums, Trace};
 use crate::model::GreyBox;
-use crate::num::Lanes;
-
-/// Blocks of single-precision lanes with fused multiply-add.
-type Block = Lanes<WIDTH, true>;
+#[cfg(target_arch = "aarch64")]
+use crate::num::Base;
+#[cfg(target_arch = "x86_64")]
+use crate::num::{Avx2, Avx512};
 
 /// A set of instructions with the numbers that it moves.
 pub trait InstructionSet: Copy + Send + Sync {
@@ -53,40 +53,34 @@ pub struct Double;
 /// Lanes in 256 bits with fused multiply-add.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug)]
-pub struct Avx2(());
+pub struct In256(());
 
-/// Lanes in what the target always has: NEON.
+/// Lanes in 512 bits.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy, Debug)]
+pub struct In512(());
+
+#[cfg(target_arch = "x86_64")]
+impl In256 {
+    /// The set, if this processor has it.
+    pub fn detect() -> Option<In256> {
+        let there = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+        there.then_some(In256(()))
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl In512 {
+    /// The set, if this processor has it.
+    pub fn detect() -> Option<In512> {
+        is_x86_feature_detected!("avx512f").then_some(In512(()))
+    }
+}
+
+/// Lanes in what the target always has.
 #[cfg(target_arch = "aarch64")]
 #[derive(Clone, Copy, Debug)]
-pub struct Neon(());
-
-/// The lanes of this kind of processor.
-#[cfg(target_arch = "x86_64")]
-pub type Vectors = Avx2;
-/// The lanes of this kind of processor.
-#[cfg(target_arch = "aarch64")]
-pub type Vectors = Neon;
-/// Elsewhere no multiply-add is known to be fused.
-#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-pub type Vectors = Double;
-
-/// The lanes that this processor has; `None` where no multiply-add is fused (x86 from before 2013).
-#[cfg(target_arch = "x86_64")]
-pub fn vectors() -> Option<Vectors> {
-    (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")).then_some(Avx2(()))
-}
-
-/// The lanes that this processor has.
-#[cfg(target_arch = "aarch64")]
-pub fn vectors() -> Option<Vectors> {
-    Some(Neon(()))
-}
-
-/// None.
-#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-pub fn vectors() -> Option<Vectors> {
-    None
-}
+pub struct Neon;
 
 /// Implements [`InstructionSet`] by functions compiled with the given features.
 macro_rules! compiled {
@@ -181,6 +175,8 @@ macro_rules! compiled {
 
 compiled!(Double, f64);
 #[cfg(target_arch = "x86_64")]
-compiled!(Avx2, Block, "avx2,fma");
+compiled!(In256, Avx2<true>, "avx2,fma");
+#[cfg(target_arch = "x86_64")]
+compiled!(In512, Avx512<true>, "avx512f");
 #[cfg(target_arch = "aarch64")]
-compiled!(Neon, Block);
+compiled!(Neon, Base<true>);

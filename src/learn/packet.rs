@@ -1,9 +1,6 @@
 //! Packets: a scalar, or a block of lanes, that rollouts move in together.
 
-use crate::num::{Lanes, Real};
-
-/// Rollouts in a block of lanes.
-pub const WIDTH: usize = 16;
+use crate::num::{Lanes, Packed, ROW, Real, Register};
 
 /// A [`Real`] of which the single numbers can be reached.
 pub trait Packet: Real {
@@ -36,26 +33,27 @@ impl Packet for f64 {
     }
 }
 
-impl<const FUSED: bool> Packet for Lanes<WIDTH, FUSED> {
-    const WIDTH: usize = WIDTH;
+/// One row of lanes in any kind of register.
+impl<const N: usize, const FUSED: bool, V: Register> Packet for Lanes<N, FUSED, V> {
+    const WIDTH: usize = {
+        assert!(N == ROW && V::LANES == ROW, "a packet is one row");
+        ROW
+    };
     type Sum = f32;
     #[inline(always)]
     fn gather(mut lane: impl FnMut(usize) -> f64) -> Self {
-        Lanes(std::array::from_fn(|i| lane(i) as f32))
+        let row = std::array::from_fn(|i| lane(i) as f32);
+        Self::pack(
+            #[inline(always)]
+            |_| row,
+        )
     }
     #[inline(always)]
     fn lane(&self, index: usize) -> f64 {
-        self.0[index].into()
+        self.unpack(0)[index].into()
     }
     #[inline(always)]
     fn sum(self) -> f32 {
-        // by halves, in an order that every instruction set keeps
-        let mut x = self.0;
-        for half in [8, 4, 2, 1] {
-            for i in 0..half {
-                x[i] += x[i + half];
-            }
-        }
-        x[0]
+        Lanes::sum(self)
     }
 }

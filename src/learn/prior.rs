@@ -2,7 +2,7 @@
 
 use crate::learn::packet::Packet;
 use crate::model::{GreyBox, Starting};
-use crate::num::{Dual, Real};
+use crate::num::{Dual, Real, each};
 use crate::physics::effects::Terms;
 use crate::physics::rigid_body::{self, Vector};
 use crate::physics::{AirData, Channel, Controls, State, Wrench};
@@ -173,7 +173,7 @@ impl<R: Packet> At<R> {
         let moment = tally.moment;
         let mut dual = body.map(fixed);
         dual.jxz = Dual::variable(body.jxz, 0);
-        let (state, moment) = (self.state.map(fixed), moment.map(fixed));
+        let (state, moment) = (self.state.map(fixed), each(moment, fixed));
         let spin = rigid_body::angular_acceleration(&dual, &state, moment);
         if let Some(last) = sums.last_mut() {
             for (spin, turn) in spin.iter().zip(turn) {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::model::GreyBox;
-use crate::num::Real;
+use crate::num::{Real, each};
 use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
 use crate::physics::rigid_body::{self, Vector};
@@ -50,8 +50,12 @@ impl<R: Real> Memory<R> {
 
 impl<R: Copy> Memory<R> {
     /// The memory with every number read as another kind.
+    #[inline(always)]
     pub fn map<S: Copy>(&self, f: impl FnMut(R) -> S) -> Memory<S> {
-        Memory(self.0.map(|last| last.map(f)))
+        match self.0 {
+            Some(last) => Memory(Some(each(last, f))),
+            None => Memory(None),
+        }
     }
 }
 

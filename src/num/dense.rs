@@ -11,10 +11,6 @@ pub const WIDEST: usize = 512;
 /// The widest layer that [`Dense::evaluate`] has room for on the stack.
 pub const ON_STACK: usize = 128;
 
-/// Outputs that are summed side by side, in registers: six of 16 lanes are twelve of the sixteen that
-/// AVX2 has, and 24 of NEON's 32.
-const BLOCK: usize = 6;
-
 /// A dense network: affine layers with max(0, ·) between them, none after the last.
 ///
 /// All parameters lie in one list, layer after layer: the weights, `[in, out]` as the crate burn
@@ -172,8 +168,21 @@ impl Dense {
     /// If the network has not `IN` inputs and `OUT` outputs, or a layer wider than [`ON_STACK`].
     #[inline(always)]
     pub fn evaluate<R: Real, const IN: usize, const OUT: usize>(&self, input: [R; IN]) -> [R; OUT] {
-        let mut from = [R::zero(); ON_STACK];
-        let mut to = [R::zero(); ON_STACK];
+        // room that is not used costs time as well
+        if self.sizes.iter().all(|units| *units <= ON_STACK / 2) {
+            self.on_stack::<R, IN, OUT, { ON_STACK / 2 }>(input)
+        } else {
+            self.on_stack::<R, IN, OUT, ON_STACK>(input)
+        }
+    }
+
+    #[inline(always)]
+    fn on_stack<R: Real, const IN: usize, const OUT: usize, const ROOM: usize>(
+        &self,
+        input: [R; IN],
+    ) -> [R; OUT] {
+        let (mut one, mut other) = ([R::zero(); ROOM], [R::zero(); ROOM]);
+        let (mut from, mut to) = (&mut one, &mut other);
         from[..IN].copy_from_slice(&input);
         let last = self.sizes.len() - 2;
         let mut layers = self.layers();
@@ -245,14 +254,25 @@ impl Layer<'_> {
     /// y = x W + b.
     #[inline(always)]
     pub fn apply<R: Real>(&self, input: &[R], output: &mut [R]) {
-        let mut first = 0;
-        while first + BLOCK <= output.len() {
-            self.columns::<R, BLOCK>(first, input, output);
-            first += BLOCK;
+        match R::ABREAST {
+            ..6 => self.blocks::<R, 3>(input, output),
+            6..8 => self.blocks::<R, 6>(input, output),
+            8..16 => self.blocks::<R, 8>(input, output),
+            16.. => self.blocks::<R, 16>(input, output),
         }
-        while first + BLOCK / 3 <= output.len() {
-            self.columns::<R, { BLOCK / 3 }>(first, input, output);
-            first += BLOCK / 3;
+    }
+
+    /// `B` outputs side by side, the rest by twos and ones.
+    #[inline(always)]
+    fn blocks<R: Real, const B: usize>(&self, input: &[R], output: &mut [R]) {
+        let mut first = 0;
+        while first + B <= output.len() {
+            self.columns::<R, B>(first, input, output);
+            first += B;
+        }
+        while first + 2 <= output.len() {
+            self.columns::<R, 2>(first, input, output);
+            first += 2;
         }
         while first < output.len() {
             self.columns::<R, 1>(first, input, output);

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use super::Real;
+use super::{Real, each};
 
 /// A value with its gradient with respect to `N` inputs.
 ///
@@ -27,7 +27,7 @@ impl<const N: usize, T: Real> Dual<N, T> {
     /// A function's value with the chain rule applied: `slope` is its derivative at `self`.
     #[inline(always)]
     fn chain(self, value: T, slope: T) -> Self {
-        Dual { value, gradient: self.gradient.map(|g| g * slope) }
+        Dual { value, gradient: each(self.gradient, |g| g * slope) }
     }
 }
 
@@ -92,7 +92,7 @@ impl<const N: usize, T: Real> Neg for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Dual { value: -self.value, gradient: self.gradient.map(|g| -g) }
+        Dual { value: -self.value, gradient: each(self.gradient, |g| -g) }
     }
 }
 
@@ -127,11 +127,11 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
     }
     #[inline(always)]
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
-        let pick = |t, o| T::where_less(a.value, b.value, t, o);
-        Dual {
-            value: pick(then.value, otherwise.value),
-            gradient: std::array::from_fn(|i| pick(then.gradient[i], otherwise.gradient[i])),
+        let mut gradient = then.gradient;
+        for (t, o) in gradient.iter_mut().zip(otherwise.gradient) {
+            *t = T::where_less(a.value, b.value, *t, o);
         }
+        Dual { value: T::where_less(a.value, b.value, then.value, otherwise.value), gradient }
     }
 }
 

@@ -1,21 +1,41 @@
-//! Lanes: `N` single-precision numbers that move together through the same equations.
+//! Lanes: single-precision numbers that move together through the same equations.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+#[cfg(target_arch = "x86_64")]
+use super::Pair;
 use super::Real;
+use super::register::{ROUND, Register};
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::{__m128, __m256, __m512};
 
-/// `N` values of `f32`, one per candidate of a batch.
+/// `N` lanes in a register `V`, one for each candidate of a batch.
 ///
-/// Plain arrays and straight-line code: the compiler turns each operation into the vector
-/// instructions of whatever target a kernel is compiled for, so one source serves the portable,
-/// AVX2, AVX-512 and NEON builds.
+/// In single numbers (`V = [f32; N]`) the compiler makes vectors of them, which it takes long for and
+/// does badly for AVX-512; in the registers of an instruction set it only has to keep them.
 ///
 /// With `FUSED`, [`Real::mul_add`] rounds once: twice the speed where the processor has the
-/// instruction and the kernel is compiled for it, very slow elsewhere, and other last bits. Without
-/// it every instruction set gives the same numbers to the bit.
+/// instruction and the kernel is compiled for it, very slow elsewhere, and other last bits. But for that
+/// all kinds of lanes give the same numbers to the bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
-pub struct Lanes<const N: usize, const FUSED: bool = false>(pub [f32; N]);
+pub struct Lanes<const N: usize, const FUSED: bool = false, V = [f32; N]>(pub V);
+
+/// Sixteen lanes in a register of AVX-512.
+#[cfg(target_arch = "x86_64")]
+pub type Avx512<const FUSED: bool> = Lanes<16, FUSED, __m512>;
+/// Sixteen lanes in registers of AVX2.
+#[cfg(target_arch = "x86_64")]
+pub type Avx2<const FUSED: bool> = Lanes<16, FUSED, Pair<__m256>>;
+/// Sixteen lanes in what the target always has.
+#[cfg(target_arch = "x86_64")]
+pub type Base<const FUSED: bool> = Lanes<16, FUSED, Pair<Pair<__m128>>>;
+/// Sixteen lanes in what the target always has.
+#[cfg(not(target_arch = "x86_64"))]
+pub type Base<const FUSED: bool> = Lanes<16, FUSED>;
+
+/// Whether a multiply-add is fused in what the target always has.
+pub const BASE_FUSED: bool = cfg!(target_arch = "aarch64");
 
 impl<const N: usize, const FUSED: bool> Lanes<N, FUSED> {
     /// The same value in every lane.
@@ -25,144 +45,194 @@ impl<const N: usize, const FUSED: bool> Lanes<N, FUSED> {
     }
 }
 
-/// `N` results of an expression in `i`. A loop rather than `std::array::from_fn`: a function that is
-/// not inlined leaves the vector instructions of whoever calls it.
-macro_rules! lanes {
-    ($i:ident => $value:expr) => {{
-        let mut all = [0.0; N];
-        let mut $i = 0;
-        while $i < N {
-            all[$i] = $value;
-            $i += 1;
-        }
-        Lanes(all)
-    }};
-}
-
 macro_rules! operator {
-    ($trait:ident, $method:ident, $op:tt) => {
-        impl<const N: usize, const FUSED: bool> $trait for Lanes<N, FUSED> {
+    ($trait:ident, $method:ident) => {
+        impl<const N: usize, const FUSED: bool, V: Register> $trait for Lanes<N, FUSED, V> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                lanes!(i => self.0[i] $op other.0[i])
+                Lanes(V::$method(self.0, other.0))
             }
         }
     };
 }
-operator!(Add, add, +);
-operator!(Sub, sub, -);
-operator!(Mul, mul, *);
-operator!(Div, div, /);
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
+operator!(Div, div);
 
-impl<const N: usize, const FUSED: bool> AddAssign for Lanes<N, FUSED> {
+impl<const N: usize, const FUSED: bool, V: Register> AddAssign for Lanes<N, FUSED, V> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
-impl<const N: usize, const FUSED: bool> SubAssign for Lanes<N, FUSED> {
+impl<const N: usize, const FUSED: bool, V: Register> SubAssign for Lanes<N, FUSED, V> {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
-impl<const N: usize, const FUSED: bool> Neg for Lanes<N, FUSED> {
+impl<const N: usize, const FUSED: bool, V: Register> Neg for Lanes<N, FUSED, V> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        lanes!(i => -self.0[i])
+        Lanes(self.0.neg())
     }
 }
 
-impl<const N: usize, const FUSED: bool> Real for Lanes<N, FUSED> {
+impl<const N: usize, const FUSED: bool, V: Register> Real for Lanes<N, FUSED, V> {
+    const ABREAST: usize = V::SUMS;
+    const IN_REGISTERS: bool = true;
+
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
-        Lanes::splat(x as f32)
+        Lanes(V::splat(x as f32))
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        (lanes!(i => sin_cos(self.0[i]).0), lanes!(i => sin_cos(self.0[i]).1))
+        let (s, c) = sin_cos(self.0);
+        (Lanes(s), Lanes(c))
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
-        lanes!(i => atan2(self.0[i], x.0[i]))
+        Lanes(atan2(self.0, x.0))
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        lanes!(i => self.0[i].sqrt())
+        Lanes(self.0.sqrt())
     }
     #[inline(always)]
     fn exp(self) -> Self {
-        lanes!(i => exp(self.0[i]))
+        Lanes(exp(self.0))
     }
     #[inline(always)]
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
-        lanes!(i => if a.0[i] < b.0[i] { then.0[i] } else { otherwise.0[i] })
+        Lanes(V::where_less(a.0, b.0, then.0, otherwise.0))
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         if FUSED {
-            return lanes!(i => self.0[i].mul_add(factor.0[i], addend.0[i]));
+            return Lanes(self.0.fused(factor.0, addend.0));
         }
         self * factor + addend
     }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Lanes(self.0.abs())
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Lanes(other.0.lesser(self.0))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Lanes(other.0.greater(self.0))
+    }
 }
 
-/// Adding and subtracting 1.5 · 2²³ rounds to the nearest integer without a call.
-const ROUND: f32 = 12_582_912.0;
+impl<const N: usize, const FUSED: bool, V: Register> Lanes<N, FUSED, V> {
+    /// The sum over the lanes, N being a power of two: the upper half is added to the lower one until one
+    /// number is left, so that every kind of register gives the same to the bit.
+    #[inline(always)]
+    pub fn sum(self) -> f32 {
+        self.0.sum()
+    }
+}
+
+/// Lanes that can be reached in rows of [`ROW`].
+pub trait Packed: Real {
+    /// How many rows they are.
+    const ROWS: usize;
+    /// Lanes of the rows `row(0)`, `row(1)`, …
+    fn pack(row: impl FnMut(usize) -> [f32; ROW]) -> Self;
+    /// One of the rows.
+    fn unpack(self, row: usize) -> [f32; ROW];
+}
+
+/// Lanes of a row.
+pub const ROW: usize = 16;
+
+impl<const N: usize, const FUSED: bool, V: Register> Packed for Lanes<N, FUSED, V> {
+    const ROWS: usize = N / ROW;
+
+    #[inline(always)]
+    fn pack(mut row: impl FnMut(usize) -> [f32; ROW]) -> Self {
+        let mut from = [0.0; N];
+        let mut r = 0;
+        while r < Self::ROWS {
+            from[r * ROW..(r + 1) * ROW].copy_from_slice(&row(r));
+            r += 1;
+        }
+        Lanes(V::read(&from))
+    }
+
+    #[inline(always)]
+    fn unpack(self, row: usize) -> [f32; ROW] {
+        let (mut all, mut to) = ([0.0; N], [0.0; ROW]);
+        self.0.write(&mut all);
+        to.copy_from_slice(&all[row * ROW..(row + 1) * ROW]);
+        to
+    }
+}
 
 /// Sine and cosine to 1e-7 absolute for |x| < 8192, without branches (Cephes `sinf`, `cosf`).
 #[inline(always)]
-fn sin_cos(x: f32) -> (f32, f32) {
-    let turns = (x * std::f32::consts::FRAC_2_PI + ROUND) - ROUND;
+fn sin_cos<V: Register>(x: V) -> (V, V) {
+    let c = V::splat;
+    let shifted = x.mul(c(std::f32::consts::FRAC_2_PI)).add(c(ROUND));
+    let turns = shifted.sub(c(ROUND));
     // π/2 in three parts, so that the reduced argument keeps its last bits
-    let y = ((x - turns * 1.570_312_5) - turns * 4.837_513e-4) - turns * 7.549_79e-8;
-    let quarter = turns - 4.0 * ((turns * 0.25 - 0.375 + ROUND) - ROUND); // 0..3, as a float
-    let z = y * y;
-    let sine = y + y * z * (-1.666_665_4e-1 + z * (8.332_161e-3 + z * -1.951_529_6e-4));
-    let cosine =
-        1.0 - 0.5 * z + z * z * (4.166_664_6e-2 + z * (-1.388_731_6e-3 + z * 2.443_315_7e-5));
-    let odd = quarter == 1.0 || quarter == 3.0 || quarter == -1.0;
-    let (s, c) = if odd { (cosine, sine) } else { (sine, cosine) };
-    let s = if quarter == 2.0 || quarter == 3.0 || quarter == -1.0 { -s } else { s };
-    let c = if quarter == 1.0 || quarter == 2.0 { -c } else { c };
-    (s, c)
+    let y = x.sub(turns.mul(c(1.570_312_5))).sub(turns.mul(c(4.837_513e-4)));
+    let y = y.sub(turns.mul(c(7.549_79e-8)));
+    let z = y.mul(y);
+    let sine = c(8.332_161e-3).add(z.mul(c(-1.951_529_6e-4)));
+    let sine = y.add(y.mul(z).mul(c(-1.666_665_4e-1).add(z.mul(sine))));
+    let cosine = c(-1.388_731_6e-3).add(z.mul(c(2.443_315_7e-5)));
+    let cosine = z.mul(z).mul(c(4.166_664_6e-2).add(z.mul(cosine)));
+    let cosine = c(1.0).sub(c(0.5).mul(z)).add(cosine);
+    V::quarters(shifted, sine, cosine)
 }
 
 /// The angle of the point (x, y) to 3 ulp, without branches (Cephes `atanf`).
 #[inline(always)]
-fn atan2(y: f32, x: f32) -> f32 {
+fn atan2<V: Register>(y: V, x: V) -> V {
+    use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+    let c = V::splat;
     let (ax, ay) = (x.abs(), y.abs());
-    let (big, small) = if ax > ay { (ax, ay) } else { (ay, ax) };
-    let ratio = small / if big > 1e-37 { big } else { 1e-37 };
+    let big = V::where_less(ay, ax, ax, ay);
+    let small = V::where_less(ay, ax, ay, ax);
+    let ratio = small.div(big.greater(c(1e-37)));
     // tan(π/8): above it, atan(t) = π/4 + atan((t − 1)/(t + 1))
-    let high = ratio > 0.414_213_57;
-    let t = if high { (ratio - 1.0) / (ratio + 1.0) } else { ratio };
-    let z = t * t;
-    let mut angle =
-        t + t * z * (-0.333_329_5 + z * (0.199_777_11 + z * (-0.138_776_85 + z * 0.080_537_45)));
-    angle += if high { std::f32::consts::FRAC_PI_4 } else { 0.0 };
-    angle = if ay > ax { std::f32::consts::FRAC_PI_2 - angle } else { angle };
-    angle = if x < 0.0 { std::f32::consts::PI - angle } else { angle };
-    if y < 0.0 { -angle } else { angle }
+    let high = c(0.414_213_57);
+    let folded = ratio.sub(c(1.0)).div(ratio.add(c(1.0)));
+    let t = V::where_less(high, ratio, folded, ratio);
+    let z = t.mul(t);
+    let series = c(-0.138_776_85).add(z.mul(c(0.080_537_45)));
+    let series = c(-0.333_329_5).add(z.mul(c(0.199_777_11).add(z.mul(series))));
+    let angle = t.add(t.mul(z).mul(series));
+    let angle = angle.add(V::where_less(high, ratio, c(FRAC_PI_4), c(0.0)));
+    let angle = V::where_less(ax, ay, c(FRAC_PI_2).sub(angle), angle);
+    let angle = V::where_less(x, c(0.0), c(PI).sub(angle), angle);
+    V::where_less(y, c(0.0), angle.neg(), angle)
 }
 
 /// The exponential to 2 ulp, saturating at the ends of the range (Cephes `expf`).
 #[inline(always)]
-fn exp(x: f32) -> f32 {
-    let x = if x > 88.0 { 88.0 } else { x };
-    let x = if x < -87.0 { -87.0 } else { x };
-    let n = (x * std::f32::consts::LOG2_E + ROUND) - ROUND;
-    let r = (x - n * 0.693_359_4) + n * 2.121_944_4e-4;
-    let p = 1.987_569_1e-4;
-    let p = p * r + 1.398_199_9e-3;
-    let p = p * r + 8.333_452e-3;
-    let p = p * r + 4.166_579_6e-2;
-    let p = p * r + 1.666_666_5e-1;
-    let p = p * r + 0.5;
-    let mantissa = p * r * r + r + 1.0;
-    mantissa * f32::from_bits(((n as i32 + 127) << 23) as u32)
+fn exp<V: Register>(x: V) -> V {
+    let c = V::splat;
+    let x = c(88.0).lesser(x);
+    let x = c(-87.0).greater(x);
+    let n = x.mul(c(std::f32::consts::LOG2_E)).add(c(ROUND)).sub(c(ROUND));
+    let r = x.sub(n.mul(c(0.693_359_4))).add(n.mul(c(2.121_944_4e-4)));
+    let p = c(1.987_569_1e-4);
+    let p = p.mul(r).add(c(1.398_199_9e-3));
+    let p = p.mul(r).add(c(8.333_452e-3));
+    let p = p.mul(r).add(c(4.166_579_6e-2));
+    let p = p.mul(r).add(c(1.666_666_5e-1));
+    let p = p.mul(r).add(c(0.5));
+    let mantissa = p.mul(r).mul(r).add(r).add(c(1.0));
+    mantissa.mul(V::power(n))
 }
 
 #[cfg(test)]
@@ -174,16 +244,75 @@ mod tests {
         // 1e-6 is eight units in the last place at one: three times the routines' stated error
         for i in -40_000..=40_000_i32 {
             let x = i as f32 * 2.5e-4;
-            let (s, c) = sin_cos(x);
+            let ([s], [c]) = sin_cos([x]);
             assert!((s as f64 - (x as f64).sin()).abs() < 1e-6, "sin {x}: {s}");
             assert!((c as f64 - (x as f64).cos()).abs() < 1e-6, "cos {x}: {c}");
-            assert!((exp(x) as f64 / (x as f64).exp() - 1.0).abs() < 1e-6, "exp {x}");
+            assert!((exp([x])[0] as f64 / (x as f64).exp() - 1.0).abs() < 1e-6, "exp {x}");
             let (y, x) = ((x * 7.0).sin(), (x * 3.0).cos());
             assert!(
-                (atan2(y, x) as f64 - (y as f64).atan2(x as f64)).abs() < 1e-6,
+                (atan2([y], [x])[0] as f64 - (y as f64).atan2(x as f64)).abs() < 1e-6,
                 "atan2 {y} {x}"
             );
         }
-        assert_eq!(atan2(0.0, 0.0), 0.0);
+        assert_eq!(atan2([0.0_f32], [0.0]), [0.0]);
+    }
+
+    /// Every function of lanes at many places, lane by lane.
+    #[inline(always)]
+    fn tried<const N: usize, const FUSED: bool, V: Register>() -> Vec<[f32; ROW]> {
+        let mut all = Vec::new();
+        let rows = Lanes::<N, FUSED, V>::ROWS;
+        for k in 0..400 {
+            let row = |a: f32, b: f32| -> Lanes<N, FUSED, V> {
+                Packed::pack(|_| std::array::from_fn(|i| (k * 16 + i) as f32 * a - b))
+            };
+            let (x, y) = (row(3.1e-3, 9.0), row(-1.7e-3, -5.3));
+            let (s, c) = x.sin_cos();
+            for value in [x + y, x - y, x * y, x / y, -x, s, c, y.atan2(x), x.exp(), x.tanh()] {
+                all.push(value.unpack(rows - 1));
+            }
+            let chosen = Real::where_less(x, y, s, c);
+            for value in [x.abs().sqrt(), x.min(y), x.max(y), chosen, x.mul_add(y, s)] {
+                all.push(value.unpack(0));
+            }
+            all.push([x.sum() / rows as f32; ROW]);
+        }
+        let zero = Lanes::<N, FUSED, V>::zero();
+        let lost = Lanes::<N, FUSED, V>::from_f64(f64::NAN);
+        for value in [lost.min(zero), lost.max(zero), zero.min(lost), lost.exp()] {
+            all.push(value.unpack(0).map(|x| if x.is_nan() { 7.0 } else { x }));
+        }
+        all
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn every_kind_of_register_gives_the_same_numbers_to_the_bit() {
+        type Four = Pair<Pair<__m128>>;
+        type Two = Pair<__m256>;
+        #[target_feature(enable = "avx2,fma")]
+        fn in_avx2() -> [Vec<[f32; ROW]>; 2] {
+            [tried::<16, false, Two>(), tried::<16, true, Two>()]
+        }
+        #[target_feature(enable = "avx512f")]
+        fn in_avx512() -> [Vec<[f32; ROW]>; 3] {
+            [
+                tried::<16, false, __m512>(),
+                tried::<16, true, __m512>(),
+                tried::<32, true, Pair<__m512>>(),
+            ]
+        }
+        let (plain, fused) = (tried::<16, false, [f32; 16]>(), tried::<16, true, [f32; 16]>());
+        assert!(plain.len() > 6000 && plain != fused);
+        assert_eq!(tried::<16, false, Four>(), plain);
+        assert_eq!(tried::<16, true, Four>(), fused);
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: the processor has the features
+            assert_eq!(unsafe { in_avx2() }, [plain.clone(), fused.clone()]);
+        }
+        if is_x86_feature_detected!("avx512f") {
+            // SAFETY: the processor has the feature
+            assert_eq!(unsafe { in_avx512() }, [plain, fused.clone(), fused]);
+        }
     }
 }

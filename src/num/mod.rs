@@ -5,12 +5,16 @@ pub mod dense;
 mod dual;
 mod lanes;
 mod real;
+mod register;
 mod table;
 pub mod statistics;
 pub mod stream;
 
 pub use dense::Dense;
 pub use dual::Dual;
-pub use lanes::Lanes;
-pub use real::Real;
+#[cfg(target_arch = "x86_64")]
+pub use lanes::{Avx2, Avx512};
+pub use lanes::{BASE_FUSED, Base, Lanes, Packed, ROW};
+pub use real::{Real, each};
+pub use register::{Pair, Register};
 pub use table::{Table, TableError};

@@ -22,6 +22,11 @@ pub trait Real:
     + AddAssign
     + SubAssign
 {
+    /// How many outputs of a layer are summed side by side, in registers.
+    const ABREAST: usize = 6;
+    /// Whether a function that is not in line with its caller would lose the caller's instructions.
+    const IN_REGISTERS: bool = false;
+
     /// The constant `x`, with no derivative, in every lane.
     fn from_f64(x: f64) -> Self;
     /// Sine and cosine.
@@ -84,6 +89,19 @@ pub trait Real:
         let one = Self::from_f64(1.0);
         self.atan2(((one - self) * (one + self)).max(Self::zero()).sqrt())
     }
+}
+
+/// `f` of every number. In line with its caller, which an array's own `map` may not be: what is not in line
+/// leaves the vector instructions of who calls it.
+#[inline(always)]
+pub fn each<const N: usize, T: Copy, S: Copy>(all: [T; N], mut f: impl FnMut(T) -> S) -> [S; N] {
+    let mut out = [f(all[0]); N];
+    let mut i = 1;
+    while i < N {
+        out[i] = f(all[i]);
+        i += 1;
+    }
+    out
 }
 
 impl Real for f64 {

@@ -146,20 +146,29 @@ impl<R: Real> Actuators<R> {
     ///
     /// Exact unless a surface is at its stop, where the filter's own output is not observed: the
     /// first step after leaving it may then be off by up to 8 % of the travel.
+    #[inline(always)]
     pub fn from_observed(
         state: &ActuatorState<R>,
         previous: &[Command<R>; 2],
         figures: &ActuatorFigures,
     ) -> Self {
-        let surface = |position: R, rate: R, commands: [R; 2]| {
+        #[inline(always)]
+        fn surface<R: Real>(
+            position: R,
+            rate: R,
+            [new, old]: [R; 2],
+            figures: &ActuatorFigures,
+        ) -> SurfaceFilter<R> {
             let trace = [position, position - rate.scale(figures.step)];
-            let input = commands.map(|c| c.scale(figures.deflection_max));
+            let most = figures.deflection_max;
+            let input = [new.scale(most), old.scale(most)];
             SurfaceFilter { input, output: trace, clipped: trace }
-        };
+        }
+        let ActuatorState { aileron, aileron_rate, elevator, elevator_rate, .. } = *state;
         let [new, old] = previous;
         Actuators {
-            aileron: surface(state.aileron, state.aileron_rate, [new.aileron, old.aileron]),
-            elevator: surface(state.elevator, state.elevator_rate, [new.elevator, old.elevator]),
+            aileron: surface(aileron, aileron_rate, [new.aileron, old.aileron], figures),
+            elevator: surface(elevator, elevator_rate, [new.elevator, old.elevator], figures),
             throttle_input: new.throttle,
             throttle: state.throttle,
         }

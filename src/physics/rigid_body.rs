@@ -1,6 +1,6 @@
 //! The rigid body: from forces to the rates of the state, eqs. (7)–(12) and (35) of \[GSFM26\].
 
-use crate::num::Real;
+use crate::num::{Real, each};
 use crate::physics::wrench::Channel;
 use crate::physics::{AirData, State, Wrench};
 
@@ -214,7 +214,7 @@ pub fn accelerations_transposed<R: Real>(
     spin: Vector<R>,
 ) -> Wrench<R> {
     let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
-    let [x, y, z] = acceleration.map(|a| a / body.mass);
+    let [x, y, z] = each(acceleration, |a| a / body.mass);
     let along = cos_alpha * x + sin_alpha * z;
     let (drag, side) = match axes {
         ForceAxes::Stability => (-along, y),

@@ -1,6 +1,6 @@
 //! The eight variables of flight that the model predicts.
 
-use crate::num::Real;
+use crate::num::{Real, each};
 
 /// The physical state s^p = \[φ, θ, V_a, p, q, r, α, β\], eq. (4) of \[GSFM26\].
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -70,7 +70,7 @@ impl<R: Copy> State<R> {
     /// Applies `f` to every component.
     #[inline(always)]
     pub fn map<S: Copy>(&self, f: impl FnMut(R) -> S) -> State<S> {
-        State::from_array(self.to_array().map(f))
+        State::from_array(each(self.to_array(), f))
     }
 }
 

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use crate::control::Target;
 use crate::control::policy::{ACTIONS, OBSERVATIONS, command, observe};
 use crate::control::task::Task;
+pub use crate::model::block::Block;
 use crate::model::{GreyBox, Memory};
-use crate::num::{Lanes, Real};
+use crate::num::{ROW, Real};
 use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
 use crate::physics::{Controls, State};
@@ -14,13 +15,10 @@ use crate::sim::START_ALTITUDE;
 use crate::sim::targets::Stratified;
 
 /// Aircraft that move together.
-pub const WIDTH: usize = 16;
+pub const WIDTH: usize = ROW;
 
 /// Steps of an imagined episode, as many as of a flown one.
 pub const STEPS: u32 = 1000;
-
-/// `WIDTH` numbers, one an aircraft.
-pub type Block = Lanes<WIDTH>;
 
 /// Beyond these the model is not believed and the episode ends: angles θ, α, β (rad), rates p, q, r
 /// (rad/s), airspeed (m/s).
@@ -69,7 +67,6 @@ pub struct Imagination {
     flocks: Vec<Flock>,
     neutral: Flock,
     targets: Stratified,
-    instructions: Instructions,
     lost: u64,
 }
 
@@ -110,7 +107,6 @@ impl Imagination {
             flocks: vec![neutral.clone(); count],
             neutral,
             targets,
-            instructions: Instructions::detect(),
             lost: 0,
         };
         imagination.restart(imagination.targets.count());
@@ -161,8 +157,7 @@ impl Imagination {
     /// One step of a block under `action`; aircraft whose episodes end begin anew afterwards.
     pub fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Stepped {
         let flock = &mut self.flocks[block];
-        let (observed, reward, outside) =
-            self.instructions.advance(&self.model, &self.task, flock, action);
+        let (observed, reward, outside) = flock.advance(&self.model, &self.task, action);
         let mut ended = [Ended::No; WIDTH];
         let mut anew = Block::zero();
         for (lane, (steps, how)) in flock.step.iter_mut().zip(&mut ended).enumerate() {
@@ -214,7 +209,7 @@ impl Flock {
         if let Some(inputs) = &mut self.inputs {
             controls = model.act(&controls, inputs);
         }
-        let next = model.step_inlined(&self.state, &controls, START_ALTITUDE, &mut self.memory);
+        let next = model.step_block(&self.state, &controls, START_ALTITUDE, &mut self.memory);
         self.state = State { roll: wrapped(next.roll), ..next };
         let mut limited = *action;
         for x in &mut limited {
@@ -262,52 +257,4 @@ impl Envelope {
         all = inside(s.roll, 10.0, all);
         Block::from_f64(1.0) - all
     }
-}
-
-/// The vector instructions a step is compiled for; all give the same numbers to the bit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Instructions {
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    Baseline,
-}
-
-type Advanced = ([Block; OBSERVATIONS], Block, Block);
-
-impl Instructions {
-    fn detect() -> Instructions {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx2") {
-                return Instructions::Avx2;
-            }
-        }
-        Instructions::Baseline
-    }
-
-    fn advance(
-        self,
-        model: &GreyBox,
-        task: &Task,
-        flock: &mut Flock,
-        action: &[Block; ACTIONS],
-    ) -> Advanced {
-        match self {
-            // SAFETY: `detect` has seen the processor's features
-            #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2 => unsafe { advance_avx2(model, task, flock, action) },
-            Instructions::Baseline => flock.advance(model, task, action),
-        }
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn advance_avx2(
-    model: &GreyBox,
-    task: &Task,
-    flock: &mut Flock,
-    action: &[Block; ACTIONS],
-) -> Advanced {
-    flock.advance(model, task, action)
 }

@@ -6,13 +6,15 @@ use crate::control::task::Task;
 use crate::control::{Observation, Target};
 use crate::model::{GreyBox, Memory, STEP};
 use crate::num::dense::Units;
-use crate::num::{Lanes, Real};
+#[cfg(target_arch = "x86_64")]
+use crate::num::{Avx2, Lanes, Pair};
+use crate::num::{BASE_FUSED, Base, Packed, ROW, Real};
 use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
 use crate::physics::{ActuatorState, Airframe, Command, State};
 
-/// Candidates that move together.
-pub(super) const WIDTH: usize = 16;
+/// Candidates of a block.
+pub(super) const WIDTH: usize = ROW;
 
 /// Steps planned ahead, H of \[GSFM26\].
 pub(super) const HORIZON: usize = 5;
@@ -66,32 +68,37 @@ impl Worth {
 /// The vector instructions a rollout is compiled for, with memory for its networks.
 ///
 /// Where a multiply-add is fused it is used: the last bits differ from those of a processor that has
-/// none. There is no copy for AVX-512: given scatters, the compiler vectorises across blocks and not
-/// along lanes, at a fiftieth of the speed (a hybrid tick took 380 ms), and Zen 4 makes two halves of
-/// each instruction anyway.
+/// none.
 #[derive(Clone, Debug)]
 pub(super) enum Machine {
     #[cfg(target_arch = "x86_64")]
-    Avx2(Units<Lanes<WIDTH, true>>),
-    Baseline(Units<Lanes<WIDTH, BASELINE_FUSED>>),
+    Avx512(Units<Wide>),
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Units<Avx2<true>>),
+    Baseline(Units<Base<BASE_FUSED>>),
 }
 
-/// Whether a multiply-add is fused in what the target always has.
-const BASELINE_FUSED: bool = cfg!(target_arch = "aarch64");
+/// Two blocks at once: each weight of a network that is read is used twice.
+#[cfg(target_arch = "x86_64")]
+type Wide = Lanes<32, true, Pair<std::arch::x86_64::__m512>>;
 
 impl Machine {
     /// The widest that this processor has.
     pub fn detect() -> Machine {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-            return Machine::Avx2(Units::new(Lanes::zero()));
+        if is_x86_feature_detected!("avx512f") {
+            // SAFETY: the processor has the feature
+            return Machine::Avx512(unsafe { room_avx512() });
+        } else if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: the processor has the features
+            return Machine::Avx2(unsafe { room_avx2() });
         }
         Machine::baseline()
     }
 
     /// What the target always has.
     pub fn baseline() -> Machine {
-        Machine::Baseline(Units::new(Lanes::zero()))
+        Machine::Baseline(Units::new(Base::zero()))
     }
 
     /// Flies every block, and says what its candidates are worth.
@@ -105,10 +112,37 @@ impl Machine {
         match self {
             // SAFETY: `detect` has seen the processor's features
             #[cfg(target_arch = "x86_64")]
+            Machine::Avx512(units) => unsafe { fly_avx512(scene, actions, blocks, out, units) },
+            // SAFETY: as above
+            #[cfg(target_arch = "x86_64")]
             Machine::Avx2(units) => unsafe { fly_avx2(scene, actions, blocks, out, units) },
             Machine::Baseline(units) => fly(scene, actions, blocks, out, units),
         }
     }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn room_avx512() -> Units<Wide> {
+    Units::new(Wide::zero())
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn fly_avx512(
+    scene: &Scene,
+    actions: Actions,
+    blocks: &mut [Block],
+    out: &mut [Worth],
+    units: &mut Units<Wide>,
+) {
+    fly(scene, actions, blocks, out, units);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn room_avx2() -> Units<Avx2<true>> {
+    Units::new(Avx2::zero())
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -118,43 +152,43 @@ fn fly_avx2(
     actions: Actions,
     blocks: &mut [Block],
     out: &mut [Worth],
-    units: &mut Units<Lanes<WIDTH, true>>,
+    units: &mut Units<Avx2<true>>,
 ) {
     fly(scene, actions, blocks, out, units);
 }
 
 #[inline(always)]
-fn fly<const FUSED: bool>(
+fn fly<R: Packed>(
     scene: &Scene,
     actions: Actions,
     blocks: &mut [Block],
     out: &mut [Worth],
-    units: &mut Units<Lanes<WIDTH, FUSED>>,
+    units: &mut Units<R>,
 ) {
-    for (block, out) in blocks.iter_mut().zip(out) {
-        *out = rollout(scene, actions, block, units);
+    for (blocks, out) in blocks.chunks_mut(R::ROWS).zip(out.chunks_mut(R::ROWS)) {
+        rollout(scene, actions, blocks, out, units);
     }
 }
 
-/// One block of imagined aircraft on their way.
-struct Flight<const FUSED: bool> {
-    state: State<Lanes<WIDTH, FUSED>>,
-    actuators: Actuators<Lanes<WIDTH, FUSED>>,
-    previous: [Command<Lanes<WIDTH, FUSED>>; 2],
-    memory: Memory<Lanes<WIDTH, FUSED>>,
-    inputs: Option<InputMemory<Lanes<WIDTH, FUSED>>>,
-    target: Target<Lanes<WIDTH, FUSED>>,
-    disturbance: State<Lanes<WIDTH, FUSED>>,
-    sum: Lanes<WIDTH, FUSED>,
+/// Imagined aircraft on their way.
+struct Flight<R> {
+    state: State<R>,
+    actuators: Actuators<R>,
+    previous: [Command<R>; 2],
+    memory: Memory<R>,
+    inputs: Option<InputMemory<R>>,
+    target: Target<R>,
+    disturbance: State<R>,
+    sum: R,
     weight: f64,
 }
 
-impl<const FUSED: bool> Flight<FUSED> {
+impl<R: Packed> Flight<R> {
     /// Effects on the deflections start at rest where the surfaces are: over the five steps a plan under
     /// a lag or a delay so believes in more of the present deflection than really acts.
     #[inline(always)]
     fn new(scene: &Scene) -> Self {
-        let lane = Lanes::<WIDTH, FUSED>::from_f64;
+        let lane = R::from_f64;
         let Scene { model, seen, target, .. } = scene;
         let z = &seen.actuators;
         let observed = ActuatorState {
@@ -176,14 +210,14 @@ impl<const FUSED: bool> Flight<FUSED> {
             inputs: (!model.acts_at_once()).then(|| InputMemory::at_rest(&controls)),
             target: target.map(lane),
             disturbance: scene.disturbance.map(lane),
-            sum: Lanes::zero(),
+            sum: R::zero(),
             weight: 1.0,
         }
     }
 
     /// A step in the order of the simulator, and its reward.
     #[inline(always)]
-    fn advance(&mut self, scene: &Scene, command: Command<Lanes<WIDTH, FUSED>>) {
+    fn advance(&mut self, scene: &Scene, command: Command<R>) {
         let Scene { model, task, seen, .. } = scene;
         let mut controls = self.actuators.controls();
         if let Some(inputs) = &mut self.inputs {
@@ -198,23 +232,34 @@ impl<const FUSED: bool> Flight<FUSED> {
     }
 
     #[inline(always)]
-    fn observed(&self, scene: &Scene) -> ActuatorState<Lanes<WIDTH, FUSED>> {
+    fn observed(&self, scene: &Scene) -> ActuatorState<R> {
         self.actuators.observed(&scene.model.airframe.actuators)
     }
 }
 
-/// The worth of one block: a plan of five steps, and what follows it.
+/// One component of the actions that blocks hold for a step; the last block stands in for those that are
+/// missing.
 #[inline(always)]
-fn rollout<const FUSED: bool>(
+fn given<R: Packed>(blocks: &[Block], step: usize, component: usize) -> R {
+    R::pack(
+        #[inline(always)]
+        |row| blocks[row.min(blocks.len() - 1)][step][component],
+    )
+}
+
+/// The worth of as many blocks as `R` has rows, or fewer: a plan of five steps, and what follows it.
+#[inline(always)]
+fn rollout<R: Packed>(
     scene: &Scene,
     actions: Actions,
-    block: &mut Block,
-    units: &mut Units<Lanes<WIDTH, FUSED>>,
-) -> Worth {
-    let mut flight = Flight::<FUSED>::new(scene);
-    let mut reference = [Lanes::zero(); 2];
+    blocks: &mut [Block],
+    out: &mut [Worth],
+    units: &mut Units<R>,
+) {
+    let mut flight = Flight::<R>::new(scene);
+    let mut reference = [R::zero(); 2];
     if let Some(ahead) = scene.ahead {
-        reference = [Lanes::from_f64(ahead.reference()[0]), Lanes::from_f64(ahead.reference()[1])];
+        reference = [R::from_f64(ahead.reference()[0]), R::from_f64(ahead.reference()[1])];
     }
     let steps = match scene.ahead {
         Some(ahead) => ahead.steps(),
@@ -224,10 +269,9 @@ fn rollout<const FUSED: bool>(
     // instructions, a second copy of the model doubles what takes minutes to compile
     let mut step = 0;
     while step < steps {
-        let mut chosen = [Lanes::zero(); ACTIONS];
+        let mut chosen = [R::zero(); ACTIONS];
         if step < HORIZON {
-            let given = &block[step];
-            chosen = [Lanes(given[0]), Lanes(given[1]), Lanes(given[2])];
+            chosen = [given(blocks, step, 0), given(blocks, step, 1), given(blocks, step, 2)];
         } else if step == HORIZON && actions != Actions::Base {
             reference = [flight.state.roll, flight.state.pitch];
         }
@@ -253,26 +297,30 @@ fn rollout<const FUSED: bool>(
             command = slewed(command, &flight.previous[0], &scene.model.airframe);
         }
         if step < HORIZON {
-            let given = &mut block[step];
-            given[0] = command.aileron.0;
-            given[1] = command.elevator.0;
-            given[2] = (command.throttle.scale(2.0) - Lanes::splat(1.0)).0;
+            let thrust = command.throttle.scale(2.0) - R::from_f64(1.0);
+            for (row, block) in blocks.iter_mut().enumerate() {
+                block[step][0] = command.aileron.unpack(row);
+                block[step][1] = command.elevator.unpack(row);
+                block[step][2] = thrust.unpack(row);
+            }
         }
         flight.advance(scene, command);
         step += 1;
     }
-    let mut doubt = Lanes::<WIDTH, FUSED>::zero();
+    let mut doubt = R::zero();
     if let (Some(alpha), Some(agent)) = (scene.alpha, scene.agent) {
         let view = observe(&flight.state, &flight.observed(scene), &flight.target);
         let advised = agent.actor.act(units, &view);
         let first = agent.critics[0].value(units, &view, &advised);
         let second = agent.critics[1].value(units, &view, &advised);
         // a number that is lost stays lost
-        let least = first + (second - first).min(Lanes::zero());
+        let least = first + (second - first).min(R::zero());
         flight.sum += least.scale(alpha * flight.weight);
         doubt = (first - second).abs().scale(alpha * flight.weight);
     }
-    Worth { returns: flight.sum.0, doubt: doubt.0 }
+    for (row, out) in out.iter_mut().enumerate() {
+        *out = Worth { returns: flight.sum.unpack(row), doubt: doubt.unpack(row) };
+    }
 }
 
 /// `command` with its surfaces as far from the `last` one as the airframe's slew limit lets them go in a step: whoever
@@ -334,18 +382,25 @@ mod tests {
             ahead: None,
         };
         let wave = |k: usize| std::array::from_fn(|i| ((k * 16 + i) as f32 * 0.37).sin());
-        let mut blocks: [Block; 1] =
-            [std::array::from_fn(|h| std::array::from_fn(|c| wave(3 * h + c)))];
+        // an odd number: the last has no other beside it
+        let mut blocks: [Block; 3] = std::array::from_fn(|b| {
+            std::array::from_fn(|h| std::array::from_fn(|c| wave(40 * b + 3 * h + c)))
+        });
         let mut run = |mut machine: Machine| {
-            let mut out = [Worth::NONE];
+            let mut out = [Worth::NONE; 3];
             machine.fly(&scene, Actions::Given, &mut blocks, &mut out);
-            out[0].returns
+            out.map(|worth| worth.returns).concat()
         };
         let baseline = run(Machine::baseline());
         let widest = run(Machine::detect());
-        for (a, b) in widest.iter().zip(baseline) {
+        for (a, b) in widest.iter().zip(&baseline) {
             // single precision through five steps, rewards summing up to 5
             assert!((a - b).abs() < 1e-5, "{a} {b}");
+        }
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: the processor has the features
+            assert_eq!(run(Machine::Avx2(unsafe { room_avx2() })), widest);
         }
     }
 }

@@ -4,7 +4,7 @@ use super::design::STATES;
 use super::schedule::Entry;
 use super::{AIRSPEED_KP, PITCH_RATE, ROLL_RATE, ROUNDING, STALL_ALPHA, STALL_GAIN};
 use crate::model::STEP;
-use crate::num::Real;
+use crate::num::{Real, each};
 use crate::physics::{ActuatorState, Command, State};
 
 /// The law of one condition: the gain, and the steady flight that it holds.
@@ -44,8 +44,8 @@ impl Law {
         deflection: f64,
     ) -> [R; 2] {
         let number = R::from_f64;
-        let [aileron, elevator] = self.deflection.map(number);
-        let [p, q, r, alpha, beta] = self.steady.map(number);
+        let [aileron, elevator] = each(self.deflection, number);
+        let [p, q, r, alpha, beta] = each(self.steady, number);
         let [new, old] = previous;
         let x = [
             s.roll - inner.reference[0],

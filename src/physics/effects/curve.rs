@@ -40,17 +40,34 @@ pub(super) use heights;
 
 /// Reports to `terms` each hat over `alpha` (rad) times `amount`; beyond its ends a curve stays level.
 ///
-/// A call, unlike all other effects: in line, the hats would fill a planner's kernels, also of models that
-/// have no curve.
-#[inline(never)]
+/// A call, unlike all other effects, where that costs little: in line the hats would swell every fit.
+#[inline(always)]
 pub(super) fn hats<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Terms<R>) {
+    #[inline(never)]
+    fn called<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Terms<R>) {
+        in_line(alpha, amount, channel, terms);
+    }
+    if R::IN_REGISTERS {
+        in_line(alpha, amount, channel, terms);
+    } else {
+        called(alpha, amount, channel, terms);
+    }
+}
+
+#[inline(always)]
+fn in_line<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Terms<R>) {
     let degrees = alpha.scale(1.0_f64.to_degrees());
     let fine = degrees.clamp(FINE_DEG.0, FINE_DEG.1) - R::from_f64(FINE_DEG.0);
     let places = (degrees + fine - R::from_f64(FIRST_DEG)).scale(1.0 / SPACING_DEG);
     let place = places.clamp(0.0, (PLACES - 1) as f64);
-    for (k, own) in (0..PLACES).filter(|k| !NOUGHT.contains(k)).enumerate() {
-        let away = (place - R::from_f64(own as f64)).abs();
-        terms.add(k, channel, amount * (R::from_f64(1.0) - away).max(R::zero()));
+    let (mut k, mut own) = (0, 0);
+    while own < PLACES {
+        if own != NOUGHT[0] && own != NOUGHT[1] {
+            let away = (place - R::from_f64(own as f64)).abs();
+            terms.add(k, channel, amount * (R::from_f64(1.0) - away).max(R::zero()));
+            k += 1;
+        }
+        own += 1;
     }
 }
 
