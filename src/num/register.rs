@@ -45,7 +45,7 @@ pub trait Register: Copy + Debug + Send + Sync + 'static {
     /// `a < b ? then : otherwise`.
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
     /// Sine and cosine of an angle with n quarters of a turn more, n being the integer that was rounded
-    /// into `shifted` by adding [`ROUND`].
+    /// into `shifted` by adding 1.5 · 2²³.
     fn quarters(shifted: Self, sine: Self, cosine: Self) -> (Self, Self);
     /// 2ⁿ of an integer in −126..=127.
     fn power(n: Self) -> Self;
