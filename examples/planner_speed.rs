@@ -15,6 +15,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 
+use greylag::control::cem::{Change, Value};
 use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Origin};
 use greylag::control::{self, Kind, Observation, Source, Target};
 use greylag::model::residual::{INPUTS, OUTPUTS};
@@ -57,20 +58,22 @@ fn main() -> Result<()> {
     let flops = processor::peak();
     println!("one core's peak, fused multiply-add in single precision: {:.0} GFLOP/s", flops / 1e9);
     println!(
-        "{:>12} {:>10} {:>10} {:>10} {:>12}",
+        "{:>14} {:>10} {:>10} {:>10} {:>12}",
         "controller", "p50 ms", "p99 ms", "p99.9 ms", "allocations"
     );
-    for kind in [
-        Kind::Policy,
-        Kind::Lqi,
-        Kind::Cem,
-        Kind::CemPolicy,
-        Kind::CemCritic,
-        Kind::Hybrid,
-        Kind::HybridLqi,
+    let fitted = [Change::Value(Value::Fitted)];
+    for (kind, changes) in [
+        (Kind::Policy, &[][..]),
+        (Kind::Lqi, &[]),
+        (Kind::Cem, &[]),
+        (Kind::CemPolicy, &[]),
+        (Kind::CemCritic, &[]),
+        (Kind::Hybrid, &[]),
+        (Kind::Hybrid, &fitted),
+        (Kind::HybridLqi, &[]),
     ] {
         let mut controller =
-            control::build(kind, Source { model: &model, agent: Some(&agent), changes: &[] })?;
+            control::build(kind, Source { model: &model, agent: Some(&agent), changes })?;
         controller.reset(1);
         let target = Target { roll: 0.6, pitch: 0.2, airspeed: State::NEUTRAL.airspeed };
         let mut seen = Observation {
@@ -93,8 +96,8 @@ fn main() -> Result<()> {
         times.sort_by(f64::total_cmp);
         let at = |q: f64| times[((TICKS - 1) as f64 * q).round() as usize];
         println!(
-            "{:>12} {:10.3} {:10.3} {:10.3} {allocated:>12}",
-            kind.name(),
+            "{:>14} {:10.3} {:10.3} {:10.3} {allocated:>12}",
+            format!("{}{}", kind.name(), if changes.is_empty() { "" } else { ", fitted" }),
             at(0.5),
             at(0.99),
             at(0.999)

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use greylag::control::cem::{Aids, Cem, Settings, Update};
+use greylag::control::cem::{Aids, Cem, Settings, Update, Value};
 use greylag::control::ilqr::Ilqr;
 use greylag::control::lqi::Lqi;
 use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Origin, Policy};
@@ -100,6 +100,26 @@ fn critics_decide_when_they_say_more_than_the_reward() {
     assert_eq!(weightless, without);
 }
 
+/// A plane through some of the critics' values leads where the critics do, and not where the reward alone does.
+#[test]
+fn fitted_values_lead_where_the_critics_do() {
+    let model = model();
+    let command = |value, alpha| {
+        let settings = Settings { value, alpha, ..Settings::HYBRID };
+        let aids = Aids { agent: Some(agent(&model, 100.0)), base: None, ilqr: None };
+        let mut planner = Cem::new("hybrid", &model, settings, aids);
+        planner.reset(1);
+        planner.command(&seen(), &TARGET)
+    };
+    let critics = command(Value::Critics, Some(1.0));
+    let fitted = command(Value::Fitted, Some(1.0));
+    let reward = command(Value::Fitted, None);
+    // hundredths of the travel: the search goes 0.02 at a time
+    assert!(near(&fitted, &critics, 0.01), "{fitted:?} {critics:?}");
+    assert!(!near(&reward, &critics, 0.01), "{reward:?} {critics:?}");
+    assert_eq!(reward, command(Value::Critics, None));
+}
+
 /// The same seed gives the same commands, tick after tick, also after a reset and from a clone.
 #[test]
 fn flights_repeat_to_the_bit() {
@@ -125,9 +145,14 @@ fn flights_replay_to_the_bit_under_each_set_of_instructions() {
     let model = model();
     let agent = agent(&model, 1.0);
     let plant = greylag_sitl::plant::PlantOptions::default();
-    for kind in [Kind::Hybrid, Kind::HybridLqi] {
+    let kinds = [
+        (Kind::Hybrid, "value=critics"),
+        (Kind::Hybrid, "value=fitted"),
+        (Kind::HybridLqi, "value=critics"),
+    ];
+    for (kind, value) in kinds {
         for text in ["instructions=widest", "instructions=portable"] {
-            let changes = [text.parse().unwrap()];
+            let changes = [text.parse().unwrap(), value.parse().unwrap()];
             let source = Source { model: &model, agent: Some(&agent), changes: &changes };
             let mut planner = control::build(kind, source).unwrap();
             let mut simulator = Simulator::new(&plant).unwrap();

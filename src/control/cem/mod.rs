@@ -4,6 +4,7 @@
 mod fan;
 mod rollout;
 mod settings;
+mod surrogate;
 
 use std::cmp::Ordering;
 use std::time::{Duration, Instant};
@@ -22,7 +23,14 @@ use crate::model::GreyBox;
 use crate::num::stream;
 use crate::physics::Command;
 use rollout::{Actions, Block, HORIZON, Machine, Scene, WIDTH, Worth};
-pub use settings::{Change, ChangeError, Instructions, Settings, Start, Update};
+pub use settings::{Change, ChangeError, Instructions, Settings, Start, Update, Value};
+use surrogate::Surrogate;
+
+/// Candidates whose ends the critics value before a plane takes their place.
+const SURVEYED: usize = 128;
+
+/// Candidates that they value again at the end.
+const RESCORED: usize = 64;
 
 /// What a search may lean on.
 #[derive(Clone, Debug, Default)]
@@ -67,6 +75,7 @@ pub struct Cem {
     last: Option<Plan>,
     age: usize,
     kept: Vec<Plan>,
+    surrogate: Option<Surrogate>,
     spent: Spent,
     seed: u64,
     tick: u64,
@@ -124,7 +133,8 @@ impl Cem {
             order: Vec::with_capacity(count * WIDTH),
             last: None,
             age: 0,
-            kept: Vec::with_capacity(WIDTH),
+            kept: Vec::with_capacity(WIDTH.max(RESCORED)),
+            surrogate: None,
             spent: Spent::default(),
             seed: 0,
             tick: 0,
@@ -185,6 +195,7 @@ impl Cem {
             target,
             agent: self.agent.as_ref(),
             alpha: self.settings.alpha,
+            surrogate: self.surrogate,
             memory: self.disturbance.as_ref().map(Disturbance::memory).unwrap_or_default(),
             disturbance: self.disturbance.as_ref().map_or(disturbance::NONE, Disturbance::rate),
             ahead: self.base.as_ref().map(|base| &base.ahead),
@@ -199,22 +210,22 @@ impl Cem {
         let (block, lane) = (index / WIDTH, index % WIDTH);
         let actions = &self.blocks[block];
         let plan = std::array::from_fn(|h| std::array::from_fn(|c| actions[h][c][lane].into()));
-        let Worth { returns, doubt } = self.worth[block];
+        let Worth { returns, doubt, .. } = self.worth[block];
         Valued { plan, worth: returns[lane], doubt: doubt[lane] }
     }
 
-    /// Mean and standard deviation of the candidates' actions, as the update weighs them, with the best
-    /// of them; `None` if too few stay finite.
-    fn refit(&mut self) -> Option<(Plan, Plan, Valued)> {
+    /// Mean and standard deviation of the actions of the candidates in the blocks up to `end`, as the update
+    /// weighs them, with the best of them; `None` if too few stay finite.
+    fn refit(&mut self, end: usize) -> Option<(Plan, Plan, Valued)> {
         let begun = Instant::now();
-        let refitted = self.refitted();
+        let refitted = self.refitted(end);
         self.spent.refit += begun.elapsed();
         refitted
     }
 
-    fn refitted(&mut self) -> Option<(Plan, Plan, Valued)> {
+    fn refitted(&mut self, end: usize) -> Option<(Plan, Plan, Valued)> {
         self.order.clear();
-        for (b, worth) in self.worth.iter().enumerate() {
+        for (b, worth) in self.worth[..end].iter().enumerate() {
             for (i, &value) in worth.returns.iter().enumerate() {
                 // a candidate that leaves the numbers is the worst there is
                 let value = if value.is_finite() { value } else { f32::NEG_INFINITY };
@@ -264,6 +275,8 @@ impl Cem {
         let mut rng = stream::stream(self.seed, &[self.tick]);
         self.tick += 1;
         let all = self.blocks.len();
+        let fitted = self.settings.value == Value::Fitted && self.settings.alpha.is_some();
+        self.surrogate = None;
         let mut first = self.settings.proposals.div_ceil(WIDTH).min(all);
         self.sample_noise(&mut rng, [0, first]);
         self.fly(seen, target, Actions::Policy, [0, first]);
@@ -279,18 +292,34 @@ impl Cem {
                 let plan = self.kept[k];
                 self.put(0, k, &plan);
             }
+            if fitted && self.surrogate.is_none() {
+                let surveyed = SURVEYED.div_ceil(WIDTH).clamp(first, all);
+                self.fly(seen, target, Actions::Given, [first, surveyed]);
+                self.surrogate = Surrogate::fit(&self.worth[..surveyed]);
+                first = surveyed;
+            }
             self.fly(seen, target, Actions::Given, [first, all]);
-            (mean, spread, _) = self.refit()?;
-            self.keep();
+            (mean, spread, _) = self.refit(all)?;
+            self.keep(self.settings.kept);
             first = 0;
+        }
+        if self.surrogate.take().is_some() {
+            self.keep(RESCORED);
+            for k in 0..self.kept.len() {
+                let plan = self.kept[k];
+                self.put(k / WIDTH, k % WIDTH, &plan);
+            }
+            let end = self.kept.len() / WIDTH;
+            self.fly(seen, target, Actions::Given, [0, end]);
+            (mean, _, _) = self.refit(end)?;
         }
         self.kept.clear();
         Some(mean)
     }
 
-    /// Keeps the best candidates for the next iteration.
-    fn keep(&mut self) {
-        let count = self.settings.kept.min(self.order.len());
+    /// Keeps the best candidates of an iteration.
+    fn keep(&mut self, count: usize) {
+        let count = count.min(self.order.len());
         self.kept.clear();
         if count == 0 {
             return;
@@ -332,7 +361,7 @@ impl Cem {
             }
             self.fly(seen, target, Actions::Given, [first, all]);
             let found;
-            (mean, spread, found) = self.refit()?;
+            (mean, spread, found) = self.refit(all)?;
             if found.worth > best.worth {
                 best = found;
             }

@@ -1,7 +1,8 @@
 //! Rollouts of many candidates at once, in the widest vectors that the processor has.
 
+use super::surrogate::Surrogate;
 use crate::control::lqi::Ahead;
-use crate::control::policy::{ACTIONS, Agent, command, observe};
+use crate::control::policy::{ACTIONS, Agent, OBSERVATIONS, command, observe};
 use crate::control::task::Task;
 use crate::control::{Observation, Target};
 use crate::model::{GreyBox, Memory, STEP};
@@ -33,6 +34,8 @@ pub(super) struct Scene<'a> {
     pub agent: Option<&'a Agent>,
     /// Weight α of what the critics say of the end, eq. (26); `None` leaves them out.
     pub alpha: Option<f64>,
+    /// What values the end in the critics' place.
+    pub surrogate: Option<Surrogate>,
     /// What the integrator remembers.
     pub memory: Memory,
     /// What the state's rate has beside the model's.
@@ -59,10 +62,19 @@ pub(super) struct Worth {
     pub returns: [f32; WIDTH],
     /// How far the critics' values of the end lie apart, discounted and weighted as these are.
     pub doubt: [f32; WIDTH],
+    /// Where critics value the end: what they see there.
+    pub end: [[f32; WIDTH]; OBSERVATIONS],
+    /// Likewise: the smaller of their values, or what stands for it.
+    pub value: [f32; WIDTH],
 }
 
 impl Worth {
-    pub const NONE: Worth = Worth { returns: [0.0; WIDTH], doubt: [0.0; WIDTH] };
+    pub const NONE: Worth = Worth {
+        returns: [0.0; WIDTH],
+        doubt: [0.0; WIDTH],
+        end: [[0.0; WIDTH]; OBSERVATIONS],
+        value: [0.0; WIDTH],
+    };
 }
 
 /// The vector instructions a rollout is compiled for, with memory for its networks.
@@ -310,16 +322,30 @@ fn rollout<R: Packed>(
     let mut doubt = R::zero();
     if let (Some(alpha), Some(agent)) = (scene.alpha, scene.agent) {
         let view = observe(&flight.state, &flight.observed(scene), &flight.target);
-        let advised = agent.actor.act(units, &view);
-        let first = agent.critics[0].value(units, &view, &advised);
-        let second = agent.critics[1].value(units, &view, &advised);
-        // a number that is lost stays lost
-        let least = first + (second - first).min(R::zero());
-        flight.sum += least.scale(alpha * flight.weight);
-        doubt = (first - second).abs().scale(alpha * flight.weight);
+        let value = match &scene.surrogate {
+            Some(surrogate) => surrogate.value(&view),
+            None => {
+                let advised = agent.actor.act(units, &view);
+                let first = agent.critics[0].value(units, &view, &advised);
+                let second = agent.critics[1].value(units, &view, &advised);
+                doubt = (first - second).abs().scale(alpha * flight.weight);
+                // a number that is lost stays lost
+                first + (second - first).min(R::zero())
+            }
+        };
+        flight.sum += value.scale(alpha * flight.weight);
+        for (row, out) in out.iter_mut().enumerate() {
+            let mut i = 0;
+            while i < OBSERVATIONS {
+                out.end[i] = view[i].unpack(row);
+                i += 1;
+            }
+            out.value = value.unpack(row);
+        }
     }
     for (row, out) in out.iter_mut().enumerate() {
-        *out = Worth { returns: flight.sum.unpack(row), doubt: doubt.unpack(row) };
+        out.returns = flight.sum.unpack(row);
+        out.doubt = doubt.unpack(row);
     }
 }
 
@@ -377,6 +403,7 @@ mod tests {
             target: &target,
             agent: None,
             alpha: None,
+            surrogate: None,
             memory: Memory::default(),
             disturbance: disturbance::NONE,
             ahead: None,

@@ -25,6 +25,16 @@ pub enum Start {
     Last,
 }
 
+/// What values the end of a candidate, where critics are asked at all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Value {
+    /// The critics, each candidate.
+    Critics,
+    /// A plane through the critics' values of the tick's first 128 candidates; the best 64 of the last
+    /// iteration are valued by the critics again. Without a base only.
+    Fitted,
+}
+
 /// Which vector instructions fly the candidates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Instructions {
@@ -60,6 +70,8 @@ pub struct Settings {
     pub noise: [f64; 2],
     /// Weight α of the critics' value of the end, eq. (26).
     pub alpha: Option<f64>,
+    /// Who says that value.
+    pub value: Value,
     /// Steps in all that a plan is flown in the model, the base flying from the sixth on; without a
     /// base there are five.
     pub steps: usize,
@@ -88,6 +100,7 @@ impl Settings {
         proposals: 0,
         noise: [0.2, 0.5],
         alpha: None,
+        value: Value::Critics,
         steps: HORIZON,
         chunk: 1,
         margin: 0.0,
@@ -166,6 +179,8 @@ pub enum Change {
     Noise(f64),
     /// [`Settings::alpha`].
     Alpha(Option<f64>),
+    /// [`Settings::value`].
+    Value(Value),
     /// [`Settings::steps`].
     Steps(usize),
     /// [`Settings::chunk`].
@@ -194,6 +209,7 @@ impl Change {
             Change::Proposals(proposals) => Settings { proposals, ..s },
             Change::Noise(deviation) => Settings { noise: [deviation, 3.0 * deviation], ..s },
             Change::Alpha(alpha) => Settings { alpha, ..s },
+            Change::Value(value) => Settings { value, ..s },
             Change::Steps(steps) => Settings { steps, ..s },
             Change::Chunk(chunk) => Settings { chunk, ..s },
             Change::Margin(margin) => Settings { margin, ..s },
@@ -209,7 +225,7 @@ impl Change {
 #[error(
     "{text:?} changes no setting of the planner: {why}; give KEY=VALUE with population, elites, \
      temperature, iterations, start (neutral, policy, last), spread, persistence, kept, proposals, noise, \
-     alpha (or none), steps, chunk, margin, ilqr (yes, no), \
+     alpha (or none), value (critics, fitted), steps, chunk, margin, ilqr (yes, no), \
      disturbance (s, or none), instructions (widest, portable)"
 )]
 pub struct ChangeError {
@@ -257,6 +273,11 @@ fn parse(text: &str) -> Result<Change, String> {
         "proposals" => Change::Proposals(lanes([0, 16384])?),
         "noise" => Change::Noise(number([0.0, 2.0])?),
         "alpha" => Change::Alpha(unless_none([0.0, 1e3])?),
+        "value" => Change::Value(match value {
+            "critics" => Value::Critics,
+            "fitted" => Value::Fitted,
+            _ => return Err(format!("there is no value {value:?}")),
+        }),
         "steps" => Change::Steps(count([HORIZON, 500])?),
         "chunk" => Change::Chunk(count([1, HORIZON])?),
         "margin" => Change::Margin(number([0.0, 1e3])?),

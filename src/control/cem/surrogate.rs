@@ -1,0 +1,123 @@
+//! What the critics say of the end, told cheaply: a plane through the ends that they have valued.
+//!
+//! Twin critics are piecewise linear, and the candidates of one tick end close together: a tick's own
+//! plane is to them what a distilled value network would be to all of flight, without training, a file
+//! or a doubt whether it belongs to the policy.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::rollout::Worth;
+use crate::control::policy::OBSERVATIONS as N;
+use crate::num::Real;
+
+/// Part of an observation's variance that is added to it: ends that lie on a plane themselves have
+/// a slope along it only.
+const RIDGE: f64 = 1e-4;
+
+/// v(o) ≈ level + slope · (o − centre), of observations as in eq. (28) of \[GSFM26\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Surrogate {
+    centre: [f64; N],
+    slope: [f64; N],
+    level: f64,
+}
+
+impl Surrogate {
+    /// The least-squares plane through the ends of the candidates of `worth`; `None` if fewer than
+    /// two for each slope are finite.
+    pub fn fit(worth: &[Worth]) -> Option<Surrogate> {
+        let ends = || worth.iter().flat_map(ends_of).filter(|(o, v)| (o.sum() + v).is_finite());
+        let count = ends().count();
+        if count < 2 * N {
+            return None;
+        }
+        let n = count as f64;
+        let (centre, level) = ends()
+            .fold((SVector::zeros(), 0.0), |(o, v), (end, value)| (o + end / n, v + value / n));
+        let mut square = SMatrix::<f64, N, N>::zeros();
+        let mut product = SVector::<f64, N>::zeros();
+        for (end, value) in ends() {
+            let off = end - centre;
+            square.ger(1.0, &off, &off, 1.0);
+            product.axpy(value - level, &off, 1.0);
+        }
+        for i in 0..N {
+            // what does not vary has no slope, and is no reason to divide by nothing
+            square[(i, i)] += RIDGE * square[(i, i)] + f64::MIN_POSITIVE;
+        }
+        let slope = square.cholesky()?.solve(&product);
+        let surrogate = Surrogate { centre: centre.into(), slope: slope.into(), level };
+        surrogate.slope.iter().all(|x| x.is_finite()).then_some(surrogate)
+    }
+
+    /// The plane at observations in lanes.
+    #[inline(always)]
+    pub fn value<R: Real>(&self, seen: &[R; N]) -> R {
+        let mut value = R::from_f64(self.level);
+        let mut i = 0;
+        while i < N {
+            value += (seen[i] - R::from_f64(self.centre[i])).scale(self.slope[i]);
+            i += 1;
+        }
+        value
+    }
+}
+
+/// The ends of a block's candidates, and what the critics say of each.
+fn ends_of(worth: &Worth) -> impl Iterator<Item = (SVector<f64, N>, f64)> {
+    (0..worth.value.len()).map(|lane| {
+        let end = SVector::from_fn(|i, _| f64::from(worth.end[i][lane]));
+        (end, f64::from(worth.value[lane]))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ends that vary in eleven of their numbers, valued on a plane.
+    fn valued(block: usize) -> Worth {
+        let mut worth = Worth::NONE;
+        for lane in 0..worth.value.len() {
+            let mut value = -3.0;
+            for i in 0..11 {
+                let k = (16 * block + lane) * 11 + i;
+                worth.end[i][lane] = 0.5 + 0.01 * (k as f32 * 0.7).sin();
+                value += 0.1 * (i as f32 - 4.0) * (worth.end[i][lane] - 0.5);
+            }
+            worth.value[lane] = value;
+        }
+        worth
+    }
+
+    #[test]
+    fn a_plane_is_found_again_and_lost_candidates_are_left_out() {
+        let mut worth = [valued(0), valued(1), valued(2), valued(3)];
+        worth[1].value[3] = f32::NAN;
+        worth[2].end[4][5] = f32::INFINITY;
+        let surrogate = Surrogate::fit(&worth).unwrap();
+        let other = valued(9);
+        for lane in 0..other.value.len() {
+            let end = std::array::from_fn(|i| f64::from(other.end[i][lane]));
+            let off = surrogate.value(&end) - f64::from(other.value[lane]);
+            assert!(off.abs() < 1e-5, "{off}");
+        }
+    }
+
+    #[test]
+    fn too_few_ends_make_no_plane() {
+        assert_eq!(Surrogate::fit(&[valued(0)]), None);
+        let mut lost = [valued(0), valued(1)];
+        lost.iter_mut().for_each(|worth| worth.value[4..].fill(f32::NAN));
+        assert_eq!(Surrogate::fit(&lost), None);
+    }
+
+    /// Where nothing varies, the plane is flat.
+    #[test]
+    fn equal_ends_have_their_value() {
+        let mut worth = [Worth::NONE; 2];
+        worth.iter_mut().for_each(|worth| worth.value.fill(-2.5));
+        let surrogate = Surrogate::fit(&worth).unwrap();
+        assert_eq!(surrogate.value(&[1.0; N]), -2.5);
+    }
+}
