@@ -58,10 +58,11 @@ fn main() -> Result<()> {
     let flops = processor::peak();
     println!("one core's peak, fused multiply-add in single precision: {:.0} GFLOP/s", flops / 1e9);
     println!(
-        "{:>14} {:>10} {:>10} {:>10} {:>12}",
+        "{:>19} {:>10} {:>10} {:>10} {:>12}",
         "controller", "p50 ms", "p99 ms", "p99.9 ms", "allocations"
     );
     let fitted = [Change::Value(Value::Fitted)];
+    let cores = [Change::Cores(2)];
     for (kind, changes) in [
         (Kind::Policy, &[][..]),
         (Kind::Lqi, &[]),
@@ -70,7 +71,9 @@ fn main() -> Result<()> {
         (Kind::CemCritic, &[]),
         (Kind::Hybrid, &[]),
         (Kind::Hybrid, &fitted),
+        (Kind::Hybrid, &cores),
         (Kind::HybridLqi, &[]),
+        (Kind::HybridLqi, &cores),
     ] {
         let mut controller =
             control::build(kind, Source { model: &model, agent: Some(&agent), changes })?;
@@ -96,8 +99,12 @@ fn main() -> Result<()> {
         times.sort_by(f64::total_cmp);
         let at = |q: f64| times[((TICKS - 1) as f64 * q).round() as usize];
         println!(
-            "{:>14} {:10.3} {:10.3} {:10.3} {allocated:>12}",
-            format!("{}{}", kind.name(), if changes.is_empty() { "" } else { ", fitted" }),
+            "{:>19} {:10.3} {:10.3} {:10.3} {allocated:>12}",
+            match changes {
+                [] => kind.name().into(),
+                [Change::Cores(cores)] => format!("{}, {cores} cores", kind.name()),
+                _ => format!("{}, fitted", kind.name()),
+            },
             at(0.5),
             at(0.99),
             at(0.999)

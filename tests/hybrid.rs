@@ -8,8 +8,9 @@ use greylag::control::ilqr::Ilqr;
 use greylag::control::lqi::Lqi;
 use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Origin, Policy};
 use greylag::control::{self, Controller, Kind, Observation, SetupError, Source, Target};
-use greylag::model::GreyBox;
+use greylag::model::{GreyBox, Memory};
 use greylag::num::{Dense, stream};
+use greylag::physics::actuators::Actuators;
 use greylag::physics::{ActuatorState, Command, State, Time};
 
 fn model() -> GreyBox {
@@ -118,6 +119,64 @@ fn fitted_values_lead_where_the_critics_do() {
     assert!(near(&fitted, &critics, 0.01), "{fitted:?} {critics:?}");
     assert!(!near(&reward, &critics, 0.01), "{reward:?} {critics:?}");
     assert_eq!(reward, command(Value::Critics, None));
+}
+
+/// A second core does half of the work and changes nothing.
+#[test]
+fn two_cores_command_what_one_does() {
+    let model = model();
+    let agent = agent(&model, 1.0);
+    for kind in [Kind::Hybrid, Kind::HybridLqi] {
+        // five blocks do not come out even
+        let [one, two] = ["cores=1", "cores=2"].map(|cores| {
+            let changes = [cores.parse().unwrap(), "population=80".parse().unwrap()];
+            let source = Source { model: &model, agent: Some(&agent), changes: &changes };
+            let mut planner = control::build(kind, source).unwrap();
+            planner.reset(3);
+            [0, 1, 2].map(|_| planner.command(&seen(), &TARGET))
+        });
+        assert_eq!(one, two, "{kind}");
+    }
+}
+
+/// A delayed planner flies, a tick later, what the other plans from where the model then is.
+#[test]
+fn a_delayed_plan_is_that_of_the_state_it_is_flown_in() {
+    let model = model();
+    let agent = agent(&model, 1.0);
+    let plan = |delay: bool, prepared: bool, seen: &[Observation]| {
+        let settings = Settings { delay, ..Settings::HYBRID };
+        let aids = Aids { agent: Some(agent.clone()), base: None, ilqr: None };
+        let mut planner = Cem::new("hybrid", &model, settings, aids);
+        planner.reset(1);
+        let mut command = |seen: &Observation| {
+            let command = planner.command(seen, &TARGET);
+            if prepared {
+                planner.prepare();
+            }
+            command
+        };
+        seen.iter().map(&mut command).collect::<Vec<_>>()
+    };
+    let late = |ms| Observation { time: Time::from_micros(1000 * ms), ..seen() };
+    let first = plan(true, true, &[seen(), late(10)]);
+    assert_eq!(first, plan(true, false, &[seen(), late(10)]));
+    assert_eq!(first[0], plan(false, false, &[seen()])[0]);
+    let figures = &model.airframe.actuators;
+    let mut actuators = Actuators::from_observed(&seen().actuators, &seen().previous, figures);
+    let controls = actuators.controls();
+    let mut memory = Memory::default();
+    let state = model.step(&seen().state, &controls, seen().altitude, &mut memory);
+    actuators.step(&first[0], figures);
+    let there = Observation {
+        state,
+        actuators: actuators.observed(figures),
+        previous: [first[0], seen().previous[0]],
+        ..seen()
+    };
+    assert_eq!(first[1], plan(false, false, &[seen(), there])[1]);
+    // a tick was left out: what was planned for it is not flown
+    assert_ne!(plan(true, true, &[seen(), late(20)])[1], first[1]);
 }
 
 /// The same seed gives the same commands, tick after tick, also after a reset and from a clone.

@@ -64,6 +64,9 @@ pub trait Controller: Send + Sync {
     fn reset(&mut self, seed: u64);
     /// The command for this tick.
     fn command(&mut self, seen: &Observation, target: &Target) -> Command;
+    /// Computes what it can before the next tick is seen: whoever has time between two commands calls this. The
+    /// commands are the same if nobody does.
+    fn prepare(&mut self) {}
     /// What the last command, for `seen`, was chosen from; `None` of a controller that does not plan.
     fn insight(&self, _seen: &Observation) -> Option<Insight> {
         None

@@ -19,9 +19,11 @@ use crate::control::lqi::{Ahead, Lqi};
 use crate::control::policy::Agent;
 use crate::control::task::Task;
 use crate::control::{Controller, Observation, Target};
-use crate::model::GreyBox;
+use crate::model::{GreyBox, STEP};
 use crate::num::stream;
-use crate::physics::Command;
+use crate::physics::actuators::Actuators;
+use crate::physics::inputs::InputMemory;
+use crate::physics::{Command, Time};
 use rollout::{Actions, Block, HORIZON, Machine, Scene, WIDTH, Worth};
 pub use settings::{Change, ChangeError, Instructions, Settings, Start, Update, Value};
 use surrogate::Surrogate;
@@ -68,12 +70,17 @@ pub struct Cem {
     ilqr: Option<Ilqr>,
     disturbance: Option<Disturbance>,
     machine: Machine,
+    /// That of the second core.
+    second: Option<Machine>,
     blocks: Vec<Block>,
     worth: Vec<Worth>,
     order: Vec<(f32, u32)>,
     /// The plan of the last tick, if it was the search's, and for how many ticks it has been flown.
     last: Option<Plan>,
     age: usize,
+    /// Of a delayed search: what the next tick is to be planned for, and the moment that `last` is for.
+    next: Option<(Observation, Target)>,
+    planned_for: Option<Time>,
     kept: Vec<Plan>,
     surrogate: Option<Surrogate>,
     spent: Spent,
@@ -116,6 +123,10 @@ impl Cem {
         );
         let count = settings.population.div_ceil(WIDTH);
         let steps = settings.steps.max(HORIZON);
+        let machine = match settings.instructions {
+            Instructions::Widest => Machine::detect(),
+            Instructions::Portable => Machine::baseline(),
+        };
         Cem {
             name,
             model: model.clone(),
@@ -124,15 +135,15 @@ impl Cem {
             base: aids.base.map(|lqi| Base { lqi, ahead: Ahead::new(steps) }),
             ilqr: aids.ilqr,
             disturbance: settings.disturbance.map(Disturbance::new),
-            machine: match settings.instructions {
-                Instructions::Widest => Machine::detect(),
-                Instructions::Portable => Machine::baseline(),
-            },
+            second: (settings.cores > 1).then(|| machine.clone()),
+            machine,
             blocks: vec![[[[0.0; WIDTH]; 3]; HORIZON]; count],
             worth: vec![Worth::NONE; count],
             order: Vec::with_capacity(count * WIDTH),
             last: None,
             age: 0,
+            next: None,
+            planned_for: None,
             kept: Vec::with_capacity(WIDTH.max(RESCORED)),
             surrogate: None,
             spent: Spent::default(),
@@ -201,7 +212,20 @@ impl Cem {
             ahead: self.base.as_ref().map(|base| &base.ahead),
         };
         let (blocks, worth) = (&mut self.blocks[first..end], &mut self.worth[first..end]);
-        self.machine.fly(&scene, actions, blocks, worth);
+        // blocks that fly together stay together: the numbers are those of one core
+        let half = blocks.len().div_ceil(4) * 2;
+        match &mut self.second {
+            Some(second) if half < blocks.len() => {
+                let (head, tail) = blocks.split_at_mut(half);
+                let (worth_head, worth_tail) = worth.split_at_mut(half);
+                let machine = &mut self.machine;
+                rayon::join(
+                    || machine.fly(&scene, actions, head, worth_head),
+                    || second.fly(&scene, actions, tail, worth_tail),
+                );
+            }
+            _ => self.machine.fly(&scene, actions, blocks, worth),
+        }
         self.spent.fly += begun.elapsed();
     }
 
@@ -384,6 +408,37 @@ impl Cem {
         }
     }
 
+    /// The command planned a tick ago, or a new one if there is none for this moment.
+    fn planned_before(&mut self, seen: &Observation, target: &Target) -> Command {
+        let off = |time: Time| (time.as_secs_f64() - seen.time.as_secs_f64()).abs();
+        if !self.planned_for.is_some_and(|time| off(time) < STEP / 2.0) {
+            self.last = self.search(seen, target);
+        }
+        let Some(plan) = &self.last else { return LOST };
+        let command = flown(&plan[0]);
+        self.next = Some((self.after(seen, command), *target));
+        command
+    }
+
+    /// What the model says will be observed a tick after `seen`.
+    fn after(&self, seen: &Observation, command: Command) -> Observation {
+        let figures = &self.model.airframe.actuators;
+        let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);
+        let mut inputs = InputMemory::at_rest(&actuators.controls());
+        let controls = self.model.act(&actuators.controls(), &mut inputs);
+        let mut memory = self.disturbance.as_ref().map(Disturbance::memory).unwrap_or_default();
+        let rate = self.disturbance.as_ref().map_or(disturbance::NONE, Disturbance::rate);
+        let state = self.model.step(&seen.state, &controls, seen.altitude, &mut memory);
+        actuators.step(&command, figures);
+        Observation {
+            time: seen.time.plus(Duration::from_secs_f64(STEP)),
+            state: state.advance(&rate, STEP),
+            actuators: actuators.observed(figures),
+            previous: [command, seen.previous[0]],
+            ..*seen
+        }
+    }
+
     /// The base's command, or that of a plan that is surely better.
     fn over_base(&mut self, mut base: Base, seen: &Observation, target: &Target) -> Command {
         let begun = Instant::now();
@@ -437,6 +492,7 @@ impl Controller for Cem {
     fn reset(&mut self, seed: u64) {
         (self.seed, self.tick) = (seed, 0);
         (self.last, self.age) = (None, 0);
+        (self.next, self.planned_for) = (None, None);
         self.disturbance = self.settings.disturbance.map(Disturbance::new);
         if let Some(base) = &mut self.base {
             base.lqi.reset(seed);
@@ -446,12 +502,23 @@ impl Controller for Cem {
         }
     }
 
+    fn prepare(&mut self) {
+        if let Some((seen, target)) = self.next.take() {
+            self.spent = Spent::default();
+            self.last = self.search(&seen, &target);
+            self.planned_for = Some(seen.time);
+        }
+    }
+
     fn insight(&self, seen: &Observation) -> Option<Insight> {
         Some(self.told(seen))
     }
 
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {
-        self.spent = Spent::default();
+        self.prepare();
+        if self.base.is_some() || !self.settings.delay {
+            self.spent = Spent::default();
+        }
         let begun = Instant::now();
         if let Some(disturbance) = &mut self.disturbance {
             disturbance.update(&self.model, seen);
@@ -459,6 +526,9 @@ impl Controller for Cem {
         self.spent.prepare = begun.elapsed();
         if let Some(base) = self.base.take() {
             return self.over_base(base, seen, target);
+        }
+        if self.settings.delay {
+            return self.planned_before(seen, target);
         }
         self.age += 1;
         if self.last.is_none() || self.age >= self.settings.chunk {

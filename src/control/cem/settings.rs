@@ -77,6 +77,9 @@ pub struct Settings {
     pub steps: usize,
     /// Ticks that a plan is flown before the next one is made, up to 5; with a base every tick is planned.
     pub chunk: usize,
+    /// Whether a tick plans for the next one, from where the model will be then (RT-HCP's delay of one step),
+    /// so that planning may take the whole period. Without a base only, and a plan is then flown for one tick.
+    pub delay: bool,
     /// What a plan must be worth beside the base's to be flown, in units of the return.
     pub margin: f64,
     /// Whether iLQR's plan is among the candidates; it needs a base.
@@ -85,6 +88,8 @@ pub struct Settings {
     pub disturbance: Option<f64>,
     /// What flies the candidates.
     pub instructions: Instructions,
+    /// Cores that fly them, one or two; the commands are the same.
+    pub cores: usize,
 }
 
 impl Settings {
@@ -103,10 +108,12 @@ impl Settings {
         value: Value::Critics,
         steps: HORIZON,
         chunk: 1,
+        delay: false,
         margin: 0.0,
         ilqr: false,
         disturbance: None,
         instructions: Instructions::Widest,
+        cores: 1,
     };
     /// CEM + π.
     pub const POLICY: Settings = Settings { proposals: 32, ..Settings::PAPER };
@@ -185,6 +192,8 @@ pub enum Change {
     Steps(usize),
     /// [`Settings::chunk`].
     Chunk(usize),
+    /// [`Settings::delay`].
+    Delay(bool),
     /// [`Settings::margin`].
     Margin(f64),
     /// [`Settings::ilqr`].
@@ -193,6 +202,8 @@ pub enum Change {
     Disturbance(Option<f64>),
     /// [`Settings::instructions`].
     Instructions(Instructions),
+    /// [`Settings::cores`].
+    Cores(usize),
 }
 
 impl Change {
@@ -212,10 +223,12 @@ impl Change {
             Change::Value(value) => Settings { value, ..s },
             Change::Steps(steps) => Settings { steps, ..s },
             Change::Chunk(chunk) => Settings { chunk, ..s },
+            Change::Delay(delay) => Settings { delay, ..s },
             Change::Margin(margin) => Settings { margin, ..s },
             Change::Ilqr(ilqr) => Settings { ilqr, ..s },
             Change::Disturbance(disturbance) => Settings { disturbance, ..s },
             Change::Instructions(instructions) => Settings { instructions, ..s },
+            Change::Cores(cores) => Settings { cores, ..s },
         }
     }
 }
@@ -225,8 +238,8 @@ impl Change {
 #[error(
     "{text:?} changes no setting of the planner: {why}; give KEY=VALUE with population, elites, \
      temperature, iterations, start (neutral, policy, last), spread, persistence, kept, proposals, noise, \
-     alpha (or none), value (critics, fitted), steps, chunk, margin, ilqr (yes, no), \
-     disturbance (s, or none), instructions (widest, portable)"
+     alpha (or none), value (critics, fitted), steps, chunk, delay (yes, no), margin, \
+     ilqr (yes, no), disturbance (s, or none), instructions (widest, portable), cores (1, 2)"
 )]
 pub struct ChangeError {
     text: String,
@@ -255,6 +268,11 @@ fn parse(text: &str) -> Result<Change, String> {
         Ok(x) if (low..=high).contains(&x) => Ok(x),
         _ => Err(format!("{value:?} is not a number from {low} to {high}")),
     };
+    let switch = || match value {
+        "yes" => Ok(true),
+        "no" => Ok(false),
+        _ => Err(format!("{value:?} is neither yes nor no")),
+    };
     let unless_none = |range| if value == "none" { Ok(None) } else { number(range).map(Some) };
     Ok(match key {
         "population" => Change::Population(lanes([WIDTH, 16384])?),
@@ -281,11 +299,9 @@ fn parse(text: &str) -> Result<Change, String> {
         "steps" => Change::Steps(count([HORIZON, 500])?),
         "chunk" => Change::Chunk(count([1, HORIZON])?),
         "margin" => Change::Margin(number([0.0, 1e3])?),
-        "ilqr" => Change::Ilqr(match value {
-            "yes" => true,
-            "no" => false,
-            _ => return Err(format!("{value:?} is neither yes nor no")),
-        }),
+        "ilqr" => Change::Ilqr(switch()?),
+        "delay" => Change::Delay(switch()?),
+        "cores" => Change::Cores(count([1, 2])?),
         "instructions" => Change::Instructions(match value {
             "widest" => Instructions::Widest,
             "portable" => Instructions::Portable,
@@ -317,6 +333,8 @@ mod tests {
             ("population=100", "not a multiple of 16"),
             ("population=0", "not a whole number from 16"),
             ("start=there", "no start"),
+            ("delay=1", "neither yes nor no"),
+            ("cores=3", "not a whole number from 1 to 2"),
             ("speed=1", "no setting \"speed\""),
         ] {
             let error = read(text).unwrap_err();

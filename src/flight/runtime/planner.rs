@@ -65,6 +65,7 @@ impl Threaded {
                 if answers.send((tick, run(controller.as_mut(), &request))).is_err() {
                     return;
                 }
+                controller.prepare();
             }
         };
         let thread = std::thread::Builder::new().name("planner".into()).spawn(work)?;
