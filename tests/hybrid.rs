@@ -158,7 +158,7 @@ fn a_delayed_plan_is_that_of_the_state_it_is_flown_in() {
         };
         seen.iter().map(&mut command).collect::<Vec<_>>()
     };
-    let late = |ms| Observation { time: Time::from_micros(1000 * ms), ..seen() };
+    let late = |ms: u64| Observation { time: Time::from_micros(1000 * ms), ..seen() };
     let first = plan(true, true, &[seen(), late(10)]);
     assert_eq!(first, plan(true, false, &[seen(), late(10)]));
     assert_eq!(first[0], plan(false, false, &[seen()])[0]);
