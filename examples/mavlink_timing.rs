@@ -5,8 +5,9 @@
 //! ```
 //! It flies a minute in real time, then five minutes of flight in lockstep, prints what it
 //! measured, and ends with an error when a wanted figure is missed. An idle machine is part of
-//! the measurement. `--controller hybrid` flies a planner, whose plans are counted; `--load 2` keeps two
-//! threads busy meanwhile: plans may be late then, the attitude has to be held.
+//! the measurement. `--controller hybrid` flies a planner, whose plans are counted (`--planner
+//! delay=yes` and the like change it); `--load 2` keeps two threads busy meanwhile: plans may be
+//! late then, the attitude has to be held.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::path::Path;
@@ -19,6 +20,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Parser;
 use greylag::commands::fly;
+use greylag::control::cem::Change;
 use greylag::control::{self, Kind, Target, build};
 use greylag::flight::pilot::{Config, Pilot};
 use greylag::flight::recorder::Place;
@@ -66,25 +68,28 @@ struct Arguments {
     /// Controller that flies.
     #[arg(long, default_value = "lqi")]
     controller: Kind,
+    /// Settings of a planner in other than their usual size.
+    #[arg(long, num_args = 1.., value_name = "KEY=VALUE")]
+    planner: Vec<Change>,
     /// Threads that are kept busy meanwhile.
     #[arg(long, default_value_t = 0)]
     load: usize,
 }
 
 fn main() -> Result<ExitCode> {
-    let Arguments { controller: kind, load } = Arguments::parse();
+    let Arguments { controller: kind, planner: changes, load } = Arguments::parse();
     let model = fly::model(Path::new("params/x8/jsbsim.toml"), None)?;
-    let in_process = settled_in_process(kind, &model)?;
+    let in_process = settled_in_process(kind, &model, &changes)?;
     println!(
         "target {ROLL_DEG} / {PITCH_DEG} deg, {kind}, JSBSim; in process {in_process:.4} deg; {load} busy \
          threads\n"
     );
     let busy = Busy::start(load)?;
-    let real = flight(kind, &model, Pace::RealTime, REAL_TIME_S)?;
+    let real = flight(kind, &model, &changes, Pace::RealTime, REAL_TIME_S)?;
     drop(busy);
     let mut verdicts = real_time(&real, kind, load, in_process)?;
     if load == 0 {
-        let lockstep = flight(kind, &model, Pace::Lockstep, LOCKSTEP_S)?;
+        let lockstep = flight(kind, &model, &changes, Pace::Lockstep, LOCKSTEP_S)?;
         let speed = lockstep.shim.flown_s / lockstep.shim.wall_s;
         let errors = settled(&lockstep.samples)?;
         verdicts.push((near(errors, in_process), format!("lockstep: settled {}", told(errors))));
@@ -180,9 +185,9 @@ impl Drop for Busy {
 }
 
 /// The settled error of the same target flown from neutral in process, degrees.
-fn settled_in_process(kind: Kind, model: &GreyBox) -> Result<f64> {
+fn settled_in_process(kind: Kind, model: &GreyBox, changes: &[Change]) -> Result<f64> {
     let mut simulator = Simulator::new(&PlantOptions::default())?;
-    let mut controller = fly::controller(kind, model, Path::new(fly::POLICY), &[])?;
+    let mut controller = fly::controller(kind, model, Path::new(fly::POLICY), changes)?;
     let target =
         Target { roll: ROLL_DEG.to_radians(), pitch: PITCH_DEG.to_radians(), airspeed: 20.0 };
     let episode = Episode { environment: &mut simulator, controller: controller.as_mut(), seed: 0 };
@@ -224,12 +229,18 @@ fn error_at_end(samples: &[Sample]) -> f64 {
 }
 
 /// Flies the target in OFFBOARD until the shim has flown `seconds`.
-fn flight(kind: Kind, model: &GreyBox, pace: Pace, seconds: f64) -> Result<Flown> {
+fn flight(
+    kind: Kind,
+    model: &GreyBox,
+    changes: &[Change],
+    pace: Pace,
+    seconds: f64,
+) -> Result<Flown> {
     let room = tempfile::tempdir()?;
     let folder = room.path().join("flight");
     let stop = Arc::new(AtomicBool::new(false));
     let options = options(model, pace, &folder)?;
-    let companion = Flight::start(&options, crew(kind, model, pace)?, stop.clone())?;
+    let companion = Flight::start(&options, crew(kind, model, changes, pace)?, stop.clone())?;
     let vehicle = companion.vehicle.context("no vehicle link")?;
     let client = companion.clients.first().copied().flatten().context("no client link")?;
     let simulator = simulate(vehicle, pace, seconds, stop.clone())?;
@@ -260,12 +271,12 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<Options> {
 
 /// The controller with an LQI as its fallback. In lockstep the aircraft's seconds are milliseconds of the
 /// client's, so that it may be silent for longer of them.
-fn crew(kind: Kind, model: &GreyBox, pace: Pace) -> Result<Crew> {
+fn crew(kind: Kind, model: &GreyBox, changes: &[Change], pace: Pace) -> Result<Crew> {
     let mut config = Config::for_model(model)?;
     if pace == Pace::Lockstep {
         config.offboard_loss_s = 60.0;
     }
-    let controller = fly::controller(kind, model, Path::new(fly::POLICY), &[])?;
+    let controller = fly::controller(kind, model, Path::new(fly::POLICY), changes)?;
     let pilot = Pilot::new(config, build(Kind::Lqi, model)?)?;
     let seat = match kind.pace() {
         control::Pace::Planned => Seat::Thread,
