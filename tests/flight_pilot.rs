@@ -75,6 +75,7 @@ fn frame(time: Time) -> Telemetry {
         order: Order::Next { lost: 0 },
         faults: Faults::NONE,
         yaw: 0.0,
+        rate_hold_s: 0.0,
         actuators: ActuatorState::default(),
         specific_force: [0.0, 0.0, -9.81],
         altitude: 600.0,

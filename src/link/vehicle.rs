@@ -34,6 +34,8 @@ pub struct Telemetry {
     pub state: State,
     /// Yaw, rad.
     pub yaw: f64,
+    /// Time for which a simulator holds the body rates from this instant, s; 0 where they are sampled.
+    pub rate_hold_s: f64,
     /// Specific force, m/s², FRD.
     pub specific_force: [f64; 3],
     /// Actuator positions and rates.

@@ -8,7 +8,7 @@ pub(super) type Get = fn(&Sample) -> f64;
 pub(super) type Place = fn(&mut Sample) -> &mut f64;
 
 /// The columns of the format in the order they are written: name, value, place.
-pub(super) const COLUMNS: [(&str, Get, Place); 28] = [
+pub(super) const COLUMNS: [(&str, Get, Place); 29] = [
     ("time_s", |s| s.time_s, |s| &mut s.time_s),
     ("roll_rad", |s| s.attitude_rad[0], |s| &mut s.attitude_rad[0]),
     ("pitch_rad", |s| s.attitude_rad[1], |s| &mut s.attitude_rad[1]),
@@ -37,6 +37,7 @@ pub(super) const COLUMNS: [(&str, Get, Place); 28] = [
     ("throttle_cmd", |s| s.throttle_cmd, |s| &mut s.throttle_cmd),
     ("roll_target_rad", |s| s.roll_target_rad, |s| &mut s.roll_target_rad),
     ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
+    ("rate_hold_s", |s| s.rate_hold_s, |s| &mut s.rate_hold_s),
 ];
 /// Columns without which a file is no flight log.
 pub(super) const NEEDED: [&str; 7] =

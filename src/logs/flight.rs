@@ -1,5 +1,7 @@
 //! A flight as a table: one sample a row, the columns of the log format.
 
+use crate::num::statistics::quantile;
+
 /// One row of a flight log. SI units, radians, body axes FRD, earth axes NED; a missing value is NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
@@ -43,6 +45,9 @@ pub struct Sample {
     pub roll_target_rad: f64,
     /// Commanded pitch θ*, rad (an extra column, `pitch_target_rad`).
     pub pitch_target_rad: f64,
+    /// Time for which the body rates hold from this sample, s; 0 for samples at instants (an extra
+    /// column, `rate_hold_s`).
+    pub rate_hold_s: f64,
 }
 
 impl Default for Sample {
@@ -70,8 +75,20 @@ impl Default for Sample {
             throttle_cmd: nan,
             roll_target_rad: nan,
             pitch_target_rad: nan,
+            rate_hold_s: nan,
         }
     }
+}
+
+/// What a recorded body rate stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// The rate at the instant of the sample, as gyros and most simulators log it.
+    Instants,
+    /// The rate that a simulator holds from this sample to the next one. JSBSim advances so: rates and
+    /// attitude by explicit Euler, velocity by Adams–Bashforth 2.
+    Held,
 }
 
 /// A flight: samples in time order, with what is known about them as a whole.
@@ -87,6 +104,23 @@ pub struct Flight {
     pub unknown_columns: Vec<String>,
     /// What was assumed or derived while reading, one sentence each.
     pub notes: Vec<String>,
+}
+
+impl Flight {
+    /// What the log's own column `rate_hold_s` says of its rates; `None` if it says nothing.
+    ///
+    /// A simulator that holds its rates for less than half a sample period samples at instants.
+    pub fn declared_sampling(&self) -> Option<Sampling> {
+        let held: Vec<f64> =
+            self.samples.iter().map(|s| s.rate_hold_s).filter(|x| x.is_finite()).collect();
+        let periods: Vec<f64> =
+            self.samples.windows(2).map(|w| w[1].time_s - w[0].time_s).collect();
+        let (hold, period) = (quantile(&held, 0.5), quantile(&periods, 0.5));
+        (hold.is_finite() && period.is_finite()).then_some(match hold >= 0.5 * period {
+            true => Sampling::Held,
+            false => Sampling::Instants,
+        })
+    }
 }
 
 impl From<Vec<Sample>> for Flight {

@@ -47,6 +47,18 @@ pub struct Controls<R = f64> {
     pub throttle: R,
 }
 
+impl Controls {
+    /// The controls after the share `part` of the way to `next`, on a straight line.
+    pub fn towards(&self, next: &Controls, part: f64) -> Controls {
+        let mix = |a: f64, b: f64| a + part * (b - a);
+        Controls {
+            aileron: mix(self.aileron, next.aileron),
+            elevator: mix(self.elevator, next.elevator),
+            throttle: mix(self.throttle, next.throttle),
+        }
+    }
+}
+
 /// The observed actuator state z, eq. (27) of \[GSFM26\].
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ActuatorState<R = f64> {

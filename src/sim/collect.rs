@@ -155,6 +155,7 @@ pub fn sample(seen: &Observation, command: Option<&Command>, target: &Target) ->
         throttle_cmd: command.throttle,
         roll_target_rad: target.roll,
         pitch_target_rad: target.pitch,
+        rate_hold_s: crate::model::STEP,
         ..Sample::default()
     }
 }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::control::schedule::menu::{MENU, Manoeuvre};
 use crate::control::schedule::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use crate::control::{Controller, Observation, Target};
+use crate::logs::Sampling;
 use crate::model::{GreyBox, JoinError};
 use crate::physics::catalogue;
 use crate::physics::inputs::InputMemory;
@@ -201,6 +202,7 @@ fn imagine(
     let flight = Reconstruction {
         name: schedule.name.clone(),
         step_s: STEP_S,
+        sampling: Sampling::Held,
         segments: vec![Segment { instants }],
         nuisances: Vec::new(),
         noise,

@@ -134,6 +134,7 @@ impl Instruments {
         let command = flown.commands[k];
         Sample {
             time_s: k as f64 * DT_S,
+            rate_hold_s: DT_S,
             attitude_rad: [
                 turn(&|t| t.roll_rad) + draw(Attitude),
                 turn(&|t| t.pitch_rad) + draw(Attitude),

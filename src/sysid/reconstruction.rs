@@ -1,5 +1,6 @@
 //! A flight after reconstruction: one clock, no sensor errors, no gaps inside a segment.
 
+use crate::logs::Sampling;
 use crate::physics::{Command, Controls, State};
 
 /// One instant of a reconstructed flight.
@@ -53,6 +54,9 @@ pub struct Reconstruction {
     pub name: String,
     /// Time between samples, s.
     pub step_s: f64,
+    /// What the body rates stand for, and with them the deflections: held from sample to sample, or
+    /// samples of what moves on between them.
+    pub sampling: Sampling,
     /// The flight without its gaps.
     pub segments: Vec<Segment>,
     /// What was estimated along.

@@ -161,6 +161,7 @@ pub fn as_measured(name: &str, flight: &Flight, noise: Noise) -> Reconstruction 
     Reconstruction {
         name: name.into(),
         step_s: 0.01,
+        sampling: greylag::logs::Sampling::Held,
         segments: vec![Segment { instants: flight.samples.iter().map(instant).collect() }],
         nuisances: Vec::new(),
         noise: noise.state,

@@ -51,7 +51,11 @@ impl Flight {
         Ok(Flight {
             plant,
             sensors: Sensors::new(options.noise, options.bias, options.seed),
-            log: options.truth.as_ref().map(TruthLog::create).transpose()?,
+            log: options
+                .truth
+                .as_ref()
+                .map(|t| TruthLog::create(t, FRAME_US as f64 * 1e-6))
+                .transpose()?,
             time_us: zero + (ahead as u64 + 1) * FRAME_US,
             pending,
             ahead,

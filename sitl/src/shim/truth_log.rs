@@ -10,18 +10,21 @@ use crate::plant::{Inputs, Truth};
 
 const HEADER: &str = "time_s,roll_rad,pitch_rad,yaw_rad,p_radps,q_radps,r_radps,airspeed_mps,\
 alpha_rad,beta_rad,ax_mps2,ay_mps2,az_mps2,vn_mps,ve_mps,vd_mps,altitude_m,air_density_kgpm3,\
-aileron_rad,elevator_rad,throttle,aileron_cmd,elevator_cmd,throttle_cmd";
+aileron_rad,elevator_rad,throttle,aileron_cmd,elevator_cmd,throttle_cmd,rate_hold_s";
 
 /// A truth file that is being written.
 #[derive(Debug)]
 pub struct TruthLog {
     path: PathBuf,
     file: BufWriter<File>,
+    /// Time for which the plant holds its rates, s.
+    step_s: f64,
 }
 
 impl TruthLog {
-    /// Creates the file with its header row; refuses one that exists unless told to replace it.
-    pub fn create(target: &TruthFile) -> Result<Self, ShimError> {
+    /// Creates the file with its header row for a plant that steps by `step_s` (s); refuses one that
+    /// exists unless told to replace it.
+    pub fn create(target: &TruthFile, step_s: f64) -> Result<Self, ShimError> {
         let path = target.path.clone();
         let mut how = OpenOptions::new();
         match target.existing {
@@ -35,7 +38,7 @@ impl TruthLog {
             }
             Err(source) => return Err(ShimError::Truth { path, source }),
         };
-        let mut log = TruthLog { path, file: BufWriter::new(file) };
+        let mut log = TruthLog { path, file: BufWriter::new(file), step_s };
         let written = writeln!(log.file, "{HEADER}");
         log.check(written)?;
         Ok(log)
@@ -69,6 +72,7 @@ impl TruthLog {
             inputs.aileron,
             inputs.elevator,
             inputs.throttle,
+            self.step_s,
         ];
         let mut write = || -> io::Result<()> {
             write!(self.file, "{}", time_us as f64 * 1e-6)?;

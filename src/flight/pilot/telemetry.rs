@@ -62,6 +62,7 @@ mod tests {
             faults: Faults::NONE,
             state: State::NEUTRAL,
             yaw: 0.0,
+            rate_hold_s: 0.0,
             specific_force: [0.0, 0.0, -9.81],
             actuators: ActuatorState::default(),
             altitude: 600.0,

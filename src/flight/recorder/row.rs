@@ -69,6 +69,7 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
         throttle_cmd: c.throttle,
         roll_target_rad: decision.target.roll,
         pitch_target_rad: decision.target.pitch,
+        rate_hold_s: state.rate_hold_s,
         ..Sample::default()
     }
 }

@@ -83,6 +83,7 @@ impl Sitl {
             faults: Faults::NONE,
             state: State::NEUTRAL,
             yaw: 0.0,
+            rate_hold_s: PERIOD_US as f64 * 1e-6,
             specific_force: [0.0, 0.0, -9.81],
             actuators: ActuatorState::default(),
             altitude: 0.0,

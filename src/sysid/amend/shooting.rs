@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::flight::{AIRSPEED, BLUR, Flight, OFFSETS, SENSORS, SKEW};
+use crate::logs::Sampling;
 use crate::model::{GreyBox, Memory};
 use crate::physics::inputs::InputMemory;
 use crate::physics::{Controls, State};
@@ -49,7 +50,7 @@ pub(super) fn cut(flights: &[Flight], length_s: f64) -> Vec<Shot> {
     shots
 }
 
-/// The controls that act in each segment of a flight under `model`, the record being late and blurred as
+/// The controls that act during each model step of each segment of a flight under `model`, the record being late and blurred as
 /// `sensors` say.
 pub(super) fn acting(
     model: &GreyBox,
@@ -57,32 +58,34 @@ pub(super) fn acting(
     sensors: &[f64; SENSORS],
 ) -> Vec<Vec<Controls>> {
     let record = [sensors[SKEW] / flight.dt, sensors[BLUR]];
-    flight.segments.iter().map(|segment| act(model, segment, record, flight.substeps)).collect()
+    flight.segments.iter().map(|segment| act(model, flight, segment, record)).collect()
 }
 
+/// The controls that act during each model step of a segment, `substeps` of them a sample.
 fn act(
     model: &GreyBox,
+    flight: &Prepared,
     segment: &[Instant],
     [late, blur]: [f64; 2],
-    substeps: usize,
 ) -> Vec<Controls> {
-    let at = |k: usize| between(segment, k, late, blur);
-    let mut memory = InputMemory::at_rest(&at(0));
-    let one = |k: usize| {
-        let recorded = at(k);
-        if model.acts_at_once() {
-            return recorded;
-        }
-        (0..substeps).fold(recorded, |_, _| model.act(&recorded, &mut memory))
+    let at = |place: f64| between(segment, place + late, blur);
+    let mut memory = InputMemory::at_rest(&at(0.0));
+    let one = |step: usize| {
+        let (k, j) = (step / flight.substeps, step % flight.substeps);
+        let recorded = at(match flight.sampling {
+            Sampling::Held => k as f64,
+            // the middle of the step
+            Sampling::Instants => k as f64 + (j as f64 + 0.5) / flight.substeps as f64,
+        });
+        if model.acts_at_once() { recorded } else { model.act(&recorded, &mut memory) }
     };
-    (0..segment.len()).map(one).collect()
+    (0..segment.len() * flight.substeps).map(one).collect()
 }
 
-/// The controls `late` samples after sample `k`, by cubic interpolation, whose slope in `late` has no
-/// steps, less `blur` times the second difference, which a mean over that time has added.
-fn between(segment: &[Instant], k: usize, late: f64, blur: f64) -> Controls {
+/// The controls at `place` (samples), by cubic interpolation, whose slope in the place has no steps, less `blur` times the second difference, which a mean over that time has added.
+fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
     let last = segment.len() as f64 - 1.0;
-    let place = (k as f64 + late).clamp(0.0, last);
+    let place = place.clamp(0.0, last);
     let (i, t) = (place.floor() as isize, place.fract());
     let sample = |j: isize| &segment[(i + j).clamp(0, last as isize) as usize].controls;
     let [a, b, c, d] = [-1, 0, 1, 2].map(sample);
@@ -132,9 +135,11 @@ pub(super) fn fly(
     let segment = &flight.segments[shot.segment];
     let scale = model.scale();
     let mut memory = Memory::default();
+    let model = flight.stepping(model);
     let advance = |k: usize, state: State, memory: &mut Memory| {
         let altitude = segment[k].altitude;
-        (0..flight.substeps).fold(state, |s, _| model.step(&s, &controls[k], altitude, memory))
+        let steps = &controls[k * flight.substeps..(k + 1) * flight.substeps];
+        steps.iter().fold(state, |s, controls| model.step(&s, controls, altitude, memory))
     };
     if let Some(before) = shot.start.checked_sub(1) {
         // the integrator remembers the step before
@@ -210,7 +215,8 @@ mod tests {
         };
         let record: Vec<Instant> = (0..60).map(instant).collect();
         let worst = |blur: f64| {
-            let error = |k: usize| (between(&record, k, 0.5, blur).aileron - true_value(k)).abs();
+            let error =
+                |k: usize| (between(&record, k as f64 + 0.5, blur).aileron - true_value(k)).abs();
             (10..50).map(error).fold(0.0, f64::max)
         };
         // the mean takes (0.19)²/8 = 0.5 %; undone to second order, 0.19⁴ · 5/128 = 5e-5 is left

@@ -7,7 +7,8 @@ use super::CompareError;
 use super::kernel::{Kernel, weigh};
 use super::names::RegimeVariable;
 use super::result::{FlightResult, FlightTrace, NuisanceResult};
-use crate::model::{GreyBox, STEP};
+use crate::logs::Sampling;
+use crate::model::{GreyBox, Integrator, Memory, STEP};
 use crate::physics::State;
 use crate::physics::inputs::InputMemory;
 use crate::sysid::reconstruction::{Instant, Reconstruction};
@@ -24,6 +25,8 @@ pub struct Prepared {
     pub dt: f64,
     /// Steps of [`STEP`] between samples.
     pub substeps: usize,
+    /// What body rates and deflections stand for between samples.
+    pub sampling: Sampling,
     /// Stretches in the air without gaps.
     pub segments: Vec<Vec<Instant>>,
     /// Noise of roll, pitch, airspeed, p, q, r, α, β that the reconstruction has left in; zero where
@@ -78,6 +81,7 @@ impl Prepared {
             name: flight.name.clone(),
             dt,
             substeps,
+            sampling: flight.sampling,
             segments,
             noise,
             force_noise,
@@ -96,14 +100,56 @@ impl Prepared {
         for instants in &mut acting.segments {
             let Some(first) = instants.first() else { continue };
             let mut memory = InputMemory::at_rest(&first.controls);
+            let mut before = first.controls;
             for instant in instants {
                 let measured = instant.controls;
-                for _ in 0..self.substeps {
-                    instant.controls = model.act(&measured, &mut memory);
+                for j in 1..=self.substeps {
+                    let input = match self.sampling {
+                        Sampling::Held => measured,
+                        Sampling::Instants => {
+                            before.towards(&measured, j as f64 / self.substeps as f64)
+                        }
+                    };
+                    instant.controls = model.act(&input, &mut memory);
                 }
+                before = measured;
             }
         }
         Cow::Owned(acting)
+    }
+
+    /// `model` with the integrator that this flight's samples call for: its own where the log holds what
+    /// a simulator holds, RK4 where it has samples at instants.
+    pub fn stepping<'a>(&self, model: &'a GreyBox) -> Cow<'a, GreyBox> {
+        match (self.sampling, model.integrator) {
+            (Sampling::Instants, Integrator::Jsbsim) => {
+                let mut model = model.clone();
+                model.integrator = Integrator::Rk4;
+                Cow::Owned(model)
+            }
+            _ => Cow::Borrowed(model),
+        }
+    }
+
+    /// The state of `model`, which must be [`Self::stepping`], one sample after `state`, the deflections
+    /// being those of sample `at` until the one after it, `next`.
+    pub fn advance(
+        &self,
+        model: &GreyBox,
+        state: State,
+        [at, next]: [&Instant; 2],
+        memory: &mut Memory,
+    ) -> State {
+        (0..self.substeps).fold(state, |s, j| {
+            let controls = match self.sampling {
+                Sampling::Held => at.controls,
+                Sampling::Instants => {
+                    let part = (j as f64 + 0.5) / self.substeps as f64;
+                    at.controls.towards(&next.controls, part)
+                }
+            };
+            model.step(&s, &controls, at.altitude, memory)
+        })
     }
 
     /// The samples of a window.

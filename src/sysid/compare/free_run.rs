@@ -57,13 +57,14 @@ fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>
     let every = ((START_EVERY_S / flight.dt).round() as usize).max(1);
     let looks: Vec<usize> =
         times.iter().map(|t| ((t / flight.dt).round() as usize).max(1)).collect();
+    let model = flight.stepping(model);
     let mut runs = Vec::new();
     let mut trace = Trace::default();
     for segment in &flight.segments {
         let starts: Vec<usize> = (0..segment.len() - 1).step_by(every).collect();
         let flown: Vec<(Vec<Look>, Vec<[f64; 8]>)> = starts
             .par_iter()
-            .map(|&start| run(model, flight.substeps, segment, start, &looks, every))
+            .map(|&start| run(&model, flight, segment, start, &looks, every))
             .collect();
         let mut drawn: Vec<[f64; 8]> = Vec::with_capacity(segment.len() + 1);
         for (start, (looks, path)) in starts.iter().zip(flown) {
@@ -84,7 +85,7 @@ fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>
 /// One run from sample `start`: its looks, and its path over the first `keep` samples.
 fn run(
     model: &GreyBox,
-    substeps: usize,
+    flight: &Prepared,
     segment: &[Instant],
     start: usize,
     looks: &[usize],
@@ -92,19 +93,20 @@ fn run(
 ) -> (Vec<Look>, Vec<[f64; 8]>) {
     let scale = model.scale();
     let mut memory = Memory::default();
-    let advance = |at: &Instant, state: State, memory: &mut Memory| {
-        (0..substeps).fold(state, |s, _| model.step(&s, &at.controls, at.altitude, memory))
+    let advance = |k: usize, state: State, memory: &mut Memory| {
+        let next = &segment[(k + 1).min(segment.len() - 1)];
+        flight.advance(model, state, [&segment[k], next], memory)
     };
-    if let Some(before) = start.checked_sub(1).map(|i| &segment[i]) {
+    if let Some(before) = start.checked_sub(1) {
         // the integrator remembers the step before
-        advance(before, before.state, &mut memory);
+        advance(before, segment[before].state, &mut memory);
     }
     let last = looks.last().map_or(0, |l| (start + l).min(segment.len() - 1));
     let mut state = segment[start].state;
     let mut seen = Vec::new();
     let mut path = vec![state.to_array()];
     for i in start..last.max((start + keep).min(segment.len()) - 1) {
-        state = advance(&segment[i], state, &mut memory);
+        state = advance(i, state, &mut memory);
         let measured = segment[i + 1].state.to_array();
         let error = error(&measured, &state.to_array());
         let good = scaled(&error, &scale) <= DIVERGENCE_BOUND;

@@ -6,6 +6,7 @@
 use super::flight::{Prepared, Window};
 use super::kernel::{Kernel, weigh};
 use super::names::ChannelId;
+use crate::logs::Sampling;
 use crate::model::{GreyBox, Integrator, Memory};
 use crate::num::Real;
 use crate::physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
@@ -33,8 +34,11 @@ pub struct Series {
 /// Forces need the accelerometers and are left out if the flight has none.
 pub fn channels(model: &GreyBox, flight: &Prepared) -> Vec<Series> {
     let flight = &*flight.acting(model);
-    let steps: Vec<Vec<Vector<f64>>> =
-        flight.segments.iter().map(|s| one_step_rates(model, s, flight)).collect();
+    let steps: Vec<Vec<Vector<f64>>> = flight
+        .segments
+        .iter()
+        .map(|s| one_step_rates(&flight.stepping(model), s, flight))
+        .collect();
     let both: Vec<[[f64; 2]; 9]> = flight
         .windows
         .iter()
@@ -65,12 +69,14 @@ fn window(
         let predicted = smooth(&kernel.sample, samples.iter().map(|i| predicted_force(model, i)));
         set(&mut both[..3], measured, predicted);
     }
-    set(&mut both[3..6], measured_moment(model, samples, kernel), {
-        smooth(
-            &kernel.step,
-            steps(samples, model.integrator).map(|s| s.average(|i, z| moment(model, i, z))),
-        )
-    });
+    let at_instants = flight.sampling == Sampling::Instants;
+    let average = |of: &dyn Fn(&Instant, &Instant) -> Vector<f64>| match at_instants {
+        true => smooth(&kernel.sample, samples.iter().map(|i| of(i, i))),
+        false => smooth(&kernel.step, steps(samples, model.integrator).map(|s| s.average(of))),
+    };
+    let turning = average(&|i, _| gyroscopic(&model.body, &i.state));
+    let measured = measured_moment(model, samples, kernel, turning);
+    set(&mut both[3..6], measured, average(&|i, z| moment(model, i, z)));
     let slope = |of: fn(&State) -> f64| weigh(&kernel.slope, samples.iter().map(|i| of(&i.state)));
     let measured = [slope(|s| s.airspeed), slope(|s| s.alpha), slope(|s| s.beta)];
     set(&mut both[6..], measured, smooth(&kernel.step, rates.iter().copied()));
@@ -143,13 +149,16 @@ pub(in crate::sysid) fn to_force_axes<R: Real>(
     [drag, lift, side]
 }
 
-/// Σ K (J Δω/Δt + ω × Jω), N m, with the model's inertia.
-fn measured_moment(model: &GreyBox, samples: &[Instant], kernel: &Kernel) -> Vector<f64> {
+/// Σ K (J Δω/Δt + ω × Jω), N m, with the model's inertia; `turning` is the second term.
+fn measured_moment(
+    model: &GreyBox,
+    samples: &[Instant],
+    kernel: &Kernel,
+    turning: Vector<f64>,
+) -> Vector<f64> {
     let rate = |of: fn(&State) -> f64| weigh(&kernel.slope, samples.iter().map(|i| of(&i.state)));
     let spin = [rate(|s| s.p), rate(|s| s.q), rate(|s| s.r)];
-    let turning = steps(samples, model.integrator)
-        .map(|step| step.average(|i, _| gyroscopic(&model.body, &i.state)));
-    let (momentum, turning) = (inertia(&model.body, spin), smooth(&kernel.step, turning));
+    let momentum = inertia(&model.body, spin);
     std::array::from_fn(|k| momentum[k] + turning[k])
 }
 
@@ -178,15 +187,12 @@ fn moment(model: &GreyBox, at: &Instant, controls: &Instant) -> Vector<f64> {
 /// Rates of V, α, β that the model's integrator makes of each step, 1/s.
 fn one_step_rates(model: &GreyBox, segment: &[Instant], flight: &Prepared) -> Vec<Vector<f64>> {
     let mut memory = Memory::default();
-    let mut rate = |at: &Instant| {
-        let mut state = at.state;
-        for _ in 0..flight.substeps {
-            state = model.step(&state, &at.controls, at.altitude, &mut memory);
-        }
-        let (a, b) = (at.state, state);
+    let mut rate = |k: usize| {
+        let (at, next) = (&segment[k], &segment[(k + 1).min(segment.len() - 1)]);
+        let (a, b) = (at.state, flight.advance(model, at.state, [at, next], &mut memory));
         [b.airspeed - a.airspeed, b.alpha - a.alpha, b.beta - a.beta].map(|x| x / flight.dt)
     };
-    segment.iter().map(&mut rate).collect()
+    (0..segment.len()).map(&mut rate).collect()
 }
 
 /// What the sensors' noise, taken as white, brings into each channel's residual: variances in the
@@ -276,6 +282,12 @@ pub fn columns(model: &GreyBox, flight: &Prepared) -> Columns {
         let samples = flight.samples(window);
         for (weight, at) in flight.kernel.sample.iter().zip(samples) {
             force_columns(model, at, *weight, &mut add);
+        }
+        if flight.sampling == Sampling::Instants {
+            for (weight, at) in flight.kernel.sample.iter().zip(samples) {
+                moment_columns(model, at, at, *weight, &mut add);
+            }
+            continue;
         }
         for (weight, step) in flight.kernel.step.iter().zip(steps(samples, model.integrator)) {
             let part = if step.to.is_some() { 0.5 } else { 1.0 };

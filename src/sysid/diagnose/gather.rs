@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::local::CHANNELS;
+use crate::logs::Sampling;
 use crate::model::Integrator;
 use crate::physics::Controls;
 use crate::sysid::compare::flight::Prepared;
@@ -30,7 +31,8 @@ pub struct Place<'a> {
 }
 
 /// Averages what `evaluate` reports, as `add(column, channel, amount)`, over each window: forces on
-/// the samples, moments on the steps, as the integrator has them.
+/// the samples, moments on the steps as the integrator has them, on the samples too where these are taken
+/// at instants.
 pub fn gather(
     flight: &Prepared,
     integrator: Integrator,
@@ -97,7 +99,11 @@ fn group(
             let start = flight.windows[w].start;
             if start <= index && index <= start + kernel.steps() && count < OVERLAP {
                 let k = index - start;
-                let step = kernel.step.get(k).copied().unwrap_or(0.0);
+                let step = match flight.sampling {
+                    Sampling::Held => kernel.step.get(k).copied().unwrap_or(0.0),
+                    // both ends of a step count half: the mean of the two steps beside the sample
+                    Sampling::Instants => kernel.sample[k],
+                };
                 holders[count] = (w - first, kernel.sample[k], step);
                 count += 1;
             }
@@ -115,7 +121,7 @@ fn group(
             });
         };
         match (integrator, instants.get(index + 1)) {
-            (Integrator::Rk4, Some(next)) => {
+            (Integrator::Rk4, Some(next)) if flight.sampling == Sampling::Held => {
                 visit(&instants[index], 1.0, 0.5);
                 visit(next, 0.0, 0.5);
             }

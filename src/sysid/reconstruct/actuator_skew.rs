@@ -7,8 +7,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Timing;
 use super::nuisance::SKEW_SAMPLES;
+use crate::logs::Sampling;
 use crate::sysid::reconstruction::{Instant, Segment};
 
 /// Length of the averaging kernel, s.
@@ -51,14 +51,14 @@ pub fn estimate(
     segments: &[Segment],
     erring: &[Vec<Segment>],
     step: f64,
-    timing: Timing,
+    sampling: Sampling,
     gusts: f64,
 ) -> Skew {
     let prior = (SKEW_SAMPLES * step).powi(-2);
     let (mut information, mut weighted) = (prior, 0.0);
     let axes: [(Rate, Terms); 2] = [(|i| i.state.p, roll_terms), (|i| i.state.q, pitch_terms)];
     for (rate, terms) in axes {
-        let of = |segments: &[Segment]| from_axis(segments, step, timing, rate, terms);
+        let of = |segments: &[Segment]| from_axis(segments, step, sampling, rate, terms);
         let Some(skew) = of(segments) else { continue };
         let again: Vec<f64> = erring.iter().filter_map(|s| of(s)).map(|s| s.late).collect();
         let skew = extrapolated(skew, &again);
@@ -105,7 +105,7 @@ fn pitch_terms(i: &Instant) -> Vec<f64> {
 fn from_axis(
     segments: &[Segment],
     step: f64,
-    timing: Timing,
+    sampling: Sampling,
     rate: fn(&Instant) -> f64,
     terms: fn(&Instant) -> Vec<f64>,
 ) -> Option<Skew> {
@@ -118,7 +118,7 @@ fn from_axis(
         .collect();
     let (mut rows, mut values) = (Vec::new(), Vec::new());
     for segment in segments {
-        let terms: Vec<Vec<f64>> = held(segment.instants.iter().map(terms).collect(), timing);
+        let terms: Vec<Vec<f64>> = held(segment.instants.iter().map(terms).collect(), sampling);
         let rates: Vec<f64> = segment.instants.iter().map(rate).collect();
         let mut middle = half + 1;
         while middle + half + 1 < rates.len() {
@@ -132,10 +132,10 @@ fn from_axis(
 }
 
 /// The terms over the interval that starts with each sample.
-fn held(terms: Vec<Vec<f64>>, timing: Timing) -> Vec<Vec<f64>> {
-    match timing {
-        Timing::Held => terms,
-        Timing::Sampled => (0..terms.len())
+fn held(terms: Vec<Vec<f64>>, sampling: Sampling) -> Vec<Vec<f64>> {
+    match sampling {
+        Sampling::Held => terms,
+        Sampling::Instants => (0..terms.len())
             .map(|k| {
                 let after = &terms[(k + 1).min(terms.len() - 1)];
                 terms[k].iter().zip(after).map(|(a, b)| 0.5 * (a + b)).collect()

@@ -11,7 +11,8 @@ use super::levels::{CALM, Levels};
 use super::measurement::{self, AT, OTHERS, Others, Reading};
 use super::nuisance::{COUNT, INERTIAL, Values, WIND};
 use super::path::Path;
-use super::{Options, ReconstructError, Timing};
+use super::{Options, ReconstructError};
+use crate::logs::Sampling;
 use crate::num::stream::Stream;
 
 /// Columns where the constants are free: all, those between instants; right-hand side last.
@@ -38,6 +39,8 @@ pub struct Problem<'a> {
     pub log: &'a Log,
     /// What the reconstruction is told.
     pub options: &'a Options,
+    /// What a rate sample stands for.
+    pub sampling: Sampling,
     /// Means of the constants before the data is seen.
     pub means: Values,
     /// Standard deviations of the constants before the data is seen.
@@ -144,7 +147,7 @@ impl Problem<'_> {
             .into_iter()
             .map(|r| r.with(std::array::from_fn(|i| l.measured[i] * unit())))
             .collect();
-        let drive = Drive::new(track, values, step, self.options.timing, gravity);
+        let drive = Drive::new(track, values, step, self.sampling, gravity);
         let sd = step_deviations::<N>(l, step);
         let along: &Path = path;
         let instant = |k: usize, node: &mut Node<N, 1>, corner: &mut band::Corner<1>| {
@@ -168,8 +171,8 @@ impl Problem<'_> {
         let link = |k: usize, corner: &mut band::Corner<1>| {
             let mut step = drive.step::<N, 1>(along, values, k, step, gravity);
             for i in 0..N {
-                let unit = match (i, self.options.timing) {
-                    (0..3, Timing::Sampled) => 0.5 * (noise[k][i] + noise[k + 1][i]),
+                let unit = match (i, self.sampling) {
+                    (0..3, Sampling::Instants) => 0.5 * (noise[k][i] + noise[k + 1][i]),
                     _ => noise[k][i],
                 };
                 step.rest[i][0] = sd[i] * unit;
@@ -239,7 +242,7 @@ impl Problem<'_> {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let (values, l) = (&found.values, &found.levels);
         let readings = measurement::readings(track, path, values, step);
-        let drive = Drive::new(track, values, step, self.options.timing, gravity);
+        let drive = Drive::new(track, values, step, self.sampling, gravity);
         let spread = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
         let sd = step_deviations::<N>(l, step);
         let instant = |k: usize, node: &mut Node<N, W>, corner: &mut band::Corner<W>| {

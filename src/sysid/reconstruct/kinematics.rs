@@ -2,12 +2,12 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Timing;
 use super::band::{Block, Wide};
 use super::intake::Track;
 use super::nuisance::{EARTH, FORCE, GYRO, INERTIAL, SKEW_FORCE, Values};
 use super::path::Path;
 use super::rotation::{cross, exp, log};
+use crate::logs::Sampling;
 
 /// Time over which a gust is forgotten, s: the length scale of turbulence some hundred metres up over
 /// the airspeed of a small aircraft.
@@ -63,7 +63,13 @@ impl Drive {
     /// The drive of `track` at the constants `values`, samples `step` (s) apart.
     ///
     /// Without accelerometers the velocity is carried on unchanged.
-    pub fn new(track: &Track, values: &Values, step: f64, timing: Timing, gravity: f64) -> Drive {
+    pub fn new(
+        track: &Track,
+        values: &Values,
+        step: f64,
+        sampling: Sampling,
+        gravity: f64,
+    ) -> Drive {
         let n = track.len();
         let bias = Vector3::from_column_slice(&values[GYRO..GYRO + 3]);
         let gyro = |k: usize| Vector3::from(track.rates[k]) - bias;
@@ -71,13 +77,13 @@ impl Drive {
         let has_force = track.force.first().is_some_and(|f| f[0].is_finite());
         let mut drive = Drive { rate: vec![], force: vec![], force_by_skew: vec![] };
         for k in 0..n - 1 {
-            let (rate, mean): (_, [(Matrix3<f64>, usize, f64); 2]) = match timing {
-                Timing::Held => {
+            let (rate, mean): (_, [(Matrix3<f64>, usize, f64); 2]) = match sampling {
+                Sampling::Held => {
                     let before = k.saturating_sub(1);
                     let back = exp(&(gyro(before) * -step));
                     (gyro(k), [(Matrix3::identity(), k, 1.5), (back, before, -0.5)])
                 }
-                Timing::Sampled => {
+                Sampling::Instants => {
                     let rate = (gyro(k) + gyro(k + 1)) * 0.5;
                     let on = exp(&(rate * step));
                     (rate, [(Matrix3::identity(), k, 0.5), (on, k + 1, 0.5)])

@@ -18,25 +18,17 @@ pub(in crate::sysid) mod nuisance;
 mod outcome;
 mod path;
 mod rotation;
+mod sampling;
 mod smoother;
 
 pub use manoeuvres::{Kind as ManoeuvreKind, Manoeuvre, manoeuvres};
 
 use equations::Problem;
+use sampling::Chosen;
 
-use crate::logs::Flight;
+use crate::logs::{Flight, Sampling};
 use crate::physics::airframe::ActuatorFigures;
 use crate::sysid::reconstruction::Reconstruction;
-
-/// What a rate sample stands for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Timing {
-    /// The rate from this sample to the next one, as JSBSim and [`crate::model::Integrator`]'s scheme
-    /// of that name have it: rates and attitude by explicit Euler, velocity by Adams–Bashforth 2.
-    Held,
-    /// The rate at the instant of the sample.
-    Sampled,
-}
 
 /// Which clock the deflections are handed out on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +50,10 @@ pub struct Options {
     pub actuators: ActuatorFigures,
     /// Effective gravity, m/s².
     pub gravity: f64,
-    /// What a rate sample stands for. Clock skews are relative to the gyros' samples so understood.
-    pub timing: Timing,
+    /// What a rate sample stands for; `None` to take it from the log: from its
+    /// column `rate_hold_s`, else from its clocks. Clock skews
+    /// are relative to the gyros' samples so understood.
+    pub sampling: Option<Sampling>,
     /// Which clock the deflections are handed out on.
     pub actuators_clock: ActuatorClock,
     /// Shortest time between reconstructed samples, s; a slower log keeps its own median period.
@@ -79,7 +73,7 @@ impl Options {
             name: name.into(),
             actuators,
             gravity: 9.80665,
-            timing: Timing::Held,
+            sampling: None,
             actuators_clock: ActuatorClock::Estimated,
             step_s: 0.01,
             gap_s: 0.1,
@@ -150,7 +144,10 @@ pub enum ReconstructError {
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
     let (means, widths) = (nuisance::prior_means(), nuisance::prior_widths(log.step));
-    let problem = Problem { log: &log, options, means, widths };
-    let found = smoother::smooth(&problem)?;
-    outcome::assemble(&problem, &found)
+    let declared = options.sampling.or_else(|| flight.declared_sampling());
+    let problem = Problem { log: &log, options, sampling: Sampling::Instants, means, widths };
+    let Chosen { sampling, found, note } = sampling::choose(&problem, declared)?;
+    let mut outcome = outcome::assemble(&Problem { sampling, ..problem }, &found)?;
+    outcome.notes.extend(note);
+    Ok(outcome)
 }

@@ -37,7 +37,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     let erring = draws(problem, found)?;
     let left = left(&segments, &erring, &found.levels.gyro);
     let gusts = found.levels.gusts;
-    let skew = actuator_skew::estimate(&segments, &erring, log.step, options.timing, gusts);
+    let skew = actuator_skew::estimate(&segments, &erring, log.step, problem.sampling, gusts);
     let late = late_beyond_doubt(&skew, log.step);
     if late && options.actuators_clock == ActuatorClock::AsRecorded {
         notes.push(format!(
@@ -64,6 +64,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     Ok(Reconstruction {
         name: options.name.clone(),
         step_s: log.step,
+        sampling: problem.sampling,
         segments,
         nuisances,
         noise: [m[0], m[1], m[3], l.gyro[0], l.gyro[1], l.gyro[2], m[4], m[5]],

@@ -35,7 +35,7 @@ const LEVEL_SETTLED: f64 = 0.02;
 /// # Errors
 /// [`ReconstructError::NoPath`] if the search does not settle on numbers.
 pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
-    let Problem { log, options, means, widths } = *problem;
+    let Problem { log, options, means, widths, .. } = *problem;
     let singular = || no_path(&options.name, "the equations became singular");
     let mut found = Found {
         paths: log.tracks.iter().map(Path::guess).collect(),

@@ -107,7 +107,11 @@ pub(super) fn fly(
         observer,
         launcher,
         sensors: Sensors::new(px4.noise, options.bias, field, options.seed),
-        log: options.truth.as_ref().map(TruthLog::create).transpose()?,
+        log: options
+            .truth
+            .as_ref()
+            .map(|t| TruthLog::create(t, STEP_US as f64 * 1e-6))
+            .transpose()?,
         client: None,
         connection: 0,
         counts: Summary::default(),

@@ -63,6 +63,7 @@ impl Assembly {
                 faults: Faults::NONE,
                 state: State::NEUTRAL,
                 yaw: 0.0,
+                rate_hold_s: 0.0,
                 specific_force: [0.0, 0.0, -9.81],
                 actuators: Default::default(),
                 altitude: 0.0,
