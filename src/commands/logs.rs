@@ -1,6 +1,6 @@
 //! `greylag logs`: what a flight log holds, or the same as a CSV table.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
@@ -11,7 +11,10 @@ use crate::logs::finding::Severity;
 use crate::logs::info::Info;
 use crate::logs::mapping::Mapping;
 use crate::logs::phases::Kind;
-use crate::logs::{Log, Options, csv};
+use crate::logs::{Flight, Log, Options, csv};
+use crate::model::GreyBox;
+use crate::sysid::reconstruct;
+use crate::sysid::reconstruction::Reconstruction;
 
 /// Exit status when what would be computed from the log is wrong.
 const PROBLEM: u8 = 2;
@@ -42,6 +45,22 @@ enum Verb {
         input: PathBuf,
         /// The table.
         output: PathBuf,
+        /// Replace the table if it exists.
+        #[arg(long)]
+        force: bool,
+        #[command(flatten)]
+        reading: Reading,
+    },
+    /// Reconstruct the flight path of a log: write the states without sensor errors as a CSV table and
+    /// print the sensor errors, the wind and the clocks with their standard deviations.
+    Reconstruct {
+        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+        input: PathBuf,
+        /// The table, in the columns of the log format.
+        output: PathBuf,
+        /// The model file of the aircraft: its actuators turn commands into deflections.
+        #[arg(long, default_value = "params/x8/prior.toml")]
+        model: PathBuf,
         /// Replace the table if it exists.
         #[arg(long)]
         force: bool,
@@ -84,14 +103,41 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             let log = crate::logs::load(input, &reading.options()?)?;
             convert(&log, output, *force)
         }
+        Verb::Reconstruct { input, output, model, force, reading } => {
+            files::writable(output, (*force).into())?;
+            let model = GreyBox::load(model)?;
+            let log = crate::logs::load(input, &reading.options()?)?;
+            let name = log.flight.name.clone();
+            let options = reconstruct::Options {
+                gravity: model.atmosphere.gravity,
+                ..reconstruct::Options::new(name, model.airframe.actuators)
+            };
+            let flight = reconstruct::reconstruct(&log.flight, &options)?;
+            csv_file(&flight.to_flight(), output, *force)?;
+            print_reconstruction(&flight, output);
+            Ok(ExitCode::SUCCESS)
+        }
     }
 }
 
-fn convert(log: &Log, output: &std::path::Path, force: bool) -> Result<ExitCode> {
+fn csv_file(flight: &Flight, output: &Path, force: bool) -> Result<()> {
     let mut bytes = Vec::new();
-    csv::write(&log.flight, &mut bytes)?;
+    csv::write(flight, &mut bytes)?;
     let text = String::from_utf8(bytes).context("the table is no text")?;
-    files::write(output, &text, force.into())?;
+    files::write(output, &text, force.into())
+}
+
+fn print_reconstruction(flight: &Reconstruction, output: &Path) {
+    let rows: usize = flight.segments.iter().map(|s| s.instants.len()).sum();
+    println!("{rows} reconstructed samples of {} in {}", flight.name, output.display());
+    for n in &flight.nuisances {
+        println!("{:<22} {:>11.5} ± {:.5} {}", n.name, n.value, n.sd, n.unit);
+    }
+    flight.notes.iter().for_each(|note| println!("{note}"));
+}
+
+fn convert(log: &Log, output: &Path, force: bool) -> Result<ExitCode> {
+    csv_file(&log.flight, output, force)?;
     log.findings.iter().for_each(|finding| eprintln!("{finding}"));
     println!("{} rows of {} in {}", log.flight.samples.len(), log.flight.name, output.display());
     Ok(status(&Info::of(log)))

@@ -1,6 +1,6 @@
 //! A flight after reconstruction: one clock, no sensor errors, no gaps inside a segment.
 
-use crate::logs::Sampling;
+use crate::logs::{Flight, Sample, Sampling};
 use crate::physics::{Command, Controls, State};
 
 /// One instant of a reconstructed flight.
@@ -72,4 +72,40 @@ pub struct Reconstruction {
     pub force_noise: [f64; 3],
     /// What the reader must know: assumptions made, power lost, for example for want of a vane.
     pub notes: Vec<String>,
+}
+
+impl Reconstruction {
+    /// The flight as a log: reconstructed states and what was measured beside them.
+    pub fn to_flight(&self) -> Flight {
+        let rate_hold_s = if self.sampling == Sampling::Held { self.step_s } else { 0.0 };
+        let sample = |i: &Instant| {
+            let (s, z) = (&i.state, &i.controls);
+            let command = i.command.unwrap_or(Command {
+                aileron: f64::NAN,
+                elevator: f64::NAN,
+                throttle: f64::NAN,
+            });
+            Sample {
+                time_s: i.time_s,
+                attitude_rad: [s.roll, s.pitch, i.yaw],
+                rates_radps: [s.p, s.q, s.r],
+                airspeed_mps: s.airspeed,
+                alpha_rad: s.alpha,
+                beta_rad: s.beta,
+                specific_force_mps2: i.specific_force,
+                altitude_m: i.altitude,
+                air_density_kgpm3: i.density,
+                aileron_rad: z.aileron,
+                elevator_rad: z.elevator,
+                throttle: z.throttle,
+                aileron_cmd: command.aileron,
+                elevator_cmd: command.elevator,
+                throttle_cmd: command.throttle,
+                rate_hold_s,
+                ..Sample::default()
+            }
+        };
+        let samples = self.segments.iter().flat_map(|s| &s.instants).map(sample).collect();
+        Flight { name: self.name.clone(), samples, ..Flight::default() }
+    }
 }

@@ -8,6 +8,7 @@ use super::remainder::{Remainder, remainder};
 use super::round::{Problem, Round};
 use super::settling::{Ranked, SETTLING, ranked, settled};
 use super::shape::{Shape, shape};
+use super::shares;
 use crate::model::GreyBox;
 use crate::physics::inputs::Kind;
 
@@ -31,6 +32,11 @@ const SHAPELESS: f64 = 0.1;
 /// Precision of the formula of an effect that is not linear in its constants: whatever takes a smaller part of
 /// what such an effect took before may be no more than its error.
 const PRECISION: f64 = 2e-3;
+/// Least share of a channel's variance that an effect must explain to be material: what is less is below
+/// what reconstruction and sampling leave of exact models.
+const MATERIAL: f64 = 5e-4;
+/// Least share of a channel's error beyond noise that an effect must take to be material beside others.
+const MATERIAL_BESIDE: f64 = 0.02;
 /// A candidate whose contribution is this much like another's can take its place.
 const RIVAL: f64 = 0.3;
 
@@ -59,6 +65,8 @@ pub struct Selected {
     pub refused: Vec<String>,
     /// Whether it takes too little of the error to matter, whatever else speaks against it.
     pub slight: bool,
+    /// What there is to say of it if it is significant but not material; see [`material`].
+    pub trace: Option<String>,
     /// Whether it is a figure of the model's own by another name, so that what is left says nothing of it.
     pub relieves: bool,
     /// Whether it is not linear in its constants.
@@ -71,6 +79,8 @@ pub struct Selected {
 pub struct Found {
     /// The first round: the model tuned, nothing joined.
     pub first: Round,
+    /// Share of each channel's variance beyond noise that the first round leaves unexplained.
+    pub unexplained: [f64; 6],
     /// What a flexible model could remove of what the first round leaves.
     pub first_remainder: Remainder,
     /// The last round, with every asserted effect in the model; `None` if that is the first one.
@@ -118,6 +128,7 @@ pub fn search(
         ranked(problem, Round::new(problem, tuned, &entries)?, options);
     let first_remainder = remainder(&first, options.nulls, options.level);
     let mut found = Found {
+        unexplained: shares::unexplained(&first, &first.tuned_residual()),
         remainder: first_remainder.clone(),
         first,
         first_remainder,
@@ -136,8 +147,13 @@ pub fn search(
         found.level.clear();
         run_off(problem, &mut found);
         let Some(winner) = examine(&found, options) else { break };
-        let passed = winner.refused.is_empty();
-        progress(&format!("{}: {}", winner.id, if passed { "joins" } else { "is refused" }));
+        let passed = winner.refused.is_empty() || winner.trace.is_some();
+        let outcome = match (&winner.trace, passed) {
+            (Some(_), _) => "is a trace",
+            (None, true) => "joins",
+            (None, false) => "is refused",
+        };
+        progress(&format!("{}: {outcome}", winner.id));
         found.selected.push(winner);
         if !passed || !found.join(problem, model, &entries, options) {
             break;
@@ -245,6 +261,11 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
         refused.push("the flights contradict one another about its amount".into());
     }
     let contribution = round.contribution(score);
+    let trace = match refused.is_empty() && !relieves {
+        true => immaterial(found, round, score),
+        false => None,
+    };
+    refused.extend(trace.clone());
     Some(Selected {
         id: trial.id,
         score: score.clone(),
@@ -257,9 +278,37 @@ fn examine(found: &Found, options: &Options) -> Option<Selected> {
         taken: round.taken_by(score),
         refused,
         slight,
+        trace,
         relieves,
         curved: trial.points[score.point].contribution.is_some(),
         contribution,
+    })
+}
+
+/// Says so if a significant effect does not matter: in no channel does it explain [`MATERIAL`] of the variance
+/// and [`MATERIAL_BESIDE`] of what the tuned model left beyond noise.
+fn immaterial(found: &Found, round: &Round, score: &Score) -> Option<String> {
+    let taken = round.taken_by(score);
+    let of_channel = |c: usize| {
+        let only = std::array::from_fn(|k| k == c);
+        let share = (taken[c] / checks::excess(&found.first, &only).max(taken[c])).max(0.0);
+        let share = if share.is_finite() { share } else { 0.0 };
+        [share, share * found.unexplained[c]]
+    };
+    let shares: Vec<[f64; 2]> = (0..6).map(of_channel).collect();
+    let matters = |[of_error, of_variance]: &[f64; 2]| {
+        *of_error >= MATERIAL_BESIDE && *of_variance >= MATERIAL
+    };
+    let most = |k: usize| 100.0 * shares.iter().map(|s| s[k]).fold(0.0, f64::max);
+    (!shares.iter().any(matters)).then(|| {
+        format!(
+            "trace: real or of the sampling, it explains at most {:.2} % of a channel's variance and {:.1} % of \
+             a channel's error, under {:.2} % and {:.0} %",
+            most(1),
+            most(0),
+            100.0 * MATERIAL,
+            100.0 * MATERIAL_BESIDE
+        )
     })
 }
 
@@ -372,16 +421,18 @@ impl Found {
                     100.0 * share
                 ));
             }
-            if Kind::from_id(effect.id).is_some() && shape.bends() {
-                effect.refused.push(
-                    "with it, second derivatives of the surfaces still explain part of what is missing: \
-                     what acts on them takes another course in time"
-                        .into(),
-                );
+            let bends = shape.bends_beside(effect.score.fall);
+            if Kind::from_id(effect.id).is_some() && bends > SHAPELESS {
+                effect.refused.push(format!(
+                    "lack of fit: with it, second derivatives of the surfaces still explain {:.0} % of what is \
+                     missing, so what acts on them takes another course in time",
+                    100.0 * bends
+                ));
             }
         }
         // what was found beside an effect that is not there is no more sure than that
-        let Some(first) = self.selected.iter().position(|s| !s.refused.is_empty()) else { return };
+        let refused = |s: &Selected| !s.refused.is_empty() && s.trace.is_none();
+        let Some(first) = self.selected.iter().position(refused) else { return };
         let (refused, later) = self.selected.split_at_mut(first + 1);
         for effect in later.iter_mut().filter(|s| s.refused.is_empty()) {
             effect
@@ -390,9 +441,21 @@ impl Found {
         }
     }
 
-    /// Whether what is left goes with products of states more than chance does.
+    /// Whether what is left goes with products of states more than chance does, in a channel where it matters.
     pub fn has_shape(&self) -> bool {
-        self.shape.as_ref().is_some_and(|shape| (0..6).any(|c| shape.term(c).is_some()))
+        let left = self.left();
+        let in_channel = |shape: &Shape, c: usize| left[c] >= MATERIAL && shape.term(c).is_some();
+        self.shape.as_ref().is_some_and(|shape| (0..6).any(|c| in_channel(shape, c)))
+    }
+
+    /// Share of each channel's variance beyond noise that the last round leaves unexplained.
+    pub fn left(&self) -> [f64; 6] {
+        shares::unexplained(&self.first, &self.round().tuned_residual())
+    }
+
+    /// Whether the last round leaves a channel that matters.
+    pub fn leaves_something(&self) -> bool {
+        self.left().iter().any(|share| *share >= MATERIAL)
     }
 
     /// Share of the squared error beyond noise under the tuned model that a flexible model could still

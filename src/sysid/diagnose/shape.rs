@@ -73,9 +73,11 @@ impl Shape {
         Some((left / (left + fall), name(most)))
     }
 
-    /// Whether second derivatives of the surfaces still explain something, in whatever channel.
-    pub fn bends(&self) -> bool {
-        self.channels.iter().any(|c| c.bent > BENDING)
+    /// The share that second derivatives of the surfaces take, in whatever channel, beside `fall`, which an
+    /// effect took; zero if they take no more than they do of right models.
+    pub fn bends_beside(&self, fall: f64) -> f64 {
+        let bent = self.channels.iter().map(|c| c.bent).filter(|bent| *bent > BENDING).sum::<f64>();
+        bent / (bent + fall).max(f64::MIN_POSITIVE)
     }
 
     fn left_in(&self, channels: &[usize], unsure: f64) -> Option<f64> {

@@ -15,44 +15,38 @@ const SYMBOLS: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
 
 /// Every channel that the flights allow.
 pub fn channels(found: &Found) -> Vec<ChannelLeft> {
-    let (before, after) = (found.first.tuned_residual(), found.round().tuned_residual());
-    let series: Vec<Vec<weak::Series>> = found
-        .first
-        .flights
-        .iter()
-        .map(|f| weak::channels(&found.first.model, &f.measured))
-        .collect();
-    let mut list = Vec::new();
-    for (k, id) in ChannelId::ALL.iter().enumerate().take(6) {
+    let (before, after) = (found.unexplained, found.left());
+    let residual = found.round().tuned_residual();
+    let of = |k: usize| ChannelLeft {
+        channel: SYMBOLS[k].into(),
+        tuned_unexplained_fraction: before[k],
+        unexplained_fraction: after[k],
+        worst_regime: worst(found.round(), &residual, k),
+        left_with: found.shape.as_ref().and_then(|shape| shape.term(k)),
+    };
+    (0..SYMBOLS.len()).filter(|k| before[*k].is_finite()).map(of).collect()
+}
+
+/// Share of each channel's variance beyond noise that `residual`, a column a flight, leaves unexplained under
+/// the model of `first`; NaN where the flights do not measure the channel.
+pub fn unexplained(first: &Round, residual: &[super::gather::Column]) -> [f64; 6] {
+    let series: Vec<Vec<weak::Series>> =
+        first.flights.iter().map(|f| weak::channels(&first.model, &f.measured)).collect();
+    std::array::from_fn(|k| {
         let own: Vec<&weak::Series> =
-            series.iter().flatten().filter(|s| s.channel == *id).collect();
+            series.iter().flatten().filter(|s| s.channel == ChannelId::ALL[k]).collect();
         let measured: Vec<f64> =
             own.iter().flat_map(|s| s.measured.iter().copied()).filter(|x| x.is_finite()).collect();
         if measured.is_empty() {
-            continue;
+            return f64::NAN;
         }
         let noise = mean(&own.iter().map(|s| s.noise_variance).collect::<Vec<_>>());
         let middle = mean(&measured);
-        let variance =
-            measured.iter().map(|x| (x - middle).powi(2)).sum::<f64>() / measured.len() as f64;
-        let share = |residual: &[super::gather::Column]| {
-            let squares: Vec<f64> = residual
-                .iter()
-                .flat_map(|c| c[k].iter())
-                .filter(|x| x.is_finite())
-                .map(|x| x * x)
-                .collect();
-            ((mean(&squares) - noise) / (variance - noise).max(1e-12)).max(0.0)
-        };
-        list.push(ChannelLeft {
-            channel: SYMBOLS[k].into(),
-            tuned_unexplained_fraction: share(&before),
-            unexplained_fraction: share(&after),
-            worst_regime: worst(found.round(), &after, k),
-            left_with: found.shape.as_ref().and_then(|shape| shape.term(k)),
-        });
-    }
-    list
+        let deviations: Vec<f64> = measured.iter().map(|x| (x - middle).powi(2)).collect();
+        let left = residual.iter().flat_map(|c| c[k].iter()).filter(|x| x.is_finite());
+        let squares: Vec<f64> = left.map(|x| x * x).collect();
+        ((mean(&squares) - noise) / (mean(&deviations) - noise).max(1e-12)).max(0.0)
+    })
 }
 
 /// The regime in which the mean residual of a channel stands out most, in words.

@@ -1,5 +1,7 @@
 //! A channel of a log: its samples in time order, missing ones left out.
 
+use crate::num::statistics::quantile;
+
 /// Share of repeated values above which a channel is taken to be slower than the log's rows.
 const HELD_SHARE: f64 = 0.3;
 
@@ -48,6 +50,12 @@ impl Channel {
     /// Whether it has no sample.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
+    }
+
+    /// Median time between samples, s; zero without two of them.
+    pub fn period(&self) -> f64 {
+        let periods: Vec<f64> = self.time.windows(2).map(|w| w[1] - w[0]).collect();
+        if periods.is_empty() { 0.0 } else { quantile(&periods, 0.5) }
     }
 
     /// The number of samples from `start` to `end`, s.

@@ -24,6 +24,8 @@ pub struct Log {
     pub tracks: Vec<Track>,
     /// Which sensors the log has.
     pub has: Sensors,
+    /// How often they measure.
+    pub periods: Periods,
     /// What the reader must know.
     pub notes: Vec<String>,
 }
@@ -43,6 +45,19 @@ pub struct Sensors {
     pub velocity: bool,
     /// Altitude.
     pub altitude: bool,
+}
+
+/// Mean time between the measurements of a sensor, s; zero where it is unknown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Periods {
+    /// Attitude.
+    pub attitude: f64,
+    /// Airspeed.
+    pub airspeed: f64,
+    /// Vanes.
+    pub vanes: f64,
+    /// Velocity over ground.
+    pub velocity: f64,
 }
 
 /// A stretch without gaps, as measured; a missing measurement is NaN. Units as in [`Sample`].
@@ -128,6 +143,15 @@ impl Channels {
         }
     }
 
+    fn periods(&self) -> Periods {
+        Periods {
+            attitude: self.attitude[0].period(),
+            airspeed: self.airspeed.period(),
+            vanes: self.vanes[0].period().max(self.vanes[1].period()),
+            velocity: self.velocity[0].period(),
+        }
+    }
+
     /// Says which needed channel is missing, or shows one and the same value all the time.
     fn check(&self, flight: &str) -> Result<(), ReconstructError> {
         let missing =
@@ -168,7 +192,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     declare(&channels, &has, &mut notes);
     let stretches = stretches(flight, &has, options)?;
     let step = step(&stretches, options);
-    let mut log = Log { step, tracks: Vec::new(), has, notes };
+    let mut log = Log { step, tracks: Vec::new(), has, periods: channels.periods(), notes };
     let mut longest = 0.0_f64;
     for times in &stretches {
         let [start, end] = [times[0], times[times.len() - 1]];

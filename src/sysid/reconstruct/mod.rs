@@ -143,7 +143,7 @@ pub enum ReconstructError {
 /// its sensors contradict one another.
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
-    let (means, widths) = (nuisance::prior_means(), nuisance::prior_widths(log.step));
+    let (means, widths) = (nuisance::prior_means(), nuisance::prior_widths(&log));
     let declared = options.sampling.or_else(|| flight.declared_sampling());
     let problem = Problem { log: &log, options, sampling: Sampling::Instants, means, widths };
     let Chosen { sampling, found, note } = sampling::choose(&problem, declared)?;

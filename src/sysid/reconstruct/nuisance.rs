@@ -1,6 +1,7 @@
 //! The constants estimated along with the path: their names, units and prior widths.
 
-use super::{Options, intake::Sensors};
+use super::Options;
+use super::intake::{Log, Sensors};
 
 /// Number of constants.
 pub const COUNT: usize = 19;
@@ -65,9 +66,19 @@ pub const NAMES: [(&str, &str); COUNT] = [
     ("earth_rate_down", "rad/s"),
 ];
 
-/// Standard deviations before the data is seen, with samples `step` (s) apart.
-pub fn prior_widths(step: f64) -> Values {
-    let mut width = [SKEW_SAMPLES * step; COUNT];
+/// Prior width of the delay of a sensor slower than the log's rows, in its own sample periods: it filters
+/// over about as long as it takes to measure.
+const SKEW_PERIODS: f64 = 0.5;
+
+/// Standard deviations before the data of `log` is seen.
+pub fn prior_widths(log: &Log) -> Values {
+    let least = SKEW_SAMPLES * log.step;
+    let mut width = [least; COUNT];
+    let slower = |period: f64| if period > 2.0 * log.step { SKEW_PERIODS * period } else { least };
+    width[SKEW_ATTITUDE] = slower(log.periods.attitude);
+    width[SKEW_AIRSPEED] = slower(log.periods.airspeed);
+    width[SKEW_VANES] = slower(log.periods.vanes);
+    width[SKEW_VELOCITY] = slower(log.periods.velocity);
     width[GYRO..GYRO + 3].fill(0.05);
     width[FORCE..FORCE + 3].fill(1.0);
     width[ALPHA..=BETA].fill(5.0_f64.to_radians());

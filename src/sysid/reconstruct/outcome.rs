@@ -218,7 +218,7 @@ fn declare(log: &Log, smoothed: &Found, options: &Options, notes: &mut Vec<Strin
             }
         ));
     }
-    let widths = nuisance::prior_widths(log.step);
+    let widths = nuisance::prior_widths(log);
     for place in (0..COUNT).filter(|p| nuisance::concerned(*p, has)) {
         if smoothed.deviations[place] > UNSEEN * widths[place] {
             notes.push(nuisance::unseen(place, has, options));

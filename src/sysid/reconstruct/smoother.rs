@@ -66,6 +66,10 @@ fn gusty(
     found: &mut Found,
     singular: &dyn Fn() -> ReconstructError,
 ) -> Result<(), ReconstructError> {
+    // an airspeed alone, filtered and late as pitots are, would be taken for vertical gusts
+    if !(problem.log.has.alpha && problem.log.has.beta) {
+        return Ok(());
+    }
     let mut trial = found.clone();
     for channel in 3..6 {
         trial.levels.measured[channel] = trial.levels.white[channel];
