@@ -7,7 +7,7 @@ mod logs_support;
 use std::path::Path;
 
 use compare_support::{REALISTIC, fly, model};
-use greylag::logs::{Options, Sample, parse};
+use greylag::logs::{FlowAngles, Options, Sample, parse};
 use greylag::physics::atmosphere::{Atmosphere, Density};
 use greylag::sysid::compare::{self, Comparison, compare};
 use greylag::sysid::reconstruct::{self, reconstruct};
@@ -26,7 +26,9 @@ fn flown() -> Vec<Sample> {
 }
 
 fn rebuilt(bytes: &[u8]) -> Reconstruction {
-    let flight = parse(bytes, Path::new("flight"), &Options::default()).unwrap().flight;
+    let mut flight = parse(bytes, Path::new("flight"), &Options::default()).unwrap().flight;
+    // this aircraft has vanes, though ArduPilot's record of them usually holds estimates
+    flight.flow_angles = FlowAngles::Measured;
     let aircraft = model("jsbsim");
     let options = reconstruct::Options {
         gravity: aircraft.atmosphere.gravity,

@@ -265,6 +265,7 @@ fn reading(raw: Raw, rows: rows::Rows, path: &Path) -> Reading {
             samples: rows.samples,
             unknown_columns: unknown_columns.clone(),
             notes: Vec::new(),
+            ..Flight::default()
         },
         unknown_columns,
         dropped: rows.dropped,

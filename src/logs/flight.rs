@@ -91,6 +91,16 @@ pub enum Sampling {
     Held,
 }
 
+/// Where a log's α and β come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FlowAngles {
+    /// Vanes or another sensor of the flow.
+    #[default]
+    Measured,
+    /// A flight controller's estimate from velocity, attitude and wind: it repeats the other sensors.
+    Estimated,
+}
+
 /// A flight: samples in time order, with what is known about them as a whole.
 ///
 /// Where only the rows matter, `Flight::from(samples)` or `..Flight::default()` fill in the rest.
@@ -100,6 +110,8 @@ pub struct Flight {
     pub name: String,
     /// The rows, in time order.
     pub samples: Vec<Sample>,
+    /// Where α and β come from.
+    pub flow_angles: FlowAngles,
     /// Channels of the file that the format does not name.
     pub unknown_columns: Vec<String>,
     /// What was assumed or derived while reading, one sentence each.

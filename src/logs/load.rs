@@ -9,7 +9,7 @@ use super::finding::Finding;
 use super::format::Format;
 use super::mapping::Mapping;
 use super::topics::{Topics, period_s};
-use super::{Flight, Sample, checks, dataflash, rows, table, tlog, ulog};
+use super::{Flight, FlowAngles, Sample, checks, dataflash, rows, table, tlog, ulog};
 use crate::logs::columns::COLUMNS;
 
 /// How a log is read.
@@ -210,6 +210,11 @@ fn binary(
         flight: Flight {
             name: name(path),
             samples: kept.samples,
+            flow_angles: match format {
+                // AOA.AOA and AOA.SSA are estimates unless a mapping names them as sensors
+                Format::Dataflash if o.mapping.get("alpha_rad").is_none() => FlowAngles::Estimated,
+                _ => FlowAngles::Measured,
+            },
             unknown_columns: Vec::new(),
             notes: table.notes,
         },

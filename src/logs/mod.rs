@@ -20,6 +20,6 @@ mod tlog;
 mod topics;
 mod ulog;
 
-pub use flight::{Flight, Sample, Sampling};
+pub use flight::{Flight, FlowAngles, Sample, Sampling};
 pub use format::Format;
 pub use load::{Channel, Log, LogError, Options, inspect, load, parse};

@@ -8,6 +8,7 @@ use super::flight::Prepared;
 use super::names::ChannelId;
 use super::weak;
 use crate::model::GreyBox;
+use crate::num::statistics::mean;
 use crate::physics::State;
 use crate::sysid::reconstruction::{Instant, Nuisance};
 
@@ -28,9 +29,11 @@ const CONSTANTS: [(&str, Move); COUNT] = [
     ("alpha_bias", |i, by| i.state.alpha += by),
     ("beta_bias", |i, by| i.state.beta += by),
     ("airspeed_scale", |i, by| i.state.airspeed *= 1.0 + by),
+    ("alpha_path", |i, by| i.state.alpha += by),
+    ("beta_path", |i, by| i.state.beta += by),
 ];
 /// How many constants there are.
-pub const COUNT: usize = 9;
+pub const COUNT: usize = 11;
 
 /// How far one standard deviation of each constant moves a residual, in the channel's unit.
 pub type Shift = [f64; COUNT];
@@ -82,6 +85,12 @@ pub fn deviation<'a>(shifts: impl Iterator<Item = (usize, &'a Shift)>) -> f64 {
     }
     let square: f64 = sums.iter().flatten().map(|sum| (sum / count).powi(2)).sum();
     if square.is_finite() { square.sqrt() } else { 0.0 }
+}
+
+/// Root mean square over windows of what the constants bring into a residual, all together.
+pub fn level<'a>(shifts: impl Iterator<Item = &'a Shift>) -> f64 {
+    let squares: Vec<f64> = shifts.map(|s| s.iter().map(|x| x * x).sum()).collect();
+    if squares.is_empty() { 0.0 } else { mean(&squares).sqrt() }
 }
 
 #[cfg(test)]

@@ -208,6 +208,8 @@ fn channel(
         unexplained: power.unexplained(),
         finding: found.as_ref(),
         follows: finding::follows(&bins),
+        within_doubt: (power.residual - power.noise).max(0.0).sqrt()
+            < doubt::NORMAL_95 * doubt::level(residuals.iter().map(|r| &r.shift)),
         mass: model.body.mass,
         flights: flights.len(),
     });

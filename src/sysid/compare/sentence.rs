@@ -19,6 +19,8 @@ pub struct Subject<'a> {
     pub finding: Option<&'a Finding>,
     /// The variable that the residual mainly follows.
     pub follows: Option<RegimeVariable>,
+    /// Whether the sensors' errors that the reconstruction leaves may account for all of it (95 %).
+    pub within_doubt: bool,
     /// Mass of the aircraft as the model believes it, kg.
     pub mass: f64,
     /// Number of flights compared.
@@ -39,6 +41,11 @@ pub fn sentence(subject: &Subject) -> String {
     }
     let Some(finding) = subject.finding else {
         let why = match subject.follows {
+            _ if subject.within_doubt => {
+                "which the remaining errors of the sensors may account for: these flights cannot judge \
+                 the model more closely"
+                    .into()
+            }
             Some(variable) => format!(
                 "which follows {}, though no range of it has the samples to give a figure",
                 spoken(variable)
@@ -257,6 +264,7 @@ mod tests {
         sentence(&Subject {
             channel,
             unexplained: 0.4,
+            within_doubt: false,
             finding: Some(&finding),
             follows: None,
             mass: 3.364,

@@ -2,7 +2,7 @@
 
 use super::channel::{Channel, Kind, wrap};
 use super::{Options, ReconstructError};
-use crate::logs::{Flight, Sample};
+use crate::logs::{Flight, FlowAngles, Sample};
 use crate::num::statistics::quantile;
 use crate::physics::actuators::Actuators;
 use crate::physics::atmosphere::{Atmosphere, Density};
@@ -115,15 +115,16 @@ impl Channels {
         let three = |kind, get: &dyn Fn(&Sample, usize) -> f64| {
             std::array::from_fn(|i| channel(kind, &|s| get(s, i)))
         };
+        let vane = |get: &dyn Fn(&Sample) -> f64| match flight.flow_angles {
+            FlowAngles::Measured => channel(Kind::Linear, get),
+            FlowAngles::Estimated => channel(Kind::Linear, &|_| f64::NAN),
+        };
         Channels {
             rates: three(Kind::Linear, &|s, i| s.rates_radps[i]),
             force: three(Kind::Linear, &|s, i| s.specific_force_mps2[i]),
             attitude: three(Kind::Angle, &|s, i| s.attitude_rad[i]),
             airspeed: channel(Kind::Linear, &|s| s.airspeed_mps),
-            vanes: [
-                channel(Kind::Linear, &|s| s.alpha_rad),
-                channel(Kind::Linear, &|s| s.beta_rad),
-            ],
+            vanes: [vane(&|s| s.alpha_rad), vane(&|s| s.beta_rad)],
             velocity: three(Kind::Linear, &|s, i| s.velocity_ned_mps[i]),
             altitude: channel(Kind::Kept, &|s| s.altitude_m),
             positions: three(Kind::Kept, &|s, i| [s.aileron_rad, s.elevator_rad, s.throttle][i]),
@@ -190,6 +191,13 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     let has = channels.sensors();
     let mut notes = Vec::new();
     declare(&channels, &has, &mut notes);
+    if flight.flow_angles == FlowAngles::Estimated {
+        notes.push(
+            "α and β of this log are the flight controller's estimates, not measurements: left out. If the \
+             aircraft has vanes, map alpha_rad and beta_rad to them."
+                .into(),
+        );
+    }
     let stretches = stretches(flight, &has, options)?;
     let step = step(&stretches, options);
     let mut log = Log { step, tracks: Vec::new(), has, periods: channels.periods(), notes };

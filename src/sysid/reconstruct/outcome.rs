@@ -5,10 +5,11 @@ use super::channel::wrap;
 use super::equations::{Found, Problem, no_path};
 use super::intake::{Log, Track};
 use super::kinematics::shifted;
-use super::nuisance::{self, COUNT, FORCE, GYRO, SCALE, SKEW_FORCE, Values};
+use super::nuisance::{self, COUNT, FORCE, GYRO, SCALE, SKEW_FORCE, Values, WIND};
 use super::path::{Path, flow_angles};
 use super::rotation::to_euler;
 use super::{ActuatorClock, Options, ReconstructError};
+use crate::num::statistics::mean;
 use crate::num::stream::stream;
 use crate::physics::{Controls, State};
 use crate::sysid::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
@@ -36,6 +37,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     let mut nuisances = nuisances(log, found);
     let erring = draws(problem, found)?;
     let left = left(&segments, &erring, &found.levels.gyro);
+    nuisances.extend(unmeasured_angles(log, found, &segments, &left));
     let gusts = found.levels.gusts;
     let skew = actuator_skew::estimate(&segments, &erring, log.step, problem.sampling, gusts);
     let late = late_beyond_doubt(&skew, log.step);
@@ -184,6 +186,33 @@ fn nuisances(log: &Log, smoothed: &Found) -> Vec<Nuisance> {
                 sd: smoothed.deviations[place],
                 unit,
             }
+        })
+        .collect()
+}
+
+/// How well α and β are known where no vane measures them: by the wind and by the path. Their values are zero.
+fn unmeasured_angles(
+    log: &Log,
+    smoothed: &Found,
+    segments: &[Segment],
+    left: &[f64; 8],
+) -> Vec<Nuisance> {
+    let speeds: Vec<f64> =
+        segments.iter().flat_map(|s| s.instants.iter().map(|i| i.state.airspeed)).collect();
+    let airspeed = mean(&speeds).max(1.0);
+    let [north, east, down] = std::array::from_fn(|i| smoothed.deviations[WIND + i]);
+    let across = north.hypot(east) / std::f64::consts::SQRT_2;
+    let angles = [
+        ("alpha_path", log.has.alpha, down, left[6]),
+        ("beta_path", log.has.beta, across, left[7]),
+    ];
+    let unmeasured = angles.into_iter().filter(|(_, measured, ..)| !measured);
+    unmeasured
+        .map(|(name, _, wind, path)| Nuisance {
+            name: name.into(),
+            value: 0.0,
+            sd: (wind / airspeed).hypot(path),
+            unit: "rad",
         })
         .collect()
 }
