@@ -23,7 +23,8 @@ def diagnose(greylag, case, nulls):
             command += ["--nulls", nulls]
         done = subprocess.run([str(x) for x in command], capture_output=True, text=True)
         said = json.loads(out.read_text()) if out.exists() else None
-    record = {"case": truth["case"], "truth": truth["truth"], "seed": truth["seed"], "hidden": truth["hidden"]}
+    record = {"greylag": str(greylag), "folder": str(case)}
+    record |= {"case": truth["case"], "truth": truth["truth"], "seed": truth["seed"], "hidden": truth["hidden"]}
     record.update(amount=truth["amount"], sensors=truth["sensors"], exit=done.returncode)
     if said is None:
         return {**record, "verdict": "failed", "why": done.stderr[-600:], "asserted": [], "ranked": []}
@@ -83,6 +84,32 @@ def table(records):
     return "\n".join(rows)
 
 
+def answered(path, greylag):
+    """The records that an earlier run left of this program, by folder."""
+    if not (path and path.exists()):
+        return {}
+    records = [json.loads(text) for text in path.read_text().splitlines()]
+    return {r["folder"]: r for r in records if r["greylag"] == str(greylag)}
+
+
+def score(cases, a):
+    """The records of all cases, each printed and kept as soon as it is there."""
+    before, records = answered(a.jsonl, a.greylag) if a.resume else {}, []
+
+    def one(case):
+        return before.get(str(case)) or diagnose(a.greylag, case, a.nulls)
+
+    with ThreadPoolExecutor(a.jobs) as pool:
+        for record in pool.map(one, cases):
+            records.append(record)
+            print(line(record), flush=True)
+            if a.jsonl and record["folder"] not in before:
+                a.jsonl.parent.mkdir(parents=True, exist_ok=True)
+                with a.jsonl.open("a") as file:
+                    file.write(json.dumps(record) + "\n")
+    return records
+
+
 def main():
     """Scores the cases of the command line."""
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -91,6 +118,7 @@ def main():
     p.add_argument("--jobs", type=int, default=2)
     p.add_argument("--nulls", type=int, help="simulated nulls of each diagnosis; the program's default without")
     p.add_argument("--jsonl", type=Path, help="append a record a case to this file")
+    p.add_argument("--resume", action="store_true", help="keep what the JSONL file has of the same program and case")
     p.add_argument("--strict", action="store_true", help="exit with 1 if anything wrong is asserted or a case fails")
     a = p.parse_args()
     cases = [case.parent for folder in a.cases for case in folder.rglob("truth.json")]
@@ -98,15 +126,7 @@ def main():
     cases.sort(key=lambda case: ("-null-" not in case.name, case.name.split("-", 1)[1], case))
     if not cases:
         sys.exit("no cases there; make some with make_cases.py")
-    records = []
-    with ThreadPoolExecutor(a.jobs) as pool:
-        for record in pool.map(lambda case: diagnose(a.greylag, case, a.nulls), cases):
-            records.append(record)
-            print(line(record), flush=True)
-            if a.jsonl:
-                a.jsonl.parent.mkdir(parents=True, exist_ok=True)
-                with a.jsonl.open("a") as file:
-                    file.write(json.dumps(record) + "\n")
+    records = score(cases, a)
     print("\n" + table(records))
     if a.strict and any(wrong(r) or r["verdict"] == "failed" for r in records):
         sys.exit(1)
