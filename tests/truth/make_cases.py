@@ -11,6 +11,7 @@ import json
 import shutil
 import sys
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,17 +30,18 @@ GENTLER = 0.75
 
 
 def truth_of(name):
-    """The module that flies, by its name."""
+    """What flies, and the length of its steps (s)."""
     if name == "continuous":
         import continuous
 
-        return continuous
+        return continuous.fly, continuous.STEP
     import official
 
-    return official
+    integrators = "adams" if name == "official-adams" else "default"
+    return partial(official.fly, integrators=integrators), official.STEP
 
 
-def fly_within_bounds(truth, case, seed, flight, effect, amount, duration):
+def fly_within_bounds(fly, case, seed, flight, effect, amount, duration):
     """Truth, commands, and what was drawn; gentler where the aircraft leaves the bounds."""
     random = hidden.random_of(seed, case, *flight.encode(), 1)
     speed, course, heading = random.uniform(0.0, WIND_MAX), *random.uniform(0.0, 2.0 * np.pi, 2)
@@ -47,7 +49,7 @@ def fly_within_bounds(truth, case, seed, flight, effect, amount, duration):
     scale = 1.0
     for _ in range(7):
         plan = manoeuvres.plan_of(flight, hidden.random_of(seed, case, *flight.encode(), 2), scale, duration)
-        rows, commands = truth.fly(plan, effect, amount, wind, heading)
+        rows, commands = fly(plan, effect, amount, wind, heading)
         if np.isfinite(rows).all() and (np.abs(rows[:, :2]) < (ROLL_MAX, PITCH_MAX)).all():
             return rows, commands, {"wind_ned_mps": wind.tolist(), "scale": scale}
         scale *= GENTLER
@@ -56,15 +58,15 @@ def fly_within_bounds(truth, case, seed, flight, effect, amount, duration):
 
 def make_case(folder, kind, case, seed, effect, options, duration, wrong):
     """Writes one case."""
-    truth, folder = truth_of(kind), folder / case
+    (fly, step), folder = truth_of(kind), folder / case
     folder.mkdir(parents=True)
-    amount = hidden.amplitude(effect, kind, hidden.random_of(seed, case, 3)) if effect else 0.0
+    amount = hidden.amplitude(effect, kind.split("-")[0], hidden.random_of(seed, case, 3)) if effect else 0.0
     told = {"case": case, "truth": kind, "seed": seed, "hidden": effect, "amount": amount, "duration_s": duration}
     told.update(sensors=asdict(options), wrong=wrong, flights={})
     for flight in manoeuvres.FLIGHTS:
-        rows, commands, drawn = fly_within_bounds(truth, case, seed, flight, effect, amount, duration)
+        rows, commands, drawn = fly_within_bounds(fly, case, seed, flight, effect, amount, duration)
         random = hidden.random_of(seed, case, *flight.encode(), 4)
-        names, table, errors = sensors.log(rows, truth.STEP, commands, manoeuvres.SETTLE, options, random)
+        names, table, errors = sensors.log(rows, step, commands, manoeuvres.SETTLE, options, random)
         sensors.write(folder / f"{flight}.csv", names, table)
         told["flights"][flight] = {**drawn, "errors": errors}
     parts = model_file.coefficients(effect, hidden.random_of(seed, case, 5), wrong)
@@ -90,7 +92,7 @@ def pairs(text):
 def arguments():
     """The command line."""
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument("--truth", choices=("continuous", "official"), required=True)
+    p.add_argument("--truth", choices=("continuous", "official", "official-adams"), required=True)
     p.add_argument("--seed", type=int, required=True)
     p.add_argument("--effects", default="all", help="'all', or ids with commas between; '' for none")
     p.add_argument("--nulls", type=int, default=0, help="cases without a hidden effect")

@@ -215,6 +215,18 @@ def simulator(effect=None, amount=0.0):
     return sim
 
 
+INTEGRATORS = {"default": {}, "adams": {"rate/rotational": 4, "rate/translational": 4, "position/rotational": 3}}
+"""JSBSim's integrators by its own numbers: explicit Euler for rates and attitude by default, at whatever step; or
+Adams-Bashforth of third and second order. Euler's half step of 1.25 ms acts as a lag of every moment: with the X8's
+damping of 29/s in roll, as 4 % more inertia than the file says."""
+
+
+def integrate_by(sim, integrators):
+    """Sets JSBSim's integrators."""
+    for name, number in INTEGRATORS[integrators].items():
+        sim[f"simulation/integrator/{name}"] = number
+
+
 def start(sim, wind, heading):
     """Sets the aircraft flying: 18 m/s through the air, 600 m."""
     first = {
@@ -241,9 +253,10 @@ SEEN = (
 """Where the columns of `sensors.TRUTH` are read, and their units; the forces are still to be divided by the mass."""
 
 
-def fly(wanted, effect, amount, wind, heading):
+def fly(wanted, effect, amount, wind, heading, integrators="default"):
     """Truth (a row a step of 1/400 s) and commands of a plan, flown in a steady wind (NED, m/s)."""
     sim = simulator(effect, amount)
+    integrate_by(sim, integrators)
     start(sim, wind, heading)
     nodes = [sim.get_property_manager().get_node(name) for name, _ in SEEN]
     units = np.array([unit for _, unit in SEEN])

@@ -123,7 +123,7 @@ def main():
     a = p.parse_args()
     cases = [case.parent for folder in a.cases for case in folder.rglob("truth.json")]
     # nulls first: a false alarm shows soonest
-    cases.sort(key=lambda case: ("-null-" not in case.name, case.name.split("-", 1)[1], case))
+    cases.sort(key=lambda case: ("-null-" not in case.name, case.name.removeprefix("official-adams").split("-", 1)[1], case))
     if not cases:
         sys.exit("no cases there; make some with make_cases.py")
     records = score(cases, a)
