@@ -3,6 +3,7 @@
 import numpy as np
 
 import aircraft as x8
+from hidden import TAKEN_OUT
 
 WRONG = 0.10
 """How wrong coefficients are: standard deviation as a share of the value, none beyond twice.
@@ -13,8 +14,6 @@ The widths that a model file states by default are 15 %.
 
 def coefficients(effect, random, wrong=WRONG):
     """Coefficients by effect and name, off by `wrong`, without what `effect` takes out."""
-    from hidden import TAKEN_OUT
-
     out = {}
     for part, names in x8.COEFFICIENTS.items():
         names = dict(names)
