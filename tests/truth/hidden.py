@@ -1,0 +1,64 @@
+"""The effects that a case can hide, with the amplitudes at which they show in three flights.
+
+The ids are those of `greylag effects list`.
+"""
+
+import numpy as np
+
+AMPLITUDES = {
+    "drag_alpha2": (0.6, 1.2, False),
+    "drag_beta2": (0.5, 1.2, False),
+    "drag_elevator_abs": (0.08, 0.16, False),
+    "lift_stall": (0.19, 0.24, False),
+    "pitch_break": (-3.0, -1.5, False),
+    "cg_shift": (0.008, 0.016, True),
+    "unsteady_lift": (2.0, 4.0, False),
+    "thrust_decay": (0.3, 0.5, False),
+    "thrust_scale": (-10.0, -8.0, False),
+    "thrust_line_offset": (0.02, 0.04, True),
+    "motor_torque": (0.4, 1.0, True),
+    "propeller_gyro": (0.04, 0.1, True),
+    "propwash": (0.3, 0.6, False),
+    "aeroelastic_loss": (0.1, 0.2, False),
+    "actuator_lag": (0.02, 0.05, False),
+    "time_delay": (0.02, 0.03, False),
+    "dead_zone": (0.015, 0.035, False),
+    "backlash": (0.02, 0.06, False),
+    "rate_limit": (1.6, 2.4, False),
+    "mass_error": (0.1, 0.2, False),
+    "inertia_xz": (0.06, 0.1, False),
+    "asymmetry": (0.002, 0.004, True),
+    "dihedral_alpha": (0.3, 0.6, True),
+    "roll_control_alpha": (0.3, 0.5, True),
+    "effectiveness_saturation": (-2.0, -1.0, False),
+}
+"""Smallest and largest amplitude, and whether it may as well be negative.
+
+In SI units, as the catalogue has them. Of `drag_beta2` and `drag_elevator_abs`: the whole coefficient, as the
+model lacks what the aircraft has of its own. Of `lift_stall`: the angle of attack of the stall. Of
+`unsteady_lift`: CLalphadot; Cmalphadot is -1/2 of it.
+"""
+
+INPUTS = ("actuator_lag", "time_delay", "dead_zone", "backlash", "rate_limit")
+"""Effects on what the surfaces do with their measured position."""
+
+TAKEN_OUT = {"drag_beta2": "drag_beta2", "drag_elevator_abs": "drag_elevator_abs", "lift_stall": "lift_table"}
+"""What a model loses so that it lacks the effect, where the aircraft has it of its own."""
+
+
+def amplitude(effect, truth, random):
+    """A clear amplitude of `effect`, drawn."""
+    low, high, either_sign = AMPLITUDES[effect]
+    size = random.uniform(low, high)
+    if either_sign and random.random() < 0.5:
+        size = -size
+    if effect == "lift_stall" and truth == "official":
+        size = 0.2146  # where the lift table of its file has its maximum
+    if effect == "time_delay":  # whole steps of 400 Hz
+        size = round(size * 400.0) / 400.0
+    return float(f"{size:.4g}")
+
+
+def random_of(seed, name, *more):
+    """Random numbers of one subject of one case."""
+    return np.random.default_rng([seed, *name.encode(), *more])

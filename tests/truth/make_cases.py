@@ -1,0 +1,127 @@
+"""Makes cases for `greylag diagnose`: flights of a truth that shares no code with it, and a model.
+
+    python tests/truth/make_cases.py --truth continuous --seed 1 --effects all --nulls 20 --out cases
+
+Every case is a folder with model.toml, airframe.toml, train-1..3.csv, test-1..2.csv and truth.json. All of it
+follows from the seed.
+"""
+
+import argparse
+import json
+import shutil
+import sys
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+import hidden
+import manoeuvres
+import model_file
+import sensors
+
+AIRFRAME = Path(__file__).resolve().parents[2] / "params" / "x8" / "airframe.toml"
+ROLL_MAX, PITCH_MAX = np.radians(85.0), np.radians(60.0)
+"""Bounds within which a flight is kept."""
+WIND_MAX = 6.0
+"""Strongest steady wind, m/s."""
+GENTLER = 0.75
+
+
+def truth_of(name):
+    """What flies, and the length of its steps (s)."""
+    if name == "continuous":
+        import continuous
+
+        return continuous.fly, continuous.STEP
+    import official
+
+    integrators = "adams" if name == "official-adams" else "default"
+    return partial(official.fly, integrators=integrators), official.STEP
+
+
+def fly_within_bounds(fly, case, seed, flight, effect, amount, duration):
+    """Truth, commands, and what was drawn; gentler where the aircraft leaves the bounds."""
+    random = hidden.random_of(seed, case, *flight.encode(), 1)
+    speed, course, heading = random.uniform(0.0, WIND_MAX), *random.uniform(0.0, 2.0 * np.pi, 2)
+    wind = np.array([speed * np.cos(course), speed * np.sin(course), 0.0])
+    scale = 1.0
+    for _ in range(7):
+        plan = manoeuvres.plan_of(flight, hidden.random_of(seed, case, *flight.encode(), 2), scale, duration)
+        rows, commands = fly(plan, effect, amount, wind, heading)
+        if np.isfinite(rows).all() and (np.abs(rows[:, :2]) < (ROLL_MAX, PITCH_MAX)).all():
+            return rows, commands, {"wind_ned_mps": wind.tolist(), "scale": scale}
+        scale *= GENTLER
+    raise RuntimeError(f"{case}, {flight}: the aircraft leaves its bounds; hide less of {effect}")
+
+
+def make_case(folder, kind, case, seed, effect, options, duration, wrong):
+    """Writes one case."""
+    (fly, step), folder = truth_of(kind), folder / case
+    folder.mkdir(parents=True)
+    amount = hidden.amplitude(effect, kind.split("-")[0], hidden.random_of(seed, case, 3)) if effect else 0.0
+    told = {"case": case, "truth": kind, "seed": seed, "hidden": effect, "amount": amount, "duration_s": duration}
+    told.update(sensors=asdict(options), wrong=wrong, flights={})
+    for flight in manoeuvres.FLIGHTS:
+        rows, commands, drawn = fly_within_bounds(fly, case, seed, flight, effect, amount, duration)
+        random = hidden.random_of(seed, case, *flight.encode(), 4)
+        names, table, errors = sensors.log(rows, step, commands, manoeuvres.SETTLE, options, random)
+        sensors.write(folder / f"{flight}.csv", names, table)
+        told["flights"][flight] = {**drawn, "errors": errors}
+    parts = model_file.coefficients(effect, hidden.random_of(seed, case, 5), wrong)
+    (folder / "model.toml").write_text(model_file.text(case, parts))
+    shutil.copyfile(AIRFRAME, folder / "airframe.toml")
+    (folder / "truth.json").write_text(json.dumps(told, indent=1) + "\n")
+
+
+def chosen(text):
+    """The effects of `--effects`."""
+    ids = list(hidden.AMPLITUDES) if text == "all" else [x for x in text.split(",") if x]
+    unknown = [x for x in ids if x not in hidden.AMPLITUDES]
+    if unknown:
+        sys.exit(f"--effects: {', '.join(unknown)} cannot be hidden; those that can are {', '.join(hidden.AMPLITUDES)}")
+    return ids
+
+
+def pairs(text):
+    """`group=rate,...` as a table."""
+    return {k: float(v) for k, v in (pair.split("=") for pair in text.split(",") if pair)}
+
+
+def arguments():
+    """The command line."""
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    p.add_argument("--truth", choices=("continuous", "official", "official-adams"), required=True)
+    p.add_argument("--seed", type=int, required=True)
+    p.add_argument("--effects", default="all", help="'all', or ids with commas between; '' for none")
+    p.add_argument("--nulls", type=int, default=0, help="cases without a hidden effect")
+    p.add_argument("--rate", type=float, default=100.0, help="samples a second of the logs")
+    p.add_argument("--noise", type=float, default=1.0, help="factor on the sensors' noise and biases")
+    p.add_argument("--skew", type=float, default=0.01, help="most that a sensor group is late, s; 0 for one clock")
+    p.add_argument("--wrong", type=float, default=model_file.WRONG, help="standard deviation of coefficients' errors")
+    p.add_argument("--quantised", action="store_true", help="whole counts of each sensor")
+    p.add_argument("--held", default="", help="slower sensors, held in between: airspeed=25,velocity=10")
+    p.add_argument("--missing", default="", help="sensor groups that are not logged: vanes,actuators")
+    p.add_argument("--duration", type=float, default=manoeuvres.FLIGHT, help="length of each flight, s")
+    p.add_argument("--out", type=Path, required=True, help="folder of the cases; each must be new")
+    return p.parse_args()
+
+
+def main():
+    """Makes the cases of the command line."""
+    a = arguments()
+    missing = [x for x in a.missing.split(",") if x]
+    options = sensors.Options(a.rate, a.noise, a.skew, a.quantised, pairs(a.held), missing)
+    unknown = [x for x in (*missing, *options.held) if x not in sensors.GROUPS]
+    if unknown:
+        sys.exit(f"no sensor group {', '.join(unknown)}; there are {', '.join(sensors.GROUPS)}")
+    cases = [(f"{a.truth}-null-{k:02}", None) for k in range(a.nulls)]
+    cases += [(f"{a.truth}-{effect}", effect) for effect in chosen(a.effects)]
+    for case, effect in cases:
+        make_case(a.out, a.truth, case, a.seed, effect, options, a.duration, a.wrong)
+        print(a.out / case, flush=True)
+
+
+if __name__ == "__main__":
+    main()
