@@ -51,7 +51,7 @@ fn validate_free_run_of_the_exact_model() {
     let (prior, twin) = (one("prior", exact()), one("jsbsim", exact()));
     let (p, t) = (scaled(&prior, 5.0), scaled(&twin, 5.0));
     println!("free run at 5 s: jsbsim {t:.2e}, true prior {p:.2e}, {:.3} %", 100.0 * t / p);
-    // the figure of the issue; reached: 0.14 %
+    // the required figure; reached: 0.14 %
     assert!(t <= 0.01 * p);
     assert!(twin.free_run.iter().all(|s| s.diverged == 0 && s.runs > 40));
     // the curve begins small and passes through the scores at the horizons
@@ -344,7 +344,7 @@ fn validate_reconstructed_exact_flights() {
         "5 s after reconstruction: jsbsim {t:.2e}, true prior {p:.2e}, {:.3} %",
         100.0 * t / p
     );
-    // the figure of the issue; reached: 0.14 %
+    // the required figure; reached: 0.14 %
     assert!(t <= 0.01 * p);
     finds_both_slips(&one("prior-as-printed", &flights));
 }

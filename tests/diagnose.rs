@@ -81,7 +81,7 @@ fn found(id: &str, amount: f64, share: f64, seed: u64) {
     assert!(found.sentences[0].contains(id));
 }
 
-// 5 % is what the issue asks of the median parameter error at clear amplitudes; operators and inertia
+// 5 % is required of the median parameter error at clear amplitudes; operators and inertia
 // are linearised in weak form, which leaves them some 10 %
 
 #[test]

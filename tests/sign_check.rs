@@ -205,7 +205,7 @@ impl Tally {
 
 /// Seeds of each kind from the environment: `SIGNS=300`.
 #[test]
-#[ignore = "a campaign of a minute, for README.md"]
+#[ignore = "a campaign of a minute, for docs/validation/real-flight-controllers.md"]
 fn hundreds_of_checks_in_every_air() {
     let seeds = std::env::var("SIGNS").ok().and_then(|n| n.parse().ok()).unwrap_or(100u64);
     for personality in [Px4, Ardupilot] {

@@ -28,6 +28,6 @@ fn lockstep_is_at_least_twenty_times_real_time() {
     let shim = Shim::start(lockstep(&link));
     let tcp = frames_per_second(Companion::tcp_in(&listener), shim);
     println!("lockstep: {udp:.0} frames/s over UDP, {tcp:.0} over TCP (real time is 100)");
-    // The demand of the issue, 20 times real time, for the shim's part over UDP.
+    // The requirement: 20 times real time, for the shim's part over UDP.
     assert!(udp >= 2000.0, "{udp:.0} frames/s over UDP");
 }

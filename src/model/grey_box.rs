@@ -24,7 +24,7 @@ const WIDTH: f64 = 0.15;
 
 impl Named {
     /// Its standard deviation as a prior: the stated one, else 15 % of its value
-    /// (`missing_effects.md`, step 4). A coefficient of zero without a stated width is held.
+    /// (`docs/explanation/diagnosis.md`, the algebra). A coefficient of zero without a stated width is held.
     pub fn width(&self) -> f64 {
         self.sd.unwrap_or(WIDTH * self.value.abs())
     }

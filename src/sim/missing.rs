@@ -5,7 +5,7 @@ use rand::RngExt;
 
 use crate::num::stream::{Stream, stream};
 
-/// Side drag that the aircraft's own file has, which a hidden amplitude adds to (`x8_facts.md`).
+/// Side drag that the aircraft's own file has, which a hidden amplitude adds to (`params/x8/FACTS.md`).
 const OWN_CDBETA: f64 = -0.0058;
 /// Likewise, over β².
 const OWN_CDBETA2: f64 = 0.1478;

@@ -1,6 +1,6 @@
 //! A model refitted to flights, effects added, by output error.
 //!
-//! The last steps of the shared note `missing_effects.md`: an equation-error fit brings the
+//! The method stands in `docs/explanation/diagnosis.md`: an equation-error fit brings the
 //! coefficients near, multi-step shooting finishes them, and flights that the fit never saw say what
 //! it was worth.
 

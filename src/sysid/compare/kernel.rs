@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-/// Length of the kernel, s (`missing_effects.md`, step 3).
+/// Length of the kernel, s (`docs/explanation/comparison.md`).
 pub const KERNEL_S: f64 = 0.37;
 
 /// A Hann window over `steps` time steps, that is `steps + 1` samples.

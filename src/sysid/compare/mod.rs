@@ -1,6 +1,6 @@
 //! Models against flights: how far free runs stray, and in which channel and regime a model fails.
 //!
-//! The method is that of the shared note `missing_effects.md`, steps 3, 4 and 11. "Before" is the
+//! The method stands in `docs/explanation/comparison.md`. "Before" is the
 //! model as given; tuning it is the business of what ranks missing effects, for which
 //! [`weak::columns`] gives what to regress on.
 

@@ -1,6 +1,6 @@
 //! Which physical effect a model lacks: candidates ranked, thresholds from null flights, or none of these.
 //!
-//! The method is that of the shared note `missing_effects.md`, steps 3 to 9 and 12. Flights must be
+//! The method stands in `docs/explanation/diagnosis.md`. Flights must be
 //! reconstructed with their deflections as recorded
 //! ([`ActuatorClock::AsRecorded`](crate::sysid::reconstruct::ActuatorClock)): what is clock and what is
 //! physics is decided here.
