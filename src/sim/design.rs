@@ -206,6 +206,7 @@ fn imagine(
         noise,
         left: noise,
         force_noise,
+        rudder: None,
         notes: Vec::new(),
     };
     let mut prepared = Prepared::new(&flight, 0.0)?;

@@ -2,6 +2,7 @@
 
 use super::channel::{Channel, Kind, wrap};
 use super::{Options, ReconstructError};
+use crate::logs::rudder::RudderMotion;
 use crate::logs::{Flight, Sample};
 use crate::num::statistics::quantile;
 use crate::physics::actuators::Actuators;
@@ -24,6 +25,8 @@ pub struct Log {
     pub tracks: Vec<Track>,
     /// Which sensors the log has.
     pub has: Sensors,
+    /// How the rudder moves, if it does.
+    pub rudder: Option<RudderMotion>,
     /// What the reader must know.
     pub notes: Vec<String>,
 }
@@ -168,7 +171,8 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     declare(&channels, &has, &mut notes);
     let stretches = stretches(flight, &has, options)?;
     let step = step(&stretches, options);
-    let mut log = Log { step, tracks: Vec::new(), has, notes };
+    let rudder = RudderMotion::of(&flight.samples);
+    let mut log = Log { step, tracks: Vec::new(), has, rudder, notes };
     let mut longest = 0.0_f64;
     for times in &stretches {
         let [start, end] = [times[0], times[times.len() - 1]];
