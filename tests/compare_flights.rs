@@ -6,6 +6,7 @@ mod compare_support;
 use std::sync::OnceLock;
 
 use compare_support::{EXACT, Noise, REALISTIC, as_measured, fly, model};
+use greylag::logs::rudder::RudderMotion;
 use greylag::model::GreyBox;
 use greylag::sysid::compare::flight::Prepared;
 use greylag::sysid::compare::{
@@ -58,6 +59,21 @@ fn validate_free_run_of_the_exact_model() {
     assert!(prior.growth[0].rmse_scaled < 0.5 * p);
     let at = prior.growth.iter().find(|g| g.time_s == 5.0).unwrap();
     assert_eq!(at.rmse_scaled, p);
+}
+
+#[test]
+fn a_rudder_that_moves_is_said_first() {
+    let mut flights = exact().to_vec();
+    let quiet = against(&[model("jsbsim")], &flights);
+    flights[2].rudder = Some(RudderMotion::Command(0.12));
+    let moving = against(&[model("jsbsim")], &flights);
+    for said in [&moving.sentences, &moving.models[0].sentences] {
+        assert!(
+            said[0].starts_with("The rudder command moves (sd 12 % of its travel)"),
+            "{said:?}"
+        );
+        assert_eq!(said[1..], quiet.sentences);
+    }
 }
 
 #[test]

@@ -40,6 +40,15 @@ fn wrong(seed: u64) -> GreyBox {
 
 /// Two flights of 50 s with `hidden` in the aircraft, through noisy instruments and reconstruction.
 fn flown(seed: u64, hidden: &[(&str, f64)]) -> Vec<Reconstruction> {
+    flown_with(seed, hidden, |_| ())
+}
+
+/// The same with their logs changed.
+fn flown_with(
+    seed: u64,
+    hidden: &[(&str, f64)],
+    change: impl Fn(&mut Flight),
+) -> Vec<Reconstruction> {
     let lqi = control::build(Kind::Lqi, &exact()).unwrap();
     let hidden: Vec<Hidden> =
         hidden.iter().map(|(id, amount)| Hidden::new(id, *amount).unwrap()).collect();
@@ -47,7 +56,9 @@ fn flown(seed: u64, hidden: &[(&str, f64)]) -> Vec<Reconstruction> {
         let plant = PlantOptions { hidden: hidden.clone(), ..PlantOptions::default() };
         let flown = fly_within_bounds(&plant, &*lqi, schedule).unwrap();
         let instruments = Instruments::drawn(10 * seed + k as u64);
-        rebuilt(&instruments.log(&flown, &schedule.name, 10 * seed + k as u64))
+        let mut log = instruments.log(&flown, &schedule.name, 10 * seed + k as u64);
+        change(&mut log);
+        rebuilt(&log)
     };
     // pitch, then everything at once
     let [pitch, _, all] = flights::training(seed);
@@ -97,6 +108,24 @@ fn an_effect_on_the_body_is_named() {
 #[test]
 fn an_effect_on_the_deflections_is_named() {
     found("dead_zone", 0.025, 0.1, 3);
+}
+
+#[test]
+fn a_rudder_that_moves_is_said_first_and_nothing_is_asserted_where_it_acts() {
+    // doublets of ± 4.1° and 2 s: their sd is their amplitude
+    let doublets = |log: &mut Flight| {
+        for (k, sample) in log.samples.iter_mut().enumerate() {
+            let side = if (k / 100).is_multiple_of(2) { 1.0 } else { -1.0 };
+            sample.rudder_rad = side * 4.1_f64.to_radians();
+        }
+    };
+    let flights = flown_with(1, &[("dihedral_alpha", 0.5)], doublets);
+    let found = asked(1, &flights, &Options::default());
+    assert!(found.sentences[0].starts_with("The rudder moves (sd 4.1°)"), "{:?}", found.sentences);
+    // without the rudder it is asserted: `a_static_effect_is_named`
+    let rolling = found.effects.iter().find(|e| e.id == "dihedral_alpha").unwrap();
+    assert!(!rolling.asserted && rolling.refused.iter().any(|r| r.contains("rudder")));
+    assert_ne!(found.verdict, Verdict::Effect);
 }
 
 /// The three training flights of a trial.

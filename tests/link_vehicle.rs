@@ -10,8 +10,9 @@ use link_support::{Shown, dissect, frame_from, peer, shim};
 use mavlink::MavlinkVersion::V2;
 use mavlink::dialects::ardupilotmega::*;
 
-/// An airframe of its own, so that nothing hides the number of the X8.
-const DEFLECTION: f64 = 0.4;
+/// What ±1 means where the vehicle sends no travel of its own, rad: the X8's.
+#[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
+const DEFLECTION: f64 = 0.5235;
 
 fn take(sitl: &mut Sitl, bytes: &[u8]) -> Vec<Telemetry> {
     let mut states = vec![];
@@ -68,6 +69,34 @@ fn a_state_frame_is_converted_to_si() {
         (t.position, t.velocity, t.wind),
         ([45.0, 7.5], [10.0, -2.0, 0.5], [3.0, -2.0, 0.0])
     );
+}
+
+#[test]
+fn a_travel_that_the_vehicle_sends_is_used_and_compared_with_the_airframes() {
+    let sending = |aileron, elevator| {
+        let mut shown = Shown::at(20_000);
+        shown.actuators.active = 7;
+        (shown.actuators.actuator[5], shown.actuators.actuator[6]) = (aileron, elevator);
+        shown.bytes()
+    };
+    let mut sitl = Sitl::new(1, DEFLECTION);
+    let t = take(&mut sitl, &sending(0.4, 0.3))[0];
+    close(t.actuators.aileron, 0.5 * 0.4);
+    close(t.actuators.elevator, -0.25 * 0.3);
+    close(t.actuators.elevator_rate, -4.0 * 0.3);
+    let obstacle = sitl.obstacle().unwrap();
+    for part in ["0.4000 rad (aileron)", "0.3000 rad (elevator)", "0.5235", "deflection_max_rad"] {
+        assert!(obstacle.contains(part), "{obstacle}");
+    }
+    assert!(sitl.take_notice().is_some());
+    assert!(sitl.take_notice().is_none(), "it is said once");
+    // The airframe of that aircraft agrees, as the X8's does with a vehicle that sends none.
+    for (airframe, bytes) in [(0.4, sending(0.4, 0.4)), (DEFLECTION, Shown::at(20_000).bytes())] {
+        let mut sitl = Sitl::new(1, airframe);
+        assert_eq!(take(&mut sitl, &bytes).len(), 1);
+        assert_eq!((sitl.obstacle(), sitl.take_notice()), (None, None));
+    }
+    assert!(Sitl::new(1, 0.4).obstacle().is_none(), "nothing was heard yet");
 }
 
 #[test]

@@ -81,7 +81,9 @@ pub(crate) fn load(
     properties: &Properties,
     effects: &[Hidden],
 ) -> Result<(), AircraftError> {
-    let document = hidden::write_into(&read(dir, name)?, properties, effects, fdm.dt())?;
+    let plain = read(dir, name)?;
+    let properties = properties.in_document(&plain);
+    let document = hidden::write_into(&plain, &properties, effects, fdm.dt())?;
     let mut tree = Tree { disk: dir.map(FileResolver::new), memory: MemoryResolver::new() };
     if dir.is_none() {
         for (path, text) in BUILT_IN {

@@ -1,6 +1,7 @@
 //! The program `greylag-sitl`: a flight controller with an aircraft, played to a companion.
 
 mod arguments;
+mod said_once;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -11,12 +12,13 @@ use anyhow::Context;
 use arguments::Cli;
 use clap::Parser;
 use greylag_sitl::shim::{self, Launch, Pace, ShimOptions};
+use said_once::said_once;
 
 fn main() -> ExitCode {
     match fly(&Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("greylag-sitl: {error:#}");
+            eprintln!("greylag-sitl: {}", said_once(&error));
             ExitCode::FAILURE
         }
     }

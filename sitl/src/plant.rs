@@ -3,6 +3,7 @@
 mod nodes;
 mod options;
 mod state;
+mod travel;
 
 use jsbsim::Fdm;
 
@@ -13,6 +14,7 @@ use nodes::Nodes;
 pub(crate) use nodes::to_body;
 pub use options::{PlantOptions, Properties};
 pub use state::{FULL_DEFLECTION_RAD, Inputs, Start, Truth};
+pub use travel::Travel;
 
 /// Length of one step, s, unless the options say otherwise.
 pub const DT_S: f64 = 0.01;
@@ -31,12 +33,32 @@ pub enum PlantError {
     Air(#[from] AirError),
     /// The aircraft has no property of that name.
     #[error(
-        "the aircraft '{aircraft}' has no property '{property}', which the plant needs; add it to the aircraft's XML or name another"
+        "the aircraft '{aircraft}' has no property '{property}', which the plant needs; add it to the aircraft's XML or name the aircraft's own with --property"
     )]
     Property {
         /// The aircraft's name.
         aircraft: String,
         /// The property's name.
+        property: String,
+    },
+    /// An engine does not run after its start.
+    #[error(
+        "engine {engine} of the aircraft '{aircraft}' does not run after its start: see that the aircraft's XML fills its tanks, feeds it from them and leaves its ignition on"
+    )]
+    Engine {
+        /// The aircraft's name.
+        aircraft: String,
+        /// The engine, from 0.
+        engine: usize,
+    },
+    /// A surface does not follow its command, so its travel is unknown.
+    #[error(
+        "the aircraft '{aircraft}' does not move '{property}' at full command, so the travel of that surface is unknown; name the property that holds its deflection in rad with --property"
+    )]
+    Travel {
+        /// The aircraft's name.
+        aircraft: String,
+        /// The property that stays where it is.
         property: String,
     },
     /// The start of an episode is not one that can be flown from.
@@ -130,9 +152,29 @@ impl Plant {
         self.nodes
             .start(&mut self.fdm, start, &self.options)
             .map_err(jsbsim("setting the start"))?;
+        self.start_engines()?;
         (self.steps, self.next_gust) = (0, 0);
         let truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the start"))?;
         self.accept(truth)
+    }
+
+    fn start_engines(&mut self) -> Result<(), PlantError> {
+        let started = self.nodes.start_engines(&mut self.fdm);
+        match started.map_err(jsbsim("starting the engines"))? {
+            None => Ok(()),
+            Some(engine) => {
+                Err(PlantError::Engine { aircraft: self.options.aircraft.clone(), engine })
+            }
+        }
+    }
+
+    /// What is to be known of the aircraft before it is flown, one sentence each.
+    pub fn notes(&self) -> Vec<String> {
+        let glider = format!(
+            "the aircraft '{}' has no throttle: it flies as a glider, and throttle commands move nothing",
+            self.options.aircraft
+        );
+        self.nodes.is_glider().then_some(glider).into_iter().collect()
     }
 
     /// Flies one step of [`PlantOptions::step_s`] with `inputs`, limited to their ranges.

@@ -7,7 +7,7 @@ use clap::Args;
 
 use crate::air::{Air, Gust, Turbulence};
 use crate::hidden::Hidden;
-use crate::plant::PlantOptions;
+use crate::plant::{PlantOptions, Properties};
 
 /// Which aircraft in which air; to be flattened into a program's options.
 #[derive(Clone, Debug, Args)]
@@ -28,6 +28,10 @@ struct AircraftArgs {
     /// Name of the aircraft.
     #[arg(long, value_name = "NAME")]
     aircraft: Option<String>,
+    /// Name a property of the aircraft (may be repeated): KEY is aileron_command, elevator_command,
+    /// throttle_command, aileron_position, elevator_position or throttle_position.
+    #[arg(long, value_name = "KEY=NAME", value_parser = property)]
+    property: Vec<(String, String)>,
     /// Hide an effect in the aircraft (may be repeated); a wrong ID is answered with all that are known.
     #[arg(long, value_name = "ID=AMPLITUDE", allow_hyphen_values = true)]
     hide: Vec<Hidden>,
@@ -57,6 +61,15 @@ struct AirArgs {
     gust: Vec<Numbers<7>>,
 }
 
+/// Reads KEY=NAME.
+fn property(text: &str) -> Result<(String, String), String> {
+    let (key, name) = text.split_once('=').ok_or("write it as KEY=NAME")?;
+    match Properties::default().name_mut(key) {
+        Some(_) => Ok((key.to_owned(), name.to_owned())),
+        None => Err(format!("{key} is no key; the keys are {}", Properties::KEYS.join(", "))),
+    }
+}
+
 /// Numbers written with commas.
 #[derive(Clone, Copy, Debug)]
 pub struct Numbers<const N: usize>(pub [f64; N]);
@@ -79,6 +92,11 @@ impl PlantArgs {
         plant.aircraft_dir = self.aircraft.aircraft_dir.clone();
         if let Some(name) = &self.aircraft.aircraft {
             plant.aircraft = name.clone();
+        }
+        for (key, name) in &self.aircraft.property {
+            if let Some(property) = plant.properties.name_mut(key) {
+                property.clone_from(name);
+            }
         }
         plant.hidden = self.aircraft.hide.clone();
         plant

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use greylag_sitl::plant_arguments::PlantArgs;
 
+use crate::commands::aircraft::{self, StartArguments};
 use crate::commands::files::shipped;
 use crate::control::{self, Kind};
 use crate::logs::csv;
@@ -38,13 +39,17 @@ pub struct Arguments {
     seed: u32,
     #[command(flatten)]
     plant: PlantArgs,
+    #[command(flatten)]
+    start: StartArguments,
 }
 
 /// Flies the episodes that are not there yet.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let planner = match (&arguments.model, arguments.round) {
+    let load = |path: &PathBuf| GreyBox::load(&shipped(path));
+    let models: Vec<GreyBox> = arguments.model.iter().map(load).collect::<Result<_, _>>()?;
+    let planner = match (models.first(), arguments.round) {
         (None, 0) => None,
-        (Some(path), 1..) => Some(control::build(Kind::Cem, &GreyBox::load(&shipped(path))?)?),
+        (Some(model), 1..) => Some(control::build(Kind::Cem, model)?),
         (None, _) => {
             bail!("round {} is planned: give the model to plan with, --model", arguments.round)
         }
@@ -57,8 +62,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let seen = stop.clone();
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))?;
     let count = arguments.episodes.unwrap_or(if arguments.round == 0 { 175 } else { 25 });
-    let plant = arguments.plant.options(arguments.seed);
-    Simulator::new(&plant)?;
+    let mut plant = arguments.plant.options(arguments.seed);
+    plant.start = arguments.start.start(&plant.aircraft, &models)?;
+    aircraft::introduce(&plant, &models)?;
     let flown = AtomicU32::new(0);
     (0..count).into_par_iter().try_for_each_init(
         || (Simulator::new(&plant), planner.as_ref().map(|p| p.boxed_clone())),

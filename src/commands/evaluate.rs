@@ -12,12 +12,12 @@ use serde::Serialize;
 use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::plant_arguments::PlantArgs;
 
+use crate::commands::aircraft::{self, StartArguments};
 use crate::commands::files::{self, shipped};
 use crate::commands::{choices, fly};
 use crate::control::cem::Change;
 use crate::control::{Controller, Kind, Needs, Target};
 use crate::model::GreyBox;
-use crate::physics::State;
 use crate::report::EvaluationReport;
 use crate::sim::episode::STEPS;
 use crate::sim::evaluation::{Evaluation, evaluate};
@@ -51,6 +51,8 @@ pub struct Arguments {
     seed: u32,
     #[command(flatten)]
     plant: PlantArgs,
+    #[command(flatten)]
+    start: StartArguments,
     /// Write the scores as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -90,9 +92,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         );
     }
     let targets = targets(arguments)?;
-    let plant = arguments.plant.options(arguments.seed);
+    let mut plant = arguments.plant.options(arguments.seed);
     // everything that can be wrong is found before the first flight
-    let entrants = entrants(arguments)?;
+    let load = |path: &PathBuf| GreyBox::load(&shipped(path));
+    let models = arguments.models.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    plant.start = arguments.start.start(&plant.aircraft, &models)?;
+    let entrants = entrants(arguments, &models)?;
+    aircraft::introduce(&plant, &models)
+        .with_context(|| format!("cannot fly aircraft {}", plant.aircraft))?;
     let evaluations = entrants
         .iter()
         .map(|e| one(arguments.seed, e, &targets, &plant))
@@ -128,7 +135,7 @@ fn flights(entrants: &[Entrant], plant: &PlantOptions) -> Result<Vec<(Target, Ve
     let mut simulator = Simulator::new(plant)?;
     let mut all = Vec::new();
     for [roll, pitch] in SHOWN.map(|angles| angles.map(f64::to_radians)) {
-        let target = Target { roll, pitch, airspeed: State::NEUTRAL.airspeed };
+        let target = Target { roll, pitch, airspeed: plant.start.airspeed_mps };
         let flown = entrants.iter().map(|e| {
             let mut controller = e.controller.boxed_clone();
             track(&mut simulator, controller.as_mut(), &target, STEPS)
@@ -179,9 +186,7 @@ struct Entrant {
 
 /// Every controller on every model or policy that it may be built from; one that needs neither enters
 /// once.
-fn entrants(arguments: &Arguments) -> Result<Vec<Entrant>> {
-    let load = |path: &PathBuf| GreyBox::load(&shipped(path));
-    let models = arguments.models.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+fn entrants(arguments: &Arguments, models: &[GreyBox]) -> Result<Vec<Entrant>> {
     let (models, none) = (models.iter(), PathBuf::new());
     let policies = || arguments.policies.iter();
     let mut entrants = Vec::new();

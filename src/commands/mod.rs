@@ -1,5 +1,7 @@
 //! Subcommands: arguments, then a few lines of work.
 
+#[cfg(feature = "sitl")]
+mod aircraft;
 mod amend;
 mod choices;
 #[cfg(feature = "sitl")]
@@ -19,15 +21,18 @@ mod files;
 pub mod fly;
 mod intake;
 mod link;
+mod log_once;
 mod logs;
 #[cfg(feature = "sitl")]
 mod mystery;
 mod replay;
+mod said_once;
 #[cfg(feature = "sitl")]
 mod targets;
 #[cfg(feature = "learn")]
 mod train;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -88,7 +93,12 @@ enum Command {
 /// Runs the subcommand of the command line; what goes wrong is said in one line.
 pub fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .without_time()
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(|| log_once::LogOnce)
+        .init();
     let result = match Arguments::parse().command {
         Command::Amend(arguments) => amend::run(&arguments),
         #[cfg(feature = "sitl")]
@@ -116,7 +126,7 @@ pub fn main() -> ExitCode {
         Command::Train(arguments) => train::run(&arguments),
     };
     result.unwrap_or_else(|error| {
-        eprintln!("greylag: {error:#}");
+        eprintln!("greylag: {}", said_once::said_once(&error));
         ExitCode::FAILURE
     })
 }

@@ -145,7 +145,7 @@ impl Vehicle {
     /// Why the vehicle cannot be engaged now, if it cannot.
     pub fn obstacle(&self) -> Option<String> {
         match self {
-            Vehicle::Sitl(_) => None,
+            Vehicle::Sitl(sitl) => sitl.obstacle(),
             Vehicle::Real(real) => real.obstacle(),
         }
     }
@@ -153,7 +153,7 @@ impl Vehicle {
     /// The oldest notice that was not fetched.
     pub fn take_notice(&mut self) -> Option<Notice> {
         match self {
-            Vehicle::Sitl(_) => None,
+            Vehicle::Sitl(sitl) => sitl.take_notice(),
             Vehicle::Real(real) => real.take_notice(),
         }
     }

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::columns::COLUMNS;
 use super::finding::{Finding, Severity};
 use super::phases::{self, Kind, Phase};
+use super::rudder::RudderMotion;
 use super::{Channel, Format, Log};
 
 /// What `greylag logs info` says of a log.
@@ -78,7 +79,7 @@ impl Info {
             channels: log.channels.clone(),
             purposes: purposes(log),
             topics: log.topics.clone(),
-            findings: log.findings.clone(),
+            findings: rudder(log).into_iter().chain(log.findings.iter().cloned()).collect(),
         }
     }
 
@@ -86,6 +87,15 @@ impl Info {
     pub fn severity(&self) -> Severity {
         self.findings.iter().map(|f| f.severity).max().unwrap_or(Severity::Note)
     }
+}
+
+/// What a rudder that moves means to whoever studies the log.
+fn rudder(log: &Log) -> Option<Finding> {
+    let motion = RudderMotion::of(&log.flight.samples)?;
+    Some(Finding::warning(format!(
+        "{motion}: against a model without a rudder effect, yaw, roll, side-force and drag residuals \
+         include its moments and forces"
+    )))
 }
 
 /// Share of the rows, or of the time by its own rate, that a column must cover to count as there.

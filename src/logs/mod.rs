@@ -13,6 +13,7 @@ pub mod info;
 mod load;
 pub mod mapping;
 pub mod phases;
+pub mod rudder;
 mod resample;
 mod rows;
 mod table;

@@ -103,7 +103,7 @@ pub fn explore(
     planner: Option<&mut dyn Controller>,
     place: &Place,
 ) -> Result<Flight, Trouble> {
-    let target = place.target(State::NEUTRAL.airspeed);
+    let target = place.target(simulator.start().airspeed_mps);
     simulator.reseed(place.stream(CHOICES).next_u32());
     let mut seen = simulator.reset()?;
     let mut planner = planner;

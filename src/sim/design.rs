@@ -208,6 +208,7 @@ fn imagine(
         noise,
         left: noise,
         force_noise,
+        rudder: None,
         notes: Vec::new(),
     };
     let mut prepared = Prepared::new(&flight, 0.0)?;

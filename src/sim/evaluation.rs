@@ -10,7 +10,6 @@ use serde::Serialize;
 use crate::control::{Controller, Target};
 use crate::num::statistics::{interquartile_mean, mean, quantile};
 use crate::num::{bootstrap, stream};
-use crate::physics::State;
 use crate::sim::episode::DIVERGED_DEG;
 use crate::sim::targets::Row;
 use crate::sim::{Episode, Group, Outcome, Simulator, Trouble};
@@ -98,7 +97,7 @@ pub fn evaluate(
                 let target = Target {
                     roll: row.roll_deg.to_radians(),
                     pitch: row.pitch_deg.to_radians(),
-                    airspeed: State::NEUTRAL.airspeed,
+                    airspeed: plant.start.airspeed_mps,
                 };
                 let seed: u64 = stream::stream(seed.into(), &[row.number.into()]).random();
                 environment.reseed(seed as u32);

@@ -9,6 +9,7 @@ use crate::sim::{Environment, Trouble};
 /// JSBSim.
 pub struct Simulator {
     plant: Plant,
+    start: Start,
     previous: [Command; 2],
 }
 
@@ -18,12 +19,18 @@ impl Simulator {
     /// # Errors
     /// If there is no such aircraft.
     pub fn new(options: &PlantOptions) -> Result<Simulator, Trouble> {
-        Ok(Simulator { plant: Plant::new(options)?, previous: [Command::IDLE; 2] })
+        let plant = Plant::new(options)?;
+        Ok(Simulator { plant, start: options.start, previous: [Command::IDLE; 2] })
     }
 
     /// The seed of the turbulence from the next reset on.
     pub fn reseed(&mut self, seed: u32) {
         self.plant.reseed(seed);
+    }
+
+    /// Where its episodes start.
+    pub fn start(&self) -> Start {
+        self.start
     }
 
     /// The whole truth of the plant.
@@ -60,7 +67,7 @@ impl Simulator {
 impl Environment for Simulator {
     fn reset(&mut self) -> Result<Observation, Trouble> {
         self.previous = [Command::IDLE; 2];
-        let truth = self.plant.reset(&Start::NEUTRAL)?;
+        let truth = self.plant.reset(&self.start)?;
         Ok(self.observe(&truth))
     }
 

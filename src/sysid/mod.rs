@@ -6,5 +6,6 @@ pub mod diagnose;
 pub mod measurement_effects;
 pub mod reconstruct;
 pub mod reconstruction;
+pub mod rudder;
 pub mod signature;
 pub mod separation;

@@ -1,5 +1,6 @@
 //! A flight after reconstruction: one clock, no sensor errors, no gaps inside a segment.
 
+use crate::logs::rudder::RudderMotion;
 use crate::logs::{Flight, Sample, Sampling};
 use crate::physics::{Command, Controls, State};
 
@@ -70,6 +71,8 @@ pub struct Reconstruction {
     pub left: [f64; 8],
     /// Standard deviation of the accelerometers' noise, m/s².
     pub force_noise: [f64; 3],
+    /// How the rudder moves, if it does.
+    pub rudder: Option<RudderMotion>,
     /// What the reader must know: assumptions made, power lost, for example for want of a vane.
     pub notes: Vec<String>,
 }

@@ -2,6 +2,7 @@
 
 use jsbsim::{Error, Fdm, NodeId};
 
+use super::options::THROTTLE_COMMAND;
 use super::{Inputs, PlantError, PlantOptions, Start, Truth};
 use crate::air::Gust;
 
@@ -15,12 +16,15 @@ const SLUG: f64 = LBF / FT;
 const PSF: f64 = LBF / (FT * FT);
 
 /// A step too short to move anything, s, with which derivatives are evaluated anew.
-const STILL_S: f64 = 1e-12;
+pub(super) const STILL_S: f64 = 1e-12;
 
 /// Nodes of everything that is read or written in a step.
 pub(super) struct Nodes {
-    commands: [NodeId; 3],
-    positions: [NodeId; 3],
+    surfaces: [NodeId; 2],
+    /// One a throttle; none on a glider.
+    throttles: Vec<NodeId>,
+    positions: [NodeId; 2],
+    throttle_position: Option<NodeId>,
     attitude: [NodeId; 3],
     rates: [NodeId; 3],
     airspeed: NodeId,
@@ -33,7 +37,10 @@ pub(super) struct Nodes {
     place: [NodeId; 3],
     density: NodeId,
     pressure: NodeId,
-    thrust: NodeId,
+    /// Thrust of each engine.
+    thrusts: Vec<NodeId>,
+    /// Whether each engine runs; empty when none has to be started.
+    running: Vec<NodeId>,
     hidden_thrust: Option<NodeId>,
 }
 
@@ -52,18 +59,23 @@ impl Nodes {
                 let [a, b, c] = names.map(|name| node(&format!("{before}{name}{after}")));
                 Ok([a?, b?, c?])
             };
+        let each = |name: &str| numbered(fdm, name);
         let p = &options.properties;
+        let throttles = each(&p.throttle_command);
+        let is_glider = throttles.is_empty() && p.throttle_command == THROTTLE_COMMAND;
+        if throttles.is_empty() && !is_glider {
+            node(&p.throttle_command)?;
+        }
+        // Only these can stand still with their throttle open.
+        let is_started = look("propulsion/starter_cmd").is_some();
         Ok(Nodes {
-            commands: [
-                node(&p.aileron_command)?,
-                node(&p.elevator_command)?,
-                node(&p.throttle_command)?,
-            ],
+            surfaces: [node(&p.aileron_command)?, node(&p.elevator_command)?],
+            throttles,
             positions: [
-                node(&p.aileron_position)?,
+                look(&p.aileron_position).map_or_else(|| node(p.aileron_fallback()), Ok)?,
                 node(&p.elevator_position)?,
-                node(&p.throttle_position)?,
             ],
+            throttle_position: (!is_glider).then(|| node(&p.throttle_position)).transpose()?,
             attitude: three("attitude/", ["phi", "theta", "psi"], "-rad")?,
             rates: three("velocities/", ["p", "q", "r"], "-rad_sec")?,
             airspeed: node("velocities/vt-fps")?,
@@ -76,18 +88,42 @@ impl Nodes {
             place: three("position/", ["lat-geod-deg", "long-gc-deg", "h-sl-ft"], "")?,
             density: node("atmosphere/rho-slugs_ft3")?,
             pressure: node("atmosphere/P-psf")?,
-            thrust: node("propulsion/engine/thrust-lbs")?,
+            thrusts: each_engine(fdm, "thrust-lbs"),
+            running: if is_started { each_engine(fdm, "set-running") } else { Vec::new() },
             hidden_thrust: look(crate::hidden::THRUST_PROPERTY),
         })
     }
 
     /// Writes the commands.
     pub(super) fn command(&self, fdm: &mut Fdm, inputs: &Inputs) -> Result<(), Error> {
-        let [aileron, elevator, throttle] = self.commands;
+        let [aileron, elevator] = self.surfaces;
         fdm.write_node(aileron, inputs.aileron)?;
         fdm.write_node(elevator, inputs.elevator)?;
-        fdm.write_node(throttle, inputs.throttle)?;
+        for throttle in &self.throttles {
+            fdm.write_node(*throttle, inputs.throttle)?;
+        }
         Ok(())
+    }
+
+    /// Whether the aircraft has no throttle.
+    pub(super) fn is_glider(&self) -> bool {
+        self.throttles.is_empty()
+    }
+
+    /// Starts every engine that can stand still; the number of the first that does not run then.
+    /// JSBSim starts them at full power, from where they follow the throttle.
+    pub(super) fn start_engines(&self, fdm: &mut Fdm) -> Result<Option<usize>, Error> {
+        if self.running.is_empty() {
+            return Ok(None);
+        }
+        const ALL: f64 = -1.0;
+        fdm.set_property("propulsion/set-running", ALL)?;
+        for (engine, running) in self.running.iter().enumerate() {
+            if fdm.read_node(*running)? == 0.0 {
+                return Ok(Some(engine));
+            }
+        }
+        Ok(None)
     }
 
     /// Starts `gust` with the next frame.
@@ -166,7 +202,10 @@ impl Nodes {
     pub(super) fn truth(&self, fdm: &mut Fdm) -> Result<Truth, Error> {
         let [roll_rad, pitch_rad, yaw_rad] = read3(fdm, &self.attitude, 1.0)?;
         let [p_radps, q_radps, r_radps] = read3(fdm, &self.rates, 1.0)?;
-        let [aileron_rad, elevator_rad, throttle] = read3(fdm, &self.positions, 1.0)?;
+        let [aileron_rad, elevator_rad] = self.positions;
+        let (aileron_rad, elevator_rad) =
+            (fdm.read_node(aileron_rad)?, fdm.read_node(elevator_rad)?);
+        let throttle = self.throttle_position.map_or(Ok(0.0), |node| fdm.read_node(node))?;
         let [latitude_deg, longitude_deg, altitude_ft] = read3(fdm, &self.place, 1.0)?;
         Ok(Truth {
             roll_rad,
@@ -201,9 +240,24 @@ impl Nodes {
     }
 
     fn thrust(&self, fdm: &mut Fdm) -> Result<f64, Error> {
-        let hidden = self.hidden_thrust.map_or(Ok(0.0), |node| fdm.read_node(node))?;
-        Ok((fdm.read_node(self.thrust)? + hidden) * LBF)
+        let mut total = self.hidden_thrust.map_or(Ok(0.0), |node| fdm.read_node(node))?;
+        for thrust in &self.thrusts {
+            total += fdm.read_node(*thrust)?;
+        }
+        Ok(total * LBF)
     }
+}
+
+/// The nodes `NAME`, `NAME[1]`, … up to the first that is not there.
+fn numbered(fdm: &Fdm, name: &str) -> Vec<NodeId> {
+    let names = (0..).map(|i| if i == 0 { name.to_owned() } else { format!("{name}[{i}]") });
+    names.map_while(|name| fdm.node(&name).ok().flatten()).collect()
+}
+
+/// The nodes of that name of every engine.
+fn each_engine(fdm: &Fdm, name: &str) -> Vec<NodeId> {
+    let names = (0..).map(|i| format!("propulsion/engine[{i}]/{name}"));
+    names.map_while(|name| fdm.node(&name).ok().flatten()).collect()
 }
 
 impl Start {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::Start;
 use crate::air::Air;
 use crate::aircraft;
 use crate::hidden::Hidden;
@@ -26,6 +27,8 @@ pub struct PlantOptions {
     pub latitude_deg: f64,
     /// Longitude of the start, deg.
     pub longitude_deg: f64,
+    /// The state at which the episodes of a simulator start.
+    pub start: Start,
     /// Length of one step, s: [`DT_S`](super::DT_S) unless something else is needed. JSBSim lays
     /// out the actuators' filters for the step when it loads the aircraft, so another step is
     /// another aircraft by a little (`sitl/tests/plant_step.rs` measures it).
@@ -43,6 +46,7 @@ impl Default for PlantOptions {
             seed: 1,
             latitude_deg: 46.8,
             longitude_deg: 0.0,
+            start: Start::NEUTRAL,
             step_s: super::DT_S,
         }
     }
@@ -57,7 +61,7 @@ pub struct Properties {
     pub elevator_command: String,
     /// Throttle command, 0..1.
     pub throttle_command: String,
-    /// Aileron position, rad.
+    /// Aileron position, rad; where the aircraft lacks the default, `fcs/left-aileron-pos-rad`.
     pub aileron_position: String,
     /// Elevator position, rad.
     pub elevator_position: String,
@@ -65,13 +69,63 @@ pub struct Properties {
     pub throttle_position: String,
 }
 
+/// The aileron's position by FW-JSBGym's name, of a flying wing with two elevons.
+const AILERON_POSITION: &str = "fcs/effective-aileron-pos";
+/// The aileron's position by JSBSim's own name.
+const LEFT_AILERON_POSITION: &str = "fcs/left-aileron-pos-rad";
+/// The throttle command by JSBSim's own name, which every aircraft with an engine has.
+pub(super) const THROTTLE_COMMAND: &str = "fcs/throttle-cmd-norm";
+
+impl Properties {
+    /// The keys by which a property can be named, in the order of the fields.
+    pub const KEYS: [&str; 6] = [
+        "aileron_command",
+        "elevator_command",
+        "throttle_command",
+        "aileron_position",
+        "elevator_position",
+        "throttle_position",
+    ];
+
+    /// The name under `key`, one of [`Self::KEYS`].
+    pub fn name_mut(&mut self, key: &str) -> Option<&mut String> {
+        match key {
+            "aileron_command" => Some(&mut self.aileron_command),
+            "elevator_command" => Some(&mut self.elevator_command),
+            "throttle_command" => Some(&mut self.throttle_command),
+            "aileron_position" => Some(&mut self.aileron_position),
+            "elevator_position" => Some(&mut self.elevator_position),
+            "throttle_position" => Some(&mut self.throttle_position),
+            _ => None,
+        }
+    }
+
+    /// The aileron's position where the aircraft lacks the first choice.
+    pub(super) fn aileron_fallback(&self) -> &str {
+        if self.aileron_position == AILERON_POSITION {
+            LEFT_AILERON_POSITION
+        } else {
+            &self.aileron_position
+        }
+    }
+
+    /// The names that an aircraft's `document` uses.
+    pub(crate) fn in_document(&self, document: &str) -> Properties {
+        let mut names = self.clone();
+        if !document.contains(&self.aileron_position) {
+            names.aileron_position = self.aileron_fallback().to_owned();
+        }
+        names
+    }
+}
+
 impl Default for Properties {
     fn default() -> Self {
         Properties {
             aileron_command: "fcs/aileron-cmd-norm".into(),
             elevator_command: "fcs/elevator-cmd-norm".into(),
-            throttle_command: "fcs/throttle-cmd-norm".into(),
-            aileron_position: "fcs/effective-aileron-pos".into(),
+            throttle_command: THROTTLE_COMMAND.into(),
+            aileron_position: AILERON_POSITION.into(),
             elevator_position: "fcs/elevator-pos-rad".into(),
             throttle_position: "fcs/throttle-pos-norm".into(),
         }

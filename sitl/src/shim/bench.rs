@@ -60,7 +60,7 @@ impl Bench {
         let (time_us, shown) = self.distorter.apply(frame.time_us, measured);
         self.shown_us = time_us;
         encode_slow(time_us, &shown, self.flight.home_m(), &mut self.encoder, out);
-        StateFrame::new(time_us, &shown).encode(&mut self.encoder, out);
+        StateFrame::new(time_us, &shown, self.flight.travel()).encode(&mut self.encoder, out);
     }
 
     /// Takes bytes that have arrived.

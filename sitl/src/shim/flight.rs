@@ -7,7 +7,7 @@ use super::options::{Launch, Pace, ShimOptions};
 use super::sensors::Sensors;
 use super::telemetry::{FRAME_US, StateFrame};
 use super::truth_log::TruthLog;
-use crate::plant::{Inputs, Plant, Truth};
+use crate::plant::{Inputs, Plant, Travel, Truth};
 
 /// Why a flight is over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +21,7 @@ pub enum Over {
 /// The plant with its clock, sensors and truth file.
 pub struct Flight {
     plant: Plant,
+    travel: Travel,
     sensors: Sensors,
     log: Option<TruthLog>,
     /// States not yet shown, oldest first; the last is the present one.
@@ -38,6 +39,7 @@ impl Flight {
     /// Builds the plant and puts it at its start.
     pub fn new(options: &ShimOptions) -> Result<Self, ShimError> {
         let mut plant = Plant::new(&options.plant)?;
+        let travel = plant.travel()?;
         let start = plant.reset(&options.start)?;
         let ahead = match options.pace {
             Pace::RealTime => 0,
@@ -50,6 +52,7 @@ impl Flight {
         let steps = |seconds: f64| (seconds * 1e6 / FRAME_US as f64).round().max(1.0) as u64;
         Ok(Flight {
             plant,
+            travel,
             sensors: Sensors::new(options.noise, options.bias, options.seed),
             log: options
                 .truth
@@ -69,6 +72,16 @@ impl Flight {
     /// The time of the frame to be shown now, µs.
     pub fn shown_us(&self) -> u64 {
         self.time_us - self.ahead as u64 * FRAME_US
+    }
+
+    /// Travel of the aircraft's surfaces.
+    pub fn travel(&self) -> Travel {
+        self.travel
+    }
+
+    /// What is to be known of the aircraft.
+    pub fn notes(&self) -> Vec<String> {
+        self.plant.notes()
     }
 
     /// Altitude of the start, m.
@@ -95,7 +108,7 @@ impl Flight {
     pub fn measure(&mut self) -> (StateFrame, Truth) {
         let (time_us, truth) = self.pending.front().copied().unwrap_or_default();
         let measured = self.sensors.measure(&truth);
-        (StateFrame::new(time_us, &measured), measured)
+        (StateFrame::new(time_us, &measured, self.travel), measured)
     }
 
     /// Goes one frame on, flying `inputs` if launched; says when the flight is over.

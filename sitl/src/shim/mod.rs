@@ -29,6 +29,7 @@ mod summary;
 mod telemetry;
 mod truth_log;
 
+pub use crate::plant::FULL_DEFLECTION_RAD;
 pub use distortion::Distortion;
 pub use error::ShimError;
 pub use flight::Over;
@@ -37,7 +38,6 @@ pub use options::{Bias, Existing, FrameFaults, Launch, Noise, Pace, ShimOptions,
 pub use px4_sim::{FIRST_US, OutputMap, OutputMapError, Px4Event, Px4Noise, Px4Options, STEP_US};
 pub use session::{COMPANION, SHIM};
 pub use summary::{Event, Latency, Notice, Summary};
-pub use telemetry::FULL_DEFLECTION_RAD;
 
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -71,6 +71,9 @@ pub fn run(
     }
     let link = Link::open(&options.link, wait)?;
     let mut flight = Flight::new(options)?;
+    for note in flight.notes() {
+        observer(Notice { time_s: 0.0, event: Event::Note(note) });
+    }
     let mut faults = Faults::new(options.faults, options.seed);
     if let Some(personality) = options.personality {
         let mut controller = FlightController::with(personality, flight, &options.parameters)?;

@@ -13,6 +13,8 @@ use super::px4_sim::Px4Event;
 pub enum Event {
     /// The link is open; this side's own address where there is one.
     Open(Address, Option<SocketAddr>),
+    /// What is to be known of the aircraft.
+    Note(String),
     /// Nobody has been heard yet, or not any more.
     Waiting(Address),
     /// The companion has been heard.
@@ -49,6 +51,7 @@ impl fmt::Display for Event {
             Event::Waiting(link) => {
                 write!(f, "waiting for a companion on {link}; start one with `cargo fly`")
             }
+            Event::Note(note) => write!(f, "note: {note}"),
             Event::Found => write!(f, "companion found"),
             Event::Lost => write!(f, "companion lost"),
             Event::Launched => write!(f, "launched"),

@@ -6,11 +6,7 @@ use super::codec::{
     ActuatorOutputStatus, AoaSsa, AttitudeQuaternion, Encoder, GlobalPositionInt, GpsRawInt,
     Heartbeat, HighresImu, SysStatus, VfrHud, WindCov,
 };
-use crate::plant::Truth;
-
-/// Full surface deflection, rad: what ±1 means in ACTUATOR_OUTPUT_STATUS.
-#[allow(clippy::approx_constant)] // The aircraft's limit as its file has it, not π/6.
-pub const FULL_DEFLECTION_RAD: f64 = 0.5235;
+use crate::plant::{Travel, Truth};
 
 /// Simulated time from one frame to the next, µs.
 pub const FRAME_US: u64 = 10_000;
@@ -47,8 +43,8 @@ pub struct StateFrame {
 }
 
 impl StateFrame {
-    /// The frame of `time_us` that shows `measured`.
-    pub fn new(time_us: u64, measured: &Truth) -> Self {
+    /// The frame of `time_us` that shows `measured` of an aircraft with this travel.
+    pub fn new(time_us: u64, measured: &Truth, travel: Travel) -> Self {
         StateFrame {
             time_us,
             imu: imu(time_us, measured),
@@ -58,7 +54,7 @@ impl StateFrame {
                 aoa: measured.alpha_rad.to_degrees() as f32,
                 ssa: measured.beta_rad.to_degrees() as f32,
             },
-            actuators: actuators(time_us, measured),
+            actuators: actuators(time_us, measured, travel),
             attitude: attitude(time_us, measured),
         }
     }
@@ -131,14 +127,19 @@ pub(super) fn hud(measured: &Truth) -> VfrHud {
     }
 }
 
-fn actuators(time_us: u64, measured: &Truth) -> ActuatorOutputStatus {
+fn actuators(time_us: u64, measured: &Truth, travel: Travel) -> ActuatorOutputStatus {
+    let Travel { aileron_rad, elevator_rad } = travel;
     let mut actuator = [0.0; 32];
-    actuator[0] = (measured.aileron_rad / FULL_DEFLECTION_RAD) as f32;
-    actuator[1] = (measured.elevator_rad / FULL_DEFLECTION_RAD) as f32;
+    actuator[0] = (measured.aileron_rad / aileron_rad) as f32;
+    actuator[1] = (measured.elevator_rad / elevator_rad) as f32;
     actuator[2] = measured.throttle as f32;
-    actuator[3] = (measured.aileron_rate_radps / FULL_DEFLECTION_RAD) as f32;
-    actuator[4] = (measured.elevator_rate_radps / FULL_DEFLECTION_RAD) as f32;
-    ActuatorOutputStatus { time_usec: time_us, active: 5, actuator }
+    actuator[3] = (measured.aileron_rate_radps / aileron_rad) as f32;
+    actuator[4] = (measured.elevator_rate_radps / elevator_rad) as f32;
+    if travel == Travel::X8 {
+        return ActuatorOutputStatus { time_usec: time_us, active: 5, actuator };
+    }
+    (actuator[5], actuator[6]) = (aileron_rad as f32, elevator_rad as f32);
+    ActuatorOutputStatus { time_usec: time_us, active: 7, actuator }
 }
 
 pub(super) fn attitude(time_us: u64, measured: &Truth) -> AttitudeQuaternion {

@@ -71,6 +71,8 @@ const INCIDENCE: RangeInclusive<f64> = -3.15..=3.15;
 const FORCE: RangeInclusive<f64> = -500.0..=500.0;
 /// Normalised deflection, with room for noise.
 const DEFLECTION: RangeInclusive<f64> = -1.5..=1.5;
+/// rad: a surface that moves, by a right angle at most.
+const TRAVEL: RangeInclusive<f64> = 0.001..=1.6;
 /// Throttle position, with room for noise.
 const THROTTLE: RangeInclusive<f64> = -0.25..=1.25;
 /// Normalised deflection rate, 1/s: the actuator's own limit is far below.
@@ -101,6 +103,10 @@ pub fn actuators([aileron, elevator, throttle, aileron_rate, elevator_rate]: [f6
         && THROTTLE.contains(&throttle)
         && DEFLECTION_RATE.contains(&aileron_rate)
         && DEFLECTION_RATE.contains(&elevator_rate)
+}
+/// Whether the travel of aileron and elevator, rad, is believable.
+pub fn travel(values: [f64; 2]) -> bool {
+    values.iter().all(|x| TRAVEL.contains(x))
 }
 /// Whether latitude and longitude, degrees, are believable.
 pub fn position([latitude, longitude]: [f64; 2]) -> bool {

@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use super::{Faults, Order, Outputs, Telemetry, limits};
+use super::{Faults, Notice, Order, Outputs, Telemetry, limits};
+use crate::link::autopilot::Severity;
 use crate::link::framing::{Frame, FrameCounts, Frames, Source, Version};
 use crate::link::peer::PeerId;
 use crate::link::wire::Message;
@@ -20,6 +21,8 @@ const PERIOD_US: u64 = 10_000;
 const RESTART_US: u64 = 1_000_000;
 /// After this silence another peer may take the link over.
 const TAKEOVER: Duration = Duration::from_secs(1);
+/// Share by which the travel of airframe and vehicle may differ: a file holds four digits of it.
+const TRAVEL_TOLERANCE: f64 = 1e-3;
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 /// What came over the vehicle link.
@@ -53,15 +56,18 @@ struct Parts {
     imu: Option<(Time, [f64; 3])>,
     air: Option<(f64, f64)>,
     incidence: Option<(Time, f64, f64)>,
-    actuators: Option<(Time, [f64; 5])>,
+    actuators: Option<(Time, [f64; 5], [f64; 2])>,
 }
 
 /// The vehicle side of the `sitl` profile.
 #[derive(Clone, Debug)]
 pub struct Sitl {
     system: u8,
-    /// Deflection at normalised 1, rad.
+    /// Deflection at full command by the airframe, rad.
     deflection: f64,
+    /// Travel of the vehicle's aileron and elevator when it is not the airframe's, rad.
+    foreign_travel: Option<[f64; 2]>,
+    told_foreign_travel: bool,
     parts: Parts,
     /// The last state delivered; faulty parts of the next one keep its values.
     last: Telemetry,
@@ -73,8 +79,9 @@ pub struct Sitl {
 }
 
 impl Sitl {
-    /// A vehicle of system id `system` whose surfaces deflect by `deflection` rad at normalised 1
-    /// (0.5235 for the X8).
+    /// A vehicle of system id `system` whose surfaces deflect by `deflection` rad at full command
+    /// (0.5235 for the X8). Positions are those that the vehicle reports by its own travel; a
+    /// vehicle of another travel cannot be engaged.
     pub fn new(system: u8, deflection: f64) -> Self {
         let nan = f64::NAN;
         let nothing = Telemetry {
@@ -94,6 +101,8 @@ impl Sitl {
         Sitl {
             system,
             deflection,
+            foreign_travel: None,
+            told_foreign_travel: false,
             parts: Parts::default(),
             last: nothing,
             peer: None,
@@ -151,8 +160,8 @@ impl Sitl {
             VehicleMessage::Incidence { time, alpha, beta } => {
                 self.parts.incidence = Some((time, alpha, beta))
             }
-            VehicleMessage::Actuators { time, active, outputs } => {
-                self.parts.actuators = (active >= 5).then_some((time, outputs));
+            VehicleMessage::Actuators { time, active, outputs, travel } => {
+                self.parts.actuators = (active >= 5).then_some((time, outputs, travel));
             }
             VehicleMessage::Position { position, velocity } if limits::position(position) => {
                 (self.last.position, self.last.velocity) = (position, velocity);
@@ -178,7 +187,9 @@ impl Sitl {
         rates: [f64; 3],
     ) -> Option<Telemetry> {
         let whole = parts.imu.zip(parts.air).zip(parts.incidence.zip(parts.actuators));
-        let Some((((time, force), air), ((time_b, alpha, beta), (time_c, outputs)))) = whole else {
+        let Some((((time, force), air), ((time_b, alpha, beta), (time_c, outputs, travel)))) =
+            whole
+        else {
             self.counts.incomplete += 1;
             return None;
         };
@@ -192,12 +203,40 @@ impl Sitl {
         let mut next = Telemetry { time, order, faults: Faults::NONE, ..self.last };
         fill_motion(&mut next, q, rates);
         fill_air(&mut next, air, [alpha, beta], force);
-        fill_actuators(&mut next, outputs, self.deflection);
+        fill_actuators(&mut next, outputs, travel);
+        self.compare_travel(travel);
         self.counts.faulty += u64::from(!next.faults.is_empty());
         if order != Order::Late {
             self.last = next;
         }
         Some(next)
+    }
+
+    fn compare_travel(&mut self, travel: [f64; 2]) {
+        let differs = |t: f64| (t - self.deflection).abs() > TRAVEL_TOLERANCE * self.deflection;
+        self.foreign_travel = travel.into_iter().any(differs).then_some(travel);
+    }
+
+    /// See [`super::Vehicle::obstacle`].
+    pub fn obstacle(&self) -> Option<String> {
+        self.foreign_travel.map(|[aileron, elevator]| {
+            format!(
+                "the vehicle's travel is {aileron:.4} rad (aileron), {elevator:.4} rad (elevator), \
+                 the airframe file's deflection_max_rad is {:.4}: give the model and airframe of \
+                 this aircraft",
+                self.deflection
+            )
+        })
+    }
+
+    /// See [`super::Vehicle::take_notice`]: another travel is told once.
+    pub fn take_notice(&mut self) -> Option<Notice> {
+        if self.told_foreign_travel {
+            return None;
+        }
+        let obstacle = self.obstacle()?;
+        self.told_foreign_travel = true;
+        Some(Notice::Text(Severity::Error, format!("cannot be engaged: {obstacle}")))
     }
 
     /// Counts a frame by its time.
@@ -306,15 +345,15 @@ fn fill_air(
     }
 }
 
-fn fill_actuators(next: &mut Telemetry, outputs: [f64; 5], deflection: f64) {
+fn fill_actuators(next: &mut Telemetry, outputs: [f64; 5], travel: [f64; 2]) {
     let [aileron, elevator, throttle, aileron_rate, elevator_rate] = outputs;
-    match limits::actuators(outputs) {
+    match limits::actuators(outputs) && limits::travel(travel) {
         true => {
             next.actuators = ActuatorState {
-                aileron: aileron * deflection,
-                aileron_rate: aileron_rate * deflection,
-                elevator: elevator * deflection,
-                elevator_rate: elevator_rate * deflection,
+                aileron: aileron * travel[0],
+                aileron_rate: aileron_rate * travel[0],
+                elevator: elevator * travel[1],
+                elevator_rate: elevator_rate * travel[1],
                 throttle,
             }
         }

@@ -11,6 +11,10 @@ use crate::physics::{Command, Time};
 /// MAV_MODE_FLAG_SAFETY_ARMED.
 const ARMED: u8 = 128;
 
+/// Deflection at normalised 1 of a vehicle that does not send its travel, rad: the X8's.
+#[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
+pub const TRAVEL: f64 = 0.5235;
+
 /// A message from the vehicle, in SI units but for the normalised actuators.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum VehicleMessage {
@@ -46,6 +50,8 @@ pub enum VehicleMessage {
         active: u32,
         /// The five outputs.
         outputs: [f64; 5],
+        /// Travel of aileron and elevator, rad.
+        travel: [f64; 2],
     },
     /// ATTITUDE_QUATERNION, which completes a state frame.
     Attitude {
@@ -89,6 +95,10 @@ pub fn read(frame: &Frame<'_>) -> Option<VehicleMessage> {
             time: Time::from_micros(m.time_usec),
             active: m.active,
             outputs: std::array::from_fn(|i| wide(m.actuator[i])),
+            travel: match m.active {
+                7.. => [m.actuator[5], m.actuator[6]].map(wide),
+                _ => [TRAVEL; 2],
+            },
         },
         MavMessage::ATTITUDE_QUATERNION(m) => VehicleMessage::Attitude {
             boot_ms: m.time_boot_ms,

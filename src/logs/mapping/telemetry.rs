@@ -41,6 +41,7 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
     let Some(vehicle) = vehicle(topics) else { return Vec::new() };
     let system = vehicle.to_be_bytes()[0];
     let mut out = states();
+    out.extend(deflections(topics, vehicle));
     out.push(airspeed(topics, system));
     for rule in &mut out {
         // Another component of the same system may send what the first does not.
@@ -126,13 +127,29 @@ fn states() -> Vec<Rule> {
     }
     out.push(Rule::density("HIGHRES_IMU", ("abs_pressure", 100.0), ("temperature", 1.0)));
     out.push(Rule::density("SCALED_PRESSURE", ("press_abs", 100.0), ("temperature", 0.01)));
-    let note = "deflections are ACTUATOR_OUTPUT_STATUS in the order of the sitl profile, 0.5235 rad at 1; another aircraft needs a mapping";
-    for (column, field, gain) in [
-        ("aileron_rad", "actuator0", DEFLECTION),
-        ("elevator_rad", "actuator1", DEFLECTION),
-        ("throttle", "actuator2", 1.0),
-    ] {
-        out.push(Rule::linear(column, "ACTUATOR_OUTPUT_STATUS", field, gain).noting(note));
-    }
     out
+}
+
+/// Positions of the actuators in the order of the sitl profile, which sends the travel of the
+/// surfaces where it is not the X8's.
+fn deflections(topics: &Topics, vehicle: u16) -> Vec<Rule> {
+    let [aileron, elevator] = sent_travel(topics, vehicle).unwrap_or([DEFLECTION; 2]);
+    let note = format!(
+        "deflections are ACTUATOR_OUTPUT_STATUS in the order of the sitl profile, {aileron:.4} rad \
+         (aileron), {elevator:.4} rad (elevator) at 1; another order needs a mapping"
+    );
+    [("aileron_rad", "actuator0", aileron), ("elevator_rad", "actuator1", elevator)]
+        .into_iter()
+        .chain([("throttle", "actuator2", 1.0)])
+        .map(|(column, field, gain)| {
+            Rule::linear(column, "ACTUATOR_OUTPUT_STATUS", field, gain).noting(&note)
+        })
+        .collect()
+}
+
+/// Travel of aileron and elevator as the vehicle sends it, rad.
+fn sent_travel(topics: &Topics, vehicle: u16) -> Option<[f64; 2]> {
+    let topic = topics.topics.get(&("ACTUATOR_OUTPUT_STATUS".to_owned(), vehicle))?;
+    let last = |name| topic.field(name)?.last().copied();
+    (last("active")? >= 7.0).then_some([last("actuator5")?, last("actuator6")?])
 }

@@ -12,6 +12,7 @@ use crate::model::GreyBox;
 use crate::physics::effects::{Coefficient, Description};
 use crate::sysid::compare::HorizonScore;
 use crate::sysid::reconstruction::{Reconstruction, Segment};
+use crate::sysid::rudder;
 
 /// Times that all effects are asked for at most.
 const ROUNDS: usize = 3;
@@ -140,7 +141,9 @@ pub fn amend(
             judged_at_s: JUDGED_AT_S,
         },
     };
-    amendment.sentences = story::sentences(&amendment);
+    let rudder = rudder::unmodelled(flights, model).or(rudder::unmodelled(held_out, model));
+    amendment.sentences = rudder.map(rudder::warning).into_iter().collect();
+    amendment.sentences.extend(story::sentences(&amendment));
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
 }
 

@@ -17,6 +17,7 @@ use super::verdict;
 use super::weak::{self, Series};
 use crate::model::GreyBox;
 use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::rudder;
 
 /// The channel's variance, less noise, must be at least this part of itself for a share to mean
 /// something.
@@ -58,7 +59,10 @@ pub fn compare(
         .iter()
         .map(|model| {
             progress(&format!("comparing {} with {} flight(s)", model.name, prepared.len()));
-            one_model(model, &prepared, &used, options)
+            let mut result = one_model(model, &prepared, &used, options);
+            let rudder = rudder::unmodelled(flights, model).map(rudder::warning);
+            result.sentences.splice(0..0, rudder);
+            result
         })
         .collect::<Vec<_>>();
     Ok(Comparison {

@@ -19,6 +19,7 @@ use crate::model::GreyBox;
 use crate::physics;
 use crate::sysid::compare::flight::Prepared;
 use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::rudder;
 
 /// Least share of the error beyond noise that must be learnable before something is said to be missing:
 /// what the reconstruction leaves is no effect.
@@ -39,8 +40,12 @@ pub fn diagnose(
     known(&options.without)?;
     let (problem, used, mut notes) = problem(model, flights, options)?;
     notes.extend(excitation::check(&problem.flights)?);
-    let found = search(&problem, model, options, progress)
+    let mut found = search(&problem, model, options, progress)
         .ok_or_else(|| DiagnoseError::Unusable { model: model.name.clone() })?;
+    let rudder = rudder::unmodelled(flights, model);
+    if let Some(motion) = rudder {
+        found.refuse_in(&rudder::CHANNELS, &rudder::reason(motion));
+    }
     let effects = ranking::candidates(&found, options);
     let channels = shares::channels(&found);
     let measurement = measurement::measurement(&used);
@@ -55,7 +60,11 @@ pub fn diagnose(
         version: env!("CARGO_PKG_VERSION"),
         model: model.name.clone(),
         verdict,
-        sentences: sentences::sentences(&found, verdict, &effects, &channels, &measurement),
+        sentences: rudder
+            .map(rudder::warning)
+            .into_iter()
+            .chain(sentences::sentences(&found, verdict, &effects, &channels, &measurement))
+            .collect(),
         advice: advice::advice(&found, verdict, &effects, &channels),
         effects,
         channels,

@@ -11,6 +11,7 @@ use super::shape::{Shape, shape};
 use super::shares;
 use crate::model::GreyBox;
 use crate::physics::inputs::Kind;
+use crate::sysid::compare::ChannelId;
 
 /// Most effects that are asserted together.
 const MOST: usize = 6;
@@ -430,7 +431,20 @@ impl Found {
                 ));
             }
         }
-        // what was found beside an effect that is not there is no more sure than that
+        self.refuse_companions();
+    }
+
+    /// Refuses every effect that acts in one of `channels`, for `reason`.
+    pub fn refuse_in(&mut self, channels: &[ChannelId], reason: &str) {
+        let touched = |c: &usize| channels.contains(&ChannelId::ALL[*c]);
+        for effect in self.selected.iter_mut().filter(|s| s.channels.iter().any(touched)) {
+            effect.refused.push(reason.to_owned());
+        }
+        self.refuse_companions();
+    }
+
+    /// Refuses what was found beside an effect that is refused: it is no more sure than that.
+    fn refuse_companions(&mut self) {
         let refused = |s: &Selected| !s.refused.is_empty() && s.trace.is_none();
         let Some(first) = self.selected.iter().position(refused) else { return };
         let (refused, later) = self.selected.split_at_mut(first + 1);

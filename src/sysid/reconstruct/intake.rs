@@ -2,6 +2,7 @@
 
 use super::channel::{Channel, Kind, wrap};
 use super::{Options, ReconstructError};
+use crate::logs::rudder::RudderMotion;
 use crate::logs::{Flight, FlowAngles, Sample};
 use crate::num::statistics::quantile;
 use crate::physics::actuators::Actuators;
@@ -26,6 +27,8 @@ pub struct Log {
     pub has: Sensors,
     /// How often they measure.
     pub periods: Periods,
+    /// How the rudder moves, if it does.
+    pub rudder: Option<RudderMotion>,
     /// What the reader must know.
     pub notes: Vec<String>,
 }
@@ -200,7 +203,9 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     }
     let stretches = stretches(flight, &has, options)?;
     let step = step(&stretches, options);
-    let mut log = Log { step, tracks: Vec::new(), has, periods: channels.periods(), notes };
+    let rudder = RudderMotion::of(&flight.samples);
+    let periods = channels.periods();
+    let mut log = Log { step, tracks: Vec::new(), has, periods, rudder, notes };
     let mut longest = 0.0_f64;
     for times in &stretches {
         let [start, end] = [times[0], times[times.len() - 1]];

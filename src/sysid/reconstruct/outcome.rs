@@ -72,6 +72,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
         noise: [m[0], m[1], m[3], l.gyro[0], l.gyro[1], l.gyro[2], m[4], m[5]],
         left,
         force_noise: if log.has.force { l.force } else { [f64::NAN; 3] },
+        rudder: log.rudder,
         notes,
     })
 }

@@ -1,6 +1,6 @@
 //! The stack's own attitude loops, with the airspeed and altitude loops it flies by itself with.
 
-use crate::plant::{DT_S, FULL_DEFLECTION_RAD, Inputs, Truth};
+use crate::plant::{DT_S, Inputs, Travel, Truth};
 
 /// Roll error (rad) and its integral to aileron (rad), roll rate (rad/s) to aileron.
 const ROLL: [f64; 3] = [2.5, 0.9, 0.05];
@@ -18,12 +18,18 @@ const ALTITUDE: [f64; 3] = [0.01, 0.02, 0.15];
 /// The loops with their memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Law {
+    travel: Travel,
     integral: [f64; 3],
     /// The altitude that is held, m.
     altitude: Option<f64>,
 }
 
 impl Law {
+    /// Loops that have not flown yet, for surfaces of this travel.
+    pub(super) fn new(travel: Travel) -> Self {
+        Law { travel, ..Law::default() }
+    }
+
     /// Flies an attitude (rad), with a thrust or at cruise.
     pub(super) fn attitude(
         &mut self,
@@ -37,8 +43,8 @@ impl Law {
         let elevator = PITCH[0] * errors[1] + PITCH[1] * self.integral[1] - PITCH[2] * seen.q_radps;
         let throttle = THROTTLE + AIRSPEED[0] * errors[2] + AIRSPEED[1] * self.integral[2];
         let free = [
-            aileron.abs() < FULL_DEFLECTION_RAD,
-            elevator.abs() < FULL_DEFLECTION_RAD,
+            aileron.abs() < self.travel.aileron_rad,
+            elevator.abs() < self.travel.elevator_rad,
             (0.0..=1.0).contains(&throttle),
         ];
         for axis in 0..3 {
@@ -47,8 +53,8 @@ impl Law {
             }
         }
         Inputs {
-            aileron: aileron / FULL_DEFLECTION_RAD,
-            elevator: elevator / FULL_DEFLECTION_RAD,
+            aileron: aileron / self.travel.aileron_rad,
+            elevator: elevator / self.travel.elevator_rad,
             throttle: thrust.unwrap_or(throttle),
         }
         .clamped()

@@ -124,14 +124,15 @@ impl FlightController {
         changed: &[(String, f64)],
     ) -> Result<Self, ShimError> {
         flight.launch();
+        let travel = flight.travel();
         Ok(FlightController {
             personality,
             flight,
             parser: Parser::default(),
             encoder: Encoder::new(SYSTEM, COMPONENT),
-            streams: Streams::default(),
+            streams: Streams::new(travel),
             parameters: Table::new(personality, changed)?,
-            law: Law::default(),
+            law: Law::new(travel),
             distorter: Distorter::default(),
             sticks: Sticks::default(),
             wish: None,
@@ -160,7 +161,7 @@ impl FlightController {
         }
         // The controller's own loops see what is right: only what is told can be wrong.
         let (told_us, told) = self.distorter.apply(frame.time_us, measured);
-        let frame = StateFrame::new(told_us, &told);
+        let frame = StateFrame::new(told_us, &told, self.flight.travel());
         self.streams.send(&frame, &told, self.flight.home_m(), &mut self.encoder, out);
         self.steps += 1;
     }
@@ -222,7 +223,7 @@ impl FlightController {
     pub fn set_mode(&mut self, mode: Mode) {
         if self.mode != mode {
             (self.mode, self.entered_us) = (mode, self.now_us);
-            self.law = Law::default();
+            self.law = Law::new(self.flight.travel());
             let heartbeat = self.heartbeat();
             self.encoder.encode(&heartbeat, &mut self.waiting);
         }

@@ -1,8 +1,8 @@
 //! What the played controller sends by itself: nothing much until it is asked.
 
-use crate::plant::Truth;
+use crate::plant::{Travel, Truth};
 use crate::shim::codec::{AoaSsa, Encoder, ServoOutputRaw, VfrHud};
-use crate::shim::telemetry::{self, FRAME_US, FULL_DEFLECTION_RAD, StateFrame};
+use crate::shim::telemetry::{self, FRAME_US, StateFrame};
 
 /// Sea-level density of the standard atmosphere, kg/m³.
 const SEA_LEVEL: f64 = 1.225;
@@ -19,11 +19,13 @@ struct Row {
 #[derive(Clone, Debug)]
 pub(super) struct Streams {
     rows: [Row; 8],
+    travel: Travel,
     last_us: u64,
 }
 
-impl Default for Streams {
-    fn default() -> Self {
+impl Streams {
+    /// The streams of an aircraft whose surfaces have this travel.
+    pub(super) fn new(travel: Travel) -> Self {
         let row = |id, interval_us| Row { id, interval_us, due_us: 0 };
         // The rates of a telemetry port that nobody has asked for more.
         let rows = [
@@ -36,7 +38,7 @@ impl Default for Streams {
             row(231, None),
             row(1, Some(1_000_000)),
         ];
-        Streams { rows, last_us: 0 }
+        Streams { rows, travel, last_us: 0 }
     }
 }
 
@@ -77,7 +79,7 @@ impl Streams {
         out: &mut Vec<u8>,
     ) {
         if self.knows(id) {
-            encode(id, now, measured, home_m, encoder, out);
+            encode(id, now, measured, home_m, self.travel, encoder, out);
         }
     }
 
@@ -99,7 +101,7 @@ impl Streams {
         for row in &mut self.rows {
             let Some(interval) = row.interval_us.filter(|_| now >= row.due_us) else { continue };
             row.due_us = (row.due_us + interval).max(now.saturating_sub(interval) + 1);
-            encode(row.id, now, measured, home_m, encoder, out);
+            encode(row.id, now, measured, home_m, self.travel, encoder, out);
         }
     }
 }
@@ -109,6 +111,7 @@ fn encode(
     now: u64,
     measured: &Truth,
     home_m: f64,
+    travel: Travel,
     encoder: &mut Encoder,
     out: &mut Vec<u8>,
 ) {
@@ -124,7 +127,7 @@ fn encode(
             },
             out,
         ),
-        36 => encoder.encode(&servos(now, measured), out),
+        36 => encoder.encode(&servos(now, measured, travel), out),
         33 => encoder.encode(&telemetry::position(now, measured, home_m), out),
         231 => encoder.encode(&telemetry::wind(now, measured), out),
         _ => encoder.encode(&telemetry::health(), out),
@@ -137,11 +140,11 @@ fn hud(measured: &Truth) -> VfrHud {
     VfrHud { airspeed: equivalent as f32, ..telemetry::hud(measured) }
 }
 
-fn servos(now: u64, measured: &Truth) -> ServoOutputRaw {
-    let surface = |rad: f64| (1500.0 + 500.0 * rad / FULL_DEFLECTION_RAD).round() as u16;
+fn servos(now: u64, measured: &Truth, travel: Travel) -> ServoOutputRaw {
+    let surface = |rad: f64, full_rad: f64| (1500.0 + 500.0 * rad / full_rad).round() as u16;
     let mut servo = [0; 8];
-    servo[0] = surface(measured.aileron_rad);
-    servo[1] = surface(measured.elevator_rad);
+    servo[0] = surface(measured.aileron_rad, travel.aileron_rad);
+    servo[1] = surface(measured.elevator_rad, travel.elevator_rad);
     servo[2] = (1000.0 + 1000.0 * measured.throttle).round() as u16;
     ServoOutputRaw { time_usec: now as u32, servo, ..ServoOutputRaw::default() }
 }

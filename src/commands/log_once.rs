@@ -1,0 +1,43 @@
+//! Warnings on standard error, each said once: every worker that loads an aircraft has the same ones.
+
+use std::collections::BTreeSet;
+use std::io::{self, Write};
+use std::sync::Mutex;
+
+/// Lines that were said.
+static SAID: Mutex<BTreeSet<Vec<u8>>> = Mutex::new(BTreeSet::new());
+/// Lines that are remembered at most; later ones are said whenever they come.
+const REMEMBERED: usize = 1000;
+
+/// Standard error without repetitions.
+pub struct LogOnce;
+
+impl Write for LogOnce {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        if is_new(line) {
+            io::stderr().write_all(line)?;
+        }
+        Ok(line.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
+
+fn is_new(line: &[u8]) -> bool {
+    let Ok(mut said) = SAID.lock() else { return true };
+    said.len() >= REMEMBERED || said.insert(line.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_new_once() {
+        assert!(is_new(b"WARN one of this test"));
+        assert!(!is_new(b"WARN one of this test"));
+        assert!(is_new(b"WARN another of this test"));
+    }
+}

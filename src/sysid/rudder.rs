@@ -1,0 +1,36 @@
+//! A rudder that moves in the flights and that the model does not have.
+
+use crate::logs::rudder::RudderMotion;
+use crate::model::GreyBox;
+use crate::sysid::compare::ChannelId;
+use crate::sysid::reconstruction::Reconstruction;
+
+/// The effect that holds a rudder's forces and moments.
+const EFFECT: &str = "rudder_linear";
+/// The channels into which a rudder's forces and moments go: it turns the aircraft to the side, and
+/// its deflection with the sideslip that follows costs drag.
+pub const CHANNELS: [ChannelId; 4] =
+    [ChannelId::Drag, ChannelId::Side, ChannelId::Roll, ChannelId::Yaw];
+
+/// The largest movement of a rudder in `flights` that `model` has no effect for.
+pub fn unmodelled(flights: &[Reconstruction], model: &GreyBox) -> Option<RudderMotion> {
+    if model.has(EFFECT) {
+        return None;
+    }
+    flights.iter().filter_map(|f| f.rudder).max_by(|a, b| a.size().total_cmp(&b.size()))
+}
+
+/// What is to be said first of residuals that hold a rudder's forces and moments.
+pub fn warning(motion: RudderMotion) -> String {
+    format!(
+        "{motion} and the model has no rudder effect: yaw, roll, side-force and drag residuals include \
+         its moments and forces; fly with the rudder centred, or leave the column out if the aircraft \
+         has no rudder."
+    )
+}
+
+/// Why an effect is not asserted while such a rudder moves.
+pub fn reason(motion: RudderMotion) -> String {
+    let motion = motion.to_string();
+    format!("t{}, and the model has no rudder effect for its channels", &motion[1..])
+}

@@ -1,0 +1,113 @@
+//! An aircraft that is not the X8 through shim and companion: what is recorded is what was flown.
+#![cfg(feature = "sitl")]
+
+mod flight_support;
+mod shim_support;
+
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+use flight_support::*;
+use greylag::commands::fly::crew;
+use greylag::control::Kind;
+use greylag::flight::recorder::Place;
+use greylag::flight::runtime::Pace;
+use greylag::logs::csv::{self, Tolerance};
+use greylag::logs::{Options, Sample, load};
+use greylag_sitl::plant::PlantOptions;
+use greylag_sitl::shim::{self, Existing, TruthFile};
+use mavlink::dialects::ardupilotmega::*;
+use shim_support::{Shim, parameter};
+
+/// 25° of travel, as small aircraft with a tail have it, in place of the X8's 0.5235 rad.
+const TRAVEL_RAD: f64 = 0.4363;
+
+/// The X8 with other stops under the name `other`.
+fn other_aircraft() -> (tempfile::TempDir, PlantOptions) {
+    let folder = tempfile::tempdir().unwrap();
+    let (from, to) = (Path::new("sitl/aircraft/x8"), folder.path().join("other"));
+    fs::create_dir_all(to.join("Engines")).unwrap();
+    for engine in ["Engines/x8_motor.xml", "Engines/x8_direct.xml"] {
+        fs::copy(from.join(engine), to.join(engine)).unwrap();
+    }
+    let document = fs::read_to_string(from.join("x8.xml")).unwrap();
+    let flight_control = document.find("<flight_control").unwrap();
+    let (before, after) = document.split_at(flight_control);
+    let end = after.find("</flight_control>").unwrap();
+    let stops = after[..end].replace("0.5235", &TRAVEL_RAD.to_string());
+    fs::write(to.join("other.xml"), [before, &stops, &after[end..]].concat()).unwrap();
+    let plant = PlantOptions {
+        aircraft_dir: Some(folder.path().to_owned()),
+        aircraft: "other".into(),
+        ..PlantOptions::default()
+    };
+    (folder, plant)
+}
+
+#[test]
+fn recorded_deflections_are_those_flown_at_another_travel() {
+    let (folder, plant) = other_aircraft();
+    let mut model = x8().clone();
+    model.airframe.actuators.deflection_max = TRAVEL_RAD;
+    let mut options = options(Pace::Lockstep);
+    options.deflection = TRAVEL_RAD;
+    options.record = Some(Place::Exactly(folder.path().join("flight")));
+    let companion = Companion::with(&options, crew(Kind::Lqi, &model, Path::new("")).unwrap());
+    let truth = folder.path().join("truth.csv");
+    let link = format!("udpout:{}", companion.vehicle());
+    let shim = Shim::start(&link, shim::Pace::Lockstep, 10.0, |shim| {
+        shim.plant = plant;
+        shim.truth = Some(TruthFile { path: truth.clone(), existing: Existing::Keep });
+    });
+    let mut client = Client::new(companion.client(0));
+    client.send(&parameter("GL_OFFB_LOSS_S", 60.0));
+    client.wait("echo", |m| matches!(m, MavMessage::PARAM_VALUE(p) if p.param_value == 60.0));
+    client.engage(30.0, 10.0);
+    while shim.is_flying() {
+        client.setpoint(30.0, 10.0);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    shim.end();
+    companion.end();
+    let samples = |path: &Path| csv::load(path, Tolerance::Strict).unwrap().flight.samples;
+    let flown = samples(&truth);
+    check_deflections(&samples(&folder.path().join("flight/flight.csv")), &flown);
+    // The telemetry log holds the travel as well.
+    let log = load(&folder.path().join("flight/flight.tlog"), &Options::default()).unwrap();
+    check_deflections(&log.flight.samples, &flown);
+}
+
+/// Every row that shows a time of the truth shows its deflections.
+fn check_deflections(recorded: &[Sample], truth: &[Sample]) {
+    let (mut rows, mut largest) = (0, 0.0_f64);
+    for row in recorded {
+        let Some(flown) = truth.iter().find(|t| (t.time_s - row.time_s).abs() < 1e-4) else {
+            continue;
+        };
+        for (got, want) in
+            [(row.aileron_rad, flown.aileron_rad), (row.elevator_rad, flown.elevator_rad)]
+        {
+            // Floats on the wire: 24 bits of 0.44 rad.
+            assert!((got - want).abs() < 1e-6, "{got} for {want} at {} s", row.time_s);
+        }
+        largest = largest.max(flown.elevator_rad.abs());
+        rows += 1;
+    }
+    // The elevator did move: 1e-6 of nothing would be no proof.
+    assert!(rows > 500 && largest > 0.05, "{rows} rows, {largest} rad");
+}
+
+#[test]
+fn an_aircraft_of_another_travel_than_the_airframe_is_refused() {
+    let (_folder, plant) = other_aircraft();
+    let companion = Companion::start(&options(Pace::Lockstep));
+    let link = format!("udpout:{}", companion.vehicle());
+    let shim = Shim::start(&link, shim::Pace::Lockstep, 10.0, |shim| shim.plant = plant);
+    let mut client = Client::new(companion.client(0));
+    client.wait_for_text("travel is 0.4363 rad");
+    assert_ne!(client.arm(), MavResult::MAV_RESULT_ACCEPTED);
+    client.wait_for_text("arming refused");
+    shim.end();
+    companion.end();
+}
