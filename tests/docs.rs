@@ -9,6 +9,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use greylag::control::schedule::Schedule;
+use greylag::logs::mapping::Mapping;
+use greylag::physics::Airframe;
+
 use docs_support::commands::{Invocation, invocations};
 use docs_support::markdown::{self, Page, anchors, links, pages, root};
 use docs_support::{cli, effects, sitl};
@@ -136,6 +140,14 @@ fn the_page_of_log_columns_names_each() {
     for name in docs_support::log_columns() {
         assert!(page.contains(&format!("`{name}`")), "docs/reference/log-columns.md lacks {name}");
     }
+}
+
+#[test]
+fn examples_of_file_formats_are_read() {
+    let example = |page: &str| markdown::first_block(&markdown::read(page), "toml");
+    Airframe::parse(&example("docs/reference/airframe-file.md")).unwrap();
+    Schedule::parse(&example("docs/reference/schedule-file.md")).unwrap();
+    Mapping::parse(&example("docs/how-to/map-a-log.md"), Path::new("mapping.toml")).unwrap();
 }
 
 #[test]

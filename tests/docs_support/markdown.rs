@@ -63,6 +63,12 @@ fn below(folder: &Path, paths: &mut Vec<PathBuf>) {
     }
 }
 
+/// The text of the first fenced block of a language.
+pub fn first_block(text: &str, language: &str) -> String {
+    let (_, rest) = text.split_once(&format!("```{language}\n")).unwrap();
+    rest.split("```").next().unwrap_or_default().to_owned()
+}
+
 /// The lines outside of fenced blocks.
 fn prose(text: &str) -> impl Iterator<Item = &str> {
     let mut inside = false;
