@@ -1,5 +1,6 @@
 //! `greylag link`: what a link to a flight controller carries, and what it lacks.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -46,6 +47,9 @@ struct Check {
     /// The stack to check for [default: the one that answers].
     #[arg(long, value_name = "NAME", value_enum)]
     profile: Option<ProfileName>,
+    /// Model of the aircraft, for the actuators of its airframe.
+    #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
+    model: PathBuf,
     /// What it shall be commanded.
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
@@ -60,7 +64,7 @@ struct Check {
 /// If the link cannot be opened, or nobody answers on it.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Command::Check(check) = &arguments.command;
-    let model = fly::model("params/x8/jsbsim.toml".as_ref(), None)?;
+    let model = fly::model(&check.model, None)?;
     let mut ear = Ear::open(&check.vehicle)?;
     let actuators = model.airframe.actuators;
     let asked = check.profile.and_then(ProfileName::stack);
