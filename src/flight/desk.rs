@@ -105,16 +105,15 @@ impl Desk {
 
     fn heed(&mut self, host: Duration) {
         while let Some(notice) = self.vehicle.take_notice() {
+            if let Some(words) = notice.ending() {
+                // Its verdict cannot be a refusal: it is forced.
+                let _ = self.pilot.disarm(self.now(host), true);
+                self.pilot.tell(Severity::Critical, &words);
+            }
             match notice {
                 Notice::Text(severity, words) => self.pilot.tell(severity, &words),
-                Notice::System(_) => {}
+                Notice::System(_) | Notice::Released(_) | Notice::HandedBack(_) => {}
                 Notice::Engaged => self.pilot.engaged(self.now(host)),
-                Notice::HandedBack(reason) => {
-                    // Its verdict cannot be a refusal: it is forced.
-                    let _ = self.pilot.disarm(self.now(host), true);
-                    let words = format!("handed back to the controller: {reason}");
-                    self.pilot.tell(Severity::Critical, &words);
-                }
             }
         }
     }

@@ -228,6 +228,13 @@ impl Control {
     /// Does what the vehicle has to tell.
     fn heed_vehicle(&mut self) {
         while let Some(notice) = self.vehicle.take_notice() {
+            if let Some(words) = notice.ending() {
+                let now = self.clock.at(Instant::now());
+                self.note(Call::Disarm(now, true));
+                // Its verdict cannot be a refusal: it is forced.
+                let _ = self.pilot.disarm(now, true);
+                self.pilot.tell(Severity::Critical, &words);
+            }
             match notice {
                 Notice::Text(severity, words) => self.pilot.tell(severity, &words),
                 Notice::System(system) => self.clients.adopt(system),
@@ -236,14 +243,7 @@ impl Control {
                     self.note(Call::Engaged(now));
                     self.pilot.engaged(now);
                 }
-                Notice::HandedBack(reason) => {
-                    let now = self.clock.at(Instant::now());
-                    self.note(Call::Disarm(now, true));
-                    // Its verdict cannot be a refusal: it is forced.
-                    let _ = self.pilot.disarm(now, true);
-                    let words = format!("handed back to the controller: {reason}");
-                    self.pilot.tell(Severity::Critical, &words);
-                }
+                Notice::Released(_) | Notice::HandedBack(_) => {}
             }
         }
     }

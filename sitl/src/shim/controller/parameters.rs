@@ -26,13 +26,21 @@ const PX4: [(&str, f64, u8); 13] = [
 ];
 
 /// ArduPilot's are of one radio's calibration, with a reversed pitch channel.
-const ARDUPILOT: [(&str, f64, u8); 26] = [
+const ARDUPILOT: [(&str, f64, u8); 33] = [
     ("SERVO1_REVERSED", 0.0, INT),
     ("SERVO2_REVERSED", 0.0, INT),
     ("SYSID_THISMAV", 1.0, INT),
     ("MAV_GCS_SYSID", 1.0, INT),
     ("SCHED_LOOP_RATE", 200.0, INT),
     ("RC_OVERRIDE_TIME", 0.5, REAL),
+    ("GUIDED_TIMEOUT", 1.0, REAL),
+    ("THR_FAILSAFE", 1.0, INT),
+    ("FS_SHORT_ACTN", 0.0, INT),
+    ("FS_LONG_ACTN", 1.0, INT),
+    ("RC_FS_TIMEOUT", 1.0, REAL),
+    ("RC_OPTIONS", 32.0, INT),
+    // Of ArduPilot's own simulator: 1 is no radio, 0 one with its sticks released.
+    ("SIM_RC_FAIL", 1.0, INT),
     ("RCMAP_ROLL", 1.0, INT),
     ("RCMAP_PITCH", 2.0, INT),
     ("RCMAP_THROTTLE", 3.0, INT),

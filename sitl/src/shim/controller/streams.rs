@@ -7,6 +7,9 @@ use crate::shim::telemetry::{self, FRAME_US, FULL_DEFLECTION_RAD, StateFrame};
 /// Sea-level density of the standard atmosphere, kg/m³.
 const SEA_LEVEL: f64 = 1.225;
 
+/// MAV_RESULT_DENIED.
+pub(super) const DENIED: u8 = 2;
+
 /// A stream with the time between its messages, µs, and the next one's.
 #[derive(Clone, Copy, Debug)]
 struct Row {
@@ -20,6 +23,8 @@ struct Row {
 pub(super) struct Streams {
     rows: [Row; 8],
     last_us: u64,
+    /// MAV_SYS_STATUS_SENSOR bits of a radio's receiver, when one is bound.
+    receiver: u32,
 }
 
 impl Default for Streams {
@@ -36,20 +41,29 @@ impl Default for Streams {
             row(231, None),
             row(1, Some(1_000_000)),
         ];
-        Streams { rows, last_us: 0 }
+        Streams { rows, last_us: 0, receiver: 0 }
     }
 }
 
 impl Streams {
-    /// SET_MESSAGE_INTERVAL: MAV_RESULT. Faster than `limit_hz`, or than the steps, is limited.
-    pub(super) fn set(&mut self, id: u32, interval_us: f32, limit_hz: f64) -> u8 {
+    /// The streams of a controller with these bits of a radio's receiver in its SYS_STATUS.
+    pub(super) fn with_receiver(receiver: u32) -> Self {
+        Streams { receiver, ..Streams::default() }
+    }
+
+    /// SET_MESSAGE_INTERVAL: MAV_RESULT. Faster than the steps is limited, as PX4 does; faster than
+    /// `denied_hz` is denied and changes nothing, as ArduPilot does.
+    pub(super) fn set(&mut self, id: u32, interval_us: f32, denied_hz: f64) -> u8 {
         let Some(row) = self.rows.iter_mut().find(|row| row.id == id) else {
             // MAV_RESULT_UNSUPPORTED.
             return 3;
         };
-        let shortest = (1e6 / limit_hz).max(FRAME_US as f64);
+        // A microsecond of rounding.
+        if interval_us > 0.0 && f64::from(interval_us) + 1.0 < 1e6 / denied_hz {
+            return DENIED;
+        }
         row.interval_us = match interval_us {
-            us if us > 0.0 => Some((f64::from(us)).max(shortest) as u64),
+            us if us > 0.0 => Some(f64::from(us).max(FRAME_US as f64) as u64),
             _ => None,
         };
         0
@@ -77,7 +91,7 @@ impl Streams {
         out: &mut Vec<u8>,
     ) {
         if self.knows(id) {
-            encode(id, now, measured, home_m, encoder, out);
+            encode(id, now, measured, home_m, self.receiver, encoder, out);
         }
     }
 
@@ -99,7 +113,7 @@ impl Streams {
         for row in &mut self.rows {
             let Some(interval) = row.interval_us.filter(|_| now >= row.due_us) else { continue };
             row.due_us = (row.due_us + interval).max(now.saturating_sub(interval) + 1);
-            encode(row.id, now, measured, home_m, encoder, out);
+            encode(row.id, now, measured, home_m, self.receiver, encoder, out);
         }
     }
 }
@@ -109,6 +123,7 @@ fn encode(
     now: u64,
     measured: &Truth,
     home_m: f64,
+    receiver: u32,
     encoder: &mut Encoder,
     out: &mut Vec<u8>,
 ) {
@@ -127,7 +142,13 @@ fn encode(
         36 => encoder.encode(&servos(now, measured), out),
         33 => encoder.encode(&telemetry::position(now, measured, home_m), out),
         231 => encoder.encode(&telemetry::wind(now, measured), out),
-        _ => encoder.encode(&telemetry::health(), out),
+        _ => {
+            let mut health = telemetry::health();
+            health.onboard_control_sensors_present |= receiver;
+            health.onboard_control_sensors_enabled |= receiver;
+            health.onboard_control_sensors_health |= receiver;
+            encoder.encode(&health, out);
+        }
     }
 }
 
