@@ -84,7 +84,9 @@ impl Desk {
             self.outputs = demand.outputs;
             out.extend(self.vehicle.answer(host, state.time, &demand));
             if let Some(recorder) = &self.recorder {
-                recorder.row(Row::new(state, &decision, 0.0));
+                let row = Row::new(state, &decision, 0.0);
+                let shown = self.vehicle.flies_surfaces();
+                recorder.row(if shown { row } else { row.without_surfaces() });
             }
             watch(state, &decision);
         }

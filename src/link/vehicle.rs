@@ -155,6 +155,11 @@ impl Vehicle {
         }
     }
 
+    /// Whether the surfaces that are commanded are those that fly, so that a record may show them.
+    pub fn flies_surfaces(&self) -> bool {
+        matches!(self, Vehicle::Sitl(_)) || self.has_channels()
+    }
+
     /// Why the vehicle cannot be engaged now, if it cannot.
     pub fn obstacle(&self) -> Option<String> {
         match self {

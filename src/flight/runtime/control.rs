@@ -221,7 +221,9 @@ impl Control {
         self.load += LOAD_WEIGHT * (share - self.load);
         if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {
             let latency_us = latency.as_secs_f64() * 1e6;
-            recorder.row(Row::new(state, decision, latency_us));
+            let row = Row::new(state, decision, latency_us);
+            let shown = self.vehicle.flies_surfaces();
+            recorder.row(if shown { row } else { row.without_surfaces() });
         }
     }
 

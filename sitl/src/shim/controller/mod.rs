@@ -7,6 +7,7 @@
 //! sensor errors of the options.
 
 mod connect;
+mod lag;
 mod law;
 mod modes;
 mod parameters;
@@ -27,6 +28,7 @@ use super::flight::{Flight, Over};
 use super::options::ShimOptions;
 use super::telemetry::StateFrame;
 use crate::plant::{Inputs, Truth};
+use lag::Lag;
 use law::Law;
 pub use modes::Mode;
 use parameters::Table;
@@ -104,6 +106,7 @@ pub struct FlightController {
     streams: Streams,
     parameters: Table,
     law: Law,
+    lag: Lag,
     distorter: Distorter,
     sticks: Sticks,
     wish: Option<Wish>,
@@ -118,6 +121,8 @@ pub struct FlightController {
     now_us: u64,
     measured: Truth,
     inputs: Inputs,
+    /// What was commanded last, before what makes it late.
+    commanded: Inputs,
     /// What waits to be sent with the next step.
     waiting: Vec<u8>,
     /// What was counted.
@@ -149,6 +154,7 @@ impl FlightController {
             streams: Streams::with_receiver(receiver),
             parameters,
             law: Law::default(),
+            lag: Lag::default(),
             distorter: Distorter::default(),
             sticks: Sticks::default(),
             wish: None,
@@ -161,6 +167,7 @@ impl FlightController {
             now_us: 0,
             measured: Truth::default(),
             inputs: Inputs::default(),
+            commanded: Inputs::default(),
             waiting: Vec::new(),
             counts: Counts::default(),
         })
@@ -177,7 +184,12 @@ impl FlightController {
             self.encoder.encode(&heartbeat, out);
         }
         // The controller's own loops see what is right: only what is told can be wrong.
-        let (told_us, told) = self.distorter.apply(frame.time_us, measured);
+        let cutoff = match self.personality {
+            Personality::Px4 => self.parameters.get("IMU_GYRO_CUTOFF"),
+            Personality::Ardupilot => self.parameters.get("INS_GYRO_FILTER"),
+        };
+        let filtered = self.lag.filtered(measured, cutoff);
+        let (told_us, told) = self.distorter.apply(frame.time_us, filtered);
         let frame = StateFrame::new(told_us, &told);
         self.streams.send(&frame, &told, self.flight.home_m(), &mut self.encoder, out);
         self.steps += 1;
@@ -206,7 +218,9 @@ impl FlightController {
     /// If the plant cannot go on.
     pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {
         self.watch();
-        let inputs = self.command();
+        self.commanded = self.command();
+        // PX4 has no such parameter: NaN, and no delay.
+        let inputs = self.lag.delayed(self.commanded, self.parameters.get("SIM_SERVO_DELAY"));
         self.inputs = if self.armed { inputs } else { Inputs::default() };
         self.flight.advance(self.inputs)
     }
@@ -229,6 +243,11 @@ impl FlightController {
     /// Simulated time of the last step, µs.
     pub fn now_us(&self) -> u64 {
         self.now_us
+    }
+
+    /// Changes a parameter, as a pilot at the ground station would.
+    pub fn set_parameter(&mut self, name: &str, value: f64) {
+        self.parameters.put(name, value);
     }
 
     /// Disarms or arms, as a pilot at the controller would.
@@ -506,8 +525,8 @@ impl FlightController {
                 true if self.has_radio() && !self.sticks_alive() => {
                     sticks::ardupilot(RADIO_US, &self.parameters)
                 }
-                true => self.sticks.inputs(self.personality, &self.parameters, self.inputs),
-                false => self.inputs,
+                true => self.sticks.inputs(self.personality, &self.parameters, self.commanded),
+                false => self.commanded,
             };
         }
         let wish = self.wish.filter(|_| self.mode == Mode::Guided && self.wish_alive());
