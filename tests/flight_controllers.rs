@@ -118,6 +118,16 @@ fn a_controller_of_another_stack_is_refused_by_name() {
 }
 
 #[test]
+fn a_controller_that_signs_is_recognised_by_its_frames() {
+    use greylag::link::signing::{Key, Signer};
+    let mut bench = Bench::new(Ardupilot, Surfaces, |_| {});
+    bench.signer = Some(Signer::new(Key::from_bytes([1; 32]), 0));
+    bench.run(6.0);
+    let Verdict::Rejected(said) = bench.desk.arm(bench.host) else { panic!() };
+    assert!(said.contains("the controller signs") && said.contains("--sign-vehicle"), "{said}");
+}
+
+#[test]
 fn a_disarmed_controller_is_not_engaged() {
     let mut bench = ready(Px4, Surfaces);
     bench.controller.arm(false);
