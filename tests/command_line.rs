@@ -68,6 +68,46 @@ fn evaluate_refuses_what_it_cannot_fly() {
 }
 
 #[test]
+fn a_start_below_the_airframes_least_airspeed_is_refused() {
+    refuses(
+        &["evaluate", "--controller", "pid", "--start-airspeed-mps", "5"],
+        &["5 m/s", "airspeed_min_mps", "--start-airspeed-mps"],
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    refuses(
+        &["collect", "--out", out, "--aircraft-dir", "nowhere", "--aircraft", "glider"],
+        &["glider", "--start-airspeed-mps"],
+    );
+}
+
+#[test]
+fn a_property_can_be_named_and_a_wrong_key_is_answered_with_those_there_are() {
+    let with = |property: &str| {
+        let words = ["fcs/no-such-property", "aileron_position"];
+        let word = if property.starts_with("wing") { &words[1..] } else { &words[..1] };
+        refuses(&["evaluate", "--controller", "pid", "--property", property], word);
+    };
+    with("aileron_position=fcs/no-such-property");
+    with("wing=fcs/no-such-property");
+}
+
+#[test]
+fn a_cause_is_said_once() {
+    let output = greylag(&[
+        "evaluate",
+        "--controller",
+        "pid",
+        "--aircraft-dir",
+        "nowhere",
+        "--aircraft",
+        "glider",
+    ]);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(error.matches("os error").count(), 1, "{error}");
+}
+
+#[test]
 fn targets_outside_their_group_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("targets.csv");

@@ -87,6 +87,11 @@ fn parameters_that_do_not_fit_are_said_with_the_value_to_set() {
     for (personality, authority, name, value, words) in [
         (Px4, Surfaces, "COM_RC_IN_MODE", 0.0, "COM_RC_IN_MODE is 0: set it to 1"),
         (Px4, Surfaces, "FW_MAN_R_SC", 0.5, "FW_MAN_R_SC is 0.5: set it to 1"),
+        (Px4, Surfaces, "NAV_RCL_ACT", 2.0, "NAV_RCL_ACT is 2: set it to 1"),
+        (Ardupilot, Surfaces, "THR_FAILSAFE", 0.0, "THR_FAILSAFE is 0: set it to 1"),
+        (Ardupilot, Surfaces, "FS_SHORT_ACTN", 3.0, "FS_SHORT_ACTN is 3: set it to 0"),
+        (Ardupilot, Surfaces, "RC_OPTIONS", 34.0, "RC_OPTIONS is 34: set it to 32"),
+        (Ardupilot, Attitude, "GUIDED_TIMEOUT", 3.0, "GUIDED_TIMEOUT is 3: set it to 0.5"),
         (Px4, Attitude, "COM_OF_LOSS_T", 5.0, "COM_OF_LOSS_T is 5: set it to 0.5"),
         (Ardupilot, Surfaces, "MAV_GCS_SYSID", 255.0, "MAV_GCS_SYSID is 255: set it to 1"),
         (Ardupilot, Surfaces, "RC_OVERRIDE_TIME", 3.0, "RC_OVERRIDE_TIME is 3: set it to 0.5"),
@@ -113,6 +118,16 @@ fn a_controller_of_another_stack_is_refused_by_name() {
 }
 
 #[test]
+fn a_controller_that_signs_is_recognised_by_its_frames() {
+    use greylag::link::signing::{Key, Signer};
+    let mut bench = Bench::new(Ardupilot, Surfaces, |_| {});
+    bench.signer = Some(Signer::new(Key::from_bytes([1; 32]), 0));
+    bench.run(6.0);
+    let Verdict::Rejected(said) = bench.desk.arm(bench.host) else { panic!() };
+    assert!(said.contains("the controller signs") && said.contains("--sign-vehicle"), "{said}");
+}
+
+#[test]
 fn a_disarmed_controller_is_not_engaged() {
     let mut bench = ready(Px4, Surfaces);
     bench.controller.arm(false);
@@ -131,27 +146,176 @@ fn a_wire_that_is_cut_hands_the_aircraft_back_and_only_a_request_takes_it_again(
         bench.steer(30.0, 5.0, 4.0);
         bench.cut = true;
         let cut = bench.host;
-        while !bench.said("handed back") {
+        while !bench.said("not confirmed yet: no state") {
             bench.step();
         }
         let took = bench.host - cut;
-        println!("{personality} {authority:?}: handed back {took:?} after the cut");
+        println!("{personality} {authority:?}: hand-back asked {took:?} after the cut");
         // Issue 8: within half a second of a dead link.
         assert!(took.as_secs_f64() <= 0.5);
         bench.run(3.0);
         // The controller's own failsafe, but for GUIDED, which ArduPilot leaves by itself never.
         let mode = bench.controller.mode();
         let guided = (personality, authority) == (Ardupilot, Attitude);
-        assert!(guided || matches!(mode, Mode::Hold | Mode::Return), "{mode:?}");
+        assert!(guided || matches!(mode, Mode::Hold | Mode::Circle), "{mode:?}");
+        // What is not known is not claimed, and after two heartbeats it is said again.
+        assert!(!bench.said("handed back") && bench.said("hand-back not confirmed"));
         bench.cut = false;
+        bench.run(0.3);
+        // No later than one repetition of the request, though the link was dead for its first ones.
+        assert!(!guided || bench.controller.mode() == Mode::Hold, "{:?}", bench.texts());
         bench.run(6.0);
-        assert_ne!(bench.controller.mode(), Mode::Manual);
+        assert!(bench.said("handed back"), "{:?}", bench.texts());
+        assert!(!matches!(bench.controller.mode(), Mode::Manual | Mode::Guided));
         let level = bench.controller.measured().roll_rad.to_degrees().abs();
         assert!(level < 5.0, "{level}");
         // It goes on when asked.
         bench.engage(10.0, 3.0);
         bench.steer(10.0, 3.0, 8.0);
         assert!(bench.settled_deg(10.0, 3.0) < 0.6, "{:?}", bench.texts());
+    }
+}
+
+#[test]
+fn px4_is_engaged_by_what_its_heartbeat_shows() {
+    // Real PX4 acknowledged MANUAL at once, refused it, and stayed in HOLD: 6 of 6 engagements
+    // failed, and the servos were blamed for it.
+    for authority in [Surfaces, Attitude] {
+        for start in 0..5 {
+            let mut bench = ready(Px4, authority);
+            // At every phase of the 10 Hz at which it looks at its requirements.
+            (0..2 * start).for_each(|_| bench.step());
+            bench.engage(20.0, 5.0);
+            let steered = if authority == Surfaces { Mode::Manual } else { Mode::Guided };
+            while !bench.said("engaged") {
+                bench.step();
+                assert!(!bench.said("hand"), "{:?}", bench.texts());
+            }
+            assert_eq!(bench.controller.mode(), steered, "{:?}", bench.texts());
+            bench.steer(20.0, 5.0, 3.0);
+            assert_eq!(bench.controller.mode(), steered, "{:?}", bench.texts());
+            assert!(authority == Attitude || bench.said("signs are right"), "{:?}", bench.texts());
+        }
+    }
+}
+
+#[test]
+fn a_dead_companion_leaves_ardupilot_in_manual_when_a_radio_is_bound() {
+    for (no_radio, left) in [(1.0, Mode::Circle), (0.0, Mode::Manual)] {
+        let mut bench = Bench::new(Ardupilot, Surfaces, |options| {
+            options.parameters = vec![("SIM_RC_FAIL".into(), no_radio)];
+        });
+        bench.run(6.0);
+        bench.engage(15.0, 3.0);
+        bench.steer(15.0, 3.0, 3.0);
+        assert_eq!(bench.said("a radio is bound"), no_radio == 0.0, "{:?}", bench.texts());
+        // The companion is dead: nothing goes up any more.
+        bench.cut = true;
+        bench.run(1.0);
+        assert_eq!(bench.controller.mode(), Mode::Manual);
+        let throttle = bench.controller.inputs().throttle;
+        assert_eq!(throttle == 0.0, no_radio == 0.0, "{throttle}");
+        bench.run(1.0);
+        assert_eq!(bench.controller.mode(), left);
+    }
+}
+
+#[test]
+fn px4_holds_after_a_hand_back_though_the_sticks_end() {
+    use greylag::link::autopilot::Autopilot;
+    let mut bench = ready(Px4, Surfaces);
+    bench.engage(20.0, 5.0);
+    bench.steer(20.0, 5.0, 2.0);
+    let now = bench.desk.now(bench.host);
+    assert_eq!(bench.desk.pilot().disarm(now, true), Verdict::Accepted);
+    bench.run(2.0);
+    // PX4 takes the end of the sticks for a lost radio: NAV_RCL_ACT decides, and 1 is HOLD.
+    assert_eq!((bench.controller.counts.failsafes, bench.controller.mode()), (1, Mode::Hold));
+}
+
+#[test]
+fn a_stream_that_ardupilot_denies_is_asked_for_no_more() {
+    let mut bench = Bench::new(Ardupilot, Attitude, |options| {
+        options.parameters = vec![("SCHED_LOOP_RATE".into(), 50.0)];
+    });
+    bench.run(4.0);
+    let denials = bench.controller.counts.denied;
+    // ATTITUDE_QUATERNION, HIGHRES_IMU, VFR_HUD, AOA_SSA: each denied once or, before its first
+    // answer came, twice.
+    assert!((4..=8).contains(&denials), "{denials}");
+    bench.run(10.0);
+    assert_eq!(bench.controller.counts.denied, denials);
+    let told =
+        bench.texts().iter().filter(|t| t.contains("SCHED_LOOP_RATE to 200, then reboot")).count();
+    assert_eq!(told, 1, "{:?}", bench.texts());
+}
+
+#[test]
+fn an_oscillation_by_delay_hands_the_aircraft_back() {
+    // Real ArduPlane let the LQI swing at 2.6 Hz for 50 s, unnoticed. The delay that sets it off here
+    // comes in flight, so that the check of signs has passed.
+    let mut bench = ready(Ardupilot, Surfaces);
+    bench.engage(0.0, 3.0);
+    bench.steer(0.0, 3.0, 4.0);
+    bench.controller.set_parameter("SIM_SERVO_DELAY", 150.0);
+    let begun = bench.host;
+    while !bench.said("it oscillates in") {
+        bench.steer(0.0, 3.0, 0.1);
+        assert!((bench.host - begun).as_secs_f64() < 15.0, "{:?}", bench.texts());
+    }
+    println!("said {:?} after the delay came", bench.host - begun);
+    bench.run(1.0);
+    assert_eq!(bench.controller.mode(), Mode::Hold);
+    assert!(bench.said("handed back"), "{:?}", bench.texts());
+}
+
+#[test]
+fn the_fastest_manoeuvres_and_turbulence_are_no_oscillation() {
+    // Between the envelope's ends as fast as the LQI goes, in light turbulence with noisy sensors.
+    for personality in [Px4, Ardupilot] {
+        let mut bench = Bench::new(personality, Surfaces, |options| {
+            options.noise = Noise::REALISTIC;
+            options.plant.air = Air {
+                wind_ned_mps: [5.0, -5.0, 0.0],
+                turbulence: Some(Turbulence { wind_20ft_mps: 7.5, severity: 3 }),
+                gusts: vec![],
+            };
+        });
+        bench.run(6.0);
+        bench.engage(0.0, 3.0);
+        bench.steer(0.0, 3.0, 3.0);
+        for seconds in [4.0, 1.5, 0.8, 0.4] {
+            for sign in [1.0, -1.0, 1.0, -1.0] {
+                bench.steer(60.0 * sign, 15.0 * sign, seconds);
+            }
+        }
+        assert!(!bench.said("oscillates") && !bench.said("hand"), "{:?}", bench.texts());
+        assert_eq!(bench.controller.mode(), Mode::Manual);
+    }
+}
+
+#[test]
+fn a_record_shows_surfaces_only_where_they_were_flown() {
+    // Beside real PX4 the attitudes' record held an elevator of correlation −0.23 with the truth.
+    use greylag::flight::recorder::{Place, Recorder};
+    for authority in [Surfaces, Attitude] {
+        let name = format!("record-{authority:?}-{}", std::process::id());
+        let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        let mut bench = ready(Px4, authority);
+        bench.desk.record(Recorder::start(&Place::Exactly(folder.clone())).unwrap());
+        bench.engage(20.0, 5.0);
+        bench.steer(20.0, 5.0, 3.0);
+        drop(bench);
+        let log = std::fs::read_to_string(folder.join("flight.csv")).unwrap();
+        let header: Vec<&str> =
+            log.lines().find(|line| line.contains("aileron_cmd")).unwrap().split(',').collect();
+        let last: Vec<&str> = log.lines().last().unwrap().split(',').collect();
+        let at = |name: &str| last[header.iter().position(|column| *column == name).unwrap()];
+        for column in ["aileron_cmd", "elevator_cmd", "aileron_rad", "elevator_rad"] {
+            assert_eq!(at(column).is_empty(), authority == Attitude, "{column}: {last:?}");
+        }
+        assert!(!at("throttle_cmd").is_empty());
+        std::fs::remove_dir_all(folder).unwrap();
     }
 }
 

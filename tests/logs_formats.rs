@@ -70,6 +70,21 @@ fn one_flight_in_four_formats_is_one_table() {
 }
 
 #[test]
+fn targets_of_px4_come_from_its_quaternion() {
+    let mut truth = samples(400);
+    for (i, sample) in truth.iter_mut().enumerate() {
+        let t = i as f64 * 0.01;
+        (sample.roll_target_rad, sample.pitch_target_rad) = (0.9 * t.sin(), 0.3 * t.cos());
+    }
+    let read = read(&ulog(&truth)).flight.samples;
+    for (a, b) in truth.iter().zip(&read) {
+        // Single precision.
+        assert!((a.roll_target_rad - b.roll_target_rad).abs() < 1e-5, "{a:?} {b:?}");
+        assert!((a.pitch_target_rad - b.pitch_target_rad).abs() < 1e-5);
+    }
+}
+
+#[test]
 fn a_file_cut_anywhere_is_read_up_to_there_with_a_warning() {
     let truth = samples(60);
     for bytes in [ulog(&truth), dataflash(&truth), tlog(&truth)] {

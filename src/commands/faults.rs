@@ -31,6 +31,15 @@ pub struct Arguments {
     /// Controllers.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["lqi"], value_parser = choices::controller())]
     controller: Vec<ControllerKind>,
+    /// Model that the controllers are designed from or plan with; the X8 flies.
+    /// Flights that `--resume` notes are all of the default model.
+    #[arg(
+        long,
+        value_name = "FILE",
+        default_value = "params/x8/jsbsim.toml",
+        conflicts_with = "resume"
+    )]
+    model: PathBuf,
     /// What is at the other end of the vehicle's link.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["sitl", "px4", "ardupilot"], value_enum)]
     opposite: Vec<Opposite>,
@@ -64,7 +73,7 @@ impl ValueEnum for Opposite {
 /// # Errors
 /// If an aircraft or a controller cannot be made, or the file of `--resume` cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let model = fly::model("params/x8/jsbsim.toml".as_ref(), None)?;
+    let model = fly::model(&arguments.model, None)?;
     let ledger = arguments.resume.as_deref().map(Ledger::open).transpose()?;
     let mut entries = Vec::new();
     for &controller in &arguments.controller {

@@ -233,7 +233,11 @@ pub fn controller(
 pub fn crew(kind: Kind, model: &GreyBox, folder: &Path) -> anyhow::Result<Crew> {
     let controller = controller(kind, model, folder, &[])?;
     // The design of an LQI takes a moment; it is not made twice.
-    let fallback = if kind == Kind::Lqi { controller.boxed_clone() } else { fallback(model)? };
+    let fallback = if matches!(kind, Kind::Lqi | Kind::LqiDamped) {
+        controller.boxed_clone()
+    } else {
+        fallback(model)?
+    };
     let pilot = Pilot::new(Config::for_model(model)?, fallback)?;
     let seat = if kind.pace() == control::Pace::Planned { Seat::Thread } else { Seat::Loop };
     Ok(Crew { pilot, controller, seat })

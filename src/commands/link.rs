@@ -1,5 +1,6 @@
 //! `greylag link`: what a link to a flight controller carries, and what it lacks.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -46,6 +47,9 @@ struct Check {
     /// The stack to check for [default: the one that answers].
     #[arg(long, value_name = "NAME", value_enum)]
     profile: Option<ProfileName>,
+    /// Model of the aircraft, for the actuators of its airframe.
+    #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
+    model: PathBuf,
     /// What it shall be commanded.
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
@@ -60,7 +64,7 @@ struct Check {
 /// If the link cannot be opened, or nobody answers on it.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Command::Check(check) = &arguments.command;
-    let model = fly::model("params/x8/jsbsim.toml".as_ref(), None)?;
+    let model = fly::model(&check.model, None)?;
     let mut ear = Ear::open(&check.vehicle)?;
     let actuators = model.airframe.actuators;
     let asked = check.profile.and_then(ProfileName::stack);
@@ -154,8 +158,17 @@ fn report(check: &Check, real: &Real) -> Result<ExitCode> {
     }
     traffic(check, real, &mut missing);
     latency(real);
-    streams(real, &mut missing);
-    parameters(real, &mut missing);
+    if real.is_shut_out() {
+        missing.push(
+            "the controller signs its frames and ignores this command's, which are not signed: fly \
+             with --sign and --sign-vehicle, or switch its signing off for this check"
+                .into(),
+        );
+    } else {
+        streams(real, &mut missing);
+        parameters(real, &mut missing);
+        real.radio_warning().iter().for_each(|words| println!("\nwarning: {words}"));
+    }
     if missing.is_empty() {
         println!("\n{} can be flown by {:?}", real.profile().stack, real.profile().authority);
         return Ok(ExitCode::SUCCESS);
@@ -167,8 +180,10 @@ fn report(check: &Check, real: &Real) -> Result<ExitCode> {
 
 fn traffic(check: &Check, real: &Real, missing: &mut Vec<String>) {
     let survey = real.survey();
-    let rate: f64 =
-        survey.messages().map(|(_, t)| t.mean_hz() * t.bytes as f64 / t.frames.max(1) as f64).sum();
+    let rate: f64 = survey
+        .messages()
+        .map(|(_, t)| survey.mean_hz(t) * t.bytes as f64 / t.frames.max(1) as f64)
+        .sum();
     let kilobits = |bytes: f64| bytes * 10.0 * 1e-3;
     print!("received    {:.0} kbit/s (ten bits a byte on a wire)", kilobits(rate));
     let wanted: f64 =
@@ -232,11 +247,18 @@ fn streams(real: &Real, missing: &mut Vec<String>) {
             (true, false) => "missing, not needed",
         };
         if thin && stream.needed {
-            missing.push(format!(
-                "{} comes at {hz:.0} Hz instead of {:.0}: raise the port's data rate (MAV_1_RATE on \
-                 PX4), the baud rate, or SCHED_LOOP_RATE on ArduPilot",
-                stream.name, stream.hz
-            ));
+            let words = real.denial(stream.id).unwrap_or_else(|| {
+                format!(
+                    "{} comes at {hz:.0} Hz instead of {:.0}: {}",
+                    stream.name,
+                    stream.hz,
+                    remedy(real.profile().stack)
+                )
+            });
+            // One denial names all that were denied.
+            if !missing.contains(&words) {
+                missing.push(words);
+            }
         }
         table.add_row([
             stream.name.to_owned(),
@@ -252,10 +274,18 @@ fn streams(real: &Real, missing: &mut Vec<String>) {
         .survey()
         .messages()
         .filter(|(id, _)| !named.contains(id))
-        .map(|(id, traffic)| format!("{id} ({:.1} Hz)", traffic.mean_hz()))
+        .map(|(id, traffic)| format!("{id} ({:.1} Hz)", real.survey().mean_hz(traffic)))
         .collect();
     if !others.is_empty() {
         println!("others by number: {}", others.join(", "));
+    }
+}
+
+/// What makes a stream come faster.
+fn remedy(stack: Stack) -> &'static str {
+    match stack {
+        Stack::Px4 => "raise the port's data rate (MAV_1_RATE) or its baud rate",
+        Stack::Ardupilot => "raise the port's baud rate, or SCHED_LOOP_RATE (then reboot)",
     }
 }
 
@@ -263,7 +293,7 @@ fn parameters(real: &Real, missing: &mut Vec<String>) {
     println!("\nparameters");
     for (_, standing, words) in real.parameter_report() {
         println!("  {words}");
-        if !matches!(standing, Standing::Good(_)) {
+        if !matches!(standing, Standing::Good(_) | Standing::Absent) {
             missing.push(words);
         }
     }

@@ -150,6 +150,7 @@ controllers! {
     Pid "pid" Immediate Gains "PID with the gains published with the simulator." => |_from| pid::Pid::new(pid::PUBLIC),
     PidRetuned "pid-retuned" Immediate Gains "PID retuned, at a safer airspeed." => |_from| pid::Pid::new(pid::RETUNED),
     Lqi "lqi" Immediate Model "Gain-scheduled LQI designed from the model." => |from| lqi::Lqi::new(from.model)?,
+    LqiDamped "lqi-damped" Immediate Model "The LQI with softer loops, for a link with more delay." => |from| lqi::Lqi::weighted("lqi-damped", from.model, &lqi::Weights::DAMPED)?,
     Ilqr "ilqr" Planned Model "iLQR over half a second, beside the model's LQI: offset-free." => |from| ilqr::Ilqr::new(from.model, lqi::Lqi::new(from.model)?),
     Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |from| from.planner("cem", cem::Settings::PAPER)?,
     Mppi "mppi" Planned Model "MPPI over the same five steps." => |from| from.planner("mppi", cem::Settings::MPPI)?,

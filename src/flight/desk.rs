@@ -84,7 +84,9 @@ impl Desk {
             self.outputs = demand.outputs;
             out.extend(self.vehicle.answer(host, state.time, &demand));
             if let Some(recorder) = &self.recorder {
-                recorder.row(Row::new(state, &decision, 0.0));
+                let row = Row::new(state, &decision, 0.0);
+                let shown = self.vehicle.flies_surfaces();
+                recorder.row(if shown { row } else { row.without_surfaces() });
             }
             watch(state, &decision);
         }
@@ -105,16 +107,15 @@ impl Desk {
 
     fn heed(&mut self, host: Duration) {
         while let Some(notice) = self.vehicle.take_notice() {
+            if let Some(words) = notice.ending() {
+                // Its verdict cannot be a refusal: it is forced.
+                let _ = self.pilot.disarm(self.now(host), true);
+                self.pilot.tell(Severity::Critical, &words);
+            }
             match notice {
                 Notice::Text(severity, words) => self.pilot.tell(severity, &words),
-                Notice::System(_) => {}
+                Notice::System(_) | Notice::Released(_) | Notice::HandedBack(_) => {}
                 Notice::Engaged => self.pilot.engaged(self.now(host)),
-                Notice::HandedBack(reason) => {
-                    // Its verdict cannot be a refusal: it is forced.
-                    let _ = self.pilot.disarm(self.now(host), true);
-                    let words = format!("handed back to the controller: {reason}");
-                    self.pilot.tell(Severity::Critical, &words);
-                }
             }
         }
     }

@@ -85,10 +85,25 @@ pub enum Notice {
     Text(Severity, String),
     /// The controller has given us the helm.
     Engaged,
+    /// The controller was asked to take the aircraft, for this reason, and has not confirmed it.
+    Released(String),
     /// The controller has the aircraft again, for this reason: engage no more until asked.
     HandedBack(String),
     /// The controller's system id, which becomes ours.
     System(u8),
+}
+
+impl Notice {
+    /// What a notice that ends our steering says to the ground stations.
+    pub fn ending(&self) -> Option<String> {
+        match self {
+            Notice::Released(reason) => {
+                Some(format!("hand-back asked, not confirmed yet: {reason}"))
+            }
+            Notice::HandedBack(reason) => Some(format!("handed back to the controller: {reason}")),
+            Notice::Text(..) | Notice::Engaged | Notice::System(_) => None,
+        }
+    }
 }
 
 /// A vehicle of one of the profiles.
@@ -140,6 +155,11 @@ impl Vehicle {
             Vehicle::Sitl(_) => false,
             Vehicle::Real(real) => real.profile().authority == Authority::Surfaces,
         }
+    }
+
+    /// Whether the surfaces that are commanded are those that fly, so that a record may show them.
+    pub fn flies_surfaces(&self) -> bool {
+        matches!(self, Vehicle::Sitl(_)) || self.has_channels()
     }
 
     /// Why the vehicle cannot be engaged now, if it cannot.

@@ -38,7 +38,7 @@ impl<'a> Reader<'a> {
                 one_sided(&mut series);
                 Target::Attitude
             }
-            Fill::Sum { .. } | Fill::Density { .. } => {
+            Fill::Sum { .. } | Fill::Tilt { .. } | Fill::Density { .. } => {
                 let column = rule.columns()[0];
                 let wraps = is_wrapped(column) && is_angle(&series[0], column);
                 if wraps {

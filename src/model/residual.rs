@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use crate::model::weights;
 use crate::num::dense::{DenseError, ON_STACK};
 use crate::num::{Dense, Real};
+use crate::physics::airframe::{ActuatorFigures, Geometry};
 use crate::physics::{Airframe, Controls, State};
 
 /// Inputs of the network: V, p, q, r, α, β, then δa, δe, δt.
@@ -101,7 +102,19 @@ impl Origin {
 
 /// SHA-256 of what a residual depends on in an airframe: name, geometry and actuators.
 pub fn fingerprint(airframe: &Airframe) -> String {
-    hash(format!("{} {:?} {:?}", airframe.name, airframe.geometry, airframe.actuators).as_bytes())
+    hash(fingerprinted(airframe).as_bytes())
+}
+
+/// The text of schema 1 that is hashed: field by field, so that a further field of an airframe does not
+/// refuse the policies and residuals that were learned before it.
+fn fingerprinted(airframe: &Airframe) -> String {
+    let Geometry { area, span, chord } = airframe.geometry;
+    let ActuatorFigures { surface, throttle, deflection_max, step } = airframe.actuators;
+    format!(
+        "{} Geometry {{ area: {area:?}, span: {span:?}, chord: {chord:?} }} ActuatorFigures {{ surface: \
+         {surface:?}, throttle: {throttle:?}, deflection_max: {deflection_max:?}, step: {step:?} }}",
+        airframe.name
+    )
 }
 
 /// SHA-256 in hexadecimal.
@@ -227,6 +240,17 @@ mod tests {
     fn model() -> GreyBox {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
         GreyBox::load(&folder.join("prior.toml")).unwrap()
+    }
+
+    #[test]
+    fn the_fingerprint_of_schema_1_stays_what_it_was() {
+        let airframe = model().airframe;
+        // That of the policy in params/x8/policy, trained before the fields were written out.
+        let shipped = "b6f028741a1b461a25f87aa5eb0301411d7b376dcf4090784acced3ed87224c6";
+        assert_eq!(fingerprint(&airframe), shipped);
+        // The text hashed then was that of Debug.
+        let Airframe { name, geometry, actuators, .. } = &airframe;
+        assert_eq!(fingerprinted(&airframe), format!("{name} {geometry:?} {actuators:?}"));
     }
 
     fn residual(model: &GreyBox) -> Residual {

@@ -10,6 +10,7 @@ use greylag::flight::pilot::{Config, Decision, Pilot};
 use greylag::flight::runtime::{Crew, Seat};
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 use greylag::link::framing::pieces;
+use greylag::link::signing::Signer;
 use greylag::link::vehicle::{Authority, Profile, Real, Stack, Telemetry, Vehicle};
 use greylag_sitl::plant::{PlantOptions, Start, Truth};
 use greylag_sitl::shim::controller::FlightController;
@@ -58,6 +59,8 @@ pub struct Bench {
     pub cut: bool,
     /// The controller's heartbeats do not come through.
     pub heartless: bool,
+    /// The controller signs what it sends, and ignores what is not signed.
+    pub signer: Option<Signer>,
 }
 
 impl Bench {
@@ -78,6 +81,7 @@ impl Bench {
             up: Vec::new(),
             cut: false,
             heartless: false,
+            signer: None,
         }
     }
 
@@ -93,6 +97,9 @@ impl Bench {
             });
             down = rest;
         }
+        if let Some(signer) = &mut self.signer {
+            down = signer.sign(self.host.as_micros() as u64, 0, &down);
+        }
         let truth = self.controller.measured();
         if !self.cut {
             let seen = &mut self.seen;
@@ -102,7 +109,7 @@ impl Bench {
         }
         self.desk.poll(self.host, &mut self.up);
         let up = std::mem::take(&mut self.up);
-        if !self.cut {
+        if !self.cut && self.signer.is_none() {
             self.controller.hear(&up);
         }
         assert_eq!(self.controller.fly().unwrap(), None, "the flight is over");

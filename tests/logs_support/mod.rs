@@ -71,6 +71,8 @@ pub fn ulog(samples: &[Sample]) -> Vec<u8> {
         ("vehicle_air_data", "float baro_alt_meter;float rho"),
         ("actuator_servos", "float[8] control"),
         ("actuator_motors", "float[12] control"),
+        // As PX4 of 2025 writes it: no Euler angles.
+        ("vehicle_attitude_setpoint", "float[4] q_d"),
     ];
     for (name, fields) in topics {
         ulog_record(&mut out, b'F', format!("{name}:uint64_t timestamp;{fields};").as_bytes());
@@ -96,7 +98,7 @@ pub fn ulog(samples: &[Sample]) -> Vec<u8> {
         servos.resize(8, f64::NAN);
         let mut motors = vec![s.throttle_cmd];
         motors.resize(12, f64::NAN);
-        let all: [Vec<f64>; 10] = [
+        let all: [Vec<f64>; 11] = [
             quaternion(s.attitude_rad).to_vec(),
             w.to_vec(),
             f.to_vec(),
@@ -107,6 +109,8 @@ pub fn ulog(samples: &[Sample]) -> Vec<u8> {
             vec![s.altitude_m, s.air_density_kgpm3],
             servos,
             motors,
+            // NaN where there is no target.
+            quaternion([s.roll_target_rad, s.pitch_target_rad, 0.3]).to_vec(),
         ];
         for (i, values) in all.iter().enumerate() {
             let mut body = vec![i as u8, 0];

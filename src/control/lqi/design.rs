@@ -18,7 +18,8 @@ const ATTITUDE_STATES: [usize; 7] = [0, 1, 3, 4, 5, 6, 7];
 /// What an error costs: one over the square of the size that is as bad as the others' (Bryson).
 ///
 /// Found on the `jsbsim` model by settled error over the target file; the figures are forgiving.
-pub(super) struct Weights {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weights {
     /// Attitude error, rad.
     pub attitude: f64,
     /// Integrated attitude error, rad s.
@@ -31,13 +32,18 @@ pub(super) struct Weights {
     pub deflection: f64,
 }
 
-pub(super) const WEIGHTS: Weights =
-    Weights { attitude: 0.05, integral: 0.02, rate: 2.0, sideslip: 0.3, deflection: 0.3 };
+impl Weights {
+    /// Those of the default design.
+    pub const DEFAULT: Weights =
+        Weights { attitude: 0.05, integral: 0.02, rate: 2.0, sideslip: 0.3, deflection: 0.3 };
+    /// Softer loops that bear more delay.
+    pub const DAMPED: Weights =
+        Weights { attitude: 0.15, integral: 0.1, rate: 2.0, sideslip: 0.3, deflection: 0.15 };
+}
 
 /// The gain that holds `trim`, or `None` if the model cannot be stabilised there.
-pub(super) fn design(model: &GreyBox, trim: &Trim, altitude: f64) -> Option<Gain> {
+pub(super) fn design(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -> Option<Gain> {
     let (a, b) = augmented(model, &linearise(model, trim, altitude));
-    let w = &WEIGHTS;
     let square = |x: f64| 1.0 / (x * x);
     let mut q = SVector::<f64, STATES>::zeros();
     (q[0], q[1]) = (square(w.attitude), square(w.attitude));

@@ -12,6 +12,7 @@ use crate::model::{GreyBox, STEP};
 use crate::physics::Command;
 pub(crate) use ahead::Ahead;
 use ahead::{HOLD, Inner, Law};
+pub use design::Weights;
 use schedule::Schedule;
 
 /// Largest rates of the reference, rad/s: commanded steps become ramps that the surfaces can
@@ -39,6 +40,7 @@ pub(crate) struct Goal {
 /// The gain-scheduled LQI, designed from any model.
 #[derive(Clone, Debug)]
 pub struct Lqi {
+    name: &'static str,
     schedule: Arc<Schedule>,
     deflection: f64,
     reference: Option<[f64; 2]>,
@@ -54,8 +56,21 @@ impl Lqi {
     /// # Errors
     /// If the model cannot be trimmed or stabilised at some attitude at any airspeed.
     pub fn new(model: &GreyBox) -> Result<Lqi, SetupError> {
+        Lqi::weighted("lqi", model, &Weights::DEFAULT)
+    }
+
+    /// The same with other weights, under a name of its own.
+    ///
+    /// # Errors
+    /// As [`Lqi::new`].
+    pub fn weighted(
+        name: &'static str,
+        model: &GreyBox,
+        weights: &Weights,
+    ) -> Result<Lqi, SetupError> {
         Ok(Lqi {
-            schedule: Arc::new(Schedule::new(model)?),
+            name,
+            schedule: Arc::new(Schedule::new(model, weights)?),
             deflection: model.airframe.actuators.deflection_max,
             reference: None,
             integral: [0.0; 2],
@@ -134,7 +149,7 @@ impl Lqi {
 
 impl Controller for Lqi {
     fn name(&self) -> &'static str {
-        "lqi"
+        self.name
     }
 
     fn boxed_clone(&self) -> Box<dyn Controller> {

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::design::{Gain, design};
+use super::design::{Gain, Weights, design};
 use crate::control::SetupError;
 use crate::model::{GreyBox, Trim};
 use crate::physics::State;
@@ -72,9 +72,10 @@ impl Schedule {
     /// Designs the whole grid from `model`, on all cores.
     ///
     /// A condition that cannot be trimmed takes the design of the next higher airspeed.
-    pub(super) fn new(model: &GreyBox) -> Result<Schedule, SetupError> {
+    pub(super) fn new(model: &GreyBox, weights: &Weights) -> Result<Schedule, SetupError> {
         let attitudes = ROLL.count * PITCH.count;
-        let columns: Vec<_> = (0..attitudes).into_par_iter().map(|i| column(model, i)).collect();
+        let columns: Vec<_> =
+            (0..attitudes).into_par_iter().map(|i| column(model, i, weights)).collect();
         if let Some(i) = columns.iter().position(|column| column.iter().all(Option::is_none)) {
             let (roll, pitch) = attitude(i);
             return Err(SetupError::Design {
@@ -165,7 +166,7 @@ fn attitude(index: usize) -> (f64, f64) {
 }
 
 /// The designs of one attitude over airspeed; `None` where there is none.
-fn column(model: &GreyBox, index: usize) -> Vec<Option<Entry>> {
+fn column(model: &GreyBox, index: usize, weights: &Weights) -> Vec<Option<Entry>> {
     let (roll, pitch) = attitude(index);
     (0..AIRSPEED.count)
         .map(|k| {
@@ -178,7 +179,7 @@ fn column(model: &GreyBox, index: usize) -> Vec<Option<Entry>> {
                 steady: [roll, pitch, p, q, r, alpha, beta],
                 deflection: [c.aileron, c.elevator],
                 throttle: c.throttle,
-                gain: flyable.then(|| design(model, &trim, ALTITUDE))??,
+                gain: flyable.then(|| design(model, &trim, ALTITUDE, weights))??,
             })
         })
         .collect()

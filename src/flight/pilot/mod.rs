@@ -17,6 +17,7 @@ mod failsafe;
 mod helm;
 mod limits;
 mod modes;
+mod oscillation;
 mod parameters;
 mod programme;
 mod signs;
@@ -35,6 +36,7 @@ use crate::link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks
 use crate::link::vehicle::{Fault, Telemetry};
 use crate::physics::{Command, Time};
 use estimate::{Estimate, Frame, RESTART, within};
+use oscillation::Oscillation;
 use programme::Programme;
 use signs::Check;
 use texts::Texts;
@@ -72,7 +74,9 @@ pub struct Pilot {
     programme: Option<Programme>,
     /// The check of the surfaces' signs, where there is one.
     check: Option<Check>,
-    /// What the check has found wrong.
+    /// The guard against oscillations, where there is a controller to give the aircraft to.
+    oscillation: Option<Oscillation>,
+    /// What the check, or the guard, has found wrong.
     refused: Option<Fault>,
 }
 
@@ -134,6 +138,7 @@ impl Pilot {
             load: 0.0,
             programme: None,
             check: None,
+            oscillation: None,
             refused: None,
         })
     }
@@ -144,15 +149,18 @@ impl Pilot {
         self.programme = Some(Programme::new(schedule));
     }
 
-    /// Checks the surfaces' signs from now on, whenever the helm is taken: for a vehicle whose channels
-    /// may be mixed up. Without the model's answers in the settings nothing can be checked.
+    /// Checks the surfaces' signs from now on, whenever the helm is taken, and guards against
+    /// oscillations: for a vehicle whose controller moves the surfaces for us, and has the aircraft back
+    /// when either fails. Without the model's answers in the settings no signs can be checked.
     pub fn check_signs(&mut self) {
+        self.oscillation = Some(Oscillation::default());
         self.check = self.config.answers.clone().map(Check::new);
     }
 
     /// The vehicle's controller has given us the helm, if it is one to give it.
     pub fn engaged(&mut self, now: Time) {
         self.advance(now);
+        self.oscillation = self.oscillation.map(|_| Oscillation::default());
         if let Some(check) = &mut self.check {
             check.begin(self.in_force);
         }
@@ -216,10 +224,24 @@ impl Pilot {
         }
         self.in_force =
             if self.armed { self.limits.slew(self.in_force, wanted) } else { Command::IDLE };
+        self.guard();
         if let (Pending::Check { time, .. }, Some(check)) = (self.pending, &mut self.check) {
             check.told(time, self.in_force);
         }
         self.decision()
+    }
+
+    /// Looks for an oscillation in what was flown on.
+    fn guard(&mut self) {
+        let (Pending::Fly { seen, .. }, Some(guard)) = (&self.pending, &mut self.oscillation)
+        else {
+            return;
+        };
+        let step = self.limits.surface_step;
+        if let Some(axis) = guard.see(&seen.state, &self.before, &self.in_force, step) {
+            *guard = Oscillation::default();
+            self.refused = Some(Fault::Oscillation(axis));
+        }
     }
 
     /// Notes which share of the cycle the control task needed lately, 0..1, for the status.

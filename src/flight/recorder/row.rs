@@ -28,6 +28,23 @@ impl Row {
         Row { sample: sample(state, decision), decision: *decision, latency_us }
     }
 
+    /// The row without surfaces, for a controller that is commanded attitudes: what the companion's
+    /// own loop would have commanded was never sent, and what its actuators did is not known. The
+    /// throttle is sent.
+    pub fn without_surfaces(mut self) -> Self {
+        let sample = &mut self.sample;
+        for column in [
+            &mut sample.aileron_rad,
+            &mut sample.elevator_rad,
+            &mut sample.throttle,
+            &mut sample.aileron_cmd,
+            &mut sample.elevator_cmd,
+        ] {
+            *column = f64::NAN;
+        }
+        self
+    }
+
     pub(super) fn write<W: Write>(&self, out: &mut Rows<W>) -> std::io::Result<()> {
         let d = &self.decision;
         let digit = |flag: bool| if flag { "1" } else { "0" };

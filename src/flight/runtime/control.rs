@@ -221,13 +221,22 @@ impl Control {
         self.load += LOAD_WEIGHT * (share - self.load);
         if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {
             let latency_us = latency.as_secs_f64() * 1e6;
-            recorder.row(Row::new(state, decision, latency_us));
+            let row = Row::new(state, decision, latency_us);
+            let shown = self.vehicle.flies_surfaces();
+            recorder.row(if shown { row } else { row.without_surfaces() });
         }
     }
 
     /// Does what the vehicle has to tell.
     fn heed_vehicle(&mut self) {
         while let Some(notice) = self.vehicle.take_notice() {
+            if let Some(words) = notice.ending() {
+                let now = self.clock.at(Instant::now());
+                self.note(Call::Disarm(now, true));
+                // Its verdict cannot be a refusal: it is forced.
+                let _ = self.pilot.disarm(now, true);
+                self.pilot.tell(Severity::Critical, &words);
+            }
             match notice {
                 Notice::Text(severity, words) => self.pilot.tell(severity, &words),
                 Notice::System(system) => self.clients.adopt(system),
@@ -236,14 +245,7 @@ impl Control {
                     self.note(Call::Engaged(now));
                     self.pilot.engaged(now);
                 }
-                Notice::HandedBack(reason) => {
-                    let now = self.clock.at(Instant::now());
-                    self.note(Call::Disarm(now, true));
-                    // Its verdict cannot be a refusal: it is forced.
-                    let _ = self.pilot.disarm(now, true);
-                    let words = format!("handed back to the controller: {reason}");
-                    self.pilot.tell(Severity::Critical, &words);
-                }
+                Notice::Released(_) | Notice::HandedBack(_) => {}
             }
         }
     }

@@ -24,6 +24,8 @@ pub enum Fault {
     Unanswered(Axis),
     /// How it turns with its surfaces could not be told.
     SignsUnknown,
+    /// The loop swings about this axis by itself, its surface at its limits.
+    Oscillation(Axis),
 }
 
 impl Fault {
@@ -52,12 +54,31 @@ impl Fault {
                      reversed makes {other} of it)"
                 )
             }
+            Fault::Oscillation(axis) => {
+                let (axis, surface) = match axis {
+                    Axis::Roll => ("roll", "aileron"),
+                    Axis::Pitch => ("pitch", "elevator"),
+                };
+                format!(
+                    "it oscillates in {axis}, the {surface} at its limits: the delay is more than \
+                     its controller bears; fly --controller lqi-damped, or attitudes{}",
+                    faster(stack)
+                )
+            }
             Fault::SignsUnknown => {
                 "the surfaces' signs could not be told: engage in level flight, \
                                     in calmer air"
                     .into()
             }
         }
+    }
+}
+
+/// What shortens the delay at a controller of `stack`.
+fn faster(stack: Stack) -> &'static str {
+    match stack {
+        Stack::Ardupilot => "; raise SCHED_LOOP_RATE and INS_GYRO_FILTER",
+        Stack::Px4 => "",
     }
 }
 

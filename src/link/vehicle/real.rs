@@ -10,6 +10,7 @@ mod engagement;
 pub mod parameters;
 pub mod profile;
 mod pulse;
+mod requests;
 mod sticks;
 pub mod survey;
 
@@ -24,10 +25,11 @@ use crate::link::wire::Message;
 use crate::link::wire::controller::{self as wire, ControllerMessage};
 use crate::physics::{Command, Time};
 use assembly::Assembly;
-use engagement::{Engagement, Phase};
+use engagement::{Engagement, Shown};
 use parameters::{Parameters, Standing};
 use profile::{Authority, Profile, Stack};
 use pulse::Pulse;
+use requests::{Answer, Requests};
 use sticks::Sticks;
 use survey::Survey;
 
@@ -46,6 +48,10 @@ const GONE: Duration = Duration::from_secs(3);
 const BLIND: Duration = Duration::from_millis(300);
 /// A stream below this share of its rate is asked for again, and engaging is refused.
 const ENOUGH: f64 = 0.8;
+
+/// What a controller that signs means for a companion that does not.
+const SHUT_OUT: &str = "the controller signs its frames and ignores ours, which carry no right \
+                        signature: give its key with --sign and add --sign-vehicle";
 
 /// The controller that is spoken to.
 #[derive(Clone, Copy, Debug)]
@@ -67,6 +73,11 @@ pub struct Real {
     intruder: Option<Source>,
     parameters: Parameters,
     survey: Survey,
+    requests: Requests,
+    /// Whether the controller's frames carry a signature.
+    signs: bool,
+    /// Whether the controller hears a radio, as far as it has told while it flew itself.
+    radio: Option<bool>,
     assembly: Assembly,
     engagement: Engagement,
     sticks: Sticks,
@@ -93,8 +104,11 @@ impl Real {
             intruder: None,
             parameters: Parameters::new(profile.stack.rules(profile.authority)),
             survey: Survey::default(),
+            requests: Requests::default(),
+            signs: false,
+            radio: None,
             assembly: Assembly::new(profile.actuators),
-            engagement: Engagement::new(),
+            engagement: Engagement::new(profile.stack.lead()),
             sticks: Sticks::default(),
             sent: Command::IDLE,
             last_state: None,
@@ -140,12 +154,23 @@ impl Real {
             return None;
         }
         self.survey.frame(host, frame.id, frame.sequence, frame.bytes.len());
+        self.signs |= frame.signed;
         match message? {
-            ControllerMessage::Ack { command: wire::SET_MODE, result } => {
-                let was = self.engagement.phase;
-                self.engagement.answered(host, result);
-                self.announce(was);
+            ControllerMessage::Ack { command: wire::SET_MODE, result, to } if self.is_us(to) => {
+                self.engagement.answered(result);
             }
+            ControllerMessage::Ack { command: wire::SET_MESSAGE_INTERVAL, result, to }
+                if self.is_us(to) =>
+            {
+                if let Answer::Granted(id) = self.requests.answered(result) {
+                    self.survey.restart(host, id);
+                }
+            }
+            // Our own overrides may look like a radio.
+            ControllerMessage::Receiver { alive } if !self.engagement.steers() => {
+                self.radio = Some(alive);
+            }
+            ControllerMessage::CurrentMode { custom_mode } => self.shown(host, custom_mode),
             ControllerMessage::Parameter { name, cast, bytewise } => {
                 let value = if self.profile.stack == Stack::Px4 { bytewise } else { cast };
                 self.parameters.take(&name, value);
@@ -190,19 +215,37 @@ impl Real {
         let heard = host;
         let system = from.system;
         self.controller = Some(Controller { system, peer, autopilot, armed, heard });
-        let steered = self.profile.stack.steered(self.profile.authority);
-        let in_mode = custom_mode == steered.custom(self.profile.stack);
-        let was = self.engagement.phase;
-        if self.engagement.told(host, in_mode) {
-            self.engagement.taken();
-            self.lose(format!(
-                "the controller left {} by itself or by its pilot's hand",
-                steered.name
-            ));
-        } else if self.engagement.steers() && !armed {
+        self.shown(host, custom_mode);
+        if self.engagement.steers() && !armed {
             self.hand_back("the controller is disarmed".into());
         }
-        self.announce(was);
+    }
+
+    /// The controller shows its mode.
+    fn shown(&mut self, host: Duration, custom_mode: u32) {
+        let steered = self.profile.stack.steered(self.profile.authority);
+        let name = steered.name;
+        match self.engagement.shown(host, custom_mode == steered.custom(self.profile.stack)) {
+            Shown::Nothing => {}
+            Shown::Engaged => {
+                self.say(Severity::Notice, format!("engaged: the controller is in {name}"));
+                self.notices.push_back(Notice::Engaged);
+            }
+            Shown::Taken => self.notices.push_back(Notice::HandedBack(format!(
+                "the controller left {name} by itself or by its pilot's hand"
+            ))),
+            Shown::Confirmed => self.say(
+                Severity::Notice,
+                format!("handed back to the controller: it has left {name}, as it was asked"),
+            ),
+        }
+    }
+
+    /// Whether an answer is to us; old firmware names nobody.
+    fn is_us(&self, to: Source) -> bool {
+        let system = self.system().unwrap_or(0);
+        matches!(to, Source { system: 0, component: 0 })
+            || to == Source { system, component: ONBOARD }
     }
 
     /// A controller is heard for the first time, or again: then nothing is known of it any more, not
@@ -213,6 +256,8 @@ impl Real {
         }
         self.parameters.forget();
         self.survey = Survey::default();
+        self.requests = Requests::default();
+        (self.signs, self.radio) = (false, None);
         let stack = Stack::of(autopilot);
         let who = stack.map_or("an unknown autopilot".to_owned(), |stack| stack.to_string());
         self.say(Severity::Info, format!("controller found: {who}, system {system}"));
@@ -246,15 +291,6 @@ impl Real {
         }
     }
 
-    fn announce(&mut self, was: Phase) {
-        let (Phase::Entering { .. }, Phase::Engaged { .. }) = (was, self.engagement.phase) else {
-            return;
-        };
-        let steered = self.profile.stack.steered(self.profile.authority);
-        self.say(Severity::Notice, format!("engaged: the controller is in {}", steered.name));
-        self.notices.push_back(Notice::Engaged);
-    }
-
     fn say(&mut self, severity: Severity, words: String) {
         // Nobody fetching them is no reason to fill the memory.
         if self.notices.len() < 64 {
@@ -262,14 +298,10 @@ impl Real {
         }
     }
 
-    /// Tells that the aircraft is the controller's.
-    fn lose(&mut self, reason: String) {
-        self.notices.push_back(Notice::HandedBack(reason));
-    }
-
+    /// Asks the controller to take the aircraft; that it has is told when it shows so.
     fn hand_back(&mut self, reason: String) {
         self.engagement.hand_back();
-        self.lose(reason);
+        self.notices.push_back(Notice::Released(reason));
     }
 
     /// The answer to the state of `time`: what makes the actuators do as demanded, or nothing.
@@ -281,8 +313,8 @@ impl Real {
         if let Some(fault) = demand.fault.filter(|_| self.engagement.steers()) {
             self.hand_back(fault.words(self.profile.stack));
         }
-        if self.controller.is_some() {
-            self.engagement.begin(host);
+        if self.controller.is_some() && self.engagement.begin(host) {
+            self.radio_warning().into_iter().for_each(|words| self.say(Severity::Warning, words));
         }
         self.states += 1;
         if command.is_finite() {
@@ -329,7 +361,8 @@ impl Real {
     /// The watchdog.
     fn watch(&mut self, host: Duration) {
         if !self.engagement.steers() {
-            return self.pulse.rest();
+            self.pulse.rest();
+            return self.remind(host);
         }
         // A controller that tracks an attitude does not mind a slow companion.
         let surfaces = self.profile.authority == Authority::Surfaces;
@@ -344,8 +377,24 @@ impl Real {
             self.hand_back("no state of the vehicle for 0.3 s".into());
         } else if let Some(words) = scarce {
             self.hand_back(words);
-        } else if let Some(why) = self.engagement.overdue(host) {
+        } else if let Some(why) =
+            self.engagement.overdue(host, self.profile.stack, self.profile.authority)
+        {
             self.hand_back(format!("the controller did not go to {steered}: {why}"));
+        }
+    }
+
+    /// Says that a hand-back is not confirmed.
+    fn remind(&mut self, host: Duration) {
+        if self.engagement.unconfirmed(host) {
+            let (steered, hold) =
+                (self.profile.stack.steered(self.profile.authority), self.profile.stack.hold());
+            let words = format!(
+                "hand-back not confirmed: the controller may still be in {}; take over by radio or \
+                 set {}",
+                steered.name, hold.name
+            );
+            self.say(Severity::Critical, words);
         }
     }
 
@@ -353,8 +402,13 @@ impl Real {
     fn ask(&mut self, host: Duration, to: Source, bytes: &mut Vec<u8>) {
         let first = self.survey.windows() == 0 && self.survey.messages().count() <= 1;
         if self.survey.turn(host) || first {
+            self.requests.turn();
+            if let Some(words) = self.requests.complaint(self.profile.stack) {
+                self.say(Severity::Error, words);
+            }
             for stream in self.profile.stack.streams() {
-                if self.survey.hz(stream.id) < ENOUGH * stream.hz {
+                let thin = self.survey.hz(stream.id) < ENOUGH * stream.hz;
+                if thin && self.requests.ask(stream.id) {
                     let message = wire::message_interval(to, stream.id, (1e6 / stream.hz) as f32);
                     bytes.extend(self.write(&message));
                 }
@@ -384,6 +438,28 @@ impl Real {
         }
     }
 
+    /// What a radio means for a flight by surfaces. ArduPlane goes on with the radio's sticks when
+    /// our overrides end, and stays in MANUAL: no failsafe of its own acts.
+    pub fn radio_warning(&self) -> Option<String> {
+        let by_channels =
+            (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);
+        (by_channels && self.radio == Some(true)).then(|| {
+            "a radio is bound: if this computer dies, ArduPilot stays in MANUAL on the radio's \
+             sticks. Put its throttle at cruise and be ready to fly"
+                .to_owned()
+        })
+    }
+
+    /// Whether the controller signs what it sends and has answered nothing that we asked.
+    pub fn is_shut_out(&self) -> bool {
+        self.signs && self.parameters.is_silent()
+    }
+
+    /// Why a stream that was denied does not come, with the remedy.
+    pub fn denial(&self, id: u32) -> Option<String> {
+        self.requests.words(self.profile.stack).filter(|_| self.requests.is_denied(id))
+    }
+
     /// Why the aircraft cannot be engaged now, with the remedy.
     pub fn obstacle(&self) -> Option<String> {
         let Some(controller) = self.controller else {
@@ -403,6 +479,9 @@ impl Real {
         if !controller.armed {
             return Some("the controller is not armed: arm and launch it first".into());
         }
+        if self.is_shut_out() {
+            return Some(SHUT_OUT.into());
+        }
         self.parameters.obstacle(controller.system).or_else(|| self.thin_stream())
     }
 
@@ -414,6 +493,9 @@ impl Real {
             .streams()
             .iter()
             .find(|stream| stream.needed && self.survey.hz(stream.id) < ENOUGH * stream.hz)?;
+        if let Some(words) = self.denial(thin.id) {
+            return Some(words);
+        }
         Some(format!(
             "{} comes at {:.0} Hz, {:.0} are needed: wait a second, then see `greylag link check`",
             thin.name,

@@ -15,7 +15,7 @@ use crate::physics::Time;
 /// MAV_CMD_DO_SET_MODE.
 pub const SET_MODE: u16 = 176;
 /// MAV_CMD_SET_MESSAGE_INTERVAL.
-const SET_MESSAGE_INTERVAL: u16 = 511;
+pub const SET_MESSAGE_INTERVAL: u16 = 511;
 
 /// A message from a flight controller, in SI units.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,6 +73,18 @@ pub enum ControllerMessage {
         command: u16,
         /// MAV_RESULT, 0 is accepted.
         result: u8,
+        /// Whom it answers: zeros from firmware that does not say.
+        to: Source,
+    },
+    /// SYS_STATUS: the radio's receiver.
+    Receiver {
+        /// Whether it is there and healthy.
+        alive: bool,
+    },
+    /// CURRENT_MODE.
+    CurrentMode {
+        /// The stack's own number of its mode.
+        custom_mode: u32,
     },
     /// PARAM_VALUE, its value read as its type and the sender's habit say.
     Parameter {
@@ -97,6 +109,9 @@ pub enum ControllerMessage {
     },
 }
 
+/// MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
+const RECEIVER: u32 = 1 << 16;
+
 /// Gas constant of dry air, J/(kg K).
 const AIR: f64 = 287.053;
 
@@ -112,10 +127,17 @@ pub fn read(frame: &Frame<'_>) -> Option<ControllerMessage> {
                 custom_mode: fields.u32(0),
             });
         }
+        1 => {
+            let alive = fields.u32(0) & fields.u32(8) & RECEIVER != 0;
+            return Some(ControllerMessage::Receiver { alive });
+        }
         22 => return Some(parameter(fields)),
         77 => {
-            return Some(ControllerMessage::Ack { command: fields.u16(0), result: fields.u8(2) });
+            let to = Source { system: fields.u8(8), component: fields.u8(9) };
+            let (command, result) = (fields.u16(0), fields.u8(2));
+            return Some(ControllerMessage::Ack { command, result, to });
         }
+        436 => return Some(ControllerMessage::CurrentMode { custom_mode: fields.u32(0) }),
         253 => {
             let words: Vec<u8> =
                 fields.bytes::<50>(1).into_iter().take_while(|b| *b != 0).collect();
@@ -186,8 +208,10 @@ fn measured(message: MavMessage) -> Option<ControllerMessage> {
     })
 }
 
-/// Air density by pressure (hPa) and temperature (°C), kg/m³; NaN outside the lower atmosphere.
+/// Air density by pressure and temperature (°C), kg/m³; NaN outside the lower atmosphere. The message
+/// gives hPa; PX4 of 2025 sends Pa, which no hPa of this atmosphere can be mistaken for.
 fn density(pressure: f64, temperature: f64) -> f64 {
+    let pressure = if pressure > 10_000.0 { pressure / 100.0 } else { pressure };
     let believable = (200.0..=1100.0).contains(&pressure) && (-80.0..=85.0).contains(&temperature);
     if believable { 100.0 * pressure / (AIR * (temperature + 273.15)) } else { f64::NAN }
 }
@@ -305,4 +329,22 @@ pub fn time_sync(ours: i64, to: Source) -> Message {
         target_system: to.system,
         target_component: to.component,
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pressure_is_read_in_hectopascal_and_in_pascal() {
+        // 934.0756 hPa at 10.6 °C, as real PX4 sent it in Pa: 93407.56 / (287.053 · 283.75).
+        for pressure in [934.0756, 93_407.56] {
+            assert!(
+                (density(pressure, 10.6) - 1.14678).abs() < 1e-4,
+                "{}",
+                density(pressure, 10.6)
+            );
+        }
+        assert!(density(5_000.0, 10.6).is_nan());
+    }
 }

@@ -4,7 +4,7 @@
 //! `actuator_outputs` (pulses whose meaning lies in parameters of the mixer), several motors
 //! (the first counts), and `wind`, which the log format has no column for.
 
-use super::rule::{Rule, Shape, Term};
+use super::rule::{Rule, Shape, Term, Tilt};
 use crate::logs::topics::Topics;
 
 /// The topics that the rules use.
@@ -65,6 +65,11 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
     out.push(Rule::linear("air_density_kgpm3", "vehicle_air_data", "rho", 1.0));
     out.push(Rule::linear("roll_target_rad", "vehicle_attitude_setpoint", "roll_body", 1.0));
     out.push(Rule::linear("pitch_target_rad", "vehicle_attitude_setpoint", "pitch_body", 1.0));
+    // Since August 2024 (e008ca24f1) the setpoint has no Euler angles.
+    let q = ["q_d[0]", "q_d[1]", "q_d[2]", "q_d[3]"];
+    let setpoint = "vehicle_attitude_setpoint";
+    out.push(Rule::tilt("roll_target_rad", setpoint, Tilt::Roll, q));
+    out.push(Rule::tilt("pitch_target_rad", setpoint, Tilt::Pitch, q));
     out.extend(commands(topics));
     out
 }

@@ -50,6 +50,30 @@ pub struct Term {
     pub shape: Shape,
 }
 
+/// An angle of a quaternion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tilt {
+    /// Its roll.
+    Roll,
+    /// Its pitch.
+    Pitch,
+}
+
+impl Tilt {
+    /// The angle, rad; NaN of what is no attitude.
+    fn of(self, [w, x, y, z]: [f64; 4]) -> f64 {
+        let norm = (w * w + x * x + y * y + z * z).sqrt();
+        if !(0.5..2.0).contains(&norm) {
+            return f64::NAN;
+        }
+        let [w, x, y, z] = [w, x, y, z].map(|c| c / norm);
+        match self {
+            Tilt::Roll => (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
+            Tilt::Pitch => (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
+        }
+    }
+}
+
 /// What fills which columns.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fill {
@@ -64,6 +88,15 @@ pub enum Fill {
     },
     /// Roll, pitch and yaw from a quaternion NED→FRD, w first.
     Quaternion([&'static str; 4]),
+    /// One column: the roll or the pitch of a quaternion NED→FRD, w first.
+    Tilt {
+        /// The column.
+        column: &'static str,
+        /// Which angle.
+        angle: Tilt,
+        /// The quaternion's fields.
+        fields: [&'static str; 4],
+    },
     /// Air density from static pressure (times the factor in Pa) and temperature (factor, in °C).
     Density {
         /// The pressure's field with its factor.
@@ -112,6 +145,11 @@ impl Rule {
         Rule::new(topic, Fill::Quaternion(fields))
     }
 
+    /// The roll or the pitch of a quaternion's fields.
+    pub fn tilt(column: &'static str, topic: &str, angle: Tilt, fields: [&'static str; 4]) -> Rule {
+        Rule::new(topic, Fill::Tilt { column, angle, fields })
+    }
+
     /// Pressure with temperature.
     pub fn density(
         topic: &str,
@@ -148,6 +186,7 @@ impl Rule {
     pub fn columns(&self) -> Vec<&str> {
         match &self.fill {
             Fill::Sum { column, .. } => vec![column],
+            Fill::Tilt { column, .. } => vec![column],
             Fill::Quaternion(_) => vec!["roll_rad", "pitch_rad", "yaw_rad"],
             Fill::Density { .. } => vec!["air_density_kgpm3"],
         }
@@ -163,7 +202,7 @@ impl Rule {
     pub fn origin(&self) -> String {
         let fields = match &self.fill {
             Fill::Sum { terms, .. } => terms.iter().map(|t| t.field.as_str()).collect(),
-            Fill::Quaternion(fields) => fields.to_vec(),
+            Fill::Quaternion(fields) | Fill::Tilt { fields, .. } => fields.to_vec(),
             Fill::Density { pressure, temperature } => vec![pressure.0, temperature.0],
         };
         format!("{}.{}", self.topic, fields.join("+"))
@@ -184,6 +223,12 @@ impl Rule {
             }
             Fill::Quaternion(fields) => {
                 fields.iter().map(|f| topic.field(f).map(<[f64]>::to_vec)).collect()
+            }
+            Fill::Tilt { angle, fields, .. } => {
+                let [w, x, y, z] = fields.map(|f| topic.field(f));
+                let (w, x, y, z) = (w?, x?, y?, z?);
+                let at = |i: usize| angle.of([w[i], x[i], y[i], z[i]]);
+                Some(vec![(0..topic.time_s.len()).map(at).collect()])
             }
             Fill::Density { pressure, temperature } => {
                 let p = topic.field(pressure.0)?;

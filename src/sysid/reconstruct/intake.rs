@@ -11,6 +11,10 @@ use crate::physics::{Command, Controls};
 
 /// Fewest samples of a sensor in a segment that are worth using.
 const FEWEST: usize = 10;
+/// Median row periods that a pause must exceed to be a gap,
+const GAP_PERIODS: f64 = 2.5;
+/// up to this period, s: at less than 5 Hz nothing is known between the rows.
+const SLOWEST_PERIOD: f64 = 0.2;
 /// Time over which a climb is taken from the altitude, s.
 const CLIMB_WINDOW: f64 = 1.0;
 /// Time around a row over which its airspeed is averaged to tell flight from ground, s.
@@ -202,7 +206,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
         );
     }
     let stretches = stretches(flight, &has, options)?;
-    let step = step(&stretches, options);
+    let (step, gap) = (step(&stretches, options), gap(flight, options));
     let rudder = RudderMotion::of(&flight.samples);
     let periods = channels.periods();
     let mut log = Log { step, tracks: Vec::new(), has, periods, rudder, notes };
@@ -222,7 +226,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
             Some(why) => log
                 .notes
                 .push(format!("The stretch from {start:.2} s to {end:.2} s is left out: {why}.")),
-            None => log.tracks.push(track(&channels, &has, [start, end], step, options)),
+            None => log.tracks.push(track(&channels, &has, [start, end], [step, gap], options)),
         }
     }
     if log.tracks.is_empty() {
@@ -275,17 +279,27 @@ fn stretches(
             && (!has.force || s.specific_force_mps2.iter().all(|x| x.is_finite()))
     };
     let airborne = airborne(flight, options)?;
+    let gap = gap(flight, options);
     let mut stretches: Vec<Vec<f64>> = Vec::new();
     for s in flight.samples.iter().filter(usable).filter(|s| airborne(s.time_s)) {
         match stretches.last_mut() {
             Some(times) if times.last().is_some_and(|t| s.time_s <= *t) => {}
-            Some(times) if times.last().is_some_and(|t| s.time_s - t <= options.gap_s) => {
+            Some(times) if times.last().is_some_and(|t| s.time_s - t <= gap) => {
                 times.push(s.time_s);
             }
             _ => stretches.push(vec![s.time_s]),
         }
     }
     Ok(stretches)
+}
+
+/// Longest time between rows that is no gap, s: longer for a log that is slow throughout.
+fn gap(flight: &Flight, options: &Options) -> f64 {
+    let times: Vec<f64> = flight.samples.iter().map(|s| s.time_s).collect();
+    let periods: Vec<f64> =
+        times.windows(2).map(|w| w[1] - w[0]).filter(|period| *period > 0.0).collect();
+    let period = if periods.is_empty() { 0.0 } else { quantile(&periods, 0.5) };
+    1.000_001 * options.gap_s.max(GAP_PERIODS * period.min(SLOWEST_PERIOD))
 }
 
 /// Tells flight from ground by the mean airspeed around a time.
@@ -324,13 +338,13 @@ fn track(
     channels: &Channels,
     has: &Sensors,
     [start, end]: [f64; 2],
-    step: f64,
+    [step, gap]: [f64; 2],
     options: &Options,
 ) -> Track {
     let n = ((end - start) / step + 1e-6).floor() as usize + 1;
     let nan = f64::NAN;
     let times: Vec<f64> = (0..n).map(|k| (start + k as f64 * step).min(end)).collect();
-    let reach = options.gap_s * 1.000_001;
+    let reach = gap;
     let near = 0.5 * step;
     let measured = |c: &Channel, t: f64| c.measured(t, reach, near);
     let keep = |use_it: bool, x: f64| if use_it { x } else { nan };

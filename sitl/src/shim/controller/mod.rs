@@ -7,6 +7,7 @@
 //! sensor errors of the options.
 
 mod connect;
+mod lag;
 mod law;
 mod modes;
 mod parameters;
@@ -27,11 +28,12 @@ use super::flight::{Flight, Over};
 use super::options::ShimOptions;
 use super::telemetry::StateFrame;
 use crate::plant::{Inputs, Truth};
+use lag::Lag;
 use law::Law;
 pub use modes::Mode;
 use parameters::Table;
 use sticks::Sticks;
-use streams::Streams;
+use streams::{Equipment, Streams};
 
 /// The system that the played controller is.
 pub const SYSTEM: u8 = 1;
@@ -39,8 +41,19 @@ pub const SYSTEM: u8 = 1;
 const COMPONENT: u8 = 1;
 /// ArduPilot reads its channels every second step: 50 Hz.
 const SAMPLE_EVERY: u64 = 2;
-/// ArduPilot flies the last attitude for so long after the stream of targets has ended, s.
-const GUIDED_TIMEOUT_S: f64 = 3.0;
+/// PX4's commander looks at the requirements of its modes every tenth step: 10 Hz ...
+const LOOK_EVERY: u64 = 10;
+/// ... and sticks reach it through another module: real PX4 refused MANUAL 150 ms after the first
+/// stick in two of three requests, and never after 300 ms.
+const STICKS_SEEN_S: f64 = 0.15;
+/// ArduPilot was 1.2 s on the last stick at an RC_FS_TIMEOUT of 1 s.
+const FAILSAFE_LAG_S: f64 = 0.2;
+/// A radio with its sticks released, µs: idle throttle.
+const RADIO_US: [u16; 3] = [1500, 1500, 1000];
+/// MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
+const RECEIVER: u32 = 1 << 16;
+/// The bank at which ArduPilot turns back to where GUIDED was entered, rad: 45° to 55° were seen.
+const TURN_BACK: f64 = 50.0 * std::f64::consts::PI / 180.0;
 
 /// A flight stack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +84,8 @@ pub struct Counts {
     pub ignored: u64,
     /// Modes entered because the companion had fallen silent.
     pub failsafes: u64,
+    /// Streams that were denied.
+    pub denied: u64,
 }
 
 /// An attitude to be flown, with its thrust.
@@ -91,6 +106,7 @@ pub struct FlightController {
     streams: Streams,
     parameters: Table,
     law: Law,
+    lag: Lag,
     distorter: Distorter,
     sticks: Sticks,
     wish: Option<Wish>,
@@ -99,10 +115,14 @@ pub struct FlightController {
     /// Latitude and longitude of the start, degrees.
     home: Option<(f64, f64)>,
     entered_us: u64,
+    /// Whether PX4 found the requirements of MANUAL met when it last looked.
+    manual_allowed: bool,
     steps: u64,
     now_us: u64,
     measured: Truth,
     inputs: Inputs,
+    /// What was commanded last, before what makes it late.
+    commanded: Inputs,
     /// What waits to be sent with the next step.
     waiting: Vec<u8>,
     /// What was counted.
@@ -125,14 +145,17 @@ impl FlightController {
     ) -> Result<Self, ShimError> {
         flight.launch();
         let travel = flight.travel();
+        let parameters = Table::new(personality, changed)?;
+        let receiver = if parameters.get("SIM_RC_FAIL") == 0.0 { RECEIVER } else { 0 };
         Ok(FlightController {
             personality,
             flight,
             parser: Parser::default(),
             encoder: Encoder::new(SYSTEM, COMPONENT),
-            streams: Streams::new(travel),
-            parameters: Table::new(personality, changed)?,
+            streams: Streams::new(Equipment { travel, receiver }),
+            parameters,
             law: Law::new(travel),
+            lag: Lag::default(),
             distorter: Distorter::default(),
             sticks: Sticks::default(),
             wish: None,
@@ -140,10 +163,12 @@ impl FlightController {
             armed: true,
             home: None,
             entered_us: 0,
+            manual_allowed: false,
             steps: 0,
             now_us: 0,
             measured: Truth::default(),
             inputs: Inputs::default(),
+            commanded: Inputs::default(),
             waiting: Vec::new(),
             counts: Counts::default(),
         })
@@ -160,7 +185,12 @@ impl FlightController {
             self.encoder.encode(&heartbeat, out);
         }
         // The controller's own loops see what is right: only what is told can be wrong.
-        let (told_us, told) = self.distorter.apply(frame.time_us, measured);
+        let cutoff = match self.personality {
+            Personality::Px4 => self.parameters.get("IMU_GYRO_CUTOFF"),
+            Personality::Ardupilot => self.parameters.get("INS_GYRO_FILTER"),
+        };
+        let filtered = self.lag.filtered(measured, cutoff);
+        let (told_us, told) = self.distorter.apply(frame.time_us, filtered);
         let frame = StateFrame::new(told_us, &told, self.flight.travel());
         self.streams.send(&frame, &told, self.flight.home_m(), &mut self.encoder, out);
         self.steps += 1;
@@ -189,7 +219,9 @@ impl FlightController {
     /// If the plant cannot go on.
     pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {
         self.watch();
-        let inputs = self.command();
+        self.commanded = self.command();
+        // PX4 has no such parameter: NaN, and no delay.
+        let inputs = self.lag.delayed(self.commanded, self.parameters.get("SIM_SERVO_DELAY"));
         self.inputs = if self.armed { inputs } else { Inputs::default() };
         self.flight.advance(self.inputs)
     }
@@ -212,6 +244,11 @@ impl FlightController {
     /// Simulated time of the last step, µs.
     pub fn now_us(&self) -> u64 {
         self.now_us
+    }
+
+    /// Changes a parameter, as a pilot at the ground station would.
+    pub fn set_parameter(&mut self, name: &str, value: f64) {
+        self.parameters.put(name, value);
     }
 
     /// Disarms or arms, as a pilot at the controller would.
@@ -297,33 +334,48 @@ impl FlightController {
         let requested = connect::requested(m.command, &m.param);
         let result = match m.command {
             _ if requested.is_some() => requested.map_or(3, |r| self.grants(r)),
-            176 => self.asked_for_mode(m.param[1], m.param[2]),
+            176 => {
+                if self.personality == Personality::Px4 {
+                    // PX4's MAVLink receiver answers by itself before its commander does.
+                    self.acknowledge(frame, m.command, 0);
+                }
+                self.asked_for_mode(m.param[1], m.param[2])
+            }
             400 => {
                 self.armed = m.param[0] == 1.0;
                 0
             }
             511 => {
-                let limit = match self.personality {
-                    Personality::Px4 => 100.0,
+                let denied = match self.personality {
+                    Personality::Px4 => f64::INFINITY,
                     // A stream is sent at 0.8 of the scheduler's rate at most.
                     Personality::Ardupilot => 0.8 * self.parameters.get("SCHED_LOOP_RATE"),
                 };
-                self.streams.set(m.param[0] as u32, m.param[1], limit)
+                let result = self.streams.set(m.param[0] as u32, m.param[1], denied);
+                if result == streams::DENIED {
+                    self.counts.denied += 1;
+                    self.say(3, b"Requested rate too fast");
+                }
+                result
             }
             // MAV_RESULT_UNSUPPORTED.
             _ => 3,
         };
+        self.acknowledge(frame, m.command, result);
+        if let Some(requested) = requested.filter(|_| result == 0) {
+            self.send_requested(requested);
+        }
+    }
+
+    fn acknowledge(&mut self, frame: &Frame, command: u16, result: u8) {
         let ack = CommandAck {
-            command: m.command,
+            command,
             result,
             target_system: frame.system,
             target_component: frame.component,
             ..CommandAck::default()
         };
         self.encoder.encode(&ack, &mut self.waiting);
-        if let Some(requested) = requested.filter(|_| result == 0) {
-            self.send_requested(requested);
-        }
     }
 
     /// MAV_RESULT of a request for a mode.
@@ -331,9 +383,9 @@ impl FlightController {
         let Some(mode) = Mode::of(self.personality, main, sub) else { return 2 };
         let refused = match mode {
             // PX4 wants to see the stream first.
-            Mode::Manual => self.personality == Personality::Px4 && !self.sticks_alive(),
+            Mode::Manual => self.personality == Personality::Px4 && !self.manual_allowed,
             Mode::Guided => self.personality == Personality::Px4 && !self.wish_alive(),
-            Mode::Hold | Mode::Return => false,
+            Mode::Hold | Mode::Return | Mode::Circle => false,
         };
         if refused {
             return 1;
@@ -391,33 +443,76 @@ impl FlightController {
     fn wish_alive(&self) -> bool {
         let timeout = match self.personality {
             Personality::Px4 => self.parameters.get("COM_OF_LOSS_T"),
-            Personality::Ardupilot => GUIDED_TIMEOUT_S,
+            Personality::Ardupilot => self.parameters.get("GUIDED_TIMEOUT"),
         };
         self.wish.is_some_and(|wish| (self.now_us - wish.at_us) as f64 * 1e-6 <= timeout)
     }
 
+    /// Says a line of at most 25 bytes.
+    fn say(&mut self, severity: u8, words: &[u8]) {
+        let mut text = [0; 25];
+        text[..words.len()].copy_from_slice(words);
+        let line = StatusText { severity, text, ..StatusText::default() };
+        self.encoder.encode(&line, &mut self.waiting);
+    }
+
     /// The stack's failsafes.
     fn watch(&mut self) {
-        // A mode that has just been entered may wait for its first stick or target.
-        let settled = (self.now_us - self.entered_us) as f64 * 1e-6 > 0.5;
-        let lost = match (self.mode, self.personality) {
-            (Mode::Manual, _) => !self.sticks_alive(),
-            (Mode::Guided, Personality::Px4) => !self.wish_alive(),
-            _ => false,
+        if self.steps.is_multiple_of(LOOK_EVERY) {
+            let steady = self.sticks.steady_s(self.now_us).is_some_and(|s| s >= STICKS_SEEN_S);
+            self.manual_allowed = self.sticks_alive() && steady;
+        }
+        let failsafe: Option<(Mode, &[u8])> = match self.personality {
+            Personality::Px4 => self.px4_failsafe(),
+            Personality::Ardupilot => self.ardupilot_failsafe(),
         };
-        if lost && settled {
+        if let Some((mode, words)) = failsafe {
             self.counts.failsafes += 1;
-            let (mode, words): (_, &[u8]) = match (self.mode, self.personality) {
-                (Mode::Manual, Personality::Px4) => (Mode::Hold, b"Manual control lost"),
-                (Mode::Manual, Personality::Ardupilot) => (Mode::Return, b"Throttle failsafe on"),
-                _ => (Mode::Hold, b"Offboard control lost"),
-            };
-            let mut text = [0; 25];
-            text[..words.len()].copy_from_slice(words);
-            let line = StatusText { severity: 2, text, ..StatusText::default() };
-            self.encoder.encode(&line, &mut self.waiting);
+            self.say(2, words);
             self.set_mode(mode);
         }
+    }
+
+    /// Whether a mode has been on for long enough: it may wait for its first stick or target.
+    fn settled(&self) -> bool {
+        (self.now_us - self.entered_us) as f64 * 1e-6 > 0.5
+    }
+
+    /// PX4's. Lost sticks count in HOLD too, whoever gave it the aircraft; in OFFBOARD only its
+    /// setpoints do. On its way home it goes on.
+    fn px4_failsafe(&mut self) -> Option<(Mode, &'static [u8])> {
+        if self.mode == Mode::Guided {
+            let lost = self.settled() && !self.wish_alive();
+            return lost.then_some((Mode::Hold, b"Offboard control lost"));
+        }
+        if self.sticks.age_s(self.now_us).is_none() || self.sticks_alive() {
+            return None;
+        }
+        self.sticks = Sticks::default();
+        if self.mode == Mode::Return {
+            return None;
+        }
+        let mode = match self.parameters.get("NAV_RCL_ACT") as i32 {
+            1 => Mode::Hold,
+            2 => Mode::Return,
+            _ => return None,
+        };
+        Some((mode, b"Manual control lost"))
+    }
+
+    /// ArduPilot's, in MANUAL: with a radio there is none, since the radio's sticks are there.
+    fn ardupilot_failsafe(&mut self) -> Option<(Mode, &'static [u8])> {
+        let patience = self.parameters.get("RC_FS_TIMEOUT") + FAILSAFE_LAG_S;
+        let lost = self.sticks.age_s(self.now_us).is_none_or(|age| age > patience);
+        let acts = self.parameters.get("THR_FAILSAFE") == 1.0
+            && matches!(self.parameters.get("FS_SHORT_ACTN") as i32, 0 | 1);
+        let fails = self.mode == Mode::Manual && !self.has_radio() && self.settled();
+        (fails && lost && acts).then_some((Mode::Circle, b"Throttle failsafe on"))
+    }
+
+    /// Whether a radio is bound, its sticks released and its throttle closed.
+    fn has_radio(&self) -> bool {
+        self.parameters.get("SIM_RC_FAIL") == 0.0
     }
 
     fn command(&mut self) -> Inputs {
@@ -428,14 +523,21 @@ impl FlightController {
                 Personality::Ardupilot => self.steps.is_multiple_of(SAMPLE_EVERY),
             };
             return match samples {
-                true => self.sticks.inputs(self.personality, &self.parameters, self.inputs),
-                false => self.inputs,
+                true if self.has_radio() && !self.sticks_alive() => {
+                    sticks::ardupilot(RADIO_US, &self.parameters)
+                }
+                true => self.sticks.inputs(self.personality, &self.parameters, self.commanded),
+                false => self.commanded,
             };
         }
         let wish = self.wish.filter(|_| self.mode == Mode::Guided && self.wish_alive());
         match wish {
             Some(Wish { roll, pitch, thrust, .. }) => {
                 self.law.attitude(&self.measured, roll, pitch, thrust)
+            }
+            // Without targets ArduPilot goes back to the point at which GUIDED was entered.
+            None if (self.mode, self.personality) == (Mode::Guided, Personality::Ardupilot) => {
+                self.law.attitude(&self.measured, TURN_BACK, 0.0, None)
             }
             None => self.law.level(&self.measured),
         }

@@ -14,9 +14,12 @@ pub enum Mode {
     Hold,
     /// The same, after a failsafe: RTL. (It flies level here; the way home is not played.)
     Return,
+    /// ArduPilot's short failsafe: CIRCLE. (It flies level here; PX4 has none and is never in it.)
+    Circle,
 }
 
 impl Mode {
+    /// Those that can be asked for.
     pub(super) const ALL: [Mode; 4] = [Mode::Manual, Mode::Guided, Mode::Hold, Mode::Return];
 
     /// Main and sub mode.
@@ -24,12 +27,13 @@ impl Mode {
         match (personality, self) {
             (Personality::Px4, Mode::Manual) => (1, 0),
             (Personality::Px4, Mode::Guided) => (6, 0),
-            (Personality::Px4, Mode::Hold) => (4, 3),
+            (Personality::Px4, Mode::Hold | Mode::Circle) => (4, 3),
             (Personality::Px4, Mode::Return) => (4, 5),
             (Personality::Ardupilot, Mode::Manual) => (0, 0),
             (Personality::Ardupilot, Mode::Guided) => (15, 0),
             (Personality::Ardupilot, Mode::Hold) => (12, 0),
             (Personality::Ardupilot, Mode::Return) => (11, 0),
+            (Personality::Ardupilot, Mode::Circle) => (1, 0),
         }
     }
 
@@ -50,6 +54,7 @@ impl Mode {
             (Personality::Ardupilot, Mode::Guided) => ("Guided", 0),
             (Personality::Px4, Mode::Hold) => ("Hold", 0),
             (Personality::Ardupilot, Mode::Hold) => ("Loiter", 0),
+            (_, Mode::Circle) => ("Circle", 0),
             // MAV_STANDARD_MODE_SAFE_RECOVERY.
             (_, Mode::Return) => ("Return", 5),
         };

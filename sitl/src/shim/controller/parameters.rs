@@ -9,7 +9,7 @@ const INT: u8 = 6;
 const REAL: u8 = 9;
 
 /// Name, value, type. PX4's are its defaults, but those that a companion has to have set.
-const PX4: [(&str, f64, u8); 13] = [
+const PX4: [(&str, f64, u8); 14] = [
     ("PWM_MAIN_REV", 0.0, INT),
     ("MAV_SYS_ID", 1.0, INT),
     ("COM_RC_IN_MODE", 1.0, INT),
@@ -23,16 +23,28 @@ const PX4: [(&str, f64, u8); 13] = [
     ("TRIM_ROLL", 0.01, REAL),
     ("TRIM_PITCH", -0.02, REAL),
     ("FW_AIRSPD_TRIM", 20.0, REAL),
+    ("IMU_GYRO_CUTOFF", 40.0, REAL),
 ];
 
 /// ArduPilot's are of one radio's calibration, with a reversed pitch channel.
-const ARDUPILOT: [(&str, f64, u8); 26] = [
+const ARDUPILOT: [(&str, f64, u8); 35] = [
     ("SERVO1_REVERSED", 0.0, INT),
     ("SERVO2_REVERSED", 0.0, INT),
     ("SYSID_THISMAV", 1.0, INT),
     ("MAV_GCS_SYSID", 1.0, INT),
     ("SCHED_LOOP_RATE", 200.0, INT),
     ("RC_OVERRIDE_TIME", 0.5, REAL),
+    ("GUIDED_TIMEOUT", 1.0, REAL),
+    ("THR_FAILSAFE", 1.0, INT),
+    ("FS_SHORT_ACTN", 0.0, INT),
+    ("FS_LONG_ACTN", 1.0, INT),
+    ("RC_FS_TIMEOUT", 1.0, REAL),
+    ("RC_OPTIONS", 32.0, INT),
+    // Of ArduPilot's own simulator: 1 is no radio, 0 one with its sticks released.
+    ("SIM_RC_FAIL", 1.0, INT),
+    // Low-pass of the gyros, Hz; 0 is none. What comes late between command and surface, ms.
+    ("INS_GYRO_FILTER", 20.0, INT),
+    ("SIM_SERVO_DELAY", 0.0, INT),
     ("RCMAP_ROLL", 1.0, INT),
     ("RCMAP_PITCH", 2.0, INT),
     ("RCMAP_THROTTLE", 3.0, INT),
@@ -89,6 +101,11 @@ impl Table {
     /// The value of a parameter; NaN for one that the stack does not have.
     pub(super) fn get(&self, name: &str) -> f64 {
         self.rows.iter().find(|(known, ..)| *known == name).map_or(f64::NAN, |(_, value, _)| *value)
+    }
+
+    /// Sets a parameter that the stack has.
+    pub(super) fn put(&mut self, name: &str, value: f64) {
+        self.rows.iter_mut().filter(|(known, ..)| *known == name).for_each(|row| row.1 = value);
     }
 
     fn find(&self, id: &[u8; 16]) -> Option<usize> {

@@ -10,14 +10,26 @@ use crate::shim::codec::{ManualControl, RcChannelsOverride};
 pub(super) struct Sticks {
     manual: Option<(u64, [i16; 3])>,
     channels: Option<(u64, [u16; 3])>,
+    /// When the stream of MANUAL_CONTROL that lasts began.
+    since: Option<u64>,
 }
+
+/// A gap of so much ends a stream of sticks, µs: PX4's default COM_RC_LOSS_T.
+const GAP_US: u64 = 500_000;
 
 impl Sticks {
     pub(super) fn manual(&mut self, now_us: u64, m: &ManualControl) {
+        let goes_on = self.manual.is_some_and(|(at, _)| now_us.saturating_sub(at) <= GAP_US);
+        self.since = self.since.filter(|_| goes_on).or(Some(now_us));
         self.manual = Some((now_us, [m.x, m.y, m.z]));
     }
 
-    /// A channel of 0 goes back to the radio, which is switched off here.
+    /// Seconds since the stream of MANUAL_CONTROL began.
+    pub(super) fn steady_s(&self, now_us: u64) -> Option<f64> {
+        self.since.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
+    }
+
+    /// A channel of 0 goes back to the radio.
     pub(super) fn override_channels(&mut self, now_us: u64, m: &RcChannelsOverride) {
         let [one, two, three, ..] = m.channel;
         let given_back = [one, two, three].contains(&0);
@@ -60,7 +72,7 @@ fn px4([x, y, z]: [i16; 3], parameters: &Table) -> Inputs {
 }
 
 /// Channels by their calibration: angles to 1/4500 of full travel, throttle to whole percents.
-fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
+pub(super) fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
     let read = |channel: usize, name: &str| parameters.get(&format!("RC{channel}_{name}"));
     let angle = |channel: usize| {
         let pulse = f64::from(pulses[channel - 1]);

@@ -7,6 +7,9 @@ use crate::shim::telemetry::{self, FRAME_US, StateFrame};
 /// Sea-level density of the standard atmosphere, kg/m³.
 const SEA_LEVEL: f64 = 1.225;
 
+/// MAV_RESULT_DENIED.
+pub(super) const DENIED: u8 = 2;
+
 /// A stream with the time between its messages, µs, and the next one's.
 #[derive(Clone, Copy, Debug)]
 struct Row {
@@ -15,17 +18,26 @@ struct Row {
     due_us: u64,
 }
 
+/// What the streams say of the aircraft's equipment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Equipment {
+    /// Travel of the surfaces.
+    pub travel: Travel,
+    /// MAV_SYS_STATUS_SENSOR bits of a radio's receiver; zero where none is bound.
+    pub receiver: u32,
+}
+
 /// The streams, in the order in which they are looked at.
 #[derive(Clone, Debug)]
 pub(super) struct Streams {
     rows: [Row; 8],
-    travel: Travel,
+    equipment: Equipment,
     last_us: u64,
 }
 
 impl Streams {
-    /// The streams of an aircraft whose surfaces have this travel.
-    pub(super) fn new(travel: Travel) -> Self {
+    /// The streams of an aircraft so equipped.
+    pub(super) fn new(equipment: Equipment) -> Self {
         let row = |id, interval_us| Row { id, interval_us, due_us: 0 };
         // The rates of a telemetry port that nobody has asked for more.
         let rows = [
@@ -38,20 +50,22 @@ impl Streams {
             row(231, None),
             row(1, Some(1_000_000)),
         ];
-        Streams { rows, travel, last_us: 0 }
+        Streams { rows, equipment, last_us: 0 }
     }
-}
 
-impl Streams {
-    /// SET_MESSAGE_INTERVAL: MAV_RESULT. Faster than `limit_hz`, or than the steps, is limited.
-    pub(super) fn set(&mut self, id: u32, interval_us: f32, limit_hz: f64) -> u8 {
+    /// SET_MESSAGE_INTERVAL: MAV_RESULT. Faster than the steps is limited, as PX4 does; faster than
+    /// `denied_hz` is denied and changes nothing, as ArduPilot does.
+    pub(super) fn set(&mut self, id: u32, interval_us: f32, denied_hz: f64) -> u8 {
         let Some(row) = self.rows.iter_mut().find(|row| row.id == id) else {
             // MAV_RESULT_UNSUPPORTED.
             return 3;
         };
-        let shortest = (1e6 / limit_hz).max(FRAME_US as f64);
+        // A microsecond of rounding.
+        if interval_us > 0.0 && f64::from(interval_us) + 1.0 < 1e6 / denied_hz {
+            return DENIED;
+        }
         row.interval_us = match interval_us {
-            us if us > 0.0 => Some((f64::from(us)).max(shortest) as u64),
+            us if us > 0.0 => Some(f64::from(us).max(FRAME_US as f64) as u64),
             _ => None,
         };
         0
@@ -79,7 +93,7 @@ impl Streams {
         out: &mut Vec<u8>,
     ) {
         if self.knows(id) {
-            encode(id, now, measured, home_m, self.travel, encoder, out);
+            encode(id, now, measured, home_m, self.equipment, encoder, out);
         }
     }
 
@@ -101,7 +115,7 @@ impl Streams {
         for row in &mut self.rows {
             let Some(interval) = row.interval_us.filter(|_| now >= row.due_us) else { continue };
             row.due_us = (row.due_us + interval).max(now.saturating_sub(interval) + 1);
-            encode(row.id, now, measured, home_m, self.travel, encoder, out);
+            encode(row.id, now, measured, home_m, self.equipment, encoder, out);
         }
     }
 }
@@ -111,7 +125,7 @@ fn encode(
     now: u64,
     measured: &Truth,
     home_m: f64,
-    travel: Travel,
+    equipment: Equipment,
     encoder: &mut Encoder,
     out: &mut Vec<u8>,
 ) {
@@ -127,10 +141,16 @@ fn encode(
             },
             out,
         ),
-        36 => encoder.encode(&servos(now, measured, travel), out),
+        36 => encoder.encode(&servos(now, measured, equipment.travel), out),
         33 => encoder.encode(&telemetry::position(now, measured, home_m), out),
         231 => encoder.encode(&telemetry::wind(now, measured), out),
-        _ => encoder.encode(&telemetry::health(), out),
+        _ => {
+            let mut health = telemetry::health();
+            health.onboard_control_sensors_present |= equipment.receiver;
+            health.onboard_control_sensors_enabled |= equipment.receiver;
+            health.onboard_control_sensors_health |= equipment.receiver;
+            encoder.encode(&health, out);
+        }
     }
 }
 

@@ -1,15 +1,20 @@
-//! Who has the aircraft: from asking the controller for it to handing it back.
+//! Who has the aircraft: from asking the controller for it to its handing back.
+//!
+//! What counts is the mode that the controller shows, in HEARTBEAT or CURRENT_MODE. Its COMMAND_ACK
+//! does not: PX4 sends two for a mode, the first always ACCEPTED, and a link may lose either.
 
 use std::time::Duration;
 
+use super::profile::{Authority, Stack};
+
 /// The controller is asked for a mode again after this time.
 pub(super) const ASK_AGAIN: Duration = Duration::from_millis(250);
-/// It has this long to go over.
+/// It has this long to show the mode after the first request.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// It is asked to take the aircraft back this often.
-const HAND_BACKS: u32 = 5;
-/// A heartbeat that was under way when the mode changed may still tell the old one.
-const GRACE: Duration = Duration::from_millis(1300);
+/// A hand-back that no heartbeat has confirmed for so long is said again: two heartbeats are due.
+const UNCONFIRMED: Duration = Duration::from_secs(2);
+/// HEARTBEAT and CURRENT_MODE may overtake one another by a datagram.
+const GRACE: Duration = Duration::from_millis(100);
 
 /// Where things stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,23 +26,49 @@ pub(super) enum Phase {
     Entering { since: Duration, asked: Option<Duration> },
     /// We steer.
     Engaged { since: Duration },
-    /// It is being told to fly by itself.
-    Releasing { asked: Option<Duration>, times: u32 },
+    /// It is being asked to fly by itself, until it shows that it does.
+    Releasing { since: Option<Duration>, asked: Option<Duration> },
 }
 
-/// The phase with what it was told.
+/// What a mode that the controller shows means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shown {
+    /// Nothing new.
+    Nothing,
+    /// We steer from now on.
+    Engaged,
+    /// It, or its pilot, has taken the aircraft.
+    Taken,
+    /// It has the aircraft back, as it was asked.
+    Confirmed,
+}
+
+/// The phase with what the controller has answered.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Engagement {
     pub(super) phase: Phase,
-    /// Result of the last refusal of the mode.
+    /// Commands are streamed for so long before the mode is asked for.
+    lead: Duration,
+    /// The last MAV_RESULT that was no acceptance.
     refused: Option<u8>,
+    /// Whether any request was accepted.
+    accepted: bool,
     /// After a hand-back nothing is begun until the demand has ended once.
     barred: bool,
+    /// Whether it was said that a hand-back is not confirmed.
+    reminded: bool,
 }
 
 impl Engagement {
-    pub(super) fn new() -> Self {
-        Engagement { phase: Phase::Idle, refused: None, barred: false }
+    pub(super) fn new(lead: Duration) -> Self {
+        Engagement {
+            phase: Phase::Idle,
+            lead,
+            refused: None,
+            accepted: false,
+            barred: false,
+            reminded: false,
+        }
     }
 
     /// Whether commands are to be sent.
@@ -45,73 +76,92 @@ impl Engagement {
         matches!(self.phase, Phase::Entering { .. } | Phase::Engaged { .. })
     }
 
-    /// Somebody wants to steer.
-    pub(super) fn begin(&mut self, host: Duration) {
-        if !self.barred && !self.steers() {
+    /// Somebody wants to steer; whether that is new.
+    pub(super) fn begin(&mut self, host: Duration) -> bool {
+        let begins = !self.barred && !self.steers();
+        if begins {
             self.phase = Phase::Entering { since: host, asked: None };
-            self.refused = None;
+            (self.refused, self.accepted) = (None, false);
         }
+        begins
     }
 
     /// Nobody wants to steer.
     pub(super) fn rest(&mut self) {
         self.barred = false;
         if self.steers() {
-            self.phase = Phase::Releasing { asked: None, times: 0 };
+            self.release();
         }
     }
 
     /// The aircraft goes back to the controller, and stays there until somebody asks again.
     pub(super) fn hand_back(&mut self) {
         self.barred = true;
-        self.phase = Phase::Releasing { asked: None, times: 0 };
+        self.release();
     }
 
-    /// The controller, or its pilot, has taken it.
-    pub(super) fn taken(&mut self) {
-        self.barred = true;
-        self.phase = Phase::Idle;
+    fn release(&mut self) {
+        self.phase = Phase::Releasing { since: None, asked: None };
+        self.reminded = false;
     }
 
-    /// The controller has answered a request for a mode.
-    pub(super) fn answered(&mut self, host: Duration, result: u8) {
-        if let Phase::Entering { .. } = self.phase {
-            match result {
-                0 => self.phase = Phase::Engaged { since: host },
-                // In progress.
-                5 => {}
-                _ => self.refused = Some(result),
-            }
+    /// The controller has answered a request for a mode: no answer engages.
+    pub(super) fn answered(&mut self, result: u8) {
+        match (self.phase, result) {
+            (Phase::Entering { .. }, 0) => self.accepted = true,
+            // 5 is in progress.
+            (Phase::Entering { .. }, 1..=4 | 6..) => self.refused = Some(result),
+            _ => {}
         }
     }
 
-    /// The controller's heartbeat has told its mode; whether it has left the one we steer in.
-    pub(super) fn told(&mut self, host: Duration, steered: bool) -> bool {
+    /// The controller shows its mode: whether it is the steered one.
+    pub(super) fn shown(&mut self, host: Duration, steered: bool) -> Shown {
         match self.phase {
-            Phase::Entering { .. } if steered => {
+            // A mode that was on before the first request is its pilot's, who flies.
+            Phase::Entering { asked: Some(_), .. } if steered => {
                 self.phase = Phase::Engaged { since: host };
-                false
+                Shown::Engaged
             }
-            Phase::Engaged { since } => !steered && host.saturating_sub(since) > GRACE,
-            Phase::Releasing { times, .. } if !steered && times > 0 => {
+            Phase::Engaged { since } if !steered && host.saturating_sub(since) > GRACE => {
+                self.barred = true;
                 self.phase = Phase::Idle;
-                false
+                Shown::Taken
             }
-            _ => false,
+            Phase::Releasing { asked: Some(_), .. } if !steered => {
+                self.phase = Phase::Idle;
+                Shown::Confirmed
+            }
+            _ => Shown::Nothing,
         }
     }
 
     /// Why it takes too long, if it does.
-    pub(super) fn overdue(&self, host: Duration) -> Option<String> {
-        match self.phase {
-            Phase::Entering { since, .. } if host.saturating_sub(since) > PATIENCE => {
-                Some(match self.refused {
-                    Some(result) => format!("it refused (MAV_RESULT {result})"),
-                    None => "it did not answer".into(),
-                })
-            }
-            _ => None,
+    pub(super) fn overdue(
+        &self,
+        host: Duration,
+        stack: Stack,
+        authority: Authority,
+    ) -> Option<String> {
+        let Phase::Entering { since, .. } = self.phase else { return None };
+        if host.saturating_sub(since) <= self.lead + PATIENCE {
+            return None;
         }
+        Some(match self.refused {
+            Some(result) => refusal(result, stack, authority),
+            None if self.accepted => {
+                "it accepted, but showed another mode: its pilot's mode switch may hold it".into()
+            }
+            None => "it did not answer: check the link towards the controller".into(),
+        })
+    }
+
+    /// Whether a hand-back is unconfirmed for so long that it has to be said; it is said once.
+    pub(super) fn unconfirmed(&mut self, host: Duration) -> bool {
+        let Phase::Releasing { since: Some(since), .. } = self.phase else { return false };
+        let late = host.saturating_sub(since) > UNCONFIRMED && !self.reminded;
+        self.reminded |= late;
+        late
     }
 
     /// Whether a request is due at `host`: `true` in the answer is for the steered mode, `false`
@@ -120,19 +170,95 @@ impl Engagement {
         let due =
             |asked: Option<Duration>| asked.is_none_or(|at| host.saturating_sub(at) >= ASK_AGAIN);
         match self.phase {
-            Phase::Entering { since, asked } if due(asked) => {
+            Phase::Entering { since, asked }
+                if due(asked) && host.saturating_sub(since) >= self.lead =>
+            {
                 self.phase = Phase::Entering { since, asked: Some(host) };
                 Some(true)
             }
-            Phase::Releasing { asked, times } if due(asked) && times < HAND_BACKS => {
-                self.phase = Phase::Releasing { asked: Some(host), times: times + 1 };
+            Phase::Releasing { since, asked } if due(asked) => {
+                let since = since.or(Some(host));
+                self.phase = Phase::Releasing { since, asked: Some(host) };
                 Some(false)
-            }
-            Phase::Releasing { asked, .. } if due(asked) => {
-                self.phase = Phase::Idle;
-                None
             }
             _ => None,
         }
+    }
+}
+
+/// What a refusal of the steered mode commonly means.
+fn refusal(result: u8, stack: Stack, authority: Authority) -> String {
+    match (result, stack, authority) {
+        (1, Stack::Px4, Authority::Surfaces) => {
+            "PX4 sees no sticks: set COM_RC_IN_MODE to 1 and check that nobody else sends sticks"
+                .into()
+        }
+        (1, Stack::Px4, Authority::Attitude) => {
+            "the requirements of OFFBOARD are not met: PX4 sees no setpoints, or its estimate is \
+             not valid"
+                .into()
+        }
+        (1, Stack::Ardupilot, _) => {
+            "ArduPilot rejected it for now: ask again in level flight".into()
+        }
+        (2, ..) => {
+            "it denied it: a failsafe or a geofence holds its mode, or the mode is disabled".into()
+        }
+        (3, ..) => "it does not support it: its firmware has no such mode".into(),
+        (4, ..) => "it failed to change over: read its own messages at the ground station".into(),
+        _ => format!("it refused (MAV_RESULT {result})"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEAD: Duration = Duration::from_millis(500);
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn an_acceptance_does_not_engage_and_a_later_refusal_is_the_reason() {
+        let mut engagement = Engagement::new(LEAD);
+        engagement.begin(ms(0));
+        assert_eq!(engagement.request(ms(490)), None);
+        assert_eq!(engagement.request(ms(500)), Some(true));
+        // PX4's pair of answers: its receiver's, then its commander's.
+        engagement.answered(0);
+        engagement.answered(1);
+        assert!(matches!(engagement.phase, Phase::Entering { .. }));
+        assert_eq!(engagement.request(ms(750)), Some(true));
+        let overdue = |at| engagement.overdue(ms(at), Stack::Px4, Authority::Attitude);
+        assert_eq!(overdue(3500), None);
+        assert!(overdue(3501).unwrap().contains("requirements of OFFBOARD"));
+    }
+
+    #[test]
+    fn a_mode_that_was_on_before_it_was_asked_for_does_not_engage() {
+        let mut engagement = Engagement::new(LEAD);
+        engagement.begin(ms(0));
+        assert_eq!(engagement.shown(ms(100), true), Shown::Nothing);
+        engagement.request(ms(500));
+        assert_eq!(engagement.shown(ms(510), true), Shown::Engaged);
+    }
+
+    #[test]
+    fn a_hand_back_is_asked_for_until_another_mode_is_shown() {
+        let mut engagement = Engagement::new(Duration::ZERO);
+        engagement.begin(ms(0));
+        engagement.request(ms(0));
+        engagement.shown(ms(10), true);
+        engagement.hand_back();
+        // A minute in a dead link: four requests a second.
+        let asked = (0..6000).filter(|i| engagement.request(ms(10 * i)) == Some(false)).count();
+        assert_eq!(asked, 240);
+        assert!(engagement.unconfirmed(ms(60_000)) && !engagement.unconfirmed(ms(60_010)));
+        assert_eq!(engagement.shown(ms(60_100), true), Shown::Nothing);
+        assert_eq!(engagement.request(ms(60_250)), Some(false));
+        assert_eq!(engagement.shown(ms(60_300), false), Shown::Confirmed);
+        assert_eq!(engagement.request(ms(61_000)), None);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::profile::{Need, Rule};
+use super::profile::{Need, Presence, Rule};
 
 /// Between two requests for the same parameter.
 const AGAIN: Duration = Duration::from_millis(400);
@@ -35,6 +35,8 @@ pub enum Standing {
     Unread,
     /// The controller does not answer for it.
     Unknown,
+    /// The firmware does not have it, and it may be missing.
+    Absent,
     /// As needed.
     Good(f64),
     /// Not as needed.
@@ -80,6 +82,11 @@ impl Parameters {
         }
     }
 
+    /// Whether none was answered, though all were asked for.
+    pub(super) fn is_silent(&self) -> bool {
+        self.entries.iter().all(|entry| entry.value.is_none() && entry.tries > 0)
+    }
+
     /// The value of a parameter, once read.
     pub(super) fn get(&self, name: &str) -> Option<f64> {
         let entry = self.entries.iter().find(|entry| entry.rule.names.contains(&name))?;
@@ -111,18 +118,22 @@ impl Parameters {
 impl Entry {
     fn standing(&self, system: u8) -> Standing {
         let limit = TRIES * self.rule.names.len() as u32;
-        match self.value {
-            None if self.tries >= limit => Standing::Unknown,
-            None => Standing::Unread,
-            Some((_, value)) if self.rule.need.allows(value, system) => Standing::Good(value),
-            Some((_, value)) => Standing::Bad(value),
+        match (self.value, self.rule.presence) {
+            (None, Presence::Optional) if self.tries >= limit => Standing::Absent,
+            (None, _) if self.tries >= limit => Standing::Unknown,
+            (None, _) => Standing::Unread,
+            (Some((_, value)), _) if self.rule.need.allows(value, system) => Standing::Good(value),
+            (Some((_, value)), _) => Standing::Bad(value),
         }
     }
 
     fn report(&self, system: u8) -> (&'static str, Standing, String) {
         let name = self.rule.names[self.value.map_or(0, |(at, _)| at)];
-        let remedy =
-            if self.rule.need == Need::OurSystem { f64::from(system) } else { self.rule.remedy };
+        let remedy = match (self.rule.need, self.value) {
+            (Need::OurSystem, _) => f64::from(system),
+            (Need::Without(bits), Some((_, value))) => f64::from(value as u32 & !bits),
+            _ => self.rule.remedy,
+        };
         let standing = self.standing(system);
         let words = match standing {
             Standing::Good(value) => format!("{name} is {value}"),
@@ -130,6 +141,7 @@ impl Entry {
                 format!("{name} is {value}: set it to {remedy} ({})", self.rule.why)
             }
             Standing::Unread => format!("{name} is not read yet"),
+            Standing::Absent => format!("{name} is not in this firmware"),
             Standing::Unknown => format!(
                 "{name} is unknown to the controller: its firmware is not one that this profile fits"
             ),
@@ -145,6 +157,7 @@ impl Need {
             Need::Between(low, high) => (low - 1e-6..=high + 1e-6).contains(&value),
             Need::OurSystem => value == f64::from(system),
             Need::Pulse => PULSE.contains(&value),
+            Need::Without(bits) => value >= 0.0 && value as u32 & bits == 0,
         }
     }
 }
@@ -184,6 +197,30 @@ mod tests {
         assert!(words.contains("RC_OVERRIDE_TIME is 3: set it to 0.5"), "{words}");
         let words = parameters.obstacle(7).unwrap();
         assert!(words.contains("SYSID_MYGCS is 1: set it to 7"), "{words}");
+    }
+
+    #[test]
+    fn a_parameter_of_newer_firmware_may_be_missing_but_not_wrong() {
+        let attitude = || Parameters::new(Stack::Ardupilot.rules(Authority::Attitude));
+        let asked = |mut parameters: Parameters| {
+            (0..100).for_each(|step| drop(parameters.due(AGAIN * step)));
+            parameters
+        };
+        let mut old = attitude();
+        old.take("SCHED_LOOP_RATE", 200.0);
+        assert_eq!(asked(old).obstacle(1), None);
+        let mut new = attitude();
+        new.take("SCHED_LOOP_RATE", 200.0);
+        new.take("GUIDED_TIMEOUT", 3.0);
+        let words = asked(new).obstacle(1).unwrap();
+        assert!(words.contains("GUIDED_TIMEOUT is 3: set it to 0.5"), "{words}");
+    }
+
+    #[test]
+    fn a_bit_that_must_be_clear_is_said_with_the_rest_kept() {
+        let parameters = answered(|name| (name == "RC_OPTIONS").then_some(34.0));
+        let words = parameters.obstacle(1).unwrap();
+        assert!(words.contains("RC_OPTIONS is 34: set it to 32"), "{words}");
     }
 
     #[test]

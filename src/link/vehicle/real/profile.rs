@@ -1,6 +1,7 @@
 //! What each flight stack accepts: modes, streams, parameters.
 
 use std::fmt;
+use std::time::Duration;
 
 use crate::physics::airframe::ActuatorFigures;
 
@@ -75,13 +76,15 @@ const PX4_STREAMS: [Stream; 5] = [
     stream(231, "WIND_COV", 2.0, false, 40),
 ];
 
-const ARDUPILOT_STREAMS: [Stream; 6] = [
+const ARDUPILOT_STREAMS: [Stream; 7] = [
     stream(31, "ATTITUDE_QUATERNION", 100.0, true, 48),
     stream(105, "HIGHRES_IMU", 100.0, true, 63),
     stream(74, "VFR_HUD", 50.0, true, 20),
     stream(11020, "AOA_SSA", 50.0, false, 16),
     stream(33, "GLOBAL_POSITION_INT", 10.0, false, 28),
     stream(168, "WIND", 2.0, false, 12),
+    // Whether a radio is bound.
+    stream(1, "SYS_STATUS", 1.0, false, 43),
 ];
 
 /// What a parameter must be.
@@ -95,6 +98,17 @@ pub enum Need {
     OurSystem,
     /// Any number that makes sense for a channel's pulse width, µs: it is used.
     Pulse,
+    /// A bit mask without any of these bits.
+    Without(u32),
+}
+
+/// Whether firmware may lack a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Presence {
+    /// Firmware without it is not one that the profile fits.
+    Required,
+    /// Some releases do not have it.
+    Optional,
 }
 
 /// A parameter that is read and checked before engaging.
@@ -108,10 +122,16 @@ pub struct Rule {
     pub remedy: f64,
     /// What it is for.
     pub why: &'static str,
+    /// Whether it may be missing.
+    pub presence: Presence,
 }
 
 const fn rule(names: &'static [&'static str], need: Need, remedy: f64, why: &'static str) -> Rule {
-    Rule { names, need, remedy, why }
+    Rule { names, need, remedy, why, presence: Presence::Required }
+}
+
+const fn optional(rule: Rule) -> Rule {
+    Rule { presence: Presence::Optional, ..rule }
 }
 
 const ONE: &[f64] = &[1.0];
@@ -132,9 +152,9 @@ const PX4_SURFACES: [Rule; 7] = [
     ),
     rule(
         &["NAV_RCL_ACT"],
-        Need::Between(1.0, 6.0),
+        Need::OneOf(ONE),
         1.0,
-        "the controller must act when the companion is dead",
+        "the sticks end with every hand-back: the controller must hold then, not return or descend",
     ),
     rule(&["FW_MAN_R_SC"], Need::OneOf(ONE), 1.0, "full stick must be full aileron"),
     rule(&["FW_MAN_P_SC"], Need::OneOf(ONE), 1.0, "full stick must be full elevator"),
@@ -152,7 +172,7 @@ const PX4_ATTITUDE: [Rule; 2] = [
     rule(&["COM_OBL_RC_ACT"], Need::OneOf(&[5.0]), 5.0, "it must hold, not wait for a radio"),
 ];
 
-const ARDUPILOT_SURFACES: [Rule; 19] = [
+const ARDUPILOT_SURFACES: [Rule; 24] = [
     rule(
         &["RC_OVERRIDE_TIME"],
         Need::Between(0.1, 0.5),
@@ -166,6 +186,11 @@ const ARDUPILOT_SURFACES: [Rule; 19] = [
         "overrides of other systems are ignored",
     ),
     rule(&["SCHED_LOOP_RATE"], LOOP_RATE, 200.0, "a stream is sent at 0.8 of it at most"),
+    rule(&["THR_FAILSAFE"], Need::OneOf(ONE), 1.0, NO_RADIO),
+    rule(&["FS_SHORT_ACTN"], Need::OneOf(&[0.0, 1.0]), 0.0, NO_RADIO),
+    rule(&["FS_LONG_ACTN"], Need::OneOf(&[0.0, 1.0]), 1.0, NO_RADIO),
+    optional(rule(&["RC_FS_TIMEOUT"], Need::Between(0.1, 1.0), 1.0, NO_RADIO)),
+    rule(&["RC_OPTIONS"], Need::Without(2), 32.0, "bit 1 makes it ignore overrides"),
     rule(&["RCMAP_ROLL"], Need::OneOf(ONE), 1.0, "channel 1 is sent as roll"),
     rule(&["RCMAP_PITCH"], Need::OneOf(&[2.0]), 2.0, "channel 2 is sent as pitch"),
     rule(&["RCMAP_THROTTLE"], Need::OneOf(&[3.0]), 3.0, "channel 3 is sent as throttle"),
@@ -183,12 +208,20 @@ const ARDUPILOT_SURFACES: [Rule; 19] = [
     rule(&["RC3_MAX"], Need::Pulse, 1900.0, SCALE),
     rule(&["RC3_REVERSED"], Need::OneOf(&[0.0, 1.0]), 0.0, SCALE),
 ];
+const NO_RADIO: &str = "without a radio the controller must act when the companion is dead";
 const SCALE: &str = "the pulses are scaled by it";
 /// 100 Hz of state at 0.8 of the loop's rate.
 const LOOP_RATE: Need = Need::Between(125.0, 2000.0);
 
-const ARDUPILOT_ATTITUDE: [Rule; 1] =
-    [rule(&["SCHED_LOOP_RATE"], LOOP_RATE, 200.0, "a stream is sent at 0.8 of it at most")];
+const ARDUPILOT_ATTITUDE: [Rule; 2] = [
+    rule(&["SCHED_LOOP_RATE"], LOOP_RATE, 200.0, "a stream is sent at 0.8 of it at most"),
+    optional(rule(
+        &["GUIDED_TIMEOUT"],
+        Need::Between(0.1, 1.0),
+        0.5,
+        "a dead companion's last attitude is flown for so long",
+    )),
+];
 
 impl Stack {
     /// MAV_AUTOPILOT.
@@ -211,6 +244,16 @@ impl Stack {
             (Stack::Px4, Authority::Attitude) => mode("OFFBOARD", 6, 0),
             (Stack::Ardupilot, Authority::Surfaces) => mode("MANUAL", 0, 0),
             (Stack::Ardupilot, Authority::Attitude) => mode("GUIDED", 15, 0),
+        }
+    }
+
+    /// For how long commands are streamed before the steered mode is asked for. PX4 looks at its
+    /// requirements every 100 ms and has sticks pass through another module first: it refused 2 of 3
+    /// at 150 ms, none at 300 ms. ArduPilot asks for no stream, and mixes early sticks into LOITER.
+    pub fn lead(self) -> Duration {
+        match self {
+            Stack::Px4 => Duration::from_millis(500),
+            Stack::Ardupilot => Duration::ZERO,
         }
     }
 

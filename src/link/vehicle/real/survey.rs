@@ -17,10 +17,10 @@ pub struct Traffic {
     pub bytes: u64,
     /// Rate over the last whole window, Hz.
     pub hz: f64,
-    /// When the first came.
-    pub first: Duration,
+    /// Since when they are counted.
+    since: Duration,
     /// When the last came.
-    pub last: Duration,
+    last: Duration,
     in_window: u32,
     /// Sum of the squared deviations of the interval from its mean (Welford), with the mean, s.
     mean: f64,
@@ -28,12 +28,6 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// Mean rate between the first and the last frame, Hz; 0 for fewer than two.
-    pub fn mean_hz(&self) -> f64 {
-        let span = self.last.saturating_sub(self.first).as_secs_f64();
-        if span > 0.0 { (self.frames - 1) as f64 / span } else { 0.0 }
-    }
-
     /// Standard deviation of the interval between two frames, ms.
     pub fn jitter_ms(&self) -> f64 {
         match self.frames {
@@ -43,9 +37,7 @@ impl Traffic {
     }
 
     fn note(&mut self, host: Duration, bytes: usize) {
-        if self.frames == 0 {
-            self.first = host;
-        } else {
+        if self.frames > 0 {
             let interval = host.saturating_sub(self.last).as_secs_f64();
             let delta = interval - self.mean;
             self.mean += delta / self.frames as f64;
@@ -62,6 +54,8 @@ impl Traffic {
 #[derive(Clone, Debug, Default)]
 pub struct Survey {
     messages: BTreeMap<u32, Traffic>,
+    /// When the first frame came, and the last.
+    span: Option<(Duration, Duration)>,
     sequence: Option<u8>,
     received: u64,
     lost: u64,
@@ -79,7 +73,24 @@ impl Survey {
             self.lost += if gap < 128 { u64::from(gap) } else { 0 };
         }
         self.received += 1;
-        self.messages.entry(id).or_default().note(host, bytes);
+        let (first, _) = *self.span.get_or_insert((host, host));
+        self.span = Some((first, host));
+        let fresh = Traffic { since: first, ..Traffic::default() };
+        self.messages.entry(id).or_insert(fresh).note(host, bytes);
+    }
+
+    /// Counts a message anew, as when its rate has been granted.
+    pub(super) fn restart(&mut self, host: Duration, id: u32) {
+        if let Some(traffic) = self.messages.get_mut(&id) {
+            let Traffic { hz, in_window, .. } = *traffic;
+            *traffic = Traffic { since: host, hz, in_window, ..Traffic::default() };
+        }
+    }
+
+    /// A message's mean rate over the time in which it was counted, a second at least, Hz.
+    pub fn mean_hz(&self, traffic: &Traffic) -> f64 {
+        let last = self.span.map_or(Duration::ZERO, |(_, last)| last);
+        traffic.frames as f64 / last.saturating_sub(traffic.since).max(WINDOW).as_secs_f64()
     }
 
     /// Closes windows that are over at `host`; whether one has closed.
@@ -137,6 +148,31 @@ impl Survey {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_burst_of_answers_is_no_stream() {
+        let mut survey = Survey::default();
+        survey.frame(Duration::ZERO, 0, 0, 21);
+        for i in 0..9 {
+            survey.frame(Duration::from_micros(3_000_000 + i), 22, 1 + i as u8, 37);
+        }
+        survey.frame(Duration::from_secs(8), 0, 10, 21);
+        let rate = survey.messages().find(|(id, _)| *id == 22).map(|(_, t)| survey.mean_hz(t));
+        // Nine in eight seconds.
+        assert_eq!(rate, Some(9.0 / 8.0));
+    }
+
+    #[test]
+    fn jitter_is_counted_from_the_granting_of_the_rate() {
+        let mut survey = Survey::default();
+        // 4 Hz before, 50 Hz after.
+        (0..8).for_each(|i| survey.frame(Duration::from_millis(250 * i), 74, i as u8, 32));
+        survey.restart(Duration::from_secs(2), 74);
+        (0..100)
+            .for_each(|i| survey.frame(Duration::from_millis(2020 + 20 * i), 74, 8 + i as u8, 32));
+        let (_, traffic) = survey.messages().next().unwrap();
+        assert!(traffic.jitter_ms() < 1e-6 && (survey.mean_hz(traffic) - 50.0).abs() < 1.0);
+    }
 
     #[test]
     fn rates_losses_and_jitter_of_a_known_stream() {

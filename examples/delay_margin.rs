@@ -1,0 +1,241 @@
+//! Measures how much pure input delay each controller bears before its pitch or roll loop swings by itself.
+//!
+//! ```text
+//! cargo run --release --ignore-rust-version --no-default-features --features sitl --example delay_margin
+//! ```
+//!
+//! Further designs of the LQI are tried by their weights, as `attitude,integral,rate,sideslip,deflection`.
+//!
+//! JSBSim flies in steps of a millisecond. The controller runs at 100 Hz on the true state; its
+//! elevator, or its aileron, arrives later by the delay, which grows by 2 ms. `ardupilot` adds what
+//! ArduPlane puts into the loop: gyros filtered at 20 Hz, channels read at 50 Hz. A short pulse starts
+//! it: a small one shows the linear margin, full deflection the one that the slew limit leaves.
+
+use std::collections::VecDeque;
+use std::path::Path;
+
+use anyhow::Result;
+use greylag::control::lqi::{Lqi, Weights};
+use greylag::control::{Controller, Kind, Observation, Target, build};
+use greylag::model::GreyBox;
+use greylag::physics::actuators::Actuators;
+use greylag::physics::airframe::ActuatorFigures;
+use greylag::physics::{Command, Controls, State, Time};
+use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start, Truth};
+
+/// Steps of the plant in a cycle of the controller, and in a second.
+const CYCLE: usize = 10;
+const SECOND: usize = 1000;
+/// Largest change of a surface in a cycle: the envelope's 20 /s.
+const SLEW: f64 = 0.2;
+/// Swing of a rate, from peak to peak over the last two seconds, that counts as unstable, rad/s.
+const SWING: f64 = 0.17;
+/// Delays tried, ms.
+const STEP_MS: usize = 2;
+const LONGEST_MS: usize = 200;
+
+/// The axis whose surface is late.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Axis {
+    Pitch,
+    Roll,
+}
+
+/// What lies between state and surface beside the delay.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Between {
+    Direct,
+    Ardupilot,
+}
+
+fn main() -> Result<()> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+    let model = GreyBox::load(&folder.join("jsbsim.toml"))?;
+    let figures = model.airframe.actuators;
+    let mut controllers: Vec<(String, Box<dyn Controller>)> = Vec::new();
+    for kind in [Kind::Lqi, Kind::LqiDamped, Kind::Pid, Kind::PidRetuned] {
+        controllers.push((kind.name().into(), build(kind, &model)?));
+    }
+    for figures in std::env::args().skip(1) {
+        let x: Vec<f64> = figures.split(',').map(str::parse).collect::<Result<_, _>>()?;
+        let [attitude, integral, rate, sideslip, deflection] = x[..] else {
+            anyhow::bail!("weights are attitude,integral,rate,sideslip,deflection: {figures}");
+        };
+        let weights = Weights { attitude, integral, rate, sideslip, deflection };
+        let lqi = Lqi::weighted("lqi", &model, &weights)?;
+        controllers.push((figures, Box::new(lqi)));
+    }
+    println!("least delay (ms) at which the loop swings by itself, at 20 m/s, target 0, 3 deg");
+    println!(
+        "{:<26}{:>10}{:>8}{:>12}{:>12}{:>12}{:>12}",
+        "controller", "path", "error", "pitch,small", "pitch,full", "roll,small", "roll,full"
+    );
+    for (name, controller) in &mut controllers {
+        for path in [Between::Direct, Between::Ardupilot] {
+            let error = settled_deg(controller.as_mut(), figures, path)?;
+            print!("{name:<26}{:>10}{error:>8.3}", format!("{path:?}").to_lowercase());
+            for axis in [Axis::Pitch, Axis::Roll] {
+                for pulse in [0.1, 1.0] {
+                    let margin = margin_ms(controller.as_mut(), figures, path, axis, pulse)?;
+                    print!("{:>12}", margin.map_or("> 200".into(), |ms| ms.to_string()));
+                }
+            }
+            println!();
+        }
+    }
+    Ok(())
+}
+
+/// The least delay at which the axis swings on after the pulse.
+fn margin_ms(
+    controller: &mut dyn Controller,
+    figures: ActuatorFigures,
+    path: Between,
+    axis: Axis,
+    pulse: f64,
+) -> Result<Option<usize>> {
+    for delay in (0..=LONGEST_MS).step_by(STEP_MS) {
+        let mut flight = Flight::new(figures, path, axis, delay, pulse)?;
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        let target = Target { roll: 0.0, pitch: 3f64.to_radians(), airspeed: 20.0 };
+        let lost = flight.fly(controller, &target, 10 * SECOND, |step, truth| {
+            if step >= 8 * SECOND {
+                let rate = if axis == Axis::Pitch { truth.q_radps } else { truth.p_radps };
+                range = [range[0].min(rate), range[1].max(rate)];
+            }
+        });
+        if lost.is_err() || range[1] - range[0] > SWING {
+            return Ok(Some(delay));
+        }
+    }
+    Ok(None)
+}
+
+/// Mean of the roll and pitch RMSE over the last two of twelve seconds at two attitudes, degrees.
+fn settled_deg(
+    controller: &mut dyn Controller,
+    figures: ActuatorFigures,
+    path: Between,
+) -> Result<f64> {
+    let mut sum = 0.0;
+    for (roll, pitch) in [(30f64, 10f64), (-20.0, -5.0)] {
+        let target = Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 20.0 };
+        let mut flight = Flight::new(figures, path, Axis::Pitch, 0, 0.0)?;
+        let mut squares = [0.0; 2];
+        flight.fly(controller, &target, 12 * SECOND, |step, truth| {
+            if step >= 10 * SECOND {
+                squares[0] += (truth.roll_rad.to_degrees() - roll).powi(2);
+                squares[1] += (truth.pitch_rad.to_degrees() - pitch).powi(2);
+            }
+        })?;
+        sum += squares.iter().map(|s| (s / (2 * SECOND) as f64).sqrt()).sum::<f64>() / 2.0;
+    }
+    Ok(sum / 2.0)
+}
+
+/// One flight with a late surface.
+struct Flight {
+    plant: Plant,
+    figures: ActuatorFigures,
+    path: Between,
+    axis: Axis,
+    pulse: f64,
+    /// What is on its way to the late surface.
+    late: VecDeque<f64>,
+}
+
+impl Flight {
+    fn new(
+        figures: ActuatorFigures,
+        path: Between,
+        axis: Axis,
+        delay_ms: usize,
+        pulse: f64,
+    ) -> Result<Flight> {
+        let options = PlantOptions { step_s: 1.0 / SECOND as f64, ..PlantOptions::default() };
+        let late = std::iter::repeat_n(0.0, delay_ms).collect();
+        Ok(Flight { plant: Plant::new(&options)?, figures, path, axis, pulse, late })
+    }
+
+    fn fly(
+        &mut self,
+        controller: &mut dyn Controller,
+        target: &Target,
+        steps: usize,
+        mut see: impl FnMut(usize, &Truth),
+    ) -> Result<()> {
+        controller.reset(0);
+        let mut truth = self.plant.reset(&Start::NEUTRAL)?;
+        let mut rates = [truth.p_radps, truth.q_radps, truth.r_radps];
+        let mut previous = [Command::IDLE; 2];
+        let mut channels = Command::IDLE;
+        let mut thought = Actuators::at_rest(&Controls::default());
+        for step in 0..steps {
+            let filter = if self.path == Between::Direct { 1.0 } else { share(20.0) };
+            for (y, x) in rates.iter_mut().zip([truth.p_radps, truth.q_radps, truth.r_radps]) {
+                *y += filter * (x - *y);
+            }
+            if step % CYCLE == 0 {
+                // Beside real firmware nobody reports the surfaces: they are thought of as undelayed.
+                thought.step(&previous[0], &self.figures);
+                let actuators = thought.observed(&self.figures);
+                let seen = Observation { actuators, previous, ..observe(step, &truth, rates) };
+                let wanted = controller.command(&seen, target);
+                previous = [slewed(previous[0], wanted), previous[0]];
+            }
+            if self.path == Between::Direct || step % (2 * CYCLE) == 0 {
+                channels = previous[0];
+            }
+            let late = self.delayed(step, channels);
+            truth = self.plant.step(late)?;
+            see(step, &truth);
+        }
+        Ok(())
+    }
+
+    /// What the surfaces get: one of them late, with the pulse on it in the fourth second.
+    fn delayed(&mut self, step: usize, command: Command) -> Inputs {
+        let Command { mut aileron, mut elevator, throttle } = command;
+        let surface = if self.axis == Axis::Pitch { &mut elevator } else { &mut aileron };
+        self.late.push_back(*surface);
+        *surface = self.late.pop_front().unwrap_or(*surface);
+        if (4 * SECOND..4 * SECOND + SECOND / 10).contains(&step) {
+            *surface = (*surface + self.pulse).clamp(-1.0, 1.0);
+        }
+        Inputs { aileron, elevator, throttle }
+    }
+}
+
+/// Share of a new sample in a first-order low-pass of `hz` at a sample a millisecond.
+fn share(hz: f64) -> f64 {
+    1.0 - (-std::f64::consts::TAU * hz / SECOND as f64).exp()
+}
+
+fn slewed(before: Command, wanted: Command) -> Command {
+    let near = |from: f64, to: f64| to.clamp(from - SLEW, from + SLEW);
+    Command {
+        aileron: near(before.aileron, wanted.aileron),
+        elevator: near(before.elevator, wanted.elevator),
+        throttle: wanted.throttle,
+    }
+    .clamped()
+}
+
+fn observe(step: usize, truth: &Truth, [p, q, r]: [f64; 3]) -> Observation {
+    Observation {
+        time: Time::from_micros(1000 * step as u64),
+        state: State {
+            roll: truth.roll_rad,
+            pitch: truth.pitch_rad,
+            airspeed: truth.airspeed_mps,
+            p,
+            q,
+            r,
+            alpha: truth.alpha_rad,
+            beta: truth.beta_rad,
+        },
+        actuators: Default::default(),
+        altitude: truth.altitude_m,
+        previous: [Command::IDLE; 2],
+    }
+}

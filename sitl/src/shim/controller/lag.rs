@@ -1,0 +1,68 @@
+//! What a real controller puts between the aircraft and a companion: filtered gyros, late surfaces.
+
+use std::collections::VecDeque;
+
+use crate::plant::{DT_S, Inputs, Truth};
+
+/// Filters and delays with their memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lag {
+    rates: Option<[f64; 3]>,
+    late: VecDeque<Inputs>,
+}
+
+impl Lag {
+    /// `measured` with its rates behind a low-pass of `cutoff_hz`; 0 is none.
+    pub(super) fn filtered(&mut self, mut measured: Truth, cutoff_hz: f64) -> Truth {
+        let now = [measured.p_radps, measured.q_radps, measured.r_radps];
+        let share = if cutoff_hz > 0.0 { share(cutoff_hz) } else { 1.0 };
+        let rates = self.rates.get_or_insert(now);
+        for (y, x) in rates.iter_mut().zip(now) {
+            *y += share * (x - *y);
+        }
+        [measured.p_radps, measured.q_radps, measured.r_radps] = *rates;
+        measured
+    }
+
+    /// The inputs of `delay_ms` ago, in whole steps.
+    pub(super) fn delayed(&mut self, inputs: Inputs, delay_ms: f64) -> Inputs {
+        let steps = (delay_ms * 1e-3 / DT_S).round().max(0.0) as usize;
+        self.late.push_back(inputs);
+        while self.late.len() > steps + 1 {
+            self.late.pop_front();
+        }
+        self.late.front().copied().unwrap_or(inputs)
+    }
+}
+
+/// Share of a new sample in a first-order low-pass at the steps' rate that is as late, for what is slow,
+/// as the second-order Butterworth low-pass of both stacks: √2 / (2π f), 11 ms at 20 Hz.
+fn share(cutoff_hz: f64) -> f64 {
+    let late_s = std::f64::consts::SQRT_2 / (std::f64::consts::TAU * cutoff_hz);
+    DT_S / (DT_S + late_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ramp_of_the_gyro_comes_late_by_the_filters_delay() {
+        let mut lag = Lag::default();
+        let mut shown = 0.0;
+        for i in 0..100 {
+            let measured = Truth { q_radps: 0.01 * f64::from(i), ..Truth::default() };
+            shown = lag.filtered(measured, 20.0).q_radps;
+        }
+        // 1 rad/s²: √2 / (2π 20) = 11.25 ms behind.
+        assert!((0.99 - shown - 0.01125).abs() < 1e-6, "{shown}");
+    }
+
+    #[test]
+    fn inputs_come_late_by_whole_steps() {
+        let mut lag = Lag::default();
+        let at = |i: usize| Inputs { elevator: i as f64, ..Inputs::default() };
+        let flown: Vec<f64> = (0..8).map(|i| lag.delayed(at(i), 30.0).elevator).collect();
+        assert_eq!(flown, [0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0]);
+    }
+}

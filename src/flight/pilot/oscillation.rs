@@ -1,0 +1,162 @@
+//! The oscillation guard: does the loop through a surface swing by itself, at the surface's limits?
+//!
+//! A loop with more delay than it was designed for can fall into a limit cycle that the slew limit of its
+//! surface sustains: the X8 by ArduPlane's channels swung at 2.6 Hz, q to 228 °/s, for 50 s, with every
+//! state fresh and every command in range. What gives it away is a rate that changes its sign again
+//! and again with the command at its limit each time. A manoeuvre does so once or twice; air does not
+//! keep the command at its limit.
+
+use super::limits::TICK_S;
+use crate::link::vehicle::Axis;
+use crate::physics::{Command, State};
+
+/// A steady turn has a pitch rate: what is slower than this is taken off, s.
+const SLOW_S: f64 = 0.5;
+/// A half swing lasts between these, s: 1 to 8 Hz. Slower ones are flight, faster ones structure or
+/// noise.
+const HALF_SWING_S: [f64; 2] = [0.06, 0.5];
+/// Least peak of a half swing, rad/s (23 °/s): three times what light turbulence gives, a quarter of
+/// the mildest limit cycle that was seen (pitch 4° rms at 2.6 Hz is 90 °/s).
+const PEAK: f64 = 0.4;
+/// A rate below this has no sign, rad/s (3 °/s): ten times the noise of a gyro.
+const NO_SIGN: f64 = 0.05;
+/// Least share of a half swing with the command at its slew limit or its stop.
+const LIMITED: f64 = 0.2;
+/// Half swings in a row, and how long they last together, s. A step between ±60° gives three.
+const SWINGS: u32 = 6;
+const LONG_S: f64 = 1.0;
+/// Part of a step or of full travel that counts as all of it.
+const ALL: f64 = 0.999;
+
+/// One axis.
+#[derive(Clone, Copy, Debug, Default)]
+struct Swings {
+    mean: Option<f64>,
+    /// Sign of the half swing that goes on, 0 before the first.
+    sign: f64,
+    ticks: u32,
+    limited: u32,
+    peak: f64,
+    /// Half swings in a row that were swings, with their ticks.
+    row: u32,
+    row_ticks: u32,
+}
+
+/// The guard of roll and pitch.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Oscillation([Swings; 2]);
+
+impl Oscillation {
+    /// Takes in a tick: the state, the commands before and after it, and the largest change of a
+    /// surface in a tick. The axis that oscillates, if one does.
+    pub(super) fn see(
+        &mut self,
+        state: &State,
+        before: &Command,
+        now: &Command,
+        step: f64,
+    ) -> Option<Axis> {
+        let limited =
+            |before: f64, now: f64| (now - before).abs() >= ALL * step || now.abs() >= ALL;
+        let [roll, pitch] = &mut self.0;
+        let rolls = roll.see(state.p, limited(before.aileron, now.aileron));
+        let pitches = pitch.see(state.q, limited(before.elevator, now.elevator));
+        match (rolls, pitches) {
+            (_, true) => Some(Axis::Pitch),
+            (true, false) => Some(Axis::Roll),
+            (false, false) => None,
+        }
+    }
+}
+
+impl Swings {
+    fn see(&mut self, rate: f64, limited: bool) -> bool {
+        if !rate.is_finite() {
+            return false;
+        }
+        let mean = self.mean.get_or_insert(rate);
+        *mean += (rate - *mean) * TICK_S / SLOW_S;
+        let swing = rate - *mean;
+        if swing.abs() > NO_SIGN && swing.signum() != self.sign {
+            self.close();
+            self.sign = swing.signum();
+        }
+        self.ticks += 1;
+        self.limited += u32::from(limited);
+        self.peak = self.peak.max(swing.abs());
+        self.row >= SWINGS && f64::from(self.row_ticks) * TICK_S >= LONG_S
+    }
+
+    /// A half swing has ended: whether it was one decides on the row.
+    fn close(&mut self) {
+        let length = f64::from(self.ticks) * TICK_S;
+        let share = f64::from(self.limited) / f64::from(self.ticks.max(1));
+        let is_swing = (HALF_SWING_S[0]..=HALF_SWING_S[1]).contains(&length)
+            && self.peak >= PEAK
+            && share >= LIMITED;
+        if is_swing {
+            (self.row, self.row_ticks) = (self.row + 1, self.row_ticks + self.ticks);
+        } else {
+            (self.row, self.row_ticks) = (0, 0);
+        }
+        (self.ticks, self.limited, self.peak) = (0, 0, 0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// Largest change in a tick at the X8's 20 /s.
+    const STEP: f64 = 0.2;
+
+    /// When the guard trips, s, on a pitch rate and an elevator that is wanted, both of time (s).
+    fn trips(seconds: f64, rate: impl Fn(f64) -> f64, wanted: impl Fn(f64) -> f64) -> Option<f64> {
+        let mut guard = Oscillation::default();
+        let mut before = Command::IDLE;
+        (0..(seconds / TICK_S) as usize).find_map(|i| {
+            let at = i as f64 * TICK_S;
+            let elevator = wanted(at).clamp(before.elevator - STEP, before.elevator + STEP);
+            let now = Command { elevator: elevator.clamp(-1.0, 1.0), ..before };
+            let state = State { q: rate(at), ..State::NEUTRAL };
+            let axis = guard.see(&state, &before, &now, STEP);
+            before = now;
+            axis.map(|axis| {
+                assert_eq!(axis, Axis::Pitch);
+                at
+            })
+        })
+    }
+
+    #[test]
+    fn the_limit_cycle_that_was_recorded_is_found_after_a_second() {
+        // 2.6 Hz, q to 228 °/s, the elevator between its stops; in a turn with a q of its own too.
+        for turn in [0.0, 0.7] {
+            let q = |t: f64| turn + 3.98 * (TAU * 2.6 * t).sin();
+            let at = trips(5.0, q, |t| -10.0 * (TAU * 2.6 * t + 0.5).sin()).unwrap();
+            assert!((1.0..2.0).contains(&at), "{at}");
+        }
+        // The mildest: pitch 4° rms, the elevator by 0.4 to and fro.
+        let q = |t: f64| 1.6 * (TAU * 2.6 * t).sin();
+        let mild = |t: f64| 0.2 * (TAU * 2.6 * t).sin().signum();
+        assert_eq!(trips(5.0, q, mild), None, "two ticks of twenty are no limit");
+        let at = trips(5.0, q, |t| 2.0 * mild(t)).unwrap();
+        assert!((1.0..2.0).contains(&at), "{at}");
+    }
+
+    #[test]
+    fn a_free_swing_with_the_command_inside_its_limits_is_flight() {
+        // A phugoid, a short period that dies out, and a fast one that is small.
+        assert_eq!(trips(60.0, |t| 0.3 * (TAU * 0.1 * t).sin(), |_| 0.1), None);
+        assert_eq!(trips(60.0, |t| 2.0 * (-t).exp() * (TAU * 2.0 * t).sin(), |_| 0.1), None);
+        assert_eq!(trips(60.0, |t| 0.1 * (TAU * 6.0 * t).sin(), |t| 9.0 * (40.0 * t).sin()), None);
+    }
+
+    #[test]
+    fn steps_of_a_second_with_the_surface_at_its_stops_are_manoeuvres() {
+        // Full elevator one way, then the other, twice a second: a swing of 1 s is no oscillation.
+        let q = |t: f64| 3.0 * (TAU * 0.8 * t).sin();
+        assert_eq!(trips(30.0, q, |t| 10.0 * (TAU * 0.8 * t).sin()), None);
+    }
+}

@@ -1,0 +1,106 @@
+//! The streams that were asked for, with what the controller has answered.
+
+use std::collections::{BTreeSet, VecDeque};
+
+use super::profile::{Stack, Stream};
+
+/// What an answer to a request for a stream means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// Nothing new.
+    Nothing,
+    /// This message comes at its rate from now on.
+    Granted(u32),
+    /// This message does not come at its rate: asking again is of no use.
+    Denied,
+}
+
+/// Requests for streams. An answer does not name its message: answers come in the order of the
+/// requests, and what was lost is forgotten with the next round.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Requests {
+    waiting: VecDeque<u32>,
+    granted: BTreeSet<u32>,
+    denied: BTreeSet<u32>,
+    told: bool,
+}
+
+impl Requests {
+    /// A new round begins.
+    pub(super) fn turn(&mut self) {
+        self.waiting.clear();
+    }
+
+    /// Whether a message may be asked for; notes that it is.
+    pub(super) fn ask(&mut self, id: u32) -> bool {
+        let may = !self.denied.contains(&id);
+        if may {
+            self.waiting.push_back(id);
+        }
+        may
+    }
+
+    /// The controller has answered the oldest request with a MAV_RESULT.
+    pub(super) fn answered(&mut self, result: u8) -> Answer {
+        let Some(id) = self.waiting.pop_front() else { return Answer::Nothing };
+        match result {
+            0 if self.granted.insert(id) => Answer::Granted(id),
+            // Denied, unsupported.
+            2 | 3 => {
+                self.denied.insert(id);
+                Answer::Denied
+            }
+            _ => Answer::Nothing,
+        }
+    }
+
+    /// Whether a message was denied.
+    pub(super) fn is_denied(&self, id: u32) -> bool {
+        self.denied.contains(&id)
+    }
+
+    /// The streams that the flight needs and that were denied, in words; said once.
+    pub(super) fn complaint(&mut self, stack: Stack) -> Option<String> {
+        let words = self.words(stack).filter(|_| !self.told)?;
+        self.told = true;
+        Some(words)
+    }
+
+    /// The streams that the flight needs and that were denied, in words, with the remedy.
+    pub(super) fn words(&self, stack: Stack) -> Option<String> {
+        let denied = |stream: &&Stream| stream.needed && self.denied.contains(&stream.id);
+        let names: Vec<String> = stack
+            .streams()
+            .iter()
+            .filter(denied)
+            .map(|stream| format!("{} at {:.0} Hz", stream.name, stream.hz))
+            .collect();
+        let remedy = match stack {
+            Stack::Ardupilot => "set SCHED_LOOP_RATE to 200, then reboot the controller",
+            Stack::Px4 => "its firmware does not stream it",
+        };
+        let names = names.join(", ");
+        (!names.is_empty()).then(|| format!("the controller denies {names}: {remedy}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_denied_is_asked_for_no_more_and_said_once() {
+        let mut requests = Requests::default();
+        assert!([31, 105, 74, 33].into_iter().all(|id| requests.ask(id)));
+        // ArduPlane with a loop of 50 Hz: 40 Hz at most.
+        let answers = [2, 2, 2, 0].map(|result| requests.answered(result));
+        assert_eq!(answers[2..], [Answer::Denied, Answer::Granted(33)]);
+        requests.turn();
+        assert!(!requests.ask(31) && requests.ask(33));
+        // A grant that is repeated is nothing new.
+        assert_eq!(requests.answered(0), Answer::Nothing);
+        let words = requests.complaint(Stack::Ardupilot).unwrap();
+        assert!(words.contains("ATTITUDE_QUATERNION at 100 Hz") && words.contains("reboot"));
+        assert_eq!(requests.complaint(Stack::Ardupilot), None);
+    }
+}
