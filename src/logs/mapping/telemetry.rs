@@ -153,5 +153,5 @@ fn sent_travel(topics: &Topics, system: u8) -> Option<[f64; 2]> {
         .instances("ACTUATOR_OUTPUT_STATUS")
         .find(|(instance, _)| instance.to_be_bytes()[0] == system)?;
     let last = |name| topic.field(name)?.last().copied();
-    (last("active")? >= 7.0).then_some([last("actuator5")?, last("actuator6")?])
+    (last("active")? == 7.0).then_some([last("actuator5")?, last("actuator6")?])
 }
