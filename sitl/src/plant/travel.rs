@@ -74,13 +74,13 @@ impl Plant {
         let inputs = Inputs { aileron: command, elevator: command, throttle: 0.0 };
         // Filters keep the step for which they were laid out; nothing else moves in so short a one.
         self.fdm.set_dt(super::nodes::STILL_S);
-        let (mut last, mut at_rest) = ([f64::NAN; 2], 0);
+        let (mut last, mut at_rest) = ([f64::INFINITY; 2], 0);
         for _ in 0..STEPS {
             self.nodes.command(&mut self.fdm, &inputs).map_err(jsbsim("writing the commands"))?;
             self.fdm.run().map_err(jsbsim("measuring the travel of the surfaces"))?;
             let truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the state"))?;
             let now = [truth.aileron_rad, truth.elevator_rad];
-            let moved = now.iter().zip(&last).any(|(a, b)| !((a - b).abs() < STILL_RAD));
+            let moved = now.iter().zip(&last).any(|(a, b)| (a - b).abs() >= STILL_RAD);
             at_rest = if moved { 0 } else { at_rest + 1 };
             if at_rest == AT_REST {
                 break;

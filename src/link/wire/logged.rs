@@ -44,7 +44,16 @@ pub enum Logged {
 
 /// The names of the actuator fields.
 const CONTROLS: [&str; 4] = ["controls0", "controls1", "controls2", "controls3"];
-const ACTUATORS: [&str; 5] = ["actuator0", "actuator1", "actuator2", "actuator3", "actuator4"];
+const ACTUATORS: [&str; 8] = [
+    "actuator0",
+    "actuator1",
+    "actuator2",
+    "actuator3",
+    "actuator4",
+    "actuator5",
+    "actuator6",
+    "active",
+];
 const SERVOS: [&str; 16] = [
     "servo1_raw",
     "servo2_raw",
@@ -148,12 +157,11 @@ pub fn read(frame: &Frame<'_>) -> Option<Logged> {
         MavMessage::AOA_SSA(m) => {
             floats("AOA_SSA", Own::Micros(m.time_usec), &["AOA", "SSA"], &[m.AOA, m.SSA])
         }
-        MavMessage::ACTUATOR_OUTPUT_STATUS(m) => floats(
-            "ACTUATOR_OUTPUT_STATUS",
-            Own::Micros(m.time_usec),
-            &ACTUATORS,
-            &m.actuator[..ACTUATORS.len()],
-        ),
+        MavMessage::ACTUATOR_OUTPUT_STATUS(m) => {
+            let [a, b, c, d, e, f, g, ..] = m.actuator;
+            let numbers = [a, b, c, d, e, f, g, m.active as f32];
+            floats("ACTUATOR_OUTPUT_STATUS", Own::Micros(m.time_usec), &ACTUATORS, &numbers)
+        }
         MavMessage::HIL_ACTUATOR_CONTROLS(m) => floats(
             "HIL_ACTUATOR_CONTROLS",
             Own::Micros(m.time_usec),

@@ -41,7 +41,7 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
     let Some(vehicle) = vehicle(topics) else { return Vec::new() };
     let system = vehicle.to_be_bytes()[0];
     let mut out = states();
-    out.extend(deflections(topics, vehicle));
+    out.extend(deflections(topics, system));
     out.push(airspeed(topics, system));
     for rule in &mut out {
         // Another component of the same system may send what the first does not.
@@ -132,8 +132,8 @@ fn states() -> Vec<Rule> {
 
 /// Positions of the actuators in the order of the sitl profile, which sends the travel of the
 /// surfaces where it is not the X8's.
-fn deflections(topics: &Topics, vehicle: u16) -> Vec<Rule> {
-    let [aileron, elevator] = sent_travel(topics, vehicle).unwrap_or([DEFLECTION; 2]);
+fn deflections(topics: &Topics, system: u8) -> Vec<Rule> {
+    let [aileron, elevator] = sent_travel(topics, system).unwrap_or([DEFLECTION; 2]);
     let note = format!(
         "deflections are ACTUATOR_OUTPUT_STATUS in the order of the sitl profile, {aileron:.4} rad \
          (aileron), {elevator:.4} rad (elevator) at 1; another order needs a mapping"
@@ -148,8 +148,10 @@ fn deflections(topics: &Topics, vehicle: u16) -> Vec<Rule> {
 }
 
 /// Travel of aileron and elevator as the vehicle sends it, rad.
-fn sent_travel(topics: &Topics, vehicle: u16) -> Option<[f64; 2]> {
-    let topic = topics.topics.get(&("ACTUATOR_OUTPUT_STATUS".to_owned(), vehicle))?;
+fn sent_travel(topics: &Topics, system: u8) -> Option<[f64; 2]> {
+    let (_, topic) = topics
+        .instances("ACTUATOR_OUTPUT_STATUS")
+        .find(|(instance, _)| instance.to_be_bytes()[0] == system)?;
     let last = |name| topic.field(name)?.last().copied();
-    (last("active")? >= 7.0).then_some([last("actuator5")?, last("actuator6")?])
+    (last("active")? == 7.0).then_some([last("actuator5")?, last("actuator6")?])
 }
