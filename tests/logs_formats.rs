@@ -216,7 +216,9 @@ fn a_real_px4_log_on_the_ground_says_so() {
     assert_eq!(counted("vehicle_angular_velocity"), Some(1812));
     let text: String = log.findings.iter().map(|f| f.to_string()).collect();
     assert!(text.contains("no flight in this log") && text.contains("dropped out 1 times, 30 ms"));
-    assert!(matches!(load(&path, &Options::default()), Err(LogError::Unusable { .. })));
+    // its pitot shows −3.6 to −1.1 m/s at rest, which is no reason to refuse it; there is no flight to compare
+    let flight = load(&path, &Options::default()).unwrap().flight;
+    assert!(flight.samples.iter().all(|s| s.airspeed_mps < 5.0));
 }
 
 #[test]

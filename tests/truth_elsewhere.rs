@@ -70,7 +70,7 @@ fn validate_nothing_wrong_is_asserted_of_a_continuous_time_aircraft() {
 
 #[test]
 fn validate_nothing_wrong_is_asserted_of_official_jsbsim() {
-    nothing_wrong_is_asserted("official");
+    nothing_wrong_is_asserted("official-adams");
 }
 
 #[test]

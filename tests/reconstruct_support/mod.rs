@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use greylag::control::{self, Kind, Target};
-use greylag::logs::{Flight, Sample};
+use greylag::logs::{Flight, Sample, Sampling};
 use greylag::model::GreyBox;
 use greylag::num::stream::{Stream, stream};
 use greylag::physics::Command;
@@ -26,7 +26,12 @@ pub fn model() -> GreyBox {
 
 /// The options of a reconstruction of these flights.
 pub fn options() -> Options {
-    Options { gravity: 9.806, ..Options::new("flight", model().airframe.actuators) }
+    // the flights are JSBSim's: their gyros are late too, so that the clocks cannot tell
+    Options {
+        gravity: 9.806,
+        sampling: Some(Sampling::Held),
+        ..Options::new("flight", model().airframe.actuators)
+    }
 }
 
 /// Wind and turbulence of a flight.
