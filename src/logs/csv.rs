@@ -381,7 +381,7 @@ mod tests {
     fn bad_rows_are_dropped_by_number_and_refused_above_five_in_a_hundred() {
         let mut flight = flown(100);
         flight.samples[10].time_s = flight.samples[9].time_s;
-        flight.samples[20].airspeed_mps = -1.0;
+        flight.samples[20].airspeed_mps = -20.0;
         flight.samples[30].attitude_rad[0] = 4.0;
         let reading = read(&text(&flight)).unwrap();
         // Row 1 is the header, so sample 10 stands in row 12.

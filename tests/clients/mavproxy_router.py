@@ -28,7 +28,7 @@ def fly(proxy, watcher):
     proxy.wait_for("Detected vehicle 1:1 ", 60.0)
     line = proxy.type("param fetch", "Received", 30.0)
     counts = re.search(r"Received (\d+) parameters", line)
-    check(counts is not None and int(counts[1]) == 13, f"not PX4's 13 parameters: {line}")
+    check(counts is not None and int(counts[1]) == 14, f"not PX4's 14 parameters: {line}")
     # A busy machine does not let MAVProxy repeat itself within PX4's half second; what is tested is the way.
     patient(proxy, watcher)
     watcher.until_mode(HOLD)

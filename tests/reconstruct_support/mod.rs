@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use greylag::control::{self, Kind, Target};
-use greylag::logs::{Flight, Sample, Sampling};
+use greylag::logs::{Flight, Sample};
 use greylag::model::GreyBox;
 use greylag::num::stream::{Stream, stream};
 use greylag::physics::Command;
@@ -26,12 +26,7 @@ pub fn model() -> GreyBox {
 
 /// The options of a reconstruction of these flights.
 pub fn options() -> Options {
-    // the flights are JSBSim's: their gyros are late too, so that the clocks cannot tell
-    Options {
-        gravity: 9.806,
-        sampling: Some(Sampling::Held),
-        ..Options::new("flight", model().airframe.actuators)
-    }
+    Options { gravity: 9.806, ..Options::new("flight", model().airframe.actuators) }
 }
 
 /// Wind and turbulence of a flight.
@@ -152,6 +147,7 @@ fn row(flown: &Flown, e: &Errors, k: usize, random: &mut Stream) -> Sample {
     let command = flown.commands[k];
     Sample {
         time_s: k as f64 * STEP,
+        rate_hold_s: STEP,
         attitude_rad: [
             turn(&|t| t.roll_rad, now.roll_rad) + draw(0),
             turn(&|t| t.pitch_rad, now.pitch_rad) + draw(0),

@@ -133,12 +133,8 @@ fn verdict(found: &Found) -> Verdict {
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;
     if found.selected.iter().any(|s| s.refused.is_empty()) {
         Verdict::Effect
-    } else if !found.leaves_something() {
-        // what is significant but explains nothing that matters is no reason to doubt the model
-        Verdict::Adequate
     } else if found.selected.iter().any(|s| !s.slight && s.trace.is_none())
-        || significant
-        || found.has_shape()
+        || (found.leaves_something() && (significant || found.has_shape()))
     {
         Verdict::Unexplained
     } else {

@@ -33,9 +33,14 @@ const SHAPELESS: f64 = 0.1;
 /// Precision of the formula of an effect that is not linear in its constants: whatever takes a smaller part of
 /// what such an effect took before may be no more than its error.
 const PRECISION: f64 = 2e-3;
-/// Least share of a channel's variance that an effect must explain to be material: what is less is below
-/// what reconstruction and sampling leave of exact models.
-const MATERIAL: f64 = 5e-4;
+/// The same of what second derivatives of the surfaces take beside an effect on the inputs.
+const BENT: f64 = 0.02;
+/// Least share of a channel's variance that an effect must explain to be material. A delay of 10 ms explains
+/// 2e-4 of it.
+const MATERIAL: f64 = 1e-4;
+/// A channel that is explained but for this share of its variance is adequate: reconstruction and sampling
+/// leave as much of exact models.
+const ADEQUATE: f64 = 5e-4;
 /// Least share of a channel's error beyond noise that an effect must take to be material beside others.
 const MATERIAL_BESIDE: f64 = 0.02;
 /// A candidate whose contribution is this much like another's can take its place.
@@ -423,9 +428,9 @@ impl Found {
                 ));
             }
             let bends = shape.bends_beside(effect.score.fall);
-            if Kind::from_id(effect.id).is_some() && bends > SHAPELESS {
+            if Kind::from_id(effect.id).is_some() && bends > BENT {
                 effect.refused.push(format!(
-                    "lack of fit: with it, second derivatives of the surfaces still explain {:.0} % of what is \
+                    "lack of fit: with it, second derivatives of the surfaces still explain {:.1} % of what is \
                      missing, so what acts on them takes another course in time",
                     100.0 * bends
                 ));
@@ -458,7 +463,7 @@ impl Found {
     /// Whether what is left goes with products of states more than chance does, in a channel where it matters.
     pub fn has_shape(&self) -> bool {
         let left = self.left();
-        let in_channel = |shape: &Shape, c: usize| left[c] >= MATERIAL && shape.term(c).is_some();
+        let in_channel = |shape: &Shape, c: usize| left[c] >= ADEQUATE && shape.term(c).is_some();
         self.shape.as_ref().is_some_and(|shape| (0..6).any(|c| in_channel(shape, c)))
     }
 
@@ -467,9 +472,9 @@ impl Found {
         shares::unexplained(&self.first, &self.round().tuned_residual())
     }
 
-    /// Whether the last round leaves a channel that matters.
+    /// Whether the last round leaves a channel that is not adequate.
     pub fn leaves_something(&self) -> bool {
-        self.left().iter().any(|share| *share >= MATERIAL)
+        self.left().iter().any(|share| *share >= ADEQUATE)
     }
 
     /// Share of the squared error beyond noise under the tuned model that a flexible model could still
