@@ -15,7 +15,7 @@ const GRAVITY: f64 = 9.806;
 #[derive(Clone, Debug)]
 struct Row(Vec<f64>);
 
-const COLUMNS: [&str; 24] = [
+const COLUMNS: [&str; 25] = [
     "time_s",
     "roll_rad",
     "pitch_rad",
@@ -40,6 +40,7 @@ const COLUMNS: [&str; 24] = [
     "aileron_cmd",
     "elevator_cmd",
     "throttle_cmd",
+    "rate_hold_s",
 ];
 
 impl Row {
