@@ -71,7 +71,7 @@ pub struct Selected {
     pub refused: Vec<String>,
     /// Whether it takes too little of the error to matter, whatever else speaks against it.
     pub slight: bool,
-    /// What there is to say of it if it is significant but not material; see [`material`].
+    /// What there is to say of it if it is significant but not material.
     pub trace: Option<String>,
     /// Whether it is a figure of the model's own by another name, so that what is left says nothing of it.
     pub relieves: bool,
