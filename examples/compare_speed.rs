@@ -11,7 +11,7 @@ use greylag::logs::{self, csv};
 use greylag::report::{ComparisonReport, DiagnosisReport};
 use greylag::sysid::compare::{Options, compare};
 use greylag::sysid::diagnose::{self, diagnose};
-use greylag::sysid::reconstruct::{self, ActuatorClock, reconstruct};
+use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 
 fn main() {
     let mut text = Vec::new();
@@ -23,7 +23,7 @@ fn main() {
     println!("{} samples read in {:.2} s", flight.samples.len(), start.elapsed().as_secs_f64());
     let start = Instant::now();
     let prior = model("prior-as-printed");
-    let mut options = reconstruct::Options::new("ten minutes", prior.airframe.actuators);
+    let mut options = flight_path::Options::new("ten minutes", prior.airframe.actuators);
     options.actuators_clock = ActuatorClock::AsRecorded;
     let flight = reconstruct(&flight, &options).expect("a flight");
     println!("reconstructed in {:.2} s", start.elapsed().as_secs_f64());
@@ -81,7 +81,7 @@ fn main() {
 fn ranking() {
     let log = fly(2, 120.0, REALISTIC);
     let mut model = model("jsbsim");
-    let mut options = reconstruct::Options::new("two minutes", model.airframe.actuators);
+    let mut options = flight_path::Options::new("two minutes", model.airframe.actuators);
     options.actuators_clock = ActuatorClock::AsRecorded;
     let flight = reconstruct(&log, &options).expect("a flight");
     let thrust = model.coefficients().iter().position(|c| c.name == "thrust_linear.Cp_n");

@@ -21,10 +21,11 @@ use serde::Serialize;
 
 use greylag::control::lqi::Lqi;
 use greylag::control::{self, Controller, Kind, Target};
-use greylag::learn::portrait::portrait;
-use greylag::learn::score::{Horizon, free_run};
-use greylag::learn::windows::Track;
-use greylag::learn::{Criterion, JXZ, Learned, Recipe, Start, Trainer, export};
+use greylag::learn::dynamics::export;
+use greylag::learn::dynamics::residual_map::portrait;
+use greylag::learn::dynamics::score::{Horizon, free_run};
+use greylag::learn::dynamics::windows::Track;
+use greylag::learn::{Criterion, JXZ, Learned, Recipe, Start, Trainer};
 use greylag::logs::{Flight, Sample};
 use greylag::model::{GreyBox, Integrator};
 use greylag::physics::State;

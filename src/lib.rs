@@ -64,6 +64,7 @@ pub mod num;
 pub mod physics;
 pub mod model;
 pub mod control;
+pub mod manoeuvres;
 pub mod link;
 pub mod logs;
 pub mod flight;

@@ -10,7 +10,7 @@ use amend_support::{Manoeuvres, errors, flight, fly, off, sensors};
 use greylag::logs::csv;
 use greylag::model::{GreyBox, Integrator};
 use greylag::sysid::amend::{Added, AmendError, Options, amend};
-use greylag::sysid::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
 
 fn added(id: &str) -> Options {
     Options { effects: vec![Added { id: id.into(), start: None }], ..Options::default() }

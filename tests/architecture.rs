@@ -5,8 +5,19 @@ use std::path::{Path, PathBuf};
 
 /// The rooms from the ground up, as `src/lib.rs` declares them.
 const LAYERS: &[&str] = &[
-    "num", "physics", "model", "control", "link", "logs", "flight", "sysid", "sim", "learn",
-    "report", "commands",
+    "num",
+    "physics",
+    "model",
+    "control",
+    "manoeuvres",
+    "link",
+    "logs",
+    "flight",
+    "sysid",
+    "sim",
+    "learn",
+    "report",
+    "commands",
 ];
 
 /// Crates with the only rooms that may name them. A room may be narrowed to a folder below it.

@@ -8,12 +8,13 @@ use std::sync::OnceLock;
 use compare_support::{EXACT, Noise, REALISTIC, as_measured, fly, model};
 use greylag::logs::rudder::RudderMotion;
 use greylag::model::GreyBox;
-use greylag::sysid::compare::flight::Prepared;
 use greylag::sysid::compare::{
     Bin, ChannelId, ChannelResult, CompareError, Comparison, ModelResult, Options, RegimeVariable,
-    compare, weak,
+    compare,
 };
-use greylag::sysid::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
+use greylag::sysid::weak_form::prepared::Prepared;
+use greylag::sysid::weak_form::windows;
 
 /// Three flights of a minute; the same ones for every test.
 fn exact() -> &'static [Reconstruction] {
@@ -148,7 +149,7 @@ fn a_planted_lift_error_is_told_in_percent() {
 
 #[test]
 fn an_uncertain_bias_is_part_of_the_interval() {
-    use greylag::sysid::reconstruction::Nuisance;
+    use greylag::sysid::flight_path::reconstruction::Nuisance;
     let sd = 0.5_f64.to_radians();
     let off = |by: f64, sd: f64| {
         let mut flight = noisy()[0].clone();
@@ -183,7 +184,7 @@ fn columns_times_coefficients_are_the_prediction() {
     for name in ["prior", "jsbsim"] {
         let model = model(name);
         let flight = Prepared::new(&exact()[0], 5.0).unwrap();
-        let (columns, series) = (weak::columns(&model, &flight), weak::channels(&model, &flight));
+        let (columns, series) = (windows::columns(&model, &flight), windows::channels(&model, &flight));
         assert_eq!(columns.names.len(), model.coefficients().len());
         for (k, series) in series.iter().take(6).enumerate() {
             for (w, predicted) in series.predicted.iter().enumerate() {
@@ -340,12 +341,12 @@ fn nominal_flights_of_any_length_show_both_slips() {
 
 /// Through the reconstruction, as a user's logs go.
 fn reconstructed(noise: Noise) -> Vec<Reconstruction> {
-    use greylag::sysid::reconstruct::{self, reconstruct};
+    use greylag::sysid::flight_path::{self, reconstruct};
     let aircraft = model("jsbsim");
     let one_flight = |seed| {
-        let options = reconstruct::Options {
+        let options = flight_path::Options {
             gravity: aircraft.atmosphere.gravity,
-            ..reconstruct::Options::new(format!("{seed}.csv"), aircraft.airframe.actuators)
+            ..flight_path::Options::new(format!("{seed}.csv"), aircraft.airframe.actuators)
         };
         reconstruct(&fly(seed, 60.0, noise), &options).unwrap()
     };

@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use greylag::control::schedule::flights;
 use greylag::control::{self, Kind};
 use greylag::logs::Flight;
+use greylag::manoeuvres::flights;
 use greylag::model::GreyBox;
 use greylag::num::stream::stream;
 use greylag::sim::flight_test::fly_within_bounds;
@@ -14,8 +14,8 @@ use greylag::sim::missing::Missing;
 use greylag::sim::starting_model::starting_model;
 use greylag::sim::trial::Trial;
 use greylag::sysid::diagnose::{DiagnoseError, Diagnosis, Options, Verdict, diagnose};
-use greylag::sysid::reconstruct::{self, ActuatorClock, reconstruct};
-use greylag::sysid::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag_sitl::hidden::Hidden;
 use greylag_sitl::plant::PlantOptions;
 use rand_distr::{Distribution, StandardNormal};
@@ -66,10 +66,10 @@ fn flown_with(
 }
 
 fn rebuilt(log: &Flight) -> Reconstruction {
-    let options = reconstruct::Options {
+    let options = flight_path::Options {
         gravity: 9.806,
         actuators_clock: ActuatorClock::AsRecorded,
-        ..reconstruct::Options::new(&log.name, exact().airframe.actuators)
+        ..flight_path::Options::new(&log.name, exact().airframe.actuators)
     };
     reconstruct(log, &options).unwrap()
 }

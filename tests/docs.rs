@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use greylag::control::schedule::Schedule;
 use greylag::logs::mapping::Mapping;
+use greylag::manoeuvres::Schedule;
 use greylag::physics::Airframe;
 
 use docs_support::commands::{Invocation, invocations};

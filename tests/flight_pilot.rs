@@ -4,13 +4,13 @@ use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use greylag::control::schedule::{Axis, Excitation, Schedule, Shape, Step};
 use greylag::control::{Controller, Observation, Target};
 use greylag::flight::pilot::{Answers, Config, Decision, Pilot, Plan, Source, TrimPoint};
 use greylag::link::autopilot::{
     AttitudeSetpoint, Autopilot, Mode, ParameterValue, Sticks, Verdict,
 };
 use greylag::link::vehicle::{Faults, Order, Telemetry};
+use greylag::manoeuvres::{Axis, Excitation, Schedule, Shape, Step};
 use greylag::model::GreyBox;
 use greylag::physics::{ActuatorState, Airframe, Command, State, Time};
 

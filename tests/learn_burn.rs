@@ -7,7 +7,7 @@ mod learn_support;
 
 use burn::optim::{AdamConfig, Optimizer};
 use burn::tensor::{DType, Device, Tensor, TensorData, activation};
-use greylag::learn::windows::{Track, Window};
+use greylag::learn::dynamics::windows::{Track, Window};
 use greylag::learn::{
     Arithmetic, Engine, Gradient, Mlp, Objective, Optimiser, Passes, Penalty, PriorSlopes, Subject,
 };

@@ -3,7 +3,7 @@
 
 mod learn_support;
 
-use greylag::learn::windows::{Track, Window};
+use greylag::learn::dynamics::windows::{Track, Window};
 use greylag::learn::{
     Arithmetic, Engine, Gradient, Objective, Passes, Penalty, PriorSlopes, Subject,
 };

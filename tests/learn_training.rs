@@ -3,11 +3,10 @@
 
 mod learn_support;
 
-use greylag::learn::score::free_run;
-use greylag::learn::windows::Track;
-use greylag::learn::{
-    Checkpoint, Criterion, JXZ, Learned, Recipe, Start, TrainError, Trainer, export,
-};
+use greylag::learn::dynamics::export;
+use greylag::learn::dynamics::score::free_run;
+use greylag::learn::dynamics::windows::Track;
+use greylag::learn::{Checkpoint, Criterion, JXZ, Learned, Recipe, Start, TrainError, Trainer};
 use greylag::model::{GreyBox, Integrator};
 use learn_support::{flight, model, moved};
 

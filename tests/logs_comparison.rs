@@ -10,8 +10,8 @@ use compare_support::{REALISTIC, fly, model};
 use greylag::logs::{FlowAngles, Options, Sample, parse};
 use greylag::physics::atmosphere::{Atmosphere, Density};
 use greylag::sysid::compare::{self, Comparison, compare};
-use greylag::sysid::reconstruct::{self, reconstruct};
-use greylag::sysid::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::{self, reconstruct};
 use logs_support::{csv, dataflash, tlog, tlog_with, ulog};
 
 /// Twenty seconds of flight with what all four formats can hold: commands, no deflections.
@@ -30,9 +30,9 @@ fn rebuilt(bytes: &[u8]) -> Reconstruction {
     // this aircraft has vanes, though ArduPilot's record of them usually holds estimates
     flight.flow_angles = FlowAngles::Measured;
     let aircraft = model("jsbsim");
-    let options = reconstruct::Options {
+    let options = flight_path::Options {
         gravity: aircraft.atmosphere.gravity,
-        ..reconstruct::Options::new("flight", aircraft.airframe.actuators)
+        ..flight_path::Options::new("flight", aircraft.airframe.actuators)
     };
     reconstruct(&flight, &options).unwrap()
 }

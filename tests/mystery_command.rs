@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use greylag::control::schedule::Schedule;
 use greylag::logs::csv::{self, Tolerance};
+use greylag::manoeuvres::Schedule;
 use greylag::model::GreyBox;
 
 fn greylag(arguments: &[&str]) -> Output {

@@ -10,7 +10,7 @@ use greylag::physics::inputs::{self, PAST, Past};
 use greylag::physics::point::Base;
 use greylag::physics::rigid_body::{self, ForceAxes};
 use greylag::physics::{AirData, Channel, Controls, Point, State, Wrench};
-use greylag::sysid::measurement_effects::MEASUREMENT_EFFECTS;
+use greylag::sysid::flight_path::measurement_effects::MEASUREMENT_EFFECTS;
 
 /// What an effect reports.
 struct Reported<R>(Vec<(usize, Channel, R)>);

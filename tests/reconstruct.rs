@@ -4,8 +4,8 @@
 mod reconstruct_support;
 
 use greylag::logs::{Flight, Sample};
-use greylag::sysid::reconstruct::{ActuatorClock, ManoeuvreKind, Options, manoeuvres, reconstruct};
-use greylag::sysid::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::{ActuatorClock, ManoeuvreKind, Options, manoeuvres, reconstruct};
 use rayon::prelude::*;
 use reconstruct_support::{Errors, Flown, air, fly, options, spoil};
 

@@ -32,7 +32,7 @@ fn of_kind<'a>(figures: &'a [Value], kind: &str) -> Vec<&'a Value> {
 fn ten_minutes_of_flight_make_a_page_under_three_megabytes() {
     let comparison = report_comparison::comparison(300.0);
     let html = report(&comparison).page().render();
-    let own = html.replace(include_str!("../src/report/assets/uPlot.iife.min.js"), "");
+    let own = html.replace(include_str!("../src/report/kit/assets/uPlot.iife.min.js"), "");
     for foreign in ["http:", "https:", "src=", "@import", "url(", "fetch(", "XMLHttpRequest"] {
         assert!(!own.contains(foreign), "the page holds {foreign}");
     }

@@ -53,7 +53,7 @@ fn text(html: &str) -> String {
 #[test]
 fn the_story_stands_in_order_and_loads_nothing() {
     let html = whole(&report_diagnosis::diagnosis());
-    let own = html.replace(include_str!("../src/report/assets/uPlot.iife.min.js"), "");
+    let own = html.replace(include_str!("../src/report/kit/assets/uPlot.iife.min.js"), "");
     for foreign in ["http:", "https:", "src=", "@import", "url(", "fetch(", "XMLHttpRequest"] {
         assert!(!own.contains(foreign), "the page holds {foreign}");
     }

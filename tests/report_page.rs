@@ -11,7 +11,7 @@ use serde_json::Value;
 
 /// The page without the vendored library, whose licence comments name its home.
 fn without_uplot(html: &str) -> String {
-    let script = include_str!("../src/report/assets/uPlot.iife.min.js");
+    let script = include_str!("../src/report/kit/assets/uPlot.iife.min.js");
     assert!(html.contains(script), "uPlot is embedded as it was published");
     html.replace(script, "")
 }

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use greylag::control::schedule::{Axis, Excitation, Schedule, Shape, Step, flights, menu};
 use greylag::control::{self, Controller, Kind};
+use greylag::manoeuvres::{Axis, Excitation, Schedule, Shape, Step, flights, menu};
 use greylag::model::GreyBox;
 use greylag::physics::Command;
 use greylag::sim::flight_test::{FlightTestError, Flown, fly};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use greylag::model::GreyBox;
 use greylag::sysid::diagnose::{Candidate, Detail, Diagnosis, Options, diagnose};
-use greylag::sysid::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
 
 use crate::cases::Case;
 use crate::record::Record;

@@ -7,8 +7,8 @@ use anyhow::{Context, Result};
 use greylag::model::GreyBox;
 use greylag::physics::{effects, inputs};
 use greylag::sim::design::{Suspect, alternatives};
-use greylag::sysid::compare::flight::Prepared;
-use greylag::sysid::compare::weak::{Series, channels, columns};
+use greylag::sysid::weak_form::prepared::Prepared;
+use greylag::sysid::weak_form::windows::{Series, channels, columns};
 
 use crate::cases::Case;
 use crate::search::Flown;

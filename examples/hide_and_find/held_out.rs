@@ -1,8 +1,8 @@
 //! Models judged on flights that no fit has seen.
 
 use greylag::model::GreyBox;
-use greylag::sysid::compare::flight::Prepared;
 use greylag::sysid::compare::free_run;
+use greylag::sysid::weak_form::prepared::Prepared;
 
 /// Horizon of the free runs, s.
 const HORIZON_S: f64 = 5.0;

@@ -13,9 +13,9 @@ use greylag::sim::missing::Missing;
 use greylag::sim::starting_model::starting_model;
 use greylag::sim::trial::Trial;
 use greylag::sysid::amend::{self, Fit, FitOptions};
-use greylag::sysid::compare::flight::Prepared;
-use greylag::sysid::reconstruct::{self, ActuatorClock, reconstruct};
-use greylag::sysid::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
+use greylag::sysid::weak_form::prepared::Prepared;
 
 use crate::ask::{Answer, ask};
 use crate::cases::Case;
@@ -91,10 +91,10 @@ impl Bench {
 }
 
 fn rebuilt(log: &Log, model: &GreyBox) -> Result<Reconstruction> {
-    let options = reconstruct::Options {
+    let options = flight_path::Options {
         gravity: model.atmosphere.gravity,
         actuators_clock: ActuatorClock::AsRecorded,
-        ..reconstruct::Options::new(&log.name, model.airframe.actuators)
+        ..flight_path::Options::new(&log.name, model.airframe.actuators)
     };
     Ok(reconstruct(log, &options)?)
 }

@@ -7,7 +7,7 @@ use greylag::control::policy::observation::UNIT;
 use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Origin, observe};
 use greylag::control::task::Task;
 use greylag::control::{Observation, Target};
-use greylag::learn::windows::{Track, Window, windows};
+use greylag::learn::dynamics::windows::{Track, Window, windows};
 use greylag::learn::{Hyperparameters, Objective, Penalty};
 use greylag::model::residual::{INPUTS, OUTPUTS, Scales};
 use greylag::model::{GreyBox, Integrator, Memory, Residual, Twin};

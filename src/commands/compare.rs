@@ -11,7 +11,7 @@ use crate::commands::intake::{Intake, LogArguments};
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
 use crate::sysid::compare::{Comparison, ModelResult, Options, compare};
-use crate::sysid::reconstruct::ActuatorClock;
+use crate::sysid::flight_path::ActuatorClock;
 
 /// Exit status of a comparison that had to leave a log out, or whose logs are wrong somewhere.
 const IN_DOUBT: u8 = 2;

@@ -7,8 +7,8 @@ use anyhow::{Context, Result, bail};
 use comfy_table::{CellAlignment, Table};
 
 use crate::commands::files::{self, shipped};
-use crate::control::schedule::{Schedule, menu};
 use crate::control::{Kind, build};
+use crate::manoeuvres::{Schedule, menu};
 use crate::model::GreyBox;
 use crate::sim::design::{ENOUGH, Prospect, Suspect, prospects};
 

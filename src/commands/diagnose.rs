@@ -12,8 +12,8 @@ use crate::model::GreyBox;
 use crate::report::DiagnosisReport;
 use crate::sysid::compare::{self, compare};
 use crate::sysid::diagnose::{Candidate, Diagnosis, Options, diagnose};
-use crate::sysid::reconstruct::ActuatorClock;
-use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::flight_path::ActuatorClock;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
 
 /// Exit status of a diagnosis that had to leave a log out, or whose logs are wrong somewhere.
 const IN_DOUBT: u8 = 2;

@@ -13,7 +13,7 @@ use crate::physics::Channel;
 use crate::physics::effects::{self, Description};
 use crate::physics::inputs;
 use crate::report::{EffectReport, effect_facts};
-use crate::sysid::measurement_effects::MEASUREMENT_EFFECTS;
+use crate::sysid::flight_path::measurement_effects::MEASUREMENT_EFFECTS;
 use crate::sysid::signature::{SignatureError, signature};
 
 /// Options of `greylag effects`.

@@ -14,7 +14,6 @@ use crate::commands::choices;
 use crate::commands::files::shipped;
 use crate::control::cem::Change;
 use crate::control::policy::Agent;
-use crate::control::schedule::Schedule;
 use crate::control::{self, Controller, Kind, Needs, Source, build};
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
@@ -22,6 +21,7 @@ use crate::flight::runtime::{Crew, Event, Flight, Options, Pace, Seat, Signing, 
 use crate::link::address::Address;
 use crate::link::autopilot::Severity;
 use crate::link::vehicle::{Authority, Profile, Stack};
+use crate::manoeuvres::Schedule;
 use crate::model::GreyBox;
 use crate::physics::Airframe;
 

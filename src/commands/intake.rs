@@ -8,8 +8,8 @@ use crate::logs::finding::{Finding, Severity};
 use crate::logs::mapping::Mapping;
 use crate::logs::{self, csv::Tolerance};
 use crate::model::GreyBox;
-use crate::sysid::reconstruct::{self, ActuatorClock, reconstruct};
-use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
 
 /// Which logs, read how.
 #[derive(Clone, clap::Args)]
@@ -104,10 +104,10 @@ fn reconstruct_one(
     clock: ActuatorClock,
 ) -> Result<(Reconstruction, Vec<Finding>)> {
     let log = logs::load(path, reading)?;
-    let options = reconstruct::Options {
+    let options = flight_path::Options {
         gravity: model.atmosphere.gravity,
         actuators_clock: clock,
-        ..reconstruct::Options::new(name, model.airframe.actuators)
+        ..flight_path::Options::new(name, model.airframe.actuators)
     };
     let flight = reconstruct(&log.flight, &options)
         .with_context(|| format!("cannot use flight log {}", path.display()))?;

@@ -13,8 +13,8 @@ use crate::logs::mapping::Mapping;
 use crate::logs::phases::Kind;
 use crate::logs::{Flight, Log, Options, csv};
 use crate::model::GreyBox;
-use crate::sysid::reconstruct;
-use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::flight_path;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
 
 /// Exit status when what would be computed from the log is wrong.
 const PROBLEM: u8 = 2;
@@ -108,11 +108,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             let model = GreyBox::load(model)?;
             let log = crate::logs::load(input, &reading.options()?)?;
             let name = log.flight.name.clone();
-            let options = reconstruct::Options {
+            let options = flight_path::Options {
                 gravity: model.atmosphere.gravity,
-                ..reconstruct::Options::new(name, model.airframe.actuators)
+                ..flight_path::Options::new(name, model.airframe.actuators)
             };
-            let flight = reconstruct::reconstruct(&log.flight, &options)?;
+            let flight = flight_path::reconstruct(&log.flight, &options)?;
             csv_file(&flight.to_flight(), output, *force)?;
             print_reconstruction(&flight, output);
             Ok(ExitCode::SUCCESS)

@@ -9,9 +9,9 @@ use clap::Args;
 use crate::commands::choices;
 use crate::commands::fly::{self, CommandName, ProfileName};
 use crate::control::Kind;
-use crate::control::schedule::Schedule;
 use crate::flight::replay::{Outcome, replay};
 use crate::link::vehicle::{Profile, Real, Sitl, Vehicle};
+use crate::manoeuvres::Schedule;
 use crate::model::GreyBox;
 
 /// The arguments of `greylag replay`: those that the flight was flown with.

@@ -7,7 +7,6 @@ pub mod insight;
 pub mod lqi;
 pub mod pid;
 pub mod policy;
-pub mod schedule;
 pub mod task;
 mod registry;
 

@@ -1,44 +1,25 @@
 //! Learning: the grey box from flights, prior and residual together, section IV-A of \[GSFM26\].
 
 mod adam;
-mod basis;
 mod checkpoint;
-pub mod curve;
-mod dynamics;
-mod analytic;
-pub mod export;
-mod engine;
-mod equation_error;
-mod kernel;
-mod loss;
-mod mlp;
-mod network;
-mod packet;
-mod policy;
-mod policy_checkpoint;
-pub mod portrait;
-mod prior;
-mod recipe;
-mod replay;
-mod rollout;
-pub mod score;
-mod td3;
-mod valuation;
-pub mod windows;
+pub mod dynamics;
+pub mod policy;
 
 pub use adam::Adam;
-pub use analytic::{AnalyticProgress, AnalyticRecipe, AnalyticTrainer};
-pub use basis::{JXZ, TrainableError, trainable};
 pub(crate) use checkpoint::write_whole;
 pub use checkpoint::{Checkpoint, CheckpointError};
-pub use dynamics::{Learned, Moment, Progress, TrainError, Trainer};
-pub use engine::{Arithmetic, Engine};
-pub use loss::{Loss, Objective, Penalty};
-pub use mlp::{Mlp, Moments, Optimiser};
-pub use network::Passes;
-pub use policy::{PolicyError, PolicyProgress, PolicyRecipe, PolicyStanding, PolicyTrainer};
-pub use recipe::{Criterion, Recipe, Start};
-pub use replay::{Batch, Replay, Transition};
-pub use rollout::{Gradient, PriorSlopes, Subject};
-pub use td3::{Hyperparameters, Losses, Standing, Td3};
-pub use valuation::{Valuation, ValuationError, ValuationProgress, ValuationRecipe};
+pub use dynamics::basis::{JXZ, TrainableError, trainable};
+pub use dynamics::engine::{Arithmetic, Engine};
+pub use dynamics::loss::{Loss, Objective, Penalty};
+pub use dynamics::network::Passes;
+pub use dynamics::recipe::{Criterion, Recipe, Start};
+pub use dynamics::rollout::{Gradient, PriorSlopes, Subject};
+pub use dynamics::trainer::{Learned, Moment, Progress, TrainError, Trainer};
+pub use policy::analytic::{AnalyticProgress, AnalyticRecipe, AnalyticTrainer};
+pub use policy::critic_fit::{Valuation, ValuationError, ValuationProgress, ValuationRecipe};
+pub use policy::mlp::{Mlp, Moments, Optimiser};
+pub use policy::replay::{Batch, Replay, Transition};
+pub use policy::td3::{Hyperparameters, Losses, Standing, Td3};
+pub use policy::trainer::{
+    PolicyError, PolicyProgress, PolicyRecipe, PolicyStanding, PolicyTrainer,
+};

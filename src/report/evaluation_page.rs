@@ -1,7 +1,6 @@
 //! The page of an evaluation: scores beside the paper's, how targets were reached, what planners saw.
 
 use super::Align::{Left, Right};
-use super::numbers::number;
 use super::sight::{Sight, phases};
 use super::{
     Band, Choice, ChoiceOption, Figure, Page, Panel, Scale, Section, Series, Style, Table,
@@ -9,6 +8,7 @@ use super::{
 };
 use crate::control::Target;
 use crate::model::STEP;
+use crate::report::kit::numbers::number;
 use crate::sim::evaluation::{Evaluation, Score};
 use crate::sim::published::{Published, Value, published};
 use crate::sim::tracking::{Tracking, seconds};

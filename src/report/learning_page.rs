@@ -1,10 +1,10 @@
 //! The page of learning curves: how far trainings of policies came, over steps and over time.
 
 use super::Align::{Left, Right};
-use super::curves::Range;
-use super::numbers::{number, percent};
 use super::{Choice, ChoiceOption, Curves, Figure, Page, Section, Series, Style, Table};
-use crate::learn::curve::{CurvePoint, best, knee, spread};
+use crate::learn::policy::learning_curve::{CurvePoint, best, knee, spread};
+use crate::report::kit::curves::Range;
+use crate::report::kit::numbers::{number, percent};
 
 /// A training of one or several seeds.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,10 +1,10 @@
 //! What a planner saw ahead: candidates and plan as they fan out, and the time of a tick's parts.
 
 use super::Align::Right;
-use super::numbers::number;
 use super::{Figure, Style, Table, XyFigure, XyMark, XySeries};
 use crate::control::insight::{Insight, Path};
 use crate::model::STEP;
+use crate::report::kit::numbers::number;
 
 /// A tick of a planner that is shown.
 #[derive(Clone, Debug)]

@@ -1,14 +1,14 @@
 //! The page of one training: how the loss fell, where the coefficients went, what the residual learned.
 
 use super::Align::{Left, Right};
-use super::numbers::{number, percent};
 use super::{
     Choice, ChoiceOption, Curves, Figure, HeatCell, HeatMap, Page, Section, Series, Style, Table,
     XyFigure, XyMark, XySeries,
 };
-use crate::learn::portrait::{Cell, Portrait};
-use crate::learn::score::Horizon;
+use crate::learn::dynamics::residual_map::{Cell, Portrait};
+use crate::learn::dynamics::score::Horizon;
 use crate::learn::{Learned, Moment};
+use crate::report::kit::numbers::{number, percent};
 
 /// A trained model's story, with where it came from.
 #[derive(Clone, Debug)]
@@ -229,7 +229,7 @@ fn map(portrait: &Portrait) -> Section {
         let count = ((high - low) / (2.0 * half)).round() as usize + 1;
         (0..=count).map(|k| low - half + 2.0 * half * k as f64).collect()
     };
-    let [half_alpha, half_beta] = crate::learn::portrait::HALF_CELL_DEG;
+    let [half_alpha, half_beta] = crate::learn::dynamics::residual_map::HALF_CELL_DEG;
     let x_edges = edges(&|c| c.beta_deg, half_beta);
     let y_edges = edges(&|c| c.alpha_deg, half_alpha);
     let most = portrait.map.iter().map(|c| c.norm).fold(0.0, f64::max);

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use crate::control::schedule::menu::{MENU, Manoeuvre};
-use crate::control::schedule::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use crate::control::{Controller, Observation, Target};
 use crate::logs::Sampling;
+use crate::manoeuvres::menu::{MENU, Manoeuvre};
+use crate::manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use crate::model::{GreyBox, JoinError};
 use crate::physics::catalogue;
 use crate::physics::inputs::InputMemory;
@@ -15,9 +15,9 @@ use crate::sim::instruments::{Group, Instruments};
 use crate::sim::missing::{Kind, Missing};
 use crate::sim::{Environment, Imagined};
 use crate::sysid::compare::CompareError;
-use crate::sysid::compare::flight::Prepared;
-use crate::sysid::reconstruction::{Instant, Reconstruction, Segment};
+use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 use crate::sysid::separation::{Separation, separation};
+use crate::sysid::weak_form::prepared::Prepared;
 
 /// Evidence that settles which of two effects it is.
 pub const ENOUGH: f64 = 10.0;

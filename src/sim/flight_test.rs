@@ -2,8 +2,8 @@
 
 use greylag_sitl::plant::{PlantOptions, Truth};
 
-use crate::control::schedule::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use crate::control::{Controller, Target};
+use crate::manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use crate::physics::Command;
 use crate::sim::{Environment, Simulator, Trouble};
 

@@ -7,8 +7,8 @@ use greylag_sitl::plant::PlantOptions;
 use rand::RngExt;
 
 use crate::control::Controller;
-use crate::control::schedule::{Schedule, flights};
 use crate::logs::Flight;
+use crate::manoeuvres::{Schedule, flights};
 use crate::num::stream::stream;
 use crate::sim::flight_test::{FlightTestError, fly_within_bounds};
 use crate::sim::instruments::Instruments;

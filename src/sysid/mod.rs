@@ -3,9 +3,8 @@
 pub mod amend;
 pub mod compare;
 pub mod diagnose;
-pub mod measurement_effects;
-pub mod reconstruct;
-pub mod reconstruction;
+pub mod flight_path;
 pub mod rudder;
 pub mod signature;
 pub mod separation;
+pub mod weak_form;

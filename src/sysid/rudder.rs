@@ -3,7 +3,7 @@
 use crate::logs::rudder::RudderMotion;
 use crate::model::GreyBox;
 use crate::sysid::compare::ChannelId;
-use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
 
 /// The effect that holds a rudder's forces and moments.
 const EFFECT: &str = "rudder_linear";

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::compare::flight::Prepared;
-use super::compare::weak::{channels, columns};
 use crate::model::GreyBox;
+use crate::sysid::weak_form::prepared::Prepared;
+use crate::sysid::weak_form::windows::{channels, columns};
 
 /// Channels used: D, L, Y, l, m, n.
 const CHANNELS: usize = 6;

@@ -270,7 +270,7 @@ mod tests {
     fn an_error_of_the_measurement_has_none() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior.toml");
         let model = GreyBox::load(&path).unwrap();
-        let about = crate::sysid::measurement_effects::MEASUREMENT_EFFECTS[0];
+        let about = crate::sysid::flight_path::measurement_effects::MEASUREMENT_EFFECTS[0];
         assert!(matches!(
             signature(&model, &about, &[]),
             Err(SignatureError::Measurement { id: "steady_wind" })

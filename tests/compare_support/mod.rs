@@ -9,7 +9,7 @@ use greylag::model::GreyBox;
 use greylag::num::stream::{Stream, stream};
 use greylag::physics::{Command, Controls, State};
 use greylag::sim::{Environment, Simulator};
-use greylag::sysid::reconstruction::{Instant, Reconstruction, Segment};
+use greylag::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 use greylag_sitl::plant::Truth;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};

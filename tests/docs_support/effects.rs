@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use greylag::physics::effects::{self, Description};
 use greylag::physics::{Channel, inputs};
-use greylag::sysid::measurement_effects::MEASUREMENT_EFFECTS;
+use greylag::sysid::flight_path::measurement_effects::MEASUREMENT_EFFECTS;
 
 /// Where the page stands.
 pub const PAGE: &str = "docs/reference/effects.md";

@@ -5,7 +5,7 @@
 //! to single precision in burn 0.22, whatever the tensor's.
 
 use burn::tensor::{DType, Device, Gradients, Tensor, TensorData};
-use greylag::learn::windows::{Track, Window};
+use greylag::learn::dynamics::windows::{Track, Window};
 use greylag::learn::{Gradient, Objective};
 use greylag::model::residual::Scales;
 use greylag::model::{GreyBox, Integrator, STEP};

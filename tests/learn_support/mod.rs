@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use greylag::learn::windows::Track;
+use greylag::learn::dynamics::windows::Track;
 use greylag::model::{GreyBox, Twin};
 use greylag::num::{Dense, stream};
 use greylag::physics::{Command, State};

@@ -9,7 +9,7 @@ use greylag::model::GreyBox;
 use greylag::num::stream::{Stream, stream};
 use greylag::physics::Command;
 use greylag::sim::{Environment, Simulator};
-use greylag::sysid::reconstruct::Options;
+use greylag::sysid::flight_path::Options;
 use greylag_sitl::air::{Air, Turbulence};
 use greylag_sitl::plant::{PlantOptions, Truth};
 use rand::RngExt;

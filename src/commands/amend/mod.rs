@@ -19,8 +19,8 @@ use crate::report::AmendmentReport;
 use crate::sysid::amend::{self, Added, Amended, Refused};
 use crate::sysid::compare::{self, compare};
 use crate::sysid::diagnose::{self, Candidate, diagnose};
-use crate::sysid::reconstruct::ActuatorClock;
-use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::flight_path::ActuatorClock;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
 
 /// Exit status when an effect was refused, a log left out, or flights contradict one another.
 const IN_DOUBT: u8 = 2;

@@ -1,6 +1,6 @@
 //! The schedule of the demonstration: which attitudes, for how long.
 
-use crate::control::schedule::Schedule;
+use crate::manoeuvres::Schedule;
 use crate::report::Difficulty;
 
 /// One attitude of the schedule.

@@ -18,7 +18,7 @@ use crate::report::{
 };
 use crate::sim::episode::{attitude_error_deg, settled_error_deg};
 use crate::sysid::compare::{self, Comparison};
-use crate::sysid::reconstruct;
+use crate::sysid::flight_path;
 
 /// Largest settled error that counts as tracked, degrees: half of what the paper calls
 /// "near-perfect tracking" (its section V-E).
@@ -71,14 +71,14 @@ impl Teller<'_> {
 impl Teller<'_> {
     /// How well the model predicts `flight`; a flight that cannot be compared is still reported.
     fn compared(&self, flight: &Flight) -> Option<Comparison> {
-        let options = reconstruct::Options {
+        let options = flight_path::Options {
             gravity: self.model.atmosphere.gravity,
-            ..reconstruct::Options::new("flight.csv", self.model.airframe.actuators)
+            ..flight_path::Options::new("flight.csv", self.model.airframe.actuators)
         };
         let told = |why: &dyn std::fmt::Display| {
             eprintln!("the report has no comparison of model and flight: {why}");
         };
-        let path = reconstruct::reconstruct(flight, &options).map_err(|e| told(&e)).ok()?;
+        let path = flight_path::reconstruct(flight, &options).map_err(|e| told(&e)).ok()?;
         let models = std::slice::from_ref(self.model);
         compare::compare(models, &[path], &compare::Options::default(), &|_| ())
             .map_err(|e| told(&e))

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 
 use super::policy::{evaluation, reached};
 use crate::control::policy::{Actor, Critic};
-use crate::learn::curve::{CURVE, CurveFile, CurvePoint};
+use crate::learn::policy::learning_curve::{CURVE, CurveFile, CurvePoint};
 use crate::learn::{AnalyticRecipe, AnalyticTrainer, Valuation, ValuationRecipe};
 use crate::model::GreyBox;
 use crate::sim::imagined::Imagination;

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use comfy_table::Table;
 
 use crate::commands::files::{self, Overwrite};
-use crate::learn::curve::{self, CURVE};
+use crate::learn::policy::learning_curve::{self, CURVE};
 use crate::report::{LearningReport, Training};
 
 /// The folder of one seed of several begins so.

@@ -12,10 +12,11 @@ use serde::Serialize;
 
 use super::flights::{FlightArguments, Flights};
 use crate::commands::files::{self, Overwrite, shipped};
-use crate::learn::portrait::{Portrait, portrait};
-use crate::learn::score::{Horizon, free_run};
+use crate::learn::dynamics::export;
+use crate::learn::dynamics::residual_map::{Portrait, portrait};
+use crate::learn::dynamics::score::{Horizon, free_run};
 use crate::learn::{
-    Checkpoint, Criterion, Learned, Moment, Progress, Recipe, Start, Trainer, export, trainable,
+    Checkpoint, Criterion, Learned, Moment, Progress, Recipe, Start, Trainer, trainable,
 };
 use crate::model::{GreyBox, Integrator};
 use crate::report::TrainingReport;

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 use crate::commands::intake::Reading;
-use crate::learn::windows::Track;
+use crate::learn::dynamics::windows::Track;
 use crate::logs::csv::{self, Tolerance};
 use crate::model::{GreyBox, STEP};
-use crate::sysid::reconstruct::ActuatorClock;
+use crate::sysid::flight_path::ActuatorClock;
 
 /// One track in so many is held out, where there are that many.
 const HELD_OUT: usize = 10;

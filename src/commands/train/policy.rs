@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::{analytic, curves};
 use crate::commands::files::{self, Overwrite, shipped};
 use crate::control::policy::{Actor, Agent, Critic, Evaluated, Origin};
-use crate::learn::curve::{COLUMNS, CURVE, CurveFile, CurvePoint};
+use crate::learn::policy::learning_curve::{COLUMNS, CURVE, CurveFile, CurvePoint};
 use crate::learn::{
     AnalyticRecipe, Hyperparameters, PolicyProgress, PolicyRecipe, PolicyStanding, PolicyTrainer,
     ValuationRecipe, write_whole,
@@ -299,7 +299,7 @@ impl Arguments {
         let model = GreyBox::load(&path)?;
         let mut bytes = std::fs::read(&path)?;
         if model.residual.is_some() {
-            let residual = path.with_file_name(crate::learn::export::RESIDUAL);
+            let residual = path.with_file_name(crate::learn::dynamics::export::RESIDUAL);
             bytes.extend(std::fs::read(&residual).unwrap_or_default());
         }
         let origin = origin(fingerprint(&model.airframe), &model.name, hash(&bytes));

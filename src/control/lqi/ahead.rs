@@ -1,8 +1,8 @@
 //! The LQI as imagined aircraft fly it: its laws over the coming steps, evaluated in lanes.
 
 use super::design::STATES;
-use super::schedule::Entry;
 use super::{AIRSPEED_KP, PITCH_RATE, ROLL_RATE, ROUNDING, STALL_ALPHA, STALL_GAIN};
+use crate::control::lqi::gain_schedule::Entry;
 use crate::model::STEP;
 use crate::num::{Real, each};
 use crate::physics::{ActuatorState, Command, State};

@@ -1,9 +1,10 @@
 //! LQI: linear-quadratic attitude control with integral action, scheduled over the envelope.
 
+mod gain_schedule;
+
 mod ahead;
 mod design;
 mod riccati;
-mod schedule;
 
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use crate::physics::Command;
 pub(crate) use ahead::Ahead;
 use ahead::{HOLD, Inner, Law};
 pub use design::Weights;
-use schedule::Schedule;
+use gain_schedule::Schedule;
 
 /// Largest rates of the reference, rad/s: commanded steps become ramps that the surfaces can
 /// follow, so the integrators never see a large error.

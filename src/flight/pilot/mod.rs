@@ -30,10 +30,10 @@ pub use limits::{Limits, TICK_S};
 pub use modes::mode_name;
 pub use signs::Answers;
 
-use crate::control::schedule::Schedule;
 use crate::control::{Controller, Observation, Target};
 use crate::link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
 use crate::link::vehicle::{Fault, Telemetry};
+use crate::manoeuvres::Schedule;
 use crate::physics::{Command, Time};
 use estimate::{Estimate, Frame, RESTART, within};
 use oscillation::Oscillation;

@@ -2,8 +2,8 @@
 
 use super::texts::Texts;
 use crate::control::Target;
-use crate::control::schedule::{Demand, Overlay, Schedule};
 use crate::link::autopilot::Severity;
+use crate::manoeuvres::{Demand, Overlay, Schedule};
 use crate::physics::{Command, Time};
 
 /// Where a schedule stands.

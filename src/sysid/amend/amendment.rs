@@ -11,7 +11,7 @@ use super::story;
 use crate::model::GreyBox;
 use crate::physics::effects::{Coefficient, Description};
 use crate::sysid::compare::HorizonScore;
-use crate::sysid::reconstruction::{Reconstruction, Segment};
+use crate::sysid::flight_path::reconstruction::{Reconstruction, Segment};
 use crate::sysid::rudder;
 
 /// Times that all effects are asked for at most.

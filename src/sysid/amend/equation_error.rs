@@ -7,7 +7,7 @@ use super::flight::Flight;
 use super::parameters::{self, Free};
 use crate::model::GreyBox;
 use crate::sysid::compare::ChannelId;
-use crate::sysid::compare::weak::{self, Series};
+use crate::sysid::weak_form::windows::{self, Series};
 
 /// Channels that tell of coefficients: the forces, where measured, and the moments.
 const CHANNELS: [ChannelId; 6] = [
@@ -72,7 +72,7 @@ struct Residuals {
 fn residuals(model: &GreyBox, flights: &[Flight]) -> Residuals {
     let mut all = Residuals { values: Vec::new(), channel: Vec::new() };
     for flight in flights {
-        let series = weak::channels(model, &flight.prepared);
+        let series = windows::channels(model, &flight.prepared);
         for (k, id) in CHANNELS.iter().enumerate() {
             let windows = flight.prepared.windows.len();
             match series.iter().find(|s| s.channel == *id) {
@@ -140,8 +140,8 @@ fn step(
     r: &Residuals,
     weights: &[f64; 6],
 ) -> Option<DVector<f64>> {
-    let columns: Vec<weak::Columns> =
-        flights.iter().map(|f| weak::columns(present, &f.prepared)).collect();
+    let columns: Vec<windows::Columns> =
+        flights.iter().map(|f| windows::columns(present, &f.prepared)).collect();
     let column = |(k, f): (usize, &Free)| {
         let known = columns.iter().flat_map(|c| c.values[f.index].iter().flatten().copied());
         let known: Vec<f64> = known.collect();

@@ -1,9 +1,9 @@
 //! A flight with what is left in doubt of its sensors.
 
 use crate::sysid::compare::CompareError;
-use crate::sysid::compare::flight::Prepared;
-use crate::sysid::diagnose::clocks::{BLURRED, Doubt};
-use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::diagnose::search::clocks::{BLURRED, Doubt};
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::weak_form::prepared::Prepared;
 
 /// Constants of a flight's sensors that are estimated along.
 pub(super) const SENSORS: usize = 8;

@@ -18,7 +18,7 @@ use super::result::{FittedFlight, FlightEstimate, Parameter};
 use super::shooting::{self, Shot};
 use crate::model::GreyBox;
 use crate::num::statistics::quantile;
-use crate::sysid::diagnose::clocks::{self, Clocks};
+use crate::sysid::diagnose::search::clocks::{self, Clocks};
 
 /// Shortest flight to fit to, s.
 pub const LEAST_S: f64 = 10.0;

@@ -7,8 +7,8 @@ use crate::logs::Sampling;
 use crate::model::{GreyBox, Memory};
 use crate::physics::inputs::InputMemory;
 use crate::physics::{Controls, State};
-use crate::sysid::compare::flight::Prepared;
-use crate::sysid::reconstruction::Instant;
+use crate::sysid::flight_path::reconstruction::Instant;
+use crate::sysid::weak_form::prepared::Prepared;
 
 /// A run whose scaled error exceeds this has left the flight.
 const LEFT: f64 = 0.7;

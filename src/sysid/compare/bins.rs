@@ -2,11 +2,11 @@
 
 use super::bootstrap::{self, BLOCK_S, Block};
 use super::doubt::{self, NORMAL_95, Shift};
-use super::flight::Prepared;
-use super::names::{ChannelId, RegimeVariable};
 use super::result::{Bin, Map, MapCell, RegimeBins};
-use super::weak::Series;
 use crate::num::statistics::{mean, quantile};
+use crate::sysid::weak_form::channels::{ChannelId, RegimeVariable};
+use crate::sysid::weak_form::prepared::Prepared;
+use crate::sysid::weak_form::windows::Series;
 
 /// Fewest independent samples that support a bin.
 pub const SUPPORT: usize = 20;

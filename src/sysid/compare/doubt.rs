@@ -4,13 +4,13 @@
 //! alike, so no bootstrap over windows sees it. The constants are taken as independent of one
 //! another, with the standard deviations that the reconstruction gives them.
 
-use super::flight::Prepared;
-use super::names::ChannelId;
-use super::weak;
 use crate::model::GreyBox;
 use crate::num::statistics::mean;
 use crate::physics::State;
-use crate::sysid::reconstruction::{Instant, Nuisance};
+use crate::sysid::flight_path::reconstruction::{Instant, Nuisance};
+use crate::sysid::weak_form::channels::ChannelId;
+use crate::sysid::weak_form::prepared::Prepared;
+use crate::sysid::weak_form::windows;
 
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 pub const NORMAL_95: f64 = 1.96;
@@ -59,7 +59,7 @@ pub fn shifts(
             let moved = |by: f64| {
                 let mut moved = Instant { state: State { ..at.state }, ..*at };
                 change(&mut moved, by);
-                weak::residual(model, &moved)
+                windows::residual(model, &moved)
             };
             let (up, down) = (moved(sd[k]), moved(-sd[k]));
             for (shift, (up, down)) in shifts.iter_mut().zip(up.iter().zip(down)) {

@@ -1,9 +1,9 @@
 //! The worst regime of a channel: the variable that tells it apart, with the range that fails.
 
 use super::bins::{self, Residual, SUPPORT};
-use super::flight::Prepared;
-use super::names::RegimeVariable;
 use super::result::{Bin, Regime, RegimeBins};
+use crate::sysid::weak_form::channels::RegimeVariable;
+use crate::sysid::weak_form::prepared::Prepared;
 
 /// A variable that explains less of the residual's variance than this tells nothing apart.
 const SHARE_FLOOR: f64 = 0.1;

@@ -4,12 +4,12 @@ use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 
-use super::flight::Prepared;
 use super::result::{GrowthPoint, HorizonScore, StateScore};
 use crate::model::{GreyBox, Memory};
 use crate::num::statistics::{mean, quantile};
 use crate::physics::State;
-use crate::sysid::reconstruction::Instant;
+use crate::sysid::flight_path::reconstruction::Instant;
+use crate::sysid::weak_form::prepared::Prepared;
 
 /// Time between starts, s.
 pub const START_EVERY_S: f64 = 3.0;

@@ -2,25 +2,21 @@
 //!
 //! The method stands in `docs/explanation/comparison.md`. "Before" is the
 //! model as given; tuning it is the business of what ranks missing effects, for which
-//! [`weak::columns`] gives what to regress on.
+//! [`columns`](crate::sysid::weak_form::windows::columns) gives what to regress on.
 
 mod bins;
 pub mod bootstrap;
 mod doubt;
 mod error;
 mod finding;
-pub mod flight;
 pub mod free_run;
-pub mod kernel;
-mod names;
-mod result;
+pub(in crate::sysid) mod result;
 mod run;
 mod sentence;
 mod verdict;
-pub mod weak;
 
+pub use crate::sysid::weak_form::channels::{ChannelId, RegimeVariable};
 pub use error::CompareError;
-pub use names::{ChannelId, RegimeVariable};
 pub use result::{
     Bin, ChannelResult, ChannelTrace, Comparison, Document, FlightResult, FlightTrace, GrowthPoint,
     HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, Regime, RegimeBins,

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use super::names::{ChannelId, RegimeVariable};
+use crate::sysid::weak_form::channels::{ChannelId, RegimeVariable};
 
 /// The comparison of one or several models with one or several flights.
 #[derive(Clone, Debug, Serialize)]

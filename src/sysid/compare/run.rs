@@ -7,17 +7,17 @@ use super::bins::{self, Residual, SUPPORT};
 use super::bootstrap::{BLOCK_S, RESAMPLES};
 use super::doubt::{self, Shift};
 use super::finding;
-use super::flight::Prepared;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
-use super::kernel::KERNEL_S;
-use super::names::ChannelId;
 use super::result::{ChannelResult, ChannelTrace, Comparison, ModelResult, ModelTrace, Settings};
 use super::sentence::{Subject, sentence};
 use super::verdict;
-use super::weak::{self, Series};
 use crate::model::GreyBox;
-use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::rudder;
+use crate::sysid::weak_form::channels::ChannelId;
+use crate::sysid::weak_form::kernel::KERNEL_S;
+use crate::sysid::weak_form::prepared::Prepared;
+use crate::sysid::weak_form::windows::{self, Series};
 
 /// The channel's variance, less noise, must be at least this part of itself for a share to mean
 /// something.
@@ -156,7 +156,8 @@ fn one_model(
     options: &Options,
 ) -> ModelResult {
     let (runs, paths) = free_run::fly(model, flights, &options.horizons_s);
-    let series: Vec<Vec<Series>> = flights.par_iter().map(|f| weak::channels(model, f)).collect();
+    let series: Vec<Vec<Series>> =
+        flights.par_iter().map(|f| windows::channels(model, f)).collect();
     let shifts: Vec<Vec<[Shift; ChannelId::ALL.len()]>> = flights
         .par_iter()
         .zip(from)

@@ -1,8 +1,8 @@
 //! A channel's finding as one sentence of plain language.
 
 use super::finding::{Finding, Trend};
-use super::names::{ChannelId, RegimeVariable};
 use super::result::Regime;
+use crate::sysid::weak_form::channels::{ChannelId, RegimeVariable};
 
 /// A channel that the model explains but for less than this is said to be explained.
 const EXPLAINED: f64 = 0.01;

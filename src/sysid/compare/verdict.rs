@@ -1,7 +1,7 @@
 //! The findings of a model in the order in which they are told.
 
-use super::names::ChannelId;
 use super::result::{ChannelResult, HorizonScore};
+use crate::sysid::weak_form::channels::ChannelId;
 
 /// The sentences of a model: the worst of forces (they move V, α, β) and the worst of moments (they
 /// move p, q, r) lead, the others follow. The rates of V, α, β repeat the forces and are left out

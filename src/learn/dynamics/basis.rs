@@ -1,0 +1,278 @@
+//! The trainable coefficients in coordinates in which each changes the rates as much as any other.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::learn::dynamics::windows::Track;
+use crate::model::GreyBox;
+use crate::num::{Dual, Real};
+use crate::physics::effects::Kind;
+use crate::physics::effects::Needs;
+use crate::physics::point::AirData;
+use crate::physics::rigid_body::{self, RigidBody};
+use crate::physics::{Channel, State, Wrench};
+
+/// The name under which the product of inertia is trainable.
+///
+/// No other inertia is: scaling moments and inertias, or forces and mass, together changes nothing,
+/// so no data could tell them from the coefficients.
+pub const JXZ: &str = "rigid_body.jxz_kgm2";
+
+/// Samples that the coordinates are made from.
+const SAMPLES: usize = 4096;
+
+/// Part of the strongest direction's strength, squared, under which a direction is not seen.
+const UNSEEN: f64 = 1e-9;
+
+/// θ_p = θ_p0 + T η: η has as many entries as the data sees directions.
+///
+/// Adam moves every parameter at its own pace, but along the axes it is given: coefficients differ a
+/// thousandfold in size and move in company (aileron power with roll damping), so the axes are those
+/// of the rates that they make over the flights: ∂(F_p/x_c)/∂η has unit covariance.
+#[derive(Clone, Debug)]
+pub struct Basis {
+    /// Places in the model's list, the list's length standing for Jxz.
+    pub places: Vec<usize>,
+    /// θ_p0.
+    start: DVector<f64>,
+    /// T.
+    turn: DMatrix<f64>,
+    /// Names of the coefficients that the data does not see, or not apart from others.
+    pub unseen: Vec<String>,
+}
+
+/// Why coefficients cannot be trained.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TrainableError {
+    /// The model has no such coefficient.
+    #[error("model {model} has no coefficient {name:?} that can be trained; it has {known}")]
+    Unknown {
+        /// The model.
+        model: String,
+        /// The name.
+        name: String,
+        /// What it has.
+        known: String,
+    },
+    /// An effect acts on what others make, or near the ground.
+    #[error(
+        "model {model} has the effect {effect}, which acts on what other effects make or near the ground: learning through it is not built; leave it out of the prior"
+    )]
+    Effect {
+        /// The model.
+        model: String,
+        /// The effect.
+        effect: &'static str,
+    },
+}
+
+/// Whether a model can be learned through at all.
+///
+/// # Errors
+/// If one of its effects acts on what others make, or near the ground only.
+pub fn check(model: &GreyBox) -> Result<(), TrainableError> {
+    let bars = |id: &str| {
+        // rollouts do not know the height above ground
+        id == "ground_effect" || Kind::from_id(id).is_some_and(|k| k.needs() != Needs::Point)
+    };
+    match model.effects().find(|e| bars(e.id)) {
+        None => Ok(()),
+        Some(e) => Err(TrainableError::Effect { model: model.name.clone(), effect: e.id }),
+    }
+}
+
+/// Names of all that can be trained of `model`: the coefficients that its forces and moments are
+/// linear in, and Jxz.
+pub fn trainable(model: &GreyBox) -> Vec<String> {
+    let mut names = vec![JXZ.to_owned()];
+    for about in model.effects() {
+        let Some(kind) = Kind::from_id(about.id) else { continue };
+        let count = about.coefficients.len();
+        for (k, c) in about.coefficients[..count - about.shape].iter().enumerate() {
+            // what changes the body is no force
+            let one: Vec<f64> = (0..count).map(|i| if i == k { 0.1 } else { 0.0 }).collect();
+            let (mut body, mut still) = (*model.bare_body(), *model.bare_body());
+            kind.change(&one, &mut body);
+            kind.change(&vec![0.0; count], &mut still);
+            if body == still {
+                names.push(format!("{}.{}", about.id, c.name));
+            }
+        }
+    }
+    names
+}
+
+/// Present values: the coefficients, then Jxz.
+pub fn values(model: &GreyBox) -> Vec<f64> {
+    let coefficients = model.coefficients().iter().map(|c| c.value);
+    coefficients.chain([model.bare_body().jxz]).collect()
+}
+
+/// The present value of a coefficient, or of Jxz, by its full name.
+pub fn value(model: &GreyBox, name: &str) -> Option<f64> {
+    match name {
+        JXZ => Some(model.bare_body().jxz),
+        _ => model.coefficients().iter().find(|c| c.name == name).map(|c| c.value),
+    }
+}
+
+impl Basis {
+    /// The coordinates of the coefficients `names` of `model` over `tracks`.
+    ///
+    /// # Errors
+    /// If the model has none of a name, or it cannot be trained.
+    pub fn new(
+        model: &GreyBox,
+        names: &[String],
+        tracks: &[Track],
+    ) -> Result<Basis, TrainableError> {
+        let known = trainable(model);
+        let count = model.coefficients().len();
+        let mut places = Vec::new();
+        for name in names {
+            if !known.contains(name) {
+                return Err(TrainableError::Unknown {
+                    model: model.name.clone(),
+                    name: name.clone(),
+                    known: known.join(", "),
+                });
+            }
+            let place = model.coefficients().iter().position(|c| c.name == *name).unwrap_or(count);
+            places.push(place);
+        }
+        places.sort_unstable();
+        places.dedup();
+        let all = values(model);
+        let start = DVector::from_iterator(places.len(), places.iter().map(|p| all[*p]));
+        let gram = gram(model, &places, tracks);
+        let (turn, unseen) = whiten(&gram);
+        let name = |k: usize| {
+            model.coefficients().get(places[k]).map_or(JXZ.to_owned(), |c| c.name.clone())
+        };
+        Ok(Basis { start, turn, unseen: unseen.into_iter().map(name).collect(), places })
+    }
+
+    /// Number of coordinates.
+    pub fn len(&self) -> usize {
+        self.turn.ncols()
+    }
+
+    /// Whether nothing is trained.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// How far each coefficient moves with coordinate `k`, in the order of `places`.
+    pub fn column(&self, k: usize) -> impl Iterator<Item = f64> + '_ {
+        (0..self.turn.nrows()).map(move |i| self.turn[(i, k)])
+    }
+
+    /// Slopes with respect to the coordinates from those with respect to coefficients and Jxz.
+    pub fn slopes(&self, all: &[f64]) -> Vec<f64> {
+        let of = |k: usize| {
+            self.places.iter().enumerate().map(move |(i, p)| self.turn[(i, k)] * all[*p])
+        };
+        (0..self.len()).map(|k| of(k).sum()).collect()
+    }
+
+    /// Gives `model` the coefficients at `coordinates`, kept where an aircraft can have them.
+    pub fn apply(&self, model: &mut GreyBox, coordinates: &[f64]) {
+        let theta = &self.start + &self.turn * DVector::from_column_slice(coordinates);
+        let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
+        let mut body = *model.bare_body();
+        for (place, theta) in self.places.iter().zip(theta.iter()) {
+            match values.get_mut(*place) {
+                Some(value) => *value = *theta,
+                None => {
+                    // jx jz must exceed its square
+                    let most = 0.99 * (body.jx * body.jz).sqrt();
+                    body.jxz = theta.clamp(-most, most);
+                }
+            }
+        }
+        model.set_coefficients(&values);
+        if body != *model.bare_body() {
+            model.set_body(body);
+        }
+    }
+}
+
+/// Σ (∂(F_p/x_c)/∂θ)ᵀ (∂(F_p/x_c)/∂θ) / N over samples of the tracks.
+fn gram(model: &GreyBox, places: &[usize], tracks: &[Track]) -> DMatrix<f64> {
+    let total: usize = tracks.iter().map(|t| t.states.len()).sum();
+    let every = (total / SAMPLES).max(1);
+    let scale = model.scale();
+    let mut gram = DMatrix::zeros(places.len(), places.len());
+    let mut count = 0.0_f64;
+    for track in tracks {
+        for k in (0..track.states.len()).step_by(every) {
+            let columns = columns(model, track, k);
+            let jacobian =
+                DMatrix::from_fn(8, places.len(), |i, j| columns[places[j]][i] / scale[i]);
+            gram += jacobian.transpose() * jacobian;
+            count += 1.0;
+        }
+    }
+    gram / count.max(1.0)
+}
+
+/// ∂F_p/∂θ of every coefficient, then of Jxz, at a sample.
+pub(in crate::learn) fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
+    let (state, controls) = (&track.states[k], &track.controls[k]);
+    let air = model.air(state, track.altitude[k]);
+    let mut wrenches = vec![Wrench::zero(); model.coefficients().len()];
+    model.contributions(state, controls, &air, |i, channel, x| wrenches[i].add(channel, x));
+    let mut columns: Vec<[f64; 8]> =
+        wrenches.iter().map(|wrench| rate_of(model, state, &air, wrench)).collect();
+    let wrench = model.wrench(state, controls, &air);
+    let moment = [4, 5, 6].map(|c| Dual::<1>::from_f64(wrench.get(Channel::ALL[c])));
+    let body: RigidBody<Dual<1>> = model.body.map(Dual::from_f64);
+    let body = RigidBody { jxz: Dual::variable(model.body.jxz, 0), ..body };
+    let spin = rigid_body::angular_acceleration(&body, &state.map(Dual::from_f64), moment);
+    let [p, q, r] = spin.map(|s| s.gradient[0]);
+    columns.push([0.0, 0.0, 0.0, p, q, r, 0.0, 0.0]);
+    columns
+}
+
+/// The rates that a wrench alone makes of the state.
+pub(in crate::learn) fn rate_of(
+    model: &GreyBox,
+    state: &State,
+    air: &AirData,
+    wrench: &Wrench,
+) -> [f64; 8] {
+    let still = rigid_body::state_rate(state, air, [0.0; 3], [0.0; 3]).to_array();
+    let none = State { p: 0.0, q: 0.0, r: 0.0, ..*state };
+    let force = rigid_body::body_force(wrench, air, model.axes);
+    let moment = [4, 5, 6].map(|c| wrench.get(Channel::ALL[c]));
+    // at rest the gyroscopic terms vanish and the spin is linear in the moment
+    let spin = rigid_body::angular_acceleration(&model.body, &none, moment);
+    let push = force.map(|f| f / model.body.mass);
+    let rate = rigid_body::state_rate(state, air, push, spin).to_array();
+    std::array::from_fn(|i| rate[i] - still[i])
+}
+
+/// T with Tᵀ G T = 1 on the directions that the data sees, and who has no part in them.
+fn whiten(gram: &DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
+    let n = gram.nrows();
+    if n == 0 {
+        return (gram.clone(), Vec::new());
+    }
+    let size: Vec<f64> = (0..n).map(|i| gram[(i, i)].sqrt()).collect();
+    let unit = |i: usize| if size[i] > 0.0 { 1.0 / size[i] } else { 0.0 };
+    let correlation = DMatrix::from_fn(n, n, |i, j| gram[(i, j)] * unit(i) * unit(j));
+    let eigen = correlation.symmetric_eigen();
+    let most = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+    let seen: Vec<usize> =
+        order.iter().copied().filter(|k| eigen.eigenvalues[*k] > UNSEEN * most).collect();
+    let turn = DMatrix::from_fn(n, seen.len(), |i, k| {
+        unit(i) * eigen.eigenvectors[(i, seen[k])] / eigen.eigenvalues[seen[k]].sqrt()
+    });
+    // more than half of the coefficient's direction lies in what is not seen
+    let lost = |i: &usize| {
+        let kept: f64 = seen.iter().map(|k| eigen.eigenvectors[(*i, *k)].powi(2)).sum();
+        kept < 0.5
+    };
+    (turn, (0..n).filter(lost).collect())
+}

@@ -1,0 +1,114 @@
+//! The engine: minibatches in the precision asked for, in the widest vectors there are.
+
+use crate::learn::dynamics::kernel::Double;
+#[cfg(target_arch = "aarch64")]
+use crate::learn::dynamics::kernel::Neon;
+#[cfg(target_arch = "x86_64")]
+use crate::learn::dynamics::kernel::{In256, In512};
+use crate::learn::dynamics::loss::{Loss, Minibatch, Objective};
+use crate::learn::dynamics::rollout::{Gradient, Subject};
+use crate::learn::dynamics::windows::{Track, Window};
+
+/// What an engine computes in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arithmetic {
+    /// Blocks of single-precision lanes. Where no multiply-add is fused (x86 from before 2013) it is
+    /// [`Double`](Arithmetic::Double).
+    Lanes,
+    /// One rollout at a time in double precision: slow, for tests.
+    Double,
+}
+
+/// Computes losses and gradients of minibatches. All memory is taken when it is made.
+#[derive(Clone, Debug)]
+pub struct Engine(Kind);
+
+#[derive(Clone, Debug)]
+enum Kind {
+    #[cfg(target_arch = "x86_64")]
+    In512(Minibatch<In512>),
+    #[cfg(target_arch = "x86_64")]
+    In256(Minibatch<In256>),
+    #[cfg(target_arch = "aarch64")]
+    Neon(Minibatch<Neon>),
+    Double(Minibatch<Double>),
+}
+
+impl Kind {
+    /// In the widest lanes that this processor has; `None` where no multiply-add is fused.
+    #[cfg_attr(
+        not(any(target_arch = "x86_64", target_arch = "aarch64")),
+        expect(unused_variables, reason = "elsewhere no multiply-add is known to be fused")
+    )]
+    fn in_lanes(subject: &Subject, windows: usize, steps: usize) -> Option<Kind> {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let in_512 = |set| Kind::In512(Minibatch::new(subject, windows, steps, set));
+            let in_256 = |set| Kind::In256(Minibatch::new(subject, windows, steps, set));
+            In512::detect().map(in_512).or_else(|| In256::detect().map(in_256))
+        }
+        #[cfg(target_arch = "aarch64")]
+        return Some(Kind::Neon(Minibatch::new(subject, windows, steps, Neon)));
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        None
+    }
+}
+
+impl Engine {
+    /// An engine for minibatches of up to `windows` rollouts of up to `steps` steps.
+    pub fn new(subject: &Subject, windows: usize, steps: usize, arithmetic: Arithmetic) -> Engine {
+        let lanes = match arithmetic {
+            Arithmetic::Lanes => Kind::in_lanes(subject, windows, steps),
+            Arithmetic::Double => None,
+        };
+        let double = || Kind::Double(Minibatch::new(subject, windows, steps, Double));
+        Engine(lanes.unwrap_or_else(double))
+    }
+
+    /// The loss of `windows` of `steps` steps, with its gradient; the same to the bit on any number of
+    /// cores.
+    ///
+    /// # Panics
+    /// If there are more windows than the engine was made for, or longer ones.
+    pub fn step(
+        &mut self,
+        subject: &Subject,
+        objective: &Objective,
+        tracks: &[Track],
+        windows: &[Window],
+        steps: usize,
+    ) -> (Loss, &Gradient) {
+        match &mut self.0 {
+            #[cfg(target_arch = "x86_64")]
+            Kind::In512(m) => m.step(subject, objective, tracks, windows, steps),
+            #[cfg(target_arch = "x86_64")]
+            Kind::In256(m) => m.step(subject, objective, tracks, windows, steps),
+            #[cfg(target_arch = "aarch64")]
+            Kind::Neon(m) => m.step(subject, objective, tracks, windows, steps),
+            Kind::Double(m) => m.step(subject, objective, tracks, windows, steps),
+        }
+    }
+
+    /// The loss alone.
+    ///
+    /// # Panics
+    /// As [`step`](Engine::step).
+    pub fn loss(
+        &mut self,
+        subject: &Subject,
+        objective: &Objective,
+        tracks: &[Track],
+        windows: &[Window],
+        steps: usize,
+    ) -> Loss {
+        match &mut self.0 {
+            #[cfg(target_arch = "x86_64")]
+            Kind::In512(m) => m.loss(subject, objective, tracks, windows, steps),
+            #[cfg(target_arch = "x86_64")]
+            Kind::In256(m) => m.loss(subject, objective, tracks, windows, steps),
+            #[cfg(target_arch = "aarch64")]
+            Kind::Neon(m) => m.loss(subject, objective, tracks, windows, steps),
+            Kind::Double(m) => m.loss(subject, objective, tracks, windows, steps),
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! The model folder that a training leaves: `model.toml`, its airframe, `residual.safetensors`.
+
+use std::path::{Path, PathBuf};
+
+use crate::learn::checkpoint::write_whole;
+use crate::learn::dynamics::basis::JXZ;
+use crate::model::residual::{Origin, fingerprint};
+use crate::model::{GreyBox, Integrator};
+
+/// Why a model cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// A file cannot be read or written.
+    #[error("cannot {doing} {path}: {why}; check that its folder exists, can be written to and has room", path = path.display())]
+    File {
+        /// What was being done.
+        doing: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        why: std::io::Error,
+    },
+    /// The prior's file has another form than when it was read.
+    #[error("cannot write a model after {path}: {why}; give the prior's file as it was", path = path.display())]
+    Prior {
+        /// The prior's file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
+}
+
+/// Names of the files in a model folder.
+pub const MODEL: &str = "model.toml";
+/// The airframe, copied so that the folder is whole.
+pub const AIRFRAME: &str = "airframe.toml";
+/// The residual.
+pub const RESIDUAL: &str = "residual.safetensors";
+
+/// Writes `model`, learned from the prior in the file `prior`, into `folder`, `trained` being the full
+/// names of its trained coefficients. What stands there is replaced, the model file last.
+///
+/// # Errors
+/// If a file cannot be read or written.
+pub fn save(
+    model: &GreyBox,
+    prior: &Path,
+    trained: &[String],
+    origin: &Origin,
+    folder: &Path,
+) -> Result<(), ExportError> {
+    let fail = |doing, path: &Path| {
+        let path = path.to_owned();
+        move |why| ExportError::File { doing, path, why }
+    };
+    let text = std::fs::read_to_string(prior).map_err(fail("read", prior))?;
+    let wrong = |why: String| ExportError::Prior { path: prior.into(), why };
+    let mut table: toml::Table = toml::from_str(&text).map_err(|e| wrong(e.to_string()))?;
+    let airframe = table.get("airframe").and_then(|a| a.as_str()).unwrap_or(AIRFRAME);
+    let airframe = prior.parent().unwrap_or(Path::new(".")).join(airframe);
+    let airframe_text = std::fs::read(&airframe).map_err(fail("read", &airframe))?;
+    let name: String = format!("{}-learned", model.name).chars().take(64).collect();
+    let mut set = |key: &str, value: &str| table.insert(key.into(), value.into());
+    set("name", &name);
+    set("description", &format!("{}, with what {} learned beside it.", model.name, origin.program));
+    set("airframe", AIRFRAME);
+    set(
+        "integrator",
+        match model.integrator {
+            Integrator::Rk4 => "rk4",
+            Integrator::Jsbsim => "jsbsim",
+        },
+    );
+    set("residual", RESIDUAL);
+    for name in trained {
+        let value = model.coefficients().iter().find(|c| c.name == *name).map(|c| c.value);
+        let path: Vec<&str> = match name.as_str() {
+            JXZ => name.split('.').collect(),
+            _ => ["effects"].into_iter().chain(name.split('.')).collect(),
+        };
+        let value = value.unwrap_or(model.bare_body().jxz);
+        let entry = path.iter().try_fold(&mut table, |t, key| t.get_mut(*key)?.as_table_mut());
+        let entry = entry.ok_or_else(|| wrong(format!("it has no {name}")))?;
+        let before = entry.get("value").map(ToString::to_string).unwrap_or_default();
+        entry.insert("value".into(), value.into());
+        let source = format!(
+            "learned from flights (data {}), from {before}",
+            &origin.data[..12.min(origin.data.len())]
+        );
+        entry.insert("source".into(), source.into());
+    }
+    let text = toml::to_string(&table).map_err(|e| wrong(e.to_string()))?;
+    let residual = match &model.residual {
+        Some(residual) => residual.to_bytes(origin).map_err(|e| wrong(e.to_string()))?,
+        None => return Err(wrong("the model has no residual".into())),
+    };
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.join(name);
+        write_whole(&path, bytes).map_err(fail("write", &path))
+    };
+    write(AIRFRAME, &airframe_text)?;
+    write(RESIDUAL, &residual)?;
+    write(MODEL, text.as_bytes())
+}
+
+/// What a residual's file says of a training of `model` on `data` (SHA-256, hexadecimal).
+pub fn origin(model: &GreyBox, data: &str, seed: u64) -> Origin {
+    Origin {
+        schema: Origin::SCHEMA.into(),
+        airframe: fingerprint(&model.airframe),
+        data: data.into(),
+        seed,
+        program: concat!("greylag ", env!("CARGO_PKG_VERSION")).into(),
+    }
+}

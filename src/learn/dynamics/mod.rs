@@ -1,0 +1,17 @@
+//! The grey box learned from flights: prior coefficients and residual together, section IV-A of \[GSFM26\].
+
+pub(super) mod basis;
+pub(super) mod engine;
+pub(super) mod equation_error;
+pub mod export;
+pub(super) mod kernel;
+pub(super) mod loss;
+pub(super) mod network;
+pub(super) mod packet;
+pub(super) mod prior;
+pub(super) mod recipe;
+pub mod residual_map;
+pub(super) mod rollout;
+pub mod score;
+pub(super) mod trainer;
+pub mod windows;

@@ -1,0 +1,199 @@
+//! The network's forward pass with its trace kept, and the backward pass through it.
+
+use crate::learn::dynamics::packet::Packet;
+use crate::model::residual::{INPUTS, OUTPUTS};
+use crate::num::dense::{Layer, rectify};
+use crate::num::{Dense, Real};
+
+/// Inputs and outputs of a tile of a weight matrix whose gradient is summed in registers.
+const TILE: usize = 4;
+
+/// A network made ready for both passes.
+#[derive(Clone, Debug)]
+pub struct Passes {
+    network: Dense,
+    /// The weights of each layer as `[out, in]`, with as many zeros as it has inputs.
+    transposed: Vec<(Vec<f32>, Vec<f32>)>,
+}
+
+impl Passes {
+    /// Both passes of `network`.
+    pub fn new(network: Dense) -> Self {
+        let zeros = |n: usize| vec![0.0; n];
+        let sizes = network.sizes();
+        let transposed = sizes.windows(2).map(|s| (zeros(s[0] * s[1]), zeros(s[0]))).collect();
+        let mut passes = Passes { network, transposed };
+        passes.renew();
+        passes
+    }
+
+    /// The network.
+    pub fn network(&self) -> &Dense {
+        &self.network
+    }
+
+    /// Takes over the parameters that `change` leaves behind.
+    pub fn update(&mut self, change: impl FnOnce(&mut [f32])) {
+        change(self.network.parameters_mut());
+        self.renew();
+    }
+
+    fn renew(&mut self) {
+        for (layer, (turned, zeros)) in self.network.layers().zip(&mut self.transposed) {
+            let (inputs, outputs) = (zeros.len(), layer.bias.len());
+            for (i, row) in layer.weights.chunks_exact(outputs).enumerate() {
+                for (o, w) in row.iter().enumerate() {
+                    turned[o * inputs + i] = *w;
+                }
+            }
+        }
+    }
+
+    /// Numbers that the forward pass keeps of a point: all units but the last layer's.
+    pub fn trace(&self) -> usize {
+        let sizes = self.network.sizes();
+        sizes[..sizes.len() - 1].iter().sum()
+    }
+
+    /// Numbers that the backward pass keeps of a point: all units but the first layer's.
+    pub fn slopes(&self) -> usize {
+        self.network.sizes()[1..].iter().sum()
+    }
+
+    /// The network's answer; `trace` keeps what the backward pass needs.
+    #[inline(always)]
+    pub fn forward<R: Real>(&self, input: [R; INPUTS], trace: &mut [R]) -> [R; OUTPUTS] {
+        let mut output = [R::zero(); OUTPUTS];
+        trace[..INPUTS].copy_from_slice(&input);
+        let sizes = self.network.sizes();
+        let last = sizes.len() - 2;
+        let mut rest = trace;
+        for (k, layer) in self.network.layers().enumerate() {
+            let (from, after) = rest.split_at_mut(sizes[k]);
+            if k == last {
+                layer.apply(from, &mut output);
+            } else {
+                layer.apply(from, &mut after[..sizes[k + 1]]);
+                rectify(&mut after[..sizes[k + 1]]);
+            }
+            rest = after;
+        }
+        output
+    }
+
+    /// The slope with respect to the inputs, from the slope with respect to the outputs; `slopes`
+    /// keeps those of all units before they are rectified.
+    #[inline(always)]
+    pub fn backward<R: Real>(
+        &self,
+        trace: &[R],
+        output: [R; OUTPUTS],
+        slopes: &mut [R],
+    ) -> [R; INPUTS] {
+        let mut input = [R::zero(); INPUTS];
+        let sizes = self.network.sizes();
+        let end = slopes.len();
+        slopes[end - OUTPUTS..].copy_from_slice(&output);
+        let (mut place, mut seen) = (end - OUTPUTS, trace.len());
+        for (k, (weights, bias)) in self.transposed.iter().enumerate().rev() {
+            let layer = Layer { weights, bias };
+            let (before, after) = slopes.split_at_mut(place);
+            let from = &after[..sizes[k + 1]];
+            if k == 0 {
+                layer.apply(from, &mut input);
+                break;
+            }
+            place -= sizes[k];
+            seen -= sizes[k];
+            let to = &mut before[place..];
+            layer.apply(from, to);
+            for (slope, unit) in to.iter_mut().zip(&trace[seen..]) {
+                *slope = R::where_less(R::zero(), *unit, *slope, R::zero());
+            }
+        }
+        input
+    }
+
+    /// Adds to `gradient` what `points` points contribute, whose traces and slopes lie one after the
+    /// other.
+    #[inline(always)]
+    pub fn gather<R: Packet>(&self, traces: &[R], slopes: &[R], gradient: &mut [f64]) {
+        let sizes = self.network.sizes();
+        let (mut from, mut to, mut place) = (0, 0, 0);
+        for s in sizes.windows(2) {
+            let [inputs, outputs] = [s[0], s[1]];
+            let sides = Sides {
+                traces,
+                slopes,
+                stride: (self.trace(), self.slopes()),
+                first: (from, to),
+                outputs,
+            };
+            let (weights, rest) = gradient[place..].split_at_mut(inputs * outputs);
+            sides.weights(inputs, weights);
+            for (o, bias) in rest[..outputs].iter_mut().enumerate() {
+                let slopes = slopes.iter().skip(to + o).step_by(self.slopes());
+                *bias += slopes.fold(R::zero(), |sum, s| sum + *s).sum().into();
+            }
+            (from, to, place) = (from + inputs, to + outputs, place + (inputs + 1) * outputs);
+        }
+    }
+}
+
+/// What a layer's gradient is made of: Σ over points of unit · slope.
+struct Sides<'a, R> {
+    traces: &'a [R],
+    slopes: &'a [R],
+    stride: (usize, usize),
+    first: (usize, usize),
+    outputs: usize,
+}
+
+impl<R: Packet> Sides<'_, R> {
+    #[inline(always)]
+    fn weights(&self, inputs: usize, gradient: &mut [f64]) {
+        let mut i = 0;
+        while i + TILE <= inputs {
+            self.rows::<TILE>(i, gradient);
+            i += TILE;
+        }
+        while i < inputs {
+            self.rows::<1>(i, gradient);
+            i += 1;
+        }
+    }
+
+    #[inline(always)]
+    fn rows<const I: usize>(&self, i: usize, gradient: &mut [f64]) {
+        let mut o = 0;
+        while o + TILE <= self.outputs {
+            self.tile::<I, TILE>(i, o, gradient);
+            o += TILE;
+        }
+        while o < self.outputs {
+            self.tile::<I, 1>(i, o, gradient);
+            o += 1;
+        }
+    }
+
+    #[inline(always)]
+    fn tile<const I: usize, const O: usize>(&self, i: usize, o: usize, gradient: &mut [f64]) {
+        let mut sums = [[R::zero(); O]; I];
+        let traces = self.traces.chunks_exact(self.stride.0);
+        for (trace, slope) in traces.zip(self.slopes.chunks_exact(self.stride.1)) {
+            let units = &trace[self.first.0 + i..][..I];
+            let slopes = &slope[self.first.1 + o..][..O];
+            for (sums, unit) in sums.iter_mut().zip(units) {
+                for (sum, slope) in sums.iter_mut().zip(slopes) {
+                    *sum = unit.mul_add(*slope, *sum);
+                }
+            }
+        }
+        for (a, sums) in sums.into_iter().enumerate() {
+            let row = &mut gradient[(i + a) * self.outputs + o..][..O];
+            for (entry, sum) in row.iter_mut().zip(sums) {
+                *entry += sum.sum().into();
+            }
+        }
+    }
+}

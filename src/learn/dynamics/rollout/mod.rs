@@ -1,0 +1,291 @@
+//! A block of rollouts: forward with a trace, then in reverse for the slopes, eqs. (20) and (22).
+
+mod jsbsim;
+mod rk4;
+
+use crate::learn::dynamics::kernel::InstructionSet;
+use crate::learn::dynamics::network::Passes;
+use crate::learn::dynamics::packet::Packet;
+use crate::learn::dynamics::prior::{At, Slopes};
+use crate::model::residual::Scales;
+use crate::model::{GreyBox, Integrator};
+use crate::num::Real;
+use crate::physics::rigid_body::Vector;
+use crate::physics::{Controls, State};
+
+/// Points whose weight gradients are summed at once, so that what they read stays in the cache.
+const CHUNK: usize = 20;
+
+/// The model that is learned.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The prior with its present coefficients; its own residual is not used.
+    pub prior: GreyBox,
+    /// The residual's network.
+    pub network: Passes,
+    /// Its scales.
+    pub scales: Scales,
+    /// Whether the slopes with respect to the prior's coefficients are wanted.
+    pub prior_slopes: PriorSlopes,
+}
+
+/// Whether the prior's coefficients are learned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PriorSlopes {
+    /// They stay.
+    None,
+    /// The slopes with respect to all of them, and to Jxz, are summed up.
+    All,
+}
+
+/// What was recorded of `Packet::WIDTH` rollouts.
+#[derive(Clone, Debug, Default)]
+pub struct Recorded<R> {
+    /// States before the start, at the start, and after each step; roll in −π..π.
+    pub states: Vec<[R; 8]>,
+    /// Aileron, elevator, throttle that act, from the step before the start on.
+    pub controls: Vec<[R; 3]>,
+    /// Air density from the step before the start on, kg/m³.
+    pub density: Vec<R>,
+    /// What each rollout counts; 0 for one that fills the block up.
+    pub weight: Option<R>,
+}
+
+/// What a forward pass leaves for the reverse one. Step 0 is the one before the start, which
+/// [`Integrator::Jsbsim`] remembers; RK4 leaves it out.
+#[derive(Clone, Debug)]
+pub struct Trace<R> {
+    /// The states at which the model was asked: one a step, four a step for RK4.
+    states: Vec<State<R>>,
+    /// The network's units at each of them.
+    units: Vec<R>,
+    /// F_p and F_a at the start of each step.
+    rates: Vec<[State<R>; 2]>,
+    /// The states after each step.
+    ends: Vec<State<R>>,
+    /// The acceleration in each step, and what is remembered before it.
+    memory: Vec<[Vector<R>; 2]>,
+    /// The network's slopes of a chunk of points.
+    slopes: Vec<R>,
+    /// Sums over points of the slopes with respect to the coefficients.
+    coefficients: Vec<R>,
+}
+
+/// What a forward pass finds, summed over the rollouts that count.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sums {
+    /// Σ over steps of ‖(ŝ − s)/x_c‖².
+    pub error: f64,
+    /// Σ over steps of ‖F_p/x_c‖².
+    pub prior: f64,
+    /// Σ over steps of ‖F_a/x_c‖².
+    pub learned: f64,
+}
+
+/// Slopes of the objective with respect to the three of [`Sums`].
+pub type SumSlopes = Sums;
+
+/// Slopes of the objective with respect to what is learned.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Gradient {
+    /// With respect to the network's parameters.
+    pub network: Vec<f64>,
+    /// With respect to the prior's coefficients, then Jxz (kg m²).
+    pub prior: Vec<f64>,
+}
+
+/// How often a step asks the model.
+const fn stages(integrator: Integrator) -> usize {
+    match integrator {
+        Integrator::Rk4 => 4,
+        Integrator::Jsbsim => 1,
+    }
+}
+
+impl<R: Packet> Trace<R> {
+    /// Room for rollouts of up to `steps` steps of `subject`.
+    pub fn new(subject: &Subject, steps: usize) -> Self {
+        let points = (steps + 1) * stages(subject.prior.integrator);
+        let nothing = nothing();
+        Trace {
+            states: vec![nothing; points],
+            units: vec![R::zero(); points * subject.network.trace()],
+            rates: vec![[nothing; 2]; steps + 1],
+            ends: vec![nothing; steps + 1],
+            memory: vec![[[R::zero(); 3]; 2]; steps + 1],
+            slopes: vec![R::zero(); CHUNK * subject.network.slopes()],
+            coefficients: vec![R::zero(); subject.prior.coefficients().len() + 1],
+        }
+    }
+}
+
+#[inline(always)]
+fn nothing<R: Real>() -> State<R> {
+    State::from_array([R::zero(); 8])
+}
+
+#[inline(always)]
+fn sum<R: Real>(a: &State<R>, b: &State<R>) -> State<R> {
+    a.advance(b, 1.0)
+}
+
+/// A pass over one block.
+pub struct Pass<'a, S: InstructionSet> {
+    /// The instructions it is compiled for.
+    pub set: S,
+    /// The model.
+    pub subject: &'a Subject,
+    /// What was recorded.
+    pub recorded: &'a Recorded<S::Number>,
+    /// The scale of errors and rates, eq. (21) or ones.
+    pub scale: &'a [f64; 8],
+}
+
+impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
+    fn steps(&self) -> usize {
+        self.recorded.controls.len() - 1
+    }
+
+    /// Flies the block: the sums, and a number a lane that is finite where the path is.
+    #[inline(always)]
+    pub fn forward(&self, trace: &mut Trace<R>) -> (Sums, R) {
+        let totals = match self.subject.prior.integrator {
+            Integrator::Rk4 => self.forward_rk4(trace),
+            Integrator::Jsbsim => self.forward_jsbsim(trace),
+        };
+        let [error, prior, learned] = totals.map(|t| t.sum().into());
+        (Sums { error, prior, learned }, totals[0] + totals[1] + totals[2])
+    }
+
+    /// Adds the slopes of what was flown to `gradient`, `of` being those with respect to the sums.
+    #[inline(always)]
+    pub fn reverse(&self, trace: &mut Trace<R>, of: &SumSlopes, gradient: &mut Gradient) {
+        trace.coefficients.fill(R::zero());
+        match self.subject.prior.integrator {
+            Integrator::Rk4 => self.reverse_rk4(trace, of, gradient),
+            Integrator::Jsbsim => self.reverse_jsbsim(trace, of, gradient),
+        }
+        for (sum, part) in gradient.prior.iter_mut().zip(&trace.coefficients) {
+            *sum += part.sum().into();
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, step: usize, state: State<R>) -> At<R> {
+        let [aileron, elevator, throttle] = self.recorded.controls[step];
+        let controls = Controls { aileron, elevator, throttle };
+        At { state, controls, density: self.recorded.density[step] }
+    }
+
+    /// F_a at a point.
+    #[inline(always)]
+    fn learned(&self, at: &At<R>, point: usize, trace: &mut Trace<R>) -> State<R> {
+        let Subject { network, scales, .. } = self.subject;
+        let width = network.trace();
+        let units = &mut trace.units[point * width..][..width];
+        trace.states[point] = at.state;
+        scales.rate(network.forward(scales.inputs(&at.state, &at.controls), units))
+    }
+
+    /// x/x_c² and ‖x/x_c‖² of the rollouts that count.
+    #[inline(always)]
+    fn weighted(&self, x: [R; 8]) -> ([R; 8], R) {
+        let weight = self.recorded.weight.unwrap_or(R::from_f64(1.0));
+        let mut square = R::zero();
+        let mut half_slope = x;
+        for (x, scale) in half_slope.iter_mut().zip(self.scale) {
+            let y = (*x * weight).scale(1.0 / (scale * scale));
+            square += *x * y;
+            *x = y;
+        }
+        (half_slope, square)
+    }
+
+    /// ŝ − s weighted so after `step`; roll the short way round.
+    #[inline(always)]
+    fn error(&self, step: usize, predicted: &State<R>) -> ([R; 8], R) {
+        use std::f64::consts::{PI, TAU};
+        let mut error = predicted.to_array();
+        for (error, seen) in error.iter_mut().zip(&self.recorded.states[step + 1]) {
+            *error -= *seen;
+        }
+        let (half, turn) = (R::from_f64(PI), R::from_f64(TAU));
+        error[0] = R::where_less(half, error[0], error[0] - turn, error[0]);
+        error[0] = R::where_less(error[0], -half, error[0] + turn, error[0]);
+        self.weighted(error)
+    }
+
+    /// Adds a step's error and norms.
+    #[inline(always)]
+    fn tally(&self, step: usize, trace: &Trace<R>, totals: &mut [R; 3]) {
+        let [prior, learned] = &trace.rates[step];
+        totals[0] += self.error(step, &trace.ends[step]).1;
+        totals[1] += self.weighted(prior.to_array()).1;
+        totals[2] += self.weighted(learned.to_array()).1;
+    }
+
+    /// Slopes with respect to the state after a step, to F_p and to F_a that the step's part of the
+    /// sums has.
+    #[inline(always)]
+    fn direct(&self, step: usize, trace: &Trace<R>, of: &SumSlopes) -> [State<R>; 3] {
+        let [prior, learned] = &trace.rates[step];
+        let error = State::from_array(self.error(step, &trace.ends[step]).0);
+        let prior = State::from_array(self.weighted(prior.to_array()).0);
+        let learned = State::from_array(self.weighted(learned.to_array()).0);
+        [
+            nothing().advance(&error, 2.0 * of.error),
+            nothing().advance(&prior, 2.0 * of.prior),
+            nothing().advance(&learned, 2.0 * of.learned),
+        ]
+    }
+
+    /// Slopes through prior and residual at a point, to the state there; adds those to what is
+    /// learned. Points come in falling order.
+    #[inline(always)]
+    fn point(
+        &self,
+        trace: &mut Trace<R>,
+        place: Place,
+        prior: &Slopes<R>,
+        learned: &State<R>,
+        gradient: &mut Gradient,
+    ) -> State<R> {
+        let Place { step, point, first } = place;
+        let Subject { network, scales, .. } = self.subject;
+        let at = self.at(step, trace.states[point]);
+        let mut slope = self.set.slope(&self.subject.prior, &at, prior);
+        if self.subject.prior_slopes == PriorSlopes::All {
+            self.set.coefficients(&self.subject.prior, &at, prior, &mut trace.coefficients);
+        }
+        let (width, wide) = (network.trace(), network.slopes());
+        let slot = (point - first) % CHUNK;
+        let mut output = learned.to_array();
+        for (slope, scale) in output.iter_mut().zip(&scales.output) {
+            *slope = slope.scale(*scale);
+        }
+        let units = &trace.units[point * width..][..width];
+        let input = network.backward(units, output, &mut trace.slopes[slot * wide..][..wide]);
+        // the first six inputs are the state from airspeed on
+        for i in 0..6 {
+            slope[2 + i] = input[i].mul_add(R::from_f64(scales.factor[i]), slope[2 + i]);
+        }
+        if slot == 0 {
+            let points = (self.steps() + 1) * stages(self.subject.prior.integrator);
+            let count = CHUNK.min(points - point);
+            let units = &trace.units[point * width..][..count * width];
+            network.gather(units, &trace.slopes[..count * wide], &mut gradient.network);
+        }
+        State::from_array(slope)
+    }
+}
+
+/// A point of a rollout.
+#[derive(Clone, Copy)]
+struct Place {
+    /// The step it belongs to.
+    step: usize,
+    /// Its number.
+    point: usize,
+    /// The number of the first point of the rollout.
+    first: usize,
+}

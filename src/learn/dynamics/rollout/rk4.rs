@@ -1,0 +1,70 @@
+//! Rollouts by the classical Runge–Kutta scheme.
+
+use crate::learn::dynamics::kernel::InstructionSet;
+use crate::learn::dynamics::packet::Packet;
+use crate::learn::dynamics::prior::Slopes;
+use crate::learn::dynamics::rollout::{Gradient, Pass, Place, SumSlopes, Trace, nothing, sum};
+use crate::model::STEP;
+use crate::physics::State;
+
+/// Weights of the four slopes, in steps.
+const WEIGHTS: [f64; 4] = [STEP / 6.0, STEP / 3.0, STEP / 3.0, STEP / 6.0];
+/// How far before each of the slopes the state is moved along the one before, in steps.
+const AHEAD: [f64; 4] = [0.0, STEP / 2.0, STEP / 2.0, STEP];
+
+impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
+    #[inline(always)]
+    pub(super) fn forward_rk4(&self, trace: &mut Trace<R>) -> [R; 3] {
+        let mut totals = [R::zero(); 3];
+        let mut state = State::from_array(self.recorded.states[1]);
+        for step in 1..=self.steps() {
+            let start = state;
+            let mut rate = nothing();
+            for stage in 0..4 {
+                let at = self.at(step, start.advance(&rate, AHEAD[stage]));
+                let learned = self.learned(&at, 4 * step + stage, trace);
+                let prior = self.set.ask(&self.subject.prior, &at).rate;
+                if stage == 0 {
+                    trace.rates[step] = [prior, learned];
+                }
+                rate = sum(&prior, &learned);
+                state = state.advance(&rate, WEIGHTS[stage]);
+            }
+            trace.ends[step] = state;
+            self.tally(step, trace, &mut totals);
+        }
+        totals
+    }
+
+    #[inline(always)]
+    pub(super) fn reverse_rk4(
+        &self,
+        trace: &mut Trace<R>,
+        of: &SumSlopes,
+        gradient: &mut Gradient,
+    ) {
+        // the slope with respect to the state after the step
+        let mut slope = nothing();
+        for step in (1..=self.steps()).rev() {
+            let [error, norm_prior, norm_learned] = self.direct(step, trace, of);
+            slope = sum(&slope, &error);
+            let mut before = slope;
+            // the slope with respect to the state at which the stage after this one asked
+            let mut later = nothing();
+            for stage in (0..4).rev() {
+                let ahead = AHEAD.get(stage + 1).copied().unwrap_or(0.0);
+                let rate = nothing().advance(&slope, WEIGHTS[stage]).advance(&later, ahead);
+                let mut slopes = [rate; 2];
+                if stage == 0 {
+                    slopes = [sum(&rate, &norm_prior), sum(&rate, &norm_learned)];
+                }
+                let none = [R::zero(); 3];
+                let prior = Slopes { acceleration: none, spin: none, rate: slopes[0] };
+                let point = Place { step, point: 4 * step + stage, first: 4 };
+                later = self.point(trace, point, &prior, &slopes[1], gradient);
+                before = sum(&before, &later);
+            }
+            slope = before;
+        }
+    }
+}

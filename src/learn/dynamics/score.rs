@@ -1,0 +1,79 @@
+//! Free runs of a model over recorded tracks: how its error grows with the horizon.
+
+use rayon::prelude::*;
+
+use crate::learn::dynamics::windows::{Track, Window, windows};
+use crate::model::{GreyBox, Memory};
+
+/// Steps between starts.
+const EVERY: usize = 50;
+
+/// Scaled error at which a run counts as lost, and is counted with.
+const BOUND: f64 = 1.0;
+
+/// The error after a number of steps.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Horizon {
+    /// Steps.
+    pub steps: usize,
+    /// Runs that long.
+    pub runs: usize,
+    /// Root mean square over runs of the error, itself the root mean square over the states of
+    /// (ŝ − s)/x_c; a run counts 1 at most.
+    pub rms: f64,
+    /// Median over runs of the same.
+    pub median: f64,
+    /// Part of the runs that reached the bound.
+    pub lost: f64,
+}
+
+/// Errors of `model` flying freely over `tracks` under what acted, after each of `horizons` steps.
+pub fn free_run(model: &GreyBox, tracks: &[Track], horizons: &[usize]) -> Vec<Horizon> {
+    horizons.iter().map(|steps| horizon(model, tracks, *steps)).collect()
+}
+
+fn horizon(model: &GreyBox, tracks: &[Track], steps: usize) -> Horizon {
+    let starts: Vec<Window> =
+        windows(tracks, steps).into_iter().filter(|w| w.start as usize % EVERY == 1).collect();
+    let mut errors: Vec<f64> =
+        starts.par_iter().map(|w| off_after(model, tracks, w, steps)).collect();
+    errors.sort_by(f64::total_cmp);
+    let runs = errors.len();
+    let mean = errors.iter().map(|e| e * e).sum::<f64>() / runs as f64;
+    let lost = errors.iter().filter(|e| **e >= BOUND).count() as f64 / runs as f64;
+    Horizon {
+        steps,
+        runs,
+        rms: mean.sqrt(),
+        median: errors.get(runs / 2).copied().unwrap_or(f64::NAN),
+        lost,
+    }
+}
+
+/// The error of one run after `steps` steps from `window` on: the root mean square over the states of
+/// (ŝ − s)/x_c, 1 at most.
+pub(in crate::learn) fn off_after(
+    model: &GreyBox,
+    tracks: &[Track],
+    window: &Window,
+    steps: usize,
+) -> f64 {
+    let (track, start) = (&tracks[window.track as usize], window.start as usize);
+    let mut memory = Memory::default();
+    let advance = |k: usize, state, memory: &mut Memory| {
+        model.step(&state, &track.controls[k], track.altitude[k], memory)
+    };
+    // what the integrator remembers of the step before
+    advance(start - 1, track.states[start - 1], &mut memory);
+    let mut state = track.states[start];
+    for k in start..start + steps {
+        state = advance(k, state, &mut memory);
+    }
+    let (seen, scale) = (track.states[start + steps].to_array(), model.scale());
+    let mut error: [f64; 8] = std::array::from_fn(|i| state.to_array()[i] - seen[i]);
+    let turn = std::f64::consts::TAU;
+    error[0] = (error[0] + 0.5 * turn).rem_euclid(turn) - 0.5 * turn;
+    let mean = (0..8).map(|i| (error[i] / scale[i]).powi(2)).sum::<f64>() / 8.0;
+    // a run that left the numbers is lost
+    if mean.is_finite() { mean.sqrt().min(BOUND) } else { BOUND }
+}

@@ -1,0 +1,155 @@
+//! Recorded flights as training data: tracks of states under controls, cut into windows.
+
+use sha2::{Digest, Sha256};
+
+use crate::learn::dynamics::packet::Packet;
+use crate::learn::dynamics::rollout::Recorded;
+use crate::logs::Flight;
+use crate::model::GreyBox;
+use crate::physics::inputs::InputMemory;
+use crate::physics::{Controls, State};
+
+/// A stretch of flight without gaps, a sample every 0.01 s.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Track {
+    /// The states.
+    pub states: Vec<State>,
+    /// The controls that acted from each sample to the next.
+    pub controls: Vec<Controls>,
+    /// Altitude at each sample, m.
+    pub altitude: Vec<f64>,
+    /// Air density at each sample as the model has it, kg/m³.
+    pub density: Vec<f64>,
+}
+
+impl Track {
+    /// A track of `samples` (state, measured controls, altitude in m): what acts, and in which air,
+    /// is what `model` says.
+    pub fn new(model: &GreyBox, samples: impl Iterator<Item = (State, Controls, f64)>) -> Track {
+        let mut track = Track::default();
+        let mut memory: Option<InputMemory> = None;
+        for (state, controls, altitude) in samples {
+            let memory = memory.get_or_insert_with(|| InputMemory::at_rest(&controls));
+            track.states.push(state);
+            track.controls.push(model.act(&controls, memory));
+            track.altitude.push(altitude);
+            track.density.push(model.atmosphere.density_at(altitude));
+        }
+        track
+    }
+
+    /// The track of a recorded flight whose states are known as they are, as `greylag collect` writes it.
+    pub fn of(model: &GreyBox, flight: &Flight) -> Track {
+        let rows = flight.samples.iter().map(|s| {
+            let [roll, pitch, _] = s.attitude_rad;
+            let [p, q, r] = s.rates_radps;
+            let (airspeed, alpha, beta) = (s.airspeed_mps, s.alpha_rad, s.beta_rad);
+            let state = State { roll, pitch, airspeed, p, q, r, alpha, beta };
+            let (aileron, elevator) = (s.aileron_rad, s.elevator_rad);
+            (state, Controls { aileron, elevator, throttle: s.throttle }, s.altitude_m)
+        });
+        Track::new(model, rows)
+    }
+
+    /// Where rollouts of `steps` steps can start: one sample is kept before, `steps` after.
+    pub fn starts(&self, steps: usize) -> std::ops::Range<usize> {
+        1..self.states.len().saturating_sub(steps).max(1)
+    }
+}
+
+/// The start of a rollout.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// The track's number.
+    pub track: u32,
+    /// The sample's number in it, 1 at least.
+    pub start: u32,
+    /// What it counts in the loss; 1 in the paper's.
+    pub weight: f64,
+}
+
+/// Steepest pitch at which Euler angles still move slowly, rad: beyond it they have a pole.
+const STEEPEST: f64 = 1.4;
+/// Airspeed under which flow angles mean nothing, m/s.
+const SLOWEST: f64 = 5.0;
+
+/// Whether the eight variables describe the flight well there.
+pub(in crate::learn) fn regular(state: &State) -> bool {
+    state.is_finite() && state.pitch.abs() < STEEPEST && state.airspeed > SLOWEST
+}
+
+/// Every window of `steps` steps, in order, in which the aircraft flies and does not point at the
+/// zenith or the nadir.
+pub fn windows(tracks: &[Track], steps: usize) -> Vec<Window> {
+    let mut all = Vec::new();
+    for (track, t) in tracks.iter().enumerate() {
+        // regular samples up to each one
+        let mut run = 0;
+        let runs: Vec<usize> = t
+            .states
+            .iter()
+            .map(|s| {
+                run = if regular(s) { run + 1 } else { 0 };
+                run
+            })
+            .collect();
+        let good = |start: &usize| runs[start + steps] >= steps + 2;
+        let starts = t.starts(steps).filter(good);
+        all.extend(starts.map(|start| Window {
+            track: track as u32,
+            start: start as u32,
+            weight: 1.0,
+        }));
+    }
+    all
+}
+
+/// SHA-256 of the tracks, hexadecimal.
+pub fn hash(tracks: &[Track]) -> String {
+    let mut hash = Sha256::new();
+    for track in tracks {
+        hash.update((track.states.len() as u64).to_le_bytes());
+        for k in 0..track.states.len() {
+            let Controls { aileron, elevator, throttle } = track.controls[k];
+            let rest = [aileron, elevator, throttle, track.altitude[k]];
+            for x in track.states[k].to_array().iter().chain(&rest) {
+                hash.update(x.to_le_bytes());
+            }
+        }
+    }
+    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+impl<R: Packet> Recorded<R> {
+    /// Takes over the windows of a block, `steps` long; lanes beyond `windows` repeat the first and
+    /// do not count.
+    ///
+    /// # Panics
+    /// If there is no window, or more than lanes.
+    pub fn fill(&mut self, tracks: &[Track], windows: &[Window], steps: usize) {
+        assert!((1..=R::WIDTH).contains(&windows.len()), "a window for each lane");
+        let of = |lane: usize| windows.get(lane).unwrap_or(&windows[0]);
+        let pick = |k: usize, get: &dyn Fn(&Track, usize) -> f64| {
+            R::gather(|lane| {
+                let Window { track, start, .. } = *of(lane);
+                get(&tracks[track as usize], start as usize - 1 + k)
+            })
+        };
+        self.states.clear();
+        self.controls.clear();
+        self.density.clear();
+        for k in 0..steps + 2 {
+            self.states.push(std::array::from_fn(|i| pick(k, &|t, s| t.states[s].to_array()[i])));
+        }
+        for k in 0..steps + 1 {
+            self.controls.push([
+                pick(k, &|t, s| t.controls[s].aileron),
+                pick(k, &|t, s| t.controls[s].elevator),
+                pick(k, &|t, s| t.controls[s].throttle),
+            ]);
+            self.density.push(pick(k, &|t, s| t.density[s]));
+        }
+        let counts = |lane: usize| windows.get(lane).map_or(0.0, |w| w.weight);
+        self.weight = Some(R::gather(counts));
+    }
+}

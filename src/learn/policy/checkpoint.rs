@@ -1,0 +1,128 @@
+//! The checkpoint of a policy's training, in a file that is there whole or not at all.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+
+use crate::learn::checkpoint::{CheckpointError, write_whole};
+use crate::learn::policy::mlp::Moments;
+use crate::learn::policy::td3::Standing;
+use crate::learn::policy::trainer::PolicyStanding;
+
+const SCHEMA: &str = "greylag.policy-checkpoint/1";
+const METADATA: &str = "greylag";
+/// The networks, in the order of a [`Standing`].
+const NAMES: [&str; 3] = ["actor", "critic1", "critic2"];
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Said {
+    schema: String,
+    identity: String,
+    steps: u64,
+    targets: u64,
+    remembered: u64,
+    updates: u64,
+    adam_steps: [u64; 3],
+}
+
+impl PolicyStanding {
+    /// Writes it in place of any file at `path`; a reader sees the old one or the new one.
+    ///
+    /// # Errors
+    /// If the disk refuses.
+    pub fn save(&self, path: &Path) -> Result<(), CheckpointError> {
+        let bytes =
+            to_bytes(self).map_err(|why| CheckpointError::Content { path: path.into(), why })?;
+        write_whole(path, &bytes).map_err(|why| CheckpointError::File {
+            doing: "write",
+            path: path.into(),
+            why,
+        })
+    }
+
+    /// Reads one.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is none.
+    pub fn load(path: &Path) -> Result<PolicyStanding, CheckpointError> {
+        let bytes = std::fs::read(path).map_err(|why| CheckpointError::File {
+            doing: "read",
+            path: path.into(),
+            why,
+        })?;
+        from_bytes(&bytes).map_err(|why| CheckpointError::Content { path: path.into(), why })
+    }
+}
+
+/// The lists of a standing, each with its name.
+fn lists(standing: &PolicyStanding) -> Vec<(String, &[f32])> {
+    let mut lists = vec![("replay".to_owned(), &standing.replay[..])];
+    for (name, (own, target, moments)) in NAMES.iter().zip(&standing.td3.networks) {
+        lists.push((format!("{name}.own"), own));
+        lists.push((format!("{name}.target"), target));
+        lists.push((format!("{name}.mean"), &moments.mean));
+        lists.push((format!("{name}.square"), &moments.square));
+    }
+    lists
+}
+
+fn to_bytes(standing: &PolicyStanding) -> Result<Vec<u8>, String> {
+    let little = |list: &[f32]| list.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let parts: Vec<_> =
+        lists(standing).into_iter().map(|(name, list)| (name, list.len(), little(list))).collect();
+    let views = parts
+        .iter()
+        .map(|(name, count, bytes)| {
+            TensorView::new(Dtype::F32, vec![*count], bytes).map(|view| (name.as_str(), view))
+        })
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|e| e.to_string())?;
+    let said = Said {
+        schema: SCHEMA.into(),
+        identity: standing.identity.clone(),
+        steps: standing.steps,
+        targets: standing.targets,
+        remembered: standing.remembered,
+        updates: standing.td3.updates,
+        adam_steps: standing.td3.networks.each_ref().map(|(_, _, moments)| moments.steps),
+    };
+    let said = serde_json::to_string(&said).map_err(|e| e.to_string())?;
+    let metadata = HashMap::from([(METADATA.to_owned(), said)]);
+    safetensors::serialize(views, Some(metadata)).map_err(|e| e.to_string())
+}
+
+fn from_bytes(bytes: &[u8]) -> Result<PolicyStanding, String> {
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
+    let said = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let said: Said = serde_json::from_str(said.ok_or("it has no metadata of ours")?)
+        .map_err(|e| e.to_string())?;
+    if said.schema != SCHEMA {
+        return Err(format!("its schema is {:?}, this program reads {SCHEMA}", said.schema));
+    }
+    let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
+    let list = |name: String| -> Result<Vec<f32>, String> {
+        match tensors.tensor(&name) {
+            Ok(t) if t.dtype() == Dtype::F32 => {
+                let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+                Ok(t.data().chunks_exact(4).map(number).collect())
+            }
+            _ => Err(format!("it has no {name} of F32")),
+        }
+    };
+    let network = |k: usize| -> Result<(Vec<f32>, Vec<f32>, Moments), String> {
+        let part = |what: &str| list(format!("{}.{what}", NAMES[k]));
+        let (mean, square) = (part("mean")?, part("square")?);
+        Ok((part("own")?, part("target")?, Moments { steps: said.adam_steps[k], mean, square }))
+    };
+    Ok(PolicyStanding {
+        identity: said.identity,
+        steps: said.steps,
+        targets: said.targets,
+        remembered: said.remembered,
+        replay: list("replay".into())?,
+        td3: Standing { updates: said.updates, networks: [network(0)?, network(1)?, network(2)?] },
+    })
+}

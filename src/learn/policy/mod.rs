@@ -1,0 +1,10 @@
+//! Policies and critics, learned in an imagined environment.
+
+pub(super) mod analytic;
+pub(super) mod checkpoint;
+pub(super) mod critic_fit;
+pub mod learning_curve;
+pub(super) mod mlp;
+pub(super) mod replay;
+pub(super) mod td3;
+pub(super) mod trainer;

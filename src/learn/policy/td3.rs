@@ -1,0 +1,267 @@
+//! TD3 (Fujimoto et al. 2018), Table VII of \[GSFM26\], in the order of the algorithm.
+//!
+//! What departs from the paper:
+//! - Observations are scaled, and targets observed as what is left to them
+//!   ([`crate::control::policy::observe`]): the same information.
+//! - An aircraft that leaves the model's envelope earns the worst reward for ever,
+//!   −(κ_φ + κ_θ + κ_v)/(1 − γ), and nothing follows. The end of an episode's time is no end: what
+//!   follows is valued as ever. The paper says nothing of either.
+//! - The actor's last layer starts small, so that it starts at neutral surfaces and half throttle.
+
+use burn::tensor::{Device, Tensor, TensorData};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::control::policy::{ACTIONS, OBSERVATIONS};
+use crate::learn::policy::mlp::{Mlp, Moments, Optimiser};
+use crate::learn::policy::replay::Batch;
+use crate::num::Dense;
+use crate::num::dense::DenseError;
+
+/// Hyperparameters; [`Hyperparameters::default`] is Table VII.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Hyperparameters {
+    /// Units of the actor's hidden layers.
+    pub actor: Vec<usize>,
+    /// Units of a critic's hidden layers.
+    pub critic: Vec<usize>,
+    /// Discount γ.
+    pub discount: f64,
+    /// Rate τ at which the target networks follow.
+    pub tau: f64,
+    /// Learning rate of the actor.
+    pub actor_rate: f64,
+    /// Learning rate of the critics.
+    pub critic_rate: f64,
+    /// Updates of the critics for one of the actor, d.
+    pub delay: u64,
+    /// Standard deviation of the noise that smooths the target policy, σ.
+    pub smoothing: f64,
+    /// Where that noise is clipped, c.
+    pub smoothing_clip: f64,
+    /// Standard deviation of the noise that explores.
+    pub exploration: f64,
+    /// Rows of a minibatch.
+    pub batch: usize,
+}
+
+impl Default for Hyperparameters {
+    fn default() -> Self {
+        Hyperparameters {
+            actor: vec![300, 300],
+            critic: vec![200, 200, 200],
+            discount: 0.99,
+            tau: 0.05,
+            actor_rate: 3e-4,
+            critic_rate: 3e-4,
+            delay: 2,
+            smoothing: 0.2,
+            smoothing_clip: 0.5,
+            exploration: 0.1,
+            batch: 256,
+        }
+    }
+}
+
+/// The six networks with their optimisers.
+#[derive(Clone)]
+pub struct Td3 {
+    settings: Hyperparameters,
+    device: Device,
+    actor: Learner,
+    critics: [Learner; 2],
+    updates: u64,
+}
+
+/// A network, the target network that follows it, and its optimiser.
+#[derive(Clone)]
+struct Learner {
+    network: Mlp,
+    target: Mlp,
+    optimiser: Optimiser,
+}
+
+/// What an update saw.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Losses {
+    /// Mean squared error of both critics, eq. (2).
+    pub critics: f32,
+}
+
+/// Where a [`Td3`] stands: for actor, first and second critic the parameters, those of the target
+/// network, and what the optimiser remembers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standing {
+    /// Updates made.
+    pub updates: u64,
+    /// The networks.
+    pub networks: [(Vec<f32>, Vec<f32>, Moments); 3],
+}
+
+impl Learner {
+    fn new(network: &Dense, rate: f64, device: &Device) -> Learner {
+        let network = Mlp::new(network, device);
+        let optimiser = Optimiser::new(&network, rate);
+        Learner { target: network.clone(), network, optimiser }
+    }
+
+    fn standing(&self) -> (Vec<f32>, Vec<f32>, Moments) {
+        (self.network.parameters(), self.target.parameters(), self.optimiser.moments())
+    }
+}
+
+impl Td3 {
+    /// Networks drawn from `rng`.
+    ///
+    /// # Errors
+    /// If a layer cannot be evaluated.
+    pub fn new(settings: Hyperparameters, rng: &mut impl Rng) -> Result<Td3, DenseError> {
+        let device = Device::flex();
+        let mut actor = Dense::uniform(&settings.actor_sizes(), rng)?;
+        let last = settings.actor.last().map_or(0, |n| (n + 1) * ACTIONS);
+        let first = actor.parameters().len() - last;
+        actor.parameters_mut()[first..].iter_mut().for_each(|p| *p *= 0.1);
+        let mut critic = || Dense::uniform(&settings.critic_sizes(), rng);
+        let critics = [critic()?, critic()?];
+        Ok(Td3 {
+            actor: Learner::new(&actor, settings.actor_rate, &device),
+            critics: critics.map(|c| Learner::new(&c, settings.critic_rate, &device)),
+            settings,
+            device,
+            updates: 0,
+        })
+    }
+
+    /// One update from `batch`, eq. (1) to (3); `rng` draws the smoothing noise.
+    pub fn update(&mut self, batch: &Batch, rng: &mut impl Rng) -> Losses {
+        let rows = |numbers: &[f32], width: usize| -> Tensor<2> {
+            let data = TensorData::new(numbers.to_vec(), [batch.size, width]);
+            Tensor::from_data(data, &self.device)
+        };
+        let observed = rows(&batch.observed, OBSERVATIONS);
+        // what the next step is worth: eq. (1)
+        let next = rows(&batch.next, OBSERVATIONS);
+        let noise = rows(&self.noise(batch.size, rng), ACTIONS);
+        let action = (self.actor.target.forward(next.clone()).tanh() + noise).clamp(-1.0, 1.0);
+        let there = Tensor::cat(vec![next, action], 1);
+        let [one, two] = &self.critics;
+        let value = one.target.forward(there.clone()).min_pair(two.target.forward(there));
+        let goes_on = rows(&batch.goes_on, 1) * self.settings.discount;
+        let wanted = (rows(&batch.reward, 1) + goes_on * value).autodiff();
+        // the critics: eq. (2)
+        let here = Tensor::cat(vec![observed.clone(), rows(&batch.action, ACTIONS)], 1).autodiff();
+        let followed = [one.network.followed(), two.network.followed()];
+        let [one, two] =
+            [0, 1].map(|k| (followed[k].forward(here.clone()) - wanted.clone()).square().mean());
+        let loss = one + two;
+        let mut gradients = loss.backward();
+        for (critic, followed) in self.critics.iter_mut().zip(followed) {
+            critic.optimiser.step(&mut critic.network, followed, &mut gradients);
+        }
+        self.updates += 1;
+        // the actor, eq. (3), and the target networks, once in a while
+        if self.updates.is_multiple_of(self.settings.delay) {
+            self.improve(observed);
+        }
+        Losses { critics: loss.into_scalar::<f32>() }
+    }
+
+    fn improve(&mut self, observed: Tensor<2>) {
+        let observed = observed.autodiff();
+        let followed = self.actor.network.followed();
+        let action = followed.forward(observed.clone()).tanh();
+        let here = Tensor::cat(vec![observed, action], 1);
+        let loss = -self.critics[0].network.passed().forward(here).mean();
+        let mut gradients = loss.backward();
+        self.actor.optimiser.step(&mut self.actor.network, followed, &mut gradients);
+        self.follow();
+    }
+
+    /// The target networks follow the others.
+    fn follow(&mut self) {
+        for learner in self.critics.iter_mut().chain([&mut self.actor]) {
+            learner.target.approach(&learner.network, self.settings.tau);
+        }
+    }
+
+    /// Clipped noise for the target policy.
+    fn noise(&self, rows: usize, rng: &mut impl Rng) -> Vec<f32> {
+        let (deviation, clip) =
+            (self.settings.smoothing as f32, self.settings.smoothing_clip as f32);
+        let draw = |_| {
+            let x: f32 = StandardNormal.sample(rng);
+            (deviation * x).clamp(-clip, clip)
+        };
+        (0..rows * ACTIONS).map(draw).collect()
+    }
+
+    /// Updates made.
+    pub fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    /// The hyperparameters.
+    pub fn settings(&self) -> &Hyperparameters {
+        &self.settings
+    }
+
+    /// The actor's network.
+    ///
+    /// # Errors
+    /// If a parameter is no longer finite.
+    pub fn actor(&self) -> Result<Dense, DenseError> {
+        self.actor.network.to_dense()
+    }
+
+    /// The critics' networks.
+    ///
+    /// # Errors
+    /// If a parameter is no longer finite.
+    pub fn critics(&self) -> Result<[Dense; 2], DenseError> {
+        let [one, two] = &self.critics;
+        Ok([one.network.to_dense()?, two.network.to_dense()?])
+    }
+
+    /// Where it stands.
+    pub fn standing(&self) -> Standing {
+        let [one, two] = &self.critics;
+        let networks = [self.actor.standing(), one.standing(), two.standing()];
+        Standing { updates: self.updates, networks }
+    }
+
+    /// Goes on from where another of the same hyperparameters stood.
+    ///
+    /// # Errors
+    /// If the numbers are of other networks.
+    pub fn resume(&mut self, standing: Standing) -> Result<(), DenseError> {
+        let Standing { updates, networks } = standing;
+        let [actor, critic] = [self.settings.actor_sizes(), self.settings.critic_sizes()];
+        let [one, two] = &mut self.critics;
+        let learners = [&mut self.actor, one, two].into_iter();
+        for ((learner, sizes), (own, target, moments)) in
+            learners.zip([&actor, &critic, &critic]).zip(networks)
+        {
+            learner.network = Mlp::new(&Dense::new(sizes, own)?, &self.device);
+            learner.target = Mlp::new(&Dense::new(sizes, target)?, &self.device);
+            let found = moments.mean.len();
+            if !learner.optimiser.remember(moments) {
+                let expected = learner.network.parameters().len();
+                return Err(DenseError::Count { sizes: sizes.clone(), expected, found });
+            }
+        }
+        self.updates = updates;
+        Ok(())
+    }
+}
+
+impl Hyperparameters {
+    /// Layers of the actor.
+    pub fn actor_sizes(&self) -> Vec<usize> {
+        [&[OBSERVATIONS], &self.actor[..], &[ACTIONS]].concat()
+    }
+
+    /// Layers of a critic.
+    pub fn critic_sizes(&self) -> Vec<usize> {
+        [&[OBSERVATIONS + ACTIONS], &self.critic[..], &[1]].concat()
+    }
+}

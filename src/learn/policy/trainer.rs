@@ -1,0 +1,318 @@
+//! Training a policy: TD3 in a world, at the same number of updates for a step in each of them.
+
+use std::sync::Arc;
+
+use rand::RngExt as _;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use crate::control::policy::{ACTIONS, Actor, Critic, ShapeError};
+use crate::control::task::Task;
+use crate::learn::policy::replay::{Batch, Replay, Transition};
+use crate::learn::policy::td3::{Hyperparameters, Standing, Td3};
+use crate::num::dense::{DenseError, Units};
+use crate::num::stream::{self, Stream};
+use crate::num::{Real, statistics};
+use crate::sim::Trouble;
+use crate::sim::imagined::{Block, Ended, Stepped, WIDTH};
+use crate::sim::world::World;
+
+/// Purposes of the random streams.
+const START: u64 = 20;
+const ACT: u64 = 21;
+const UPDATE: u64 = 22;
+
+/// What a policy is trained by. [`PolicyRecipe::default`] is the paper's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PolicyRecipe {
+    /// TD3's.
+    pub td3: Hyperparameters,
+    /// Steps of the environment, all aircraft together.
+    pub steps: u64,
+    /// Steps of random actions, without updates, at the start.
+    pub warmup: u64,
+    /// Transitions remembered.
+    pub replay: usize,
+    /// Aircraft at once.
+    pub instances: usize,
+    /// Part of the targets that lie in the hard corners.
+    pub corners: f64,
+    /// Steps between two checkpoints; all episodes begin anew there, so that a training that is resumed
+    /// ends as one that was not interrupted.
+    pub checkpoint: u64,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+impl Default for PolicyRecipe {
+    fn default() -> Self {
+        PolicyRecipe {
+            td3: Hyperparameters::default(),
+            steps: 700_000,
+            warmup: 10_000,
+            replay: 1_000_000,
+            instances: 64,
+            corners: 0.0,
+            checkpoint: 50_000,
+            seed: 1,
+        }
+    }
+}
+
+/// Why a training cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum PolicyError {
+    /// A loss is no number.
+    #[error(
+        "the loss of the critics is no longer a number after {0} steps; lower the learning rates"
+    )]
+    Loss(u64),
+    /// A network cannot be used.
+    #[error("the networks: {0}")]
+    Network(#[from] DenseError),
+    /// A network has another shape than a policy's.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// The world cannot go on.
+    #[error("the world it is trained in: {0}")]
+    World(#[from] Trouble),
+    /// A checkpoint belongs to another training.
+    #[error(
+        "the checkpoint is of another training (other options, model or program); name another --out"
+    )]
+    Other,
+}
+
+/// A training under way.
+pub struct PolicyTrainer<W: World> {
+    recipe: PolicyRecipe,
+    identity: String,
+    world: W,
+    td3: Td3,
+    actor: Actor,
+    replay: Replay,
+    batch: Batch,
+    units: Units<Block>,
+    steps: u64,
+    losses: Vec<f64>,
+    rewards: Vec<f64>,
+}
+
+/// How it went since it was last asked.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PolicyProgress {
+    /// Steps made.
+    pub steps: u64,
+    /// Updates made.
+    pub updates: u64,
+    /// Mean loss of the critics; NaN before the first update.
+    pub loss: f64,
+    /// Mean reward of a step.
+    pub reward: f64,
+    /// Episodes begun so far.
+    pub episodes: u64,
+    /// Episodes that ended outside the envelope so far.
+    pub lost: u64,
+}
+
+/// Where a training stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PolicyStanding {
+    /// What identifies recipe and world.
+    pub identity: String,
+    /// Steps made.
+    pub steps: u64,
+    /// Targets given.
+    pub targets: u64,
+    /// Transitions ever remembered.
+    pub remembered: u64,
+    /// The replay memory.
+    pub replay: Vec<f32>,
+    /// The networks.
+    pub td3: Standing,
+}
+
+impl<W: World> PolicyTrainer<W> {
+    /// A training in `world`, whose instances are the recipe's; `identity` tells it from others.
+    ///
+    /// # Errors
+    /// If the networks cannot be made.
+    pub fn new(recipe: PolicyRecipe, world: W, identity: String) -> Result<Self, PolicyError> {
+        let td3 = Td3::new(recipe.td3.clone(), &mut stream::stream(recipe.seed, &[START]))?;
+        let actor = Actor::new(td3.actor()?)?;
+        Ok(PolicyTrainer {
+            replay: Replay::new(recipe.replay),
+            recipe,
+            identity,
+            world,
+            td3,
+            actor,
+            batch: Batch::default(),
+            units: Units::new(Block::zero()),
+            steps: 0,
+            losses: Vec::new(),
+            rewards: Vec::new(),
+        })
+    }
+
+    /// Trains for about `steps` steps more, up to the recipe's; stops at every checkpoint.
+    ///
+    /// # Errors
+    /// If a loss is no number or the world fails.
+    pub fn run(&mut self, steps: u64) -> Result<PolicyProgress, PolicyError> {
+        let until = (self.steps + steps).min(self.recipe.steps).min(self.next_checkpoint());
+        while self.steps < until {
+            self.advance()?;
+        }
+        if self.at_checkpoint() {
+            let given = self.world.targets();
+            self.world.restart(given)?;
+        }
+        let mean = |list: &mut Vec<f64>| statistics::mean(&std::mem::take(list));
+        Ok(PolicyProgress {
+            steps: self.steps,
+            updates: self.td3.updates(),
+            loss: mean(&mut self.losses),
+            reward: mean(&mut self.rewards),
+            episodes: self.world.targets(),
+            lost: self.world.lost(),
+        })
+    }
+
+    fn next_checkpoint(&self) -> u64 {
+        (self.steps / self.recipe.checkpoint + 1) * self.recipe.checkpoint
+    }
+
+    /// Whether the last step crossed into a new stretch between checkpoints.
+    pub fn at_checkpoint(&self) -> bool {
+        let stretch = |steps: u64| steps / self.recipe.checkpoint;
+        let before = self.steps.saturating_sub(self.world.instances() as u64);
+        stretch(before) != stretch(self.steps)
+    }
+
+    /// One step of every aircraft, then as many updates.
+    fn advance(&mut self) -> Result<(), PolicyError> {
+        let mut rng = stream::stream(self.recipe.seed, &[ACT, self.steps]);
+        let instances = self.world.instances();
+        for block in 0..instances.div_ceil(WIDTH) {
+            let observed = self.world.observe(block);
+            let action = self.explore(&observed, &mut rng);
+            let stepped = self.world.step(block, &action)?;
+            for lane in 0..WIDTH.min(instances - block * WIDTH) {
+                self.remember(lane, &observed, &action, &stepped);
+            }
+        }
+        self.steps += instances as u64;
+        if self.steps <= self.recipe.warmup {
+            return Ok(());
+        }
+        for _ in 0..instances {
+            let mut rng = stream::stream(self.recipe.seed, &[UPDATE, self.td3.updates()]);
+            self.replay.draw(&mut rng, self.recipe.td3.batch, &mut self.batch);
+            let losses = self.td3.update(&self.batch, &mut rng);
+            if !losses.critics.is_finite() {
+                return Err(PolicyError::Loss(self.steps));
+            }
+            self.losses.push(losses.critics.into());
+        }
+        self.actor = Actor::new(self.td3.actor()?)?;
+        Ok(())
+    }
+
+    /// Random actions in the warm-up, then the actor's with noise.
+    fn explore(&mut self, observed: &[Block; 15], rng: &mut Stream) -> [Block; ACTIONS] {
+        if self.steps < self.recipe.warmup {
+            let mut action = [Block::zero(); ACTIONS];
+            action.iter_mut().flat_map(|a| &mut a.0).for_each(|a| *a = rng.random_range(-1.0..1.0));
+            return action;
+        }
+        let mut action = self.actor.act_block(&mut self.units, observed);
+        for a in action.iter_mut().flat_map(|a| &mut a.0) {
+            let noise: f32 = StandardNormal.sample(rng);
+            *a = (*a + self.recipe.td3.exploration as f32 * noise).clamp(-1.0, 1.0);
+        }
+        action
+    }
+
+    fn remember(
+        &mut self,
+        lane: usize,
+        observed: &[Block; 15],
+        action: &[Block; ACTIONS],
+        stepped: &Stepped,
+    ) {
+        let lost = stepped.ended[lane] == Ended::Lost;
+        let of = |numbers: &[Block; 15]| numbers.map(|x| x.0[lane]);
+        let task = Task::PAPER;
+        let worst = -(task.roll_cap + task.pitch_cap + task.airspeed_cap);
+        // a lost aircraft earns the worst for ever; where it is then may be no number
+        let reward = match lost {
+            true => (worst / (1.0 - self.recipe.td3.discount)) as f32,
+            false => stepped.reward.0[lane],
+        };
+        self.rewards.push(if lost { worst } else { reward.into() });
+        let observed = of(observed);
+        self.replay.add(&Transition {
+            observed,
+            action: action.map(|x| x.0[lane]),
+            reward,
+            next: if lost { observed } else { of(&stepped.observed) },
+            goes_on: if lost { 0.0 } else { 1.0 },
+        });
+    }
+
+    /// Steps made.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// The recipe.
+    pub fn recipe(&self) -> &PolicyRecipe {
+        &self.recipe
+    }
+
+    /// The actor as it is now.
+    pub fn actor(&self) -> Arc<Actor> {
+        Arc::new(self.actor.clone())
+    }
+
+    /// The critics as they are now.
+    ///
+    /// # Errors
+    /// If a parameter is no longer finite.
+    pub fn critics(&self) -> Result<Arc<[Critic; 2]>, PolicyError> {
+        let [one, two] = self.td3.critics()?;
+        Ok(Arc::new([Critic::new(one)?, Critic::new(two)?]))
+    }
+
+    /// Where it stands; to be kept at a checkpoint only.
+    pub fn standing(&self) -> PolicyStanding {
+        PolicyStanding {
+            identity: self.identity.clone(),
+            steps: self.steps,
+            targets: self.world.targets(),
+            remembered: self.replay.added(),
+            replay: self.replay.numbers().to_vec(),
+            td3: self.td3.standing(),
+        }
+    }
+
+    /// Goes on from where a training of the same identity stood at a checkpoint.
+    ///
+    /// # Errors
+    /// If it was another training.
+    pub fn resume(&mut self, standing: PolicyStanding) -> Result<(), PolicyError> {
+        if standing.identity != self.identity {
+            return Err(PolicyError::Other);
+        }
+        let PolicyStanding { replay, remembered, .. } = standing;
+        let replay = Replay::restore(self.recipe.replay, replay, remembered);
+        self.replay = replay.ok_or(PolicyError::Other)?;
+        self.td3.resume(standing.td3)?;
+        self.actor = Actor::new(self.td3.actor()?)?;
+        self.steps = standing.steps;
+        // the first targets of the episodes that begin now were given before the checkpoint was kept
+        let begun = self.world.instances() as u64;
+        Ok(self.world.restart(standing.targets.saturating_sub(begun))?)
+    }
+}

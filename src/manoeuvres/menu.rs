@@ -1,0 +1,277 @@
+//! The menu of flight-test manoeuvres, by name.
+
+use crate::manoeuvres::excitation::Axis::{self, Aileron, Elevator, Pitch, Roll, Throttle};
+use crate::manoeuvres::{Excitation, Schedule, Shape, Step};
+
+/// Airspeeds at which speed-dependent effects are told apart, m/s.
+const SPEEDS: [f64; 3] = [15.0, 19.0, 24.0];
+
+/// A manoeuvre of the menu.
+#[derive(Clone, Copy, Debug)]
+pub struct Manoeuvre {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is for, in one sentence.
+    pub description: &'static str,
+    steps: fn() -> Vec<Step>,
+}
+
+impl Manoeuvre {
+    /// The manoeuvre as a schedule, wings level at its end.
+    pub fn schedule(&self) -> Schedule {
+        let mut steps = (self.steps)();
+        steps.push(Step::hold(2.0, 0.0, 2.0, 18.0));
+        Schedule { name: self.name.into(), description: self.description.into(), steps }
+    }
+}
+
+/// A turn onto the opposite heading, to be flown between manoeuvres.
+pub const TURN: Manoeuvre = Manoeuvre {
+    name: "turn",
+    description: "A turn onto the opposite heading.",
+    // at 45° and 19 m/s the heading turns by 30 °/s
+    steps: || vec![Step::hold(6.5, 45.0, 5.0, 19.0)],
+};
+
+/// The manoeuvre of that name.
+pub fn named(name: &str) -> Option<&'static Manoeuvre> {
+    MENU.iter().find(|m| m.name == name)
+}
+
+/// Every manoeuvre.
+pub const MENU: &[Manoeuvre] = &[
+    Manoeuvre {
+        name: "elevator-3211",
+        description: "3-2-1-1 on the elevator at two speeds: pitch dynamics.",
+        steps: || SPEEDS[..2].iter().map(|&v| step_3211(Elevator, 0.22, 0.25, 5.0, v)).collect(),
+    },
+    Manoeuvre {
+        name: "aileron-3211",
+        description: "3-2-1-1 on the aileron at two speeds: roll with its adverse yaw.",
+        steps: || SPEEDS[..2].iter().map(|&v| step_3211(Aileron, 0.25, 0.25, 5.0, v)).collect(),
+    },
+    Manoeuvre {
+        name: "slow-multisine",
+        description: "Sines of 0.1 to 1.5 Hz on every control at once.",
+        steps: || multisines(12.0, 0.1, 1.5, [0.12, 0.10, 0.15]),
+    },
+    Manoeuvre {
+        name: "fast-multisine",
+        description: "Sines of 2 to 6 Hz on the surfaces: tells lags and delays apart.",
+        steps: || multisines(8.0, 2.0, 6.0, [0.20, 0.20, 0.0]),
+    },
+    Manoeuvre {
+        name: "throttle-steps",
+        description: "Steps of the throttle at three speeds: thrust, its decay, its wash.",
+        steps: || {
+            let up_down = |v: f64| {
+                let step = Step::hold(6.0, 0.0, 2.0, v);
+                step.with(pulse(Throttle, 0.6, 0.5, 2.0)).with(pulse(Throttle, -0.6, 3.0, 2.0))
+            };
+            SPEEDS.map(up_down).to_vec()
+        },
+    },
+    Manoeuvre {
+        name: "throttle-with-surfaces",
+        description: "Doublets of both surfaces at full and at no throttle: propeller wash.",
+        steps: || {
+            let at = |throttle: f64| {
+                let step =
+                    Step::hold(5.0, 0.0, 3.0, 18.0).with(pulse(Throttle, throttle, 0.0, 5.0));
+                step.with(doublet(Elevator, 0.2, 1.0, 0.35)).with(doublet(Aileron, 0.2, 2.8, 0.35))
+            };
+            vec![at(0.7), at(-0.7), at(0.7)]
+        },
+    },
+    Manoeuvre {
+        name: "level-acceleration",
+        description: "From slow to fast and back, near level: drag over speed.",
+        steps: || {
+            vec![
+                Step::hold(5.0, 0.0, 4.0, 14.0),
+                Step::hold(8.0, 0.0, 0.0, 28.0).with(pulse(Throttle, 1.0, 0.0, 5.0)),
+                Step::hold(7.0, 0.0, 0.0, 14.0).with(pulse(Throttle, -1.0, 0.0, 6.0)),
+            ]
+        },
+    },
+    Manoeuvre {
+        name: "stall-and-push",
+        description: "Slow to beyond the stall, push, and push to negative angles of attack.",
+        steps: || {
+            vec![
+                stall(1.0),
+                Step::hold(4.0, 0.0, 0.0, 19.0),
+                push(1.0),
+                Step::hold(3.0, 0.0, 4.0, 18.0),
+            ]
+        },
+    },
+    Manoeuvre {
+        name: "roll-and-pull",
+        description: "Roll rate with pull at once: rate effects against those of incidence.",
+        steps: || {
+            let one = |side: f64| {
+                let step = Step::hold(4.0, 30.0 * side, 4.0, 19.0);
+                step.with(firm(Aileron, 0.3 * side, 0.6, 0.5)).with(pulse(Elevator, -0.3, 0.6, 0.5))
+            };
+            vec![one(1.0), one(-1.0), one(1.0)]
+        },
+    },
+    Manoeuvre {
+        name: "bank-to-bank",
+        description: "Fast rolls from bank to bank: products of inertia, roll damping.",
+        steps: || {
+            let one = |side: f64| {
+                Step::hold(2.5, 40.0 * side, 4.0, 21.0).with(firm(Aileron, 0.35 * side, 0.1, 0.4))
+            };
+            [1.0, -1.0, 1.0, -1.0, 1.0, -1.0].map(one).to_vec()
+        },
+    },
+    Manoeuvre {
+        name: "skid",
+        description: "Aileron doublets at the yaw mode's pace with wings near level: sideslip without a rudder.",
+        steps: || {
+            let sway =
+                |v: f64| Step::hold(8.0, 0.0, 3.0, v).with(sines(Aileron, 0.35, 0.5, 1.1, 5));
+            vec![sway(15.0), sway(20.0)]
+        },
+    },
+    Manoeuvre {
+        name: "pull-in-bank",
+        description: "Pulls in a steep turn to both sides: sideways centre of gravity, side force.",
+        steps: || {
+            let one = |side: f64| {
+                let step = Step::hold(6.0, 50.0 * side, 4.0, 21.0);
+                step.with(doublet(Elevator, -0.25, 2.5, 0.5)).with(pulse(Elevator, -0.2, 4.5, 0.5))
+            };
+            vec![one(1.0), one(-1.0)]
+        },
+    },
+    Manoeuvre {
+        name: "two-headings",
+        description: "The same doublets on opposite headings: what turns with the wind.",
+        steps: || {
+            let shake = Step::hold(4.0, 0.0, 3.0, 19.0).with(doublet(Elevator, 0.15, 1.0, 0.4));
+            vec![shake.clone(), Step::hold(7.0, 45.0, 5.0, 19.0), shake]
+        },
+    },
+    Manoeuvre {
+        name: "two-altitudes",
+        description: "The same doublets before and after a climb: what goes with air density.",
+        steps: || {
+            let shake = Step::hold(4.0, 0.0, 3.0, 19.0).with(doublet(Elevator, 0.15, 1.0, 0.4));
+            vec![shake.clone(), Step::hold(20.0, 0.0, 25.0, 19.0), shake]
+        },
+    },
+    Manoeuvre {
+        name: "small-doublets",
+        description: "Small doublets of both surfaces: dead zone and backlash.",
+        steps: || doublets(0.03),
+    },
+    Manoeuvre {
+        name: "large-doublets",
+        description: "Large doublets of both surfaces: saturation and limited rate.",
+        steps: || doublets(0.4),
+    },
+    Manoeuvre {
+        name: "roll-at-two-alphas",
+        description: "Aileron pulses and steady rolls, slow and fast: what changes with incidence.",
+        steps: || {
+            let at = |v: f64, pitch: f64| {
+                let step = Step::hold(6.0, 0.0, pitch, v);
+                step.with(doublet(Aileron, 0.25, 1.0, 0.3)).with(doublet(Aileron, 0.25, 3.5, 0.8))
+            };
+            vec![at(14.0, 7.0), at(24.0, 0.0)]
+        },
+    },
+    Manoeuvre {
+        name: "elevator-with-throttle",
+        description: "Elevator sines while the throttle steps: incidence rate against pitch rate.",
+        steps: || {
+            let step = Step::hold(10.0, 0.0, 3.0, 17.0);
+            let step = step.with(sines(Elevator, 0.18, 0.5, 3.0, 6));
+            vec![step.with(pulse(Throttle, 0.6, 2.0, 3.0)).with(pulse(Throttle, -0.5, 6.0, 3.0))]
+        },
+    },
+    Manoeuvre {
+        name: "push-over",
+        description: "Pitch targets up and down with the elevator quiet between: drag over incidence.",
+        steps: || {
+            let step = Step::hold(10.0, 0.0, 2.0, 19.0);
+            vec![step.with(doublet(Pitch, 0.2, 1.0, 2.0)).with(doublet(Pitch, -0.25, 5.5, 1.5))]
+        },
+    },
+];
+
+/// Slow with the nose up and the throttle closed to beyond the stall, then the nose down; `depth`
+/// 0..1 is how long the nose is held up.
+pub(super) fn stall(depth: f64) -> Step {
+    let up = 3.2 + 0.8 * depth;
+    let step = Step::hold(up + 2.8, 0.0, 14.0, 12.0).with(pulse(Throttle, -1.0, 0.0, up));
+    step.with(pulse(Pitch, (-20.0_f64).to_radians(), up, 1.2))
+}
+
+/// Pushes to a clearly negative angle of attack, of `depth` 0..1.
+pub(super) fn push(depth: f64) -> Step {
+    let step = Step::hold(4.0, 0.0, 10.0, 18.0);
+    step.with(pulse(Elevator, 0.35 * depth, 1.2, 0.35)).with(pulse(
+        Elevator,
+        0.25 * depth,
+        2.8,
+        0.4,
+    ))
+}
+
+/// A 3-2-1-1 of `axis` near level at `v` (m/s).
+fn step_3211(axis: Axis, amplitude: f64, width: f64, pitch_deg: f64, v: f64) -> Step {
+    let shape = Shape::ThreeTwoOneOne { width };
+    Step::hold(7.0 * width + 4.0, 0.0, pitch_deg - 2.0, v).with(loose(axis, amplitude, 1.5, shape))
+}
+
+/// Sines on aileron, elevator and throttle at once, with slow changes of attitude.
+fn multisines(duration: f64, low: f64, high: f64, [a, e, t]: [f64; 3]) -> Vec<Step> {
+    let step = Step::hold(duration, 0.0, 3.0, 18.0);
+    let step = step.with(sines(Aileron, a, low, high, 1)).with(sines(Elevator, e, low, high, 2));
+    let step = if t > 0.0 { step.with(sines(Throttle, t, low, high, 3)) } else { step };
+    vec![step.with(sines(Roll, 0.2, 0.1, 0.25, 4))]
+}
+
+/// Doublets of both surfaces in turn, three widths each.
+fn doublets(amplitude: f64) -> Vec<Step> {
+    let on = |axis: Axis| {
+        let step = Step::hold(6.0, 0.0, 3.0, 18.0);
+        step.with(doublet(axis, amplitude, 0.8, 0.15))
+            .with(doublet(axis, amplitude, 2.0, 0.3))
+            .with(doublet(axis, amplitude, 3.8, 0.5))
+    };
+    vec![on(Elevator), on(Aileron)]
+}
+
+/// Share of the controller's reaction during pulses of a surface.
+const LOOSE: f64 = 0.25;
+
+/// `shape` on `axis`, against a controller held off where the axis is a surface.
+pub(super) fn loose(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Excitation {
+    let authority = if matches!(axis, Aileron | Elevator) { LOOSE } else { 1.0 };
+    Excitation::new(axis, amplitude, start, shape).against(authority)
+}
+
+/// The same as [`pulse`] with the controller in full authority: for pulses on top of a manoeuvre.
+pub(super) fn firm(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
+    Excitation::new(axis, amplitude, start, Shape::Step { width })
+}
+
+/// +`amplitude` for `width` (s) from `start` (s) on.
+pub(super) fn pulse(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
+    loose(axis, amplitude, start, Shape::Step { width })
+}
+
+/// ±`amplitude`, each for `width` (s), from `start` (s) on.
+pub(super) fn doublet(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
+    loose(axis, amplitude, start, Shape::Doublet { width })
+}
+
+/// Sines from `low` to `high` (Hz) throughout.
+pub(super) fn sines(axis: Axis, amplitude: f64, low: f64, high: f64, seed: u64) -> Excitation {
+    Excitation::new(axis, amplitude, 0.0, Shape::multisine(low, high, seed))
+}

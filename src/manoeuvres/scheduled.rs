@@ -1,0 +1,93 @@
+//! A controller that flies a schedule with another controller.
+
+use crate::control::{Controller, Observation, Target};
+use crate::manoeuvres::{Demand, Schedule};
+use crate::physics::{Command, Time};
+
+/// A schedule in flight: puts its excitation on top of whatever a controller commands.
+#[derive(Clone, Debug)]
+pub struct Overlay {
+    schedule: Schedule,
+    start: Option<Time>,
+    /// The controller's commands when excitations began that hold it off.
+    held: [Option<f64>; 3],
+}
+
+impl Overlay {
+    /// `schedule`, not begun.
+    pub fn new(schedule: Schedule) -> Overlay {
+        Overlay { schedule, start: None, held: [None; 3] }
+    }
+
+    /// Goes back to the start.
+    pub fn reset(&mut self) {
+        (self.start, self.held) = (None, [None; 3]);
+    }
+
+    /// What is asked for at `now`; the first call begins the schedule.
+    pub fn demand(&mut self, now: Time) -> Demand {
+        let start = *self.start.get_or_insert(now);
+        self.schedule.at(now.since(start).as_secs_f64())
+    }
+
+    /// Whether the schedule has come to its end at `now`.
+    pub fn is_over(&self, now: Time) -> bool {
+        self.start.is_some_and(|start| now.since(start).as_secs_f64() >= self.schedule.duration())
+    }
+
+    /// The command in its ranges, `own` being the controller's.
+    pub fn command(&mut self, demand: &Demand, own: Command) -> Command {
+        let mut of = |axis: usize, own: f64, added: f64| {
+            let share = demand.authority[axis];
+            if share == 1.0 {
+                self.held[axis] = None;
+                return own + added;
+            }
+            let held = *self.held[axis].get_or_insert(own);
+            held + share * (own - held) + added
+        };
+        Command {
+            aileron: of(0, own.aileron, demand.added.aileron),
+            elevator: of(1, own.elevator, demand.added.elevator),
+            throttle: of(2, own.throttle, demand.added.throttle),
+        }
+        .clamped()
+    }
+}
+
+/// An inner controller towards a schedule's targets, with the schedule's excitation on top.
+///
+/// The schedule begins with the first command after a reset.
+pub struct Scheduled {
+    inner: Box<dyn Controller>,
+    overlay: Overlay,
+}
+
+impl Scheduled {
+    /// `inner` on `schedule`.
+    pub fn new(inner: Box<dyn Controller>, schedule: Schedule) -> Scheduled {
+        Scheduled { inner, overlay: Overlay::new(schedule) }
+    }
+}
+
+impl Controller for Scheduled {
+    fn name(&self) -> &'static str {
+        self.inner.name()
+    }
+
+    fn reset(&mut self, seed: u64) {
+        self.overlay.reset();
+        self.inner.reset(seed);
+    }
+
+    /// The target is the schedule's; the one given is not looked at.
+    fn command(&mut self, seen: &Observation, _target: &Target) -> Command {
+        let demand = self.overlay.demand(seen.time);
+        let own = self.inner.command(seen, &demand.target);
+        self.overlay.command(&demand, own)
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(Scheduled { inner: self.inner.boxed_clone(), overlay: self.overlay.clone() })
+    }
+}

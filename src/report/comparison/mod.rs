@@ -1,0 +1,33 @@
+//! What the report of a comparison is made from.
+
+pub(super) mod page;
+pub(super) mod regimes;
+pub(super) mod tables;
+pub(super) mod traces;
+
+use crate::report::Page;
+use crate::sysid::compare::Comparison;
+
+/// A comparison of models with flights, with where it came from.
+#[derive(Clone, Debug)]
+pub struct ComparisonReport<'a> {
+    /// Title of the page.
+    pub title: String,
+    /// What was found.
+    pub comparison: &'a Comparison,
+    /// The models' files, in the order of the comparison's models.
+    pub model_files: Vec<String>,
+    /// The logs' files, as they were given.
+    pub log_files: Vec<String>,
+    /// The command line that made the comparison.
+    pub command_line: String,
+    /// Further programs or files and their versions or hashes.
+    pub versions: Vec<(String, String)>,
+}
+
+impl ComparisonReport<'_> {
+    /// The page of the comparison.
+    pub fn page(&self) -> Page {
+        page::comparison_page(self)
+    }
+}

@@ -1,0 +1,167 @@
+//! The page of one comparison of models with flights.
+
+use crate::report::comparison::ComparisonReport;
+use crate::report::comparison::{regimes, tables, traces};
+use crate::report::{
+    BarGroup, Bars, ChoiceOption, Curves, Figure, Finding, Findings, Link, Page, Section, Series,
+    Style,
+};
+use crate::sysid::compare::{ChannelId, Comparison, GrowthPoint, ModelResult};
+
+/// Sentences of the first model that stand large at the top.
+const LEADING: usize = 2;
+/// Sentences of each further model that are shown.
+const OF_OTHERS: usize = 2;
+
+/// The page of `report`: the sentence first, then what bears it out.
+pub fn comparison_page(report: &ComparisonReport) -> Page {
+    let c = report.comparison;
+    let mut sections = vec![Section::new("", "", vec![Figure::Findings(findings(c))])];
+    sections.push(tables::summary(c));
+    sections.push(Section::new("Unexplained", UNEXPLAINED_NOTE, vec![unexplained(c)]));
+    sections.extend(traces::section(c));
+    sections.push(regimes::regimes(c));
+    sections.push(regimes::maps(c));
+    sections.push(Section::new("Error growth", &growth_note(c), growth(c)));
+    sections.push(tables::nuisances(c));
+    sections.push(tables::notes(c));
+    sections.push(tables::provenance(report));
+    sections.retain(|s| !s.figures.is_empty());
+    Page { title: report.title.clone(), subtitle: subtitle(c), sections }
+}
+
+/// The short section of a flight report: what its own model gets wrong about it.
+pub(in crate::report) fn short_section(c: &Comparison) -> Section {
+    let mut found = findings(c);
+    // The figures that the links point to are on the page of the comparison itself.
+    for finding in found.lead.iter_mut().chain(&mut found.rest) {
+        finding.link = None;
+    }
+    let mut figures = vec![Figure::Findings(found), unexplained(c)];
+    figures.extend(growth(c));
+    Section::new("Model against flight", UNEXPLAINED_NOTE, figures)
+}
+
+const UNEXPLAINED_NOTE: &str = "Share of each channel's variation that is neither explained by \
+     the model nor by the sensors' noise. Over 100 % the model is worse than a constant.";
+
+fn subtitle(c: &Comparison) -> String {
+    let names = |all: Vec<&str>| all.join(", ");
+    let seconds: f64 = c.flights.iter().flat_map(|f| &f.segments_s).map(|s| s[1] - s[0]).sum();
+    format!(
+        "{} against {}, {seconds:.0} s in the air.",
+        names(c.models.iter().map(|m| m.name.as_str()).collect()),
+        names(c.flights.iter().map(|f| f.name.as_str()).collect()),
+    )
+}
+
+/// What a channel is called on buttons and in tables.
+pub(in crate::report) fn channel_name(id: ChannelId) -> String {
+    format!("{} {}", id.symbol(), id.name())
+}
+
+fn findings(c: &Comparison) -> Findings {
+    let mut lead = Vec::new();
+    let mut rest = Vec::new();
+    for (k, model) in c.models.iter().enumerate() {
+        let own = if k == 0 { usize::MAX } else { OF_OTHERS };
+        for (i, sentence) in model.sentences.iter().take(own).enumerate() {
+            let finding = Finding { sentence: sentence.clone(), link: link(model, sentence) };
+            match (k, i < LEADING) {
+                (0, true) => lead.push(finding),
+                (0, false) => rest.push(finding),
+                _ => rest.push(Finding {
+                    sentence: format!("{}: {}", model.name, finding.sentence),
+                    ..finding
+                }),
+            }
+        }
+    }
+    if lead.is_empty() {
+        let sentence = "No channel could be compared: the notes say why.".into();
+        lead.push(Finding { sentence, link: None });
+    }
+    Findings { lead, rest }
+}
+
+/// The way to the channel that `sentence` speaks of.
+fn link(model: &ModelResult, sentence: &str) -> Option<Link> {
+    let plain = |text: &str| text.trim_end_matches('.').to_lowercase();
+    let of = model.channels.iter().find(|ch| plain(&ch.worst_regime) == plain(sentence))?;
+    Some(Link { anchor: regimes::ANCHOR.into(), option: channel_name(of.channel) })
+}
+
+/// The models with their colours.
+pub(in crate::report) fn keys(c: &Comparison) -> Vec<(String, Style)> {
+    c.models.iter().enumerate().map(|(i, m)| (m.name.clone(), Style::nth(i))).collect()
+}
+
+pub(in crate::report) fn unexplained(c: &Comparison) -> Figure {
+    let share = |model: &ModelResult, id: ChannelId| {
+        let of = model.channels.iter().find(|ch| ch.channel == id);
+        of.map_or(f64::NAN, |ch| 100.0 * ch.unexplained_fraction)
+    };
+    let seen =
+        |id: &ChannelId| c.models.iter().any(|m| m.channels.iter().any(|x| x.channel == *id));
+    let groups: Vec<BarGroup> = ChannelId::ALL
+        .into_iter()
+        .filter(seen)
+        .map(|id| BarGroup {
+            label: channel_name(id),
+            values: c.models.iter().map(|m| share(m, id)).collect(),
+        })
+        .collect();
+    Figure::Bars(Bars {
+        title: "Unexplained share".into(),
+        unit: "%".into(),
+        keys: keys(c),
+        groups,
+        full: 100.0,
+    })
+}
+
+fn growth_note(c: &Comparison) -> String {
+    format!(
+        "Free runs on the recorded actuators, started from reconstructed states every {} s; each \
+         state's error is divided by its characteristic value x_c. A run that has diverged counts \
+         as {}.",
+        c.settings.start_every_s, c.settings.divergence_bound
+    )
+}
+
+pub(in crate::report) fn growth(c: &Comparison) -> Vec<Figure> {
+    let longest = c.models.iter().map(|m| &m.growth).max_by_key(|g| g.len());
+    let Some(longest) = longest.filter(|g| !g.is_empty()) else { return Vec::new() };
+    let curves = |title: &str, value: fn(&GrowthPoint) -> f64| {
+        // The models fly the same runs, so their times are the same as far as they reach.
+        let series = c.models.iter().enumerate().map(|(i, m)| {
+            let mut values: Vec<f64> = m.growth.iter().map(value).collect();
+            values.resize(longest.len(), f64::NAN);
+            Series::new(&m.name, Style::nth(i), values)
+        });
+        Figure::Curves(Curves {
+            title: title.into(),
+            x_label: "Time after the start (s)".into(),
+            y_label: "Error / x_c".into(),
+            x: longest.iter().map(|p| p.time_s).collect(),
+            series: series.collect(),
+            ..Curves::default()
+        })
+    };
+    vec![
+        curves("Root mean square over the runs", |p| p.rmse_scaled),
+        curves("Median run", |p| p.median_scaled),
+    ]
+}
+
+/// Alternatives by channel, those that `figures` has something for.
+pub(in crate::report) fn by_channel(
+    c: &Comparison,
+    figures: impl Fn(ChannelId) -> Vec<Figure>,
+) -> Vec<ChoiceOption> {
+    let seen =
+        |id: &ChannelId| c.models.iter().any(|m| m.channels.iter().any(|x| x.channel == *id));
+    let option = |id| ChoiceOption { name: channel_name(id), figures: figures(id) };
+    let all = ChannelId::ALL.into_iter().filter(seen).map(option);
+    all.filter(|o| !o.figures.is_empty()).collect()
+}

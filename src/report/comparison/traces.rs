@@ -1,0 +1,218 @@
+//! Measured against predicted over time: telling stretches of the flights, then each as a whole.
+
+use crate::report::comparison::page::channel_name;
+use crate::report::{Choice, ChoiceOption, Figure, Panel, Section, Series, Style, TimeFigure};
+use crate::sysid::compare::{ChannelId, ChannelTrace, Comparison, FlightTrace, ModelTrace};
+
+/// Length of a stretch, s: several free runs of the usual 3 s.
+const STRETCH_S: f64 = 30.0;
+/// Rows drawn of a stretch.
+const STRETCH_ROWS: usize = 1000;
+/// Values drawn of all whole flights together, so that the page stays near 2 MB.
+const WHOLE_VALUES: usize = 120_000;
+/// Whole flights drawn.
+const WHOLE_FLIGHTS: usize = 6;
+/// Names and units of the states, in the order of `State::NAMES`, with the factor from SI.
+const STATES: [(&str, &str, f64); 8] = [
+    ("Roll φ", "°", DEGREE),
+    ("Pitch θ", "°", DEGREE),
+    ("Airspeed V", "m/s", 1.0),
+    ("Roll rate p", "°/s", DEGREE),
+    ("Pitch rate q", "°/s", DEGREE),
+    ("Yaw rate r", "°/s", DEGREE),
+    ("Angle of attack α", "°", DEGREE),
+    ("Sideslip β", "°", DEGREE),
+];
+const DEGREE: f64 = 180.0 / std::f64::consts::PI;
+
+/// A stretch of one flight: the flight, its rows, and how far the first model strays there.
+#[derive(Clone, Copy)]
+struct Stretch {
+    flight: usize,
+    first: usize,
+    end: usize,
+    error: f64,
+}
+
+/// The section, if the comparison holds what was flown.
+pub(in crate::report) fn section(c: &Comparison) -> Option<Section> {
+    let mut stretches = stretches(c);
+    let mut options = Vec::new();
+    stretches.sort_by(|a, b| b.error.total_cmp(&a.error));
+    let picks = [("worst", 0), ("typical", stretches.len() / 2), ("best", stretches.len())];
+    let mut shown = Vec::new();
+    for (word, at) in picks {
+        let at = at.min(stretches.len().saturating_sub(1));
+        if at < stretches.len() && !shown.contains(&at) {
+            shown.push(at);
+            options.push(option(c, word, stretches[at]));
+        }
+    }
+    let flown: Vec<usize> =
+        (0..c.flights.len()).filter(|f| !c.flights[*f].trace.time_s.is_empty()).collect();
+    let drawn = &flown[..flown.len().min(WHOLE_FLIGHTS)];
+    for &flight in drawn {
+        let lines = STATES.len() * (1 + c.models.len());
+        let rows = (WHOLE_VALUES / lines / drawn.len().max(1)).clamp(300, 4000);
+        let end = c.flights[flight].trace.time_s.len();
+        let name = format!("all of {}", c.flights[flight].name);
+        let figures = vec![Figure::Time(figure(c, flight, 0..end, rows))];
+        options.push(ChoiceOption { name, figures });
+    }
+    if options.is_empty() {
+        return None;
+    }
+    let mut note = format!(
+        "The model flies on the recorded actuators and is put back on the reconstructed state \
+         every {} s; forces and moments are averages over {} s. Stretches of {STRETCH_S:.0} s are \
+         ranked by the error of {}.",
+        c.settings.start_every_s,
+        c.settings.kernel_s,
+        c.models.first().map_or("the model", |m| &m.name)
+    );
+    let left_out: Vec<&str> =
+        flown[drawn.len()..].iter().map(|f| c.flights[*f].name.as_str()).collect();
+    if !left_out.is_empty() {
+        note.push_str(&format!(" Not drawn as a whole: {}.", left_out.join(", ")));
+    }
+    let choice = Choice { anchor: "time".into(), label: "Stretch".into(), options };
+    Some(Section::new("Measured against predicted", &note, vec![Figure::Choice(choice)]))
+}
+
+fn option(c: &Comparison, word: &str, s: Stretch) -> ChoiceOption {
+    let time = &c.flights[s.flight].trace.time_s;
+    let (from, to) = (time[s.first], time[s.end - 1]);
+    let flight = match c.flights.len() {
+        1 => String::new(),
+        _ => format!(" of {}", c.flights[s.flight].name),
+    };
+    ChoiceOption {
+        name: format!("{word}: {from:.0} to {to:.0} s{flight}"),
+        figures: vec![Figure::Time(figure(c, s.flight, s.first..s.end, STRETCH_ROWS))],
+    }
+}
+
+/// Squared error of the first model at every row: each state's by its own mean over all flights.
+fn errors(c: &Comparison) -> Vec<Vec<f64>> {
+    let Some(model) = c.models.first() else { return Vec::new() };
+    let pairs: Vec<(&FlightTrace, &ModelTrace)> =
+        c.flights.iter().map(|f| &f.trace).zip(&model.traces).collect();
+    let square = |(f, m): (&FlightTrace, &ModelTrace), k: usize, i: usize| {
+        let at = |list: &Vec<f64>| list.get(i).copied().unwrap_or(f64::NAN);
+        (at(&m.states[k]) - at(&f.states[k])).powi(2)
+    };
+    let mut sums: Vec<Vec<f64>> = pairs.iter().map(|(f, _)| vec![0.0; f.time_s.len()]).collect();
+    for k in 0..STATES.len() {
+        let rows = |p: usize| 0..pairs[p].0.time_s.len();
+        let all = (0..pairs.len()).flat_map(|p| rows(p).map(move |i| (p, i)));
+        let finite: Vec<f64> =
+            all.map(|(p, i)| square(pairs[p], k, i)).filter(|e| e.is_finite()).collect();
+        let mean = finite.iter().sum::<f64>() / finite.len().max(1) as f64;
+        for (p, sum) in sums.iter_mut().enumerate().filter(|_| mean > 0.0) {
+            for (i, s) in sum.iter_mut().enumerate() {
+                *s += square(pairs[p], k, i) / mean;
+            }
+        }
+    }
+    sums
+}
+
+/// The flights cut into stretches that the first model was flown through.
+fn stretches(c: &Comparison) -> Vec<Stretch> {
+    let mut found = Vec::new();
+    for (flight, errors) in errors(c).iter().enumerate() {
+        let time = &c.flights[flight].trace.time_s;
+        let mut first = 0;
+        while first < time.len() {
+            let last = time[first] + STRETCH_S;
+            let end = first + time[first..].iter().take_while(|t| **t < last).count().max(1);
+            let own: Vec<f64> =
+                errors[first..end].iter().copied().filter(|e| e.is_finite()).collect();
+            // A stretch that is mostly pause, or the short rest at the end, tells little.
+            if time[end - 1] - time[first] > 0.5 * STRETCH_S && 2 * own.len() > end - first {
+                let error = own.iter().sum::<f64>() / own.len() as f64;
+                found.push(Stretch { flight, first, end, error });
+            }
+            first = end;
+        }
+    }
+    found
+}
+
+fn figure(c: &Comparison, flight: usize, rows: std::ops::Range<usize>, most: usize) -> TimeFigure {
+    let trace = &c.flights[flight].trace;
+    let every = rows.len().div_ceil(most).max(1);
+    let gap = |i: usize| trace.states.iter().all(|s| s.get(i).is_none_or(|v| v.is_nan()));
+    // Rows of NaN are kept whatever the step, since they break the lines between segments.
+    let kept: Vec<usize> =
+        rows.clone().filter(|i| (i - rows.start).is_multiple_of(every) || gap(*i)).collect();
+    let take = |list: &[f64], factor: f64| -> Vec<f64> {
+        kept.iter().map(|i| factor * list.get(*i).copied().unwrap_or(f64::NAN)).collect()
+    };
+    let panels = STATES.iter().enumerate().map(|(k, (title, unit, factor))| {
+        let measured = Series::new("measured", Style::Measured, take(&trace.states[k], *factor));
+        let mut series = vec![measured];
+        for (i, model) in c.models.iter().enumerate() {
+            if let Some(own) = model.traces.get(flight) {
+                let values = take(&own.states[k], *factor);
+                series.push(Series::new(&model.name, Style::nth(i), values));
+            }
+        }
+        Panel::new(title, unit, series)
+    });
+    let mut figure = TimeFigure::default();
+    // Steps up to a second are the drawing's; the segments' own rows break the lines.
+    figure.add_track(&take(&trace.time_s, 1.0), f64::INFINITY, panels.collect());
+    if let (Some(first), Some(last)) =
+        (trace.time_s.get(rows.start), trace.time_s.get(rows.end - 1))
+    {
+        add_channels(&mut figure, c, flight, [*first, *last], most);
+    }
+    if every > 1 {
+        figure.notes.push(format!("One sample in {every} is drawn."));
+    }
+    figure
+}
+
+/// Adds the channels in weak form between two times (s), one panel each.
+fn add_channels(
+    figure: &mut TimeFigure,
+    c: &Comparison,
+    flight: usize,
+    [from, to]: [f64; 2],
+    most: usize,
+) {
+    let of = |id: ChannelId| -> Vec<(usize, &ChannelTrace)> {
+        let traces = c.models.iter().map(|m| m.traces.get(flight));
+        let own = traces.map(|t| t.and_then(|t| t.channels.iter().find(|t| t.channel == id)));
+        own.enumerate().filter_map(|(i, t)| Some((i, t?))).collect()
+    };
+    // All channels of a flight have the same windows.
+    let Some((_, any)) = ChannelId::ALL.into_iter().find_map(|id| of(id).first().copied()) else {
+        return;
+    };
+    let rows = thinned(any, [from, to], most);
+    let take = |list: &[f64]| -> Vec<f64> {
+        rows.iter().map(|i| list.get(*i).copied().unwrap_or(f64::NAN)).collect()
+    };
+    let panel = |id: ChannelId| {
+        let traces = of(id);
+        let (_, first) = traces.first()?;
+        let mut series = vec![Series::new("measured", Style::Measured, take(&first.measured))];
+        for (i, trace) in &traces {
+            series.push(Series::new(&c.models[*i].name, Style::nth(*i), take(&trace.predicted)));
+        }
+        Some(Panel::new(&channel_name(id), id.unit(), series))
+    };
+    let panels = ChannelId::ALL.into_iter().filter_map(panel).collect();
+    figure.add_track(&take(&any.time_s), f64::INFINITY, panels);
+}
+
+/// The windows between two times that are drawn: every nth, with those that break the curves.
+fn thinned(trace: &ChannelTrace, [from, to]: [f64; 2], most: usize) -> Vec<usize> {
+    let rows = 0..trace.time_s.len();
+    let inside: Vec<usize> = rows.filter(|i| (from..=to).contains(&trace.time_s[*i])).collect();
+    let every = inside.len().div_ceil(most).max(1);
+    let drawn = |(k, i): &(usize, &usize)| k.is_multiple_of(every) || trace.measured[**i].is_nan();
+    inside.iter().enumerate().filter(drawn).map(|(_, i)| *i).collect()
+}

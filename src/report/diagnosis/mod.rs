@@ -1,0 +1,39 @@
+//! What the report of a diagnosis is made from.
+
+pub(super) mod page;
+pub(super) mod proof;
+pub(super) mod suspects;
+pub(super) mod tables;
+
+use crate::report::Page;
+use crate::sysid::compare::Comparison;
+use crate::sysid::diagnose::Diagnosis;
+
+/// A diagnosis of what a model lacks, with what bears it out.
+#[derive(Clone, Debug)]
+pub struct DiagnosisReport<'a> {
+    /// Title of the page.
+    pub title: String,
+    /// What was found.
+    pub diagnosis: &'a Diagnosis,
+    /// The model as given, first of its models, against the flights of the diagnosis: where it fails.
+    pub failing: Option<&'a Comparison>,
+    /// Models in the order in which they improve (as given, tuned, with the asserted effects) against
+    /// flights that no fit has seen.
+    pub held_out: Option<&'a Comparison>,
+    /// The model's file.
+    pub model_file: String,
+    /// The logs' files, as they were given.
+    pub log_files: Vec<String>,
+    /// The command line that made the diagnosis.
+    pub command_line: String,
+    /// Further programs or files and their versions or hashes.
+    pub versions: Vec<(String, String)>,
+}
+
+impl DiagnosisReport<'_> {
+    /// The page of the diagnosis.
+    pub fn page(&self) -> Page {
+        page::diagnosis_page(self)
+    }
+}

@@ -1,0 +1,179 @@
+//! The page of one diagnosis: what a model lacks, told from the sentence to the proof.
+
+use crate::report::comparison::page::channel_name;
+use crate::report::diagnosis::DiagnosisReport;
+use crate::report::diagnosis::{proof, suspects, tables};
+use crate::report::kit::numbers::percent;
+use crate::report::{
+    BarGroup, Bars, Figure, Finding, Findings, Grid, GridCell, GridRow, Link, Page, Section, Style,
+    Table,
+};
+use crate::sysid::compare::{ChannelId, ChannelResult, Comparison, RegimeVariable};
+use crate::sysid::diagnose::{Diagnosis, Verdict};
+
+/// Sentences that stand large at the top.
+const LEADING: usize = 2;
+/// Share below which a cell of the map stays blank.
+const BLANK: f64 = 0.05;
+
+/// The page of `report`: the sentence first, then what bears it out.
+pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
+    let d = report.diagnosis;
+    let mut sections = vec![Section::new("", "", vec![Figure::Findings(findings(d))])];
+    sections.push(where_it_fails(d, report.failing));
+    sections.push(suspects::ranking(d));
+    sections.push(suspects::curves(d));
+    sections.push(suspects::agreement(d));
+    sections.push(proof::chance(d));
+    sections.extend(report.held_out.map(proof::before_and_after));
+    sections.push(tables::advice(d));
+    sections.push(tables::unseen(d));
+    sections.push(tables::tuned(&d.tuned));
+    sections.push(tables::measurement(d));
+    sections.push(tables::candidates(d));
+    sections.push(tables::notes(d));
+    sections.push(tables::provenance(report));
+    sections.retain(|s| !s.figures.is_empty());
+    Page { title: report.title.clone(), subtitle: subtitle(report), sections }
+}
+
+fn subtitle(report: &DiagnosisReport) -> String {
+    let d = report.diagnosis;
+    let verdict = match d.verdict {
+        Verdict::Effect => "an effect is missing",
+        Verdict::Adequate => "nothing is seen to be missing",
+        Verdict::Unexplained => "something is missing that the catalogue does not hold",
+    };
+    format!("{} with {}: {verdict}.", d.model, report.log_files.join(", "))
+}
+
+fn findings(d: &Diagnosis) -> Findings {
+    let finding = |s: &String| Finding { sentence: s.clone(), link: link(d, s) };
+    let mut lead: Vec<Finding> = d.sentences.iter().take(LEADING).map(finding).collect();
+    if lead.is_empty() {
+        let sentence = "The diagnosis says nothing: the notes say why.".into();
+        lead.push(Finding { sentence, link: None });
+    }
+    Findings { lead, rest: d.sentences.iter().skip(LEADING).map(finding).collect() }
+}
+
+/// The way to the curve of the effect that `sentence` names.
+fn link(d: &Diagnosis, sentence: &str) -> Option<Link> {
+    let letter = |c: char| c.is_alphanumeric() || c == '_';
+    let names = |id: &str| sentence.split(|c| !letter(c)).any(|word| word == id);
+    let of = d.effects.iter().find(|c| c.curve.is_some() && names(&c.id))?;
+    Some(Link { anchor: suspects::ANCHOR.into(), option: of.id.clone() })
+}
+
+/// A channel's name from its symbol; the symbol itself where it is none.
+pub(in crate::report) fn channel_of(symbol: &str) -> String {
+    let id = ChannelId::ALL.into_iter().find(|id| id.symbol() == symbol);
+    id.map_or_else(|| symbol.to_string(), channel_name)
+}
+
+fn where_it_fails(d: &Diagnosis, failing: Option<&Comparison>) -> Section {
+    let mut figures = Vec::new();
+    figures.extend(failing.and_then(map));
+    if !d.channels.is_empty() {
+        figures.push(left(d));
+        figures.push(worst(d));
+    }
+    let note = "The share of each channel's variation that is neither explained by the model nor by \
+                the sensors' noise. “Tuned” is the model with its own coefficients fitted first: \
+                what is left then is for a missing effect to explain.";
+    Section::new("Where it fails", note, figures)
+}
+
+/// Channels over regime variables: what each variable tells of the residual of the model as given.
+fn map(c: &Comparison) -> Option<Figure> {
+    let channels = &c.models.first()?.channels;
+    let variables: Vec<RegimeVariable> = RegimeVariable::CONTINUOUS
+        .into_iter()
+        .chain([RegimeVariable::Flight])
+        .filter(|v| channels.iter().any(|ch| ch.bins.iter().any(|b| b.variable == *v)))
+        .collect();
+    if variables.is_empty() {
+        return None;
+    }
+    let row = |ch: &ChannelResult| {
+        let share = ch.unexplained_fraction;
+        let mut cells = vec![GridCell { text: format!("{} %", percent(share)), weight: 0.0 }];
+        cells.extend(variables.iter().map(|v| cell(ch, *v)));
+        GridRow { label: channel_name(ch.channel), cells }
+    };
+    let mut columns = vec![("left".to_string(), "share that is unexplained".to_string())];
+    columns.extend(variables.iter().map(|v| (sign(*v).to_string(), v.name().to_string())));
+    Some(Figure::Grid(Grid {
+        title: format!("What follows what, {}", c.models[0].name),
+        unit: "how much of the unexplained follows each variable, %".into(),
+        corner: "Channel".into(),
+        columns,
+        rows: channels.iter().map(row).collect(),
+    }))
+}
+
+fn cell(channel: &ChannelResult, variable: RegimeVariable) -> GridCell {
+    let found = channel.bins.iter().find(|b| b.variable == variable);
+    let share = found.map_or(0.0, |b| b.explained);
+    if share.is_nan() || share < BLANK {
+        return GridCell { text: String::new(), weight: 0.0 };
+    }
+    // What is left of a channel that is explained anyway stays pale.
+    let left = channel.unexplained_fraction;
+    let importance = if left.is_finite() { (left / 0.1).clamp(0.0, 1.0) } else { 0.0 };
+    GridCell { text: percent(share), weight: share * importance }
+}
+
+fn sign(variable: RegimeVariable) -> &'static str {
+    match variable {
+        RegimeVariable::Alpha => "α",
+        RegimeVariable::Beta => "β",
+        RegimeVariable::Airspeed => "V",
+        RegimeVariable::Throttle => "thr.",
+        RegimeVariable::P => "p",
+        RegimeVariable::Q => "q",
+        RegimeVariable::R => "r",
+        RegimeVariable::Aileron => "δa",
+        RegimeVariable::Elevator => "δe",
+        RegimeVariable::AileronRate => "δ̇a",
+        RegimeVariable::ElevatorRate => "δ̇e",
+        RegimeVariable::Altitude => "h",
+        RegimeVariable::Time => "time",
+        RegimeVariable::Flight => "flight",
+    }
+}
+
+fn left(d: &Diagnosis) -> Figure {
+    let asserted = d.effects.iter().any(|c| c.asserted);
+    let mut keys = vec![("tuned".to_string(), Style::Actual)];
+    if asserted {
+        keys.push(("with the asserted effects".to_string(), Style::Second));
+    }
+    let group = |ch: &crate::sysid::diagnose::ChannelLeft| BarGroup {
+        label: channel_of(&ch.channel),
+        values: [ch.tuned_unexplained_fraction, ch.unexplained_fraction]
+            .iter()
+            .take(keys.len())
+            .map(|x| 100.0 * x)
+            .collect(),
+    };
+    let groups: Vec<BarGroup> = d.channels.iter().map(group).collect();
+    let all = groups.iter().flat_map(|g| &g.values).copied().filter(|v| v.is_finite());
+    // Shares of a few percent are told apart, too.
+    let full = all.fold(0.0, f64::max).clamp(5.0, 100.0);
+    Figure::Bars(Bars { title: "Left unexplained".into(), unit: "%".into(), keys, groups, full })
+}
+
+fn worst(d: &Diagnosis) -> Figure {
+    use crate::report::Align::Left;
+    let columns = [("Channel", Left), ("What is left", Left), ("Goes with", Left)];
+    let mut table = Table::new("Worst regime", &columns);
+    for channel in &d.channels {
+        if channel.worst_regime.is_some() || channel.left_with.is_some() {
+            let text = |of: &Option<String>| of.clone().unwrap_or("–".into());
+            let (worst, term) = (text(&channel.worst_regime), text(&channel.left_with));
+            table.push([channel_of(&channel.channel), worst, term]);
+        }
+    }
+    Figure::Table(table)
+}

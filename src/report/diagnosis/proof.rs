@@ -1,0 +1,122 @@
+//! What bears a diagnosis out: what chance reaches, the error on flights that no fit has seen.
+
+use crate::report::Align::{Left, Right};
+use crate::report::comparison::page::{growth, unexplained};
+use crate::report::comparison::tables::summary;
+use crate::report::kit::numbers::{evidence, number, percent};
+use crate::report::{Figure, Finding, Findings, Histogram, Rule, Section, Table};
+use crate::sysid::compare::{Comparison, ModelResult};
+use crate::sysid::diagnose::Diagnosis;
+
+/// Evidence under which a null is not drawn: decades of nothing would fill the scale.
+const DRAWN: f64 = 0.1;
+/// Decoys in the table, the strongest first.
+const DECOYS: usize = 8;
+/// The horizon that the sentence speaks of, s, where there is one.
+const TOLD_S: f64 = 5.0;
+
+/// What chance reaches: nulls that lack nothing, columns that cannot be effects.
+pub(in crate::report) fn chance(d: &Diagnosis) -> Section {
+    let mut figures = Vec::new();
+    let best = d.effects.iter().find(|c| c.asserted).or(d.effects.first());
+    if !d.nulls.best.is_empty() {
+        let decoy = d.decoys.iter().map(|x| x.evidence).filter(|e| e.is_finite());
+        let decoy = decoy.fold(f64::NAN, f64::max);
+        let mut rules = Vec::new();
+        if let Some(best) = best {
+            rules.push(Rule { value: best.threshold, label: "threshold".into() });
+            rules.push(Rule { value: best.evidence, label: best.id.clone() });
+        }
+        rules.push(Rule { value: decoy, label: "best decoy".into() });
+        rules.retain(|r| r.value.is_finite() && r.value > 0.0);
+        figures.push(Figure::Histogram(Histogram::log(
+            "Best candidate of each null",
+            "Evidence",
+            "nulls",
+            &d.nulls.best.iter().copied().filter(|e| *e >= DRAWN).collect::<Vec<_>>(),
+            rules,
+        )));
+    }
+    if !d.decoys.is_empty() {
+        figures.push(Figure::Table(decoys(d)));
+    }
+    Section::new("What chance reaches", &chance_note(d), figures)
+}
+
+fn chance_note(d: &Diagnosis) -> String {
+    let n = &d.nulls;
+    let hidden = match n.best.iter().filter(|e| **e < DRAWN).count() {
+        0 => String::new(),
+        found => format!(" In {found} nothing reached {DRAWN}; they are not drawn."),
+    };
+    let strongest = n.best.iter().copied().filter(|e| e.is_finite()).fold(f64::NAN, f64::max);
+    let most = match strongest.is_finite() {
+        true => format!(" The strongest reached {}.", evidence(strongest)),
+        false => String::new(),
+    };
+    format!(
+        "{} nulls were drawn that lack nothing: these flights under the tuned model, with what the \
+         richest fit leaves as noise, its sign drawn anew for every stretch of some seconds, and the \
+         coefficients wrong by chance within their widths. What is found in them is chance. Thresholds allow {} %.{most}{hidden} \
+         Decoys are columns that cannot be effects: reversed in time, or with their phases shuffled.",
+        n.count,
+        (1e4 * n.level).round() / 100.0,
+    )
+}
+
+fn decoys(d: &Diagnosis) -> Table {
+    let mut all: Vec<_> = d.decoys.iter().collect();
+    all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    let mut table = Table::new("Decoys", &[("Decoy", Left), ("Evidence", Right)]);
+    for decoy in all.iter().take(DECOYS) {
+        table.push([decoy.name.clone(), evidence(decoy.evidence)]);
+    }
+    if all.len() > DECOYS {
+        table.push([format!("{} more, all weaker", all.len() - DECOYS), String::new()]);
+    }
+    table
+}
+
+/// Free runs and what is unexplained on flights that no fit has seen, model by model.
+pub(in crate::report) fn before_and_after(c: &Comparison) -> Section {
+    let mut figures = vec![Figure::Findings(statement(c))];
+    figures.extend(growth(c));
+    figures.push(unexplained(c));
+    // The table by horizon; state by state is for the comparison's own page.
+    figures.extend(summary(c).figures.into_iter().take(1));
+    let names = c.flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
+    let note = format!(
+        "The models fly freely on the recorded actuators of {names}, which no fit has seen, from \
+         reconstructed states every {} s.",
+        c.settings.start_every_s
+    );
+    Section::new("Before and after", &note, figures)
+}
+
+/// The fall of the error in one sentence: from the last but one model, the tuned one, to the last.
+fn statement(c: &Comparison) -> Findings {
+    let horizons = || c.settings.horizons_s.iter().copied();
+    let told = horizons().find(|h| *h == TOLD_S).or(horizons().next_back()).unwrap_or(TOLD_S);
+    let error = |m: &ModelResult| {
+        m.free_run.iter().find(|s| s.horizon_s == told).map_or(f64::NAN, |s| s.rmse_scaled)
+    };
+    let plain = |sentence: String| Finding { sentence, link: None };
+    let lead = match &c.models[..] {
+        [.., before, after] => {
+            let what = match 1.0 - error(after) / error(before) {
+                fall if !fall.is_finite() => "cannot be told".to_string(),
+                fall if fall >= 0.0 => format!("falls by {} %", percent(fall)),
+                fall => format!("rises by {} %", percent(-fall)),
+            };
+            format!(
+                "On flights that no fit has seen, the error after {told} s {what} from “{}” to “{}”.",
+                before.name, after.name
+            )
+        }
+        _ => "There is one model only, and nothing to compare it with.".into(),
+    };
+    let detail = |m: &ModelResult| {
+        plain(format!("{}: {} of the characteristic values x_c", m.name, number(error(m))))
+    };
+    Findings { lead: vec![plain(lead)], rest: c.models.iter().map(detail).collect() }
+}

@@ -1,0 +1,215 @@
+//! The suspects of a diagnosis: evidence, curves, agreement between flights.
+
+use crate::report::Align::{Left, Right};
+use crate::report::diagnosis::page::channel_of;
+use crate::report::kit::numbers::{NORMAL_95, interval, number};
+use crate::report::{
+    Choice, ChoiceOption, Evidence, EvidenceGroup, EvidenceRow, Figure, Section, Style, Table,
+    Whisker, Whiskers, XyBand, XyFigure, XyMark, XySeries,
+};
+use crate::sysid::diagnose::{Candidate, Curve, Diagnosis};
+
+/// Where sentences on an effect lead to.
+pub(in crate::report) const ANCHOR: &str = "effect";
+/// Candidates under their thresholds that are drawn; the table has all.
+const BELOW: usize = 8;
+/// Candidates that are not asserted whose curves are drawn.
+const CURVES: usize = 3;
+/// Points drawn of the measured scatter.
+const POINTS: usize = 1500;
+
+pub(in crate::report) fn ranking(d: &Diagnosis) -> Section {
+    let mut seen: Vec<&str> = Vec::new();
+    let mut groups = Vec::new();
+    for found in d.effects.iter().filter(|c| c.asserted) {
+        if !seen.contains(&found.id.as_str()) {
+            groups.push(tied(d, found, &mut seen));
+        }
+    }
+    let rest = || d.effects.iter().filter(|c| !seen.contains(&c.id.as_str()));
+    let above = |c: &&Candidate| c.evidence > c.threshold;
+    groups.push(EvidenceGroup {
+        title: "Above chance, but refused".into(),
+        note: String::new(),
+        style: Style::Fourth,
+        rows: rest().filter(above).map(row).collect(),
+    });
+    let below: Vec<&Candidate> = rest().filter(|c| !above(c)).collect();
+    let more = below.len().saturating_sub(BELOW);
+    groups.push(EvidenceGroup {
+        title: "No more than chance".into(),
+        note: match more {
+            0 => String::new(),
+            1 => "One more is in the table below.".into(),
+            n => format!("{n} more are in the table below."),
+        },
+        style: Style::Measured,
+        rows: below.into_iter().take(BELOW).map(row).collect(),
+    });
+    groups.retain(|g| !g.rows.is_empty());
+    if groups.is_empty() {
+        return Section::default();
+    }
+    let note = "Evidence is the smaller of what the candidate gains in fit, less a penalty for its \
+                parameters, and how surely its coefficients differ from nought over independent \
+                stretches of flight. What chance reaches was found in nulls, drawn so that \
+                they lack nothing. A candidate above it is refused where it does not hold on stretches that \
+                the fit did not see, leaves what is physically possible, or the flights disagree.";
+    let figure = Evidence { title: "Evidence against chance".into(), groups };
+    Section::new("Suspects", note, vec![Figure::Evidence(figure)])
+}
+
+/// An asserted effect with those that the data cannot tell from it.
+fn tied<'a>(d: &'a Diagnosis, found: &'a Candidate, seen: &mut Vec<&'a str>) -> EvidenceGroup {
+    let alike = |c: &&Candidate| found.indistinguishable_from.contains(&c.id);
+    let others: Vec<&Candidate> = d.effects.iter().filter(alike).collect();
+    seen.push(&found.id);
+    seen.extend(others.iter().map(|c| c.id.as_str()));
+    let (title, note) = match found.indistinguishable_from.len() {
+        0 => (format!("Asserted: {}", found.id), String::new()),
+        _ => (
+            format!("Asserted: {} or a look-alike", found.id),
+            "These data cannot tell them apart; what to fly does.".to_string(),
+        ),
+    };
+    let plain = |c: &Candidate| EvidenceRow { detail: detail(c).join("; "), ..row(c) };
+    let rows = std::iter::once(found).chain(others).map(plain).collect();
+    EvidenceGroup { title, note, style: Style::Actual, rows }
+}
+
+fn row(c: &Candidate) -> EvidenceRow {
+    let mut detail = detail(c);
+    if !c.indistinguishable_from.is_empty() {
+        detail.push(format!("not to be told from {}", c.indistinguishable_from.join(", ")));
+    }
+    EvidenceRow {
+        label: c.id.clone(),
+        detail: detail.join("; "),
+        value: c.evidence,
+        threshold: c.threshold,
+    }
+}
+
+fn detail(c: &Candidate) -> Vec<String> {
+    let what = c.description.trim_end_matches('.').to_string();
+    let refused = c.refused.iter().map(|why| format!("refused: {}", why.trim_end_matches('.')));
+    std::iter::once(what).chain(refused).collect()
+}
+
+pub(in crate::report) fn curves(d: &Diagnosis) -> Section {
+    let with = |asserted: bool| {
+        let of = d.effects.iter().filter(move |c| c.asserted == asserted);
+        of.filter_map(|c| Some((c, c.curve.as_ref()?)))
+    };
+    let options: Vec<ChoiceOption> = with(true)
+        .chain(with(false).take(CURVES))
+        .map(|(c, curve)| ChoiceOption { name: c.id.clone(), figures: figures(c, curve) })
+        .collect();
+    if options.is_empty() {
+        return Section::default();
+    }
+    let note = "What the flights show that the tuned model without the effect does not (points, \
+                averages over about 0.4 s), and what the effect contributes as fitted, with its \
+                95 % interval.";
+    let choice = Choice { anchor: ANCHOR.into(), label: "Effect".into(), options };
+    Section::new("The effect", note, vec![Figure::Choice(choice)])
+}
+
+fn figures(c: &Candidate, curve: &Curve) -> Vec<Figure> {
+    vec![Figure::Xy(plot(c, curve)), Figure::Table(parameters(c))]
+}
+
+fn plot(c: &Candidate, curve: &Curve) -> XyFigure {
+    let every = curve.x.len().div_ceil(POINTS).max(1);
+    let some = |list: &[f64]| list.iter().copied().step_by(every).collect::<Vec<f64>>();
+    let column = |k: usize| curve.contribution.iter().map(|x| x[k]).collect::<Vec<f64>>();
+    XyFigure {
+        title: format!("{} over {}", channel_of(&curve.channel), curve.variable),
+        x_label: curve.variable.clone(),
+        y_label: format!("Measured − tuned model ({})", curve.unit),
+        bands: vec![XyBand {
+            label: "95 % interval".into(),
+            x: curve.at.clone(),
+            low: column(1),
+            high: column(2),
+        }],
+        series: vec![
+            XySeries {
+                label: "measured".into(),
+                style: Style::Measured,
+                mark: XyMark::Dots,
+                x: some(&curve.x),
+                y: some(&curve.residual),
+            },
+            XySeries {
+                label: c.id.clone(),
+                style: Style::Command,
+                mark: XyMark::Line,
+                x: curve.at.clone(),
+                y: column(0),
+            },
+        ],
+    }
+}
+
+fn parameters(c: &Candidate) -> Table {
+    let columns =
+        [("Parameter", Left), ("Value", Right), ("95 % interval", Right), ("What it is", Left)];
+    let mut table = Table::new(&format!("Parameters of {}", c.id), &columns);
+    for p in &c.parameters {
+        let ends = interval(p.ci95[0], p.ci95[1]);
+        table.push([p.name.clone(), number(p.value), ends, p.unit.clone()]);
+    }
+    table
+}
+
+pub(in crate::report) fn agreement(d: &Diagnosis) -> Section {
+    let figures: Vec<Figure> = d
+        .effects
+        .iter()
+        .filter(|c| (c.asserted || c.evidence > c.threshold) && !c.by_flight.is_empty())
+        .filter_map(|c| Some(Figure::Whiskers(by_flight(c)?)))
+        .collect();
+    let note = "The first parameter fitted on each flight alone, with its 95 % interval: flights \
+                that disagree point to something else than this effect.";
+    Section::new("Do the flights agree?", note, figures)
+}
+
+fn by_flight(c: &Candidate) -> Option<Whiskers> {
+    let first = c.parameters.first()?;
+    let flights = c.by_flight.iter().map(|f| (f.flight.as_str(), f.value, f.sd));
+    let title = format!("{}: {}", c.id, first.name);
+    Some(flight_by_flight(title, &first.unit, flights, (first.value, first.ci95)))
+}
+
+/// What each flight alone says of a value (flight, value, standard deviation), above what all say
+/// together (value with its 95 % interval).
+pub(in crate::report) fn flight_by_flight<'a>(
+    title: String,
+    unit: &str,
+    flights: impl Iterator<Item = (&'a str, f64, f64)>,
+    (value, ends): (f64, [f64; 2]),
+) -> Whiskers {
+    let row = |label: &str, style: Style, value: f64, ends: [f64; 2]| Whisker {
+        label: label.into(),
+        style,
+        value,
+        interval: ends,
+        text: format!("{} ({})", number(value), interval(ends[0], ends[1])),
+    };
+    let mut rows: Vec<Whisker> = flights
+        .map(|(flight, value, sd)| {
+            row(flight, Style::Second, value, [value - NORMAL_95 * sd, value + NORMAL_95 * sd])
+        })
+        .collect();
+    rows.push(row("all flights", Style::Actual, value, ends));
+    let legend = "dashed: none of it".into();
+    Whiskers {
+        title,
+        unit: unit.into(),
+        scale: crate::report::Scale::Linear,
+        lines: vec![0.0],
+        legend,
+        rows,
+    }
+}

@@ -1,0 +1,141 @@
+//! What a flight report is made from.
+
+pub(super) mod page;
+pub(super) mod targets;
+pub(super) mod verdict;
+
+use crate::logs::Flight;
+use crate::report::Sight;
+use crate::report::{LoopTiming, Page};
+use crate::sysid::compare::Comparison;
+
+/// A flight with what is known about it.
+#[derive(Clone, Debug)]
+pub struct FlightReport<'a> {
+    /// Title of the page.
+    pub title: String,
+    /// The log.
+    pub flight: &'a Flight,
+    /// Name of the controller that flew.
+    pub controller: String,
+    /// Name of the model it flew with.
+    pub model: String,
+    /// Seed of everything random in the flight; `None` when nothing was.
+    pub seed: Option<u64>,
+    /// The command line that made the flight.
+    pub command_line: String,
+    /// Programs and their versions.
+    pub versions: Vec<(String, String)>,
+    /// The schedule, in time order; empty when no target was set.
+    pub segments: Vec<Segment>,
+    /// Largest settled error that counts as tracked, rad.
+    pub tolerance_rad: f64,
+    /// Deflections at full command, which turn commands into the unit of what acts.
+    pub travel: SurfaceTravel,
+    /// Durations of the control cycles; `None` when they were not recorded.
+    pub timing: Option<LoopTiming>,
+    /// What happened, in time order.
+    pub events: Vec<Event>,
+    /// How well the model predicts this flight; `None` when they were not compared.
+    pub comparison: Option<Comparison>,
+    /// What the planner saw at some ticks; empty when none flew.
+    pub sights: Vec<Sight>,
+}
+
+/// Deflections at a command of +1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceTravel {
+    /// Aileron, rad.
+    pub aileron_rad: f64,
+    /// Elevator, rad.
+    pub elevator_rad: f64,
+}
+
+/// A part of the schedule with one target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// When the target was set, s, on the flight's clock.
+    pub start_s: f64,
+    /// When it ended, s.
+    pub end_s: f64,
+    /// Commanded roll, rad.
+    pub roll_target_rad: f64,
+    /// Commanded pitch, rad.
+    pub pitch_target_rad: f64,
+    /// How far the target is from level flight.
+    pub difficulty: Difficulty,
+    /// Settled error: mean of the roll and pitch RMS errors over the last fifth, rad; NaN when it
+    /// could not be told.
+    pub settled_error_rad: f64,
+}
+
+impl Segment {
+    /// Whether the settled error is within `tolerance_rad`; one that could not be told is not.
+    pub fn tracked(&self, tolerance_rad: f64) -> bool {
+        self.settled_error_rad <= tolerance_rad
+    }
+}
+
+/// How far a target is from level flight, by the groups of the evaluation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Difficulty {
+    /// |roll| below 45° with |pitch| below 25°.
+    Easy,
+    /// Anything beyond.
+    Hard,
+}
+
+impl Difficulty {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Difficulty::Easy => "easy",
+            Difficulty::Hard => "hard",
+        }
+    }
+}
+
+/// Something that happened at an instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// When, s, on the flight's clock.
+    pub time_s: f64,
+    /// What kind of thing.
+    pub kind: EventKind,
+    /// What, in words.
+    pub text: String,
+}
+
+/// What kind of thing happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// The mode changed.
+    Mode,
+    /// A message was sent or received.
+    Text,
+    /// A failsafe acted.
+    Failsafe,
+}
+
+impl EventKind {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            EventKind::Mode => "mode",
+            EventKind::Text => "text",
+            EventKind::Failsafe => "failsafe",
+        }
+    }
+}
+
+impl FlightReport<'_> {
+    /// Number of segments that were tracked.
+    pub fn tracked(&self) -> usize {
+        self.segments.iter().filter(|s| s.tracked(self.tolerance_rad)).count()
+    }
+
+    /// The page of the flight.
+    pub fn page(&self) -> Page {
+        page::page(self)
+    }
+}

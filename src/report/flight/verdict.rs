@@ -1,0 +1,110 @@
+//! The sentence that says what happened in a flight, with what bears it out.
+
+use crate::logs::Sample;
+use crate::report::flight::{Difficulty, FlightReport, Segment};
+use crate::report::{LoopTiming, Outcome, Verdict};
+
+/// Targets that were not tracked up to this number are listed under the sentence.
+const LISTED_TARGETS: usize = 6;
+
+/// From the first time to the last, s.
+pub(in crate::report) fn duration_s(samples: &[Sample]) -> f64 {
+    let times = || samples.iter().map(|s| s.time_s).filter(|t| t.is_finite());
+    match (times().next(), times().next_back()) {
+        (Some(first), Some(last)) => last - first,
+        _ => 0.0,
+    }
+}
+
+pub(in crate::report) fn verdict(report: &FlightReport) -> Verdict {
+    let (tracked, all) = (report.tracked(), report.segments.len());
+    let late = report.timing.as_ref().map(LoopTiming::late);
+    let mut parts = Vec::new();
+    if all == 0 {
+        parts.push(format!("Flew {:.1} s without a target", duration_s(&report.flight.samples)));
+    } else {
+        parts.push(format!("Tracked {tracked} of {all} targets"));
+        parts.extend(settled_by_difficulty(&report.segments));
+    }
+    parts.push(match late {
+        None => "loop timing was not recorded".into(),
+        Some(0) => "no late cycle".into(),
+        Some(1) => "1 late cycle".into(),
+        Some(n) => format!("{n} late cycles"),
+    });
+    let outcome = match (all, late) {
+        _ if tracked < all => Outcome::Missed,
+        (_, Some(1..)) => Outcome::Missed,
+        (0, _) | (_, None) => Outcome::Open,
+        _ => Outcome::Reached,
+    };
+    Verdict { outcome, sentence: format!("{}.", parts.join("; ")), details: details(report) }
+}
+
+fn settled_by_difficulty(segments: &[Segment]) -> Option<String> {
+    let group = |difficulty: Difficulty| {
+        let of = segments.iter().filter(|s| s.difficulty == difficulty);
+        let errors: Vec<f64> = of.map(|s| s.settled_error_rad).filter(|e| e.is_finite()).collect();
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        (!errors.is_empty()).then(|| format!("{} {}", degrees(mean), difficulty.name()))
+    };
+    let groups: Vec<String> =
+        [Difficulty::Easy, Difficulty::Hard].into_iter().filter_map(group).collect();
+    (!groups.is_empty()).then(|| format!("settled error {}", groups.join(", ")))
+}
+
+fn details(report: &FlightReport) -> Vec<String> {
+    let mut details = not_tracked(report);
+    if !report.segments.is_empty() {
+        let tolerance = degrees(report.tolerance_rad);
+        details.push(format!(
+            "A target counts as tracked when its settled error is at most {tolerance}."
+        ));
+    }
+    if let Some(timing) = &report.timing {
+        let [p50, p99, p999] = timing.percentiles_us([0.5, 0.99, 0.999]).map(|us| us / 1e3);
+        details.push(format!(
+            "Loop, {}: p50 {p50:.2} ms, p99 {p99:.2} ms, p99.9 {p999:.2} ms of {} ms.",
+            timing.measure,
+            timing.budget_us / 1e3
+        ));
+    }
+    details
+}
+
+/// A line for each target that was not tracked, and one for those beyond the first few.
+fn not_tracked(report: &FlightReport) -> Vec<String> {
+    let missed = || {
+        let numbered = report.segments.iter().zip(1..);
+        numbered.filter(|(s, _): &(&Segment, usize)| !s.tracked(report.tolerance_rad))
+    };
+    let line = |(s, number): (&Segment, usize)| {
+        let (roll, pitch) = (signed(s.roll_target_rad), signed(s.pitch_target_rad));
+        let error = degrees(s.settled_error_rad);
+        format!(
+            "Not tracked: target {number}, roll {roll}°, pitch {pitch}°, settled error {error}."
+        )
+    };
+    let mut lines: Vec<String> = missed().take(LISTED_TARGETS).map(line).collect();
+    let beyond = missed().count().saturating_sub(LISTED_TARGETS);
+    if beyond > 0 {
+        lines.push(format!("Not tracked either: {beyond} more, in the table of targets."));
+    }
+    lines
+}
+
+/// Degrees with a sign, by a true minus.
+pub(in crate::report) fn signed(rad: f64) -> String {
+    format!("{:+.1}", rad.to_degrees()).replace('-', "−")
+}
+
+/// An error in degrees, with digits enough that a small one is not shown as zero.
+pub(in crate::report) fn degrees(rad: f64) -> String {
+    let deg = rad.to_degrees();
+    match deg.abs() {
+        _ if !deg.is_finite() => "unknown".into(),
+        a if a < 0.0095 && a > 0.0 => format!("{deg:.4}°"),
+        a if a < 9.95 => format!("{deg:.2}°"),
+        _ => format!("{deg:.1}°"),
+    }
+}

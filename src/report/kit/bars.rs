@@ -1,0 +1,104 @@
+//! Horizontal bars: one quantity for several things, side by side for several models.
+
+use crate::report::Style;
+use crate::report::kit::html::escape;
+
+/// Groups of bars from zero.
+#[derive(Clone, Debug)]
+pub struct Bars {
+    /// What is shown.
+    pub title: String,
+    /// Unit of the values, such as `%`.
+    pub unit: String,
+    /// What the bars of a group stand for, in their order.
+    pub keys: Vec<(String, Style)>,
+    /// The groups, top to bottom.
+    pub groups: Vec<BarGroup>,
+    /// The value at which a bar is full; longer ones are cut, and marked.
+    pub full: f64,
+}
+
+/// Bars of one thing.
+#[derive(Clone, Debug)]
+pub struct BarGroup {
+    /// What it is.
+    pub label: String,
+    /// One value for each key, in the unit of the figure; NaN where it cannot be told.
+    pub values: Vec<f64>,
+}
+
+impl Bars {
+    pub(in crate::report) fn html(&self) -> String {
+        let groups: String = self.groups.iter().map(|g| self.group_html(g)).collect();
+        format!(
+            "<figure class=\"panel bars\"><figcaption><h3>{}</h3><span class=\"unit\">{}</span>{}\
+             </figcaption>\n<dl>\n{groups}</dl></figure>\n",
+            escape(&self.title),
+            escape(&self.unit),
+            keys_html(&self.keys)
+        )
+    }
+
+    fn group_html(&self, group: &BarGroup) -> String {
+        let mut html = format!("<dt>{}</dt>", escape(&group.label));
+        for (value, (name, style)) in group.values.iter().zip(&self.keys) {
+            let share = if value.is_finite() { 100.0 * value / self.full } else { 0.0 };
+            let share = share.clamp(0.0, 100.0);
+            let cut = if value.is_finite() && *value > self.full { " cut" } else { "" };
+            html.push_str(&format!(
+                "<dd title=\"{}\"><span class=\"track\"><i class=\"bar-fill{cut}\" \
+                 style=\"width:{share:.2}%;background:var(--{})\"></i></span>\
+                 <span class=\"value\">{}</span></dd>",
+                escape(name),
+                style.name(),
+                escape(&value_text(*value, &self.unit))
+            ));
+        }
+        html + "\n"
+    }
+}
+
+fn value_text(value: f64, unit: &str) -> String {
+    match value {
+        v if !v.is_finite() => "cannot be told".into(),
+        v if v.abs() >= 1e4 => format!("{v:.1e} {unit}"),
+        v if v.abs() < 0.005 => format!("< 0.01 {unit}"),
+        v if v.abs() < 0.095 => format!("{v:.2} {unit}"),
+        v if v.abs() < 9.95 => format!("{v:.1} {unit}"),
+        v => format!("{v:.0} {unit}"),
+    }
+}
+
+/// A key of colours; empty if there is one only.
+pub(in crate::report) fn keys_html(keys: &[(String, Style)]) -> String {
+    if keys.len() < 2 {
+        return String::new();
+    }
+    let entry = |(name, style): &(String, Style)| {
+        format!(
+            "<span class=\"entry\"><i class=\"swatch\" style=\"background:var(--{})\"></i>{}</span>",
+            style.name(),
+            escape(name)
+        )
+    };
+    format!("<div class=\"legend\">{}</div>", keys.iter().map(entry).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bar_stays_within_its_track_whatever_its_value() {
+        let values = vec![250.0, f64::NAN, -3.0, f64::INFINITY];
+        let keys = ["a", "b", "c", "d"].map(|k| (k.to_string(), Style::Actual)).to_vec();
+        let groups = vec![BarGroup { label: "lift".into(), values }];
+        let bars = Bars { title: "t".into(), unit: "%".into(), keys, groups, full: 100.0 };
+        let html = bars.html();
+        let widths: Vec<&str> =
+            html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
+        // Cut at full, nothing, nothing below zero, nothing for what is no number.
+        assert_eq!(widths, ["100.00", "0.00", "0.00", "0.00"]);
+        assert!(html.contains("250 %") && html.contains("cannot be told"));
+    }
+}

@@ -1,0 +1,58 @@
+//! Alternatives of which the reader sees one at a time.
+
+use crate::report::Figure;
+use crate::report::kit::html::escape;
+
+/// Named alternatives behind a row of buttons; choices with the same label switch together.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// What a link points to: letters and hyphens, once a page.
+    pub anchor: String,
+    /// What is chosen, for example `Channel`.
+    pub label: String,
+    /// The alternatives; the first is seen at first. A browser without scripts shows all.
+    pub options: Vec<ChoiceOption>,
+}
+
+/// One alternative.
+#[derive(Clone, Debug)]
+pub struct ChoiceOption {
+    /// Its name on the button.
+    pub name: String,
+    /// What it shows.
+    pub figures: Vec<Figure>,
+}
+
+impl Choice {
+    pub(in crate::report) fn html(&self, data: &mut Vec<String>) -> String {
+        let (anchor, label) = (escape(&self.anchor), escape(&self.label));
+        let mut html = format!("<div class=\"choice\" id=\"{anchor}\" data-label=\"{label}\">\n");
+        if self.options.len() > 1 {
+            let button = |o: &ChoiceOption| {
+                let name = escape(&o.name);
+                format!(
+                    "<button type=\"button\" data-option=\"{name}\" aria-pressed=\"false\">\
+                     {name}</button>"
+                )
+            };
+            let buttons: String = self.options.iter().map(button).collect();
+            html.push_str(&format!(
+                "<div class=\"options\" role=\"group\" aria-label=\"{label}\">\
+                 <span class=\"unit\">{label}</span>{buttons}</div>\n"
+            ));
+        }
+        for option in &self.options {
+            let name = escape(&option.name);
+            html.push_str(&format!(
+                "<div class=\"option\" data-option=\"{name}\"><h3 class=\"chosen\">{name}</h3>\
+                 <div class=\"figures\">\n"
+            ));
+            for figure in &option.figures {
+                html.push_str(&figure.html(data));
+            }
+            html.push_str("</div></div>\n");
+        }
+        html.push_str("</div>\n");
+        html
+    }
+}

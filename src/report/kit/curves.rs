@@ -1,0 +1,51 @@
+//! Lines of a quantity over another, the height by decades or evenly.
+
+use serde::Serialize;
+
+use crate::report::Series;
+use crate::report::kit::html::{compact, escape};
+
+/// Lines over one horizontal quantity.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Curves {
+    /// What is shown.
+    #[serde(skip)]
+    pub title: String,
+    /// Name of the horizontal axis, with its unit.
+    pub x_label: String,
+    /// Name of the vertical axis, with its unit.
+    pub y_label: String,
+    /// Horizontal values, ascending.
+    #[serde(serialize_with = "compact")]
+    pub x: Vec<f64>,
+    /// The lines; one value for each horizontal one, what the scale has no height for is a gap.
+    pub series: Vec<Series>,
+    /// Shaded ranges around lines, such as the least and the most of several seeds.
+    pub ranges: Vec<Range>,
+    /// Heights evenly instead of by decades.
+    pub linear: bool,
+}
+
+/// A shaded range in the colour of a line.
+#[derive(Clone, Debug, Serialize)]
+pub struct Range {
+    /// Index of the line among the series.
+    pub of: usize,
+    /// Lower edge, as many values as horizontal ones.
+    #[serde(serialize_with = "compact")]
+    pub low: Vec<f64>,
+    /// Upper edge, likewise.
+    #[serde(serialize_with = "compact")]
+    pub high: Vec<f64>,
+}
+
+impl Curves {
+    pub(in crate::report) fn html(&self, index: usize) -> String {
+        let title = escape(&self.title);
+        format!(
+            "<figure class=\"panel xy\"><figcaption><h3>{title}</h3></figcaption>\
+             <div class=\"plot\" data-figure=\"{index}\" tabindex=\"0\" role=\"img\" \
+             aria-label=\"{title}\"></div></figure>\n"
+        )
+    }
+}

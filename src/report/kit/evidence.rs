@@ -1,0 +1,147 @@
+//! Evidence for things, each as a bar against its own threshold, in groups that belong together.
+
+use crate::report::Style;
+use crate::report::kit::html::escape;
+use crate::report::kit::numbers::evidence;
+
+/// Longest bars, in thresholds; longer ones are cut, and marked.
+const FULL: f64 = 6.0;
+
+/// Bars of evidence divided by threshold: a line through all of them stands at one.
+#[derive(Clone, Debug)]
+pub struct Evidence {
+    /// What is shown.
+    pub title: String,
+    /// The groups, top to bottom.
+    pub groups: Vec<EvidenceGroup>,
+}
+
+/// Things that belong together.
+#[derive(Clone, Debug)]
+pub struct EvidenceGroup {
+    /// What they have in common.
+    pub title: String,
+    /// A sentence on it; may be empty.
+    pub note: String,
+    /// How its bars are drawn.
+    pub style: Style,
+    /// The things, top to bottom.
+    pub rows: Vec<EvidenceRow>,
+}
+
+/// One thing.
+#[derive(Clone, Debug)]
+pub struct EvidenceRow {
+    /// What it is called.
+    pub label: String,
+    /// What else there is to say of it; may be empty.
+    pub detail: String,
+    /// Its evidence; NaN if it could not be told.
+    pub value: f64,
+    /// What chance reaches; NaN if it is not known.
+    pub threshold: f64,
+}
+
+impl EvidenceRow {
+    /// Evidence in thresholds.
+    fn ratio(&self) -> f64 {
+        if self.threshold > 0.0 { self.value / self.threshold } else { f64::NAN }
+    }
+}
+
+impl Evidence {
+    /// The longest bar that the figure has room for, in thresholds.
+    fn full(&self) -> f64 {
+        let ratios = self.groups.iter().flat_map(|g| &g.rows).map(EvidenceRow::ratio);
+        let longest = ratios.filter(|r| r.is_finite()).fold(0.0, f64::max);
+        longest.clamp(1.5, FULL)
+    }
+
+    pub(in crate::report) fn html(&self) -> String {
+        let full = self.full();
+        let groups: String = self.groups.iter().map(|g| g.html(full)).collect();
+        format!(
+            "<figure class=\"panel evidence\"><figcaption><h3>{}</h3>\
+             <span class=\"unit\">the upright line is what chance reaches</span></figcaption>\n\
+             {groups}</figure>\n",
+            escape(&self.title)
+        )
+    }
+}
+
+impl EvidenceGroup {
+    fn html(&self, full: f64) -> String {
+        let note = match self.note.is_empty() {
+            true => String::new(),
+            false => format!("<p class=\"note\">{}</p>", escape(&self.note)),
+        };
+        let rows: String = self.rows.iter().map(|r| r.html(full, self.style)).collect();
+        format!(
+            "<div class=\"suspects\"><h4>{}</h4>{note}<dl>\n{rows}</dl></div>\n",
+            escape(&self.title)
+        )
+    }
+}
+
+impl EvidenceRow {
+    fn html(&self, full: f64, style: Style) -> String {
+        let ratio = self.ratio();
+        let share = if ratio.is_finite() { (100.0 * ratio / full).clamp(0.0, 100.0) } else { 0.0 };
+        let cut = if ratio > full { " cut" } else { "" };
+        let detail = match self.detail.is_empty() {
+            true => String::new(),
+            false => format!("<small>{}</small>", escape(&self.detail)),
+        };
+        let text = match (self.value.is_finite(), self.threshold.is_finite()) {
+            (false, _) => "cannot be told".into(),
+            (true, false) => format!("{}, chance not known", evidence(self.value)),
+            (true, true) => {
+                format!("{}, chance {}", evidence(self.value), evidence(self.threshold))
+            }
+        };
+        format!(
+            "<dt>{}{detail}</dt><dd><span class=\"track\"><i class=\"bar-fill{cut}\" \
+             style=\"width:{share:.2}%;background:var(--{})\"></i><i class=\"tick\" \
+             style=\"left:{:.2}%\"></i></span><span class=\"value\">{}</span></dd>\n",
+            escape(&self.label),
+            style.name(),
+            100.0 / full,
+            escape(&text)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(value: f64, threshold: f64) -> EvidenceRow {
+        EvidenceRow { label: "lift_stall".into(), detail: String::new(), value, threshold }
+    }
+
+    #[test]
+    fn bars_stay_within_their_track_whatever_the_evidence() {
+        let rows = vec![row(120.0, 10.0), row(5.0, 10.0), row(-4.0, 10.0), row(f64::NAN, 10.0)];
+        let rows = [rows, vec![row(50.0, 0.0), row(f64::INFINITY, f64::NAN)]].concat();
+        let group =
+            EvidenceGroup { title: "t".into(), note: String::new(), style: Style::Actual, rows };
+        let html = Evidence { title: "e".into(), groups: vec![group] }.html();
+        let widths: Vec<&str> =
+            html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
+        // Twelve thresholds are cut at six; half a threshold is a twelfth of six; the rest is nothing.
+        assert_eq!(widths, ["100.00", "8.33", "0.00", "0.00", "0.00", "0.00"]);
+        assert!(html.contains("bar-fill cut") && html.contains("left:16.67%"));
+        assert!(html.contains("5.0, chance 10.0") && html.contains("cannot be told"));
+    }
+
+    #[test]
+    fn the_line_of_chance_is_in_sight_when_nothing_reaches_it() {
+        let group = EvidenceGroup {
+            title: "t".into(),
+            note: String::new(),
+            style: Style::Measured,
+            rows: vec![row(1.0, 10.0)],
+        };
+        assert_eq!(Evidence { title: "e".into(), groups: vec![group] }.full(), 1.5);
+    }
+}

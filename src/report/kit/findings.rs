@@ -1,0 +1,53 @@
+//! Findings in plain words, each with a link to what bears it out.
+
+use crate::report::kit::html::escape;
+
+/// Sentences, the leading ones large.
+#[derive(Clone, Debug, Default)]
+pub struct Findings {
+    /// What the reader must know first.
+    pub lead: Vec<Finding>,
+    /// The rest, in order.
+    pub rest: Vec<Finding>,
+}
+
+/// A sentence.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// The sentence, with its full stop.
+    pub sentence: String,
+    /// The figure that shows it.
+    pub link: Option<Link>,
+}
+
+/// A way to one alternative of a [`crate::report::Choice`].
+#[derive(Clone, Debug)]
+pub struct Link {
+    /// Anchor of the choice.
+    pub anchor: String,
+    /// Name of the alternative.
+    pub option: String,
+}
+
+impl Findings {
+    pub(in crate::report) fn html(&self) -> String {
+        let lead: String = self.lead.iter().map(|f| format!("<p>{}</p>", f.html())).collect();
+        let rest: String = self.rest.iter().map(|f| format!("<li>{}</li>", f.html())).collect();
+        let list = if rest.is_empty() { rest } else { format!("<ul>{rest}</ul>") };
+        format!("<div class=\"verdict findings\">{lead}{list}</div>\n")
+    }
+}
+
+impl Finding {
+    fn html(&self) -> String {
+        let sentence = escape(&self.sentence);
+        match &self.link {
+            None => sentence,
+            Some(link) => format!(
+                "{sentence} <a class=\"show\" href=\"#{}\" data-option=\"{}\">Show</a>",
+                escape(&link.anchor),
+                escape(&link.option)
+            ),
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Text and data made safe to stand inside an HTML page.
+
+use serde::{Serialize, Serializer};
+
+/// `text` with the five characters that mean something to HTML replaced; safe as element text
+/// and inside a quoted attribute.
+pub(in crate::report) fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe.push_str("&amp;"),
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '"' => safe.push_str("&quot;"),
+            '\'' => safe.push_str("&#39;"),
+            // Control characters are not allowed in HTML text; logs may hold them.
+            c if c.is_control() && !matches!(c, '\n' | '\t') => safe.push('\u{fffd}'),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+/// `data` as JSON that may stand in a `<script>` element: no `<` is left in it, so neither
+/// `</script>` nor `<!--` can end it.
+pub(in crate::report) fn script_json<T: Serialize>(data: &T) -> String {
+    serde_json::to_string(data)
+        .expect("figures are structs of strings and numbers, which JSON can hold")
+        .replace('<', "\\u003c")
+}
+
+/// Serialises values with six significant digits, which is more than a screen shows and less
+/// than an f32 holds; what is not finite becomes `null`.
+pub(in crate::report) fn compact<S: Serializer>(
+    values: &[f64],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(values.iter().map(|&v| six_digits(v)))
+}
+
+/// Serialises times to 0.1 ms: six digits would not do after the first 1000 s.
+pub(in crate::report) fn compact_time<S: Serializer>(
+    times: &[f64],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(times.iter().map(|t| (t * 1e4).round() / 1e4))
+}
+
+fn six_digits(value: f64) -> f32 {
+    if value == 0.0 || !value.is_finite() {
+        return value as f32;
+    }
+    let unit = 10f64.powi(5 - value.abs().log10().floor() as i32);
+    let rounded = (value * unit).round() / unit;
+    if rounded.is_finite() { rounded as f32 } else { value as f32 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn escapes_every_special_character() {
+        assert_eq!(escape("<a b='\"&'>\u{7}"), "&lt;a b=&#39;&quot;&amp;&#39;&gt;\u{fffd}");
+    }
+
+    #[test]
+    fn json_cannot_end_its_script_element() {
+        let json = script_json(&["</script><!--"]);
+        assert!(!json.contains('<'));
+        let back: Vec<String> = serde_json::from_str(&json).unwrap();
+        assert_eq!(back, ["</script><!--"]);
+    }
+
+    #[test]
+    fn numbers_keep_six_digits_and_lose_nan() {
+        #[derive(Serialize)]
+        struct Values(#[serde(serialize_with = "compact")] Vec<f64>);
+        let values =
+            Values(vec![std::f64::consts::PI, -0.000_123_456_78, 1e300, f64::NAN, 0.0, 1e-320]);
+        // 1e300 is beyond f32, so it is no number on the page either.
+        assert_eq!(script_json(&values), "[3.14159,-0.000123457,null,null,0.0,0.0]");
+    }
+}

@@ -1,0 +1,83 @@
+//! Means with their intervals in bins, one small plot for each quantity that was binned.
+
+use serde::Serialize;
+
+use crate::report::Style;
+use crate::report::kit::bars::keys_html;
+use crate::report::kit::html::{compact, escape};
+
+/// Small plots of means in bins that share one vertical scale.
+#[derive(Clone, Debug, Serialize)]
+pub struct Intervals {
+    /// Name of the vertical axis, with its unit.
+    pub y_label: String,
+    /// Unit of the means.
+    pub unit: String,
+    /// What the lines of every panel stand for, in their order.
+    pub keys: Vec<(String, Style)>,
+    /// The panels.
+    pub panels: Vec<IntervalPanel>,
+}
+
+/// One quantity in bins.
+#[derive(Clone, Debug, Serialize)]
+pub struct IntervalPanel {
+    /// What was binned.
+    pub title: String,
+    /// Its unit; empty when it has none.
+    pub unit: String,
+    /// Names at 0, 1, 2 …, when the bins are no intervals.
+    pub names: Vec<String>,
+    /// The bins of each line, as many as keys.
+    pub lines: Vec<IntervalBins>,
+}
+
+/// The bins of one line; all lists have one length.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct IntervalBins {
+    /// Lower edges; NaN if open.
+    #[serde(serialize_with = "compact")]
+    pub from: Vec<f64>,
+    /// Upper edges; NaN if open.
+    #[serde(serialize_with = "compact")]
+    pub to: Vec<f64>,
+    /// Where the mean is drawn.
+    #[serde(serialize_with = "compact")]
+    pub center: Vec<f64>,
+    /// The means.
+    #[serde(serialize_with = "compact")]
+    pub mean: Vec<f64>,
+    /// Lower ends of the 95 % intervals.
+    #[serde(serialize_with = "compact")]
+    pub low: Vec<f64>,
+    /// Upper ends.
+    #[serde(serialize_with = "compact")]
+    pub high: Vec<f64>,
+    /// Independent samples in each.
+    pub samples: Vec<usize>,
+    /// Whether they are enough; drawn grey if not.
+    pub supported: Vec<bool>,
+}
+
+impl Intervals {
+    pub(in crate::report) fn html(&self, index: usize) -> String {
+        let mut html = format!(
+            "<div class=\"intervals\"><div class=\"keys\"><span class=\"unit\">{}</span>{}\
+             <span class=\"legend\"><span class=\"entry\"><i class=\"swatch thin\"></i>\
+             too few samples</span></span></div>\n<div class=\"multiples\">\n",
+            escape(&self.y_label),
+            keys_html(&self.keys)
+        );
+        for (p, panel) in self.panels.iter().enumerate() {
+            let (title, unit) = (escape(&panel.title), escape(&panel.unit));
+            html.push_str(&format!(
+                "<figure class=\"panel\"><figcaption><h3>{title}</h3>\
+                 <span class=\"unit\">{unit}</span><output class=\"readout\"></output></figcaption>\
+                 <div class=\"plot\" data-figure=\"{index}\" data-panel=\"{p}\" tabindex=\"0\" \
+                 role=\"img\" aria-label=\"{} over {title}\"></div></figure>\n",
+                escape(&self.y_label)
+            ));
+        }
+        html + "</div></div>\n"
+    }
+}

@@ -1,0 +1,107 @@
+//! Rows and columns of text.
+
+use crate::report::kit::html::escape;
+
+/// Letters above which a text of the last column is broken into lines of some width.
+const LONG: usize = 28;
+
+/// A table.
+#[derive(Clone, Debug, Default)]
+pub struct Table {
+    /// What it holds, read out before it and not shown; may be empty.
+    pub caption: String,
+    /// The columns, left to right.
+    pub columns: Vec<Column>,
+    /// The rows, top to bottom.
+    pub rows: Vec<Row>,
+}
+
+/// A column's head.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// Its title, with the unit of its numbers.
+    pub title: String,
+    /// Where its text stands.
+    pub align: Align,
+}
+
+/// Where the text of a column stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Align {
+    /// Words.
+    Left,
+    /// Numbers.
+    Right,
+}
+
+/// One row.
+#[derive(Clone, Debug, Default)]
+pub struct Row {
+    /// Text of each column.
+    pub cells: Vec<String>,
+    /// Start and end, s, of the time it speaks of: its first cell then zooms the time figures there.
+    pub span_s: Option<[f64; 2]>,
+}
+
+impl Table {
+    /// A table without rows; `columns` are title and alignment.
+    pub fn new(caption: &str, columns: &[(&str, Align)]) -> Self {
+        let column = |&(title, align): &(&str, Align)| Column { title: title.into(), align };
+        Table {
+            caption: caption.into(),
+            columns: columns.iter().map(column).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row of text.
+    pub fn push<I: IntoIterator<Item = String>>(&mut self, cells: I) {
+        self.rows.push(Row { cells: cells.into_iter().collect(), span_s: None });
+    }
+
+    pub(in crate::report) fn html(&self) -> String {
+        let class = |i: usize| match self.columns.get(i).map(|c| c.align) {
+            Some(Align::Right) => " class=\"number\"",
+            _ => "",
+        };
+        let head: String = self
+            .columns
+            .iter()
+            .enumerate()
+            .map(|(i, c)| format!("<th scope=\"col\"{}>{}</th>", class(i), escape(&c.title)))
+            .collect();
+        let last = |row: &Row| row.cells.last().map_or(0, |text| text.chars().count());
+        let long = if self.rows.iter().map(last).max().unwrap_or(0) > LONG {
+            " class=\"long\""
+        } else {
+            ""
+        };
+        let mut html = format!(
+            "<div class=\"table\" tabindex=\"0\"><table{long}><caption>{}</caption>\
+             <thead><tr>{head}</tr></thead>\n<tbody>\n",
+            escape(&self.caption)
+        );
+        for row in &self.rows {
+            let cell = |(i, text): (usize, &String)| {
+                format!("<td{}>{}</td>", class(i), row.cell_html(i, text))
+            };
+            let cells: String = row.cells.iter().enumerate().map(cell).collect();
+            html.push_str(&format!("<tr>{cells}</tr>\n"));
+        }
+        html.push_str("</tbody></table></div>\n");
+        html
+    }
+}
+
+impl Row {
+    fn cell_html(&self, index: usize, text: &str) -> String {
+        match self.span_s {
+            Some([from, to]) if index == 0 && from.is_finite() && to.is_finite() => format!(
+                "<button type=\"button\" class=\"zoom\" data-from=\"{from}\" data-to=\"{to}\" \
+                 title=\"Zoom to this time\">{}</button>",
+                escape(text)
+            ),
+            _ => escape(text),
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Panels over time whose zoom and cursor move together.
+
+use serde::Serialize;
+
+use crate::report::kit::decimate;
+use crate::report::kit::html::{compact, compact_time, escape};
+use crate::report::{Rule, Style};
+
+/// Rows above which a track is thinned for drawing.
+const DRAWN_ROWS: usize = 20_000;
+
+/// Panels over time; all time figures of a page share one clock.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct TimeFigure {
+    /// Groups of panels, one for each sample clock.
+    pub tracks: Vec<Track>,
+    /// Instants marked in every panel.
+    pub marks: Vec<Mark>,
+    /// What stands under the panels: what was left out or thinned.
+    #[serde(skip)]
+    pub notes: Vec<String>,
+}
+
+/// Panels whose series were sampled at the same times.
+#[derive(Clone, Debug, Serialize)]
+pub struct Track {
+    #[serde(serialize_with = "compact_time")]
+    time_s: Vec<f64>,
+    panels: Vec<Panel>,
+}
+
+/// One pair of axes over time.
+#[derive(Clone, Debug, Serialize)]
+pub struct Panel {
+    /// What is shown.
+    pub title: String,
+    /// Unit of the values, empty when they have none.
+    pub unit: String,
+    /// How values become heights.
+    pub scale: Scale,
+    /// Lines, in drawing order.
+    pub series: Vec<Series>,
+    /// Shaded bands behind the lines.
+    pub bands: Vec<Band>,
+    /// Levels.
+    pub rules: Vec<Rule>,
+}
+
+impl Panel {
+    /// A panel of lines on a linear scale, with no band and no rule.
+    pub fn new(title: &str, unit: &str, series: Vec<Series>) -> Self {
+        Panel {
+            title: title.into(),
+            unit: unit.into(),
+            scale: Scale::Linear,
+            series,
+            bands: Vec::new(),
+            rules: Vec::new(),
+        }
+    }
+}
+
+/// How values become heights.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scale {
+    /// Evenly.
+    Linear,
+    /// By decades from `floor` (in the unit of the panel) up; smaller values are drawn at `floor`.
+    Log {
+        /// The smallest value shown; positive.
+        floor: f64,
+    },
+}
+
+/// One line of a panel.
+#[derive(Clone, Debug, Serialize)]
+pub struct Series {
+    /// Its name in the legend.
+    pub label: String,
+    /// What it stands for.
+    pub style: Style,
+    /// One value for each time of the track; what is not finite is a gap.
+    #[serde(serialize_with = "compact")]
+    pub values: Vec<f64>,
+}
+
+impl Series {
+    /// A line from its values.
+    pub fn new(label: &str, style: Style, values: Vec<f64>) -> Self {
+        Series { label: label.into(), style, values }
+    }
+
+    fn is_missing(&self) -> bool {
+        !self.values.iter().any(|v| v.is_finite())
+    }
+}
+
+/// A shaded range around one line of the panel.
+#[derive(Clone, Debug, Serialize)]
+pub struct Band {
+    /// Index of the line in the panel's series.
+    pub around: usize,
+    /// Distance from the line to either edge, in the unit of the panel.
+    pub half_width: f64,
+    /// Its name in the legend.
+    pub label: String,
+}
+
+/// A marked instant.
+#[derive(Clone, Debug, Serialize)]
+pub struct Mark {
+    /// When, s, on the page's clock.
+    pub time_s: f64,
+    /// A few characters that a table of the page explains.
+    pub label: String,
+}
+
+impl TimeFigure {
+    /// Adds panels sampled at `time_s` (s, ascending; rows out of order are left out).
+    ///
+    /// A series without one finite value is left out, as is a panel without series; a pause longer
+    /// than `gap_s` breaks the lines; more than 20,000 rows are thinned to the extremes of equal
+    /// groups. Each of these is said in the notes.
+    pub fn add_track(&mut self, time_s: &[f64], gap_s: f64, panels: Vec<Panel>) {
+        let mut panels = self.without_missing(panels);
+        if panels.is_empty() {
+            return;
+        }
+        let rows = decimate::rows_in_order(time_s, gap_s);
+        let kept = rows.iter().flatten().count();
+        if kept < time_s.len() {
+            let lost = time_s.len() - kept;
+            self.notes.push(format!("{lost} rows out of time order are not drawn."));
+        }
+        let mut time = decimate::times_of(&rows, time_s);
+        for series in panels.iter_mut().flat_map(|p| &mut p.series) {
+            series.values = decimate::values_of(&rows, &series.values);
+        }
+        if time.len() > DRAWN_ROWS {
+            let group = (2 * time.len()).div_ceil(DRAWN_ROWS);
+            self.notes.push(format!(
+                "Drawn from the smallest and largest of every {group} samples; \
+                 the flight log holds all {kept}."
+            ));
+            for series in panels.iter_mut().flat_map(|p| &mut p.series) {
+                series.values = decimate::extremes(&series.values, group);
+            }
+            time = decimate::pair_times(&time, group);
+        }
+        self.tracks.push(Track { time_s: time, panels });
+    }
+
+    fn without_missing(&mut self, panels: Vec<Panel>) -> Vec<Panel> {
+        let mut missing = Vec::new();
+        let mut kept = Vec::new();
+        for mut panel in panels {
+            for (i, series) in panel.series.iter().enumerate() {
+                if series.is_missing() {
+                    missing.push(format!("{} ({})", panel.title, series.label));
+                    panel.bands.retain(|b| b.around != i);
+                }
+            }
+            // A band follows its line, whose index moves when a line before it goes.
+            for band in &mut panel.bands {
+                let before = &panel.series[..band.around.min(panel.series.len())];
+                band.around -= before.iter().filter(|s| s.is_missing()).count();
+            }
+            panel.series.retain(|s| !s.is_missing());
+            if !panel.series.is_empty() {
+                kept.push(panel);
+            }
+        }
+        if !missing.is_empty() {
+            self.notes.push(format!("Not in this log: {}.", missing.join(", ")));
+        }
+        kept
+    }
+
+    pub(in crate::report) fn html(&self, index: usize) -> String {
+        let columns = match self.tracks.iter().map(|t| t.panels.len()).sum::<usize>() {
+            0 | 1 => "one",
+            n if n % 3 == 0 => "three",
+            _ => "two",
+        };
+        let mut html = format!("<div class=\"time\"><div class=\"panels {columns}\">\n");
+        for (t, track) in self.tracks.iter().enumerate() {
+            for (p, panel) in track.panels.iter().enumerate() {
+                let (title, unit) = (escape(&panel.title), escape(&panel.unit));
+                html.push_str(&format!(
+                    "<figure class=\"panel\"><figcaption><h3>{title}</h3>\
+                     <span class=\"unit\">{unit}</span></figcaption>\
+                     <div class=\"plot\" data-figure=\"{index}\" data-track=\"{t}\" \
+                     data-panel=\"{p}\" tabindex=\"0\" role=\"img\" \
+                     aria-label=\"{title} over time\"></div></figure>\n"
+                ));
+            }
+        }
+        html.push_str("</div>\n");
+        for note in &self.notes {
+            html.push_str(&format!("<p class=\"note\">{}</p>\n", escape(note)));
+        }
+        html.push_str("</div>\n");
+        html
+    }
+}

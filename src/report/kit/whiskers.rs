@@ -1,0 +1,163 @@
+//! Values with their intervals, one a line, on one horizontal scale.
+
+use crate::report::kit::html::escape;
+use crate::report::kit::numbers::number;
+use crate::report::{Scale, Style};
+
+/// Room beside the outermost intervals, in the width of all of them.
+const ROOM: f64 = 0.06;
+
+/// Values with intervals.
+#[derive(Clone, Debug)]
+pub struct Whiskers {
+    /// What is shown.
+    pub title: String,
+    /// The unit of the scale.
+    pub unit: String,
+    /// How values become places; what is not positive stands at the floor of a scale by decades.
+    pub scale: Scale,
+    /// Where upright lines stand behind the values, in the unit.
+    pub lines: Vec<f64>,
+    /// What the lines stand for.
+    pub legend: String,
+    /// The values, top to bottom.
+    pub rows: Vec<Whisker>,
+}
+
+/// A value with its interval.
+#[derive(Clone, Debug)]
+pub struct Whisker {
+    /// What it is.
+    pub label: String,
+    /// How it is drawn.
+    pub style: Style,
+    /// The value, in the figure's unit; NaN if there is none.
+    pub value: f64,
+    /// The ends of its 95 % interval.
+    pub interval: [f64; 2],
+    /// The same in words.
+    pub text: String,
+}
+
+impl Whiskers {
+    /// A value on the scale.
+    fn on_scale(&self, x: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => x,
+            Scale::Log { .. } if x.is_nan() => x,
+            Scale::Log { floor } => x.max(floor).log10(),
+        }
+    }
+
+    /// The ends of the scale; `None` if nothing is finite.
+    fn ends(&self) -> Option<[f64; 2]> {
+        let values = self.rows.iter().flat_map(|r| [r.value, r.interval[0], r.interval[1]]);
+        let all = values.chain(self.lines.iter().copied()).map(|v| self.on_scale(v));
+        let all = all.filter(|v| v.is_finite());
+        let [low, high] =
+            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+        let width = high - low;
+        let room = if width > 0.0 { ROOM * width } else { low.abs().max(1.0) };
+        (low <= high && width.is_finite()).then_some([low - room, high + room])
+    }
+
+    pub(in crate::report) fn html(&self) -> String {
+        let [low, high] = self.ends().unwrap_or([0.0, 1.0]);
+        let place = |x: f64| (100.0 * (self.on_scale(x) - low) / (high - low)).clamp(0.0, 100.0);
+        let shown = |x: f64| match self.scale {
+            Scale::Linear => number(x),
+            Scale::Log { .. } => number(10f64.powf(x)),
+        };
+        let lines: String = self
+            .lines
+            .iter()
+            .filter(|at| at.is_finite())
+            .map(|at| format!("<i class=\"tick\" style=\"left:{:.2}%\"></i>", place(*at)))
+            .collect();
+        let rows: String = self.rows.iter().map(|r| r.html(&place, &lines)).collect();
+        format!(
+            "<figure class=\"panel whiskers\"><figcaption><h3>{}</h3><span class=\"unit\">{}</span>\
+             </figcaption>\n<dl>\n{rows}<dt class=\"ends\"></dt><dd class=\"ends\">\
+             <span class=\"track\"><span>{}</span><span>{}</span><span>{}</span></span>\
+             <span class=\"value\"></span></dd></dl></figure>\n",
+            escape(&self.title),
+            escape(&self.unit),
+            shown(low),
+            escape(&self.legend),
+            shown(high)
+        )
+    }
+}
+
+impl Whisker {
+    fn html(&self, place: &dyn Fn(f64) -> f64, lines: &str) -> String {
+        let ink = self.style.name();
+        let mut marks = String::new();
+        if let [a, b] = self.interval
+            && a.is_finite()
+            && b.is_finite()
+        {
+            let (left, right) = (place(a.min(b)), place(a.max(b)));
+            marks.push_str(&format!(
+                "<i class=\"whisker\" style=\"left:{left:.2}%;width:{:.2}%;background:var(--{ink})\"></i>",
+                right - left
+            ));
+        }
+        if self.value.is_finite() {
+            marks.push_str(&format!(
+                "<i class=\"point\" style=\"left:{:.2}%;background:var(--{ink})\"></i>",
+                place(self.value)
+            ));
+        }
+        format!(
+            "<dt>{}</dt><dd><span class=\"track\">{lines}{marks}</span>\
+             <span class=\"value\">{}</span></dd>\n",
+            escape(&self.label),
+            escape(&self.text)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(value: f64, interval: [f64; 2]) -> Whisker {
+        Whisker { label: "a".into(), style: Style::Actual, value, interval, text: "t".into() }
+    }
+
+    #[test]
+    fn whiskers_stay_within_their_track_whatever_they_are() {
+        let rows = vec![
+            row(1.0, [0.0, 2.0]),
+            row(f64::NAN, [f64::NEG_INFINITY, 1.0]),
+            row(1e300, [-1e300, 1e308]),
+        ];
+        let scales = [Scale::Linear, Scale::Log { floor: 1e-3 }];
+        let all = [rows.clone(), rows[1..2].to_vec(), Vec::new()];
+        for (rows, scale) in all.into_iter().flat_map(|r| scales.map(|s| (r.clone(), s))) {
+            let (lines, legend) = (vec![0.0, f64::NAN], "none".into());
+            let (title, unit) = ("t".into(), "u".into());
+            let figure = Whiskers { title, unit, scale, lines, legend, rows };
+            let html = figure.html();
+            assert!(!html.contains("NaN") && !html.contains("inf"), "{html}");
+            for part in html.split("left:").skip(1) {
+                let left: f64 = part.split('%').next().unwrap().parse().unwrap();
+                assert!((0.0..=100.0).contains(&left));
+            }
+        }
+    }
+
+    #[test]
+    fn one_value_stands_in_the_middle() {
+        let figure = Whiskers {
+            title: "t".into(),
+            unit: String::new(),
+            scale: Scale::Linear,
+            lines: Vec::new(),
+            legend: String::new(),
+            rows: vec![row(3.0, [3.0, 3.0])],
+        };
+        assert!(figure.html().contains("class=\"point\" style=\"left:50.00%"));
+    }
+}

@@ -1,0 +1,82 @@
+//! One quantity against another, as points or as a path.
+
+use serde::Serialize;
+
+use crate::report::Style;
+use crate::report::kit::html::{compact, escape};
+
+/// A pair of axes with points or paths.
+#[derive(Clone, Debug, Serialize)]
+pub struct XyFigure {
+    /// What is shown.
+    #[serde(skip)]
+    pub title: String,
+    /// Name of the horizontal axis, with its unit.
+    pub x_label: String,
+    /// Name of the vertical axis, with its unit.
+    pub y_label: String,
+    /// Shaded ranges behind what is drawn.
+    pub bands: Vec<XyBand>,
+    /// What is drawn, in drawing order.
+    pub series: Vec<XySeries>,
+}
+
+/// A shaded range over the horizontal axis.
+#[derive(Clone, Debug, Serialize)]
+pub struct XyBand {
+    /// Its name in the legend.
+    pub label: String,
+    /// Horizontal values, ascending.
+    #[serde(serialize_with = "compact")]
+    pub x: Vec<f64>,
+    /// Lower edge, as many values as horizontal ones.
+    #[serde(serialize_with = "compact")]
+    pub low: Vec<f64>,
+    /// Upper edge, likewise.
+    #[serde(serialize_with = "compact")]
+    pub high: Vec<f64>,
+}
+
+/// Points of one kind.
+#[derive(Clone, Debug, Serialize)]
+pub struct XySeries {
+    /// Its name in the legend.
+    pub label: String,
+    /// What it stands for.
+    pub style: Style,
+    /// How it is drawn.
+    pub mark: XyMark,
+    /// Horizontal values; a pair with a value that is not finite breaks a path.
+    #[serde(serialize_with = "compact")]
+    pub x: Vec<f64>,
+    /// Vertical values, as many as horizontal ones.
+    #[serde(serialize_with = "compact")]
+    pub y: Vec<f64>,
+}
+
+/// How points are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum XyMark {
+    /// A thin line through them.
+    Path,
+    /// A wide line through them.
+    Line,
+    /// Small filled points, where there are many.
+    Dots,
+    /// Open circles.
+    Circles,
+    /// Crosses.
+    Crosses,
+}
+
+impl XyFigure {
+    pub(in crate::report) fn html(&self, index: usize) -> String {
+        let title = escape(&self.title);
+        format!(
+            "<figure class=\"panel xy\"><figcaption><h3>{title}</h3></figcaption>\
+             <div class=\"plot\" data-figure=\"{index}\" tabindex=\"0\" role=\"img\" \
+             aria-label=\"{title}\"></div></figure>\n"
+        )
+    }
+}

@@ -1,0 +1,71 @@
+//! What to fly next.
+use crate::physics::catalogue::describe;
+
+use crate::sysid::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
+use crate::sysid::diagnose::search::stepwise::Found;
+
+/// Pieces of advice on effects that these data could not have shown.
+const UNSEEN: usize = 2;
+
+/// The advice, the most useful first.
+pub fn advice(
+    found: &Found,
+    verdict: Verdict,
+    effects: &[Candidate],
+    channels: &[ChannelLeft],
+) -> Vec<Advice> {
+    let mut list = Vec::new();
+    for c in effects.iter().filter(|c| c.asserted) {
+        for other in &c.indistinguishable_from {
+            list.push(Advice {
+                manoeuvre: separating(&c.id),
+                why: format!("it tells {} from {other}", c.id),
+                between: Some([c.id.clone(), other.clone()]),
+            });
+        }
+    }
+    if verdict == Verdict::Unexplained {
+        let open: Vec<&Candidate> = effects.iter().filter(|c| !c.asserted).take(2).collect();
+        if let [a, b] = open[..] {
+            list.push(Advice {
+                manoeuvre: separating(&a.id),
+                why: format!("{} is the closest shape; this tells whether it is the cause", a.id),
+                between: Some([a.id.clone(), b.id.clone()]),
+            });
+        }
+        list.extend(channels.iter().filter_map(|c| c.worst_regime.clone()).take(1).map(|regime| {
+            Advice {
+                manoeuvre: "more flight in the worst regime, slowly and fast".into(),
+                why: regime,
+                between: None,
+            }
+        }));
+    }
+    let hidden = effects
+        .iter()
+        .filter(|c| !c.asserted && c.evidence < c.threshold && c.evidence > 0.3 * c.threshold);
+    list.extend(hidden.take(UNSEEN).map(|c| Advice {
+        manoeuvre: separating(&c.id),
+        why: match c.minimum_detectable {
+            Some(least) => format!(
+                "{} is near the threshold; less than {} of it could not be seen",
+                c.id,
+                crate::sysid::diagnose::answer::sentences::figures(least)
+            ),
+            None => format!("{} is near the threshold", c.id),
+        },
+        between: None,
+    }));
+    if list.is_empty() && found.round().flights.len() < 2 {
+        list.push(Advice {
+            manoeuvre: "a second flight with other manoeuvres".into(),
+            why: "one flight cannot be checked against another".into(),
+            between: None,
+        });
+    }
+    list
+}
+
+fn separating(id: &str) -> String {
+    describe(id).and_then(|a| a.entry).map_or(String::new(), |e| e.separated_by.to_owned())
+}

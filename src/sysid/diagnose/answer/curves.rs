@@ -1,0 +1,82 @@
+//! An effect's contribution over the regime variable that shows it best.
+
+use crate::sysid::compare::{ChannelId, RegimeVariable};
+use crate::sysid::diagnose::answer::result::Curve;
+use crate::sysid::diagnose::regression::gather::Column;
+use crate::sysid::diagnose::search::round::Round;
+
+/// Places on the axis.
+const PLACES: usize = 12;
+/// Variables that tell when or where, not how, the aircraft flew.
+const NOT_SHOWN: [RegimeVariable; 3] =
+    [RegimeVariable::Altitude, RegimeVariable::Time, RegimeVariable::Flight];
+
+/// The curve of `contribution` (flight by flight) in the first of `channels`. `relative`: its standard
+/// deviation relative to itself; `left`: whether the round's residual still holds it.
+pub fn curve(
+    round: &Round,
+    contribution: &[Column],
+    channels: &[usize],
+    relative: f64,
+    left: bool,
+) -> Option<Curve> {
+    let channel = *channels.first()?;
+    let id = ChannelId::ALL[channel];
+    let residual = round.tuned_residual();
+    let (mut made, mut scatter, mut regimes) = (Vec::new(), Vec::new(), Vec::new());
+    for ((flight, own), residual) in round.flights.iter().zip(contribution).zip(&residual) {
+        for (w, window) in flight.acting.windows.iter().enumerate() {
+            let (Some(x), Some(r)) = (own[channel].get(w), residual[channel].get(w)) else {
+                continue;
+            };
+            if r.is_finite() {
+                made.push(*x);
+                scatter.push(r + if left { 0.0 } else { *x });
+                regimes.push(window.regime);
+            }
+        }
+    }
+    let shown = |k: &usize| !NOT_SHOWN.contains(&RegimeVariable::CONTINUOUS[*k]);
+    let best = (0..RegimeVariable::CONTINUOUS.len())
+        .filter(shown)
+        .map(|k| (k, explained(&made, &regimes.iter().map(|r| r[k]).collect::<Vec<_>>())))
+        .max_by(|a, b| a.1.total_cmp(&b.1))?
+        .0;
+    let x: Vec<f64> = regimes.iter().map(|r| r[best]).collect();
+    let variable = RegimeVariable::CONTINUOUS[best];
+    let bins = bins(&made, &x);
+    Some(Curve {
+        channel: id.symbol().into(),
+        variable: format!("{} {}", variable.name(), variable.unit()).trim().into(),
+        unit: id.unit().into(),
+        at: bins.iter().map(|b| b[0]).collect(),
+        contribution: bins
+            .iter()
+            .map(|[_, y]| {
+                let by = 1.96 * relative * y.abs();
+                [*y, y - by, y + by]
+            })
+            .collect(),
+        x,
+        residual: scatter,
+    })
+}
+
+/// Means of x and y in bins of equal count over x.
+fn bins(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
+    let mut order: Vec<usize> = (0..x.len()).collect();
+    order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));
+    let size = order.len().div_ceil(PLACES).max(1);
+    let mean =
+        |bin: &[usize], of: &[f64]| bin.iter().map(|k| of[*k]).sum::<f64>() / bin.len() as f64;
+    order.chunks(size).map(|bin| [mean(bin, x), mean(bin, y)]).collect()
+}
+
+/// Share of the variance of `y` between bins over `x`.
+fn explained(y: &[f64], x: &[f64]) -> f64 {
+    let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
+    let all: f64 = y.iter().map(|v| (v - mean).powi(2)).sum();
+    let size = y.len().div_ceil(PLACES).max(1) as f64;
+    let between: f64 = bins(y, x).iter().map(|[_, m]| size * (m - mean).powi(2)).sum();
+    if all > 0.0 { between / all } else { 0.0 }
+}

@@ -1,0 +1,241 @@
+//! The smallest amount of an effect that the flights would have shown.
+//!
+//! An effect that is linear in its constants needs their standard deviations only. One on the deflections
+//! is not: near nought a lag is a late clock, and a dead zone nothing at all. It is tried at increasing
+//! amounts on the flights' own deflections, everything that is fitted along projected out each time.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+
+use crate::sysid::diagnose::regression::catalogue::Entry;
+use crate::sysid::diagnose::regression::cells::Placed;
+use crate::sysid::diagnose::regression::projected::Projected;
+use crate::sysid::diagnose::regression::rank::{Draw, Trial, deviations};
+use crate::sysid::diagnose::search::round::Round;
+
+/// Most amounts that are tried.
+const TRIED: usize = 8;
+/// Largest factor between one amount and the next.
+const STRIDE: f64 = 8.0;
+/// Power of the amount with which what an effect shows is taken to grow while nothing is known,
+const POWER: f64 = 2.0;
+/// and between which powers two amounts may say it does.
+const POWERS: [f64; 2] = [0.5, 4.0];
+/// An amount whose evidence is within this share of the one sought is close enough.
+const CLOSE: f64 = 0.1;
+
+/// For each candidate of `round`, the smallest amount of its first free coefficient whose evidence would have
+/// exceeded `threshold`, five times in six; those are left out that have none, as shapes of which there is no
+/// small amount, and effects that would not show at any possible amount.
+pub fn detectable(round: &Round, threshold: f64) -> BTreeMap<&'static str, f64> {
+    let straight = round.trials.iter().filter(|t| t.points[0].contribution.is_none());
+    let mut all: BTreeMap<&'static str, f64> =
+        straight.filter_map(|t| Some((t.id, linear(round, t, threshold)?))).collect();
+    all.extend(operators(round, threshold));
+    all
+}
+
+fn linear(round: &Round, trial: &Trial, threshold: f64) -> Option<f64> {
+    let columns: Vec<usize> = trial.points[0].free.iter().map(|f| f.1).collect();
+    let shown = Shown::new(&round.projected, trial, &columns)?;
+    let amount = shown.needed(threshold) * shown.alone;
+    amount.is_finite().then_some(amount)
+}
+
+/// How well a direction shows against noise.
+struct Shown {
+    /// Standard deviation of its amount by the noise alone.
+    alone: f64,
+    /// How much more the blocks scatter, at least 1.
+    scatter: f64,
+    /// What a free constant costs, ln n each.
+    penalty: f64,
+}
+
+impl Shown {
+    fn new(p: &Projected, trial: &Trial, columns: &[usize]) -> Option<Shown> {
+        let null = Draw { total: DVector::zeros(p.width()), blocks: p.noise.clone() };
+        let (alone, robust) = deviations(&p.grams(), &null, columns)?;
+        let penalty = columns.len() as f64 * trial.support.max(2.0).ln();
+        Some(Shown { alone, scatter: (robust / alone).max(1.0), penalty })
+    }
+
+    /// The amount in standard deviations at which gain and Wald statistic both exceed `threshold` even if noise
+    /// takes one deviation.
+    fn needed(&self, threshold: f64) -> f64 {
+        let threshold = threshold.max(0.0);
+        let by_gain = (threshold + self.penalty).sqrt();
+        by_gain.max(threshold.sqrt() * self.scatter) + self.scatter
+    }
+}
+
+/// An effect on the deflections whose smallest visible amount is sought.
+struct Sought<'a> {
+    entry: &'a Entry,
+    trial: &'a Trial,
+    /// Least and largest size possible.
+    bounds: [f64; 2],
+    size: f64,
+    /// The largest size that does not show, with its evidence as a share of what is needed.
+    hidden: Option<[f64; 2]>,
+    /// The smallest that does.
+    seen: Option<[f64; 2]>,
+    /// The one tried last.
+    last: Option<[f64; 2]>,
+    found: Option<f64>,
+}
+
+impl<'a> Sought<'a> {
+    fn new(entry: &'a Entry, trial: &'a Trial) -> Option<Sought<'a>> {
+        let starts = entry.about.entry.map_or(&[][..], |e| e.starts);
+        let (low, high) = entry.about.coefficients[0].bounds;
+        let mut sought = Sought {
+            entry,
+            trial,
+            bounds: [low, high],
+            size: 0.0,
+            hidden: None,
+            seen: None,
+            last: None,
+            found: None,
+        };
+        sought.size = sought.turned(starts.first()?[0]);
+        let ends = [sought.turned(low), sought.turned(high)];
+        sought.bounds = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        Some(sought)
+    }
+
+    /// Size of an amount and amount of a size: a lower limit is more of an effect.
+    fn turned(&self, x: f64) -> f64 {
+        let starts = self.entry.about.entry.map_or(&[][..], |e| e.starts);
+        let falls = starts.first().map(|s| s[0]) > starts.last().map(|s| s[0]);
+        if falls { x.recip() } else { x }
+    }
+
+    /// Notes that the size tried reached `ratio` of what is needed, and chooses the next one.
+    fn tried(&mut self, ratio: f64) {
+        if (ratio - 1.0).abs() < CLOSE {
+            self.found = Some(self.size);
+            return;
+        }
+        let ratio = ratio.max(1e-6);
+        // at a bound, the same size is tried again
+        let other = self.last.filter(|[size, _]| *size != self.size);
+        let power = other.map_or(POWER, |[size, before]| {
+            ((ratio / before).ln() / (self.size / size).ln()).clamp(POWERS[0], POWERS[1])
+        });
+        self.last = Some([self.size, ratio]);
+        let place = if ratio < 1.0 { &mut self.hidden } else { &mut self.seen };
+        *place = self.last;
+        let next = match (self.hidden, self.seen) {
+            (Some([a, low]), Some([b, high])) => {
+                let part = -low.ln() / (high / low).ln();
+                a * (b / a).powf(part.clamp(0.1, 0.9))
+            }
+            _ => {
+                let factor = ratio.powf(-1.0 / power).clamp(1.0 / STRIDE, STRIDE);
+                self.size * factor
+            }
+        };
+        self.size = next.clamp(self.bounds[0], self.bounds[1]);
+    }
+
+    /// The amount sought, as well as it is known.
+    fn amount(&self) -> Option<f64> {
+        let size = self.found.or(self.seen.map(|[size, _]| size))?;
+        Some(self.turned(size))
+    }
+}
+
+fn operators(round: &Round, threshold: f64) -> Vec<(&'static str, f64)> {
+    let of = |entry: &'_ Entry| round.trials.iter().position(|t| t.id == entry.about.id);
+    let mut sought: Vec<Sought> = round
+        .entries
+        .iter()
+        .filter(|e| e.operator)
+        .filter_map(|e| Sought::new(e, &round.trials[of(e)?]))
+        .collect();
+    for _ in 0..TRIED {
+        let open: Vec<usize> = (0..sought.len()).filter(|k| sought[*k].found.is_none()).collect();
+        if open.is_empty() {
+            break;
+        }
+        let ratios =
+            ratios(round, threshold, &open.iter().map(|k| &sought[*k]).collect::<Vec<_>>());
+        let Some(ratios) = ratios else { break };
+        open.iter().zip(ratios).for_each(|(k, ratio)| sought[*k].tried(ratio));
+    }
+    sought.iter().filter_map(|s| Some((s.trial.id, s.amount()?))).collect()
+}
+
+/// What each of `sought` shows at its size, as a share of what is needed.
+fn ratios(round: &Round, threshold: f64, sought: &[&Sought]) -> Option<Vec<f64>> {
+    let na = round.known.len();
+    let last = na + sought.len();
+    let models: Vec<_> = sought
+        .iter()
+        .map(|s| {
+            let mut with = round.model.clone();
+            with.join(s.trial.id, &[s.turned(s.size)]).ok().map(|()| with)
+        })
+        .collect::<Option<_>>()?;
+    let mut placed: Vec<Placed> = Vec::new();
+    for (flight, old) in round.flights.iter().zip(&round.placed) {
+        let mut list: Placed = old.iter().take_while(|(p, _)| *p < na).cloned().collect();
+        list.extend(models.iter().enumerate().map(|(k, with)| (na + k, flight.operator(with))));
+        list.push((last, flight.residual.clone()));
+        placed.push(list);
+    }
+    let mut shared = round.shared();
+    shared.truncate(na);
+    let p = Projected::new(&round.cells, &placed, last, &round.known, &round.noise, &shared)?;
+    let one = |(k, s): (usize, &&Sought)| {
+        // nothing at all is no direction
+        let shown = Shown::new(&p, s.trial, &[k]).filter(|_| p.total[(k, k)] > 0.0);
+        shown.map_or(0.0, |shown| 1.0 / (shown.alone * shown.needed(threshold)))
+    };
+    Some(sought.iter().enumerate().map(one).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::inputs::Kind;
+
+    /// Seeks the amount of the effect `id` whose evidence, a power of its size, is as much as needed at `amount`.
+    fn sought(id: &str, amount: f64, power: f64) -> Option<f64> {
+        let entry = Entry { about: Kind::from_id(id)?.describe(), operator: true };
+        let id = entry.about.id;
+        let trial = Trial { id, points: Vec::new(), support: 100.0, channels: [true; 6] };
+        let mut sought = Sought::new(&entry, &trial)?;
+        let size = sought.turned(amount);
+        for _ in 0..TRIED {
+            if sought.found.is_none() {
+                let ratio = (sought.size / size).powf(power);
+                sought.tried(ratio);
+            }
+        }
+        sought.amount()
+    }
+
+    #[test]
+    fn the_amount_is_found_however_fast_the_evidence_grows() {
+        // a lag beside a late clock grows with its square, a dead zone straight
+        for (id, amount) in [("actuator_lag", 2e-3), ("dead_zone", 1e-4), ("backlash", 0.1)] {
+            for power in [1.0, 2.0] {
+                let found = sought(id, amount, power).unwrap();
+                assert!((found / amount - 1.0).abs() < 1.1 * CLOSE, "{id}: {found} for {amount}");
+            }
+        }
+        // a lower limit is more of it
+        let found = sought("rate_limit", 3.0, 2.0).unwrap();
+        assert!((found / 3.0 - 1.0).abs() < 1.1 * CLOSE, "{found}");
+    }
+
+    #[test]
+    fn what_never_shows_has_no_amount() {
+        // its evidence is 1 % of what is needed at the largest lag there is
+        assert_eq!(sought("actuator_lag", 20.0, 2.0), None);
+    }
+}

@@ -1,0 +1,12 @@
+//! The answer: verdict, ranking, intervals, and the sentences that state them.
+
+pub(super) mod advice;
+pub(super) mod curves;
+pub(super) mod decoys;
+pub(super) mod detectable;
+pub(super) mod measurement;
+pub(super) mod ranking;
+pub(super) mod result;
+pub(super) mod run;
+pub(super) mod sentences;
+pub(super) mod shares;

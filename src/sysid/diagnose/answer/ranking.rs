@@ -1,0 +1,176 @@
+//! Every candidate as it is told: asserted ones first, then by evidence.
+
+use std::collections::BTreeMap;
+
+use crate::physics::catalogue::describe;
+use crate::physics::effects::Description;
+use crate::sysid::compare::ChannelId;
+use crate::sysid::diagnose::answer::curves;
+use crate::sysid::diagnose::answer::detectable::detectable;
+use crate::sysid::diagnose::answer::result::{Candidate, FlightEstimate, Parameter};
+use crate::sysid::diagnose::options::{Detail, Options};
+use crate::sysid::diagnose::regression::rank::{Score, Trial};
+use crate::sysid::diagnose::search::checks;
+use crate::sysid::diagnose::search::round::Round;
+use crate::sysid::diagnose::search::stepwise::{Found, Selected};
+
+/// Runners-up with a curve.
+const RUNNERS_UP: usize = 2;
+/// Half of a 95 % interval in standard deviations.
+const INTERVAL: f64 = 1.96;
+
+/// All candidates.
+pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
+    let (asserted, refused): (Vec<&Selected>, Vec<&Selected>) =
+        found.selected.iter().partition(|s| s.refused.is_empty());
+    let round = found.round();
+    let least = least(found);
+    let mut list: Vec<Candidate> =
+        asserted.iter().chain(&refused).filter_map(|s| selected(found, s, options)).collect();
+    for candidate in &mut list {
+        candidate.minimum_detectable = least.get(candidate.id.as_str()).copied();
+    }
+    for (place, (trial, score)) in found.scores.iter().enumerate() {
+        let trial = &round.trials[*trial];
+        if list.iter().any(|c| c.id == trial.id) {
+            continue;
+        }
+        let Some(about) = describe(trial.id) else { continue };
+        let mut candidate = open(found, trial, score, &about);
+        candidate.minimum_detectable = least.get(trial.id).copied();
+        if round.at_bound(found.scores[place].0, score) {
+            candidate
+                .refused
+                .push("a constant lies at the end of what is physically possible".into());
+        }
+        if options.detail == Detail::Full && place < RUNNERS_UP {
+            candidate.curve = curves::curve(
+                round,
+                &round.contribution(score),
+                &round.channels_of(score),
+                relative(score),
+                true,
+            );
+        }
+        list.push(candidate);
+    }
+    list
+}
+
+/// The smallest amounts that would have shown, of those that have joined the model before they did.
+fn least(found: &Found) -> BTreeMap<&'static str, f64> {
+    let mut least = detectable(&found.first, found.threshold);
+    if let Some(last) = &found.last {
+        least.extend(detectable(last, found.threshold));
+    }
+    least
+}
+
+/// The largest standard deviation relative to its value, of a fitted contribution.
+fn relative(score: &Score) -> f64 {
+    score.wald.max(1e-9).sqrt().recip()
+}
+
+fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate> {
+    let about = describe(s.id)?;
+    let round = found.round();
+    let parameters = about.coefficients.iter().enumerate().map(|(k, c)| {
+        let (value, sd) = fitted(round, s.id, c.name).unwrap_or((s.score.values[k], 0.0));
+        // the blocks' scatter stands in the deviation of the round that selected it
+        parameter(&about, k, value, sd.max(s.score.deviations[k]))
+    });
+    let parameters = parameters.collect();
+    let curve = match options.detail {
+        Detail::Full => curves::curve(
+            round,
+            &s.contribution,
+            &s.channels,
+            relative(&s.score),
+            !round.model.has(s.id),
+        ),
+        Detail::Lean => None,
+    };
+    Some(Candidate {
+        id: s.id.into(),
+        description: about.description,
+        asserted: s.refused.is_empty(),
+        evidence: s.score.evidence,
+        threshold: s.threshold,
+        parameters,
+        channels: names(&s.channels),
+        indistinguishable_from: s.class.clone(),
+        heldout_error_reduction: s.heldout,
+        selected_in_bootstraps: s.selected,
+        by_flight: flights(round, &s.by_flight),
+        minimum_detectable: None,
+        refused: s.refused.clone(),
+        curve,
+    })
+}
+
+/// Value and standard deviation of a coefficient that has joined the model.
+fn fitted(round: &Round, id: &str, name: &str) -> Option<(f64, f64)> {
+    let full = format!("{id}.{name}");
+    let place = round.model.coefficients().iter().position(|c| c.name == full)?;
+    let tuned = round.tuned();
+    let value = tuned.coefficients()[place].value;
+    match round.coefficients.iter().position(|k| *k == place) {
+        None => Some((value, 0.0)),
+        Some(k) => {
+            let p = &round.projected;
+            Some((value, p.covariance[(k, k)].max(0.0).sqrt()))
+        }
+    }
+}
+
+fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Candidate {
+    let round = found.round();
+    let parameters = (0..about.coefficients.len())
+        .map(|k| parameter(about, k, score.values[k], score.deviations[k]))
+        .collect();
+    // what is no more than chance says nothing flight by flight either
+    let by_flight = match score.evidence > found.threshold {
+        true => flights(round, &checks::by_flight(round, trial, score)),
+        false => Vec::new(),
+    };
+    Candidate {
+        id: trial.id.into(),
+        description: about.description,
+        asserted: false,
+        evidence: score.evidence,
+        threshold: found.threshold,
+        parameters,
+        channels: names(&round.channels_of(score)),
+        indistinguishable_from: Vec::new(),
+        heldout_error_reduction: f64::NAN,
+        selected_in_bootstraps: f64::NAN,
+        by_flight,
+        minimum_detectable: None,
+        refused: Vec::new(),
+        curve: None,
+    }
+}
+
+fn parameter(about: &Description, k: usize, value: f64, sd: f64) -> Parameter {
+    let c = &about.coefficients[k];
+    Parameter {
+        name: c.name.into(),
+        value,
+        ci95: [value - INTERVAL * sd, value + INTERVAL * sd],
+        unit: c.unit.into(),
+    }
+}
+
+fn names(channels: &[usize]) -> Vec<String> {
+    const NAMES: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
+    debug_assert_eq!(ChannelId::ALL[0], ChannelId::Drag);
+    channels.iter().map(|c| NAMES[*c].to_owned()).collect()
+}
+
+fn flights(round: &Round, values: &[[f64; 2]]) -> Vec<FlightEstimate> {
+    let of = |(flight, [value, sd]): (
+        &crate::sysid::diagnose::regression::columns::Ready,
+        &[f64; 2],
+    )| FlightEstimate { flight: flight.measured.name.clone(), value: *value, sd: *sd };
+    round.flights.iter().zip(values).map(of).collect()
+}

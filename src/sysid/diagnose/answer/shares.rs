@@ -1,0 +1,118 @@
+//! What is left of each channel, with the prior as tuned.
+
+use crate::model::GreyBox;
+use crate::num::statistics::mean;
+use crate::sysid::compare::{ChannelId, RegimeVariable};
+use crate::sysid::diagnose::answer::result::{ChannelLeft, Tuned};
+use crate::sysid::diagnose::search::round::Round;
+use crate::sysid::diagnose::search::stepwise::Found;
+use crate::sysid::weak_form::windows;
+
+/// Bins over a regime variable.
+const BINS: usize = 5;
+/// Standard deviations of its mean beyond which a bin is worth a sentence.
+const WORTH: f64 = 4.0;
+const SYMBOLS: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
+
+/// Every channel that the flights allow.
+pub fn channels(found: &Found) -> Vec<ChannelLeft> {
+    let (before, after) = (found.unexplained, found.left());
+    let residual = found.round().tuned_residual();
+    let of = |k: usize| ChannelLeft {
+        channel: SYMBOLS[k].into(),
+        tuned_unexplained_fraction: before[k],
+        unexplained_fraction: after[k],
+        worst_regime: worst(found.round(), &residual, k),
+        left_with: found.shape.as_ref().and_then(|shape| shape.term(k)),
+    };
+    (0..SYMBOLS.len()).filter(|k| before[*k].is_finite()).map(of).collect()
+}
+
+/// Share of each channel's variance beyond noise that `residual`, a column a flight, leaves unexplained under
+/// the model of `first`; NaN where the flights do not measure the channel.
+pub fn unexplained(
+    first: &Round,
+    residual: &[crate::sysid::diagnose::regression::gather::Column],
+) -> [f64; 6] {
+    let series: Vec<Vec<windows::Series>> =
+        first.flights.iter().map(|f| windows::channels(&first.model, &f.measured)).collect();
+    std::array::from_fn(|k| {
+        let own: Vec<&windows::Series> =
+            series.iter().flatten().filter(|s| s.channel == ChannelId::ALL[k]).collect();
+        let measured: Vec<f64> =
+            own.iter().flat_map(|s| s.measured.iter().copied()).filter(|x| x.is_finite()).collect();
+        if measured.is_empty() {
+            return f64::NAN;
+        }
+        let noise = mean(&own.iter().map(|s| s.noise_variance).collect::<Vec<_>>());
+        let middle = mean(&measured);
+        let deviations: Vec<f64> = measured.iter().map(|x| (x - middle).powi(2)).collect();
+        let left = residual.iter().flat_map(|c| c[k].iter()).filter(|x| x.is_finite());
+        let squares: Vec<f64> = left.map(|x| x * x).collect();
+        ((mean(&squares) - noise) / (mean(&deviations) - noise).max(1e-12)).max(0.0)
+    })
+}
+
+/// The regime in which the mean residual of a channel stands out most, in words.
+fn worst(
+    round: &Round,
+    residual: &[crate::sysid::diagnose::regression::gather::Column],
+    channel: usize,
+) -> Option<String> {
+    let mut points: Vec<([f64; RegimeVariable::CONTINUOUS.len()], f64)> = Vec::new();
+    for (flight, left) in round.flights.iter().zip(residual) {
+        for (window, r) in flight.acting.windows.iter().zip(&left[channel]) {
+            if r.is_finite() {
+                points.push((window.regime, *r));
+            }
+        }
+    }
+    let mut best: Option<(f64, String)> = None;
+    for (k, variable) in RegimeVariable::CONTINUOUS.iter().enumerate() {
+        if matches!(variable, RegimeVariable::Time) {
+            continue;
+        }
+        points.sort_by(|a, b| a.0[k].total_cmp(&b.0[k]));
+        for bin in points.chunks(points.len().div_ceil(BINS).max(1)) {
+            let values: Vec<f64> = bin.iter().map(|p| p.1).collect();
+            let m = mean(&values);
+            let sd = (values.iter().map(|x| (x - m).powi(2)).sum::<f64>()
+                / (values.len().max(2) - 1) as f64)
+                .sqrt();
+            // neighbouring windows overlap by half
+            let z = m.abs() / (sd / (0.5 * values.len() as f64).sqrt());
+            if z > WORTH && best.as_ref().is_none_or(|(other, _)| z > *other) {
+                let id = ChannelId::ALL[channel];
+                let words = format!(
+                    "{} {:+.3} {} beside the model at {} {:.1} to {:.1} {}",
+                    id.name(),
+                    m,
+                    id.unit(),
+                    variable.name(),
+                    bin[0].0[k],
+                    bin[bin.len() - 1].0[k],
+                    variable.unit()
+                );
+                best = Some((z, words.trim().to_owned()));
+            }
+        }
+    }
+    best.map(|(_, words)| words)
+}
+
+/// The prior's coefficients as tuned in the last round.
+pub fn tuned(found: &Found, model: &GreyBox) -> Vec<Tuned> {
+    let round = found.round();
+    let p = &round.projected;
+    let of = |(k, place): (usize, &usize)| {
+        let given = model.coefficients().get(*place)?;
+        Some(Tuned {
+            name: given.name.clone(),
+            prior: given.value,
+            prior_sd: given.width(),
+            value: round.model.coefficients()[*place].value + p.tuned[k],
+            sd: p.covariance[(k, k)].max(0.0).sqrt(),
+        })
+    };
+    round.coefficients.iter().enumerate().filter_map(of).collect()
+}

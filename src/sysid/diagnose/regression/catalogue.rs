@@ -1,0 +1,264 @@
+//! The candidates: every effect of the catalogue that a model lacks, with its columns.
+
+use rayon::prelude::*;
+
+use crate::model::GreyBox;
+use crate::physics::effects::{Description, Kind};
+use crate::physics::inputs;
+use crate::sysid::diagnose::regression::columns::{Ready, combine};
+use crate::sysid::diagnose::regression::gather::Column;
+use crate::sysid::diagnose::regression::local::CHANNELS;
+use crate::sysid::diagnose::regression::rank::{Point, Trial};
+
+/// Share of a shape constant by which its derivative is taken.
+const MOVED: f64 = 0.02;
+/// Largest change of a shape constant that its linearisation is trusted with, as a share.
+pub const REACH: f64 = 0.35;
+
+/// Factor between places below the least start.
+const SMALLER: f64 = 2.5;
+
+/// An effect that may be missing.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// What is known of it.
+    pub about: Description,
+    /// Whether it acts on the deflections.
+    pub operator: bool,
+}
+
+/// The effects that `model` lacks and that can be searched for, but for those of `without`.
+pub fn candidates(model: &GreyBox, without: &[String]) -> Vec<Entry> {
+    let of = |about: Description, operator| Entry { about, operator };
+    let physical = Kind::ALL.iter().map(|k| of(k.describe(), false));
+    let on_inputs = inputs::Kind::ALL.iter().map(|k| of(k.describe(), true));
+    physical
+        .chain(on_inputs)
+        .filter(|e| {
+            let about = &e.about;
+            let searched =
+                about.entry.is_some_and(|entry| about.shape == 0 || !entry.starts.is_empty());
+            searched
+                && about.table.is_none()
+                && !model.has(about.id)
+                && !without.iter().any(|id| id == about.id)
+        })
+        .collect()
+}
+
+/// Columns of candidates over all flights: for each flight, a list of one length.
+pub struct Columns {
+    /// The candidates, columns numbered from 0.
+    pub trials: Vec<Trial>,
+    /// Flight by flight.
+    pub columns: Vec<Vec<Column>>,
+}
+
+/// The columns of `entries` for `flights` under `model`; `refined` gives further places at which the
+/// nonlinear ones are linearised.
+pub fn columns(
+    model: &GreyBox,
+    flights: &[Ready],
+    entries: &[Entry],
+    refined: &[(&str, Vec<f64>)],
+) -> Columns {
+    let mut all = Columns { trials: Vec::new(), columns: vec![Vec::new(); flights.len()] };
+    let (straight, curved): (Vec<Entry>, Vec<Entry>) =
+        entries.iter().partition(|e| starts(e).is_empty());
+    all.add_linear(model, flights, &straight);
+    let places: Vec<(&Entry, Vec<f64>)> = curved
+        .iter()
+        .flat_map(|e| {
+            let own = refined.iter().filter(|(id, _)| *id == e.about.id).map(|(_, v)| v.clone());
+            let listed = starts(e).iter().map(|s| s.to_vec());
+            smaller(e)
+                .into_iter()
+                .chain(listed)
+                .chain(own)
+                .map(|values| (e, values))
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    let made: Vec<Option<Vec<Vec<Column>>>> =
+        places.par_iter().map(|(e, values)| curved_columns(model, flights, e, values)).collect();
+    for e in &curved {
+        let mut trial =
+            Trial { id: e.about.id, points: Vec::new(), support: 0.0, channels: [false; 6] };
+        for ((of, values), made) in places.iter().zip(&made) {
+            if let (true, Some(made)) = (of.about.id == e.about.id, made) {
+                all.add_point(&mut trial, e, values, made);
+            }
+        }
+        all.finish(trial, flights);
+    }
+    all
+}
+
+fn starts(entry: &Entry) -> &'static [&'static [f64]] {
+    entry.about.entry.map_or(&[], |e| e.starts)
+}
+
+/// Places below the least start of an effect on the deflections, where good sensors may still see it.
+fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
+    let (Some(first), Some(last)) = (starts(entry).first(), starts(entry).last()) else {
+        return Vec::new();
+    };
+    if !entry.operator {
+        return Vec::new();
+    }
+    // the less of a limit, the higher it is
+    let factor = if first[0] < last[0] { 1.0 / SMALLER } else { SMALLER };
+    vec![vec![first[0] * factor.powi(2)], vec![first[0] * factor]]
+}
+
+/// Whether an effect is linear in all its constants.
+pub fn straight(entry: &Entry) -> bool {
+    starts(entry).is_empty()
+}
+
+/// `model` with all of `entries` that can join it, at nought or what lies nearest to it, and these with their values.
+pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec<f64>)>) {
+    let mut everything = model.clone();
+    let mut joined = Vec::new();
+    for e in entries {
+        let nearest = |(low, high): (f64, f64)| 0.0_f64.clamp(low, high);
+        let values: Vec<f64> = e.about.coefficients.iter().map(|c| nearest(c.bounds)).collect();
+        if everything.join(e.about.id, &values).is_ok() {
+            joined.push((*e, values));
+        }
+    }
+    // what some of them would replace is still there
+    for c in model.coefficients() {
+        everything.set_coefficient(&c.name, c.value);
+    }
+    (everything, joined)
+}
+
+/// Coefficients that a search leaves free: all but gains that are one in every start.
+pub fn free(entry: &Entry) -> Vec<usize> {
+    let linear = entry.about.coefficients.len() - entry.about.shape;
+    (0..entry.about.coefficients.len())
+        .filter(|k| {
+            *k >= linear || starts(entry).is_empty() || starts(entry).iter().any(|s| s[*k] != 1.0)
+        })
+        .collect()
+}
+
+impl Columns {
+    /// One model with all of `entries` at zero gives the columns of all in one pass.
+    fn add_linear(&mut self, model: &GreyBox, flights: &[Ready], entries: &[Entry]) {
+        let (everything, joined) = with_all(model, entries);
+        let wanted = model.coefficients().len()..everything.coefficients().len();
+        for (list, flight) in self.columns.iter_mut().zip(flights) {
+            list.extend(flight.linear(&everything, wanted.clone()));
+        }
+        let mut next = 0;
+        for (e, values) in joined {
+            let free = e.about.coefficients.iter().enumerate().map(|(k, c)| {
+                let (low, high) = c.bounds;
+                (k, next + k, [low, high])
+            });
+            let free = free.collect();
+            let trial = Trial {
+                id: e.about.id,
+                points: vec![Point { values, contribution: None, free }],
+                support: 0.0,
+                channels: [false; 6],
+            };
+            next += e.about.coefficients.len();
+            self.finish(trial, flights);
+        }
+    }
+
+    fn add_point(
+        &mut self,
+        trial: &mut Trial,
+        entry: &Entry,
+        values: &[f64],
+        made: &[Vec<Column>],
+    ) {
+        let first = self.columns.first().map_or(0, Vec::len);
+        for (list, own) in self.columns.iter_mut().zip(made) {
+            list.extend(own.iter().cloned());
+        }
+        let reach = |k: usize| {
+            let (low, high) = entry.about.coefficients[k].bounds;
+            let by = REACH * values[k].abs();
+            [(values[k] - by).max(low), (values[k] + by).min(high)]
+        };
+        trial.points.push(Point {
+            values: values.to_vec(),
+            contribution: Some(first),
+            free: free(entry)
+                .iter()
+                .enumerate()
+                .map(|(i, &k)| (k, first + 1 + i, reach(k)))
+                .collect(),
+        });
+    }
+
+    /// Notes where a trial acts, and keeps it if it acts at all.
+    fn finish(&mut self, mut trial: Trial, flights: &[Ready]) {
+        let own: Vec<usize> = trial
+            .points
+            .iter()
+            .flat_map(|p| p.free.iter().map(|f| f.1).chain(p.contribution))
+            .collect();
+        for channel in 0..CHANNELS {
+            let acts =
+                self.columns.iter().any(|list| own.iter().any(|c| !list[*c][channel].is_empty()));
+            trial.channels[channel] = acts;
+            if acts {
+                let finite =
+                    |f: &Ready| f.residual[channel].iter().filter(|x| x.is_finite()).count();
+                // neighbouring windows overlap by half
+                trial.support += 0.5 * flights.iter().map(finite).sum::<usize>() as f64;
+            }
+        }
+        if trial.channels.iter().any(|c| *c) {
+            self.trials.push(trial);
+        }
+    }
+}
+
+/// A nonlinear candidate at `values`: its contribution, then the derivatives by its free coefficients,
+/// flight by flight; `None` if the values are not possible.
+fn curved_columns(
+    model: &GreyBox,
+    flights: &[Ready],
+    entry: &Entry,
+    values: &[f64],
+) -> Option<Vec<Vec<Column>>> {
+    let id = entry.about.id;
+    let joined = |values: &[f64]| {
+        let mut with = model.clone();
+        with.join(id, values).is_ok().then_some(with)
+    };
+    let of = |flight: &Ready, with: &GreyBox, values: &[f64]| {
+        if entry.operator {
+            return flight.operator(with);
+        }
+        let first = model.coefficients().len();
+        let linear = values.len() - entry.about.shape;
+        combine(&flight.linear(with, first..first + linear), &values[..linear])
+    };
+    let here = joined(values)?;
+    let mut moved = Vec::new();
+    for k in free(entry) {
+        let (low, high) = entry.about.coefficients[k].bounds;
+        let by = (MOVED * values[k].abs()).max(1e-6);
+        let (mut a, mut b) = (values.to_vec(), values.to_vec());
+        a[k] = (a[k] - by).max(low);
+        b[k] = (b[k] + by).min(high);
+        moved.push((joined(&a)?, joined(&b)?, a.clone(), b.clone(), b[k] - a[k]));
+    }
+    let one = |flight: &Ready| {
+        let mut list = vec![of(flight, &here, values)];
+        for (down, up, a, b, by) in &moved {
+            let (down, up) = (of(flight, down, a), of(flight, up, b));
+            list.push(combine(&[up, down], &[1.0 / by, -1.0 / by]));
+        }
+        list
+    };
+    Some(flights.iter().map(one).collect())
+}

@@ -1,0 +1,136 @@
+//! Flights cut into cells: one channel of one flight, its finite windows in runs and blocks.
+
+use nalgebra::DMatrix;
+
+use crate::sysid::diagnose::regression::columns::Ready;
+use crate::sysid::diagnose::regression::gather::Column;
+use crate::sysid::diagnose::regression::local::CHANNELS;
+use crate::sysid::diagnose::regression::whiten::Whitener;
+
+/// Length of a block of windows that are taken to hang together, s.
+pub const BLOCK_S: f64 = 4.0;
+
+/// The columns of one flight with their places in the list of all.
+pub type Placed = Vec<(usize, Column)>;
+
+/// One channel of one flight.
+#[derive(Clone, Debug)]
+pub struct Cell {
+    /// Which flight.
+    pub flight: usize,
+    /// Which channel.
+    pub channel: usize,
+    /// Windows that count, in order.
+    pub windows: Vec<usize>,
+    /// Ends of the runs of neighbouring windows, as places in `windows`.
+    pub runs: Vec<usize>,
+    /// Block of each of them, numbered over all flights.
+    pub blocks: Vec<usize>,
+}
+
+/// The cells of all flights, with the flight of every block.
+#[derive(Clone, Debug)]
+pub struct Cells {
+    /// Flight by flight, channel by channel; cells without windows are left out.
+    pub list: Vec<Cell>,
+    /// The flight of each block.
+    pub flight_of_block: Vec<usize>,
+}
+
+impl Cells {
+    /// Cuts `flights`.
+    pub fn new(flights: &[Ready]) -> Cells {
+        let mut cells = Cells { list: Vec::new(), flight_of_block: Vec::new() };
+        for (flight, ready) in flights.iter().enumerate() {
+            let block_of = cells.number(flight, ready);
+            for channel in 0..CHANNELS {
+                let cell = cell(flight, channel, ready, &block_of);
+                if !cell.windows.is_empty() {
+                    cells.list.push(cell);
+                }
+            }
+        }
+        cells
+    }
+
+    /// The block of each window of `ready`; a rest shorter than half a block joins the one before.
+    fn number(&mut self, flight: usize, ready: &Ready) -> Vec<usize> {
+        let windows = &ready.acting.windows;
+        let mut block_of = Vec::with_capacity(windows.len());
+        for run in windows.chunk_by(|a, b| a.segment == b.segment) {
+            let (start, end) = (run[0].time_s, run[run.len() - 1].time_s);
+            let count = ((end - start) / BLOCK_S).round().max(1.0);
+            let length = (end - start) / count;
+            let first = self.flight_of_block.len();
+            for window in run {
+                let place = ((window.time_s - start) / length.max(1e-9)).min(count - 1.0);
+                block_of.push(first + place.max(0.0) as usize);
+            }
+            self.flight_of_block.resize(first + count as usize, flight);
+        }
+        block_of
+    }
+
+    /// Number of blocks.
+    pub fn blocks(&self) -> usize {
+        self.flight_of_block.len()
+    }
+}
+
+fn cell(flight: usize, channel: usize, ready: &Ready, block_of: &[usize]) -> Cell {
+    let values = &ready.residual[channel];
+    let windows: Vec<usize> = (0..values.len()).filter(|w| values[*w].is_finite()).collect();
+    let segment = |w: usize| ready.acting.windows[w].segment;
+    let runs = (1..=windows.len())
+        .filter(|&k| {
+            k == windows.len()
+                || windows[k] != windows[k - 1] + 1
+                || segment(windows[k]) != segment(windows[k - 1])
+        })
+        .collect();
+    let blocks = windows.iter().map(|w| block_of[*w]).collect();
+    Cell { flight, channel, windows, runs, blocks }
+}
+
+impl Cell {
+    /// The runs of `values`, a value a window of the flight.
+    pub fn split(&self, values: &[f64]) -> Vec<Vec<f64>> {
+        let mut start = 0;
+        let cut = |&end: &usize| {
+            let run = self.windows[start..end].iter().map(|w| values[*w]).collect();
+            start = end;
+            run
+        };
+        self.runs.iter().map(cut).collect()
+    }
+
+    /// `values` whitened, a value a row.
+    pub fn whitened(&self, values: &[f64], whitener: &Whitener) -> Vec<f64> {
+        self.split(values).iter().flat_map(|run| whitener.apply(run)).collect()
+    }
+
+    /// The whitened columns of `placed` that act in the channel, with their places.
+    pub fn matrix(&self, placed: &Placed, whitener: &Whitener) -> (Vec<usize>, DMatrix<f64>) {
+        let mut places = Vec::new();
+        let mut data = Vec::new();
+        for (place, column) in placed {
+            if !column[self.channel].is_empty() {
+                places.push(*place);
+                data.extend(self.whitened(&column[self.channel], whitener));
+            }
+        }
+        (places.clone(), DMatrix::from_vec(self.windows.len(), places.len(), data))
+    }
+
+    /// The rows of each block: block, first row, one past the last.
+    pub fn rows_of_blocks(&self) -> Vec<(usize, usize, usize)> {
+        let mut rows: Vec<(usize, usize, usize)> = Vec::new();
+        for (row, block) in self.blocks.iter().enumerate() {
+            match rows.last_mut() {
+                Some((last, _, end)) if last == block => *end = row + 1,
+                _ => rows.push((*block, row, row + 1)),
+            }
+        }
+        rows
+    }
+}

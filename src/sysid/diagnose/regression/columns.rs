@@ -1,0 +1,252 @@
+//! What one unit of each unknown adds to the residual of a flight, window by window.
+
+use std::ops::Range;
+
+use crate::model::GreyBox;
+use crate::physics::rigid_body::{self, RigidBody, Vector};
+use crate::physics::{Channel, Wrench};
+use crate::sysid::diagnose::regression::gather::{Column, gather, rates};
+use crate::sysid::diagnose::regression::local::{self, ALPHA, CHANNELS, CONTROLS, INPUTS};
+use crate::sysid::flight_path::reconstruction::Instant;
+use crate::sysid::weak_form::prepared::Prepared;
+use crate::sysid::weak_form::windows::{gyroscopic, inertia, to_force_axes};
+
+/// Columns of sensor errors: gyros p, q, r, α, β, share of the airspeed, accelerometers x, y, z, then
+/// lateness of α, β, airspeed, accelerometers and recorded actuators (s), and how much the record of the
+/// actuators is a mean over time (half the variance of that time, squared samples).
+pub const SENSORS: usize = 15;
+
+/// A flight under a model.
+#[derive(Clone, Debug)]
+pub struct Ready {
+    /// The flight as measured.
+    pub measured: Prepared,
+    /// The same with the deflections that act under the model.
+    pub acting: Prepared,
+    /// Measured less predicted.
+    pub residual: Column,
+    /// What one unit of each sensor error adds to it.
+    pub sensors: Vec<Column>,
+    /// Derivatives of the prediction by aileron, elevator and throttle, segment by sample.
+    controls: Vec<Vec<[[f64; CHANNELS]; 3]>>,
+    /// The model that says how the aircraft accelerates, if it is another one.
+    accelerating: Option<GreyBox>,
+}
+
+impl Ready {
+    /// `flight` under `model`.
+    pub fn new(model: &GreyBox, flight: &Prepared) -> Ready {
+        let acting = flight.acting(model).into_owned();
+        let locals: Vec<Vec<local::Local>> = acting
+            .segments
+            .iter()
+            .map(|s| s.iter().map(|at| local::local(model, at, &at.controls)).collect())
+            .collect();
+        let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 6, |place, add| {
+            // the end of a step of RK4 is close to its start
+            let here = &locals[place.segment][place.index];
+            let value = if place.at.time_s == acting.segments[place.segment][place.index].time_s {
+                here.value
+            } else {
+                local::local(model, place.at, place.controls).value
+            };
+            (0..CHANNELS).for_each(|c| add(0, c, value[c]));
+            for (i, slope) in here.slope.iter().enumerate() {
+                (0..CHANNELS).for_each(|c| add(1 + i, c, slope[c]));
+            }
+            let v = place.at.state.airspeed;
+            (0..CHANNELS).for_each(|c| add(1 + ALPHA + 2, c, (v - 1.0) * here.slope[ALPHA + 2][c]));
+            let air = model.air(&place.at.state, place.at.altitude);
+            for axis in 0..3 {
+                let mut force = [0.0; 3];
+                force[axis] = model.body.mass;
+                let force = to_force_axes(force, &air, model.axes);
+                (0..3).for_each(|c| add(1 + INPUTS + axis, c, force[c]));
+            }
+            let flow = |i: &Instant| [i.state.alpha, i.state.beta, i.state.airspeed];
+            for (i, rate) in
+                differences(&acting, place.segment, place.index, flow).iter().enumerate()
+            {
+                let slope = &here.slope[ALPHA + i];
+                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 3 + i, c, -rate * slope[c]));
+            }
+            let moved =
+                |i: &Instant| [i.controls.aileron, i.controls.elevator, i.controls.throttle];
+            for (i, rate) in
+                differences(&acting, place.segment, place.index, moved).iter().enumerate()
+            {
+                let slope = &here.slope[CONTROLS + i];
+                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 7, c, -rate * slope[c]));
+            }
+            for (i, bend) in bends(&acting, place.segment, place.index).iter().enumerate() {
+                let slope = &here.slope[CONTROLS + i];
+                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 8, c, bend * slope[c]));
+            }
+            let force = differences(&acting, place.segment, place.index, |i| i.specific_force);
+            if force.iter().all(|f| f.is_finite()) {
+                let force = to_force_axes(force.map(|f| -f * model.body.mass), &air, model.axes);
+                (0..3).for_each(|c| add(1 + INPUTS + 6, c, force[c]));
+            }
+        });
+        let mut residual = std::mem::take(&mut columns[0]);
+        add_spin(model, &acting, &mut residual);
+        let sensors = (1..=CONTROLS).chain(1 + INPUTS..1 + INPUTS + 9);
+        let sensors: Vec<Column> = sensors.map(|k| std::mem::take(&mut columns[k])).collect();
+        let controls = locals
+            .iter()
+            .map(|s| {
+                s.iter().map(|l| [0, 1, 2].map(|i| l.slope[CONTROLS + i].map(|x| -x))).collect()
+            })
+            .collect();
+        let accelerating = None;
+        Ready { measured: flight.clone(), acting, residual, sensors, controls, accelerating }
+    }
+
+    /// With accelerations of another model in the columns of mass and inertia.
+    pub fn accelerating_as(self, model: Option<&GreyBox>) -> Ready {
+        Ready { accelerating: model.cloned(), ..self }
+    }
+
+    /// What one unit of each of the coefficients `wanted` of `model`, a model that has the effects of
+    /// the flight's, predicts; shape constants and those of input effects have empty columns.
+    pub fn linear(&self, model: &GreyBox, wanted: Range<usize>) -> Vec<Column> {
+        let mut columns = gather(&self.acting, model.integrator, wanted.len(), |place, add| {
+            let at = place.at;
+            let air = model.air(&at.state, at.altitude);
+            model.contributions(&at.state, place.controls, &air, |index, channel, amount: f64| {
+                if !wanted.contains(&index) {
+                    return;
+                }
+                let column = index - wanted.start;
+                match channel {
+                    Channel::Drag => add(column, 0, amount),
+                    Channel::Lift => add(column, 1, amount),
+                    Channel::Side => add(column, 2, amount),
+                    Channel::Roll => add(column, 3, amount),
+                    Channel::Pitch => add(column, 4, amount),
+                    Channel::Yaw => add(column, 5, amount),
+                    Channel::BodyX => {
+                        let mut wrench = Wrench::zero();
+                        wrench.add(channel, amount);
+                        let force = rigid_body::body_force(&wrench, &air, model.axes);
+                        let force = to_force_axes(force, &air, model.axes);
+                        (0..3).for_each(|c| add(column, c, force[c]));
+                    }
+                }
+            });
+        });
+        for (column, index) in wanted.enumerate() {
+            if let Some((body, step)) = changed_body(model, index) {
+                let of_body = self.body(model, &body, step);
+                columns[column].iter_mut().zip(of_body).for_each(|(a, b)| join(a, b));
+            }
+        }
+        columns
+    }
+
+    /// What a step of `step` to `body` adds to the residual, by one unit. The accelerations are a
+    /// model's: measured ones share the residual's noise.
+    fn body(&self, model: &GreyBox, body: &RigidBody, step: f64) -> Column {
+        let old = &model.body;
+        let model = self.accelerating.as_ref().unwrap_or(model);
+        let mut columns = gather(&self.acting, model.integrator, 1, |place, add| {
+            let state = &place.at.state;
+            let air = model.air(state, place.at.altitude);
+            let wrench = model.wrench(state, place.controls, &air);
+            let force = rigid_body::body_force(&wrench, &air, model.axes);
+            let force = to_force_axes(force, &air, model.axes);
+            let heavier = (body.mass - old.mass) / model.body.mass;
+            (0..3).for_each(|c| add(0, c, -force[c] * heavier / step));
+            let (_, spin) = model.accelerations(state, place.controls, &air);
+            let moment = |body: &RigidBody| {
+                let (a, b): (Vector<f64>, Vector<f64>) =
+                    (inertia(body, spin), gyroscopic(body, state));
+                [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+            };
+            let (new, old) = (moment(body), moment(old));
+            (0..3).for_each(|c| add(0, 3 + c, (old[c] - new[c]) / step));
+        });
+        columns.pop().unwrap_or_default()
+    }
+
+    /// What `model`, the flight's with one more effect on the deflections or another constant of one,
+    /// predicts beyond the flight's, to first order in the deflections.
+    pub fn operator(&self, model: &GreyBox) -> Column {
+        let other = self.measured.acting(model);
+        let mut columns = gather(&self.acting, model.integrator, 1, |place, add| {
+            let (k, i) = (place.segment, place.index);
+            let (a, b) = (&self.acting.segments[k][i].controls, &other.segments[k][i].controls);
+            let moved = [b.aileron - a.aileron, b.elevator - a.elevator];
+            let slopes = &self.controls[k][i];
+            for (c, (aileron, elevator)) in slopes[0].iter().zip(slopes[1]).enumerate() {
+                add(0, c, moved[0] * aileron + moved[1] * elevator);
+            }
+        });
+        columns.pop().unwrap_or_default()
+    }
+}
+
+/// `Σ weights · columns`.
+pub fn combine(columns: &[Column], weights: &[f64]) -> Column {
+    let mut sum = Column::default();
+    for (column, weight) in columns.iter().zip(weights) {
+        for (a, b) in sum.iter_mut().zip(column) {
+            join(a, b.iter().map(|x| weight * x).collect());
+        }
+    }
+    sum
+}
+
+fn join(a: &mut Vec<f64>, b: Vec<f64>) {
+    if a.is_empty() {
+        *a = b;
+    } else {
+        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+    }
+}
+
+/// Whether mass or inertia of `model` depend on its coefficient `index`.
+pub fn of_body(model: &GreyBox, index: usize) -> bool {
+    changed_body(model, index).is_some()
+}
+
+/// The body that `model` has with the coefficient `index` moved, and by how much, if it changes it.
+fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
+    const MOVED: f64 = 1e-3;
+    let mut moved = model.clone();
+    let named = &model.coefficients()[index];
+    moved.set_coefficient(&named.name, named.value + MOVED);
+    (moved.body != model.body).then_some((moved.body, MOVED))
+}
+
+/// Adds the moment of the measured angular acceleration.
+fn add_spin(model: &GreyBox, flight: &Prepared, residual: &mut Column) {
+    let spins = rates(flight, |i| [i.state.p, i.state.q, i.state.r]);
+    let moments: Vec<Vector<f64>> = spins.iter().map(|w| inertia(&model.body, *w)).collect();
+    for axis in 0..3 {
+        join(&mut residual[3 + axis], moments.iter().map(|m| m[axis]).collect());
+    }
+}
+
+/// Second differences of aileron, elevator and throttle.
+pub fn bends(flight: &Prepared, segment: usize, index: usize) -> [f64; 3] {
+    let instants = &flight.segments[segment];
+    let (before, after) = (index.saturating_sub(1), (index + 1).min(instants.len() - 1));
+    let of = |i: &Instant| [i.controls.aileron, i.controls.elevator, i.controls.throttle];
+    let [a, b, c] = [before, index, after].map(|i| of(&instants[i]));
+    [0, 1, 2].map(|k| a[k] - 2.0 * b[k] + c[k])
+}
+
+/// Rates of `of` by central differences, 1/s.
+fn differences(
+    flight: &Prepared,
+    segment: usize,
+    index: usize,
+    of: impl Fn(&Instant) -> [f64; 3],
+) -> [f64; 3] {
+    let instants = &flight.segments[segment];
+    let (before, after) = (index.saturating_sub(1), (index + 1).min(instants.len() - 1));
+    let per = 1.0 / (flight.dt * (after - before).max(1) as f64);
+    let (a, b) = (of(&instants[before]), of(&instants[after]));
+    [0, 1, 2].map(|k| (b[k] - a[k]) * per)
+}

@@ -1,0 +1,124 @@
+//! A flexible model without physics: random Fourier features of state, deflections and their past.
+
+use std::f64::consts::TAU;
+
+use rand::RngExt;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::model::{GreyBox, Integrator};
+use crate::num::stream::{Stream, stream};
+use crate::sysid::diagnose::regression::columns::Ready;
+use crate::sysid::diagnose::regression::gather::{Column, gather};
+use crate::sysid::diagnose::regression::local::CHANNELS;
+use crate::sysid::weak_form::prepared::Prepared;
+
+/// Random stream of the features.
+const FEATURES: u64 = 81;
+/// Cosines.
+const COSINES: usize = 40;
+/// What they are of: α, β, V, p, q, r, deflections and throttle now, deflections a while ago, the rate of α.
+const VARIABLES: usize = 12;
+/// How many they are: the variables themselves and the cosines.
+pub const COUNT: usize = VARIABLES + COSINES;
+/// Standard deviation of the cosines' frequencies, per standard deviation of a variable: features that
+/// bend about once over what was flown.
+const BEND: f64 = 0.5;
+/// Time over which the rate of α is taken, s: shorter, it would be noise.
+const SPAN_S: f64 = 0.06;
+/// How long ago the past deflections were, s.
+const AGO_S: f64 = 0.08;
+
+/// A cosine's frequency along each variable and its phase.
+struct Cosine {
+    frequency: [f64; VARIABLES],
+    phase: f64,
+}
+
+/// The features of every flight; the same in all channels, each times the dynamic pressure.
+pub fn features(model: &GreyBox, flights: &[Ready], seed: u64) -> Vec<Vec<Column>> {
+    let spread = spread(flights, variables);
+    let mut random = stream(seed, &[FEATURES]);
+    let cosines: Vec<Cosine> = (0..COSINES).map(|_| cosine(&mut random)).collect();
+    let of = |flight: &Ready| {
+        let one = gather(&flight.acting, Integrator::Jsbsim, COUNT, |place, add| {
+            let z = standard(variables(&flight.acting, place.segment, place.index), &spread);
+            let pressure = model.air(&place.at.state, place.at.altitude).q_s;
+            // forces weigh by samples, moments by steps: the two sides of a window
+            for channel in [0, 3] {
+                for (k, z) in z.iter().enumerate() {
+                    add(k, channel, pressure * z);
+                }
+                for (k, c) in cosines.iter().enumerate() {
+                    let turn: f64 = c.frequency.iter().zip(&z).map(|(f, z)| f * z).sum();
+                    add(VARIABLES + k, channel, pressure * (turn + c.phase).cos());
+                }
+            }
+        });
+        one.into_iter().map(everywhere).collect()
+    };
+    flights.iter().map(of).collect()
+}
+
+fn everywhere(column: Column) -> Column {
+    std::array::from_fn(|c| column[if c < CHANNELS / 2 { 0 } else { CHANNELS / 2 }].clone())
+}
+
+fn cosine(random: &mut Stream) -> Cosine {
+    let mut unit = || -> f64 { StandardNormal.sample(random) };
+    let frequency = std::array::from_fn(|_| BEND * unit());
+    Cosine { frequency, phase: TAU * random.random::<f64>() }
+}
+
+fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES] {
+    let instants = &flight.segments[segment];
+    let i = &instants[index];
+    let ago = &instants[index.saturating_sub((AGO_S / flight.dt).round() as usize)].controls;
+    let half = (0.5 * SPAN_S / flight.dt).round().max(1.0) as usize;
+    let (a, b) = (index.saturating_sub(half), (index + half).min(instants.len() - 1));
+    let rise = instants[b].state.alpha - instants[a].state.alpha;
+    let (s, z) = (&i.state, &i.controls);
+    [
+        s.alpha,
+        s.beta,
+        s.airspeed,
+        s.p,
+        s.q,
+        s.r,
+        z.aileron,
+        z.elevator,
+        z.throttle,
+        ago.aileron - z.aileron,
+        ago.elevator - z.elevator,
+        rise / (flight.dt * (b - a).max(1) as f64),
+    ]
+}
+
+/// Mean and standard deviation over all flights of each of the variables that `of` takes from a flight, a
+/// segment and an index.
+pub fn spread<const N: usize>(
+    flights: &[Ready],
+    of: impl Fn(&Prepared, usize, usize) -> [f64; N],
+) -> [[f64; 2]; N] {
+    let (mut sum, mut square, mut count) = ([0.0; N], [0.0; N], 0.0);
+    for flight in flights {
+        for (segment, instants) in flight.acting.segments.iter().enumerate() {
+            for index in 0..instants.len() {
+                let x = of(&flight.acting, segment, index);
+                for k in 0..N {
+                    sum[k] += x[k];
+                    square[k] += x[k] * x[k];
+                }
+                count += 1.0;
+            }
+        }
+    }
+    std::array::from_fn(|k| {
+        let mean = sum[k] / count;
+        [mean, (square[k] / count - mean * mean).max(0.0).sqrt().max(1e-6)]
+    })
+}
+
+/// `raw` less its mean, in standard deviations.
+pub fn standard<const N: usize>(raw: [f64; N], spread: &[[f64; 2]; N]) -> [f64; N] {
+    std::array::from_fn(|k| (raw[k] - spread[k][0]) / spread[k][1])
+}

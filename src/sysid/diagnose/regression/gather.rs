@@ -1,0 +1,148 @@
+//! Averages with the kernel over every window of a flight, each sample evaluated once.
+
+use rayon::prelude::*;
+
+use crate::logs::Sampling;
+use crate::model::Integrator;
+use crate::physics::Controls;
+use crate::sysid::diagnose::regression::local::CHANNELS;
+use crate::sysid::flight_path::reconstruction::Instant;
+use crate::sysid::weak_form::prepared::Prepared;
+
+/// A value a window in each of the channels D, L, Y, l, m, n; an empty list stands for zeros.
+pub type Column = [Vec<f64>; CHANNELS];
+
+/// Windows that one task takes, which spares evaluating samples of overlapping windows twice.
+const GROUP: usize = 16;
+/// Windows that may hold one sample.
+const OVERLAP: usize = 4;
+
+/// A sample to be evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'a> {
+    /// Its segment.
+    pub segment: usize,
+    /// Its place in the segment.
+    pub index: usize,
+    /// The sample whose state counts.
+    pub at: &'a Instant,
+    /// The controls that count.
+    pub controls: &'a Controls,
+}
+
+/// Averages what `evaluate` reports, as `add(column, channel, amount)`, over each window: forces on
+/// the samples, moments on the steps as the integrator has them, on the samples too where these are taken
+/// at instants.
+pub fn gather(
+    flight: &Prepared,
+    integrator: Integrator,
+    columns: usize,
+    evaluate: impl Fn(&Place, &mut dyn FnMut(usize, usize, f64)) + Sync,
+) -> Vec<Column> {
+    let windows = flight.windows.len();
+    let groups: Vec<(usize, usize)> = groups(flight);
+    let parts: Vec<Vec<f64>> = groups
+        .par_iter()
+        .map(|&(first, last)| group(flight, integrator, columns, first, last, &evaluate))
+        .collect();
+    let mut out: Vec<Column> = vec![Column::default(); columns];
+    for (column, place) in out.iter_mut().enumerate() {
+        for (channel, list) in place.iter_mut().enumerate() {
+            let part = |(&(first, last), part): (&(usize, usize), &Vec<f64>)| {
+                let width = last - first;
+                let start = (column * CHANNELS + channel) * width;
+                part[start..start + width].to_vec()
+            };
+            let values: Vec<f64> = groups.iter().zip(&parts).flat_map(part).collect();
+            if values.iter().any(|x| *x != 0.0) {
+                debug_assert_eq!(values.len(), windows);
+                *list = values;
+            }
+        }
+    }
+    out
+}
+
+/// Runs of at most [`GROUP`] windows of one segment: first and one past the last.
+fn groups(flight: &Prepared) -> Vec<(usize, usize)> {
+    let mut groups: Vec<(usize, usize)> = Vec::new();
+    for (w, window) in flight.windows.iter().enumerate() {
+        match groups.last_mut() {
+            Some((first, last))
+                if flight.windows[*first].segment == window.segment && *last - *first < GROUP =>
+            {
+                *last = w + 1;
+            }
+            _ => groups.push((w, w + 1)),
+        }
+    }
+    groups
+}
+
+fn group(
+    flight: &Prepared,
+    integrator: Integrator,
+    columns: usize,
+    first: usize,
+    last: usize,
+    evaluate: &(impl Fn(&Place, &mut dyn FnMut(usize, usize, f64)) + Sync),
+) -> Vec<f64> {
+    let (kernel, width) = (&flight.kernel, last - first);
+    let mut sums = vec![0.0; columns * CHANNELS * width];
+    let segment = flight.windows[first].segment;
+    let instants = &flight.segments[segment];
+    let (from, to) = (flight.windows[first].start, flight.windows[last - 1].start + kernel.steps());
+    for index in from..=to {
+        let mut holders = [(0, 0.0, 0.0); OVERLAP];
+        let mut count = 0;
+        for w in first..last {
+            let start = flight.windows[w].start;
+            if start <= index && index <= start + kernel.steps() && count < OVERLAP {
+                let k = index - start;
+                let step = match flight.sampling {
+                    Sampling::Held => kernel.step.get(k).copied().unwrap_or(0.0),
+                    // both ends of a step count half: the mean of the two steps beside the sample
+                    Sampling::Instants => kernel.sample[k],
+                };
+                holders[count] = (w - first, kernel.sample[k], step);
+                count += 1;
+            }
+        }
+        let mut visit = |at: &Instant, forces: f64, moments: f64| {
+            let place = Place { segment, index, at, controls: &instants[index].controls };
+            evaluate(&place, &mut |column, channel, amount| {
+                let row = (column * CHANNELS + channel) * width;
+                for &(w, sample, step) in &holders[..count] {
+                    let weight = if channel < 3 { sample * forces } else { step * moments };
+                    if weight != 0.0 {
+                        sums[row + w] += weight * amount;
+                    }
+                }
+            });
+        };
+        match (integrator, instants.get(index + 1)) {
+            (Integrator::Rk4, Some(next)) if flight.sampling == Sampling::Held => {
+                visit(&instants[index], 1.0, 0.5);
+                visit(next, 0.0, 0.5);
+            }
+            _ => visit(&instants[index], 1.0, 1.0),
+        }
+    }
+    sums
+}
+
+/// `of` for every window from the kernel's slope: the smoothed rates of a signal.
+pub fn rates<const N: usize>(
+    flight: &Prepared,
+    of: impl Fn(&Instant) -> [f64; N],
+) -> Vec<[f64; N]> {
+    let rate = |window| {
+        let mut sum = [0.0; N];
+        for (weight, at) in flight.kernel.slope.iter().zip(flight.samples(window)) {
+            let x = of(at);
+            (0..N).for_each(|k| sum[k] += weight * x[k]);
+        }
+        sum
+    };
+    flight.windows.iter().map(rate).collect()
+}

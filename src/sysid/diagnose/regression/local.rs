@@ -1,0 +1,77 @@
+//! The residual at one sample, with its derivatives by what may be in error there.
+
+use crate::model::GreyBox;
+use crate::num::{Dual, Real};
+use crate::physics::rigid_body;
+use crate::physics::{Channel, Controls, State};
+use crate::sysid::flight_path::reconstruction::Instant;
+use crate::sysid::weak_form::windows::{gyroscopic, to_force_axes};
+
+/// Channels: D, L, Y (N), l, m, n (N m).
+pub const CHANNELS: usize = 6;
+/// Places of the derivatives: p, q, r, α, β, V, then aileron, elevator, throttle.
+pub const INPUTS: usize = 9;
+/// Place of the first rate.
+pub const RATES: usize = 0;
+/// Place of the angle of attack; sideslip and airspeed follow.
+pub const ALPHA: usize = 3;
+/// Place of the aileron; elevator and throttle follow.
+pub const CONTROLS: usize = 6;
+
+/// Measured less predicted at one sample, without the moments of the angular acceleration, which the
+/// kernel takes from the rates.
+#[derive(Clone, Copy, Debug)]
+pub struct Local {
+    /// The residual; forces NaN where the log has no specific force.
+    pub value: [f64; CHANNELS],
+    /// Its derivatives by the inputs in their order.
+    pub slope: [[f64; CHANNELS]; INPUTS],
+}
+
+/// The residual of `model` at `at` with `controls`.
+pub fn local(model: &GreyBox, at: &Instant, controls: &Controls) -> Local {
+    type D = Dual<INPUTS>;
+    let s = &at.state;
+    let state = State {
+        roll: D::from_f64(s.roll),
+        pitch: D::from_f64(s.pitch),
+        airspeed: D::variable(s.airspeed, ALPHA + 2),
+        p: D::variable(s.p, RATES),
+        q: D::variable(s.q, RATES + 1),
+        r: D::variable(s.r, RATES + 2),
+        alpha: D::variable(s.alpha, ALPHA),
+        beta: D::variable(s.beta, ALPHA + 1),
+    };
+    let controls = Controls {
+        aileron: D::variable(controls.aileron, CONTROLS),
+        elevator: D::variable(controls.elevator, CONTROLS + 1),
+        throttle: D::variable(controls.throttle, CONTROLS + 2),
+    };
+    let all = residual(model, &state, &controls, at);
+    Local {
+        value: all.map(|x| x.value),
+        slope: std::array::from_fn(|i| {
+            std::array::from_fn(|k| {
+                let slope = all[k].gradient[i];
+                if slope.is_finite() { slope } else { 0.0 }
+            })
+        }),
+    }
+}
+
+fn residual<R: Real>(
+    model: &GreyBox,
+    state: &State<R>,
+    controls: &Controls<R>,
+    at: &Instant,
+) -> [R; CHANNELS] {
+    let air = model.air(state, at.altitude);
+    let wrench = model.wrench(state, controls, &air);
+    let measured = at.specific_force.map(|f| R::from_f64(f * model.body.mass));
+    let predicted = rigid_body::body_force(&wrench, &air, model.axes);
+    let left = std::array::from_fn(|k| measured[k] - predicted[k]);
+    let [drag, lift, side] = to_force_axes(left, &air, model.axes);
+    let turning = gyroscopic(&model.body, state);
+    let [roll, pitch, yaw] = [Channel::Roll, Channel::Pitch, Channel::Yaw].map(|c| wrench.get(c));
+    [drag, lift, side, turning[0] - roll, turning[1] - pitch, turning[2] - yaw]
+}

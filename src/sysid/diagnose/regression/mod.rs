@@ -1,0 +1,14 @@
+//! The regression that ranks candidates: columns, whitening, elimination of nuisances (Frisch–Waugh–Lovell).
+
+pub(super) mod catalogue;
+pub(super) mod cells;
+pub(super) mod columns;
+pub(super) mod features;
+pub(super) mod gather;
+pub(super) mod local;
+pub(super) mod noise;
+pub(super) mod projected;
+pub(super) mod rank;
+pub(super) mod sensors;
+pub(super) mod shared;
+pub(super) mod whiten;

@@ -1,0 +1,257 @@
+//! Candidate columns with the tuned prior and the sensors' errors projected out, block by block.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::sysid::diagnose::regression::cells::{Cells, Placed};
+use crate::sysid::diagnose::regression::noise::Noise;
+use crate::sysid::diagnose::regression::whiten::Whitener;
+
+/// A known unknown: a coefficient of the prior, or a sensor's error.
+#[derive(Clone, Debug)]
+pub struct Known {
+    /// Its name.
+    pub name: String,
+    /// Its standard deviation as a prior; infinite for an asserted effect's.
+    pub width: f64,
+    /// What the prior says less the value at which the model was linearised.
+    pub offset: f64,
+}
+
+impl Known {
+    fn weight(&self) -> f64 {
+        if self.width.is_finite() { self.width.powi(-2) } else { 0.0 }
+    }
+}
+
+/// Gram matrices of all candidate columns, and of the residual as the last one.
+pub struct Projected {
+    /// Of each block.
+    pub blocks: Vec<DMatrix<f64>>,
+    /// Of the pseudo-observations at the prior.
+    pub prior: DMatrix<f64>,
+    /// Their sum.
+    pub total: DMatrix<f64>,
+    /// What the noise of each block alone gives with the candidate columns.
+    pub noise: Vec<DVector<f64>>,
+    /// A square root of `prior` for the candidates: draws of the prior's error are this times unit ones.
+    pub prior_root: DMatrix<f64>,
+    /// Values of the known unknowns fitted without any candidate, beyond where they are linearised.
+    pub tuned: DVector<f64>,
+    /// What a unit of each candidate column takes from the known unknowns' values.
+    pub taken: DMatrix<f64>,
+    /// Covariance of the known unknowns without any candidate.
+    pub covariance: DMatrix<f64>,
+    /// Squared residual with its number of rows, block by channel.
+    pub by_channel: Vec<[(f64, usize); 6]>,
+    /// Projected rows of each cell.
+    pub rows: Vec<DMatrix<f64>>,
+}
+
+impl Projected {
+    /// `placed`: flight by flight, the columns of the known unknowns (places 0..), of the candidates
+    /// behind them, and of the residual in the last place `last`; `shared`: what their product with the
+    /// residual is by shared noise alone, by place, zero beyond its end.
+    pub fn new(
+        cells: &Cells,
+        placed: &[Placed],
+        last: usize,
+        known: &[Known],
+        noise: &Noise,
+        shared: &[f64],
+    ) -> Option<Projected> {
+        let (na, ny) = (known.len(), last - known.len() + 1);
+        let whitened: Vec<(Vec<usize>, DMatrix<f64>)> = cells
+            .list
+            .par_iter()
+            .map(|c| c.matrix(&placed[c.flight], &noise.whiteners[c.channel]))
+            .collect();
+        let mut aa = DMatrix::zeros(na, na);
+        let mut ay = DMatrix::zeros(na, ny);
+        for (places, z) in &whitened {
+            let split = places.iter().take_while(|p| **p < na).count();
+            let a = z.columns(0, split);
+            let products = a.tr_mul(z);
+            for (i, pi) in places[..split].iter().enumerate() {
+                for (j, pj) in places.iter().enumerate() {
+                    if *pj < na {
+                        aa[(*pi, *pj)] += products[(i, j)];
+                    } else {
+                        ay[(*pi, *pj - na)] += products[(i, j)];
+                    }
+                }
+            }
+        }
+        let shared_of = |place: usize| shared.get(place).copied().unwrap_or(0.0);
+        for (k, known) in known.iter().enumerate() {
+            ay[(k, ny - 1)] -= shared_of(k);
+            aa[(k, k)] += known.weight();
+            ay[(k, ny - 1)] += known.weight() * known.offset;
+            // what neither data nor prior tells stays where it is
+            if aa[(k, k)] <= 0.0 {
+                aa[(k, k)] = 1.0;
+            }
+        }
+        let covariance = scaled_inverse(&aa)?;
+        let taken = &covariance * &ay;
+        let rows: Vec<DMatrix<f64>> =
+            whitened.par_iter().map(|(places, z)| project(places, z, na, ny, &taken)).collect();
+        let mut blocks = block_grams(cells, &rows, ny);
+        let of_known = DVector::from_iterator(na, (0..na).map(shared_of));
+        let own = DVector::from_iterator(ny - 1, (na..last).map(shared_of));
+        let bias = own - taken.columns(0, ny - 1).tr_mul(&of_known);
+        let share = 1.0 / blocks.len().max(1) as f64;
+        for block in &mut blocks {
+            for k in 0..ny - 1 {
+                block[(k, ny - 1)] -= share * bias[k];
+                block[(ny - 1, k)] -= share * bias[k];
+            }
+        }
+        let by_channel = by_channel(cells, &rows, ny);
+        let mut root = -taken.clone();
+        for (k, known) in known.iter().enumerate() {
+            root[(k, ny - 1)] += known.offset;
+            root.row_mut(k).scale_mut(known.weight().sqrt());
+        }
+        let prior = root.tr_mul(&root);
+        let total = blocks.iter().fold(prior.clone(), |sum, b| sum + b);
+        let noise = noise_products(cells, &rows, &noise.residuals, ny);
+        let tuned = taken.column(ny - 1).into_owned();
+        let prior_root = root.columns(0, ny - 1).transpose();
+        Some(Projected {
+            blocks,
+            prior,
+            total,
+            noise,
+            prior_root,
+            tuned,
+            taken,
+            covariance,
+            by_channel,
+            rows,
+        })
+    }
+
+    /// Number of rows, channel by channel.
+    pub fn rows_by_channel(&self) -> [f64; 6] {
+        std::array::from_fn(|c| self.by_channel.iter().map(|of| of[c].1 as f64).sum())
+    }
+
+    /// Number of candidate columns.
+    pub fn width(&self) -> usize {
+        self.total.ncols() - 1
+    }
+
+    /// The Gram matrix that other columns in the places of these would have: of the candidates, less what they
+    /// take from the known unknowns; `whiteners` by channel.
+    pub fn others(&self, cells: &Cells, placed: &[Placed], whiteners: &[Whitener]) -> DMatrix<f64> {
+        let (na, ny) = (self.taken.nrows(), self.taken.ncols());
+        let mut gram = DMatrix::zeros(ny, ny);
+        for cell in &cells.list {
+            let (places, z) = cell.matrix(&placed[cell.flight], &whiteners[cell.channel]);
+            let rows = project(&places, &z, na, ny, &self.taken);
+            gram.gemm_tr(1.0, &rows, &rows, 1.0);
+        }
+        gram
+    }
+
+    /// The Gram matrices of the data as they are.
+    pub fn grams(&self) -> Grams<'_> {
+        let blocks = self.blocks.iter().collect();
+        Grams { blocks, prior: &self.prior, total: self.total.clone() }
+    }
+
+    /// The Gram matrices of `blocks`, some of which may be missing and some there several times.
+    pub fn resampled(&self, blocks: impl Iterator<Item = usize>) -> Grams<'_> {
+        let blocks: Vec<&DMatrix<f64>> = blocks.map(|b| &self.blocks[b]).collect();
+        let mut total = self.prior.clone();
+        blocks.iter().for_each(|b| total += *b);
+        Grams { blocks, prior: &self.prior, total }
+    }
+}
+
+/// Gram matrices of candidate columns and residual over a choice of blocks.
+pub struct Grams<'a> {
+    /// Of each block.
+    pub blocks: Vec<&'a DMatrix<f64>>,
+    /// Of the pseudo-observations at the prior.
+    pub prior: &'a DMatrix<f64>,
+    /// Their sum.
+    pub total: DMatrix<f64>,
+}
+
+/// The inverse of a symmetric matrix whose rows may be of very different size.
+pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = matrix.diagonal().map(|d| d.max(f64::MIN_POSITIVE).sqrt().recip());
+    let n = matrix.nrows();
+    let mut scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    for i in 0..n {
+        scaled[(i, i)] += 1e-10;
+    }
+    let inverse = scaled.cholesky()?.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// Rows of the candidates and the residual less what the known unknowns take.
+fn project(
+    places: &[usize],
+    z: &DMatrix<f64>,
+    na: usize,
+    ny: usize,
+    taken: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let split = places.iter().take_while(|p| **p < na).count();
+    let own = DMatrix::from_fn(split, ny, |i, j| taken[(places[i], j)]);
+    let mut rows = -(z.columns(0, split) * own);
+    for (j, place) in places.iter().enumerate().skip(split) {
+        let mut column = rows.column_mut(place - na);
+        column += z.column(j);
+    }
+    rows
+}
+
+fn block_grams(cells: &Cells, rows: &[DMatrix<f64>], ny: usize) -> Vec<DMatrix<f64>> {
+    (0..cells.blocks())
+        .into_par_iter()
+        .map(|block| {
+            let mut gram = DMatrix::zeros(ny, ny);
+            for (cell, rows) in cells.list.iter().zip(rows) {
+                for (_, from, to) in cell.rows_of_blocks().iter().filter(|(b, _, _)| *b == block) {
+                    let part = rows.rows(*from, to - from);
+                    gram.gemm_tr(1.0, &part, &part, 1.0);
+                }
+            }
+            gram
+        })
+        .collect()
+}
+
+fn by_channel(cells: &Cells, rows: &[DMatrix<f64>], ny: usize) -> Vec<[(f64, usize); 6]> {
+    let mut sums = vec![[(0.0, 0); 6]; cells.blocks()];
+    for (cell, rows) in cells.list.iter().zip(rows) {
+        for (row, block) in cell.blocks.iter().enumerate() {
+            let place = &mut sums[*block][cell.channel];
+            place.0 += rows[(row, ny - 1)].powi(2);
+            place.1 += 1;
+        }
+    }
+    sums
+}
+
+/// Products of the candidate columns with the residual of the rich fit.
+fn noise_products(
+    cells: &Cells,
+    rows: &[DMatrix<f64>],
+    residuals: &[Vec<f64>],
+    ny: usize,
+) -> Vec<DVector<f64>> {
+    let mut products = vec![DVector::zeros(ny - 1); cells.blocks()];
+    for ((cell, rows), left) in cells.list.iter().zip(rows).zip(residuals) {
+        for (block, from, to) in cell.rows_of_blocks() {
+            let part = rows.view((from, 0), (to - from, ny - 1));
+            let left = DVector::from_column_slice(&left[from..to]);
+            products[block] += part.tr_mul(&left);
+        }
+    }
+    products
+}

@@ -1,0 +1,231 @@
+//! The evidence for each candidate: penalised gain, block-robust Wald statistic, the smaller of both.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::sysid::diagnose::regression::projected::{Grams, scaled_inverse};
+
+/// Where a candidate is linearised.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Values of all its coefficients.
+    pub values: Vec<f64>,
+    /// Candidate column of its contribution there; `None` for one that is linear, at zero.
+    pub contribution: Option<usize>,
+    /// Its free coefficients: place in `values`, candidate column of the derivative, lowest and highest
+    /// value up to which the linearisation is trusted.
+    pub free: Vec<(usize, usize, [f64; 2])>,
+}
+
+/// A candidate effect as columns.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// Its id.
+    pub id: &'static str,
+    /// Where it is linearised; one place for linear ones.
+    pub points: Vec<Point>,
+    /// Independent rows in the channels in which it acts.
+    pub support: f64,
+    /// Channels in which it acts.
+    pub channels: [bool; 6],
+}
+
+/// What a candidate reaches.
+#[derive(Clone, Debug)]
+pub struct Score {
+    /// The smaller of `fall` less d ln n and `wald`.
+    pub evidence: f64,
+    /// Block-robust Wald statistic.
+    pub wald: f64,
+    /// What candidates are ordered by: the evidence where it is not positive, else the geometric mean of
+    /// penalised gain and Wald statistic. Far above chance, the smaller of the two alone would order by how
+    /// evenly an effect is spread over the blocks.
+    pub order: f64,
+    /// Fall of the squared whitened error.
+    pub fall: f64,
+    /// Values of all coefficients.
+    pub values: Vec<f64>,
+    /// Standard deviations of the free ones, zero for the others.
+    pub deviations: Vec<f64>,
+    /// Weights of the candidate columns in the fitted contribution.
+    pub weights: Vec<(usize, f64)>,
+    /// Which point it started from.
+    pub point: usize,
+}
+
+/// Products of the candidate columns with a residual, as a whole and block by block.
+pub struct Draw {
+    /// Over all blocks and the prior.
+    pub total: DVector<f64>,
+    /// Of each block.
+    pub blocks: Vec<DVector<f64>>,
+}
+
+impl Draw {
+    /// Of the data.
+    pub fn measured(p: &Grams) -> Draw {
+        let last = p.total.ncols() - 1;
+        let of = |m: &DMatrix<f64>| m.view((0, last), (last, 1)).column(0).into_owned();
+        Draw { total: of(&p.total), blocks: p.blocks.iter().map(|b| of(b)).collect() }
+    }
+}
+
+impl Trial {
+    /// The best of its points under `draw`.
+    pub fn score(&self, p: &Grams, draw: &Draw) -> Option<Score> {
+        let scores = (0..self.points.len()).filter_map(|k| self.score_at(p, draw, k));
+        scores.max_by(|a, b| a.fall.total_cmp(&b.fall))
+    }
+
+    fn score_at(&self, p: &Grams, draw: &Draw, place: usize) -> Option<Score> {
+        let point = &self.points[place];
+        let columns: Vec<usize> = point.free.iter().map(|f| f.1).collect();
+        let gram = select(&p.total, &columns);
+        let inverse = scaled_inverse(&gram)?;
+        let mut product = pick(&draw.total, &columns);
+        if let Some(own) = point.contribution {
+            product -=
+                DVector::from_iterator(columns.len(), columns.iter().map(|c| p.total[(*c, own)]));
+        }
+        let step = self.within(point, &gram, &product, &inverse * &product);
+        let mut weights: Vec<(usize, f64)> =
+            columns.iter().copied().zip(step.0.iter().copied()).collect();
+        weights.extend(point.contribution.map(|c| (c, 1.0)));
+        let (linear, square) = along(&weights, &p.total, &draw.total);
+        let fall = 2.0 * linear - square;
+        let gain = fall - columns.len() as f64 * self.support.max(2.0).ln();
+        let whole = point.contribution.is_none() && !step.1;
+        let (wald, deviations) = if whole {
+            joint_wald(p, draw, &columns, &inverse, &weights, &step.0)
+        } else {
+            let wald = ray_wald(p, draw, &weights, linear, square);
+            (wald, joint_wald(p, draw, &columns, &inverse, &weights, &step.0).1)
+        };
+        let mut values = point.values.clone();
+        let mut all_deviations = vec![0.0; values.len()];
+        for (k, (index, _, _)) in point.free.iter().enumerate() {
+            values[*index] += step.0[k];
+            all_deviations[*index] = deviations[k];
+        }
+        Some(Score {
+            evidence: gain.min(wald),
+            order: if gain.min(wald) > 0.0 { (gain * wald).sqrt() } else { gain.min(wald) },
+            wald,
+            fall,
+            values,
+            deviations: all_deviations,
+            weights,
+            point: place,
+        })
+    }
+
+    /// `step` kept where the linearisation is trusted, one coefficient after the other, and whether any
+    /// had to be held back.
+    fn within(
+        &self,
+        point: &Point,
+        gram: &DMatrix<f64>,
+        product: &DVector<f64>,
+        mut step: DVector<f64>,
+    ) -> (DVector<f64>, bool) {
+        let mut held = vec![false; step.len()];
+        for _ in 0..step.len() {
+            let Some(k) = (0..step.len()).find(|k| {
+                let (index, _, [low, high]) = point.free[*k];
+                let value = point.values[index] + step[*k];
+                !held[*k] && !(low..=high).contains(&value)
+            }) else {
+                break;
+            };
+            let (index, _, [low, high]) = point.free[k];
+            held[k] = true;
+            step[k] = (point.values[index] + step[k]).clamp(low, high) - point.values[index];
+            // the others again, those held fixed
+            let open: Vec<usize> = (0..step.len()).filter(|i| !held[*i]).collect();
+            if open.is_empty() {
+                break;
+            }
+            let fixed: Vec<usize> = (0..step.len()).filter(|i| held[*i]).collect();
+            let rest = DVector::from_iterator(
+                open.len(),
+                open.iter().map(|i| {
+                    product[*i] - fixed.iter().map(|j| gram[(*i, *j)] * step[*j]).sum::<f64>()
+                }),
+            );
+            if let Some(inverse) = scaled_inverse(&select(gram, &open)) {
+                let solved = inverse * rest;
+                open.iter().zip(solved.iter()).for_each(|(i, x)| step[*i] = *x);
+            }
+        }
+        (step, held.iter().any(|h| *h))
+    }
+}
+
+/// x'b and x'Sx for the contribution x that `weights` make.
+fn along(weights: &[(usize, f64)], gram: &DMatrix<f64>, product: &DVector<f64>) -> (f64, f64) {
+    let linear = weights.iter().map(|(c, w)| w * product[*c]).sum();
+    (linear, quadratic(weights, weights, gram))
+}
+
+/// u'Sv.
+pub fn quadratic(u: &[(usize, f64)], v: &[(usize, f64)], gram: &DMatrix<f64>) -> f64 {
+    u.iter().map(|(i, a)| v.iter().map(|(j, b)| a * b * gram[(*i, *j)]).sum::<f64>()).sum()
+}
+
+fn select(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(columns.len(), columns.len(), |i, j| matrix[(columns[i], columns[j])])
+}
+
+fn pick(vector: &DVector<f64>, columns: &[usize]) -> DVector<f64> {
+    DVector::from_iterator(columns.len(), columns.iter().map(|c| vector[*c]))
+}
+
+/// θ' V⁻¹ θ with the blocks' own scatter in V, and the standard deviations.
+fn joint_wald(
+    p: &Grams,
+    draw: &Draw,
+    columns: &[usize],
+    inverse: &DMatrix<f64>,
+    weights: &[(usize, f64)],
+    theta: &DVector<f64>,
+) -> (f64, Vec<f64>) {
+    let mut meat = select(p.prior, columns);
+    let count = p.blocks.len() as f64;
+    let correction = count / (count - 1.0).max(1.0);
+    for (gram, product) in p.blocks.iter().zip(&draw.blocks) {
+        let explained =
+            columns.iter().map(|c| weights.iter().map(|(d, w)| w * gram[(*c, *d)]).sum::<f64>());
+        let score = pick(product, columns) - DVector::from_iterator(columns.len(), explained);
+        meat += correction * &score * score.transpose();
+    }
+    let covariance = inverse * meat * inverse;
+    // the blocks' scatter may by chance be smaller than what the noise alone must leave
+    let deviations =
+        (0..columns.len()).map(|k| covariance[(k, k)].max(inverse[(k, k)]).sqrt()).collect();
+    let wald = scaled_inverse(&covariance).map_or(0.0, |v| theta.dot(&(v * theta)));
+    (wald, deviations)
+}
+
+/// The same for the amount of a fixed contribution.
+fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, square: f64) -> f64 {
+    if square <= 0.0 {
+        return 0.0;
+    }
+    let amount = linear / square;
+    let count = p.blocks.len() as f64;
+    let correction = count / (count - 1.0).max(1.0);
+    let mut meat = quadratic(weights, weights, p.prior);
+    for (gram, product) in p.blocks.iter().zip(&draw.blocks) {
+        let (l, s) = along(weights, gram, product);
+        meat += correction * (l - s * amount).powi(2);
+    }
+    if amount > 0.0 && meat > 0.0 { linear * linear / meat } else { 0.0 }
+}
+
+/// Standard deviations of the first of `columns` fitted together: by the noise alone, and by the scatter
+/// of the blocks of `null`.
+pub fn deviations(p: &Grams, null: &Draw, columns: &[usize]) -> Option<(f64, f64)> {
+    let inverse = scaled_inverse(&select(&p.total, columns))?;
+    let zero = DVector::zeros(columns.len());
+    let (_, deviations) = joint_wald(p, null, columns, &inverse, &[], &zero);
+    Some((inverse[(0, 0)].max(0.0).sqrt(), deviations[0]))
+}

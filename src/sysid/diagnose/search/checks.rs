@@ -1,0 +1,299 @@
+//! What an effect must pass besides its evidence: held-out segments, bootstraps, the flights' agreement.
+
+use nalgebra::{DMatrix, DVector};
+use rand::RngExt;
+use rayon::prelude::*;
+
+use crate::num::stream::stream;
+use crate::sysid::diagnose::regression::cells::{Cells, Placed};
+use crate::sysid::diagnose::regression::columns::combine;
+use crate::sysid::diagnose::regression::noise::Noise;
+use crate::sysid::diagnose::regression::projected::{Known, Projected, scaled_inverse};
+use crate::sysid::diagnose::regression::rank::{Draw, Point, Score, Trial, quadratic};
+use crate::sysid::diagnose::search::round::Round;
+
+/// Folds of the held-out segments.
+const FOLDS: usize = 5;
+/// Random stream of the bootstraps.
+const BOOTSTRAPS: u64 = 82;
+/// Contributions that correlate more than this cannot be told apart.
+pub const ALIKE: f64 = 0.9;
+/// Nor those whose evidence is this close.
+pub const CLOSE: f64 = 10.0;
+/// Squared error per row by which the level of the noise may be off: with nothing missing, −0.03 to 0.07.
+const UNSURE: f64 = 0.1;
+/// Standard deviations of the noise's square beyond which what an effect leaves is no chance.
+const DOUBT: f64 = 4.0;
+/// Least share of what a flight seems to tell that is more than the noise of its columns.
+const TOLD: f64 = 0.5;
+/// Prior standard deviations by which the model's own figures are wrong, if a candidate in their place is more
+/// than an error of the prior,
+const STRAIN: f64 = 5.0;
+/// and the least share of what it takes that this strain is.
+const RELIEF: f64 = 0.9;
+/// Candidates that a bootstrap lets compete.
+const COMPETING: usize = 8;
+
+/// Share of the squared error beyond noise that `score` takes from segments that its amounts were not
+/// fitted on; segments of a block's length, every fifth one held out in turn, in the channels in which
+/// the candidate acts.
+pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
+    let p = &round.projected;
+    let last = p.width();
+    let directions = directions(trial, score);
+    let mut taken = 0.0;
+    for fold in 0..FOLDS {
+        let inside = |b: usize| b % FOLDS == fold;
+        let mut train = p.prior.clone();
+        let mut test = DMatrix::zeros(last + 1, last + 1);
+        for (b, gram) in p.blocks.iter().enumerate() {
+            if inside(b) { test += gram } else { train += gram }
+        }
+        let reduce = |m: &DMatrix<f64>| {
+            let gram = DMatrix::from_fn(directions.len(), directions.len(), |i, j| {
+                quadratic(&directions[i], &directions[j], m)
+            });
+            let product = DVector::from_iterator(
+                directions.len(),
+                directions.iter().map(|d| d.iter().map(|(c, w)| w * m[(*c, last)]).sum::<f64>()),
+            );
+            (gram, product)
+        };
+        let (gram, product) = reduce(&train);
+        let Some(inverse) = scaled_inverse(&gram) else { return f64::NAN };
+        let amounts = inverse * product;
+        let (gram, product) = reduce(&test);
+        taken += 2.0 * amounts.dot(&product) - amounts.dot(&(gram * &amounts));
+    }
+    taken / excess(round, &trial.channels).max(taken).max(1.0)
+}
+
+/// What a model leaves beyond noise.
+#[derive(Clone, Debug)]
+pub struct Beyond {
+    excess: [f64; 6],
+    rows: [f64; 6],
+}
+
+impl Beyond {
+    /// Of the model of `round`, which has no candidates: a fit with the columns of all of them follows the
+    /// noise that stands in these, and leaves down to half of it in the moments.
+    pub fn of(round: &Round) -> Beyond {
+        let only = |c: usize| std::array::from_fn(|k| k == c);
+        Beyond {
+            excess: std::array::from_fn(|c| excess(round, &only(c))),
+            rows: std::array::from_fn(|c| rows(round, &only(c))),
+        }
+    }
+
+    /// The share that is left in `channels` beside `fall`, which an effect took from them, if that is more than
+    /// chance leaves.
+    pub fn share(&self, channels: &[usize], fall: f64) -> Option<f64> {
+        let own = |of: &[f64; 6]| channels.iter().map(|c| of[*c]).sum::<f64>();
+        let (left, rows) = (own(&self.excess), own(&self.rows));
+        // the square of white noise scatters by √(2n)
+        let beyond_doubt = left > f64::max(DOUBT * (2.0 * rows).sqrt(), UNSURE * rows);
+        beyond_doubt.then(|| left / (left + fall))
+    }
+}
+
+/// Squared whitened error beyond noise in `channels`.
+pub fn excess(round: &Round, channels: &[bool; 6]) -> f64 {
+    let blocks = round.projected.by_channel.iter();
+    let of = |sums: &[(f64, usize); 6]| -> f64 {
+        (0..6).filter(|c| channels[*c]).map(|c| sums[c].0).sum()
+    };
+    blocks.map(of).sum::<f64>() - rows(round, channels)
+}
+
+/// Rows in `channels`.
+fn rows(round: &Round, channels: &[bool; 6]) -> f64 {
+    let all = round.projected.rows_by_channel();
+    (0..6).filter(|c| channels[*c]).map(|c| all[c]).sum()
+}
+
+/// What may be scaled in a contribution: each column of a linear candidate, a nonlinear one as a whole.
+fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
+    match trial.points[score.point].contribution {
+        None => score.weights.iter().map(|(c, _)| vec![(*c, 1.0)]).collect(),
+        Some(_) => vec![score.weights.clone()],
+    }
+}
+
+/// Whether `score` is the model's own figure by another name: what it takes is the strain of coefficients that
+/// the data has pulled far from their prior, and hardly any of the error, which they take as well.
+pub fn relieves(round: &Round, score: &Score) -> bool {
+    let prior = &round.projected.prior;
+    let last = round.projected.width();
+    let linear: f64 = score.weights.iter().map(|(c, w)| w * prior[(*c, last)]).sum();
+    let relief = 2.0 * linear - quadratic(&score.weights, &score.weights, prior);
+    relief > STRAIN.powi(2) && relief > RELIEF * score.fall
+}
+
+/// How much the contributions of two scores are alike: the correlation of what they add to the residual.
+pub fn likeness(round: &Round, a: &Score, b: &Score) -> f64 {
+    let total = &round.projected.total;
+    let of = |u: &Score, v: &Score| quadratic(&u.weights, &v.weights, total);
+    of(a, b) / (of(a, a) * of(b, b)).sqrt()
+}
+
+/// Places in `scores` of those that these data cannot tell from the first one.
+pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> {
+    let (_, own) = &scores[of];
+    (0..scores.len())
+        .filter(|k| *k != of)
+        .filter(|k| {
+            let (trial, other) = &scores[*k];
+            other.evidence > own.evidence - CLOSE
+                && !round.at_bound(*trial, other)
+                && likeness(round, own, other).abs() > ALIKE
+        })
+        .collect()
+}
+
+/// Share of `count` block bootstraps in which one of the trials of `class` comes first among those of `open`,
+/// the best ones first; blocks are drawn flight by flight.
+pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) -> f64 {
+    let seed = round.seed;
+    let by_flight: Vec<Vec<usize>> = (0..round.flights.len())
+        .map(|f| {
+            let of = &round.cells.flight_of_block;
+            (0..of.len()).filter(|b| of[*b] == f).collect()
+        })
+        .collect();
+    let competing = &open[..open.len().min(COMPETING)];
+    let wins = (0..count)
+        .into_par_iter()
+        .filter(|k| {
+            let mut random = stream(seed, &[BOOTSTRAPS, *k as u64]);
+            let mut drawn = Vec::new();
+            for blocks in by_flight.iter().filter(|b| !b.is_empty()) {
+                for _ in 0..blocks.len() {
+                    drawn.push(blocks[random.random_range(0..blocks.len() as u32) as usize]);
+                }
+            }
+            let grams = round.projected.resampled(drawn.into_iter());
+            let draw = Draw::measured(&grams);
+            let best = competing
+                .iter()
+                .filter_map(|t| Some((*t, round.trials[*t].score(&grams, &draw)?)))
+                .filter(|(t, s)| !round.at_bound(*t, s))
+                .max_by(|a, b| a.1.order.total_cmp(&b.1.order));
+            best.is_some_and(|(t, s)| class.contains(&t) && s.evidence > 0.0)
+        })
+        .count();
+    wins as f64 / count.max(1) as f64
+}
+
+/// The first free coefficient as each flight has it, with its standard deviation; NaN where a flight does not
+/// tell. Sensors are each flight's own and fitted anew; the other coefficients are the aircraft's, and known
+/// as well as all flights together know them. A flight that hardly rolls cannot find them again: its balance
+/// of small moments holds as well with all of them too small, and noise in the columns has it so.
+pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<[f64; 2]> {
+    (0..round.flights.len())
+        .map(|flight| one_flight(round, trial, score, flight).unwrap_or([f64::NAN; 2]))
+        .collect()
+}
+
+fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Option<[f64; 2]> {
+    let own: Vec<usize> =
+        (0..round.cells.list.len()).filter(|k| round.cells.list[*k].flight == flight).collect();
+    let cells = Cells {
+        list: own.iter().map(|k| round.cells.list[*k].clone()).collect(),
+        flight_of_block: round.cells.flight_of_block.clone(),
+    };
+    let residuals = own.iter().map(|k| round.noise.residuals[*k].clone()).collect();
+    let noise = Noise { whiteners: round.noise.whiteners.clone(), residuals };
+    let point = &trial.points[score.point];
+    let columns: Vec<usize> = point.free.iter().map(|f| f.1).chain(point.contribution).collect();
+    let (na, last) = (round.known.len(), round.known.len() + columns.len());
+    let feigned = &round.shared[flight];
+    let mut shared: Vec<f64> = feigned[..na].to_vec();
+    shared.extend(columns.iter().map(|c| feigned.get(na + c).copied().unwrap_or(0.0)));
+    let placed = alone(&round.placed, flight, na, &columns);
+    let mut with_residual = placed.clone();
+    let residual = round.placed[flight].iter().find(|(p, _)| *p == round.last)?;
+    with_residual[flight].push((last, residual.1.clone()));
+    let known = together(round, score);
+    let p = Projected::new(&cells, &with_residual, last, &known, &noise, &shared)?;
+    let free = point.free.iter().enumerate().map(|(k, f)| (f.0, k, f.2)).collect();
+    let contribution = point.contribution.map(|_| point.free.len());
+    let first = point.free[0].0;
+    let point = Point { values: point.values.clone(), contribution, free };
+    let by_itself = Trial { points: vec![point], ..trial.clone() };
+    let grams = p.grams();
+    let found = by_itself.score(&grams, &Draw::measured(&grams))?;
+    // what the flight leaves beyond noise, as another effect that is missing does, may lie anywhere
+    let misfit = misfit(&p, &trial.channels, found.fall);
+    let [value, sd] = [found.values[first], misfit * found.deviations[first]];
+    if contribution.is_some() {
+        return Some([value, sd]);
+    }
+    // of what moves the columns, the sensors' noise tells nothing: it only seems to be excitation
+    let disturbed = alone(&round.disturbed, flight, na, &columns);
+    let added = less(&disturbed, &placed);
+    let feint = p.others(&cells, &added, &noise.whiteners);
+    let n = columns.len();
+    let gram = grams.total.view((0, 0), (n, n)).into_owned();
+    let told = &gram - feint.view((0, 0), (n, n));
+    let (all, left) = (scaled_inverse(&gram)?, scaled_inverse(&told)?);
+    let share = all[(0, 0)] / left[(0, 0)];
+    let amounts = &left * grams.total.view((0, n), (n, 1)).column(0);
+    (share > TOLD).then(|| [amounts[0], sd / share])
+}
+
+/// By how much what is left in `channels` once a candidate has taken `fall` exceeds the noise, at least 1.
+fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
+    let own = |of: &[(f64, usize); 6]| (0..6).filter(|c| channels[*c]).map(|c| of[c]).collect();
+    let all: Vec<Vec<(f64, usize)>> = p.by_channel.iter().map(own).collect();
+    let square: f64 = all.iter().flatten().map(|(square, _)| square).sum();
+    let rows: usize = all.iter().flatten().map(|(_, rows)| rows).sum();
+    ((square - fall) / rows.max(1) as f64).max(1.0).sqrt()
+}
+
+/// The known unknowns with the model's coefficients as all flights have them together with `score`'s effect.
+fn together(round: &Round, score: &Score) -> Vec<Known> {
+    let p = &round.projected;
+    let mut all = round.known.clone();
+    for (k, known) in all.iter_mut().take(round.coefficients.len()).enumerate() {
+        let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
+        // relative to all of the effect, as sure as its evidence
+        let astray = given.powi(2) / score.wald.max(1.0);
+        known.offset = p.tuned[k] - given;
+        known.width = (p.covariance[(k, k)].max(0.0) + astray).sqrt().min(known.width);
+    }
+    all
+}
+
+/// The known columns of one flight and the candidate columns `columns`, numbered anew; the other flights have
+/// none.
+fn alone(placed: &[Placed], flight: usize, na: usize, columns: &[usize]) -> Vec<Placed> {
+    let own = &placed[flight];
+    let mut list: Placed = own.iter().take_while(|(p, _)| *p < na).cloned().collect();
+    for (k, column) in columns.iter().enumerate() {
+        let of = own.iter().find(|(p, _)| *p == na + column);
+        list.extend(of.map(|(_, column)| (na + k, column.clone())));
+    }
+    let mut all = vec![Placed::new(); placed.len()];
+    all[flight] = list;
+    all
+}
+
+/// The columns of `a` less those of `b` in the same places.
+fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
+    let of = |(a, b): (&Placed, &Placed)| {
+        let both = a.iter().filter_map(|(p, x)| Some((*p, x, &b.iter().find(|(q, _)| q == p)?.1)));
+        both.map(|(p, x, y)| (p, combine(&[x.clone(), y.clone()], &[1.0, -1.0]))).collect()
+    };
+    a.iter().zip(b).map(of).collect()
+}
+
+/// Whether flights contradict the common `value`: the other sign beyond doubt, or another amount beyond
+/// doubt and by half.
+pub fn contradict(value: f64, flights: &[[f64; 2]]) -> bool {
+    flights.iter().any(|[own, sd]| {
+        let other_sign = own * value < 0.0 && own.abs() > 3.0 * sd;
+        let off = (own - value).abs();
+        other_sign || (off > 4.0 * sd && off > 0.5 * value.abs())
+    })
+}

@@ -1,0 +1,11 @@
+//! The stepwise search: rounds, checks of a candidate, thresholds by a bootstrap under the null.
+
+pub(super) mod checks;
+pub(in crate::sysid) mod clocks;
+pub(super) mod excitation;
+pub(super) mod nulls;
+pub(super) mod remainder;
+pub(super) mod round;
+pub(super) mod settling;
+pub(super) mod shape;
+pub(super) mod stepwise;

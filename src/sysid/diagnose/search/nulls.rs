@@ -1,0 +1,81 @@
+//! What chance reaches: the best candidate's evidence in flights without a missing effect.
+
+use nalgebra::DVector;
+use rand::RngExt;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use crate::num::stream::stream;
+use crate::sysid::diagnose::regression::projected::Projected;
+use crate::sysid::diagnose::regression::rank::{Draw, Trial};
+
+/// Random streams of nulls.
+const NULLS: u64 = 80;
+
+/// The draw number `k` of a null flight: the noise of each block as it was, its sign by chance, and the
+/// prior wrong by chance within its widths. The channels of a block keep their common sign.
+pub fn draw(p: &Projected, seed: u64, k: usize) -> Draw {
+    let mut random = stream(seed, &[NULLS, k as u64]);
+    let mut total = DVector::zeros(p.width());
+    let blocks: Vec<DVector<f64>> = p
+        .noise
+        .iter()
+        .map(|noise| {
+            let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+            let block = noise * sign;
+            total += &block;
+            block
+        })
+        .collect();
+    let prior = DVector::from_fn(p.prior_root.ncols(), |_, _| StandardNormal.sample(&mut random));
+    total += &p.prior_root * prior;
+    Draw { total, blocks }
+}
+
+/// The best evidence in each of `count` null flights, ascending.
+pub fn best(p: &Projected, trials: &[Trial], seed: u64, count: usize) -> Vec<f64> {
+    let grams = p.grams();
+    let mut best: Vec<f64> = (0..count)
+        .into_par_iter()
+        .map(|k| {
+            let draw = draw(p, seed, k);
+            let evidence = trials.iter().filter_map(|t| t.score(&grams, &draw)).map(|s| s.evidence);
+            evidence.fold(f64::NEG_INFINITY, f64::max)
+        })
+        .collect();
+    best.sort_by(f64::total_cmp);
+    best
+}
+
+/// The quantile 1 − `level` of values of which `sample` is one, by a Gumbel law with the sample's mean
+/// and deviation: that of the largest of many.
+pub fn threshold(sample: &[f64], level: f64) -> f64 {
+    let finite: Vec<f64> = sample.iter().copied().filter(|x| x.is_finite()).collect();
+    let count = finite.len() as f64;
+    if finite.len() < 5 {
+        return f64::INFINITY;
+    }
+    let mean = finite.iter().sum::<f64>() / count;
+    let variance = finite.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let scale = (6.0 * variance).sqrt() / std::f64::consts::PI;
+    const EULER: f64 = 0.577_215_664_901_532_9;
+    mean - EULER * scale - scale * (-(1.0 - level).ln()).ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_threshold_of_known_maxima() {
+        // the maximum of 20 chi-square-like draws E = −2 ln U: its 99 % quantile is −2 ln(1 − 0.99^(1/20))
+        let exact = -2.0 * (1.0 - 0.99_f64.powf(1.0 / 20.0)).ln();
+        let mut random = stream(5, &[]);
+        let mut largest =
+            || (0..20).map(|_| -2.0 * random.random::<f64>().ln()).fold(0.0, f64::max);
+        let sample: Vec<f64> = (0..4000).map(|_| largest()).collect();
+        let found = threshold(&sample, 0.01);
+        // 4000 draws: the scale is good to about 2 %
+        assert!((found / exact - 1.0).abs() < 0.06, "{found} {exact}");
+    }
+}

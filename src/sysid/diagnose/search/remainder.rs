@@ -1,0 +1,192 @@
+//! What a flexible model without physics could still remove, cross-validated by flight.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rand::RngExt;
+use rayon::prelude::*;
+
+use crate::num::stream::stream;
+use crate::sysid::diagnose::regression::projected::scaled_inverse;
+use crate::sysid::diagnose::search::nulls::threshold;
+use crate::sysid::diagnose::search::round::Round;
+
+/// Ridges that are tried, as shares of a feature's mean square.
+const RIDGES: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
+/// Random stream of the null draws.
+const NULLS: u64 = 83;
+/// Fewest flights that are folds of their own; fewer are cut in this many pieces.
+const FOLDS: usize = 3;
+
+/// What is still to be had, channel by channel.
+#[derive(Clone, Debug)]
+pub struct Remainder {
+    /// Fall of the squared whitened error on flights that the flexible model was not fitted on.
+    pub removable: [f64; 6],
+    /// What chance reaches.
+    pub threshold: [f64; 6],
+    /// The same over all channels.
+    pub total: f64,
+    /// What chance reaches over all channels.
+    pub total_threshold: f64,
+}
+
+/// One channel: features of each fold, targets, ridge solvers.
+struct Channel {
+    folds: Vec<Fold>,
+}
+
+struct Fold {
+    features: DMatrix<f64>,
+    target: DVector<f64>,
+    noise: DVector<f64>,
+    blocks: Vec<usize>,
+    /// Solvers fitted on the other folds, a ridge each.
+    others: Vec<Cholesky<f64, Dyn>>,
+}
+
+/// What a flexible model could remove of what `round` leaves; the thresholds from `count` draws of noise.
+pub fn remainder(round: &Round, count: usize, level: f64) -> Remainder {
+    let channels: Vec<Option<Channel>> =
+        (0..6).into_par_iter().map(|c| channel(round, c)).collect();
+    let gain = |sign: Option<&[f64]>| -> [f64; 6] {
+        std::array::from_fn(|c| channels[c].as_ref().map_or(0.0, |ch| ch.gain(sign)))
+    };
+    let removable = gain(None);
+    let blocks = round.cells.blocks();
+    let nulls: Vec<[f64; 6]> = (0..count)
+        .into_par_iter()
+        .map(|k| {
+            let mut random = stream(round.seed, &[NULLS, k as u64]);
+            let signs: Vec<f64> =
+                (0..blocks).map(|_| if random.random::<bool>() { 1.0 } else { -1.0 }).collect();
+            gain(Some(&signs))
+        })
+        .collect();
+    let over = |of: &dyn Fn(&[f64; 6]) -> f64, level: f64| {
+        let values: Vec<f64> = nulls.iter().map(of).collect();
+        threshold(&values, level)
+    };
+    Remainder {
+        removable,
+        threshold: std::array::from_fn(|c| over(&|n| n[c], level / 6.0)),
+        total: removable.iter().sum(),
+        total_threshold: over(&|n| n.iter().sum(), level),
+    }
+}
+
+fn channel(round: &Round, channel: usize) -> Option<Channel> {
+    let cells: Vec<usize> =
+        (0..round.cells.list.len()).filter(|k| round.cells.list[*k].channel == channel).collect();
+    let pieces = if cells.len() >= 2 { 1 } else { FOLDS };
+    let projected = projected_features(round, &cells)?;
+    let mut folds = Vec::new();
+    for (k, (features, noise, target)) in cells.iter().zip(projected) {
+        let rows = features.nrows();
+        for piece in 0..pieces {
+            let (from, to) = (rows * piece / pieces, rows * (piece + 1) / pieces);
+            folds.push(Fold {
+                features: features.rows(from, to - from).into_owned(),
+                target: target.rows(from, to - from).into_owned(),
+                noise: noise.rows(from, to - from).into_owned(),
+                blocks: round.cells.list[*k].blocks[from..to].to_vec(),
+                others: Vec::new(),
+            });
+        }
+    }
+    let grams: Vec<DMatrix<f64>> = folds.iter().map(|f| f.features.tr_mul(&f.features)).collect();
+    let count = folds.len();
+    for (own, fold) in folds.iter_mut().enumerate() {
+        let width = fold.features.ncols();
+        let sum = (0..count)
+            .filter(|k| *k != own)
+            .fold(DMatrix::zeros(width, width), |s, k| s + &grams[k]);
+        let scale = sum.trace() / width as f64;
+        for ridge in RIDGES {
+            let ridged = &sum + DMatrix::identity(width, width) * (ridge * scale + 1e-9);
+            fold.others.push(ridged.cholesky()?);
+        }
+    }
+    Some(Channel { folds })
+}
+
+/// Features, noise and residual of one cell.
+type Projected = (DMatrix<f64>, DVector<f64>, DVector<f64>);
+
+/// Whitened features of unit size, noise and residual of each cell, with what the known unknowns can follow
+/// of them taken out: by plain least squares, else a flexible model would find again what shared noise feigns.
+fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> {
+    let na = round.known.len();
+    let mut all = Vec::new();
+    for k in cells {
+        let cell = &round.cells.list[*k];
+        let whitener = &round.noise.whiteners[cell.channel];
+        let (places, z) = cell.matrix(&round.placed[cell.flight], whitener);
+        let known = places.iter().take_while(|p| **p < na).count();
+        let first = places.iter().take_while(|p| **p <= round.last).count();
+        let mut a = DMatrix::zeros(z.nrows(), na);
+        (0..known).for_each(|i| a.set_column(places[i], &z.column(i)));
+        let mut y = z.columns(first, z.ncols() - first).into_owned();
+        y = y.insert_columns(0, 2, 0.0);
+        y.set_column(0, &DVector::from_column_slice(&round.noise.residuals[*k]));
+        y.set_column(1, &z.column(first - 1));
+        all.push((a, y));
+    }
+    let mut gram = DMatrix::zeros(na, na);
+    let mut products = DMatrix::zeros(na, all.first()?.1.ncols());
+    for (a, y) in &all {
+        gram += a.tr_mul(a);
+        products += a.tr_mul(y);
+    }
+    for (k, known) in round.known.iter().enumerate() {
+        gram[(k, k)] += known.width.powi(-2).max(1e-12);
+    }
+    let taken = scaled_inverse(&gram)? * products;
+    let mut square: DVector<f64> = DVector::zeros(taken.ncols());
+    let mut rest: Vec<DMatrix<f64>> = Vec::new();
+    for (a, y) in all {
+        let left = y - a * &taken;
+        for (j, column) in left.column_iter().enumerate() {
+            square[j] += column.norm_squared();
+        }
+        rest.push(left);
+    }
+    let rows: usize = rest.iter().map(DMatrix::nrows).sum();
+    let split = |left: DMatrix<f64>| {
+        let noise = left.column(0).into_owned();
+        let target = left.column(1).into_owned();
+        let mut features = left.remove_columns(0, 2);
+        for (j, mut column) in features.column_iter_mut().enumerate() {
+            let size: f64 = (square[j + 2] / rows as f64).sqrt();
+            column /= size.max(1e-12);
+        }
+        (features, noise, target)
+    };
+    Some(rest.into_iter().map(split).collect())
+}
+
+impl Channel {
+    /// The best ridge's fall of the squared error of folds left out, not below zero; of the data, or of
+    /// noise whose blocks have `signs`.
+    fn gain(&self, signs: Option<&[f64]>) -> f64 {
+        let targets: Vec<DVector<f64>> = self
+            .folds
+            .iter()
+            .map(|f| match signs {
+                None => f.target.clone(),
+                Some(s) => DVector::from_fn(f.noise.len(), |i, _| f.noise[i] * s[f.blocks[i]]),
+            })
+            .collect();
+        let products: Vec<DVector<f64>> =
+            self.folds.iter().zip(&targets).map(|(f, y)| f.features.tr_mul(y)).collect();
+        let whole = products.iter().fold(DVector::zeros(products[0].len()), |s, p| s + p);
+        let of_ridge = |ridge: usize| {
+            let folds = self.folds.iter().zip(&targets).zip(&products);
+            let of = |((fold, target), own): ((&Fold, &DVector<f64>), &DVector<f64>)| {
+                let weights = fold.others[ridge].solve(&(&whole - own));
+                let left = target - &fold.features * weights;
+                target.norm_squared() - left.norm_squared()
+            };
+            folds.map(of).sum::<f64>()
+        };
+        (0..RIDGES.len()).map(of_ridge).fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,86 @@
+//! Candidates ranked, and a model settled after one of them has joined.
+
+use crate::model::GreyBox;
+use crate::sysid::diagnose::options::Options;
+use crate::sysid::diagnose::regression::rank::Score;
+use crate::sysid::diagnose::search::nulls;
+use crate::sysid::diagnose::search::round::{Beside, Problem, Round};
+
+/// Passes of tuning after an effect has joined, which is where nonlinear ones settle.
+pub const SETTLING: usize = 3;
+/// A change of mass or inertia that settles farther from where it was found than this share of it was found by
+/// the accelerations of a model that is too far off.
+const ASTRAY: f64 = 0.1;
+
+/// A round with its scores.
+pub struct Ranked {
+    /// The round.
+    pub round: Round,
+    /// The candidates, best evidence first.
+    pub scores: Vec<(usize, Score)>,
+    /// Best evidence in null flights.
+    pub nulls: Vec<f64>,
+    /// Evidence that is asked of a candidate.
+    pub threshold: f64,
+}
+
+/// Ranks the candidates of `round`, those of mass and inertia by better accelerations if its own are too far off.
+pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
+    let rank = |mut round: Round| {
+        let scores = round.rank();
+        let nulls = nulls::best(&round.projected, &round.trials, options.seed, options.nulls);
+        let threshold = nulls::threshold(&nulls, options.level);
+        Ranked { round, scores, nulls, threshold }
+    };
+    let ranked = rank(round);
+    match accelerated(problem, &ranked) {
+        Some(round) => rank(round),
+        None => ranked,
+    }
+}
+
+/// The round with the accelerations of its model once the best change of mass or inertia has joined and settled;
+/// `None` if none is called for. Where the inertia is grossly wrong the model's accelerations are, and so are the
+/// columns that are made of them: each flight has its own amount then, and all too little.
+fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
+    let Ranked { round, scores, threshold, .. } = ranked;
+    let of_body = |trial: usize, score: &Score| {
+        let mut model = round.with(score);
+        let before = model.body;
+        model.join_most(round.trials[trial].id, &score.values).ok()?;
+        (model.body != before).then_some(model)
+    };
+    let mut told = scores.iter().filter(|(_, s)| s.evidence > *threshold);
+    let (trial, score, model) = told.find_map(|(k, s)| Some((*k, s, of_body(*k, s)?)))?;
+    let trial = &round.trials[trial];
+    let first = trial.points[score.point].free[0].0;
+    let entry = round.entries.iter().find(|e| e.about.id == trial.id)?;
+    let name = format!("{}.{}", trial.id, entry.about.coefficients[first].name);
+    // the first pass tells whether others are worth their time
+    let (model, _) = settled(problem, round, model, 1)?;
+    let value = model.coefficients().iter().find(|c| c.name == name)?.value;
+    if (value - score.values[first]).abs() <= ASTRAY * value.abs() {
+        return None;
+    }
+    let (model, _) = settled(problem, round, model, SETTLING)?;
+    let beside = Beside { accelerating: Some(&model), ..Beside::default() };
+    Round::beside(problem, round.model.clone(), &round.entries, beside)
+}
+
+/// `model` settled under the noise of `round`, and the squared error that it left before the last of `passes`.
+pub fn settled(
+    problem: &Problem,
+    round: &Round,
+    mut model: GreyBox,
+    passes: usize,
+) -> Option<(GreyBox, f64)> {
+    let mut left = f64::INFINITY;
+    for _ in 0..passes {
+        let beside = Beside { noise: Some(&round.noise), ..Beside::default() };
+        let settled = Round::beside(problem, model, &[], beside)?;
+        let last = settled.projected.width();
+        left = settled.projected.total[(last, last)];
+        model = settled.tuned();
+    }
+    Some((model, left))
+}

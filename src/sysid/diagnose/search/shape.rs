@@ -1,0 +1,195 @@
+//! What products of what was flown still explain beside an effect, so that its formula has another shape than
+//! what is missing.
+//!
+//! The flexible model of [`crate::sysid::diagnose::search::remainder`] must show on other flights what it learned, and sees only what
+//! is large. Here the question is one of a few terms, those that aerodynamic tables are made of, and a fit on
+//! the same flights is held against the noise of these.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::model::{GreyBox, Integrator};
+use crate::num::statistics::mean;
+use crate::sysid::diagnose::regression::cells::Placed;
+use crate::sysid::diagnose::regression::columns::{Ready, bends};
+use crate::sysid::diagnose::regression::features::{spread, standard};
+use crate::sysid::diagnose::regression::gather::{Column, gather};
+use crate::sysid::diagnose::regression::local::CHANNELS;
+use crate::sysid::diagnose::regression::projected::{Projected, scaled_inverse};
+use crate::sysid::diagnose::search::nulls;
+use crate::sysid::diagnose::search::round::Round;
+use crate::sysid::weak_form::prepared::Prepared;
+
+/// States and deflections whose products are the terms.
+const NAMES: [&str; 9] = ["α", "β", "V", "p", "q", "r", "δa", "δe", "throttle"];
+/// Squares and products of each with each.
+const PRODUCTS: usize = NAMES.len() * (NAMES.len() + 1) / 2;
+/// Second derivatives of the surfaces, which is where a lag differs from a delay.
+const BENT: [&str; 2] = ["δa″", "δe″"];
+/// Terms of a channel.
+const TERMS: usize = PRODUCTS + BENT.len();
+/// Keeps terms apart that the flights hardly tell apart: a share of a term's square.
+const RIDGE: f64 = 1e-4;
+/// Standard deviations beyond which what the terms take is no chance.
+const DOUBT: f64 = 4.0;
+/// Squared error per row that the terms may take of what sensors and path have left unsaid,
+const UNSURE: f64 = 0.1;
+/// and before it says by itself that something is missing: without anything missing, 0.13 at most.
+const ALARM: f64 = 0.15;
+/// Squared whitened error that second derivatives take of right models: up to 25.
+const BENDING: f64 = 30.0;
+
+/// What the terms take of the squared whitened error, channel by channel.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    channels: Vec<Taken>,
+}
+
+/// The same of one channel.
+#[derive(Clone, Debug)]
+struct Taken {
+    /// Beyond what they take of noise.
+    left: f64,
+    /// Standard deviation of what they take of noise.
+    doubt: f64,
+    rows: f64,
+    /// The term that takes most by itself.
+    most: usize,
+    /// What the second derivatives take by themselves.
+    bent: f64,
+}
+
+impl Shape {
+    /// The term that what is left in `channel` goes with most, if so much is left that something is missing.
+    pub fn term(&self, channel: usize) -> Option<String> {
+        self.left_in(&[channel], ALARM).map(|_| name(self.channels[channel].most))
+    }
+
+    /// The share that the terms take in `channels` beside `fall`, which effects took from them, if that is
+    /// more than chance, with the term that takes most.
+    pub fn beside(&self, channels: &[usize], fall: f64) -> Option<(f64, String)> {
+        let left = self.left_in(channels, UNSURE)?;
+        let own = channels.iter().map(|c| &self.channels[*c]);
+        let most = own.max_by(|a, b| a.left.total_cmp(&b.left))?.most;
+        Some((left / (left + fall), name(most)))
+    }
+
+    /// The share that second derivatives of the surfaces take, in whatever channel, beside `fall`, which an
+    /// effect took; zero if they take no more than they do of right models.
+    pub fn bends_beside(&self, fall: f64) -> f64 {
+        let bent = self.channels.iter().map(|c| c.bent).filter(|bent| *bent > BENDING).sum::<f64>();
+        bent / (bent + fall).max(f64::MIN_POSITIVE)
+    }
+
+    fn left_in(&self, channels: &[usize], unsure: f64) -> Option<f64> {
+        let sum = |of: &dyn Fn(&Taken) -> f64| -> f64 {
+            channels.iter().map(|c| of(&self.channels[*c])).sum()
+        };
+        let left = sum(&|c| c.left);
+        let rows = sum(&|c| c.rows);
+        let chance = DOUBT * sum(&|c| c.doubt.powi(2)).sqrt();
+        (rows > 0.0 && left > chance.max(unsure * rows)).then_some(left)
+    }
+}
+
+/// What the terms take of what `round`, a model without candidates, leaves; noise from `count` draws.
+/// `None` if they cannot be fitted.
+pub fn shape(round: &Round, count: usize) -> Option<Shape> {
+    let na = round.known.len();
+    let last = na + CHANNELS * TERMS;
+    let spread = spread(&round.flights, variables);
+    let place = |(known, flight): (&Placed, &Ready)| {
+        let mut list: Placed = known.iter().take_while(|(p, _)| *p < na).cloned().collect();
+        let own = terms(&round.model, flight, &spread).into_iter().enumerate();
+        list.extend(own.map(|(k, column)| (na + k, column)));
+        list.push((last, flight.residual.clone()));
+        list
+    };
+    let placed: Vec<Placed> = round.placed.iter().zip(&round.flights).map(place).collect();
+    // plain least squares: a residual corrected for shared noise does not lie in the columns' span
+    let p = Projected::new(&round.cells, &placed, last, &round.known, &round.noise, &[])?;
+    let measured = p.total.column(p.width()).into_owned();
+    let draws: Vec<DVector<f64>> =
+        (0..count).map(|k| nulls::draw(&p, round.seed, k).total).collect();
+    let rows = p.rows_by_channel();
+    let of = |c: usize| {
+        let first = c * TERMS;
+        let own = |v: &DVector<f64>| v.rows(first, TERMS).into_owned();
+        let gram = p.total.view((first, first), (TERMS, TERMS)).into_owned();
+        taken(&gram, &own(&measured), &draws.iter().map(own).collect::<Vec<_>>(), rows[c])
+    };
+    Some(Shape { channels: (0..CHANNELS).map(of).collect::<Option<_>>()? })
+}
+
+/// What terms with the Gram matrix `gram` take of a residual with which their products are `measured`, beside
+/// what they take of `draws` of noise.
+fn taken(
+    gram: &DMatrix<f64>,
+    measured: &DVector<f64>,
+    draws: &[DVector<f64>],
+    rows: f64,
+) -> Option<Taken> {
+    let mut ridged = gram.clone();
+    (0..TERMS).for_each(|k| ridged[(k, k)] *= 1.0 + RIDGE);
+    let inverse = scaled_inverse(&ridged)?;
+    let fall = |v: &DVector<f64>| v.dot(&(&inverse * v));
+    let noise: Vec<f64> = draws.iter().map(fall).collect();
+    let by_chance = mean(&noise);
+    let variance = mean(&noise.iter().map(|x| (x - by_chance).powi(2)).collect::<Vec<_>>());
+    let alone = |k: &usize| measured[*k].powi(2) / gram[(*k, *k)].max(f64::MIN_POSITIVE);
+    let count = BENT.len();
+    let bent = measured.rows(PRODUCTS, count);
+    let own = gram.view((PRODUCTS, PRODUCTS), (count, count)).into_owned();
+    Some(Taken {
+        left: fall(measured) - by_chance,
+        doubt: variance.sqrt(),
+        rows,
+        most: (0..TERMS).max_by(|a, b| alone(a).total_cmp(&alone(b)))?,
+        bent: bent.dot(&(scaled_inverse(&own)? * bent)),
+    })
+}
+
+/// The terms of `flight`, those of one channel after those of the other, each times the dynamic pressure.
+fn terms(model: &GreyBox, flight: &Ready, spread: &[[f64; 2]; NAMES.len()]) -> Vec<Column> {
+    let sides = gather(&flight.acting, Integrator::Jsbsim, TERMS, |place, add| {
+        let z = standard(variables(&flight.acting, place.segment, place.index), spread);
+        let pressure = model.air(&place.at.state, place.at.altitude).q_s;
+        let bends = bends(&flight.acting, place.segment, place.index);
+        // forces weigh by samples, moments by steps: the two sides of a window
+        for side in [0, CHANNELS / 2] {
+            for (k, (i, j)) in pairs().enumerate() {
+                add(k, side, pressure * z[i] * z[j]);
+            }
+            for (k, bend) in bends.iter().take(BENT.len()).enumerate() {
+                add(PRODUCTS + k, side, pressure * bend);
+            }
+        }
+    });
+    let of = |channel: usize| {
+        let side = if channel < CHANNELS / 2 { 0 } else { CHANNELS / 2 };
+        sides.iter().map(move |term| {
+            let mut column = Column::default();
+            column[channel] = term[side].clone();
+            column
+        })
+    };
+    (0..CHANNELS).flat_map(of).collect()
+}
+
+/// Of what each product is.
+fn pairs() -> impl Iterator<Item = (usize, usize)> {
+    (0..NAMES.len()).flat_map(|i| (i..NAMES.len()).map(move |j| (i, j)))
+}
+
+fn name(term: usize) -> String {
+    match pairs().nth(term) {
+        Some((i, j)) if i == j => format!("{}²", NAMES[i]),
+        Some((i, j)) => format!("{}·{}", NAMES[i], NAMES[j]),
+        None => BENT[term - PRODUCTS].into(),
+    }
+}
+
+fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; NAMES.len()] {
+    let at = &flight.segments[segment][index];
+    let (s, z) = (&at.state, &at.controls);
+    [s.alpha, s.beta, s.airspeed, s.p, s.q, s.r, z.aileron, z.elevator, z.throttle]
+}

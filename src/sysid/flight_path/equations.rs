@@ -1,0 +1,366 @@
+//! The equations of a fit: all stretches linearised at what was found, eliminated, solved.
+
+use nalgebra::{SMatrix, SVector, Vector3};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use crate::logs::Sampling;
+use crate::num::stream::Stream;
+use crate::sysid::flight_path::band::{self, Left, Link, Node, Stretch, add_gram};
+use crate::sysid::flight_path::intake::{Log, Track};
+use crate::sysid::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST, Step, gust_kept};
+use crate::sysid::flight_path::levels::{CALM, Levels};
+use crate::sysid::flight_path::measurement::{self, AT, OTHERS, Others, Reading};
+use crate::sysid::flight_path::nuisance::{COUNT, INERTIAL, Values, WIND};
+use crate::sysid::flight_path::path::Path;
+use crate::sysid::flight_path::{Options, ReconstructError};
+
+/// Columns where the constants are free: all, those between instants; right-hand side last.
+const WIDTH: usize = COUNT + 1;
+const BETWEEN: usize = COUNT - INERTIAL + 1;
+
+/// What was found so far.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The path of each track.
+    pub paths: Vec<Path>,
+    /// The constants.
+    pub values: Values,
+    /// Their standard deviations.
+    pub deviations: Values,
+    /// Noise levels.
+    pub levels: Levels,
+}
+
+/// What is fitted.
+#[derive(Clone, Copy)]
+pub struct Problem<'a> {
+    /// The log.
+    pub log: &'a Log,
+    /// What the reconstruction is told.
+    pub options: &'a Options,
+    /// What a rate sample stands for.
+    pub sampling: Sampling,
+    /// Means of the constants before the data is seen.
+    pub means: Values,
+    /// Standard deviations of the constants before the data is seen.
+    pub widths: Values,
+}
+
+/// One linearisation, solved: `N` unknowns an instant.
+pub struct Solved<const N: usize> {
+    /// Moves of every instant of every stretch.
+    moves: Vec<Vec<[f64; N]>>,
+    /// Moves of the constants; zero where they are held.
+    constants: Values,
+    /// Standard deviations of the constants; zero where they are held.
+    deviations: Values,
+    /// The readings before the move.
+    pub readings: Vec<Vec<Reading>>,
+}
+
+/// A path with an error like that of the one found.
+#[derive(Clone, Debug)]
+pub struct Erring {
+    /// The path of each track.
+    pub paths: Vec<Path>,
+    /// The noise of the gyros of each track, rad/s.
+    pub gyro: Vec<Vec<[f64; 3]>>,
+}
+
+impl Problem<'_> {
+    /// The path's motion with the constants, gusts as they are.
+    pub fn calm(&self, found: &Found, bound: f64) -> Option<Solved<MOTION>> {
+        self.solve::<MOTION, WIDTH, AT, BETWEEN>(found, bound)
+    }
+
+    /// Motion with gusts, the constants held.
+    pub fn held(&self, found: &Found, bound: f64) -> Option<Solved<MOTION_AND_GUST>> {
+        self.solve::<MOTION_AND_GUST, 1, 1, 1>(found, bound)
+    }
+
+    /// −2 ln L of the levels, up to what does not change with the gusts' level, with the constants held.
+    pub fn misfit(&self, found: &Found, bound: f64) -> Option<f64> {
+        let (_, _, left) = self.eliminate::<MOTION_AND_GUST, 1, 1, 1>(found, bound, None)?;
+        let components = 3.0 * found.paths.iter().map(Path::len).sum::<usize>() as f64;
+        let misfit = left.corner[0][0] + left.log_det;
+        Some(misfit + 2.0 * components * found.levels.gusts.ln())
+    }
+
+    /// What the constants of [`calm`](Self::calm) would be moved by if the sensors of the air had the
+    /// residuals `others`, by stretch, then instant.
+    pub fn moved_by(
+        &self,
+        found: &Found,
+        bound: f64,
+        others: &[Vec<[Others; 3]>],
+    ) -> Option<[Values; OTHERS]> {
+        const W: usize = WIDTH + OTHERS;
+        const M: usize = AT + OTHERS;
+        let eliminated = self.eliminate::<MOTION, W, M, BETWEEN>(found, bound, Some(others));
+        let (_, _, left) = eliminated?;
+        let factor = self.information(&left)?.cholesky()?;
+        Some(std::array::from_fn(|r| {
+            let right = SVector::<f64, COUNT>::from_fn(|i, _| left.corner[OTHERS + i][r]);
+            factor.solve(&right).into()
+        }))
+    }
+
+    /// What is known of the constants, before the data and by them: the last columns but one.
+    fn information<const W: usize>(&self, left: &Left<W>) -> Option<SMatrix<f64, COUNT, COUNT>> {
+        let first = W.checked_sub(WIDTH)?;
+        Some(SMatrix::from_fn(|i, j| {
+            let before = if i == j { self.widths[i].powi(-2) } else { 0.0 };
+            left.corner[first + i][first + j] + before
+        }))
+    }
+
+    /// How the path errs that was found, in one draw of the noise of every sensor, the constants held.
+    pub fn erring(&self, found: &Found, random: &mut Stream) -> Option<Erring> {
+        let mut erring = Erring { paths: found.paths.clone(), gyro: Vec::new() };
+        for (track, path) in self.log.tracks.iter().zip(&mut erring.paths) {
+            let gyro = if found.levels.gusts > CALM {
+                self.err::<MOTION_AND_GUST>(track, path, found, random)?
+            } else {
+                self.err::<MOTION>(track, path, found, random)?
+            };
+            erring.gyro.push(gyro);
+        }
+        Some(erring)
+    }
+
+    /// Moves `path` by its error in one draw; returns the gyros' noise in it, rad/s.
+    fn err<const N: usize>(
+        &self,
+        track: &Track,
+        path: &mut Path,
+        found: &Found,
+        random: &mut Stream,
+    ) -> Option<Vec<[f64; 3]>> {
+        let (step, gravity) = (self.log.step, self.options.gravity);
+        let (values, l) = (&found.values, &found.levels);
+        let mut unit = || -> f64 { StandardNormal.sample(random) };
+        let noise: Vec<[f64; N]> =
+            (0..path.len()).map(|_| std::array::from_fn(|_| unit())).collect();
+        let measured = measurement::readings(track, path, values, step);
+        let readings: Vec<Reading> = measured
+            .into_iter()
+            .map(|r| r.with(std::array::from_fn(|i| l.measured[i] * unit())))
+            .collect();
+        let drive = Drive::new(track, values, step, self.sampling, gravity);
+        let sd = step_deviations::<N>(l, step);
+        let along: &Path = path;
+        let instant = |k: usize, node: &mut Node<N, 1>, corner: &mut band::Corner<1>| {
+            if k == 0 {
+                start::<N, 1>(&Vector3::zeros(), l.gusts, node, corner);
+            }
+            let reading = &readings[k];
+            let spread = &l.measured;
+            measurement::add::<N, 1, 1>(
+                along,
+                values,
+                k,
+                reading,
+                spread,
+                f64::INFINITY,
+                None,
+                node,
+                corner,
+            );
+        };
+        let link = |k: usize, corner: &mut band::Corner<1>| {
+            let mut step = drive.step::<N, 1>(along, values, k, step, gravity);
+            for i in 0..N {
+                let unit = match (i, self.sampling) {
+                    (0..3, Sampling::Instants) => 0.5 * (noise[k][i] + noise[k + 1][i]),
+                    _ => noise[k][i],
+                };
+                step.rest[i][0] = sd[i] * unit;
+            }
+            weigh(step, &sd, corner)
+        };
+        let (stretch, _) = band::eliminate(along.len(), instant, link)?;
+        for (k, x) in stretch.substitute(&[1.0]).iter().enumerate() {
+            path.shift(k, x);
+        }
+        Some(noise.iter().map(|unit| std::array::from_fn(|i| l.gyro[i] * unit[i])).collect())
+    }
+
+    fn solve<const N: usize, const W: usize, const M: usize, const D: usize>(
+        &self,
+        found: &Found,
+        bound: f64,
+    ) -> Option<Solved<N>> {
+        let (stretches, readings, left) = self.eliminate::<N, W, M, D>(found, bound, None)?;
+        let (mut constants, mut deviations) = ([0.0; COUNT], [0.0; COUNT]);
+        let mut by = [0.0; W];
+        by[W - 1] = 1.0;
+        if W == WIDTH {
+            let right = SVector::<f64, COUNT>::from_fn(|i, _| {
+                left.corner[i][W - 1] - (found.values[i] - self.means[i]) / self.widths[i].powi(2)
+            });
+            let factor = self.information(&left)?.cholesky()?;
+            constants = factor.solve(&right).into();
+            let covariance = factor.inverse();
+            deviations = std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt());
+            by.iter_mut().zip(&constants).for_each(|(by, step)| *by = -step);
+        }
+        let moves = stretches.par_iter().map(|s| s.substitute(&by)).collect();
+        Some(Solved { moves, constants, deviations, readings })
+    }
+
+    fn eliminate<const N: usize, const W: usize, const M: usize, const D: usize>(
+        &self,
+        found: &Found,
+        bound: f64,
+        others: Option<&[Vec<[Others; 3]>]>,
+    ) -> Option<(Vec<Stretch<N, W>>, Vec<Vec<Reading>>, Left<W>)> {
+        let pairs = self.log.tracks.par_iter().zip(&found.paths).enumerate();
+        let done: Vec<_> = pairs
+            .map(|(i, (track, path))| {
+                let others = others.and_then(|o| o.get(i)).map(Vec::as_slice);
+                self.stretch::<N, W, M, D>(track, path, found, bound, others)
+            })
+            .collect::<Option<_>>()?;
+        let (mut stretches, mut readings, mut left) = (Vec::new(), Vec::new(), Left::ZERO);
+        for (stretch, reading, share) in done {
+            stretches.push(stretch);
+            readings.push(reading);
+            left.add(&share);
+        }
+        Some((stretches, readings, left))
+    }
+
+    fn stretch<const N: usize, const W: usize, const M: usize, const D: usize>(
+        &self,
+        track: &Track,
+        path: &Path,
+        found: &Found,
+        bound: f64,
+        others: Option<&[[Others; 3]]>,
+    ) -> Option<(Stretch<N, W>, Vec<Reading>, Left<W>)> {
+        let (step, gravity) = (self.log.step, self.options.gravity);
+        let (values, l) = (&found.values, &found.levels);
+        let readings = measurement::readings(track, path, values, step);
+        let drive = Drive::new(track, values, step, self.sampling, gravity);
+        let spread = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
+        let sd = step_deviations::<N>(l, step);
+        let instant = |k: usize, node: &mut Node<N, W>, corner: &mut band::Corner<W>| {
+            if k == 0 {
+                start::<N, W>(&path.gust[0], l.gusts, node, corner);
+            }
+            measurement::add::<N, W, M>(
+                path,
+                values,
+                k,
+                &readings[k],
+                &spread,
+                bound,
+                others.map(|o| &o[k]),
+                node,
+                corner,
+            );
+        };
+        let link = |k: usize, corner: &mut band::Corner<W>| {
+            let step = drive.step::<N, D>(path, values, k, step, gravity);
+            weigh(step, &sd, corner)
+        };
+        let (stretch, left) = band::eliminate(path.len(), instant, link)?;
+        Some((stretch, readings, left))
+    }
+}
+
+/// Standard deviations of the differences between samples `step` (s) apart.
+fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
+    let gust = levels.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
+    std::array::from_fn(|i| match i {
+        0..3 => levels.gyro[i] * step,
+        3..MOTION => levels.force[i - 3] * step,
+        _ => gust,
+    })
+}
+
+/// A start of which nothing is known but the size of gusts.
+fn start<const N: usize, const W: usize>(
+    gust: &Vector3<f64>,
+    level: f64,
+    node: &mut Node<N, W>,
+    corner: &mut band::Corner<W>,
+) {
+    for i in 0..N {
+        let information = [0.01, 1e-4, level.powi(-2)][i / 3];
+        node.own[i][i] += information;
+        if i >= MOTION {
+            let gust = gust[i - MOTION];
+            node.rest[i][W - 1] -= gust * information;
+            corner[W - 1][W - 1] += gust * gust * information;
+        }
+    }
+}
+
+/// The equations of a step whose rows have the standard deviations `sd`.
+fn weigh<const N: usize, const W: usize, const D: usize>(
+    mut step: Step<N, D>,
+    sd: &[f64; N],
+    corner: &mut band::Corner<W>,
+) -> Link<N, W> {
+    for (i, sd) in sd.iter().enumerate() {
+        let weight = sd.recip();
+        step.first[i].iter_mut().for_each(|x| *x *= weight);
+        step.second[i].iter_mut().for_each(|x| *x *= weight);
+        step.rest[i].iter_mut().for_each(|x| *x *= weight);
+    }
+    let mut link = Link { first: Node::ZERO, second: Node::ZERO, coupling: [[0.0; N]; N] };
+    add_gram(&mut link.first.own, &step.first, &step.first);
+    add_gram(&mut link.second.own, &step.second, &step.second);
+    add_gram(&mut link.coupling, &step.first, &step.second);
+    for (node, by) in [(&mut link.first, &step.first), (&mut link.second, &step.second)] {
+        let mut rest = [[0.0; D]; N];
+        add_gram(&mut rest, by, &step.rest);
+        for (row, rest) in node.rest.iter_mut().zip(&rest) {
+            row[W - D..].copy_from_slice(rest);
+        }
+    }
+    let mut own = [[0.0; D]; D];
+    add_gram(&mut own, &step.rest, &step.rest);
+    for (row, own) in corner[W - D..].iter_mut().zip(&own) {
+        row[W - D..].iter_mut().zip(own).for_each(|(x, y)| *x += y);
+    }
+    link
+}
+
+impl<const N: usize> Solved<N> {
+    /// Moves the path and the constants; returns the largest move of a constant in its deviation.
+    ///
+    /// # Errors
+    /// The path left the numbers.
+    pub fn apply(&self, found: &mut Found, flight: &str) -> Result<f64, ReconstructError> {
+        let mut largest = 0.0_f64;
+        for place in 0..COUNT {
+            let (step, deviation) = (self.constants[place], self.deviations[place]);
+            if deviation > 0.0 {
+                found.deviations[place] = deviation;
+            }
+            found.values[place] += step;
+            let moved = if step == 0.0 { 0.0 } else { step.abs() / deviation };
+            largest = if moved.is_finite() { largest.max(moved) } else { f64::NAN };
+        }
+        let wind = Vector3::from_column_slice(&found.values[WIND..WIND + 3]);
+        for (path, moves) in found.paths.iter_mut().zip(&self.moves) {
+            path.wind = wind;
+            for (k, x) in moves.iter().enumerate() {
+                path.shift(k, x);
+            }
+        }
+        if largest.is_finite() {
+            Ok(largest)
+        } else {
+            Err(no_path(flight, "the path left the numbers"))
+        }
+    }
+}
+
+/// The search ended without numbers.
+pub fn no_path(flight: &str, why: &'static str) -> ReconstructError {
+    ReconstructError::NoPath { flight: flight.into(), why }
+}

@@ -1,0 +1,79 @@
+//! What gusts like those found would do to the constants, by drawing them.
+//!
+//! The constants are fitted as if the sensors of the air had white noise, though wide enough to hold the
+//! gusts. Gusts last for many seconds, so that this says neither how far a mean wind may be off nor that
+//! a delay is known better than a bias. Draws of gusts, sent through the very equations of the fit, do.
+
+use nalgebra::{Matrix3, Vector3};
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::num::stream::{Stream, stream};
+use crate::sysid::flight_path::equations::{Found, Problem};
+use crate::sysid::flight_path::kinematics::gust_kept;
+use crate::sysid::flight_path::measurement::{OTHERS, Others, by_gust};
+use crate::sysid::flight_path::nuisance::{COUNT, Values};
+use crate::sysid::flight_path::path::Path;
+
+/// Pairs of draws in one set of equations: without gusts, with them.
+const PAIRS: usize = OTHERS / 2;
+/// Sets of equations: 32 pairs know a standard deviation to an eighth of itself.
+const SETS: u64 = 4;
+
+/// The standard deviations of the constants of the calm fit `found`, were its noise that of `rough`:
+/// gusts of that level beside the white noise of the sensors of the air.
+pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -> Option<Values> {
+    let (mut assumed, mut drawn) = ([0.0; COUNT], [0.0; COUNT]);
+    for set in 0..SETS {
+        let mut random = stream(set, &[]);
+        let others: Vec<_> = found
+            .paths
+            .iter()
+            .map(|path| draws(problem, path, found, rough, &mut random))
+            .collect();
+        let moved = problem.moved_by(found, bound, &others)?;
+        for place in 0..COUNT {
+            for pair in 0..PAIRS {
+                assumed[place] += moved[pair][place].powi(2);
+                drawn[place] += moved[PAIRS + pair][place].powi(2);
+            }
+        }
+    }
+    let count = PAIRS as f64 * SETS as f64;
+    Some(std::array::from_fn(|place| {
+        let others = (found.deviations[place].powi(2) - assumed[place] / count).max(0.0);
+        (others + drawn[place] / count).sqrt()
+    }))
+}
+
+/// Residuals of airspeed, α, β along a path: first with the noise that the fit assumes, then, of the same
+/// numbers, with white noise and gusts.
+fn draws(
+    problem: &Problem,
+    path: &Path,
+    found: &Found,
+    rough: &Found,
+    random: &mut Stream,
+) -> Vec<[Others; 3]> {
+    let mut draw = || -> f64 { StandardNormal.sample(random) };
+    let (level, kept) = (rough.levels.gusts, gust_kept(problem.log.step));
+    let fresh = level * (1.0 - kept * kept).sqrt();
+    let mut gusts: [Vector3<f64>; PAIRS] =
+        std::array::from_fn(|_| Vector3::from_fn(|_, _| level * draw()));
+    let (l, white) = (&found.levels, &rough.levels.measured);
+    (0..path.len())
+        .map(|k| {
+            let by_gust = by_gust(path, k, &found.values).unwrap_or(Matrix3::zeros());
+            let mut rows = [[0.0; OTHERS]; 3];
+            for (pair, gust) in gusts.iter_mut().enumerate() {
+                let felt = by_gust * *gust;
+                for i in 0..3 {
+                    let unit = draw();
+                    rows[i][pair] = unit * l.measured[3 + i] * l.colour[3 + i];
+                    rows[i][PAIRS + pair] = unit * white[3 + i] + felt[i];
+                }
+                *gust = *gust * kept + Vector3::from_fn(|_, _| fresh * draw());
+            }
+            rows
+        })
+        .collect()
+}

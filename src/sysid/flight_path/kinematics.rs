@@ -1,0 +1,196 @@
+//! The inertial part: how gyros and accelerometers carry the path from one sample to the next.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::logs::Sampling;
+use crate::sysid::flight_path::band::{Block, Wide};
+use crate::sysid::flight_path::intake::Track;
+use crate::sysid::flight_path::nuisance::{EARTH, FORCE, GYRO, INERTIAL, SKEW_FORCE, Values};
+use crate::sysid::flight_path::path::Path;
+use crate::sysid::flight_path::rotation::{cross, exp, log};
+
+/// Time over which a gust is forgotten, s: the length scale of turbulence some hundred metres up over
+/// the airspeed of a small aircraft.
+const GUST_TIME: f64 = 20.0;
+
+/// The part of a gust that is left after `step`, s.
+pub fn gust_kept(step: f64) -> f64 {
+    (-step / GUST_TIME).exp()
+}
+
+/// Mean rates and forces over each interval, as the gyros and accelerometers have them.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    /// Mean rate from each sample to the next, body axes, rad/s.
+    rate: Vec<Vector3<f64>>,
+    /// Mean specific force from each sample to the next, axes of the body at the first one, m/s².
+    force: Vec<Vector3<f64>>,
+    /// Its change with the delay of the accelerometers, m/s³.
+    force_by_skew: Vec<Vector3<f64>>,
+}
+
+/// Attitude and velocity, unknowns of every instant; the gust's three may follow.
+pub const MOTION: usize = 6;
+/// With the gust.
+pub const MOTION_AND_GUST: usize = 9;
+
+/// The difference between one sample carried on and the next one, and how it depends on both: rows
+/// of attitude (rad), velocity (m/s, body axes), gust (m/s, earth axes).
+pub struct Step<const N: usize, const D: usize> {
+    /// By the first sample.
+    pub first: Block<N>,
+    /// By the second sample.
+    pub second: Block<N>,
+    /// By the constants that act between samples, then the difference itself with its sign turned:
+    /// the last `D` columns of the equations.
+    pub rest: Wide<N, D>,
+}
+
+/// Writes a 3 × 3 block.
+fn put<const N: usize, const W: usize>(
+    into: &mut [[f64; W]; N],
+    (row, column): (usize, usize),
+    block: &Matrix3<f64>,
+) {
+    for i in 0..3 {
+        for j in 0..3 {
+            into[row + i][column + j] = block[(i, j)];
+        }
+    }
+}
+
+impl Drive {
+    /// The drive of `track` at the constants `values`, samples `step` (s) apart.
+    ///
+    /// Without accelerometers the velocity is carried on unchanged.
+    pub fn new(
+        track: &Track,
+        values: &Values,
+        step: f64,
+        sampling: Sampling,
+        gravity: f64,
+    ) -> Drive {
+        let n = track.len();
+        let bias = Vector3::from_column_slice(&values[GYRO..GYRO + 3]);
+        let gyro = |k: usize| Vector3::from(track.rates[k]) - bias;
+        let (force, slope) = shifted(&track.force, values[SKEW_FORCE] / step);
+        let has_force = track.force.first().is_some_and(|f| f[0].is_finite());
+        let mut drive = Drive { rate: vec![], force: vec![], force_by_skew: vec![] };
+        for k in 0..n - 1 {
+            let (rate, mean): (_, [(Matrix3<f64>, usize, f64); 2]) = match sampling {
+                Sampling::Held => {
+                    let before = k.saturating_sub(1);
+                    let back = exp(&(gyro(before) * -step));
+                    (gyro(k), [(Matrix3::identity(), k, 1.5), (back, before, -0.5)])
+                }
+                Sampling::Instants => {
+                    let rate = (gyro(k) + gyro(k + 1)) * 0.5;
+                    let on = exp(&(rate * step));
+                    (rate, [(Matrix3::identity(), k, 0.5), (on, k + 1, 0.5)])
+                }
+            };
+            let mix = |of: &[Vector3<f64>]| {
+                mean.iter().map(|(r, i, share)| r * of[*i] * *share).sum::<Vector3<f64>>()
+            };
+            drive.rate.push(rate);
+            drive.force.push(if has_force { mix(&force) } else { weight(track, k, gravity) });
+            drive.force_by_skew.push(if has_force { mix(&slope) / step } else { Vector3::zeros() });
+        }
+        drive
+    }
+
+    /// The step from sample `k` to the next one along `path`.
+    ///
+    /// The gust decays over [`GUST_TIME`]. With `D` = 1 the constants are held.
+    pub fn step<const N: usize, const D: usize>(
+        &self,
+        path: &Path,
+        values: &Values,
+        k: usize,
+        step: f64,
+        gravity: f64,
+    ) -> Step<N, D> {
+        let body = path.attitude[k].transpose();
+        let turned = body * path.attitude[k + 1];
+        let attitude = log(&(exp(&(self.rate[k] * step)).transpose() * turned));
+        let down = Vector3::new(0.0, 0.0, gravity);
+        let earth = Vector3::new(values[EARTH], 0.0, values[EARTH + 1]);
+        let v = path.velocity[k];
+        let coriolis = earth.cross(&v) * -2.0;
+        let gained = body * (path.velocity[k + 1] - v - (down + coriolis) * step);
+        let bias = Vector3::from_column_slice(&values[FORCE..FORCE + 3]);
+        let velocity = gained - (self.force[k] - bias) * step;
+        let one = Matrix3::identity();
+        let mut link = Step { first: [[0.0; N]; N], second: [[0.0; N]; N], rest: [[0.0; D]; N] };
+        put(&mut link.first, (0, 0), &-turned.transpose());
+        put(&mut link.second, (0, 0), &one);
+        put(&mut link.first, (3, 0), &cross(&gained));
+        put(&mut link.first, (3, 3), &-body);
+        put(&mut link.second, (3, 3), &body);
+        for i in 0..3 {
+            link.rest[i][D - 1] = -attitude[i];
+            link.rest[3 + i][D - 1] = -velocity[i];
+        }
+        if N == MOTION_AND_GUST {
+            let kept = gust_kept(step);
+            let gust = path.gust[k + 1] - path.gust[k] * kept;
+            put(&mut link.first, (6, 6), &(one * -kept));
+            put(&mut link.second, (6, 6), &one);
+            (0..3).for_each(|i| link.rest[6 + i][D - 1] = -gust[i]);
+        }
+        if D > 1 {
+            put(&mut link.rest, (0, GYRO - INERTIAL), &(one * step));
+            put(&mut link.rest, (3, FORCE - INERTIAL), &(one * step));
+            for i in 0..3 {
+                link.rest[3 + i][SKEW_FORCE - INERTIAL] = self.force_by_skew[k][i] * -step;
+            }
+            for (place, axis) in [(EARTH, Vector3::x()), (EARTH + 1, Vector3::z())] {
+                let slope = body * axis.cross(&v) * (2.0 * step);
+                (0..3).for_each(|i| link.rest[3 + i][place - INERTIAL] = slope[i]);
+            }
+        }
+        link
+    }
+}
+
+/// The specific force that holds the velocity where it is.
+fn weight(track: &Track, k: usize, gravity: f64) -> Vector3<f64> {
+    let [roll, pitch, _] = track.attitude[k].map(|x| if x.is_finite() { x } else { 0.0 });
+    let r = crate::sysid::flight_path::rotation::from_euler([roll, pitch, 0.0]);
+    r.transpose() * Vector3::new(0.0, 0.0, -gravity)
+}
+
+/// `samples` that came `late` samples late, put right by parabolas through three of them, with the
+/// change of each by one more sample of lateness.
+pub fn shifted(samples: &[[f64; 3]], late: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
+    let last = samples.len() as isize - 1;
+    let at = |i: isize| Vector3::from(samples[i.clamp(0, last) as usize]);
+    let whole = late.round();
+    let part = late - whole;
+    (0..=last)
+        .map(|k| {
+            let i = k + whole as isize;
+            let (a, b, c) = (at(i - 1), at(i), at(i + 1));
+            let (slope, bend) = ((c - a) * 0.5, a - b * 2.0 + c);
+            (b + slope * part + bend * (0.5 * part * part), slope + bend * part)
+        })
+        .unzip()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lateness_is_put_right() {
+        // a parabola is interpolated exactly
+        let f = |t: f64| 0.3 + 0.2 * t - 0.05 * t * t;
+        let samples: Vec<[f64; 3]> = (0..20).map(|k| [f(k as f64 - 0.7); 3]).collect();
+        let (shifted, slope) = shifted(&samples, 0.7);
+        for k in 3..15 {
+            let t = k as f64;
+            assert!((shifted[k].x - f(t)).abs() < 1e-12);
+            assert!((slope[k].x - (0.2 - 0.1 * t)).abs() < 1e-12);
+        }
+    }
+}

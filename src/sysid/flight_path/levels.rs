@@ -1,0 +1,116 @@
+//! The noise levels: first from the data alone, then from what the fit leaves.
+
+use crate::sysid::flight_path::intake::{Log, Track};
+use crate::sysid::flight_path::measurement::{self, Reading};
+use crate::sysid::flight_path::noise;
+use crate::sysid::flight_path::path::CHANNELS;
+
+/// Smallest noise levels, of the size of what the kinematics leave out: gyro rad/s, force m/s².
+const GYRO_FLOOR: f64 = 2e-4;
+const FORCE_FLOOR: f64 = 5e-3;
+/// Smallest noise levels of the measured channels.
+const FLOORS: [f64; CHANNELS] = [2e-5, 2e-5, 2e-5, 1e-3, 5e-5, 5e-5, 1e-3, 1e-3, 1e-3];
+/// Least level of a channel in what the noise of gyros or accelerometers moves the path by between two
+/// samples. Were it less, the path would follow every single measurement, and the likeliest delay be half
+/// a sample, whatever the delay: there interpolation averages neighbours.
+const CARRIED: f64 = 30.0;
+/// Levels where too few samples tell: rad, m/s, rad, m/s.
+const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 0.5];
+/// What the velocity may do where no accelerometer says it, m/s².
+const UNKNOWN_FORCE: f64 = 3.0;
+/// Gusts of calm air, m/s.
+pub const CALM: f64 = 0.002;
+/// Blocks over which residuals are averaged to see their colour, s.
+const COLOUR_BLOCKS: [f64; 2] = [1.0, 4.0];
+
+/// Noise levels, as standard deviations.
+#[derive(Clone, Copy, Debug)]
+pub struct Levels {
+    /// Gyros, rad/s.
+    pub gyro: [f64; 3],
+    /// Accelerometers, m/s².
+    pub force: [f64; 3],
+    /// Gusts, each component, m/s.
+    pub gusts: f64,
+    /// The measured channels.
+    pub measured: [f64; CHANNELS],
+    /// Their least levels: the white part of what was measured, where the samples come fast enough to
+    /// tell. A path that may follow the measurements closely leaves residuals that are too small.
+    pub white: [f64; CHANNELS],
+    /// How much wider than white noise their means scatter.
+    pub colour: [f64; CHANNELS],
+}
+
+impl Levels {
+    /// Levels before anything is fitted: the white part of every channel.
+    pub fn first(log: &Log) -> Levels {
+        let over = |get: &dyn Fn(&Track, usize) -> f64| {
+            noise::white(log.tracks.iter().flat_map(|t| (0..t.len()).map(move |k| get(t, k))))
+        };
+        let or = |level: f64, default: f64| if level.is_finite() { level } else { default };
+        let attitude = |i: usize| {
+            // angles near ±π jump; their sine and cosine do not
+            let (a, b) =
+                (over(&|t, k| t.attitude[k][i].sin()), over(&|t, k| t.attitude[k][i].cos()));
+            a.hypot(b)
+        };
+        let white: [f64; CHANNELS] = std::array::from_fn(|i| match i {
+            0..3 => attitude(i),
+            3 => over(&|t, k| t.airspeed[k]),
+            4 | 5 => over(&|t, k| t.vanes[k][i - 4]),
+            _ => over(&|t, k| t.velocity[k][i - 6]),
+        });
+        let samples: usize = log.tracks.iter().map(Track::len).sum();
+        let dense = |i: usize| {
+            let tracks = log.tracks.iter();
+            let count =
+                tracks.flat_map(|t| (0..t.len()).map(move |k| measurement::measured(t, i, k)));
+            2 * count.filter(|x| x.is_finite()).count() > samples
+        };
+        let force = |i: usize| over(&|t, k| t.force[k][i]).max(FORCE_FLOOR);
+        let gyro = [0, 1, 2].map(|i| or(over(&|t, k| t.rates[k][i]), 0.0).max(GYRO_FLOOR));
+        let force = [0, 1, 2].map(|i| if log.has.force { force(i) } else { UNKNOWN_FORCE });
+        let speeds = log.tracks.iter().flat_map(|t| &t.airspeed).filter(|v| v.is_finite());
+        let (sum, count) = speeds.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+        let between = |sd: [f64; 3]| CARRIED * log.step * sd.into_iter().fold(0.0, f64::max);
+        // what is not known of forces is no noise that could be averaged
+        let gain = if log.has.force { between(force) } else { 0.0 };
+        let turn = between(gyro);
+        let floor: [f64; CHANNELS] = std::array::from_fn(|i| {
+            FLOORS[i].max(match i {
+                0..=2 => turn,
+                4 | 5 => or(gain * count / sum, 0.0),
+                _ => gain,
+            })
+        });
+        Levels {
+            gyro,
+            force,
+            gusts: CALM,
+            measured: std::array::from_fn(|i| or(white[i], DEFAULTS[i]).max(floor[i])),
+            white: std::array::from_fn(
+                |i| if dense(i) { white[i].max(floor[i]) } else { floor[i] },
+            ),
+            colour: [1.0; CHANNELS],
+        }
+    }
+
+    /// Takes the levels anew from the residuals of every stretch; returns the largest relative change.
+    pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
+        let mut change = 0.0_f64;
+        for channel in 0..CHANNELS {
+            let all = readings.iter().flatten().map(|r| r.residual[channel]);
+            let mut residuals: Vec<f64> = all.filter(|x| !x.is_nan()).collect();
+            let over = |block: f64| noise::colour(&residuals, (block / step).round() as usize);
+            let colour = COLOUR_BLOCKS.map(over).into_iter().fold(1.0, f64::max);
+            let level = noise::level(&mut residuals);
+            if level.is_nan() {
+                continue;
+            }
+            let level = level.max(self.white[channel]);
+            change = change.max((level / self.measured[channel]).ln().abs());
+            (self.measured[channel], self.colour[channel]) = (level, colour);
+        }
+        change
+    }
+}

@@ -1,0 +1,129 @@
+//! Manoeuvres: what was flown when, from rates, surfaces, bank and throttle.
+//!
+//! A moment belongs to a roll or pitch manoeuvre if the root mean square of the roll rate (of the
+//! rate of pitch angle), or of the surface about its mean, over the second around it exceeds a bound;
+//! else to a change of thrust if the throttle moves; else to a turn if the bank is large; else the flight
+//! is steady. Stretches under half a second join the one before them.
+
+use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
+
+/// Roll rate that is a manoeuvre, rad/s.
+const ROLL_RATE: f64 = 0.15;
+/// Rate of pitch angle that is a manoeuvre, rad/s.
+const PITCH_RATE: f64 = 0.08;
+/// Deflection about its mean that is a manoeuvre, rad.
+const DEFLECTION: f64 = 0.03;
+/// Throttle about its mean that is a manoeuvre.
+const THROTTLE: f64 = 0.05;
+/// Bank that is a turn, rad.
+const BANK: f64 = 0.26;
+/// Time over which activity is taken, s.
+const WINDOW: f64 = 1.0;
+/// Shortest stretch, s.
+const SHORTEST: f64 = 0.5;
+
+/// What was flown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// Nothing moves.
+    Steady,
+    /// Banked, nothing else moves.
+    Turn,
+    /// The throttle moves, the surfaces do not.
+    Thrust,
+    /// The ailerons or the roll rate move.
+    Roll,
+    /// The elevator or the pitch angle moves.
+    Pitch,
+    /// Both.
+    RollAndPitch,
+}
+
+/// A stretch of one kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Manoeuvre {
+    /// Start on the log's clock, s.
+    pub start_s: f64,
+    /// End, s.
+    pub end_s: f64,
+    /// What was flown.
+    pub kind: Kind,
+}
+
+/// The manoeuvres of a flight in order of time, without gaps inside its segments.
+pub fn manoeuvres(flight: &Reconstruction) -> Vec<Manoeuvre> {
+    flight.segments.iter().flat_map(|s| of_segment(s, flight.step_s)).collect()
+}
+
+fn of_segment(segment: &Segment, step: f64) -> Vec<Manoeuvre> {
+    let kinds = kinds(&segment.instants, step);
+    let mut found: Vec<Manoeuvre> = Vec::new();
+    for (instant, kind) in segment.instants.iter().zip(kinds) {
+        let t = instant.time_s;
+        match found.last_mut() {
+            Some(last) if last.kind == kind => last.end_s = t,
+            Some(last) => {
+                last.end_s = t;
+                found.push(Manoeuvre { start_s: t, end_s: t, kind });
+            }
+            None => found.push(Manoeuvre { start_s: t, end_s: t, kind }),
+        }
+    }
+    let mut merged: Vec<Manoeuvre> = Vec::new();
+    for m in found {
+        match merged.last_mut() {
+            Some(last) if last.kind == m.kind || m.end_s - m.start_s < SHORTEST => {
+                last.end_s = m.end_s;
+            }
+            _ => merged.push(m),
+        }
+    }
+    merged
+}
+
+fn kinds(instants: &[Instant], step: f64) -> Vec<Kind> {
+    let half = (WINDOW / step / 2.0).round() as usize;
+    let level = |get: &dyn Fn(&Instant) -> f64| root_mean_square(instants, half, 0.0, get);
+    let about_mean = |get: &dyn Fn(&Instant) -> f64| root_mean_square(instants, half, 1.0, get);
+    let roll = level(&|i| i.state.p);
+    let pitch = level(&|i| i.state.roll.cos() * i.state.q - i.state.roll.sin() * i.state.r);
+    let aileron = about_mean(&|i| i.controls.aileron);
+    let elevator = about_mean(&|i| i.controls.elevator);
+    let throttle = about_mean(&|i| i.controls.throttle);
+    (0..instants.len())
+        .map(|k| {
+            let rolls = roll[k] > ROLL_RATE || aileron[k] > DEFLECTION;
+            let pitches = pitch[k] > PITCH_RATE || elevator[k] > DEFLECTION;
+            match (rolls, pitches) {
+                (true, true) => Kind::RollAndPitch,
+                (true, false) => Kind::Roll,
+                (false, true) => Kind::Pitch,
+                _ if throttle[k] > THROTTLE => Kind::Thrust,
+                _ if instants[k].state.roll.abs() > BANK => Kind::Turn,
+                _ => Kind::Steady,
+            }
+        })
+        .collect()
+}
+
+/// Root of the mean square less `share` of the squared mean, over `half` samples to either side.
+fn root_mean_square(
+    instants: &[Instant],
+    half: usize,
+    share: f64,
+    get: &dyn Fn(&Instant) -> f64,
+) -> Vec<f64> {
+    let mut sums = vec![[0.0; 2]];
+    for x in instants.iter().map(get) {
+        let [a, b] = sums[sums.len() - 1];
+        sums.push([a + x, b + x * x]);
+    }
+    (0..instants.len())
+        .map(|k| {
+            let (from, to) = (k.saturating_sub(half), (k + half + 1).min(instants.len()));
+            let n = (to - from) as f64;
+            let [mean, square] = [0, 1].map(|i| (sums[to][i] - sums[from][i]) / n);
+            (square - share * mean * mean).max(0.0).sqrt()
+        })
+        .collect()
+}

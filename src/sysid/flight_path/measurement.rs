@@ -1,0 +1,242 @@
+//! The measured part: what the sensors show of the path, with their errors.
+
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+use crate::sysid::flight_path::band::{Corner, Node, add_gram};
+use crate::sysid::flight_path::channel::wrap;
+use crate::sysid::flight_path::intake::Track;
+use crate::sysid::flight_path::kinematics::MOTION_AND_GUST;
+use crate::sysid::flight_path::nuisance::{
+    ALPHA, BETA, INERTIAL, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_VANES, SKEW_VELOCITY, Values,
+    WIND,
+};
+use crate::sysid::flight_path::path::{CHANNELS, Path, SLOW, flow_angles};
+use crate::sysid::flight_path::rotation::{cross, euler_by_turn, to_euler};
+
+/// Columns of the constants that act at instants, right-hand side last.
+pub const AT: usize = INERTIAL + 1;
+/// How many further residuals the equations can be solved for at once.
+pub const OTHERS: usize = 16;
+/// Further residuals of a channel.
+pub type Others = [f64; OTHERS];
+
+/// The measurements of an instant against what its path should show; NaN where there is none.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    /// Measured less shown.
+    pub residual: [f64; CHANNELS],
+    /// How what should be shown changes with the delay, per s.
+    by_late: [f64; CHANNELS],
+}
+
+impl Reading {
+    /// The same with other residuals where there are measurements.
+    pub fn with(mut self, residuals: [f64; CHANNELS]) -> Reading {
+        for (residual, other) in self.residual.iter_mut().zip(residuals) {
+            *residual = if residual.is_nan() { f64::NAN } else { other };
+        }
+        self
+    }
+}
+
+/// The delay that a channel is read with.
+pub fn skew_of(channel: usize) -> usize {
+    match channel {
+        0..3 => SKEW_ATTITUDE,
+        3 => SKEW_AIRSPEED,
+        4 | 5 => SKEW_VANES,
+        _ => SKEW_VELOCITY,
+    }
+}
+
+/// The measurement of a channel at sample `k`; NaN if there is none.
+pub fn measured(track: &Track, channel: usize, k: usize) -> f64 {
+    match channel {
+        0..3 => track.attitude[k][channel],
+        3 => track.airspeed[k],
+        4 | 5 => track.vanes[k][channel - 4],
+        _ => track.velocity[k][channel - 6],
+    }
+}
+
+/// How airspeed, α and β change with the velocity through the air; `None` if it is slow.
+fn air_slopes(u: &Vector3<f64>) -> Option<Matrix3<f64>> {
+    let (v, plane) = (u.norm(), u.x.hypot(u.z));
+    (plane >= SLOW).then(|| {
+        let beta = (Vector3::y() - u * (u.y / (v * v))) / plane;
+        let p2 = plane * plane;
+        let alpha = Vector3::new(-u.z / p2, 0.0, u.x / p2);
+        Matrix3::from_columns(&[u / v, alpha, beta]).transpose()
+    })
+}
+
+/// What sensors without errors would show at sample `k`.
+fn shown(path: &Path, k: usize) -> [f64; CHANNELS] {
+    let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
+    let u = path.air_velocity(k);
+    let [alpha, beta] = flow_angles(&u);
+    let ground = path.velocity[k];
+    [roll, pitch, yaw, u.norm(), alpha, beta, ground.x, ground.y, ground.z]
+}
+
+/// How airspeed, α and β as measured change with a gust at sample `k`, earth axes.
+pub fn by_gust(path: &Path, k: usize, values: &Values) -> Option<Matrix3<f64>> {
+    let mut slopes = air_slopes(&path.air_velocity(k))?;
+    slopes.row_mut(0).scale_mut(1.0 + values[SCALE]);
+    Some(slopes * -path.attitude[k].transpose())
+}
+
+/// The readings at every sample of `track`, samples `step` (s) apart.
+pub fn readings(track: &Track, path: &Path, values: &Values, step: f64) -> Vec<Reading> {
+    let none = Reading { residual: [f64::NAN; CHANNELS], by_late: [0.0; CHANNELS] };
+    let n = path.len();
+    let shown: Vec<[f64; CHANNELS]> =
+        (0..n).into_par_iter().with_min_len(1000).map(|k| shown(path, k)).collect();
+    let read = |j: usize| {
+        let mut reading = none;
+        if j == 0 || j + 1 >= n {
+            return reading;
+        }
+        for channel in 0..CHANNELS {
+            let late = values[skew_of(channel)] / step;
+            let whole = late.round();
+            let data = j as isize + whole as isize;
+            if data < 0 || data as usize >= n {
+                continue;
+            }
+            let y = measured(track, channel, data as usize);
+            if y.is_nan() {
+                continue;
+            }
+            let angle = |x: f64| if channel < 3 { wrap(x) } else { x };
+            let h = shown[j][channel];
+            let (ahead, behind) =
+                (angle(shown[j + 1][channel] - h), angle(h - shown[j - 1][channel]));
+            let (rate, bend, part) = ((ahead + behind) * 0.5, ahead - behind, whole - late);
+            let (h, gain) =
+                with_errors(channel, h + rate * part + 0.5 * bend * part * part, values);
+            reading.residual[channel] = angle(y - h);
+            reading.by_late[channel] = -gain * (rate + bend * part) / step;
+        }
+        reading
+    };
+    (0..n).into_par_iter().with_min_len(1000).map(read).collect()
+}
+
+/// What a sensor with its errors shows where one without shows `h`, and the gain from one to the other.
+fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
+    match channel {
+        3 => (h * (1.0 + values[SCALE]), 1.0 + values[SCALE]),
+        4 => (h + values[ALPHA], 1.0),
+        5 => (h + values[BETA], 1.0),
+        _ => (h, 1.0),
+    }
+}
+
+/// Adds the reading of sample `k` to the equations. `spread` holds the standard deviations of the
+/// channels; a residual beyond `bound` of them counts less. The first columns are `others`, further
+/// residuals of the sensors of the air; then come the constants that act at instants, none if `M` is 1.
+#[expect(clippy::too_many_arguments, reason = "one call site; a struct would only rename them")]
+pub fn add<const N: usize, const W: usize, const M: usize>(
+    path: &Path,
+    values: &Values,
+    k: usize,
+    reading: &Reading,
+    spread: &[f64; CHANNELS],
+    bound: f64,
+    others: Option<&[Others; 3]>,
+    node: &mut Node<N, W>,
+    corner: &mut Corner<W>,
+) {
+    if reading.residual.iter().all(|x| x.is_nan()) {
+        return;
+    }
+    let (by_node, by_constants) = slopes::<N, M>(path, k, values, reading);
+    let (mut nodes, mut rests) = ([[0.0; N]; CHANNELS], [[0.0; M]; CHANNELS]);
+    for channel in 0..CHANNELS {
+        let residual = reading.residual[channel];
+        let Some(slope) = by_node[channel].filter(|_| !residual.is_nan()) else { continue };
+        let size = (residual / spread[channel]).abs();
+        let weight = (bound / size).min(1.0).sqrt() / spread[channel];
+        nodes[channel] = slope.map(|x| x * weight);
+        rests[channel] = by_constants[channel].map(|x| x * weight);
+        rests[channel][M - 1] = residual * weight;
+        if let (3..6, Some(others)) = (channel, others) {
+            let columns = rests[channel].iter_mut().zip(&others[channel - 3]);
+            columns.for_each(|(x, other)| *x = other * weight);
+        }
+    }
+    add_gram(&mut node.own, &nodes, &nodes);
+    let mut coupling = [[0.0; M]; N];
+    add_gram(&mut coupling, &nodes, &rests);
+    for (row, coupling) in node.rest.iter_mut().zip(&coupling) {
+        spill(row, coupling);
+    }
+    let mut own = [[0.0; M]; M];
+    add_gram(&mut own, &rests, &rests);
+    for (i, own) in own.iter().enumerate() {
+        spill(&mut corner[if i + 1 == M { W - 1 } else { i }], own);
+    }
+}
+
+/// Adds the first columns and the last one to theirs.
+fn spill<const M: usize, const W: usize>(row: &mut [f64; W], part: &[f64; M]) {
+    row.iter_mut().zip(&part[..M - 1]).for_each(|(x, y)| *x += y);
+    row[W - 1] += part[M - 1];
+}
+
+/// How every channel depends on the path at sample `k`, `None` where it says nothing, and on the
+/// constants.
+fn slopes<const N: usize, const M: usize>(
+    path: &Path,
+    k: usize,
+    values: &Values,
+    reading: &Reading,
+) -> ([Option<[f64; N]>; CHANNELS], [[f64; M]; CHANNELS]) {
+    let body = path.attitude[k].transpose();
+    let u = path.air_velocity(k);
+    let from = M.saturating_sub(AT);
+    let mut nodes = [None; CHANNELS];
+    let mut constants = [[0.0; M]; CHANNELS];
+    if let Some(euler) = euler_by_turn(&path.attitude[k]) {
+        for (channel, node) in nodes[..3].iter_mut().enumerate() {
+            let mut row = [0.0; N];
+            (0..3).for_each(|i| row[i] = euler[(channel, i)]);
+            *node = Some(row);
+        }
+    }
+    if let Some(mut slopes) = air_slopes(&u) {
+        slopes.row_mut(0).scale_mut(1.0 + values[SCALE]);
+        let (by_turn, by_velocity) = (slopes * cross(&u), slopes * body);
+        for i in 0..3 {
+            let mut row = [0.0; N];
+            for j in 0..3 {
+                row[j] = by_turn[(i, j)];
+                row[3 + j] = by_velocity[(i, j)];
+                if N == MOTION_AND_GUST {
+                    row[6 + j] = -by_velocity[(i, j)];
+                }
+                if M > 1 {
+                    constants[3 + i][from + WIND + j] = -by_velocity[(i, j)];
+                }
+            }
+            nodes[3 + i] = Some(row);
+        }
+        if M > 1 {
+            constants[3][from + SCALE] = u.norm();
+            (constants[4][from + ALPHA], constants[5][from + BETA]) = (1.0, 1.0);
+        }
+    }
+    for (channel, node) in nodes.iter_mut().enumerate().skip(6) {
+        let mut row = [0.0; N];
+        row[channel - 3] = 1.0;
+        *node = Some(row);
+    }
+    if M > 1 {
+        for (channel, row) in constants.iter_mut().enumerate() {
+            row[from + skew_of(channel)] = reading.by_late[channel];
+        }
+    }
+    (nodes, constants)
+}

@@ -1,0 +1,133 @@
+//! The constants estimated along with the path: their names, units and prior widths.
+
+use crate::sysid::flight_path::Options;
+use crate::sysid::flight_path::intake::{Log, Sensors};
+
+/// Number of constants.
+pub const COUNT: usize = 19;
+/// Place of the bias of the angle-of-attack vane.
+pub const ALPHA: usize = 0;
+/// Place of the bias of the sideslip vane.
+pub const BETA: usize = 1;
+/// Place of the airspeed scale less one: measured = (1 + scale) · true.
+pub const SCALE: usize = 2;
+/// Place of the wind north, east, down: the steady part, about which gusts vary.
+pub const WIND: usize = 3;
+/// Place of the delay of the attitude behind the gyros.
+pub const SKEW_ATTITUDE: usize = 6;
+/// Place of the delay of the airspeed.
+pub const SKEW_AIRSPEED: usize = 7;
+/// Place of the delay of the vanes.
+pub const SKEW_VANES: usize = 8;
+/// Place of the delay of the velocity over ground.
+pub const SKEW_VELOCITY: usize = 9;
+/// The first of the constants that act between instants; those before it act at instants.
+pub const INERTIAL: usize = 10;
+/// Place of the gyro biases p, q, r.
+pub const GYRO: usize = 10;
+/// Place of the accelerometer biases x, y, z.
+pub const FORCE: usize = 13;
+/// Place of the delay of the accelerometers.
+pub const SKEW_FORCE: usize = 16;
+/// Place of the Earth's rate north and down, rad/s: a log without a latitude does not say them, and
+/// their Coriolis acceleration, 0.003 m/s² at 20 m/s, is twice what a minute's accelerometer bias is known to.
+pub const EARTH: usize = 17;
+
+/// The constants in the order in which they are handed out.
+pub const ORDER: [usize; COUNT] =
+    [10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 16, 7, 8, 9, 17, 18];
+
+/// Prior width of a clock skew, samples: ±1.5 samples are its 95 % interval.
+pub const SKEW_SAMPLES: f64 = 0.77;
+
+/// Values of the constants.
+pub type Values = [f64; COUNT];
+
+/// Names and units, by place.
+pub const NAMES: [(&str, &str); COUNT] = [
+    ("alpha_bias", "rad"),
+    ("beta_bias", "rad"),
+    ("airspeed_scale", ""),
+    ("wind_north", "m/s"),
+    ("wind_east", "m/s"),
+    ("wind_down", "m/s"),
+    ("skew_attitude", "s"),
+    ("skew_airspeed", "s"),
+    ("skew_vanes", "s"),
+    ("skew_velocity", "s"),
+    ("gyro_bias_p", "rad/s"),
+    ("gyro_bias_q", "rad/s"),
+    ("gyro_bias_r", "rad/s"),
+    ("accelerometer_bias_x", "m/s²"),
+    ("accelerometer_bias_y", "m/s²"),
+    ("accelerometer_bias_z", "m/s²"),
+    ("skew_accelerometer", "s"),
+    ("earth_rate_north", "rad/s"),
+    ("earth_rate_down", "rad/s"),
+];
+
+/// Prior width of the delay of a sensor slower than the log's rows, in its own sample periods: it filters
+/// over about as long as it takes to measure.
+const SKEW_PERIODS: f64 = 0.5;
+
+/// Standard deviations before the data of `log` is seen.
+pub fn prior_widths(log: &Log) -> Values {
+    let least = SKEW_SAMPLES * log.step;
+    let mut width = [least; COUNT];
+    let slower = |period: f64| if period > 2.0 * log.step { SKEW_PERIODS * period } else { least };
+    width[SKEW_ATTITUDE] = slower(log.periods.attitude);
+    width[SKEW_AIRSPEED] = slower(log.periods.airspeed);
+    width[SKEW_VANES] = slower(log.periods.vanes);
+    width[SKEW_VELOCITY] = slower(log.periods.velocity);
+    width[GYRO..GYRO + 3].fill(0.05);
+    width[FORCE..FORCE + 3].fill(1.0);
+    width[ALPHA..=BETA].fill(5.0_f64.to_radians());
+    width[SCALE] = 0.2;
+    width[WIND..WIND + 2].fill(15.0);
+    // air rises and sinks, but not for the length of a flight
+    width[WIND + 2] = 1.0;
+    width[EARTH..EARTH + 2].copy_from_slice(&[1.3e-5, 4.2e-5]);
+    width
+}
+
+/// Means before the data is seen: zero but for the Earth's rate, 7.29e-5 rad/s at any latitude from −65°
+/// to 65°, whose north component is never negative. Its deviations are those of the same latitudes.
+pub fn prior_means() -> Values {
+    let mut mean = [0.0; COUNT];
+    mean[EARTH] = 5.8e-5;
+    mean
+}
+
+/// Whether the log has the sensor that a constant belongs to.
+pub fn concerned(place: usize, has: &Sensors) -> bool {
+    match place {
+        ALPHA => has.alpha,
+        BETA => has.beta,
+        SKEW_VANES => has.alpha || has.beta,
+        FORCE..=SKEW_FORCE => has.force,
+        SKEW_VELOCITY => has.velocity,
+        EARTH.. => false,
+        _ => true,
+    }
+}
+
+/// What would let the data see a constant that they do not.
+pub fn remedy(place: usize, has: &Sensors) -> &'static str {
+    match place {
+        SCALE | WIND..SKEW_ATTITUDE if !has.velocity => "log the velocity over ground",
+        SCALE | WIND..SKEW_ATTITUDE if !has.yaw => "log the heading",
+        SCALE | WIND..SKEW_ATTITUDE => "fly several headings",
+        ALPHA | BETA => "fly at several airspeeds and banks",
+        _ => "fly livelier manoeuvres",
+    }
+}
+
+/// The note on a constant that keeps its prior.
+pub fn unseen(place: usize, has: &Sensors, options: &Options) -> String {
+    format!(
+        "The data of {} cannot tell {}: it keeps its prior; {} to see it.",
+        options.name,
+        NAMES[place].0,
+        remedy(place, has)
+    )
+}

@@ -1,0 +1,265 @@
+//! The outcome: what the smoother found, as a reconstruction with its notes.
+
+use crate::num::statistics::mean;
+use crate::num::stream::stream;
+use crate::physics::{Controls, State};
+use crate::sysid::flight_path::actuator_skew::{self, Skew};
+use crate::sysid::flight_path::channel::wrap;
+use crate::sysid::flight_path::equations::{Found, Problem, no_path};
+use crate::sysid::flight_path::intake::{Log, Track};
+use crate::sysid::flight_path::kinematics::shifted;
+use crate::sysid::flight_path::nuisance::{
+    self, COUNT, FORCE, GYRO, SCALE, SKEW_FORCE, Values, WIND,
+};
+use crate::sysid::flight_path::path::{Path, flow_angles};
+use crate::sysid::flight_path::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
+use crate::sysid::flight_path::rotation::to_euler;
+use crate::sysid::flight_path::{ActuatorClock, Options, ReconstructError};
+
+/// Part of the prior width above which the data is said not to see a constant.
+const UNSEEN: f64 = 0.7;
+/// Gusts worth a note, m/s.
+const ROUGH: f64 = 0.1;
+/// Smallest delay of the actuators that is put right, samples: less is within what the regression that
+/// finds it leaves out.
+const CORRECTED: f64 = 0.25;
+
+/// Draws of the path's errors: their rms over a flight is then known to a few percent.
+const DRAWS: usize = 3;
+
+/// Puts together what is handed out.
+///
+/// # Errors
+/// [`ReconstructError::NoPath`] if the path's errors cannot be drawn.
+pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, ReconstructError> {
+    let Problem { log, options, .. } = *problem;
+    let mut segments = path_as_segments(log, found, &found.paths, None);
+    let mut notes = log.notes.clone();
+    declare(log, found, options, &mut notes);
+    let mut nuisances = nuisances(log, found);
+    let erring = draws(problem, found)?;
+    let left = left(&segments, &erring, &found.levels.gyro);
+    nuisances.extend(unmeasured_angles(log, found, &segments, &left));
+    let gusts = found.levels.gusts;
+    let skew = actuator_skew::estimate(&segments, &erring, log.step, problem.sampling, gusts);
+    let late = late_beyond_doubt(&skew, log.step);
+    if late && options.actuators_clock == ActuatorClock::AsRecorded {
+        notes.push(format!(
+            "The recorded actuators seem {:.1} ms late against the gyros, by their clock or by a lag that \
+             the record does not show; they are left as recorded.",
+            1e3 * skew.late
+        ));
+    } else if late {
+        correct(&mut segments, &skew, log.step);
+        notes.push(format!(
+            "The recorded actuators came {:.1} ms late against the gyros and were put right; a lag of \
+             the surfaces that the record does not show would look the same.",
+            1e3 * skew.late
+        ));
+    }
+    nuisances.push(Nuisance {
+        name: "skew_actuators".into(),
+        value: skew.late,
+        sd: skew.deviation,
+        unit: "s",
+    });
+    let l = &found.levels;
+    let m = &l.measured;
+    Ok(Reconstruction {
+        name: options.name.clone(),
+        step_s: log.step,
+        sampling: problem.sampling,
+        segments,
+        nuisances,
+        noise: [m[0], m[1], m[3], l.gyro[0], l.gyro[1], l.gyro[2], m[4], m[5]],
+        left,
+        force_noise: if log.has.force { l.force } else { [f64::NAN; 3] },
+        rudder: log.rudder,
+        notes,
+    })
+}
+
+/// Flights with one more error each like those that the path has.
+fn draws(problem: &Problem, found: &Found) -> Result<Vec<Vec<Segment>>, ReconstructError> {
+    let mut random = stream(0, &[]);
+    let draw = |_| {
+        let erring = problem.erring(found, &mut random)?;
+        Some(path_as_segments(problem.log, found, &erring.paths, Some(&erring.gyro)))
+    };
+    let all: Option<Vec<_>> = (0..DRAWS).map(draw).collect();
+    all.ok_or_else(|| no_path(&problem.options.name, "the equations became singular"))
+}
+
+/// Root mean square of the errors drawn, in the order of the state.
+fn left(segments: &[Segment], erring: &[Vec<Segment>], gyro: &[f64; 3]) -> [f64; 8] {
+    let (mut squares, mut count) = ([0.0; 8], 0.0_f64);
+    for draw in erring {
+        let pairs = segments.iter().zip(draw);
+        for (a, b) in pairs.flat_map(|(a, b)| a.instants.iter().zip(&b.instants)) {
+            let (a, b) = (a.state.to_array(), b.state.to_array());
+            for (i, sum) in squares.iter_mut().enumerate() {
+                let error = if i == 0 { wrap(b[i] - a[i]) } else { b[i] - a[i] };
+                *sum += error * error;
+            }
+            count += 1.0;
+        }
+    }
+    let mut left = squares.map(|sum| (sum / count).sqrt());
+    left[3..6].copy_from_slice(gyro);
+    left
+}
+
+/// The tracks along `paths`, the rates with the gyros' noise `gyro` on top.
+fn path_as_segments(
+    log: &Log,
+    found: &Found,
+    paths: &[Path],
+    gyro: Option<&[Vec<[f64; 3]>]>,
+) -> Vec<Segment> {
+    let pairs = log.tracks.iter().zip(paths).enumerate();
+    pairs
+        .map(|(i, (track, path))| segment(track, path, &found.values, log, gyro.map(|g| &g[i][..])))
+        .collect()
+}
+
+fn segment(
+    track: &Track,
+    path: &Path,
+    values: &Values,
+    log: &Log,
+    gyro: Option<&[[f64; 3]]>,
+) -> Segment {
+    let (force, _) = shifted(&track.force, values[SKEW_FORCE] / log.step);
+    let instant = |k: usize| {
+        let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
+        let air = path.air_velocity(k);
+        let [alpha, beta] = flow_angles(&air);
+        let noise = gyro.map_or([0.0; 3], |g| g[k]);
+        let [p, q, r] = std::array::from_fn(|i| track.rates[k][i] - values[GYRO + i] + noise[i]);
+        Instant {
+            time_s: track.start + k as f64 * log.step,
+            state: State { roll, pitch, airspeed: air.norm(), p, q, r, alpha, beta },
+            yaw: if log.has.yaw { yaw } else { f64::NAN },
+            controls: track.controls[k],
+            command: track.commands[k],
+            specific_force: std::array::from_fn(|i| force[k][i] - values[FORCE + i]),
+            altitude: track.altitude[k],
+            density: track.density[k],
+        }
+    };
+    Segment { instants: (0..track.len()).map(instant).collect() }
+}
+
+/// Whether the recorded deflections came late by more than the estimate may err.
+fn late_beyond_doubt(skew: &Skew, step: f64) -> bool {
+    skew.late.abs() >= CORRECTED * step && skew.late.abs() >= 2.0 * skew.deviation
+}
+
+/// Puts late deflections right, by linear interpolation.
+fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
+    let late = skew.late / step;
+    for segment in segments {
+        let recorded: Vec<Controls> = segment.instants.iter().map(|i| i.controls).collect();
+        let last = recorded.len() - 1;
+        for (k, instant) in segment.instants.iter_mut().enumerate() {
+            let place = (k as f64 + late).clamp(0.0, last as f64);
+            let (i, part) = (place as usize, place.fract());
+            let (a, b) = (&recorded[i], &recorded[(i + 1).min(last)]);
+            let mix = |a: f64, b: f64| a + part * (b - a);
+            instant.controls = Controls {
+                aileron: mix(a.aileron, b.aileron),
+                elevator: mix(a.elevator, b.elevator),
+                throttle: mix(a.throttle, b.throttle),
+            };
+        }
+    }
+}
+
+/// The constants that the log's sensors have, the airspeed scale as a factor.
+fn nuisances(log: &Log, smoothed: &Found) -> Vec<Nuisance> {
+    nuisance::ORDER
+        .into_iter()
+        .filter(|place| nuisance::concerned(*place, &log.has))
+        .map(|place| {
+            let (name, unit) = nuisance::NAMES[place];
+            let offset = if place == SCALE { 1.0 } else { 0.0 };
+            Nuisance {
+                name: name.into(),
+                value: offset + smoothed.values[place],
+                sd: smoothed.deviations[place],
+                unit,
+            }
+        })
+        .collect()
+}
+
+/// How well α and β are known where no vane measures them: by the wind and by the path. Their values are zero.
+fn unmeasured_angles(
+    log: &Log,
+    smoothed: &Found,
+    segments: &[Segment],
+    left: &[f64; 8],
+) -> Vec<Nuisance> {
+    let speeds: Vec<f64> =
+        segments.iter().flat_map(|s| s.instants.iter().map(|i| i.state.airspeed)).collect();
+    let airspeed = mean(&speeds).max(1.0);
+    let [north, east, down] = std::array::from_fn(|i| smoothed.deviations[WIND + i]);
+    let across = north.hypot(east) / std::f64::consts::SQRT_2;
+    let angles = [
+        ("alpha_path", log.has.alpha, down, left[6]),
+        ("beta_path", log.has.beta, across, left[7]),
+    ];
+    let unmeasured = angles.into_iter().filter(|(_, measured, ..)| !measured);
+    unmeasured
+        .map(|(name, _, wind, path)| Nuisance {
+            name: name.into(),
+            value: 0.0,
+            sd: (wind / airspeed).hypot(path),
+            unit: "rad",
+        })
+        .collect()
+}
+
+fn declare(log: &Log, smoothed: &Found, options: &Options, notes: &mut Vec<String>) {
+    let has = &log.has;
+    let mut note = |when: bool, text: &str| {
+        if when {
+            notes.push(text.into());
+        }
+    };
+    note(
+        !has.force,
+        "No accelerometers: the path between samples is smoothed, not driven, and forces cannot be \
+         compared.",
+    );
+    let vanes = match (has.alpha, has.beta) {
+        (true, true) => "",
+        (false, true) => "angle of attack",
+        (true, false) => "sideslip",
+        (false, false) => "angle of attack and sideslip",
+    };
+    if !vanes.is_empty() {
+        notes.push(format!(
+            "No vane for {vanes}: reconstructed from {}; gusts are not seen there, and effects of {vanes} \
+             are known less well.",
+            match (has.velocity, has.force) {
+                (true, true) => "the wind-corrected velocity and the inertial sensors",
+                (true, false) => "the wind-corrected velocity",
+                (false, true) => "the inertial sensors alone, so that a slow error remains",
+                (false, false) => "the airspeed and the attitude, which hardly hold it",
+            }
+        ));
+    }
+    let widths = nuisance::prior_widths(log);
+    for place in (0..COUNT).filter(|p| nuisance::concerned(*p, has)) {
+        if smoothed.deviations[place] > UNSEEN * widths[place] {
+            notes.push(nuisance::unseen(place, has, options));
+        }
+    }
+    if smoothed.levels.gusts > ROUGH {
+        notes.push(format!(
+            "The air was rough: gusts of about {:.1} m/s beside the mean wind.",
+            smoothed.levels.gusts
+        ));
+    }
+}

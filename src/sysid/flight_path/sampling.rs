@@ -1,0 +1,76 @@
+//! How a log's rates were sampled: as it says itself, or as its clocks bear out.
+//!
+//! A simulator that steps by explicit Euler logs the rate that it holds until the next sample. Read as a
+//! sample at an instant, that rate is half a sample period early, and every other sensor seems late by as
+//! much. A log that does not say how it was sampled is therefore read as samples at instants first. If all
+//! its clocks then agree on half a period, and agree on zero with held rates, the rates are held.
+//! Means over a sample period need no case of their own: their gyros are late by half a period, which the
+//! clock skews take up.
+
+use crate::logs::Sampling;
+use crate::sysid::flight_path::ReconstructError;
+use crate::sysid::flight_path::equations::{Found, Problem};
+use crate::sysid::flight_path::intake::Log;
+use crate::sysid::flight_path::nuisance::{
+    SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_FORCE, SKEW_VANES, SKEW_VELOCITY, concerned,
+};
+use crate::sysid::flight_path::smoother::smooth;
+
+/// Clocks that must agree.
+const FEWEST: usize = 2;
+/// A clock is known if its standard deviation is below this part of the sample period.
+const KNOWN: f64 = 0.1;
+/// Part of the sample period by which the clocks of one simulator may differ: the interpolation's error.
+const AGREE: f64 = 0.03;
+/// The same in standard deviations of each clock.
+const DEVIATIONS: f64 = 3.0;
+
+/// The sampling of a log with the path found under it, and what is to be said of the choice.
+pub struct Chosen {
+    /// What a rate sample stands for.
+    pub sampling: Sampling,
+    /// The path and the constants.
+    pub found: Found,
+    /// The evidence, if the log does not say it.
+    pub note: Option<String>,
+}
+
+/// Smooths the log of `problem` under the sampling `declared`, or under the one that its clocks bear out.
+///
+/// # Errors
+/// [`ReconstructError::NoPath`] if the search does not settle on numbers.
+pub fn choose(problem: &Problem, declared: Option<Sampling>) -> Result<Chosen, ReconstructError> {
+    let under = |sampling| smooth(&Problem { sampling, ..*problem });
+    if let Some(sampling) = declared {
+        return Ok(Chosen { sampling, found: under(sampling)?, note: None });
+    }
+    let instants = under(Sampling::Instants)?;
+    let step = problem.log.step;
+    if agree(problem.log, &instants, 0.5 * step)
+        && let Ok(held) = under(Sampling::Held)
+        && agree(problem.log, &held, 0.0)
+    {
+        let note = format!(
+            "Body rates hold for a sample period, as a stepping simulator's do: all clocks then agree; read \
+             as samples at instants, every sensor would be {:.1} ms late.",
+            500.0 * step
+        );
+        return Ok(Chosen { sampling: Sampling::Held, found: held, note: Some(note) });
+    }
+    Ok(Chosen { sampling: Sampling::Instants, found: instants, note: None })
+}
+
+/// Whether all known clocks of the log are `late` (s) against the gyros, and enough of them.
+fn agree(log: &Log, found: &Found, late: f64) -> bool {
+    let clocks = [SKEW_ATTITUDE, SKEW_AIRSPEED, SKEW_VANES, SKEW_VELOCITY, SKEW_FORCE];
+    let known: Vec<usize> = clocks
+        .into_iter()
+        .filter(|place| concerned(*place, &log.has))
+        .filter(|place| found.deviations[*place] < KNOWN * log.step)
+        .collect();
+    let close = |place: &usize| {
+        let bound = DEVIATIONS * found.deviations[*place] + AGREE * log.step;
+        (found.values[*place] - late).abs() < bound
+    };
+    known.len() >= FEWEST && known.iter().all(close)
+}

@@ -1,0 +1,134 @@
+//! The smoother: the path and the constants that fit all sensors best, by Gauss–Newton.
+//!
+//! First gusts are noise of the sensors of the air, with which motion and constants are fitted. Where the
+//! data find gusts likelier, the air then gusts along the path, the constants held; what gusts of that
+//! level may have done to the constants goes into their deviations. To seek path, gusts and constants
+//! together would find an airspeed scale far above one, for it makes every gust smaller.
+
+use nalgebra::Vector3;
+
+use crate::sysid::flight_path::ReconstructError;
+use crate::sysid::flight_path::equations::{Found, Problem, no_path};
+use crate::sysid::flight_path::gusts;
+use crate::sysid::flight_path::intake::Log;
+use crate::sysid::flight_path::levels::{CALM, Levels};
+use crate::sysid::flight_path::nuisance::WIND;
+use crate::sysid::flight_path::path::Path;
+
+/// Levels of gusts that are tried, m/s, then the factors around the best of them.
+const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
+const FINE: [f64; 3] = [2.0, 1.4, 1.2];
+/// Residuals beyond this many standard deviations count less.
+const BOUND: f64 = 4.0;
+/// Iterations with gusts.
+const GUSTY: usize = 4;
+/// Iterations before levels are taken from residuals, and in all.
+const FIRST: usize = 2;
+const LAST: usize = 25;
+/// The fit has settled where no constant moves by more than this part of its deviation, and no level
+/// by more than that part of itself.
+const SETTLED: f64 = 0.05;
+const LEVEL_SETTLED: f64 = 0.02;
+
+/// Smooths all stretches of the log together.
+///
+/// # Errors
+/// [`ReconstructError::NoPath`] if the search does not settle on numbers.
+pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
+    let Problem { log, options, means, widths, .. } = *problem;
+    let singular = || no_path(&options.name, "the equations became singular");
+    let mut found = Found {
+        paths: log.tracks.iter().map(Path::guess).collect(),
+        values: means,
+        deviations: widths,
+        levels: Levels::first(log),
+    };
+    start(&mut found, log);
+    for iteration in 0..LAST {
+        let bound = if iteration < FIRST { f64::INFINITY } else { BOUND };
+        let solved = problem.calm(&found, bound).ok_or_else(singular)?;
+        let moved = solved.apply(&mut found, &options.name)?;
+        if iteration < FIRST {
+            continue;
+        }
+        let change = found.levels.renew(&solved.readings, log.step);
+        if iteration > FIRST && moved < SETTLED && change < LEVEL_SETTLED {
+            break;
+        }
+    }
+    gusty(problem, &mut found, &singular)?;
+    Ok(found)
+}
+
+/// Lets the air gust along the path where the data find that likelier.
+fn gusty(
+    problem: &Problem,
+    found: &mut Found,
+    singular: &dyn Fn() -> ReconstructError,
+) -> Result<(), ReconstructError> {
+    // an airspeed alone, filtered and late as pitots are, would be taken for vertical gusts
+    if !(problem.log.has.alpha && problem.log.has.beta) {
+        return Ok(());
+    }
+    let mut trial = found.clone();
+    for channel in 3..6 {
+        trial.levels.measured[channel] = trial.levels.white[channel];
+        trial.levels.colour[channel] = 1.0;
+    }
+    trial.levels.gusts = likeliest_gusts(problem, &trial).ok_or_else(singular)?;
+    if trial.levels.gusts <= CALM {
+        return Ok(());
+    }
+    let deviations = gusts::deviations(problem, found, &trial, BOUND).ok_or_else(singular)?;
+    for _ in 0..GUSTY {
+        let solved = problem.held(&trial, BOUND).ok_or_else(singular)?;
+        solved.apply(&mut trial, &problem.options.name)?;
+    }
+    trial.deviations = deviations;
+    *found = trial;
+    Ok(())
+}
+
+/// The level of the gusts that the data find likeliest, m/s.
+fn likeliest_gusts(problem: &Problem, found: &Found) -> Option<f64> {
+    let mut trial = found.clone();
+    let mut misfit = |gusts: f64| {
+        trial.levels.gusts = gusts;
+        problem.misfit(&trial, f64::INFINITY)
+    };
+    let (mut best, mut least) = (CALM, misfit(CALM)?);
+    for coarse in COARSE {
+        let now = misfit(coarse)?;
+        if now > least {
+            break;
+        }
+        (best, least) = (coarse, now);
+    }
+    if best == CALM {
+        return Some(CALM);
+    }
+    for factor in FINE {
+        for fine in [best / factor, best * factor] {
+            let now = misfit(fine)?;
+            if now < least {
+                (best, least) = (fine, now);
+                break;
+            }
+        }
+    }
+    Some(best)
+}
+
+/// Sets out in the wind that the measurements leave.
+fn start(found: &mut Found, log: &Log) {
+    let mut sum = (Vector3::zeros(), 0.0);
+    for (path, track) in found.paths.iter().zip(&log.tracks) {
+        let (left, count) = path.wind_left(track);
+        sum = (sum.0 + left, sum.1 + count);
+    }
+    if sum.1 > 0.0 {
+        let wind = sum.0 / sum.1;
+        found.values[WIND..WIND + 3].copy_from_slice(wind.as_slice());
+        found.paths.iter_mut().for_each(|path| path.carry(wind));
+    }
+}

@@ -1,0 +1,324 @@
+//! A reconstructed flight made ready to be compared: on the models' clock, in the air, cut in windows.
+
+use std::borrow::Cow;
+use std::f64::consts::{PI, TAU};
+
+use crate::logs::Sampling;
+use crate::model::{GreyBox, Integrator, Memory, STEP};
+use crate::physics::State;
+use crate::physics::inputs::InputMemory;
+use crate::sysid::compare::CompareError;
+use crate::sysid::compare::result::{FlightResult, FlightTrace, NuisanceResult};
+use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction};
+use crate::sysid::weak_form::channels::RegimeVariable;
+use crate::sysid::weak_form::kernel::{Kernel, weigh};
+
+/// Slower than this (m/s) an aircraft of any size is taken to stand, not to fly.
+const FLYING_FLOOR: f64 = 3.0;
+
+/// A flight on the models' clock.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// Its name.
+    pub name: String,
+    /// Time between samples, s.
+    pub dt: f64,
+    /// Steps of [`STEP`] between samples.
+    pub substeps: usize,
+    /// What body rates and deflections stand for between samples.
+    pub sampling: Sampling,
+    /// Stretches in the air without gaps.
+    pub segments: Vec<Vec<Instant>>,
+    /// Noise of roll, pitch, airspeed, p, q, r, α, β that the reconstruction has left in; zero where
+    /// unknown.
+    pub noise: [f64; 8],
+    /// Noise of the accelerometers, m/s², likewise.
+    pub force_noise: [f64; 3],
+    /// The kernel on its clock.
+    pub kernel: Kernel,
+    /// The windows, in time order.
+    pub windows: Vec<Window>,
+}
+
+/// A window of the weak form.
+#[derive(Clone, Debug)]
+pub struct Window {
+    /// Which segment.
+    pub segment: usize,
+    /// Its first sample in the segment.
+    pub start: usize,
+    /// Its middle on the log's clock, s.
+    pub time_s: f64,
+    /// Where it lies, in the order of [`RegimeVariable::CONTINUOUS`] and their units.
+    pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
+}
+
+impl Prepared {
+    /// Puts `flight` on the models' clock and keeps what was flown faster than `slowest` (m/s).
+    ///
+    /// # Errors
+    /// [`CompareError::Clock`] if it has no clock.
+    pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Prepared, CompareError> {
+        let substeps = substeps(flight)?;
+        let dt = STEP * substeps as f64;
+        let segments: Vec<Vec<Instant>> = flight
+            .segments
+            .iter()
+            .flat_map(|segment| in_the_air(&segment.instants, slowest.max(FLYING_FLOOR)))
+            .map(|piece| on_clock(piece, flight.step_s, dt))
+            .filter(|piece| piece.len() > 1)
+            .collect();
+        let kernel = Kernel::hann(dt);
+        let left = |stated: f64, of: &dyn Fn(&Instant) -> f64| {
+            if stated.is_finite() { stated.min(white_noise(&segments, of)) } else { 0.0 }
+        };
+        let noise = std::array::from_fn(|k| left(flight.noise[k], &|i| i.state.to_array()[k]));
+        let force_noise =
+            std::array::from_fn(|k| left(flight.force_noise[k], &|i| i.specific_force[k]));
+        let first = flight.segments.iter().find_map(|s| s.instants.first());
+        let windows = windows(&segments, &kernel, first.map_or(0.0, |i| i.time_s));
+        Ok(Prepared {
+            name: flight.name.clone(),
+            dt,
+            substeps,
+            sampling: flight.sampling,
+            segments,
+            noise,
+            force_noise,
+            kernel,
+            windows,
+        })
+    }
+
+    /// The flight with the deflections that act under `model`'s input effects in place of the measured
+    /// ones.
+    pub fn acting(&self, model: &GreyBox) -> Cow<'_, Prepared> {
+        if model.acts_at_once() {
+            return Cow::Borrowed(self);
+        }
+        let mut acting = self.clone();
+        for instants in &mut acting.segments {
+            let Some(first) = instants.first() else { continue };
+            let mut memory = InputMemory::at_rest(&first.controls);
+            let mut before = first.controls;
+            for instant in instants {
+                let measured = instant.controls;
+                for j in 1..=self.substeps {
+                    let input = match self.sampling {
+                        Sampling::Held => measured,
+                        Sampling::Instants => {
+                            before.towards(&measured, j as f64 / self.substeps as f64)
+                        }
+                    };
+                    instant.controls = model.act(&input, &mut memory);
+                }
+                before = measured;
+            }
+        }
+        Cow::Owned(acting)
+    }
+
+    /// `model` with the integrator that this flight's samples call for: its own where the log holds what
+    /// a simulator holds, RK4 where it has samples at instants.
+    pub fn stepping<'a>(&self, model: &'a GreyBox) -> Cow<'a, GreyBox> {
+        match (self.sampling, model.integrator) {
+            (Sampling::Instants, Integrator::Jsbsim) => {
+                let mut model = model.clone();
+                model.integrator = Integrator::Rk4;
+                Cow::Owned(model)
+            }
+            _ => Cow::Borrowed(model),
+        }
+    }
+
+    /// The state of `model`, which must be [`Self::stepping`], one sample after `state`, the deflections
+    /// being those of sample `at` until the one after it, `next`.
+    pub fn advance(
+        &self,
+        model: &GreyBox,
+        state: State,
+        [at, next]: [&Instant; 2],
+        memory: &mut Memory,
+    ) -> State {
+        (0..self.substeps).fold(state, |s, j| {
+            let controls = match self.sampling {
+                Sampling::Held => at.controls,
+                Sampling::Instants => {
+                    let part = (j as f64 + 0.5) / self.substeps as f64;
+                    at.controls.towards(&next.controls, part)
+                }
+            };
+            model.step(&s, &controls, at.altitude, memory)
+        })
+    }
+
+    /// The samples of a window.
+    pub fn samples(&self, window: &Window) -> &[Instant] {
+        &self.segments[window.segment][window.start..=window.start + self.kernel.steps()]
+    }
+
+    /// Whether at least one window has specific force throughout.
+    pub fn has_force(&self) -> bool {
+        self.windows.iter().any(|w| self.force_in(w))
+    }
+
+    /// Whether a window has specific force throughout.
+    pub fn force_in(&self, window: &Window) -> bool {
+        self.samples(window).iter().all(|i| i.specific_force.iter().all(|f| f.is_finite()))
+    }
+
+    /// Number of samples.
+    pub fn sample_count(&self) -> usize {
+        self.segments.iter().map(Vec::len).sum()
+    }
+
+    /// What the result says of it, `from` being what it was made from.
+    pub fn result(&self, from: &Reconstruction) -> FlightResult {
+        let ends = |s: &Vec<Instant>| Some([s.first()?.time_s, s.last()?.time_s]);
+        let nuisance = |n: &crate::sysid::flight_path::reconstruction::Nuisance| NuisanceResult {
+            name: n.name.clone(),
+            value: n.value,
+            sd: n.sd,
+            unit: n.unit,
+        };
+        FlightResult {
+            name: self.name.clone(),
+            step_s: self.dt,
+            samples: self.sample_count(),
+            segments_s: self.segments.iter().filter_map(ends).collect(),
+            nuisances: from.nuisances.iter().map(nuisance).collect(),
+            notes: from.notes.clone(),
+            trace: self.trace(),
+        }
+    }
+
+    fn trace(&self) -> FlightTrace {
+        let mut trace = FlightTrace::default();
+        for segment in &self.segments {
+            for i in segment {
+                let z = i.controls;
+                push(&mut trace, i.time_s, i.state.to_array(), [z.aileron, z.elevator, z.throttle]);
+            }
+            if let Some(last) = segment.last() {
+                push(&mut trace, last.time_s + self.dt, [f64::NAN; 8], [f64::NAN; 3]);
+            }
+        }
+        trace
+    }
+}
+
+fn push(trace: &mut FlightTrace, time_s: f64, state: [f64; 8], controls: [f64; 3]) {
+    trace.time_s.push(time_s);
+    trace.states.iter_mut().zip(state).for_each(|(list, x)| list.push(x));
+    trace.controls.iter_mut().zip(controls).for_each(|(list, x)| list.push(x));
+}
+
+/// Model steps of [`STEP`] between samples of the models' clock: the nearest whole number.
+fn substeps(flight: &Reconstruction) -> Result<usize, CompareError> {
+    let step_s = flight.step_s;
+    if !(1e-6..=1.0).contains(&step_s) {
+        return Err(CompareError::Clock { flight: flight.name.clone(), step_s });
+    }
+    Ok(((step_s / STEP).round() as usize).max(1))
+}
+
+/// The samples of a stretch `dt` (s) apart: as they are if they are so already, else linear between
+/// them, deflections held.
+fn on_clock(instants: &[Instant], step_s: f64, dt: f64) -> Vec<Instant> {
+    if (step_s / dt - 1.0).abs() < 1e-6 {
+        return instants.to_vec();
+    }
+    let every = (dt / step_s).round() as usize;
+    if every > 1 && (dt / (step_s * every as f64) - 1.0).abs() < 1e-6 {
+        return instants.iter().step_by(every).copied().collect();
+    }
+    let count = ((instants.len() - 1) as f64 * step_s / dt).floor() as usize;
+    let at = |k: usize| {
+        let place = k as f64 * dt / step_s;
+        let i = (place.floor() as usize).min(instants.len() - 2);
+        between(&instants[i], &instants[i + 1], place - i as f64)
+    };
+    (0..=count).map(at).collect()
+}
+
+/// Standard deviation of white noise in a series, by third differences, which a smooth signal does
+/// not have: their variance is 1 + 9 + 9 + 1 = 20 times that of the noise.
+fn white_noise(segments: &[Vec<Instant>], of: &dyn Fn(&Instant) -> f64) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for four in segments.iter().flat_map(|s| s.windows(4)) {
+        let third = of(&four[3]) - of(&four[0]) - 3.0 * (of(&four[2]) - of(&four[1]));
+        if third.is_finite() {
+            sum += third * third;
+            count += 1.0;
+        }
+    }
+    if count > 0.0 { (sum / count / 20.0_f64).sqrt() } else { f64::INFINITY }
+}
+
+fn between(a: &Instant, b: &Instant, part: f64) -> Instant {
+    let mix = |x: f64, y: f64| x + (y - x) * part;
+    let (x, mut y) = (a.state.to_array(), b.state.to_array());
+    // roll the short way round
+    y[0] = x[0] + (y[0] - x[0] + PI).rem_euclid(TAU) - PI;
+    Instant {
+        time_s: mix(a.time_s, b.time_s),
+        state: State::from_array(std::array::from_fn(|k| mix(x[k], y[k]))),
+        specific_force: std::array::from_fn(|k| mix(a.specific_force[k], b.specific_force[k])),
+        altitude: mix(a.altitude, b.altitude),
+        density: mix(a.density, b.density),
+        ..*a
+    }
+}
+
+/// The pieces that are flown, finite throughout.
+fn in_the_air(instants: &[Instant], slowest: f64) -> impl Iterator<Item = &[Instant]> {
+    let flown = move |i: &Instant| {
+        let z = i.controls;
+        i.state.airspeed >= slowest
+            && i.state.is_finite()
+            && [z.aileron, z.elevator, z.throttle, i.altitude].iter().all(|x| x.is_finite())
+    };
+    instants.chunk_by(move |a, b| flown(a) && flown(b)).filter(|piece| piece.len() > 1)
+}
+
+fn windows(segments: &[Vec<Instant>], kernel: &Kernel, origin: f64) -> Vec<Window> {
+    let steps = kernel.steps();
+    let mut windows = Vec::new();
+    for (segment, instants) in segments.iter().enumerate() {
+        let count = instants.len().saturating_sub(steps);
+        for start in (0..count).step_by(kernel.stride()) {
+            let samples = &instants[start..=start + steps];
+            let time_s = 0.5 * (samples[0].time_s + samples[steps].time_s);
+            let regime = regime(samples, kernel, time_s - origin);
+            windows.push(Window { segment, start, time_s, regime });
+        }
+    }
+    windows
+}
+
+/// Where a window lies, each variable averaged with the kernel.
+fn regime(
+    samples: &[Instant],
+    kernel: &Kernel,
+    since_start: f64,
+) -> [f64; RegimeVariable::CONTINUOUS.len()] {
+    use RegimeVariable as V;
+    let mean = |of: fn(&Instant) -> f64| weigh(&kernel.sample, samples.iter().map(of));
+    let rate = |of: fn(&Instant) -> f64| weigh(&kernel.slope, samples.iter().map(of));
+    RegimeVariable::CONTINUOUS.map(|variable| match variable {
+        V::Alpha => mean(|i| i.state.alpha).to_degrees(),
+        V::Beta => mean(|i| i.state.beta).to_degrees(),
+        V::Airspeed => mean(|i| i.state.airspeed),
+        V::Throttle => mean(|i| i.controls.throttle),
+        V::P => mean(|i| i.state.p).to_degrees(),
+        V::Q => mean(|i| i.state.q).to_degrees(),
+        V::R => mean(|i| i.state.r).to_degrees(),
+        V::Aileron => mean(|i| i.controls.aileron).to_degrees(),
+        V::Elevator => mean(|i| i.controls.elevator).to_degrees(),
+        V::AileronRate => rate(|i| i.controls.aileron).to_degrees(),
+        V::ElevatorRate => rate(|i| i.controls.elevator).to_degrees(),
+        V::Altitude => mean(|i| i.altitude),
+        V::Time => since_start,
+        V::Flight => f64::NAN,
+    })
+}

@@ -1,0 +1,338 @@
+//! Channels in weak form: measured and predicted forces, moments and rates, window by window.
+//!
+//! Measured data is never differentiated: see [`Kernel`]. Products are
+//! formed before smoothing.
+
+use crate::logs::Sampling;
+use crate::model::{GreyBox, Integrator, Memory};
+use crate::num::Real;
+use crate::physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
+use crate::physics::{AirData, Channel, State, Wrench};
+use crate::sysid::flight_path::reconstruction::Instant;
+use crate::sysid::weak_form::channels::ChannelId;
+use crate::sysid::weak_form::kernel::{Kernel, weigh};
+use crate::sysid::weak_form::prepared::{Prepared, Window};
+
+/// Windows in which the sensitivity to sensor noise is worked out, a flight.
+const NOISE_WINDOWS: usize = 40;
+
+/// One channel of one flight.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Which.
+    pub channel: ChannelId,
+    /// Measured, a value a window, in the channel's unit; NaN where the log has no specific force.
+    pub measured: Vec<f64>,
+    /// Predicted, likewise.
+    pub predicted: Vec<f64>,
+    /// Variance that the sensors' noise brings into measured − predicted.
+    pub noise_variance: f64,
+}
+
+/// All channels of a flight under `model`, in the model's own force axes.
+///
+/// Forces need the accelerometers and are left out if the flight has none.
+pub fn channels(model: &GreyBox, flight: &Prepared) -> Vec<Series> {
+    let flight = &*flight.acting(model);
+    let steps: Vec<Vec<Vector<f64>>> = flight
+        .segments
+        .iter()
+        .map(|s| one_step_rates(&flight.stepping(model), s, flight))
+        .collect();
+    let both: Vec<[[f64; 2]; 9]> = flight
+        .windows
+        .iter()
+        .map(|w| window(model, flight, w, &steps[w.segment][w.start..]))
+        .collect();
+    let noise = noise_variance(model, flight);
+    let series = |(k, &channel): (usize, &ChannelId)| Series {
+        channel,
+        measured: both.iter().map(|w| w[k][0]).collect(),
+        predicted: both.iter().map(|w| w[k][1]).collect(),
+        noise_variance: noise[k],
+    };
+    let forces = if flight.has_force() { 0 } else { 3 };
+    ChannelId::ALL.iter().enumerate().skip(forces).map(series).collect()
+}
+
+/// Measured and predicted in one window, in the order of [`ChannelId::ALL`].
+fn window(
+    model: &GreyBox,
+    flight: &Prepared,
+    window: &Window,
+    rates: &[Vector<f64>],
+) -> [[f64; 2]; 9] {
+    let (kernel, samples) = (&flight.kernel, flight.samples(window));
+    let mut both = [[f64::NAN; 2]; 9];
+    if flight.force_in(window) {
+        let measured = smooth(&kernel.sample, samples.iter().map(|i| measured_force(model, i)));
+        let predicted = smooth(&kernel.sample, samples.iter().map(|i| predicted_force(model, i)));
+        set(&mut both[..3], measured, predicted);
+    }
+    let at_instants = flight.sampling == Sampling::Instants;
+    let average = |of: &dyn Fn(&Instant, &Instant) -> Vector<f64>| match at_instants {
+        true => smooth(&kernel.sample, samples.iter().map(|i| of(i, i))),
+        false => smooth(&kernel.step, steps(samples, model.integrator).map(|s| s.average(of))),
+    };
+    let turning = average(&|i, _| gyroscopic(&model.body, &i.state));
+    let measured = measured_moment(model, samples, kernel, turning);
+    set(&mut both[3..6], measured, average(&|i, z| moment(model, i, z)));
+    let slope = |of: fn(&State) -> f64| weigh(&kernel.slope, samples.iter().map(|i| of(&i.state)));
+    let measured = [slope(|s| s.airspeed), slope(|s| s.alpha), slope(|s| s.beta)];
+    set(&mut both[6..], measured, smooth(&kernel.step, rates.iter().copied()));
+    both
+}
+
+fn set(both: &mut [[f64; 2]], measured: Vector<f64>, predicted: Vector<f64>) {
+    for (k, place) in both.iter_mut().enumerate() {
+        *place = [measured[k], predicted[k]];
+    }
+}
+
+fn smooth(weights: &[f64], values: impl Iterator<Item = Vector<f64>>) -> Vector<f64> {
+    let mut sum = [0.0; 3];
+    for (w, x) in weights.iter().zip(values) {
+        (0..3).for_each(|k| sum[k] += w * x[k]);
+    }
+    sum
+}
+
+/// A step between two samples, as an integrator sees it.
+struct Step<'a> {
+    from: &'a Instant,
+    /// The end, for schemes that evaluate within the step: controls are still those of the start.
+    to: Option<&'a Instant>,
+}
+
+fn steps(samples: &[Instant], integrator: Integrator) -> impl Iterator<Item = Step<'_>> {
+    samples.windows(2).map(move |pair| Step {
+        from: &pair[0],
+        to: (integrator == Integrator::Rk4).then_some(&pair[1]),
+    })
+}
+
+impl Step<'_> {
+    /// The mean of `f(state instant, controls instant)` over the step: its start for explicit
+    /// Euler, both ends under the start's controls for RK4.
+    fn average(&self, f: impl Fn(&Instant, &Instant) -> Vector<f64>) -> Vector<f64> {
+        let start = f(self.from, self.from);
+        match self.to {
+            None => start,
+            Some(to) => {
+                let end = f(to, self.from);
+                std::array::from_fn(|k| 0.5 * (start[k] + end[k]))
+            }
+        }
+    }
+}
+
+/// D less thrust, L, Y from the accelerometers, N, in the order of [`ChannelId::ALL`].
+fn measured_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
+    let air = model.air(&at.state, at.altitude);
+    let force = at.specific_force.map(|f| f * model.body.mass);
+    to_force_axes(force, &air, model.axes)
+}
+
+fn predicted_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
+    let air = model.air(&at.state, at.altitude);
+    let wrench = model.wrench(&at.state, &at.controls, &air);
+    to_force_axes(rigid_body::body_force(&wrench, &air, model.axes), &air, model.axes)
+}
+
+/// The inverse of [`rigid_body::body_force`]: D less thrust, L, Y.
+pub(in crate::sysid) fn to_force_axes<R: Real>(
+    force: Vector<R>,
+    air: &AirData<R>,
+    axes: ForceAxes,
+) -> Vector<R> {
+    let [drag, side, lift] = rigid_body::aerodynamic_force(force, air, axes);
+    [drag, lift, side]
+}
+
+/// Σ K (J Δω/Δt + ω × Jω), N m, with the model's inertia; `turning` is the second term.
+fn measured_moment(
+    model: &GreyBox,
+    samples: &[Instant],
+    kernel: &Kernel,
+    turning: Vector<f64>,
+) -> Vector<f64> {
+    let rate = |of: fn(&State) -> f64| weigh(&kernel.slope, samples.iter().map(|i| of(&i.state)));
+    let spin = [rate(|s| s.p), rate(|s| s.q), rate(|s| s.r)];
+    let momentum = inertia(&model.body, spin);
+    std::array::from_fn(|k| momentum[k] + turning[k])
+}
+
+/// J ω.
+pub(in crate::sysid) fn inertia<R: Real>(body: &RigidBody, w: Vector<R>) -> Vector<R> {
+    [
+        w[0].scale(body.jx) - w[2].scale(body.jxz),
+        w[1].scale(body.jy),
+        w[2].scale(body.jz) - w[0].scale(body.jxz),
+    ]
+}
+
+/// ω × J ω.
+pub(in crate::sysid) fn gyroscopic<R: Real>(body: &RigidBody, state: &State<R>) -> Vector<R> {
+    let w = [state.p, state.q, state.r];
+    let h = inertia(body, w);
+    [w[1] * h[2] - w[2] * h[1], w[2] * h[0] - w[0] * h[2], w[0] * h[1] - w[1] * h[0]]
+}
+
+fn moment(model: &GreyBox, at: &Instant, controls: &Instant) -> Vector<f64> {
+    let air = model.air(&at.state, at.altitude);
+    let wrench = model.wrench(&at.state, &controls.controls, &air);
+    [Channel::Roll, Channel::Pitch, Channel::Yaw].map(|c| wrench.get(c))
+}
+
+/// Rates of V, α, β that the model's integrator makes of each step, 1/s.
+fn one_step_rates(model: &GreyBox, segment: &[Instant], flight: &Prepared) -> Vec<Vector<f64>> {
+    let mut memory = Memory::default();
+    let mut rate = |k: usize| {
+        let (at, next) = (&segment[k], &segment[(k + 1).min(segment.len() - 1)]);
+        let (a, b) = (at.state, flight.advance(model, at.state, [at, next], &mut memory));
+        [b.airspeed - a.airspeed, b.alpha - a.alpha, b.beta - a.beta].map(|x| x / flight.dt)
+    };
+    (0..segment.len()).map(&mut rate).collect()
+}
+
+/// What the sensors' noise, taken as white, brings into each channel's residual: variances in the
+/// order of [`ChannelId::ALL`].
+fn noise_variance(model: &GreyBox, flight: &Prepared) -> [f64; 9] {
+    let kernel = &flight.kernel;
+    let squares = |w: &[f64]| w.iter().map(|x| x * x).sum::<f64>();
+    let (average, slope) = (squares(&kernel.sample), squares(&kernel.slope));
+    let every = flight.windows.len().div_ceil(NOISE_WINDOWS).max(1);
+    let some: Vec<&Instant> = flight
+        .windows
+        .iter()
+        .step_by(every)
+        .map(|w| &flight.samples(w)[kernel.steps() / 2])
+        .collect();
+    let mut variance = measured_noise(model, flight, average, slope);
+    for at in &some {
+        let part = state_noise(model, at, &flight.noise);
+        (0..9).for_each(|k| variance[k] += average * part[k] / some.len() as f64);
+    }
+    variance
+}
+
+/// The part that enters through what the kernel weighs: accelerations, rates, airspeed, α, β.
+fn measured_noise(model: &GreyBox, flight: &Prepared, average: f64, slope: f64) -> [f64; 9] {
+    let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|sd| sd * sd);
+    let [fx, fy, fz] = flight.force_noise.map(|sd| (model.body.mass * sd).powi(2));
+    let body = &model.body;
+    let [jx, jy, jz, jxz] = [body.jx, body.jy, body.jz, body.jxz].map(|j| j * j);
+    let force = [fx, fz, fy].map(|x| average * x);
+    let moment = [jx * p + jxz * r, jy * q, jz * r + jxz * p].map(|x| slope * x);
+    let path = [v, alpha, beta].map(|x| slope * x);
+    std::array::from_fn(|k| [force, moment, path][k / 3][k % 3])
+}
+
+/// The variance that the state's noise brings into one sample of the residual, by central differences.
+fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
+    let mut variance = [0.0; 9];
+    for (k, sd) in noise.iter().enumerate().filter(|(_, sd)| **sd > 0.0) {
+        let moved = |by: f64| {
+            let mut x = at.state.to_array();
+            x[k] += by;
+            residual(model, &Instant { state: State::from_array(x), ..*at })
+        };
+        let (up, down) = (moved(*sd), moved(-sd));
+        (0..9).for_each(|c| variance[c] += (0.5 * (up[c] - down[c])).powi(2));
+    }
+    variance
+}
+
+/// Predicted less what the state's noise moves of the measured side too: the forces turned by α and
+/// β, the gyroscopic moments.
+pub(in crate::sysid) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
+    let (force, measured) = (predicted_force(model, at), measured_force(model, at));
+    let known = at.specific_force.iter().all(|f| f.is_finite());
+    let force = std::array::from_fn(|k| force[k] - if known { measured[k] } else { 0.0 });
+    let rate = model.rate(&at.state, &at.controls, at.altitude);
+    let turning = gyroscopic(&model.body, &at.state);
+    let moment = moment(model, at, at);
+    let moment = std::array::from_fn(|k| moment[k] - turning[k]);
+    std::array::from_fn(|k| [force, moment, [rate.airspeed, rate.alpha, rate.beta]][k / 3][k % 3])
+}
+
+/// The linear part of a model in weak form: what one unit of each coefficient contributes.
+#[derive(Clone, Debug)]
+pub struct Columns {
+    /// Names of the coefficients, as in the model.
+    pub names: Vec<String>,
+    /// `values[coefficient][channel][window]`, channels D, L, Y, l, m, n. Multiplied by the
+    /// coefficients and added up they are [`Series::predicted`].
+    pub values: Vec<[Vec<f64>; 6]>,
+}
+
+/// The columns of `model` over the windows of `flight`, to regress the measured channels on.
+///
+/// Shape constants and those of effects on inputs or inertia have columns of zeros: the model is not
+/// linear in them, or they act on the measured side.
+pub fn columns(model: &GreyBox, flight: &Prepared) -> Columns {
+    let flight = &*flight.acting(model);
+    let names: Vec<String> = model.coefficients().iter().map(|c| c.name.clone()).collect();
+    let mut values: Vec<[Vec<f64>; 6]> =
+        vec![std::array::from_fn(|_| vec![0.0; flight.windows.len()]); names.len()];
+    for (w, window) in flight.windows.iter().enumerate() {
+        let mut add = |index: usize, channel: usize, amount: f64| {
+            values[index][channel][w] += amount;
+        };
+        let samples = flight.samples(window);
+        for (weight, at) in flight.kernel.sample.iter().zip(samples) {
+            force_columns(model, at, *weight, &mut add);
+        }
+        if flight.sampling == Sampling::Instants {
+            for (weight, at) in flight.kernel.sample.iter().zip(samples) {
+                moment_columns(model, at, at, *weight, &mut add);
+            }
+            continue;
+        }
+        for (weight, step) in flight.kernel.step.iter().zip(steps(samples, model.integrator)) {
+            let part = if step.to.is_some() { 0.5 } else { 1.0 };
+            moment_columns(model, step.from, step.from, weight * part, &mut add);
+            if let Some(to) = step.to {
+                moment_columns(model, to, step.from, weight * part, &mut add);
+            }
+        }
+    }
+    Columns { names, values }
+}
+
+fn force_columns(
+    model: &GreyBox,
+    at: &Instant,
+    weight: f64,
+    add: &mut impl FnMut(usize, usize, f64),
+) {
+    let air = model.air(&at.state, at.altitude);
+    model.contributions(&at.state, &at.controls, &air, |index, channel, amount: f64| {
+        if matches!(channel, Channel::Drag | Channel::Lift | Channel::Side | Channel::BodyX) {
+            let mut wrench = Wrench::zero();
+            wrench.add(channel, weight * amount);
+            let force = rigid_body::body_force(&wrench, &air, model.axes);
+            let force = to_force_axes(force, &air, model.axes);
+            (0..3).for_each(|k| add(index, k, force[k]));
+        }
+    });
+}
+
+fn moment_columns(
+    model: &GreyBox,
+    at: &Instant,
+    controls: &Instant,
+    weight: f64,
+    add: &mut impl FnMut(usize, usize, f64),
+) {
+    let air = model.air(&at.state, at.altitude);
+    model.contributions(&at.state, &controls.controls, &air, |index, channel, amount: f64| {
+        let place = match channel {
+            Channel::Roll => 3,
+            Channel::Pitch => 4,
+            Channel::Yaw => 5,
+            Channel::Drag | Channel::Lift | Channel::Side | Channel::BodyX => return,
+        };
+        add(index, place, weight * amount);
+    });
+}
