@@ -17,11 +17,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use greylag::commands::fly::{self, POLICY, crew};
+use greylag::commands::fly::{self, POLICY, companion_with};
 use greylag::control::{Kind, build};
 use greylag::flight::desk::Desk;
 use greylag::flight::pilot::{Config, Pilot};
-use greylag::flight::runtime::{Crew, Flight, Options, Pace, Seat};
+use greylag::flight::runtime::{Companion, Flight, Options, Pace, Placement};
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 use greylag::link::framing::{FrameCounts, Frames};
 use greylag::link::offboard::{Heard, OffboardClient};
@@ -135,7 +135,7 @@ fn in_process(model: &GreyBox, hours: f64, opposite: &str) -> Result<()> {
         }
         other => bail!("{other}: known are sitl, px4, ardupilot"),
     };
-    let mut desk = Desk::new(crew(Kind::Lqi, model, Path::new(POLICY))?, vehicle);
+    let mut desk = Desk::new(companion_with(Kind::Lqi, model, Path::new(POLICY))?, vehicle);
     let steps = (hours * 360_000.0) as u64;
     let begun = Instant::now();
     let (mut down, mut up) = (Vec::new(), Vec::new());
@@ -234,8 +234,11 @@ fn through_sockets(model: &GreyBox, hours: f64) -> Result<()> {
     let config = Config { offboard_loss_s: 60.0, ..Config::for_model(model)? };
     let controller = build(Kind::Lqi, model)?;
     let pilot = Pilot::new(config, controller.boxed_clone())?;
-    let flight =
-        Flight::start(&options, Crew { pilot, controller, seat: Seat::Loop }, stop.clone())?;
+    let flight = Flight::start(
+        &options,
+        Companion { pilot, controller, placement: Placement::Loop },
+        stop.clone(),
+    )?;
     let vehicle = flight.vehicle.context("no vehicle link")?;
     let client = flight.clients.first().copied().flatten().context("no client link")?;
     let shim_options = ShimOptions {

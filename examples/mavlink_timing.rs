@@ -24,7 +24,7 @@ use greylag::control::cem::Change;
 use greylag::control::{self, Kind, Target, build};
 use greylag::flight::pilot::{Config, Pilot};
 use greylag::flight::recorder::Place;
-use greylag::flight::runtime::{Crew, Flight, Options, Pace, Seat, Summary};
+use greylag::flight::runtime::{Companion, Flight, Options, Pace, Placement, Summary};
 use greylag::link::autopilot::Mode;
 use greylag::link::offboard::{Heard, OffboardClient};
 use greylag::logs::Sample;
@@ -240,7 +240,8 @@ fn flight(
     let folder = room.path().join("flight");
     let stop = Arc::new(AtomicBool::new(false));
     let options = options(model, pace, &folder)?;
-    let companion = Flight::start(&options, crew(kind, model, changes, pace)?, stop.clone())?;
+    let companion =
+        Flight::start(&options, companion_with(kind, model, changes, pace)?, stop.clone())?;
     let vehicle = companion.vehicle.context("no vehicle link")?;
     let client = companion.clients.first().copied().flatten().context("no client link")?;
     let simulator = simulate(vehicle, pace, seconds, stop.clone())?;
@@ -271,18 +272,23 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<Options> {
 
 /// The controller with an LQI as its fallback. In lockstep the aircraft's seconds are milliseconds of the
 /// client's, so that it may be silent for longer of them.
-fn crew(kind: Kind, model: &GreyBox, changes: &[Change], pace: Pace) -> Result<Crew> {
+fn companion_with(
+    kind: Kind,
+    model: &GreyBox,
+    changes: &[Change],
+    pace: Pace,
+) -> Result<Companion> {
     let mut config = Config::for_model(model)?;
     if pace == Pace::Lockstep {
         config.offboard_loss_s = 60.0;
     }
     let controller = fly::controller(kind, model, Path::new(fly::POLICY), changes)?;
     let pilot = Pilot::new(config, build(Kind::Lqi, model)?)?;
-    let seat = match kind.pace() {
-        control::Pace::Planned => Seat::Thread,
-        control::Pace::Immediate => Seat::Loop,
+    let placement = match kind.pace() {
+        control::Pace::Planned => Placement::Thread,
+        control::Pace::Immediate => Placement::Loop,
     };
-    Ok(Crew { pilot, controller, seat })
+    Ok(Companion { pilot, controller, placement })
 }
 
 type Simulation = JoinHandle<Result<shim::Summary, shim::ShimError>>;

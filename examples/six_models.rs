@@ -22,7 +22,7 @@ use serde::Serialize;
 use greylag::control::lqi::Lqi;
 use greylag::control::{self, Controller, Kind, Target};
 use greylag::learn::dynamics::export;
-use greylag::learn::dynamics::residual_map::portrait;
+use greylag::learn::dynamics::residual_map::residual_map;
 use greylag::learn::dynamics::score::{Horizon, free_run};
 use greylag::learn::dynamics::windows::Track;
 use greylag::learn::{Criterion, JXZ, Learned, Recipe, Start, Trainer};
@@ -198,7 +198,7 @@ fn main() -> Result<()> {
         let everything = held_out.concat();
         rows.push(Row {
             model: way.name,
-            ratio: portrait(&model, &tracks(&model, &everything)).map_or(0.0, |p| p.ratio),
+            ratio: residual_map(&model, &tracks(&model, &everything)).map_or(0.0, |p| p.ratio),
             coefficients: errors(&learned),
             learned,
             prior: score(&prior),

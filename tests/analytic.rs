@@ -29,7 +29,7 @@ fn the_reward_climbs() {
     // one part of the episode's four has a start in it, so ten updates see the same mixture
     let (first, last) = (mean(&rewards[..8]), mean(&rewards[52..]));
     println!("mean reward of a step: {first:.3} at the start, {last:.3} after 60 updates");
-    // at a slope of nought it would stay where it was; the best policies earn −0.06
+    // at a slope of zero it would stay where it was; the best policies earn −0.06
     assert!(last > 0.7 * first, "{first} {last}");
 }
 

@@ -184,7 +184,8 @@ fn columns_times_coefficients_are_the_prediction() {
     for name in ["prior", "jsbsim"] {
         let model = model(name);
         let flight = Prepared::new(&exact()[0], 5.0).unwrap();
-        let (columns, series) = (windows::columns(&model, &flight), windows::channels(&model, &flight));
+        let (columns, series) =
+            (windows::columns(&model, &flight), windows::channels(&model, &flight));
         assert_eq!(columns.names.len(), model.coefficients().len());
         for (k, series) in series.iter().take(6).enumerate() {
             for (w, predicted) in series.predicted.iter().enumerate() {

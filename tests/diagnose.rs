@@ -52,7 +52,7 @@ fn flown_with(
     let lqi = control::build(Kind::Lqi, &exact()).unwrap();
     let hidden: Vec<Hidden> =
         hidden.iter().map(|(id, amount)| Hidden::new(id, *amount).unwrap()).collect();
-    let one = |(k, schedule): (usize, &control::schedule::Schedule)| {
+    let one = |(k, schedule): (usize, &greylag::manoeuvres::Schedule)| {
         let plant = PlantOptions { hidden: hidden.clone(), ..PlantOptions::default() };
         let flown = fly_within_bounds(&plant, &*lqi, schedule).unwrap();
         let instruments = Instruments::drawn(10 * seed + k as u64);

@@ -10,7 +10,7 @@ use std::time::Duration;
 use flight_support::*;
 use greylag::control::{Controller, Kind, Observation, Target};
 use greylag::flight::recorder::Place;
-use greylag::flight::runtime::{Pace, Seat};
+use greylag::flight::runtime::{Pace, Placement};
 use greylag::logs::csv::{self, Tolerance};
 use greylag::physics::Command;
 use mavlink::dialects::ardupilotmega::*;
@@ -198,7 +198,7 @@ fn lockstep_flight(kind: Kind) -> Vec<Answer> {
     let options = options(Pace::Lockstep);
     let companion = Companion::with(
         &options,
-        greylag::commands::fly::crew(kind, x8(), std::path::Path::new("")).unwrap(),
+        greylag::commands::fly::companion_with(kind, x8(), std::path::Path::new("")).unwrap(),
     );
     let mut vehicle = Vehicle::new(companion.vehicle());
     vehicle.step(Trouble::None, PATIENCE).unwrap();
@@ -242,9 +242,10 @@ fn a_planner_that_is_always_late_leaves_the_fallback_flying_and_is_recorded() {
     let root = tempfile::tempdir().unwrap();
     let mut options = options(Pace::RealTime);
     options.record = Some(Place::Exactly(root.path().join("flight")));
-    let mut crew = greylag::commands::fly::crew(Kind::Lqi, x8(), std::path::Path::new("")).unwrap();
-    (crew.controller, crew.seat) = (Box::new(Slow), Seat::Thread);
-    let companion = Companion::with(&options, crew);
+    let mut companion =
+        greylag::commands::fly::companion_with(Kind::Lqi, x8(), std::path::Path::new("")).unwrap();
+    (companion.controller, companion.placement) = (Box::new(Slow), Placement::Thread);
+    let companion = Companion::with(&options, companion);
     let vehicle = Vehicle::new(companion.vehicle()).on_the_wall();
     let mut client = Client::new(companion.client(0));
     client.engage(20.0, 5.0);

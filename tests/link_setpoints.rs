@@ -118,7 +118,7 @@ fn two_clients_cannot_steer_at_once() {
     }
     assert_eq!((double.setpoints.len(), clients.counts().contested_setpoints), (20, 20));
     assert!(double.setpoints.iter().all(|s| s.roll > 1.0));
-    // The first one falls silent at 1.9 s: a second later the helm is free.
+    // The first one falls silent at 1.9 s: a second later control authority is free.
     send(&mut clients, &mut double, 2899, 2, setpoint([1.0, 0.0, 0.0, 0.0], 0.5, 7));
     assert_eq!(double.setpoints.len(), 20);
     send(&mut clients, &mut double, 2900, 2, setpoint([1.0, 0.0, 0.0, 0.0], 0.5, 7));

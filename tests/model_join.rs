@@ -88,7 +88,7 @@ fn coefficients_of_a_joined_effect_are_its_own() {
 }
 
 #[test]
-fn what_an_effect_replaces_is_nought_and_held() {
+fn what_an_effect_replaces_is_zero_and_held() {
     let mut model = shipped("prior");
     let signed = |model: &GreyBox| {
         let named = model.coefficients().iter().find(|c| c.name == "drag_linear.CDde").unwrap();

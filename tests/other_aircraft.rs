@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use flight_support::*;
-use greylag::commands::fly::crew;
+use greylag::commands::fly::companion_with;
 use greylag::control::Kind;
 use greylag::flight::recorder::Place;
 use greylag::flight::runtime::Pace;
@@ -53,7 +53,8 @@ fn recorded_deflections_are_those_flown_at_another_travel() {
     let mut options = options(Pace::Lockstep);
     options.deflection = TRAVEL_RAD;
     options.record = Some(Place::Exactly(folder.path().join("flight")));
-    let companion = Companion::with(&options, crew(Kind::Lqi, &model, Path::new("")).unwrap());
+    let companion =
+        Companion::with(&options, companion_with(Kind::Lqi, &model, Path::new("")).unwrap());
     let truth = folder.path().join("truth.csv");
     let link = format!("udpout:{}", companion.vehicle());
     let shim = Shim::start(&link, shim::Pace::Lockstep, 10.0, |shim| {

@@ -23,7 +23,7 @@ impl<R> Terms<R> for Reported<R> {
 
 const GEOMETRY: Geometry = Geometry { area: 0.75, span: 2.1, chord: 0.3571 };
 
-/// A point at which nothing is nought.
+/// A point at which nothing is zero.
 const STATE: State = State {
     roll: 0.4,
     pitch: -0.3,
@@ -55,7 +55,7 @@ fn made(kind: Kind, shape: &[f64], base: &Base) -> Vec<(usize, Channel, f64)> {
     reported.0
 }
 
-/// A base in which nothing is nought.
+/// A base in which nothing is zero.
 fn base() -> Base {
     let mut wrench = Wrench::zero();
     Channel::ALL.iter().enumerate().for_each(|(i, c)| wrench.add(*c, 1.0 + i as f64));

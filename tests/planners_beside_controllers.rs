@@ -8,7 +8,7 @@ use std::path::Path;
 
 use controller_support::{Bench, profile};
 use flight_support::x8;
-use greylag::commands::fly::{POLICY, crew};
+use greylag::commands::fly::{POLICY, companion_with};
 use greylag::control::Kind;
 use greylag::flight::desk::Desk;
 use greylag::link::vehicle::{Authority, Real, Vehicle};
@@ -26,8 +26,8 @@ fn flown(kind: Kind, personality: Personality, seed: u64) -> [f64; LEGS.len()] {
         options.noise = Noise::REALISTIC;
     });
     let real = Real::new(profile(personality, Authority::Surfaces));
-    let crew = crew(kind, x8(), Path::new(POLICY)).unwrap();
-    bench.desk = Desk::new(crew, Vehicle::Real(Box::new(real)));
+    let companion = companion_with(kind, x8(), Path::new(POLICY)).unwrap();
+    bench.desk = Desk::new(companion, Vehicle::Real(Box::new(real)));
     // Commands meet the controller's samples of every 20 ms at once, or a state later.
     bench.run(6.0 + 0.01 * seed as f64);
     bench.engage(0.0, 3.0);

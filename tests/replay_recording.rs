@@ -14,11 +14,11 @@ use std::time::{Duration, Instant};
 
 use controller_support::profile;
 use flight_support::*;
-use greylag::commands::fly::{POLICY, crew};
+use greylag::commands::fly::{POLICY, companion_with};
 use greylag::control::{Controller, Kind, Observation, Target};
 use greylag::flight::recorder::Place;
 use greylag::flight::replay::{Outcome, replay};
-use greylag::flight::runtime::{Options, Pace, Seat};
+use greylag::flight::runtime::{Options, Pace, Placement};
 use greylag::link::vehicle::{Authority, Real, Sitl, Vehicle};
 use greylag::logs::csv::{self, Tolerance};
 use greylag_sitl::shim::{self, Noise, Personality};
@@ -29,7 +29,7 @@ use shim_support::Shim;
 
 /// Replays with a fresh LQI.
 fn again(folder: &Path, vehicle: Vehicle) -> Outcome {
-    replay(folder, crew(Kind::Lqi, x8(), Path::new(POLICY)).unwrap(), vehicle).unwrap()
+    replay(folder, companion_with(Kind::Lqi, x8(), Path::new(POLICY)).unwrap(), vehicle).unwrap()
 }
 
 fn sitl() -> Vehicle {
@@ -68,7 +68,8 @@ fn a_flight_with_everything_in_it_replays_to_the_bit() {
     assert_eq!((outcome.different, outcome.plans_different, outcome.without_state), (0, 0, 0));
     // Another controller gives other commands: the comparison can fail.
     let other =
-        replay(&folder, crew(Kind::PidRetuned, x8(), Path::new(POLICY)).unwrap(), sitl()).unwrap();
+        replay(&folder, companion_with(Kind::PidRetuned, x8(), Path::new(POLICY)).unwrap(), sitl())
+            .unwrap();
     assert!(other.different > 300, "{other:?}");
 }
 
@@ -82,7 +83,7 @@ struct Sluggish {
 impl Sluggish {
     fn new(slow: bool) -> Sluggish {
         Sluggish {
-            lqi: crew(Kind::Lqi, x8(), Path::new(POLICY)).unwrap().controller,
+            lqi: companion_with(Kind::Lqi, x8(), Path::new(POLICY)).unwrap().controller,
             asked: 0,
             slow,
         }
@@ -116,14 +117,14 @@ impl Controller for Sluggish {
 fn a_flight_whose_planner_is_busy_at_times_replays_to_the_bit() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("flight");
-    let crewed = |slow: bool, seat: Seat| {
-        let mut crew = crew(Kind::Lqi, x8(), Path::new(POLICY)).unwrap();
-        (crew.controller, crew.seat) = (Box::new(Sluggish::new(slow)), seat);
-        crew
+    let staffed = |slow: bool, placement: Placement| {
+        let mut companion = companion_with(Kind::Lqi, x8(), Path::new(POLICY)).unwrap();
+        (companion.controller, companion.placement) = (Box::new(Sluggish::new(slow)), placement);
+        companion
     };
     let record = Some(Place::Exactly(folder.clone()));
     let options = Options { record, ..options(Pace::RealTime) };
-    let companion = Companion::with(&options, crewed(true, Seat::Thread));
+    let companion = Companion::with(&options, staffed(true, Placement::Thread));
     let link = format!("udpout:{}", companion.vehicle());
     let shim = Shim::start(&link, shim::Pace::RealTime, 600.0, |_| ());
     let mut client = Client::new(companion.client(0));
@@ -133,7 +134,7 @@ fn a_flight_whose_planner_is_busy_at_times_replays_to_the_bit() {
     println!("{}", companion.end());
     let calls = std::fs::read_to_string(folder.join("flight.calls")).unwrap();
     assert!(calls.lines().filter(|line| line.ends_with(" busy")).count() > 5);
-    let outcome = replay(&folder, crewed(false, Seat::Loop), sitl()).unwrap();
+    let outcome = replay(&folder, staffed(false, Placement::Loop), sitl()).unwrap();
     println!("{outcome:?}");
     assert!(outcome.ticks > 200 && !outcome.cut_short, "{outcome:?}");
     assert_eq!((outcome.different, outcome.plans_different, outcome.without_state), (0, 0, 0));
@@ -166,8 +167,8 @@ fn flown_beside(personality: Personality, folder: &Path) -> String {
     client.texts().join("\n")
 }
 
-/// What is left of a recording without the lines that say when the controller gave the helm over.
-fn without_the_helm(folder: &Path, to: &Path) {
+/// What is left of a recording without the lines that say when the controller gave control authority over.
+fn without_authority(folder: &Path, to: &Path) {
     std::fs::create_dir(to).unwrap();
     std::fs::copy(folder.join("flight.tlog"), to.join("flight.tlog")).unwrap();
     let calls = std::fs::read_to_string(folder.join("flight.calls")).unwrap();
@@ -190,9 +191,9 @@ fn a_flight_with_a_check_of_signs_replays_to_the_bit() {
         let unchecked = again(&folder, real(personality, Authority::Attitude));
         println!("without the check: {unchecked:?}");
         assert!(unchecked.different > 20, "{unchecked:?}");
-        // A check that never begins is never over: without the helm it is level flight to the end.
+        // A check that never begins is never over: without control authority it is level flight to the end.
         let waiting = root.path().join("waiting");
-        without_the_helm(&folder, &waiting);
+        without_authority(&folder, &waiting);
         let waiting = again(&waiting, real(personality, Authority::Surfaces));
         assert!(waiting.different > 200, "{waiting:?}");
     }

@@ -184,7 +184,7 @@ fn start(model: &GreyBox, id: &str, starts: &Starts) -> Result<Vec<f64>> {
     Ok(own.map(|c| c.value).collect())
 }
 
-/// The fitted parameters of `missing` beside the hidden ones; those hidden as nought are left out, for
+/// The fitted parameters of `missing` beside the hidden ones; those hidden as zero are left out, for
 /// an error in per cent means nothing there.
 fn parameters(missing: &Missing, fit: &Fit) -> Vec<Found> {
     let own = |name: &str| name.starts_with(&format!("{}.", missing.id));

@@ -14,15 +14,15 @@ use comfy_table::presets::NOTHING;
 use rayon::prelude::*;
 
 use crate::commands::choices;
-use crate::commands::fly::{self, POLICY, crew};
+use crate::commands::fly::{self, POLICY, companion_with};
 use crate::control::Kind as ControllerKind;
-use crate::sim::faults::{Case, Cause, Kind, Opposite, Report, Works};
+use crate::sim::faults::{Case, Cause, CompanionFactory, Counterpart, Kind, Report};
 use ledger::{Entry, Ledger};
 
 /// The arguments of `greylag faults`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Flights with each controller at each opposite.
+    /// Flights with each controller at each counterpart.
     #[arg(long, value_name = "N", default_value_t = 100)]
     flights: u64,
     /// Seed of the first flight; the others follow.
@@ -42,7 +42,7 @@ pub struct Arguments {
     model: PathBuf,
     /// What is at the other end of the vehicle's link.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["sitl", "px4", "ardupilot"], value_enum)]
-    opposite: Vec<Opposite>,
+    counterpart: Vec<Counterpart>,
     /// Show what befell each flight with a finding, and what was said.
     #[arg(long)]
     show: bool,
@@ -51,18 +51,18 @@ pub struct Arguments {
     resume: Option<PathBuf>,
 }
 
-impl ValueEnum for Opposite {
+impl ValueEnum for Counterpart {
     fn value_variants<'a>() -> &'a [Self] {
-        &Opposite::ALL
+        &Counterpart::ALL
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.name()).help(match self {
-            Opposite::Sitl => "The simulator's shim",
-            Opposite::Px4 => "PX4 by surfaces",
-            Opposite::Px4Attitude => "PX4 by attitude",
-            Opposite::Ardupilot => "ArduPilot by channels",
-            Opposite::ArdupilotAttitude => "ArduPilot by attitude",
+            Counterpart::Sitl => "The simulator's shim",
+            Counterpart::Px4 => "PX4 by surfaces",
+            Counterpart::Px4Attitude => "PX4 by attitude",
+            Counterpart::Ardupilot => "ArduPilot by channels",
+            Counterpart::ArdupilotAttitude => "ArduPilot by attitude",
         }))
     }
 }
@@ -77,16 +77,17 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let ledger = arguments.resume.as_deref().map(Ledger::open).transpose()?;
     let mut entries = Vec::new();
     for &controller in &arguments.controller {
-        let works = Works::new(crew(controller, &model, POLICY.as_ref())?, &model)?;
+        let factory =
+            CompanionFactory::new(companion_with(controller, &model, POLICY.as_ref())?, &model)?;
         let before = entries.len();
-        for &opposite in &arguments.opposite {
+        for &counterpart in &arguments.counterpart {
             let seeds = arguments.first..arguments.first + arguments.flights;
             let fly = |seed| -> Result<Entry> {
-                let case = Case { seed, controller, opposite };
+                let case = Case { seed, controller, counterpart };
                 if let Some(known) = ledger.as_ref().and_then(|ledger| ledger.find(&case)) {
                     return Ok(known);
                 }
-                let report = works.fly(case)?;
+                let report = factory.fly(case)?;
                 if arguments.show && !report.findings.is_empty() {
                     show(&report);
                 }
@@ -99,23 +100,23 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             let flown: Result<Vec<Entry>> = seeds.into_par_iter().map(fly).collect();
             entries.extend(flown?);
         }
-        print_faults(controller, &arguments.opposite, &entries[before..]);
+        print_faults(controller, &arguments.counterpart, &entries[before..]);
     }
     print_findings(&entries);
     let failed = entries.iter().any(|entry| entry.findings.iter().any(|f| f.is_failure()));
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// Fault against opposite: flights with that fault among theirs, of these the flights with a finding.
-fn print_faults(controller: ControllerKind, opposites: &[Opposite], entries: &[Entry]) {
+/// Fault against counterpart: flights with that fault among theirs, of these the flights with a finding.
+fn print_faults(controller: ControllerKind, counterparts: &[Counterpart], entries: &[Entry]) {
     println!("\n{}: findings of flights of 60 s with each fault", controller.name());
     let mut table = Table::new();
     table.load_style(NOTHING);
-    table.set_header(["fault"].into_iter().chain(opposites.iter().map(|o| o.name())));
+    table.set_header(["fault"].into_iter().chain(counterparts.iter().map(|o| o.name())));
     for kind in Kind::ALL {
-        let cells = opposites.iter().map(|opposite| {
+        let cells = counterparts.iter().map(|counterpart| {
             let with = entries.iter().filter(|e| {
-                e.opposite == opposite.name() && e.faults().iter().any(|f| f.kind == kind)
+                e.counterpart == counterpart.name() && e.faults().iter().any(|f| f.kind == kind)
             });
             let (all, found) = with.fold((0, 0), |(all, found), e| {
                 (all + 1, found + usize::from(!e.findings.is_empty()))
@@ -165,7 +166,7 @@ fn show(report: &Report) {
 mod tests {
     use super::*;
     use crate::control::{Controller, Observation, Target};
-    use crate::flight::runtime::Crew;
+    use crate::flight::runtime::Companion;
     use crate::physics::Command;
     use crate::sim::faults::Finding;
 
@@ -176,20 +177,24 @@ mod tests {
         pool.install(test);
     }
 
-    fn works() -> Works {
+    fn factory() -> CompanionFactory {
         let model = fly::model("params/x8/jsbsim.toml".as_ref(), None).unwrap();
-        Works::new(crew(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap(), &model).unwrap()
+        CompanionFactory::new(
+            companion_with(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap(),
+            &model,
+        )
+        .unwrap()
     }
 
     #[test]
     fn a_few_flights_with_every_fault_leave_the_companion_sound() {
         roomy(|| {
-            let works = works();
-            // Each kind of fault comes first once in so many seeds; the opposites share them out.
+            let factory = factory();
+            // Each kind of fault comes first once in so many seeds; the counterparts share them out.
             for seed in 0..Kind::ALL.len() as u64 {
-                let opposite = Opposite::ALL[seed as usize % Opposite::ALL.len()];
-                let case = Case { seed, controller: ControllerKind::Lqi, opposite };
-                let report = works.fly(case).unwrap();
+                let counterpart = Counterpart::ALL[seed as usize % Counterpart::ALL.len()];
+                let case = Case { seed, controller: ControllerKind::Lqi, counterpart };
+                let report = factory.fly(case).unwrap();
                 let entry = Entry::from(&report);
                 assert!(
                     !entry.findings.iter().any(|f| f.is_failure()),
@@ -205,9 +210,10 @@ mod tests {
     #[test]
     fn a_flight_repeats_from_its_seed() {
         roomy(|| {
-            let works = works();
-            let case = Case { seed: 7, controller: ControllerKind::Lqi, opposite: Opposite::Px4 };
-            let [one, two] = [works.fly(case).unwrap(), works.fly(case).unwrap()];
+            let factory = factory();
+            let case =
+                Case { seed: 7, controller: ControllerKind::Lqi, counterpart: Counterpart::Px4 };
+            let [one, two] = [factory.fly(case).unwrap(), factory.fly(case).unwrap()];
             assert_eq!(one.findings, two.findings);
             assert_eq!(one.texts, two.texts);
             assert!(!one.texts.is_empty());
@@ -238,11 +244,12 @@ mod tests {
     fn what_a_controller_does_without_any_fault_is_laid_to_no_fault() {
         roomy(|| {
             let model = fly::model("params/x8/jsbsim.toml".as_ref(), None).unwrap();
-            let lqi = crew(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap();
-            let hardover = Crew { controller: Box::new(Hardover), ..lqi };
-            let works = Works::new(hardover, &model).unwrap();
-            let case = Case { seed: 0, controller: ControllerKind::Lqi, opposite: Opposite::Sitl };
-            let report = works.fly(case).unwrap();
+            let lqi = companion_with(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap();
+            let hardover = Companion { controller: Box::new(Hardover), ..lqi };
+            let factory = CompanionFactory::new(hardover, &model).unwrap();
+            let case =
+                Case { seed: 0, controller: ControllerKind::Lqi, counterpart: Counterpart::Sitl };
+            let report = factory.fly(case).unwrap();
             let entry = Entry::from(&report);
             let rolled = entry.findings.iter().find(|f| f.finding == "attitude").unwrap();
             assert_eq!(rolled.standing(), "by itself", "{:?}", entry.findings);
@@ -253,11 +260,14 @@ mod tests {
     #[test]
     fn a_full_disk_is_told_and_flown_on_with() {
         roomy(|| {
-            let works = works();
+            let factory = factory();
             let disk = Kind::ALL.iter().position(|kind| *kind == Kind::Disk).unwrap() as u64;
-            let case =
-                Case { seed: disk, controller: ControllerKind::Lqi, opposite: Opposite::Sitl };
-            let report = works.fly(case).unwrap();
+            let case = Case {
+                seed: disk,
+                controller: ControllerKind::Lqi,
+                counterpart: Counterpart::Sitl,
+            };
+            let report = factory.fly(case).unwrap();
             assert!(
                 report.texts.iter().any(|(_, t)| t.contains("recording of flight")),
                 "{report:?}"

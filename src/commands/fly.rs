@@ -17,7 +17,9 @@ use crate::control::policy::Agent;
 use crate::control::{self, Controller, Kind, Needs, Source, build};
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
-use crate::flight::runtime::{Crew, Event, Flight, Options, Pace, Seat, Signing, VehicleLink};
+use crate::flight::runtime::{
+    Companion, Event, Flight, Options, Pace, Placement, Signing, VehicleLink,
+};
 use crate::link::address::Address;
 use crate::link::autopilot::Severity;
 use crate::link::vehicle::{Authority, Profile, Stack};
@@ -158,16 +160,16 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// has been started then.
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let model = model(&arguments.model, arguments.airframe.as_deref())?;
-    let mut crew = crew(arguments.controller, &model, &arguments.policy)?;
+    let mut companion = companion_with(arguments.controller, &model, &arguments.policy)?;
     if let Some(path) = &arguments.schedule {
-        crew.pilot.follow(Schedule::load(path)?);
+        companion.pilot.follow(Schedule::load(path)?);
     }
     let options = options(arguments, &model);
     let stop = Arc::new(AtomicBool::new(false));
     let told = stop.clone();
     ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))
         .context("setting the handler of Ctrl-C")?;
-    let flight = Flight::start(&options, crew, stop)?;
+    let flight = Flight::start(&options, companion, stop)?;
     announce(arguments, &flight);
     show_events(&flight, &arguments.vehicle);
     let summary =
@@ -230,7 +232,7 @@ pub fn controller(
 ///
 /// # Errors
 /// If the policy cannot be used, the model does not allow a controller, or has no level flight.
-pub fn crew(kind: Kind, model: &GreyBox, folder: &Path) -> anyhow::Result<Crew> {
+pub fn companion_with(kind: Kind, model: &GreyBox, folder: &Path) -> anyhow::Result<Companion> {
     let controller = controller(kind, model, folder, &[])?;
     // The design of an LQI takes a moment; it is not made twice.
     let fallback = if matches!(kind, Kind::Lqi | Kind::LqiDamped) {
@@ -239,8 +241,9 @@ pub fn crew(kind: Kind, model: &GreyBox, folder: &Path) -> anyhow::Result<Crew> 
         fallback(model)?
     };
     let pilot = Pilot::new(Config::for_model(model)?, fallback)?;
-    let seat = if kind.pace() == control::Pace::Planned { Seat::Thread } else { Seat::Loop };
-    Ok(Crew { pilot, controller, seat })
+    let placement =
+        if kind.pace() == control::Pace::Planned { Placement::Thread } else { Placement::Loop };
+    Ok(Companion { pilot, controller, placement })
 }
 
 fn fallback(model: &GreyBox) -> anyhow::Result<Box<dyn Controller>> {

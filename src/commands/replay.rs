@@ -49,11 +49,11 @@ pub struct Arguments {
 /// If a file cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, arguments.airframe.as_deref())?;
-    let mut crew = fly::crew(arguments.controller, &model, &arguments.policy)?;
+    let mut companion = fly::companion_with(arguments.controller, &model, &arguments.policy)?;
     if let Some(path) = &arguments.schedule {
-        crew.pilot.follow(Schedule::load(path)?);
+        companion.pilot.follow(Schedule::load(path)?);
     }
-    let outcome = replay(&arguments.folder, crew, vehicle(arguments, &model))?;
+    let outcome = replay(&arguments.folder, companion, vehicle(arguments, &model))?;
     print(&outcome);
     let exact = outcome.different == 0 && outcome.without_state <= u64::from(outcome.cut_short);
     Ok(if exact && outcome.ticks > 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })

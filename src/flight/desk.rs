@@ -8,7 +8,7 @@ use std::time::Duration;
 use crate::control::Controller;
 use crate::flight::pilot::{Decision, Pilot, Plan};
 use crate::flight::recorder::{Recorder, Row};
-use crate::flight::runtime::Crew;
+use crate::flight::runtime::Companion;
 use crate::link::autopilot::{Autopilot, Severity, Text, Verdict};
 use crate::link::peer::{LinkId, PeerId, SERIAL};
 use crate::link::vehicle::{Notice, Order, Outputs, Telemetry, Vehicle};
@@ -33,16 +33,16 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// A companion at a vehicle that is not heard yet. The crew's controller flies in the loop,
+    /// A companion at a vehicle that is not heard yet. The companion's controller flies in the loop,
     /// wherever it would sit otherwise.
-    pub fn new(crew: Crew, vehicle: Vehicle) -> Self {
-        let mut pilot = crew.pilot;
+    pub fn new(companion: Companion, vehicle: Vehicle) -> Self {
+        let mut pilot = companion.pilot;
         if vehicle.has_channels() {
             pilot.check_signs();
         }
         Desk {
             pilot,
-            controller: crew.controller,
+            controller: companion.controller,
             vehicle,
             outputs: Outputs::Disarmed,
             anchor: None,

@@ -7,7 +7,7 @@ use std::time::Duration;
 use crate::control::Controller;
 use crate::flight::pilot::{Plan, Request};
 use crate::flight::recorder::call::{Call, CallError, HEADER, Planned, same};
-use crate::flight::runtime::Crew;
+use crate::flight::runtime::Companion;
 use crate::link::autopilot::Autopilot;
 use crate::link::framing::{FrameCounts, Frames, frame_len};
 use crate::link::peer::{LinkId, PeerId, SERIAL};
@@ -135,12 +135,16 @@ impl States {
     }
 }
 
-/// Replays the recording in `folder` with `crew` at `vehicle`, both as fresh as in flight.
+/// Replays the recording in `folder` with `companion` at `vehicle`, both as fresh as in flight.
 ///
 /// # Errors
 /// If a file cannot be read, or is none of a recording.
-pub fn replay(folder: &Path, crew: Crew, vehicle: Vehicle) -> Result<Outcome, ReplayError> {
-    replay_watched(folder, crew, vehicle, &mut |_, _, _| ())
+pub fn replay(
+    folder: &Path,
+    companion: Companion,
+    vehicle: Vehicle,
+) -> Result<Outcome, ReplayError> {
+    replay_watched(folder, companion, vehicle, &mut |_, _, _| ())
 }
 
 /// What sees every planned tick of a replay: its time, what the controller was asked, and the controller
@@ -153,7 +157,7 @@ pub type Watch<'a> = dyn FnMut(Time, &Request, &dyn Controller) + 'a;
 /// As [`replay`].
 pub fn replay_watched(
     folder: &Path,
-    crew: Crew,
+    companion: Companion,
     vehicle: Vehicle,
     watch: &mut Watch,
 ) -> Result<Outcome, ReplayError> {
@@ -165,12 +169,12 @@ pub fn replay_watched(
     let tlog = file("flight.tlog");
     let bytes = std::fs::read(&tlog).map_err(failed(tlog.clone()))?;
     let states = States { vehicle, bytes, at: 0, ready: VecDeque::new() };
-    let mut crew = crew;
+    let mut companion = companion;
     if states.vehicle.has_channels() {
-        crew.pilot.check_signs();
+        companion.pilot.check_signs();
     }
     let outcome = Outcome::default();
-    let mut replayed = Replayed { crew, states, watch, outcome, owed: false };
+    let mut replayed = Replayed { companion, states, watch, outcome, owed: false };
     let mut lines = text.split_inclusive('\n').enumerate().peekable();
     match lines.next() {
         Some((_, first)) if first.trim_end() == HEADER => {}
@@ -194,7 +198,7 @@ pub fn replay_watched(
 
 struct Replayed<'w, 'f> {
     watch: &'w mut Watch<'f>,
-    crew: Crew,
+    companion: Companion,
     states: States,
     outcome: Outcome,
     /// An engagement that the planner had not been told of, because it was busy.
@@ -204,7 +208,7 @@ struct Replayed<'w, 'f> {
 impl Replayed<'_, '_> {
     /// Makes one call; `false` when the telemetry has ended. Verdicts were given in flight.
     fn make(&mut self, call: &Call) -> bool {
-        let pilot = &mut self.crew.pilot;
+        let pilot = &mut self.companion.pilot;
         match *call {
             Call::Advance(now) => pilot.advance(now),
             Call::Arm(now, force) => drop(pilot.arm(now, force)),
@@ -227,7 +231,7 @@ impl Replayed<'_, '_> {
             self.outcome.cut_short |= ended;
             return !ended;
         };
-        let request = self.crew.pilot.observe(state.time, &state);
+        let request = self.companion.pilot.observe(state.time, &state);
         let told = request.filter(|_| planned != Planned::Busy);
         if told.is_none() {
             self.owed |= request.is_some_and(|request| request.engage);
@@ -236,10 +240,10 @@ impl Replayed<'_, '_> {
             let engage = request.engage || std::mem::take(&mut self.owed);
             let request = Request { engage, ..request };
             if request.engage {
-                self.crew.controller.reset(SEED);
+                self.companion.controller.reset(SEED);
             }
-            let command = self.crew.controller.command(&request.observation, &request.target);
-            (self.watch)(time, &request, self.crew.controller.as_ref());
+            let command = self.companion.controller.command(&request.observation, &request.target);
+            (self.watch)(time, &request, self.companion.controller.as_ref());
             command
         });
         let plan = match planned {
@@ -252,7 +256,7 @@ impl Replayed<'_, '_> {
             Planned::Busy => Plan::Busy,
             Planned::None => Plan::None,
         };
-        let decision = self.crew.pilot.decide(plan);
+        let decision = self.companion.pilot.decide(plan);
         // A real controller's session models the actuators by what it has sent.
         self.states.vehicle.answer(host, state.time, &decision.demand());
         self.outcome.ticks += 1;

@@ -7,7 +7,7 @@
 mod commands;
 mod counts;
 mod due;
-mod helm;
+mod setpoint_authority;
 mod outbox;
 mod parameters;
 mod session;
@@ -27,9 +27,9 @@ use super::wire::request::{self, MissionStep, Recipient, Request};
 use super::wire::telemetry::Home;
 use crate::physics::Time;
 pub use counts::ClientCounts;
-use helm::Helm;
 use outbox::Outbox;
 use session::{Session, Stay};
+use setpoint_authority::SetpointAuthority;
 use setpoints::OTHER_SETPOINT;
 
 /// Sessions at most.
@@ -67,8 +67,8 @@ pub struct Clients {
     home: Option<Home>,
     was_armed: bool,
     text_id: u16,
-    setpoint_helm: Helm,
-    stick_helm: Helm,
+    setpoint_authority: SetpointAuthority,
+    stick_authority: SetpointAuthority,
     counts: ClientCounts,
     next_summary: Duration,
     bad_at_summary: u64,
@@ -87,8 +87,8 @@ impl Clients {
             home: None,
             was_armed: false,
             text_id: 0,
-            setpoint_helm: Helm::default(),
-            stick_helm: Helm::default(),
+            setpoint_authority: SetpointAuthority::default(),
+            stick_authority: SetpointAuthority::default(),
             counts: ClientCounts::default(),
             next_summary: Duration::ZERO,
             bad_at_summary: 0,
@@ -131,8 +131,8 @@ impl Clients {
     /// Forgets a peer, as when its connection has closed.
     pub fn forget(&mut self, peer: PeerId) {
         self.sessions.retain(|s| s.peer != peer);
-        self.setpoint_helm.release(peer);
-        self.stick_helm.release(peer);
+        self.setpoint_authority.release(peer);
+        self.stick_authority.release(peer);
     }
 
     /// Takes one datagram, or some bytes of whole frames, from a peer.

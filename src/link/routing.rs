@@ -18,7 +18,7 @@ pub enum Way {
     Controller,
     /// It is for us alone.
     Ours,
-    /// It goes nowhere: it would take the helm from whoever has it, or give a key away.
+    /// It goes nowhere: it would take control authority from whoever has it, or give a key away.
     Nowhere,
 }
 

@@ -83,7 +83,7 @@ pub struct Demand {
 pub enum Notice {
     /// A line for the ground stations.
     Text(Severity, String),
-    /// The controller has given us the helm.
+    /// The controller has given us control authority.
     Engaged,
     /// The controller was asked to take the aircraft, for this reason, and has not confirmed it.
     Released(String),

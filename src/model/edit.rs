@@ -39,7 +39,7 @@ pub struct Edit {
     /// Coefficients of effects that are new, those of one effect in a row, with the source of the
     /// effect's formula.
     pub added: Vec<(Number, String)>,
-    /// Coefficients that become nought, each with the effect that stands in its place.
+    /// Coefficients that become zero, each with the effect that stands in its place.
     pub dropped: Vec<(String, &'static str)>,
     /// Texts that stand in place of what the file has: keys, the last of them below the others.
     pub replaced: Vec<(&'static [&'static str], &'static str)>,
@@ -124,12 +124,12 @@ fn entry<'a>(effects: &'a mut dyn TableLike, name: &str) -> Result<&'a mut Item,
     item.ok_or_else(|| EditError::Place(format!("effects.{name}")))
 }
 
-/// Makes the coefficient `name` nought for the sake of the effect `by`.
+/// Makes the coefficient `name` zero for the sake of the effect `by`.
 fn drop_coefficient(effects: &mut dyn TableLike, name: &str, by: &str) -> Result<(), EditError> {
     let place = || EditError::Place(format!("effects.{name}"));
     let item = entry(effects, name)?;
     let table = item.as_table_like_mut().ok_or_else(place)?;
-    let source = format!("greylag amend: nought, {by} stands in its place");
+    let source = format!("greylag amend: zero, {by} stands in its place");
     for (key, new) in [("value", 0.0.into()), ("source", Value::from(source))] {
         let old = table.get_mut(key).and_then(Item::as_value_mut).ok_or_else(place)?;
         replace(old, new);
@@ -224,7 +224,7 @@ CLq = { value = 3.87, sd = 0.1, source = "Gryte" } # damps
         assert_eq!(dropped["value"].as_float(), Some(0.0));
         assert!(dropped.get("sd").is_none());
         let source = dropped["source"].as_str();
-        assert_eq!(source, Some("greylag amend: nought, lift_table stands in its place"));
+        assert_eq!(source, Some("greylag amend: zero, lift_table stands in its place"));
         assert_eq!(read["effects"]["lift_stall"]["k"]["value"].as_float(), Some(1.0));
         // amended again, the source tells of the last fit only
         let again = Edit { fitted_to: "b.csv".into(), added: Vec::new(), ..edit() };

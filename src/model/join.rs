@@ -68,7 +68,7 @@ pub enum JoinError {
 
 impl GreyBox {
     /// Adds the effect `id` with `values` of its coefficients, in its own order. What it stands in the place of
-    /// becomes nought, and stays so in a fit.
+    /// becomes zero, and stays so in a fit.
     ///
     /// # Errors
     /// The effect is unknown, there already or needs a table, or the values are not possible.
@@ -103,7 +103,7 @@ impl GreyBox {
         Ok(())
     }
 
-    /// The effect in whose favour the coefficient `name` is nought, if there is one.
+    /// The effect in whose favour the coefficient `name` is zero, if there is one.
     pub fn replaced(&self, name: &str) -> Option<&'static str> {
         let gone = self.coefficients.iter().any(|c| c.name == name && c.value == 0.0);
         self.effects().find(|about| gone && about.replaces.contains(&name)).map(|about| about.id)

@@ -5,7 +5,7 @@ use super::{
     Choice, ChoiceOption, Curves, Figure, HeatCell, HeatMap, Page, Section, Series, Style, Table,
     XyFigure, XyMark, XySeries,
 };
-use crate::learn::dynamics::residual_map::{Cell, Portrait};
+use crate::learn::dynamics::residual_map::{Cell, ResidualMap};
 use crate::learn::dynamics::score::Horizon;
 use crate::learn::{Learned, Moment};
 use crate::report::kit::numbers::{number, percent};
@@ -26,7 +26,7 @@ pub struct TrainingReport<'a> {
     /// Errors of the learned model on the same.
     pub learned: &'a [Horizon],
     /// What the residual adds, where there is one.
-    pub residual: Option<&'a Portrait>,
+    pub residual: Option<&'a ResidualMap>,
     /// What the reader must know.
     pub notes: &'a [String],
     /// Things and their values: files, hashes, options.
@@ -37,8 +37,8 @@ impl TrainingReport<'_> {
     /// The page of the training.
     pub fn page(&self) -> Page {
         let mut sections = vec![self.errors(), self.losses(), self.tracks()];
-        if let Some(portrait) = self.residual {
-            sections.extend([shares(portrait), curves(portrait), map(portrait)]);
+        if let Some(residual_map) = self.residual {
+            sections.extend([shares(residual_map), curves(residual_map), map(residual_map)]);
         }
         sections.push(self.notes());
         sections.push(self.provenance());
@@ -169,11 +169,11 @@ impl TrainingReport<'_> {
     }
 }
 
-fn shares(portrait: &Portrait) -> Section {
+fn shares(residual_map: &ResidualMap) -> Section {
     let columns =
         [("Rate of", Left), ("Prior", Right), ("Residual", Right), ("Strongest at", Left)];
     let mut table = Table::new("What the residual adds", &columns);
-    for share in &portrait.channels {
+    for share in &residual_map.channels {
         let place = share
             .strongest
             .as_ref()
@@ -184,14 +184,14 @@ fn shares(portrait: &Portrait) -> Section {
         "Root mean square in units of x_c a second over the flights held out; ‖F_a‖/‖F_p‖ is {}. A \
          residual that stands out in one regime is an effect that the prior lacks: `greylag diagnose` \
          says which.",
-        number(portrait.ratio)
+        number(residual_map.ratio)
     );
     Section::new("The residual", &note, vec![Figure::Table(table)])
 }
 
-fn curves(portrait: &Portrait) -> Section {
+fn curves(residual_map: &ResidualMap) -> Section {
     let mut options: Vec<ChoiceOption> = Vec::new();
-    for curve in portrait.curves.iter().filter(|c| c.points.iter().any(|p| p[2] > 0.0)) {
+    for curve in residual_map.curves.iter().filter(|c| c.points.iter().any(|p| p[2] > 0.0)) {
         let column = |i: usize| -> Vec<f64> { curve.points.iter().map(|p| p[i]).collect() };
         let figure = Figure::Xy(XyFigure {
             title: format!("{} over {}", curve.channel, curve.over),
@@ -220,9 +220,9 @@ fn curves(portrait: &Portrait) -> Section {
     Section::new("Where it acts", "", vec![Figure::Choice(choice)])
 }
 
-fn map(portrait: &Portrait) -> Section {
+fn map(residual_map: &ResidualMap) -> Section {
     let edges = |get: &dyn Fn(&Cell) -> f64, half: f64| -> Vec<f64> {
-        let mut all: Vec<f64> = portrait.map.iter().map(get).collect();
+        let mut all: Vec<f64> = residual_map.map.iter().map(get).collect();
         all.sort_by(f64::total_cmp);
         all.dedup();
         let (Some(low), Some(high)) = (all.first(), all.last()) else { return Vec::new() };
@@ -232,12 +232,12 @@ fn map(portrait: &Portrait) -> Section {
     let [half_alpha, half_beta] = crate::learn::dynamics::residual_map::HALF_CELL_DEG;
     let x_edges = edges(&|c| c.beta_deg, half_beta);
     let y_edges = edges(&|c| c.alpha_deg, half_alpha);
-    let most = portrait.map.iter().map(|c| c.norm).fold(0.0, f64::max);
+    let most = residual_map.map.iter().map(|c| c.norm).fold(0.0, f64::max);
     if most <= 0.0 || x_edges.is_empty() {
         return Section::default();
     }
     let place = |edges: &[f64], x: f64| edges.iter().filter(|e| **e < x).count().saturating_sub(1);
-    let cells = portrait.map.iter().map(|c| HeatCell {
+    let cells = residual_map.map.iter().map(|c| HeatCell {
         x: place(&x_edges, c.beta_deg),
         y: place(&y_edges, c.alpha_deg),
         value: c.norm,

@@ -64,15 +64,15 @@ pub struct Imagination {
     model: Arc<GreyBox>,
     task: Task,
     instances: usize,
-    flocks: Vec<Flock>,
-    neutral: Flock,
+    batches: Vec<Batch>,
+    neutral: Batch,
     targets: Stratified,
     lost: u64,
 }
 
 /// One block of aircraft.
 #[derive(Clone, Debug)]
-struct Flock {
+struct Batch {
     state: State<Block>,
     actuators: Actuators<Block>,
     memory: Memory<Block>,
@@ -91,7 +91,7 @@ impl Imagination {
         // what the scheme remembers at the start is the acceleration there
         model.step(&state, &rest, START_ALTITUDE, &mut memory);
         let rest = Controls { aileron: lane(0.0), elevator: lane(0.0), throttle: lane(0.0) };
-        let neutral = Flock {
+        let neutral = Batch {
             state: state.map(lane),
             actuators: Actuators::at_rest(&rest),
             memory: memory.map(lane),
@@ -104,7 +104,7 @@ impl Imagination {
             model,
             task: Task::PAPER,
             instances,
-            flocks: vec![neutral.clone(); count],
+            batches: vec![neutral.clone(); count],
             neutral,
             targets,
             lost: 0,
@@ -116,8 +116,8 @@ impl Imagination {
     /// Begins all episodes anew, `targets` having been given before.
     pub fn restart(&mut self, targets: u64) {
         self.targets.go_on_after(targets);
-        for k in 0..self.flocks.len() {
-            self.flocks[k] = self.neutral.clone();
+        for k in 0..self.batches.len() {
+            self.batches[k] = self.neutral.clone();
             for lane in 0..WIDTH {
                 self.aim(k, lane);
             }
@@ -125,10 +125,10 @@ impl Imagination {
     }
 
     /// Gives an aircraft its next target.
-    fn aim(&mut self, flock: usize, lane: usize) {
-        if flock * WIDTH + lane < self.instances {
+    fn aim(&mut self, batch: usize, lane: usize) {
+        if batch * WIDTH + lane < self.instances {
             let [roll, pitch] = self.targets.next_target();
-            let target = &mut self.flocks[flock].target;
+            let target = &mut self.batches[batch].target;
             (target.roll.0[lane], target.pitch.0[lane]) = (roll as f32, pitch as f32);
         }
     }
@@ -140,7 +140,7 @@ impl Imagination {
 
     /// Blocks there are; lanes of the last beyond the instances are of no account.
     pub fn blocks(&self) -> usize {
-        self.flocks.len()
+        self.batches.len()
     }
 
     /// Episodes begun, one for each target given, and those that ended outside the envelope.
@@ -150,17 +150,17 @@ impl Imagination {
 
     /// What the aircraft of a block observe now.
     pub fn observe(&self, block: usize) -> [Block; OBSERVATIONS] {
-        let Flock { state, actuators, target, .. } = &self.flocks[block];
+        let Batch { state, actuators, target, .. } = &self.batches[block];
         observe(state, &actuators.observed(&self.model.airframe.actuators), target)
     }
 
     /// One step of a block under `action`; aircraft whose episodes end begin anew afterwards.
     pub fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Stepped {
-        let flock = &mut self.flocks[block];
-        let (observed, reward, outside) = flock.advance(&self.model, &self.task, action);
+        let batch = &mut self.batches[block];
+        let (observed, reward, outside) = batch.advance(&self.model, &self.task, action);
         let mut ended = [Ended::No; WIDTH];
         let mut anew = Block::zero();
-        for (lane, (steps, how)) in flock.step.iter_mut().zip(&mut ended).enumerate() {
+        for (lane, (steps, how)) in batch.step.iter_mut().zip(&mut ended).enumerate() {
             *steps += 1;
             *how = match (outside.0[lane] > 0.0, *steps >= STEPS) {
                 (true, _) => Ended::Lost,
@@ -171,7 +171,7 @@ impl Imagination {
             *steps = 0;
         }
         if ended != [Ended::No; WIDTH] {
-            flock.begin(anew, &self.neutral);
+            batch.begin(anew, &self.neutral);
             for (lane, how) in ended.iter().enumerate() {
                 if *how != Ended::No {
                     let counts = block * WIDTH + lane < self.instances;
@@ -184,9 +184,9 @@ impl Imagination {
     }
 }
 
-impl Flock {
+impl Batch {
     /// Puts the aircraft of `chosen` back to the start.
-    fn begin(&mut self, chosen: Block, neutral: &Flock) {
+    fn begin(&mut self, chosen: Block, neutral: &Batch) {
         self.state = self.state.replaced(chosen, &neutral.state);
         self.actuators = self.actuators.replaced(chosen, &neutral.actuators);
         self.memory = self.memory.replaced(chosen, &neutral.memory);

@@ -117,7 +117,7 @@ pub fn off(model: &GreyBox, seed: u64) -> GreyBox {
     wrong
 }
 
-/// The model without a stall: the slope of the lift table about nought in place of the table.
+/// The model without a stall: the slope of the lift table about zero in place of the table.
 pub fn without_stall() -> GreyBox {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
     let text = std::fs::read_to_string(folder.join("jsbsim.toml")).unwrap();

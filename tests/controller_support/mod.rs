@@ -7,7 +7,7 @@ use std::time::Duration;
 use greylag::control::{Controller, Kind, build};
 use greylag::flight::desk::Desk;
 use greylag::flight::pilot::{Config, Decision, Pilot};
-use greylag::flight::runtime::{Crew, Seat};
+use greylag::flight::runtime::{Companion, Placement};
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 use greylag::link::framing::pieces;
 use greylag::link::signing::Signer;
@@ -31,13 +31,13 @@ pub fn profile(personality: Personality, authority: Authority) -> Profile {
 }
 
 /// An LQI with an LQI to fall back on; the design, which takes most of a bench's time, is made once.
-fn lqi() -> Crew {
+fn lqi() -> Companion {
     static DESIGN: LazyLock<(Config, Box<dyn Controller>)> =
         LazyLock::new(|| (Config::for_model(x8()).unwrap(), build(Kind::Lqi, x8()).unwrap()));
     let (config, design) = &*DESIGN;
     let [controller, fallback] = [(), ()].map(|()| design.boxed_clone());
     let pilot = Pilot::new(config.clone(), fallback).unwrap();
-    Crew { pilot, controller, seat: Seat::Loop }
+    Companion { pilot, controller, placement: Placement::Loop }
 }
 
 /// What the bench saw at one state.

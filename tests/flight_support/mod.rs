@@ -10,9 +10,9 @@ use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use greylag::commands::fly::crew;
+use greylag::commands::fly::companion_with;
 use greylag::control::Kind;
-use greylag::flight::runtime::{Crew, Flight, Options, Pace, Summary};
+use greylag::flight::runtime::{self, Flight, Options, Pace, Summary};
 use greylag::model::{GreyBox, Twin};
 use greylag::physics::{Command, State};
 use mavlink::dialects::ardupilotmega::*;
@@ -53,12 +53,12 @@ pub struct Companion {
 
 impl Companion {
     pub fn start(options: &Options) -> Self {
-        Companion::with(options, crew(Kind::Lqi, x8(), Path::new("")).unwrap())
+        Companion::with(options, companion_with(Kind::Lqi, x8(), Path::new("")).unwrap())
     }
 
-    pub fn with(options: &Options, crew: Crew) -> Self {
+    pub fn with(options: &Options, companion: runtime::Companion) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
-        Companion { flight: Some(Flight::start(options, crew, stop.clone()).unwrap()), stop }
+        Companion { flight: Some(Flight::start(options, companion, stop.clone()).unwrap()), stop }
     }
 
     pub fn vehicle(&self) -> SocketAddr {

@@ -2,7 +2,7 @@
 
 mod client;
 mod schedule;
-mod story;
+mod summary;
 
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
@@ -30,7 +30,7 @@ use crate::manoeuvres::Schedule;
 use crate::report::FlightReport;
 use client::{Client, View};
 use schedule::Legs;
-use story::{TOLERANCE_DEG, Teller};
+use summary::{TOLERANCE_DEG, Teller};
 
 /// Options of `greylag demo`.
 #[derive(clap::Args)]
@@ -67,8 +67,8 @@ pub struct Arguments {
 /// If something cannot be opened, or the flight ends before the schedule does.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, None)?;
-    let crew = || fly::crew(arguments.controller, &model, &arguments.policy);
-    let mut flying = crew()?;
+    let set_up = || fly::companion_with(arguments.controller, &model, &arguments.policy);
+    let mut flying = set_up()?;
     let schedule = arguments.schedule.as_deref().map(Schedule::load).transpose()?;
     let legs = schedule.as_ref().map_or_else(Legs::demonstration, Legs::during);
     let tracked = if schedule.is_none() { legs.legs.as_slice() } else { &[] };
@@ -99,11 +99,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     println!("{}", simulated?);
     let mut sights = Vec::new();
     if arguments.controller.pace() == control::Pace::Planned {
-        let mut again = crew()?;
+        let mut again = set_up()?;
         schedule.iter().for_each(|schedule| again.pilot.follow(schedule.clone()));
         let vehicle = Vehicle::Sitl(Sitl::new(1, model.airframe.actuators.deflection_max));
         // the flight is told even if the planner's sight cannot be
-        sights = story::sights(&folder, again, vehicle).unwrap_or_else(|why| {
+        sights = summary::sights(&folder, again, vehicle).unwrap_or_else(|why| {
             eprintln!("the report does not show what the planner saw: {why:#}");
             Vec::new()
         });
@@ -117,7 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         texts: flown?,
         sights,
     };
-    let recorded = story::read(&folder)?;
+    let recorded = summary::read(&folder)?;
     let report = teller.tell(&folder, &recorded)?;
     let page = folder.join("report.html");
     files::write(&page, &report.page().render(), Overwrite::Never)?;

@@ -17,7 +17,7 @@ pub struct Entry {
     /// Who steered.
     pub controller: String,
     /// Through whom.
-    pub opposite: String,
+    pub counterpart: String,
     /// The seed.
     pub seed: u64,
     /// What was found.
@@ -44,7 +44,7 @@ impl From<&Report> for Entry {
         };
         Entry {
             controller: report.case.controller.name().into(),
-            opposite: report.case.opposite.name().into(),
+            counterpart: report.case.counterpart.name().into(),
             seed: report.case.seed,
             findings: report.findings.iter().map(note).collect(),
         }
@@ -60,13 +60,13 @@ impl Entry {
     /// The options of `greylag faults` that fly it again.
     pub fn options(&self) -> String {
         format!(
-            "--controller {} --opposite {} --first {} --flights 1",
-            self.controller, self.opposite, self.seed
+            "--controller {} --counterpart {} --first {} --flights 1",
+            self.controller, self.counterpart, self.seed
         )
     }
 
     fn key(&self) -> (String, String, u64) {
-        (self.controller.clone(), self.opposite.clone(), self.seed)
+        (self.controller.clone(), self.counterpart.clone(), self.seed)
     }
 }
 
@@ -134,7 +134,8 @@ impl Ledger {
 
     /// What an earlier run found.
     pub fn find(&self, case: &Case) -> Option<Entry> {
-        let key = (case.controller.name().to_owned(), case.opposite.name().to_owned(), case.seed);
+        let key =
+            (case.controller.name().to_owned(), case.counterpart.name().to_owned(), case.seed);
         self.known.get(&key).cloned()
     }
 
@@ -156,7 +157,7 @@ mod tests {
         let path = folder.path().join("campaign");
         let entry = Entry {
             controller: "lqi".into(),
-            opposite: "px4".into(),
+            counterpart: "px4".into(),
             seed: 3,
             findings: vec![Note { at_s: 1.5, finding: "attitude".into(), cause: None }],
         };

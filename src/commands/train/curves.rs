@@ -95,7 +95,7 @@ fn training(folder: &Path) -> Result<Training> {
     seeds.sort();
     let mut read = Vec::new();
     for (seed, folder) in seeds {
-        let points = curve::read(&folder.join(CURVE))?;
+        let points = learning_curve::read(&folder.join(CURVE))?;
         let seed = if seed == 0 { "–".into() } else { seed.to_string() };
         if !points.is_empty() {
             read.push((seed, points));

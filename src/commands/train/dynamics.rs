@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::flights::{FlightArguments, Flights};
 use crate::commands::files::{self, Overwrite, shipped};
 use crate::learn::dynamics::export;
-use crate::learn::dynamics::residual_map::{Portrait, portrait};
+use crate::learn::dynamics::residual_map::{ResidualMap, residual_map};
 use crate::learn::dynamics::score::{Horizon, free_run};
 use crate::learn::{
     Checkpoint, Criterion, Learned, Moment, Progress, Recipe, Start, Trainer, trainable,
@@ -114,7 +114,7 @@ struct Document<'a> {
     history: &'a [Moment],
     prior: Vec<Horizon>,
     learned: Vec<Horizon>,
-    residual: Option<Portrait>,
+    residual: Option<ResidualMap>,
     notes: Vec<String>,
 }
 
@@ -161,9 +161,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let scores = [&prior, &model].map(|m| free_run(m, &judge, &HORIZONS));
     println!("{}", coefficients(&learned));
     println!("{}", horizons(&scores));
-    let residual = portrait(&model, &judge);
-    if let Some(portrait) = &residual {
-        println!("{}", shares(portrait));
+    let residual = residual_map(&model, &judge);
+    if let Some(residual_map) = &residual {
+        println!("{}", shares(residual_map));
     }
     let [before, after] = scores;
     let document = Document {
@@ -301,11 +301,11 @@ fn line(p: &Progress, trainer: &Trainer, ms: f64) -> String {
 }
 
 /// What the residual adds, channel by channel.
-fn shares(portrait: &Portrait) -> Table {
+fn shares(residual_map: &ResidualMap) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
     table.set_header(["rate of", "prior, x_c/s", "residual, x_c/s", "strongest at"]);
-    for share in &portrait.channels {
+    for share in &residual_map.channels {
         let place = share
             .strongest
             .as_ref()

@@ -1,7 +1,7 @@
 //! CEM-MPC, section III-D of \[GSFM26\], with the policy's proposals and the critics' values that make
 //! it the hybrid controller of section IV-C.
 
-mod fan;
+mod candidates;
 mod rollout;
 mod settings;
 mod surrogate;

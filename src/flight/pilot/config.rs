@@ -1,6 +1,6 @@
 //! The numbers a pilot flies by: the airframe's envelope, times, slew limits, level trim.
 
-use super::signs::Answers;
+use super::polarity::Answers;
 use crate::model::{GreyBox, Trim, TrimError};
 use crate::physics::airframe::Envelope;
 

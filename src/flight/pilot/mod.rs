@@ -14,13 +14,13 @@ mod decision;
 
 mod estimate;
 mod failsafe;
-mod helm;
+mod polarity_hold;
 mod limits;
 mod modes;
 mod oscillation;
 mod parameters;
 mod programme;
-mod signs;
+mod polarity;
 mod telemetry;
 mod texts;
 
@@ -28,7 +28,7 @@ pub use config::{Config, ConfigError, ThrustSource, TrimPoint};
 pub use decision::{Decision, Plan, Request, Source};
 pub use limits::{Limits, TICK_S};
 pub use modes::mode_name;
-pub use signs::Answers;
+pub use polarity::Answers;
 
 use crate::control::{Controller, Observation, Target};
 use crate::link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
@@ -37,8 +37,8 @@ use crate::manoeuvres::Schedule;
 use crate::physics::{Command, Time};
 use estimate::{Estimate, Frame, RESTART, within};
 use oscillation::Oscillation;
+use polarity::Check;
 use programme::Programme;
-use signs::Check;
 use texts::Texts;
 
 /// Least time between two lines about the same kind of trouble, s.
@@ -149,7 +149,7 @@ impl Pilot {
         self.programme = Some(Programme::new(schedule));
     }
 
-    /// Checks the surfaces' signs from now on, whenever the helm is taken, and guards against
+    /// Checks the surfaces' signs from now on, whenever control authority is taken, and guards against
     /// oscillations: for a vehicle whose controller moves the surfaces for us, and has the aircraft back
     /// when either fails. Without the model's answers in the settings no signs can be checked.
     pub fn check_signs(&mut self) {
@@ -157,7 +157,7 @@ impl Pilot {
         self.check = self.config.answers.clone().map(Check::new);
     }
 
-    /// The vehicle's controller has given us the helm, if it is one to give it.
+    /// The vehicle's controller has given us control authority, if it is one to give it.
     pub fn engaged(&mut self, now: Time) {
         self.advance(now);
         self.oscillation = self.oscillation.map(|_| Oscillation::default());
@@ -304,7 +304,7 @@ impl Pilot {
         if !self.armed {
             return Pending::Disarmed;
         }
-        if let Some(pending) = self.check_helm(quality) {
+        if let Some(pending) = self.check_polarity(quality) {
             return pending;
         }
         if let (Mode::Manual, Some((_, sticks))) = (self.mode, self.sticks) {

@@ -91,7 +91,7 @@ impl Autopilot for Pilot {
         self.forget_controllers();
         self.refused = None;
         if let Some(check) = &mut self.check {
-            check.await_helm();
+            check.await_authority();
         }
         // Up to now the aircraft may have been standing still.
         self.estimate.refresh(now);

@@ -34,7 +34,7 @@ pub enum Call {
     Arm(Time, bool),
     /// Disarming was asked for, by force or not.
     Disarm(Time, bool),
-    /// The controller gave the helm over.
+    /// The controller gave control authority over.
     Engaged(Time),
     /// A mode was asked for.
     Mode(Time, Mode),

@@ -8,10 +8,10 @@ use crossbeam_channel::{Sender, select_biased};
 use super::clock::{Clock, Pace};
 use super::planner::Planner;
 use super::ports::Ports;
+use super::recording_autopilot::RecordingAutopilot;
 use super::stamps::{Stamps, unix_us};
 use super::summary::Summary;
 use super::timing::Timing;
-use super::witness::Witness;
 use super::{Event, Options};
 use crate::flight::pilot::{Decision, Pilot, Plan};
 use crate::flight::recorder::call::Planned;
@@ -269,7 +269,7 @@ impl Control {
                 self.ports.sift(unix_us(), &mut packet);
                 self.tell_of_refusals();
                 self.route(now.host, &packet);
-                let mut pilot = Witness {
+                let mut pilot = RecordingAutopilot {
                     pilot: &mut self.pilot,
                     vehicle: &self.vehicle,
                     recorder: self.recorder.as_ref(),
@@ -315,7 +315,7 @@ impl Control {
             self.pilot.tell(Severity::Warning, &trouble);
         }
         self.heed_vehicle();
-        let mut pilot = Witness {
+        let mut pilot = RecordingAutopilot {
             pilot: &mut self.pilot,
             vehicle: &self.vehicle,
             recorder: self.recorder.as_ref(),

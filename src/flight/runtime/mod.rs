@@ -16,7 +16,7 @@ mod ports;
 mod stamps;
 mod summary;
 mod timing;
-mod witness;
+mod recording_autopilot;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -76,18 +76,18 @@ impl Options {
 }
 
 /// Who flies.
-pub struct Crew {
+pub struct Companion {
     /// Decides.
     pub pilot: Pilot,
     /// Computes the command of each tick.
     pub controller: Box<dyn Controller>,
     /// Where it computes it.
-    pub seat: Seat,
+    pub placement: Placement,
 }
 
 /// Where a controller runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Seat {
+pub enum Placement {
     /// In the control loop: for controllers that need microseconds.
     Loop,
     /// On a thread of its own, with a deadline: for planners.
@@ -143,21 +143,23 @@ impl Flight {
     /// The first thing that cannot be opened.
     pub fn start(
         options: &Options,
-        crew: Crew,
+        companion: Companion,
         stop: Arc<AtomicBool>,
     ) -> Result<Self, FlightError> {
         let ports = Ports::open(options)?;
         let recorder = options.record.as_ref().map(Recorder::start).transpose()?;
-        let planner = match crew.seat {
-            Seat::Loop => Planner::Inline(crew.controller),
-            Seat::Thread => Threaded::start(crew.controller, options.plan_deadline, options.pace)
-                .map(Planner::Threaded)
-                .map_err(|error| FlightError::Thread("planner", error))?,
+        let planner = match companion.placement {
+            Placement::Loop => Planner::Inline(companion.controller),
+            Placement::Thread => {
+                Threaded::start(companion.controller, options.plan_deadline, options.pace)
+                    .map(Planner::Threaded)
+                    .map_err(|error| FlightError::Thread("planner", error))?
+            }
         };
         let (say, events) = bounded(EVENTS);
         let (vehicle, clients) = (ports.vehicle_address(), ports.client_addresses());
         let recording = recorder.as_ref().map(|r| r.folder().to_owned());
-        let control = Control::new(options, crew.pilot, planner, ports, recorder, say);
+        let control = Control::new(options, companion.pilot, planner, ports, recorder, say);
         let thread = std::thread::Builder::new()
             .name("control".into())
             .spawn(move || control.run(&stop))

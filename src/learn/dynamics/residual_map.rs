@@ -1,4 +1,4 @@
-//! The portrait of a residual: on which channel it acts, in which regime, how strongly.
+//! Where the learned residual acts: on which channel it acts, in which regime, how strongly.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -18,7 +18,7 @@ const SUPPORT: usize = 20;
 
 /// What a residual adds over recorded flights.
 #[derive(Clone, Debug, Serialize)]
-pub struct Portrait {
+pub struct ResidualMap {
     /// ‖F_a‖/‖F_p‖ over all samples, eq. (22).
     pub ratio: f64,
     /// By channel.
@@ -80,8 +80,8 @@ fn regime(state: &State) -> [f64; 3] {
 /// A sample: its regime, F_p/x_c and F_a/x_c.
 type Row = ([f64; 3], [f64; 8], [f64; 8]);
 
-/// The portrait of the residual of `model` over `tracks`; `None` if it has none or there is no sample.
-pub fn portrait(model: &GreyBox, tracks: &[Track]) -> Option<Portrait> {
+/// The residual map of `model` over `tracks`; `None` if it has none or there is no sample.
+pub fn residual_map(model: &GreyBox, tracks: &[Track]) -> Option<ResidualMap> {
     let residual = model.residual.as_ref()?;
     let mut bare = model.clone();
     bare.residual = None;
@@ -113,7 +113,7 @@ pub fn portrait(model: &GreyBox, tracks: &[Track]) -> Option<Portrait> {
         learned: rms(&|r| r.2[c]),
         strongest: strongest(&curves[3 * c..3 * c + 3]),
     };
-    Some(Portrait {
+    Some(ResidualMap {
         ratio: rms(&|r| norm(&r.2)) / rms(&|r| norm(&r.1)),
         channels: (0..8).map(share).collect(),
         map: map(&rows),

@@ -21,7 +21,7 @@ pub struct ClientCounts {
     pub turned_away: u64,
     /// Setpoints and stick positions that were garbage or of a kind that is not flown.
     pub refused_setpoints: u64,
-    /// Setpoints and stick positions from a peer while another one has the helm.
+    /// Setpoints and stick positions from a peer while another one has control authority.
     pub contested_setpoints: u64,
     /// Commands with a number that is not known here.
     pub unknown_commands: u64,

@@ -29,7 +29,7 @@ impl Clients {
     ) {
         match setpoint {
             Err(fault) => self.refuse_setpoint(now, at, refusal(fault)),
-            Ok(setpoint) if self.setpoint_helm.takes(self.sessions[at].peer, now.host) => {
+            Ok(setpoint) if self.setpoint_authority.takes(self.sessions[at].peer, now.host) => {
                 autopilot.attitude_setpoint(now.vehicle, setpoint);
             }
             Ok(_) => self.contested(now, at),
@@ -45,7 +45,7 @@ impl Clients {
     ) {
         match sticks {
             None => self.counts.refused_setpoints += 1,
-            Some(sticks) if self.stick_helm.takes(self.sessions[at].peer, now.host) => {
+            Some(sticks) if self.stick_authority.takes(self.sessions[at].peer, now.host) => {
                 autopilot.sticks(now.vehicle, sticks);
             }
             Some(_) => self.contested(now, at),

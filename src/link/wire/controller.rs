@@ -223,7 +223,7 @@ pub fn recipient(frame: &Frame<'_>) -> (u8, u8) {
     })
 }
 
-/// Whether a message steers: while we have the helm, others must not reach the controller.
+/// Whether a message steers: while we have control authority, others must not reach the controller.
 /// MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, SET_ATTITUDE_TARGET, SET_POSITION_TARGET_*.
 pub fn steers(id: u32) -> bool {
     matches!(id, 69 | 70 | 82 | 84 | 86 | 139)

@@ -1,6 +1,6 @@
 //! Curves over the angle of attack: sums of hats, so that they are linear in their heights.
 //!
-//! Two knots of the grid stay at nought, else a straight line would be told twice: by the curve, and by the
+//! Two knots of the grid stay at zero, else a straight line would be told twice: by the curve, and by the
 //! coefficients `CL0` and `CLalpha` (`CD0`) of the effects it stands beside.
 
 use super::Terms;
@@ -15,8 +15,8 @@ const SPACING_DEG: f64 = 2.0;
 const FINE_DEG: (f64, f64) = (10.0, 20.0);
 /// Places: from −8° to 30°.
 const PLACES: usize = 25;
-/// Places at which a curve is nought, 0° and 4°: where an aircraft flies most.
-const NOUGHT: [usize; 2] = [4, 6];
+/// Places at which a curve is zero, 0° and 4°: where an aircraft flies most.
+const ZERO: [usize; 2] = [4, 6];
 
 /// Coefficients of a curve: its height at every other place, as `CL_m8` or `CL_p20`.
 macro_rules! heights {
@@ -62,7 +62,7 @@ fn in_line<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Term
     let place = places.clamp(0.0, (PLACES - 1) as f64);
     let (mut k, mut own) = (0, 0);
     while own < PLACES {
-        if own != NOUGHT[0] && own != NOUGHT[1] {
+        if own != ZERO[0] && own != ZERO[1] {
             let away = (place - R::from_f64(own as f64)).abs();
             terms.add(k, channel, amount * (R::from_f64(1.0) - away).max(R::zero()));
             k += 1;
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
     use crate::physics::effects::Effect;
 
-    const KNOTS: usize = PLACES - NOUGHT.len();
+    const KNOTS: usize = PLACES - ZERO.len();
 
     struct Heights([f64; KNOTS]);
 
@@ -99,7 +99,7 @@ mod tests {
         assert_eq!(names.len(), KNOTS);
         let share =
             |degrees: f64, name: &str| at(degrees)[names.iter().position(|n| *n == name).unwrap()];
-        // −1° lies half way between −2° and 0°, where the curve is nought
+        // −1° lies half way between −2° and 0°, where the curve is zero
         assert!((share(-1.0, "CL_m2") - 0.5).abs() < 1e-12);
         assert!((share(9.5, "CL_p10") - 0.75).abs() < 1e-12);
         assert!((share(10.5, "CL_p10") - 0.5).abs() < 1e-12 && share(11.5, "CL_p10") == 0.0);

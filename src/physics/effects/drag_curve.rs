@@ -12,7 +12,7 @@ impl Effect for DragCurve {
     const DESCRIPTION: &'static str =
         "Drag as flown: what it is more than the other effects say, over angle of attack.";
     const FORMULA: &'static str = "D = Q Σ CDk hk(α), hk falling from 1 at αk to 0 at the knots beside it";
-    const SOURCE: &'static str = "piecewise linear, knots every 2°, from 10° to 20° every 1°, nought at 0° and 4°";
+    const SOURCE: &'static str = "piecewise linear, knots every 2°, from 10° to 20° every 1°, zero at 0° and 4°";
     const COEFFICIENTS: &'static [Coefficient] = curve::heights!("CD", (-0.2, 0.2));
 
     #[inline(always)]

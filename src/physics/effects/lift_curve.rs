@@ -12,7 +12,7 @@ impl Effect for LiftCurve {
     const DESCRIPTION: &'static str =
         "Lift as flown: what it is more than the other effects say, stall included, over angle of attack.";
     const FORMULA: &'static str = "L = Q Σ CLk hk(α), hk falling from 1 at αk to 0 at the knots beside it";
-    const SOURCE: &'static str = "piecewise linear, knots every 2°, from 10° to 20° every 1°, nought at 0° and 4°";
+    const SOURCE: &'static str = "piecewise linear, knots every 2°, from 10° to 20° every 1°, zero at 0° and 4°";
     const COEFFICIENTS: &'static [Coefficient] = curve::heights!("CL", (-0.5, 0.5));
     /// Else a stall would take away what the curve adds beyond it.
     const NEEDS: Needs = Needs::Base;

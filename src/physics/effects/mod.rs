@@ -108,7 +108,7 @@ pub trait Effect {
     const TABLE: Option<&'static str> = None;
     /// What it must be told.
     const NEEDS: Needs = Needs::Point;
-    /// Full names of coefficients in whose place it stands: they are nought in a model that it joins.
+    /// Full names of coefficients in whose place it stands: they are zero in a model that it joins.
     const REPLACES: &'static [&'static str] = &[];
     /// Its entry in the catalogue of effects that a model may lack; `None` for parts of a prior.
     const ENTRY: Option<Entry> = None;

@@ -51,7 +51,7 @@ pub(in crate::report) fn ranking(d: &Diagnosis) -> Section {
         return Section::default();
     }
     let note = "Evidence is the smaller of what the candidate gains in fit, less a penalty for its \
-                parameters, and how surely its coefficients differ from nought over independent \
+                parameters, and how surely its coefficients differ from zero over independent \
                 stretches of flight. What chance reaches was found in nulls, drawn so that \
                 they lack nothing. A candidate above it is refused where it does not hold on stretches that \
                 the fit did not see, leaves what is physically possible, or the flights disagree.";

@@ -11,15 +11,15 @@ use greylag_sitl::shim::{Distortion, ShimError};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::judge::{Cause, Finding, Found, Judge, Plight};
+use super::counterpart::{Aircraft, Counterpart, vehicle};
+use super::judge::{Cause, Exposure, Finding, Found, Judge};
 use super::mix::{Fault, Kind, draw};
-use super::opposite::{Aircraft, Opposite, vehicle};
 use super::wire::Wire;
 use crate::control::{Controller, Kind as ControllerKind, SetupError, build};
 use crate::flight::desk::Desk;
 use crate::flight::pilot::{ConfigError, Pilot};
 use crate::flight::recorder::Recorder;
-use crate::flight::runtime::Crew;
+use crate::flight::runtime::Companion;
 use crate::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 use crate::link::vehicle::Vehicle;
 use crate::model::GreyBox;
@@ -68,7 +68,7 @@ pub struct Case {
     /// Who steers.
     pub controller: ControllerKind,
     /// Whom it steers through.
-    pub opposite: Opposite,
+    pub counterpart: Counterpart,
 }
 
 /// What came of it.
@@ -84,37 +84,37 @@ pub struct Report {
     pub texts: Vec<(f64, String)>,
 }
 
-/// A companion fresh from the works: the design of its controller is not made again.
-pub struct Works {
-    crew: Crew,
+/// A companion fresh from the factory: the design of its controller is not made again.
+pub struct CompanionFactory {
+    companion: Companion,
     fallback: Box<dyn Controller>,
     model: GreyBox,
 }
 
-impl Works {
-    /// The works that build companions with `crew`, for the aircraft of `model`; as in flight, the
+impl CompanionFactory {
+    /// The factory that builds companions with `companion`, for the aircraft of `model`; as in flight, the
     /// fallback is an LQI.
     ///
     /// # Errors
     /// If the model has no LQI.
-    pub fn new(crew: Crew, model: &GreyBox) -> Result<Self, FaultsError> {
-        let fallback = match crew.controller.name() == ControllerKind::Lqi.name() {
-            true => crew.controller.boxed_clone(),
+    pub fn new(companion: Companion, model: &GreyBox) -> Result<Self, FaultsError> {
+        let fallback = match companion.controller.name() == ControllerKind::Lqi.name() {
+            true => companion.controller.boxed_clone(),
             false => build(ControllerKind::Lqi, model)?,
         };
-        Ok(Works { crew, fallback, model: model.clone() })
+        Ok(CompanionFactory { companion, fallback, model: model.clone() })
     }
 
-    fn desk(&self, opposite: Opposite) -> Result<Desk, FaultsError> {
-        let config = self.crew.pilot.config().clone();
+    fn desk(&self, counterpart: Counterpart) -> Result<Desk, FaultsError> {
+        let config = self.companion.pilot.config().clone();
         let pilot = Pilot::new(config, self.fallback.boxed_clone())?;
-        let controller = self.crew.controller.boxed_clone();
-        let crew = Crew { pilot, controller, seat: self.crew.seat };
-        Ok(Desk::new(crew, vehicle(opposite, &self.model)))
+        let controller = self.companion.controller.boxed_clone();
+        let companion = Companion { pilot, controller, placement: self.companion.placement };
+        Ok(Desk::new(companion, vehicle(counterpart, &self.model)))
     }
 
     /// Flies `case`; a panic of the companion is a finding. What an aircraft did is laid to a cause if it
-    /// was in that plight, and does not do it when the same flight is flown without the faults of that kind; to none
+    /// was in that exposure, and does not do it when the same flight is flown without the faults of that kind; to none
     /// of them if it does it without any.
     ///
     /// # Errors
@@ -144,7 +144,7 @@ impl Works {
     }
 
     fn fly_under(&self, case: Case, faults: Vec<Fault>) -> Result<Report, FaultsError> {
-        let mut desk = self.desk(case.opposite)?;
+        let mut desk = self.desk(case.counterpart)?;
         let disk = faults.iter().any(|f| f.kind == Kind::Disk).then(Disk::default);
         if let Some(disk) = &disk {
             let folder = std::path::PathBuf::new();
@@ -153,7 +153,7 @@ impl Works {
         let mut random = ChaCha8Rng::seed_from_u64(case.seed);
         random.set_stream(STARVED);
         let mut flight = Flight {
-            aircraft: Aircraft::new(case.opposite, case.seed)?,
+            aircraft: Aircraft::new(case.counterpart, case.seed)?,
             desk,
             down: Wire::new(case.seed, 0),
             up: Wire::new(case.seed, 1),
@@ -256,8 +256,8 @@ impl Flight {
             self.aircraft.hear(&batch);
         }
         let flies = self.aircraft.fly();
-        let plight = self.plight(&acting);
-        self.judge.aircraft(now_s, &self.aircraft.truth(), plight);
+        let exposure = self.exposure(&acting);
+        self.judge.aircraft(now_s, &self.aircraft.truth(), exposure);
         flies
     }
 
@@ -288,12 +288,12 @@ impl Flight {
         }
     }
 
-    /// In which plight the aircraft is at this step, through no fault of who steers it.
-    fn plight(&mut self, acting: &[Fault]) -> Plight {
+    /// In which exposure the aircraft is at this step, through no fault of who steers it.
+    fn exposure(&mut self, acting: &[Fault]) -> Exposure {
         let inputs = self.aircraft.inputs();
         let same = std::mem::replace(&mut self.flown, inputs) == inputs;
         let lied_to = |fault: &Fault| matches!(fault.kind, Kind::Airspeed | Kind::Alpha);
-        Plight {
+        Exposure {
             unsteered: same && self.aircraft.is_steered(),
             blind: matches!(self.aircraft, Aircraft::Sitl(_)) && self.judge.is_blind(),
             misled: acting.iter().any(lied_to),
@@ -389,9 +389,9 @@ impl std::fmt::Display for Case {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "--controller {} --opposite {} --first {} --flights 1",
+            "--controller {} --counterpart {} --first {} --flights 1",
             self.controller.name(),
-            self.opposite.name(),
+            self.counterpart.name(),
             self.seed
         )
     }

@@ -20,7 +20,7 @@ const RECOVERED_DEG: f64 = 3.0;
 const ROUNDING: f64 = 1e-9;
 /// Steps of the actuators standing still that are a stretch in which nobody steers: 0.2 s.
 const UNSTEERED: u32 = 20;
-/// A plight of so long ago no longer explains anything, steps. Bank and pitch are arrested within half a
+/// A exposure of so long ago no longer explains anything, steps. Bank and pitch are arrested within half a
 /// second once somebody steers again; airspeed and altitude take longer to come back.
 const MEMORY: u64 = 300;
 const MEMORY_OF_ATTITUDE: u64 = 100;
@@ -52,7 +52,7 @@ pub enum Finding {
 
 /// What an aircraft suffers that its companion cannot help.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Plight {
+pub struct Exposure {
     /// The actuators stand where they stood, since nothing new has arrived, and nobody else flies.
     pub unsteered: bool,
     /// There is no state to fly on, and nobody else to hand the aircraft to.
@@ -207,10 +207,10 @@ impl Judge {
         self.blind
     }
 
-    fn suffer(&mut self, plight: Plight) {
+    fn suffer(&mut self, exposure: Exposure) {
         self.steps += 1;
-        self.unsteered = if plight.unsteered { self.unsteered + 1 } else { 0 };
-        let acting = [self.unsteered >= UNSTEERED, plight.blind, plight.misled];
+        self.unsteered = if exposure.unsteered { self.unsteered + 1 } else { 0 };
+        let acting = [self.unsteered >= UNSTEERED, exposure.blind, exposure.misled];
         for ((_, at), acts) in self.causes.iter_mut().zip(acting) {
             if acts {
                 *at = Some(self.steps);
@@ -240,8 +240,8 @@ impl Judge {
     }
 
     /// Judges the aircraft.
-    pub fn aircraft(&mut self, now_s: f64, truth: &Truth, plight: Plight) {
-        self.suffer(plight);
+    pub fn aircraft(&mut self, now_s: f64, truth: &Truth, exposure: Exposure) {
+        self.suffer(exposure);
         let start = *self.start_m.get_or_insert(truth.altitude_m);
         let e = self.envelope;
         let (roll, pitch) = (truth.roll_rad.to_degrees(), truth.pitch_rad.to_degrees());

@@ -1,15 +1,15 @@
 //! Flights under faults of link, sensors, clocks, processor, disk: drawn by seed, judged automatically.
 //!
-//! A case is a seed, a controller, an opposite; [`Works::fly`] flies it for 60 s in lockstep in this
+//! A case is a seed, a controller, a counterpart; [`CompanionFactory::fly`] flies it for 60 s in lockstep in this
 //! process, with the companion's own pilot and vehicle session and the shim's own aircraft.
 
 mod flight;
 mod judge;
 mod mix;
-mod opposite;
+mod counterpart;
 mod wire;
 
-pub use flight::{Case, FaultsError, Report, Works};
+pub use counterpart::Counterpart;
+pub use flight::{Case, CompanionFactory, FaultsError, Report};
 pub use judge::{Cause, Finding, Found};
 pub use mix::{Fault, Kind, draw};
-pub use opposite::Opposite;

@@ -67,7 +67,7 @@ pub struct Amended {
 }
 
 impl Amended {
-    /// Coefficients that are nought for the sake of an effect that has joined, each with that effect.
+    /// Coefficients that are zero for the sake of an effect that has joined, each with that effect.
     pub fn dropped(&self) -> Vec<(String, &'static str)> {
         dropped(&self.tuned, &self.model)
     }
@@ -114,7 +114,7 @@ pub fn amend(
     notes.extend(
         dropped(&tuned.model, &fit.model)
             .iter()
-            .map(|(name, by)| format!("{name} is nought: {by} stands in its place.")),
+            .map(|(name, by)| format!("{name} is zero: {by} stands in its place.")),
     );
     notes.extend(parameters::taken_over(&fit.model).map(|(of, by)| {
         format!("The shape constants of {of} stay as they were fitted without {by}, which can take up whatever they could.")
@@ -366,7 +366,7 @@ fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendError> {
     Ok(model.join_most(&added.id, &start)?)
 }
 
-/// The middle one of the catalogue's starts, else nought or what lies nearest to it within bounds.
+/// The middle one of the catalogue's starts, else zero or what lies nearest to it within bounds.
 fn usual_start(about: &Description) -> Vec<f64> {
     let starts = about.entry.map_or(&[][..], |e| e.starts);
     let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);

@@ -15,7 +15,7 @@ const MUCH: f64 = 0.1;
 
 /// By how many standard errors `other` follows the shots more closely than `fit`: the mean difference of the shots'
 /// costs, two (Akaike's) off for each coefficient more, over the scatter of these differences (Vuong 1989). Each
-/// fit's weights suit itself, so the costs are means by both. Nought if fewer than three shots are in both.
+/// fit's weights suit itself, so the costs are means by both. Zero if fewer than three shots are in both.
 pub(super) fn closer(fit: &Fit, other: &Fit) -> f64 {
     let cost = |left: &Left| -> f64 {
         let weigh = |squares: &[f64; 8], weights: &[f64; 8]| -> f64 {

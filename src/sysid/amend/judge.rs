@@ -16,7 +16,7 @@ const IMPROVED: f64 = 0.01;
 /// An effect that lowers it to less than this share joins though the search has not settled with it: others may be
 /// needed for that.
 pub const SETTLED_OR_NOT: f64 = 0.5;
-/// Standard deviations by which an effect's coefficient must exceed nought.
+/// Standard deviations by which an effect's coefficient must exceed zero.
 const CLEAR: f64 = 1.96;
 /// The same for effects with more coefficients than three, one of which exceeds that by chance.
 const CLEAR_OF_MANY: f64 = 3.0;
@@ -159,7 +159,7 @@ pub fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
     if !own.is_empty() && own.iter().all(|p| p.value.abs() < clear * p.sd) {
         let all: Vec<String> =
             own.iter().map(|p| format!("{} = {:.3e} ± {:.1e}", p.name, p.value, p.sd)).collect();
-        objections.push(format!("the interval holds nought: {}", all.join(", ")));
+        objections.push(format!("the interval holds zero: {}", all.join(", ")));
     }
     for p in own {
         if let Some((flight, value)) = outlier(p) {

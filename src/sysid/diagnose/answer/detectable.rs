@@ -1,7 +1,7 @@
 //! The smallest amount of an effect that the flights would have shown.
 //!
 //! An effect that is linear in its constants needs their standard deviations only. One on the deflections
-//! is not: near nought a lag is a late clock, and a dead zone nothing at all. It is tried at increasing
+//! is not: near zero a lag is a late clock, and a dead zone nothing at all. It is tried at increasing
 //! amounts on the flights' own deflections, everything that is fitted along projected out each time.
 
 use std::collections::BTreeMap;

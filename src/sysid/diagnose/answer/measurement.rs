@@ -14,7 +14,7 @@ const KINDS: [(&str, &str, f64, f64); 8] = [
     ("skew_actuators", "actuators_late", 0.0, 0.015),
     ("skew_", "clock_skew", 0.0, 0.015),
 ];
-/// Standard deviations beyond which a constant is clearly not nought.
+/// Standard deviations beyond which a constant is clearly not zero.
 const CLEARLY: f64 = 4.0;
 
 /// What each flight's sensors and wind were. Late actuators may as well be the aircraft's, which the

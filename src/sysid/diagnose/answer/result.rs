@@ -158,7 +158,7 @@ pub struct Measurement {
     pub sd: f64,
     /// Its unit.
     pub unit: String,
-    /// Whether it is clearly not nought.
+    /// Whether it is clearly not zero.
     pub asserted: bool,
 }
 

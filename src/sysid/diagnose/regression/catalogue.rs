@@ -116,7 +116,7 @@ pub fn straight(entry: &Entry) -> bool {
     starts(entry).is_empty()
 }
 
-/// `model` with all of `entries` that can join it, at nought or what lies nearest to it, and these with their values.
+/// `model` with all of `entries` that can join it, at zero or what lies nearest to it, and these with their values.
 pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec<f64>)>) {
     let mut everything = model.clone();
     let mut joined = Vec::new();

@@ -232,7 +232,7 @@ impl Round {
         })
     }
 
-    /// Wald statistic of all free constants of an effect that has joined against nought; `None` for one whose
+    /// Wald statistic of all free constants of an effect that has joined against zero; `None` for one whose
     /// constants are not amounts.
     pub fn amount(&self, id: &str) -> Option<f64> {
         let prefix = format!("{id}.");

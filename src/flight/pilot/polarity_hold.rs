@@ -1,14 +1,14 @@
 //! The pilot while nobody may steer yet: the check of signs, from arming to its verdict.
 
 use super::estimate::Frame;
-use super::signs::Verdict;
+use super::polarity::Verdict;
 use super::{Pending, Pilot};
 use crate::link::autopilot::Severity;
 use crate::physics::{Command, Time};
 
 impl Pilot {
     /// Takes the state into the check of signs, if there is one; what is pending while it lasts.
-    pub(super) fn check_helm(&mut self, quality: Frame) -> Option<Pending> {
+    pub(super) fn check_polarity(&mut self, quality: Frame) -> Option<Pending> {
         if self.refused.is_none() && !self.check.as_ref()?.is_open() {
             return None;
         }

@@ -10,7 +10,7 @@ use crate::model::GreyBox;
 
 /// What is at the other end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Opposite {
+pub enum Counterpart {
     /// The simulator's shim.
     Sitl,
     /// PX4 by surfaces.
@@ -23,34 +23,34 @@ pub enum Opposite {
     ArdupilotAttitude,
 }
 
-impl Opposite {
+impl Counterpart {
     /// All of them.
-    pub const ALL: [Opposite; 5] = [
-        Opposite::Sitl,
-        Opposite::Px4,
-        Opposite::Px4Attitude,
-        Opposite::Ardupilot,
-        Opposite::ArdupilotAttitude,
+    pub const ALL: [Counterpart; 5] = [
+        Counterpart::Sitl,
+        Counterpart::Px4,
+        Counterpart::Px4Attitude,
+        Counterpart::Ardupilot,
+        Counterpart::ArdupilotAttitude,
     ];
 
     /// Its name in tables.
     pub fn name(self) -> &'static str {
         match self {
-            Opposite::Sitl => "sitl",
-            Opposite::Px4 => "px4",
-            Opposite::Px4Attitude => "px4-attitude",
-            Opposite::Ardupilot => "ardupilot",
-            Opposite::ArdupilotAttitude => "ardupilot-attitude",
+            Counterpart::Sitl => "sitl",
+            Counterpart::Px4 => "px4",
+            Counterpart::Px4Attitude => "px4-attitude",
+            Counterpart::Ardupilot => "ardupilot",
+            Counterpart::ArdupilotAttitude => "ardupilot-attitude",
         }
     }
 
     fn personality(self) -> Option<(Personality, Authority)> {
         match self {
-            Opposite::Sitl => None,
-            Opposite::Px4 => Some((Personality::Px4, Authority::Surfaces)),
-            Opposite::Px4Attitude => Some((Personality::Px4, Authority::Attitude)),
-            Opposite::Ardupilot => Some((Personality::Ardupilot, Authority::Surfaces)),
-            Opposite::ArdupilotAttitude => Some((Personality::Ardupilot, Authority::Attitude)),
+            Counterpart::Sitl => None,
+            Counterpart::Px4 => Some((Personality::Px4, Authority::Surfaces)),
+            Counterpart::Px4Attitude => Some((Personality::Px4, Authority::Attitude)),
+            Counterpart::Ardupilot => Some((Personality::Ardupilot, Authority::Surfaces)),
+            Counterpart::ArdupilotAttitude => Some((Personality::Ardupilot, Authority::Attitude)),
         }
     }
 }
@@ -62,11 +62,11 @@ pub(super) enum Aircraft {
 }
 
 impl Aircraft {
-    pub(super) fn new(opposite: Opposite, seed: u64) -> Result<Self, ShimError> {
+    pub(super) fn new(counterpart: Counterpart, seed: u64) -> Result<Self, ShimError> {
         let mut options = ShimOptions::new(PlantOptions::default(), Start::NEUTRAL);
         options.seed = seed;
         options.noise = Noise::REALISTIC;
-        Ok(match opposite.personality() {
+        Ok(match counterpart.personality() {
             None => Aircraft::Sitl(Box::new(Bench::new(&options)?)),
             Some((personality, _)) => {
                 options.launch = Launch::Immediate;
@@ -130,10 +130,10 @@ impl Aircraft {
     }
 }
 
-/// The companion's side of the vehicle's link for `opposite`.
-pub(super) fn vehicle(opposite: Opposite, model: &GreyBox) -> Vehicle {
+/// The companion's side of the vehicle's link for `counterpart`.
+pub(super) fn vehicle(counterpart: Counterpart, model: &GreyBox) -> Vehicle {
     let actuators = model.airframe.actuators;
-    match opposite.personality() {
+    match counterpart.personality() {
         None => Vehicle::Sitl(Sitl::new(1, actuators.deflection_max)),
         Some((personality, authority)) => {
             let stack = match personality {

@@ -8,7 +8,7 @@ use super::schedule::Leg;
 use crate::commands::files;
 use crate::control::Target;
 use crate::flight::replay::replay_watched;
-use crate::flight::runtime::Crew;
+use crate::flight::runtime::Companion;
 use crate::link::vehicle::Vehicle;
 use crate::logs::csv::{self, Tolerance};
 use crate::logs::{Flight, Sample};
@@ -89,13 +89,13 @@ impl Teller<'_> {
 /// Ticks after a command at which the planner's sight is told: the search has begun to move the aircraft.
 const TOLD_AFTER: usize = 20;
 
-/// What the planner of `crew` saw a moment after each command: the recording in `folder` is replayed, which
+/// What the planner of `companion` saw a moment after each command: the recording in `folder` is replayed, which
 /// also says whether its commands come out to the bit.
-pub fn sights(folder: &Path, crew: Crew, vehicle: Vehicle) -> Result<Vec<Sight>> {
+pub fn sights(folder: &Path, companion: Companion, vehicle: Vehicle) -> Result<Vec<Sight>> {
     println!("replaying the recording, to show what the planner saw");
     let mut all = Vec::new();
     let (mut target, mut ticks) = ([f64::NAN; 2], 0);
-    let outcome = replay_watched(folder, crew, vehicle, &mut |time, request, controller| {
+    let outcome = replay_watched(folder, companion, vehicle, &mut |time, request, controller| {
         let now = [request.target.roll, request.target.pitch];
         (target, ticks) = if now == target { (now, ticks + 1) } else { (now, 0) };
         if ticks == TOLD_AFTER

@@ -10,14 +10,14 @@ use crate::link::vehicle::Vehicle;
 use crate::physics::Time;
 
 /// Passes everything on to the pilot; each line for the ground stations becomes an event as well.
-pub(super) struct Witness<'a, F: FnMut(Event)> {
+pub(super) struct RecordingAutopilot<'a, F: FnMut(Event)> {
     pub(super) pilot: &'a mut Pilot,
     pub(super) vehicle: &'a Vehicle,
     pub(super) recorder: Option<&'a Recorder>,
     pub(super) hear: F,
 }
 
-impl<F: FnMut(Event)> Witness<'_, F> {
+impl<F: FnMut(Event)> RecordingAutopilot<'_, F> {
     fn note(&self, call: Call) {
         if let Some(recorder) = self.recorder {
             recorder.call(call);
@@ -25,7 +25,7 @@ impl<F: FnMut(Event)> Witness<'_, F> {
     }
 }
 
-impl<F: FnMut(Event)> Autopilot for Witness<'_, F> {
+impl<F: FnMut(Event)> Autopilot for RecordingAutopilot<'_, F> {
     fn arm(&mut self, now: Time, force: bool) -> Verdict {
         // What the controller needs is not a check that force can skip.
         match self.vehicle.obstacle() {

@@ -1,7 +1,7 @@
 //! The gentle check of signs: does the aircraft answer to the surfaces as the model does?
 //!
 //! A real controller's own loops may be right, and yet a channel, a reversal or a mixer between our
-//! commands and the surfaces be wrong. So nobody steers at first when a controller gives the helm over: the
+//! commands and the surfaces be wrong. So nobody steers at first when a controller gives control authority over: the
 //! surfaces stand at level trim, with small pulses of aileron and elevator on them, at different
 //! times. Rates are compared with what the model answers to these pulses, with its sign and without;
 //! pulses are not made by what the air does, so that gusts cannot be taken for an answer for long.
@@ -65,13 +65,13 @@ struct Begun {
 enum Stage {
     /// Nothing is to be checked: nobody steers, or it has passed.
     Rest,
-    /// Somebody wants to steer; the helm has not been given over.
+    /// Somebody wants to steer; control authority has not been given over.
     Waiting,
     /// The helm is ours, the first state since may be to come.
     Running { begun: Option<Begun>, evidence: Evidence, last: Command },
 }
 
-/// The check of one aircraft, made anew whenever the helm is taken.
+/// The check of one aircraft, made anew whenever control authority is taken.
 #[derive(Clone, Debug)]
 pub(super) struct Check {
     answers: Answers,
@@ -85,7 +85,7 @@ impl Check {
     }
 
     /// Somebody wants to steer.
-    pub(super) fn await_helm(&mut self) {
+    pub(super) fn await_authority(&mut self) {
         self.stage = Stage::Waiting;
     }
 
@@ -131,7 +131,7 @@ impl Check {
         verdict
     }
 
-    /// The command on the state of `now`, if the helm is ours: level, with pulses.
+    /// The command on the state of `now`, if control authority is ours: level, with pulses.
     pub(super) fn command(&self, now: Time) -> Option<Command> {
         let Stage::Running { begun: Some(begun), .. } = &self.stage else { return None };
         let index = begun.index(now) as isize;
@@ -208,7 +208,7 @@ mod tests {
         verdict_after(2, late, wired)
     }
 
-    /// The same when the helm went over `unheard` states before that is heard.
+    /// The same when control authority went over `unheard` states before that is heard.
     fn verdict_after(
         unheard: usize,
         late: usize,
@@ -222,7 +222,7 @@ mod tests {
         let mut check = Check::new(Answers::of(&model, 22.0).unwrap());
         let mut twin = Twin::at_rest(trim.state, &trim.controls, 600.0);
         let mut wire = VecDeque::from(vec![level; late]);
-        check.await_helm();
+        check.await_authority();
         assert_eq!(check.command(Time::default()), None);
         check.begin(level);
         for _ in 0..unheard {
@@ -291,7 +291,7 @@ mod tests {
         let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
         for before in [1, 30] {
             let mut check = Check::new(Answers::of(&model, 22.0).unwrap());
-            check.await_helm();
+            check.await_authority();
             check.begin(Command::IDLE);
             for k in 0..before {
                 let now = Time::from_micros(10_000 * k);

@@ -4,18 +4,18 @@ use std::time::Duration;
 
 use crate::link::peer::PeerId;
 
-/// After this silence another client may take the helm. It equals the time after which a lost
+/// After this silence another client may take control authority. It equals the time after which a lost
 /// setpoint stream ends OFFBOARD, so that a restarted client waits no longer than the aircraft.
 const RELEASE: Duration = Duration::from_secs(1);
 
 /// The helm of one kind of setpoint: two clients that send at once must not shake the surfaces.
 #[derive(Debug, Default)]
-pub struct Helm {
+pub struct SetpointAuthority {
     holder: Option<(PeerId, Duration)>,
 }
 
-impl Helm {
-    /// Whether a setpoint from `peer` is to be followed; if so it has the helm from now on.
+impl SetpointAuthority {
+    /// Whether a setpoint from `peer` is to be followed; if so it has control authority from now on.
     pub fn takes(&mut self, peer: PeerId, host: Duration) -> bool {
         match self.holder {
             Some((holder, heard)) if holder != peer && host.saturating_sub(heard) < RELEASE => {
@@ -28,7 +28,7 @@ impl Helm {
         }
     }
 
-    /// Leaves the helm to the next one, as when the holder's connection has closed.
+    /// Leaves control authority to the next one, as when the holder's connection has closed.
     pub fn release(&mut self, peer: PeerId) {
         if self.holder.is_some_and(|(holder, _)| holder == peer) {
             self.holder = None;

@@ -86,7 +86,7 @@ impl Evidence {
 
     /// Least squares of the changes of a rate from state to state: gusts, which wander, are nearly
     /// white in them; by how much they are not, the standard error is made larger. Beside the answer to
-    /// what was commanded there is one to the step that the surfaces made when the helm went over,
+    /// what was commanded there is one to the step that the surfaces made when control authority went over,
     /// of unknown size, `taken` states before the first, and a constant.
     fn axis(&self, answers: &Answers, axis: usize, answered: &[f64], taken: isize) -> Option<Fit> {
         let to_step = |state: isize| answers.after(axis, state + taken);
