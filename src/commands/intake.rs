@@ -30,6 +30,9 @@ pub struct Reading {
     /// Read logs in which more than 5 % of the rows are unusable.
     #[arg(long)]
     lenient: bool,
+    /// Use logs in which wrong units, signs or axes were found.
+    #[arg(long)]
+    despite_problems: bool,
 }
 
 /// What the logs gave.
@@ -75,7 +78,7 @@ impl Reading {
         let mut intake = Intake::default();
         for (k, (path, name)) in paths.iter().zip(names(paths)).enumerate() {
             eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
-            match reconstruct_one(path, &name, &reading, model, clock) {
+            match self.reconstruct_one(path, &name, &reading, model, clock) {
                 Ok((flight, findings)) => {
                     intake.flights.push(flight);
                     intake.in_doubt |= findings.iter().any(|f| f.severity == Severity::Problem);
@@ -93,25 +96,32 @@ impl Reading {
         }
         Ok(intake)
     }
-}
 
-/// The reconstructed flight of a log, with what was odd about the file.
-fn reconstruct_one(
-    path: &Path,
-    name: &str,
-    reading: &logs::Options,
-    model: &GreyBox,
-    clock: ActuatorClock,
-) -> Result<(Reconstruction, Vec<Finding>)> {
-    let log = logs::load(path, reading)?;
-    let options = flight_path::Options {
-        gravity: model.atmosphere.gravity,
-        actuators_clock: clock,
-        ..flight_path::Options::new(name, model.airframe.actuators)
-    };
-    let flight = reconstruct(&log.flight, &options)
-        .with_context(|| format!("cannot use flight log {}", path.display()))?;
-    Ok((flight, log.findings))
+    /// The reconstructed flight of a log, with what was odd about the file.
+    fn reconstruct_one(
+        &self,
+        path: &Path,
+        name: &str,
+        reading: &logs::Options,
+        model: &GreyBox,
+        clock: ActuatorClock,
+    ) -> Result<(Reconstruction, Vec<Finding>)> {
+        let log = logs::load(path, reading)?;
+        if let Some(problems) = log.problems().filter(|_| !self.despite_problems) {
+            bail!(
+                "flight log {}: {problems}. Every figure would be wrong. If the log is right all the same, use it with --despite-problems",
+                path.display()
+            );
+        }
+        let options = flight_path::Options {
+            gravity: model.atmosphere.gravity,
+            actuators_clock: clock,
+            ..flight_path::Options::new(name, model.airframe.actuators)
+        };
+        let flight = reconstruct(&log.flight, &options)
+            .with_context(|| format!("cannot use flight log {}", path.display()))?;
+        Ok((flight, log.findings))
+    }
 }
 
 /// What the flights are called: the file's name, or the whole path where two share it.

@@ -42,7 +42,7 @@ pub enum CsvError {
     },
     /// Too many rows cannot be used.
     #[error(
-        "flight log {path}: {dropped} of {rows} rows are unusable (first: row {first}), above 5 %: repair it or read it leniently"
+        "flight log {path}: {dropped} of {rows} rows are unusable ({reasons}; first: row {first}), above 5 %: repair it or read it leniently"
     )]
     Unusable {
         /// The file.
@@ -51,6 +51,8 @@ pub enum CsvError {
         dropped: usize,
         /// Rows read.
         rows: usize,
+        /// Why, with counts.
+        reasons: String,
         /// The first of those dropped, the header being row 1.
         first: usize,
     },
@@ -183,7 +185,7 @@ pub(super) struct Raw {
 impl Raw {
     /// The rows, those that could not be read included, as `take` judges them.
     fn judged(&self, take: impl Fn(&mut rows::Rows, usize, Option<Sample>)) -> rows::Rows {
-        let mut rows = rows::Rows::default();
+        let mut rows = rows::Rows::with_sparse_columns_of(&self.rows);
         let mut next = self.rows.iter().zip(&self.places).peekable();
         for i in 0..self.total {
             let own = next.next_if(|(_, place)| **place == i).map(|(sample, _)| *sample);
@@ -234,6 +236,7 @@ fn refusal(rows: &rows::Rows, path: &Path, tolerance: Tolerance) -> Option<CsvEr
         path: path.to_owned(),
         dropped: rows.dropped,
         rows: rows.total,
+        reasons: rows.reasons(),
         first,
     })
 }

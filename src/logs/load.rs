@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::csv::{self, CsvError, Tolerance};
-use super::finding::Finding;
+use super::finding::{Finding, Severity};
 use super::format::Format;
 use super::mapping::Mapping;
 use super::topics::{Topics, period_s};
-use super::{Flight, FlowAngles, Sample, checks, dataflash, rows, table, tlog, ulog};
+use super::{Flight, FlowAngles, Sample, dataflash, rows, screening, table, tlog, ulog};
 use crate::logs::columns::COLUMNS;
 
 /// How a log is read.
@@ -55,6 +55,15 @@ pub struct Log {
     pub findings: Vec<Finding>,
 }
 
+impl Log {
+    /// What makes figures that are computed from it wrong, a line each; `None` if nothing was found.
+    pub fn problems(&self) -> Option<String> {
+        let problems = self.findings.iter().filter(|f| f.severity == Severity::Problem);
+        let lines: Vec<&str> = problems.map(|f| f.text.as_str()).collect();
+        (!lines.is_empty()).then(|| lines.join("; "))
+    }
+}
+
 /// Why a log cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
@@ -78,11 +87,22 @@ pub enum LogError {
         /// The file.
         path: PathBuf,
     },
+    /// The columns of a CSV table are not separated by commas.
+    #[error(
+        "flight log {}: its columns are separated by {separator}: write it with commas between columns and a point in numbers",
+        path.display()
+    )]
+    Separator {
+        /// The file.
+        path: PathBuf,
+        /// What separates them.
+        separator: &'static str,
+    },
     /// The CSV is wrong.
-    #[error("{source}{hint}")]
+    #[error("{error}{hint}")]
     Csv {
         /// What is wrong.
-        source: CsvError,
+        error: CsvError,
         /// What it looks like.
         hint: String,
     },
@@ -97,7 +117,7 @@ pub enum LogError {
         remedy: String,
     },
     /// Too many rows cannot be used.
-    #[error("flight log {}: {dropped} of {rows} rows are unusable (first: row {first}), above 5 %: repair it or read it leniently{hint}", path.display())]
+    #[error("flight log {}: {dropped} of {rows} rows are unusable ({reasons}; first: row {first}), above 5 %: repair it or read it leniently{hint}", path.display())]
     Unusable {
         /// The file.
         path: PathBuf,
@@ -105,6 +125,8 @@ pub enum LogError {
         dropped: usize,
         /// Rows of the table.
         rows: usize,
+        /// Why, with counts.
+        reasons: String,
         /// The first of those dropped.
         first: usize,
         /// What it looks like.
@@ -152,6 +174,9 @@ fn parse_for(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Lo
     if bytes.is_empty() {
         return Err(LogError::Empty { path: path.to_owned() });
     }
+    if let Some(separator) = separator(bytes) {
+        return Err(LogError::Separator { path: path.to_owned(), separator });
+    }
     let Some(format) = Format::of(bytes) else {
         return Err(LogError::Foreign { path: path.to_owned() });
     };
@@ -163,6 +188,17 @@ fn parse_for(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Lo
         Format::Tlog => tlog::read(bytes, &wanted),
     };
     binary(format, topics, path, options, to)
+}
+
+/// What separates the columns of a table of this format that is not written with commas.
+fn separator(bytes: &[u8]) -> Option<&'static str> {
+    let header = bytes.split(|b| *b == b'\n').next()?;
+    let header = std::str::from_utf8(header).ok().filter(|h| !h.contains(','))?;
+    let named = |by: char| header.split(by).any(|name| name.trim() == "time_s");
+    [(';', "semicolons"), ('\t', "tabs")]
+        .into_iter()
+        .find(|(by, _)| named(*by))
+        .map(|(_, name)| name)
 }
 
 fn binary(
@@ -183,7 +219,7 @@ fn binary(
         findings.push(Finding::problem(error.to_string()));
     }
     findings.extend(topics.findings);
-    findings.extend(checks::check(&table.rows));
+    findings.extend(screening::screen(&table.rows));
     let mut kept = rows::Rows::default();
     let mut looked_at = rows::Rows::default();
     for (i, sample) in table.rows.into_iter().enumerate() {
@@ -196,7 +232,8 @@ fn binary(
         kept = looked_at;
     } else if let Some(first) = kept.refused(o.tolerance) {
         let (dropped, rows, hint) = (kept.dropped, kept.total, hint(&findings));
-        let error = LogError::Unusable { path: path.to_owned(), dropped, rows, first, hint };
+        let (path, reasons) = (path.to_owned(), kept.reasons());
+        let error = LogError::Unusable { path, dropped, rows, reasons, first, hint };
         if to == Use::Compute {
             return Err(error);
         }
@@ -227,7 +264,7 @@ fn binary(
 }
 
 fn text(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Log, LogError> {
-    let bare = |source| LogError::Csv { source, hint: String::new() };
+    let bare = |error| LogError::Csv { error, hint: String::new() };
     let mut raw = csv::raw(bytes, path, &options.mapping).map_err(bare)?;
     let missing = std::mem::take(&mut raw.missing);
     let lacking = !missing.is_empty();
@@ -238,7 +275,7 @@ fn text(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Log, Lo
         }
         findings.push(Finding::problem(source.to_string()));
     }
-    findings.extend(checks::check(&raw.rows));
+    findings.extend(screening::screen(&raw.rows));
     let reading = if lacking {
         csv::keep_all(raw, path)
     } else {
@@ -248,7 +285,7 @@ fn text(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Log, Lo
         }
         let tolerance = if to == Use::Look { Tolerance::Lenient } else { options.tolerance };
         csv::settle(raw, path, tolerance)
-            .map_err(|source| LogError::Csv { source, hint: hint(&findings) })?
+            .map_err(|error| LogError::Csv { error, hint: hint(&findings) })?
     };
     if reading.cut_short {
         findings.push(Finding::warning("the file ends in the middle of a row, which is left out"));

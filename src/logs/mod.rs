@@ -4,7 +4,6 @@
 
 pub mod csv;
 pub mod finding;
-mod checks;
 mod columns;
 mod dataflash;
 mod flight;
@@ -16,6 +15,7 @@ pub mod phases;
 pub mod rudder;
 mod resample;
 mod rows;
+mod screening;
 mod table;
 mod tlog;
 mod topics;

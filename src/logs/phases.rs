@@ -43,10 +43,17 @@ pub fn split_s(rows: &[Sample]) -> f64 {
 /// The phases of a log in order.
 pub fn phases(rows: &[Sample]) -> Vec<Phase> {
     let split = split_s(rows);
-    let flying = |s: &Sample| if s.airspeed_mps > FLYING_MPS { Kind::Flight } else { Kind::Ground };
+    let flying = |airspeed: f64| if airspeed > FLYING_MPS { Kind::Flight } else { Kind::Ground };
     let mut raw: Vec<Phase> = Vec::new();
-    for row in rows.iter().filter(|s| s.time_s.is_finite() && s.airspeed_mps.is_finite()) {
-        let kind = flying(row);
+    // an airspeed that comes more slowly than the rows holds until the next one
+    let mut airspeed = f64::NAN;
+    for row in rows.iter().filter(|s| s.time_s.is_finite()) {
+        if row.airspeed_mps.is_finite() {
+            airspeed = row.airspeed_mps;
+        } else if airspeed.is_nan() {
+            continue;
+        }
+        let kind = flying(airspeed);
         match raw.last_mut() {
             Some(p) if row.time_s - p.to_s <= split && p.kind == kind => {
                 p.to_s = row.time_s;

@@ -1,12 +1,16 @@
 //! Which rows of a table can be used.
 
 use super::Sample;
-use super::columns::COLUMNS;
+use super::columns::{COLUMNS, NEEDED, index};
 
 /// Share of unusable rows above which a log is refused.
 const REFUSED_SHARE: f64 = 0.05;
 /// The least that a pitot at rest shows, m/s: noise about zero, as true airspeed.
 const PITOT_AT_REST: f64 = -5.0;
+/// Share of rows that a column fills below which it is a slower sensor's,
+const FILLED_SHARE: f64 = 0.95;
+/// if it fills so many: a sensor that failed fills few.
+const ENOUGH: usize = 50;
 /// Row numbers kept in the report of unusable rows.
 const ROWS_NAMED: usize = 20;
 
@@ -20,6 +24,28 @@ pub enum Tolerance {
     Lenient,
 }
 
+/// Why a row cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reason {
+    /// It could not be read: a field is no number, or fields are missing.
+    Unreadable,
+    /// A needed column is empty.
+    Incomplete,
+    /// An angle, an airspeed or an infinite number that no aircraft shows.
+    Impossible,
+    /// It is not later than the row before.
+    OutOfOrder,
+}
+
+impl Reason {
+    const ALL: [(Reason, &'static str); 4] = [
+        (Reason::Unreadable, "hold what is no number"),
+        (Reason::Incomplete, "lack a needed column"),
+        (Reason::Impossible, "hold an impossible angle or airspeed"),
+        (Reason::OutOfOrder, "are not later than the row before"),
+    ];
+}
+
 /// The usable rows of a table, with a count of the others.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
@@ -30,20 +56,43 @@ pub(super) struct Rows {
     pub dropped: usize,
     /// The numbers of the first of them.
     pub dropped_rows: Vec<usize>,
+    /// Rows dropped for each reason.
+    counts: [usize; Reason::ALL.len()],
+    /// Needed columns that may be empty in a row, by their place in [`NEEDED`].
+    sparse: [bool; NEEDED.len()],
 }
 
 impl Rows {
+    /// No rows yet, of a table in which columns that `rows` fill only now and then, as a slow sensor beside
+    /// a fast one does, may be empty.
+    pub fn with_sparse_columns_of(rows: &[Sample]) -> Rows {
+        let sparse = NEEDED.map(|name| {
+            let get = index(name).map(|i| COLUMNS[i].1);
+            let filled = rows.iter().filter(|s| get.is_some_and(|get| get(s).is_finite())).count();
+            name != "time_s"
+                && filled >= ENOUGH
+                && (filled as f64) < FILLED_SHARE * rows.len() as f64
+        });
+        Rows { sparse, ..Rows::default() }
+    }
+
     /// Takes row `number`; `None` is a row that could not be read.
     pub fn take(&mut self, number: usize, sample: Option<Sample>) {
         self.total += 1;
-        match sample.map(at_rest).filter(|s| usable(s, self.samples.last())) {
-            Some(sample) => self.samples.push(sample),
-            None => {
-                self.dropped += 1;
-                if self.dropped_rows.len() < ROWS_NAMED {
-                    self.dropped_rows.push(number);
-                }
-            }
+        let Some(sample) = sample.map(at_rest) else {
+            return self.drop(number, Reason::Unreadable);
+        };
+        match self.fault(&sample) {
+            None => self.samples.push(sample),
+            Some(reason) => self.drop(number, reason),
+        }
+    }
+
+    fn drop(&mut self, number: usize, reason: Reason) {
+        self.dropped += 1;
+        self.counts[reason as usize] += 1;
+        if self.dropped_rows.len() < ROWS_NAMED {
+            self.dropped_rows.push(number);
         }
     }
 
@@ -64,6 +113,33 @@ impl Rows {
         let first = self.dropped_rows.first().copied();
         if tolerance == Tolerance::Strict && poor { first } else { None }
     }
+
+    /// Why rows were dropped, with counts.
+    pub fn reasons(&self) -> String {
+        let said = Reason::ALL.iter().zip(self.counts).filter(|(_, count)| *count > 0);
+        said.map(|((_, text), count)| format!("{count} {text}")).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Why a sample cannot be used after those that were taken.
+    fn fault(&self, s: &Sample) -> Option<Reason> {
+        let missing = NEEDED
+            .iter()
+            .zip(self.sparse)
+            .any(|(name, sparse)| !sparse && index(name).is_some_and(|i| COLUMNS[i].1(s).is_nan()));
+        let pi = std::f64::consts::PI + 1e-6;
+        let impossible = COLUMNS.iter().any(|c| c.1(s).is_infinite())
+            || s.attitude_rad[0].abs() > pi
+            || s.attitude_rad[1].abs() > pi / 2.0
+            || s.airspeed_mps < 0.0;
+        let late = self.samples.last().is_some_and(|last| s.time_s <= last.time_s);
+        [
+            (missing, Reason::Incomplete),
+            (impossible, Reason::Impossible),
+            (late, Reason::OutOfOrder),
+        ]
+        .into_iter()
+        .find_map(|(so, reason)| so.then_some(reason))
+    }
 }
 
 /// The sample with an airspeed of zero where the pitot shows its noise about zero.
@@ -72,18 +148,6 @@ fn at_rest(mut sample: Sample) -> Sample {
         sample.airspeed_mps = 0.0;
     }
     sample
-}
-
-/// Whether a sample is later than the last one, has what is needed, and is possible.
-fn usable(s: &Sample, last: Option<&Sample>) -> bool {
-    let needed = [s.time_s, s.attitude_rad[0], s.attitude_rad[1], s.airspeed_mps];
-    let pi = std::f64::consts::PI + 1e-6;
-    needed.iter().chain(&s.rates_radps).all(|x| x.is_finite())
-        && COLUMNS.iter().all(|c| !c.1(s).is_infinite())
-        && s.attitude_rad[0].abs() <= pi
-        && s.attitude_rad[1].abs() <= pi / 2.0
-        && s.airspeed_mps >= 0.0
-        && last.is_none_or(|last| s.time_s > last.time_s)
 }
 
 #[cfg(test)]
@@ -110,5 +174,26 @@ mod tests {
         let speeds: Vec<f64> = rows.samples.iter().map(|s| s.airspeed_mps).collect();
         assert_eq!(speeds, [0.0, 0.0, 0.2, 17.0]);
         assert_eq!(rows.dropped_rows, [5]);
+    }
+
+    #[test]
+    fn a_slow_sensor_beside_a_fast_one_costs_no_row() {
+        // airspeed at 5 Hz in rows of 50 Hz: nine of ten fields are empty
+        let airspeed = |k: usize| if k % 10 == 0 { 17.0 } else { f64::NAN };
+        let all: Vec<Sample> = (0..1000).map(|k| row(k as f64 * 0.02, airspeed(k))).collect();
+        let mut rows = Rows::with_sparse_columns_of(&all);
+        all.iter().enumerate().for_each(|(k, s)| rows.take(k + 1, Some(*s)));
+        assert_eq!((rows.samples.len(), rows.dropped), (1000, 0));
+    }
+
+    #[test]
+    fn the_reasons_are_counted() {
+        let mut rows = Rows::default();
+        let samples = [Some(row(1.0, 17.0)), Some(row(0.5, 17.0)), Some(row(2.0, f64::NAN)), None];
+        samples.into_iter().enumerate().for_each(|(k, s)| rows.take(k + 1, s));
+        assert_eq!(
+            rows.reasons(),
+            "1 hold what is no number, 1 lack a needed column, 1 are not later than the row before"
+        );
     }
 }

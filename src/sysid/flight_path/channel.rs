@@ -4,6 +4,8 @@ use crate::num::statistics::quantile;
 
 /// Share of repeated values above which a channel is taken to be slower than the log's rows.
 const HELD_SHARE: f64 = 0.3;
+/// Periods of the slower sensor after which a repeated value is a measurement again.
+const LONGEST_PERIODS: f64 = 2.5;
 
 /// What a channel is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +29,9 @@ pub struct Channel {
 
 impl Channel {
     /// The finite ones of `samples` (time in s, value); values that repeat the last one are left out
-    /// if they are many, for then the log holds a slower sensor's value. Angles are unwrapped.
+    /// if they are many, for then the log holds a slower sensor's value. Of a value that stays longer than
+    /// that sensor's period, as a coarsely quantised one does, some repeats are kept, the last one always.
+    /// Angles are unwrapped.
     pub fn new(samples: impl Iterator<Item = (f64, f64)>, kind: Kind) -> Channel {
         let (mut time, mut value): (Vec<f64>, Vec<f64>) =
             samples.filter(|(_, x)| x.is_finite()).unzip();
@@ -36,10 +40,11 @@ impl Channel {
         let repeated = fresh.iter().filter(|f| !**f).count();
         let stuck = kind != Kind::Kept && value.len() > 20 && repeated + 1 == value.len();
         if kind != Kind::Kept && repeated as f64 > HELD_SHARE * value.len() as f64 && !stuck {
-            let mut keep = fresh.iter();
-            time.retain(|_| *keep.next().unwrap_or(&true));
-            let mut keep = fresh.iter();
-            value.retain(|_| *keep.next().unwrap_or(&true));
+            let keep = kept(&time, &fresh);
+            let mut kept = keep.iter();
+            time.retain(|_| *kept.next().unwrap_or(&true));
+            let mut kept = keep.iter();
+            value.retain(|_| *kept.next().unwrap_or(&true));
         }
         if kind == Kind::Angle {
             unwrap(&mut value);
@@ -105,6 +110,22 @@ impl Channel {
     }
 }
 
+/// Which samples are kept where repeats are left out.
+fn kept(time: &[f64], fresh: &[bool]) -> Vec<bool> {
+    let new: Vec<f64> = time.iter().zip(fresh).filter(|(_, f)| **f).map(|(t, _)| *t).collect();
+    let periods: Vec<f64> = new.windows(2).map(|w| w[1] - w[0]).collect();
+    let longest = LONGEST_PERIODS * if periods.is_empty() { 0.0 } else { quantile(&periods, 0.5) };
+    let mut last = f64::NEG_INFINITY;
+    let keep = |(i, t): (usize, &f64)| {
+        let keep = fresh[i] || i + 1 == time.len() || t - last > longest;
+        if keep {
+            last = *t;
+        }
+        keep
+    };
+    time.iter().enumerate().map(keep).collect()
+}
+
 fn unwrap(angles: &mut [f64]) {
     use std::f64::consts::TAU;
     for i in 1..angles.len() {
@@ -116,4 +137,29 @@ fn unwrap(angles: &mut [f64]) {
 pub fn wrap(angle: f64) -> f64 {
     use std::f64::consts::TAU;
     angle - TAU * (angle / TAU).round()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 100 Hz samples of a slow sine as `value` makes them.
+    fn channel(value: impl Fn(f64) -> f64) -> Channel {
+        let times = (0..1000).map(|k| k as f64 * 0.01);
+        Channel::new(times.map(|t| (t, value(t))), Kind::Linear)
+    }
+
+    #[test]
+    fn a_held_sensor_has_its_own_rate_and_is_known_to_the_end() {
+        let held = channel(|t| (0.5 * (t * 25.0 + 1e-9).floor() / 25.0).sin());
+        assert!((held.period() - 0.04).abs() < 1e-9);
+        assert!(held.between(9.99, 0.2).is_finite());
+    }
+
+    #[test]
+    fn a_quantised_sensor_is_known_while_it_stays() {
+        // about 0.6 s pass at the sine's top without a step of 0.05
+        let coarse = channel(|t| (t.sin() / 0.05).round() * 0.05);
+        assert!((0..1000).all(|k| coarse.between(k as f64 * 0.01, 0.2).is_finite()));
+    }
 }

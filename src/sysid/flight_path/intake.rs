@@ -110,6 +110,7 @@ struct Channels {
     vanes: [Channel; 2],
     velocity: [Channel; 3],
     altitude: Channel,
+    density: Channel,
     positions: [Channel; 3],
     commands: [Channel; 3],
 }
@@ -134,6 +135,7 @@ impl Channels {
             vanes: [vane(&|s| s.alpha_rad), vane(&|s| s.beta_rad)],
             velocity: three(Kind::Linear, &|s, i| s.velocity_ned_mps[i]),
             altitude: channel(Kind::Kept, &|s| s.altitude_m),
+            density: channel(Kind::Kept, &|s| s.air_density_kgpm3),
             positions: three(Kind::Kept, &|s, i| [s.aileron_rad, s.elevator_rad, s.throttle][i]),
             commands: three(Kind::Kept, &|s, i| [s.aileron_cmd, s.elevator_cmd, s.throttle_cmd][i]),
         }
@@ -206,6 +208,13 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
         );
     }
     let stretches = stretches(flight, &has, options)?;
+    if !has.yaw && !has.velocity {
+        notes.push(
+            "The log has no heading and no velocity over ground: the heading is integrated from the \
+             gyros, and the wind stays at its prior. Log one of them."
+                .into(),
+        );
+    }
     let (step, gap) = (step(&stretches, options), gap(flight, options));
     let rudder = RudderMotion::of(&flight.samples);
     let periods = channels.periods();
@@ -260,7 +269,9 @@ fn declare(channels: &Channels, has: &Sensors, notes: &mut Vec<String>) {
             absent.join(", ")
         ));
     }
-    notes.push(if has.altitude {
+    notes.push(if !channels.density.is_empty() {
+        "Air density: as logged.".into()
+    } else if has.altitude {
         "Air density: standard atmosphere at the logged altitude.".into()
     } else {
         "Air density: standard atmosphere at sea level, for want of an altitude.".into()
@@ -370,11 +381,19 @@ fn track(
     if has.altitude && !has.velocity {
         climb(&mut track, step);
     }
+    if !has.yaw && !has.velocity {
+        heading(&mut track, step);
+    }
     let air = Atmosphere { density: Density::Standard, gravity: options.gravity };
-    track.density = track
-        .altitude
+    let logged = |t: f64| {
+        let density = channels.density.between(t, f64::INFINITY);
+        if density.is_nan() { channels.density.held(t) } else { density }
+    };
+    let standard = |h: f64| air.density_at(if h.is_finite() { h } else { 0.0 });
+    track.density = times
         .iter()
-        .map(|h| air.density_at(if h.is_finite() { *h } else { 0.0 }))
+        .zip(&track.altitude)
+        .map(|(t, h)| Some(logged(*t)).filter(|d| *d > 0.0).unwrap_or_else(|| standard(*h)))
         .collect();
     track.controls = controls(channels, &times, options);
     track
@@ -389,6 +408,22 @@ fn climb(track: &mut Track, step: f64) {
         let rise = track.altitude[k + half] - track.altitude[k - half];
         track.velocity[k][2] = -rise / (2 * half) as f64 / step;
         k += 2 * half;
+    }
+}
+
+/// Integrates the heading from the gyros, ψ̇ = (q sin φ + r cos φ) / cos θ, and hands it out once every
+/// [`CLIMB_WINDOW`]: where nothing else shows the heading, the path could turn as it likes.
+fn heading(track: &mut Track, step: f64) {
+    let every = (CLIMB_WINDOW / step).round().max(1.0) as usize;
+    let (mut yaw, mut last) = (0.0, [0.0; 2]);
+    for k in 0..track.len() {
+        let [roll, pitch, _] = track.attitude[k];
+        if roll.is_finite() && pitch.is_finite() {
+            last = [roll, pitch];
+        }
+        let ([roll, pitch], [_, q, r]) = (last, track.rates[k]);
+        track.attitude[k][2] = if k % every == 0 { wrap(yaw) } else { f64::NAN };
+        yaw += step * (q * roll.sin() + r * roll.cos()) / pitch.cos();
     }
 }
 

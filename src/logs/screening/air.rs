@@ -1,0 +1,156 @@
+//! Airspeed, vanes, climb and density: units and signs.
+
+use super::cure;
+use super::relation::{
+    Relation, change, integral, near, quantile, through_origin, values, windows, with_intercept,
+};
+use crate::logs::Sample;
+use crate::logs::finding::Finding;
+use crate::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
+
+/// Units of speed other than m/s: name, m/s in one.
+const SPEEDS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("knots", 0.514_444), ("ft/s", 0.3048)];
+const FOOT: f64 = 0.3048;
+/// Window over which a climb is compared, s.
+const CLIMB_S: f64 = 2.0;
+/// Spread of the middle half of the ratios to the ground speed, over their median, beyond which wind speaks.
+const GROUND_SPREAD: f64 = 0.25;
+/// Likewise of the ratios in turns, beyond which manoeuvres speak.
+const TURN_SPREAD: f64 = 0.5;
+/// Correlation from which a relation is believed.
+const CERTAIN: f64 = 0.8;
+/// Angle of attack beyond which nobody flies for a twentieth of the time, rad.
+const VANE_LARGE: f64 = 1.0;
+
+/// Everything about the air.
+pub fn check(rows: &[Sample]) -> Vec<Finding> {
+    let airspeed = airspeed(rows);
+    let speed_is_right = airspeed.is_none();
+    let mut out: Vec<Finding> = airspeed.into_iter().collect();
+    out.extend(vanes(rows));
+    out.extend(climb(rows, speed_is_right));
+    out
+}
+
+/// Steady turns give the airspeed without wind, V = g tan φ / ψ̇; the velocity over ground gives it where
+/// the wind is weak.
+fn airspeed(rows: &[Sample]) -> Option<Finding> {
+    let by_turns = steady(&values(rows, by_turn), TURN_SPREAD);
+    let ground = values(rows, |s| {
+        let v = s.velocity_ned_mps.iter().map(|v| v * v).sum::<f64>().sqrt();
+        if v > 8.0 { s.airspeed_mps / v } else { f64::NAN }
+    });
+    other_unit(by_turns, "turns show")
+        .or_else(|| other_unit(steady(&ground, GROUND_SPREAD), "the velocity over ground shows"))
+}
+
+/// The median, where the middle half of the values lies close together.
+fn steady(ratios: &[f64], spread: f64) -> Option<f64> {
+    let [low, middle, high] = [0.25, 0.5, 0.75].map(|q| quantile(ratios, q));
+    middle.filter(|m| high.zip(low).is_some_and(|(high, low)| high - low < spread * m))
+}
+
+/// Airspeed over what a steady turn shows; NaN elsewhere.
+fn by_turn(s: &Sample) -> f64 {
+    let [roll, pitch, _] = s.attitude_rad;
+    let turn = (s.rates_radps[1] * roll.sin() + s.rates_radps[2] * roll.cos()) / pitch.cos();
+    let banked = roll.abs() > 0.25 && roll.abs() < 1.2 && pitch.abs() < 0.5;
+    let steady = s.rates_radps[0].abs() < 0.15 && turn.abs() > 0.05;
+    if banked && steady {
+        s.airspeed_mps * turn / (STANDARD_GRAVITY * roll.tan())
+    } else {
+        f64::NAN
+    }
+}
+
+fn other_unit(ratio: Option<f64>, shown: &str) -> Option<Finding> {
+    let ratio = ratio?;
+    let miss = |mps: f64| (ratio * mps - 1.0).abs();
+    let (unit, scale) = SPEEDS.into_iter().min_by(|a, b| miss(a.1).total_cmp(&miss(b.1)))?;
+    if miss(scale) > 0.15 {
+        return None;
+    }
+    Some(Finding::problem(format!(
+        "airspeed looks like {unit}, not m/s (it is {ratio:.2} times what {shown}): {}",
+        cure("airspeed_mps", (scale * 1e6).round() / 1e6)
+    )))
+}
+
+fn vanes(rows: &[Sample]) -> Vec<Finding> {
+    let large = |get: fn(&Sample) -> f64| quantile(&values(rows, |s| get(s).abs()), 0.95);
+    [("alpha_rad", large(|s| s.alpha_rad)), ("beta_rad", large(|s| s.beta_rad))]
+        .into_iter()
+        .filter_map(|(column, size)| Some((column, size.filter(|x| *x > VANE_LARGE)?)))
+        .map(|(column, size)| {
+            Finding::problem(format!(
+                "{column} looks like degrees, not radians (95 % of it below {size:.1}): {}",
+                cure(column, 0.0174533)
+            ))
+        })
+        .collect()
+}
+
+/// Altitude against the climb that velocity over ground, or airspeed and pitch, integrate to.
+fn climb(rows: &[Sample], speed_is_right: bool) -> Option<Finding> {
+    let windows = windows(rows, CLIMB_S);
+    let height = |w: &&[Sample]| change(w, |s| s.altitude_m);
+    let down = through_origin(
+        windows.iter().map(|w| (-integral(w, |s| s.velocity_ned_mps[2]), height(w))),
+    );
+    let pitch = |s: &Sample| {
+        let alpha = if s.alpha_rad.abs() < VANE_LARGE { s.alpha_rad } else { 0.0 };
+        s.airspeed_mps * (s.attitude_rad[1] - alpha).sin()
+    };
+    let air = with_intercept(windows.iter().map(|w| (integral(w, pitch), height(w))));
+    let sure = |r: Option<Relation>| r.filter(|r| r.correlation.abs() > CERTAIN).map(|r| r.slope);
+    let (down, air) = (sure(down), sure(air));
+    let feet = |slope: Option<f64>| slope.is_some_and(|s| near(s, 1.0 / FOOT, 0.3));
+    if feet(air) && speed_is_right || feet(down) && air.is_none() {
+        return Some(Finding::problem(format!(
+            "altitude looks like feet, not metres (it climbs {:.1} times as fast as the aircraft): {}",
+            air.or(down).unwrap_or_default(),
+            cure("altitude_m", FOOT)
+        )));
+    }
+    if speed_is_right && air.is_some_and(|s| near(s, FOOT, 0.3)) {
+        return Some(Finding::problem(format!(
+            "airspeed looks like ft/s, not m/s (the altitude climbs 0.3 times as fast as airspeed and pitch say): {}",
+            cure("airspeed_mps", FOOT)
+        )));
+    }
+    if air.is_some_and(|s| s < 0.0) && down.is_none_or(|s| s < 0.0) {
+        return Some(Finding::problem(format!(
+            "altitude falls while the nose is up and the aircraft flies: it looks positive down, while the log format's is positive up: {}",
+            cure("altitude_m", -1.0)
+        )));
+    }
+    if down.is_some_and(|s| s < 0.0) {
+        return Some(Finding::problem(format!(
+            "altitude rises while vd_mps is positive: the velocity looks positive up (ENU), while the log format's is positive down (NED): {}",
+            cure("vd_mps", -1.0)
+        )));
+    }
+    density(rows)
+}
+
+/// A logged density against the standard atmosphere at the logged altitude.
+fn density(rows: &[Sample]) -> Option<Finding> {
+    let ratio = |foot: f64| {
+        quantile(
+            &values(rows, |s| s.air_density_kgpm3 / standard_density(s.altitude_m * foot)),
+            0.5,
+        )
+    };
+    let metres = ratio(1.0).filter(|r| !(0.75..1.3).contains(r))?;
+    let text = if ratio(FOOT).is_some_and(|r| near(r, 1.0, 0.12)) {
+        format!(
+            "altitude looks like feet, not metres (the logged air density fits it so): {}",
+            cure("altitude_m", FOOT)
+        )
+    } else {
+        format!(
+            "the logged air density is {metres:.2} times that of the standard atmosphere at the logged altitude: one of air_density_kgpm3 and altitude_m is in another unit; map it, or leave the density out"
+        )
+    };
+    Some(Finding::problem(text))
+}

@@ -1,0 +1,107 @@
+//! Attitude against body rates: units and signs.
+
+use std::f64::consts::{PI, TAU};
+
+use super::cure;
+use super::relation::{
+    Relation, change, integral, near, quantile, through_origin, values, windows,
+};
+use crate::logs::Sample;
+use crate::logs::finding::Finding;
+
+const DEGREE: f64 = PI / 180.0;
+/// Window over which angles and rates are compared, s.
+const WINDOW_S: f64 = 0.5;
+/// Correlation from which a relation is believed.
+const CERTAIN: f64 = 0.8;
+
+/// Units first; signs only where the units are right, for they are seen through sines.
+pub fn check(rows: &[Sample]) -> Vec<Finding> {
+    let windows = windows(rows, WINDOW_S);
+    let units = units(rows, &windows);
+    if units.is_empty() { signs(&windows) } else { units }
+}
+
+fn units(rows: &[Sample], windows: &[&[Sample]]) -> Vec<Finding> {
+    let mut out = Vec::new();
+    // roll against p alone, pitch against q alone: angles in degrees have no sine
+    let against = |axis: usize| {
+        let pairs = windows
+            .iter()
+            .map(|w| (integral(w, |s| s.rates_radps[axis]), change(w, |s| s.attitude_rad[axis])));
+        through_origin(pairs).filter(|r| r.correlation > CERTAIN).map(|r| r.slope)
+    };
+    let ratio = against(0).or_else(|| against(1));
+    let largest =
+        |axis: usize| quantile(&values(rows, |s| s.attitude_rad[axis].abs()), 0.99).unwrap_or(0.0);
+    let rate = quantile(&values(rows, |s| s.rates_radps[0].abs()), 0.99).unwrap_or(0.0);
+    let (roll, pitch) = (largest(0), largest(1));
+    let large = roll > 3.3 || pitch > 1.7;
+    let angles = large || ratio.is_some_and(|r| near(r, 1.0 / DEGREE, 0.4));
+    let rates = ratio.is_some_and(|r| near(r, DEGREE, 0.4))
+        || rate > 12.0
+        || large && ratio.is_some_and(|r| near(r, 1.0, 0.4));
+    if angles {
+        out.push(Finding::problem(format!(
+            "roll and pitch look like degrees, not radians (99 % of |roll| below {roll:.1}): {}; pitch_rad and yaw_rad likewise",
+            cure("roll_rad", 0.0174533)
+        )));
+    }
+    if rates {
+        out.push(Finding::problem(format!(
+            "p, q, r look like degrees a second, not radians a second (99 % of |p| below {rate:.1}): {}; q_radps and r_radps likewise",
+            cure("p_radps", 0.0174533)
+        )));
+    }
+    if let Some(r) = ratio.filter(|r| !angles && !rates && !near(*r, 1.0, 0.4)) {
+        out.push(Finding::warning(format!(
+            "roll changes {r:.2} times as much as p says: one of them is wrongly scaled or delayed"
+        )));
+    }
+    out
+}
+
+/// φ̇ = p + (q sin φ + r cos φ) tan θ, θ̇ = q cos φ − r sin φ, ψ̇ = (q sin φ + r cos φ) / cos θ.
+fn signs(windows: &[&[Sample]]) -> Vec<Finding> {
+    let [roll, pitch, yaw] = relations(windows);
+    let turned = |r: Option<Relation>| r.is_some_and(|r| r.correlation < -CERTAIN);
+    let mut out = Vec::new();
+    if turned(roll) {
+        out.push(Finding::problem(format!(
+            "roll falls while p is positive: one of them has the wrong sign (positive is right wing down). If it is roll: {}",
+            cure("roll_rad", -1.0)
+        )));
+    }
+    if turned(pitch) {
+        out.push(Finding::problem(format!(
+            "pitch falls while q is positive: one of them has the wrong sign (positive is nose up). If it is pitch: {}",
+            cure("pitch_rad", -1.0)
+        )));
+    }
+    if turned(yaw) {
+        out.push(Finding::problem(format!(
+            "yaw falls while the aircraft turns right: yaw looks counted from east to the left (ENU), while the log format counts from north to the right (NED); read it with --mapping FILE, in which [columns] has yaw_rad = {{ from = \"csv.yaw_rad\", scale = -1, offset = 1.5708 }}"
+        )));
+    }
+    out
+}
+
+fn relations(windows: &[&[Sample]]) -> [Option<Relation>; 3] {
+    let turn = |s: &Sample| {
+        let [roll, pitch, _] = s.attitude_rad;
+        (s.rates_radps[1] * roll.sin() + s.rates_radps[2] * roll.cos()) / pitch.cos()
+    };
+    let roll = |s: &Sample| s.rates_radps[0] + turn(s) * s.attitude_rad[1].sin();
+    let pitch = |s: &Sample| {
+        let bank = s.attitude_rad[0];
+        s.rates_radps[1] * bank.cos() - s.rates_radps[2] * bank.sin()
+    };
+    let against = |rate: &dyn Fn(&Sample) -> f64, axis: usize| {
+        let pairs = windows.iter().map(|w| {
+            let angle = change(w, |s| s.attitude_rad[axis]);
+            (integral(w, rate), angle - TAU * (angle / TAU).round())
+        });
+        through_origin(pairs)
+    };
+    [against(&roll, 0), against(&pitch, 1), against(&turn, 2)]
+}

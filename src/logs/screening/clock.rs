@@ -1,0 +1,38 @@
+//! The clock: seconds, milliseconds or microseconds.
+
+use super::cure;
+use super::relation::{near, quantile, through_origin, values};
+use crate::logs::Sample;
+use crate::logs::finding::Finding;
+
+/// Median time between rows above which the clock is looked at, s. A log of 1 Hz is no use anyway.
+const SUSPICIOUS_S: f64 = 0.9;
+/// Rows over which a turn is compared with the rates.
+const SPAN: usize = 20;
+
+/// Compares how far the roll angle goes with what the roll rate and the clock say.
+pub fn check(rows: &[Sample]) -> Option<Finding> {
+    let times = values(rows, |s| s.time_s);
+    let periods: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).filter(|p| *p > 0.0).collect();
+    let period = quantile(&periods, 0.5)?;
+    if period < SUSPICIOUS_S {
+        return None;
+    }
+    let pairs = rows.chunks(SPAN).filter(|c| c.len() == SPAN).map(|c| {
+        let step = |w: &[Sample]| {
+            0.5 * (w[0].rates_radps[0] + w[1].rates_radps[0]) * (w[1].time_s - w[0].time_s)
+        };
+        let turned: f64 = c.windows(2).map(step).sum();
+        (turned, c[SPAN - 1].attitude_rad[0] - c[0].attitude_rad[0])
+    });
+    let slope = through_origin(pairs)?.slope.abs();
+    [("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)]
+        .into_iter()
+        .find(|(_, factor)| near(slope, *factor, 0.7))
+        .map(|(unit, factor)| {
+            Finding::problem(format!(
+                "time_s looks like {unit}, not seconds (its rows are {period:.0} apart): {}",
+                cure("time_s", factor)
+            ))
+        })
+}

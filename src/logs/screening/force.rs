@@ -1,0 +1,95 @@
+//! Accelerometers: unit and sign of each axis.
+
+use super::cure;
+use super::relation::{change, mean, quantile, values, windows, with_intercept};
+use crate::logs::Sample;
+use crate::logs::finding::Finding;
+use crate::physics::atmosphere::STANDARD_GRAVITY;
+
+const G: f64 = STANDARD_GRAVITY;
+/// Window over which accelerations are compared, s.
+const WINDOW_S: f64 = 1.0;
+/// Correlation below which a sign is called wrong.
+const TURNED: f64 = -0.7;
+
+/// Everything about the specific force.
+pub fn check(rows: &[Sample]) -> Vec<Finding> {
+    let size = |s: &Sample| s.specific_force_mps2.iter().map(|a| a * a).sum::<f64>().sqrt();
+    let Some(middle) = quantile(&values(rows, size), 0.5) else { return Vec::new() };
+    if let Some((unit, scale)) = unit(middle) {
+        return vec![Finding::problem(format!(
+            "specific force looks like {unit}, not m/s² (its median size is {middle:.2}): {}; ay_mps2 and az_mps2 likewise",
+            cure("ax_mps2", scale)
+        ))];
+    }
+    if let Some(vertical) = vertical(rows) {
+        return vec![vertical];
+    }
+    along_and_across(rows)
+}
+
+fn unit(middle: f64) -> Option<(&'static str, f64)> {
+    match middle {
+        0.5..2.0 => Some(("g", 9.80665)),
+        300.0..3000.0 => Some(("milli-g", 0.00980665)),
+        _ => None,
+    }
+}
+
+fn vertical(rows: &[Sample]) -> Option<Finding> {
+    let z = quantile(&values(rows, |s| s.specific_force_mps2[2]), 0.5).filter(|z| *z > 5.0)?;
+    let left = turns_left(rows);
+    let text = if left {
+        "the axes look forward-left-up (FLU): az is positive, and r is negative in right turns; read ay_mps2, az_mps2, q_radps, r_radps, pitch_rad and yaw_rad with scale = -1 in a mapping (--mapping FILE)".to_owned()
+    } else {
+        format!(
+            "az is {z:.2} in the middle: the z accelerometer looks positive up, while the log format's reads about -9.81 in level flight: {}",
+            cure("az_mps2", -1.0)
+        )
+    };
+    Some(Finding::problem(text))
+}
+
+/// Whether r is negative in banks to the right: ψ̇ = g tan φ / V in coordinated flight.
+fn turns_left(rows: &[Sample]) -> bool {
+    let pairs = windows(rows, WINDOW_S)
+        .into_iter()
+        .map(|w| (mean(w, |s| s.attitude_rad[0].tan()), mean(w, |s| s.rates_radps[2])));
+    with_intercept(pairs).is_some_and(|r| r.correlation < TURNED)
+}
+
+/// f_x = u̇ + q w − r v + g sin θ and f_y = v̇ + r u − p w − g sin φ cos θ, in still air.
+fn along_and_across(rows: &[Sample]) -> Vec<Finding> {
+    let windows = windows(rows, WINDOW_S);
+    let body = |s: &Sample| {
+        let alpha = if s.alpha_rad.is_finite() { s.alpha_rad } else { 0.0 };
+        let beta = if s.beta_rad.is_finite() { s.beta_rad } else { 0.0 };
+        let v = s.airspeed_mps;
+        [v * alpha.cos() * beta.cos(), v * beta.sin(), v * alpha.sin() * beta.cos()]
+    };
+    let expected = |w: &[Sample], axis: usize| {
+        let time = w[w.len() - 1].time_s - w[0].time_s;
+        let turning = |s: &Sample| {
+            let ([u, v, w], [p, q, r]) = (body(s), s.rates_radps);
+            let [roll, pitch, _] = s.attitude_rad;
+            match axis {
+                0 => q * w - r * v + G * pitch.sin(),
+                _ => r * u - p * w - G * roll.sin() * pitch.cos(),
+            }
+        };
+        change(w, |s| body(s)[axis]) / time + mean(w, turning)
+    };
+    [(0, "ax_mps2", "positive backward", "forward"), (1, "ay_mps2", "positive to the left", "to the right")]
+        .into_iter()
+        .filter(|(axis, ..)| {
+            let pairs = windows.iter().map(|w| (expected(w, *axis), mean(w, |s| s.specific_force_mps2[*axis])));
+            with_intercept(pairs).is_some_and(|r| r.correlation < TURNED)
+        })
+        .map(|(_, column, looks, right)| {
+            Finding::problem(format!(
+                "{column} contradicts how the aircraft accelerates: it looks {looks}, while the log format's is positive {right}: {}",
+                cure(column, -1.0)
+            ))
+        })
+        .collect()
+}

@@ -1,0 +1,73 @@
+//! Screening: wrong units, signs and axes, found before anything is computed from a log.
+//!
+//! Each check uses a relation that holds for every aeroplane whatever its coefficients: Euler angles are the
+//! integral of the body rates, a steady turn has V ψ̇ = g tan φ, altitude is the integral of the climb, a
+//! surface accelerates the aircraft in its own direction. A finding names the column and the mapping that
+//! cures it. Nothing is converted unasked.
+
+mod air;
+mod angles;
+mod clock;
+mod dead;
+mod force;
+mod relation;
+mod surfaces;
+
+use super::Sample;
+use super::finding::Finding;
+use super::phases::{self, Kind};
+
+/// Rows below which nothing is said about units.
+const ENOUGH: usize = 50;
+/// Flight below which a verdict would rest on too little, s.
+const SHORTEST_FLIGHT_S: f64 = 5.0;
+
+/// Everything found in the rows as they stand in the file.
+pub fn screen(rows: &[Sample]) -> Vec<Finding> {
+    if rows.is_empty() {
+        return vec![Finding::problem("the log has no rows with all needed channels")];
+    }
+    let mut out = Vec::new();
+    if rows.len() >= ENOUGH {
+        let clock = clock::check(rows);
+        let clock_is_right = clock.is_none();
+        out.extend(clock);
+        if clock_is_right {
+            out.extend(angles::check(rows));
+            out.extend(force::check(rows));
+            let axes_are_right = out.is_empty();
+            out.extend(air::check(rows));
+            out.extend(surfaces::check(rows, axes_are_right));
+        }
+        out.extend(dead::check(rows));
+    }
+    out.extend(flight(rows));
+    out
+}
+
+/// Whether there is a flight, and one that is long enough.
+fn flight(rows: &[Sample]) -> Option<Finding> {
+    let flights: Vec<_> =
+        phases::phases(rows).into_iter().filter(|p| p.kind == Kind::Flight).collect();
+    if flights.is_empty() {
+        let fastest = relation::values(rows, |s| s.airspeed_mps).into_iter().fold(0.0, f64::max);
+        return Some(Finding::problem(format!(
+            "there is no flight in this log: airspeed never stays above {} m/s for {} s (largest value {fastest:.1} m/s); give a log with a flight, or check the airspeed channel",
+            phases::FLYING_MPS,
+            phases::SUSTAINED_S
+        )));
+    }
+    let flown: f64 = flights.iter().map(|p| p.to_s - p.from_s).sum();
+    (rows.len() >= ENOUGH && flown < SHORTEST_FLIGHT_S).then(|| {
+        Finding::problem(format!(
+            "the log holds {flown:.1} s of flight: a verdict needs at least {SHORTEST_FLIGHT_S} s, an effect about a minute; give a longer log"
+        ))
+    })
+}
+
+/// The mapping that multiplies `column` by `scale`.
+fn cure(column: &str, scale: f64) -> String {
+    format!(
+        "read it with --mapping FILE, in which [columns] has {column} = {{ from = \"csv.{column}\", scale = {scale} }} (in a binary log its topic and field stand in place of csv.{column})"
+    )
+}

@@ -1,0 +1,110 @@
+//! Relations between columns: windows of a log, regressions over them.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::logs::Sample;
+use crate::num::statistics;
+
+/// A pause of so many median periods ends a window.
+const PAUSE_PERIODS: f64 = 5.0;
+/// Fewest pairs that a relation is taken from.
+const FEWEST: usize = 12;
+
+/// The finite values of a column.
+pub fn values(rows: &[Sample], get: impl Fn(&Sample) -> f64) -> Vec<f64> {
+    rows.iter().map(get).filter(|x| x.is_finite()).collect()
+}
+
+/// The value below which the share `q` of the values lies; `None` for fewer than [`super::ENOUGH`].
+pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
+    (values.len() >= super::ENOUGH).then(|| statistics::quantile(values, q))
+}
+
+/// Whether `x` is within the share `tolerance` of `target`.
+pub fn near(x: f64, target: f64, tolerance: f64) -> bool {
+    (x / target - 1.0).abs() < tolerance
+}
+
+/// Windows of about `length_s` without a pause, one after the other.
+pub fn windows(rows: &[Sample], length_s: f64) -> Vec<&[Sample]> {
+    let times = values(rows, |s| s.time_s);
+    let periods: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).filter(|p| *p > 0.0).collect();
+    let Some(period) = quantile(&periods, 0.5) else { return Vec::new() };
+    let (mut out, mut start) = (Vec::new(), 0);
+    for i in 1..rows.len() {
+        let step = rows[i].time_s - rows[i - 1].time_s;
+        if !(step > 0.0 && step < PAUSE_PERIODS * period) {
+            start = i;
+        } else if rows[i].time_s - rows[start].time_s >= length_s - 0.5 * period && i > start {
+            out.push(&rows[start..=i]);
+            start = i;
+        }
+    }
+    out
+}
+
+/// The integral of `rate` over a window by the trapezoidal rule.
+pub fn integral(window: &[Sample], rate: impl Fn(&Sample) -> f64) -> f64 {
+    let step = |w: &[Sample]| 0.5 * (rate(&w[0]) + rate(&w[1])) * (w[1].time_s - w[0].time_s);
+    window.windows(2).map(step).sum()
+}
+
+/// The mean of `value` over a window.
+pub fn mean(window: &[Sample], value: impl Fn(&Sample) -> f64) -> f64 {
+    window.iter().map(value).sum::<f64>() / window.len() as f64
+}
+
+/// How much `value` grows from the first to the last row of a window.
+pub fn change(window: &[Sample], value: impl Fn(&Sample) -> f64) -> f64 {
+    value(&window[window.len() - 1]) - value(&window[0])
+}
+
+/// How y follows x.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Relation {
+    /// dy/dx.
+    pub slope: f64,
+    /// Correlation, −1..1.
+    pub correlation: f64,
+}
+
+/// Regression of y on x through the origin; `None` for too few finite pairs.
+pub fn through_origin(pairs: impl Iterator<Item = (f64, f64)>) -> Option<Relation> {
+    relation(pairs.filter(|(x, y)| x.is_finite() && y.is_finite()).collect())
+}
+
+/// Regression of y on x with an intercept; `None` for too few finite pairs.
+pub fn with_intercept(pairs: impl Iterator<Item = (f64, f64)>) -> Option<Relation> {
+    let pairs: Vec<_> = pairs.filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+    let n = pairs.len() as f64;
+    let (mx, my) =
+        (pairs.iter().map(|p| p.0).sum::<f64>() / n, pairs.iter().map(|p| p.1).sum::<f64>() / n);
+    relation(pairs.into_iter().map(|(x, y)| (x - mx, y - my)).collect())
+}
+
+fn relation(pairs: Vec<(f64, f64)>) -> Option<Relation> {
+    let sum = |f: fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>();
+    let (xx, yy, xy) = (sum(|p| p.0 * p.0), sum(|p| p.1 * p.1), sum(|p| p.0 * p.1));
+    (pairs.len() >= FEWEST && xx > 0.0 && yy > 0.0)
+        .then(|| Relation { slope: xy / xx, correlation: xy / (xx * yy).sqrt() })
+}
+
+/// The partial correlation of y with the last regressor of each row, all others and a constant being
+/// partialled out (Frisch–Waugh–Lovell); `None` for too few rows, or where the others determine it.
+pub fn partial_correlation(rows: &[(Vec<f64>, f64)]) -> Option<f64> {
+    let width = rows.first()?.0.len();
+    if rows.len() < 10 * width {
+        return None;
+    }
+    let others = DMatrix::from_fn(rows.len(), width, |i, j| match j {
+        0 => 1.0,
+        _ => rows[i].0[j - 1],
+    });
+    let y = DVector::from_iterator(rows.len(), rows.iter().map(|r| r.1));
+    let x = DVector::from_iterator(rows.len(), rows.iter().map(|r| r.0[width - 1]));
+    let gram = (others.transpose() * &others).cholesky()?;
+    let rest = |v: &DVector<f64>| v - &others * gram.solve(&(others.transpose() * v));
+    let (x, y, whole) = (rest(&x), rest(&y), x.norm());
+    let product = x.norm() * y.norm();
+    (x.norm() > 1e-3 * whole && product > 0.0).then(|| x.dot(&y) / product)
+}

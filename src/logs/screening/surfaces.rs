@@ -1,0 +1,145 @@
+//! Surfaces and throttle: units, and whether they move the aircraft in their own direction.
+
+use super::cure;
+use super::relation::{change, mean, partial_correlation, quantile, values, windows};
+use crate::logs::Sample;
+use crate::logs::finding::Finding;
+
+/// Deflection beyond which no surface is for a hundredth of the time, rad (69°).
+const DEFLECTION_LARGE: f64 = 1.2;
+/// Command beyond which it is no share of the travel.
+const COMMAND_LARGE: f64 = 1.5;
+/// Time over which an angular acceleration is taken, s.
+const WINDOW_S: f64 = 0.1;
+/// Partial correlation beyond which a surface is taken to act the other way.
+const TURNED: f64 = 0.6;
+
+/// Reads a column.
+type Get = fn(&Sample) -> f64;
+
+/// Units, then polarity where the units and the axes are right.
+pub fn check(rows: &[Sample], axes_are_right: bool) -> Vec<Finding> {
+    let mut out: Vec<Finding> = units(rows);
+    if out.is_empty() && axes_are_right {
+        out.extend(aileron(rows));
+        out.extend(elevator(rows));
+    }
+    out
+}
+
+fn units(rows: &[Sample]) -> Vec<Finding> {
+    let size = |get: Get| quantile(&values(rows, |s| get(s).abs()), 0.99).unwrap_or(0.0);
+    let deflections: [(&str, Get); 3] = [
+        ("aileron_rad", |s| s.aileron_rad),
+        ("elevator_rad", |s| s.elevator_rad),
+        ("rudder_rad", |s| s.rudder_rad),
+    ];
+    let commands: [(&str, Get); 3] = [
+        ("aileron_cmd", |s| s.aileron_cmd),
+        ("elevator_cmd", |s| s.elevator_cmd),
+        ("rudder_cmd", |s| s.rudder_cmd),
+    ];
+    let throttles: [(&str, Get); 2] =
+        [("throttle", |s| s.throttle), ("throttle_cmd", |s| s.throttle_cmd)];
+    let large = |list: &[(&'static str, Get)], limit: f64| -> Vec<(&'static str, f64)> {
+        list.iter().map(|(n, get)| (*n, size(*get))).filter(|(_, x)| *x > limit).collect()
+    };
+    let mut out = Vec::new();
+    for (column, x) in large(&deflections, DEFLECTION_LARGE) {
+        out.push(Finding::problem(format!(
+            "{column} looks like degrees, not radians (99 % of it below {x:.1}): {}",
+            cure(column, 0.0174533)
+        )));
+    }
+    for (column, x) in large(&commands, COMMAND_LARGE) {
+        out.push(Finding::problem(format!(
+            "{column} reaches {x:.1}, while the log format's commands lie in -1..1: read it with --mapping FILE and the scale that makes full travel 1"
+        )));
+    }
+    for (column, x) in large(&throttles, COMMAND_LARGE) {
+        out.push(throttle(column, x));
+    }
+    out
+}
+
+fn throttle(column: &str, size: f64) -> Finding {
+    Finding::problem(match size {
+        0.0..=130.0 => format!(
+            "{column} looks like per cent, not 0..1 (99 % of it below {size:.0}): {}",
+            cure(column, 0.01)
+        ),
+        _ => format!(
+            "{column} looks like microseconds of a pulse, not 0..1 (99 % of it below {size:.0}): read it with --mapping FILE, in which [columns] has {column} = {{ from = \"csv.{column}\", scale = 0.001, offset = -1 }}"
+        ),
+    })
+}
+
+/// ṗ on p, r, β and the aileron: positive is right wing down.
+fn aileron(rows: &[Sample]) -> Option<Finding> {
+    let (column, get) =
+        moving(rows, [("aileron_rad", |s| s.aileron_rad), ("aileron_cmd", |s| s.aileron_cmd)])?;
+    let beta = has(rows, |s| s.beta_rad);
+    let regressors = |w: &[Sample]| {
+        let mut all = vec![mean(w, |s| s.rates_radps[0]), mean(w, |s| s.rates_radps[2])];
+        all.extend(beta.then(|| mean(w, |s| s.beta_rad)));
+        all.push(mean(w, get));
+        all
+    };
+    let found = polarity(rows, 0, regressors)?;
+    (found < -TURNED).then(|| {
+        Finding::problem(format!(
+            "{column} acts the other way: the aircraft rolls left where it is positive, while the log format's is positive for right wing down: {}",
+            cure(column, -1.0)
+        ))
+    })
+}
+
+/// q̇ on q, α (or the normal force in its place) and the elevator: positive is nose down.
+fn elevator(rows: &[Sample]) -> Option<Finding> {
+    let (column, get) =
+        moving(rows, [("elevator_rad", |s| s.elevator_rad), ("elevator_cmd", |s| s.elevator_cmd)])?;
+    let alpha: Get = match has(rows, |s| s.alpha_rad) {
+        true => |s| s.alpha_rad,
+        false => |s| s.specific_force_mps2[2] / s.airspeed_mps.powi(2),
+    };
+    let regressors =
+        |w: &[Sample]| vec![mean(w, |s| s.rates_radps[1]), mean(w, alpha), mean(w, get)];
+    let found = polarity(rows, 1, regressors)?;
+    (found > TURNED).then(|| {
+        Finding::problem(format!(
+            "{column} acts the other way: the nose rises where it is positive, while the log format's is positive for nose down: {}",
+            cure(column, -1.0)
+        ))
+    })
+}
+
+/// Whether half of the rows have the column.
+fn has(rows: &[Sample], get: Get) -> bool {
+    2 * values(rows, get).len() > rows.len()
+}
+
+/// The first of the columns that the log has and that moves.
+fn moving(rows: &[Sample], columns: [(&'static str, Get); 2]) -> Option<(&'static str, Get)> {
+    columns.into_iter().find(|(_, get)| {
+        let all = values(rows, *get);
+        2 * all.len() > rows.len() && all.iter().any(|x| *x != all[0])
+    })
+}
+
+/// The partial correlation of the angular acceleration about `axis` with the last regressor.
+fn polarity(
+    rows: &[Sample],
+    axis: usize,
+    regressors: impl Fn(&[Sample]) -> Vec<f64>,
+) -> Option<f64> {
+    let equations: Vec<(Vec<f64>, f64)> = windows(rows, WINDOW_S)
+        .into_iter()
+        .filter(|w| w.iter().all(|s| s.airspeed_mps > crate::logs::phases::FLYING_MPS))
+        .map(|w| {
+            let time = w[w.len() - 1].time_s - w[0].time_s;
+            (regressors(w), change(w, |s| s.rates_radps[axis]) / time)
+        })
+        .filter(|(x, y)| y.is_finite() && x.iter().all(|x| x.is_finite()))
+        .collect();
+    partial_correlation(&equations)
+}
