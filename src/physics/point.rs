@@ -74,7 +74,7 @@ pub struct Base<R = f64> {
     pub wrench: Wrench<R>,
     /// Their force in body axes, N.
     pub force: Vector<R>,
-    /// The part of `wrench` due to aileron and elevator.
+    /// The part of `wrench` due to aileron, elevator and rudder.
     pub deflected: Wrench<R>,
     /// What `wrench` would be without deflections and body rates.
     pub still: Wrench<R>,

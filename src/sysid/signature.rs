@@ -204,14 +204,15 @@ fn manoeuvre(models: &[GreyBox; 2], trim: &Trim) -> Vec<Pair> {
 
 /// The command of [`MANOEUVRE`] at `time` (s).
 fn command(model: &GreyBox, trim: &Trim, time: f64) -> Command {
-    let stop = model.airframe.actuators.deflection_max;
+    let level = model.airframe.actuators.command(&trim.controls);
     let pulse = |from: f64, to: f64| if (from..to).contains(&time) { 1.0 } else { 0.0 };
     let elevator = pulse(0.5, 1.4) - pulse(1.4, 2.0) + pulse(2.0, 2.3) - pulse(2.3, 2.6);
     let aileron = pulse(4.0, 4.4) - pulse(4.4, 4.8);
     Command {
-        aileron: trim.controls.aileron / stop + 0.3 * aileron,
-        elevator: trim.controls.elevator / stop + 0.2 * elevator,
+        aileron: level.aileron + 0.3 * aileron,
+        elevator: level.elevator + 0.2 * elevator,
         throttle: trim.controls.throttle.max(pulse(6.0, 8.0)),
+        rudder: level.rudder + 0.3 * (pulse(8.0, 8.4) - pulse(8.4, 8.8)),
     }
     .clamped()
 }

@@ -39,7 +39,7 @@ pub fn options(pace: Pace) -> Options {
         pace,
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
-        deflection: x8().airframe.actuators.deflection_max,
+        travels: x8().airframe.actuators.travels(),
         controller: None,
         signing: None,
     }

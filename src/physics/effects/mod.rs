@@ -229,6 +229,7 @@ effects! {
     roll_linear::RollLinear,
     pitch_linear::PitchLinear,
     yaw_linear::YawLinear,
+    rudder_linear::RudderLinear,
     thrust_linear::ThrustLinear,
     lift_table::LiftTable,
     drag_table::DragTable,

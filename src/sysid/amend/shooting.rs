@@ -99,6 +99,7 @@ fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
         aileron: mix(|z| z.aileron),
         elevator: mix(|z| z.elevator),
         throttle: mix(|z| z.throttle),
+        rudder: mix(|z| z.rudder),
     }
 }
 
