@@ -7,6 +7,7 @@ use std::time::Duration;
 use greylag::link::client::Clients;
 use greylag::link::framing::StreamCutter;
 use greylag::link::vehicle::Sitl;
+use greylag::physics::servos::Travels;
 use link_support::hostile::{corpus, mutate};
 use link_support::*;
 use rand::{Rng, RngExt, SeedableRng};

@@ -5,6 +5,7 @@ mod link_support;
 use std::time::Duration;
 
 use greylag::link::vehicle::{Faults, Order, Outputs, Sitl, Telemetry};
+use greylag::physics::servos::Travels;
 use greylag::physics::{Command, Time};
 use link_support::{Shown, dissect, frame_from, peer, shim};
 use mavlink::MavlinkVersion::V2;
@@ -85,7 +86,7 @@ fn a_travel_that_the_vehicle_sends_is_used_and_compared_with_the_airframes() {
     close(t.actuators.elevator, -0.25 * 0.3);
     close(t.actuators.elevator_rate, -4.0 * 0.3);
     let obstacle = sitl.obstacle().unwrap();
-    for part in ["0.4000 rad (aileron)", "0.3000 rad (elevator)", "0.5235", "deflection_max_rad"] {
+    for part in ["0.4000 rad (aileron)", "0.3000 rad (elevator)", "0.5235", "airframe file"] {
         assert!(obstacle.contains(part), "{obstacle}");
     }
     assert!(sitl.take_notice().is_some());
@@ -214,7 +215,7 @@ fn controls(bytes: &[u8]) -> HIL_ACTUATOR_CONTROLS_DATA {
 fn the_answer_echoes_the_time_and_is_zero_when_disarmed() {
     let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let time = Time::from_micros(123_456);
-    let command = Command { aileron: 0.5, elevator: -3.0, throttle: 0.7 };
+    let command = Command { aileron: 0.5, elevator: -3.0, throttle: 0.7, rudder: 0.0 };
     let armed = controls(&sitl.command(time, Outputs::Armed(command)));
     assert_eq!((armed.time_usec, armed.mode.bits()), (123_456, 128));
     // Beyond its range a command is limited.
@@ -226,10 +227,10 @@ fn the_answer_echoes_the_time_and_is_zero_when_disarmed() {
 #[test]
 fn a_command_that_is_not_finite_never_leaves() {
     let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
-    let bad = Command { aileron: f64::NAN, elevator: 0.0, throttle: f64::INFINITY };
+    let bad = Command { aileron: f64::NAN, elevator: 0.0, throttle: f64::INFINITY, rudder: 0.0 };
     let first = controls(&sitl.command(Time::default(), Outputs::Armed(bad)));
     assert_eq!(first.controls, [0.0; 16]);
-    let good = Command { aileron: 0.25, elevator: 0.5, throttle: 0.75 };
+    let good = Command { aileron: 0.25, elevator: 0.5, throttle: 0.75, rudder: 0.0 };
     sitl.command(Time::default(), Outputs::Armed(good));
     let after = controls(&sitl.command(Time::default(), Outputs::Armed(bad)));
     assert_eq!(after.controls[..3], [0.25, 0.5, 0.75]);

@@ -99,7 +99,7 @@ struct Condition {
 /// A variable to sweep: its label, its ends in the label's unit, how to set it.
 type Variable = (&'static str, [f64; 2], fn(&mut Condition, f64));
 
-const VARIABLES: [Variable; 11] = [
+const VARIABLES: [Variable; 12] = [
     ("angle of attack, °", [-25.0, 25.0], |c, x| c.state.alpha = x.to_radians()),
     ("sideslip, °", [-20.0, 20.0], |c, x| c.state.beta = x.to_radians()),
     ("airspeed, m/s", [12.0, 35.0], |c, x| c.state.airspeed = x),
@@ -110,6 +110,7 @@ const VARIABLES: [Variable; 11] = [
     ("aileron, °", [-30.0, 30.0], |c, x| c.controls.aileron = x.to_radians()),
     ("elevator, °", [-30.0, 30.0], |c, x| c.controls.elevator = x.to_radians()),
     ("throttle", [0.0, 1.0], |c, x| c.controls.throttle = x),
+    ("rudder, °", [-30.0, 30.0], |c, x| c.controls.rudder = x.to_radians()),
     ("altitude, m", [600.0, 607.0], |c, x| c.altitude = x),
 ];
 

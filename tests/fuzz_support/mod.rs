@@ -15,6 +15,7 @@ use greylag::model::{GreyBox, weights};
 use greylag::num::Dense;
 use greylag::num::stream::stream;
 use greylag::physics::Airframe;
+use greylag::physics::servos::Travels;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
