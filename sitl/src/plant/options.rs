@@ -10,7 +10,7 @@ use crate::hidden::Hidden;
 /// Which aircraft to fly, in what air, with what hidden in it.
 #[derive(Clone, Debug)]
 pub struct PlantOptions {
-    /// Folder that holds `NAME/NAME.xml`; `None` is the X8 built into the program.
+    /// Folder that holds `NAME/NAME.xml`; `None` is one of those built into the program.
     pub aircraft_dir: Option<PathBuf>,
     /// The aircraft's name.
     pub aircraft: String,
