@@ -61,7 +61,8 @@ fn main() -> Result<()> {
         let [attitude, integral, rate, sideslip, deflection] = x[..] else {
             anyhow::bail!("weights are attitude,integral,rate,sideslip,deflection: {figures}");
         };
-        let weights = Weights { attitude, integral, rate, sideslip, deflection };
+        let weights =
+            Weights { attitude, integral, rate, sideslip, deflection, ..Weights::DEFAULT };
         let lqi = Lqi::weighted("lqi", &model, &weights)?;
         controllers.push((figures, Box::new(lqi)));
     }
@@ -195,14 +196,14 @@ impl Flight {
 
     /// What the surfaces get: one of them late, with the pulse on it in the fourth second.
     fn delayed(&mut self, step: usize, command: Command) -> Inputs {
-        let Command { mut aileron, mut elevator, throttle } = command;
+        let Command { mut aileron, mut elevator, throttle, .. } = command;
         let surface = if self.axis == Axis::Pitch { &mut elevator } else { &mut aileron };
         self.late.push_back(*surface);
         *surface = self.late.pop_front().unwrap_or(*surface);
         if (4 * SECOND..4 * SECOND + SECOND / 10).contains(&step) {
             *surface = (*surface + self.pulse).clamp(-1.0, 1.0);
         }
-        Inputs { aileron, elevator, throttle }
+        Inputs { aileron, elevator, throttle, rudder: 0.0 }
     }
 }
 
@@ -217,6 +218,7 @@ fn slewed(before: Command, wanted: Command) -> Command {
         aileron: near(before.aileron, wanted.aileron),
         elevator: near(before.elevator, wanted.elevator),
         throttle: wanted.throttle,
+        rudder: 0.0,
     }
     .clamped()
 }

@@ -119,7 +119,7 @@ fn in_process(model: &GreyBox, hours: f64, opposite: &str) -> Result<()> {
     let (mut aircraft, vehicle) = match opposite {
         "sitl" => (
             Aircraft::Sitl(Box::new(Bench::new(&options)?)),
-            Vehicle::Sitl(Sitl::new(1, actuators.deflection_max)),
+            Vehicle::Sitl(Sitl::new(1, actuators.travels())),
         ),
         "px4" | "ardupilot" => {
             options.launch = Launch::Immediate;
@@ -227,7 +227,7 @@ fn through_sockets(model: &GreyBox, hours: f64) -> Result<()> {
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
         controller: None,
-        deflection: model.airframe.actuators.deflection_max,
+        travels: model.airframe.actuators.travels(),
         signing: None,
     };
     // The aircraft's minute is half a second of the client's.

@@ -266,7 +266,7 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<Options> {
         plan_deadline: Options::PLAN_DEADLINE,
         controller: None,
         signing: None,
-        deflection: model.airframe.actuators.deflection_max,
+        travels: model.airframe.actuators.travels(),
     })
 }
 

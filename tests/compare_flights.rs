@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 use compare_support::{EXACT, Noise, REALISTIC, as_measured, fly, model};
 use greylag::logs::rudder::RudderMotion;
 use greylag::model::GreyBox;
+use greylag::physics::airframe::Yaw;
 use greylag::sysid::compare::{
     Bin, ChannelId, ChannelResult, CompareError, Comparison, ModelResult, Options, RegimeVariable,
     compare,
@@ -67,7 +68,9 @@ fn a_rudder_that_moves_is_said_first() {
     let mut flights = exact().to_vec();
     let quiet = against(&[model("jsbsim")], &flights);
     flights[2].rudder = Some(RudderMotion::Command(0.12));
-    let moving = against(&[model("jsbsim")], &flights);
+    let mut unstated = model("jsbsim");
+    unstated.airframe.yaw = Yaw::Unstated;
+    let moving = against(&[unstated], &flights);
     for said in [&moving.sentences, &moving.models[0].sentences] {
         assert!(
             said[0].starts_with("The rudder command moves (sd 12 % of its travel)"),
@@ -75,6 +78,13 @@ fn a_rudder_that_moves_is_said_first() {
         );
         assert_eq!(said[1..], quiet.sentences);
     }
+    // firmware of an aircraft without a rudder commands one all the same
+    assert_eq!(model("jsbsim").airframe.yaw, Yaw::NoRudder);
+    assert_eq!(against(&[model("jsbsim")], &flights).sentences, quiet.sentences);
+    // a deflection is more than a command: somebody must be wrong
+    flights[2].rudder = Some(RudderMotion::Deflection(0.07));
+    let said = against(&[model("jsbsim")], &flights).sentences;
+    assert!(said[0].starts_with("The rudder moves (sd 4.0°)"), "{said:?}");
 }
 
 #[test]

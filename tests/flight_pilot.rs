@@ -31,6 +31,7 @@ impl Controller for Proportional {
             aileron: target.roll - seen.state.roll,
             elevator: seen.state.pitch - target.pitch,
             throttle: 0.1 * (target.airspeed - seen.state.airspeed),
+            rudder: 0.0,
         }
     }
 }
@@ -62,7 +63,7 @@ impl Controller for Broken {
     }
     fn reset(&mut self, _seed: u64) {}
     fn command(&mut self, _: &Observation, _: &Target) -> Command {
-        Command { aileron: f64::NAN, elevator: 0.0, throttle: 0.0 }
+        Command { aileron: f64::NAN, elevator: 0.0, throttle: 0.0, rudder: 0.0 }
     }
 }
 
@@ -93,7 +94,7 @@ struct Flight {
     plan: Plan,
 }
 
-const RIGHT: Command = Command { aileron: 1.0, elevator: -1.0, throttle: 1.0 };
+const RIGHT: Command = Command { aileron: 1.0, elevator: -1.0, throttle: 1.0, rudder: 0.0 };
 const LEVEL_SETPOINT: AttitudeSetpoint = AttitudeSetpoint { roll: 0.2, pitch: 0.1, thrust: None };
 const TICK: Duration = Duration::from_millis(10);
 
@@ -355,7 +356,8 @@ fn without_a_usable_state_the_command_is_held_for_50_ms_then_surfaces_go_to_trim
         assert_eq!(decision.mode, if i <= 50 { Mode::Offboard } else { Mode::Hold }, "tick {i}");
     }
     let trim = flight.pilot.config().trim_at(20.0);
-    let level = Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle };
+    let level =
+        Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle, rudder: 0.0 };
     assert_eq!(flight.last.unwrap().command, level);
     let said = flight.texts();
     assert_eq!(said.matches("vehicle state refused: body rates").count(), 1, "{said}");
@@ -378,7 +380,8 @@ fn a_plan_that_is_no_number_is_replaced_and_told_once_in_five_seconds() {
     flight.plan = Plan::Ready(Command { elevator: f64::INFINITY, ..Command::IDLE });
     assert_eq!(flight.fly(99).source, Source::Fallback);
     assert_eq!(flight.texts().matches("fallback flies").count(), 1);
-    flight.plan = Plan::Ready(Command { aileron: 1e30, elevator: -1e30, throttle: 1e30 });
+    flight.plan =
+        Plan::Ready(Command { aileron: 1e30, elevator: -1e30, throttle: 1e30, rudder: 0.0 });
     let decision = flight.fly(1);
     assert_eq!(decision.source, Source::Planned);
 }
@@ -422,7 +425,10 @@ fn sticks_command_surfaces_in_manual_and_attitude_in_stabilized() {
     assert_eq!(flight.pilot.set_mode(flight.now, Mode::Manual), Verdict::Accepted);
     let decision = flight.fly(15);
     // Stick back is elevator up, which is negative.
-    assert_eq!(decision.command, Command { aileron: 0.5, elevator: -0.5, throttle: 0.6 });
+    assert_eq!(
+        decision.command,
+        Command { aileron: 0.5, elevator: -0.5, throttle: 0.6, rudder: 0.0 }
+    );
     assert_eq!(decision.source, Source::Sticks);
     flight.pilot.sticks(flight.now, sticks);
     assert_eq!(flight.pilot.set_mode(flight.now, Mode::Stabilized), Verdict::Accepted);
@@ -505,7 +511,12 @@ impl Dice {
         }
     }
     fn command(&mut self) -> Command {
-        Command { aileron: self.number(), elevator: self.number(), throttle: self.number() }
+        Command {
+            aileron: self.number(),
+            elevator: self.number(),
+            throttle: self.number(),
+            rudder: 0.0,
+        }
     }
 }
 
@@ -643,7 +654,7 @@ fn a_schedule_is_flown_inside_the_limits_for_as_long_as_offboard_lasts() {
     let steep = Step::hold(2.0, 70.0, 5.0, 5.0).with(kick);
     let mut flight = Flight::offboard();
     flight.pilot.follow(Schedule::new("steep", "", vec![steep]).unwrap());
-    flight.plan = Plan::Ready(Command { aileron: 0.0, elevator: -0.1, throttle: 0.3 });
+    flight.plan = Plan::Ready(Command { aileron: 0.0, elevator: -0.1, throttle: 0.3, rudder: 0.0 });
     fn fly(flight: &mut Flight, ticks: usize) -> Decision {
         let one = |_| {
             flight.pilot.attitude_setpoint(flight.now, LEVEL_SETPOINT);

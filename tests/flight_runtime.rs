@@ -233,7 +233,7 @@ impl Controller for Slow {
     fn reset(&mut self, _seed: u64) {}
     fn command(&mut self, _: &Observation, _: &Target) -> Command {
         std::thread::sleep(Duration::from_millis(30));
-        Command { aileron: 1.0, elevator: 1.0, throttle: 1.0 }
+        Command { aileron: 1.0, elevator: 1.0, throttle: 1.0, rudder: 0.0 }
     }
 }
 

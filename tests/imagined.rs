@@ -35,8 +35,9 @@ fn lanes_fly_as_one_aircraft_in_double_precision() {
         let mut worst = 0.0_f64;
         for step in 0..300 {
             let [aileron, elevator, thrust] = wave(step);
-            let seen =
-                single.step(Command { aileron, elevator, throttle: (thrust + 1.0) / 2.0 }).unwrap();
+            let seen = single
+                .step(Command { aileron, elevator, throttle: (thrust + 1.0) / 2.0, rudder: 0.0 })
+                .unwrap();
             let stepped = lanes.step(0, &wave(step).map(Block::from_f64));
             let roll = f64::from(stepped.observed[0].0[5]);
             let pitch = 0.5 * f64::from(stepped.observed[1].0[5]);

@@ -7,6 +7,7 @@ use std::time::Duration;
 use greylag::link::client::Clients;
 use greylag::link::framing::StreamCutter;
 use greylag::link::vehicle::Sitl;
+use greylag::physics::servos::Travels;
 use link_support::hostile::{corpus, mutate};
 use link_support::*;
 use rand::{Rng, RngExt, SeedableRng};
@@ -53,7 +54,7 @@ fn the_client_side_survives_mutated_frames() {
 
 #[test]
 fn the_vehicle_side_survives_mutated_frames() {
-    let mut sitl = Sitl::new(1, 0.5);
+    let mut sitl = Sitl::new(1, Travels::alike(0.5));
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut delivered = 0u64;
     for i in 0..u64::from(INPUTS) {

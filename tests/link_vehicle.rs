@@ -5,6 +5,7 @@ mod link_support;
 use std::time::Duration;
 
 use greylag::link::vehicle::{Faults, Order, Outputs, Sitl, Telemetry};
+use greylag::physics::servos::Travels;
 use greylag::physics::{Command, Time};
 use link_support::{Shown, dissect, frame_from, peer, shim};
 use mavlink::MavlinkVersion::V2;
@@ -27,7 +28,7 @@ fn close(got: f64, want: f64) {
 
 #[test]
 fn a_state_frame_is_converted_to_si() {
-    let mut sitl = Sitl::new(1, DEFLECTION);
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let position = MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
         lat: 450_000_000,
         lon: 75_000_000,
@@ -79,29 +80,29 @@ fn a_travel_that_the_vehicle_sends_is_used_and_compared_with_the_airframes() {
         (shown.actuators.actuator[5], shown.actuators.actuator[6]) = (aileron, elevator);
         shown.bytes()
     };
-    let mut sitl = Sitl::new(1, DEFLECTION);
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let t = take(&mut sitl, &sending(0.4, 0.3))[0];
     close(t.actuators.aileron, 0.5 * 0.4);
     close(t.actuators.elevator, -0.25 * 0.3);
     close(t.actuators.elevator_rate, -4.0 * 0.3);
     let obstacle = sitl.obstacle().unwrap();
-    for part in ["0.4000 rad (aileron)", "0.3000 rad (elevator)", "0.5235", "deflection_max_rad"] {
+    for part in ["0.4000 rad (aileron)", "0.3000 rad (elevator)", "0.5235", "airframe file"] {
         assert!(obstacle.contains(part), "{obstacle}");
     }
     assert!(sitl.take_notice().is_some());
     assert!(sitl.take_notice().is_none(), "it is said once");
     // The airframe of that aircraft agrees, as the X8's does with a vehicle that sends none.
     for (airframe, bytes) in [(0.4, sending(0.4, 0.4)), (DEFLECTION, Shown::at(20_000).bytes())] {
-        let mut sitl = Sitl::new(1, airframe);
+        let mut sitl = Sitl::new(1, Travels::alike(airframe));
         assert_eq!(take(&mut sitl, &bytes).len(), 1);
         assert_eq!((sitl.obstacle(), sitl.take_notice()), (None, None));
     }
-    assert!(Sitl::new(1, 0.4).obstacle().is_none(), "nothing was heard yet");
+    assert!(Sitl::new(1, Travels::alike(0.4)).obstacle().is_none(), "nothing was heard yet");
 }
 
 #[test]
 fn what_was_never_heard_is_not_a_number() {
-    let mut sitl = Sitl::new(1, DEFLECTION);
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let t = take(&mut sitl, &Shown::at(0).bytes())[0];
     assert!(t.position[0].is_nan() && t.velocity[0].is_nan() && t.wind[0].is_nan());
 }
@@ -120,7 +121,7 @@ fn garbage_is_flagged_and_the_last_good_value_stands() {
         (|s| s.actuators.actuator[0] = 7.0, Faults::ACTUATORS),
         (|s| s.actuators.actuator[4] = f32::NAN, Faults::ACTUATORS),
     ];
-    let mut sitl = Sitl::new(1, DEFLECTION);
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let good = take(&mut sitl, &Shown::at(0).bytes())[0];
     for (at, (spoil, fault)) in cases.into_iter().enumerate() {
         let mut shown = Shown::at(10_000 * (at as u64 + 1));
@@ -147,7 +148,7 @@ fn garbage_is_flagged_and_the_last_good_value_stands() {
 
 #[test]
 fn loss_repetition_lateness_and_restart_are_told_apart() {
-    let mut sitl = Sitl::new(1, DEFLECTION);
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let mut order = |us| take(&mut sitl, &Shown::at(us).bytes())[0].order;
     assert_eq!(order(5_000_000), Order::First);
     assert_eq!(order(5_010_000), Order::Next { lost: 0 });
@@ -166,7 +167,7 @@ fn loss_repetition_lateness_and_restart_are_told_apart() {
 
 #[test]
 fn a_frame_with_a_missing_or_foreign_part_is_incomplete() {
-    let mut sitl = Sitl::new(1, DEFLECTION);
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let whole = Shown::at(0).bytes();
     let imu = shim(MavMessage::HIGHRES_IMU(Shown::at(0).imu)).len();
     assert!(take(&mut sitl, &whole[imu..]).is_empty());
@@ -189,7 +190,7 @@ fn a_frame_with_a_missing_or_foreign_part_is_incomplete() {
 
 #[test]
 fn only_the_vehicle_is_listened_to() {
-    let mut sitl = Sitl::new(1, DEFLECTION);
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let stranger = frame_from(V2, 255, 190, &MavMessage::HIGHRES_IMU(Shown::at(0).imu));
     assert!(take(&mut sitl, &stranger).is_empty());
     assert_eq!((sitl.counts().foreign, sitl.peer()), (1, None));
@@ -212,9 +213,9 @@ fn controls(bytes: &[u8]) -> HIL_ACTUATOR_CONTROLS_DATA {
 
 #[test]
 fn the_answer_echoes_the_time_and_is_zero_when_disarmed() {
-    let mut sitl = Sitl::new(1, DEFLECTION);
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let time = Time::from_micros(123_456);
-    let command = Command { aileron: 0.5, elevator: -3.0, throttle: 0.7 };
+    let command = Command { aileron: 0.5, elevator: -3.0, throttle: 0.7, rudder: 0.0 };
     let armed = controls(&sitl.command(time, Outputs::Armed(command)));
     assert_eq!((armed.time_usec, armed.mode.bits()), (123_456, 128));
     // Beyond its range a command is limited.
@@ -225,11 +226,11 @@ fn the_answer_echoes_the_time_and_is_zero_when_disarmed() {
 
 #[test]
 fn a_command_that_is_not_finite_never_leaves() {
-    let mut sitl = Sitl::new(1, DEFLECTION);
-    let bad = Command { aileron: f64::NAN, elevator: 0.0, throttle: f64::INFINITY };
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
+    let bad = Command { aileron: f64::NAN, elevator: 0.0, throttle: f64::INFINITY, rudder: 0.0 };
     let first = controls(&sitl.command(Time::default(), Outputs::Armed(bad)));
     assert_eq!(first.controls, [0.0; 16]);
-    let good = Command { aileron: 0.25, elevator: 0.5, throttle: 0.75 };
+    let good = Command { aileron: 0.25, elevator: 0.5, throttle: 0.75, rudder: 0.0 };
     sitl.command(Time::default(), Outputs::Armed(good));
     let after = controls(&sitl.command(Time::default(), Outputs::Armed(bad)));
     assert_eq!(after.controls[..3], [0.25, 0.5, 0.75]);
@@ -238,7 +239,7 @@ fn a_command_that_is_not_finite_never_leaves() {
 
 #[test]
 fn the_heartbeat_beats_once_a_second() {
-    let mut sitl = Sitl::new(1, DEFLECTION);
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let beats = (0..500)
         .filter(|i| sitl.heartbeat(Duration::from_millis(10 * i), Outputs::Disarmed).is_some());
     assert_eq!(beats.count(), 5);

@@ -30,7 +30,7 @@ fn says(error: &str, words: &[&str]) {
     }
 }
 
-const AS_IT_IS: (&str, &str) = ("schema = 1", "schema = 1");
+const AS_IT_IS: (&str, &str) = ("schema = ", "schema = ");
 
 #[test]
 fn shipped_files_load() {
@@ -53,7 +53,7 @@ fn wrong_schema() {
         &complaint(("schema = 1", "schema = 2"), AS_IT_IS),
         &["prior.toml", "schema is 2", "schema 1"],
     );
-    says(&complaint(AS_IT_IS, ("schema = 1", "schema = 9")), &["airframe.toml", "schema is 9"]);
+    says(&complaint(AS_IT_IS, ("schema = 2", "schema = 9")), &["airframe.toml", "schema is 9"]);
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn numbers_that_no_aircraft_has() {
         &complaint(AS_IT_IS, ("surface_slew_per_s = 20.0", "surface_slew_per_s = inf")),
         &["surface_slew_per_s"],
     );
-    says(&complaint(AS_IT_IS, ("value = 0.2,", "value = 1e-310,")), &["throttle_lag_s"]);
+    says(&complaint(AS_IT_IS, ("value = 0.2,", "value = 1e-310,")), &["controls.throttle.lag_s"]);
     says(&complaint(("value = 3.364", "value = 1e300"), AS_IT_IS), &["mass_kg", "at most"]);
 }
 

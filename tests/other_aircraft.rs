@@ -15,6 +15,7 @@ use greylag::flight::recorder::Place;
 use greylag::flight::runtime::Pace;
 use greylag::logs::csv::{self, Tolerance};
 use greylag::logs::{Options, Sample, load};
+use greylag::physics::servos::Travel;
 use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::shim::{self, Existing, TruthFile};
 use mavlink::dialects::ardupilotmega::*;
@@ -49,9 +50,11 @@ fn other_aircraft() -> (tempfile::TempDir, PlantOptions) {
 fn recorded_deflections_are_those_flown_at_another_travel() {
     let (folder, plant) = other_aircraft();
     let mut model = x8().clone();
-    model.airframe.actuators.deflection_max = TRAVEL_RAD;
+    for surface in [&mut model.airframe.actuators.aileron, &mut model.airframe.actuators.elevator] {
+        surface.travel = Travel::symmetric(TRAVEL_RAD);
+    }
     let mut options = options(Pace::Lockstep);
-    options.deflection = TRAVEL_RAD;
+    options.travels = model.airframe.actuators.travels();
     options.record = Some(Place::Exactly(folder.path().join("flight")));
     let companion =
         Companion::with(&options, companion_with(Kind::Lqi, &model, Path::new("")).unwrap());

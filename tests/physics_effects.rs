@@ -34,7 +34,7 @@ const STATE: State = State {
     alpha: 0.12,
     beta: -0.08,
 };
-const CONTROLS: Controls = Controls { aileron: 0.2, elevator: -0.1, throttle: 0.6 };
+const CONTROLS: Controls = Controls { aileron: 0.2, elevator: -0.1, throttle: 0.6, rudder: 0.0 };
 
 fn catalogue() -> Vec<Description> {
     let effects = Kind::ALL.iter().map(|k| k.describe()).filter(|about| about.entry.is_some());
@@ -170,7 +170,12 @@ fn external_load_pulls_down() {
 /// Lift of `lift_stall` per unit k at `alpha`, the linear lift being `linear` N.
 fn stalled<R: Real>(alpha: f64, shape: &[f64], linear: f64) -> (R, AirData<R>) {
     let state = State { alpha, ..STATE }.map(R::from_f64);
-    let controls = Controls { aileron: R::zero(), elevator: R::zero(), throttle: R::zero() };
+    let controls = Controls {
+        aileron: R::zero(),
+        elevator: R::zero(),
+        throttle: R::zero(),
+        rudder: R::zero(),
+    };
     let air = AirData::new(&state, R::from_f64(1.156), 600.0, &GEOMETRY);
     let mut base = Base::zero();
     base.still.add(Channel::Lift, R::from_f64(linear));

@@ -35,6 +35,7 @@ fn conditions(count: usize) -> Vec<(State, Controls)> {
                 aileron: within(0.5),
                 elevator: within(0.5),
                 throttle: 0.5 + within(0.5),
+                rudder: 0.0,
             };
             (state, controls)
         })
@@ -87,6 +88,7 @@ fn lanes_follow_double_precision() {
                 aileron: lane(controls.aileron),
                 elevator: lane(controls.elevator),
                 throttle: lane(controls.throttle),
+                rudder: lane(controls.rudder),
             };
             let fast = model.rate(&state.map(lane), &lanes, 600.0).to_array();
             for i in 0..8 {
@@ -106,7 +108,7 @@ fn linearisation_agrees_with_differences() {
         let linear = linearise(&model, &trim, 600.0);
         let step = |x: [f64; 11]| {
             let [s @ .., aileron, elevator, throttle] = x;
-            let controls = Controls { aileron, elevator, throttle };
+            let controls = Controls { aileron, elevator, throttle, rudder: 0.0 };
             model.step(&State::from_array(s), &controls, 600.0, &mut Memory::default()).to_array()
         };
         let mut at = [0.0; 11];

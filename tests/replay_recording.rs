@@ -33,7 +33,7 @@ fn again(folder: &Path, vehicle: Vehicle) -> Outcome {
 }
 
 fn sitl() -> Vehicle {
-    Vehicle::Sitl(Sitl::new(1, x8().airframe.actuators.deflection_max))
+    Vehicle::Sitl(Sitl::new(1, x8().airframe.actuators.travels()))
 }
 
 fn a_flight_with_everything_in_it_replays_to_the_bit() {

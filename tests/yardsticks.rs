@@ -118,7 +118,8 @@ fn lost_numbers_are_not_flown_on() {
     let target = control::Target { roll: 0.2, pitch: 0.0, airspeed: 16.67 };
     let mut imagined = Imagined::new(model.clone());
     let mut seen = imagined.reset().unwrap();
-    let nan = greylag::physics::Command { aileron: f64::NAN, elevator: 0.0, throttle: 0.0 };
+    let nan =
+        greylag::physics::Command { aileron: f64::NAN, elevator: 0.0, throttle: 0.0, rudder: 0.0 };
     assert!(imagined.step(nan).is_err());
     seen.state.airspeed = f64::NAN;
     // policies come from files and are held to the same in their own room

@@ -66,7 +66,8 @@ fn track(model: &GreyBox) -> Track {
         .map(|k| {
             let wave = |w: f64| 0.1 * (w * k as f64).sin();
             let row = (twin.state, twin.actuators.controls(), twin.altitude);
-            let command = Command { aileron: wave(0.13), elevator: wave(0.07), throttle: 0.3 };
+            let command =
+                Command { aileron: wave(0.13), elevator: wave(0.07), throttle: 0.3, rudder: 0.0 };
             twin.step(model, &command);
             row
         })

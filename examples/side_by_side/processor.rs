@@ -98,6 +98,7 @@ impl Operations {
             aileron: Counted(controls.aileron),
             elevator: Counted(controls.elevator),
             throttle: Counted(controls.throttle),
+            rudder: Counted(controls.rudder),
         };
         COUNTS.set(Operations::NONE);
         std::hint::black_box(model.step(&state, &controls, 600.0, &mut Memory::default()));
@@ -214,6 +215,7 @@ fn steps<R: Packed>(model: &GreyBox, state: &State, controls: &Controls) -> f64 
         aileron: lane(controls.aileron),
         elevator: lane(controls.elevator),
         throttle: lane(controls.throttle),
+        rudder: lane(controls.rudder),
     };
     let mut memory = Memory::default();
     let start = Instant::now();

@@ -42,7 +42,9 @@ fn fly(folder: &Path, name: &str) -> Result<String, PlantError> {
         plant.step(Inputs { throttle: 0.7, ..Inputs::default() })?;
     }
     let travel = match travel {
-        Ok(t) => format!("travel {:.4}, {:.4} rad", t.aileron_rad, t.elevator_rad),
+        Ok(t) => {
+            format!("travel {:.4}, {:.4} rad", t.aileron.largest_rad(), t.elevator.largest_rad())
+        }
         Err(_) => "travel unknown".to_owned(),
     };
     let notes = plant.notes().join("; ");

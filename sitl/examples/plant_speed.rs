@@ -17,7 +17,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 plant.reset(&Start::NEUTRAL)?;
             }
             let t = f64::from(k) * 0.01;
-            plant.step(Inputs { aileron: 0.2 * t.sin(), elevator: 0.05, throttle: 0.3 })?;
+            plant.step(Inputs {
+                aileron: 0.2 * t.sin(),
+                elevator: 0.05,
+                throttle: 0.3,
+                rudder: 0.0,
+            })?;
         }
         best = best.min(begun.elapsed().as_secs_f64());
     }

@@ -1,4 +1,4 @@
-//! The aircraft files that JSBSim loads: the X8 built into the program, or a folder on disk.
+//! The aircraft files that JSBSim loads: those built into the program, or a folder on disk.
 
 use std::path::{Path, PathBuf};
 
@@ -8,21 +8,32 @@ use crate::hidden::{self, Hidden, HiddenError};
 use crate::plant::Properties;
 
 /// The files of the aircraft built into the program, by their path in a JSBSim tree.
-const BUILT_IN: [(&str, &str); 3] = [
+const BUILT_IN: [(&str, &str); 6] = [
     ("x8/x8.xml", include_str!("../aircraft/x8/x8.xml")),
     ("x8/Engines/x8_motor.xml", include_str!("../aircraft/x8/Engines/x8_motor.xml")),
     ("x8/Engines/x8_direct.xml", include_str!("../aircraft/x8/Engines/x8_direct.xml")),
+    ("aerosonde/aerosonde.xml", include_str!("../aircraft/aerosonde/aerosonde.xml")),
+    (
+        "aerosonde/Engines/aerosonde_motor.xml",
+        include_str!("../aircraft/aerosonde/Engines/aerosonde_motor.xml"),
+    ),
+    (
+        "aerosonde/Engines/aerosonde_direct.xml",
+        include_str!("../aircraft/aerosonde/Engines/aerosonde_direct.xml"),
+    ),
 ];
 
-/// Name of the aircraft built into the program.
+/// Name of the aircraft that flies unless another is named.
 pub(crate) const BUILT_IN_NAME: &str = "x8";
+/// Names of all that are built in.
+const BUILT_IN_NAMES: &str = "x8, aerosonde";
 
 /// Why an aircraft could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum AircraftError {
     /// The name is not that of the built-in aircraft, and no folder was given.
     #[error(
-        "no aircraft '{name}' is built in (only '{BUILT_IN_NAME}'); give the folder that holds \
+        "no aircraft '{name}' is built in (only {BUILT_IN_NAMES}); give the folder that holds \
          {name}/{name}.xml with --aircraft-dir"
     )]
     NotBuiltIn {
@@ -101,8 +112,12 @@ pub(crate) fn load(
 /// The text of the aircraft's main document.
 pub(crate) fn read(dir: Option<&Path>, name: &str) -> Result<String, AircraftError> {
     match dir {
-        None if name == BUILT_IN_NAME => Ok(BUILT_IN[0].1.to_owned()),
-        None => Err(AircraftError::NotBuiltIn { name: name.to_owned() }),
+        None => {
+            let path = format!("{name}/{name}.xml");
+            let found = BUILT_IN.iter().find(|(built_in, _)| *built_in == path);
+            let missing = || AircraftError::NotBuiltIn { name: name.to_owned() };
+            found.map(|(_, text)| (*text).to_owned()).ok_or_else(missing)
+        }
         Some(dir) => {
             let path = dir.join(name).join(format!("{name}.xml"));
             std::fs::read_to_string(&path).map_err(|source| AircraftError::Read { path, source })

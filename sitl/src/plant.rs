@@ -14,7 +14,7 @@ use nodes::Nodes;
 pub(crate) use nodes::to_body;
 pub use options::{PlantOptions, Properties};
 pub use state::{FULL_DEFLECTION_RAD, Inputs, Start, Truth};
-pub use travel::Travel;
+pub use travel::{Stops, Travel};
 
 /// Length of one step, s, unless the options say otherwise.
 pub const DT_S: f64 = 0.01;
@@ -196,6 +196,7 @@ impl Plant {
         truth.time_s = self.steps as f64 * step_s;
         truth.aileron_rate_radps = (truth.aileron_rad - self.truth.aileron_rad) / step_s;
         truth.elevator_rate_radps = (truth.elevator_rad - self.truth.elevator_rad) / step_s;
+        truth.rudder_rate_radps = (truth.rudder_rad - self.truth.rudder_rad) / step_s;
         self.accept(truth)
     }
 

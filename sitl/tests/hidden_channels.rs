@@ -26,7 +26,7 @@ const LIVELY: Start = Start {
 };
 
 /// A command that moves all actuators.
-const FIRM: Inputs = Inputs { aileron: 0.9, elevator: -0.8, throttle: 1.0 };
+const FIRM: Inputs = Inputs { aileron: 0.9, elevator: -0.8, throttle: 1.0, rudder: 0.0 };
 
 /// What acts on the aircraft: drag, side force and lift in wind axes, N; moments, N m; thrust, N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -104,7 +104,8 @@ fn the_wildest_flight_never_panics() {
             // Bang-bang commands from a linear congruential generator (Knuth's MMIX constants).
             x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let bang = |bit: u32| if x >> bit & 1 == 1 { 1.0 } else { -1.0 };
-            let inputs = Inputs { aileron: bang(60), elevator: bang(61), throttle: bang(62) };
+            let inputs =
+                Inputs { aileron: bang(60), elevator: bang(61), throttle: bang(62), rudder: 0.0 };
             if plant.step(inputs).is_err() {
                 failed += 1;
                 break;

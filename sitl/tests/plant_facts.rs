@@ -82,6 +82,7 @@ fn actuators_follow_their_recurrences_to_1e_12() {
             aileron: square(17),
             elevator: 0.9 * square(23),
             throttle: (square(40) + 1.0) / 2.0,
+            rudder: 0.0,
         };
         let before = plant.truth();
         let truth = plant.step(inputs).unwrap();
@@ -170,8 +171,8 @@ fn same_seed_same_flight_and_another_seed_another() {
 
 #[test]
 fn commands_are_clipped_to_their_ranges() {
-    let beyond = Inputs { aileron: 7.0, elevator: -1e30, throttle: 5.0 };
-    let full = Inputs { aileron: 1.0, elevator: -1.0, throttle: 1.0 };
+    let beyond = Inputs { aileron: 7.0, elevator: -1e30, throttle: 5.0, rudder: 0.0 };
+    let full = Inputs { aileron: 1.0, elevator: -1.0, throttle: 1.0, rudder: 0.0 };
     let (beyond, full) = (hold(&mut plant(), beyond, 100), hold(&mut plant(), full, 100));
     assert_eq!(beyond, full);
     assert!(full.throttle < 1.0 && full.throttle > 0.99, "{full:?}");

@@ -18,6 +18,7 @@ fn fly(step_s: f64) -> Vec<Truth> {
                 aileron: 0.06 * (3.0 * t).sin(),
                 elevator: 0.02 * (2.0 * t).cos(),
                 throttle: 0.5,
+                rudder: 0.0,
             };
             (0..steps).map(|_| plant.step(inputs).expect("flown")).last().expect("a step")
         })
@@ -56,7 +57,7 @@ fn a_held_deflection_is_the_same_whatever_the_step() {
     for step_s in [0.01, 0.004, 0.001] {
         let mut plant = plant(step_s);
         plant.reset(&Start::NEUTRAL).expect("a start");
-        let inputs = Inputs { aileron: 0.1, elevator: -0.1, throttle: 0.5 };
+        let inputs = Inputs { aileron: 0.1, elevator: -0.1, throttle: 0.5, rudder: 0.0 };
         let steps = (0.5 / step_s) as usize;
         let truth = (0..steps).map(|_| plant.step(inputs).expect("flown")).last().expect("a step");
         // 0.5 s are 35 time constants of the surfaces.

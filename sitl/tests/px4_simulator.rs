@@ -130,7 +130,7 @@ fn outputs_move_the_aircraft_exactly_as_they_move_the_plant() {
         }
         let [roll, pitch, throttle] = [roll, pitch, throttle].map(f64::from);
         // A positive elevator of the plant pitches down; PX4's pitches up.
-        plant.step(Inputs { aileron: roll, elevator: -pitch, throttle }).unwrap();
+        plant.step(Inputs { aileron: roll, elevator: -pitch, throttle, rudder: 0.0 }).unwrap();
     }
     // A float on the wire holds 1e-6 of 10 m/s².
     assert!(largest < 2e-6, "{largest}");

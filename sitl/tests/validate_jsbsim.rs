@@ -178,6 +178,7 @@ fn turbulent_flight(plant: &mut Plant, seed: u32) -> [Vec<f64>; 6] {
                 elevator: 0.0688 / FULL_DEFLECTION_RAD - 1.5 * (alpha_rad - truth.pitch_rad)
                     + 0.25 * truth.q_radps,
                 throttle: 0.185,
+                rudder: 0.0,
             })
             .unwrap();
         if k >= SKIPPED {

@@ -4,6 +4,7 @@ use anyhow::{Result, bail};
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
 
 use crate::model::GreyBox;
+use crate::physics::servos::Travels;
 
 /// The aircraft whose start is the paper's.
 const X8: &str = "x8";
@@ -59,14 +60,25 @@ pub fn introduce(options: &PlantOptions, models: &[GreyBox]) -> Result<()> {
     plant.notes().iter().for_each(|note| eprintln!("note: {note}"));
     let Ok(travel) = plant.travel() else { return Ok(()) };
     for model in models {
-        let full = model.airframe.actuators.deflection_max;
-        let differs = |t: f64| (t - full).abs() > TRAVEL_TOLERANCE * full;
-        if differs(travel.aileron_rad) || differs(travel.elevator_rad) {
-            eprintln!(
-                "note: the aircraft's travel is {:.4} rad (aileron), {:.4} rad (elevator), the airframe of \
-                 model {} says {full:.4}: its controllers take a command for another deflection",
-                travel.aileron_rad, travel.elevator_rad, model.name
-            );
+        let Travels { aileron, elevator, rudder } = model.airframe.actuators.travels();
+        let rudders = rudder.zip(travel.rudder);
+        let surfaces = [
+            Some(("aileron", aileron, travel.aileron)),
+            Some(("elevator", elevator, travel.elevator)),
+            rudders.map(|(said, measured)| ("rudder", said, measured)),
+        ];
+        for (surface, said, measured) in surfaces.into_iter().flatten() {
+            let close = |a: f64, b: f64| (a - b).abs() <= TRAVEL_TOLERANCE * b.abs();
+            if !(close(measured.least_rad, said.least) && close(measured.most_rad, said.most)) {
+                eprintln!(
+                    "note: the {surface} of the aircraft goes from {:.4} to {:.4} rad, the airframe of model \
+                     {} says {:.4} to {:.4}: its controllers take a command for another deflection",
+                    measured.least_rad, measured.most_rad, model.name, said.least, said.most
+                );
+            }
+        }
+        if rudder.is_some() && travel.rudder.is_none() {
+            eprintln!("note: the airframe of model {} has a rudder, the aircraft none", model.name);
         }
     }
     Ok(())

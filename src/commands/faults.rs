@@ -236,7 +236,7 @@ mod tests {
         fn reset(&mut self, _: u64) {}
 
         fn command(&mut self, _: &Observation, _: &Target) -> Command {
-            Command { aileron: 1.0, elevator: 0.0, throttle: 0.5 }
+            Command { aileron: 1.0, elevator: 0.0, throttle: 0.5, rudder: 0.0 }
         }
     }
 

@@ -191,7 +191,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Options {
         pace: if arguments.lockstep { Pace::Lockstep } else { Pace::RealTime },
         duration: arguments.duration_s,
         plan_deadline: Duration::from_millis(arguments.plan_deadline_ms),
-        deflection: model.airframe.actuators.deflection_max,
+        travels: model.airframe.actuators.travels(),
         controller: arguments.controller_profile(model),
         signing: arguments.signing(),
     }

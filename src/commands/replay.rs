@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 fn vehicle(arguments: &Arguments, model: &GreyBox) -> Vehicle {
     let actuators = model.airframe.actuators;
     match arguments.profile.stack() {
-        None => Vehicle::Sitl(Sitl::new(1, actuators.deflection_max)),
+        None => Vehicle::Sitl(Sitl::new(1, actuators.travels())),
         Some(stack) => {
             let authority = arguments.command.authority();
             Vehicle::Real(Box::new(Real::new(Profile { stack, authority, actuators })))

@@ -131,6 +131,11 @@ impl Controller for Pid {
         let elevator = self.step(1, t.pitch, target.pitch - s.pitch, s.q, 0.0, stops);
         let throttle =
             self.step(2, t.airspeed, airspeed - s.airspeed, 0.0, t.throttle_trim, (0.0, 1.0));
-        Command { aileron: aileron / t.deflection, elevator: elevator / t.deflection, throttle }
+        Command {
+            aileron: aileron / t.deflection,
+            elevator: elevator / t.deflection,
+            throttle,
+            rudder: 0.0,
+        }
     }
 }

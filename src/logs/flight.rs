@@ -29,7 +29,7 @@ pub struct Sample {
     pub aileron_rad: f64,
     /// Elevator deflection that acts, rad.
     pub elevator_rad: f64,
-    /// Rudder deflection that acts, rad.
+    /// Rudder deflection that acts, rad; positive trailing edge left.
     pub rudder_rad: f64,
     /// Throttle position that acts, 0..1.
     pub throttle: f64,
@@ -37,7 +37,7 @@ pub struct Sample {
     pub aileron_cmd: f64,
     /// Commanded elevator, −1..1.
     pub elevator_cmd: f64,
-    /// Commanded rudder, −1..1.
+    /// Commanded rudder, −1..1; positive yaws left.
     pub rudder_cmd: f64,
     /// Commanded throttle, 0..1.
     pub throttle_cmd: f64,

@@ -93,8 +93,8 @@ impl Info {
 fn rudder(log: &Log) -> Option<Finding> {
     let motion = RudderMotion::of(&log.flight.samples)?;
     Some(Finding::warning(format!(
-        "{motion}: against a model without a rudder effect, yaw, roll, side-force and drag residuals \
-         include its moments and forces"
+        "{motion}: unless the airframe file says that the aircraft has no rudder, a model needs \
+         rudder_linear, or yaw, roll, side-force and drag residuals include its moments and forces"
     )))
 }
 

@@ -8,7 +8,7 @@ use crate::num::statistics::mean;
 /// Standard deviation of a deflection that counts as movement, rad: 0.2°. By a rudder of
 /// Cn = 0.07/rad that is the moment of 0.2° of sideslip at Cnβ = 0.07/rad, less than a vane's noise
 /// of 0.3°. Ten seconds of doublets of 5° in ten minutes of flight are 0.6°.
-const MOVES_RAD: f64 = 0.0035;
+pub const MOVES_RAD: f64 = 0.0035;
 /// The same of a command, whose travel is not known: a part of it. 1 % of 25° of travel is 0.25°, and
 /// more than the dead band of a servo (some 4 µs of 500 µs).
 const MOVES_PART: f64 = 0.01;

@@ -93,7 +93,7 @@ impl Schedule {
     /// If the text is no such TOML, or asks for what no schedule may.
     pub fn parse(text: &str) -> Result<Schedule, String> {
         let file: File = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
-        check_schema(file.schema)?;
+        check_schema(file.schema, 1)?;
         let steps = file.step.iter().enumerate().map(|(k, step)| {
             let excitations = step.excitation.iter().map(ExcitationFile::checked);
             let excitations: Result<Vec<_>, String> = excitations.collect();

@@ -50,6 +50,7 @@ impl Overlay {
             aileron: of(0, own.aileron, demand.added.aileron),
             elevator: of(1, own.elevator, demand.added.elevator),
             throttle: of(2, own.throttle, demand.added.throttle),
+            rudder: own.rudder,
         }
         .clamped()
     }

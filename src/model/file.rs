@@ -97,7 +97,7 @@ impl GreyBox {
         let what = "model file";
         let content = |why| FileError::Content { what, path: path.into(), why };
         let file: File = toml::from_str(text).map_err(|e| content(toml_error(text, &e)))?;
-        check_schema(file.schema).map_err(content)?;
+        check_schema(file.schema, 1).map_err(content)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let airframe = Airframe::load(&folder.join(&file.airframe))?;
         let learned = file.residual.clone();

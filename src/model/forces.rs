@@ -208,7 +208,7 @@ impl GreyBox {
     #[inline(always)]
     fn parts<R: Real>(&self, place: &Place<R>) -> [Wrench<R>; 2] {
         let zero = R::zero();
-        let controls = Controls { aileron: zero, elevator: zero, ..*place.controls };
+        let controls = Controls { aileron: zero, elevator: zero, rudder: zero, ..*place.controls };
         let (mut state, mut air) = (*place.state, *place.air);
         let mut sums = [Wrench::zero(); 2];
         for sum in &mut sums {

@@ -19,6 +19,9 @@ pub struct Named {
     pub sd: Option<f64>,
 }
 
+/// The effect that holds a rudder's forces and moments.
+pub const RUDDER: &str = "rudder_linear";
+
 /// Prior width of a coefficient whose file states none, as a share of its value.
 const WIDTH: f64 = 0.15;
 
@@ -125,6 +128,11 @@ impl GreyBox {
         self.effects().any(|about| about.id == id)
     }
 
+    /// Whether the aircraft has a rudder and the model knows what it does.
+    pub fn has_rudder(&self) -> bool {
+        self.airframe.actuators.rudder.is_some() && self.has(RUDDER)
+    }
+
     /// The effects that the model names.
     pub fn effects(&self) -> impl Iterator<Item = Description> {
         let inputs = self.inputs.iter().map(|(kind, _)| kind.describe());
@@ -179,7 +187,7 @@ impl GreyBox {
 
     /// The reference scale x_c, eq. (21): \[1, 1, V0, 2V0/b, 2V0/c, 2V0/b, 1, 1\], V0 in m/s.
     pub fn scale(&self) -> [f64; 8] {
-        let v0 = State::NEUTRAL.airspeed;
+        let v0 = self.airframe.reference.airspeed;
         let (span, chord) = (self.airframe.geometry.span, self.airframe.geometry.chord);
         [1.0, 1.0, v0, 2.0 * v0 / span, 2.0 * v0 / chord, 2.0 * v0 / span, 1.0, 1.0]
     }

@@ -6,13 +6,13 @@ use super::{GreyBox, Memory, Trim};
 use crate::num::Dual;
 use crate::physics::{Controls, State};
 
-/// One step of 0.01 s, linear about a condition: δs₊ = a δs + b δz, z = (δa, δe, δt).
+/// One step of 0.01 s, linear about a condition: δs₊ = a δs + b δz, z = (δa, δe, δt, δr).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linear {
     /// ∂s₊/∂s, states in the order of eq. (4).
     pub a: SMatrix<f64, 8, 8>,
-    /// ∂s₊/∂(δa, δe, δt).
-    pub b: SMatrix<f64, 8, 3>,
+    /// ∂s₊/∂(δa, δe, δt, δr).
+    pub b: SMatrix<f64, 8, 4>,
 }
 
 /// Linearises one step of `model` about `trim` at `altitude` (m).
@@ -32,10 +32,11 @@ pub fn linearise_step(
     altitude: f64,
 ) -> Linear {
     let x = state.to_array();
-    let z = [controls.aileron, controls.elevator, controls.throttle];
-    let state = State::from_array(std::array::from_fn(|i| Dual::<11>::variable(x[i], i)));
-    let [aileron, elevator, throttle] = std::array::from_fn(|i| Dual::variable(z[i], 8 + i));
-    let controls = Controls { aileron, elevator, throttle };
+    let z = [controls.aileron, controls.elevator, controls.throttle, controls.rudder];
+    let state = State::from_array(std::array::from_fn(|i| Dual::<12>::variable(x[i], i)));
+    let [aileron, elevator, throttle, rudder] =
+        std::array::from_fn(|i| Dual::variable(z[i], 8 + i));
+    let controls = Controls { aileron, elevator, throttle, rudder };
     let next = model.step(&state, &controls, altitude, &mut Memory::default()).to_array();
     Linear {
         a: SMatrix::from_fn(|i, j| next[i].gradient[j]),

@@ -15,7 +15,7 @@ pub mod weights;
 
 #[cfg(feature = "learn")]
 pub(crate) use forces::Starting;
-pub use grey_box::{GreyBox, Named};
+pub use grey_box::{GreyBox, Named, RUDDER};
 #[cfg(feature = "learn")]
 pub(crate) use integrator::advance_jsbsim;
 pub use integrator::{Integrator, Memory, STEP, Twin};

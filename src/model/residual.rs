@@ -109,12 +109,25 @@ pub fn fingerprint(airframe: &Airframe) -> String {
 /// refuse the policies and residuals that were learned before it.
 fn fingerprinted(airframe: &Airframe) -> String {
     let Geometry { area, span, chord } = airframe.geometry;
-    let ActuatorFigures { surface, throttle, deflection_max, step } = airframe.actuators;
-    format!(
+    let ActuatorFigures { aileron, elevator, throttle, step, .. } = airframe.actuators;
+    let (surface, deflection_max) = (aileron.filter, aileron.travel.most);
+    let mut text = format!(
         "{} Geometry {{ area: {area:?}, span: {span:?}, chord: {chord:?} }} ActuatorFigures {{ surface: \
          {surface:?}, throttle: {throttle:?}, deflection_max: {deflection_max:?}, step: {step:?} }}",
         airframe.name
-    )
+    );
+    if !says_all(&airframe.actuators) {
+        let rudder = airframe.actuators.rudder;
+        text += &format!(" aileron {aileron:?} elevator {elevator:?} rudder {rudder:?}");
+    }
+    text
+}
+
+/// Whether schema 1 says all of `figures`: surfaces alike, to both sides, at any rate, no rudder.
+fn says_all(figures: &ActuatorFigures) -> bool {
+    let ActuatorFigures { aileron, elevator, rudder, .. } = figures;
+    let plain = aileron.travel.is_symmetric() && aileron.rate_max.is_none();
+    plain && elevator == aileron && rudder.is_none()
 }
 
 /// SHA-256 in hexadecimal.
@@ -128,8 +141,9 @@ impl Scales {
     pub fn new(airframe: &Airframe, x_c: [f64; OUTPUTS]) -> Scales {
         let [_, _, v0, p, q, r, _, _] = x_c;
         let unit = [0.25 * v0, 0.1 * p, 0.02 * q, 0.05 * r, 0.2, 0.2];
-        let stop = airframe.actuators.deflection_max;
-        let mut factor = [1.0 / stop, 1.0 / stop, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let ActuatorFigures { aileron, elevator, .. } = airframe.actuators;
+        let [aileron, elevator] = [aileron, elevator].map(|s| 1.0 / s.travel.largest());
+        let mut factor = [aileron, elevator, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         factor.rotate_right(6);
         factor[..6].copy_from_slice(&unit.map(|u| 1.0 / u));
         let mut offset = [0.0; INPUTS];
@@ -141,7 +155,7 @@ impl Scales {
     #[inline(always)]
     pub fn inputs<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> [R; INPUTS] {
         let State { airspeed, p, q, r, alpha, beta, .. } = *state;
-        let Controls { aileron, elevator, throttle } = *controls;
+        let Controls { aileron, elevator, throttle, .. } = *controls;
         // plain loops here and in kernels: a closure that is not inlined leaves the vector instructions
         let mut x = [airspeed, p, q, r, alpha, beta, aileron, elevator, throttle];
         for (i, x) in x.iter_mut().enumerate() {
@@ -274,8 +288,8 @@ mod tests {
     fn inputs_are_of_order_one_and_know_no_attitude() {
         let model = model();
         let scales = Scales::new(&model.airframe, model.scale());
-        let stop = model.airframe.actuators.deflection_max;
-        let controls = Controls { aileron: stop, elevator: -stop, throttle: 1.0 };
+        let stop = model.airframe.actuators.aileron.travel.most;
+        let controls = Controls { aileron: stop, elevator: -stop, throttle: 1.0, rudder: 0.0 };
         let stall = State { airspeed: 1.25 * 16.67, alpha: 0.2, beta: -0.2, ..State::NEUTRAL };
         let there = scales.inputs(&stall, &controls);
         for (x, expected) in there.iter().zip([1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0]) {

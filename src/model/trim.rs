@@ -100,10 +100,12 @@ fn level_condition<R: Real>(
         alpha,
         beta: zero,
     };
-    (state, Controls { aileron: zero, elevator, throttle })
+    (state, Controls { aileron: zero, elevator, throttle, rudder: zero })
 }
 
-/// Unknowns: α, β, p, q, r, δa, δe, δt. With `throttle` given, δt = throttle replaces V̇ = 0.
+/// Unknowns: α, the sideways unknown, p, q, r, δa, δe, δt. The sideways unknown is δr at β = 0 where the
+/// model has a rudder that yaws (a coordinated turn), else β at δr = 0. With `throttle` given,
+/// δt = throttle replaces V̇ = 0.
 fn solve_attitude(
     model: &GreyBox,
     roll: f64,
@@ -112,6 +114,7 @@ fn solve_attitude(
     altitude: f64,
     throttle: Option<f64>,
 ) -> Option<Trim> {
+    let sideways = Sideways::of(model);
     // the coordinated turn of a point mass starts the search close by
     let turn = model.atmosphere.gravity / airspeed * roll.tan();
     let start = [
@@ -125,7 +128,7 @@ fn solve_attitude(
         0.3,
     ];
     let x = newton::solve(start, [0.1, 0.1, 0.5, 0.5, 0.5, 0.2, 0.2, 0.5], |x| {
-        let (state, controls) = attitude_condition(x, roll, pitch, airspeed);
+        let (state, controls) = attitude_condition(x, roll, pitch, airspeed, sideways);
         let rate = model.rate(&state, &controls, altitude);
         let along = match throttle {
             Some(t) => x[7] - Dual::from_f64(t),
@@ -133,8 +136,23 @@ fn solve_attitude(
         };
         [rate.roll, rate.pitch, rate.p, rate.q, rate.r, rate.alpha, rate.beta, along]
     })?;
-    let (state, controls) = attitude_condition(x, roll, pitch, airspeed);
+    let (state, controls) = attitude_condition(x, roll, pitch, airspeed, sideways);
     Some(Trim { state, controls, acceleration: 0.0 })
+}
+
+/// What balances a turn sideways.
+#[derive(Clone, Copy)]
+enum Sideways {
+    /// Sideslip.
+    Sideslip,
+    /// The rudder, without sideslip.
+    Rudder,
+}
+
+impl Sideways {
+    fn of(model: &GreyBox) -> Sideways {
+        if model.has_rudder() { Sideways::Rudder } else { Sideways::Sideslip }
+    }
 }
 
 fn attitude_condition<R: Real>(
@@ -142,12 +160,17 @@ fn attitude_condition<R: Real>(
     roll: f64,
     pitch: f64,
     airspeed: f64,
+    sideways: Sideways,
 ) -> (State<R>, Controls<R>) {
-    let [alpha, beta, p, q, r, aileron, elevator, throttle] = x;
+    let [alpha, free, p, q, r, aileron, elevator, throttle] = x;
+    let (beta, rudder) = match sideways {
+        Sideways::Sideslip => (free, R::zero()),
+        Sideways::Rudder => (R::zero(), free),
+    };
     let [roll, pitch, airspeed] = [roll, pitch, airspeed].map(R::from_f64);
     (
         State { roll, pitch, airspeed, p, q, r, alpha, beta },
-        Controls { aileron, elevator, throttle },
+        Controls { aileron, elevator, throttle, rudder },
     )
 }
 

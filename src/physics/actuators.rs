@@ -4,7 +4,7 @@
 //! recurrence with the same coefficients reproduces it to rounding.
 
 use crate::num::Real;
-use crate::physics::airframe::ActuatorFigures;
+use crate::physics::servos::{ActuatorFigures, Surface};
 
 /// A command, the action of eq. (29) of \[GSFM26\] with throttle = (a_thr + 1)/2.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -15,15 +15,17 @@ pub struct Command<R = f64> {
     pub elevator: R,
     /// Throttle, 0..1.
     pub throttle: R,
+    /// Rudder, −1..1; positive yaws left. Zero on an aircraft without one.
+    pub rudder: R,
 }
 
 impl Command {
     /// Surfaces centred, motor off.
-    pub const IDLE: Command = Command { aileron: 0.0, elevator: 0.0, throttle: 0.0 };
+    pub const IDLE: Command = Command { aileron: 0.0, elevator: 0.0, throttle: 0.0, rudder: 0.0 };
 
     /// Whether every component is a finite number.
     pub fn is_finite(&self) -> bool {
-        self.aileron.is_finite() && self.elevator.is_finite() && self.throttle.is_finite()
+        [self.aileron, self.elevator, self.throttle, self.rudder].iter().all(|x| x.is_finite())
     }
 
     /// The command limited to its ranges.
@@ -32,6 +34,7 @@ impl Command {
             aileron: self.aileron.clamp(-1.0, 1.0),
             elevator: self.elevator.clamp(-1.0, 1.0),
             throttle: self.throttle.clamp(0.0, 1.0),
+            rudder: self.rudder.clamp(-1.0, 1.0),
         }
     }
 }
@@ -45,6 +48,8 @@ pub struct Controls<R = f64> {
     pub elevator: R,
     /// Throttle position δt, 0..1.
     pub throttle: R,
+    /// Rudder deflection δr, rad; positive trailing edge left. Zero on an aircraft without one.
+    pub rudder: R,
 }
 
 impl Controls {
@@ -55,6 +60,7 @@ impl Controls {
             aileron: mix(self.aileron, next.aileron),
             elevator: mix(self.elevator, next.elevator),
             throttle: mix(self.throttle, next.throttle),
+            rudder: mix(self.rudder, next.rudder),
         }
     }
 }
@@ -72,13 +78,22 @@ pub struct ActuatorState<R = f64> {
     pub elevator_rate: R,
     /// Throttle position, 0..1.
     pub throttle: R,
+    /// Rudder position, rad; zero on an aircraft without one.
+    pub rudder: R,
+    /// Rudder rate, rad/s.
+    pub rudder_rate: R,
 }
 
 impl<R: Copy> ActuatorState<R> {
     /// The positions, which are what acts.
     #[inline(always)]
     pub fn controls(&self) -> Controls<R> {
-        Controls { aileron: self.aileron, elevator: self.elevator, throttle: self.throttle }
+        Controls {
+            aileron: self.aileron,
+            elevator: self.elevator,
+            throttle: self.throttle,
+            rudder: self.rudder,
+        }
     }
 }
 
@@ -93,13 +108,14 @@ pub struct SurfaceFilter<R = f64> {
     clipped: [R; 2],
 }
 
-/// The filters of all three actuators.
+/// The filters of all actuators; an aircraft without a rudder has none for it.
 ///
-/// The observed five numbers ([`ActuatorState`]) are not quite a Markov state; this is.
+/// The observed numbers ([`ActuatorState`]) are not quite a Markov state; this is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Actuators<R = f64> {
     aileron: SurfaceFilter<R>,
     elevator: SurfaceFilter<R>,
+    rudder: Option<SurfaceFilter<R>>,
     throttle_input: R,
     throttle: R,
 }
@@ -109,17 +125,35 @@ impl<R: Real> SurfaceFilter<R> {
         SurfaceFilter { input: [position; 2], output: [position; 2], clipped: [position; 2] }
     }
 
+    /// The filter that explains a `position` (rad) and `rate` (rad/s) after the two last commands.
     #[inline(always)]
-    fn step(&mut self, command: R, figures: &ActuatorFigures) {
-        let [b, a1, a2] = figures.surface;
-        let input = command.scale(figures.deflection_max);
+    fn observed(
+        [position, rate]: [R; 2],
+        [new, old]: [R; 2],
+        figures: &Surface,
+        step: f64,
+    ) -> Self {
+        let trace = [position, position - rate.scale(step)];
+        let input = [figures.travel.deflection(new), figures.travel.deflection(old)];
+        SurfaceFilter { input, output: trace, clipped: trace }
+    }
+
+    #[inline(always)]
+    fn step(&mut self, command: R, figures: &Surface, step: f64) {
+        let [b, a1, a2] = figures.filter;
+        let input = figures.travel.deflection(command);
         let y = (input + self.input[0].scale(2.0) + self.input[1]).scale(b)
             - self.output[0].scale(a1)
             - self.output[1].scale(a2);
         self.input = [input, self.input[0]];
         self.output = [y, self.output[0]];
-        let limit = figures.deflection_max;
-        self.clipped = [y.clamp(-limit, limit), self.clipped[0]];
+        let travel = figures.travel;
+        let mut next = y.clamp(travel.least, travel.most);
+        if let Some(rate) = figures.rate_max {
+            let reach = R::from_f64(rate * step);
+            next = next.max(self.clipped[0] - reach).min(self.clipped[0] + reach);
+        }
+        self.clipped = [next, self.clipped[0]];
     }
 
     #[inline(always)]
@@ -138,49 +172,62 @@ impl<R: Real> SurfaceFilter<R> {
     }
 
     #[inline(always)]
-    fn rate(&self, figures: &ActuatorFigures) -> R {
-        (self.clipped[0] - self.clipped[1]).scale(1.0 / figures.step)
+    fn rate(&self, step: f64) -> R {
+        (self.clipped[0] - self.clipped[1]).scale(1.0 / step)
     }
 }
 
 impl<R: Real> Actuators<R> {
-    /// Actuators at rest at `controls`, commanded to stay there.
+    /// Actuators at rest at `controls`, commanded to stay there; a rudder without figures stays there.
     pub fn at_rest(controls: &Controls<R>) -> Self {
         Actuators {
             aileron: SurfaceFilter::at(controls.aileron),
             elevator: SurfaceFilter::at(controls.elevator),
+            rudder: Some(SurfaceFilter::at(controls.rudder)),
             throttle_input: controls.throttle,
             throttle: controls.throttle,
         }
     }
 
+    /// The same without a rudder that `figures` do not have.
+    pub fn fitted(self, figures: &ActuatorFigures) -> Self {
+        Actuators { rudder: figures.rudder.and(self.rudder), ..self }
+    }
+
     /// The filters that explain an observed `state` after the commands `previous` (newest first).
     ///
     /// Exact unless a surface is at its stop, where the filter's own output is not observed: the
-    /// first step after leaving it may then be off by up to 8 % of the travel.
+    /// first step after leaving it may then be off by up to 8 % of the travel. Likewise where a
+    /// surface moves at its largest rate.
     #[inline(always)]
     pub fn from_observed(
         state: &ActuatorState<R>,
         previous: &[Command<R>; 2],
         figures: &ActuatorFigures,
     ) -> Self {
-        #[inline(always)]
-        fn surface<R: Real>(
-            position: R,
-            rate: R,
-            [new, old]: [R; 2],
-            figures: &ActuatorFigures,
-        ) -> SurfaceFilter<R> {
-            let trace = [position, position - rate.scale(figures.step)];
-            let most = figures.deflection_max;
-            let input = [new.scale(most), old.scale(most)];
-            SurfaceFilter { input, output: trace, clipped: trace }
-        }
         let ActuatorState { aileron, aileron_rate, elevator, elevator_rate, .. } = *state;
-        let [new, old] = previous;
+        let ([new, old], step) = (previous, figures.step);
+        let aileron = SurfaceFilter::observed(
+            [aileron, aileron_rate],
+            [new.aileron, old.aileron],
+            &figures.aileron,
+            step,
+        );
+        let elevator = SurfaceFilter::observed(
+            [elevator, elevator_rate],
+            [new.elevator, old.elevator],
+            &figures.elevator,
+            step,
+        );
+        let mut rudder = None;
+        if let Some(figures) = &figures.rudder {
+            let motion = [state.rudder, state.rudder_rate];
+            rudder = Some(SurfaceFilter::observed(motion, [new.rudder, old.rudder], figures, step));
+        }
         Actuators {
-            aileron: surface(aileron, aileron_rate, [new.aileron, old.aileron], figures),
-            elevator: surface(elevator, elevator_rate, [new.elevator, old.elevator], figures),
+            aileron,
+            elevator,
+            rudder,
             throttle_input: new.throttle,
             throttle: state.throttle,
         }
@@ -193,6 +240,10 @@ impl<R: Real> Actuators<R> {
         Actuators {
             aileron: self.aileron.replaced(chosen, &then.aileron),
             elevator: self.elevator.replaced(chosen, &then.elevator),
+            rudder: match (&self.rudder, &then.rudder) {
+                (Some(old), Some(new)) => Some(old.replaced(chosen, new)),
+                (old, _) => *old,
+            },
             throttle_input: one(self.throttle_input, then.throttle_input),
             throttle: one(self.throttle, then.throttle),
         }
@@ -201,8 +252,11 @@ impl<R: Real> Actuators<R> {
     /// Advances by one step of 0.01 s under `command`.
     #[inline(always)]
     pub fn step(&mut self, command: &Command<R>, figures: &ActuatorFigures) {
-        self.aileron.step(command.aileron, figures);
-        self.elevator.step(command.elevator, figures);
+        self.aileron.step(command.aileron, &figures.aileron, figures.step);
+        self.elevator.step(command.elevator, &figures.elevator, figures.step);
+        if let (Some(rudder), Some(of)) = (&mut self.rudder, &figures.rudder) {
+            rudder.step(command.rudder, of, figures.step);
+        }
         let [b, a] = figures.throttle;
         self.throttle = (command.throttle + self.throttle_input).scale(b) + self.throttle.scale(a);
         self.throttle_input = command.throttle;
@@ -215,18 +269,28 @@ impl<R: Real> Actuators<R> {
             aileron: self.aileron.clipped[0],
             elevator: self.elevator.clipped[0],
             throttle: self.throttle,
+            rudder: match &self.rudder {
+                Some(rudder) => rudder.clipped[0],
+                None => R::zero(),
+            },
         }
     }
 
     /// What is observed now: positions, with rates as differences over the last step.
     #[inline(always)]
     pub fn observed(&self, figures: &ActuatorFigures) -> ActuatorState<R> {
+        let (rudder, rudder_rate) = match &self.rudder {
+            Some(rudder) => (rudder.clipped[0], rudder.rate(figures.step)),
+            None => (R::zero(), R::zero()),
+        };
         ActuatorState {
             aileron: self.aileron.clipped[0],
-            aileron_rate: self.aileron.rate(figures),
+            aileron_rate: self.aileron.rate(figures.step),
             elevator: self.elevator.clipped[0],
-            elevator_rate: self.elevator.rate(figures),
+            elevator_rate: self.elevator.rate(figures.step),
             throttle: self.throttle,
+            rudder,
+            rudder_rate,
         }
     }
 }
@@ -244,9 +308,11 @@ mod tests {
     fn recurrences_are_those_measured_in_the_simulator() {
         let f = figures();
         // printed with five decimals
-        for (ours, printed) in
-            [(f.surface[0], 0.12774), (-f.surface[1], 0.76644), (-f.surface[2], -0.27740)]
-        {
+        for (ours, printed) in [
+            (f.aileron.filter[0], 0.12774),
+            (-f.aileron.filter[1], 0.76644),
+            (-f.aileron.filter[2], -0.27740),
+        ] {
             assert!((ours - printed).abs() < 6e-6, "{ours} {printed}");
         }
         assert!((f.throttle[0] - 0.024390).abs() < 5e-7 && (f.throttle[1] - 0.951220).abs() < 5e-7);
@@ -259,7 +325,12 @@ mod tests {
         let mut previous = [Command::IDLE; 2];
         for k in 0..50 {
             let x = (k as f64 * 0.7).sin() * 0.6;
-            let command = Command { aileron: x, elevator: -0.5 * x, throttle: 0.5 + 0.4 * x };
+            let command = Command {
+                aileron: x,
+                elevator: -0.5 * x,
+                throttle: 0.5 + 0.4 * x,
+                rudder: 0.3 * x,
+            };
             actuators.step(&command, &f);
             previous = [command, previous[0]];
         }
@@ -282,7 +353,7 @@ mod tests {
         let mut actuators = Actuators::at_rest(&Controls::default());
         let mut largest = 0.0_f64;
         for _ in 0..100 {
-            actuators.step(&Command { aileron: 1.0, elevator: 0.0, throttle: 0.0 }, &f);
+            actuators.step(&Command { aileron: 1.0, ..Command::IDLE }, &f);
             largest = largest.max(actuators.controls().aileron);
         }
         assert_eq!(largest, 0.5235);

@@ -1,8 +1,15 @@
 //! The airframe: geometry, actuators and the envelope it may be flown in, from a TOML file.
 
+mod controls;
+
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+
+pub use controls::Yaw;
+use controls::{Alike, Each};
+
+pub use crate::physics::servos::ActuatorFigures;
 
 /// Wing area in m², span and mean chord in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,35 +20,6 @@ pub struct Geometry {
     pub span: f64,
     /// Mean aerodynamic chord c.
     pub chord: f64,
-}
-
-/// The actuators' discrete filters at one time step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ActuatorFigures {
-    /// b0, a1, a2 of y = b0 (u + 2u₋₁ + u₋₂) − a1 y₋₁ − a2 y₋₂.
-    pub surface: [f64; 3],
-    /// b, a of y = b (u + u₋₁) + a y₋₁.
-    pub throttle: [f64; 2],
-    /// Deflection at full command, which is also the stop, rad.
-    pub deflection_max: f64,
-    /// Time step, s.
-    pub step: f64,
-}
-
-impl ActuatorFigures {
-    /// The bilinear transform of ω²/(s² + 2ζωs + ω²) for the surfaces (`frequency` in rad/s) and of
-    /// 1/(τs + 1) for the throttle (`lag` in s), at `step` (s).
-    pub fn tustin(frequency: f64, damping: f64, deflection_max: f64, lag: f64, step: f64) -> Self {
-        let w = frequency * step;
-        let d = 4.0 + 4.0 * damping * w + w * w;
-        let k = step / lag;
-        ActuatorFigures {
-            surface: [w * w / d, (2.0 * w * w - 8.0) / d, (4.0 - 4.0 * damping * w + w * w) / d],
-            throttle: [k / (2.0 + k), (2.0 - k) / (2.0 + k)],
-            deflection_max,
-            step,
-        }
-    }
 }
 
 /// Limits within which the pilot keeps the aircraft.
@@ -66,6 +44,60 @@ pub struct Envelope {
     pub surface_slew_per_s: f64,
 }
 
+/// The condition about which an aircraft's quantities are scaled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    /// Airspeed V0 of x_c, eq. (21) of \[GSFM26\], m/s.
+    pub airspeed: f64,
+    /// Altitude of designs and checks, m above mean sea level.
+    pub altitude: f64,
+    /// Throttle of steady flight there, 0..1.
+    pub throttle: f64,
+}
+
+impl Reference {
+    /// That of files of schema 1: the start of an episode in section V-A of \[GSFM26\].
+    const OF_SCHEMA_1: Reference = Reference { airspeed: 16.67, altitude: 600.0, throttle: 0.118 };
+}
+
+/// Incidence that a controller keeps to, rad.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Incidence {
+    /// That steady flight should not exceed.
+    #[serde(rename = "comfortable_rad")]
+    pub comfortable: f64,
+    /// That no commanded attitude may need: the rest is for the transient.
+    #[serde(rename = "tolerable_rad")]
+    pub tolerable: f64,
+    /// Beyond which the nose is pushed down.
+    #[serde(rename = "push_from_rad")]
+    pub push_from: f64,
+    /// Elevator (rad) a rad beyond it.
+    pub push_gain: f64,
+}
+
+impl Incidence {
+    /// For a wing that stalls at about 12°.
+    pub const DEFAULT: Incidence =
+        Incidence { comfortable: 0.05, tolerable: 0.09, push_from: 0.16, push_gain: 3.0 };
+
+    fn checked(self) -> Result<Self, String> {
+        let Incidence { comfortable, tolerable, push_from, push_gain } = self;
+        if 0.0 < comfortable
+            && comfortable < tolerable
+            && tolerable < push_from
+            && push_from < 1.0
+            && (0.0..=20.0).contains(&push_gain)
+        {
+            return Ok(self);
+        }
+        Err("incidence must have 0 < comfortable_rad < tolerable_rad < push_from_rad < 1 and push_gain in \
+             0..20; correct it there"
+            .into())
+    }
+}
+
 /// An aircraft without its aerodynamics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Airframe {
@@ -75,6 +107,12 @@ pub struct Airframe {
     pub geometry: Geometry,
     /// Actuator filters at 0.01 s.
     pub actuators: ActuatorFigures,
+    /// What is known of a rudder.
+    pub yaw: Yaw,
+    /// The condition about which quantities are scaled.
+    pub reference: Reference,
+    /// Incidence that controllers keep to.
+    pub incidence: Incidence,
     /// Limits to fly within.
     pub envelope: Envelope,
 }
@@ -124,8 +162,19 @@ struct File {
     schema: u32,
     name: String,
     geometry: GeometryFile,
-    actuators: ActuatorFile,
+    actuators: Option<Alike>,
+    controls: Option<Each>,
+    reference: Option<ReferenceFile>,
+    incidence: Option<Incidence>,
     envelope: Envelope,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ReferenceFile {
+    airspeed_mps: Sourced,
+    altitude_m: Sourced,
+    throttle: Sourced,
 }
 
 #[derive(Deserialize)]
@@ -136,17 +185,45 @@ struct GeometryFile {
     mean_chord_m: Sourced,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ActuatorFile {
-    surface_frequency_radps: Sourced,
-    surface_damping: Sourced,
-    deflection_max_rad: Sourced,
-    throttle_lag_s: Sourced,
+impl File {
+    /// Filters of the controls, with what the file says of a rudder.
+    fn controls(&self) -> Result<(ActuatorFigures, Yaw), String> {
+        match (self.schema, &self.actuators, &self.controls) {
+            (1, Some(alike), None) => alike.figures(),
+            (2, None, Some(each)) => each.figures(),
+            (1, ..) => {
+                Err("schema 1 describes its controls in [actuators] alone; [controls] is of \
+                            schema = 2"
+                    .into())
+            }
+            _ => {
+                Err("schema 2 describes its controls in [controls.aileron], [controls.elevator], \
+                      [controls.throttle] and, where there is one, [controls.rudder]"
+                    .into())
+            }
+        }
+    }
+
+    fn reference(&self) -> Result<Reference, String> {
+        let Some(reference) = &self.reference else {
+            return Ok(Reference::OF_SCHEMA_1);
+        };
+        let altitude = reference.altitude_m.value;
+        if !(-500.0..=11_000.0).contains(&altitude) {
+            return Err(format!(
+                "reference.altitude_m = {altitude} must lie between -500 and 11000"
+            ));
+        }
+        Ok(Reference {
+            airspeed: positive("reference.airspeed_mps", &reference.airspeed_mps, 1000.0)?,
+            altitude,
+            throttle: positive("reference.throttle", &reference.throttle, 1.0)?,
+        })
+    }
 }
 
 impl Airframe {
-    /// Reads an airframe file (`schema = 1`).
+    /// Reads an airframe file (`schema = 2`, or 1 of earlier programs).
     ///
     /// # Errors
     /// If the file cannot be read, is no such TOML, or holds a number that no aircraft has.
@@ -164,10 +241,16 @@ impl Airframe {
     /// [`load`](Self::load) from the file's text; the error is what is wrong with it.
     pub fn parse(text: &str) -> Result<Airframe, String> {
         let file: File = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
-        check_schema(file.schema)?;
+        check_schema(file.schema, 2)?;
         let file = File { name: named(file.name)?, ..file };
+        if file.schema == 2 && file.reference.is_none() {
+            return Err(
+                "schema 2 needs [reference] with airspeed_mps, altitude_m and throttle".into()
+            );
+        }
+        let (actuators, yaw) = file.controls()?;
+        let reference = file.reference()?;
         let g = &file.geometry;
-        let a = &file.actuators;
         Ok(Airframe {
             name: file.name,
             geometry: Geometry {
@@ -175,13 +258,10 @@ impl Airframe {
                 span: positive("geometry.span_m", &g.span_m, 100.0)?,
                 chord: positive("geometry.mean_chord_m", &g.mean_chord_m, 50.0)?,
             },
-            actuators: ActuatorFigures::tustin(
-                positive("actuators.surface_frequency_radps", &a.surface_frequency_radps, 1000.0)?,
-                positive("actuators.surface_damping", &a.surface_damping, 10.0)?,
-                positive("actuators.deflection_max_rad", &a.deflection_max_rad, 1.6)?,
-                positive("actuators.throttle_lag_s", &a.throttle_lag_s, 20.0)?,
-                0.01,
-            ),
+            actuators,
+            yaw,
+            reference,
+            incidence: file.incidence.unwrap_or(Incidence::DEFAULT).checked()?,
             envelope: file.envelope.checked()?,
         })
     }
@@ -229,14 +309,14 @@ pub(crate) fn named(name: String) -> Result<String, String> {
     if fits { Ok(name) } else { Err("name must be one line of 1 to 64 bytes; give it one".into()) }
 }
 
-/// Refuses a file of another layout than this program's.
-pub(crate) fn check_schema(schema: u32) -> Result<(), String> {
-    if schema == 1 {
+/// Refuses a file of another layout than this program's: 1 to `newest`.
+pub(crate) fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
+    if (1..=newest).contains(&schema) {
         return Ok(());
     }
     Err(format!(
-        "its schema is {schema}, this program reads schema 1; use a file of schema 1 or the \
-         program version that wrote it"
+        "its schema is {schema}, this program reads schema {newest}; use a file of schema {newest} or \
+         the program version that wrote it"
     ))
 }
 

@@ -10,6 +10,7 @@ pub mod effects;
 pub mod inputs;
 pub mod point;
 pub mod rigid_body;
+pub mod servos;
 mod state;
 mod time;
 mod wrench;

@@ -10,6 +10,8 @@ use crate::physics::{Controls, State, Wrench};
 pub struct AirData<R = f64> {
     /// Q = ½ρV²S, the dynamic pressure times the wing area, N.
     pub q_s: R,
+    /// Air density ρ, kg/m³.
+    pub density: R,
     /// Sine of the angle of attack.
     pub sin_alpha: R,
     /// Cosine of the angle of attack.
@@ -38,6 +40,7 @@ impl<R: Real> AirData<R> {
         let (per_span, per_chord) = (per_2v.scale(geometry.span), per_2v.scale(geometry.chord));
         AirData {
             q_s: (density * state.airspeed * state.airspeed).scale(0.5 * geometry.area),
+            density,
             sin_alpha,
             cos_alpha,
             sin_beta,
@@ -74,7 +77,7 @@ pub struct Base<R = f64> {
     pub wrench: Wrench<R>,
     /// Their force in body axes, N.
     pub force: Vector<R>,
-    /// The part of `wrench` due to aileron and elevator.
+    /// The part of `wrench` due to aileron, elevator and rudder.
     pub deflected: Wrench<R>,
     /// What `wrench` would be without deflections and body rates.
     pub still: Wrench<R>,

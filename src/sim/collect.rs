@@ -89,7 +89,8 @@ impl Wander {
             }
         }
         let [aileron, elevator, throttle] = self.now.map(|x| self.size * x);
-        Command { aileron, elevator, throttle: self.throttle + 0.5 * throttle }.clamped()
+        Command { aileron, elevator, throttle: self.throttle + 0.5 * throttle, rudder: 0.0 }
+            .clamped()
     }
 }
 

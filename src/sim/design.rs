@@ -219,8 +219,7 @@ fn imagine(
 
 /// What a perfect log has of a moment, the specific force as `truth` makes it.
 fn instant(truth: &GreyBox, seen: &Observation, memory: &mut InputMemory) -> Instant {
-    let z = seen.actuators;
-    let controls = Controls { aileron: z.aileron, elevator: z.elevator, throttle: z.throttle };
+    let controls = seen.actuators.controls();
     let air = truth.air(&seen.state, seen.altitude);
     let acting = truth.act(&controls, memory);
     let wrench = truth.wrench(&seen.state, &acting, &air);

@@ -90,10 +90,11 @@ impl Imagination {
         let mut memory = Memory::default();
         // what the scheme remembers at the start is the acceleration there
         model.step(&state, &rest, START_ALTITUDE, &mut memory);
-        let rest = Controls { aileron: lane(0.0), elevator: lane(0.0), throttle: lane(0.0) };
+        let zero = lane(0.0);
+        let rest = Controls { aileron: zero, elevator: zero, throttle: zero, rudder: zero };
         let neutral = Batch {
             state: state.map(lane),
-            actuators: Actuators::at_rest(&rest),
+            actuators: Actuators::at_rest(&rest).fitted(&model.airframe.actuators),
             memory: memory.map(lane),
             inputs: (!model.acts_at_once()).then(|| InputMemory::at_rest(&rest)),
             target: Target { roll: 0.0, pitch: 0.0, airspeed: state.airspeed }.map(lane),

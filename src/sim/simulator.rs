@@ -57,6 +57,8 @@ impl Simulator {
                 elevator: truth.elevator_rad,
                 elevator_rate: truth.elevator_rate_radps,
                 throttle: truth.throttle,
+                rudder: truth.rudder_rad,
+                rudder_rate: truth.rudder_rate_radps,
             },
             altitude: truth.altitude_m,
             previous: self.previous,
@@ -73,8 +75,8 @@ impl Environment for Simulator {
 
     fn step(&mut self, command: Command) -> Result<Observation, Trouble> {
         let command = command.clamped();
-        let Command { aileron, elevator, throttle } = command;
-        let truth = self.plant.step(Inputs { aileron, elevator, throttle })?;
+        let Command { aileron, elevator, throttle, rudder } = command;
+        let truth = self.plant.step(Inputs { aileron, elevator, throttle, rudder })?;
         self.previous = [command, self.previous[0]];
         Ok(self.observe(&truth))
     }

@@ -99,7 +99,7 @@ struct Condition {
 /// A variable to sweep: its label, its ends in the label's unit, how to set it.
 type Variable = (&'static str, [f64; 2], fn(&mut Condition, f64));
 
-const VARIABLES: [Variable; 11] = [
+const VARIABLES: [Variable; 12] = [
     ("angle of attack, °", [-25.0, 25.0], |c, x| c.state.alpha = x.to_radians()),
     ("sideslip, °", [-20.0, 20.0], |c, x| c.state.beta = x.to_radians()),
     ("airspeed, m/s", [12.0, 35.0], |c, x| c.state.airspeed = x),
@@ -110,6 +110,7 @@ const VARIABLES: [Variable; 11] = [
     ("aileron, °", [-30.0, 30.0], |c, x| c.controls.aileron = x.to_radians()),
     ("elevator, °", [-30.0, 30.0], |c, x| c.controls.elevator = x.to_radians()),
     ("throttle", [0.0, 1.0], |c, x| c.controls.throttle = x),
+    ("rudder, °", [-30.0, 30.0], |c, x| c.controls.rudder = x.to_radians()),
     ("altitude, m", [600.0, 607.0], |c, x| c.altitude = x),
 ];
 
@@ -204,14 +205,15 @@ fn manoeuvre(models: &[GreyBox; 2], trim: &Trim) -> Vec<Pair> {
 
 /// The command of [`MANOEUVRE`] at `time` (s).
 fn command(model: &GreyBox, trim: &Trim, time: f64) -> Command {
-    let stop = model.airframe.actuators.deflection_max;
+    let level = model.airframe.actuators.command(&trim.controls);
     let pulse = |from: f64, to: f64| if (from..to).contains(&time) { 1.0 } else { 0.0 };
     let elevator = pulse(0.5, 1.4) - pulse(1.4, 2.0) + pulse(2.0, 2.3) - pulse(2.3, 2.6);
     let aileron = pulse(4.0, 4.4) - pulse(4.4, 4.8);
     Command {
-        aileron: trim.controls.aileron / stop + 0.3 * aileron,
-        elevator: trim.controls.elevator / stop + 0.2 * elevator,
+        aileron: level.aileron + 0.3 * aileron,
+        elevator: level.elevator + 0.2 * elevator,
         throttle: trim.controls.throttle.max(pulse(6.0, 8.0)),
+        rudder: level.rudder + 0.3 * (pulse(8.0, 8.4) - pulse(8.4, 8.8)),
     }
     .clamped()
 }

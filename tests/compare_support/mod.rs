@@ -76,6 +76,7 @@ pub fn fly_with(seed: u64, seconds: f64, noise: Noise, excitation: f64) -> Fligh
             aileron: base.aileron + excitation * on_top.command.aileron,
             elevator: base.elevator + excitation * on_top.command.elevator,
             throttle: base.throttle + excitation * on_top.command.throttle,
+            rudder: 0.0,
         }
         .clamped();
         flight.samples.push(sample(&simulator.truth(), &command, noise, &mut random));
@@ -99,6 +100,7 @@ fn excite(step: usize, random: &mut Stream) -> Excitation {
             aileron: random.random_range(-0.12..0.12),
             elevator: random.random_range(-0.12..0.12),
             throttle: random.random_range(-0.3..0.3),
+            rudder: 0.0,
         },
     }
 }
@@ -152,6 +154,7 @@ pub fn as_measured(name: &str, flight: &Flight, noise: Noise) -> Reconstruction 
             aileron: s.aileron_rad,
             elevator: s.elevator_rad,
             throttle: s.throttle,
+            rudder: 0.0,
         },
         command: None,
         specific_force: s.specific_force_mps2,

@@ -39,7 +39,7 @@ pub fn options(pace: Pace) -> Options {
         pace,
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
-        deflection: x8().airframe.actuators.deflection_max,
+        travels: x8().airframe.actuators.travels(),
         controller: None,
         signing: None,
     }
@@ -121,6 +121,7 @@ impl Answer {
             aileron: self.aileron.into(),
             elevator: self.elevator.into(),
             throttle: self.throttle.into(),
+            rudder: 0.0,
         }
     }
 }
@@ -169,7 +170,7 @@ impl Vehicle {
         let (s, z) = (self.twin.state, self.twin.actuators.observed(&x8().airframe.actuators));
         let time_usec = self.time_us;
         let mut actuator = [0.0; 32];
-        let full = x8().airframe.actuators.deflection_max;
+        let full = x8().airframe.actuators.aileron.travel.most;
         let scaled = [z.aileron, z.elevator, z.throttle * full, z.aileron_rate, z.elevator_rate];
         actuator.iter_mut().zip(scaled).for_each(|(a, x)| *a = (x / full) as f32);
         let (sr, cr) = (s.roll / 2.0).sin_cos();

@@ -15,6 +15,7 @@ use greylag::model::{GreyBox, weights};
 use greylag::num::Dense;
 use greylag::num::stream::stream;
 use greylag::physics::Airframe;
+use greylag::physics::servos::Travels;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -171,7 +172,7 @@ fn clients(inputs: u64, rng: ChaCha8Rng) -> u64 {
 }
 
 fn sitl(inputs: u64, rng: ChaCha8Rng) -> u64 {
-    let mut vehicle = Sitl::new(1, 0.5);
+    let mut vehicle = Sitl::new(1, Travels::alike(0.5));
     let mut states = 0;
     vehicle_frames(inputs, rng, (1, 200), |host, bytes| {
         vehicle.handle(host, peer(1), bytes, |t| {

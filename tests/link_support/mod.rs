@@ -46,7 +46,7 @@ impl Double {
                 position: [45.0, 7.5],
                 velocity: [10.0, 12.0, -0.5],
                 target: [0.2, 0.0],
-                command: Command { aileron: 0.25, elevator: -0.5, throttle: 0.6 },
+                command: Command { aileron: 0.25, elevator: -0.5, throttle: 0.6, rudder: 0.0 },
                 actuators: ActuatorState::default(),
                 load: 0.2,
             },

@@ -38,11 +38,16 @@ pub fn state(truth: &Truth) -> State {
 }
 
 pub fn controls(truth: &Truth) -> Controls {
-    Controls { aileron: truth.aileron_rad, elevator: truth.elevator_rad, throttle: truth.throttle }
+    Controls {
+        aileron: truth.aileron_rad,
+        elevator: truth.elevator_rad,
+        throttle: truth.throttle,
+        rudder: 0.0,
+    }
 }
 
 pub fn inputs(c: &Command) -> Inputs {
-    Inputs { aileron: c.aileron, elevator: c.elevator, throttle: c.throttle }
+    Inputs { aileron: c.aileron, elevator: c.elevator, throttle: c.throttle, rudder: 0.0 }
 }
 
 /// Commands that excite the aircraft in six ways, 1000 steps each.
@@ -71,7 +76,8 @@ pub fn noise(seed: u64, memory: f64, hold: usize) -> Vec<Command> {
                     *v = memory * *v + drive * n;
                 }
             }
-            Command { aileron: 0.5 * x[0], elevator: 0.7 * x[1], throttle: 0.5 + x[2] }.clamped()
+            Command { aileron: 0.5 * x[0], elevator: 0.7 * x[1], throttle: 0.5 + x[2], rudder: 0.0 }
+                .clamped()
         })
         .collect()
 }

@@ -3,7 +3,7 @@
 use jsbsim::{Error, Fdm, NodeId};
 
 use super::options::THROTTLE_COMMAND;
-use super::{Inputs, PlantError, PlantOptions, Start, Truth};
+use super::{Inputs, PlantError, PlantOptions, Properties, Start, Truth};
 use crate::air::Gust;
 
 /// Metres per foot (exact).
@@ -21,6 +21,8 @@ pub(super) const STILL_S: f64 = 1e-12;
 /// Nodes of everything that is read or written in a step.
 pub(super) struct Nodes {
     surfaces: [NodeId; 2],
+    /// Command and position of the rudder.
+    rudder: Option<[NodeId; 2]>,
     /// One a throttle; none on a glider.
     throttles: Vec<NodeId>,
     positions: [NodeId; 2],
@@ -70,6 +72,7 @@ impl Nodes {
         let is_started = look("propulsion/starter_cmd").is_some();
         Ok(Nodes {
             surfaces: [node(&p.aileron_command)?, node(&p.elevator_command)?],
+            rudder: rudder(&look, &node, p)?,
             throttles,
             positions: [
                 look(&p.aileron_position).map_or_else(|| node(p.aileron_fallback()), Ok)?,
@@ -99,6 +102,9 @@ impl Nodes {
         let [aileron, elevator] = self.surfaces;
         fdm.write_node(aileron, inputs.aileron)?;
         fdm.write_node(elevator, inputs.elevator)?;
+        if let Some([rudder, _]) = self.rudder {
+            fdm.write_node(rudder, inputs.rudder)?;
+        }
         for throttle in &self.throttles {
             fdm.write_node(*throttle, inputs.throttle)?;
         }
@@ -206,6 +212,7 @@ impl Nodes {
         let (aileron_rad, elevator_rad) =
             (fdm.read_node(aileron_rad)?, fdm.read_node(elevator_rad)?);
         let throttle = self.throttle_position.map_or(Ok(0.0), |node| fdm.read_node(node))?;
+        let rudder_rad = self.rudder.map_or(Ok(0.0), |[_, node]| fdm.read_node(node))?;
         let [latitude_deg, longitude_deg, altitude_ft] = read3(fdm, &self.place, 1.0)?;
         Ok(Truth {
             roll_rad,
@@ -228,6 +235,7 @@ impl Nodes {
             aileron_rad,
             elevator_rad,
             throttle,
+            rudder_rad,
             thrust_n: self.thrust(fdm)?,
             ..Truth::default()
         })
@@ -246,6 +254,20 @@ impl Nodes {
         }
         Ok(total * LBF)
     }
+}
+
+/// Command and position of the rudder; one that is named must be there.
+fn rudder(
+    look: &impl Fn(&str) -> Option<NodeId>,
+    node: &impl Fn(&str) -> Result<NodeId, PlantError>,
+    names: &Properties,
+) -> Result<Option<[NodeId; 2]>, PlantError> {
+    let Properties { rudder_command, rudder_position, .. } = names;
+    let usual = Properties::default();
+    if (rudder_command, rudder_position) == (&usual.rudder_command, &usual.rudder_position) {
+        return Ok(look(rudder_command).zip(look(rudder_position)).map(|(c, p)| [c, p]));
+    }
+    Ok(Some([node(rudder_command)?, node(rudder_position)?]))
 }
 
 /// The nodes `NAME`, `NAME[1]`, … up to the first that is not there.

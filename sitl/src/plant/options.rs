@@ -10,7 +10,7 @@ use crate::hidden::Hidden;
 /// Which aircraft to fly, in what air, with what hidden in it.
 #[derive(Clone, Debug)]
 pub struct PlantOptions {
-    /// Folder that holds `NAME/NAME.xml`; `None` is the X8 built into the program.
+    /// Folder that holds `NAME/NAME.xml`; `None` is one of those built into the program.
     pub aircraft_dir: Option<PathBuf>,
     /// The aircraft's name.
     pub aircraft: String,
@@ -67,6 +67,10 @@ pub struct Properties {
     pub elevator_position: String,
     /// Throttle position, 0..1.
     pub throttle_position: String,
+    /// Rudder command, −1..1; an aircraft need not have one.
+    pub rudder_command: String,
+    /// Rudder position, rad.
+    pub rudder_position: String,
 }
 
 /// The aileron's position by FW-JSBGym's name, of a flying wing with two elevons.
@@ -78,13 +82,15 @@ pub(super) const THROTTLE_COMMAND: &str = "fcs/throttle-cmd-norm";
 
 impl Properties {
     /// The keys by which a property can be named, in the order of the fields.
-    pub const KEYS: [&str; 6] = [
+    pub const KEYS: [&str; 8] = [
         "aileron_command",
         "elevator_command",
         "throttle_command",
         "aileron_position",
         "elevator_position",
         "throttle_position",
+        "rudder_command",
+        "rudder_position",
     ];
 
     /// The name under `key`, one of [`Self::KEYS`].
@@ -96,6 +102,8 @@ impl Properties {
             "aileron_position" => Some(&mut self.aileron_position),
             "elevator_position" => Some(&mut self.elevator_position),
             "throttle_position" => Some(&mut self.throttle_position),
+            "rudder_command" => Some(&mut self.rudder_command),
+            "rudder_position" => Some(&mut self.rudder_position),
             _ => None,
         }
     }
@@ -128,6 +136,8 @@ impl Default for Properties {
             aileron_position: AILERON_POSITION.into(),
             elevator_position: "fcs/elevator-pos-rad".into(),
             throttle_position: "fcs/throttle-pos-norm".into(),
+            rudder_command: "fcs/rudder-cmd-norm".into(),
+            rudder_position: "fcs/rudder-pos-rad".into(),
         }
     }
 }

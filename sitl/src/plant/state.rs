@@ -71,6 +71,8 @@ pub struct Inputs {
     pub elevator: f64,
     /// Throttle, 0..1.
     pub throttle: f64,
+    /// Rudder, −1..1; positive yaws left.
+    pub rudder: f64,
 }
 
 impl Inputs {
@@ -80,11 +82,12 @@ impl Inputs {
             aileron: self.aileron.clamp(-1.0, 1.0),
             elevator: self.elevator.clamp(-1.0, 1.0),
             throttle: self.throttle.clamp(0.0, 1.0),
+            rudder: self.rudder.clamp(-1.0, 1.0),
         }
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        self.aileron.is_finite() && self.elevator.is_finite() && self.throttle.is_finite()
+        [self.aileron, self.elevator, self.throttle, self.rudder].iter().all(|x| x.is_finite())
     }
 }
 
@@ -137,6 +140,10 @@ pub struct Truth {
     pub elevator_rate_radps: f64,
     /// Throttle position, 0..1.
     pub throttle: f64,
+    /// Rudder deflection, rad.
+    pub rudder_rad: f64,
+    /// Rudder rate, rad/s: the deflection's change over the last step by the step.
+    pub rudder_rate_radps: f64,
     /// Thrust along the body x axis, N, hidden effects on it included.
     pub thrust_n: f64,
 }
@@ -152,7 +159,7 @@ impl Truth {
             ("velocity", self.velocity_ned_mps.iter().sum()),
             ("position", self.latitude_deg + self.longitude_deg + self.altitude_m),
             ("air", self.air_density_kgpm3 + self.static_pressure_pa),
-            ("actuator", self.aileron_rad + self.elevator_rad + self.throttle),
+            ("actuator", self.aileron_rad + self.elevator_rad + self.throttle + self.rudder_rad),
             ("thrust", self.thrust_n),
         ]
         .into_iter()

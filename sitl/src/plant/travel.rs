@@ -15,19 +15,45 @@ const LEAST_RAD: f64 = 1e-3;
 /// filter stops short of its end by rounding.
 const ROUNDING_RAD: f64 = 1e-9;
 
-/// Deflections at full command: the larger of those at +1 and at −1.
+/// Where a surface comes to rest at full command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stops {
+    /// At the command −1, rad.
+    pub least_rad: f64,
+    /// At the command 1, rad.
+    pub most_rad: f64,
+}
+
+impl Stops {
+    /// The same to both sides, rad.
+    pub const fn symmetric(most_rad: f64) -> Stops {
+        Stops { least_rad: -most_rad, most_rad }
+    }
+
+    /// The larger of both deflections, rad.
+    pub fn largest_rad(&self) -> f64 {
+        self.most_rad.abs().max(self.least_rad.abs())
+    }
+}
+
+/// Deflections at full command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Travel {
-    /// Of the aileron, rad.
-    pub aileron_rad: f64,
-    /// Of the elevator, rad.
-    pub elevator_rad: f64,
+    /// Of the aileron.
+    pub aileron: Stops,
+    /// Of the elevator.
+    pub elevator: Stops,
+    /// Of the rudder, where there is one.
+    pub rudder: Option<Stops>,
 }
 
 impl Travel {
     /// That of the X8.
-    pub const X8: Travel =
-        Travel { aileron_rad: FULL_DEFLECTION_RAD, elevator_rad: FULL_DEFLECTION_RAD };
+    pub const X8: Travel = Travel {
+        aileron: Stops::symmetric(FULL_DEFLECTION_RAD),
+        elevator: Stops::symmetric(FULL_DEFLECTION_RAD),
+        rudder: None,
+    };
 }
 
 impl Default for Travel {
@@ -48,38 +74,40 @@ impl Plant {
         self.fdm.set_dt(self.options.step_s);
         self.restore(&before)?;
         let (up, down) = measured?;
-        let largest = |surface: usize, property: &str| {
-            let travel = up[surface].abs().max(down[surface].abs());
-            self.checked(travel, property)
+        let stops = |surface: usize| Stops {
+            least_rad: rounded(down[surface]),
+            most_rad: rounded(up[surface]),
         };
+        let rudder = stops(2);
         Ok(Travel {
-            aileron_rad: largest(0, &self.options.properties.aileron_position)?,
-            elevator_rad: largest(1, &self.options.properties.elevator_position)?,
+            aileron: self.checked(stops(0), &self.options.properties.aileron_position)?,
+            elevator: self.checked(stops(1), &self.options.properties.elevator_position)?,
+            rudder: (rudder.largest_rad() > LEAST_RAD).then_some(rudder),
         })
     }
 
-    fn checked(&self, travel: f64, property: &str) -> Result<f64, PlantError> {
-        match travel {
-            t if (t - FULL_DEFLECTION_RAD).abs() < ROUNDING_RAD => Ok(FULL_DEFLECTION_RAD),
-            t if t.is_finite() && t > LEAST_RAD => Ok(t),
-            _ => Err(PlantError::Travel {
-                aircraft: self.options.aircraft.clone(),
-                property: property.to_owned(),
-            }),
+    fn checked(&self, stops: Stops, property: &str) -> Result<Stops, PlantError> {
+        let travel = stops.largest_rad();
+        if travel.is_finite() && travel > LEAST_RAD {
+            return Ok(stops);
         }
+        Err(PlantError::Travel {
+            aircraft: self.options.aircraft.clone(),
+            property: property.to_owned(),
+        })
     }
 
-    /// Aileron and elevator where they come to rest at `command`, rad.
-    fn stops(&mut self, command: f64) -> Result<[f64; 2], PlantError> {
-        let inputs = Inputs { aileron: command, elevator: command, throttle: 0.0 };
+    /// Aileron, elevator and rudder where they come to rest at `command`, rad.
+    fn stops(&mut self, command: f64) -> Result<[f64; 3], PlantError> {
+        let inputs = Inputs { aileron: command, elevator: command, throttle: 0.0, rudder: command };
         // Filters keep the step for which they were laid out; nothing else moves in so short a one.
         self.fdm.set_dt(super::nodes::STILL_S);
-        let (mut last, mut at_rest) = ([f64::INFINITY; 2], 0);
+        let (mut last, mut at_rest) = ([f64::INFINITY; 3], 0);
         for _ in 0..STEPS {
             self.nodes.command(&mut self.fdm, &inputs).map_err(jsbsim("writing the commands"))?;
             self.fdm.run().map_err(jsbsim("measuring the travel of the surfaces"))?;
             let truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the state"))?;
-            let now = [truth.aileron_rad, truth.elevator_rad];
+            let now = [truth.aileron_rad, truth.elevator_rad, truth.rudder_rad];
             let moved = now.iter().zip(&last).any(|(a, b)| (a - b).abs() >= STILL_RAD);
             at_rest = if moved { 0 } else { at_rest + 1 };
             if at_rest == AT_REST {
@@ -89,4 +117,12 @@ impl Plant {
         }
         Ok(last)
     }
+}
+
+/// A deflection, without the rounding by which a filter stops short of its end.
+fn rounded(deflection: f64) -> f64 {
+    if (deflection.abs() - FULL_DEFLECTION_RAD).abs() < ROUNDING_RAD {
+        return FULL_DEFLECTION_RAD.copysign(deflection);
+    }
+    deflection
 }

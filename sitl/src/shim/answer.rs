@@ -22,20 +22,17 @@ pub struct Answer {
 impl Answer {
     /// Reads an answer; `None` when a control that is used is not a finite number.
     pub fn read(message: &HilActuatorControls) -> Option<Self> {
-        let [aileron, elevator, throttle, ..] = message.controls;
-        if ![aileron, elevator, throttle].iter().all(|control| control.is_finite()) {
+        let [aileron, elevator, throttle, rudder, ..] = message.controls;
+        if ![aileron, elevator, throttle, rudder].iter().all(|control| control.is_finite()) {
             return None;
         }
         let told = Inputs {
             aileron: f64::from(aileron),
             elevator: f64::from(elevator),
             throttle: f64::from(throttle),
+            rudder: f64::from(rudder),
         };
-        let flown = Inputs {
-            aileron: told.aileron.clamp(-1.0, 1.0),
-            elevator: told.elevator.clamp(-1.0, 1.0),
-            throttle: told.throttle.clamp(0.0, 1.0),
-        };
+        let flown = told.clamped();
         let armed = message.mode & ARMED != 0;
         Some(Answer {
             echo_us: message.time_usec,

@@ -57,7 +57,7 @@ impl Flight {
             log: options
                 .truth
                 .as_ref()
-                .map(|t| TruthLog::create(t, FRAME_US as f64 * 1e-6))
+                .map(|t| TruthLog::create(t, FRAME_US as f64 * 1e-6, &travel))
                 .transpose()?,
             time_us: zero + (ahead as u64 + 1) * FRAME_US,
             pending,

@@ -6,7 +6,7 @@ use super::codec::{
     ActuatorOutputStatus, AoaSsa, AttitudeQuaternion, Encoder, GlobalPositionInt, GpsRawInt,
     Heartbeat, HighresImu, SysStatus, VfrHud, WindCov,
 };
-use crate::plant::{Travel, Truth};
+use crate::plant::{Stops, Travel, Truth};
 
 /// Simulated time from one frame to the next, µs.
 pub const FRAME_US: u64 = 10_000;
@@ -128,7 +128,7 @@ pub(super) fn hud(measured: &Truth) -> VfrHud {
 }
 
 fn actuators(time_us: u64, measured: &Truth, travel: Travel) -> ActuatorOutputStatus {
-    let Travel { aileron_rad, elevator_rad } = travel;
+    let (aileron_rad, elevator_rad) = (travel.aileron.largest_rad(), travel.elevator.largest_rad());
     let mut actuator = [0.0; 32];
     actuator[0] = (measured.aileron_rad / aileron_rad) as f32;
     actuator[1] = (measured.elevator_rad / elevator_rad) as f32;
@@ -139,7 +139,17 @@ fn actuators(time_us: u64, measured: &Truth, travel: Travel) -> ActuatorOutputSt
         return ActuatorOutputStatus { time_usec: time_us, active: 5, actuator };
     }
     (actuator[5], actuator[6]) = (aileron_rad as f32, elevator_rad as f32);
-    ActuatorOutputStatus { time_usec: time_us, active: 7, actuator }
+    if let Some(rudder) = travel.rudder {
+        let full = rudder.largest_rad();
+        actuator[7] = (measured.rudder_rad / full) as f32;
+        actuator[8] = (measured.rudder_rate_radps / full) as f32;
+    }
+    let rudder = travel.rudder.unwrap_or(Stops { least_rad: 0.0, most_rad: 0.0 });
+    for (i, stops) in [travel.aileron, travel.elevator, rudder].into_iter().enumerate() {
+        actuator[9 + i] = stops.most_rad as f32;
+        actuator[12 + i] = stops.least_rad as f32;
+    }
+    ActuatorOutputStatus { time_usec: time_us, active: 15, actuator }
 }
 
 pub(super) fn attitude(time_us: u64, measured: &Truth) -> AttitudeQuaternion {

@@ -6,11 +6,14 @@ use std::path::PathBuf;
 
 use super::error::ShimError;
 use super::options::{Existing, TruthFile};
-use crate::plant::{Inputs, Truth};
+use crate::plant::{Inputs, Travel, Truth};
 
 const HEADER: &str = "time_s,roll_rad,pitch_rad,yaw_rad,p_radps,q_radps,r_radps,airspeed_mps,\
 alpha_rad,beta_rad,ax_mps2,ay_mps2,az_mps2,vn_mps,ve_mps,vd_mps,altitude_m,air_density_kgpm3,\
 aileron_rad,elevator_rad,throttle,aileron_cmd,elevator_cmd,throttle_cmd,rate_hold_s";
+
+/// The further columns of an aircraft with a rudder.
+const RUDDER: &str = ",rudder_rad,rudder_cmd";
 
 /// A truth file that is being written.
 #[derive(Debug)]
@@ -19,12 +22,13 @@ pub struct TruthLog {
     file: BufWriter<File>,
     /// Time for which the plant holds its rates, s.
     step_s: f64,
+    has_rudder: bool,
 }
 
 impl TruthLog {
-    /// Creates the file with its header row for a plant that steps by `step_s` (s); refuses one that
-    /// exists unless told to replace it.
-    pub fn create(target: &TruthFile, step_s: f64) -> Result<Self, ShimError> {
+    /// Creates the file with its header row for a plant that steps by `step_s` (s) and whose surfaces
+    /// have this `travel`; refuses one that exists unless told to replace it.
+    pub fn create(target: &TruthFile, step_s: f64, travel: &Travel) -> Result<Self, ShimError> {
         let path = target.path.clone();
         let mut how = OpenOptions::new();
         match target.existing {
@@ -38,8 +42,9 @@ impl TruthLog {
             }
             Err(source) => return Err(ShimError::Truth { path, source }),
         };
-        let mut log = TruthLog { path, file: BufWriter::new(file), step_s };
-        let written = writeln!(log.file, "{HEADER}");
+        let has_rudder = travel.rudder.is_some();
+        let mut log = TruthLog { path, file: BufWriter::new(file), step_s, has_rudder };
+        let written = writeln!(log.file, "{HEADER}{}", if has_rudder { RUDDER } else { "" });
         log.check(written)?;
         Ok(log)
     }
@@ -73,10 +78,13 @@ impl TruthLog {
             inputs.elevator,
             inputs.throttle,
             self.step_s,
+            truth.rudder_rad,
+            inputs.rudder,
         ];
+        let count = if self.has_rudder { columns.len() } else { columns.len() - 2 };
         let mut write = || -> io::Result<()> {
             write!(self.file, "{}", time_us as f64 * 1e-6)?;
-            columns.iter().try_for_each(|value| write!(self.file, ",{value}"))?;
+            columns[..count].iter().try_for_each(|value| write!(self.file, ",{value}"))?;
             writeln!(self.file)
         };
         let written = write();

@@ -77,7 +77,7 @@ impl Golden {
                 let [aileron, elevator, throttle] = [0, 1, 2].map(|i| number(cells[i]));
                 let state =
                     (!cells[3].is_empty()).then(|| std::array::from_fn(|i| number(cells[3 + i])));
-                (Inputs { aileron, elevator, throttle }, state)
+                (Inputs { aileron, elevator, throttle, rudder: 0.0 }, state)
             })
             .collect();
         Golden { steps }

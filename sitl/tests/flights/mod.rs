@@ -7,7 +7,7 @@ use greylag_sitl::air::Air;
 use greylag_sitl::plant::{DT_S, Inputs, Plant, PlantOptions, Truth};
 
 /// Surfaces centred, motor off.
-pub const IDLE: Inputs = Inputs { aileron: 0.0, elevator: 0.0, throttle: 0.0 };
+pub const IDLE: Inputs = Inputs { aileron: 0.0, elevator: 0.0, throttle: 0.0, rudder: 0.0 };
 
 /// The built-in X8 in calm air at the neutral start.
 pub fn plant() -> Plant {
@@ -33,6 +33,7 @@ pub fn busy(k: u32) -> Inputs {
         aileron: 0.3 * (3.1 * t).sin(),
         elevator: 0.15 * (1.7 * t).cos(),
         throttle: 0.4 + 0.3 * (0.9 * t).sin(),
+        rudder: 0.0,
     }
 }
 

@@ -101,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if arguments.controller.pace() == control::Pace::Planned {
         let mut again = set_up()?;
         schedule.iter().for_each(|schedule| again.pilot.follow(schedule.clone()));
-        let vehicle = Vehicle::Sitl(Sitl::new(1, model.airframe.actuators.deflection_max));
+        let vehicle = Vehicle::Sitl(Sitl::new(1, model.airframe.actuators.travels()));
         // the flight is told even if the planner's sight cannot be
         sights = summary::sights(&folder, again, vehicle).unwrap_or_else(|why| {
             eprintln!("the report does not show what the planner saw: {why:#}");
@@ -136,7 +136,7 @@ fn options(arguments: &Arguments, model: &crate::model::GreyBox) -> Result<Optio
         pace: Pace::RealTime,
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
-        deflection: model.airframe.actuators.deflection_max,
+        travels: model.airframe.actuators.travels(),
         controller: None,
         signing: None,
     })

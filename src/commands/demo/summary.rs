@@ -45,7 +45,7 @@ pub struct Teller<'a> {
 impl Teller<'_> {
     /// Reads the recording in `folder` and makes the report's material of it.
     pub fn tell<'f>(&self, folder: &Path, flight: &'f Flight) -> Result<FlightReport<'f>> {
-        let deflection = self.model.airframe.actuators.deflection_max;
+        let travels = self.model.airframe.actuators.travels();
         Ok(FlightReport {
             title: format!(
                 "Greylag demo: {} on aircraft {} in JSBSim",
@@ -59,7 +59,10 @@ impl Teller<'_> {
             versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
             segments: self.legs.iter().map(|leg| segment(leg, flight)).collect(),
             tolerance_rad: TOLERANCE_DEG.to_radians(),
-            travel: SurfaceTravel { aileron_rad: deflection, elevator_rad: deflection },
+            travel: SurfaceTravel {
+                aileron_rad: travels.aileron.largest(),
+                elevator_rad: travels.elevator.largest(),
+            },
             timing: Some(timing(&folder.join("flight.csv"))?),
             events: self.texts.iter().map(event).collect(),
             comparison: self.compared(flight),

@@ -51,7 +51,9 @@ impl Cem {
                 ahead.command(step, &mut reference, &state, &z, &previous)
             });
             let command = match (planned, behind) {
-                (Some(c), Some(base)) => Command { throttle: base.throttle, ..c },
+                (Some(c), Some(base)) => {
+                    Command { throttle: base.throttle, rudder: base.rudder, ..c }
+                }
                 (Some(c), None) | (None, Some(c)) => c,
                 (None, None) => break,
             };

@@ -132,7 +132,7 @@ impl Cem {
             model: model.clone(),
             settings,
             agent: aids.agent,
-            base: aids.base.map(|lqi| Base { lqi, ahead: Ahead::new(steps) }),
+            base: aids.base.map(|lqi| Base { lqi, ahead: Ahead::new(steps, &model.airframe) }),
             ilqr: aids.ilqr,
             disturbance: settings.disturbance.map(Disturbance::new),
             second: (settings.cores > 1).then(|| machine.clone()),
@@ -454,7 +454,7 @@ impl Cem {
         match (self.last, &mut self.base) {
             (Some(plan), Some(base)) => {
                 base.lqi.hand_over(&before, seen);
-                Command { throttle: alone.throttle, ..flown(&plan[0]) }
+                Command { throttle: alone.throttle, rudder: alone.rudder, ..flown(&plan[0]) }
             }
             _ => alone,
         }
@@ -472,12 +472,13 @@ fn shifted(plan: &Plan) -> Plan {
 }
 
 /// The command of a planner that has no plan.
-const LOST: Command = Command { aileron: f64::NAN, elevator: f64::NAN, throttle: f64::NAN };
+const LOST: Command =
+    Command { aileron: f64::NAN, elevator: f64::NAN, throttle: f64::NAN, rudder: 0.0 };
 
 /// The command of an action.
 fn flown([aileron, elevator, thrust]: &Action) -> Command {
     let [aileron, elevator, thrust] = [*aileron, *elevator, *thrust];
-    Command { aileron, elevator, throttle: (thrust + 1.0) / 2.0 }.clamped()
+    Command { aileron, elevator, throttle: (thrust + 1.0) / 2.0, rudder: 0.0 }.clamped()
 }
 
 impl Controller for Cem {

@@ -209,6 +209,8 @@ impl<R: Packed> Flight<R> {
             elevator: lane(z.elevator),
             elevator_rate: lane(z.elevator_rate),
             throttle: lane(z.throttle),
+            rudder: lane(z.rudder),
+            rudder_rate: lane(z.rudder_rate),
         };
         let previous = seen.previous.map(|c| command_of(c, lane));
         let actuators = Actuators::from_observed(&observed, &previous, &model.airframe.actuators);
@@ -304,8 +306,9 @@ fn rollout<R: Packed>(
                 command.aileron = (command.aileron + base.aileron).clamp(-1.0, 1.0);
                 command.elevator = (command.elevator + base.elevator).clamp(-1.0, 1.0);
             }
-            // the base flies the throttle: what is planned is attitude
+            // the base flies throttle and rudder: what is planned is attitude
             command.throttle = base.throttle;
+            command.rudder = base.rudder;
             command = slewed(command, &flight.previous[0], &scene.model.airframe);
         }
         if step < HORIZON {
@@ -359,9 +362,14 @@ pub(super) fn slewed<R: Real>(
 ) -> Command<R> {
     let reach = R::from_f64(airframe.envelope.surface_slew_per_s * STEP);
     let within = |x: R, from: R| x.max(from - reach).min(from + reach);
+    let mut rudder = command.rudder;
+    if airframe.actuators.rudder.is_some() {
+        rudder = within(rudder, last.rudder);
+    }
     Command {
         aileron: within(command.aileron, last.aileron),
         elevator: within(command.elevator, last.elevator),
+        rudder,
         ..command
     }
 }
@@ -373,6 +381,7 @@ fn command_of<R>(c: Command, number: impl Fn(f64) -> R) -> Command<R> {
         aileron: number(c.aileron),
         elevator: number(c.elevator),
         throttle: number(c.throttle),
+        rudder: number(c.rudder),
     }
 }
 

@@ -42,7 +42,7 @@ impl Ilqr {
         Ilqr {
             model: model.clone(),
             lqi,
-            ahead: Ahead::new(STEPS),
+            ahead: Ahead::new(STEPS, &model.airframe),
             disturbance: Disturbance::new(DISTURBANCE_S),
             desk: Desk { solver: Solver::new(), plan: None, flown: Trajectory::new() },
         }
@@ -124,6 +124,7 @@ impl Controller for Ilqr {
             seen,
             goal: self.lqi.goal(seen, target),
             throttle: alone.throttle,
+            rudder: alone.rudder,
             memory: self.disturbance.memory(),
             disturbance: self.disturbance.rate(),
         };
@@ -132,7 +133,7 @@ impl Controller for Ilqr {
             Some(plan) => {
                 self.lqi.hand_over(&before, seen);
                 let [aileron, elevator] = plan[0];
-                Command { aileron, elevator, throttle: alone.throttle }.clamped()
+                Command { aileron, elevator, ..alone }.clamped()
             }
             None => alone,
         }

@@ -47,6 +47,8 @@ pub(super) struct Problem<'a> {
     pub goal: Goal,
     /// Throttle all along, 0..1.
     pub throttle: f64,
+    /// Rudder command all along: the LQI's.
+    pub rudder: f64,
     pub memory: Memory,
     /// What the state's rate has beside the model's.
     pub disturbance: State,
@@ -64,7 +66,7 @@ impl Trajectory {
     pub fn new() -> Trajectory {
         Trajectory {
             states: vec![State::NEUTRAL; STEPS + 1],
-            controls: vec![Controls { aileron: 0.0, elevator: 0.0, throttle: 0.0 }; STEPS + 1],
+            controls: vec![Controls::default(); STEPS + 1],
             filters: vec![[[0.0; 4]; 2]; STEPS + 1],
         }
     }
@@ -113,7 +115,7 @@ impl Problem<'_> {
         let next =
             self.model.step(&flight.state, &controls, self.seen.altitude, &mut flight.memory);
         flight.state = next.advance(&self.disturbance, STEP);
-        let command = Command { aileron, elevator, throttle: self.throttle };
+        let command = Command { aileron, elevator, throttle: self.throttle, rudder: self.rudder };
         flight.actuators.step(&command, &self.model.airframe.actuators);
         flight.previous = [command, flight.previous[0]];
     }
@@ -121,17 +123,23 @@ impl Problem<'_> {
     /// Writes where `flight` is.
     fn note(&self, flight: &Flight, step: usize, out: &mut Trajectory) {
         let figures = &self.model.airframe.actuators;
-        let (z, most) = (flight.actuators.observed(figures), figures.deflection_max);
+        let z = flight.actuators.observed(figures);
+        let (ailerons, elevators) = (figures.aileron.travel, figures.elevator.travel);
         let [new, old] = flight.previous;
         out.states[step] = flight.state;
         out.controls[step] = flight.actuators.controls();
         out.filters[step] = [
-            [z.aileron, z.aileron - z.aileron_rate * STEP, new.aileron * most, old.aileron * most],
+            [
+                z.aileron,
+                z.aileron - z.aileron_rate * STEP,
+                ailerons.deflection(new.aileron),
+                ailerons.deflection(old.aileron),
+            ],
             [
                 z.elevator,
                 z.elevator - z.elevator_rate * STEP,
-                new.elevator * most,
-                old.elevator * most,
+                elevators.deflection(new.elevator),
+                elevators.deflection(old.elevator),
             ],
         ];
     }
@@ -215,9 +223,12 @@ impl Problem<'_> {
         (slope, curvature)
     }
 
-    /// Where in the state the last commanded surfaces stand, with their unit (rad).
-    pub fn last_commands(&self) -> ([usize; 2], f64) {
-        (SURFACES.map(|at| at + 2), self.model.airframe.actuators.deflection_max)
+    /// Where in the state `x` the last commanded surfaces stand, with the deflection (rad) that a
+    /// command of one asks for on their side.
+    pub fn last_commands(&self, x: &Vector) -> [(usize, f64); 2] {
+        let figures = &self.model.airframe.actuators;
+        let travels = [figures.aileron.travel, figures.elevator.travel];
+        std::array::from_fn(|i| (SURFACES[i] + 2, travels[i].slope(x[SURFACES[i] + 2])))
     }
 
     /// Weight of a squared step of the command.
@@ -233,21 +244,24 @@ impl Problem<'_> {
         let mut a = Square::zeros();
         let mut b = Input::zeros();
         a.fixed_view_mut::<8, 8>(0, 0).copy_from(&linear.a);
-        let [b0, a1, a2] = figures.surface;
         for (surface, at) in SURFACES.into_iter().enumerate() {
+            let of = [&figures.aileron, &figures.elevator][surface];
+            let [b0, a1, a2] = of.filter;
+            let [deflection, _, commanded, _] = trajectory.filters[step + 1][surface];
+            let unit = of.travel.slope(commanded);
             a.fixed_view_mut::<8, 1>(0, at).copy_from(&linear.b.column(surface));
             let (before, input, input_before) = (at + 1, at + 2, at + 3);
             // a surface at its stop stays there
-            let free = trajectory.filters[step + 1][surface][0].abs() < figures.deflection_max;
+            let free = of.travel.reaches(deflection);
             if free {
                 a[(at, at)] = -a1;
                 a[(at, before)] = -a2;
                 a[(at, input)] = 2.0 * b0;
                 a[(at, input_before)] = b0;
-                b[(at, surface)] = b0 * figures.deflection_max;
+                b[(at, surface)] = b0 * unit;
             }
             a[(before, at)] = 1.0;
-            b[(input, surface)] = figures.deflection_max;
+            b[(input, surface)] = unit;
             a[(input_before, input)] = 1.0;
         }
         (a, b)

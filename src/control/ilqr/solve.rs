@@ -73,7 +73,6 @@ impl Solver {
     ) -> Option<()> {
         let (mut slope, curvature) = problem.stage_terms(trajectory, STEPS);
         let mut value = Square::from_diagonal(&curvature);
-        let ([aileron, elevator], unit) = problem.last_commands();
         let weight = problem.move_weight();
         for step in (0..STEPS).rev() {
             let (a, b) = problem.linear(trajectory, step);
@@ -86,9 +85,8 @@ impl Solver {
             let mut q_uu: Matrix2<f64> = b.tr_mul(&vb);
             // the cost of moving a command from the last one, which is among the states
             let x = trajectory.at(step);
-            let now = [x[aileron] / unit, x[elevator] / unit];
-            for (c, at) in [aileron, elevator].into_iter().enumerate() {
-                let moved = plan[step][c] - now[c];
+            for (c, (at, unit)) in problem.last_commands(&x).into_iter().enumerate() {
+                let moved = plan[step][c] - x[at] / unit;
                 q_u[c] += weight * moved;
                 q_uu[(c, c)] += weight;
                 q_x[at] -= weight * moved / unit;

@@ -1,11 +1,13 @@
 //! The LQI as imagined aircraft fly it: its laws over the coming steps, evaluated in lanes.
 
-use super::design::STATES;
-use super::{AIRSPEED_KP, PITCH_RATE, ROLL_RATE, ROUNDING, STALL_ALPHA, STALL_GAIN};
+use super::design::{RUDDER_STATES, STATES};
+use super::{AIRSPEED_KP, PITCH_RATE, ROLL_RATE, ROUNDING};
 use crate::control::lqi::gain_schedule::Entry;
 use crate::model::STEP;
 use crate::num::{Real, each};
-use crate::physics::{ActuatorState, Command, State};
+use crate::physics::airframe::Incidence;
+use crate::physics::servos::ActuatorFigures;
+use crate::physics::{ActuatorState, Airframe, Command, State};
 
 /// The law of one condition: the gain, and the steady flight that it holds.
 #[derive(Clone, Copy, Debug)]
@@ -18,6 +20,27 @@ pub(super) struct Law {
     deflection: [f64; 2],
     /// Throttle that holds it, 0..1.
     throttle: f64,
+    /// Of an aircraft with a rudder.
+    rudder: Option<RudderLaw>,
+}
+
+/// What a rudder adds to the law of one condition.
+#[derive(Clone, Copy, Debug)]
+struct RudderLaw {
+    /// Rows aileron and elevator on the rudder's states.
+    coupling: [[f64; RUDDER_STATES]; 2],
+    /// The rudder's row.
+    row: [f64; STATES],
+    own: [f64; RUDDER_STATES],
+    /// Rudder that holds the condition, rad.
+    deflection: f64,
+}
+
+/// The surfaces that a law commands: how commands become deflections, and what pushes the nose down.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surfaces {
+    pub figures: ActuatorFigures,
+    pub incidence: Incidence,
 }
 
 /// What the law feeds back besides attitude and rates: rad and rad s.
@@ -29,11 +52,23 @@ pub(super) struct Inner<R> {
     pub integral: [R; 2],
 }
 
-impl Law {
-    pub(super) const NONE: Law =
-        Law { gain: [[0.0; STATES]; 2], steady: [0.0; 5], deflection: [0.0; 2], throttle: 0.0 };
+impl Surfaces {
+    /// Those of an aircraft.
+    pub(super) fn of(airframe: &Airframe) -> Surfaces {
+        Surfaces { figures: airframe.actuators, incidence: airframe.incidence }
+    }
+}
 
-    /// Aileron and elevator in units of the largest deflection, not limited.
+impl Law {
+    pub(super) const NONE: Law = Law {
+        gain: [[0.0; STATES]; 2],
+        steady: [0.0; 5],
+        deflection: [0.0; 2],
+        throttle: 0.0,
+        rudder: None,
+    };
+
+    /// Aileron, elevator and rudder as commands, not limited.
     #[inline(always)]
     pub(super) fn surfaces<R: Real>(
         &self,
@@ -41,12 +76,14 @@ impl Law {
         s: &State<R>,
         z: &ActuatorState<R>,
         previous: &[Command<R>; 2],
-        deflection: f64,
-    ) -> [R; 2] {
+        of: &Surfaces,
+    ) -> [R; 3] {
         let number = R::from_f64;
+        let Surfaces { figures, incidence } = of;
         let [aileron, elevator] = each(self.deflection, number);
         let [p, q, r, alpha, beta] = each(self.steady, number);
         let [new, old] = previous;
+        let (ailerons, elevators) = (figures.aileron.travel, figures.elevator.travel);
         let x = [
             s.roll - inner.reference[0],
             s.pitch - inner.reference[1],
@@ -57,12 +94,12 @@ impl Law {
             s.beta - beta,
             z.aileron - aileron,
             z.aileron - z.aileron_rate.scale(STEP) - aileron,
-            new.aileron.scale(deflection) - aileron,
-            old.aileron.scale(deflection) - aileron,
+            ailerons.deflection(new.aileron) - aileron,
+            ailerons.deflection(old.aileron) - aileron,
             z.elevator - elevator,
             z.elevator - z.elevator_rate.scale(STEP) - elevator,
-            new.elevator.scale(deflection) - elevator,
-            old.elevator.scale(deflection) - elevator,
+            elevators.deflection(new.elevator) - elevator,
+            elevators.deflection(old.elevator) - elevator,
             inner.integral[0],
             inner.integral[1],
         ];
@@ -73,8 +110,22 @@ impl Law {
             u[1] -= x[i].scale(self.gain[1][i]);
             i += 1;
         }
-        u[1] += (s.alpha - number(STALL_ALPHA)).max(R::zero()).scale(STALL_GAIN);
-        [u[0].scale(1.0 / deflection), u[1].scale(1.0 / deflection)]
+        let mut rudder = R::zero();
+        if let (Some(law), Some(figures)) = (&self.rudder, &figures.rudder) {
+            let travel = figures.travel;
+            let held = number(law.deflection);
+            let y = [
+                z.rudder - held,
+                z.rudder - z.rudder_rate.scale(STEP) - held,
+                travel.deflection(new.rudder) - held,
+                travel.deflection(old.rudder) - held,
+            ];
+            let yaw = law.act(held, &x, &y, &mut u);
+            rudder = travel.command(yaw);
+        }
+        let excess = (s.alpha - number(incidence.push_from)).max(R::zero());
+        u[1] += excess.scale(incidence.push_gain);
+        [ailerons.command(u[0]), elevators.command(u[1]), rudder]
     }
 
     pub(super) fn throttle(&self) -> f64 {
@@ -82,13 +133,42 @@ impl Law {
     }
 }
 
+impl RudderLaw {
+    /// The rudder's deflection (rad) about `held`; what its states ask of aileron and elevator joins `u`.
+    #[inline(always)]
+    fn act<R: Real>(&self, held: R, x: &[R; STATES], y: &[R; RUDDER_STATES], u: &mut [R; 2]) -> R {
+        let mut yaw = held;
+        let mut i = 0;
+        while i < STATES {
+            yaw -= x[i].scale(self.row[i]);
+            i += 1;
+        }
+        i = 0;
+        while i < RUDDER_STATES {
+            yaw -= y[i].scale(self.own[i]);
+            u[0] -= y[i].scale(self.coupling[0][i]);
+            u[1] -= y[i].scale(self.coupling[1][i]);
+            i += 1;
+        }
+        yaw
+    }
+}
+
 impl From<Entry> for Law {
     fn from(entry: Entry) -> Law {
-        let mut law = Law { deflection: entry.deflection, throttle: entry.throttle, ..Law::NONE };
+        let [aileron, elevator, rudder] = entry.deflection;
+        let deflection = [aileron, elevator];
+        let mut law = Law { deflection, throttle: entry.throttle, ..Law::NONE };
         law.steady.copy_from_slice(&entry.steady[2..]);
-        for (row, gain) in law.gain.iter_mut().zip(entry.gain.row_iter()) {
+        for (row, gain) in law.gain.iter_mut().zip(entry.gain.surfaces.row_iter()) {
             row.iter_mut().zip(gain.iter()).for_each(|(to, from)| *to = *from);
         }
+        law.rudder = entry.gain.rudder.map(|gain| RudderLaw {
+            coupling: std::array::from_fn(|i| std::array::from_fn(|j| gain.coupling[(i, j)])),
+            row: std::array::from_fn(|j| gain.row[j]),
+            own: std::array::from_fn(|j| gain.own[j]),
+            deflection: rudder,
+        });
         law
     }
 }
@@ -106,12 +186,12 @@ pub(crate) struct Ahead {
     pub(super) airspeed: f64,
     pub(super) inner: Inner<f64>,
     pub(super) airspeed_integral: f64,
-    pub(super) deflection: f64,
+    pub(super) surfaces: Surfaces,
 }
 
 impl Ahead {
-    /// Room for `steps` steps.
-    pub(crate) fn new(steps: usize) -> Ahead {
+    /// Room for `steps` steps of an aircraft.
+    pub(crate) fn new(steps: usize, airframe: &Airframe) -> Ahead {
         Ahead {
             laws: vec![Law::NONE; steps.div_ceil(HOLD)],
             steps,
@@ -119,7 +199,7 @@ impl Ahead {
             airspeed: 0.0,
             inner: Inner { reference: [0.0; 2], integral: [0.0; 2] },
             airspeed_integral: 0.0,
-            deflection: 1.0,
+            surfaces: Surfaces::of(airframe),
         }
     }
 
@@ -154,7 +234,8 @@ impl Ahead {
         let law = &self.laws[step / HOLD];
         let integral = [R::from_f64(self.inner.integral[0]), R::from_f64(self.inner.integral[1])];
         let inner = Inner { reference: *reference, integral };
-        let [aileron, elevator] = law.surfaces(&inner, state, actuators, previous, self.deflection);
+        let [aileron, elevator, rudder] =
+            law.surfaces(&inner, state, actuators, previous, &self.surfaces);
         let feed_forward = R::from_f64(law.throttle + self.airspeed_integral);
         let throttle =
             feed_forward + (R::from_f64(self.airspeed) - state.airspeed).scale(AIRSPEED_KP);
@@ -162,6 +243,7 @@ impl Ahead {
             aileron: aileron.clamp(-1.0, 1.0),
             elevator: elevator.clamp(-1.0, 1.0),
             throttle: throttle.clamp(0.0, 1.0),
+            rudder: rudder.clamp(-1.0, 1.0),
         }
     }
 }

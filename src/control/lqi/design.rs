@@ -1,16 +1,60 @@
 //! One LQI design: the gain that holds one flight condition.
 
-use nalgebra::{Matrix2, SMatrix, SVector};
+use nalgebra::{RowSVector, SMatrix, SVector};
 
 use super::riccati;
 use crate::model::{GreyBox, Linear, STEP, Trim, linearise};
+use crate::physics::servos::Surface;
 
 /// States of the design: φ θ p q r α β, then for aileron and elevator the deflection now and one
 /// step ago with the two last commanded deflections, then ∫φ and ∫θ.
 pub(super) const STATES: usize = 17;
 
-/// The gain of one condition: rows aileron and elevator (rad).
-pub(super) type Gain = SMatrix<f64, 2, STATES>;
+/// Further states of a design with a rudder: its deflection now and one step ago with the two last
+/// commanded deflections.
+pub(super) const RUDDER_STATES: usize = 4;
+const ALL: usize = STATES + RUDDER_STATES;
+
+/// The gain of one condition.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gain {
+    /// Rows aileron and elevator (rad).
+    pub surfaces: SMatrix<f64, 2, STATES>,
+    /// Of an aircraft with a rudder.
+    pub rudder: Option<RudderGain>,
+}
+
+/// What a rudder adds to the gain of one condition.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RudderGain {
+    /// Rows aileron and elevator on the rudder's states.
+    pub coupling: SMatrix<f64, 2, RUDDER_STATES>,
+    /// The rudder's row on all states but its own, then on those.
+    pub row: RowSVector<f64, STATES>,
+    pub own: RowSVector<f64, RUDDER_STATES>,
+}
+
+impl Gain {
+    /// No feedback, of a model as `model`.
+    pub fn zeros(with_rudder: bool) -> Gain {
+        let rudder = with_rudder.then(|| RudderGain {
+            coupling: SMatrix::zeros(),
+            row: RowSVector::zeros(),
+            own: RowSVector::zeros(),
+        });
+        Gain { surfaces: SMatrix::zeros(), rudder }
+    }
+
+    /// Adds `part` of `other`.
+    pub fn add(&mut self, other: &Gain, part: f64) {
+        self.surfaces += other.surfaces * part;
+        if let (Some(rudder), Some(other)) = (&mut self.rudder, &other.rudder) {
+            rudder.coupling += other.coupling * part;
+            rudder.row += other.row * part;
+            rudder.own += other.own * part;
+        }
+    }
+}
 
 /// Places of φ θ p q r α β in the state of eq. (4): airspeed is scheduled on, not fed back.
 const ATTITUDE_STATES: [usize; 7] = [0, 1, 3, 4, 5, 6, 7];
@@ -26,52 +70,93 @@ pub struct Weights {
     pub integral: f64,
     /// Body rate, rad/s.
     pub rate: f64,
-    /// Sideslip, rad.
+    /// Sideslip, rad, where no rudder holds it.
     pub sideslip: f64,
+    /// Sideslip, rad, of an aircraft with a rudder.
+    pub sideslip_by_rudder: f64,
     /// Commanded deflection away from trim, rad.
     pub deflection: f64,
 }
 
 impl Weights {
     /// Those of the default design.
-    pub const DEFAULT: Weights =
-        Weights { attitude: 0.05, integral: 0.02, rate: 2.0, sideslip: 0.3, deflection: 0.3 };
+    pub const DEFAULT: Weights = Weights {
+        attitude: 0.05,
+        integral: 0.02,
+        rate: 2.0,
+        sideslip: 0.3,
+        sideslip_by_rudder: 0.05,
+        deflection: 0.3,
+    };
     /// Softer loops that bear more delay: the pitch loop 104 ms where the default bears 46, and 78 where
     /// it bears 32 (`examples/delay_margin.rs`, behind ArduPlane's filter and sampling). Softer still
     /// (0.15, 0.1, 0.15) bears 200 ms.
     pub const DAMPED: Weights =
-        Weights { attitude: 0.08, integral: 0.05, rate: 2.0, sideslip: 0.3, deflection: 0.2 };
+        Weights { attitude: 0.08, integral: 0.05, deflection: 0.2, ..Weights::DEFAULT };
 }
 
 /// The gain that holds `trim`, or `None` if the model cannot be stabilised there.
 pub(super) fn design(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -> Option<Gain> {
-    let (a, b) = augmented(model, &linearise(model, trim, altitude));
+    let linear = linearise(model, trim, altitude);
+    let figures = &model.airframe.actuators;
+    let (aileron, elevator) = ((0, 7, &figures.aileron), (1, 11, &figures.elevator));
+    match &figures.rudder {
+        Some(rudder) if model.has_rudder() => {
+            let surfaces = [aileron, elevator, (3, STATES, rudder)];
+            let sideslip = w.sideslip_by_rudder;
+            let k: SMatrix<f64, 3, ALL> = solve(&linear, surfaces, sideslip, w)?;
+            let rudder = RudderGain {
+                coupling: k.fixed_view::<2, RUDDER_STATES>(0, STATES).into(),
+                row: k.fixed_view::<1, STATES>(2, 0).into(),
+                own: k.fixed_view::<1, RUDDER_STATES>(2, STATES).into(),
+            };
+            Some(Gain { surfaces: k.fixed_view::<2, STATES>(0, 0).into(), rudder: Some(rudder) })
+        }
+        _ => {
+            let k = solve::<STATES, 2>(&linear, [aileron, elevator], w.sideslip, w)?;
+            Some(Gain { surfaces: k, rudder: None })
+        }
+    }
+}
+
+/// A surface of the design: its column in the linear model, the place of its states, its filter.
+type Actuated<'a> = (usize, usize, &'a Surface);
+
+/// The gain over N states by M `surfaces`.
+fn solve<const N: usize, const M: usize>(
+    linear: &Linear,
+    surfaces: [Actuated; M],
+    sideslip: f64,
+    w: &Weights,
+) -> Option<SMatrix<f64, M, N>> {
+    let (a, b) = augmented(linear, surfaces);
     let square = |x: f64| 1.0 / (x * x);
-    let mut q = SVector::<f64, STATES>::zeros();
+    let mut q = SVector::<f64, N>::zeros();
     (q[0], q[1]) = (square(w.attitude), square(w.attitude));
     (q[2], q[3], q[4]) = (square(w.rate), square(w.rate), square(w.rate));
-    q[6] = square(w.sideslip);
+    q[6] = square(sideslip);
     (q[15], q[16]) = (square(w.integral), square(w.integral));
-    let r = Matrix2::from_diagonal_element(square(w.deflection));
+    let r = SMatrix::<f64, M, M>::from_diagonal_element(square(w.deflection));
     riccati::gain(&a, &b, &SMatrix::from_diagonal(&q), &r)
 }
 
 /// Attitude dynamics, actuator filters and integrators as one linear system.
-fn augmented(
-    model: &GreyBox,
+fn augmented<const N: usize, const M: usize>(
     linear: &Linear,
-) -> (SMatrix<f64, STATES, STATES>, SMatrix<f64, STATES, 2>) {
-    let mut a = SMatrix::<f64, STATES, STATES>::zeros();
-    let mut b = SMatrix::<f64, STATES, 2>::zeros();
-    let [b0, a1, a2] = model.airframe.actuators.surface;
+    surfaces: [Actuated; M],
+) -> (SMatrix<f64, N, N>, SMatrix<f64, N, M>) {
+    let mut a = SMatrix::<f64, N, N>::zeros();
+    let mut b = SMatrix::<f64, N, M>::zeros();
     for (i, from) in ATTITUDE_STATES.into_iter().enumerate() {
         for (j, to) in ATTITUDE_STATES.into_iter().enumerate() {
             a[(i, j)] = linear.a[(from, to)];
         }
-        a[(i, 7)] = linear.b[(from, 0)];
-        a[(i, 11)] = linear.b[(from, 1)];
+        for (column, at, _) in surfaces {
+            a[(i, at)] = linear.b[(from, column)];
+        }
     }
-    for (surface, at) in [7, 11].into_iter().enumerate() {
+    for (surface, (_, at, figures)) in surfaces.into_iter().enumerate() {
+        let [b0, a1, a2] = figures.filter;
         let (position, before, input, input_before) = (at, at + 1, at + 2, at + 3);
         a[(position, position)] = -a1;
         a[(position, before)] = -a2;

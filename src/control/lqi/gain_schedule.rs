@@ -6,16 +6,7 @@ use crate::control::SetupError;
 use crate::control::lqi::design::{Gain, Weights, design};
 use crate::model::{GreyBox, Trim};
 use crate::physics::State;
-
-/// Altitude of the designs, m: the start of an episode.
-const ALTITUDE: f64 = 600.0;
-
-/// Incidence that steady flight should not exceed, rad (2.9°): a quarter of the X8's stall at
-/// 12.3°, which at 60° of bank asks for 22 m/s.
-const COMFORT: f64 = 0.05;
-
-/// Incidence that no commanded attitude may need, rad (5.2°): the rest is for the transient.
-const TOLERABLE: f64 = 0.09;
+use crate::physics::airframe::{Envelope, Incidence};
 
 /// Equally spaced values of one scheduling variable.
 #[derive(Clone, Copy, Debug)]
@@ -25,20 +16,50 @@ struct Axis {
     count: usize,
 }
 
-/// Airspeed in m/s, roll in rad, pitch in rad.
-const AIRSPEED: Axis = Axis { first: 12.0, step: 2.0, count: 20 };
-const ROLL: Axis =
-    Axis { first: -std::f64::consts::FRAC_PI_3, step: std::f64::consts::PI / 18.0, count: 13 };
-const PITCH: Axis =
-    Axis { first: -std::f64::consts::FRAC_PI_6, step: std::f64::consts::PI / 18.0, count: 7 };
+/// Designs over the airspeed.
+const AIRSPEEDS: usize = 20;
+/// Spacing of the designs over roll and pitch, degrees.
+const SPACING_DEG: f64 = 10.0;
+
+/// Airspeed in m/s, roll in rad, pitch in rad: the envelope with a margin, in whole spacings.
+#[derive(Clone, Copy, Debug)]
+struct Grid {
+    airspeed: Axis,
+    roll: Axis,
+    pitch: Axis,
+}
+
+impl Grid {
+    fn over(envelope: &Envelope) -> Grid {
+        let slowest = (0.95 * envelope.airspeed_min_mps).floor().max(1.0);
+        let fastest = (1.1 * envelope.airspeed_max_mps).ceil();
+        let step = (fastest - slowest) / (AIRSPEEDS - 1) as f64;
+        let bank = (envelope.bank_max_deg / SPACING_DEG).ceil();
+        let low = (envelope.pitch_min_deg / SPACING_DEG).floor();
+        let high = (envelope.pitch_max_deg / SPACING_DEG).ceil();
+        Grid {
+            airspeed: Axis { first: slowest, step, count: AIRSPEEDS },
+            roll: Axis::attitude(-bank, bank),
+            pitch: Axis::attitude(low, high),
+        }
+    }
+
+    fn attitudes(&self) -> usize {
+        self.roll.count * self.pitch.count
+    }
+
+    fn attitude(&self, index: usize) -> (f64, f64) {
+        (self.roll.value(index / self.pitch.count), self.pitch.value(index % self.pitch.count))
+    }
+}
 
 /// What the schedule holds at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     /// φ θ p q r α β of the steady condition, rad and rad/s.
     pub steady: [f64; 7],
-    /// Aileron and elevator that hold it, rad.
-    pub deflection: [f64; 2],
+    /// Aileron, elevator and rudder that hold it, rad.
+    pub deflection: [f64; 3],
     /// Throttle that holds it, 0..1.
     pub throttle: f64,
     /// The gain there.
@@ -48,6 +69,7 @@ pub(super) struct Entry {
 /// Entries over the grid, airspeed slowest, with the smallest airspeeds per attitude.
 #[derive(Clone, Debug)]
 pub(super) struct Schedule {
+    grid: Grid,
     entries: Vec<Entry>,
     /// Airspeed (m/s) from which on each attitude can be held with a margin before the stall.
     comfortable: Vec<f64>,
@@ -56,6 +78,13 @@ pub(super) struct Schedule {
 }
 
 impl Axis {
+    /// From `low` to `high` spacings of an angle.
+    fn attitude(low: f64, high: f64) -> Axis {
+        // 30° at a time, so that those angles are exact
+        let first = low / 3.0 * std::f64::consts::FRAC_PI_6;
+        Axis { first, step: std::f64::consts::PI / 18.0, count: (high - low) as usize + 1 }
+    }
+
     fn value(self, index: usize) -> f64 {
         self.first + self.step * index as f64
     }
@@ -73,30 +102,33 @@ impl Schedule {
     ///
     /// A condition that cannot be trimmed takes the design of the next higher airspeed.
     pub(super) fn new(model: &GreyBox, weights: &Weights) -> Result<Schedule, SetupError> {
-        let attitudes = ROLL.count * PITCH.count;
-        let columns: Vec<_> =
-            (0..attitudes).into_par_iter().map(|i| column(model, i, weights)).collect();
+        let grid = Grid::over(&model.airframe.envelope);
+        let all = (0..grid.attitudes()).into_par_iter();
+        let columns: Vec<_> = all.map(|i| column(model, &grid, i, weights)).collect();
         if let Some(i) = columns.iter().position(|column| column.iter().all(Option::is_none)) {
-            let (roll, pitch) = attitude(i);
+            let (roll, pitch) = grid.attitude(i);
             return Err(SetupError::Design {
                 model: model.name.clone(),
                 roll_deg: roll.to_degrees(),
                 pitch_deg: pitch.to_degrees(),
             });
         }
-        let slowest = |alpha| columns.iter().map(|column| slowest(column, alpha)).collect();
-        let entries = (0..AIRSPEED.count)
+        let slowest = |alpha| columns.iter().map(|column| slowest(column, &grid, alpha)).collect();
+        let entries = (0..AIRSPEEDS)
             .flat_map(|k| columns.iter().map(move |column| nearest(column, k)))
             .collect::<Option<Vec<_>>>()
             .unwrap_or_default();
-        Ok(Schedule { entries, comfortable: slowest(COMFORT), tolerable: slowest(TOLERABLE) })
+        let Incidence { comfortable, tolerable, .. } = model.airframe.incidence;
+        let (comfortable, tolerable) = (slowest(comfortable), slowest(tolerable));
+        Ok(Schedule { grid, entries, comfortable, tolerable })
     }
 
     /// The entry at `airspeed` (m/s), `roll` and `pitch` (rad), linear between grid points.
     pub(super) fn at(&self, airspeed: f64, roll: f64, pitch: f64) -> Entry {
-        let places = [AIRSPEED.place(airspeed), ROLL.place(roll), PITCH.place(pitch)];
-        let mut sum =
-            Entry { steady: [0.0; 7], deflection: [0.0; 2], throttle: 0.0, gain: Gain::zeros() };
+        let Grid { airspeed: speeds, roll: rolls, pitch: pitches } = self.grid;
+        let places = [speeds.place(airspeed), rolls.place(roll), pitches.place(pitch)];
+        let gain = Gain::zeros(self.entries[0].gain.rudder.is_some());
+        let mut sum = Entry { steady: [0.0; 7], deflection: [0.0; 3], throttle: 0.0, gain };
         for corner in 0..8 {
             let mut weight = 1.0;
             let mut index = [0; 3];
@@ -105,7 +137,8 @@ impl Schedule {
                 index[axis] = low + upper;
                 weight *= if upper == 1 { part } else { 1.0 - part };
             }
-            let entry = &self.entries[(index[0] * ROLL.count + index[1]) * PITCH.count + index[2]];
+            let at = (index[0] * rolls.count + index[1]) * pitches.count + index[2];
+            let entry = &self.entries[at];
             for (s, e) in sum.steady.iter_mut().zip(entry.steady) {
                 *s += weight * e;
             }
@@ -113,19 +146,20 @@ impl Schedule {
                 *s += weight * e;
             }
             sum.throttle += weight * entry.throttle;
-            sum.gain += entry.gain * weight;
+            sum.gain.add(&entry.gain, weight);
         }
         sum
     }
 
     /// The airspeed (m/s) from which on the attitude can be held with a margin before the stall.
     pub(super) fn comfortable_airspeed(&self, roll: f64, pitch: f64) -> f64 {
-        over_attitude(&self.comfortable, roll, pitch)
+        self.over_attitude(&self.comfortable, roll, pitch)
     }
 
     /// The part (0..=1) of `roll` that `airspeed` (m/s) allows at `pitch`.
     pub(super) fn tolerable_part(&self, airspeed: f64, roll: f64, pitch: f64) -> f64 {
-        let allowed = |part: f64| over_attitude(&self.tolerable, part * roll, pitch) <= airspeed;
+        let allowed =
+            |part: f64| self.over_attitude(&self.tolerable, part * roll, pitch) <= airspeed;
         if allowed(1.0) {
             return 1.0;
         }
@@ -136,50 +170,53 @@ impl Schedule {
         }
         low
     }
-}
 
-/// Bilinear interpolation of one number per attitude.
-fn over_attitude(values: &[f64], roll: f64, pitch: f64) -> f64 {
-    let ((i, x), (j, y)) = (ROLL.place(roll), PITCH.place(pitch));
-    let at = |i: usize, j: usize| values[i * PITCH.count + j];
-    (at(i, j) * (1.0 - y) + at(i, j + 1) * y) * (1.0 - x)
-        + (at(i + 1, j) * (1.0 - y) + at(i + 1, j + 1) * y) * x
+    /// Bilinear interpolation of one number per attitude.
+    fn over_attitude(&self, values: &[f64], roll: f64, pitch: f64) -> f64 {
+        let Grid { roll: rolls, pitch: pitches, .. } = self.grid;
+        let ((i, x), (j, y)) = (rolls.place(roll), pitches.place(pitch));
+        let at = |i: usize, j: usize| values[i * pitches.count + j];
+        (at(i, j) * (1.0 - y) + at(i, j + 1) * y) * (1.0 - x)
+            + (at(i + 1, j) * (1.0 - y) + at(i + 1, j + 1) * y) * x
+    }
 }
 
 /// The lowest airspeed (m/s) of a column that needs no more incidence than `alpha` (rad), linear
 /// between designs; the highest of the grid if none does.
-fn slowest(column: &[Option<Entry>], alpha: f64) -> f64 {
+fn slowest(column: &[Option<Entry>], grid: &Grid, alpha: f64) -> f64 {
+    let airspeeds = grid.airspeed;
     let needs = |k: usize| column[k].map(|entry| entry.steady[5]);
     let Some(k) = (0..column.len()).find(|&k| needs(k).is_some_and(|a| a <= alpha)) else {
-        return AIRSPEED.value(AIRSPEED.count - 1);
+        return airspeeds.value(airspeeds.count - 1);
     };
     match k.checked_sub(1).and_then(needs).zip(needs(k)) {
         Some((slower, here)) => {
-            AIRSPEED.value(k) - AIRSPEED.step * (alpha - here) / (slower - here)
+            airspeeds.value(k) - airspeeds.step * (alpha - here) / (slower - here)
         }
-        None => AIRSPEED.value(k),
+        None => airspeeds.value(k),
     }
 }
 
-fn attitude(index: usize) -> (f64, f64) {
-    (ROLL.value(index / PITCH.count), PITCH.value(index % PITCH.count))
-}
-
 /// The designs of one attitude over airspeed; `None` where there is none.
-fn column(model: &GreyBox, index: usize, weights: &Weights) -> Vec<Option<Entry>> {
-    let (roll, pitch) = attitude(index);
-    (0..AIRSPEED.count)
+fn column(model: &GreyBox, grid: &Grid, index: usize, weights: &Weights) -> Vec<Option<Entry>> {
+    let (roll, pitch) = grid.attitude(index);
+    let altitude = model.airframe.reference.altitude;
+    let figures = &model.airframe.actuators;
+    (0..AIRSPEEDS)
         .map(|k| {
-            let trim = Trim::attitude(model, roll, pitch, AIRSPEED.value(k), ALTITUDE).ok()?;
+            let trim = Trim::attitude(model, roll, pitch, grid.airspeed.value(k), altitude).ok()?;
             let State { roll, pitch, p, q, r, alpha, beta, .. } = trim.state;
-            let stop = model.airframe.actuators.deflection_max;
             let c = trim.controls;
-            let flyable = alpha.abs() < 0.5 && c.aileron.abs() < stop && c.elevator.abs() < stop;
+            let rudder_reaches = figures.rudder.is_none_or(|s| s.travel.reaches(c.rudder));
+            let flyable = alpha.abs() < 0.5
+                && figures.aileron.travel.reaches(c.aileron)
+                && figures.elevator.travel.reaches(c.elevator)
+                && rudder_reaches;
             Some(Entry {
                 steady: [roll, pitch, p, q, r, alpha, beta],
-                deflection: [c.aileron, c.elevator],
+                deflection: [c.aileron, c.elevator, c.rudder],
                 throttle: c.throttle,
-                gain: flyable.then(|| design(model, &trim, ALTITUDE, weights))??,
+                gain: flyable.then(|| design(model, &trim, altitude, weights))??,
             })
         })
         .collect()

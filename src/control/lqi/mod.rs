@@ -12,7 +12,7 @@ use crate::control::{Controller, Observation, SetupError, Target};
 use crate::model::{GreyBox, STEP};
 use crate::physics::Command;
 pub(crate) use ahead::Ahead;
-use ahead::{HOLD, Inner, Law};
+use ahead::{HOLD, Inner, Law, Surfaces};
 pub use design::Weights;
 use gain_schedule::Schedule;
 
@@ -22,9 +22,6 @@ const ROLL_RATE: f64 = 0.8;
 const PITCH_RATE: f64 = 0.5;
 /// Time constant that rounds the ramps' ends, s.
 const ROUNDING: f64 = 0.35;
-/// Incidence (rad, 9.2°) beyond which the nose is pushed down, and by how much elevator (rad) a rad.
-const STALL_ALPHA: f64 = 0.16;
-const STALL_GAIN: f64 = 3.0;
 /// Airspeed loop: per m/s, and per m.
 const AIRSPEED_KP: f64 = 0.3;
 const AIRSPEED_KI: f64 = 0.05;
@@ -43,16 +40,15 @@ pub(crate) struct Goal {
 pub struct Lqi {
     name: &'static str,
     schedule: Arc<Schedule>,
-    deflection: f64,
+    surfaces: Surfaces,
     reference: Option<[f64; 2]>,
     integral: [f64; 2],
     airspeed_integral: f64,
 }
 
 impl Lqi {
-    /// Designs the controller for `model` over 12..50 m/s, ±60° of roll and ±30° of pitch.
-    ///
-    /// The margins before the stall and the airspeed loop are those of the X8.
+    /// Designs the controller for `model` over its envelope with a margin. A rudder holds sideslip at
+    /// zero; without one, turns have the sideslip that balances them.
     ///
     /// # Errors
     /// If the model cannot be trimmed or stabilised at some attitude at any airspeed.
@@ -72,7 +68,7 @@ impl Lqi {
         Ok(Lqi {
             name,
             schedule: Arc::new(Schedule::new(model, weights)?),
-            deflection: model.airframe.actuators.deflection_max,
+            surfaces: Surfaces::of(&model.airframe),
             reference: None,
             integral: [0.0; 2],
             airspeed_integral: 0.0,
@@ -120,7 +116,7 @@ impl Lqi {
         ahead.wanted = self.wanted(seen, target);
         ahead.airspeed = self.airspeed(target);
         ahead.airspeed_integral = self.airspeed_integral;
-        ahead.deflection = self.deflection;
+        ahead.surfaces = self.surfaces;
         for law in &mut ahead.laws {
             let [roll, pitch] = follower.follow(seen, target);
             *law = self.schedule.at(seen.state.airspeed, roll, pitch).into();
@@ -168,7 +164,7 @@ impl Controller for Lqi {
         let law = Law::from(self.schedule.at(seen.state.airspeed, roll, pitch));
         let inner = Inner { reference: [roll, pitch], integral: self.integral };
         let raw =
-            law.surfaces(&inner, &seen.state, &seen.actuators, &seen.previous, self.deflection);
+            law.surfaces(&inner, &seen.state, &seen.actuators, &seen.previous, &self.surfaces);
         let error = [seen.state.roll - roll, seen.state.pitch - pitch];
         // conditional integration: an axis whose surface is at its stop does not wind up
         for axis in 0..2 {
@@ -177,6 +173,6 @@ impl Controller for Lqi {
             }
         }
         let throttle = self.throttle(seen, target, law.throttle());
-        Command { aileron: raw[0], elevator: raw[1], throttle }.clamped()
+        Command { aileron: raw[0], elevator: raw[1], throttle, rudder: raw[2] }.clamped()
     }
 }

@@ -47,10 +47,11 @@ fn check(
     Err(ShapeError { what, inputs, outputs, found: found.into() })
 }
 
-/// The command that an action stands for; throttle = (a + 1)/2.
+/// The command that an action stands for; throttle = (a + 1)/2. A policy does not steer a rudder.
 #[inline(always)]
 pub fn command<R: Real>([aileron, elevator, thrust]: [R; ACTIONS]) -> Command<R> {
-    Command { aileron, elevator, throttle: (thrust + R::from_f64(1.0)).scale(0.5) }
+    let throttle = (thrust + R::from_f64(1.0)).scale(0.5);
+    Command { aileron, elevator, throttle, rudder: R::zero() }
 }
 
 impl Actor {

@@ -26,7 +26,7 @@ pub fn observe<R: Real>(
     target: &Target<R>,
 ) -> [R; OBSERVATIONS] {
     let State { roll, pitch, airspeed, p, q, r, alpha, beta } = *state;
-    let ActuatorState { aileron, aileron_rate, elevator, elevator_rate, throttle } = *actuators;
+    let ActuatorState { aileron, aileron_rate, elevator, elevator_rate, throttle, .. } = *actuators;
     let mut seen = [
         roll,
         pitch,

@@ -99,12 +99,12 @@ impl Config {
 
 fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
     let trim = Trim::level(model, airspeed, TRIM_ALTITUDE)?;
+    let command = model.airframe.actuators.command(&trim.controls);
     Ok(TrimPoint {
         airspeed_mps: airspeed,
         pitch_deg: trim.state.pitch.to_degrees(),
-        elevator: (trim.controls.elevator / model.airframe.actuators.deflection_max)
-            .clamp(-1.0, 1.0),
-        throttle: trim.controls.throttle.clamp(0.0, 1.0),
+        elevator: command.elevator,
+        throttle: command.throttle,
     })
 }
 
@@ -250,7 +250,7 @@ mod tests {
 
     #[test]
     fn trim_is_that_of_the_simulator() {
-        let full = model().airframe.actuators.deflection_max;
+        let full = model().airframe.actuators.elevator.travel.most;
         // The three rows measured in JSBSim; 0.01° is a tenth of the table's spacing error.
         for (airspeed, pitch, deflection, throttle) in [
             (16.67, 2.283, 0.01855, 0.118),

@@ -103,6 +103,7 @@ impl Limits {
             aileron: near(last.aileron, wanted.aileron, self.surface_step),
             elevator: near(last.elevator, wanted.elevator, self.surface_step),
             throttle: near(last.throttle, wanted.throttle, self.throttle_step),
+            rudder: near(last.rudder, wanted.rudder, self.surface_step),
         }
         .clamped()
     }
@@ -173,8 +174,8 @@ mod tests {
     fn full_travel_takes_ten_ticks() {
         // 2.0 of travel in 0.1 s is 0.2 a tick.
         let e = x8();
-        let mut now = Command { aileron: -1.0, elevator: 1.0, throttle: 0.0 };
-        let wanted = Command { aileron: 1e30, elevator: -5.0, throttle: 2.0 };
+        let mut now = Command { aileron: -1.0, elevator: 1.0, ..Command::IDLE };
+        let wanted = Command { aileron: 1e30, elevator: -5.0, throttle: 2.0, rudder: 0.0 };
         for _ in 0..9 {
             now = e.slew(now, wanted);
             assert!(now.aileron < 1.0 - 1e-9);

@@ -210,7 +210,7 @@ impl Pilot {
             Pending::Repeated => (self.in_force, self.source),
             Pending::Unusable => self.without_state(),
             Pending::Sticks(s) => (
-                Command { aileron: s.roll, elevator: s.pitch, throttle: s.throttle },
+                Command { aileron: s.roll, elevator: s.pitch, throttle: s.throttle, rudder: 0.0 },
                 Source::Sticks,
             ),
             Pending::Check { time, airspeed } => {
@@ -427,7 +427,7 @@ impl Pilot {
 
     fn level_command(&self) -> Command {
         let trim = self.config.trim_at(self.config.envelope.airspeed_cruise_mps);
-        Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle }
+        Command { elevator: trim.elevator, throttle: trim.throttle, ..Command::IDLE }
     }
 
     fn complain_of_state(&mut self, reason: &'static str) {

@@ -45,6 +45,6 @@ impl Pilot {
     fn level_at(&self, airspeed: f64) -> Command {
         let trim = self.config.trim_at(airspeed);
         let throttle = self.limits.protect(trim.throttle, airspeed);
-        Command { aileron: 0.0, elevator: trim.elevator, throttle }
+        Command { elevator: trim.elevator, throttle, ..Command::IDLE }
     }
 }

@@ -55,12 +55,10 @@ impl fmt::Display for Call {
         match self {
             Call::Advance(now) => write!(f, "advance {}", us(now)),
             Call::Tick(time, planned, c) => {
-                write!(f, "tick {} {} {} {}", us(time), c.aileron, c.elevator, c.throttle)?;
+                write!(f, "tick {} {}", us(time), Words(c))?;
                 match planned {
                     Planned::Ready(p) if same(p, c) => write!(f, " ready"),
-                    Planned::Ready(p) => {
-                        write!(f, " ready {} {} {}", p.aileron, p.elevator, p.throttle)
-                    }
+                    Planned::Ready(p) => write!(f, " ready {}", Words(p)),
                     Planned::Late => write!(f, " late"),
                     Planned::Busy => write!(f, " busy"),
                     Planned::None => write!(f, " none"),
@@ -87,9 +85,20 @@ impl fmt::Display for Call {
     }
 }
 
+/// A command in words: aileron, elevator, throttle, and the rudder unless it is centred.
+struct Words<'a>(&'a Command);
+
+impl fmt::Display for Words<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Command { aileron, elevator, throttle, rudder } = self.0;
+        write!(f, "{aileron} {elevator} {throttle}")?;
+        if rudder.to_bits() == 0.0_f64.to_bits() { Ok(()) } else { write!(f, " {rudder}") }
+    }
+}
+
 /// Whether two commands are equal to the bit.
 pub fn same(a: &Command, b: &Command) -> bool {
-    let bits = |c: &Command| [c.aileron, c.elevator, c.throttle].map(f64::to_bits);
+    let bits = |c: &Command| [c.aileron, c.elevator, c.throttle, c.rudder].map(f64::to_bits);
     bits(a) == bits(b)
 }
 
@@ -116,14 +125,17 @@ fn read(line: &str) -> Option<Call> {
         _ => None,
     };
     let command = |at: usize| {
-        Some(Command { aileron: number(at)?, elevator: number(at + 1)?, throttle: number(at + 2)? })
+        let rudder = number(at + 3);
+        let [aileron, elevator, throttle] = [number(at)?, number(at + 1)?, number(at + 2)?];
+        let command = Command { aileron, elevator, throttle, rudder: rudder.unwrap_or(0.0) };
+        Some((command, at + if rudder.is_some() { 4 } else { 3 }))
     };
     Some(match *words.first()? {
         "advance" => Call::Advance(time(1)?),
         "tick" => {
-            let given = command(2)?;
-            let planned = match *words.get(5)? {
-                "ready" if words.len() > 6 => Planned::Ready(command(6)?),
+            let (given, next) = command(2)?;
+            let planned = match *words.get(next)? {
+                "ready" if words.len() > next + 1 => Planned::Ready(command(next + 1)?.0),
                 "ready" => Planned::Ready(given),
                 "late" => Planned::Late,
                 "busy" => Planned::Busy,
@@ -173,12 +185,17 @@ mod tests {
     #[test]
     fn every_call_reads_back_to_the_bit() {
         let now = Time::from_micros(123_456_789);
-        let odd = Command { aileron: 0.1 + 0.2, elevator: -1.0 / 3.0, throttle: 5e-324 };
+        let odd =
+            Command { aileron: 0.1 + 0.2, elevator: -1.0 / 3.0, throttle: 5e-324, rudder: 0.0 };
+        let yawing = Command { rudder: -0.1, ..odd };
         let setpoint = AttitudeSetpoint { roll: 0.3, pitch: -0.0, thrust: None };
         for call in [
             Call::Advance(now),
             Call::Tick(now, Planned::Ready(odd), odd),
             Call::Tick(now, Planned::Ready(Command::IDLE), odd),
+            Call::Tick(now, Planned::Ready(yawing), yawing),
+            Call::Tick(now, Planned::Ready(yawing), odd),
+            Call::Tick(now, Planned::Ready(odd), yawing),
             Call::Tick(now, Planned::Late, odd),
             Call::Tick(now, Planned::Busy, odd),
             Call::Tick(now, Planned::None, Command::IDLE),

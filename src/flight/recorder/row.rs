@@ -39,6 +39,8 @@ impl Row {
             &mut sample.throttle,
             &mut sample.aileron_cmd,
             &mut sample.elevator_cmd,
+            &mut sample.rudder_rad,
+            &mut sample.rudder_cmd,
         ] {
             *column = f64::NAN;
         }
@@ -68,6 +70,9 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let known = |fault: Faults, x: f64| {
         if state.faults.contains(fault) { f64::NAN } else { x }
     };
+    // An aircraft without a rudder has no column of it.
+    let rudder =
+        if (z.rudder, c.rudder) == (0.0, 0.0) { [f64::NAN; 2] } else { [z.rudder, c.rudder] };
     Sample {
         time_s: state.time.as_secs_f64(),
         attitude_rad: [s.roll, s.pitch, state.yaw].map(|x| known(Faults::ATTITUDE, x)),
@@ -84,6 +89,8 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
         aileron_cmd: c.aileron,
         elevator_cmd: c.elevator,
         throttle_cmd: c.throttle,
+        rudder_rad: known(Faults::ACTUATORS, rudder[0]),
+        rudder_cmd: rudder[1],
         roll_target_rad: decision.target.roll,
         pitch_target_rad: decision.target.pitch,
         rate_hold_s: state.rate_hold_s,

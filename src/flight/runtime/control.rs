@@ -67,7 +67,7 @@ impl Control {
         events: Sender<Event>,
     ) -> Self {
         let vehicle = match options.controller {
-            None => Vehicle::Sitl(Sitl::new(AUTOPILOT.system, options.deflection)),
+            None => Vehicle::Sitl(Sitl::new(AUTOPILOT.system, options.travels)),
             Some(profile) => Vehicle::Real(Box::new(Real::new(profile))),
         };
         if vehicle.has_channels() {

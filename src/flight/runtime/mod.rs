@@ -39,6 +39,7 @@ use crate::link::autopilot::Text;
 use crate::link::peer::PeerId;
 use crate::link::transport::TransportError;
 use crate::link::vehicle::Profile;
+use crate::physics::servos::Travels;
 use control::Control;
 use planner::{Planner, Threaded};
 use ports::Ports;
@@ -61,8 +62,8 @@ pub struct Options {
     pub duration: Option<Duration>,
     /// Time after the arrival of a state frame at which a plan is late.
     pub plan_deadline: Duration,
-    /// Deflection at normalised 1, rad.
-    pub deflection: f64,
+    /// How far the airframe's surfaces go.
+    pub travels: Travels,
     /// How a real flight controller is flown; `None` is the simulator's shim.
     pub controller: Option<Profile>,
     /// How links are signed, if at all.

@@ -77,11 +77,12 @@ struct Asked<'a, R> {
 impl<R: Real> Sloped<R, 8> for Asked<'_, R> {
     #[inline(always)]
     fn part(&self, x: [Dual<2, R>; 8]) -> [R; 2] {
-        let Controls { aileron, elevator, throttle } = self.at.controls;
+        let Controls { aileron, elevator, throttle, rudder } = self.at.controls;
         let controls = Controls {
             aileron: fixed(aileron),
             elevator: fixed(elevator),
             throttle: fixed(throttle),
+            rudder: fixed(rudder),
         };
         let at = At { state: State::from_array(x), controls, density: fixed(self.at.density) };
         let said = at.ask(self.model);

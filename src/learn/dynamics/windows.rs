@@ -46,7 +46,9 @@ impl Track {
             let (airspeed, alpha, beta) = (s.airspeed_mps, s.alpha_rad, s.beta_rad);
             let state = State { roll, pitch, airspeed, p, q, r, alpha, beta };
             let (aileron, elevator) = (s.aileron_rad, s.elevator_rad);
-            (state, Controls { aileron, elevator, throttle: s.throttle }, s.altitude_m)
+            let rudder = if s.rudder_rad.is_finite() { s.rudder_rad } else { 0.0 };
+            let controls = Controls { aileron, elevator, throttle: s.throttle, rudder };
+            (state, controls, s.altitude_m)
         });
         Track::new(model, rows)
     }
@@ -110,9 +112,11 @@ pub fn hash(tracks: &[Track]) -> String {
     for track in tracks {
         hash.update((track.states.len() as u64).to_le_bytes());
         for k in 0..track.states.len() {
-            let Controls { aileron, elevator, throttle } = track.controls[k];
+            let Controls { aileron, elevator, throttle, rudder } = track.controls[k];
             let rest = [aileron, elevator, throttle, track.altitude[k]];
-            for x in track.states[k].to_array().iter().chain(&rest) {
+            // tracks without a rudder keep the hash that they had before there was one
+            let rudder = Some(&rudder).filter(|x| **x != 0.0);
+            for x in track.states[k].to_array().iter().chain(&rest).chain(rudder) {
                 hash.update(x.to_le_bytes());
             }
         }
@@ -146,6 +150,7 @@ impl<R: Packet> Recorded<R> {
                 pick(k, &|t, s| t.controls[s].aileron),
                 pick(k, &|t, s| t.controls[s].elevator),
                 pick(k, &|t, s| t.controls[s].throttle),
+                pick(k, &|t, s| t.controls[s].rudder),
             ]);
             self.density.push(pick(k, &|t, s| t.density[s]));
         }

@@ -175,9 +175,13 @@ impl<R: Real> Aircraft<R> {
             elevator: at(10),
             elevator_rate: at(11),
             throttle: at(12),
+            rudder: S::zero(),
+            rudder_rate: S::zero(),
         };
-        let new = Command { aileron: at(13), elevator: at(14), throttle: at(15) };
-        let old = Command { aileron: at(16), elevator: at(17), throttle: S::zero() };
+        let new =
+            Command { aileron: at(13), elevator: at(14), throttle: at(15), rudder: S::zero() };
+        let (aileron, elevator) = (at(16), at(17));
+        let old = Command { aileron, elevator, throttle: S::zero(), rudder: S::zero() };
         let mut place = 18;
         let memory = self.memory.map(|x| {
             place += 1;
@@ -462,6 +466,8 @@ fn observation_slopes() -> [(usize, f32); OBSERVATIONS] {
         elevator: at(10),
         elevator_rate: at(11),
         throttle: at(12),
+        rudder: D::zero(),
+        rudder_rate: D::zero(),
     };
     let target = Target { roll: 0.0, pitch: 0.0, airspeed: 0.0 }.map(D::from_f64);
     observe(&state, &actuators, &target).map(|o| {

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::ops::RangeInclusive;
 
+use crate::physics::servos::Travels;
+
 /// Parts of a state frame that were not believable, as a set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Faults(u8);
@@ -96,17 +98,20 @@ pub fn incidence(alpha: f64, beta: f64) -> bool {
 pub fn specific_force(values: [f64; 3]) -> bool {
     values.iter().all(|x| FORCE.contains(x))
 }
-/// Whether normalised aileron, elevator, throttle, aileron rate, elevator rate are believable.
-pub fn actuators([aileron, elevator, throttle, aileron_rate, elevator_rate]: [f64; 5]) -> bool {
-    DEFLECTION.contains(&aileron)
-        && DEFLECTION.contains(&elevator)
+/// Whether normalised aileron, elevator, throttle, aileron rate, elevator rate, rudder and rudder rate
+/// are believable.
+pub fn actuators(
+    [aileron, elevator, throttle, aileron_rate, elevator_rate, rudder, rudder_rate]: [f64; 7],
+) -> bool {
+    [aileron, elevator, rudder].iter().all(|x| DEFLECTION.contains(x))
         && THROTTLE.contains(&throttle)
-        && DEFLECTION_RATE.contains(&aileron_rate)
-        && DEFLECTION_RATE.contains(&elevator_rate)
+        && [aileron_rate, elevator_rate, rudder_rate].iter().all(|x| DEFLECTION_RATE.contains(x))
 }
-/// Whether the travel of aileron and elevator, rad, is believable.
-pub fn travel(values: [f64; 2]) -> bool {
-    values.iter().all(|x| TRAVEL.contains(x))
+/// Whether the travel of the surfaces is believable.
+pub fn travels(travels: &Travels) -> bool {
+    let Travels { aileron, elevator, rudder } = travels;
+    let mut all = [Some(*aileron), Some(*elevator), *rudder].into_iter().flatten();
+    all.all(|travel| TRAVEL.contains(&travel.most) && TRAVEL.contains(&-travel.least))
 }
 /// Whether latitude and longitude, degrees, are believable.
 pub fn position([latitude, longitude]: [f64; 2]) -> bool {

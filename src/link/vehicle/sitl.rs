@@ -9,6 +9,7 @@ use crate::link::peer::PeerId;
 use crate::link::wire::Message;
 use crate::link::wire::setpoint::euler;
 use crate::link::wire::sitl::{self as wire, VehicleMessage};
+use crate::physics::servos::{Travel, Travels};
 use crate::physics::{ActuatorState, Command, State, Time};
 
 /// The shim's component id.
@@ -56,17 +57,17 @@ struct Parts {
     imu: Option<(Time, [f64; 3])>,
     air: Option<(f64, f64)>,
     incidence: Option<(Time, f64, f64)>,
-    actuators: Option<(Time, [f64; 5], [f64; 2])>,
+    actuators: Option<(Time, [f64; 7], Travels)>,
 }
 
 /// The vehicle side of the `sitl` profile.
 #[derive(Clone, Debug)]
 pub struct Sitl {
     system: u8,
-    /// Deflection at full command by the airframe, rad.
-    deflection: f64,
-    /// Travel of the vehicle's aileron and elevator when it is not the airframe's, rad.
-    foreign_travel: Option<[f64; 2]>,
+    /// Deflections at full command by the airframe.
+    travels: Travels,
+    /// Travel of the vehicle's surfaces when it is not the airframe's.
+    foreign_travel: Option<Travels>,
     told_foreign_travel: bool,
     parts: Parts,
     /// The last state delivered; faulty parts of the next one keep its values.
@@ -79,10 +80,9 @@ pub struct Sitl {
 }
 
 impl Sitl {
-    /// A vehicle of system id `system` whose surfaces deflect by `deflection` rad at full command
-    /// (0.5235 for the X8). Positions are those that the vehicle reports by its own travel; a
+    /// A vehicle of system id `system` whose surfaces have these `travels` by its airframe. Positions are those that the vehicle reports by its own travel; a
     /// vehicle of another travel cannot be engaged.
-    pub fn new(system: u8, deflection: f64) -> Self {
+    pub fn new(system: u8, travels: Travels) -> Self {
         let nan = f64::NAN;
         let nothing = Telemetry {
             time: Time::default(),
@@ -100,7 +100,7 @@ impl Sitl {
         };
         Sitl {
             system,
-            deflection,
+            travels,
             foreign_travel: None,
             told_foreign_travel: false,
             parts: Parts::default(),
@@ -160,8 +160,8 @@ impl Sitl {
             VehicleMessage::Incidence { time, alpha, beta } => {
                 self.parts.incidence = Some((time, alpha, beta))
             }
-            VehicleMessage::Actuators { time, active, outputs, travel } => {
-                self.parts.actuators = (active >= 5).then_some((time, outputs, travel));
+            VehicleMessage::Actuators { time, active, outputs, travels } => {
+                self.parts.actuators = (active >= 5).then_some((time, outputs, travels));
             }
             VehicleMessage::Position { position, velocity } if limits::position(position) => {
                 (self.last.position, self.last.velocity) = (position, velocity);
@@ -187,7 +187,7 @@ impl Sitl {
         rates: [f64; 3],
     ) -> Option<Telemetry> {
         let whole = parts.imu.zip(parts.air).zip(parts.incidence.zip(parts.actuators));
-        let Some((((time, force), air), ((time_b, alpha, beta), (time_c, outputs, travel)))) =
+        let Some((((time, force), air), ((time_b, alpha, beta), (time_c, outputs, travels)))) =
             whole
         else {
             self.counts.incomplete += 1;
@@ -203,8 +203,8 @@ impl Sitl {
         let mut next = Telemetry { time, order, faults: Faults::NONE, ..self.last };
         fill_motion(&mut next, q, rates);
         fill_air(&mut next, air, [alpha, beta], force);
-        fill_actuators(&mut next, outputs, travel);
-        self.compare_travel(travel);
+        fill_actuators(&mut next, outputs, &travels);
+        self.compare_travel(travels);
         self.counts.faulty += u64::from(!next.faults.is_empty());
         if order != Order::Late {
             self.last = next;
@@ -212,19 +212,18 @@ impl Sitl {
         Some(next)
     }
 
-    fn compare_travel(&mut self, travel: [f64; 2]) {
-        let differs = |t: f64| (t - self.deflection).abs() > TRAVEL_TOLERANCE * self.deflection;
-        self.foreign_travel = travel.into_iter().any(differs).then_some(travel);
+    fn compare_travel(&mut self, found: Travels) {
+        self.foreign_travel = (!alike(&found, &self.travels)).then_some(found);
     }
 
     /// See [`super::Vehicle::obstacle`].
     pub fn obstacle(&self) -> Option<String> {
-        self.foreign_travel.map(|[aileron, elevator]| {
+        self.foreign_travel.map(|found| {
             format!(
-                "the vehicle's travel is {aileron:.4} rad (aileron), {elevator:.4} rad (elevator), \
-                 the airframe file's deflection_max_rad is {:.4}: give the model and airframe of \
+                "the vehicle's travel is {}, the airframe file's is {}: give the model and airframe of \
                  this aircraft",
-                self.deflection
+                described(&found),
+                described(&self.travels)
             )
         })
     }
@@ -345,16 +344,42 @@ fn fill_air(
     }
 }
 
-fn fill_actuators(next: &mut Telemetry, outputs: [f64; 5], travel: [f64; 2]) {
-    let [aileron, elevator, throttle, aileron_rate, elevator_rate] = outputs;
-    match limits::actuators(outputs) && limits::travel(travel) {
+/// Whether two aircraft have surfaces of the same travel. A vehicle's rudder that the airframe does not
+/// have is left centred.
+fn alike(found: &Travels, wanted: &Travels) -> bool {
+    let close = |a: f64, b: f64| (a - b).abs() <= TRAVEL_TOLERANCE * b.abs();
+    let same = |a: Travel, b: Travel| close(a.least, b.least) && close(a.most, b.most);
+    same(found.aileron, wanted.aileron)
+        && same(found.elevator, wanted.elevator)
+        && wanted.rudder.is_none_or(|wanted| found.rudder.is_some_and(|found| same(found, wanted)))
+}
+
+/// The travel of the surfaces, in words.
+fn described(travels: &Travels) -> String {
+    let one = |travel: Travel| match travel.is_symmetric() {
+        true => format!("{:.4} rad", travel.most),
+        false => format!("{:.4} to {:.4} rad", travel.least, travel.most),
+    };
+    let rudder = travels.rudder.map_or("no rudder".into(), |t| format!("{} (rudder)", one(t)));
+    let Travels { aileron, elevator, .. } = *travels;
+    format!("{} (aileron), {} (elevator), {rudder}", one(aileron), one(elevator))
+}
+
+fn fill_actuators(next: &mut Telemetry, outputs: [f64; 7], travels: &Travels) {
+    let [aileron, elevator, throttle, aileron_rate, elevator_rate, rudder, rudder_rate] = outputs;
+    let full = |travel: Travel| travel.largest();
+    let (ailerons, elevators) = (full(travels.aileron), full(travels.elevator));
+    let rudders = travels.rudder.map_or(0.0, full);
+    match limits::actuators(outputs) && limits::travels(travels) {
         true => {
             next.actuators = ActuatorState {
-                aileron: aileron * travel[0],
-                aileron_rate: aileron_rate * travel[0],
-                elevator: elevator * travel[1],
-                elevator_rate: elevator_rate * travel[1],
+                aileron: aileron * ailerons,
+                aileron_rate: aileron_rate * ailerons,
+                elevator: elevator * elevators,
+                elevator_rate: elevator_rate * elevators,
                 throttle,
+                rudder: rudder * rudders,
+                rudder_rate: rudder_rate * rudders,
             }
         }
         false => next.faults.insert(Faults::ACTUATORS),

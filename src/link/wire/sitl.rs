@@ -6,10 +6,14 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use super::{Frame, Message, decode};
+use crate::physics::servos::{Travel, Travels};
 use crate::physics::{Command, Time};
 
 /// MAV_MODE_FLAG_SAFETY_ARMED.
 const ARMED: u8 = 128;
+
+/// Outputs of a vehicle that describes every surface.
+const ALL: u32 = 15;
 
 /// Deflection at normalised 1 of a vehicle that does not send its travel, rad: the X8's.
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
@@ -41,17 +45,18 @@ pub enum VehicleMessage {
         /// Sideslip, rad.
         beta: f64,
     },
-    /// ACTUATOR_OUTPUT_STATUS: aileron, elevator and throttle positions, aileron and elevator
-    /// rates in 1/s, surfaces normalised to −1..1.
+    /// ACTUATOR_OUTPUT_STATUS: positions and rates of the surfaces in parts of their travel, the
+    /// larger of both sides.
     Actuators {
         /// The frame's time.
         time: Time,
         /// How many outputs the message says are in use.
         active: u32,
-        /// The five outputs.
-        outputs: [f64; 5],
-        /// Travel of aileron and elevator, rad.
-        travel: [f64; 2],
+        /// Aileron, elevator and throttle positions, aileron and elevator rates in 1/s, rudder
+        /// position and rate.
+        outputs: [f64; 7],
+        /// Travel of the surfaces.
+        travels: Travels,
     },
     /// ATTITUDE_QUATERNION, which completes a state frame.
     Attitude {
@@ -94,11 +99,8 @@ pub fn read(frame: &Frame<'_>) -> Option<VehicleMessage> {
         MavMessage::ACTUATOR_OUTPUT_STATUS(m) => VehicleMessage::Actuators {
             time: Time::from_micros(m.time_usec),
             active: m.active,
-            outputs: std::array::from_fn(|i| wide(m.actuator[i])),
-            travel: match m.active {
-                7.. => [m.actuator[5], m.actuator[6]].map(wide),
-                _ => [TRAVEL; 2],
-            },
+            outputs: outputs(m.active, &m.actuator.map(wide)),
+            travels: travels(m.active, &m.actuator.map(wide)),
         },
         MavMessage::ATTITUDE_QUATERNION(m) => VehicleMessage::Attitude {
             boot_ms: m.time_boot_ms,
@@ -113,6 +115,31 @@ pub fn read(frame: &Frame<'_>) -> Option<VehicleMessage> {
         MavMessage::HEARTBEAT(_) => VehicleMessage::Heartbeat,
         _ => return None,
     })
+}
+
+/// Aileron, elevator, throttle, aileron rate, elevator rate, rudder, rudder rate.
+fn outputs(active: u32, actuator: &[f64; 32]) -> [f64; 7] {
+    let rudder = if active >= ALL { [actuator[7], actuator[8]] } else { [0.0; 2] };
+    let [a, e, t, ar, er] = std::array::from_fn(|i| actuator[i]);
+    [a, e, t, ar, er, rudder[0], rudder[1]]
+}
+
+/// The travel that the vehicle says its surfaces have.
+fn travels(active: u32, actuator: &[f64; 32]) -> Travels {
+    let side = |at: usize| Travel { least: actuator[at + 3], most: actuator[at] };
+    match active {
+        ALL.. => Travels {
+            aileron: side(9),
+            elevator: side(10),
+            rudder: (actuator[11] != 0.0).then(|| side(11)),
+        },
+        7.. => Travels {
+            aileron: Travel::symmetric(actuator[5]),
+            elevator: Travel::symmetric(actuator[6]),
+            rudder: None,
+        },
+        _ => Travels::alike(TRAVEL),
+    }
 }
 
 /// What goes to the actuators.
@@ -133,6 +160,7 @@ pub fn actuator_controls(time: Time, outputs: Outputs) -> Message {
         controls[0] = command.aileron as f32;
         controls[1] = command.elevator as f32;
         controls[2] = command.throttle as f32;
+        controls[3] = command.rudder as f32;
         mode = ARMED;
     }
     Message::coded(MavMessage::HIL_ACTUATOR_CONTROLS(HIL_ACTUATOR_CONTROLS_DATA {

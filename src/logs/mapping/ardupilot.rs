@@ -51,11 +51,11 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
     out.push(Rule::density("BARO", ("Press", 1.0), ("Temp", 1.0)).noting(
         "air density is from BARO's pressure with its sensor's temperature, which runs warm",
     ));
-    // Positive elevator is nose up there.
+    // Positive elevator is nose up there, positive rudder nose right.
     for (column, field, gain) in [
         ("aileron_cmd", "Ail", 1.0 / FULL),
         ("elevator_cmd", "Elev", -1.0 / FULL),
-        ("rudder_cmd", "Rudd", 1.0 / FULL),
+        ("rudder_cmd", "Rudd", -1.0 / FULL),
         ("throttle_cmd", "Thr", 0.01),
     ] {
         out.push(Rule::linear(column, "AETR", field, gain));

@@ -83,7 +83,7 @@ fn commands(topics: &Topics) -> Vec<Rule> {
     for (column, field, gain) in [
         ("aileron_cmd", "xyz[0]", 1.0),
         ("elevator_cmd", "xyz[1]", -1.0),
-        ("rudder_cmd", "xyz[2]", 1.0),
+        ("rudder_cmd", "xyz[2]", -1.0),
     ] {
         out.push(Rule::linear(column, "vehicle_torque_setpoint", field, gain).of(fixed_wing));
     }
@@ -92,7 +92,7 @@ fn commands(topics: &Topics) -> Vec<Rule> {
     for (column, i, gain) in [
         ("aileron_cmd", 0, 1.0),
         ("elevator_cmd", 1, -1.0),
-        ("rudder_cmd", 2, 1.0),
+        ("rudder_cmd", 2, -1.0),
         ("throttle_cmd", 3, 1.0),
     ] {
         let rule = Rule::linear(column, group, &format!("control[{i}]"), gain);
@@ -105,7 +105,7 @@ fn commands(topics: &Topics) -> Vec<Rule> {
 fn allocated(topics: &Topics) -> Vec<Rule> {
     let mut out = Vec::new();
     for (column, axis, sign) in
-        [("aileron_cmd", "R", 1.0), ("elevator_cmd", "P", -1.0), ("rudder_cmd", "Y", 1.0)]
+        [("aileron_cmd", "R", 1.0), ("elevator_cmd", "P", -1.0), ("rudder_cmd", "Y", -1.0)]
     {
         let torque = |n: usize| {
             let t = topics.parameters.get(&format!("CA_SV_CS{n}_TRQ_{axis}")).copied();

@@ -36,7 +36,7 @@ pub fn rules(topics: &Topics, topic: &str, field: impl Fn(usize) -> String) -> V
     for (column, function, gain) in [
         ("aileron_cmd", AILERON, 1.0),
         ("elevator_cmd", ELEVATOR, -1.0),
-        ("rudder_cmd", RUDDER, 1.0),
+        ("rudder_cmd", RUDDER, -1.0),
     ] {
         // Two servos of one function move alike: the first tells.
         if let Some(n) = channels(function).next() {

@@ -67,7 +67,7 @@ impl<R: Real> Past<R> {
     }
 }
 
-/// What the input effects of a model remember of aileron and elevator.
+/// What the input effects of a model remember of aileron and elevator; on a rudder they do not act.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputMemory<R = f64>([[Past<R>; 2]; MOST]);
 
@@ -98,6 +98,7 @@ impl<R: Real> InputMemory<R> {
             aileron: kind.act(constant, aileron, z.aileron),
             elevator: kind.act(constant, elevator, z.elevator),
             throttle: z.throttle,
+            rudder: z.rudder,
         }
     }
 }

@@ -134,7 +134,7 @@ impl Aircraft {
 pub(super) fn vehicle(counterpart: Counterpart, model: &GreyBox) -> Vehicle {
     let actuators = model.airframe.actuators;
     match counterpart.personality() {
-        None => Vehicle::Sitl(Sitl::new(1, actuators.deflection_max)),
+        None => Vehicle::Sitl(Sitl::new(1, actuators.travels())),
         Some((personality, authority)) => {
             let stack = match personality {
                 Personality::Px4 => Stack::Px4,

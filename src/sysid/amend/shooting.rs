@@ -99,6 +99,7 @@ fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
         aileron: mix(|z| z.aileron),
         elevator: mix(|z| z.elevator),
         throttle: mix(|z| z.throttle),
+        rudder: mix(|z| z.rudder),
     }
 }
 
@@ -201,7 +202,7 @@ mod tests {
         let true_value = |k: usize| (0.19 * k as f64).sin();
         let instant = |k: usize| {
             let aileron = 0.5 * (true_value(k) + true_value(k.saturating_sub(1)));
-            let controls = Controls { aileron, elevator: 0.0, throttle: 0.0 };
+            let controls = Controls { aileron, elevator: 0.0, throttle: 0.0, rudder: 0.0 };
             Instant {
                 time_s: 0.01 * k as f64,
                 state: State::from_array([0.0; 8]),

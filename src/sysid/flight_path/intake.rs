@@ -111,8 +111,8 @@ struct Channels {
     velocity: [Channel; 3],
     altitude: Channel,
     density: Channel,
-    positions: [Channel; 3],
-    commands: [Channel; 3],
+    positions: [Channel; 4],
+    commands: [Channel; 4],
 }
 
 impl Channels {
@@ -122,6 +122,9 @@ impl Channels {
         };
         let three = |kind, get: &dyn Fn(&Sample, usize) -> f64| {
             std::array::from_fn(|i| channel(kind, &|s| get(s, i)))
+        };
+        let four = |get: &dyn Fn(&Sample) -> [f64; 4]| {
+            std::array::from_fn(|i| channel(Kind::Kept, &|s| get(s)[i]))
         };
         let vane = |get: &dyn Fn(&Sample) -> f64| match flight.flow_angles {
             FlowAngles::Measured => channel(Kind::Linear, get),
@@ -136,8 +139,8 @@ impl Channels {
             velocity: three(Kind::Linear, &|s, i| s.velocity_ned_mps[i]),
             altitude: channel(Kind::Kept, &|s| s.altitude_m),
             density: channel(Kind::Kept, &|s| s.air_density_kgpm3),
-            positions: three(Kind::Kept, &|s, i| [s.aileron_rad, s.elevator_rad, s.throttle][i]),
-            commands: three(Kind::Kept, &|s, i| [s.aileron_cmd, s.elevator_cmd, s.throttle_cmd][i]),
+            positions: four(&|s| [s.aileron_rad, s.elevator_rad, s.throttle, s.rudder_rad]),
+            commands: four(&|s| [s.aileron_cmd, s.elevator_cmd, s.throttle_cmd, s.rudder_cmd]),
         }
     }
 
@@ -199,7 +202,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     channels.check(&options.name)?;
     let has = channels.sensors();
     let mut notes = Vec::new();
-    declare(&channels, &has, &mut notes);
+    declare(&channels, &has, options, &mut notes);
     if flight.flow_angles == FlowAngles::Estimated {
         notes.push(
             "α and β of this log are the flight controller's estimates, not measurements: left out. If the \
@@ -245,7 +248,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     Ok(log)
 }
 
-fn declare(channels: &Channels, has: &Sensors, notes: &mut Vec<String>) {
+fn declare(channels: &Channels, has: &Sensors, options: &Options, notes: &mut Vec<String>) {
     let mut stuck = |channels: &[Channel], what: &str| {
         if channels.iter().any(|c| c.stuck) {
             notes.push(format!("The {what} shows one and the same value all the time: left out."));
@@ -256,8 +259,10 @@ fn declare(channels: &Channels, has: &Sensors, notes: &mut Vec<String>) {
     stuck(&channels.vanes[..1], "angle-of-attack vane");
     stuck(&channels.vanes[1..], "sideslip vane");
     stuck(&channels.velocity[..2], "velocity over ground");
-    let absent: Vec<_> = ["aileron", "elevator", "throttle"]
-        .into_iter()
+    let steered = ["aileron", "elevator", "throttle"].into_iter();
+    let rudder = options.actuators.rudder.filter(|_| !channels.commands[3].is_empty());
+    let absent: Vec<_> = steered
+        .chain(rudder.map(|_| "rudder"))
         .zip(&channels.positions)
         .filter(|(_, c)| c.is_empty())
         .map(|(name, _)| name)
@@ -429,33 +434,29 @@ fn heading(track: &mut Track, step: f64) {
 
 /// The command in force at `t`; where only some are logged, the others are NaN.
 fn command(channels: &Channels, t: f64) -> Option<Command> {
-    let [aileron, elevator, throttle] = std::array::from_fn(|i| channels.commands[i].held(t));
-    let command = Command { aileron, elevator, throttle };
+    let [aileron, elevator, throttle, rudder] =
+        std::array::from_fn(|i| channels.commands[i].held(t));
+    let rudder = if rudder.is_finite() { rudder } else { 0.0 };
+    let command = Command { aileron, elevator, throttle, rudder };
     command.is_finite().then_some(command)
 }
 
 /// The deflections at `times`: as logged, else from the commands through the actuators.
 fn controls(channels: &Channels, times: &[f64], options: &Options) -> Vec<Controls> {
     let f = &options.actuators;
-    let scale = [f.deflection_max, f.deflection_max, 1.0];
-    let sent = |t: f64| -> [f64; 3] {
-        std::array::from_fn(|i| {
+    let sent = |t: f64| {
+        let [aileron, elevator, throttle, rudder] = std::array::from_fn(|i| {
             let command = channels.commands[i].held(t);
             if command.is_finite() { command.clamp(-1.0, 1.0) } else { 0.0 }
-        })
-    };
-    let at_rest = |c: [f64; 3]| Controls {
-        aileron: c[0] * scale[0],
-        elevator: c[1] * scale[1],
-        throttle: c[2],
+        });
+        Command { aileron, elevator, throttle, rudder }
     };
     let mut clock = times.first().copied().unwrap_or(0.0);
-    let mut actuators = Actuators::at_rest(&at_rest(sent(clock)));
+    let mut actuators = Actuators::at_rest(&f.controls(&sent(clock)));
     let mut all = Vec::with_capacity(times.len());
     for &t in times {
         while clock + 0.5 * f.step < t {
-            let [aileron, elevator, throttle] = sent(clock + 1e-9);
-            actuators.step(&Command { aileron, elevator, throttle }, f);
+            actuators.step(&sent(clock + 1e-9), f);
             clock += f.step;
         }
         let simulated = actuators.controls();
@@ -468,6 +469,7 @@ fn controls(channels: &Channels, times: &[f64], options: &Options) -> Vec<Contro
             aileron: logged(0, simulated.aileron),
             elevator: logged(1, simulated.elevator),
             throttle: logged(2, simulated.throttle),
+            rudder: logged(3, if f.rudder.is_some() { simulated.rudder } else { 0.0 }),
         });
     }
     all

@@ -170,6 +170,7 @@ fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
                 aileron: mix(a.aileron, b.aileron),
                 elevator: mix(a.elevator, b.elevator),
                 throttle: mix(a.throttle, b.throttle),
+                rudder: mix(a.rudder, b.rudder),
             };
         }
     }

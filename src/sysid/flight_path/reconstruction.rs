@@ -87,6 +87,7 @@ impl Reconstruction {
                 aileron: f64::NAN,
                 elevator: f64::NAN,
                 throttle: f64::NAN,
+                rudder: f64::NAN,
             });
             Sample {
                 time_s: i.time_s,

@@ -43,8 +43,8 @@ impl Law {
         let elevator = PITCH[0] * errors[1] + PITCH[1] * self.integral[1] - PITCH[2] * seen.q_radps;
         let throttle = THROTTLE + AIRSPEED[0] * errors[2] + AIRSPEED[1] * self.integral[2];
         let free = [
-            aileron.abs() < self.travel.aileron_rad,
-            elevator.abs() < self.travel.elevator_rad,
+            aileron.abs() < self.travel.aileron.largest_rad(),
+            elevator.abs() < self.travel.elevator.largest_rad(),
             (0.0..=1.0).contains(&throttle),
         ];
         for axis in 0..3 {
@@ -53,9 +53,10 @@ impl Law {
             }
         }
         Inputs {
-            aileron: aileron / self.travel.aileron_rad,
-            elevator: elevator / self.travel.elevator_rad,
+            aileron: aileron / self.travel.aileron.largest_rad(),
+            elevator: elevator / self.travel.elevator.largest_rad(),
             throttle: thrust.unwrap_or(throttle),
+            rudder: 0.0,
         }
         .clamped()
     }

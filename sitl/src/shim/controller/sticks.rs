@@ -68,7 +68,8 @@ fn px4([x, y, z]: [i16; 3], parameters: &Table) -> Inputs {
     // mix-up between stick and surface.
     let reversed = parameters.get("PWM_MAIN_REV") as u32;
     let sign = |output: u32| if reversed >> output & 1 == 1 { -1.0 } else { 1.0 };
-    Inputs { aileron: sign(0) * roll, elevator: -sign(1) * pitch, throttle: stick(z) }.clamped()
+    Inputs { aileron: sign(0) * roll, elevator: -sign(1) * pitch, throttle: stick(z), rudder: 0.0 }
+        .clamped()
 }
 
 /// Channels by their calibration: angles to 1/4500 of full travel, throttle to whole percents.
@@ -91,6 +92,7 @@ pub(super) fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
         aileron: sign("SERVO1_REVERSED") * angle(1),
         elevator: -sign("SERVO2_REVERSED") * angle(2),
         throttle,
+        rudder: 0.0,
     }
     .clamped()
 }

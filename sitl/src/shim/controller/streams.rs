@@ -163,8 +163,8 @@ fn hud(measured: &Truth) -> VfrHud {
 fn servos(now: u64, measured: &Truth, travel: Travel) -> ServoOutputRaw {
     let surface = |rad: f64, full_rad: f64| (1500.0 + 500.0 * rad / full_rad).round() as u16;
     let mut servo = [0; 8];
-    servo[0] = surface(measured.aileron_rad, travel.aileron_rad);
-    servo[1] = surface(measured.elevator_rad, travel.elevator_rad);
+    servo[0] = surface(measured.aileron_rad, travel.aileron.largest_rad());
+    servo[1] = surface(measured.elevator_rad, travel.elevator.largest_rad());
     servo[2] = (1000.0 + 1000.0 * measured.throttle).round() as u16;
     ServoOutputRaw { time_usec: now as u32, servo, ..ServoOutputRaw::default() }
 }

@@ -25,7 +25,7 @@ use super::link::{Arrival, Link};
 use super::options::{Pace, ShimOptions};
 use super::summary::{Event, Notice, Summary};
 use super::truth_log::TruthLog;
-use crate::plant::Inputs;
+use crate::plant::{Inputs, Travel};
 use client::Client;
 pub use events::Px4Event;
 use launch::Launcher;
@@ -64,6 +64,9 @@ impl Default for Px4Options {
         Px4Options { outputs: OutputMap::default(), noise: Px4Noise::STANDARD }
     }
 }
+
+/// Travel of an aircraft as its truth shows it here: no output of PX4 moves a rudder.
+const CENTRED: Travel = Travel::X8;
 
 /// A run.
 struct Run<'a> {
@@ -110,7 +113,7 @@ pub(super) fn fly(
         log: options
             .truth
             .as_ref()
-            .map(|t| TruthLog::create(t, STEP_US as f64 * 1e-6))
+            .map(|t| TruthLog::create(t, STEP_US as f64 * 1e-6, &CENTRED))
             .transpose()?,
         client: None,
         connection: 0,

@@ -174,7 +174,8 @@ impl OutputMap {
         }
         let armed = message.mode & ARMED != 0;
         // The plant's elevator pitches down when positive.
-        let told = Inputs { aileron: roll.value(), elevator: -pitch.value(), throttle };
+        let told =
+            Inputs { aileron: roll.value(), elevator: -pitch.value(), throttle, rudder: 0.0 };
         Some(Actuation {
             time_us: message.time_usec,
             lockstep: message.flags & 1 != 0,
@@ -223,7 +224,7 @@ mod tests {
             &[(1, pitch - roll), (2, pitch + roll), (3, 0.75)],
             129,
         );
-        let inputs = Inputs { aileron: 0.25, elevator: -0.5, throttle: 0.75 };
+        let inputs = Inputs { aileron: 0.25, elevator: -0.5, throttle: 0.75, rudder: 0.0 };
         assert_eq!(wing.unwrap().inputs, inputs);
         // Of a plane: left = −r, right = r, elevator = p; the default of the stock airframes.
         let plane = OutputMap::default().to_string();

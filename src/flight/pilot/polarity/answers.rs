@@ -1,7 +1,7 @@
 //! What the model answers to a small step of each surface.
 
 use crate::model::{GreyBox, Trim, TrimError, Twin};
-use crate::physics::{Command, Controls};
+use crate::physics::Command;
 
 /// States for which an answer is known, the one on which the step is commanded included: 0.4 s, by
 /// when the roll has settled; the short period, which has nearly done so, goes on with the last.
@@ -26,9 +26,7 @@ impl Answers {
     /// If the model cannot fly level there.
     pub fn of(model: &GreyBox, airspeed: f64) -> Result<Answers, TrimError> {
         let trim = Trim::level(model, airspeed, ALTITUDE)?;
-        let Controls { aileron, elevator, throttle } = trim.controls;
-        let full = model.airframe.actuators.deflection_max;
-        let command = Command { aileron: aileron / full, elevator: elevator / full, throttle };
+        let command = model.airframe.actuators.command(&trim.controls);
         let rates = |command: Command| {
             let mut twin = Twin::at_rest(trim.state, &trim.controls, ALTITUDE);
             let mut rates = [[0.0; 2]; SPAN];

@@ -138,7 +138,7 @@ impl Check {
         Some(Command {
             aileron: begun.level.aileron + pulse(index),
             elevator: begun.level.elevator + pulse(index - OFFSET as isize),
-            throttle: begun.level.throttle,
+            ..begun.level
         })
     }
 
@@ -215,10 +215,10 @@ mod tests {
         wired: impl Fn([f64; 2]) -> [f64; 2],
     ) -> (Verdict, u64) {
         let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
-        let full = model.airframe.actuators.deflection_max;
+        let full = model.airframe.actuators.elevator.travel.most;
         let trim = Trim::level(&model, 20.0, 600.0).unwrap();
         let (elevator, throttle) = (trim.controls.elevator / full, trim.controls.throttle);
-        let level = Command { aileron: 0.0, elevator, throttle };
+        let level = Command { elevator, throttle, ..Command::IDLE };
         let mut check = Check::new(Answers::of(&model, 22.0).unwrap());
         let mut twin = Twin::at_rest(trim.state, &trim.controls, 600.0);
         let mut wire = VecDeque::from(vec![level; late]);
@@ -227,7 +227,7 @@ mod tests {
         check.begin(level);
         for _ in 0..unheard {
             let [aileron, elevator] = wired([level.aileron, level.elevator]);
-            twin.step(&model, &Command { aileron, elevator, throttle });
+            twin.step(&model, &Command { aileron, elevator, throttle, rudder: 0.0 });
         }
         for k in 0..1000 {
             let now = Time::from_micros(5_000_000 + 10_000 * k);
@@ -240,7 +240,7 @@ mod tests {
             wire.push_back(command);
             let command = wire.pop_front().unwrap();
             let [aileron, elevator] = wired([command.aileron, command.elevator]);
-            twin.step(&model, &Command { aileron, elevator, throttle });
+            twin.step(&model, &Command { aileron, elevator, throttle, rudder: 0.0 });
         }
         panic!("it does not end")
     }

@@ -44,7 +44,7 @@ pub struct Recorded<R> {
     /// States before the start, at the start, and after each step; roll in −π..π.
     pub states: Vec<[R; 8]>,
     /// Aileron, elevator, throttle that act, from the step before the start on.
-    pub controls: Vec<[R; 3]>,
+    pub controls: Vec<[R; 4]>,
     /// Air density from the step before the start on, kg/m³.
     pub density: Vec<R>,
     /// What each rollout counts; 0 for one that fills the block up.
@@ -172,8 +172,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
 
     #[inline(always)]
     fn at(&self, step: usize, state: State<R>) -> At<R> {
-        let [aileron, elevator, throttle] = self.recorded.controls[step];
-        let controls = Controls { aileron, elevator, throttle };
+        let [aileron, elevator, throttle, rudder] = self.recorded.controls[step];
+        let controls = Controls { aileron, elevator, throttle, rudder };
         At { state, controls, density: self.recorded.density[step] }
     }
 

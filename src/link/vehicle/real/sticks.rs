@@ -99,7 +99,8 @@ mod tests {
     #[test]
     fn the_mean_of_what_is_sent_is_what_was_meant() {
         let parameters = Parameters::new(Stack::Px4.rules(Authority::Surfaces));
-        let command = Command { aileron: 0.123_45, elevator: -0.067_89, throttle: 0.333_33 };
+        let command =
+            Command { aileron: 0.123_45, elevator: -0.067_89, throttle: 0.333_33, rudder: 0.0 };
         let mut sticks = Sticks::default();
         let mut sums = [0.0; 3];
         for _ in 0..1000 {
@@ -132,7 +133,8 @@ mod tests {
             parameters.take(name, value);
         }
         let sent = |aileron: f64, elevator: f64, throttle: f64| {
-            Sticks::default().pulses(&Command { aileron, elevator, throttle }, &parameters)
+            Sticks::default()
+                .pulses(&Command { aileron, elevator, throttle, rudder: 0.0 }, &parameters)
         };
         assert_eq!(sent(0.0, 0.0, 0.0), [1450, 1500, 1000]);
         // Right aileron on a reversed channel is a shorter pulse; elevator down is stick forward.

@@ -1,6 +1,6 @@
 //! The diagnosis itself: flights in, answer out.
 
-use crate::model::GreyBox;
+use crate::model::{GreyBox, RUDDER};
 use crate::physics;
 use crate::sysid::diagnose::answer::advice;
 use crate::sysid::diagnose::answer::decoys;
@@ -44,7 +44,7 @@ pub fn diagnose(
         .ok_or_else(|| DiagnoseError::Unusable { model: model.name.clone() })?;
     let rudder = rudder::unmodelled(flights, model);
     if let Some(motion) = rudder {
-        found.refuse_in(&rudder::CHANNELS, &rudder::reason(motion));
+        found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
     }
     let effects = ranking::candidates(&found, options);
     let channels = shares::channels(&found);

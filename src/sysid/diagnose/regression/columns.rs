@@ -70,10 +70,8 @@ impl Ready {
                 let slope = &here.slope[ALPHA + i];
                 (0..CHANNELS).for_each(|c| add(1 + INPUTS + 3 + i, c, -rate * slope[c]));
             }
-            let moved =
-                |i: &Instant| [i.controls.aileron, i.controls.elevator, i.controls.throttle];
             for (i, rate) in
-                differences(&acting, place.segment, place.index, moved).iter().enumerate()
+                differences(&acting, place.segment, place.index, steered).iter().enumerate()
             {
                 let slope = &here.slope[CONTROLS + i];
                 (0..CHANNELS).for_each(|c| add(1 + INPUTS + 7, c, -rate * slope[c]));
@@ -228,25 +226,30 @@ fn add_spin(model: &GreyBox, flight: &Prepared, residual: &mut Column) {
     }
 }
 
-/// Second differences of aileron, elevator and throttle.
-pub fn bends(flight: &Prepared, segment: usize, index: usize) -> [f64; 3] {
+/// Aileron, elevator, throttle, rudder.
+fn steered(i: &Instant) -> [f64; 4] {
+    let z = &i.controls;
+    [z.aileron, z.elevator, z.throttle, z.rudder]
+}
+
+/// Second differences of aileron, elevator, throttle and rudder.
+pub fn bends(flight: &Prepared, segment: usize, index: usize) -> [f64; 4] {
     let instants = &flight.segments[segment];
     let (before, after) = (index.saturating_sub(1), (index + 1).min(instants.len() - 1));
-    let of = |i: &Instant| [i.controls.aileron, i.controls.elevator, i.controls.throttle];
-    let [a, b, c] = [before, index, after].map(|i| of(&instants[i]));
-    [0, 1, 2].map(|k| a[k] - 2.0 * b[k] + c[k])
+    let [a, b, c] = [before, index, after].map(|i| steered(&instants[i]));
+    [0, 1, 2, 3].map(|k| a[k] - 2.0 * b[k] + c[k])
 }
 
 /// Rates of `of` by central differences, 1/s.
-fn differences(
+fn differences<const N: usize>(
     flight: &Prepared,
     segment: usize,
     index: usize,
-    of: impl Fn(&Instant) -> [f64; 3],
-) -> [f64; 3] {
+    of: impl Fn(&Instant) -> [f64; N],
+) -> [f64; N] {
     let instants = &flight.segments[segment];
     let (before, after) = (index.saturating_sub(1), (index + 1).min(instants.len() - 1));
     let per = 1.0 / (flight.dt * (after - before).max(1) as f64);
     let (a, b) = (of(&instants[before]), of(&instants[after]));
-    [0, 1, 2].map(|k| (b[k] - a[k]) * per)
+    std::array::from_fn(|k| (b[k] - a[k]) * per)
 }

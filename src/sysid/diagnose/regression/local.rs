@@ -9,13 +9,13 @@ use crate::sysid::weak_form::windows::{gyroscopic, to_force_axes};
 
 /// Channels: D, L, Y (N), l, m, n (N m).
 pub const CHANNELS: usize = 6;
-/// Places of the derivatives: p, q, r, α, β, V, then aileron, elevator, throttle.
-pub const INPUTS: usize = 9;
+/// Places of the derivatives: p, q, r, α, β, V, then aileron, elevator, throttle, rudder.
+pub const INPUTS: usize = 10;
 /// Place of the first rate.
 pub const RATES: usize = 0;
 /// Place of the angle of attack; sideslip and airspeed follow.
 pub const ALPHA: usize = 3;
-/// Place of the aileron; elevator and throttle follow.
+/// Place of the aileron; elevator, throttle and rudder follow.
 pub const CONTROLS: usize = 6;
 
 /// Measured less predicted at one sample, without the moments of the angular acceleration, which the
@@ -46,6 +46,7 @@ pub fn local(model: &GreyBox, at: &Instant, controls: &Controls) -> Local {
         aileron: D::variable(controls.aileron, CONTROLS),
         elevator: D::variable(controls.elevator, CONTROLS + 1),
         throttle: D::variable(controls.throttle, CONTROLS + 2),
+        rudder: D::variable(controls.rudder, CONTROLS + 3),
     };
     let all = residual(model, &state, &controls, at);
     Local {

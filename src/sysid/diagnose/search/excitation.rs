@@ -1,5 +1,6 @@
 //! Whether the flights move what a diagnosis needs moved.
 
+use crate::logs::rudder::MOVES_RAD;
 use crate::sysid::diagnose::error::DiagnoseError;
 use crate::sysid::flight_path::reconstruction::Instant;
 use crate::sysid::weak_form::prepared::Prepared;
@@ -41,6 +42,11 @@ pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
         .into_iter()
         .map(|(text, fly)| format!("{text}: what depends on it is not seen; fly {fly}"))
         .collect())
+}
+
+/// Whether the rudder moves in `flights`, so that its effects can be searched for.
+pub fn moves_rudder(flights: &[Prepared]) -> bool {
+    deviation(flights, |i| i.controls.rudder) > MOVES_RAD
 }
 
 /// Standard deviation within flights.

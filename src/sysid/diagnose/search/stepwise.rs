@@ -1,6 +1,6 @@
 //! Forward selection: the effect with the best evidence joins the model, and again, until none passes.
 
-use crate::model::GreyBox;
+use crate::model::{GreyBox, RUDDER};
 use crate::physics::inputs::Kind;
 use crate::sysid::compare::ChannelId;
 use crate::sysid::diagnose::answer::shares;
@@ -8,6 +8,7 @@ use crate::sysid::diagnose::options::Options;
 use crate::sysid::diagnose::regression::catalogue::{self, Entry};
 use crate::sysid::diagnose::regression::rank::Score;
 use crate::sysid::diagnose::search::checks;
+use crate::sysid::diagnose::search::excitation;
 use crate::sysid::diagnose::search::remainder::{Remainder, remainder};
 use crate::sysid::diagnose::search::round::{Problem, Round};
 use crate::sysid::diagnose::search::settling::{Ranked, SETTLING, ranked, settled};
@@ -127,7 +128,10 @@ pub fn search(
 ) -> Option<Found> {
     progress("tuning the model's own coefficients");
     let tuned = Round::new(problem, model.clone(), &[])?.tuned();
-    let entries = catalogue::candidates(model, &options.without);
+    let mut entries = catalogue::candidates(model, &options.without);
+    if !excitation::moves_rudder(&problem.flights) {
+        entries.retain(|e| e.about.id != RUDDER);
+    }
     progress(&format!("ranking {} candidate effects", entries.len()));
     let shape = shape(&Round::new(problem, tuned.clone(), &[])?, options.nulls);
     let Ranked { round: first, scores, nulls, threshold } =
@@ -440,9 +444,10 @@ impl Found {
     }
 
     /// Refuses every effect that acts in one of `channels`, for `reason`.
-    pub fn refuse_in(&mut self, channels: &[ChannelId], reason: &str) {
+    pub fn refuse_in(&mut self, channels: &[ChannelId], except: &str, reason: &str) {
         let touched = |c: &usize| channels.contains(&ChannelId::ALL[*c]);
-        for effect in self.selected.iter_mut().filter(|s| s.channels.iter().any(touched)) {
+        let spared = |s: &&mut Selected| s.id != except && s.channels.iter().any(touched);
+        for effect in self.selected.iter_mut().filter(spared) {
             effect.refused.push(reason.to_owned());
         }
         self.refuse_companions();

@@ -1,0 +1,42 @@
+//! Thrust of a propeller over throttle and airspeed.
+
+use super::{Coefficient, Effect, Own, Terms, coefficient};
+use crate::num::Real;
+use crate::physics::atmosphere::SEA_LEVEL_DENSITY;
+use crate::physics::{Channel, Point};
+
+/// Thrust of a motor with a propeller, as a polynomial of second degree in throttle and airspeed.
+///
+/// With the voltage in proportion to the throttle, the torque balance of a motor and a propeller of
+/// quadratic CT(J) and CQ(J) gives a thrust that this polynomial follows to 0.2 N over the envelope of an
+/// Aerosonde. It holds the drag of a windmilling propeller: below some throttle the thrust is negative.
+pub struct Propeller;
+
+impl Effect for Propeller {
+    const ID: &'static str = "propeller";
+    const DESCRIPTION: &'static str =
+        "Thrust along body x of a motor with a propeller, over throttle and airspeed.";
+    const FORMULA: &'static str =
+        "T = ρ/ρ0 (T0 + Tt δt + Ttt δt² + TV V + TtV δt V + TVV V²), ρ0 = 1.225 kg/m³";
+    const SOURCE: &'static str = "CT(J), CQ(J) and a motor to second degree: BM12 section 4.3";
+    const COEFFICIENTS: &'static [Coefficient] = &[
+        coefficient("T0_n", "thrust at rest without throttle", "N", (-1e4, 1e4)),
+        coefficient("Tt_n", "slope over throttle", "N", (-1e5, 1e5)),
+        coefficient("Ttt_n", "curvature over throttle", "N", (-1e5, 1e5)),
+        coefficient("TV_nspm", "slope over airspeed", "N s/m", (-1e4, 1e4)),
+        coefficient("TtV_nspm", "slope over airspeed that comes with throttle", "N s/m", (-1e4, 1e4)),
+        coefficient("TVV_ns2pm2", "curvature over airspeed", "N s²/m²", (-100.0, 100.0)),
+    ];
+
+    #[inline(always)]
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
+        let (share, v) = (at.air.density.scale(1.0 / SEA_LEVEL_DENSITY), at.state.airspeed);
+        let throttled = share * at.controls.throttle;
+        terms.add(0, Channel::BodyX, share);
+        terms.add(1, Channel::BodyX, throttled);
+        terms.add(2, Channel::BodyX, throttled * at.controls.throttle);
+        terms.add(3, Channel::BodyX, share * v);
+        terms.add(4, Channel::BodyX, throttled * v);
+        terms.add(5, Channel::BodyX, share * v * v);
+    }
+}

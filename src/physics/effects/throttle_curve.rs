@@ -1,0 +1,36 @@
+//! Thrust that is not in proportion to the throttle.
+
+use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
+use crate::num::Real;
+use crate::physics::{Channel, Point};
+
+/// Thrust that bends over the throttle, as that of a motor whose voltage follows it.
+pub struct ThrottleCurve;
+
+impl Effect for ThrottleCurve {
+    const ID: &'static str = "throttle_curve";
+    const DESCRIPTION: &'static str =
+        "The thrust bends over the throttle; without and at full throttle it stays.";
+    const FORMULA: &'static str = "T += Tb δt (δt − 1)";
+    const SOURCE: &'static str =
+        "thrust goes with the square of a propeller's speed, and that with the voltage: BM12 section 4.3";
+    const COEFFICIENTS: &'static [Coefficient] = &[coefficient(
+        "Tb_n",
+        "four times what half throttle gives less than half the thrust",
+        "N",
+        (-1e4, 1e4),
+    )];
+    const ENTRY: Option<Entry> = Some(Entry {
+        channels: &[Channel::BodyX],
+        look_alikes: &["thrust_scale", "thrust_linear.Cp_n", "drag_linear.CD0"],
+        separated_by: "throttle steps of several sizes at one airspeed",
+        example: &[26.0],
+        starts: &[],
+    });
+
+    #[inline(always)]
+    fn basis<R: Real>(at: &Point<R>, _: Own, terms: &mut impl Terms<R>) {
+        let throttle = at.controls.throttle;
+        terms.add(0, Channel::BodyX, throttle * (throttle - R::from_f64(1.0)));
+    }
+}
