@@ -216,6 +216,6 @@ fn a_comparison_that_found_nothing_is_still_a_page() {
         model.traces.iter_mut().flat_map(|t| &mut t.states).for_each(|s| s.fill(f64::NAN));
     }
     let html = report(&broken).page().render();
-    assert!(html.contains("cannot be told"));
+    assert!(html.contains("cannot be determined"));
     figures(&html);
 }

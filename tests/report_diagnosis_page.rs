@@ -236,7 +236,7 @@ fn a_diagnosis_that_found_nothing_is_still_a_page() {
     broken.nulls.best = vec![nan, f64::INFINITY, -1.0];
     broken.decoys.iter_mut().for_each(|x| x.evidence = nan);
     let html = page(&broken).render();
-    assert!(html.contains("cannot be told"));
+    assert!(html.contains("cannot be determined"));
     assert!(!html.contains("NaN") && !html.contains(">inf"), "a number that is none is printed");
     figures(&html);
 }

@@ -66,7 +66,7 @@ pub struct Record {
     pub ranked: Vec<String>,
     /// Those that it asserts.
     pub asserted: Vec<String>,
-    /// For each of those, and for the first, what cannot be told from it.
+    /// For each of those, and for the first, what cannot be distinguished from it.
     pub alike: BTreeMap<String, Vec<String>>,
     /// Why the first is not asserted; empty if it is.
     #[serde(default)]
@@ -111,12 +111,12 @@ impl Record {
         Record { failure: Some(format!("{why:#}")), ..Record::of(case) }
     }
 
-    /// Whether `id` is asserted, itself or by one that cannot be told from it.
+    /// Whether `id` is asserted, itself or by one that cannot be distinguished from it.
     pub fn names(&self, id: &str) -> bool {
         self.asserted.iter().any(|a| a == id || self.is_alike(a, id))
     }
 
-    /// Whether the diagnosis says that `other` cannot be told from `id`.
+    /// Whether the diagnosis says that `other` cannot be distinguished from `id`.
     pub fn is_alike(&self, id: &str, other: &str) -> bool {
         self.alike.get(id).is_some_and(|alike| alike.iter().any(|a| a == other))
     }

@@ -180,7 +180,7 @@ fn first(r: &Record) -> bool {
     r.truth.first().is_some_and(|truth| r.ranked.first() == Some(truth))
 }
 
-/// Whether the truth is among the first three, or named as what cannot be told from the first.
+/// Whether the truth is among the first three, or named as what cannot be distinguished from the first.
 fn near(r: &Record) -> bool {
     let Some(truth) = r.truth.first() else { return false };
     r.ranked.iter().take(3).any(|id| id == truth)

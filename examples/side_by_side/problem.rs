@@ -1,4 +1,4 @@
-//! The sums that all sides are given, with what PyTorch must be told of them.
+//! The sums that all sides are given, with what PyTorch needs of them.
 
 use std::path::Path;
 

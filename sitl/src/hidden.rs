@@ -1,4 +1,4 @@
-//! Effects hidden in the aircraft: terms that JSBSim flies while no one is told of them.
+//! Effects hidden in the aircraft: terms that JSBSim flies while no message shows them.
 //!
 //! An effect is written into the aircraft's XML before JSBSim loads it, as further aerodynamic
 //! functions, flight-control components, external forces, or changed mass figures. With no effect,

@@ -99,7 +99,7 @@ fn read(text: &str) -> Result<(String, Vec<f64>)> {
 }
 
 /// The manoeuvre so many times, each on the heading opposite to the last one: on a single heading the
-/// wind cannot be told from an airspeed sensor's scale.
+/// wind cannot be distinguished from an airspeed sensor's scale.
 fn repeated(manoeuvre: &menu::Manoeuvre, times: usize) -> Schedule {
     let again = |all: Schedule, _| all.then(menu::TURN.schedule()).then(manoeuvre.schedule());
     (1..times).fold(manoeuvre.schedule(), again)

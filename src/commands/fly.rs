@@ -166,8 +166,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     let options = options(arguments, &model);
     let stop = Arc::new(AtomicBool::new(false));
-    let told = stop.clone();
-    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))
+    let asked = stop.clone();
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
         .context("setting the handler of Ctrl-C")?;
     let flight = Flight::start(&options, companion, stop)?;
     announce(arguments, &flight);

@@ -14,7 +14,7 @@ use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
 /// Which logs, read how.
 #[derive(Clone, clap::Args)]
 pub struct LogArguments {
-    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
     #[arg(long = "log", num_args = 1.., required = true)]
     pub paths: Vec<PathBuf>,
     #[command(flatten)]

@@ -31,7 +31,7 @@ enum Verb {
     /// Say what a log holds, at which rates, with which gaps, and what it is missing for which
     /// purpose. Exit status 2 when something makes its numbers wrong.
     Info {
-        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
         file: PathBuf,
         /// As JSON.
         #[arg(long)]
@@ -41,7 +41,7 @@ enum Verb {
     },
     /// Write a log of any format as a CSV table.
     Convert {
-        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
         input: PathBuf,
         /// The table.
         output: PathBuf,
@@ -54,7 +54,7 @@ enum Verb {
     /// Reconstruct the flight path of a log: write the states without sensor errors as a CSV table and
     /// print the sensor errors, the wind and the clocks with their standard deviations.
     Reconstruct {
-        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
         input: PathBuf,
         /// The table, in the columns of the log format.
         output: PathBuf,

@@ -211,7 +211,7 @@ fn beside(answer: &Answer, said: &serde_json::Value) {
     println!("{} is ranked {} of {}", answer.id, rank + 1, effects.len());
     if let Some(alike) = effect["indistinguishable_from"].as_array().filter(|a| !a.is_empty()) {
         let alike: Vec<_> = alike.iter().filter_map(|a| a.as_str()).collect();
-        println!("not to be told from {} with these flights", alike.join(", "));
+        println!("cannot be distinguished from {} with these flights", alike.join(", "));
     }
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

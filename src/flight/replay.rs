@@ -201,7 +201,7 @@ struct Replayed<'w, 'f> {
     companion: Companion,
     states: States,
     outcome: Outcome,
-    /// An engagement that the planner had not been told of, because it was busy.
+    /// An engagement that the planner had not heard of, because it was busy.
     owed: bool,
 }
 
@@ -232,11 +232,11 @@ impl Replayed<'_, '_> {
             return !ended;
         };
         let request = self.companion.pilot.observe(state.time, &state);
-        let told = request.filter(|_| planned != Planned::Busy);
-        if told.is_none() {
+        let heard = request.filter(|_| planned != Planned::Busy);
+        if heard.is_none() {
             self.owed |= request.is_some_and(|request| request.engage);
         }
-        let own = told.map(|request| {
+        let own = heard.map(|request| {
             let engage = request.engage || std::mem::take(&mut self.owed);
             let request = Request { engage, ..request };
             if request.engage {

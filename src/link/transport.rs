@@ -196,7 +196,7 @@ impl Network {
         let thread = std::thread::Builder::new()
             .name("network".into())
             .spawn(move || {
-                // Ends when told to, or when the owner is gone.
+                // Ends when asked to, or when the owner is gone.
                 let _ = runtime.block_on(stopped);
             })
             .map_err(TransportError::Thread)?;

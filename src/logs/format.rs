@@ -1,4 +1,4 @@
-//! The four log formats, told apart by how they begin.
+//! The four log formats, distinguished by how they begin.
 
 use serde::Serialize;
 

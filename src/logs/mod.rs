@@ -1,6 +1,6 @@
 //! A flight in memory, with the formats it is read from or written to.
 //!
-//! [`load`] reads any of the four formats, told apart by their first bytes, onto one table.
+//! [`load`] reads any of the four formats, distinguished by their first bytes, onto one table.
 
 pub mod csv;
 pub mod finding;

@@ -3,7 +3,7 @@
 use crate::manoeuvres::excitation::Axis::{self, Aileron, Elevator, Pitch, Roll, Throttle};
 use crate::manoeuvres::{Excitation, Schedule, Shape, Step};
 
-/// Airspeeds at which speed-dependent effects are told apart, m/s.
+/// Airspeeds at which speed-dependent effects are distinguished, m/s.
 const SPEEDS: [f64; 3] = [15.0, 19.0, 24.0];
 
 /// A manoeuvre of the menu.

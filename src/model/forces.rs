@@ -2,7 +2,7 @@
 //!
 //! Effects that need only the point are summed first, in code that holds nothing else: a planner
 //! spends most of its time there. Only a model with other effects goes on to work out what those
-//! must be told, [`Base`].
+//! needs, [`Base`].
 //!
 //! Functions named `…_inlined` become part of their caller, so that a kernel compiled for several
 //! instruction sets stays in its own; everyone else calls the plain ones, which are compiled once.
@@ -120,7 +120,7 @@ impl GreyBox {
         }
     }
 
-    /// What the effects are told that need more than the point.
+    /// What the effects get as input that need more than the point.
     fn base<R: Real>(&self, place: &Place<R>) -> Base<R> {
         self.with_dependent(place, self.independent_sum(place)).0
     }
@@ -172,7 +172,7 @@ impl GreyBox {
         Sum { coefficients: &self.coefficients, first: 0, wrench }
     }
 
-    /// What the other effects are told, where `independent` is the sum of those that need only the
+    /// What the other effects get as input, where `independent` is the sum of those that need only the
     /// point, with the sum of all.
     #[inline(always)]
     fn with_dependent<R: Real>(

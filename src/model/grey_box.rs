@@ -118,7 +118,7 @@ impl GreyBox {
         &self.bare_body
     }
 
-    /// The most that one of the effects must be told.
+    /// The most that one of the effects needs.
     pub fn needs(&self) -> Needs {
         self.terms.last().map_or(Needs::Point, |term| term.kind.needs())
     }

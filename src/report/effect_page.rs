@@ -95,7 +95,7 @@ pub fn facts(about: &Description, place: &str, channels: &str) -> Vec<[String; 2
     ];
     if let Some(entry) = about.entry {
         rows.push(["easily mistaken for".into(), entry.look_alikes.join(", ")]);
-        rows.push(["told apart by".into(), entry.separated_by.into()]);
+        rows.push(["distinguished by".into(), entry.separated_by.into()]);
     }
     rows
 }

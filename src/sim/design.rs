@@ -37,7 +37,7 @@ pub enum DesignError {
         id: String,
     },
     /// The two are the same.
-    #[error("{id} cannot be told from itself; name two effects")]
+    #[error("{id} cannot be distinguished from itself; name two effects")]
     Same {
         /// The effect.
         id: String,
@@ -99,11 +99,11 @@ pub fn prospects(
     let ways = [alternatives(model, &suspects[0])?, alternatives(model, &suspects[1])?];
     let prospect = |manoeuvre: &Manoeuvre| -> Result<Prospect, DesignError> {
         let schedule = manoeuvre.schedule();
-        let told = |k: usize| -> Result<Option<Separation>, DesignError> {
+        let separation_of = |k: usize| -> Result<Option<Separation>, DesignError> {
             let flight = imagine(&truths[k], controller, &schedule)?;
             Ok(flight.map(|f| separation(model, &truths[k], &ways[1 - k], &f)))
         };
-        let separations = [told(0)?, told(1)?];
+        let separations = [separation_of(0)?, separation_of(1)?];
         Ok(Prospect { name: manoeuvre.name, duration_s: schedule.duration(), separations })
     };
     let mut all = MENU.par_iter().map(prospect).collect::<Result<Vec<_>, _>>()?;

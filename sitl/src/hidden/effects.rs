@@ -166,7 +166,7 @@ pub static EFFECTS: [Effect; 24] = [
             if frames < 1.0 || (a - frames * d.step_s).abs() > 1e-9 {
                 return Err(HiddenError::Delay { amplitude: a, step_s: d.step_s });
             }
-            // JSBSim's actuator delays by one frame less than it is told.
+            // JSBSim's actuator delays by one frame less than is asked.
             let delay = format!("<delay type=\"frames\">{}</delay>", frames + 1.0);
             d.pass_deflections("actuator", &delay);
             Ok(())

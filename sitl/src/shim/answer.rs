@@ -13,7 +13,7 @@ pub struct Answer {
     pub echo_us: u64,
     /// Whether the companion is armed.
     pub armed: bool,
-    /// What the actuators are told.
+    /// The command that the actuators get.
     pub inputs: Inputs,
     /// Whether a control lay outside its range and was limited.
     pub limited: bool,
@@ -26,19 +26,19 @@ impl Answer {
         if ![aileron, elevator, throttle, rudder].iter().all(|control| control.is_finite()) {
             return None;
         }
-        let told = Inputs {
+        let sent = Inputs {
             aileron: f64::from(aileron),
             elevator: f64::from(elevator),
             throttle: f64::from(throttle),
             rudder: f64::from(rudder),
         };
-        let flown = told.clamped();
+        let flown = sent.clamped();
         let armed = message.mode & ARMED != 0;
         Some(Answer {
             echo_us: message.time_usec,
             armed,
             inputs: if armed { flown } else { Inputs::default() },
-            limited: flown != told,
+            limited: flown != sent,
         })
     }
 }

@@ -99,7 +99,7 @@ impl Bench {
         self.measured
     }
 
-    /// What the actuators are told.
+    /// The command that the actuators get.
     pub fn inputs(&self) -> Inputs {
         self.inputs
     }

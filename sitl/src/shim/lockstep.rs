@@ -53,7 +53,7 @@ struct Asking {
     paused: bool,
 }
 
-/// Sends `frame` until it is answered; `None` when told to stop.
+/// Sends `frame` until it is answered; `None` when asked to stop.
 fn ask(
     session: &mut Session<'_>,
     frame: &StateFrame,

@@ -171,7 +171,7 @@ pub struct Summary {
     pub wall_s: f64,
     /// From sending a frame to receiving its answer.
     pub latency: Latency,
-    /// Why the run ended; `None` when it was told to stop.
+    /// Why the run ended; `None` when it was asked to stop.
     pub over: Option<Over>,
 }
 

@@ -27,7 +27,7 @@ pub struct TruthLog {
 
 impl TruthLog {
     /// Creates the file with its header row for a plant that steps by `step_s` (s) and whose surfaces
-    /// have this `travel`; refuses one that exists unless told to replace it.
+    /// have this `travel`; refuses one that exists unless asked to replace it.
     pub fn create(target: &TruthFile, step_s: f64, travel: &Travel) -> Result<Self, ShimError> {
         let path = target.path.clone();
         let mut how = OpenOptions::new();

@@ -102,7 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         let mut again = set_up()?;
         schedule.iter().for_each(|schedule| again.pilot.follow(schedule.clone()));
         let vehicle = Vehicle::Sitl(Sitl::new(1, model.airframe.actuators.travels()));
-        // the flight is told even if the planner's sight cannot be
+        // the flight is reported even if the planner's sight cannot be
         sights = summary::sights(&folder, again, vehicle).unwrap_or_else(|why| {
             eprintln!("the report does not show what the planner saw: {why:#}");
             Vec::new()

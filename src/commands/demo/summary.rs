@@ -1,4 +1,4 @@
-//! The recording of the demonstration, read back and told as a report.
+//! The recording of the demonstration, read back and drawn as a report.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ use crate::sysid::flight_path;
 /// "near-perfect tracking" (its section V-E).
 pub const TOLERANCE_DEG: f64 = 0.5;
 
-/// What is told besides the recording.
+/// What the report needs besides the recording.
 pub struct Teller<'a> {
     /// Name of the controller.
     pub controller: &'a str,
@@ -78,18 +78,18 @@ impl Teller<'_> {
             gravity: self.model.atmosphere.gravity,
             ..flight_path::Options::new("flight.csv", self.model.airframe.actuators)
         };
-        let told = |why: &dyn std::fmt::Display| {
+        let report = |why: &dyn std::fmt::Display| {
             eprintln!("the report has no comparison of model and flight: {why}");
         };
-        let path = flight_path::reconstruct(flight, &options).map_err(|e| told(&e)).ok()?;
+        let path = flight_path::reconstruct(flight, &options).map_err(|e| report(&e)).ok()?;
         let models = std::slice::from_ref(self.model);
         compare::compare(models, &[path], &compare::Options::default(), &|_| ())
-            .map_err(|e| told(&e))
+            .map_err(|e| report(&e))
             .ok()
     }
 }
 
-/// Ticks after a command at which the planner's sight is told: the search has begun to move the aircraft.
+/// Ticks after a command at which the planner's view is taken: the search has begun to move the aircraft.
 const TOLD_AFTER: usize = 20;
 
 /// What the planner of `companion` saw a moment after each command: the recording in `folder` is replayed, which

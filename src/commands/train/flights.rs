@@ -16,7 +16,7 @@ const HELD_OUT: usize = 10;
 /// Where flights come from.
 #[derive(clap::Args)]
 pub struct FlightArguments {
-    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
     #[arg(long = "log", num_args = 1..)]
     logs: Vec<PathBuf>,
     #[command(flatten)]

@@ -164,8 +164,8 @@ struct Ground {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let ground = arguments.ground()?;
     let stop = Arc::new(AtomicBool::new(false));
-    let told = stop.clone();
-    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))?;
+    let asked = stop.clone();
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
     println!("{:>8} {COLUMNS}", "seed");
     let one = |seed: u64| arguments.train(&ground, seed, &stop);
     let seeds = arguments.seed..arguments.seed + arguments.seeds;

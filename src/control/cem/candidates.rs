@@ -1,4 +1,4 @@
-//! The last search, told: its candidates flown one by one in the model.
+//! The last search: candidates flown one by one in the model.
 
 use super::rollout::{HORIZON, WIDTH, slewed};
 use super::{Cem, Plan, flown};
@@ -9,13 +9,13 @@ use crate::physics::Command;
 use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
 
-/// Candidates told, spread over all.
+/// Candidates kept for the report, spread over all.
 const TOLD: usize = 48;
 
 impl Cem {
     /// What the tick that was planned from `seen` had before it. It flies some thousand steps, and
     /// allocates.
-    pub(super) fn told(&self, seen: &Observation) -> Insight {
+    pub(super) fn last_insight(&self, seen: &Observation) -> Insight {
         let all = self.blocks.len() * WIDTH;
         let every = all.div_ceil(TOLD).max(1);
         let plans = (0..all).step_by(every).map(|index| self.candidate(index).plan);

@@ -512,7 +512,7 @@ impl Controller for Cem {
     }
 
     fn insight(&self, seen: &Observation) -> Option<Insight> {
-        Some(self.told(seen))
+        Some(self.last_insight(seen))
     }
 
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {

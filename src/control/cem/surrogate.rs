@@ -1,4 +1,4 @@
-//! What the critics say of the end, told cheaply: a plane through the ends that they have valued.
+//! A cheap terminal value: a plane through the ends that they have valued.
 //!
 //! Twin critics are piecewise linear, and the candidates of one tick end close together: a tick's own
 //! plane is to them what a distilled value network would be to all of flight, without training, a file

@@ -91,7 +91,7 @@ enum Pending {
     Fly { seen: Observation, throttle: Option<f64> },
 }
 
-/// When each kind of trouble was last told.
+/// When each kind of trouble was last reported.
 #[derive(Debug, Default)]
 struct Complaints {
     defect: Option<Time>,
@@ -226,7 +226,7 @@ impl Pilot {
             if self.armed { self.limits.slew(self.in_force, wanted) } else { Command::IDLE };
         self.guard();
         if let (Pending::Check { time, .. }, Some(check)) = (self.pending, &mut self.check) {
-            check.told(time, self.in_force);
+            check.commanded(time, self.in_force);
         }
         self.decision()
     }

@@ -1,7 +1,7 @@
 //! The recorder: a thread of its own that writes `flight.csv`, `flight.tlog`, `flight.calls`.
 //!
 //! Control hands entries over a bounded queue and never waits: what does not fit is dropped, with
-//! a count. A disk that fails ends the file, is told once, and the flight goes on.
+//! a count. A disk that fails ends the file, is reported once, and the flight goes on.
 
 pub mod call;
 mod folder;
@@ -342,11 +342,11 @@ mod tests {
             recorder.bytes(0, &frame());
         }
         std::thread::sleep(Duration::from_secs(1));
-        let told: Vec<_> = std::iter::from_fn(|| recorder.trouble()).collect();
-        assert_eq!(told.len(), 3, "{told:?}");
+        let reported: Vec<_> = std::iter::from_fn(|| recorder.trouble()).collect();
+        assert_eq!(reported.len(), 3, "{reported:?}");
         assert!(
-            told.iter().any(|t| t.contains("flight.csv"))
-                && told.iter().any(|t| t.contains("flight.tlog"))
+            reported.iter().any(|t| t.contains("flight.csv"))
+                && reported.iter().any(|t| t.contains("flight.tlog"))
         );
         recorder.row(row(2000));
         assert!(recorder.trouble().is_none());

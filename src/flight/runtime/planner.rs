@@ -44,7 +44,7 @@ pub(super) struct Threaded {
     plans: Receiver<(u64, Command)>,
     thread: Option<JoinHandle<()>>,
     tick: u64,
-    /// An engagement that the planner has not been told of, because it was busy.
+    /// An engagement that the planner has not heard of, because it was busy.
     owed: bool,
     deadline: Duration,
     pace: Pace,
@@ -184,11 +184,11 @@ mod tests {
     impl Bench {
         /// `waits`: which plans wait, the first first.
         fn new(pace: Pace, waits: &[bool]) -> Bench {
-            let ((begun, told), (go, gate)) = (bounded(9), bounded(9));
+            let ((begun, started), (go, gate)) = (bounded(9), bounded(9));
             let waits = waits.iter().rev().copied().collect();
             let controller = Held { begun, gate, waits, engaged: 0.0, planned: 0.0 };
             let planner = Threaded::start(Box::new(controller), Duration::ZERO, pace).unwrap();
-            Bench { planner, begun: told, go }
+            Bench { planner, begun: started, go }
         }
 
         /// A plan that nothing holds up, however slow the machine.

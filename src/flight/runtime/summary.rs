@@ -30,7 +30,7 @@ pub struct Summary {
 
 impl Summary {
     /// Leaves the summary as `summary.txt` beside the recording. The folder was new, so nothing is
-    /// overwritten; a disk that does not take it has been told of already.
+    /// overwritten; a disk that does not take it has been reported already.
     pub(super) fn save(&self) {
         if let Some((folder, _)) = &self.recording
             && let Ok(mut file) = File::create_new(folder.join("summary.txt"))

@@ -14,7 +14,7 @@ fn find(table: &[Parameter], name: ParameterName) -> Option<usize> {
 }
 
 /// The value in the table's type. A whole number sent as REAL32 is taken for an INT32, because
-/// pymavlink's `param_set_send` sends everything so unless told otherwise.
+/// pymavlink's `param_set_send` sends everything so unless asked otherwise.
 fn matched(table: ParameterValue, sent: Option<ParameterValue>) -> Option<ParameterValue> {
     match (table, sent?) {
         (ParameterValue::Real(_), value @ ParameterValue::Real(_)) => Some(value),

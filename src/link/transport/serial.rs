@@ -154,12 +154,12 @@ struct Ear {
     since: Instant,
     bytes: u64,
     frames: u64,
-    told: bool,
+    reported: bool,
 }
 
 impl Ear {
     fn new() -> Self {
-        Ear { since: Instant::now(), bytes: 0, frames: 0, told: false }
+        Ear { since: Instant::now(), bytes: 0, frames: 0, reported: false }
     }
 
     /// Whether it is time to say that only noise comes.
@@ -167,11 +167,11 @@ impl Ear {
         self.bytes += bytes as u64;
         self.frames += frames as u64;
         if self.frames > 0 {
-            *self = Ear { told: self.told, ..Ear::new() };
+            *self = Ear { reported: self.reported, ..Ear::new() };
             return false;
         }
-        let noise = self.bytes >= NOISE.0 && self.since.elapsed() >= NOISE.1 && !self.told;
-        self.told |= noise;
+        let noise = self.bytes >= NOISE.0 && self.since.elapsed() >= NOISE.1 && !self.reported;
+        self.reported |= noise;
         noise
     }
 }

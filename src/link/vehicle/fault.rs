@@ -22,7 +22,7 @@ pub enum Fault {
     Reversed(Axis),
     /// The aircraft does not turn with its surface.
     Unanswered(Axis),
-    /// How it turns with its surfaces could not be told.
+    /// How it turns with its surfaces could not be determined.
     SignsUnknown,
     /// The loop swings about this axis by itself, its surface at its limits.
     Oscillation(Axis),
@@ -36,8 +36,8 @@ impl Fault {
             Fault::Lost => "the client's setpoints, or the vehicle's state, were lost".into(),
             Fault::Reversed(axis) => {
                 let what = match axis {
-                    Axis::Roll => "it rolls left when the aileron is told right",
-                    Axis::Pitch => "it pitches up when the elevator is told down",
+                    Axis::Roll => "it rolls left when the aileron is commanded right",
+                    Axis::Pitch => "it pitches up when the elevator is commanded down",
                 };
                 format!(
                     "wrong sign: {what}; on the ground, in MANUAL, correct {}",
@@ -66,7 +66,7 @@ impl Fault {
                 )
             }
             Fault::SignsUnknown => {
-                "the surfaces' signs could not be told: engage in level flight, \
+                "the surfaces' signs could not be determined: engage in level flight, \
                                     in calmer air"
                     .into()
             }

@@ -76,12 +76,12 @@ pub struct Real {
     requests: Requests,
     /// Whether the controller's frames carry a signature.
     signs: bool,
-    /// Whether the controller hears a radio, as far as it has told while it flew itself.
+    /// Whether the controller hears a radio, as far as it has shown while it flew itself.
     radio: Option<bool>,
     assembly: Assembly,
     engagement: Engagement,
     sticks: Sticks,
-    /// What the actuators were last told.
+    /// The command that the actuators got last.
     sent: Command,
     last_state: Option<Duration>,
     pulse: Pulse,
@@ -298,7 +298,7 @@ impl Real {
         }
     }
 
-    /// Asks the controller to take the aircraft; that it has is told when it shows so.
+    /// Asks the controller to take the aircraft; that it has is reported when it shows so.
     fn hand_back(&mut self, reason: String) {
         self.engagement.hand_back();
         self.notices.push_back(Notice::Released(reason));

@@ -228,7 +228,7 @@ impl Sitl {
         })
     }
 
-    /// See [`super::Vehicle::take_notice`]: another travel is told once.
+    /// See [`super::Vehicle::take_notice`]: another travel is reported once.
     pub fn take_notice(&mut self) -> Option<Notice> {
         if self.told_foreign_travel {
             return None;

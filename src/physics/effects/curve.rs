@@ -1,6 +1,6 @@
 //! Curves over the angle of attack: sums of hats, so that they are linear in their heights.
 //!
-//! Two knots of the grid stay at zero, else a straight line would be told twice: by the curve, and by the
+//! Two knots of the grid stay at zero, else a straight line would be represented twice: by the curve, and by the
 //! coefficients `CL0` and `CLalpha` (`CD0`) of the effects it stands beside.
 
 use super::Terms;

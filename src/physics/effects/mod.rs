@@ -36,7 +36,7 @@ pub(crate) const fn coefficient(
 const AERODYNAMIC: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
-/// What an effect must be told besides the point itself.
+/// What an effect needs besides the point itself.
 ///
 /// Effects that need more are evaluated after those that need only the point, and see what those make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -106,7 +106,7 @@ pub trait Effect {
     const SHAPE: usize = 0;
     /// Name of the ordinate of a table over `alpha_rad` that the effect needs.
     const TABLE: Option<&'static str> = None;
-    /// What it must be told.
+    /// What it needs.
     const NEEDS: Needs = Needs::Point;
     /// Full names of coefficients in whose place it stands: they are zero in a model that it joins.
     const REPLACES: &'static [&'static str] = &[];

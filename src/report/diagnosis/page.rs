@@ -1,4 +1,4 @@
-//! The page of one diagnosis: what a model lacks, told from the sentence to the proof.
+//! The page of one diagnosis: what a model lacks, from the sentence to the proof.
 
 use crate::report::comparison::page::channel_name;
 use crate::report::diagnosis::DiagnosisReport;
@@ -159,7 +159,7 @@ fn left(d: &Diagnosis) -> Figure {
     };
     let groups: Vec<BarGroup> = d.channels.iter().map(group).collect();
     let all = groups.iter().flat_map(|g| &g.values).copied().filter(|v| v.is_finite());
-    // Shares of a few percent are told apart, too.
+    // Shares of a few percent are distinguished, too.
     let full = all.fold(0.0, f64::max).clamp(5.0, 100.0);
     Figure::Bars(Bars { title: "Left unexplained".into(), unit: "%".into(), keys, groups, full })
 }

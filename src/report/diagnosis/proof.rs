@@ -13,7 +13,7 @@ const DRAWN: f64 = 0.1;
 /// Decoys in the table, the strongest first.
 const DECOYS: usize = 8;
 /// The horizon that the sentence speaks of, s, where there is one.
-const TOLD_S: f64 = 5.0;
+const SHOWN_S: f64 = 5.0;
 
 /// What chance reaches: nulls that lack nothing, columns that cannot be effects.
 pub(in crate::report) fn chance(d: &Diagnosis) -> Section {
@@ -96,20 +96,20 @@ pub(in crate::report) fn before_and_after(c: &Comparison) -> Section {
 /// The fall of the error in one sentence: from the last but one model, the tuned one, to the last.
 fn statement(c: &Comparison) -> Findings {
     let horizons = || c.settings.horizons_s.iter().copied();
-    let told = horizons().find(|h| *h == TOLD_S).or(horizons().next_back()).unwrap_or(TOLD_S);
+    let shown = horizons().find(|h| *h == SHOWN_S).or(horizons().next_back()).unwrap_or(SHOWN_S);
     let error = |m: &ModelResult| {
-        m.free_run.iter().find(|s| s.horizon_s == told).map_or(f64::NAN, |s| s.rmse_scaled)
+        m.free_run.iter().find(|s| s.horizon_s == shown).map_or(f64::NAN, |s| s.rmse_scaled)
     };
     let plain = |sentence: String| Finding { sentence, link: None };
     let lead = match &c.models[..] {
         [.., before, after] => {
             let what = match 1.0 - error(after) / error(before) {
-                fall if !fall.is_finite() => "cannot be told".to_string(),
+                fall if !fall.is_finite() => "cannot be determined".to_string(),
                 fall if fall >= 0.0 => format!("falls by {} %", percent(fall)),
                 fall => format!("rises by {} %", percent(-fall)),
             };
             format!(
-                "On flights that no fit has seen, the error after {told} s {what} from “{}” to “{}”.",
+                "On flights that no fit has seen, the error after {shown} s {what} from “{}” to “{}”.",
                 before.name, after.name
             )
         }

@@ -80,7 +80,8 @@ fn tied<'a>(d: &'a Diagnosis, found: &'a Candidate, seen: &mut Vec<&'a str>) -> 
 fn row(c: &Candidate) -> EvidenceRow {
     let mut detail = detail(c);
     if !c.indistinguishable_from.is_empty() {
-        detail.push(format!("not to be told from {}", c.indistinguishable_from.join(", ")));
+        detail
+            .push(format!("cannot be distinguished from {}", c.indistinguishable_from.join(", ")));
     }
     EvidenceRow {
         label: c.id.clone(),

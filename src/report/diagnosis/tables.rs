@@ -121,7 +121,7 @@ pub(in crate::report) fn candidates(d: &Diagnosis) -> Section {
         ("First in bootstraps (%)", Right),
         ("First parameter", Left),
         ("Channels", Left),
-        ("Cannot be told from", Left),
+        ("Cannot be distinguished from", Left),
         ("Refused because", Left),
     ];
     let mut table = Table::new("Every candidate", &columns);

@@ -65,12 +65,12 @@ pub struct Segment {
     /// How far the target is from level flight.
     pub difficulty: Difficulty,
     /// Settled error: mean of the roll and pitch RMS errors over the last fifth, rad; NaN when it
-    /// could not be told.
+    /// could not be determined.
     pub settled_error_rad: f64,
 }
 
 impl Segment {
-    /// Whether the settled error is within `tolerance_rad`; one that could not be told is not.
+    /// Whether the settled error is within `tolerance_rad`; one that could not be determined is not.
     pub fn tracked(&self, tolerance_rad: f64) -> bool {
         self.settled_error_rad <= tolerance_rad
     }

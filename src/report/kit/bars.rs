@@ -23,7 +23,7 @@ pub struct Bars {
 pub struct BarGroup {
     /// What it is.
     pub label: String,
-    /// One value for each key, in the unit of the figure; NaN where it cannot be told.
+    /// One value for each key, in the unit of the figure; NaN where it cannot be determined.
     pub values: Vec<f64>,
 }
 
@@ -60,7 +60,7 @@ impl Bars {
 
 fn value_text(value: f64, unit: &str) -> String {
     match value {
-        v if !v.is_finite() => "cannot be told".into(),
+        v if !v.is_finite() => "cannot be determined".into(),
         v if v.abs() >= 1e4 => format!("{v:.1e} {unit}"),
         v if v.abs() < 0.005 => format!("< 0.01 {unit}"),
         v if v.abs() < 0.095 => format!("{v:.2} {unit}"),
@@ -99,6 +99,6 @@ mod tests {
             html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
         // Cut at full, nothing, nothing below zero, nothing for what is no number.
         assert_eq!(widths, ["100.00", "0.00", "0.00", "0.00"]);
-        assert!(html.contains("250 %") && html.contains("cannot be told"));
+        assert!(html.contains("250 %") && html.contains("cannot be determined"));
     }
 }

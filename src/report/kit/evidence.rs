@@ -36,7 +36,7 @@ pub struct EvidenceRow {
     pub label: String,
     /// What else there is to say of it; may be empty.
     pub detail: String,
-    /// Its evidence; NaN if it could not be told.
+    /// Its evidence; NaN if it could not be determined.
     pub value: f64,
     /// What chance reaches; NaN if it is not known.
     pub threshold: f64,
@@ -93,7 +93,7 @@ impl EvidenceRow {
             false => format!("<small>{}</small>", escape(&self.detail)),
         };
         let text = match (self.value.is_finite(), self.threshold.is_finite()) {
-            (false, _) => "cannot be told".into(),
+            (false, _) => "cannot be determined".into(),
             (true, false) => format!("{}, chance not known", evidence(self.value)),
             (true, true) => {
                 format!("{}, chance {}", evidence(self.value), evidence(self.threshold))
@@ -131,7 +131,7 @@ mod tests {
         // Twelve thresholds are cut at six; half a threshold is a twelfth of six; the rest is nothing.
         assert_eq!(widths, ["100.00", "8.33", "0.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("bar-fill cut") && html.contains("left:16.67%"));
-        assert!(html.contains("5.0, chance 10.0") && html.contains("cannot be told"));
+        assert!(html.contains("5.0, chance 10.0") && html.contains("cannot be determined"));
     }
 
     #[test]

@@ -48,7 +48,7 @@ pub enum Outcome {
     Reached,
     /// Something that was asked for was missed.
     Missed,
-    /// Nothing was asked for, or it cannot be told.
+    /// Nothing was asked for, or it cannot be determined.
     Open,
 }
 

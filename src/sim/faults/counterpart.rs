@@ -97,7 +97,7 @@ impl Aircraft {
         }
     }
 
-    /// What the actuators are told.
+    /// The command that the actuators get.
     pub(super) fn inputs(&self) -> Inputs {
         match self {
             Aircraft::Sitl(bench) => bench.inputs(),

@@ -210,7 +210,7 @@ struct Flight {
     asleep_until: u64,
     /// What has arrived meanwhile.
     unread: Vec<Vec<u8>>,
-    /// What the actuators were told at the last step.
+    /// The command that the actuators got at the last step.
     flown: Inputs,
     /// What jumps have added to the vehicle's clock, µs.
     clock_us: i64,
@@ -304,7 +304,7 @@ impl Flight {
         self.texts.extend(self.desk.texts.drain(..).map(|text| (now_s, text.words)));
     }
 
-    /// Waits until the recorder's thread has met the full disk, which has to be told.
+    /// Waits until the recorder's thread has met the full disk, which has to be reported.
     fn hear_of_the_disk(&mut self, now_s: f64) {
         if self.disk.as_ref().is_none_or(|disk| !disk.full.load(Ordering::Relaxed)) {
             return;

@@ -46,7 +46,7 @@ pub enum Finding {
     Altitude,
     /// Not level, or not at its target, at the end.
     NotRecovered,
-    /// A disk was full, and it was not told.
+    /// A disk was full, and it was not reported.
     Untold,
 }
 
@@ -68,7 +68,7 @@ pub enum Cause {
     Unsteered,
     /// Without a state to fly on a moment ago, at a vehicle that cannot fly by itself.
     Blind,
-    /// A sensor told a believable lie a moment ago.
+    /// A sensor showed a believable wrong value a moment ago.
     Misled,
     /// None of the faults: the same flight without any has it too.
     Itself,

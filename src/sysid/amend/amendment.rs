@@ -197,8 +197,8 @@ impl Ask<'_> {
         let mut accepted: Vec<&Added> = so_far.accepted.iter().collect();
         // each with the number of effects beside which it was asked for, 0 for those that have joined
         let verdict = |added: &Added| {
-            let told = so_far.effects.iter().find(|e| e.id == added.id && e.joined);
-            told.map(|told| (told.clone(), 0))
+            let tried = so_far.effects.iter().find(|e| e.id == added.id && e.joined);
+            tried.map(|tried| (tried.clone(), 0))
         };
         let mut verdicts: Vec<Option<(AddedEffect, usize)>> = effects.iter().map(verdict).collect();
         for _ in 0..ROUNDS {
@@ -245,7 +245,7 @@ impl Ask<'_> {
             return Ok(None);
         }
         let Some(mut kept) = fitted(&all)? else { return Ok(None) };
-        // what the model itself can say is not told twice, which would widen all intervals
+        // what the model itself can say is not represented twice, which would widen all intervals
         let mut fewer = all.clone();
         fewer.retain(|a| !judge::doubled(&a.id, &kept.0.parameters));
         if fewer.len() < all.len()
@@ -297,14 +297,14 @@ impl Ask<'_> {
                     settled && convention.is_borne_out(closer, error)
                 });
                 let kept = taken.is_some();
-                let told = Tried { convention, from, to, error, closer, kept };
-                verdicts[k] = Some((told, beside));
+                let tried = Tried { convention, from, to, error, closer, kept };
+                verdicts[k] = Some((tried, beside));
                 if let Some(taken) = taken {
                     (best, base) = (taken, other);
                 }
             }
         }
-        Ok((best, verdicts.into_iter().flatten().map(|(told, _)| told).collect()))
+        Ok((best, verdicts.into_iter().flatten().map(|(tried, _)| tried).collect()))
     }
 
     /// `other`, a model under another convention, with the effects that joined already; the rest are asked for again

@@ -5,7 +5,7 @@ use crate::physics::catalogue;
 use crate::physics::effects::Description;
 use crate::physics::inputs;
 
-/// Coefficients of added effects that stay where they start: shares of a whole, which cannot be told
+/// Coefficients of added effects that stay where they start: shares of a whole, which cannot be determined
 /// from the shape beside them.
 const HELD: &[&str] = &["lift_stall.k"];
 /// Effects that correct others by what no formula says: heights where little was flown stay small,

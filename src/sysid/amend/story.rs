@@ -1,4 +1,4 @@
-//! An amendment told in sentences.
+//! An amendment in sentences.
 
 use super::conventions::Tried;
 use super::judge::{JUDGED_AT_S, judged};

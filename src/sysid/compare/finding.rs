@@ -54,17 +54,17 @@ pub fn worst(
             Finding { regime, trend: Trend::None }
         })
     };
-    let Some(told) = telling(bins).filter(|b| !is_constant(residuals, b)) else {
+    let Some(decisive) = telling(bins).filter(|b| !is_constant(residuals, b)) else {
         return everywhere();
     };
-    let Some((from, to)) = range(&told.bins) else { return everywhere() };
-    let (first, last) = (&told.bins[from], &told.bins[to]);
+    let Some((from, to)) = range(&decisive.bins) else { return everywhere() };
+    let (first, last) = (&decisive.bins[from], &decisive.bins[to]);
     let inside: Vec<&Residual> =
-        residuals.iter().filter(|r| lies_in(r, told.variable, first.low, last.high)).collect();
+        residuals.iter().filter(|r| lies_in(r, decisive.variable, first.low, last.high)).collect();
     let ends = [first.low, last.high];
-    let regime = regime(&inside, Some(told.variable), ends, flights, seed, channel);
-    let ordered = told.variable != RegimeVariable::Flight;
-    let trend = if ordered { trend(&told.bins) } else { Trend::None };
+    let regime = regime(&inside, Some(decisive.variable), ends, flights, seed, channel);
+    let ordered = decisive.variable != RegimeVariable::Flight;
+    let trend = if ordered { trend(&decisive.bins) } else { Trend::None };
     Some(Finding { regime, trend })
 }
 
@@ -89,11 +89,11 @@ fn telling(bins: &[RegimeBins]) -> Option<&RegimeBins> {
 }
 
 /// Whether the residual is an offset rather than something that the variable tells apart.
-fn is_constant(residuals: &[Residual], told: &RegimeBins) -> bool {
+fn is_constant(residuals: &[Residual], decisive: &RegimeBins) -> bool {
     let count = residuals.len() as f64;
     let mean = residuals.iter().map(|r| r.value).sum::<f64>() / count;
     let square = residuals.iter().map(|r| r.value * r.value).sum::<f64>() / count;
-    told.explained * (square - mean * mean) < 0.1 * mean * mean
+    decisive.explained * (square - mean * mean) < 0.1 * mean * mean
 }
 
 /// First and last of the adjacent bins around the surest failure.

@@ -1,4 +1,4 @@
-//! The findings of a model in the order in which they are told.
+//! The findings of a model in the order in which they are stated.
 
 use super::result::{ChannelResult, HorizonScore};
 use crate::sysid::weak_form::channels::ChannelId;
@@ -14,7 +14,7 @@ pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<S
     let mut path: Vec<_> =
         channels.iter().filter(|c| !is_moment(c) && is_force(c) == forces).collect();
     let mut moments: Vec<_> = channels.iter().filter(is_moment).collect();
-    let worst_first = |a: &&ChannelResult, b: &&ChannelResult| told(b).total_cmp(&told(a));
+    let worst_first = |a: &&ChannelResult, b: &&ChannelResult| weight(b).total_cmp(&weight(a));
     path.sort_by(worst_first);
     moments.sort_by(worst_first);
     let (path_lead, path_rest) = path.split_at(path.len().min(1));
@@ -23,16 +23,16 @@ pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<S
         ([path_lead, moment_lead].concat(), [path_rest, moment_rest].concat());
     leading.sort_by(worst_first);
     rest.sort_by(worst_first);
-    let told = leading.iter().chain(&rest).map(|c| capital(&c.worst_regime) + ".");
-    diverges(free_run).into_iter().chain(told).collect()
+    let weight = leading.iter().chain(&rest).map(|c| capital(&c.worst_regime) + ".");
+    diverges(free_run).into_iter().chain(weight).collect()
 }
 
 /// The part of a channel's effect that its sentence accounts for: what its offset and its most
 /// telling variable explain.
-fn told(channel: &ChannelResult) -> f64 {
+fn weight(channel: &ChannelResult) -> f64 {
     let share = channel.bins.iter().map(|b| b.explained).fold(0.0, f64::max);
-    let told = channel.offset_share + (1.0 - channel.offset_share) * share;
-    channel.effect_per_s * told.sqrt()
+    let weight = channel.offset_share + (1.0 - channel.offset_share) * share;
+    channel.effect_per_s * weight.sqrt()
 }
 
 fn capital(text: &str) -> String {

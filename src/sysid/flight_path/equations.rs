@@ -37,7 +37,7 @@ pub struct Found {
 pub struct Problem<'a> {
     /// The log.
     pub log: &'a Log,
-    /// What the reconstruction is told.
+    /// The settings of the reconstruction.
     pub options: &'a Options,
     /// What a rate sample stands for.
     pub sampling: Sampling,

@@ -44,7 +44,7 @@ pub enum ActuatorClock {
     AsRecorded,
 }
 
-/// What a reconstruction is told besides the log.
+/// What a reconstruction needs besides the log.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// What the flight is called in reports: its file.

@@ -184,19 +184,19 @@ impl FlightController {
             let heartbeat = self.heartbeat();
             self.encoder.encode(&heartbeat, out);
         }
-        // The controller's own loops see what is right: only what is told can be wrong.
+        // The controller's own loops see what is right: only what is sent can be wrong.
         let cutoff = match self.personality {
             Personality::Px4 => self.parameters.get("IMU_GYRO_CUTOFF"),
             Personality::Ardupilot => self.parameters.get("INS_GYRO_FILTER"),
         };
         let filtered = self.lag.filtered(measured, cutoff);
-        let (told_us, told) = self.distorter.apply(frame.time_us, filtered);
-        let frame = StateFrame::new(told_us, &told, self.flight.travel());
-        self.streams.send(&frame, &told, self.flight.home_m(), &mut self.encoder, out);
+        let (sent_us, sent) = self.distorter.apply(frame.time_us, filtered);
+        let frame = StateFrame::new(sent_us, &sent, self.flight.travel());
+        self.streams.send(&frame, &sent, self.flight.home_m(), &mut self.encoder, out);
         self.steps += 1;
     }
 
-    /// What is wrong with what the companion is told from now on.
+    /// What is wrong with what the companion receives from now on.
     pub fn distort(&mut self, distortion: Distortion) {
         self.distorter.now = distortion;
     }
@@ -231,7 +231,7 @@ impl FlightController {
         self.mode
     }
 
-    /// What the actuators were last told.
+    /// The command that the actuators got last.
     pub fn inputs(&self) -> Inputs {
         self.inputs
     }

@@ -43,7 +43,7 @@ impl Sticks {
         manual.or(channels).map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// What the actuators are told; `standing` when no stick was ever heard.
+    /// The command that the actuators get; `standing` when no stick was ever heard.
     pub(super) fn inputs(
         &self,
         personality: Personality,

@@ -41,9 +41,9 @@ pub(super) struct Client {
     pub(super) answered: bool,
     /// When an actuator message last came.
     pub(super) heard: Option<Instant>,
-    /// Its silence has been told.
+    /// Its silence has been reported.
     pub(super) silent: bool,
-    told: Vec<&'static str>,
+    reported: Vec<&'static str>,
     state_interval_us: Option<u64>,
     next_state_us: u64,
 }
@@ -60,14 +60,14 @@ impl Client {
             answered: false,
             heard: None,
             silent: false,
-            told: Vec::new(),
+            reported: Vec::new(),
             state_interval_us: None,
             next_state_us: 0,
         }
     }
 
     /// Takes a frame while the step of `shown_us` is the last that was shown; appends to `reply`
-    /// what is to be sent, to `events` what is to be told.
+    /// what is to be sent, to `events` what is to be reported.
     pub(super) fn take(
         &mut self,
         frame: &Frame,
@@ -101,8 +101,8 @@ impl Client {
     }
 
     fn refuse(&mut self, why: &'static str, events: &mut Vec<Px4Event>) {
-        if !self.told.contains(&why) {
-            self.told.push(why);
+        if !self.reported.contains(&why) {
+            self.reported.push(why);
             events.push(Px4Event::Refused(why));
         }
     }

@@ -40,7 +40,7 @@ pub const FIRST_US: u64 = 1_000_000_000;
 /// HIL_GPS comes every so many steps: 10 Hz.
 const GPS_EVERY: u64 = 25;
 const STEP: Duration = Duration::from_micros(STEP_US);
-/// After this silence it is told.
+/// After this silence it is reported.
 const SILENCE: Duration = Duration::from_secs(1);
 /// A clock that is further behind than this is set anew: no burst makes up for it.
 const HOPELESS: Duration = Duration::from_millis(100);
@@ -86,7 +86,7 @@ struct Run<'a> {
     sent: Instant,
 }
 
-/// Flies whoever connects until told to stop or until the flight is over.
+/// Flies whoever connects until reported to stop or until the flight is over.
 pub(super) fn fly(
     link: Link,
     options: &ShimOptions,

@@ -174,13 +174,13 @@ impl OutputMap {
         }
         let armed = message.mode & ARMED != 0;
         // The plant's elevator pitches down when positive.
-        let told =
+        let actuation =
             Inputs { aileron: roll.value(), elevator: -pitch.value(), throttle, rudder: 0.0 };
         Some(Actuation {
             time_us: message.time_usec,
             lockstep: message.flags & 1 != 0,
             armed,
-            inputs: if armed { told } else { Inputs::default() },
+            inputs: if armed { actuation } else { Inputs::default() },
             limited,
         })
     }
@@ -208,7 +208,7 @@ impl Mean {
 mod tests {
     use super::*;
 
-    fn told(map: &str, outputs: &[(usize, f32)], mode: u8) -> Option<Actuation> {
+    fn actuation(map: &str, outputs: &[(usize, f32)], mode: u8) -> Option<Actuation> {
         let mut message = HilActuatorControls { mode, ..Default::default() };
         outputs.iter().for_each(|(number, value)| message.controls[number - 1] = *value);
         map.parse::<OutputMap>().unwrap().read(&message)
@@ -219,7 +219,7 @@ mod tests {
         // Control allocation of a flying wing (torques ∓0.5 and 0.5): roll r and pitch p come as
         // left = p − r, right = p + r.
         let (roll, pitch) = (0.25, 0.5);
-        let wing = told(
+        let wing = actuation(
             "left-elevon=1,right-elevon=2,throttle=3",
             &[(1, pitch - roll), (2, pitch + roll), (3, 0.75)],
             129,
@@ -228,22 +228,25 @@ mod tests {
         assert_eq!(wing.unwrap().inputs, inputs);
         // Of a plane: left = −r, right = r, elevator = p; the default of the stock airframes.
         let plane = OutputMap::default().to_string();
-        let plane = told(&plane, &[(6, -roll), (7, roll), (8, pitch), (5, 0.75)], 129);
+        let plane = actuation(&plane, &[(6, -roll), (7, roll), (8, pitch), (5, 0.75)], 129);
         assert_eq!(plane.unwrap().inputs, inputs);
         // One channel, reversed.
-        let single =
-            told("aileron=-1,elevator=2,throttle=3", &[(1, -roll), (2, pitch), (3, 0.75)], 129);
+        let single = actuation(
+            "aileron=-1,elevator=2,throttle=3",
+            &[(1, -roll), (2, pitch), (3, 0.75)],
+            129,
+        );
         assert_eq!(single.unwrap().inputs, inputs);
     }
 
     #[test]
     fn what_is_no_number_is_not_flown_and_what_is_too_large_is_limited() {
         let map = "aileron=1,elevator=2,throttle=3";
-        assert_eq!(told(map, &[(2, f32::NAN)], 129), None);
-        assert!(told(map, &[(4, f32::NAN)], 129).is_some(), "an output that moves nothing");
-        let wild = told(map, &[(1, 1e30), (3, -4.0)], 129).unwrap();
+        assert_eq!(actuation(map, &[(2, f32::NAN)], 129), None);
+        assert!(actuation(map, &[(4, f32::NAN)], 129).is_some(), "an output that moves nothing");
+        let wild = actuation(map, &[(1, 1e30), (3, -4.0)], 129).unwrap();
         assert_eq!((wild.inputs.aileron, wild.inputs.throttle, wild.limited), (1.0, 0.0, true));
-        assert_eq!(told(map, &[(1, 1.0), (3, 1.0)], 1).unwrap().inputs, Inputs::default());
+        assert_eq!(actuation(map, &[(1, 1.0), (3, 1.0)], 1).unwrap().inputs, Inputs::default());
     }
 
     #[test]

@@ -146,7 +146,7 @@ impl Sensors {
         message
     }
 
-    /// HIL_GPS: a 3D fix of ten satellites, without latency (PX4 is to be told so: EKF2_GPS_DELAY).
+    /// HIL_GPS: a 3D fix of ten satellites, without latency (set in PX4: EKF2_GPS_DELAY).
     pub fn gps(&mut self, time_us: u64, truth: &Truth) -> HilGps {
         let noise = self.noise;
         let mut draw = |deviation: f64| deviation * normal(&mut self.random);

@@ -30,7 +30,7 @@ const ROUND: usize = PATTERN.len() * LENGTH + 2 * OFFSET;
 const LONGEST: usize = PULSES.len() * ROUND;
 /// A sign is certain from so many standard errors on: it is asked anew at every state.
 const CERTAIN: f64 = 7.0;
-/// A sign is not told before its surface has gone the other way and been answered: one edge may
+/// A sign is not judged before its surface has gone the other way and been answered: one edge may
 /// meet one gust.
 const SEEN: [usize; 2] = [LENGTH + ANSWERED, OFFSET + LENGTH + ANSWERED];
 const ANSWERED: usize = 7;
@@ -94,7 +94,7 @@ impl Check {
         self.stage = Stage::Rest;
     }
 
-    /// The helm is ours: `in_force` is what the surfaces were last told.
+    /// The helm is ours: `in_force` is what was last commanded to the surfaces.
     pub(super) fn begin(&mut self, in_force: Command) {
         if matches!(self.stage, Stage::Waiting) {
             let evidence = Evidence::default();
@@ -142,8 +142,8 @@ impl Check {
         })
     }
 
-    /// Notes what the surfaces are told on the state of `now`.
-    pub(super) fn told(&mut self, now: Time, command: Command) {
+    /// Records what is commanded to the surfaces on the state of `now`.
+    pub(super) fn commanded(&mut self, now: Time, command: Command) {
         let Stage::Running { begun: Some(begun), evidence, last } = &mut self.stage else { return };
         let index = begun.index(now);
         evidence.change(0, index, command.aileron - last.aileron);
@@ -236,7 +236,7 @@ mod tests {
                 verdict => return (verdict, k),
             }
             let command = check.command(now).unwrap();
-            check.told(now, command);
+            check.commanded(now, command);
             wire.push_back(command);
             let command = wire.pop_front().unwrap();
             let [aileron, elevator] = wired([command.aileron, command.elevator]);
@@ -296,7 +296,7 @@ mod tests {
             for k in 0..before {
                 let now = Time::from_micros(10_000 * k);
                 assert_eq!(check.see(now, &State::NEUTRAL, Command::IDLE), Verdict::Open);
-                check.told(now, check.command(now).unwrap());
+                check.commanded(now, check.command(now).unwrap());
             }
             let later = Time::from_micros(u64::MAX / 2);
             let verdict = check.see(later, &State::NEUTRAL, Command::IDLE);

@@ -11,7 +11,7 @@
 //!
 //! Three measurements hold it: the airspeed |(u, v, w)|; the climb rate, in air that rises and
 //! sinks about zero; and a sideslip that is zero in the mean, or, where wind and velocity over
-//! ground are told, the sideways velocity that follows from them. The state being a velocity, a
+//! ground are reported, the sideways velocity that follows from them. The state being a velocity, a
 //! constant wind cancels; a steady updraught of 1 m/s shows as w/V, 3° at 20 m/s.
 
 use crate::physics::atmosphere::MIDDLE_GRAVITY;
@@ -42,12 +42,12 @@ pub struct Measured {
     pub specific_force: [f64; 3],
     /// True airspeed, m/s.
     pub airspeed: f64,
-    /// Climb rate, m/s; NaN when not told.
+    /// Climb rate, m/s; NaN when not reported.
     pub climb: f64,
-    /// Velocity over ground, NED, m/s; NaN when it has not been told since the last update: an old
+    /// Velocity over ground, NED, m/s; NaN when it has not been reported since the last update: an old
     /// one has the wrong direction in a turn.
     pub velocity: [f64; 3],
-    /// The air's velocity, NED, m/s; NaN when not told.
+    /// The air's velocity, NED, m/s; NaN when not reported.
     pub wind: [f64; 3],
 }
 

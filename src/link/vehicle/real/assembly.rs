@@ -33,7 +33,7 @@ pub(super) struct Assembly {
     air: Heard<[f64; 3]>,
     incidence: Heard<[f64; 2]>,
     estimator: AirData,
-    /// Whether the velocity has been told since the estimator last saw it.
+    /// Whether the velocity has been reported since the estimator last saw it.
     new_velocity: bool,
     actuators: Actuators,
     boot_ms: Option<u32>,
@@ -76,7 +76,7 @@ impl Assembly {
     }
 
     /// Takes a measurement; an attitude completes a state. `command` is what the actuators have
-    /// been told since the last state.
+    /// been reported since the last state.
     pub(super) fn take(
         &mut self,
         host: Duration,
@@ -186,7 +186,7 @@ impl Assembly {
     }
 
     fn fill_incidence(&mut self, host: Duration, next: &mut Telemetry, climb: f64, step: f64) {
-        let told = fresh(self.incidence, host).filter(|[a, b]| limits::incidence(*a, *b));
+        let reported = fresh(self.incidence, host).filter(|[a, b]| limits::incidence(*a, *b));
         let s = &next.state;
         let measured = Measured {
             attitude: [s.roll, s.pitch, next.yaw],
@@ -200,10 +200,10 @@ impl Assembly {
             },
             wind: next.wind,
         };
-        // Kept running beside what is told, to be there when that ends.
+        // Kept running beside what is reported, to be there when that ends.
         let estimated = self.estimator.update(&measured, step);
         let whole = !next.faults.contains(Faults::SPECIFIC_FORCE);
-        match told.or(estimated.filter(|_| whole)) {
+        match reported.or(estimated.filter(|_| whole)) {
             Some([alpha, beta]) => (next.state.alpha, next.state.beta) = (alpha, beta),
             None => next.faults.insert(Faults::INCIDENCE),
         }

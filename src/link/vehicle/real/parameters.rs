@@ -22,7 +22,7 @@ struct Entry {
     asked: Option<Duration>,
 }
 
-/// The parameters of a profile, as far as the controller has told them.
+/// The parameters of a profile, as far as the controller has reported them.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     entries: Vec<Entry>,
@@ -31,7 +31,7 @@ pub struct Parameters {
 /// How a parameter stands.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Standing {
-    /// Not told yet.
+    /// Not reported yet.
     Unread,
     /// The controller does not answer for it.
     Unknown,
@@ -49,7 +49,7 @@ impl Parameters {
         Parameters { entries: rules.iter().map(entry).collect() }
     }
 
-    /// Forgets what was told, as when the controller has started anew.
+    /// Forgets what was reported, as when the controller has started anew.
     pub(super) fn forget(&mut self) {
         for entry in &mut self.entries {
             (entry.value, entry.tries, entry.asked) = (None, 0, None);

@@ -40,13 +40,13 @@ impl Pulse {
         self.since = Some(host);
         let due = RATE * length.as_secs_f64();
         let little = |count: u32| f64::from(count) < LEAST * due;
-        let told = |count: u32, what: &str| {
+        let counted = |count: u32, what: &str| {
             let ms = length.as_millis();
             Some(format!("only {count} of {due:.0} {what} in {ms} ms"))
         };
         match (little(cycles), little(states)) {
-            (true, _) => told(cycles, "cycles of this computer"),
-            (false, true) => told(states, "states of the vehicle"),
+            (true, _) => counted(cycles, "cycles of this computer"),
+            (false, true) => counted(states, "states of the vehicle"),
             (false, false) => None,
         }
     }

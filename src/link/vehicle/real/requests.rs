@@ -22,7 +22,7 @@ pub(super) struct Requests {
     waiting: VecDeque<u32>,
     granted: BTreeSet<u32>,
     denied: BTreeSet<u32>,
-    told: bool,
+    reported: bool,
 }
 
 impl Requests {
@@ -61,8 +61,8 @@ impl Requests {
 
     /// The streams that the flight needs and that were denied, in words; said once.
     pub(super) fn complaint(&mut self, stack: Stack) -> Option<String> {
-        let words = self.words(stack).filter(|_| !self.told)?;
-        self.told = true;
+        let words = self.words(stack).filter(|_| !self.reported)?;
+        self.reported = true;
         Some(words)
     }
 

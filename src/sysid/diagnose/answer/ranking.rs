@@ -1,4 +1,4 @@
-//! Every candidate as it is told: asserted ones first, then by evidence.
+//! Every candidate as it is listed: asserted ones first, then by evidence.
 
 use std::collections::BTreeMap;
 

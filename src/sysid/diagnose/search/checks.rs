@@ -16,7 +16,7 @@ use crate::sysid::diagnose::search::round::Round;
 const FOLDS: usize = 5;
 /// Random stream of the bootstraps.
 const BOOTSTRAPS: u64 = 82;
-/// Contributions that correlate more than this cannot be told apart.
+/// Contributions that correlate more than this cannot be distinguished.
 pub const ALIKE: f64 = 0.9;
 /// Nor those whose evidence is this close.
 pub const CLOSE: f64 = 10.0;
@@ -235,8 +235,8 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let feint = p.others(&cells, &added, &noise.whiteners);
     let n = columns.len();
     let gram = grams.total.view((0, 0), (n, n)).into_owned();
-    let told = &gram - feint.view((0, 0), (n, n));
-    let (all, left) = (scaled_inverse(&gram)?, scaled_inverse(&told)?);
+    let corrected = &gram - feint.view((0, 0), (n, n));
+    let (all, left) = (scaled_inverse(&gram)?, scaled_inverse(&corrected)?);
     let share = all[(0, 0)] / left[(0, 0)];
     let amounts = &left * grams.total.view((0, n), (n, 1)).column(0);
     (share > TOLD).then(|| [amounts[0], sd / share])

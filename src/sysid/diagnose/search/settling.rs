@@ -50,8 +50,8 @@ fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
         model.join_most(round.trials[trial].id, &score.values).ok()?;
         (model.body != before).then_some(model)
     };
-    let mut told = scores.iter().filter(|(_, s)| s.evidence > *threshold);
-    let (trial, score, model) = told.find_map(|(k, s)| Some((*k, s, of_body(*k, s)?)))?;
+    let mut passing = scores.iter().filter(|(_, s)| s.evidence > *threshold);
+    let (trial, score, model) = passing.find_map(|(k, s)| Some((*k, s, of_body(*k, s)?)))?;
     let trial = &round.trials[trial];
     let first = trial.points[score.point].free[0].0;
     let entry = round.entries.iter().find(|e| e.about.id == trial.id)?;

@@ -397,8 +397,8 @@ impl Found {
         let real = |s: &&Selected| s.refused.is_empty() && !s.relieves;
         let taken: Vec<(&'static str, [f64; 6])> =
             self.selected.iter().filter(real).map(|s| (s.id, s.taken)).collect();
-        let told = self.selected.iter_mut().filter(|s| s.refused.is_empty() && !s.relieves);
-        for effect in told {
+        let assertable = self.selected.iter_mut().filter(|s| s.refused.is_empty() && !s.relieves);
+        for effect in assertable {
             let own = |of: &[f64; 6]| effect.channels.iter().map(|c| of[*c]).sum::<f64>();
             let significant =
                 effect.channels.iter().any(|c| after.removable[*c] > after.threshold[*c]);
