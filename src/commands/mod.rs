@@ -9,6 +9,7 @@ mod collect;
 mod compare;
 #[cfg(feature = "sitl")]
 mod demo;
+mod effect_files;
 mod effects;
 #[cfg(feature = "sitl")]
 mod design;

@@ -4,6 +4,7 @@ use super::expression::{Expression, Node};
 use super::tape::Tape;
 use super::variable::Variable;
 use crate::num::Real;
+use crate::physics::airframe::Sourced;
 use crate::physics::effects::{Description, Needs, Terms};
 use crate::physics::{Channel, Point};
 
@@ -58,6 +59,15 @@ impl Written {
     #[inline(always)]
     pub fn basis<R: Real>(&self, at: &Point<R>, shape: &[f64], terms: &mut impl Terms<R>) {
         self.tape.run(at, shape, |index, channel, amount| terms.add(index, channel, amount));
+    }
+
+    /// The value of a coefficient as the file gives it.
+    pub fn number(&self, coefficient: usize) -> Sourced {
+        Sourced {
+            value: self.values[coefficient],
+            source: self.about.source.into(),
+            sd: Some(self.widths[coefficient]),
+        }
     }
 
     /// How many operations an evaluation takes.

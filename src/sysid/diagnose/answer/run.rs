@@ -38,6 +38,7 @@ pub fn diagnose(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DiagnoseError> {
     known(&options.without)?;
+    known(&options.with)?;
     let (problem, used, mut notes) = problem(model, flights, options)?;
     notes.extend(excitation::check(&problem.flights)?);
     let mut found = search(&problem, model, options, progress)
@@ -144,5 +145,5 @@ fn verdict(found: &Found) -> Verdict {
 
 /// Ids of the candidates that a model lacks and that can be searched for.
 pub fn searched(model: &GreyBox, without: &[String]) -> Vec<&'static str> {
-    catalogue::candidates(model, without).iter().map(|e| e.about.id).collect()
+    catalogue::candidates(model, &[], without).iter().map(|e| e.about.id).collect()
 }
