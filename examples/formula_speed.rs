@@ -46,14 +46,25 @@ fn time<R: Real>(kind: Kind) -> f64 {
     let mut state = State::NEUTRAL.map(number);
     (state.alpha, state.beta) = (number(0.1), number(-0.05));
     let controls = Controls::default();
-    let controls = Controls { aileron: number(0.1), elevator: number(controls.elevator), throttle: number(0.3) };
+    let controls = Controls {
+        aileron: number(0.1),
+        elevator: number(controls.elevator),
+        throttle: number(0.3),
+    };
     let air = AirData::new(&state, number(1.2), 600.0, &geometry);
     let base = Base::zero();
     let run = || {
         let begun = Instant::now();
         let mut sum = Sum(R::zero());
         for _ in 0..TIMES {
-            let at = Point { state: black_box(&state), controls: &controls, air: black_box(&air), geometry: &geometry, axes: ForceAxes::Wind, base: &base };
+            let at = Point {
+                state: black_box(&state),
+                controls: &controls,
+                air: black_box(&air),
+                geometry: &geometry,
+                axes: ForceAxes::Wind,
+                base: &base,
+            };
             kind.independent_basis(&at, Own::default(), &mut sum);
             kind.dependent_basis(&at, Own::default(), &mut sum);
         }

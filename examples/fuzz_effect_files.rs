@@ -13,8 +13,12 @@ fn main() {
     let good = fuzz::run(count as usize, seed, &mut |_, said| {
         if let Err(why) = said {
             refused += 1;
-            located += u64::from(why.contains("line ") || why.contains(" = ") || why.contains("parameters."));
+            located += u64::from(
+                why.contains("line ") || why.contains(" = ") || why.contains("parameters."),
+            );
         }
     });
-    println!("{count} files of seed {seed}: {good} read, {refused} refused, {located} of these with their place, no panic");
+    println!(
+        "{count} files of seed {seed}: {good} read, {refused} refused, {located} of these with their place, no panic"
+    );
 }

@@ -33,7 +33,9 @@ meaning = "width"
 
 /// One channel with the shape constant w in it.
 fn channel(factor: &str, shape: &str) -> String {
-    format!("[[channels]]\nchannel = \"roll\"\nfactor = \"{factor}\"\nshape = \"{shape} + 0*k*w\"\n")
+    format!(
+        "[[channels]]\nchannel = \"roll\"\nfactor = \"{factor}\"\nshape = \"{shape} + 0*k*w\"\n"
+    )
 }
 
 struct All<R>(Vec<(usize, Channel, R)>);
@@ -52,7 +54,14 @@ fn given<R: Real>(kind: Kind, shape: &[f64], alpha: R, throttle: R) -> Vec<(usiz
     let controls = Controls { aileron: number(0.1), elevator: number(-0.05), throttle };
     let air = AirData::new(&state, number(1.2), 600.0, &geometry);
     let base = Base::zero();
-    let at = Point { state: &state, controls: &controls, air: &air, geometry: &geometry, axes: ForceAxes::Wind, base: &base };
+    let at = Point {
+        state: &state,
+        controls: &controls,
+        air: &air,
+        geometry: &geometry,
+        axes: ForceAxes::Wind,
+        base: &base,
+    };
     let mut all = All(Vec::new());
     kind.independent_basis(&at, Own { table: None, shape }, &mut all);
     kind.dependent_basis(&at, Own { table: None, shape }, &mut all);
@@ -75,7 +84,9 @@ fn a_formula_gives_what_the_same_effect_of_the_catalogue_gives() {
     for (kind, channel, factor, shape) in pairs {
         let text = text("", "1").replace("[parameters.w]", "[unused]");
         let text = text.split("[unused]").next().unwrap().to_owned()
-            + &format!("[[channels]]\nchannel = \"{channel}\"\nfactor = \"{factor}\"\nshape = \"{shape}\"\n");
+            + &format!(
+                "[[channels]]\nchannel = \"{channel}\"\nfactor = \"{factor}\"\nshape = \"{shape}\"\n"
+            );
         let own = Kind::Written(Box::leak(Box::new(read(&text))));
         for alpha in [-0.1, 0.0, 0.23] {
             let (a, b) = (given(kind, &[], alpha, 0.3), given(own, &[], alpha, 0.3));
@@ -114,7 +125,8 @@ fn every_function_is_what_it_says() {
     ];
     for (shape, truth) in cases {
         let full = shape.replace("alpha^-2", "max(abs(alpha), 0.01)^-2");
-        let effect = Kind::Written(Box::leak(Box::new(read(&text(&channel("qbar*S*b", &full), "1")))));
+        let effect =
+            Kind::Written(Box::leak(Box::new(read(&text(&channel("qbar*S*b", &full), "1")))));
         for alpha in [-0.23, 0.04, 0.31] {
             let all = given(effect, &[w], alpha, 0.5);
             let q_s = 0.5 * 1.2 * 16.67_f64.powi(2) * 0.75 * 2.1;

@@ -53,8 +53,11 @@ fn try_at(
     if finite.0 {
         return Ok(());
     }
-    let words: Vec<String> =
-        variables.iter().enumerate().map(|(k, v)| format!("{} = {}", v.name(), value(k, *v))).collect();
+    let words: Vec<String> = variables
+        .iter()
+        .enumerate()
+        .map(|(k, v)| format!("{} = {}", v.name(), value(k, *v)))
+        .collect();
     Err(format!(
         "the formula is no number at {}; keep what is divided by, and what stands under a root, above zero with max",
         words.join(", ")

@@ -96,10 +96,14 @@ pub fn parse(text: &str) -> Result<Written, String> {
         checked_parameter(name, parameter)?;
     }
     if names.is_empty() || names.len() > MOST_PARAMETERS {
-        return Err(format!("an effect has 1 to {MOST_PARAMETERS} parameters, this one {}; write them under [parameters]", names.len()));
+        return Err(format!(
+            "an effect has 1 to {MOST_PARAMETERS} parameters, this one {}; write them under [parameters]",
+            names.len()
+        ));
     }
     let place = Places { text };
-    let lines = file.channels.iter().map(|c| line(c, &names, &place)).collect::<Result<Vec<_>, _>>()?;
+    let lines =
+        file.channels.iter().map(|c| line(c, &names, &place)).collect::<Result<Vec<_>, _>>()?;
     if lines.is_empty() {
         return Err("the effect acts on no channel; add [[channels]] with channel and shape".into());
     }
@@ -148,7 +152,11 @@ fn line(file: &ChannelFile, names: &[&str], place: &Places) -> Result<Placed, St
     let found = CHANNELS.iter().find(|(name, _)| *name == file.channel);
     let Some((_, channel)) = found else {
         let known: Vec<&str> = CHANNELS.iter().map(|(name, _)| *name).collect();
-        return Err(format!("channel {:?} is unknown; there are {}", file.channel, known.join(", ")));
+        return Err(format!(
+            "channel {:?} is unknown; there are {}",
+            file.channel,
+            known.join(", ")
+        ));
     };
     let read = |text: &Spanned<String>, names: &[&str]| {
         let start = text.span().start;
@@ -159,7 +167,10 @@ fn line(file: &ChannelFile, names: &[&str], place: &Places) -> Result<Placed, St
         None => Expression::number(1.0),
     };
     let shape = read(&file.shape, names)?;
-    Ok(Placed { line: Line { channel: *channel, factor, shape }, shape_at: file.shape.span().start })
+    Ok(Placed {
+        line: Line { channel: *channel, factor, shape },
+        shape_at: file.shape.span().start,
+    })
 }
 
 fn built(
@@ -174,7 +185,10 @@ fn built(
         order.iter().filter_map(|k| file.parameters.get(names[*k])).collect();
     let count = linear.iter().filter(|l| **l).count();
     if count == 0 {
-        return Err("no parameter multiplies the shape, so the effect could not be nought; write k*(…)".into());
+        return Err(
+            "no parameter multiplies the shape, so the effect could not be nought; write k*(…)"
+                .into(),
+        );
     }
     let mut dimensions = Vec::new();
     for (name, parameter) in &file.parameters {
@@ -191,7 +205,8 @@ fn built(
     for Placed { line, shape_at } in &lines {
         let said = |fault: Fault| place.said(*shape_at, &fault);
         let parts = split::parts(&line.shape, linear).map_err(said)?;
-        let factor = units::dimension(&line.factor, &[]).map_err(|f| format!("factor: {}", f.why))?;
+        let factor =
+            units::dimension(&line.factor, &[]).map_err(|f| format!("factor: {}", f.why))?;
         for (k, part) in &parts {
             balance(line.channel, factor, part, names[*k], dimensions[*k], &dimensions)
                 .map_err(said)?;
@@ -217,7 +232,16 @@ fn built(
     let mut lines: Vec<Line> = lines.into_iter().map(|l| l.line).collect();
     lines.iter_mut().for_each(|line| renumber(&mut line.shape, order));
     let about = description(file, names, order, &coefficients, &lines, count, &values, &widths);
-    Ok(Written { about, status: file.status, lines, values, widths, text: text.into(), tape, needs })
+    Ok(Written {
+        about,
+        status: file.status,
+        lines,
+        values,
+        widths,
+        text: text.into(),
+        tape,
+        needs,
+    })
 }
 
 /// Parameters by their place among the coefficients.
@@ -370,7 +394,8 @@ fn starts(
 
 fn checked_id(id: &str) -> Result<(), String> {
     checked_name("id", id)?;
-    let taken = Kind::ALL.iter().any(|k| k.describe().id == id) || inputs::Kind::from_id(id).is_some();
+    let taken =
+        Kind::ALL.iter().any(|k| k.describe().id == id) || inputs::Kind::from_id(id).is_some();
     match taken {
         true => Err(format!("id = {id:?} is an effect of the catalogue; choose another id")),
         false => Ok(()),
@@ -399,7 +424,10 @@ fn checked_parameter(name: &str, p: &Parameter) -> Result<(), String> {
         return Err(format!("parameters.{name}.bounds must be two numbers, the lower first"));
     }
     if !(low..=high).contains(&p.value) {
-        return Err(format!("parameters.{name}.value = {} lies outside its bounds {low} to {high}", p.value));
+        return Err(format!(
+            "parameters.{name}.value = {} lies outside its bounds {low} to {high}",
+            p.value
+        ));
     }
     if p.width.is_some_and(|w| !(w.is_finite() && w > 0.0)) {
         return Err(format!("parameters.{name}.width must be a positive number"));

@@ -2,8 +2,8 @@
 
 use rand::RngExt;
 
-use super::file;
 use super::expression::Function;
+use super::file;
 use super::variable::Variable;
 use crate::num::stream::{Stream, stream};
 
@@ -87,8 +87,30 @@ fn pick<T: Copy>(random: &mut Stream, all: &[T]) -> T {
 /// The file with bytes taken out, put in, doubled or changed.
 fn damaged(random: &mut Stream) -> String {
     const ODD: [&str; 24] = [
-        "(", ")", "^", "²", "-", "1e308", "nan", "\"", "\n", "[", "]", "δa", ";", ":", ",", "/0", "{", "=", "\\",
-        "((((((((((", "k*k", "inf", "0", "\u{301}",
+        "(",
+        ")",
+        "^",
+        "²",
+        "-",
+        "1e308",
+        "nan",
+        "\"",
+        "\n",
+        "[",
+        "]",
+        "δa",
+        ";",
+        ":",
+        ",",
+        "/0",
+        "{",
+        "=",
+        "\\",
+        "((((((((((",
+        "k*k",
+        "inf",
+        "0",
+        "\u{301}",
     ];
     let mut text: Vec<char> = WHOLE.chars().collect();
     for _ in 0..random.random_range(1..5) {

@@ -29,14 +29,19 @@ type Parsed = Result<Expression, Fault>;
 /// If it is no formula: where, why, and what to write instead.
 pub fn parse(text: &str, parameters: &[&str]) -> Parsed {
     if text.len() > LONGEST {
-        let why = format!("the formula has {} bytes, {LONGEST} are the most; divide it into several channels or effects", text.len());
+        let why = format!(
+            "the formula has {} bytes, {LONGEST} are the most; divide it into several channels or effects",
+            text.len()
+        );
         return Err(Fault { at: LONGEST, why });
     }
     let mut parser = Parser { text, at: 0, parameters, depth: 0, nodes: 0 };
     let formula = parser.sum()?;
     match parser.peek() {
         None => Ok(formula),
-        Some(')') => Err(parser.fault("this bracket closes nothing; take it out or open it before")),
+        Some(')') => {
+            Err(parser.fault("this bracket closes nothing; take it out or open it before"))
+        }
         Some(other) => Err(parser.fault(&format!(
             "{other:?} is not expected here; write an operator (+ - * / ^) between two terms"
         ))),
@@ -76,7 +81,9 @@ impl Parser<'_> {
     fn node(&mut self, node: Node, at: usize) -> Parsed {
         self.nodes += 1;
         if self.nodes > MOST_NODES {
-            let why = format!("the formula has more than {MOST_NODES} terms; divide it into several effects");
+            let why = format!(
+                "the formula has more than {MOST_NODES} terms; divide it into several effects"
+            );
             return Err(Fault { at, why });
         }
         Ok(Expression { node, at })
@@ -197,9 +204,8 @@ impl Parser<'_> {
                 self.node(Node::Number(x), at)
             }
             c if c.is_alphabetic() || c == '_' => self.named(),
-            c => Err(self.fault(&format!(
-                "{c:?} is not expected here; a number, a name or a bracket is"
-            ))),
+            c => Err(self
+                .fault(&format!("{c:?} is not expected here; a number, a name or a bracket is"))),
         }
     }
 
@@ -335,7 +341,9 @@ impl Parser<'_> {
     fn table(&mut self, at: usize) -> Parsed {
         let x = self.sum()?;
         if !self.take(';') {
-            return Err(self.fault("a table is written table(x; x1:y1, x2:y2, …); write ; after its variable"));
+            return Err(self.fault(
+                "a table is written table(x; x1:y1, x2:y2, …); write ; after its variable",
+            ));
         }
         let mut points: Vec<[f64; 2]> = Vec::new();
         loop {
@@ -376,7 +384,10 @@ fn no_function(name: &str) -> String {
     let short: String = name.chars().take(30).collect();
     let known = Function::ALL.iter().filter(|f| !f.is_operator()).map(|f| f.name());
     let known: Vec<&str> = known.chain(["clamp", "table"]).collect();
-    format!("there is no function {short:?}; there are {}; a product needs * before the bracket", known.join(", "))
+    format!(
+        "there is no function {short:?}; there are {}; a product needs * before the bracket",
+        known.join(", ")
+    )
 }
 
 /// Letters to change, add or leave out between two names.

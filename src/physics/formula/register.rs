@@ -42,7 +42,12 @@ pub fn read(text: &str) -> Result<&'static Written, String> {
 /// If a file cannot be read or is no effect file.
 pub fn load(path: &Path) -> Result<Vec<&'static Written>, FileError> {
     let what = "effect file";
-    let unread = |path: &Path, why| FileError::Read { what, path: path.into(), why, example: "../examples/yaw_by_throttle.toml" };
+    let unread = |path: &Path, why| FileError::Read {
+        what,
+        path: path.into(),
+        why,
+        example: "../examples/yaw_by_throttle.toml",
+    };
     let mut files: Vec<PathBuf> = vec![path.into()];
     if path.is_dir() {
         let entries = std::fs::read_dir(path).map_err(|why| unread(path, why))?;

@@ -101,9 +101,9 @@ fn divided(of: &Expression, linear: &[bool]) -> Vec<(Option<usize>, Expression)>
             each(&all[0], &|part| part.times(all[1].clone()))
         }
         Node::Call(Function::Multiply, all) => each(&all[1], &|part| all[0].clone().times(part)),
-        Node::Call(Function::Divide, all) => each(&all[0], &|part| {
-            Expression::call(Function::Divide, vec![part, all[1].clone()])
-        }),
+        Node::Call(Function::Divide, all) => {
+            each(&all[0], &|part| Expression::call(Function::Divide, vec![part, all[1].clone()]))
+        }
         // `linear` leaves no other node with one of its parameters below
         _ => vec![(None, of.clone())],
     }

@@ -128,7 +128,11 @@ impl Tape {
             },
             Node::Power(base, n) => {
                 self.push(base, places)?;
-                self.operations.push(if *n == 2 { Operation::Square } else { Operation::Power(*n) });
+                self.operations.push(if *n == 2 {
+                    Operation::Square
+                } else {
+                    Operation::Power(*n)
+                });
                 Ok(())
             }
             Node::Table(x, points) => {

@@ -17,7 +17,10 @@ enum Measure {
 ///
 /// # Errors
 /// Where two sides do not have the same, with both.
-pub fn dimension(formula: &Expression, dimensions: &[Dimension]) -> Result<Option<Dimension>, Fault> {
+pub fn dimension(
+    formula: &Expression,
+    dimensions: &[Dimension],
+) -> Result<Option<Dimension>, Fault> {
     Ok(match measure(formula, dimensions)? {
         Measure::Of(dimension) => Some(dimension),
         Measure::Any => None,
@@ -42,9 +45,11 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
             Of(Dimension::NONE)
         }
         Node::Call(function, all) => match function {
-            Function::Add | Function::Subtract | Function::Min | Function::Max | Function::Deadband => {
-                same(part(&all[0])?, part(&all[1])?, &all[1], function.name())?
-            }
+            Function::Add
+            | Function::Subtract
+            | Function::Min
+            | Function::Max
+            | Function::Deadband => same(part(&all[0])?, part(&all[1])?, &all[1], function.name())?,
             Function::Multiply => both(part(&all[0])?, part(&all[1])?, Dimension::times),
             Function::Divide => both(part(&all[0])?, part(&all[1])?, Dimension::per),
             Function::Negate | Function::Abs => part(&all[0])?,
@@ -97,7 +102,9 @@ fn plain(of: Measure, at: &Expression, name: &str) -> Result<Measure, Fault> {
     match of {
         Measure::Of(d) if d != Dimension::NONE => Err(Fault {
             at: at.at,
-            why: format!("the units do not balance: {name} takes a number, its argument is {d}; divide it by a parameter in {d}"),
+            why: format!(
+                "the units do not balance: {name} takes a number, its argument is {d}; divide it by a parameter in {d}"
+            ),
         }),
         _ => Ok(Measure::Of(Dimension::NONE)),
     }
