@@ -93,10 +93,10 @@ fn known(ids: &[String]) -> Result<(), DiagnoseError> {
 }
 
 /// The problem, the flights it is made of, what the reader must know.
-type Intake<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
+pub type Intake<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
 
 /// The flights on the model's clock, with what was left out.
-fn problem<'a>(
+pub fn problem<'a>(
     model: &GreyBox,
     flights: &'a [Reconstruction],
     options: &Options,
@@ -129,7 +129,7 @@ fn problem<'a>(
     Ok((problem, used, notes))
 }
 
-fn verdict(found: &Found) -> Verdict {
+pub fn verdict(found: &Found) -> Verdict {
     let significant =
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;
     if found.selected.iter().any(|s| s.refused.is_empty()) {
