@@ -74,6 +74,10 @@ fn variable(of: Variable) -> Result<String, String> {
         V::PitchRateHat => hat("velocities/q-aero-rad_sec", "aero/ci2vel"),
         V::YawRateHat => hat("velocities/r-aero-rad_sec", "aero/bi2vel"),
         V::Pressure => scaled(LBF / (FT * FT), "aero/qbar-psf"),
+        V::PressureArea => {
+            let all = [number(LBF), property("aero/qbar-psf"), property("metrics/Sw-sqft")];
+            element("product", &all)
+        }
         V::Altitude => scaled(FT, "position/h-sl-ft"),
         V::Area => scaled(FT * FT, "metrics/Sw-sqft"),
         V::Span => scaled(FT, "metrics/bw-ft"),

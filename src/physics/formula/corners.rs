@@ -101,6 +101,7 @@ impl Place {
             V::PitchRateHat => self.air[1] = Some(x),
             V::YawRateHat => self.air[2] = Some(x),
             V::Pressure => self.air[3] = Some(x),
+            V::PressureArea => self.air[3] = Some(x / self.geometry.area),
             V::Altitude => self.altitude = x,
             V::Area => self.geometry.area = x,
             V::Span => self.geometry.span = x,

@@ -41,6 +41,8 @@ enum Operation {
     Scale(f64),
     AddVariable(Variable),
     Times(Variable),
+    /// Multiplies the top by a run of variables of the list.
+    TimesAll(u16, u16),
     /// Keeps the top; has it again.
     Keep,
     TimesKept,
@@ -53,6 +55,8 @@ enum Operation {
 pub struct Tape {
     operations: Vec<Operation>,
     tables: Vec<Table>,
+    /// Variables that are multiplied in runs.
+    variables: Vec<Variable>,
     depth: usize,
     deepest: usize,
 }
@@ -118,8 +122,45 @@ impl Tape {
         }
     }
 
+    /// A product: its factors that are no variables one by one, then all variables in a run.
+    fn product(&mut self, of: &Expression, places: &Places) -> Result<(), String> {
+        let mut factors = Vec::new();
+        let number = factors_of(of, &mut factors);
+        let (mut variables, others): (Vec<Variable>, Vec<&Expression>) = divided(&factors);
+        of_area(&mut variables);
+        let mut begun = false;
+        for other in others {
+            self.push(other, places)?;
+            if begun {
+                self.operations.push(Operation::Multiply);
+                self.depth -= 1;
+            }
+            begun = true;
+        }
+        if !begun {
+            match variables.pop() {
+                Some(first) => self.leaf(Operation::Variable(first))?,
+                None => return self.leaf(Operation::Number(number)),
+            }
+        }
+        match variables[..] {
+            [] => (),
+            [one] => self.operations.push(Operation::Times(one)),
+            _ => {
+                let first = self.variables.len() as u16;
+                self.variables.append(&mut variables);
+                self.operations.push(Operation::TimesAll(first, self.variables.len() as u16));
+            }
+        }
+        if number != 1.0 {
+            self.operations.push(Operation::Scale(number));
+        }
+        Ok(())
+    }
+
     fn push(&mut self, of: &Expression, places: &Places) -> Result<(), String> {
         match &of.node {
+            Node::Call(Function::Multiply | Function::Negate, _) => self.product(of, places),
             Node::Number(x) => self.leaf(Operation::Number(*x)),
             Node::Variable(v) => self.leaf(Operation::Variable(*v)),
             Node::Parameter(k) => match places.get(*k).copied().flatten() {
@@ -160,7 +201,7 @@ impl Tape {
     ) -> Result<(), String> {
         use Function as F;
         // a leaf to the right, or to the left of what may change its side, needs no place on the stack
-        if let ([left, right], F::Add | F::Multiply) = (all, function) {
+        if let ([left, right], F::Add) = (all, function) {
             for (leaf, other) in [(right, left), (left, right)] {
                 if let Some(direct) = direct(function, &leaf.node) {
                     self.push(other, places)?;
@@ -254,6 +295,11 @@ impl Tape {
                 Operation::Scale(x) => top = top.scale(x),
                 Operation::AddVariable(variable) => top += variable.value(at),
                 Operation::Times(variable) => top = top * variable.value(at),
+                Operation::TimesAll(first, end) => {
+                    for variable in &self.variables[first as usize..end as usize] {
+                        top = top * variable.value(at);
+                    }
+                }
                 Operation::Keep => {
                     kept = top;
                     top = take(&below, &mut depth);
@@ -268,13 +314,51 @@ impl Tape {
     }
 }
 
+/// Notes what `of` is a product of, and returns the product of the numbers in it.
+fn factors_of<'a>(of: &'a Expression, factors: &mut Vec<&'a Expression>) -> f64 {
+    match &of.node {
+        Node::Number(x) => *x,
+        Node::Call(Function::Negate, all) => -factors_of(&all[0], factors),
+        Node::Call(Function::Multiply, all) => {
+            factors_of(&all[0], factors) * factors_of(&all[1], factors)
+        }
+        _ => {
+            factors.push(of);
+            1.0
+        }
+    }
+}
+
+/// The variables among `factors`, a square as two of them, and the others.
+fn divided<'a>(factors: &[&'a Expression]) -> (Vec<Variable>, Vec<&'a Expression>) {
+    let (mut variables, mut others) = (Vec::new(), Vec::new());
+    for factor in factors {
+        match &factor.node {
+            Node::Variable(v) => variables.push(*v),
+            Node::Power(base, n @ 1..=4) => match base.node {
+                Node::Variable(v) => variables.extend((0..*n).map(|_| v)),
+                _ => others.push(*factor),
+            },
+            _ => others.push(*factor),
+        }
+    }
+    (variables, others)
+}
+
+/// Puts what an airflow knows, the dynamic pressure times the wing area, in the place of both.
+fn of_area(variables: &mut Vec<Variable>) {
+    let place = |v: Variable| variables.iter().position(|other| *other == v);
+    if let (Some(pressure), Some(area)) = (place(Variable::Pressure), place(Variable::Area)) {
+        variables[pressure] = Variable::PressureArea;
+        variables.remove(area);
+    }
+}
+
 /// The operation that takes a leaf at once.
 fn direct(function: Function, leaf: &Node) -> Option<Operation> {
     Some(match (function, leaf) {
         (Function::Add, Node::Number(x)) => Operation::AddNumber(*x),
         (Function::Add, Node::Variable(v)) => Operation::AddVariable(*v),
-        (Function::Multiply, Node::Number(x)) => Operation::Scale(*x),
-        (Function::Multiply, Node::Variable(v)) => Operation::Times(*v),
         _ => return None,
     })
 }

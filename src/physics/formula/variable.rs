@@ -80,6 +80,7 @@ variables! {
     PitchRateHat "q_hat" "qc_2V" ANGLE -0.1 0.1 Point "pitch rate as cq/2V" => |at| at.air.q_hat;
     YawRateHat "r_hat" "rb_2V" ANGLE -0.3 0.3 Point "yaw rate as br/2V" => |at| at.air.r_hat;
     Pressure "qbar" "dynamic_pressure" PRESSURE 15.0 2500.0 Point "dynamic pressure, Pa" => |at| at.air.q_s.scale(1.0 / at.geometry.area);
+    PressureArea "qbar_S" "Q" FORCE 2.0 12500.0 Point "dynamic pressure times wing area, N" => |at| at.air.q_s;
     Altitude "altitude" "h" LENGTH -100.0 5000.0 Point "altitude above mean sea level, m" => |at| R::from_f64(at.air.altitude);
     Area "S" "wing_area" AREA 0.1 5.0 Point "wing area, m²" => |at| R::from_f64(at.geometry.area);
     Span "b" "span" LENGTH 0.5 6.0 Point "span, m" => |at| R::from_f64(at.geometry.span);
