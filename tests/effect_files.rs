@@ -56,7 +56,9 @@ fn what_a_search_proposed_does_not_fly() {
     let folder = folder("proposed");
     let model = GreyBox::load(&folder.path().join("model.toml")).unwrap();
     let refused = build(ControllerKind::Lqi, &model).err().unwrap();
-    assert!(matches!(&refused, SetupError::Proposed { effect, .. } if *effect == "yaw_by_throttle"));
+    assert!(
+        matches!(&refused, SetupError::Proposed { effect, .. } if *effect == "yaw_by_throttle")
+    );
     assert!(refused.to_string().contains("status = \"accepted\""));
     let accepted = self::folder("accepted");
     let model = GreyBox::load(&accepted.path().join("model.toml")).unwrap();

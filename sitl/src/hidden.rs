@@ -97,7 +97,7 @@ impl Hidden {
     }
 
     /// An effect called `id` that is not of the list: expressions of JSBSim's functions, each with where it acts.
-    /// `{aileron}`, `{elevator}` (rad) and `{throttle}` in them stand for the properties with the positions. It
+    /// `{aileron}`, `{elevator}`, `{rudder}` (rad) and `{throttle}` in them stand for the properties with the positions. It
     /// lives as long as the process.
     pub fn written(id: &str, functions: Vec<(Place, String)>) -> Self {
         let effect = Effect {

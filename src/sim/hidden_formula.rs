@@ -69,6 +69,7 @@ fn variable(of: Variable) -> Result<String, String> {
         V::Beta => property("aero/beta-rad"),
         V::Aileron => property("{aileron}"),
         V::Elevator => property("{elevator}"),
+        V::Rudder => property("{rudder}"),
         V::Throttle => property("{throttle}"),
         V::RollRateHat => hat("velocities/p-aero-rad_sec", "aero/bi2vel"),
         V::PitchRateHat => hat("velocities/q-aero-rad_sec", "aero/ci2vel"),

@@ -93,6 +93,7 @@ impl<'a> Document<'a> {
         expression
             .replace("{aileron}", &self.properties.aileron_position)
             .replace("{elevator}", &self.properties.elevator_position)
+            .replace("{rudder}", &self.properties.rudder_position)
             .replace("{throttle}", &self.properties.throttle_position)
     }
 

@@ -96,6 +96,7 @@ impl Place {
             V::Beta => self.state.beta = x,
             V::Aileron => self.controls.aileron = x,
             V::Elevator => self.controls.elevator = x,
+            V::Rudder => self.controls.rudder = x,
             V::Throttle => self.controls.throttle = x,
             V::RollRateHat => self.air[0] = Some(x),
             V::PitchRateHat => self.air[1] = Some(x),

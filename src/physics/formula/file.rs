@@ -89,7 +89,7 @@ fn measured_in(channel: Channel) -> Dimension {
 /// What is wrong with it, in which line, and what to do.
 pub fn parse(text: &str) -> Result<Written, String> {
     let file: File = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
-    check_schema(file.schema)?;
+    check_schema(file.schema, 1)?;
     checked_id(&file.id)?;
     let names: Vec<&str> = file.parameters.keys().map(String::as_str).collect();
     for (name, parameter) in &file.parameters {

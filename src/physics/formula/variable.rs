@@ -75,6 +75,7 @@ variables! {
     Beta "beta" "β" ANGLE -0.6 0.6 Point "sideslip angle, rad" => |at| at.state.beta;
     Aileron "aileron" "δa" ANGLE -0.6 0.6 Point "aileron deflection, rad" => |at| at.controls.aileron;
     Elevator "elevator" "δe" ANGLE -0.6 0.6 Point "elevator deflection, rad, positive down" => |at| at.controls.elevator;
+    Rudder "rudder" "δr" ANGLE -0.6 0.6 Point "rudder deflection, rad, positive yaws left" => |at| at.controls.rudder;
     Throttle "throttle" "δt" ANGLE 0.0 1.0 Point "throttle position, 0 to 1" => |at| at.controls.throttle;
     RollRateHat "p_hat" "pb_2V" ANGLE -0.5 0.5 Point "roll rate as bp/2V" => |at| at.air.p_hat;
     PitchRateHat "q_hat" "qc_2V" ANGLE -0.1 0.1 Point "pitch rate as cq/2V" => |at| at.air.q_hat;

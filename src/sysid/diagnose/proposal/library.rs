@@ -5,7 +5,7 @@ use crate::physics::formula::file::channel_name;
 use crate::physics::formula::{Variable, Written, register};
 
 /// Variables of shapes that grow with dynamic pressure: all are numbers without a unit.
-const OF_AIR: [Variable; 8] = [
+const OF_AIR: [Variable; 9] = [
     Variable::Alpha,
     Variable::Beta,
     Variable::RollRateHat,
@@ -13,6 +13,7 @@ const OF_AIR: [Variable; 8] = [
     Variable::YawRateHat,
     Variable::Aileron,
     Variable::Elevator,
+    Variable::Rudder,
     Variable::Throttle,
 ];
 /// Variables of shapes that do not: thrust, gyroscopic and inertial moments.
