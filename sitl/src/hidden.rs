@@ -12,8 +12,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::plant::Properties;
-use document::Document;
 pub(crate) use document::THRUST_PROPERTY;
+use document::{Axis, Document};
 pub use effects::EFFECTS;
 
 /// An effect that can be hidden, under the id it has in the catalogue of effects.
@@ -29,6 +29,21 @@ pub struct Effect {
     write: fn(&mut Document, f64) -> Result<(), HiddenError>,
 }
 
+impl Place {
+    /// The axis of the aerodynamics, if it is one.
+    fn axis(self) -> Option<Axis> {
+        Some(match self {
+            Place::Drag => Axis::Drag,
+            Place::Side => Axis::Side,
+            Place::Lift => Axis::Lift,
+            Place::Roll => Axis::Roll,
+            Place::Pitch => Axis::Pitch,
+            Place::Yaw => Axis::Yaw,
+            Place::Thrust => return None,
+        })
+    }
+}
+
 impl fmt::Debug for Effect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Effect({})", self.id)
@@ -40,6 +55,27 @@ impl fmt::Debug for Effect {
 pub struct Hidden {
     effect: &'static Effect,
     amplitude: f64,
+    /// What an effect that is not of the list adds.
+    functions: &'static [(Place, String)],
+}
+
+/// Where a function of its own acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Drag, lbf.
+    Drag,
+    /// Side force, lbf.
+    Side,
+    /// Lift, lbf.
+    Lift,
+    /// Thrust, lbf.
+    Thrust,
+    /// Rolling moment, lbf ft.
+    Roll,
+    /// Pitching moment, lbf ft.
+    Pitch,
+    /// Yawing moment, lbf ft.
+    Yaw,
 }
 
 impl Hidden {
@@ -57,7 +93,33 @@ impl Hidden {
             let Effect { id, unit, .. } = *effect;
             return Err(HiddenError::Amplitude { id, amplitude, min, max, unit });
         }
-        Ok(Hidden { effect, amplitude })
+        Ok(Hidden { effect, amplitude, functions: &[] })
+    }
+
+    /// An effect called `id` that is not of the list: expressions of JSBSim's functions, each with where it acts.
+    /// `{aileron}`, `{elevator}`, `{rudder}` (rad) and `{throttle}` in them stand for the properties with the positions. It
+    /// lives as long as the process.
+    pub fn written(id: &str, functions: Vec<(Place, String)>) -> Self {
+        let effect = Effect {
+            id: id.to_owned().leak(),
+            formula: "",
+            unit: "",
+            bounds: (0.0, 1.0),
+            write: |_, _| Ok(()),
+        };
+        Hidden { effect: Box::leak(Box::new(effect)), amplitude: 1.0, functions: functions.leak() }
+    }
+
+    fn write(&self, document: &mut Document) -> Result<(), HiddenError> {
+        for (k, (place, expression)) in self.functions.iter().enumerate() {
+            let expression = document.with_positions(expression);
+            let name = format!("{}-{k}", self.effect.id);
+            match place.axis() {
+                Some(axis) => document.function(axis, &name, &expression)?,
+                None => document.add_thrust(expression),
+            }
+        }
+        (self.effect.write)(document, self.amplitude)
     }
 
     /// The effect.
@@ -73,7 +135,9 @@ impl Hidden {
 
 impl PartialEq for Hidden {
     fn eq(&self, other: &Self) -> bool {
-        self.effect.id == other.effect.id && self.amplitude == other.amplitude
+        self.effect.id == other.effect.id
+            && self.amplitude == other.amplitude
+            && self.functions == other.functions
     }
 }
 
@@ -184,8 +248,8 @@ pub(crate) fn write_into(
         return Ok(xml.to_owned());
     }
     let mut document = Document::new(xml, properties, step_s);
-    for Hidden { effect, amplitude } in acting {
-        (effect.write)(&mut document, *amplitude)?;
+    for hidden in acting {
+        hidden.write(&mut document)?;
     }
     document.finish()
 }

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
 
+use crate::commands::effect_files::named_effects;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
 use crate::model::GreyBox;
@@ -43,6 +44,9 @@ pub struct Arguments {
     /// Seed of everything that is drawn.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Effect files (TOML) or folders of them, tried as candidates beside the catalogue.
+    #[arg(long = "effect", value_name = "FILE", num_args = 1..)]
+    effects: Vec<String>,
     /// Ids to be left out of the catalogue.
     #[arg(long, num_args = 1..)]
     without: Vec<String>,
@@ -63,6 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let options = Options {
         seed: arguments.seed,
         nulls: arguments.nulls.into(),
+        with: named_effects(&arguments.effects)?,
         without: arguments.without.clone(),
         ..Options::default()
     };

@@ -1,16 +1,19 @@
 //! `greylag effects`: the catalogue of physical effects.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use comfy_table::Table;
 
+use crate::commands::effect_files::is_file;
 use crate::commands::files::{self, shipped};
 use crate::model::GreyBox;
 use crate::physics::Channel;
 use crate::physics::effects::{self, Description};
+use crate::physics::formula::expression::Function;
+use crate::physics::formula::{Variable, Written, register};
 use crate::physics::inputs;
 use crate::report::{EffectReport, effect_facts};
 use crate::sysid::flight_path::measurement_effects::MEASUREMENT_EFFECTS;
@@ -27,15 +30,17 @@ pub struct Arguments {
 enum What {
     /// Every effect in a line.
     List,
-    /// All that is known of one effect; with --report, its signature drawn.
+    /// All that is known of one effect, of the catalogue or of a file; with --report, its signature drawn.
     Show(Show),
+    /// The variables and functions of formulas in effect files.
+    Variables,
 }
 
 #[derive(clap::Args)]
 struct Show {
-    /// The effect's id, as `greylag effects list` names it.
-    #[arg(value_parser = id(), hide_possible_values = true)]
-    id: &'static str,
+    /// The effect's id, as `greylag effects list` names it, or an effect file.
+    #[arg(value_name = "ID|FILE", value_parser = id())]
+    id: String,
     /// Write the effect's page, one HTML file with its signature.
     #[arg(long)]
     report: Option<PathBuf>,
@@ -84,11 +89,29 @@ fn catalogue() -> Vec<(Place, Description)> {
         .collect()
 }
 
-/// An id of the catalogue; for any other, the parser names those that are like it.
-fn id() -> impl TypedValueParser<Value = &'static str> {
-    let ids: Vec<&'static str> = catalogue().iter().map(|(_, about)| about.id).collect();
-    PossibleValuesParser::new(ids.clone())
-        .try_map(move |id| ids.iter().copied().find(|known| *known == id).ok_or("no such effect"))
+/// An id of the catalogue or a file; for any other, the parser names those that are like it.
+fn id() -> impl TypedValueParser<Value = String> {
+    NamedParser(PossibleValuesParser::new(catalogue().iter().map(|(_, about)| about.id)))
+}
+
+/// Takes files as they are, and leaves ids to the parser of those that are known.
+#[derive(Clone)]
+struct NamedParser(PossibleValuesParser);
+
+impl TypedValueParser for NamedParser {
+    type Value = String;
+
+    fn parse_ref(
+        &self,
+        command: &clap::Command,
+        argument: Option<&clap::Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<String, clap::Error> {
+        match value.to_str().filter(|named| is_file(named)) {
+            Some(file) => Ok(file.to_owned()),
+            None => self.0.parse_ref(command, argument, value),
+        }
+    }
 }
 
 /// Prints the list or one entry; writes its page.
@@ -96,6 +119,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
         What::List => print!("{}", list()),
         What::Show(show) => self::show(show)?,
+        What::Variables => print!("{}", variables()),
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -139,9 +163,46 @@ fn channels(place: Place, about: &Description) -> String {
     }
 }
 
+/// The variables and functions that a formula may name.
+fn variables() -> String {
+    let mut text = String::from("variables\n");
+    for v in Variable::ALL {
+        text += &format!("  {:12} {:18} {}\n", v.name(), v.alias(), v.meaning());
+    }
+    text += "functions, beside + - * / ^\n";
+    for f in Function::ALL.iter().filter(|f| !f.is_operator()) {
+        text += &format!("  {:12} {}\n", f.name(), f.meaning());
+    }
+    text + "  clamp        clamp(x, low, high)\n  table        table(x; x1:y1, x2:y2, …): linear between, constant beyond\n"
+}
+
+/// The effect of an id or of a file.
+fn named(name: &str) -> Result<(Place, Description)> {
+    if is_file(name) {
+        let read = register::load(&shipped(Path::new(name)))?;
+        let [effect] = read[..] else { bail!("{name} is not one effect file; name one") };
+        return Ok((Place::Forces, effect.about));
+    }
+    let found = catalogue().into_iter().find(|(_, about)| about.id == name);
+    found.with_context(|| format!("there is no effect {name}"))
+}
+
+/// Prints what only effects of files have.
+fn written(effect: &Written) {
+    let names: Vec<&str> = effect.variables().iter().map(|v| v.name()).collect();
+    let kinks = effect.kinks();
+    println!("  {:20} {:?}", "status", effect.status);
+    println!("  {:20} {}", "depends on", names.join(", "));
+    println!(
+        "  {:20} {}",
+        "kinks",
+        if kinks.is_empty() { "none".into() } else { kinks.join(", ") }
+    );
+    println!("  {:20} {}", "operations", effect.operations());
+}
+
 fn show(show: &Show) -> Result<()> {
-    let found = catalogue().into_iter().find(|(_, about)| about.id == show.id);
-    let (place, about) = found.with_context(|| format!("there is no effect {}", show.id))?;
+    let (place, about) = named(&show.id)?;
     let channels = channels(place, &about);
     println!("{}", about.id);
     for [name, text] in effect_facts(&about, place.words(), &channels) {
@@ -155,6 +216,9 @@ fn show(show: &Show) -> Result<()> {
     }
     if let Some(table) = about.table {
         println!("    {table:18} table over alpha_rad, which only a model file can give");
+    }
+    if let Some(effect) = register::find(about.id) {
+        written(effect);
     }
     let Some(path) = &show.report else { return Ok(()) };
     let overwrite = show.force.into();

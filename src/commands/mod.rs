@@ -9,6 +9,7 @@ mod collect;
 mod compare;
 #[cfg(feature = "sitl")]
 mod demo;
+mod effect_files;
 mod effects;
 #[cfg(feature = "sitl")]
 mod design;
@@ -25,6 +26,7 @@ mod log_once;
 mod logs;
 #[cfg(feature = "sitl")]
 mod mystery;
+mod propose;
 mod replay;
 mod said_once;
 #[cfg(feature = "sitl")]
@@ -80,6 +82,8 @@ enum Command {
     /// Fly an aircraft that has an effect which its model lacks: data to find it in.
     #[cfg(feature = "sitl")]
     Mystery(mystery::Arguments),
+    /// Propose a formula for what no effect of the catalogue explains.
+    Propose(propose::Arguments),
     /// Replay a recorded flight, and compare the pilot's commands bit by bit.
     Replay(replay::Arguments),
     /// Write a target file.
@@ -119,6 +123,7 @@ pub fn main() -> ExitCode {
         Command::Logs(arguments) => logs::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Mystery(arguments) => mystery::run(&arguments),
+        Command::Propose(arguments) => propose::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Targets(arguments) => targets::run(&arguments),

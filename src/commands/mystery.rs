@@ -8,10 +8,12 @@ use anyhow::{Context, Result, anyhow, bail};
 use comfy_table::{CellAlignment, Table};
 use serde::{Deserialize, Serialize};
 
+use crate::commands::files::shipped;
 use crate::control::{Kind, build};
 use crate::logs::csv;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
+use crate::physics::formula::register;
 use crate::sim::missing::{Kind as MissingKind, Missing};
 use crate::sim::starting_model::starting_model;
 use crate::sim::trial::Trial;
@@ -34,16 +36,19 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR", required_unless_present = "open")]
     out: Option<PathBuf>,
     /// Hide this effect instead of one drawn from the seed; a wrong ID is answered with all there are.
-    #[arg(long, value_name = "ID")]
+    #[arg(long, value_name = "ID", group = "what")]
     effect: Option<String>,
-    /// How much of it, in its own unit.
-    #[arg(long, requires = "effect", allow_negative_numbers = true)]
+    /// Hide the effect of this file, with the values that the file has.
+    #[arg(long, value_name = "FILE", group = "what")]
+    hide: Option<PathBuf>,
+    /// How much of it, in its own unit; of an effect of a file, its first coefficient.
+    #[arg(long, requires = "what", allow_negative_numbers = true)]
     amplitude: Option<f64>,
     /// Fly in MIL-spec turbulence: 3 light, 4 moderate.
     #[arg(long, value_name = "1..7", value_parser = clap::value_parser!(u8).range(1..=7))]
     turbulence_severity: Option<u8>,
     /// Open the answer of a folder, beside what its diagnosis.json says.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "out", "effect", "turbulence_severity"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "out", "what", "turbulence_severity"])]
     open: Option<PathBuf>,
 }
 
@@ -79,7 +84,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
     if !parent.is_dir() {
         bail!("cannot create {}: name a folder in one that exists", out.display());
     }
-    let missing = Missing::drawn(seed, arguments.effect.as_deref(), arguments.amplitude)?;
+    let missing = missing(arguments, seed)?;
     let trial =
         Trial { seed, missing: vec![missing.clone()], turbulence: arguments.turbulence_severity };
     // written beside it first: the folder is there complete, or not at all
@@ -109,6 +114,28 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// What is hidden: the effect of a file, one by its id, or one drawn.
+fn missing(arguments: &Arguments, seed: u64) -> Result<Missing> {
+    let Some(file) = &arguments.hide else {
+        return Ok(Missing::drawn(seed, arguments.effect.as_deref(), arguments.amplitude)?);
+    };
+    let read = register::load(&shipped(file))?;
+    let [effect] = read[..] else {
+        bail!("{} is not one effect file; name one", file.display());
+    };
+    let mut values = effect.values.clone();
+    if let (Some(first), Some(amount)) = (values.first_mut(), arguments.amplitude) {
+        *first = amount;
+    }
+    if values.iter().all(|v| *v == 0.0) {
+        bail!(
+            "all values of {} are nought, so nothing would be hidden; give --amplitude",
+            effect.about.id
+        );
+    }
+    Ok(Missing::written(effect, &values)?)
+}
+
 fn put(folder: &Path, name: &str, text: &str) -> Result<()> {
     let path = folder.join(name);
     std::fs::write(&path, text).with_context(|| format!("writing {}", path.display()))
@@ -122,9 +149,15 @@ fn answer(seed: u64, missing: &Missing) -> Answer {
         seed,
         id: missing.id.into(),
         amplitude: missing.amplitude,
-        unit: MissingKind::from_id(missing.id).map_or("", |kind| kind.unit).into(),
+        unit: unit(missing.id).into(),
         parameters: missing.values.iter().enumerate().map(|(k, v)| (name(k), *v)).collect(),
     }
+}
+
+/// The unit of the amount of an effect.
+fn unit(id: &str) -> &'static str {
+    let of_file = || register::find(id).map(|e| e.about.coefficients[0].unit);
+    MissingKind::from_id(id).map(|kind| kind.unit).or_else(of_file).unwrap_or_default()
 }
 
 /// The names of the constants of the catalogue's effect `id`.

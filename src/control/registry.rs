@@ -29,6 +29,17 @@ pub enum SetupError {
         /// Where it fails.
         pitch_deg: f64,
     },
+    /// The model has an effect that nobody has accepted.
+    #[error(
+        "cannot fly model {model}: its effect {effect} was proposed by a search; look at it, then write status = \
+         \"accepted\" into the effect's file"
+    )]
+    Proposed {
+        /// The model's name.
+        model: String,
+        /// The effect.
+        effect: &'static str,
+    },
     /// The controller is a trained one, and none was given.
     #[error("a controller that was trained needs its files; give their folder with --policy")]
     Untrained,
@@ -141,6 +152,9 @@ macro_rules! controllers {
             source: impl Into<Source<'a>>,
         ) -> Result<Box<dyn Controller>, SetupError> {
             let source = source.into();
+            if let (Needs::Model | Needs::Both, Some(effect)) = (kind.needs(), source.model.proposed()) {
+                return Err(SetupError::Proposed { model: source.model.name.clone(), effect });
+            }
             match kind { $(Kind::$kind => { let $from = source; Ok(Box::new($build)) })* }
         }
     };

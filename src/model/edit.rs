@@ -43,6 +43,8 @@ pub struct Edit {
     pub dropped: Vec<(String, &'static str)>,
     /// Texts that stand in place of what the file has: keys, the last of them below the others.
     pub replaced: Vec<(&'static [&'static str], &'static str)>,
+    /// Files of effects that are no part of the catalogue, relative to the new model file.
+    pub effect_files: Vec<String>,
     /// What they were fitted to, for their sources.
     pub fitted_to: String,
 }
@@ -68,6 +70,10 @@ impl Edit {
             }
             let old = table.get_mut(last).and_then(Item::as_value_mut);
             replace(old.ok_or_else(place)?, (*new).into());
+        }
+        if !self.effect_files.is_empty() {
+            let files: toml_edit::Array = self.effect_files.iter().collect();
+            document.insert("effect_files", Item::Value(files.into()));
         }
         let place = || EditError::Place("effects".into());
         let effects = document.get_mut("effects").ok_or_else(place)?;
@@ -195,6 +201,7 @@ CLq = { value = 3.87, sd = 0.1, source = "Gryte" } # damps
             added: vec![(number("lift_stall.k", 1.0, None), "BM12".into())],
             dropped: vec![("lift_linear.CLq".into(), "lift_table")],
             replaced: vec![(&["air", "density"], "standard")],
+            effect_files: vec!["own.toml".into()],
             fitted_to: "a.csv (sha256 01)".into(),
         }
     }
@@ -215,6 +222,7 @@ CLq = { value = 3.87, sd = 0.1, source = "Gryte" } # damps
         let read: toml::Table = toml::from_str(&text).unwrap();
         let slope = &read["effects"]["lift_linear"]["CLalpha"];
         assert_eq!(slope["value"].as_float(), Some(0.1 + 0.2));
+        assert_eq!(read["effect_files"][0].as_str(), Some("own.toml"));
         assert_eq!(slope["sd"].as_float(), Some(0.01));
         assert_eq!(
             slope["source"].as_str(),

@@ -11,6 +11,7 @@ use crate::physics::Airframe;
 use crate::physics::airframe::{FileError, Sourced, check_schema, named, positive, toml_error};
 use crate::physics::atmosphere::{Atmosphere, Density};
 use crate::physics::effects::{Description, Kind};
+use crate::physics::formula::{Written, register};
 use crate::physics::rigid_body::{ForceAxes, RigidBody};
 use crate::physics::{catalogue, inputs};
 
@@ -27,6 +28,9 @@ struct File {
     rigid_body: BodyFile,
     air: AirFile,
     residual: Option<String>,
+    /// Effect files and folders of them, relative to this file.
+    #[serde(default)]
+    effect_files: Vec<String>,
     effects: toml::Table,
 }
 
@@ -100,6 +104,9 @@ impl GreyBox {
         check_schema(file.schema, 1).map_err(content)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let airframe = Airframe::load(&folder.join(&file.airframe))?;
+        for own in &file.effect_files {
+            register::load(&folder.join(own))?;
+        }
         let learned = file.residual.clone();
         let mut model = file.into_model(airframe).map_err(content)?;
         if let Some(name) = learned {
@@ -117,12 +124,12 @@ impl File {
         for (id, content) in &self.effects {
             let first = coefficients.len();
             if let Some(kind) = inputs::Kind::from_id(id) {
-                coefficients.extend(effect(&kind.describe(), content)?.0);
+                coefficients.extend(effect(&kind.describe(), None, content)?.0);
                 acting.push((kind, first));
                 continue;
             }
             let kind = Kind::from_id(id).ok_or_else(|| unknown_effect(id))?;
-            let (named, table) = effect(&kind.describe(), content)?;
+            let (named, table) = effect(&kind.describe(), kind.written(), content)?;
             coefficients.extend(named);
             terms.push(Term::new(kind, first, table));
         }
@@ -199,9 +206,11 @@ impl AirFile {
     }
 }
 
-/// One effect's coefficients and table out of its TOML table.
+/// One effect's coefficients and table out of its TOML table; what that leaves out of an effect of a file is as
+/// its own file has it.
 fn effect(
     about: &Description,
+    written: Option<&Written>,
     content: &toml::Value,
 ) -> Result<(Vec<Named>, Option<Table>), String> {
     let id = about.id;
@@ -218,14 +227,15 @@ fn effect(
         entries.get(key).cloned().ok_or_else(|| format!("effects.{id}.{key} is missing; add it"))
     };
     let mut named = Vec::new();
-    for c in about.coefficients {
-        let number: Sourced = get(c.name)?.try_into().map_err(|e| {
-            format!(
-                "effects.{id}.{}: {}",
-                c.name,
-                e.message().lines().collect::<Vec<_>>().join("; ")
-            )
-        })?;
+    for (place, c) in about.coefficients.iter().enumerate() {
+        let own = written.filter(|_| !entries.contains_key(c.name));
+        let number = match own {
+            Some(own) => own.number(place),
+            None => get(c.name)?.try_into().map_err(|e: toml::de::Error| {
+                let why = e.message().lines().collect::<Vec<_>>().join("; ");
+                format!("effects.{id}.{}: {why}", c.name)
+            })?,
+        };
         let (low, high) = c.bounds;
         if !(low..=high).contains(&number.value) {
             return Err(format!(
@@ -251,5 +261,9 @@ fn table(id: &str, key: &str, content: toml::Value) -> Result<Table, String> {
 
 fn unknown_effect(id: &str) -> String {
     let ids: Vec<_> = catalogue::all().map(|about| about.id).collect();
-    format!("effects.{id:?} is unknown to this program; it knows {}", ids.join(", "))
+    format!(
+        "effects.{id:?} is unknown to this program; an effect of a file needs that file in effect_files = […]; the \
+         catalogue has {}",
+        ids.join(", ")
+    )
 }

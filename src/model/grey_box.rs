@@ -4,6 +4,7 @@ use crate::model::{Integrator, Residual};
 use crate::num::{Real, Table};
 use crate::physics::atmosphere::Atmosphere;
 use crate::physics::effects::{Description, Kind, Needs};
+use crate::physics::formula::{Status, Written};
 use crate::physics::inputs::{self, InputMemory};
 use crate::physics::rigid_body::{ForceAxes, RigidBody};
 use crate::physics::{AirData, Airframe, Controls, State};
@@ -137,6 +138,16 @@ impl GreyBox {
     pub fn effects(&self) -> impl Iterator<Item = Description> {
         let inputs = self.inputs.iter().map(|(kind, _)| kind.describe());
         self.terms.iter().map(|term| term.kind.describe()).chain(inputs)
+    }
+
+    /// Its effects that come from files.
+    pub fn written(&self) -> impl Iterator<Item = &'static Written> {
+        self.terms.iter().filter_map(|term| term.kind.written())
+    }
+
+    /// An effect that a search proposed and nobody has accepted, if it has one.
+    pub fn proposed(&self) -> Option<&'static str> {
+        self.written().find(|e| e.status == Status::Proposed).map(|e| e.about.id)
     }
 
     /// Whether the model is linear in each of its coefficients, in their order.

@@ -7,6 +7,7 @@ pub mod airframe;
 pub mod atmosphere;
 pub mod catalogue;
 pub mod effects;
+pub mod formula;
 pub mod inputs;
 pub mod point;
 pub mod rigid_body;

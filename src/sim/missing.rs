@@ -4,6 +4,8 @@ use greylag_sitl::hidden::{Hidden, HiddenError};
 use rand::RngExt;
 
 use crate::num::stream::{Stream, stream};
+use crate::physics::formula::Written;
+use crate::sim::hidden_formula;
 
 /// Side drag that the aircraft's own file has, which a hidden amplitude adds to (`params/x8/FACTS.md`).
 const OWN_CDBETA: f64 = -0.0058;
@@ -136,6 +138,14 @@ pub enum MissingError {
         /// What there is.
         known: String,
     },
+    /// It is of a file, and has something in it that the simulator has not.
+    #[error("effect {id} cannot be hidden in JSBSim: {why}")]
+    Formula {
+        /// The effect.
+        id: &'static str,
+        /// What it has not.
+        why: String,
+    },
     /// The simulator does not take it.
     #[error(transparent)]
     Hidden(#[from] HiddenError),
@@ -172,6 +182,22 @@ impl Missing {
             _ => vec![a],
         };
         Ok(Missing { id: kind.id, amplitude: a, hidden, taken_out, values })
+    }
+
+    /// An effect of a file, with `values` of its coefficients.
+    ///
+    /// # Errors
+    /// If JSBSim does not know one of its variables.
+    pub fn written(effect: &'static Written, values: &[f64]) -> Result<Missing, MissingError> {
+        let hidden = hidden_formula::hidden(effect, values)
+            .map_err(|why| MissingError::Formula { id: effect.about.id, why })?;
+        Ok(Missing {
+            id: effect.about.id,
+            amplitude: values.first().copied().unwrap_or(0.0),
+            hidden: Some(hidden),
+            taken_out: None,
+            values: values.to_vec(),
+        })
     }
 
     /// An effect drawn from `seed`: any one, or `id`, with `amplitude` or one that shows clearly.

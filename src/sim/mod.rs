@@ -14,6 +14,8 @@ pub mod faults;
 pub mod flight_test;
 #[cfg(feature = "sitl")]
 pub mod flown;
+#[cfg(feature = "sitl")]
+mod hidden_formula;
 pub mod imagined;
 #[cfg(feature = "sitl")]
 pub mod instruments;

@@ -88,6 +88,15 @@ impl<'a> Document<'a> {
         property(&self.properties.throttle_position)
     }
 
+    /// `expression` with the properties of the positions in the places that stand for them.
+    pub(super) fn with_positions(&self, expression: &str) -> String {
+        expression
+            .replace("{aileron}", &self.properties.aileron_position)
+            .replace("{elevator}", &self.properties.elevator_position)
+            .replace("{rudder}", &self.properties.rudder_position)
+            .replace("{throttle}", &self.properties.throttle_position)
+    }
+
     /// The deflection of `surface`, rad, as it acts in the end.
     pub(super) fn deflection(&self, surface: Surface) -> String {
         property(self.position(surface))

@@ -11,6 +11,7 @@ use anyhow::{Result, bail};
 use places::{Places, hashed};
 use tables::print;
 
+use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
 use crate::model::GreyBox;
@@ -44,8 +45,9 @@ pub struct Arguments {
     /// Add the effects that a diagnosis of these logs asserts.
     #[arg(long, group = "what")]
     accept: bool,
-    /// Add these effects of the catalogue, in this order; with --accept after those that are asserted.
-    #[arg(long = "effect", value_name = "ID", num_args = 1.., group = "what")]
+    /// Add these effects, in this order: ids of the catalogue, or effect files (TOML); with --accept after those
+    /// that are asserted.
+    #[arg(long = "effect", value_name = "ID|FILE", num_args = 1.., group = "what")]
     effects: Vec<String>,
     /// Add nothing: fit the model's own coefficients.
     #[arg(long, group = "what", conflicts_with_all = ["accept", "effects"])]
@@ -80,7 +82,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(twice) = arguments.hold_out.iter().find(|p| arguments.logs.paths.contains(p)) {
         bail!("{} cannot be fitted to and held out at once; name it in one place", twice.display());
     }
-    for id in &arguments.effects {
+    let effects = named_effects(&arguments.effects)?;
+    for id in &effects {
         if catalogue::describe(id).is_none() {
             bail!(
                 "effect {id:?} is unknown to this program; `greylag effects list` names those it knows"
@@ -113,7 +116,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         more.flights
     };
     let options = amend::Options {
-        effects: wanted(arguments, &model, &flights)?,
+        effects: wanted(arguments, &effects, &model, &flights)?,
         conventions: arguments.conventions,
         refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
         ..amend::Options::default()
@@ -177,12 +180,13 @@ fn divided(logs: &[PathBuf], hold_out: &[PathBuf]) -> (Vec<PathBuf>, Vec<PathBuf
 /// The effects to add: those named, or those that a diagnosis of the flights asserts.
 fn wanted(
     arguments: &Arguments,
+    effects: &[String],
     model: &GreyBox,
     flights: &[Reconstruction],
 ) -> Result<Vec<Added>> {
     let mut all = Vec::new();
     if arguments.accept {
-        let options = diagnose::Options::default();
+        let options = diagnose::Options { with: own_effects(effects), ..Default::default() };
         let diagnosis = diagnose(model, flights, &options, &|doing| eprintln!("{doing}"))?;
         all.extend(diagnosis.effects.iter().filter(|c| c.asserted).map(accepted));
         if all.is_empty() {
@@ -190,7 +194,7 @@ fn wanted(
             bail!("the diagnosis asserts no effect, so there is none to accept; it says: {said}");
         }
     }
-    for id in &arguments.effects {
+    for id in effects {
         if all.iter().all(|added: &Added| added.id != *id) {
             all.push(Added { id: id.clone(), start: None });
         }

@@ -10,6 +10,7 @@ use crate::commands::files::{self, Overwrite};
 use crate::model::GreyBox;
 use crate::model::edit::{Edit, Number};
 use crate::physics::catalogue;
+use crate::physics::formula::Written;
 use crate::sysid::amend::{Amended, Amendment, Convention};
 
 /// Characters of a file's SHA-256 that sources carry.
@@ -112,6 +113,14 @@ impl Places {
         if !self.airframe_is_there()? {
             files::write(&own, &std::fs::read_to_string(&self.airframe)?, overwrite)?;
         }
+        for effect in amended.model.written() {
+            let path = self.folder.join(effect_file(effect));
+            // the same effect may stand there already, as where a model is amended again
+            if std::fs::read_to_string(&path).is_ok_and(|old| old == effect.text) {
+                continue;
+            }
+            files::write(&path, &effect.text, overwrite)?;
+        }
         files::write(&self.model(), &text, overwrite)?;
         let read = GreyBox::load(&self.model())?;
         if let Some(lost) = differs(&read, &amended.model) {
@@ -159,8 +168,14 @@ fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) 
         dropped: amended.dropped(),
         replaced: taken.map(|t| (t.convention.key(), t.to)).collect(),
         added: all.iter().filter(|c| new(&c.name)).map(|c| (number(c), source(&c.name))).collect(),
+        effect_files: amended.model.written().map(effect_file).collect(),
         fitted_to: logs.join(", "),
     }
+}
+
+/// The file of an effect beside a model.
+fn effect_file(effect: &Written) -> String {
+    format!("{}.toml", effect.about.id)
 }
 
 fn short(log: &Hashed) -> String {

@@ -6,6 +6,7 @@
 //! do with their commands are in [`inputs`](crate::physics::inputs).
 
 use crate::num::{Real, Table};
+use crate::physics::formula::{Written, register};
 use crate::physics::rigid_body::RigidBody;
 use crate::physics::{Channel, Point};
 
@@ -150,14 +151,17 @@ macro_rules! effects {
         $(mod $module; pub use $module::$type;)*
 
         /// One of the effects of the list.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[derive(Clone, Copy, Debug)]
         pub enum Kind { $(
             #[doc = concat!("See [`", stringify!($type), "`].")]
             $type,
-        )* }
+        )*
+            /// An effect of a file.
+            Written(&'static Written),
+        }
 
         impl Kind {
-            /// Every effect there is.
+            /// Every effect of the catalogue; those of files are not among them.
             pub const ALL: &'static [Kind] = &[$(Kind::$type),*];
 
             /// What is known of the effect.
@@ -172,12 +176,17 @@ macro_rules! effects {
                     table: $type::TABLE,
                     replaces: $type::REPLACES,
                     entry: $type::ENTRY,
-                },)* }
+                },)*
+                    Kind::Written(effect) => effect.about,
+                }
             }
 
             /// [`Effect::NEEDS`] of this effect.
             pub const fn needs(self) -> Needs {
-                match self { $(Kind::$type => $type::NEEDS,)* }
+                match self {
+                    $(Kind::$type => $type::NEEDS,)*
+                    Kind::Written(effect) => effect.needs(),
+                }
             }
 
             /// [`Effect::basis`] of this effect if it needs only the point; else nothing. A sum over
@@ -189,9 +198,12 @@ macro_rules! effects {
                 own: Own,
                 terms: &mut impl Terms<R>,
             ) {
-                match self { $(Kind::$type => if matches!($type::NEEDS, Needs::Point) {
-                    $type::basis(at, own, terms)
-                },)* }
+                match self {
+                    $(Kind::$type => if matches!($type::NEEDS, Needs::Point) {
+                        $type::basis(at, own, terms)
+                    },)*
+                    Kind::Written(_) => (),
+                }
             }
 
             /// [`Effect::basis`] of this effect if it needs more than the point; else nothing.
@@ -202,23 +214,44 @@ macro_rules! effects {
                 own: Own,
                 terms: &mut impl Terms<R>,
             ) {
-                match self { $(Kind::$type => if !matches!($type::NEEDS, Needs::Point) {
-                    $type::basis(at, own, terms)
-                },)* }
+                match self {
+                    $(Kind::$type => if !matches!($type::NEEDS, Needs::Point) {
+                        $type::basis(at, own, terms)
+                    },)*
+                    Kind::Written(effect) => effect.basis(at, own.shape, terms),
+                }
             }
 
             /// [`Effect::change`] of this effect.
             pub fn change(self, coefficients: &[f64], body: &mut RigidBody) {
-                match self { $(Kind::$type => $type::change(coefficients, body),)* }
+                match self {
+                    $(Kind::$type => $type::change(coefficients, body),)*
+                    Kind::Written(_) => (),
+                }
             }
         }
     };
 }
 
+impl PartialEq for Kind {
+    fn eq(&self, other: &Kind) -> bool {
+        self.describe().id == other.describe().id
+    }
+}
+
 impl Kind {
-    /// The effect of that id.
+    /// The effect of that id: of the catalogue, or of a file that was read.
     pub fn from_id(id: &str) -> Option<Kind> {
-        Kind::ALL.iter().copied().find(|kind| kind.describe().id == id)
+        let known = Kind::ALL.iter().copied().find(|kind| kind.describe().id == id);
+        known.or_else(|| register::find(id).map(Kind::Written))
+    }
+
+    /// The effect of a file, if it is one.
+    pub fn written(self) -> Option<&'static Written> {
+        match self {
+            Kind::Written(effect) => Some(effect),
+            _ => None,
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use super::parameters;
 use super::result::{AddedEffect, Amendment, Settings};
 use super::story;
 use crate::model::GreyBox;
-use crate::physics::effects::{Coefficient, Description};
+use crate::physics::effects::{Coefficient, Description, Kind};
 use crate::sysid::compare::HorizonScore;
 use crate::sysid::flight_path::reconstruction::{Reconstruction, Segment};
 use crate::sysid::rudder;
@@ -370,7 +370,9 @@ fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendError> {
 fn usual_start(about: &Description) -> Vec<f64> {
     let starts = about.entry.map_or(&[][..], |e| e.starts);
     let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);
-    let listed = starts.get(starts.len() / 2).map(|s| s.to_vec());
+    // the first of a file's is what the file says; of the catalogue's, the middle one is the usual amount
+    let own = Kind::from_id(about.id).is_some_and(|kind| kind.written().is_some());
+    let listed = starts.get(if own { 0 } else { starts.len() / 2 }).map(|s| s.to_vec());
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())
 }
 

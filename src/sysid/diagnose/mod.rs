@@ -8,6 +8,7 @@
 mod answer;
 mod error;
 mod options;
+mod proposal;
 mod regression;
 pub(in crate::sysid) mod search;
 
@@ -18,3 +19,4 @@ pub use answer::result::{
 pub use answer::run::{diagnose, searched};
 pub use error::DiagnoseError;
 pub use options::{Detail, Options};
+pub use proposal::{Alternative, Form, Grades, HeldOut, Proposal, Rung, Shape, propose};

@@ -20,6 +20,8 @@ pub struct Options {
     pub bootstraps: usize,
     /// Chance that is allowed of any assertion in a flight that lacks nothing.
     pub level: f64,
+    /// Ids of effects of files, tried beside the catalogue.
+    pub with: Vec<String>,
     /// Ids left out of the catalogue.
     pub without: Vec<String>,
     /// What is worked out besides.
@@ -33,6 +35,7 @@ impl Default for Options {
             nulls: 100,
             bootstraps: 100,
             level: 0.01,
+            with: Vec::new(),
             without: Vec::new(),
             detail: Detail::Full,
         }

@@ -38,6 +38,7 @@ pub fn diagnose(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DiagnoseError> {
     known(&options.without)?;
+    known(&options.with)?;
     let (problem, used, mut notes) = problem(model, flights, options)?;
     notes.extend(excitation::check(&problem.flights)?);
     let mut found = search(&problem, model, options, progress)
@@ -92,10 +93,10 @@ fn known(ids: &[String]) -> Result<(), DiagnoseError> {
 }
 
 /// The problem, the flights it is made of, what the reader must know.
-type Intake<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
+pub type Intake<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
 
 /// The flights on the model's clock, with what was left out.
-fn problem<'a>(
+pub fn problem<'a>(
     model: &GreyBox,
     flights: &'a [Reconstruction],
     options: &Options,
@@ -128,7 +129,7 @@ fn problem<'a>(
     Ok((problem, used, notes))
 }
 
-fn verdict(found: &Found) -> Verdict {
+pub fn verdict(found: &Found) -> Verdict {
     let significant =
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;
     if found.selected.iter().any(|s| s.refused.is_empty()) {
@@ -144,5 +145,5 @@ fn verdict(found: &Found) -> Verdict {
 
 /// Ids of the candidates that a model lacks and that can be searched for.
 pub fn searched(model: &GreyBox, without: &[String]) -> Vec<&'static str> {
-    catalogue::candidates(model, without).iter().map(|e| e.about.id).collect()
+    catalogue::candidates(model, &[], without).iter().map(|e| e.about.id).collect()
 }

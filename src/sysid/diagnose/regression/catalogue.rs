@@ -27,13 +27,23 @@ pub struct Entry {
     pub operator: bool,
 }
 
-/// The effects that `model` lacks and that can be searched for, but for those of `without`.
-pub fn candidates(model: &GreyBox, without: &[String]) -> Vec<Entry> {
+impl Entry {
+    /// Whether it is of a file, whose amounts nobody knows beforehand.
+    fn written(&self) -> bool {
+        Kind::from_id(self.about.id).is_some_and(|kind| kind.written().is_some())
+    }
+}
+
+/// The effects of the catalogue, and those of files called `with`, that `model` lacks and that can be searched for,
+/// but for those of `without`.
+pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<Entry> {
     let of = |about: Description, operator| Entry { about, operator };
     let physical = Kind::ALL.iter().map(|k| of(k.describe(), false));
     let on_inputs = inputs::Kind::ALL.iter().map(|k| of(k.describe(), true));
+    let own = with.iter().filter_map(|id| Kind::from_id(id)).filter(|k| k.written().is_some());
     physical
         .chain(on_inputs)
+        .chain(own.map(|k| of(k.describe(), false)))
         .filter(|e| {
             let about = &e.about;
             let searched =
@@ -183,6 +193,9 @@ impl Columns {
         }
         let reach = |k: usize| {
             let (low, high) = entry.about.coefficients[k].bounds;
+            if entry.written() && k < entry.about.coefficients.len() - entry.about.shape {
+                return [low, high];
+            }
             let by = REACH * values[k].abs();
             [(values[k] - by).max(low), (values[k] + by).min(high)]
         };

@@ -128,7 +128,7 @@ pub fn search(
 ) -> Option<Found> {
     progress("tuning the model's own coefficients");
     let tuned = Round::new(problem, model.clone(), &[])?.tuned();
-    let mut entries = catalogue::candidates(model, &options.without);
+    let mut entries = catalogue::candidates(model, &options.with, &options.without);
     if !excitation::moves_rudder(&problem.flights) {
         entries.retain(|e| e.about.id != RUDDER);
     }

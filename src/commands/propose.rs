@@ -1,0 +1,141 @@
+//! `greylag propose`: a formula for what no effect of the catalogue explains.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+use comfy_table::{CellAlignment, Table};
+
+use crate::commands::effect_files::named_effects;
+use crate::commands::files::{self, shipped};
+use crate::commands::intake::{Intake, LogArguments};
+use crate::model::GreyBox;
+use crate::sysid::diagnose::{Options, Proposal, propose};
+use crate::sysid::flight_path::ActuatorClock;
+
+/// Exit status when no formula is proposed.
+const NOTHING: u8 = 2;
+
+/// Options of `greylag propose`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Exit status: 0 a formula is proposed, 1 the search could not be made, 2 none is proposed: the output says why."
+)]
+pub struct Arguments {
+    /// The model file.
+    #[arg(long)]
+    model: PathBuf,
+    #[command(flatten)]
+    logs: LogArguments,
+    /// Logs that the search does not see, on which the formula is tested; without them the last log.
+    #[arg(long, num_args = 1..)]
+    hold_out: Vec<PathBuf>,
+    /// Write the effect file, which `greylag amend --effect` takes.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write everything that was found as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Effect files (TOML) or folders of them, tried as candidates beside the catalogue.
+    #[arg(long = "effect", value_name = "FILE", num_args = 1..)]
+    effects: Vec<String>,
+    /// Ids to be left out of the catalogue.
+    #[arg(long, num_args = 1..)]
+    without: Vec<String>,
+    /// Nulls, drawn so that they lack no effect, that set the thresholds.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
+    nulls: u16,
+    /// Seed of everything that is drawn.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Replace the files if they exist.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Reads, reconstructs, searches; prints what was found; writes the effect file.
+///
+/// # Errors
+/// If a file cannot be read or written, or the flights do not allow a search.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let overwrite = arguments.force.into();
+    for path in arguments.json.iter().chain(&arguments.out) {
+        files::writable(path, overwrite)?;
+    }
+    let model = GreyBox::load(&shipped(&arguments.model))?;
+    let with = named_effects(&arguments.effects)?;
+    let (search, test) = divided(arguments)?;
+    let clock = ActuatorClock::AsRecorded;
+    let Intake { flights, mut notes, .. } = arguments.logs.of(search).take_in(&model, clock)?;
+    let tests = arguments.logs.of(test).take_in(&model, clock)?;
+    notes.extend(tests.notes);
+    let options = Options {
+        seed: arguments.seed,
+        nulls: arguments.nulls.into(),
+        with,
+        without: arguments.without.clone(),
+        ..Options::default()
+    };
+    let mut proposal =
+        propose(&model, &flights, &tests.flights, &options, &|doing| eprintln!("{doing}"))?;
+    notes.append(&mut proposal.notes);
+    proposal.notes = notes;
+    print(&proposal);
+    if let Some(path) = &arguments.json {
+        files::write(path, &(serde_json::to_string_pretty(&proposal)? + "\n"), overwrite)?;
+    }
+    let Some(effect) = &proposal.effect else { return Ok(ExitCode::from(NOTHING)) };
+    match &arguments.out {
+        Some(path) => {
+            files::write(path, effect, overwrite)?;
+            println!("wrote {}; try it with `greylag amend --effect {0}`", path.display());
+        }
+        None => println!("\n{effect}"),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Logs to search in, logs to test on: the last one if none are named.
+fn divided(arguments: &Arguments) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+    let (logs, held) = (&arguments.logs.paths, &arguments.hold_out);
+    if let Some(twice) = held.iter().find(|p| logs.contains(p)) {
+        bail!("{} cannot be searched and held out at once; name it in one place", twice.display());
+    }
+    match (&logs[..], &held[..]) {
+        ([first @ .., last], []) if !first.is_empty() => Ok((first.to_vec(), vec![last.clone()])),
+        ([only], []) => bail!(
+            "{} is the only log: a formula is tested on flights that its search has not seen; name more with --log \
+             or --hold-out",
+            only.display()
+        ),
+        _ => Ok((logs.clone(), held.clone())),
+    }
+}
+
+fn print(proposal: &Proposal) {
+    println!("{}", proposal.model);
+    proposal.sentences.iter().for_each(|sentence| println!("  {sentence}"));
+    if !proposal.front.is_empty() {
+        println!("\n{}", front(proposal));
+    }
+    proposal.notes.iter().for_each(|note| println!("note: {note}"));
+}
+
+/// Formulas by size.
+fn front(proposal: &Proposal) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["formula", "size", "error removed", "evidence of last term", "by chance"]);
+    table.column_iter_mut().skip(1).for_each(|c| c.set_cell_alignment(CellAlignment::Right));
+    for rung in &proposal.front {
+        let mark = if rung.chosen { " (chosen)" } else { "" };
+        table.add_row([
+            format!("{}{mark}", rung.formula),
+            rung.complexity.to_string(),
+            format!("{:.1} %", 100.0 * rung.removed),
+            format!("{:.1}", rung.evidence),
+            format!("{:.1}", rung.threshold),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,133 @@
+//! Whether a formula is a number wherever an aircraft may be.
+
+use super::variable::Variable;
+use super::written::Written;
+use crate::physics::airframe::Geometry;
+use crate::physics::effects::Terms;
+use crate::physics::point::Base;
+use crate::physics::rigid_body::ForceAxes;
+use crate::physics::{AirData, Channel, Controls, Point, State};
+
+/// Variables whose corners are all tried; of more, as many corners are taken as these have.
+const ALL_CORNERS: usize = 12;
+
+/// Terms that are all numbers.
+struct Finite(bool);
+
+impl Terms<f64> for Finite {
+    fn add(&mut self, _: usize, _: Channel, amount: f64) {
+        self.0 &= amount.is_finite();
+    }
+}
+
+/// Refuses an effect that is no number somewhere: at the ends and in the middle of what its variables reach.
+///
+/// # Errors
+/// The place, and what to do.
+pub fn check(effect: &Written) -> Result<(), String> {
+    let variables = effect.variables();
+    let linear = effect.about.coefficients.len() - effect.about.shape;
+    let shape = &effect.values[linear..];
+    let tried = 1usize << variables.len().min(ALL_CORNERS);
+    for corner in 0..tried {
+        // a bit a variable; those behind the twelfth go with the first ones
+        let side = |k: usize| corner >> (k % ALL_CORNERS) & 1;
+        try_at(effect, shape, &variables, |k, v| v.range()[side(k)])?;
+    }
+    try_at(effect, shape, &variables, |_, v| 0.5 * (v.range()[0] + v.range()[1]))?;
+    try_at(effect, shape, &variables, |_, v| 0.0_f64.clamp(v.range()[0], v.range()[1]))
+}
+
+fn try_at(
+    effect: &Written,
+    shape: &[f64],
+    variables: &[Variable],
+    value: impl Fn(usize, Variable) -> f64,
+) -> Result<(), String> {
+    let mut place = Place::default();
+    for (k, variable) in variables.iter().enumerate() {
+        place.set(*variable, value(k, *variable));
+    }
+    let mut finite = Finite(true);
+    place.visit(|at| effect.basis(at, shape, &mut finite));
+    if finite.0 {
+        return Ok(());
+    }
+    let words: Vec<String> = variables
+        .iter()
+        .enumerate()
+        .map(|(k, v)| format!("{} = {}", v.name(), value(k, *v)))
+        .collect();
+    Err(format!(
+        "the formula is no number at {}; keep what is divided by, and what stands under a root, above zero with max",
+        words.join(", ")
+    ))
+}
+
+/// A point whose variables can be set one by one.
+struct Place {
+    state: State,
+    controls: Controls,
+    geometry: Geometry,
+    altitude: f64,
+    base: Base,
+    air: [Option<f64>; 4],
+}
+
+impl Default for Place {
+    fn default() -> Self {
+        let geometry = Geometry { area: 0.75, span: 2.1, chord: 0.3571 };
+        let (state, controls) = (State::NEUTRAL, Controls::default());
+        Place { state, controls, geometry, altitude: 0.0, base: Base::zero(), air: [None; 4] }
+    }
+}
+
+impl Place {
+    fn set(&mut self, variable: Variable, x: f64) {
+        use Variable as V;
+        match variable {
+            V::Roll => self.state.roll = x,
+            V::Pitch => self.state.pitch = x,
+            V::Airspeed => self.state.airspeed = x,
+            V::RollRate => self.state.p = x,
+            V::PitchRate => self.state.q = x,
+            V::YawRate => self.state.r = x,
+            V::Alpha => self.state.alpha = x,
+            V::Beta => self.state.beta = x,
+            V::Aileron => self.controls.aileron = x,
+            V::Elevator => self.controls.elevator = x,
+            V::Rudder => self.controls.rudder = x,
+            V::Throttle => self.controls.throttle = x,
+            V::RollRateHat => self.air[0] = Some(x),
+            V::PitchRateHat => self.air[1] = Some(x),
+            V::YawRateHat => self.air[2] = Some(x),
+            V::Pressure => self.air[3] = Some(x),
+            V::PressureArea => self.air[3] = Some(x / self.geometry.area),
+            V::Altitude => self.altitude = x,
+            V::Area => self.geometry.area = x,
+            V::Span => self.geometry.span = x,
+            V::Chord => self.geometry.chord = x,
+            V::Thrust => self.base.wrench.add(Channel::BodyX, x),
+            V::Lift => self.base.wrench.add(Channel::Lift, x),
+            V::AlphaRate => self.base.rate.alpha = x,
+            V::BetaRate => self.base.rate.beta = x,
+        }
+    }
+
+    fn visit(&self, of: impl FnOnce(&Point)) {
+        let mut air = AirData::new(&self.state, 1.2, self.altitude, &self.geometry);
+        let [p, q, r, pressure] = self.air;
+        air.p_hat = p.unwrap_or(air.p_hat);
+        air.q_hat = q.unwrap_or(air.q_hat);
+        air.r_hat = r.unwrap_or(air.r_hat);
+        air.q_s = pressure.map_or(air.q_s, |pressure| pressure * self.geometry.area);
+        of(&Point {
+            state: &self.state,
+            controls: &self.controls,
+            air: &air,
+            geometry: &self.geometry,
+            axes: ForceAxes::Wind,
+            base: &self.base,
+        });
+    }
+}

@@ -1,0 +1,22 @@
+//! Formulas that are read from files: effects that need no compiler.
+//!
+//! A text becomes a tree ([`parser`]), its units are balanced ([`units`]), it is divided into what each coefficient
+//! multiplies ([`split`]), and that becomes a list of operations over [`Real`](crate::num::Real) ([`tape`]). An
+//! effect file ([`file`]) holds one effect; once read, [`Kind::Written`](crate::physics::effects::Kind::Written)
+//! is an effect like all others.
+
+mod corners;
+pub mod dimension;
+pub mod expression;
+pub mod file;
+pub mod fuzz;
+pub mod parser;
+pub mod register;
+pub mod split;
+pub mod tape;
+pub mod units;
+pub mod variable;
+mod written;
+
+pub use variable::Variable;
+pub use written::{Line, Status, Written};

@@ -1,0 +1,389 @@
+//! A formula as a list of operations, the same for all kinds of numbers.
+//!
+//! It is a stack machine whose top is kept in a register. Derivatives come from running it with
+//! [`Dual`](crate::num::Dual) numbers: of eight states and three controls at once.
+
+use super::expression::{Expression, Function, Node};
+use super::variable::Variable;
+use crate::num::{Real, Table};
+use crate::physics::{Channel, Point};
+
+/// Numbers that wait below the top.
+const DEPTH: usize = 12;
+
+/// One operation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Operation {
+    Number(f64),
+    Variable(Variable),
+    Constant(u16),
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Negate,
+    Abs,
+    Min,
+    Max,
+    Sign,
+    Exp,
+    Sin,
+    Cos,
+    Tanh,
+    Sqrt,
+    Smoothstep,
+    Deadband,
+    Square,
+    Power(i16),
+    Table(u16),
+    /// Adds, multiplies the top by what follows, without the stack between.
+    AddNumber(f64),
+    Scale(f64),
+    AddVariable(Variable),
+    Times(Variable),
+    /// Multiplies the top by a run of variables of the list.
+    TimesAll(u16, u16),
+    /// Keeps the top; has it again.
+    Keep,
+    TimesKept,
+    /// Reports the top, and takes it.
+    Report(u16, Channel),
+}
+
+/// Operations with the tables they use.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tape {
+    operations: Vec<Operation>,
+    tables: Vec<Table>,
+    /// Variables that are multiplied in runs.
+    variables: Vec<Variable>,
+    depth: usize,
+    deepest: usize,
+}
+
+/// The place of each parameter among the shape constants, if it is one.
+pub type Places = [Option<u16>];
+
+impl Tape {
+    /// Adds the evaluation of `part` times `factor` for coefficient `index` in `channel`.
+    ///
+    /// # Errors
+    /// If too many intermediate results wait for one another.
+    pub fn report(
+        &mut self,
+        part: &Expression,
+        factor: Option<&Expression>,
+        index: u16,
+        channel: Channel,
+        places: &Places,
+    ) -> Result<(), String> {
+        match factor {
+            Some(factor) => self.push(&factor.clone().times(part.clone()), places)?,
+            None => {
+                self.push(part, places)?;
+                self.operations.push(Operation::TimesKept);
+            }
+        }
+        self.operations.push(Operation::Report(index, channel));
+        self.depth -= 1;
+        Ok(())
+    }
+
+    /// Adds the evaluation of a factor that several parts share.
+    ///
+    /// # Errors
+    /// As [`Tape::report`].
+    pub fn keep(&mut self, factor: &Expression, places: &Places) -> Result<(), String> {
+        self.push(factor, places)?;
+        self.operations.push(Operation::Keep);
+        self.depth -= 1;
+        Ok(())
+    }
+
+    /// How many operations it has.
+    pub fn len(&self) -> usize {
+        self.operations.len()
+    }
+
+    /// Whether it has none.
+    pub fn is_empty(&self) -> bool {
+        self.operations.is_empty()
+    }
+
+    fn deeper(&mut self) -> Result<(), String> {
+        self.depth += 1;
+        self.deepest = self.deepest.max(self.depth);
+        match self.depth > DEPTH {
+            true => Err(format!(
+                "more than {DEPTH} intermediate results wait for one another; begin sums and products with their \
+                 longest bracket"
+            )),
+            false => Ok(()),
+        }
+    }
+
+    /// A product: its factors that are no variables one by one, then all variables in a run.
+    fn product(&mut self, of: &Expression, places: &Places) -> Result<(), String> {
+        let mut factors = Vec::new();
+        let number = factors_of(of, &mut factors);
+        let (mut variables, others): (Vec<Variable>, Vec<&Expression>) = divided(&factors);
+        of_area(&mut variables);
+        let mut begun = false;
+        for other in others {
+            self.push(other, places)?;
+            if begun {
+                self.operations.push(Operation::Multiply);
+                self.depth -= 1;
+            }
+            begun = true;
+        }
+        if !begun {
+            match variables.pop() {
+                Some(first) => self.leaf(Operation::Variable(first))?,
+                None => return self.leaf(Operation::Number(number)),
+            }
+        }
+        match variables[..] {
+            [] => (),
+            [one] => self.operations.push(Operation::Times(one)),
+            _ => {
+                let first = self.variables.len() as u16;
+                self.variables.append(&mut variables);
+                self.operations.push(Operation::TimesAll(first, self.variables.len() as u16));
+            }
+        }
+        if number != 1.0 {
+            self.operations.push(Operation::Scale(number));
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, of: &Expression, places: &Places) -> Result<(), String> {
+        match &of.node {
+            Node::Call(Function::Multiply | Function::Negate, _) => self.product(of, places),
+            Node::Number(x) => self.leaf(Operation::Number(*x)),
+            Node::Variable(v) => self.leaf(Operation::Variable(*v)),
+            Node::Parameter(k) => match places.get(*k).copied().flatten() {
+                Some(place) => self.leaf(Operation::Constant(place)),
+                None => Err("a coefficient stands where only shape constants may".into()),
+            },
+            Node::Power(base, n) => {
+                self.push(base, places)?;
+                self.operations.push(if *n == 2 {
+                    Operation::Square
+                } else {
+                    Operation::Power(*n)
+                });
+                Ok(())
+            }
+            Node::Table(x, points) => {
+                self.push(x, places)?;
+                let [x, y] = [0, 1].map(|i| points.iter().map(|p| p[i]).collect::<Vec<_>>());
+                let table = Table::new(&x, &y).map_err(|why| why.to_string())?;
+                self.operations.push(Operation::Table(self.tables.len() as u16));
+                self.tables.push(table);
+                Ok(())
+            }
+            Node::Call(function, all) => self.function(*function, all, places),
+        }
+    }
+
+    fn leaf(&mut self, operation: Operation) -> Result<(), String> {
+        self.operations.push(operation);
+        self.deeper()
+    }
+
+    fn function(
+        &mut self,
+        function: Function,
+        all: &[Expression],
+        places: &Places,
+    ) -> Result<(), String> {
+        use Function as F;
+        // a leaf to the right, or to the left of what may change its side, needs no place on the stack
+        if let ([left, right], F::Add) = (all, function) {
+            for (leaf, other) in [(right, left), (left, right)] {
+                if let Some(direct) = direct(function, &leaf.node) {
+                    self.push(other, places)?;
+                    self.operations.push(direct);
+                    return Ok(());
+                }
+            }
+        }
+        for argument in all {
+            self.push(argument, places)?;
+        }
+        self.operations.push(match function {
+            F::Add => Operation::Add,
+            F::Subtract => Operation::Subtract,
+            F::Multiply => Operation::Multiply,
+            F::Divide => Operation::Divide,
+            F::Negate => Operation::Negate,
+            F::Abs => Operation::Abs,
+            F::Min => Operation::Min,
+            F::Max => Operation::Max,
+            F::Sign => Operation::Sign,
+            F::Exp => Operation::Exp,
+            F::Sin => Operation::Sin,
+            F::Cos => Operation::Cos,
+            F::Tanh => Operation::Tanh,
+            F::Sqrt => Operation::Sqrt,
+            F::Smoothstep => Operation::Smoothstep,
+            F::Deadband => Operation::Deadband,
+        });
+        self.depth -= all.len().saturating_sub(1);
+        Ok(())
+    }
+
+    /// Runs at `at` with shape constants `shape`, and reports each part's value.
+    #[inline(always)]
+    pub fn run<R: Real>(
+        &self,
+        at: &Point<R>,
+        shape: &[f64],
+        mut report: impl FnMut(usize, Channel, R),
+    ) {
+        let one = R::from_f64(1.0);
+        let mut below = [R::zero(); DEPTH];
+        let (mut top, mut kept, mut depth) = (R::zero(), one, 0);
+        for operation in &self.operations {
+            match *operation {
+                Operation::Number(x) => {
+                    put(&mut below, &mut depth, top);
+                    top = R::from_f64(x);
+                }
+                Operation::Variable(variable) => {
+                    put(&mut below, &mut depth, top);
+                    top = variable.value(at);
+                }
+                Operation::Constant(k) => {
+                    put(&mut below, &mut depth, top);
+                    top = R::from_f64(shape.get(k as usize).copied().unwrap_or(0.0));
+                }
+                Operation::Add => top = take(&below, &mut depth) + top,
+                Operation::Subtract => top = take(&below, &mut depth) - top,
+                Operation::Multiply => top = take(&below, &mut depth) * top,
+                Operation::Divide => top = take(&below, &mut depth) / top,
+                Operation::Min => top = take(&below, &mut depth).min(top),
+                Operation::Max => top = take(&below, &mut depth).max(top),
+                Operation::Negate => top = -top,
+                Operation::Abs => top = top.abs(),
+                Operation::Sign => {
+                    let negative = R::where_less(top, R::zero(), -one, R::zero());
+                    top = R::where_less(R::zero(), top, one, negative);
+                }
+                Operation::Exp => top = top.exp(),
+                Operation::Sin => top = top.sin_cos().0,
+                Operation::Cos => top = top.sin_cos().1,
+                Operation::Tanh => top = top.tanh(),
+                Operation::Sqrt => top = top.sqrt(),
+                Operation::Smoothstep => {
+                    let high = take(&below, &mut depth);
+                    let low = take(&below, &mut depth);
+                    let t = ((top - low) / (high - low)).clamp(0.0, 1.0);
+                    top = t * t * (R::from_f64(3.0) - t.scale(2.0));
+                }
+                Operation::Deadband => {
+                    let width = top.abs();
+                    let x = take(&below, &mut depth);
+                    top = x - x.max(-width).min(width);
+                }
+                Operation::Square => top = top * top,
+                Operation::Power(n) => top = power(top, n),
+                Operation::Table(k) => top = self.tables[k as usize].at(top),
+                Operation::AddNumber(x) => top += R::from_f64(x),
+                Operation::Scale(x) => top = top.scale(x),
+                Operation::AddVariable(variable) => top += variable.value(at),
+                Operation::Times(variable) => top = top * variable.value(at),
+                Operation::TimesAll(first, end) => {
+                    for variable in &self.variables[first as usize..end as usize] {
+                        top = top * variable.value(at);
+                    }
+                }
+                Operation::Keep => {
+                    kept = top;
+                    top = take(&below, &mut depth);
+                }
+                Operation::TimesKept => top = top * kept,
+                Operation::Report(index, channel) => {
+                    report(index as usize, channel, top);
+                    top = take(&below, &mut depth);
+                }
+            }
+        }
+    }
+}
+
+/// Notes what `of` is a product of, and returns the product of the numbers in it.
+fn factors_of<'a>(of: &'a Expression, factors: &mut Vec<&'a Expression>) -> f64 {
+    match &of.node {
+        Node::Number(x) => *x,
+        Node::Call(Function::Negate, all) => -factors_of(&all[0], factors),
+        Node::Call(Function::Multiply, all) => {
+            factors_of(&all[0], factors) * factors_of(&all[1], factors)
+        }
+        _ => {
+            factors.push(of);
+            1.0
+        }
+    }
+}
+
+/// The variables among `factors`, a square as two of them, and the others.
+fn divided<'a>(factors: &[&'a Expression]) -> (Vec<Variable>, Vec<&'a Expression>) {
+    let (mut variables, mut others) = (Vec::new(), Vec::new());
+    for factor in factors {
+        match &factor.node {
+            Node::Variable(v) => variables.push(*v),
+            Node::Power(base, n @ 1..=4) => match base.node {
+                Node::Variable(v) => variables.extend((0..*n).map(|_| v)),
+                _ => others.push(*factor),
+            },
+            _ => others.push(*factor),
+        }
+    }
+    (variables, others)
+}
+
+/// Puts what an airflow knows, the dynamic pressure times the wing area, in the place of both.
+fn of_area(variables: &mut Vec<Variable>) {
+    let place = |v: Variable| variables.iter().position(|other| *other == v);
+    if let (Some(pressure), Some(area)) = (place(Variable::Pressure), place(Variable::Area)) {
+        variables[pressure] = Variable::PressureArea;
+        variables.remove(area);
+    }
+}
+
+/// The operation that takes a leaf at once.
+fn direct(function: Function, leaf: &Node) -> Option<Operation> {
+    Some(match (function, leaf) {
+        (Function::Add, Node::Number(x)) => Operation::AddNumber(*x),
+        (Function::Add, Node::Variable(v)) => Operation::AddVariable(*v),
+        _ => return None,
+    })
+}
+
+#[inline(always)]
+fn put<R: Real>(below: &mut [R; DEPTH], depth: &mut usize, x: R) {
+    // the first one puts nothing of worth there, which keeps the top a plain number
+    if let Some(place) = below.get_mut(*depth) {
+        *place = x;
+    }
+    *depth += 1;
+}
+
+#[inline(always)]
+fn take<R: Real>(below: &[R; DEPTH], depth: &mut usize) -> R {
+    *depth = depth.wrapping_sub(1);
+    below.get(*depth).copied().unwrap_or(R::zero())
+}
+
+#[inline(always)]
+fn power<R: Real>(x: R, n: i16) -> R {
+    let one = R::from_f64(1.0);
+    let mut all = one;
+    for _ in 0..n.unsigned_abs() {
+        all = all * x;
+    }
+    if n < 0 { one / all } else { all }
+}

@@ -1,0 +1,111 @@
+//! Whether the units of a formula balance.
+
+use super::dimension::Dimension;
+use super::expression::{Expression, Function, Node};
+use super::parser::Fault;
+
+/// What a part of a formula measures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Measure {
+    /// A quantity of that dimension.
+    Of(Dimension),
+    /// Nought, which is of any dimension.
+    Any,
+}
+
+/// The dimension of `formula` with parameters of `dimensions`.
+///
+/// # Errors
+/// Where two sides do not have the same, with both.
+pub fn dimension(
+    formula: &Expression,
+    dimensions: &[Dimension],
+) -> Result<Option<Dimension>, Fault> {
+    Ok(match measure(formula, dimensions)? {
+        Measure::Of(dimension) => Some(dimension),
+        Measure::Any => None,
+    })
+}
+
+fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> {
+    use Measure::{Any, Of};
+    let part = |e: &Expression| measure(e, dimensions);
+    Ok(match &of.node {
+        Node::Number(0.0) => Any,
+        Node::Number(_) => Of(Dimension::NONE),
+        Node::Variable(v) => Of(v.dimension()),
+        Node::Parameter(k) => Of(dimensions.get(*k).copied().unwrap_or(Dimension::NONE)),
+        Node::Power(base, n) => match part(base)? {
+            Of(base) => Of(base.to_power(*n)),
+            Any => Any,
+        },
+        Node::Table(x, _) => {
+            part(x)?;
+            // its points carry the unit of its variable
+            Of(Dimension::NONE)
+        }
+        Node::Call(function, all) => match function {
+            Function::Add
+            | Function::Subtract
+            | Function::Min
+            | Function::Max
+            | Function::Deadband => same(part(&all[0])?, part(&all[1])?, &all[1], function.name())?,
+            Function::Multiply => both(part(&all[0])?, part(&all[1])?, Dimension::times),
+            Function::Divide => both(part(&all[0])?, part(&all[1])?, Dimension::per),
+            Function::Negate | Function::Abs => part(&all[0])?,
+            Function::Sign => {
+                part(&all[0])?;
+                Of(Dimension::NONE)
+            }
+            Function::Sqrt => match part(&all[0])? {
+                Of(inside) => Of(inside.root().ok_or_else(|| Fault {
+                    at: all[0].at,
+                    why: format!("{inside} under the root has no root; make it a square"),
+                })?),
+                Any => Any,
+            },
+            Function::Exp | Function::Sin | Function::Cos | Function::Tanh => {
+                plain(part(&all[0])?, &all[0], function.name())?
+            }
+            Function::Smoothstep => {
+                let x = part(&all[2])?;
+                same(part(&all[0])?, x, &all[2], "smoothstep")?;
+                same(part(&all[1])?, x, &all[2], "smoothstep")?;
+                Of(Dimension::NONE)
+            }
+        },
+    })
+}
+
+fn both(a: Measure, b: Measure, of: impl Fn(Dimension, Dimension) -> Dimension) -> Measure {
+    match (a, b) {
+        (Measure::Of(a), Measure::Of(b)) => Measure::Of(of(a, b)),
+        _ => Measure::Any,
+    }
+}
+
+fn same(left: Measure, right: Measure, at: &Expression, name: &str) -> Result<Measure, Fault> {
+    match (left, right) {
+        (Measure::Any, other) | (other, Measure::Any) => Ok(other),
+        (Measure::Of(a), Measure::Of(b)) if a == b => Ok(left),
+        (Measure::Of(a), Measure::Of(b)) => Err(Fault {
+            at: at.at,
+            why: format!(
+                "the units do not balance: left of {name:?} stands {a}, right of it {b}; give a number that has \
+                 a unit as a parameter, or divide by a speed or length"
+            ),
+        }),
+    }
+}
+
+fn plain(of: Measure, at: &Expression, name: &str) -> Result<Measure, Fault> {
+    match of {
+        Measure::Of(d) if d != Dimension::NONE => Err(Fault {
+            at: at.at,
+            why: format!(
+                "the units do not balance: {name} takes a number, its argument is {d}; divide it by a parameter in {d}"
+            ),
+        }),
+        _ => Ok(Measure::Of(Dimension::NONE)),
+    }
+}

@@ -1,0 +1,175 @@
+//! An effect of a file as functions that JSBSim flies.
+//!
+//! It shares the tree with the effect, but none of its evaluation: JSBSim works the functions out itself.
+
+use greylag_sitl::hidden::{Hidden, Place};
+
+use crate::physics::Channel;
+use crate::physics::formula::expression::{Expression, Function, Node};
+use crate::physics::formula::{Variable, Written};
+
+/// Newtons per pound of force.
+const LBF: f64 = 4.448_221_615_260_5;
+/// Metres per foot.
+const FT: f64 = 0.3048;
+
+/// `effect` with `values` of its coefficients, as JSBSim has it.
+///
+/// # Errors
+/// What JSBSim has not.
+pub fn hidden(effect: &Written, values: &[f64]) -> Result<Hidden, String> {
+    let functions = effect.lines.iter().map(|line| {
+        let (place, unit) = place(line.channel);
+        let all = [number(1.0 / unit), xml(&line.factor, values)?, xml(&line.shape, values)?];
+        Ok((place, element("product", &all)))
+    });
+    Ok(Hidden::written(effect.about.id, functions.collect::<Result<_, String>>()?))
+}
+
+/// Where a channel is in JSBSim, and how much of ours its unit is.
+fn place(channel: Channel) -> (Place, f64) {
+    match channel {
+        Channel::Drag => (Place::Drag, LBF),
+        Channel::Lift => (Place::Lift, LBF),
+        Channel::Side => (Place::Side, LBF),
+        Channel::BodyX => (Place::Thrust, LBF),
+        Channel::Roll => (Place::Roll, LBF * FT),
+        Channel::Pitch => (Place::Pitch, LBF * FT),
+        Channel::Yaw => (Place::Yaw, LBF * FT),
+    }
+}
+
+fn element(name: &str, parts: &[String]) -> String {
+    format!("<{name}>{}</{name}>", parts.concat())
+}
+
+fn number(x: f64) -> String {
+    format!("<value>{x}</value>")
+}
+
+fn property(name: &str) -> String {
+    format!("<property>{name}</property>")
+}
+
+/// A property in another unit.
+fn scaled(factor: f64, name: &str) -> String {
+    element("product", &[number(factor), property(name)])
+}
+
+fn variable(of: Variable) -> Result<String, String> {
+    use Variable as V;
+    Ok(match of {
+        V::Roll => property("attitude/phi-rad"),
+        V::Pitch => property("attitude/theta-rad"),
+        V::Airspeed => scaled(FT, "velocities/vt-fps"),
+        V::RollRate => property("velocities/p-rad_sec"),
+        V::PitchRate => property("velocities/q-rad_sec"),
+        V::YawRate => property("velocities/r-rad_sec"),
+        V::Alpha => property("aero/alpha-rad"),
+        V::Beta => property("aero/beta-rad"),
+        V::Aileron => property("{aileron}"),
+        V::Elevator => property("{elevator}"),
+        V::Rudder => property("{rudder}"),
+        V::Throttle => property("{throttle}"),
+        V::RollRateHat => hat("velocities/p-aero-rad_sec", "aero/bi2vel"),
+        V::PitchRateHat => hat("velocities/q-aero-rad_sec", "aero/ci2vel"),
+        V::YawRateHat => hat("velocities/r-aero-rad_sec", "aero/bi2vel"),
+        V::Pressure => scaled(LBF / (FT * FT), "aero/qbar-psf"),
+        V::PressureArea => {
+            let all = [number(LBF), property("aero/qbar-psf"), property("metrics/Sw-sqft")];
+            element("product", &all)
+        }
+        V::Altitude => scaled(FT, "position/h-sl-ft"),
+        V::Area => scaled(FT * FT, "metrics/Sw-sqft"),
+        V::Span => scaled(FT, "metrics/bw-ft"),
+        V::Chord => scaled(FT, "metrics/cbarw-ft"),
+        V::Thrust => scaled(LBF, "propulsion/engine/thrust-lbs"),
+        V::AlphaRate => property("aero/alphadot-rad_sec"),
+        V::BetaRate => property("aero/betadot-rad_sec"),
+        V::Lift => {
+            return Err(format!(
+                "{} is not known there while forces are worked out; write qbar*S and alpha",
+                of.name()
+            ));
+        }
+    })
+}
+
+fn hat(rate: &str, per: &str) -> String {
+    element("product", &[property(rate), property(per)])
+}
+
+fn xml(of: &Expression, values: &[f64]) -> Result<String, String> {
+    match &of.node {
+        Node::Number(x) => Ok(number(*x)),
+        Node::Variable(v) => variable(*v),
+        Node::Parameter(k) => Ok(number(values.get(*k).copied().unwrap_or(0.0))),
+        Node::Power(base, n) => Ok(element("pow", &[xml(base, values)?, number(f64::from(*n))])),
+        Node::Table(x, points) => Ok(table(&xml(x, values)?, points)),
+        Node::Call(function, all) => {
+            let all = all.iter().map(|e| xml(e, values)).collect::<Result<Vec<_>, _>>()?;
+            Ok(call(*function, &all))
+        }
+    }
+}
+
+/// Ramps one after the other: JSBSim's own tables take no expression.
+fn table(x: &str, points: &[[f64; 2]]) -> String {
+    let ramp = |pair: &[[f64; 2]]| {
+        let [[x0, y0], [x1, y1]] = [pair[0], pair[1]];
+        let from = element("difference", &[x.to_owned(), number(x0)]);
+        let part = element("min", &[element("max", &[from, number(0.0)]), number(x1 - x0)]);
+        element("product", &[number((y1 - y0) / (x1 - x0)), part])
+    };
+    let ramps: Vec<String> = points.windows(2).map(ramp).collect();
+    element("sum", &[vec![number(points[0][1])], ramps].concat())
+}
+
+fn call(function: Function, all: &[String]) -> String {
+    let one = || number(1.0);
+    match function {
+        Function::Add => element("sum", all),
+        Function::Subtract => element("difference", all),
+        Function::Multiply => element("product", all),
+        Function::Divide => element("quotient", all),
+        Function::Negate => element("product", &[number(-1.0), all[0].clone()]),
+        Function::Abs => element("abs", all),
+        Function::Min => element("min", all),
+        Function::Max => element("max", all),
+        Function::Exp => element("exp", all),
+        Function::Sin => element("sin", all),
+        Function::Cos => element("cos", all),
+        Function::Sqrt => element("sqrt", all),
+        Function::Sign => sign(&all[0]),
+        Function::Tanh => {
+            let held =
+                element("max", &[element("min", &[all[0].clone(), number(20.0)]), number(-20.0)]);
+            let e = element("exp", &[element("product", &[number(2.0), held])]);
+            let (less, more) =
+                (element("difference", &[e.clone(), one()]), element("sum", &[e, one()]));
+            element("quotient", &[less, more])
+        }
+        Function::Smoothstep => smoothstep(&all[0], &all[1], &all[2]),
+        Function::Deadband => {
+            let held = element("min", &[all[0].clone(), all[1].clone()]);
+            let low = element("product", &[number(-1.0), all[1].clone()]);
+            element("difference", &[all[0].clone(), element("max", &[held, low])])
+        }
+    }
+}
+
+/// −1, 0 or 1; JSBSim's own sign is 1 at nought.
+fn sign(x: &str) -> String {
+    let above = element("gt", &[x.to_owned(), number(0.0)]);
+    let below = element("lt", &[x.to_owned(), number(0.0)]);
+    element("difference", &[above, below])
+}
+
+fn smoothstep(low: &str, high: &str, x: &str) -> String {
+    let from = element("difference", &[x.to_owned(), low.to_owned()]);
+    let over = element("difference", &[high.to_owned(), low.to_owned()]);
+    let share = element("quotient", &[from, over]);
+    let t = element("max", &[element("min", &[share, number(1.0)]), number(0.0)]);
+    let rest = element("difference", &[number(3.0), element("product", &[number(2.0), t.clone()])]);
+    element("product", &[t.clone(), t, rest])
+}

@@ -1,0 +1,116 @@
+//! The effect file of a formula that was found.
+
+use super::grades;
+use super::library::Form;
+use crate::physics::formula::file::channel_name;
+
+/// A term with its coefficient.
+#[derive(Clone, Copy, Debug)]
+pub struct Term {
+    /// Its form.
+    pub form: Form,
+    /// Its coefficient.
+    pub value: f64,
+    /// The coefficient's standard deviation.
+    pub sd: f64,
+}
+
+/// Bounds of a coefficient: this many times what was found, to both sides.
+const ROOM: f64 = 10.0;
+
+/// Four significant figures.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.3e}").parse().unwrap_or(x)
+}
+
+/// The id of a proposal.
+pub fn id(terms: &[Term]) -> String {
+    let channel = terms.first().map_or("", |t| channel_name(t.form.channel));
+    let mut names: Vec<&str> = Vec::new();
+    for variable in terms.iter().flat_map(|t| t.form.shape.variables()) {
+        if !names.contains(&variable.name()) {
+            names.push(variable.name());
+        }
+    }
+    let full = format!("proposed_{channel}_by_{}", names.join("_"));
+    full.chars().take(40).collect()
+}
+
+/// The formula of `terms` as a line of text.
+pub fn formula(terms: &[Term]) -> String {
+    let one = |t: &Term| {
+        let factor = if t.form.of_air { format!("{}*", t.form.factor()) } else { String::new() };
+        format!("{} = k*{factor}{}", channel_name(t.form.channel), t.form.shape.text(None))
+    };
+    terms.iter().map(one).collect::<Vec<_>>().join(" + ")
+}
+
+/// The effect file of `terms`, thresholds free; `from` says of which flights.
+pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> String {
+    let quoted = |text: &str| format!("{:?}", text);
+    let mut text = format!(
+        "# Proposed by `greylag propose`. `greylag amend --effect` takes it; nothing flies with it until somebody has\n\
+         # looked at it and written status = \"accepted\".\n\
+         schema = 1\nid = {}\ndescription = {}\nsource = {}\nstatus = \"proposed\"\nlook_alikes = [{}]\n\
+         separated_by = \"flights that move its variables one by one, at two airspeeds\"\n",
+        quoted(&id(terms)),
+        quoted(description),
+        quoted(&format!("greylag propose, of {from}")),
+        alike.iter().map(|a| quoted(a)).collect::<Vec<_>>().join(", ")
+    );
+    for (k, term) in terms.iter().enumerate() {
+        let bound = rounded(ROOM * (term.value.abs() + 3.0 * term.sd));
+        text += &format!(
+            "\n[parameters.k{}]\nvalue = {}\nwidth = {}\nbounds = [-{bound}, {bound}]\nunit = {}\nmeaning = {}\n",
+            k + 1,
+            rounded(term.value),
+            rounded(term.sd.max(0.1 * term.value.abs())),
+            quoted(&term.form.unit()),
+            quoted(&format!("how much {}", grades::words(&term.form, 1.0)))
+        );
+        if let Some(c) = term.form.shape.constant() {
+            text += &format!(
+                "\n[parameters.w{}]\nvalue = {c}\nwidth = {}\nbounds = [0.0, {}]\nunit = \"\"\nmeaning = \"where it begins\"\n",
+                k + 1,
+                rounded(0.3 * c),
+                rounded(3.0 * c)
+            );
+        }
+    }
+    for (k, term) in terms.iter().enumerate() {
+        let constant = format!("w{}", k + 1);
+        text += &format!(
+            "\n[[channels]]\nchannel = {}\nfactor = {}\nshape = {}\n",
+            quoted(channel_name(term.form.channel)),
+            quoted(term.form.factor()),
+            quoted(&format!("k{}*{}", k + 1, term.form.shape.text(Some(&constant))))
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::library::Shape;
+    use super::*;
+    use crate::physics::Channel;
+    use crate::physics::formula::{Status, Variable, file as reader};
+
+    #[test]
+    fn a_draft_is_an_effect_file_that_nothing_flies() {
+        let term = |of_air, shape, value| Term {
+            form: Form { channel: Channel::Yaw, of_air, shape },
+            value,
+            sd: 0.02,
+        };
+        let terms = [
+            term(false, Shape::Linear(Variable::Throttle), 0.53),
+            term(true, Shape::Beyond(Variable::Beta, 0.07), -0.01),
+        ];
+        let text = file(&terms, "It \"yaws\".", &["yaw = k*throttle^2".into()], "a.csv");
+        let effect = reader::parse(&text).unwrap_or_else(|why| panic!("{why}\n{text}"));
+        assert_eq!(effect.status, Status::Proposed);
+        assert_eq!(effect.about.id, "proposed_yaw_by_throttle_beta");
+        assert_eq!((effect.values, effect.about.shape), (vec![0.53, -0.01, 0.07], 1));
+    }
+}

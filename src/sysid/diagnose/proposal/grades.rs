@@ -1,0 +1,121 @@
+//! What may be said of a form beside those that the flights cannot tell from it, in words.
+
+use super::library::{Form, Shape};
+use super::result::Grades;
+use crate::physics::Channel;
+use crate::physics::formula::Variable;
+
+/// How a shape runs with the sign of its variables.
+fn trend(form: &Form) -> String {
+    let positive = |v: &Variable| matches!(v, Variable::Throttle | Variable::Airspeed);
+    match form.shape {
+        // a positive variable: linear, square and threshold all grow with it
+        Shape::Linear(v) | Shape::Square(v) | Shape::Above(v, _) if positive(&v) => {
+            format!("grows {}", v.name())
+        }
+        Shape::Linear(v) | Shape::SignedSquare(v) | Shape::Beyond(v, _) => {
+            format!("odd {}", v.name())
+        }
+        Shape::Magnitude(v) | Shape::Square(v) => format!("even {}", v.name()),
+        Shape::Above(v, _) => format!("one-sided {}", v.name()),
+        Shape::Product(v, w) if positive(&v) || positive(&w) => {
+            format!("odd {} grows {}", v.name(), w.name())
+        }
+        Shape::Product(v, w) => format!("odd {} odd {}", v.name(), w.name()),
+        Shape::ByMagnitude(v, w) => format!("odd {} even {}", v.name(), w.name()),
+    }
+}
+
+/// What `best` and all of `alike`, which these flights cannot tell from it, have in common.
+pub fn grades(best: &Form, alike: &[Form]) -> Grades {
+    let same = |of: &dyn Fn(&Form) -> bool| alike.iter().all(of);
+    let variables = sorted(best);
+    Grades {
+        channel: same(&|f| f.channel == best.channel),
+        variables: same(&|f| sorted(f) == variables),
+        trend: same(&|f| trend(f) == trend(best)),
+        form: alike.is_empty(),
+    }
+}
+
+/// The variables of the shape: a rate is the same one whether it is divided by the airspeed or not.
+fn sorted(form: &Form) -> Vec<&'static str> {
+    let plain = |v: Variable| match v {
+        Variable::RollRateHat => "p",
+        Variable::PitchRateHat => "q",
+        Variable::YawRateHat => "r",
+        v => v.name(),
+    };
+    let mut all: Vec<&str> = form.shape.variables().into_iter().map(plain).collect();
+    all.sort_unstable();
+    all
+}
+
+/// The amount of a channel.
+pub fn amount(channel: Channel) -> &'static str {
+    match channel {
+        Channel::Drag => "drag",
+        Channel::Lift => "lift",
+        Channel::Side => "side force",
+        Channel::BodyX => "thrust",
+        Channel::Roll => "rolling moment",
+        Channel::Pitch => "pitching moment",
+        Channel::Yaw => "yawing moment",
+    }
+}
+
+fn long(v: Variable) -> &'static str {
+    match v {
+        Variable::Alpha => "angle of attack",
+        Variable::Beta => "sideslip",
+        Variable::RollRate | Variable::RollRateHat => "roll rate",
+        Variable::PitchRate | Variable::PitchRateHat => "pitch rate",
+        Variable::YawRate | Variable::YawRateHat => "yaw rate",
+        v => v.name(),
+    }
+}
+
+/// How the channel of `form` depends on its variables, for a coefficient of that `value`.
+pub fn words(form: &Form, value: f64) -> String {
+    let runs = if value < 0.0 { "falls" } else { "grows" };
+    let how = match form.shape {
+        Shape::Linear(v) => format!("linearly with {}", long(v)),
+        Shape::Magnitude(v) => format!("with the magnitude of {}", long(v)),
+        Shape::Square(v) => format!("with the square of {}", long(v)),
+        Shape::SignedSquare(v) => format!("with the square of {}, with its sign", long(v)),
+        Shape::Product(v, w) => format!("with the product of {} and {}", long(v), long(w)),
+        Shape::ByMagnitude(v, w) => format!("with {} times the magnitude of {}", long(v), long(w)),
+        Shape::Above(v, c) => format!("with {} above {c}", long(v)),
+        Shape::Beyond(v, c) => format!("with {} beyond ±{c}", long(v)),
+    };
+    let pressure = match form.of_air {
+        true => ", in proportion to dynamic pressure",
+        false if form.shape.variables().contains(&Variable::Airspeed) => "",
+        false => ", not with airspeed",
+    };
+    format!("{} {runs} {how}{pressure}", amount(form.channel))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn form(of_air: bool, shape: Shape) -> Form {
+        Form { channel: Channel::Yaw, of_air, shape }
+    }
+
+    #[test]
+    fn only_what_all_alike_share_is_sure() {
+        let best = form(false, Shape::Linear(Variable::Throttle));
+        let alone = grades(&best, &[]);
+        assert!(alone.form && alone.trend && alone.variables && alone.channel);
+        let square = grades(&best, &[form(false, Shape::Square(Variable::Throttle))]);
+        assert!(!square.form && square.trend && square.variables);
+        let other = grades(&best, &[form(true, Shape::Linear(Variable::Beta))]);
+        assert!(!other.trend && !other.variables && other.channel);
+        assert_eq!(
+            words(&best, 0.53),
+            "yawing moment grows linearly with throttle, not with airspeed"
+        );
+    }
+}

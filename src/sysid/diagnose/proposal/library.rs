@@ -1,0 +1,236 @@
+//! The shapes that are tried: each one variable or two in a known factor of a channel.
+
+use crate::physics::Channel;
+use crate::physics::formula::file::channel_name;
+use crate::physics::formula::{Variable, Written, register};
+
+/// Variables of shapes that grow with dynamic pressure: all are numbers without a unit.
+const OF_AIR: [Variable; 9] = [
+    Variable::Alpha,
+    Variable::Beta,
+    Variable::RollRateHat,
+    Variable::PitchRateHat,
+    Variable::YawRateHat,
+    Variable::Aileron,
+    Variable::Elevator,
+    Variable::Rudder,
+    Variable::Throttle,
+];
+/// Variables of shapes that do not: thrust, gyroscopic and inertial moments.
+const BESIDE_AIR: [Variable; 7] = [
+    Variable::Throttle,
+    Variable::Airspeed,
+    Variable::RollRate,
+    Variable::PitchRate,
+    Variable::YawRate,
+    Variable::Alpha,
+    Variable::Beta,
+];
+/// Variables that may have a dead band or a threshold.
+const BANDED: [Variable; 5] =
+    [Variable::Alpha, Variable::Beta, Variable::Aileron, Variable::Elevator, Variable::Throttle];
+/// Where thresholds lie, as quantiles of the magnitude of what was flown.
+pub(super) const QUANTILES: [f64; 2] = [0.5, 0.75];
+
+/// How an amount depends on its variables.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// v
+    Linear(Variable),
+    /// |v|
+    Magnitude(Variable),
+    /// v²
+    Square(Variable),
+    /// v |v|
+    SignedSquare(Variable),
+    /// v w
+    Product(Variable, Variable),
+    /// v |w|
+    ByMagnitude(Variable, Variable),
+    /// What v exceeds a threshold by.
+    Above(Variable, f64),
+    /// What v exceeds a dead band by, with its sign.
+    Beyond(Variable, f64),
+}
+
+/// A shape in a factor of a channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Form {
+    /// Where it acts.
+    pub channel: Channel,
+    /// Whether it grows with dynamic pressure.
+    pub of_air: bool,
+    /// How it depends on its variables.
+    pub shape: Shape,
+}
+
+impl Shape {
+    /// Its variables.
+    pub fn variables(&self) -> Vec<Variable> {
+        match *self {
+            Shape::Product(v, w) | Shape::ByMagnitude(v, w) => vec![v, w],
+            Shape::Linear(v)
+            | Shape::Magnitude(v)
+            | Shape::Square(v)
+            | Shape::SignedSquare(v)
+            | Shape::Above(v, _)
+            | Shape::Beyond(v, _) => vec![v],
+        }
+    }
+
+    /// The formula, with its constant as `constant` if that is given.
+    pub fn text(&self, constant: Option<&str>) -> String {
+        let name = Variable::name;
+        let number = |c: f64| constant.map_or(format!("{c}"), str::to_owned);
+        match *self {
+            Shape::Linear(v) => name(v).into(),
+            Shape::Magnitude(v) => format!("abs({})", name(v)),
+            Shape::Square(v) => format!("{}^2", name(v)),
+            Shape::SignedSquare(v) => format!("{0}*abs({0})", name(v)),
+            Shape::Product(v, w) => format!("{}*{}", name(v), name(w)),
+            Shape::ByMagnitude(v, w) => format!("{}*abs({})", name(v), name(w)),
+            Shape::Above(v, c) => format!("max({} - {}, 0)", name(v), number(c)),
+            Shape::Beyond(v, c) => format!("deadband({}, {})", name(v), number(c)),
+        }
+    }
+
+    /// Its threshold, if it has one.
+    pub fn constant(&self) -> Option<f64> {
+        match *self {
+            Shape::Above(_, c) | Shape::Beyond(_, c) => Some(c),
+            _ => None,
+        }
+    }
+
+    /// Terms of its formula: variables, numbers and operations.
+    pub fn complexity(&self) -> usize {
+        match self {
+            Shape::Linear(_) => 1,
+            Shape::Magnitude(_) | Shape::Square(_) => 2,
+            Shape::Product(..) => 3,
+            Shape::SignedSquare(_) | Shape::ByMagnitude(..) | Shape::Beyond(..) => 4,
+            Shape::Above(..) => 5,
+        }
+    }
+}
+
+impl Form {
+    /// What its shape is multiplied by.
+    pub fn factor(&self) -> &'static str {
+        let moment = matches!(self.channel, Channel::Roll | Channel::Yaw);
+        match (self.of_air, moment, self.channel) {
+            (false, ..) => "1",
+            (true, true, _) => "qbar*S*b",
+            (true, _, Channel::Pitch) => "qbar*S*c",
+            (true, ..) => "qbar*S",
+        }
+    }
+
+    /// The unit of its coefficient.
+    pub fn unit(&self) -> String {
+        let force = match self.channel {
+            Channel::Roll | Channel::Pitch | Channel::Yaw => "N m",
+            _ => "N",
+        };
+        if self.of_air {
+            return String::new();
+        }
+        let per = |v: &Variable| match v {
+            Variable::Airspeed => " m^-1 s",
+            Variable::RollRate | Variable::PitchRate | Variable::YawRate => " s",
+            _ => "",
+        };
+        let variables = self.shape.variables();
+        let squared = matches!(self.shape, Shape::Square(_) | Shape::SignedSquare(_));
+        let units: Vec<&str> = variables.iter().map(per).collect();
+        format!("{force}{}{}", units.concat(), if squared { units.concat() } else { String::new() })
+    }
+
+    /// Its id among the candidates.
+    pub fn id(&self) -> String {
+        let text = self.shape.text(None);
+        let plain: String =
+            text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        format!(
+            "try_{}_{}_{plain}",
+            channel_name(self.channel),
+            if self.of_air { "q" } else { "o" }
+        )
+    }
+
+    /// The effect of this form alone, its threshold fixed.
+    ///
+    /// # Errors
+    /// If its file could not be read, which none of the library is.
+    pub fn effect(&self) -> Result<&'static Written, String> {
+        let text = format!(
+            "schema = 1\nid = \"{}\"\ndescription = \"A shape that was tried.\"\nsource = \"greylag propose\"\n\
+             status = \"proposed\"\n[parameters.k]\nvalue = 0.0\nbounds = [-1e6, 1e6]\nunit = \"{}\"\n\
+             meaning = \"amount\"\n[[channels]]\nchannel = \"{}\"\nfactor = \"{}\"\nshape = \"k*{}\"\n",
+            self.id(),
+            self.unit(),
+            channel_name(self.channel),
+            self.factor(),
+            self.shape.text(None)
+        );
+        register::read(&text)
+    }
+}
+
+/// All forms in `channel`; `threshold` gives the quantile of the magnitude of a variable.
+pub fn forms(channel: Channel, threshold: &dyn Fn(Variable, f64) -> f64) -> Vec<Form> {
+    let mut shapes: Vec<(bool, Shape)> = Vec::new();
+    for (of_air, variables) in [(true, &OF_AIR[..]), (false, &BESIDE_AIR[..])] {
+        for (i, &v) in variables.iter().enumerate() {
+            let positive = matches!(v, Variable::Throttle | Variable::Airspeed);
+            shapes.push((of_air, Shape::Linear(v)));
+            shapes.push((of_air, Shape::Square(v)));
+            if !positive {
+                shapes.push((of_air, Shape::Magnitude(v)));
+                shapes.push((of_air, Shape::SignedSquare(v)));
+            }
+            for &w in &variables[i + 1..] {
+                shapes.push((of_air, Shape::Product(v, w)));
+            }
+            if of_air {
+                let odd = variables.iter().filter(|w| **w != v && **w != Variable::Throttle);
+                shapes.extend(odd.map(|w| (true, Shape::ByMagnitude(v, *w))));
+            }
+        }
+    }
+    for v in BANDED {
+        for quantile in QUANTILES {
+            let c = threshold(v, quantile);
+            if c > 0.0 {
+                shapes.push((true, Shape::Above(v, c)));
+                if v != Variable::Throttle {
+                    shapes.push((true, Shape::Beyond(v, c)));
+                } else {
+                    shapes.push((false, Shape::Above(v, c)));
+                }
+            }
+        }
+    }
+    shapes.into_iter().map(|(of_air, shape)| Form { channel, of_air, shape }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_form_is_an_effect_with_an_id_of_its_own() {
+        let mut ids = Vec::new();
+        for channel in Channel::ALL {
+            for form in forms(channel, &|_, quantile| 0.1 * quantile) {
+                let effect = form.effect().unwrap_or_else(|why| panic!("{form:?}: {why}"));
+                assert_eq!(effect.about.shape, 0, "{form:?}");
+                ids.push(form.id());
+            }
+        }
+        let count = ids.len();
+        ids.sort();
+        ids.dedup();
+        assert_eq!(ids.len(), count);
+    }
+}

@@ -1,0 +1,11 @@
+//! A formula for what no effect of the catalogue holds: shapes searched, tested on other flights, put into words.
+
+mod draft;
+mod grades;
+mod library;
+mod propose;
+mod result;
+
+pub use library::{Form, Shape};
+pub use propose::propose;
+pub use result::{Alternative, Grades, HeldOut, Proposal, Rung};

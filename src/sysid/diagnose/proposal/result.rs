@@ -1,0 +1,88 @@
+//! What a search for a formula says, as it goes into JSON (`greylag.proposal/1`).
+
+use serde::Serialize;
+
+use crate::sysid::diagnose::Verdict;
+
+/// What is sure of the form that was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Grades {
+    /// The channel in which it acts.
+    pub channel: bool,
+    /// The variables on which it depends.
+    pub variables: bool,
+    /// Whether it is odd, even or only grows with them.
+    pub trend: bool,
+    /// The form, up to its constants.
+    pub form: bool,
+}
+
+/// A form that the flights cannot tell from the one found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Alternative {
+    /// Its formula.
+    pub formula: String,
+    /// Its evidence.
+    pub evidence: f64,
+}
+
+/// A formula of the front: the best of its size.
+#[derive(Clone, Debug, Serialize)]
+pub struct Rung {
+    /// Its formula.
+    pub formula: String,
+    /// Terms, numbers and operations in it.
+    pub complexity: usize,
+    /// Share of the error beyond noise in the failing channels that it removes.
+    pub removed: f64,
+    /// Evidence of its last term.
+    pub evidence: f64,
+    /// What chance reaches: of the search over all forms, on flights that lack nothing.
+    pub threshold: f64,
+    /// Whether it is the one proposed.
+    pub chosen: bool,
+}
+
+/// What the chosen form does on flights that the search has not seen, its amounts as they were found.
+#[derive(Clone, Debug, Serialize)]
+pub struct HeldOut {
+    /// Names of the flights.
+    pub flights: Vec<String>,
+    /// Share of the error beyond noise in its channels that it removes.
+    pub removed: f64,
+    /// The fall of the squared error over the noise's.
+    pub fall: f64,
+    /// What chance reaches.
+    pub threshold: f64,
+}
+
+/// What was found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Proposal {
+    /// `greylag.proposal/1`.
+    pub schema: &'static str,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Name of the model.
+    pub model: String,
+    /// The verdict of the diagnosis before.
+    pub verdict: Verdict,
+    /// The answer in plain sentences.
+    pub sentences: Vec<String>,
+    /// Formulas by size, each the best of its own.
+    pub front: Vec<Rung>,
+    /// Forms of the first term that these flights cannot tell from it.
+    pub alike: Vec<Alternative>,
+    /// What is sure of the first term.
+    pub grades: Option<Grades>,
+    /// The test on other flights.
+    pub held_out: Option<HeldOut>,
+    /// Forms that were tried.
+    pub tried: usize,
+    /// Best evidence in flights that lack nothing, over all forms.
+    pub nulls: Vec<f64>,
+    /// The effect file, if one is proposed.
+    pub effect: Option<String>,
+    /// What the reader must know besides.
+    pub notes: Vec<String>,
+}
