@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
 
+use crate::commands::bar::Bar;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
 use crate::model::GreyBox;
@@ -58,7 +59,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Intake { flights, mut notes, mut in_doubt } =
         arguments.logs.take_in(&models[0], ActuatorClock::Estimated)?;
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
-    let mut comparison = compare(&models, &flights, &options, &|doing| eprintln!("{doing}"))?;
+    let bar = Bar::new();
+    let mut comparison = compare(&models, &flights, &options, &|stage| bar.hear(stage))?;
+    drop(bar);
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();
     notes.append(&mut comparison.notes);
     comparison.notes = notes;

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
 
+use crate::commands::bar::Bar;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
 use crate::model::GreyBox;
@@ -66,7 +67,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         without: arguments.without.clone(),
         ..Options::default()
     };
-    let mut diagnosis = diagnose(&model, &flights, &options, &|doing| eprintln!("{doing}"))?;
+    let bar = Bar::new();
+    let mut diagnosis = diagnose(&model, &flights, &options, &|stage| bar.hear(stage))?;
+    drop(bar);
     for flight in &flights {
         notes.extend(flight.notes.iter().map(|note| format!("{}: {note}", flight.name)));
     }
@@ -90,7 +93,8 @@ fn page(
     flights: &[Reconstruction],
 ) -> Result<String> {
     let models = std::slice::from_ref(model);
-    let failing = compare(models, flights, &compare::Options::default(), &|_| ())?;
+    let failing =
+        compare(models, flights, &compare::Options::default(), &crate::sysid::progress::unheard)?;
     let report = DiagnosisReport {
         title: format!("What {} lacks", diagnosis.model),
         diagnosis,

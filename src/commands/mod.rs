@@ -3,6 +3,7 @@
 #[cfg(feature = "sitl")]
 mod aircraft;
 mod amend;
+mod bar;
 mod choices;
 #[cfg(feature = "sitl")]
 mod collect;
@@ -37,6 +38,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
+
+use crate::sysid::progress::Cancelled;
 
 /// A MAVLink offboard autopilot companion for fixed-wing aircraft.
 #[derive(Parser)]
@@ -126,6 +129,10 @@ pub fn main() -> ExitCode {
         Command::Train(arguments) => train::run(&arguments),
     };
     result.unwrap_or_else(|error| {
+        if error.chain().any(|cause| cause.is::<Cancelled>()) {
+            eprintln!("greylag: stopped by Ctrl-C; nothing was written");
+            return ExitCode::from(bar::INTERRUPTED);
+        }
         eprintln!("greylag: {}", said_once::said_once(&error));
         ExitCode::FAILURE
     })

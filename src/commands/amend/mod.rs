@@ -11,6 +11,7 @@ use anyhow::{Result, bail};
 use places::{Places, hashed};
 use tables::print;
 
+use crate::commands::bar::Bar;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
 use crate::model::GreyBox;
@@ -18,7 +19,7 @@ use crate::physics::catalogue;
 use crate::report::AmendmentReport;
 use crate::sysid::amend::{self, Added, Amended, Refused};
 use crate::sysid::compare::{self, compare};
-use crate::sysid::diagnose::{self, Candidate, diagnose};
+use crate::sysid::diagnose::{self, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
@@ -118,8 +119,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
         ..amend::Options::default()
     };
-    let mut amended =
-        amend::amend(&model, &flights, &tests, &options, &|doing| eprintln!("{doing}"))?;
+    let bar = Bar::new();
+    let mut amended = amend::amend(&model, &flights, &tests, &options, &|stage| bar.hear(stage))?;
+    drop(bar);
     let story = &mut amended.amendment;
     story.notes.splice(0..0, notes);
     in_doubt |= story.effects.iter().any(|e| !e.refused.is_empty());
@@ -149,7 +151,8 @@ fn page(
 ) -> Result<String> {
     let mut models = [model.clone(), amended.tuned.clone(), amended.model.clone()];
     models[1].name = format!("{}-tuned", model.name);
-    let held_out = compare(&models, tests, &compare::Options::default(), &|_| ())?;
+    let held_out =
+        compare(&models, tests, &compare::Options::default(), &crate::sysid::progress::unheard)?;
     let paths = arguments.logs.paths.iter().chain(&arguments.hold_out);
     let report = AmendmentReport {
         title: format!("{} amended", model.name),
@@ -183,8 +186,9 @@ fn wanted(
     let mut all = Vec::new();
     if arguments.accept {
         let options = diagnose::Options::default();
-        let diagnosis = diagnose(model, flights, &options, &|doing| eprintln!("{doing}"))?;
-        all.extend(diagnosis.effects.iter().filter(|c| c.asserted).map(accepted));
+        let bar = Bar::new();
+        let diagnosis = diagnose(model, flights, &options, &|stage| bar.hear(stage))?;
+        all.extend(diagnosis.effects.iter().filter(|c| c.asserted).map(Added::of));
         if all.is_empty() {
             let said = diagnosis.sentences.join(" ");
             bail!("the diagnosis asserts no effect, so there is none to accept; it says: {said}");
@@ -196,12 +200,4 @@ fn wanted(
         }
     }
     Ok(all)
-}
-
-/// An asserted effect, to be searched for near where the diagnosis has it.
-fn accepted(candidate: &Candidate) -> Added {
-    let coefficients = catalogue::describe(&candidate.id).map(|about| about.coefficients);
-    let value = |name: &str| candidate.parameters.iter().find(|p| p.name == name).map(|p| p.value);
-    let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
-    Added { id: candidate.id.clone(), start }
 }
