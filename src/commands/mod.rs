@@ -32,6 +32,7 @@ mod said_once;
 mod targets;
 #[cfg(feature = "learn")]
 mod train;
+mod workbench;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -91,6 +92,8 @@ enum Command {
     /// Learn a model from flights, or a policy in a model.
     #[cfg(feature = "learn")]
     Train(train::Arguments),
+    /// See where a model fails, accept effects and watch the error fall, in a browser.
+    Workbench(workbench::Arguments),
 }
 
 /// Runs the subcommand of the command line; what goes wrong is said in one line.
@@ -127,6 +130,7 @@ pub fn main() -> ExitCode {
         Command::Targets(arguments) => targets::run(&arguments),
         #[cfg(feature = "learn")]
         Command::Train(arguments) => train::run(&arguments),
+        Command::Workbench(arguments) => workbench::run(&arguments),
     };
     result.unwrap_or_else(|error| {
         if error.chain().any(|cause| cause.is::<Cancelled>()) {

@@ -66,6 +66,11 @@ pub struct Options {
     pub tuned: Option<Fit>,
 }
 
+impl Options {
+    /// Horizon at which improvement is judged, s.
+    pub const JUDGED_AT_S: f64 = JUDGED_AT_S;
+}
+
 impl Default for Options {
     fn default() -> Self {
         let horizons_s = vec![1.0, 2.0, JUDGED_AT_S, 10.0];
