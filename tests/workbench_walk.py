@@ -8,6 +8,7 @@ dark, and fails on any console message of level error, exception, request to ano
 or step that does not come to its end. Needs Debian's `chromium` (or $CHROMIUM); no Python package.
 """
 
+import base64
 import filecmp
 import os
 import pathlib
@@ -77,7 +78,6 @@ def shoot(browser, folder, name):
         for theme in ("light", "dark"):
             browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": theme}])
             time.sleep(0.4)
-            import base64
             shot = browser.call("Page.captureScreenshot", captureBeyondViewport=width == 390)
             (folder / f"{name}-{width}-{theme}.png").write_bytes(base64.b64decode(shot["data"]))
         wide = browser.value("document.documentElement.scrollWidth - document.documentElement.clientWidth")
@@ -130,7 +130,7 @@ def walk(browser, bench, greylag, flights, folder, session):
     took("first ranking", time.monotonic() - begun, "2 s")
     wait(browser, "document.querySelector('.suspect')", 300, "the diagnosis")
     took("whole diagnosis", time.monotonic() - begun, "8 s")
-    wait(browser, "!document.querySelector('#job progress')", 60, "the prior is tuned")
+    wait(browser, "!document.querySelector('#job progress')", 300, "the prior is tuned")
     found += shoot(browser, folder, "3-diagnosed")
 
     effect = browser.value("document.querySelector('.suspect input').dataset.effect")
@@ -138,7 +138,7 @@ def walk(browser, bench, greylag, flights, folder, session):
     begun = time.monotonic()
     wait(browser, "document.querySelector('.bars.estimated') || document.querySelector('.bars.amended')", 60, "the estimate")
     took("tick to equation error", time.monotonic() - begun, "0.3 s")
-    wait(browser, "document.querySelector('.bars.amended')", 120, "the fit")
+    wait(browser, "document.querySelector('.bars.amended')", 300, "the fit")
     took("tick to output error", time.monotonic() - begun, "2 s")
     wait(browser, "document.querySelector('.key.after') && !document.querySelector('#job progress')", 60, "the curves after")
     click(browser, "#judge")

@@ -16,7 +16,7 @@ use crate::physics::catalogue;
 use crate::sysid::amend::Options;
 use crate::sysid::amend::document::sha256;
 use crate::sysid::compare::HorizonScore;
-use crate::sysid::compare::flight::Prepared;
+use crate::sysid::weak_form::prepared::Prepared;
 
 /// A request, made by a page that saw the session at a revision.
 #[derive(Clone, Debug, Deserialize)]

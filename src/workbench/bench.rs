@@ -17,8 +17,8 @@ use crate::model::GreyBox;
 use crate::sysid::amend::document::sha256;
 use crate::sysid::amend::{Estimate, Fit, split};
 use crate::sysid::compare::{self, Comparison, compare};
+use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::progress::unheard;
-use crate::sysid::reconstruction::Reconstruction;
 
 /// What a workbench begins with.
 pub struct Given {

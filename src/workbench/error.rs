@@ -10,7 +10,7 @@ use crate::report::WriteError;
 use crate::sysid::amend::AmendError;
 use crate::sysid::compare::CompareError;
 use crate::sysid::diagnose::DiagnoseError;
-use crate::sysid::reconstruct::ReconstructError;
+use crate::sysid::flight_path::ReconstructError;
 
 /// What kind of failure it is, for whoever answers a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,9 +13,9 @@ use crate::model::GreyBox;
 use crate::report::write_over;
 use crate::sysid::amend::document::{self, Hashed};
 use crate::sysid::amend::{self, Added, Amended, Options, Refused, amend, estimate, tune};
-use crate::sysid::compare::flight::Prepared;
 use crate::sysid::compare::{HorizonScore, free_run};
 use crate::sysid::progress::{Progress, Stage, part};
+use crate::sysid::weak_form::prepared::Prepared;
 
 /// Share of a first fit's time that tuning the prior takes.
 const TUNING: f64 = 0.4;

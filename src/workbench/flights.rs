@@ -12,9 +12,9 @@ use crate::logs::info::Info;
 use crate::logs::{self, Log};
 use crate::model::GreyBox;
 use crate::sysid::amend::document::sha256;
-use crate::sysid::compare::flight::Prepared;
-use crate::sysid::reconstruct::{self, ActuatorClock, reconstruct};
-use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
+use crate::sysid::weak_form::prepared::Prepared;
 
 /// Points of the strip that shows a flight at a glance.
 const STRIP: usize = 160;
@@ -57,7 +57,7 @@ impl Loaded {
     }
 
     fn of(log: &Log, name: &str, model: &GreyBox) -> Result<Arc<Loaded>, WorkbenchError> {
-        let options = reconstruct::Options::of(name, model, ActuatorClock::AsRecorded);
+        let options = flight_path::Options::of(name, model, ActuatorClock::AsRecorded);
         let flight = reconstruct(&log.flight, &options)?;
         let slowest = 0.5 * model.airframe.envelope.airspeed_min_mps;
         let prepared = Prepared::new(&flight, slowest)?;

@@ -16,11 +16,11 @@ use crate::logs::Format;
 use crate::logs::finding::Finding;
 use crate::logs::info::Purpose;
 use crate::logs::phases::Phase;
-use crate::sysid::compare::flight::Prepared;
 use crate::sysid::compare::{
     self, ChannelId, Comparison, FlightResult, ModelResult, RegimeVariable, compare, free_run,
 };
 use crate::sysid::progress::unheard;
+use crate::sysid::weak_form::prepared::Prepared;
 
 /// Rows of a flight that are drawn at most.
 const ROWS: usize = 2500;
@@ -282,7 +282,7 @@ fn locked(inner: &Inner, log: &LogEntry) -> bool {
 
 fn about(flight: &Loaded, locked: bool) -> About<'_> {
     let info = &flight.info;
-    let nuisance = |n: &crate::sysid::reconstruction::Nuisance| json!({ "name": n.name, "value": n.value, "sd": n.sd, "unit": n.unit });
+    let nuisance = |n: &crate::sysid::flight_path::reconstruction::Nuisance| json!({ "name": n.name, "value": n.value, "sd": n.sd, "unit": n.unit });
     About {
         format: info.format,
         rate_hz: info.rate_hz,

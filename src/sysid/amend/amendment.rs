@@ -14,8 +14,8 @@ use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::physics::effects::{Coefficient, Description};
 use crate::sysid::compare::HorizonScore;
-use crate::sysid::flight_path::reconstruction::{Reconstruction, Segment};
 use crate::sysid::diagnose::Candidate;
+use crate::sysid::flight_path::reconstruction::{Reconstruction, Segment};
 use crate::sysid::progress::{self, Progress, say};
 use crate::sysid::rudder;
 

@@ -9,8 +9,8 @@ use super::output_error::{self, Fit, FitOptions};
 use super::parameters;
 use crate::model::GreyBox;
 use crate::sysid::compare::HorizonScore;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::progress::Progress;
-use crate::sysid::reconstruction::Reconstruction;
 
 /// A model by equation error alone: forces and moments fitted, no free run.
 #[derive(Clone, Debug)]

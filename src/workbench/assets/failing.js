@@ -56,7 +56,7 @@ function grid() {
   const channels = before.channels.filter((c) => "DLYlmn".includes(c.channel));
   const shown = channels.length ? channels : before.channels;
   const most = Math.max(...shown.map((c) => Math.min(1, c.unexplained_fraction ?? 0)), 1e-9);
-  if (!shown.some((c) => c.channel === pick.channel)) start(shown);
+  if (!pick.by_hand || !shown.some((c) => c.channel === pick.channel)) start(shown);
   const head = el("tr", {}, el("th", { scope: "col" }, "Channel"), el("th", { scope: "col", class: "number", title: "share of the channel's variance beyond noise that the model as given explains" }, "R²"),
     after && el("th", { scope: "col", class: "number", title: "the same with the accepted effects" }, "R² after"),
     VARIABLES.map((v) => el("th", { scope: "col", class: "number" }, el("abbr", { title: name(shown, v) }, SYMBOL[v]))));
@@ -80,7 +80,7 @@ function cell(channel, bins, size) {
     "data-channel": channel.channel, "data-variable": bins.variable,
     "aria-label": `${channel.name} over ${bins.name}: ${percent(bins.explained)} of the residual's variance`,
     title: `${percent(bins.explained)} of the variance of what ${channel.name} leaves goes with ${bins.name}`,
-    onclick: () => { Object.assign(pick, { channel: channel.channel, variable: bins.variable }); grid(); time(); },
+    onclick: () => { Object.assign(pick, { channel: channel.channel, variable: bins.variable, by_hand: true }); grid(); time(); states(); brush(); },
   }, bins.explained >= 0.05 ? String(Math.round(100 * bins.explained)) : "");
 }
 /** The cell that says most stands chosen at first. */
@@ -102,7 +102,7 @@ function worst() {
 }
 function finding() {
   const channel = chosen(bench.failing.models[0]);
-  parts.finding.textContent = channel?.worst_regime || "";
+  parts.finding.textContent = capital(channel?.worst_regime ?? "");
 }
 
 // ---- over time ----

@@ -8,19 +8,21 @@ import { model } from "./model.js";
 
 const root = document.documentElement;
 const dark = matchMedia("(prefers-color-scheme: dark)");
-const follow = () => { root.dataset.theme = dark.matches ? "dark" : "light"; redraw(); };
-dark.addEventListener("change", follow);
-follow();
-document.getElementById("theme").addEventListener("click", () => {
-  root.dataset.theme = root.dataset.theme === "dark" ? "light" : "dark";
+/** Everything that is drawn takes the colours anew. */
+function wear(theme) {
+  root.dataset.theme = theme;
   redraw();
-  flights(bench);
-});
+  if (bench.state) flights(bench);
+}
 
 /** What the panes share. */
 const bench = {
   state: null, failing: null, diagnosis: null, flight: null, chosen: 0, act, upload, choose, busy: 0,
 };
+
+root.dataset.theme = dark.matches ? "dark" : "light";
+dark.addEventListener("change", () => wear(dark.matches ? "dark" : "light"));
+document.getElementById("theme").addEventListener("click", () => wear(root.dataset.theme === "dark" ? "light" : "dark"));
 
 let fresh = 0;
 /** Asks for everything again and shows it; an older answer that comes late is left alone. */

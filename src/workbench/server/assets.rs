@@ -10,8 +10,8 @@ const PAGE: &str = include_str!("../assets/page.html");
 /// Files by name, with their types.
 const FILES: [(&str, &str, &str); 9] = [
     ("workbench.css", CSS, include_str!("../assets/workbench.css")),
-    ("uplot.css", CSS, include_str!("../../report/assets/uPlot.min.css")),
-    ("uplot.js", JS, include_str!("../../report/assets/uPlot.iife.min.js")),
+    ("uplot.css", CSS, include_str!("../../report/kit/assets/uPlot.min.css")),
+    ("uplot.js", JS, include_str!("../../report/kit/assets/uPlot.iife.min.js")),
     ("main.js", JS, include_str!("../assets/main.js")),
     ("kit.js", JS, include_str!("../assets/kit.js")),
     ("flights.js", JS, include_str!("../assets/flights.js")),

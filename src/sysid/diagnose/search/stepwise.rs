@@ -4,6 +4,7 @@ use crate::model::GreyBox;
 use crate::physics::inputs::Kind;
 use crate::sysid::compare::ChannelId;
 use crate::sysid::diagnose::answer::shares;
+use crate::sysid::diagnose::error::DiagnoseError;
 use crate::sysid::diagnose::options::Options;
 use crate::sysid::diagnose::regression::catalogue::{self, Entry};
 use crate::sysid::diagnose::regression::rank::Score;
@@ -12,7 +13,6 @@ use crate::sysid::diagnose::search::remainder::{Remainder, remainder};
 use crate::sysid::diagnose::search::round::{Problem, Round};
 use crate::sysid::diagnose::search::settling::{Ranked, SETTLING, ranked, settled};
 use crate::sysid::diagnose::search::shape::{Shape, shape};
-use crate::sysid::diagnose::error::DiagnoseError;
 use crate::sysid::progress::{Cancelled, FirstLook, Progress, Stage, said, say};
 
 /// Share of the search that is done once all candidates have been ranked.
