@@ -47,9 +47,11 @@ class Workbench:
 def wait(browser, expression, seconds, what):
     """Waits until the page says so; how long it took, s."""
     begun = time.monotonic()
-    while not browser.value(expression):
+    # an element would come back as an empty object
+    while not browser.value(f"!!({expression})"):
         if time.monotonic() - begun > seconds:
-            sys.exit(f"{what}: not within {seconds} s; the page says {browser.value('document.body.innerText')[-3000:]}")
+            text = browser.value("document.body.innerText")
+            sys.exit(f"{what}: not within {seconds} s; the page says\n{text}")
         time.sleep(0.01)
     return time.monotonic() - begun
 
@@ -101,7 +103,7 @@ def walk(browser, bench, greylag, flights, folder, session):
     logs = sorted(flights.glob("train-*.csv")) + sorted(flights.glob("test-*.csv"))
     browser.call("Emulation.setDeviceMetricsOverride", width=1400, height=900, deviceScaleFactor=1, mobile=False)
     browser.call("Page.navigate", url=bench.address)
-    wait(browser, "document.documentElement.dataset.ready == 'yes'", 20, "the empty page")
+    wait(browser, "document.documentElement?.dataset.ready == 'yes'", 20, "the empty page")
     foreign = folder / "picture.csv"
     foreign.write_bytes(b"\x89PNG\r\n" + bytes(500))
     drop(browser, [foreign])
@@ -169,7 +171,7 @@ def walk(browser, bench, greylag, flights, folder, session):
 def again(browser, bench, folder):
     """After kill -9 and a new start, everything is there."""
     browser.call("Page.navigate", url=bench.address)
-    wait(browser, "document.documentElement.dataset.ready == 'yes'", 20, "the page after kill -9")
+    wait(browser, "document.documentElement?.dataset.ready == 'yes'", 20, "the page after kill -9")
     wait(browser, "document.querySelector('.suspect') && document.querySelector('.bars.amended') && document.getElementById('opened')", 20,
          "diagnosis, fit and opening after kill -9")
     return []
