@@ -30,6 +30,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("tokio_serial", &["link"]),
     ("burn", &["learn"]),
     ("clap", &["commands"]),
+    ("clap_complete", &["commands"]),
     ("anyhow", &["commands"]),
     ("indicatif", &["commands"]),
     ("comfy_table", &["commands"]),

@@ -98,6 +98,23 @@ def refused(origin, path, token="wrong"):
     return False
 
 
+def foreign_sockets(pid):
+    """Sockets of a process that are not on the loopback, as /proc/net has them."""
+    own = set()
+    for fd in pathlib.Path(f"/proc/{pid}/fd").iterdir():
+        link = os.readlink(fd)
+        if link.startswith("socket:["):
+            own.add(link[8:-1])
+    found = []
+    for table in ("tcp", "tcp6", "udp", "udp6"):
+        for line in pathlib.Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            # 127.0.0.1, least byte first
+            if fields[9] in own and not fields[1].startswith("0100007F:"):
+                found.append(f"{table} socket on {fields[1]}")
+    return found
+
+
 def walk(browser, bench, greylag, flights, folder, session):
     found = []
     logs = sorted(flights.glob("train-*.csv")) + sorted(flights.glob("test-*.csv"))
@@ -163,6 +180,7 @@ def walk(browser, bench, greylag, flights, folder, session):
     elif not filecmp.cmp(out / "model.toml", session / "model" / "model.toml", shallow=False):
         found.append("the saved model is not the command's")
 
+    found += foreign_sockets(bench.process.pid)
     if not refused(bench.origin, "/api/state"):
         found.append("a wrong token is answered")
     return found

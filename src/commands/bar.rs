@@ -9,10 +9,9 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::commands::status::INTERRUPTED;
 use crate::sysid::progress::Stage;
 
-/// Exit status of a program that Ctrl-C ended.
-pub const INTERRUPTED: u8 = 130;
 /// Steps of a whole bar.
 const STEPS: u64 = 1000;
 /// Time between looks of the bar's clock.

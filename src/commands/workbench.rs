@@ -1,5 +1,6 @@
 //! `greylag workbench`: see where a model fails, accept an effect, watch the error fall, in a browser.
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -19,7 +20,7 @@ pub struct Arguments {
     /// Flight logs to begin with: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog; more can be dropped on the page.
     logs: Vec<PathBuf>,
     /// The model file; an existing session knows its own.
-    #[arg(long, env = "GREYLAG_MODEL")]
+    #[arg(long, env = "GREYLAG_MODEL", hide_env_values = true)]
     model: Option<PathBuf>,
     /// Port on 127.0.0.1; 0 for any that is free.
     #[arg(long, default_value_t = 0)]
@@ -42,8 +43,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     };
     let token = random_token().context("cannot draw a token for the page")?;
     serve(given, arguments.port, &token, |address| {
-        println!("the workbench is open at {address}");
-        println!("session: {}; Ctrl-C ends it", arguments.folder.display());
+        let session = arguments.folder.display();
+        // whoever started it may have stopped reading; the page is served all the same
+        let _ = write!(
+            std::io::stdout(),
+            "the workbench is open at {address}\nsession: {session}; Ctrl-C ends it\n"
+        );
     })
     .with_context(|| format!("cannot open the workbench in {}", arguments.folder.display()))?;
     Ok(ExitCode::SUCCESS)

@@ -14,6 +14,7 @@ use tables::print;
 use crate::commands::bar::Bar;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::report::AmendmentReport;
@@ -23,18 +24,15 @@ use crate::sysid::diagnose::{self, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// Exit status when an effect was refused, a log left out, or flights contradict one another.
-const IN_DOUBT: u8 = 2;
-
 /// Options of `greylag amend`.
 #[derive(clap::Args)]
 #[command(
     group = clap::ArgGroup::new("what").required(true).multiple(true),
-    after_help = "Exit status: 0 done, 1 nothing was written, 2 written, but an effect was refused, a log was left out or flights contradict one another."
+    after_help = "Exit status: 0 done, 1 nothing was written, 3 written, but an effect was refused, a log was left out or flights contradict one another."
 )]
 pub struct Arguments {
     /// Model file to start from; it stays as it is.
-    #[arg(long)]
+    #[arg(long, env = "GREYLAG_MODEL", hide_env_values = true)]
     model: PathBuf,
     #[command(flatten)]
     logs: LogArguments,

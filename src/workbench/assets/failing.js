@@ -1,6 +1,6 @@
 // Where the model fails: channels over variables, the flight over time, free runs from any moment.
 
-import { SYMBOL, command, complain, dots, draw, el, line, percent, post, shade, show } from "./kit.js";
+import { SYMBOL, command, complain, dots, draw, el, ink, line, percent, post, shade, show } from "./kit.js";
 
 const VARIABLES = ["alpha", "beta", "airspeed", "throttle", "p", "q", "r", "aileron", "elevator", "aileron_rate", "elevator_rate", "altitude", "time"];
 const STATES = { V: ["V", "m/s"], alpha: ["α", "°"], beta: ["β", "°"], p: ["p", "°/s"], q: ["q", "°/s"], r: ["r", "°/s"], phi: ["φ", "°"], theta: ["θ", "°"] };
@@ -32,9 +32,9 @@ function build() {
     const caption = el("figcaption");
     return { figure: el("figure", {}, caption, plot), plot, caption };
   };
-  const made = { grid: el("div", { class: "scroll" }), finding: el("p", { class: "finding" }), command: el("div"), time: figure("time", "tall"), residual: figure("residual"), variable: figure("variable"), bins: figure("bins", "square") };
+  const made = { grid: el("div", { class: "scroll" }), finding: el("p", { class: "finding" }), command: el("div"), map: el("figure", {}), time: figure("time", "tall"), residual: figure("residual"), variable: figure("variable"), bins: figure("bins", "square") };
   made.where = el("div", { class: "where" },
-    el("div", {}, made.time.figure, made.residual.figure, made.variable.figure), el("div", {}, made.bins.figure));
+    el("div", {}, made.time.figure, made.residual.figure, made.variable.figure), el("div", {}, made.bins.figure, made.map));
   made.at = el("input", { type: "number", step: "0.1", "aria-label": "Start of the free run, s", onchange: () => fly(+made.at.value) });
   made.every = el("button", { type: "button", onclick: () => { pick.every = !pick.every; states(); } });
   made.reset = el("button", { type: "button", disabled: true, onclick: () => zoom(null) }, "Whole flight");
@@ -80,8 +80,18 @@ function cell(channel, bins, size) {
     "data-channel": channel.channel, "data-variable": bins.variable,
     "aria-label": `${channel.name} over ${bins.name}: ${percent(bins.explained)} of the residual's variance`,
     title: `${percent(bins.explained)} of the variance of what ${channel.name} leaves goes with ${bins.name}`,
-    onclick: () => { Object.assign(pick, { channel: channel.channel, variable: bins.variable, by_hand: true }); grid(); time(); states(); brush(); },
+    onclick: () => { Object.assign(pick, { channel: channel.channel, variable: bins.variable, by_hand: true }); pressed_cell(); },
   }, bins.explained >= 0.05 ? String(Math.round(100 * bins.explained)) : "");
+}
+/** A cell was pressed: its seconds are lit everywhere, in a flight that has some. */
+function pressed_cell() {
+  grid();
+  bench.light(lit);
+  if (lit().length || !bench.choose_lit()) {
+    time();
+    states();
+    brush();
+  }
 }
 /** The cell that says most stands chosen at first. */
 function start(channels) {
@@ -107,9 +117,8 @@ function finding() {
 
 // ---- over time ----
 
-/** The seconds in which the variable lies in the worst bin. */
-function lit() {
-  const { flight } = bench;
+/** The seconds of a flight in which the variable lies in the worst bin. */
+export function lit(flight = bench.flight) {
   const bin = worst();
   if (!flight || !bin) return [];
   const [values, times] = [flight.regimes[pick.variable] ?? [], flight.window_s];
@@ -197,6 +206,7 @@ export function freshFailing(of) {
   }
   parts.where.hidden = parts.tools.hidden = parts.states.hidden = false;
   if (pick.flight !== bench.chosen) Object.assign(pick, { window: null, run: null, at: null, flight: bench.chosen });
+  bench.light(lit);
   time();
   const times = bench.flight.time_s.filter((t) => t != null);
   const spans = lit();
@@ -227,7 +237,56 @@ function time() {
   parts.variable.caption.replaceChildren(el("b", {}, variable ? `${capital(variable.name)}${variable.unit ? ` (${variable.unit})` : ""}` : ""));
   draw(parts.variable.plot, clock([{}, line("measured", 1.2)], spans), [x, flight.regimes[pick.variable] ?? x.map(() => null)]);
   bins(channel, variable);
+  maps();
 }
+
+/** Mean residual over α and β, by each model on one scale. */
+function maps() {
+  const all = bench.failing.models.map((m) => chosen(m)?.map).filter((m) => m?.cells.length);
+  if (!all.length) return parts.map.replaceChildren();
+  const unit = chosen(bench.failing.models[0]).unit;
+  const sizes = (only) => all.flatMap((m) => m.cells).filter((c) => c.supported || !only).map((c) => Math.abs(c.mean));
+  const limit = Math.max(...sizes(true), 0) || Math.max(...sizes(false), 1e-12);
+  const one = (map, k) => {
+    const canvas = el("canvas", { role: "img", "aria-label": `mean residual over α and β, ${k ? "after" : "before"}` });
+    return [el("div", {}, canvas, k ? "after" : "before"), () => paint(canvas, map, limit)];
+  };
+  const made = all.map(one);
+  parts.map.replaceChildren(el("figcaption", {}, el("b", {}, `Residual over α (across) and β (up), to ±${show(limit)} ${unit}`)), el("div", { class: "map" }, made.map(([node]) => node)));
+  parts.map.paint = () => made.forEach(([, draw_map]) => draw_map());
+  parts.map.paint();
+}
+function paint(canvas, map, limit) {
+  const { width, height } = canvas.getBoundingClientRect();
+  if (!width) return;
+  const ratio = devicePixelRatio;
+  [canvas.width, canvas.height] = [width * ratio, height * ratio];
+  const ctx = canvas.getContext("2d");
+  ctx.scale(ratio, ratio);
+  const [left, bottom] = [26, 16];
+  const [columns, rows] = [map.alpha_deg.length - 1, map.beta_deg.length - 1];
+  const [w, h] = [(width - left) / columns, (height - bottom) / rows];
+  for (const cell of map.cells) {
+    const share = Math.min(1, Math.abs(cell.mean) / limit);
+    ctx.globalAlpha = 1;
+    ctx.fillStyle = ink("grid");
+    const at = [left + cell.alpha * w, (rows - 1 - cell.beta) * h, w - 1, h - 1];
+    ctx.fillRect(...at);
+    ctx.globalAlpha = share * (cell.supported ? 1 : 0.45);
+    ctx.fillStyle = ink(cell.mean > 0 ? "before" : "after");
+    ctx.fillRect(...at);
+  }
+  ctx.globalAlpha = 1;
+  ctx.fillStyle = ink("muted");
+  ctx.font = `10px ${ink("sans")}`;
+  const places = (edges, k) => show(edges[k]).replace(/\.0+$/, "");
+  ctx.fillText(places(map.alpha_deg, 0), left, height - 3);
+  ctx.textAlign = "right";
+  ctx.fillText(`${places(map.alpha_deg, columns)}°`, width, height - 3);
+  ctx.fillText(`${places(map.beta_deg, rows)}°`, left - 3, 10);
+  ctx.fillText(places(map.beta_deg, 0), left - 3, rows * h);
+}
+export const repaint = () => parts?.map.paint?.();
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 const symbol = (channel) => ({ V: "V̇", alpha: "α̇", beta: "β̇" })[channel] ?? channel;
 

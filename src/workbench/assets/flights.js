@@ -13,12 +13,12 @@ export function flights(bench) {
     el("br"), el("span", { class: "note" }, "CSV, ULog, DataFlash .bin, .tlog"));
   const list = bench.state.flights.map((flight, place) => one(bench, flight, place, kept));
   body.replaceChildren(drop, ...list, ...[command(bench.state.commands.flights)].filter(Boolean));
-  for (const canvas of body.querySelectorAll("canvas")) strip(canvas, bench.state.flights[+canvas.dataset.flight].strip);
+  for (const canvas of body.querySelectorAll("canvas")) strip(canvas, bench.state.flights[+canvas.dataset.flight], bench.lit.get(+canvas.dataset.flight) ?? []);
 }
 
 function one(bench, flight, place, kept) {
   const name = el("button", {
-    type: "button", class: "name", disabled: flight.locked || !!flight.error, title: flight.path, onclick: () => bench.choose(place),
+    type: "button", class: "name", disabled: flight.locked || !!flight.error, title: flight.path, onclick: () => { bench.by_hand = true; bench.choose(place); },
   }, flight.name);
   const remove = el("button", { type: "button", class: "quiet", title: "Take out of the session; the file stays", onclick: () => bench.act({ do: "remove", flight: place }) }, "Remove");
   const roles = el("fieldset", { class: "roles", "aria-label": `${flight.name} serves to` }, Object.entries(ROLES).map(([role, word]) => {
@@ -58,13 +58,16 @@ function about(flight, place, kept) {
   ].filter(Boolean);
 }
 
-function strip(canvas, values) {
+function strip(canvas, { strip: values, from_s, to_s }, lit) {
   const { width, height } = canvas.getBoundingClientRect();
   if (!values || !width) return;
   const ratio = devicePixelRatio;
   [canvas.width, canvas.height] = [width * ratio, height * ratio];
   const ctx = canvas.getContext("2d");
   ctx.scale(ratio, ratio);
+  const across = (t) => 14 + ((width - 15) * (t - from_s)) / (to_s - from_s || 1);
+  ctx.fillStyle = ink("lit");
+  for (const [from, to] of lit) ctx.fillRect(across(from), 0, Math.max(1, across(to) - across(from)), height);
   const each = height / STRIP.length;
   STRIP.forEach(([name, tone, sign], k) => {
     const list = values[name];

@@ -2,7 +2,7 @@
 
 import { complain, el, get, hush, judged, percent, post, redraw, send, show } from "./kit.js";
 import { flights } from "./flights.js";
-import { failing, freshFailing } from "./failing.js";
+import { failing, freshFailing, repaint } from "./failing.js";
 import { suspects } from "./suspects.js";
 import { model } from "./model.js";
 
@@ -13,11 +13,12 @@ function wear(theme) {
   root.dataset.theme = theme;
   redraw();
   if (bench.state) flights(bench);
+  repaint();
 }
 
 /** What the panes share. */
 const bench = {
-  state: null, failing: null, diagnosis: null, flight: null, chosen: 0, act, upload, choose, busy: 0,
+  state: null, failing: null, diagnosis: null, flight: null, chosen: 0, data: new Map(), lit: new Map(), act, upload, choose, light, choose_lit, by_hand: false,
 };
 
 root.dataset.theme = dark.matches ? "dark" : "light";
@@ -50,8 +51,36 @@ async function load_flight(own = fresh) {
   const all = bench.state.flights;
   const open = (f) => f && !f.error && !f.locked;
   if (!open(all[bench.chosen])) bench.chosen = Math.max(0, all.findIndex(open));
-  bench.flight = open(all[bench.chosen]) ? await get(`/api/flight/${bench.chosen}`) : null;
-  if (own === fresh) freshFailing(bench);
+  bench.data.clear();
+  bench.flight = open(all[bench.chosen]) ? await data(bench.chosen) : null;
+  if (own !== fresh) return;
+  freshFailing(bench);
+  // the others behind it, so that a cell lights their seconds too
+  for (const place of all.keys()) if (open(all[place]) && own === fresh) await data(place);
+  if (own !== fresh) return;
+  light();
+  if (!bench.by_hand && bench.flight) choose_lit();
+}
+/** A flight over time, asked for once. */
+async function data(place) {
+  if (!bench.data.has(place)) bench.data.set(place, await get(`/api/flight/${place}`));
+  return bench.data.get(place);
+}
+let lights = () => [];
+/** Lights the seconds of the pressed cell in all flights. */
+function light(by = lights) {
+  lights = by;
+  bench.lit = new Map([...bench.data].map(([place, flight]) => [place, lights(flight)]));
+  flights(bench);
+}
+const seconds = (spans) => (spans ?? []).reduce((sum, [from, to]) => sum + to - from, 0);
+/** Chooses the flight with most lit seconds if the chosen one has none; whether it did. */
+function choose_lit() {
+  if (seconds(bench.lit.get(bench.chosen)) > 0) return false;
+  const [place] = [...bench.lit].sort((a, b) => seconds(b[1]) - seconds(a[1]))[0] ?? [];
+  if (place == null || place === bench.chosen || !seconds(bench.lit.get(place))) return false;
+  choose(place);
+  return true;
 }
 function show_all() {
   answer();
@@ -114,7 +143,12 @@ async function upload(files) {
 async function choose(place) {
   bench.chosen = place;
   flights(bench);
-  try { await load_flight(); } catch (error) { complain(error.message); }
+  try {
+    bench.flight = await data(place);
+    freshFailing(bench);
+  } catch (error) {
+    complain(error.message);
+  }
 }
 
 // ---- what happens ----

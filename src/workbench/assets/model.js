@@ -36,7 +36,7 @@ function errors(state) {
   const fitted = state.stack.filter((s) => s.story);
   if (fitted.length) {
     const { story, on_fit } = fitted[0];
-    rows.push(["as given", "given", judged(on_fit.given), judged(story.given)], ["coefficients tuned", "tuned", null, judged(story.before)]);
+    rows.push(["as given", "given", judged(on_fit.given), judged(story.given)], ["tuned", "tuned", null, judged(story.before)]);
   }
   for (const s of state.stack) {
     if (s.story) rows.push([`+ ${s.id}`, "amended", judged(s.on_fit.amended), judged(s.story.after)]);
@@ -54,7 +54,7 @@ function errors(state) {
   const bar = (tone, v) => el("td", {}, v != null && el("div", { class: `bars ${tone}` }, el("span", {}, show(v)), el("i", { vars: { width: `${100 * v / most}%` } })));
   const head = ["NRMSE at 5 s", "Fit", "Held out", state.openings.length > 0 && "Test"].filter(Boolean);
   return el("table", { class: "errors" }, el("thead", {}, el("tr", {}, head.map((h) => el("th", { scope: "col" }, h)))),
-    el("tbody", {}, all.map(([name, tone, ...values]) => el("tr", {}, el("th", { scope: "row" }, name), values.slice(0, head.length - 1).map((v) => bar(tone, v))))));
+    el("tbody", {}, all.map(([name, tone, ...values]) => el("tr", {}, el("th", { scope: "row" }, name.replaceAll("_", " ")), values.slice(0, head.length - 1).map((v) => bar(tone, v))))));
 }
 
 function step(bench, s) {

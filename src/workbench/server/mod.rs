@@ -94,7 +94,6 @@ pub fn random_token() -> io::Result<String> {
 }
 
 fn router(shared: Shared) -> Router {
-    let logs = post(routes::take).layer(DefaultBodyLimit::max(LARGEST_LOG));
     Router::new()
         .route("/", get(assets::page))
         .route("/assets/{name}", get(assets::asset))
@@ -107,7 +106,7 @@ fn router(shared: Shared) -> Router {
         .route("/api/events", get(routes::events))
         .fallback(routes::nothing)
         .layer(DefaultBodyLimit::max(LARGEST_REQUEST))
-        .route("/api/logs", logs)
+        .route("/api/logs", post(routes::take))
         .layer(axum::middleware::from_fn_with_state(shared.clone(), guard::guard))
         .with_state(shared)
 }

@@ -4,10 +4,10 @@ use std::convert::Infallible;
 use std::sync::Arc;
 
 use axum::Json;
-use axum::body::Bytes;
-use axum::extract::rejection::BytesRejection;
+use axum::body::{Body, to_bytes};
 use axum::extract::{Path, Query, State};
-use axum::http::StatusCode;
+use axum::http::header::CONTENT_LENGTH;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::sse::{self, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
@@ -99,26 +99,28 @@ pub struct Sent {
 pub async fn take(
     State(shared): State<Shared>,
     Query(sent): Query<Sent>,
-    body: Result<Bytes, BytesRejection>,
+    headers: HeaderMap,
+    body: Body,
 ) -> Response {
-    let bytes = match body {
-        Ok(bytes) => bytes,
-        Err(rejection) if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE => {
-            let why = format!(
-                "{} is over {} MB, which a page may not send; name its file: greylag workbench {}",
-                sent.name,
-                LARGEST_LOG >> 20,
-                sent.name
-            );
-            return failure(StatusCode::PAYLOAD_TOO_LARGE, &why);
-        }
-        Err(rejection) => return failure(rejection.status(), &rejection.body_text()),
-    };
+    let announced = headers.get(CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
+    // one that says so is refused before it is sent
+    if announced.is_some_and(|bytes: usize| bytes > LARGEST_LOG) {
+        return too_large(&sent.name);
+    }
+    let Ok(bytes) = to_bytes(body, LARGEST_LOG).await else { return too_large(&sent.name) };
     aside(shared, move |bench| {
         bench.take(sent.revision, &sent.name, &bytes)?;
         bench.state()
     })
     .await
+}
+
+fn too_large(name: &str) -> Response {
+    let most = LARGEST_LOG >> 20;
+    let why = format!(
+        "{name} did not come whole, or is over {most} MB, which a page may not send; name its file: greylag workbench {name}"
+    );
+    failure(StatusCode::PAYLOAD_TOO_LARGE, &why)
 }
 
 /// What happens, as it happens.
