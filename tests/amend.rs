@@ -220,9 +220,19 @@ fn the_command_writes_a_model_that_every_command_reads() {
     let original = root.join("params/x8/jsbsim.toml");
     let before = std::fs::read(&original).unwrap();
     let (a, b, out) = (at("0.csv"), at("1.csv"), at("amended"));
-    let model = original.to_str().unwrap();
-    let line =
-        ["amend", "--model", model, "--log", &a, &b, "--effect", "actuator_lag", "--out", &out];
+    let model_file = original.to_str().unwrap();
+    let line = [
+        "amend",
+        "--model",
+        model_file,
+        "--log",
+        &a,
+        &b,
+        "--effect",
+        "actuator_lag",
+        "--out",
+        &out,
+    ];
     let said = greylag(&line);
     let text = String::from_utf8_lossy(&said.stdout);
     assert!(said.status.success(), "{text}{}", String::from_utf8_lossy(&said.stderr));
@@ -237,6 +247,22 @@ fn the_command_writes_a_model_that_every_command_reads() {
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["schema"], "greylag.amend/1");
     assert_eq!(json["hold_out"][0]["sha256"].as_str().unwrap().len(), 64);
+    // a diagnosis that was written before is not made again; one of another model is refused
+    let diagnosis = at("diagnosis.json");
+    let found = |model: &str| {
+        let effect =
+            r#"{"id":"actuator_lag","asserted":true,"parameters":[{"name":"tau_s","value":0.05}]}"#;
+        let text =
+            format!(r#"{{"schema":"greylag.diagnosis/1","model":"{model}","effects":[{effect}]}}"#);
+        std::fs::write(&diagnosis, text).unwrap();
+        let out = at("given");
+        let line = ["amend", "--model", model_file, "--log", &a, &b, "--out", &out];
+        greylag(&[&line[..], &["--diagnosis", &diagnosis]].concat())
+    };
+    let other = found("another");
+    assert!(String::from_utf8_lossy(&other.stderr).contains("not of jsbsim"));
+    assert!(found("jsbsim").status.success());
+    assert!(GreyBox::load(&scratch.path().join("given/model.toml")).unwrap().has("actuator_lag"));
     // nothing is overwritten unasked
     let again = greylag(&line);
     assert_eq!(again.status.code(), Some(1));

@@ -262,6 +262,6 @@ impl Bench {
 
 /// The longest horizon up to that of judgement that runs reach, s, with the error there.
 fn judged(scores: &[HorizonScore]) -> (f64, f64) {
-    let reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= Options::JUDGED_AT_S);
-    reached.last().map_or((f64::NAN, f64::NAN), |s| (s.horizon_s, s.rmse_scaled))
+    let mut reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= Options::JUDGED_AT_S);
+    reached.next_back().map_or((f64::NAN, f64::NAN), |s| (s.horizon_s, s.rmse_scaled))
 }

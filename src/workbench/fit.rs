@@ -48,6 +48,7 @@ struct Task {
     text: String,
     effects: Vec<Accepted>,
     flights: Divided,
+    tuned_key: String,
     tuned: Option<amend::Fit>,
     logs: [Vec<Hashed>; 2],
     airframe: (String, String),
@@ -77,8 +78,8 @@ impl Bench {
         if inner.fits.contains_key(&key) {
             return Ok(None);
         }
-        let alone = inner.key("tuned", &[]);
-        let tuned = inner.tuned.as_ref().filter(|(of, _)| *of == alone);
+        let tuned_key = inner.key("tuned", &[]);
+        let tuned = inner.tuned.as_ref().filter(|(of, _)| *of == tuned_key);
         Ok(Some(Task {
             key,
             model: inner.model.clone(),
@@ -86,6 +87,7 @@ impl Bench {
             effects: effects.to_vec(),
             flights: inner.divided()?,
             tuned: tuned.map(|(_, fit)| fit.clone()),
+            tuned_key,
             logs: [Role::Fit, Role::HoldOut].map(|role| hashed(&inner, role, &self.folder)),
             airframe: airframe(&inner.text, &inner.session.model)?,
             original: inner.session.model.clone(),
@@ -104,9 +106,7 @@ impl Bench {
             Some(tuned) => tuned.clone(),
             None => {
                 let tuned = tune(&task.model, fit, &part(progress, [0.0, TUNING]))?;
-                let mut inner = self.lock();
-                let key = inner.key("tuned", &[]);
-                inner.tuned = Some((key, tuned.clone()));
+                self.lock().tuned = Some((task.tuned_key.clone(), tuned.clone()));
                 tuned
             }
         };

@@ -168,17 +168,16 @@ impl Bench {
 
     /// Diagnoses the model as given over the flights to fit to; the prior is tuned behind it, for fits to come.
     fn diagnose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
-        let (key, model, flights) = {
+        let ([key, tuned_key], model, flights) = {
             let inner = self.lock();
-            let flights = inner.divided()?.fit;
-            (inner.key(Work::Diagnosis.word(), &[]), inner.model.clone(), flights)
+            let keys = [Work::Diagnosis.word(), "tuned"].map(|what| inner.key(what, &[]));
+            (keys, inner.model.clone(), inner.divided()?.fit)
         };
         let diagnosis = diagnose(&model, &flights, &Options::default(), progress)?;
         let value = serde_json::to_value(&diagnosis)?;
         write_over(&self.diagnosis_file(&key), &value.to_string())?;
         self.lock().diagnosis = Some((key, Arc::new(value)));
         self.changed();
-        let tuned_key = self.lock().key("tuned", &[]);
         if self.lock().tuned.as_ref().is_none_or(|(of, _)| *of != tuned_key) {
             // what tunes badly is said when an effect is ticked
             if let Ok(tuned) = tune(&model, &flights, &part(progress, [0.95, 1.0])) {

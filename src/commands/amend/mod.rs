@@ -1,5 +1,6 @@
 //! `greylag amend`: a model refitted to flights, missing effects added.
 
+mod given;
 mod places;
 mod tables;
 
@@ -41,13 +42,16 @@ pub struct Arguments {
     #[arg(long, num_args = 1..)]
     hold_out: Vec<PathBuf>,
     /// Add the effects that a diagnosis of these logs asserts.
-    #[arg(long, group = "what")]
+    #[arg(long, group = "what", conflicts_with = "diagnosis")]
     accept: bool,
+    /// Add the effects that this diagnosis asserts: the JSON of `greylag diagnose`.
+    #[arg(long, group = "what", value_name = "JSON")]
+    diagnosis: Option<PathBuf>,
     /// Add these effects of the catalogue, in this order; with --accept after those that are asserted.
     #[arg(long = "effect", value_name = "ID", num_args = 1.., group = "what")]
     effects: Vec<String>,
     /// Add nothing: fit the model's own coefficients.
-    #[arg(long, group = "what", conflicts_with_all = ["accept", "effects"])]
+    #[arg(long, group = "what", conflicts_with_all = ["accept", "diagnosis", "effects"])]
     tune_only: bool,
     /// Also try the model's other conventions (integrator, axes of the forces, the standard atmosphere), and take
     /// those that the flights bear out, the atmosphere unless they deny it.
@@ -190,6 +194,12 @@ fn wanted(
         if all.is_empty() {
             let said = diagnosis.sentences.join(" ");
             bail!("the diagnosis asserts no effect, so there is none to accept; it says: {said}");
+        }
+    }
+    if let Some(path) = &arguments.diagnosis {
+        all.extend(given::asserted(path, &model.name)?);
+        if all.is_empty() {
+            bail!("the diagnosis {} asserts no effect, so there is none to add", path.display());
         }
     }
     for id in &arguments.effects {
