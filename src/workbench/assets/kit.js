@@ -54,13 +54,13 @@ export function judged(scores) {
 }
 
 /** The command that does the same, with a button that copies it. */
-export function command(text) {
+export function command(text, what = "The same") {
   if (!text) return null;
   const copy = el("button", { type: "button", onclick: async () => {
     await navigator.clipboard?.writeText(text);
     copy.textContent = "Copied";
   } }, "Copy");
-  return el("details", { class: "command" }, el("summary", {}, "The same on the command line"), el("code", {}, text), copy);
+  return el("details", { class: "command" }, el("summary", {}, `${what} on the command line`), el("code", {}, text), copy);
 }
 
 // ---- plots ----

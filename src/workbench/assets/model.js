@@ -18,7 +18,7 @@ export function model(bench) {
     el("button", { type: "button", id: "judge", disabled: !tests.length || state.jobs.length > 0, title: "Opens the test flights; each opening is counted and recorded", onclick: () => bench.act({ do: "judge" }) }, "Judge"),
     el("button", { type: "button", id: "save", class: stack.length && !unfitted ? "main" : "", disabled: !stack.length || unfitted || state.jobs.length > 0, onclick: () => save(bench) }, "Save"));
   body.replaceChildren(...[outside, base, errors(state), ...stack.map((s) => step(bench, s)), !stack.length && el("p", { class: "empty" }, "No effect is accepted yet: tick a suspect."),
-    buttons, saved, opened(state), command(state.commands.amend), command(state.commands.judge)].filter(Boolean));
+    buttons, saved, opened(state), command(state.commands.amend, "Model and Save"), command(state.commands.judge, "Judge")].filter(Boolean));
 }
 
 let saved = null;
