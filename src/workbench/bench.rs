@@ -178,7 +178,11 @@ impl Bench {
         };
         let loaded = Loaded::parse(bytes, &name, &self.reading, &model)?;
         self.change(seen, |inner| {
-            let role = inner.session.usual_role(&name);
+            // what makes every figure wrong serves for nothing until its user has looked at it
+            let role = match loaded.in_doubt() {
+                true => Role::Unused,
+                false => inner.session.usual_role(&name),
+            };
             inner.session.logs.push(LogEntry { role, ..entry });
             inner.flights.push(Ok(loaded));
             Ok(())

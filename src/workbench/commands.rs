@@ -30,7 +30,7 @@ impl Bench {
             let all = inner.session.logs.iter().filter(|l| roles.contains(&l.role));
             all.map(|l| format!(" {}", quoted(&self.folder.join(&l.path)))).collect()
         };
-        let words = &self.words;
+        let words = self.reading_words(inner);
         let (fit, held, test) = (logs(&[Role::Fit]), logs(&[Role::HoldOut]), logs(&[Role::Test]));
         let seen = logs(&[Role::Fit, Role::HoldOut]);
         let out = quoted(&self.folder.join("model"));
@@ -66,6 +66,20 @@ impl Bench {
                 &test,
                 format!("greylag compare --model {model}{amended} --log{test}{words}"),
             ),
+        }
+    }
+}
+
+impl Bench {
+    /// How the commands must read the logs; those with problems need a word more.
+    fn reading_words(&self, inner: &Inner) -> String {
+        let used = inner.session.logs.iter().zip(&inner.flights);
+        let mut used = used.filter(|(log, _)| log.role != Role::Unused);
+        let doubt = used.any(|(_, flight)| flight.as_ref().is_ok_and(|f| f.in_doubt()));
+        let despite = " --despite-problems";
+        match doubt && !self.words.contains(despite) {
+            true => format!("{}{despite}", self.words),
+            false => self.words.clone(),
         }
     }
 }
