@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 const MODEL: &str = "params/x8/jsbsim.toml";
 /// What any answer of the program may take here: other tests run beside this one on two cores.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// The program with its address and token; it is killed when dropped, as by `kill -9`.
 struct Bench {

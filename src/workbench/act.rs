@@ -44,6 +44,15 @@ pub enum Act {
         /// The flight.
         flight: usize,
     },
+    /// Multiply a column of all logs by a factor, as a finding advises.
+    Map {
+        /// The flight with the finding.
+        flight: usize,
+        /// The column.
+        column: String,
+        /// The factor.
+        scale: f64,
+    },
     /// Diagnose the model.
     Diagnose,
     /// Accept an effect, and fit the model with it.
@@ -97,6 +106,7 @@ impl Bench {
                 drop(inner.flights.remove(flight));
                 Ok(())
             }),
+            Act::Map { flight, column, scale } => self.map(seen, flight, &column, scale),
             Act::Diagnose => {
                 self.same_model()?;
                 self.lock().divided()?;

@@ -37,8 +37,6 @@ pub struct Given {
 /// The session with what was worked out of it.
 pub struct Bench {
     pub(super) folder: PathBuf,
-    pub(super) reading: logs::Options,
-    pub(super) words: String,
     pub(super) hear: Box<dyn Fn(Event) + Send + Sync>,
     inner: Mutex<Inner>,
     _claim: Claim,
@@ -61,6 +59,12 @@ pub(super) struct Inner {
     pub failures: BTreeMap<String, String>,
     pub jobs: Vec<Job>,
     pub next_job: u64,
+    /// How logs are read.
+    pub reading: logs::Options,
+    /// The same as words of a command line.
+    pub words: String,
+    /// The text of the session's mapping; empty if it has none.
+    pub mapping: String,
 }
 
 /// The flights that a fit sees and those that it is judged by.
@@ -81,15 +85,11 @@ impl Bench {
         let claim = Claim::of(&given.folder)?;
         let folder = fs::canonicalize(&given.folder).map_err(|e| io(&given.folder, e))?;
         let (session, model, text) = begin(&folder, given.model.as_deref())?;
-        let read = |entry: &LogEntry| {
-            Loaded::read(entry, &folder, &given.reading, &model).map_err(|e| e.to_string())
-        };
-        let flights = session.logs.iter().map(read).collect();
-        let inner = Inner {
+        let mut inner = Inner {
             session,
             model,
             text,
-            flights,
+            flights: Vec::new(),
             comparison: None,
             tuned: None,
             diagnosis: None,
@@ -98,12 +98,15 @@ impl Bench {
             failures: BTreeMap::new(),
             jobs: Vec::new(),
             next_job: 1,
+            reading: given.reading,
+            words: given.words,
+            mapping: String::new(),
         };
+        inner.take_mapping(&folder)?;
+        inner.reread(&folder);
         inner.session.write(&folder)?;
         let bench = Arc::new(Bench {
             folder,
-            reading: given.reading,
-            words: given.words,
             hear: Box::new(hear),
             inner: Mutex::new(inner),
             _claim: claim,
@@ -168,15 +171,15 @@ impl Bench {
         let sha256 = sha256(bytes);
         let entry = LogEntry { path, sha256, role: Role::Unused };
         let name = entry.name();
-        let model = {
+        let (model, reading) = {
             let inner = self.lock();
             let same = inner.session.logs.iter().find(|l| l.sha256 == entry.sha256);
             if let Some(same) = same {
                 return Err(WorkbenchError::Twice(same.name()));
             }
-            inner.model.clone()
+            (inner.model.clone(), inner.reading.clone())
         };
-        let loaded = Loaded::parse(bytes, &name, &self.reading, &model)?;
+        let loaded = Loaded::parse(bytes, &name, &reading, &model)?;
         self.change(seen, |inner| {
             // what makes every figure wrong serves for nothing until its user has looked at it
             let role = match loaded.in_doubt() {
@@ -283,6 +286,7 @@ impl Inner {
         let all = [
             env!("CARGO_PKG_VERSION"),
             &self.session.model_sha256,
+            &self.mapping,
             &logs(Role::Fit),
             // a diagnosis does not look at flights held out
             &if what == "diagnosis" { String::new() } else { logs(Role::HoldOut) },

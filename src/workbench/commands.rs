@@ -77,9 +77,9 @@ impl Bench {
         let mut used = used.filter(|(log, _)| log.role != Role::Unused);
         let doubt = used.any(|(_, flight)| flight.as_ref().is_ok_and(|f| f.in_doubt()));
         let despite = " --despite-problems";
-        match doubt && !self.words.contains(despite) {
-            true => format!("{}{despite}", self.words),
-            false => self.words.clone(),
+        match doubt && !inner.words.contains(despite) {
+            true => format!("{}{despite}", inner.words),
+            false => inner.words.clone(),
         }
     }
 }

@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::logs::LogError;
+use crate::logs::mapping::MappingError;
 use crate::model::edit::EditError;
 use crate::physics::airframe::FileError;
 use crate::report::WriteError;
@@ -87,6 +88,14 @@ pub enum WorkbenchError {
     /// The effect is there.
     #[error("{0} is in the model already")]
     Present(String),
+    /// The mapping is the user's own.
+    #[error(
+        "the logs are read by a mapping of your own; add this line to its [columns] and start again: {0}"
+    )]
+    MappingGiven(String),
+    /// The session's mapping is broken.
+    #[error("cannot add to the mapping {}: it is no mapping; mend or remove it", .0.display())]
+    NoMapping(PathBuf),
     /// The moment is not flown.
     #[error(
         "no free run can start at {0:.1} s: the aircraft is not in the air there, or the log has a gap"
@@ -122,6 +131,9 @@ pub enum WorkbenchError {
     /// The log cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// The mapping cannot be read.
+    #[error(transparent)]
+    Mapping(#[from] MappingError),
     /// The log cannot be used.
     #[error(transparent)]
     Reconstruct(#[from] ReconstructError),

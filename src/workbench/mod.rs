@@ -10,6 +10,7 @@ mod error;
 mod fit;
 mod flights;
 mod jobs;
+mod mapping;
 pub mod server;
 pub mod session;
 mod view;

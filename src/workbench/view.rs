@@ -11,6 +11,7 @@ use super::commands::Commands;
 use super::error::WorkbenchError;
 use super::flights::{Loaded, Strip};
 use super::jobs::{Job, Work};
+use super::mapping::Cure;
 use super::session::{LogEntry, Opening, Role};
 use crate::logs::Format;
 use crate::logs::finding::Finding;
@@ -51,10 +52,24 @@ struct About<'a> {
     in_doubt: bool,
     phases: &'a [Phase],
     purposes: &'a [Purpose],
-    findings: &'a [Finding],
+    findings: Vec<FindingView<'a>>,
     nuisances: Vec<Value>,
     notes: &'a [String],
     strip: Option<Strip>,
+}
+
+/// A finding with what would put it right.
+#[derive(Serialize)]
+struct FindingView<'a> {
+    #[serde(flatten)]
+    finding: &'a Finding,
+    cure: Option<Cure>,
+}
+
+impl FindingView<'_> {
+    fn of(finding: &Finding) -> FindingView<'_> {
+        FindingView { finding, cure: Cure::of(finding) }
+    }
 }
 
 /// An accepted effect with what its fit says.
@@ -292,7 +307,7 @@ fn about(flight: &Loaded, locked: bool) -> About<'_> {
         in_doubt: flight.in_doubt(),
         phases: &info.phases,
         purposes: &info.purposes,
-        findings: &info.findings,
+        findings: info.findings.iter().map(FindingView::of).collect(),
         nuisances: flight.flight.nuisances.iter().map(nuisance).collect(),
         notes: &flight.flight.notes,
         strip: (!locked).then(|| flight.strip()),

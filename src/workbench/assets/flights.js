@@ -35,17 +35,20 @@ function one(bench, flight, place, kept) {
   node.append(flight.locked
     ? el("div", { class: "locked" }, "unseen until Judge")
     : el("canvas", { "data-flight": place, role: "img", "aria-label": "angle of attack, airspeed and elevator over time" }));
-  node.append(roles, ...about(flight, place, kept));
+  node.append(roles, ...about(bench, flight, place, kept));
   return node;
 }
 
 /** What is wrong with the log, what it serves for, which errors its sensors have. */
-function about(flight, place, kept) {
+function about(bench, flight, place, kept) {
   const details = (key, summary, lines, open) => {
     const id = `${place}-${key}`;
-    return lines.length ? el("details", { open: open || kept.has(id), "data-key": id }, el("summary", {}, summary), el("ul", {}, lines.map((l) => el("li", { class: l.class }, l.text)))) : null;
+    return lines.length ? el("details", { open: open || kept.has(id), "data-key": id }, el("summary", {}, summary), el("ul", {}, lines.map((l) => el("li", { class: l.class }, l.text, l.fix)))) : null;
   };
-  const findings = flight.findings.map((f) => ({ text: f.text, class: f.severity === "problem" ? "bad" : "" }));
+  const findings = flight.findings.map((f) => ({
+    text: f.text, class: f.severity === "problem" ? "bad" : "",
+    fix: f.cure && el("button", { type: "button", onclick: () => bench.act({ do: "map", flight: place, column: f.cure.column, scale: f.cure.scale }) }, `Read ${f.cure.column} × ${f.cure.scale}`),
+  }));
   const serious = flight.findings.filter((f) => f.severity === "problem").length;
   const lacking = flight.purposes.filter((p) => p.missing.length).map((p) => ({ text: `${p.name}: lacks ${p.missing.join(", ")}`, class: "bad" }));
   const serves = flight.purposes.filter((p) => !p.missing.length).map((p) => ({ text: p.name + (p.instead.length ? ` (with ${p.instead.join(", ")})` : "") }));
