@@ -29,7 +29,12 @@ fn main() {
     println!("reconstructed in {:.2} s", start.elapsed().as_secs_f64());
     let flights = [flight];
     let start = Instant::now();
-    let answer = diagnose(&model("jsbsim"), &flights, &diagnose::Options::default(), &|_| ());
+    let answer = diagnose(
+        &model("jsbsim"),
+        &flights,
+        &diagnose::Options::default(),
+        &greylag::sysid::progress::unheard,
+    );
     let answer = answer.expect("a diagnosis");
     println!(
         "diagnosed with {} nulls in {:.2} s: {:?}",
@@ -38,7 +43,12 @@ fn main() {
         answer.verdict
     );
     let start = Instant::now();
-    let found = compare(&[prior, model("jsbsim")], &flights, &Options::default(), &|_| ());
+    let found = compare(
+        &[prior, model("jsbsim")],
+        &flights,
+        &Options::default(),
+        &greylag::sysid::progress::unheard,
+    );
     let found = found.expect("a comparison");
     println!("two models compared in {:.2} s", start.elapsed().as_secs_f64());
     let start = Instant::now();

@@ -110,7 +110,13 @@ fn proposal(seed: u64, missing: Vec<Missing>) -> Result<Proposal, Box<dyn Error>
     let model = GreyBox::parse(&text, &folder.join("hidden.toml"))?;
     let logs = Trial { seed, missing, turbulence: None }.fly(build(Kind::Lqi, &exact)?.as_ref())?;
     let (search, test) = (flights(&model, &logs.training)?, flights(&model, &logs.testing)?);
-    Ok(propose(&model, &search, &test, &Options { seed, ..Options::default() }, &|_| ())?)
+    Ok(propose(
+        &model,
+        &search,
+        &test,
+        &Options { seed, ..Options::default() },
+        &greylag::sysid::progress::unheard,
+    )?)
 }
 
 /// The variables of a formula, a rate the same whatever it is divided by.

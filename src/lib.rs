@@ -74,4 +74,5 @@ pub mod sim;
 #[cfg(feature = "learn")]
 pub mod learn;
 pub mod report;
+pub mod workbench;
 pub mod commands;

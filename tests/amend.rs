@@ -24,7 +24,14 @@ fn flights(hidden: &str, first: u64) -> Vec<Reconstruction> {
 fn validate_a_hidden_lag_is_measured_and_the_error_falls() {
     let all = flights("actuator_lag=0.05", 1);
     let wrong = off(&sensors::model(), 3);
-    let found = amend(&wrong, &all[..2], &all[2..], &added("actuator_lag"), &|_| ()).unwrap();
+    let found = amend(
+        &wrong,
+        &all[..2],
+        &all[2..],
+        &added("actuator_lag"),
+        &greylag::sysid::progress::unheard,
+    )
+    .unwrap();
     let story = &found.amendment;
     story.sentences.iter().for_each(|s| println!("{s}"));
     let tau = story.parameters.iter().find(|p| p.name == "actuator_lag.tau_s").unwrap();
@@ -51,7 +58,8 @@ fn validate_an_integrator_that_no_coefficient_makes_up_for_is_replaced() {
     model.integrator = Integrator::Rk4;
     let all = flights("", 41);
     let options = Options { conventions: true, ..Options::default() };
-    let found = amend(&model, &all[..2], &all[2..], &options, &|_| ()).unwrap();
+    let found =
+        amend(&model, &all[..2], &all[2..], &options, &greylag::sysid::progress::unheard).unwrap();
     let story = &found.amendment;
     story.sentences.iter().for_each(|s| println!("{s}"));
     let tried: Vec<_> = story.conventions.iter().map(|t| (t.from, t.to, t.kept)).collect();
@@ -80,7 +88,14 @@ fn validate_a_curve_takes_up_what_no_formula_says() {
     let model = GreyBox::load(&path).unwrap();
     let all: Vec<Reconstruction> =
         (44..47).map(|k| flight("", 30.0, Manoeuvres::Stalls, k)).collect();
-    let found = amend(&model, &all[..2], &all[2..], &added("lift_curve"), &|_| ()).unwrap();
+    let found = amend(
+        &model,
+        &all[..2],
+        &all[2..],
+        &added("lift_curve"),
+        &greylag::sysid::progress::unheard,
+    )
+    .unwrap();
     let story = &found.amendment;
     story.sentences.iter().for_each(|s| println!("{s}"));
     assert!(story.effects[0].refused.is_empty(), "{:?}", story.effects[0].refused);
@@ -107,11 +122,19 @@ fn validate_the_prior_as_printed_ends_close_to_the_simulators_model() {
         "inertia_xz lift_stall drag_elevator_abs drag_alpha2 drag_beta2 lift_curve".split(' ');
     let effects = effects.map(|id| Added { id: id.into(), start: None }).collect();
     let options = Options { effects, ..Options::default() };
-    let found = amend(&printed, &all[..3], &all[3..], &options, &|_| ()).unwrap();
+    let found = amend(&printed, &all[..3], &all[3..], &options, &greylag::sysid::progress::unheard)
+        .unwrap();
     let story = &found.amendment;
     story.sentences.iter().chain(&story.notes).for_each(|s| println!("{s}"));
     assert!(story.effects.iter().all(|e| e.joined), "{:?}", story.effects);
-    let tuned = amend(&exact, &all[..3], &all[3..], &Options::default(), &|_| ()).unwrap();
+    let tuned = amend(
+        &exact,
+        &all[..3],
+        &all[3..],
+        &Options::default(),
+        &greylag::sysid::progress::unheard,
+    )
+    .unwrap();
     let least = at_5s(&tuned.amendment.after);
     println!("error {:.5}, the simulator's own model {least:.5}", at_5s(&story.after));
     assert!(at_5s(&story.after) < 0.02 * at_5s(&story.given), "{}", at_5s(&story.after));
@@ -136,7 +159,8 @@ fn what_the_model_says_itself_is_not_told_twice() {
     let with = |id: &str, start: f64| Added { id: id.into(), start: Some(vec![start]) };
     let effects = vec![with("drag_alpha2", 0.5), with("thrust_scale", 20.0)];
     let options = Options { effects, ..Options::default() };
-    let found = amend(&model, &all[..2], &all[2..], &options, &|_| ()).unwrap();
+    let found =
+        amend(&model, &all[..2], &all[2..], &options, &greylag::sysid::progress::unheard).unwrap();
     let story = &found.amendment;
     story.sentences.iter().for_each(|s| println!("{s}"));
     let joined = |id: &str| story.effects.iter().find(|e| e.id == id).unwrap().joined;
@@ -150,7 +174,14 @@ fn what_the_model_says_itself_is_not_told_twice() {
 fn an_effect_that_is_not_there_is_refused() {
     let all = flights("", 11);
     let wrong = off(&sensors::model(), 5);
-    let found = amend(&wrong, &all[..2], &all[2..], &added("motor_torque"), &|_| ()).unwrap();
+    let found = amend(
+        &wrong,
+        &all[..2],
+        &all[2..],
+        &added("motor_torque"),
+        &greylag::sysid::progress::unheard,
+    )
+    .unwrap();
     assert!(!found.amendment.effects[0].refused.is_empty());
     assert!(!found.model.has("motor_torque"));
     assert!(found.amendment.sentences.iter().any(|s| s.contains("motor_torque is refused")));
@@ -160,11 +191,15 @@ fn an_effect_that_is_not_there_is_refused() {
 fn bad_input_is_said_before_anything_is_fitted() {
     let model = sensors::model();
     let none: &[Reconstruction] = &[];
-    let why =
-        |options: &Options| amend(&model, none, none, options, &|_| ()).unwrap_err().to_string();
+    let why = |options: &Options| {
+        amend(&model, none, none, options, &greylag::sysid::progress::unheard)
+            .unwrap_err()
+            .to_string()
+    };
     assert!(why(&added("flubber")).contains("effects list"));
     assert!(why(&added("drag_beta2")).contains("already"));
-    let short = amend(&model, none, none, &Options::default(), &|_| ()).unwrap_err();
+    let short = amend(&model, none, none, &Options::default(), &greylag::sysid::progress::unheard)
+        .unwrap_err();
     assert!(matches!(short, AmendError::TooLittle { .. }), "{short}");
 }
 
@@ -185,9 +220,19 @@ fn the_command_writes_a_model_that_every_command_reads() {
     let original = root.join("params/x8/jsbsim.toml");
     let before = std::fs::read(&original).unwrap();
     let (a, b, out) = (at("0.csv"), at("1.csv"), at("amended"));
-    let model = original.to_str().unwrap();
-    let line =
-        ["amend", "--model", model, "--log", &a, &b, "--effect", "actuator_lag", "--out", &out];
+    let model_file = original.to_str().unwrap();
+    let line = [
+        "amend",
+        "--model",
+        model_file,
+        "--log",
+        &a,
+        &b,
+        "--effect",
+        "actuator_lag",
+        "--out",
+        &out,
+    ];
     let said = greylag(&line);
     let text = String::from_utf8_lossy(&said.stdout);
     assert!(said.status.success(), "{text}{}", String::from_utf8_lossy(&said.stderr));
@@ -202,6 +247,22 @@ fn the_command_writes_a_model_that_every_command_reads() {
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["schema"], "greylag.amend/1");
     assert_eq!(json["hold_out"][0]["sha256"].as_str().unwrap().len(), 64);
+    // a diagnosis that was written before is not made again; one of another model is refused
+    let diagnosis = at("diagnosis.json");
+    let found = |model: &str| {
+        let effect =
+            r#"{"id":"actuator_lag","asserted":true,"parameters":[{"name":"tau_s","value":0.05}]}"#;
+        let text =
+            format!(r#"{{"schema":"greylag.diagnosis/1","model":"{model}","effects":[{effect}]}}"#);
+        std::fs::write(&diagnosis, text).unwrap();
+        let out = at("given");
+        let line = ["amend", "--model", model_file, "--log", &a, &b, "--out", &out];
+        greylag(&[&line[..], &["--diagnosis", &diagnosis]].concat())
+    };
+    let other = found("another");
+    assert!(String::from_utf8_lossy(&other.stderr).contains("not of jsbsim"));
+    assert!(found("jsbsim").status.success());
+    assert!(GreyBox::load(&scratch.path().join("given/model.toml")).unwrap().has("actuator_lag"));
     // nothing is overwritten unasked
     let again = greylag(&line);
     assert_eq!(again.status.code(), Some(1));

@@ -26,7 +26,9 @@ fn fit(model: &GreyBox, id: &str, values: &[f64], flights: &[Flight]) -> Option<
         model.join(id, values).unwrap();
         options.added.push(id.into());
     }
-    output_error::fit(&model, flights, &options, &|_| ()).map_err(|e| println!("{e}")).ok()
+    output_error::fit(&model, flights, &options, &greylag::sysid::progress::unheard)
+        .map_err(|e| println!("{e}"))
+        .ok()
 }
 
 fn error_5s(model: &GreyBox, held: &Flight) -> f64 {

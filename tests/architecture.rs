@@ -17,16 +17,20 @@ const LAYERS: &[&str] = &[
     "sim",
     "learn",
     "report",
+    "workbench",
     "commands",
 ];
 
 /// Crates with the only rooms that may name them. A room may be narrowed to a folder below it.
 const HOMES: &[(&str, &[&str])] = &[
     ("mavlink", &["link"]),
-    ("tokio", &["link", "flight/runtime"]),
+    ("tokio", &["link", "flight/runtime", "workbench/server"]),
+    ("tokio_stream", &["workbench/server"]),
+    ("axum", &["workbench/server"]),
     ("tokio_serial", &["link"]),
     ("burn", &["learn"]),
     ("clap", &["commands"]),
+    ("clap_complete", &["commands"]),
     ("anyhow", &["commands"]),
     ("indicatif", &["commands"]),
     ("comfy_table", &["commands"]),

@@ -171,3 +171,32 @@ fn evaluate_flies_another_aircraft() {
     assert!(output.status.success(), "{error}");
     assert!(out.contains("lqi") && out.contains("easy"), "{out}");
 }
+
+#[test]
+fn the_version_says_what_was_built() {
+    let said = String::from_utf8(greylag(&["-V"]).stdout).unwrap();
+    assert!(said.starts_with("greylag 0.") && said.contains("features: sitl"), "{said}");
+}
+
+#[test]
+fn completions_know_the_commands() {
+    for shell in ["bash", "zsh", "fish"] {
+        let output = greylag(&["completions", shell]);
+        assert!(output.status.success(), "{shell}");
+        assert!(String::from_utf8_lossy(&output.stdout).contains("workbench"), "{shell}");
+    }
+}
+
+#[test]
+fn a_reader_that_leaves_is_no_fault() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_greylag"))
+        .args(["effects", "list"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.is_empty(), "{said}");
+}

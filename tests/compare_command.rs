@@ -59,6 +59,14 @@ fn two_models_on_two_logs() {
     assert_eq!(found["free_run"][1]["horizon_s"], 3.0);
     assert_eq!(found["models"].as_array().unwrap().len(), 2);
     assert_eq!(found["flights"][1]["name"], "b.csv");
+    // a program that reads it gets the JSON and nothing else; the model may stand in the environment
+    let piped = Command::new(env!("CARGO_BIN_EXE_greylag"))
+        .args(["compare", "--log", &a, "--horizon", "1", "--json", "-"])
+        .env("GREYLAG_MODEL", "params/x8/jsbsim.toml")
+        .output()
+        .unwrap();
+    let found: serde_json::Value = serde_json::from_slice(&piped.stdout).unwrap();
+    assert_eq!(found["models"][0]["name"], "jsbsim");
     // nothing is written over without being told to
     let again = greylag(&arguments);
     assert!(!again.status.success() && text(&again.stderr).contains("--force"));
@@ -74,7 +82,7 @@ fn a_bad_log_is_named_and_the_rest_is_compared() {
     let bad = bad.to_str().unwrap();
     let model = ["--model", "params/x8/prior.toml"];
     let output = greylag(&[&model[..], &["--log", bad, &good]].concat());
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output.stderr));
     assert!(text(&output.stdout).contains("left out") && text(&output.stdout).contains("bad.csv"));
     let output = greylag(&[&model[..], &["--log", bad]].concat());
     assert_eq!(output.status.code(), Some(1));

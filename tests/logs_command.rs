@@ -60,7 +60,7 @@ fn info_says_of_a_table_without_a_column_what_it_still_serves_for() {
     let path = put(folder.path(), "partial.csv", renamed.as_bytes());
     let output = greylag(&["info", path.to_str().unwrap()]);
     let said = text(&output.stdout);
-    assert_eq!(output.status.code(), Some(2), "{said}{}", text(&output.stderr));
+    assert_eq!(output.status.code(), Some(3), "{said}{}", text(&output.stderr));
     for words in [
         "1000 rows",
         "comparison in free run: no, for want of airspeed_mps",
@@ -75,7 +75,7 @@ fn info_says_of_a_table_without_a_column_what_it_still_serves_for() {
     let timeless = table.replacen("time_s", "t", 1);
     let path = put(folder.path(), "timeless.csv", timeless.as_bytes());
     let output = greylag(&["info", path.to_str().unwrap()]);
-    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(output.status.code(), Some(3));
     assert!(text(&output.stdout).contains("has no column `time_s`"), "{}", text(&output.stdout));
     // What is computed with is still refused.
     assert!(logs::load(&path, &Options::default()).is_err());
@@ -130,15 +130,15 @@ fn bad_files_fail_by_name_and_wrong_units_by_status() {
     }
     let gone = greylag(&["info", "gone.ulg"]);
     assert!(gone.status.code() == Some(1) && text(&gone.stderr).contains("gone.ulg"));
-    // Degrees for radians in rates: read, converted, and said with status 2.
+    // Degrees for radians in rates: read, converted, and said with status 3.
     let mut wrong = samples(1000);
     wrong.iter_mut().for_each(|s| s.rates_radps = s.rates_radps.map(f64::to_degrees));
     let path = put(folder.path(), "degrees.csv", &csv(&wrong));
     let info = greylag(&["info", path.to_str().unwrap()]);
-    assert_eq!(info.status.code(), Some(2));
+    assert_eq!(info.status.code(), Some(3));
     assert!(text(&info.stdout).contains("p, q, r look like degrees"), "{}", text(&info.stdout));
     let converted = greylag(&["convert", path.to_str().unwrap(), out]);
-    assert_eq!(converted.status.code(), Some(2), "{}", text(&converted.stderr));
+    assert_eq!(converted.status.code(), Some(3), "{}", text(&converted.stderr));
     assert!(text(&converted.stderr).contains("look like degrees"));
     // A mapping that names no column is refused before anything is read.
     let mapping =

@@ -39,7 +39,13 @@ fn rebuilt(bytes: &[u8]) -> Reconstruction {
 
 fn compared(flight: &Reconstruction) -> Comparison {
     let options = compare::Options { horizons_s: vec![1.0, 5.0], ..compare::Options::default() };
-    compare(&[model("prior-as-printed")], std::slice::from_ref(flight), &options, &|_| ()).unwrap()
+    compare(
+        &[model("prior-as-printed")],
+        std::slice::from_ref(flight),
+        &options,
+        &greylag::sysid::progress::unheard,
+    )
+    .unwrap()
 }
 
 /// The largest relative difference of the figures that a reader sees.

@@ -155,15 +155,10 @@ fn each_wrong_column_is_named_and_its_cure_cures_it() {
 fn foreign_axes_are_named_as_such() {
     let said = found(
         &spoiled(|s| {
-            for x in [
-                &mut s.rates_radps[1],
-                &mut s.rates_radps[2],
-                &mut s.specific_force_mps2[1],
-                &mut s.specific_force_mps2[2],
-                &mut s.attitude_rad[1],
-                &mut s.attitude_rad[2],
-            ] {
-                *x *= -1.0;
+            for axis in [1, 2] {
+                s.rates_radps[axis] *= -1.0;
+                s.specific_force_mps2[axis] *= -1.0;
+                s.attitude_rad[axis] *= -1.0;
             }
         }),
         "",

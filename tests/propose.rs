@@ -42,7 +42,9 @@ fn a_thrust_line_to_the_left_is_named_and_tested() {
     let logs = trial.fly(build(Kind::Lqi, &exact).unwrap().as_ref()).unwrap();
     let search = reconstructed(&model, &logs.training);
     let test = reconstructed(&model, &logs.testing);
-    let found = propose(&model, &search, &test, &Options::default(), &|_| ()).unwrap();
+    let found =
+        propose(&model, &search, &test, &Options::default(), &greylag::sysid::progress::unheard)
+            .unwrap();
     assert_eq!(found.verdict, Verdict::Unexplained);
     let chosen = found.front.iter().find(|r| r.chosen).unwrap();
     assert_eq!(chosen.formula, "yaw = k*throttle", "{:?}", found.sentences);

@@ -6,31 +6,30 @@ use std::process::ExitCode;
 use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
 
+use crate::commands::bar::Bar;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
 use crate::sysid::compare::{Comparison, ModelResult, Options, compare};
 use crate::sysid::flight_path::ActuatorClock;
 
-/// Exit status of a comparison that had to leave a log out, or whose logs are wrong somewhere.
-const IN_DOUBT: u8 = 2;
-
 /// Options of `greylag compare`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit status: 0 done, 1 nothing could be compared, 2 done, but a log was left out or holds what makes the figures wrong."
+    after_help = "Exit status: 0 done, 1 nothing could be compared, 3 done, but a log was left out or holds what makes the figures wrong."
 )]
 pub struct Arguments {
     /// Model files, compared side by side; the first one leads the report.
-    #[arg(long = "model", num_args = 1.., required = true)]
+    #[arg(long = "model", num_args = 1.., required = true, env = "GREYLAG_MODEL", hide_env_values = true)]
     models: Vec<PathBuf>,
     #[command(flatten)]
     logs: LogArguments,
     /// Horizons of the free runs, s.
     #[arg(long = "horizon", value_delimiter = ',', default_values_t = [1.0, 2.0, 5.0, 10.0])]
     horizons: Vec<f64>,
-    /// Write everything that was found as JSON.
+    /// Write everything that was found as JSON; `-` for standard output, with nothing else on it.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Write the report, one HTML page.
@@ -58,11 +57,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Intake { flights, mut notes, mut in_doubt } =
         arguments.logs.take_in(&models[0], ActuatorClock::Estimated)?;
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
-    let mut comparison = compare(&models, &flights, &options, &|doing| eprintln!("{doing}"))?;
+    let bar = Bar::new();
+    let mut comparison = compare(&models, &flights, &options, &|stage| bar.hear(stage))?;
+    drop(bar);
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();
     notes.append(&mut comparison.notes);
     comparison.notes = notes;
-    print(&comparison);
+    if !files::is_stdout(arguments.json.as_deref()) {
+        print(&comparison);
+    }
     if let Some(path) = &arguments.json {
         let text = serde_json::to_string_pretty(&comparison.document())? + "\n";
         files::write(path, &text, overwrite)?;

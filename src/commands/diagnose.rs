@@ -6,9 +6,11 @@ use std::process::ExitCode;
 use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
 
+use crate::commands::bar::Bar;
 use crate::commands::effect_files::named_effects;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::report::DiagnosisReport;
 use crate::sysid::compare::{self, compare};
@@ -16,23 +18,21 @@ use crate::sysid::diagnose::{Candidate, Diagnosis, Options, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// Exit status of a diagnosis that had to leave a log out, or whose logs are wrong somewhere.
-const IN_DOUBT: u8 = 2;
 /// Candidates in the table.
 const ROWS: usize = 12;
 
 /// Options of `greylag diagnose`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit status: 0 done, whatever was found; 1 nothing could be diagnosed; 2 done, but a log was left out or holds what makes the figures wrong. The verdict is in the output: effect, adequate or unexplained."
+    after_help = "Exit status: 0 done, whatever was found; 1 nothing could be diagnosed; 3 done, but a log was left out or holds what makes the figures wrong. The verdict is in the output: effect, adequate or unexplained."
 )]
 pub struct Arguments {
     /// The model file.
-    #[arg(long)]
+    #[arg(long, env = "GREYLAG_MODEL", hide_env_values = true)]
     model: PathBuf,
     #[command(flatten)]
     logs: LogArguments,
-    /// Write everything that was found as JSON.
+    /// Write everything that was found as JSON; `-` for standard output, with nothing else on it.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Write the report, one HTML page.
@@ -71,13 +71,17 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         without: arguments.without.clone(),
         ..Options::default()
     };
-    let mut diagnosis = diagnose(&model, &flights, &options, &|doing| eprintln!("{doing}"))?;
+    let bar = Bar::new();
+    let mut diagnosis = diagnose(&model, &flights, &options, &|stage| bar.hear(stage))?;
+    drop(bar);
     for flight in &flights {
         notes.extend(flight.notes.iter().map(|note| format!("{}: {note}", flight.name)));
     }
     notes.append(&mut diagnosis.notes);
     diagnosis.notes = notes;
-    print(&diagnosis);
+    if !files::is_stdout(arguments.json.as_deref()) {
+        print(&diagnosis);
+    }
     if let Some(path) = &arguments.json {
         files::write(path, &(serde_json::to_string_pretty(&diagnosis)? + "\n"), overwrite)?;
     }
@@ -95,7 +99,8 @@ fn page(
     flights: &[Reconstruction],
 ) -> Result<String> {
     let models = std::slice::from_ref(model);
-    let failing = compare(models, flights, &compare::Options::default(), &|_| ())?;
+    let failing =
+        compare(models, flights, &compare::Options::default(), &crate::sysid::progress::unheard)?;
     let report = DiagnosisReport {
         title: format!("What {} lacks", diagnosis.model),
         diagnosis,

@@ -1,5 +1,6 @@
 //! The files a user names on the command line.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
@@ -28,8 +29,16 @@ impl From<bool> for Overwrite {
     }
 }
 
+/// Whether a path stands for standard output: `-`.
+pub fn is_stdout(path: Option<&Path>) -> bool {
+    path == Some(Path::new("-"))
+}
+
 /// Fails at once if `path` may not be written later, so that no long work is lost to it.
 pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
+    if is_stdout(Some(path)) {
+        return Ok(());
+    }
     if overwrite == Overwrite::Never && path.exists() {
         bail!("{} exists; name another file, or give --force to replace it", path.display());
     }
@@ -43,6 +52,10 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
 /// Writes a whole file at once: it is there complete, or not at all.
 pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
+    if is_stdout(Some(path)) {
+        std::io::stdout().write_all(content.as_bytes())?;
+        return Ok(());
+    }
     match overwrite {
         Overwrite::Never => report::write_new(path, content)?,
         Overwrite::Force => report::write_over(path, content)?,

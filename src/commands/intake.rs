@@ -62,6 +62,24 @@ impl LogArguments {
 }
 
 impl Reading {
+    /// What the readers of logs are told.
+    ///
+    /// # Errors
+    /// If the mapping cannot be read.
+    pub fn options(&self) -> Result<logs::Options> {
+        let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
+        let tolerance = if self.lenient { Tolerance::Lenient } else { Tolerance::Strict };
+        Ok(logs::Options { tolerance, mapping })
+    }
+
+    /// The options as a command line has them, each with a space before it.
+    pub fn words(&self) -> String {
+        let mapping = self.mapping.iter().map(|m| format!(" --mapping {}", m.display()));
+        let lenient = self.lenient.then(|| " --lenient".to_owned());
+        let despite = self.despite_problems.then(|| " --despite-problems".to_owned());
+        mapping.chain(lenient).chain(despite).collect()
+    }
+
     /// As [`LogArguments::take_in`], of `paths`.
     ///
     /// # Errors
@@ -72,9 +90,7 @@ impl Reading {
         model: &GreyBox,
         clock: ActuatorClock,
     ) -> Result<Intake> {
-        let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
-        let tolerance = if self.lenient { Tolerance::Lenient } else { Tolerance::Strict };
-        let reading = logs::Options { tolerance, mapping };
+        let reading = self.options()?;
         let mut intake = Intake::default();
         for (k, (path, name)) in paths.iter().zip(names(paths)).enumerate() {
             eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
@@ -113,11 +129,7 @@ impl Reading {
                 path.display()
             );
         }
-        let options = flight_path::Options {
-            gravity: model.atmosphere.gravity,
-            actuators_clock: clock,
-            ..flight_path::Options::new(name, model.airframe.actuators)
-        };
+        let options = flight_path::Options::of(name, model, clock);
         let flight = reconstruct(&log.flight, &options)
             .with_context(|| format!("cannot use flight log {}", path.display()))?;
         Ok((flight, log.findings))

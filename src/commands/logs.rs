@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use clap::Subcommand;
 
 use crate::commands::files;
+use crate::commands::status::IN_DOUBT;
 use crate::logs::finding::Severity;
 use crate::logs::info::Info;
 use crate::logs::mapping::Mapping;
@@ -15,9 +16,6 @@ use crate::logs::{Flight, Log, Options, csv};
 use crate::model::GreyBox;
 use crate::sysid::flight_path;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
-
-/// Exit status when what would be computed from the log is wrong.
-const PROBLEM: u8 = 2;
 
 /// Options of `greylag logs`.
 #[derive(clap::Args)]
@@ -29,7 +27,7 @@ pub struct Arguments {
 #[derive(Subcommand)]
 enum Verb {
     /// Say what a log holds, at which rates, with which gaps, and what it is missing for which
-    /// purpose. Exit status 2 when something makes its numbers wrong.
+    /// purpose. Exit status 3 when something makes its numbers wrong.
     Info {
         /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
         file: PathBuf,
@@ -144,7 +142,7 @@ fn convert(log: &Log, output: &Path, force: bool) -> Result<ExitCode> {
 }
 
 fn status(info: &Info) -> ExitCode {
-    if info.severity() == Severity::Problem { ExitCode::from(PROBLEM) } else { ExitCode::SUCCESS }
+    if info.severity() == Severity::Problem { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS }
 }
 
 fn print(info: &Info) {

@@ -3,10 +3,12 @@
 #[cfg(feature = "sitl")]
 mod aircraft;
 mod amend;
+mod bar;
 mod choices;
 #[cfg(feature = "sitl")]
 mod collect;
 mod compare;
+mod completions;
 #[cfg(feature = "sitl")]
 mod demo;
 mod effect_files;
@@ -29,20 +31,36 @@ mod mystery;
 mod propose;
 mod replay;
 mod said_once;
+mod status;
 #[cfg(feature = "sitl")]
 mod targets;
 #[cfg(feature = "learn")]
 mod train;
+mod workbench;
 
 use std::io::IsTerminal;
-use std::process::ExitCode;
+
+use std::panic;
+use std::process::{self, ExitCode};
+use std::sync::LazyLock;
 
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
+use crate::sysid::progress::Cancelled;
+
+/// What `-V` says: version, commit where the build was told (`GREYLAG_COMMIT`), features.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let features = [("sitl", cfg!(feature = "sitl")), ("learn", cfg!(feature = "learn"))];
+    let built: Vec<&str> =
+        features.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
+    let commit = option_env!("GREYLAG_COMMIT").unwrap_or("unknown");
+    format!("{} (commit {commit}; features: {})", env!("CARGO_PKG_VERSION"), built.join(", "))
+});
+
 /// A MAVLink offboard autopilot companion for fixed-wing aircraft.
 #[derive(Parser)]
-#[command(name = "greylag", version, max_term_width = 100)]
+#[command(name = "greylag", version = VERSION.as_str(), max_term_width = 100)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -57,6 +75,8 @@ enum Command {
     Collect(collect::Arguments),
     /// Compare models with flight logs: how far predictions stray, in which channel and regime.
     Compare(compare::Arguments),
+    /// Write completions for a shell to standard output.
+    Completions(completions::Arguments),
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
     #[cfg(feature = "sitl")]
     Demo(demo::Arguments),
@@ -92,6 +112,20 @@ enum Command {
     /// Learn a model from flights, or a policy in a model.
     #[cfg(feature = "learn")]
     Train(train::Arguments),
+    /// See where a model fails, accept effects and watch the error fall, in a browser.
+    Workbench(workbench::Arguments),
+}
+
+/// Lets a closed pipe, as in `greylag … | head`, end the program without a word.
+fn end_with_the_reader() {
+    let usual = panic::take_hook();
+    panic::set_hook(Box::new(move |about| {
+        let text = about.payload_as_str().unwrap_or_default();
+        if text.starts_with("failed printing to stdout") && text.contains("Broken pipe") {
+            process::exit(0);
+        }
+        usual(about);
+    }));
 }
 
 /// Runs the subcommand of the command line; what goes wrong is said in one line.
@@ -103,11 +137,19 @@ pub fn main() -> ExitCode {
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(|| log_once::LogOnce)
         .init();
-    let result = match Arguments::parse().command {
+    let command = Arguments::parse().command;
+    // what flies goes on without a reader
+    if !matches!(command, Command::Fly(_)) {
+        end_with_the_reader();
+    }
+    let result = match command {
         Command::Amend(arguments) => amend::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Collect(arguments) => collect::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Completions(arguments) => {
+            completions::run(&arguments, &mut <Arguments as clap::CommandFactory>::command())
+        }
         #[cfg(feature = "sitl")]
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Effects(arguments) => effects::run(&arguments),
@@ -129,8 +171,13 @@ pub fn main() -> ExitCode {
         Command::Targets(arguments) => targets::run(&arguments),
         #[cfg(feature = "learn")]
         Command::Train(arguments) => train::run(&arguments),
+        Command::Workbench(arguments) => workbench::run(&arguments),
     };
     result.unwrap_or_else(|error| {
+        if error.chain().any(|cause| cause.is::<Cancelled>()) {
+            eprintln!("greylag: stopped by Ctrl-C; nothing was written");
+            return ExitCode::from(status::INTERRUPTED);
+        }
         eprintln!("greylag: {}", said_once::said_once(&error));
         ExitCode::FAILURE
     })

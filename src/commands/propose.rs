@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 use comfy_table::{CellAlignment, Table};
 
+use crate::commands::bar::Bar;
 use crate::commands::effect_files::named_effects;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
@@ -76,8 +77,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         without: arguments.without.clone(),
         ..Options::default()
     };
+    let bar = Bar::new();
     let mut proposal =
-        propose(&model, &flights, &tests.flights, &options, &|doing| eprintln!("{doing}"))?;
+        propose(&model, &flights, &tests.flights, &options, &|stage| bar.hear(stage))?;
+    drop(bar);
     notes.append(&mut proposal.notes);
     proposal.notes = notes;
     print(&proposal);

@@ -1,5 +1,6 @@
 //! `greylag amend`: a model refitted to flights, missing effects added.
 
+mod given;
 mod places;
 mod tables;
 
@@ -11,30 +12,29 @@ use anyhow::{Result, bail};
 use places::{Places, hashed};
 use tables::print;
 
+use crate::commands::bar::Bar;
 use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::report::AmendmentReport;
 use crate::sysid::amend::{self, Added, Amended, Refused};
 use crate::sysid::compare::{self, compare};
-use crate::sysid::diagnose::{self, Candidate, diagnose};
+use crate::sysid::diagnose::{self, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
-
-/// Exit status when an effect was refused, a log left out, or flights contradict one another.
-const IN_DOUBT: u8 = 2;
 
 /// Options of `greylag amend`.
 #[derive(clap::Args)]
 #[command(
     group = clap::ArgGroup::new("what").required(true).multiple(true),
-    after_help = "Exit status: 0 done, 1 nothing was written, 2 written, but an effect was refused, a log was left out or flights contradict one another."
+    after_help = "Exit status: 0 done, 1 nothing was written, 3 written, but an effect was refused, a log was left out or flights contradict one another."
 )]
 pub struct Arguments {
     /// Model file to start from; it stays as it is.
-    #[arg(long)]
+    #[arg(long, env = "GREYLAG_MODEL", hide_env_values = true)]
     model: PathBuf,
     #[command(flatten)]
     logs: LogArguments,
@@ -43,14 +43,17 @@ pub struct Arguments {
     #[arg(long, num_args = 1..)]
     hold_out: Vec<PathBuf>,
     /// Add the effects that a diagnosis of these logs asserts.
-    #[arg(long, group = "what")]
+    #[arg(long, group = "what", conflicts_with = "diagnosis")]
     accept: bool,
+    /// Add the effects that this diagnosis asserts: the JSON of `greylag diagnose`.
+    #[arg(long, group = "what", value_name = "JSON")]
+    diagnosis: Option<PathBuf>,
     /// Add these effects, in this order: ids of the catalogue, or effect files (TOML); with --accept after those
     /// that are asserted.
     #[arg(long = "effect", value_name = "ID|FILE", num_args = 1.., group = "what")]
     effects: Vec<String>,
     /// Add nothing: fit the model's own coefficients.
-    #[arg(long, group = "what", conflicts_with_all = ["accept", "effects"])]
+    #[arg(long, group = "what", conflicts_with_all = ["accept", "diagnosis", "effects"])]
     tune_only: bool,
     /// Also try the model's other conventions (integrator, axes of the forces, the standard atmosphere), and take
     /// those that the flights bear out, the atmosphere unless they deny it.
@@ -121,8 +124,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
         ..amend::Options::default()
     };
-    let mut amended =
-        amend::amend(&model, &flights, &tests, &options, &|doing| eprintln!("{doing}"))?;
+    let bar = Bar::new();
+    let mut amended = amend::amend(&model, &flights, &tests, &options, &|stage| bar.hear(stage))?;
+    drop(bar);
     let story = &mut amended.amendment;
     story.notes.splice(0..0, notes);
     in_doubt |= story.effects.iter().any(|e| !e.refused.is_empty());
@@ -152,7 +156,8 @@ fn page(
 ) -> Result<String> {
     let mut models = [model.clone(), amended.tuned.clone(), amended.model.clone()];
     models[1].name = format!("{}-tuned", model.name);
-    let held_out = compare(&models, tests, &compare::Options::default(), &|_| ())?;
+    let held_out =
+        compare(&models, tests, &compare::Options::default(), &crate::sysid::progress::unheard)?;
     let paths = arguments.logs.paths.iter().chain(&arguments.hold_out);
     let report = AmendmentReport {
         title: format!("{} amended", model.name),
@@ -187,11 +192,18 @@ fn wanted(
     let mut all = Vec::new();
     if arguments.accept {
         let options = diagnose::Options { with: own_effects(effects), ..Default::default() };
-        let diagnosis = diagnose(model, flights, &options, &|doing| eprintln!("{doing}"))?;
-        all.extend(diagnosis.effects.iter().filter(|c| c.asserted).map(accepted));
+        let bar = Bar::new();
+        let diagnosis = diagnose(model, flights, &options, &|stage| bar.hear(stage))?;
+        all.extend(diagnosis.effects.iter().filter(|c| c.asserted).map(Added::of));
         if all.is_empty() {
             let said = diagnosis.sentences.join(" ");
             bail!("the diagnosis asserts no effect, so there is none to accept; it says: {said}");
+        }
+    }
+    if let Some(path) = &arguments.diagnosis {
+        all.extend(given::asserted(path, &model.name)?);
+        if all.is_empty() {
+            bail!("the diagnosis {} asserts no effect, so there is none to add", path.display());
         }
     }
     for id in effects {
@@ -200,12 +212,4 @@ fn wanted(
         }
     }
     Ok(all)
-}
-
-/// An asserted effect, to be searched for near where the diagnosis has it.
-fn accepted(candidate: &Candidate) -> Added {
-    let coefficients = catalogue::describe(&candidate.id).map(|about| about.coefficients);
-    let value = |name: &str| candidate.parameters.iter().find(|p| p.name == name).map(|p| p.value);
-    let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
-    Added { id: candidate.id.clone(), start }
 }

@@ -83,9 +83,14 @@ impl Teller<'_> {
         };
         let path = flight_path::reconstruct(flight, &options).map_err(|e| report(&e)).ok()?;
         let models = std::slice::from_ref(self.model);
-        compare::compare(models, &[path], &compare::Options::default(), &|_| ())
-            .map_err(|e| report(&e))
-            .ok()
+        compare::compare(
+            models,
+            &[path],
+            &compare::Options::default(),
+            &crate::sysid::progress::unheard,
+        )
+        .map_err(|e| report(&e))
+        .ok()
     }
 }
 

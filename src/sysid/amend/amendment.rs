@@ -1,5 +1,7 @@
 //! The amendment: the prior tuned, effects added one after the other, each judged on unseen flights.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use super::conventions::{Convention, Tried, closer};
 use super::error::AmendError;
 use super::flight::Flight;
@@ -9,9 +11,12 @@ use super::parameters;
 use super::result::{AddedEffect, Amendment, Settings};
 use super::story;
 use crate::model::GreyBox;
+use crate::physics::catalogue;
 use crate::physics::effects::{Coefficient, Description, Kind};
 use crate::sysid::compare::HorizonScore;
+use crate::sysid::diagnose::Candidate;
 use crate::sysid::flight_path::reconstruction::{Reconstruction, Segment};
+use crate::sysid::progress::{self, Progress, say};
 use crate::sysid::rudder;
 
 /// Times that all effects are asked for at most.
@@ -24,6 +29,17 @@ pub struct Added {
     pub id: String,
     /// Values of its coefficients near which to search, where known.
     pub start: Option<Vec<f64>>,
+}
+
+impl Added {
+    /// A candidate of a diagnosis, to be searched for near where the diagnosis has it.
+    pub fn of(candidate: &Candidate) -> Added {
+        let coefficients = catalogue::describe(&candidate.id).map(|about| about.coefficients);
+        let value =
+            |name: &str| candidate.parameters.iter().find(|p| p.name == name).map(|p| p.value);
+        let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
+        Added { id: candidate.id.clone(), start }
+    }
 }
 
 /// What becomes of an effect that the data refuse.
@@ -46,12 +62,25 @@ pub struct Options {
     pub horizons_s: Vec<f64>,
     /// Whether the model's other conventions are tried too.
     pub conventions: bool,
+    /// The model tuned to the same flights without any effect ([`tune`]), where that is known already.
+    pub tuned: Option<Fit>,
+}
+
+impl Options {
+    /// Horizon at which improvement is judged, s.
+    pub const JUDGED_AT_S: f64 = JUDGED_AT_S;
 }
 
 impl Default for Options {
     fn default() -> Self {
         let horizons_s = vec![1.0, 2.0, JUDGED_AT_S, 10.0];
-        Options { effects: Vec::new(), refused: Refused::Left, horizons_s, conventions: false }
+        Options {
+            effects: Vec::new(),
+            refused: Refused::Left,
+            horizons_s,
+            conventions: false,
+            tuned: None,
+        }
     }
 }
 
@@ -84,13 +113,13 @@ fn dropped(before: &GreyBox, after: &GreyBox) -> Vec<(String, &'static str)> {
 /// hears what is being done.
 ///
 /// # Errors
-/// An effect cannot join the model, or the flights do not allow a fit.
+/// An effect cannot join the model, the flights do not allow a fit, or `progress` ended it.
 pub fn amend(
     model: &GreyBox,
     flights: &[Reconstruction],
     held_out: &[Reconstruction],
     options: &Options,
-    progress: &(dyn Fn(&str) + Sync),
+    progress: &Progress,
 ) -> Result<Amended, AmendError> {
     for added in &options.effects {
         joined(&mut model.clone(), added)?;
@@ -101,7 +130,7 @@ pub fn amend(
     };
     let (train, test) = (ready(flights)?, ready(held_out)?);
     let judge = Judge { test: &test, horizons_s: &options.horizons_s };
-    let ask = Ask { options, train: &train, judge: &judge, progress };
+    let ask = Ask { options, train: &train, judge: &judge, progress, begun: AtomicUsize::new(0) };
     let given = judge.scores(model);
     let best = ask.selected(model)?;
     let (tuned, before) = best.tuned.clone();
@@ -165,13 +194,18 @@ struct Ask<'a> {
     options: &'a Options,
     train: &'a [Flight],
     judge: &'a Judge<'a>,
-    progress: &'a (dyn Fn(&str) + Sync),
+    progress: &'a Progress<'a>,
+    /// Fits begun, of which the first tunes the prior.
+    begun: AtomicUsize,
 }
 
 impl Ask<'_> {
     /// The effects that `model` bears out: those that a diagnosis found together, then the others.
     fn selected(&self, model: &GreyBox) -> Result<Selection, AmendError> {
-        let tuned = output_error::fit(model, self.train, &FitOptions::default(), self.progress)?;
+        let tuned = match &self.options.tuned {
+            Some(known) => known.clone(),
+            None => self.fit(model, &FitOptions::default())?,
+        };
         let scores = self.judge.scores(&tuned.model);
         let mut first = Selection {
             tuned: (tuned.clone(), scores.clone()),
@@ -288,7 +322,8 @@ impl Ask<'_> {
                 }
                 let Some(other) = convention.other(&base) else { continue };
                 let (from, to) = (convention.of(&base), convention.of(&other));
-                (self.progress)(&format!("{}: {to} instead of {from}", model.name));
+                let doing = format!("{}: {to} instead of {from}", model.name);
+                say(self.progress, &doing, self.done()[0])?;
                 let tried = self.under(&other, &best)?;
                 let closer = tried.as_ref().map_or(f64::NAN, |t| closer(&best.fit, &t.fit));
                 let error = [best.error(), tried.as_ref().map_or(f64::NAN, Selection::error)];
@@ -345,7 +380,22 @@ impl Ask<'_> {
         }
         let added = effects.iter().map(|a| a.id.clone()).collect();
         let options = FitOptions { added, ..FitOptions::default() };
-        output_error::fit(&model, self.train, &options, self.progress)
+        self.fit(&model, &options)
+    }
+
+    /// A fit to the training flights, heard as a part of the whole.
+    fn fit(&self, model: &GreyBox, options: &FitOptions) -> Result<Fit, AmendError> {
+        let progress = progress::part(self.progress, self.done());
+        self.begun.fetch_add(1, Ordering::Relaxed);
+        output_error::fit(model, self.train, options, &progress)
+    }
+
+    /// Shares of the work that are done before and after the next fit. Some effects are asked for twice, so the
+    /// last share is never full.
+    fn done(&self) -> [f64; 2] {
+        let begun = self.begun.load(Ordering::Relaxed) as f64;
+        let planned = 1.0 + self.options.effects.len() as f64;
+        [begun, begun + 1.0].map(|fits| (fits / planned).min(0.98))
     }
 }
 
@@ -357,7 +407,7 @@ impl Selection {
 }
 
 /// `model` with an effect more, at its start.
-fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendError> {
+pub(super) fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendError> {
     let start = match (&added.start, parameters::describe(&added.id)) {
         (Some(start), _) => start.clone(),
         (None, Some((about, _))) => usual_start(&about),

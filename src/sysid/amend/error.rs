@@ -2,6 +2,7 @@
 
 use crate::model::JoinError;
 use crate::sysid::compare::CompareError;
+use crate::sysid::progress::Cancelled;
 
 /// Why a model cannot be amended.
 #[derive(Debug, thiserror::Error)]
@@ -80,4 +81,7 @@ pub enum AmendError {
         /// The model.
         model: String,
     },
+    /// Whoever listened ended it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }

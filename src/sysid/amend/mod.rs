@@ -6,6 +6,7 @@
 
 mod amendment;
 mod conventions;
+pub mod document;
 mod equation_error;
 mod error;
 mod flight;
@@ -14,6 +15,7 @@ mod judge;
 mod normal;
 pub mod output_error;
 mod parameters;
+mod quick;
 mod result;
 mod shooting;
 mod story;
@@ -24,4 +26,5 @@ pub use error::AmendError;
 pub use flight::Flight;
 pub use judge::contradictions;
 pub use output_error::{Fit, FitOptions};
+pub use quick::{Estimate, estimate, tune};
 pub use result::{AddedEffect, Amendment, FittedFlight, FlightEstimate, Parameter, Settings};

@@ -19,6 +19,7 @@ use super::shooting::{self, Shot};
 use crate::model::GreyBox;
 use crate::num::statistics::quantile;
 use crate::sysid::diagnose::search::clocks::{self, Clocks};
+use crate::sysid::progress::{Cancelled, Progress, say};
 
 /// Shortest flight to fit to, s.
 pub const LEAST_S: f64 = 10.0;
@@ -108,13 +109,13 @@ pub(super) struct Left {
 /// Fits the free coefficients of `model` to `flights`; `progress` hears what is being done.
 ///
 /// # Errors
-/// There is too little flight, nothing is free, nothing is excited, runs diverge at once, or the search
-/// does not settle.
+/// There is too little flight, nothing is free, nothing is excited, runs diverge at once, the search
+/// does not settle, or `progress` ended it.
 pub fn fit(
     model: &GreyBox,
     flights: &[Flight],
     options: &FitOptions,
-    progress: &(dyn Fn(&str) + Sync),
+    progress: &Progress,
 ) -> Result<Fit, AmendError> {
     let name = || model.name.clone();
     let flown_s: f64 = flights.iter().map(Flight::seconds).sum();
@@ -126,7 +127,8 @@ pub fn fit(
     if free.is_empty() {
         return Err(AmendError::NothingFree { model: name() });
     }
-    progress(&format!("{}: equation error over {} flight(s)", model.name, flights.len()));
+    let doing = format!("{}: equation error over {} flight(s)", model.name, flights.len());
+    say(progress, &doing, 0.0)?;
     let clocks = match free.iter().any(|f| f.input && f.added) {
         true => clocks(model, &free, flights),
         false => None,
@@ -140,12 +142,16 @@ pub fn fit(
         search.set_clocks(&clocks.late);
     }
     for (k, length_s) in options.lengths_s.iter().enumerate() {
-        progress(&format!("{}: output error over {length_s} s", model.name));
+        let doing = format!("{}: output error over {length_s} s", model.name);
+        let share = 0.9 / options.lengths_s.len() as f64;
+        let from = 0.1 + share * k as f64;
+        let step = |share_done: f64| say(progress, &doing, from + share * share_done);
+        step(0.0)?;
         search.shots_of(*length_s)?;
         // only the last length decides the figures
         match k + 1 == options.lengths_s.len() {
-            true => search.settle(options.renewals, RENEWED)?,
-            false => search.settle(options.renewals.min(2), NEAR)?,
+            true => search.settle(options.renewals, RENEWED, &step)?,
+            false => search.settle(options.renewals.min(2), NEAR, &step)?,
         }
     }
     search.finish()
@@ -272,13 +278,21 @@ impl<'a> Search<'a> {
 
     /// Iterates until nothing moves, weights included: the derivatives, which cost most, are renewed
     /// once nothing moves under the old ones, until that changes nothing by more than `tolerance`
-    /// standard deviations.
-    fn settle(&mut self, renewals: usize, tolerance: f64) -> Result<(), AmendError> {
+    /// standard deviations. `step` hears the share of the renewals that is done.
+    fn settle(
+        &mut self,
+        renewals: usize,
+        tolerance: f64,
+        step: &dyn Fn(f64) -> Result<(), Cancelled>,
+    ) -> Result<(), AmendError> {
         let mut damping = 1e-6;
         for renewal in 0..renewals {
+            let done = renewal as f64 / renewals as f64;
+            step(done)?;
             self.differentiate();
             let mut first = f64::INFINITY;
             for inner in 0..INNER {
+                step(done)?;
                 let system = self.system();
                 let moved = self.step(&system, &mut damping)?;
                 self.stuck = !moved;

@@ -1,5 +1,7 @@
 //! Why a comparison cannot be made.
 
+use crate::sysid::progress::Cancelled;
+
 /// Why a comparison cannot be made.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum CompareError {
@@ -27,4 +29,7 @@ pub enum CompareError {
     /// A horizon cannot be flown.
     #[error("horizon {0} s cannot be flown: give horizons from 0.01 to 600 s")]
     Horizon(f64),
+    /// Whoever listened ended it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }

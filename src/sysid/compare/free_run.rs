@@ -82,6 +82,35 @@ fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>
     (runs, trace)
 }
 
+/// A run from a moment of a flight.
+#[derive(Clone, Debug, Default)]
+pub struct Path {
+    /// Time on the log's clock, s.
+    pub time_s: Vec<f64>,
+    /// The predicted states, in the order and units of `State::NAMES`.
+    pub states: Trace,
+}
+
+/// Flies `model` from the measured state at the sample nearest to `time_s` for `seconds`, or until the flight
+/// ends or the run diverges; `None` outside of all segments.
+pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64) -> Option<Path> {
+    let flight = &*flight.acting(model);
+    let inside = |s: &&Vec<Instant>| {
+        s.first().is_some_and(|i| i.time_s - flight.dt <= time_s)
+            && s.last().is_some_and(|i| time_s < i.time_s)
+    };
+    let segment = flight.segments.iter().find(inside)?;
+    let start = segment.partition_point(|i| i.time_s < time_s - 0.5 * flight.dt);
+    let keep = ((seconds / flight.dt).round() as usize).max(1) + 1;
+    let (_, rows) = run(&flight.stepping(model), flight, segment, start, &[], keep);
+    let mut path = Path::default();
+    for (instant, row) in segment[start..].iter().zip(rows) {
+        path.time_s.push(instant.time_s);
+        path.states.iter_mut().zip(row).for_each(|(list, x)| list.push(x));
+    }
+    Some(path)
+}
+
 /// One run from sample `start`: its looks, and its path over the first `keep` samples.
 fn run(
     model: &GreyBox,

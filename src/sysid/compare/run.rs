@@ -13,6 +13,7 @@ use super::sentence::{Subject, sentence};
 use super::verdict;
 use crate::model::GreyBox;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::progress::{Progress, say};
 use crate::sysid::rudder;
 use crate::sysid::weak_form::channels::ChannelId;
 use crate::sysid::weak_form::kernel::KERNEL_S;
@@ -41,12 +42,12 @@ impl Default for Options {
 /// Compares `models` with reconstructed `flights`; `progress` hears what is being done.
 ///
 /// # Errors
-/// Nothing was given, no log holds a flight, or a clock or horizon does not fit.
+/// Nothing was given, no log holds a flight, a clock or horizon does not fit, or `progress` ended it.
 pub fn compare(
     models: &[GreyBox],
     flights: &[Reconstruction],
     options: &Options,
-    progress: &(dyn Fn(&str) + Sync),
+    progress: &Progress,
 ) -> Result<Comparison, CompareError> {
     let first = models.first().ok_or(CompareError::NoModel)?;
     if let Some(h) = options.horizons_s.iter().find(|h| !(0.01..=600.0).contains(*h)) {
@@ -55,16 +56,19 @@ pub fn compare(
     let slowest = 0.5 * first.airframe.envelope.airspeed_min_mps;
     let (used, prepared, mut notes) = usable(flights, slowest)?;
     notes.extend(short_of(&prepared, &options.horizons_s));
+    let share = 1.0 / models.len() as f64;
     let models = models
         .iter()
-        .map(|model| {
-            progress(&format!("comparing {} with {} flight(s)", model.name, prepared.len()));
+        .enumerate()
+        .map(|(k, model)| {
+            let doing = format!("comparing {} with {} flight(s)", model.name, prepared.len());
+            say(progress, &doing, k as f64 * share)?;
             let mut result = one_model(model, &prepared, &used, options);
             let rudder = rudder::unmodelled(flights, model).map(rudder::warning);
             result.sentences.splice(0..0, rudder);
-            result
+            Ok(result)
         })
-        .collect::<Vec<_>>();
+        .collect::<Result<Vec<_>, CompareError>>()?;
     Ok(Comparison {
         schema: "greylag.comparison/1",
         program: concat!("greylag ", env!("CARGO_PKG_VERSION")).into(),

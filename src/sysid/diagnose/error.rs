@@ -1,6 +1,7 @@
 //! Why a diagnosis cannot be made.
 
 use crate::sysid::compare::CompareError;
+use crate::sysid::progress::Cancelled;
 
 /// Why a diagnosis cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -48,4 +49,7 @@ pub enum DiagnoseError {
         /// What was asked for.
         id: String,
     },
+    /// Whoever listened ended it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }

@@ -30,6 +30,7 @@ use equations::Problem;
 use sampling::Chosen;
 
 use crate::logs::{Flight, Sampling};
+use crate::model::GreyBox;
 use crate::physics::airframe::ActuatorFigures;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
@@ -82,6 +83,15 @@ impl Options {
             gap_s: 0.1,
             shortest_s: 2.0,
             airspeed_min_mps: 5.0,
+        }
+    }
+
+    /// The same for the aircraft and the gravity of `model`, deflections on `clock`.
+    pub fn of(name: &str, model: &GreyBox, clock: ActuatorClock) -> Options {
+        Options {
+            gravity: model.atmosphere.gravity,
+            actuators_clock: clock,
+            ..Options::new(name, model.airframe.actuators)
         }
     }
 }

@@ -5,8 +5,10 @@ use crate::sysid::diagnose::answer::result::Curve;
 use crate::sysid::diagnose::regression::gather::Column;
 use crate::sysid::diagnose::search::round::Round;
 
-/// Places on the axis.
+/// Bins of equal count, by which the variable is chosen.
 const PLACES: usize = 12;
+/// Bins of equal width, in which the curve is drawn: those of equal count stop where few windows lie.
+const WIDTHS: usize = 24;
 /// Variables that tell when or where, not how, the aircraft flew.
 const NOT_SHOWN: [RegimeVariable; 3] =
     [RegimeVariable::Altitude, RegimeVariable::Time, RegimeVariable::Flight];
@@ -44,7 +46,7 @@ pub fn curve(
         .0;
     let x: Vec<f64> = regimes.iter().map(|r| r[best]).collect();
     let variable = RegimeVariable::CONTINUOUS[best];
-    let bins = bins(&made, &x);
+    let bins = over_the_range(&made, &x);
     Some(Curve {
         channel: id.symbol().into(),
         variable: format!("{} {}", variable.name(), variable.unit()).trim().into(),
@@ -72,6 +74,20 @@ fn bins(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     order.chunks(size).map(|bin| [mean(bin, x), mean(bin, y)]).collect()
 }
 
+/// Means of x and y in bins of equal width over the whole range of x; empty bins are left out.
+fn over_the_range(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
+    let (low, high) =
+        x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let width = (high - low).max(f64::MIN_POSITIVE) / WIDTHS as f64;
+    let mut sums = vec![[0.0; 3]; WIDTHS];
+    for (x, y) in x.iter().zip(y) {
+        let bin = (((x - low) / width) as usize).min(WIDTHS - 1);
+        sums[bin].iter_mut().zip([*x, *y, 1.0]).for_each(|(sum, v)| *sum += v);
+    }
+    let filled = sums.into_iter().filter(|[.., count]| *count > 0.0);
+    filled.map(|[x, y, count]| [x / count, y / count]).collect()
+}
+
 /// Share of the variance of `y` between bins over `x`.
 fn explained(y: &[f64], x: &[f64]) -> f64 {
     let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
@@ -79,4 +95,23 @@ fn explained(y: &[f64], x: &[f64]) -> f64 {
     let size = y.len().div_ceil(PLACES).max(1) as f64;
     let between: f64 = bins(y, x).iter().map(|[_, m]| size * (m - mean).powi(2)).sum();
     if all > 0.0 { between / all } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_reaches_as_far_as_the_data() {
+        // most windows lie within ±1, as in flight; a few reach ±10
+        let x: Vec<f64> = (0..200)
+            .map(|k| if k % 20 == 0 { k as f64 / 10.0 - 10.0 } else { (k as f64).sin() })
+            .collect();
+        let y: Vec<f64> = x.iter().map(|x| x * x).collect();
+        let curve = over_the_range(&y, &x);
+        let (first, last) = (curve[0], curve[curve.len() - 1]);
+        // a bin is 0.8 wide, so its mean lies within that of the end
+        assert!(first[0] < -9.2 && last[0] > 7.2, "{first:?} {last:?}");
+        assert!((first[1] - first[0].powi(2)).abs() < 0.2);
+    }
 }

@@ -18,6 +18,7 @@ use crate::sysid::diagnose::search::excitation;
 use crate::sysid::diagnose::search::round::Problem;
 use crate::sysid::diagnose::search::stepwise::{Found, search};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::progress::{Progress, say};
 use crate::sysid::rudder;
 use crate::sysid::weak_form::prepared::Prepared;
 
@@ -30,19 +31,19 @@ const WORTH_SAYING: f64 = 0.1;
 ///
 /// # Errors
 /// There is too little flight or nothing in it moves, an id to be left out is unknown, or a flight has
-/// no clock.
+/// no clock, or `progress` ended it.
 pub fn diagnose(
     model: &GreyBox,
     flights: &[Reconstruction],
     options: &Options,
-    progress: &(dyn Fn(&str) + Sync),
+    progress: &Progress,
 ) -> Result<Diagnosis, DiagnoseError> {
     known(&options.without)?;
     known(&options.with)?;
     let (problem, used, mut notes) = problem(model, flights, options)?;
     notes.extend(excitation::check(&problem.flights)?);
-    let mut found = search(&problem, model, options, progress)
-        .ok_or_else(|| DiagnoseError::Unusable { model: model.name.clone() })?;
+    let mut found = search(&problem, model, options, progress)?;
+    say(progress, "what is left", 0.95)?;
     let rudder = rudder::unmodelled(flights, model);
     if let Some(motion) = rudder {
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));

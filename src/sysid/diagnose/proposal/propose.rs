@@ -21,6 +21,7 @@ use crate::sysid::diagnose::search::settling::{Ranked, ranked};
 use crate::sysid::diagnose::search::stepwise::{Found, search};
 use crate::sysid::diagnose::{DiagnoseError, Options, Verdict};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::progress::{Progress, part, say};
 
 /// Terms of a formula.
 const MOST: usize = 3;
@@ -31,6 +32,9 @@ const SETTLING: usize = 2;
 /// Share of a channel's variance beyond noise from which a search in it is worth its time: what the diagnosis
 /// takes for adequate.
 const FAILING: f64 = 5e-4;
+/// Shares of the work after the diagnosis, and before the test.
+const SEARCHED: f64 = 0.3;
+const TESTED: f64 = 0.9;
 /// Channels that are searched.
 const CHANNELS: usize = 3;
 /// Channels of forces and moments in the order of the regression.
@@ -47,12 +51,12 @@ pub fn propose(
     flights: &[Reconstruction],
     held_out: &[Reconstruction],
     options: &Options,
-    progress: &(dyn Fn(&str) + Sync),
+    progress: &Progress,
 ) -> Result<Proposal, DiagnoseError> {
     let unusable = || DiagnoseError::Unusable { model: model.name.clone() };
     let (problem, _, mut notes) = problem(model, flights, options)?;
     notes.extend(excitation::check(&problem.flights)?);
-    let found = search(&problem, model, options, progress).ok_or_else(unusable)?;
+    let found = search(&problem, model, options, &part(progress, [0.0, SEARCHED]))?;
     let mut proposal = Proposal {
         schema: "greylag.proposal/1",
         version: env!("CARGO_PKG_VERSION"),
@@ -74,14 +78,14 @@ pub fn propose(
     }
     let tuned = Round::new(&problem, model.clone(), &[]).ok_or_else(unusable)?.tuned();
     let forms = forms(&problem, &failing(&found));
-    progress(&format!("trying {} shapes", forms.len()));
+    say(progress, &format!("trying {} shapes", forms.len()), SEARCHED)?;
     let ask = Ask { problem: &problem, options, forms: &forms };
     let climbed = ask.climb(tuned.clone(), &mut proposal).ok_or_else(unusable)?;
     let Some((first, terms)) = climbed else {
         proposal.sentences.push(nothing(&proposal));
         return Ok(proposal);
     };
-    progress("testing the formula on flights that the search has not seen");
+    say(progress, "testing the formula on flights that the search has not seen", TESTED)?;
     let (test, used, more) = self::problem(model, held_out, options)?;
     proposal.notes.extend(more);
     let names: Vec<String> = used.iter().map(|f| f.name.clone()).collect();

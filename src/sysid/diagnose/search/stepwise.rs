@@ -4,6 +4,7 @@ use crate::model::{GreyBox, RUDDER};
 use crate::physics::inputs::Kind;
 use crate::sysid::compare::ChannelId;
 use crate::sysid::diagnose::answer::shares;
+use crate::sysid::diagnose::error::DiagnoseError;
 use crate::sysid::diagnose::options::Options;
 use crate::sysid::diagnose::regression::catalogue::{self, Entry};
 use crate::sysid::diagnose::regression::rank::Score;
@@ -13,7 +14,10 @@ use crate::sysid::diagnose::search::remainder::{Remainder, remainder};
 use crate::sysid::diagnose::search::round::{Problem, Round};
 use crate::sysid::diagnose::search::settling::{Ranked, SETTLING, ranked, settled};
 use crate::sysid::diagnose::search::shape::{Shape, shape};
+use crate::sysid::progress::{Cancelled, FirstLook, Progress, Stage, said, say};
 
+/// Share of the search that is done once all candidates have been ranked.
+const RANKED: f64 = 0.3;
 /// Most effects that are asserted together.
 const MOST: usize = 6;
 /// Least fall of the error on held-out segments.
@@ -119,23 +123,33 @@ impl Found {
     }
 }
 
-/// Searches for what `model` lacks; `None` if the flights do not hold the model at all.
+/// Searches for what `model` lacks.
+///
+/// # Errors
+/// The flights do not hold the model at all, or `progress` ended the search.
 pub fn search(
     problem: &Problem,
     model: &GreyBox,
     options: &Options,
-    progress: &(dyn Fn(&str) + Sync),
-) -> Option<Found> {
-    progress("tuning the model's own coefficients");
-    let tuned = Round::new(problem, model.clone(), &[])?.tuned();
+    progress: &Progress,
+) -> Result<Found, DiagnoseError> {
+    let round = |model: GreyBox, entries: &[Entry]| {
+        let unusable = || DiagnoseError::Unusable { model: model.name.clone() };
+        Round::new(problem, model.clone(), entries).ok_or_else(unusable)
+    };
+    say(progress, "tuning the model's own coefficients", 0.0)?;
+    let tuned = round(model.clone(), &[])?.tuned();
     let mut entries = catalogue::candidates(model, &options.with, &options.without);
     if !excitation::moves_rudder(&problem.flights) {
         entries.retain(|e| e.about.id != RUDDER);
     }
-    progress(&format!("ranking {} candidate effects", entries.len()));
-    let shape = shape(&Round::new(problem, tuned.clone(), &[])?, options.nulls);
+    say(progress, &format!("ranking {} candidate effects", entries.len()), 0.05)?;
+    let shape = shape(&round(tuned.clone(), &[])?, options.nulls);
     let Ranked { round: first, scores, nulls, threshold } =
-        ranked(problem, Round::new(problem, tuned, &entries)?, options);
+        ranked(problem, round(tuned, &entries)?, options);
+    let ranking = first_look(&first, &scores, threshold);
+    let doing = "checking the best candidate";
+    said(progress(Stage { doing, fraction: RANKED, ranking: &ranking }))?;
     let first_remainder = remainder(&first, options.nulls, options.level);
     let mut found = Found {
         unexplained: shares::unexplained(&first, &first.tuned_residual()),
@@ -156,6 +170,7 @@ pub fn search(
         found.beaten.clear();
         found.level.clear();
         run_off(problem, &mut found);
+        say(progress, "checking the best candidate", found.fraction())?;
         let Some(winner) = examine(&found, options) else { break };
         let passed = winner.refused.is_empty() || winner.trace.is_some();
         let outcome = match (&winner.trace, passed) {
@@ -163,14 +178,24 @@ pub fn search(
             (None, true) => "joins",
             (None, false) => "is refused",
         };
-        progress(&format!("{}: {outcome}", winner.id));
+        say(progress, &format!("{}: {outcome}", winner.id), found.fraction())?;
         found.selected.push(winner);
-        if !passed || !found.join(problem, model, &entries, options) {
+        if !passed || !found.join(problem, model, &entries, options, progress)? {
             break;
         }
     }
     found.judge_remainder();
-    Some(found)
+    Ok(found)
+}
+
+/// The candidates as the first ranking has them.
+fn first_look(round: &Round, scores: &[(usize, Score)], threshold: f64) -> Vec<FirstLook> {
+    let of = |(trial, score): &(usize, Score)| FirstLook {
+        id: round.trials[*trial].id,
+        evidence: score.evidence,
+        threshold,
+    };
+    scores.iter().map(of).collect()
 }
 
 /// Puts the best of several close contenders first, each joined to the model and settled under one noise, and
@@ -359,14 +384,16 @@ impl Found {
         given: &GreyBox,
         entries: &[Entry],
         options: &Options,
-    ) -> bool {
-        let Some(winner) = self.selected.last().cloned() else { return false };
+        progress: &Progress,
+    ) -> Result<bool, Cancelled> {
+        let Some(winner) = self.selected.last().cloned() else { return Ok(false) };
         let mut model = self.round().with(&winner.score);
         if model.join_most(winner.id, &winner.score.values).is_err() {
-            return false;
+            return Ok(false);
         }
         for _ in 0..SETTLING {
-            let Some(round) = Round::new(problem, model.clone(), &[]) else { return false };
+            say(progress, &format!("settling the model with {}", winner.id), self.fraction())?;
+            let Some(round) = Round::new(problem, model.clone(), &[]) else { return Ok(false) };
             model = round.tuned();
             let newest = winner.id;
             let idle = self.selected.iter().find(|s| {
@@ -378,16 +405,23 @@ impl Found {
                 break;
             }
         }
-        let Some(settled) = Round::new(problem, model.clone(), &[]) else { return false };
+        let Some(settled) = Round::new(problem, model.clone(), &[]) else { return Ok(false) };
         self.beyond = Some(checks::Beyond::of(&settled));
         self.shape = shape(&settled, options.nulls);
         let open: Vec<Entry> = entries.iter().filter(|e| !model.has(e.about.id)).copied().collect();
-        let Some(round) = Round::new(problem, model, &open) else { return false };
+        say(progress, &format!("ranking {} candidate effects again", open.len()), self.fraction())?;
+        let Some(round) = Round::new(problem, model, &open) else { return Ok(false) };
         let Ranked { round, scores, threshold, .. } = ranked(problem, round, options);
         (self.scores, self.threshold) = (scores, threshold);
         self.remainder = remainder(&round, options.nulls, options.level);
         self.last = Some(round);
-        true
+        Ok(true)
+    }
+
+    /// Share of the search that is done; how many effects will be selected is not known.
+    fn fraction(&self) -> f64 {
+        let left = 0.5_f64.powi(self.selected.len() as i32);
+        RANKED + (0.9 - RANKED) * (1.0 - left)
     }
 
     /// Refuses effects that leave in their own channels much of what there is to remove: of what they take

@@ -1,0 +1,55 @@
+//! A diagnosis that was written before, as `greylag diagnose --json` writes it.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use serde::Deserialize;
+
+use crate::physics::catalogue;
+use crate::sysid::amend::Added;
+
+/// What is read of it.
+#[derive(Deserialize)]
+struct Written {
+    schema: String,
+    model: String,
+    effects: Vec<Effect>,
+}
+
+#[derive(Deserialize)]
+struct Effect {
+    id: String,
+    asserted: bool,
+    parameters: Vec<Parameter>,
+}
+
+#[derive(Deserialize)]
+struct Parameter {
+    name: String,
+    value: Option<f64>,
+}
+
+/// The effects that the diagnosis in `path` asserts of `model`, to be searched for near where it has them.
+pub fn asserted(path: &Path, model: &str) -> Result<Vec<Added>> {
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("cannot read the diagnosis {}", path.display()))?;
+    let written: Written = serde_json::from_str(&text).with_context(|| {
+        format!("{} is no diagnosis; write one with `greylag diagnose --json`", path.display())
+    })?;
+    if written.schema != "greylag.diagnosis/1" || written.model != model {
+        bail!(
+            "{} is a diagnosis ({}) of the model {}, not of {model}; diagnose this model",
+            path.display(),
+            written.schema,
+            written.model
+        );
+    }
+    Ok(written.effects.iter().filter(|e| e.asserted).map(added).collect())
+}
+
+fn added(effect: &Effect) -> Added {
+    let value = |name: &str| effect.parameters.iter().find(|p| p.name == name)?.value;
+    let about = catalogue::describe(&effect.id);
+    let start = about.and_then(|a| a.coefficients.iter().map(|c| value(c.name)).collect());
+    Added { id: effect.id.clone(), start }
+}

@@ -1,0 +1,86 @@
+//! How a long command shows how far it is, and how Ctrl-C ends it.
+
+use std::io::IsTerminal;
+use std::ops::ControlFlow;
+use std::process;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, Once};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::commands::status::INTERRUPTED;
+use crate::sysid::progress::Stage;
+
+/// Steps of a whole bar.
+const STEPS: u64 = 1000;
+/// Time between looks of the bar's clock.
+const TICK: Duration = Duration::from_millis(200);
+
+/// Times that Ctrl-C was pressed.
+static PRESSED: AtomicUsize = AtomicUsize::new(0);
+static LISTENING: Once = Once::new();
+
+/// A bar on a terminal, a line a stage elsewhere.
+pub struct Bar {
+    bar: Option<ProgressBar>,
+    last: Mutex<String>,
+}
+
+impl Bar {
+    /// A bar for a work that begins; from here on Ctrl-C ends the work, a second one the program.
+    pub fn new() -> Bar {
+        LISTENING.call_once(|| {
+            let pressed = || {
+                if PRESSED.fetch_add(1, Ordering::Relaxed) > 0 {
+                    process::exit(INTERRUPTED.into());
+                }
+            };
+            if let Err(error) = ctrlc::set_handler(pressed) {
+                tracing::warn!("Ctrl-C ends the program at once: {error}");
+            }
+        });
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let style = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} %, {eta} left");
+            let bar = ProgressBar::new(STEPS);
+            if let Ok(style) = style {
+                bar.set_style(style);
+            }
+            bar.enable_steady_tick(TICK);
+            bar
+        });
+        Bar { bar, last: Mutex::default() }
+    }
+
+    /// Shows a stage; ends the work if Ctrl-C was pressed.
+    pub fn hear(&self, stage: Stage<'_>) -> ControlFlow<()> {
+        match &self.bar {
+            Some(bar) => {
+                bar.set_message(stage.doing.to_owned());
+                bar.set_position((stage.fraction * STEPS as f64) as u64);
+            }
+            None => self.line(stage.doing),
+        }
+        match PRESSED.load(Ordering::Relaxed) {
+            0 => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        }
+    }
+
+    /// Writes a stage that differs from the one before.
+    fn line(&self, doing: &str) {
+        let Ok(mut last) = self.last.lock() else { return };
+        if *last != doing {
+            eprintln!("{doing}");
+            doing.clone_into(&mut last);
+        }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Exit statuses that several commands share; clap's 2 is a wrong command line.
+
+/// Done, but in doubt: a log was left out or holds what makes figures wrong, an effect was refused, flights contradict
+/// one another.
+pub const IN_DOUBT: u8 = 3;
+/// Ended by Ctrl-C.
+pub const INTERRUPTED: u8 = 130;

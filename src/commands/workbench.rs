@@ -1,0 +1,55 @@
+//! `greylag workbench`: see where a model fails, accept an effect, watch the error fall, in a browser.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+
+use crate::commands::files::shipped;
+use crate::commands::intake::Reading;
+use crate::workbench::Given;
+use crate::workbench::server::{random_token, serve};
+
+/// Options of `greylag workbench`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "The page is served on this machine only, to whoever has the token of the printed address. Everything is kept in the session's folder as it happens; Ctrl-C ends the workbench, and the same command goes on from there."
+)]
+pub struct Arguments {
+    /// Flight logs to begin with: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog; more can be dropped on the page.
+    logs: Vec<PathBuf>,
+    /// The model file; an existing session knows its own.
+    #[arg(long, env = "GREYLAG_MODEL", hide_env_values = true)]
+    model: Option<PathBuf>,
+    /// Port on 127.0.0.1; 0 for any that is free.
+    #[arg(long, default_value_t = 0)]
+    port: u16,
+    /// The session's folder; made if there is none.
+    #[arg(long = "dir", default_value = "greylag-session")]
+    folder: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+/// Opens the session and serves it until Ctrl-C.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let given = Given {
+        folder: arguments.folder.clone(),
+        model: arguments.model.as_deref().map(shipped),
+        logs: arguments.logs.clone(),
+        reading: arguments.reading.options()?,
+        words: arguments.reading.words(),
+    };
+    let token = random_token().context("cannot draw a token for the page")?;
+    serve(given, arguments.port, &token, |address| {
+        let session = arguments.folder.display();
+        // whoever started it may have stopped reading; the page is served all the same
+        let _ = write!(
+            std::io::stdout(),
+            "the workbench is open at {address}\nsession: {session}; Ctrl-C ends it\n"
+        );
+    })
+    .with_context(|| format!("cannot open the workbench in {}", arguments.folder.display()))?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,135 @@
+//! An amendment as files hold it: the model file's new text, and the story as JSON.
+
+use std::path::Path;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::{Amended, Amendment, Convention};
+use crate::model::GreyBox;
+use crate::model::edit::{Edit, EditError, Number};
+use crate::physics::catalogue;
+use crate::physics::formula::Written;
+
+/// Characters of a file's SHA-256 that sources carry.
+const PREFIX: usize = 12;
+/// Longest name of a model, bytes.
+const NAME: usize = 64;
+
+/// A log with its hash.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Hashed {
+    /// Its path.
+    pub path: String,
+    /// SHA-256 of its content, hexadecimal.
+    pub sha256: String,
+}
+
+impl Hashed {
+    /// The log at `path` with its `content`.
+    pub fn new(path: &Path, content: &[u8]) -> Hashed {
+        Hashed { path: path.display().to_string(), sha256: sha256(content) }
+    }
+}
+
+/// SHA-256 of `content`, hexadecimal.
+pub fn sha256(content: &[u8]) -> String {
+    Sha256::digest(content).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// What goes into `amend.json`.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    story: &'a Amendment,
+    model_file: String,
+    logs: &'a [Hashed],
+    hold_out: &'a [Hashed],
+}
+
+/// What was done, as JSON: of the model file `original`, fitted to `logs`, judged by `hold_out`.
+///
+/// # Errors
+/// A number of the story has no place in JSON.
+pub fn story(
+    amended: &Amended,
+    original: &Path,
+    logs: &[Hashed],
+    hold_out: &[Hashed],
+) -> serde_json::Result<String> {
+    let model_file = original.display().to_string();
+    let document = Document { story: &amended.amendment, model_file, logs, hold_out };
+    Ok(serde_json::to_string_pretty(&document)? + "\n")
+}
+
+/// `text`, the file of the model `before`, as amended; `airframe` is what the new file calls its airframe.
+///
+/// # Errors
+/// The text is no model file.
+pub fn model(
+    text: &str,
+    before: &GreyBox,
+    amended: &Amended,
+    logs: &[Hashed],
+    airframe: String,
+) -> Result<String, EditError> {
+    edit(before, amended, logs, airframe).apply(text)
+}
+
+/// What changes in the model file.
+fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) -> Edit {
+    let fitted = &amended.amendment.parameters;
+    let known = before.coefficients().len();
+    let number = |c: &crate::model::Named| {
+        let sd = fitted.iter().find(|p| p.name == c.name).map(|p| p.sd);
+        Number { name: c.name.clone(), value: c.value, sd }
+    };
+    let new = |name: &str| !before.coefficients().iter().any(|c| c.name == name);
+    let source = |name: &str| {
+        let id = name.split('.').next().unwrap_or_default();
+        catalogue::describe(id).map_or("", |about| about.source).into()
+    };
+    let all = amended.model.coefficients();
+    let changed = all.iter().filter(|c| fitted.iter().any(|p| p.name == c.name && !p.added));
+    let taken = amended.amendment.conventions.iter().filter(|t| t.kept);
+    let logs: Vec<String> = logs.iter().map(short).collect();
+    let name = match known == all.len() {
+        true => format!("{}-tuned", before.name),
+        false => amended.model.name.clone(),
+    };
+    let shortened = format!("{}-amended", before.name.chars().take(40).collect::<String>());
+    Edit {
+        name: if name.len() <= NAME { name } else { shortened },
+        airframe,
+        changed: changed.map(number).collect(),
+        dropped: amended.dropped(),
+        replaced: taken.map(|t| (t.convention.key(), t.to)).collect(),
+        added: all.iter().filter(|c| new(&c.name)).map(|c| (number(c), source(&c.name))).collect(),
+        effect_files: amended.model.written().map(effect_file).collect(),
+        fitted_to: logs.join(", "),
+    }
+}
+
+/// The file of an effect beside a model.
+pub fn effect_file(effect: &Written) -> String {
+    format!("{}.toml", effect.about.id)
+}
+
+fn short(log: &Hashed) -> String {
+    let name = Path::new(&log.path).file_name().unwrap_or_default().to_string_lossy().into_owned();
+    format!("{name} (sha256 {})", &log.sha256[..PREFIX])
+}
+
+/// A coefficient that is not the same to the bit, or a convention that is not the same.
+pub fn differs(read: &GreyBox, meant: &GreyBox) -> Option<String> {
+    if let Some(other) = Convention::ALL.into_iter().find(|c| c.of(read) != c.of(meant)) {
+        return Some(other.key().join("."));
+    }
+    if read.coefficients().len() != meant.coefficients().len() {
+        return Some("number of coefficients".into());
+    }
+    let same = |name: &str, value: f64| {
+        read.coefficients().iter().any(|c| c.name == name && c.value.to_bits() == value.to_bits())
+    };
+    meant.coefficients().iter().find(|c| !same(&c.name, c.value)).map(|c| c.name.clone())
+}

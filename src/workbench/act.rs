@@ -1,0 +1,277 @@
+//! What a page may ask for, and what becomes of it.
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use serde::Deserialize;
+
+use super::bench::{Bench, load};
+use super::error::{WorkbenchError, io};
+use super::fit::scores;
+use super::jobs::Work;
+use super::session::{Accepted, Opening, Role};
+use crate::physics::catalogue;
+use crate::sysid::amend::Options;
+use crate::sysid::amend::document::sha256;
+use crate::sysid::compare::HorizonScore;
+use crate::sysid::weak_form::prepared::Prepared;
+
+/// A request, made by a page that saw the session at a revision.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Request {
+    /// The revision.
+    pub revision: u64,
+    /// What is asked for.
+    pub act: Act,
+}
+
+/// What a page may ask for.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Act {
+    /// A flight shall serve for something else.
+    Role {
+        /// The flight.
+        flight: usize,
+        /// What for.
+        role: Role,
+    },
+    /// A flight leaves the session; its file stays.
+    Remove {
+        /// The flight.
+        flight: usize,
+    },
+    /// Multiply a column of all logs by a factor, as a finding advises.
+    Map {
+        /// The flight with the finding.
+        flight: usize,
+        /// The column.
+        column: String,
+        /// The factor.
+        scale: f64,
+    },
+    /// Diagnose the model.
+    Diagnose,
+    /// Accept an effect, and fit the model with it.
+    Tick {
+        /// Its id.
+        effect: String,
+    },
+    /// Keep the effect accepted last though the data refuse it.
+    Keep,
+    /// Take the effect accepted last back.
+    Undo,
+    /// Accept again what was taken back last.
+    Redo,
+    /// Fit what is not fitted, for example after a flight has changed its role.
+    Fit,
+    /// Judge the models by the test flights.
+    Judge,
+    /// Write the amended model.
+    Save {
+        /// Folder, below the session's if relative; `model` by default.
+        #[serde(default)]
+        folder: Option<PathBuf>,
+    },
+    /// Read the model file again.
+    ReloadModel,
+    /// End a job.
+    Cancel {
+        /// Its number.
+        job: u64,
+    },
+}
+
+impl Bench {
+    /// Does what is asked for.
+    ///
+    /// # Errors
+    /// The session has moved on since the requester looked, or what is asked for cannot be done.
+    pub fn act(self: &Arc<Self>, request: Request) -> Result<(), WorkbenchError> {
+        let seen = request.revision;
+        match request.act {
+            Act::Role { flight, role } => self.change(seen, |inner| {
+                let log = inner.session.logs.get_mut(flight);
+                log.ok_or(WorkbenchError::NoFlight(flight))?.role = role;
+                Ok(())
+            }),
+            Act::Remove { flight } => self.change(seen, |inner| {
+                if flight >= inner.session.logs.len() {
+                    return Err(WorkbenchError::NoFlight(flight));
+                }
+                inner.session.logs.remove(flight);
+                drop(inner.flights.remove(flight));
+                Ok(())
+            }),
+            Act::Map { flight, column, scale } => self.map(seen, flight, &column, scale),
+            Act::Diagnose => {
+                self.same_model()?;
+                self.lock().divided()?;
+                self.start(Work::Diagnosis);
+                Ok(())
+            }
+            Act::Tick { effect } => self.tick(seen, effect),
+            Act::Keep => {
+                self.change(seen, |inner| {
+                    let last = inner.session.effects.last_mut();
+                    last.ok_or(WorkbenchError::Nothing("keep"))?.anyway = true;
+                    Ok(())
+                })?;
+                self.start(Work::Fit);
+                Ok(())
+            }
+            Act::Undo => self.change(seen, |inner| {
+                let last = inner.session.effects.pop();
+                inner.session.undone.push(last.ok_or(WorkbenchError::Nothing("take back"))?);
+                inner.jobs.iter().filter(|j| j.work == Work::Fit).for_each(|j| j.stop.stop());
+                inner.jobs.retain(|j| j.work != Work::Fit);
+                Ok(())
+            }),
+            Act::Redo => {
+                self.change(seen, |inner| {
+                    let last = inner.session.undone.pop();
+                    inner
+                        .session
+                        .effects
+                        .push(last.ok_or(WorkbenchError::Nothing("accept again"))?);
+                    Ok(())
+                })?;
+                self.start(Work::Fit);
+                Ok(())
+            }
+            Act::Fit => {
+                self.same_model()?;
+                self.start(Work::Fit);
+                Ok(())
+            }
+            Act::Judge => self.judge(seen),
+            Act::Save { folder } => {
+                self.same_model()?;
+                self.save(&self.folder.join(folder.unwrap_or_else(|| "model".into())))
+            }
+            Act::ReloadModel => self.reload(seen),
+            Act::Cancel { job } => {
+                self.cancel(job);
+                Ok(())
+            }
+        }
+    }
+
+    /// Takes a log that a page has sent, called `name`.
+    ///
+    /// # Errors
+    /// It is no log or cannot be used, is there already, or cannot be kept.
+    pub fn take(&self, seen: u64, name: &str, bytes: &[u8]) -> Result<(), WorkbenchError> {
+        let plain = |c: char| c.is_alphanumeric() || "._- +()".contains(c);
+        if name.is_empty() || name.starts_with('.') || name.len() > 200 || !name.chars().all(plain)
+        {
+            return Err(WorkbenchError::Name(name.into()));
+        }
+        let place = PathBuf::from("logs").join(name);
+        let file = self.folder.join(&place);
+        // another log of that name keeps it
+        let place = match fs::read(&file) {
+            Ok(there) if there != bytes => {
+                PathBuf::from("logs").join(format!("{}-{name}", &sha256(bytes)[..8]))
+            }
+            _ => place,
+        };
+        let file = self.folder.join(&place);
+        let (revision, known) = {
+            let inner = self.lock();
+            (inner.session.revision, file.exists())
+        };
+        if revision != seen {
+            return Err(WorkbenchError::Conflict { now: revision, seen });
+        }
+        if !known {
+            let part = file.with_extension("part");
+            fs::write(&part, bytes)
+                .and_then(|()| fs::rename(&part, &file))
+                .map_err(|e| io(&file, e))?;
+        }
+        self.add(seen, place, bytes).inspect_err(|_| {
+            if !known {
+                let _ = fs::remove_file(&file);
+            }
+        })
+    }
+
+    fn tick(self: &Arc<Self>, seen: u64, effect: String) -> Result<(), WorkbenchError> {
+        self.same_model()?;
+        self.change(seen, |inner| {
+            inner.divided()?;
+            if catalogue::describe(&effect).is_none() {
+                return Err(WorkbenchError::Amend(
+                    crate::model::JoinError::Unknown { id: effect.clone() }.into(),
+                ));
+            }
+            let there = inner.session.effects.iter().any(|e| e.id == effect);
+            if there || inner.model.has(&effect) {
+                return Err(WorkbenchError::Present(effect));
+            }
+            inner.session.effects.push(Accepted { id: effect, anyway: false });
+            inner.session.undone.clear();
+            Ok(())
+        })?;
+        self.start(Work::Fit);
+        Ok(())
+    }
+
+    /// Looks at the test flights: free runs of the model as given and as amended, recorded before they are told.
+    fn judge(&self, seen: u64) -> Result<(), WorkbenchError> {
+        self.same_model()?;
+        let (given, amended, flights, names, effects) = {
+            let inner = self.lock();
+            let places: Vec<usize> = inner.session.with(Role::Test).collect();
+            let used = |k: &usize| inner.flights[*k].as_ref().ok().map(|f| f.prepared.clone());
+            let flights: Vec<Prepared> = places.iter().filter_map(used).collect();
+            if flights.is_empty() {
+                return Err(WorkbenchError::NoRole("test"));
+            }
+            let key = inner.key("fit", &inner.session.effects);
+            let amended = match inner.session.effects.is_empty() {
+                true => inner.model.clone(),
+                false => inner.fits.get(&key).ok_or(WorkbenchError::Unfitted)?.model.clone(),
+            };
+            let names: Vec<String> = places.iter().map(|k| inner.session.logs[*k].name()).collect();
+            let effects: Vec<String> = inner.session.effects.iter().map(|e| e.id.clone()).collect();
+            (inner.model.clone(), amended, flights, names, effects)
+        };
+        let (horizon_s, given) = judged(&scores(&given, &flights));
+        let (_, amended) = judged(&scores(&amended, &flights));
+        let unix_s = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_secs());
+        self.change(seen, |inner| {
+            inner.session.openings.push(Opening {
+                unix_s,
+                effects,
+                flights: names,
+                given,
+                amended,
+                horizon_s,
+            });
+            Ok(())
+        })
+    }
+
+    /// Reads the model file again; what was worked out of the old one goes.
+    fn reload(&self, seen: u64) -> Result<(), WorkbenchError> {
+        let path = self.lock().session.model.clone();
+        let (model, text) = load(&path)?;
+        self.change(seen, |inner| {
+            inner.session.model_sha256 = sha256(text.as_bytes());
+            (inner.model, inner.text) = (model, text);
+            (inner.tuned, inner.estimate, inner.comparison) = (None, None, None);
+            Ok(())
+        })
+    }
+}
+
+/// The longest horizon up to that of judgement that runs reach, s, with the error there.
+fn judged(scores: &[HorizonScore]) -> (f64, f64) {
+    let mut reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= Options::JUDGED_AT_S);
+    reached.next_back().map_or((f64::NAN, f64::NAN), |s| (s.horizon_s, s.rmse_scaled))
+}

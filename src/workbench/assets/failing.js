@@ -1,0 +1,369 @@
+// Where the model fails: channels over variables, the flight over time, free runs from any moment.
+
+import { SYMBOL, command, complain, dots, draw, el, ink, line, percent, post, shade, show } from "./kit.js";
+
+const VARIABLES = ["alpha", "beta", "airspeed", "throttle", "p", "q", "r", "aileron", "elevator", "aileron_rate", "elevator_rate", "altitude", "time"];
+const STATES = { V: ["V", "m/s"], alpha: ["α", "°"], beta: ["β", "°"], p: ["p", "°/s"], q: ["q", "°/s"], r: ["r", "°/s"], phi: ["φ", "°"], theta: ["θ", "°"] };
+const RUN_S = 5;
+const pick = { channel: null, variable: null, window: null, run: null, at: null, every: false };
+let parts = null;
+let bench = null;
+
+export function failing(of) {
+  bench = of;
+  const body = document.querySelector("#failing .body");
+  const { failing: found, state } = bench;
+  if (!found) {
+    parts = null;
+    const none = !state.flights.some((f) => f.role === "fit" || f.role === "hold_out");
+    return body.replaceChildren(el("p", { class: "empty" }, none ? "Drop a flight log: the model is compared with it at once." : "Comparing the model with the flights …"));
+  }
+  if (!parts) {
+    parts = build();
+    body.replaceChildren(parts.grid, parts.finding, parts.where, parts.tools, parts.states, parts.command);
+  }
+  grid();
+  parts.command.replaceChildren(...[command(state.commands.compare)].filter(Boolean));
+}
+
+function build() {
+  const figure = (key, size = "") => {
+    const plot = el("div", { class: `plot ${size}`, "data-plot": key });
+    const caption = el("figcaption");
+    return { figure: el("figure", {}, caption, plot), plot, caption };
+  };
+  const made = { grid: el("div", { class: "scroll" }), finding: el("p", { class: "finding" }), command: el("div"), map: el("figure", {}), time: figure("time", "tall"), residual: figure("residual"), variable: figure("variable"), bins: figure("bins", "square") };
+  made.where = el("div", { class: "where" },
+    el("div", {}, made.time.figure, made.residual.figure, made.variable.figure), el("div", {}, made.bins.figure, made.map));
+  made.at = el("input", { type: "number", step: "0.1", "aria-label": "Start of the free run, s", onchange: () => fly(+made.at.value) });
+  made.every = el("button", { type: "button", onclick: () => { pick.every = !pick.every; states(); } });
+  made.reset = el("button", { type: "button", disabled: true, onclick: () => zoom(null) }, "Whole flight");
+  made.tools = el("div", { class: "tools" }, el("b", {}, "Free run"), el("label", {}, "from ", made.at, " s"),
+    el("span", { class: "muted" }, "or click a moment in any plot over time; drag to zoom"), made.reset, made.every);
+  made.states = el("div", { class: "states" });
+  return made;
+}
+
+// ---- the grid ----
+
+const share = (channel) => (channel?.unexplained_fraction == null ? null : 1 - channel.unexplained_fraction);
+function cells(channel) {
+  return Object.fromEntries(channel.bins.map((b) => [b.variable, b]));
+}
+function grid() {
+  const { models } = bench.failing;
+  const [before, after] = models;
+  const channels = before.channels.filter((c) => "DLYlmn".includes(c.channel));
+  const shown = channels.length ? channels : before.channels;
+  const most = Math.max(...shown.map((c) => Math.min(1, c.unexplained_fraction ?? 0)), 1e-9);
+  if (!pick.by_hand || !shown.some((c) => c.channel === pick.channel)) start(shown);
+  const head = el("tr", {}, el("th", { scope: "col" }, "Channel"), el("th", { scope: "col", class: "number", title: "share of the channel's variance beyond noise that the model as given explains" }, "R²"),
+    after && el("th", { scope: "col", class: "number", title: "the same with the accepted effects" }, "R² after"),
+    VARIABLES.map((v) => el("th", { scope: "col", class: "number" }, el("abbr", { title: name(shown, v) }, SYMBOL[v]))));
+  const rows = shown.map((c) => {
+    const own = cells(c);
+    const size = Math.sqrt(Math.min(1, (c.unexplained_fraction ?? 0) / most));
+    const two = after?.channels.find((x) => x.channel === c.channel);
+    return el("tr", {}, el("th", { scope: "row" }, c.name), el("td", { class: "fit" }, r2(share(c))), after && el("td", { class: "fit" }, r2(share(two))),
+      VARIABLES.map((v) => el("td", {}, own[v] && cell(c, own[v], size))));
+  });
+  parts.grid.replaceChildren(el("table", { class: "grid" }, el("thead", {}, head), el("tbody", {}, rows)));
+  finding();
+}
+const r2 = (v) => (v == null ? "–" : v > 0.9995 ? "1.000" : v < -9.995 ? "under −9" : show(v, v >= 0.995 ? 4 : 3));
+const name = (channels, v) => channels.flatMap((c) => c.bins).find((b) => b.variable === v)?.name ?? v;
+function cell(channel, bins, size) {
+  const weight = bins.explained * size;
+  const pressed = pick.channel === channel.channel && pick.variable === bins.variable;
+  return el("button", {
+    type: "button", "aria-pressed": pressed ? "true" : "false", class: weight > 0.45 ? "strong" : "", vars: { "--weight": `${Math.round(100 * weight)}%` },
+    "data-channel": channel.channel, "data-variable": bins.variable,
+    "aria-label": `${channel.name} over ${bins.name}: ${percent(bins.explained)} of the residual's variance`,
+    title: `${percent(bins.explained)} of the variance of what ${channel.name} leaves goes with ${bins.name}`,
+    onclick: () => { Object.assign(pick, { channel: channel.channel, variable: bins.variable, by_hand: true }); pressed_cell(); },
+  }, bins.explained >= 0.05 ? String(Math.round(100 * bins.explained)) : "");
+}
+/** A cell was pressed: its seconds are lit everywhere, in a flight that has some. */
+function pressed_cell() {
+  grid();
+  bench.light(lit);
+  if (lit().length || !bench.choose_lit()) {
+    time();
+    states();
+    brush();
+  }
+}
+/** The cell that says most stands chosen at first. */
+function start(channels) {
+  let best = -1;
+  for (const c of channels)
+    for (const b of c.bins.filter((b) => VARIABLES.includes(b.variable))) {
+      const weight = b.explained * Math.min(1, c.unexplained_fraction ?? 0);
+      if (weight > best) [best, pick.channel, pick.variable] = [weight, c.channel, b.variable];
+    }
+}
+const chosen = (model) => model?.channels.find((c) => c.channel === pick.channel);
+const over = (channel) => channel?.bins.find((b) => b.variable === pick.variable);
+/** The bin in which the model as given is off most. */
+function worst() {
+  const bins = over(chosen(bench.failing.models[0]))?.bins ?? [];
+  const supported = bins.filter((b) => b.supported);
+  return (supported.length ? supported : bins).reduce((a, b) => (a && Math.abs(a.mean) >= Math.abs(b.mean) ? a : b), null);
+}
+function finding() {
+  const channel = chosen(bench.failing.models[0]);
+  parts.finding.textContent = capital(channel?.worst_regime ?? "");
+}
+
+// ---- over time ----
+
+/** The seconds of a flight in which the variable lies in the worst bin. */
+export function lit(flight = bench.flight) {
+  const bin = worst();
+  if (!flight || !bin) return [];
+  const [values, times] = [flight.regimes[pick.variable] ?? [], flight.window_s];
+  const half = 0.5 * (times[1] - times[0]) || 0.1;
+  const spans = [];
+  values.forEach((v, i) => {
+    if (v == null || times[i] == null || v < (bin.low ?? -Infinity) || v > (bin.high ?? Infinity)) return;
+    const [from, to] = [times[i] - half, times[i] + half];
+    const last = spans[spans.length - 1];
+    if (last && from <= last[1] + 1e-3) last[1] = to;
+    else spans.push([from, to]);
+  });
+  return spans;
+}
+function quality(measured, predicted, inside) {
+  let [n, sum, square, rest] = [0, 0, 0, 0];
+  measured.forEach((m, i) => {
+    if (m == null || predicted[i] == null || !inside(i)) return;
+    n += 1; sum += m; square += m * m; rest += (m - predicted[i]) ** 2;
+  });
+  const variance = square / n - (sum / n) ** 2;
+  return n > 2 && variance > 0 ? `R² ${r2(1 - rest / n / variance)} · NRMSE ${show(Math.sqrt(rest / n / variance))}` : "";
+}
+const key = (tone, word, more) => el("span", { class: `key ${tone}` }, el("i"), el("span", {}, word, more ? ` ${more}` : ""));
+
+const sync = { key: "flight", setSeries: false };
+/** Options that all plots over time share: cursor, zoom, lit seconds, a click that flies. */
+function clock(series, spans) {
+  let down = null;
+  return {
+    scales: { x: { time: false, range: (u, low, high) => pick.window ?? [low, high] } },
+    cursor: { sync, drag: { x: true, y: false, setScale: false }, points: { size: 5 } },
+    series,
+    hooks: {
+      drawClear: [(u) => shade(u, spans, "lit")],
+      setSelect: [(u) => {
+        if (u.select.width < 6) return;
+        zoom([u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")]);
+        u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+      }],
+      ready: [(u) => {
+        u.over.addEventListener("mousedown", (e) => { down = e.clientX; });
+        u.over.addEventListener("click", (e) => {
+          if (down != null && Math.abs(e.clientX - down) < 6) fly(u.posToVal(e.clientX - u.over.getBoundingClientRect().left, "x"));
+        });
+        u.over.addEventListener("dblclick", () => zoom(null));
+      }],
+    },
+  };
+}
+function zoom(window) {
+  pick.window = window;
+  parts.reset.disabled = !window;
+  time();
+  states();
+  brush();
+}
+/** Marks the cells whose failing seconds the brushed window holds. */
+function brush() {
+  const { flight, failing: found } = bench;
+  for (const button of parts.grid.querySelectorAll("button")) {
+    let [inside, all] = [0, 0];
+    const channel = found.models[0].channels.find((c) => c.channel === button.dataset.channel);
+    const values = flight?.regimes[button.dataset.variable];
+    const bins = channel?.bins.find((b) => b.variable === button.dataset.variable)?.bins.filter((b) => b.supported) ?? [];
+    const bin = bins.reduce((a, b) => (a && Math.abs(a.mean) >= Math.abs(b.mean) ? a : b), null);
+    if (pick.window && values && bin)
+      values.forEach((v, i) => {
+        const t = flight.window_s[i];
+        if (v == null || t == null || t < pick.window[0] || t > pick.window[1]) return;
+        all += 1;
+        if (v >= (bin.low ?? -Infinity) && v <= (bin.high ?? Infinity)) inside += 1;
+      });
+    button.classList.toggle("brushed", all > 0 && inside > 0.3 * all);
+  }
+}
+
+/** A flight, or models, that are new: everything over time is drawn again. */
+export function freshFailing(of) {
+  bench = of;
+  if (!parts) return;
+  if (!bench.flight) {
+    parts.where.hidden = parts.tools.hidden = parts.states.hidden = true;
+    return;
+  }
+  parts.where.hidden = parts.tools.hidden = parts.states.hidden = false;
+  if (pick.flight !== bench.chosen) Object.assign(pick, { window: null, run: null, at: null, flight: bench.chosen });
+  bench.light(lit);
+  time();
+  const times = bench.flight.time_s.filter((t) => t != null);
+  const spans = lit();
+  const most = spans.reduce((a, b) => (a && a[1] - a[0] >= b[1] - b[0] ? a : b), null);
+  fly(pick.at ?? Math.max(times[0], Math.min((most?.[0] ?? times[0]) - 0.5, times[times.length - 1] - RUN_S)));
+}
+
+function time() {
+  const { flight } = bench;
+  if (!flight) return;
+  const list = flight.channels[symbol(pick.channel)];
+  const channel = chosen(bench.failing.models[0]);
+  if (!list || !channel) return;
+  const [measured, before, after] = list;
+  const spans = lit();
+  const inside = (i) => !pick.window || (flight.window_s[i] >= pick.window[0] && flight.window_s[i] <= pick.window[1]);
+  const x = flight.window_s;
+  parts.time.caption.replaceChildren(el("b", {}, `${capital(channel.name)} (${channel.unit}), ${flight.name}`), key("measured", "measured"),
+    key("before", "before", quality(measured, before, inside)), ...(after ? [key("after", "after", quality(measured, after, inside))] : []));
+  const lines = [{}, line("before", 1.6), ...(after ? [line("after", 1.6)] : []), line("measured", 1.1)];
+  draw(parts.time.plot, clock(lines, spans), [x, before, ...(after ? [after] : []), measured]);
+  const rest = (model) => measured.map((m, i) => (m == null || model[i] == null ? null : m - model[i]));
+  const bin = worst();
+  const variable = over(channel);
+  const range = bin ? `${SYMBOL[pick.variable]} ${bin.low == null ? "under " + show(bin.high) : bin.high == null ? "over " + show(bin.low) : show(bin.low) + " to " + show(bin.high)} ${variable.unit}` : "";
+  parts.residual.caption.replaceChildren(el("b", {}, `Residual: measured − model (${channel.unit})`), ...(bin ? [key("lit", `${range}: ${show(bin.mean)} ${channel.unit} on average`)] : []));
+  draw(parts.residual.plot, clock([{}, line("before", 1.4), ...(after ? [line("after", 1.4)] : [])], spans), [x, rest(before), ...(after ? [rest(after)] : [])]);
+  parts.variable.caption.replaceChildren(el("b", {}, variable ? `${capital(variable.name)}${variable.unit ? ` (${variable.unit})` : ""}` : ""));
+  draw(parts.variable.plot, clock([{}, line("measured", 1.2)], spans), [x, flight.regimes[pick.variable] ?? x.map(() => null)]);
+  bins(channel, variable);
+  maps();
+}
+
+/** Mean residual over α and β, by each model on one scale. */
+function maps() {
+  const all = bench.failing.models.map((m) => chosen(m)?.map).filter((m) => m?.cells.length);
+  if (!all.length) return parts.map.replaceChildren();
+  const unit = chosen(bench.failing.models[0]).unit;
+  const sizes = (only) => all.flatMap((m) => m.cells).filter((c) => c.supported || !only).map((c) => Math.abs(c.mean));
+  const limit = Math.max(...sizes(true), 0) || Math.max(...sizes(false), 1e-12);
+  const one = (map, k) => {
+    const canvas = el("canvas", { role: "img", "aria-label": `mean residual over α and β, ${k ? "after" : "before"}` });
+    return [el("div", {}, canvas, k ? "after" : "before"), () => paint(canvas, map, limit)];
+  };
+  const made = all.map(one);
+  parts.map.replaceChildren(el("figcaption", {}, el("b", {}, `Residual over α (across) and β (up), to ±${show(limit)} ${unit}`)), el("div", { class: "map" }, made.map(([node]) => node)));
+  parts.map.paint = () => made.forEach(([, draw_map]) => draw_map());
+  parts.map.paint();
+}
+function paint(canvas, map, limit) {
+  const { width, height } = canvas.getBoundingClientRect();
+  if (!width) return;
+  const ratio = devicePixelRatio;
+  [canvas.width, canvas.height] = [width * ratio, height * ratio];
+  const ctx = canvas.getContext("2d");
+  ctx.scale(ratio, ratio);
+  const [left, bottom] = [26, 16];
+  const [columns, rows] = [map.alpha_deg.length - 1, map.beta_deg.length - 1];
+  const [w, h] = [(width - left) / columns, (height - bottom) / rows];
+  for (const cell of map.cells) {
+    const share = Math.min(1, Math.abs(cell.mean) / limit);
+    ctx.globalAlpha = 1;
+    ctx.fillStyle = ink("grid");
+    const at = [left + cell.alpha * w, (rows - 1 - cell.beta) * h, w - 1, h - 1];
+    ctx.fillRect(...at);
+    ctx.globalAlpha = share * (cell.supported ? 1 : 0.45);
+    ctx.fillStyle = ink(cell.mean > 0 ? "before" : "after");
+    ctx.fillRect(...at);
+  }
+  ctx.globalAlpha = 1;
+  ctx.fillStyle = ink("muted");
+  ctx.font = `10px ${ink("sans")}`;
+  const places = (edges, k) => show(edges[k]).replace(/\.0+$/, "");
+  ctx.fillText(places(map.alpha_deg, 0), left, height - 3);
+  ctx.textAlign = "right";
+  ctx.fillText(`${places(map.alpha_deg, columns)}°`, width, height - 3);
+  ctx.fillText(`${places(map.beta_deg, rows)}°`, left - 3, 10);
+  ctx.fillText(places(map.beta_deg, 0), left - 3, rows * h);
+}
+export const repaint = () => parts?.map.paint?.();
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+const symbol = (channel) => ({ V: "V̇", alpha: "α̇", beta: "β̇" })[channel] ?? channel;
+
+/** Mean residual over the variable, with its interval. */
+function bins(channel, variable) {
+  if (!variable) return;
+  const both = bench.failing.models.map((m) => over(chosen(m))?.bins ?? []);
+  parts.bins.caption.replaceChildren(el("b", {}, `Residual (${channel.unit}) over ${variable.name}${variable.unit ? ` (${variable.unit})` : ""}`));
+  const tables = both.map((list) => [list.map((b) => b.center), list.map((b) => b.mean)]);
+  const joined = tables.length > 1 ? uPlot.join(tables) : tables[0];
+  const whiskers = (u) => both.forEach((list, k) => {
+    const { ctx } = u;
+    ctx.save();
+    ctx.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue(k ? "--after" : "--before");
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    for (const b of list) {
+      const at = u.valToPos(b.center, "x", true);
+      ctx.globalAlpha = b.supported ? 1 : 0.4;
+      ctx.beginPath();
+      ctx.moveTo(at, u.valToPos(b.interval[0], "y", true));
+      ctx.lineTo(at, u.valToPos(b.interval[1], "y", true));
+      ctx.stroke();
+    }
+    ctx.restore();
+  });
+  const ends = both.flat().flatMap((b) => b.interval).filter((v) => v != null).concat(0);
+  const [low, high] = [Math.min(...ends), Math.max(...ends)];
+  const pad = 0.06 * (high - low) || 1;
+  draw(parts.bins.plot, {
+    scales: { x: { time: false }, y: { range: [low - pad, high + pad] } }, cursor: { drag: { x: false, y: false } },
+    series: [{}, ...both.map((_, k) => dots(k ? "after" : "before", 6))], hooks: { draw: [whiskers] },
+  }, joined);
+}
+
+// ---- free runs ----
+
+let asked = 0;
+async function fly(at) {
+  const own = ++asked;
+  try {
+    const begun = performance.now();
+    const { runs } = await post("/api/free-run", { flight: bench.chosen, time_s: at, seconds: RUN_S });
+    if (own !== asked) return;
+    Object.assign(pick, { run: runs, at: runs[0].time_s[0] });
+    states();
+    document.documentElement.dataset.freeRunMs = (performance.now() - begun).toFixed(1);
+  } catch (error) {
+    if (own === asked) { states(); complain(error.message); }
+  }
+}
+function states() {
+  const { flight } = bench;
+  if (!flight) return;
+  parts.at.value = pick.at == null ? "" : pick.at.toFixed(1);
+  parts.every.textContent = pick.every ? "Four states" : "All eight states";
+  const names = Object.keys(STATES).slice(0, pick.every ? 8 : 4);
+  if (parts.states.childElementCount !== names.length) {
+    parts.states.replaceChildren(...names.map((n) => el("figure", {}, el("figcaption"), el("div", { class: "plot", "data-plot": n }))));
+  }
+  // a window around the run shows it; the whole flight would hide it
+  const around = pick.window ?? (pick.at == null ? null : [pick.at - 3, pick.at + RUN_S + 3]);
+  const spans = lit();
+  names.forEach((n, k) => {
+    const [caption, plot] = parts.states.children[k].children;
+    const [sign, unit] = STATES[n];
+    const tables = [[flight.time_s.map((t, i) => t ?? between(flight.time_s, i)), flight.states[n]], ...(pick.run ?? []).map((r) => [r.time_s, r.states[n]])];
+    const data = tables.length > 1 ? uPlot.join(tables) : tables[0];
+    const [x, measured, ...models] = data;
+    const lines = models.map((_, i) => line(i ? "after" : "before", 2));
+    caption.replaceChildren(el("b", {}, `${sign} (${unit})`), ...(k === 0 && pick.run ? [key("measured", "measured"), key("before", "before"), ...(pick.run.length > 1 ? [key("after", "after")] : [])] : []));
+    const options = clock([{}, ...lines, line("measured", 1.2)], spans);
+    options.scales.x.range = (u, low, high) => around ?? [low, high];
+    draw(plot, options, [x, ...models, measured]);
+  });
+}
+/** A time for a row that only breaks the line. */
+function between(times, i) {
+  const before = times[i - 1] ?? 0;
+  return before + 1e-3;
+}

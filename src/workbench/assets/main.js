@@ -1,0 +1,181 @@
+// The workbench: one session, four panes, kept as the program has it.
+
+import { complain, el, get, hush, judged, percent, post, redraw, send, show } from "./kit.js";
+import { flights } from "./flights.js";
+import { failing, freshFailing, repaint } from "./failing.js";
+import { suspects } from "./suspects.js";
+import { model } from "./model.js";
+
+const root = document.documentElement;
+const dark = matchMedia("(prefers-color-scheme: dark)");
+/** Everything that is drawn takes the colours anew. */
+function wear(theme) {
+  root.dataset.theme = theme;
+  redraw();
+  if (bench.state) flights(bench);
+  repaint();
+}
+
+/** What the panes share. */
+const bench = {
+  state: null, failing: null, diagnosis: null, flight: null, chosen: 0, data: new Map(), lit: new Map(), act, upload, choose, light, choose_lit, by_hand: false,
+};
+
+root.dataset.theme = dark.matches ? "dark" : "light";
+dark.addEventListener("change", () => wear(dark.matches ? "dark" : "light"));
+document.getElementById("theme").addEventListener("click", () => wear(root.dataset.theme === "dark" ? "light" : "dark"));
+
+let fresh = 0;
+/** Asks for everything again and shows it; an older answer that comes late is left alone. */
+async function refresh(state) {
+  const own = ++fresh;
+  try {
+    bench.state = state ?? (await get("/api/state"));
+    if (own !== fresh) return;
+    show_all();
+    const usable = bench.state.flights.some((f) => !f.error && (f.role === "fit" || f.role === "hold_out"));
+    const [failing_now, diagnosis] = await Promise.all([
+      usable ? get("/api/failing") : null,
+      bench.state.diagnosis.there ? get("/api/diagnosis") : null,
+    ]);
+    if (own !== fresh) return;
+    Object.assign(bench, { failing: failing_now, diagnosis });
+    show_all();
+    await load_flight(own);
+    root.dataset.ready = "yes";
+  } catch (error) {
+    if (own === fresh) complain(error.message);
+  }
+}
+async function load_flight(own = fresh) {
+  const all = bench.state.flights;
+  const open = (f) => f && !f.error && !f.locked;
+  if (!open(all[bench.chosen])) bench.chosen = Math.max(0, all.findIndex(open));
+  bench.data.clear();
+  bench.flight = open(all[bench.chosen]) ? await data(bench.chosen) : null;
+  if (own !== fresh) return;
+  freshFailing(bench);
+  // the others behind it, so that a cell lights their seconds too
+  for (const place of all.keys()) if (open(all[place]) && own === fresh) await data(place);
+  if (own !== fresh) return;
+  light();
+  if (!bench.by_hand && bench.flight) choose_lit();
+}
+/** A flight over time, asked for once. */
+async function data(place) {
+  if (!bench.data.has(place)) bench.data.set(place, await get(`/api/flight/${place}`));
+  return bench.data.get(place);
+}
+let lights = () => [];
+/** Lights the seconds of the pressed cell in all flights. */
+function light(by = lights) {
+  lights = by;
+  bench.lit = new Map([...bench.data].map(([place, flight]) => [place, lights(flight)]));
+  flights(bench);
+}
+const seconds = (spans) => (spans ?? []).reduce((sum, [from, to]) => sum + to - from, 0);
+/** Chooses the flight with most lit seconds if the chosen one has none; whether it did. */
+function choose_lit() {
+  if (seconds(bench.lit.get(bench.chosen)) > 0) return false;
+  const [place] = [...bench.lit].sort((a, b) => seconds(b[1]) - seconds(a[1]))[0] ?? [];
+  if (place == null || place === bench.chosen || !seconds(bench.lit.get(place))) return false;
+  choose(place);
+  return true;
+}
+function show_all() {
+  answer();
+  job();
+  flights(bench);
+  failing(bench);
+  suspects(bench);
+  model(bench);
+}
+
+/** The session's answer in one line. */
+function answer() {
+  const { state } = bench;
+  const place = document.getElementById("answer");
+  const last = [...state.stack].reverse().find((s) => s.story);
+  const name = el("b", {}, state.model.name);
+  if (!last) return place.replaceChildren(name);
+  const [before, after] = [judged(last.story.given), judged(last.story.after)];
+  const fall = before && after != null ? percent(after / before - 1) : "–";
+  place.replaceChildren(name, ` with ${state.stack.filter((s) => s.story).map((s) => s.id).join(", ")}: NRMSE at 5 s on held-out flight `,
+    el("b", {}, `${show(before)} → ${show(after)}`), ` (${fall})`);
+}
+function job() {
+  const place = document.getElementById("job");
+  const jobs = bench.state.jobs;
+  if (!jobs.length) return place.replaceChildren();
+  const [now] = jobs;
+  place.replaceChildren(
+    el("span", {}, now.doing), el("progress", { max: 1, value: now.fraction, "aria-label": now.work }),
+    el("button", { type: "button", onclick: () => act({ do: "cancel", job: now.id }) }, "Cancel"));
+}
+
+/** Asks for a change; whatever comes of it is shown. */
+async function act(what) {
+  hush();
+  try {
+    await refresh(await post("/api/act", { revision: bench.state.revision, act: what }));
+    return true;
+  } catch (error) {
+    if (error.status === 409) await refresh();
+    complain(error.message);
+    return false;
+  }
+}
+async function upload(files) {
+  hush();
+  const said = [];
+  for (const file of files) {
+    try {
+      const query = new URLSearchParams({ name: file.name, revision: bench.state.revision });
+      bench.state = await send(`/api/logs?${query}`, file);
+      flights(bench);
+    } catch (error) {
+      said.push(error.message);
+    }
+  }
+  await refresh();
+  if (said.length) complain(said.join("; "));
+}
+async function choose(place) {
+  bench.chosen = place;
+  flights(bench);
+  try {
+    bench.flight = await data(place);
+    freshFailing(bench);
+  } catch (error) {
+    complain(error.message);
+  }
+}
+
+// ---- what happens ----
+
+let later = 0;
+const events = new EventSource("/api/events");
+events.addEventListener("message", (message) => {
+  const told = JSON.parse(message.data);
+  if (told.event === "progress" && bench.state) {
+    const known = bench.state.jobs.findIndex((j) => j.id === told.job.id);
+    if (known < 0) return;
+    const first = told.job.ranking.length !== bench.state.jobs[known].ranking.length;
+    bench.state.jobs[known] = told.job;
+    job();
+    if (first) suspects(bench);
+  } else if (told.event === "changed") {
+    clearTimeout(later);
+    later = setTimeout(() => refresh(), 30);
+  }
+});
+
+// files may be dropped anywhere
+addEventListener("dragover", (event) => { event.preventDefault(); document.querySelector(".drop")?.classList.add("over"); });
+addEventListener("dragleave", () => document.querySelector(".drop")?.classList.remove("over"));
+addEventListener("drop", (event) => {
+  event.preventDefault();
+  document.querySelector(".drop")?.classList.remove("over");
+  if (event.dataTransfer.files.length) upload([...event.dataTransfer.files]);
+});
+refresh();

@@ -1,0 +1,112 @@
+// The suspects: candidate effects ranked, each with what speaks for and against it; a tick accepts one.
+
+import { command, draw, el, ink, line, percent, show } from "./kit.js";
+
+const open = new Set();
+let before = "";
+
+export function suspects(bench) {
+  const body = document.querySelector("#suspects .body");
+  const { state, diagnosis } = bench;
+  const running = state.jobs.find((j) => j.work === "diagnosis");
+  const ready = state.flights.some((f) => f.role === "fit" && !f.error);
+  const ask = el("button", { type: "button", class: state.diagnosis.there ? "" : "main", id: "diagnose", disabled: !ready || !!running, onclick: () => bench.act({ do: "diagnose" }) },
+    state.diagnosis.there ? "Diagnose again" : "Diagnose: what is missing?");
+  const end = [command(state.commands.diagnose)].filter(Boolean);
+  if (running || !diagnosis) {
+    before = "";
+    const said = state.diagnosis.error && el("p", { class: "bad" }, state.diagnosis.error);
+    const hint = !running && !said && el("p", { class: "note" }, ready ? "Fits every effect of the catalogue to what the model leaves, and compares each with what chance reaches." : "Needs a flight to fit to.");
+    return body.replaceChildren(el("div", { class: "row" }, ask), ...[said, hint, running && first(running)].filter(Boolean), ...end);
+  }
+  // the list stays as it is while nothing of it changes, so that plots and focus stay
+  const now = JSON.stringify([state.diagnosis.key, state.stack.map((s) => [s.id, s.status]), state.commands.diagnose, state.jobs.length > 0]);
+  if (now === before) return;
+  before = now;
+  const kept = body.scrollTop;
+  const passing = diagnosis.effects.filter((e) => e.asserted || e.evidence > e.threshold || ticked(bench, e.id));
+  const others = diagnosis.effects.filter((e) => !passing.includes(e));
+  const most = Math.max(...diagnosis.effects.map((e) => e.evidence), 1);
+  body.replaceChildren(verdict(diagnosis), ...passing.map((e) => suspect(bench, e, most)),
+    more(`${others.length} others stay under what chance reaches`, others.map((e) => suspect(bench, e, most))),
+    notes(diagnosis), el("div", { class: "row" }, ask), ...end);
+  body.scrollTop = kept;
+  curves(body, diagnosis);
+}
+
+/** The ranking while the checks still run. */
+function first(job) {
+  const best = job.ranking.slice(0, 5).filter((c) => c.evidence > 0);
+  if (!best.length) return el("p", { class: "note" }, `${job.doing} …`);
+  return el("div", {}, el("p", { class: "note" }, "First ranking; the checks are running:"), el("ol", { class: "first" }, best.map((c) =>
+    el("li", {}, `${c.id}: evidence ${show(c.evidence)}, chance reaches ${show(c.threshold)}`))));
+}
+function verdict(diagnosis) {
+  const [lead, ...rest] = diagnosis.sentences;
+  return el("div", { class: `verdict ${diagnosis.verdict}` }, el("p", {}, lead ?? diagnosis.verdict), rest.length ? more("More", rest.map((s) => el("p", {}, s)), "sentences") : null);
+}
+function more(summary, children, id = summary) {
+  if (!children.length) return "";
+  return el("details", { open: open.has(id), ontoggle: (e) => { e.target.open ? open.add(id) : open.delete(id); } }, el("summary", {}, summary), children);
+}
+const ticked = (bench, id) => bench.state.stack.some((s) => s.id === id);
+
+function suspect(bench, e, most) {
+  const stack = bench.state.stack;
+  const on = ticked(bench, e.id);
+  // only what was accepted last can be taken back
+  const fixed = on && stack[stack.length - 1].id !== e.id;
+  const box = el("input", { type: "checkbox", checked: on, disabled: fixed, "data-effect": e.id, title: fixed ? "Take back the effects accepted after it first" : "",
+    onchange: () => bench.act(on ? { do: "undo" } : { do: "tick", effect: e.id }).then((done) => { if (!done) box.checked = on; }) });
+  const above = e.evidence > e.threshold;
+  const tag = e.asserted ? el("span", { class: "tag" }, "asserted") : above && e.refused.length ? el("span", { class: "tag bad" }, "refused") : null;
+  const log = (v) => 100 * Math.log10(1 + Math.max(0, v)) / Math.log10(1 + most);
+  const facts = [decisive(e)];
+  if (e.heldout_error_reduction != null) facts.push(`takes ${percent(e.heldout_error_reduction)} of the error on held-out segments`);
+  if (e.selected_in_bootstraps != null) facts.push(`best in ${percent(e.selected_in_bootstraps)} of bootstraps`);
+  if (e.channels.length) facts.push(`acts in ${e.channels.join(", ")}`);
+  return el("article", { class: `suspect ${e.asserted ? "asserted" : ""}` },
+    el("label", {}, box, el("span", {}, e.id.replaceAll("_", " "), " ", tag)),
+    el("p", { class: "muted" }, e.description),
+    el("div", { class: "meter", role: "img", "aria-label": `evidence ${show(e.evidence)}, chance reaches ${show(e.threshold)}`, title: `evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)} (log scale)` },
+      el("i", { vars: { width: `${log(e.evidence)}%` } }), el("b", { vars: { left: `${log(e.threshold)}%` } })),
+    el("p", {}, `Evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)}. `, facts.filter(Boolean).join("; "), "."),
+    ...e.refused.map((why) => el("p", { class: "bad" }, why)),
+    e.indistinguishable_from.length ? el("p", {}, "These flights cannot tell it from ", el("b", {}, e.indistinguishable_from.join(", ")), ".") : "",
+    e.curve && above ? el("figure", {}, el("figcaption", {}, el("b", {}, `${e.curve.channel} (${e.curve.unit}) over ${e.curve.variable}`)), el("div", { class: "plot", "data-curve": e.id })) : "",
+    e.by_flight.length > 1 ? more("Do the flights agree?", [el("ul", {}, e.by_flight.map((f) => el("li", {}, `${f.flight}: ${show(f.value)} ± ${show(1.96 * f.sd, 2)}`)))], `agree-${e.id}`) : "");
+}
+/** The coefficient that is clearest, with its 95 % interval. */
+function decisive(e) {
+  const clear = (p) => Math.abs(p.value) / (p.ci95[1] - p.ci95[0] || Infinity);
+  const p = [...e.parameters].sort((a, b) => clear(b) - clear(a))[0];
+  return p && `${p.name} = ${show(p.value)} (95 %: ${show(p.ci95[0])} to ${show(p.ci95[1])})${p.unit ? ` ${p.unit}` : ""}`;
+}
+function notes(diagnosis) {
+  const fly = diagnosis.advice.map((a) => el("p", {}, el("b", {}, a.manoeuvre), `: ${a.why}`, a.between ? ` (greylag design --between ${a.between.join(" ")})` : ""));
+  return el("div", {}, more("What to fly next", fly, "fly"), more("Notes", diagnosis.notes.map((n) => el("p", {}, n)), "notes"));
+}
+
+/** What is left of the channel over the variable, and what the effect says of it. */
+function curves(body, diagnosis) {
+  for (const holder of body.querySelectorAll("[data-curve]")) {
+    const { x, residual, at, contribution } = diagnosis.effects.find((e) => e.id === holder.dataset.curve).curve;
+    const order = x.map((_, i) => i).sort((a, b) => x[a] - x[b]);
+    const band = (u) => {
+      const { ctx } = u;
+      const place = (k, i) => [u.valToPos(at[i], "x", true), u.valToPos(contribution[i][k], "y", true)];
+      ctx.save();
+      ctx.fillStyle = ink("band");
+      ctx.beginPath();
+      at.forEach((_, i) => ctx.lineTo(...place(1, i)));
+      for (let i = at.length - 1; i >= 0; i--) ctx.lineTo(...place(2, i));
+      ctx.fill();
+      ctx.restore();
+    };
+    const data = uPlot.join([[order.map((i) => x[i]), order.map((i) => residual[i])], [at, contribution.map((c) => c[0])]]);
+    draw(holder, {
+      scales: { x: { time: false } }, cursor: { drag: { x: false, y: false } }, hooks: { drawSeries: [(u, k) => k === 1 && band(u)] },
+      series: [{}, { stroke: () => ink("before"), paths: () => null, points: { show: true, size: 2.5, width: 0, fill: () => ink("before") } }, line("after", 2.5)],
+    }, data);
+  }
+}

@@ -1,0 +1,341 @@
+//! The session in memory, with what has been worked out of it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use serde_json::Value;
+
+use super::error::{WorkbenchError, io};
+use super::fit::Fitted;
+use super::flights::Loaded;
+use super::jobs::{Event, Job};
+use super::session::{Accepted, Claim, LogEntry, Role, Session};
+use crate::logs;
+use crate::model::GreyBox;
+use crate::sysid::amend::document::sha256;
+use crate::sysid::amend::{Estimate, Fit, split};
+use crate::sysid::compare::{self, Comparison, compare};
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::progress::unheard;
+
+/// What a workbench begins with.
+pub struct Given {
+    /// The session's folder; made if there is none.
+    pub folder: PathBuf,
+    /// The model; needed for a new session.
+    pub model: Option<PathBuf>,
+    /// Logs to add, those that are there already left out.
+    pub logs: Vec<PathBuf>,
+    /// How logs are read.
+    pub reading: logs::Options,
+    /// The same as words of a command line.
+    pub words: String,
+}
+
+/// The session with what was worked out of it.
+pub struct Bench {
+    pub(super) folder: PathBuf,
+    pub(super) hear: Box<dyn Fn(Event) + Send + Sync>,
+    inner: Mutex<Inner>,
+    _claim: Claim,
+}
+
+/// What changes.
+pub(super) struct Inner {
+    pub session: Session,
+    pub model: GreyBox,
+    /// The model file's text.
+    pub text: String,
+    /// The session's logs, in its order, or why one cannot be used.
+    pub flights: Vec<Result<Arc<Loaded>, String>>,
+    pub comparison: Option<(String, Arc<Comparison>)>,
+    pub tuned: Option<(String, Fit)>,
+    pub diagnosis: Option<(String, Arc<Value>)>,
+    pub estimate: Option<(String, Estimate)>,
+    pub fits: BTreeMap<String, Arc<Fitted>>,
+    /// What went wrong with the job of a key.
+    pub failures: BTreeMap<String, String>,
+    pub jobs: Vec<Job>,
+    pub next_job: u64,
+    /// How logs are read.
+    pub reading: logs::Options,
+    /// The same as words of a command line.
+    pub words: String,
+    /// The text of the session's mapping; empty if it has none.
+    pub mapping: String,
+}
+
+/// The flights that a fit sees and those that it is judged by.
+pub(super) struct Divided {
+    pub fit: Vec<Reconstruction>,
+    pub held_out: Vec<Reconstruction>,
+}
+
+impl Bench {
+    /// Opens the session of a folder, or begins one; `hear` hears what happens to it.
+    ///
+    /// # Errors
+    /// The folder is taken or cannot be used, the session or the model cannot be read, or a log is none.
+    pub fn open(
+        given: Given,
+        hear: impl Fn(Event) + Send + Sync + 'static,
+    ) -> Result<Arc<Bench>, WorkbenchError> {
+        let claim = Claim::of(&given.folder)?;
+        let folder = fs::canonicalize(&given.folder).map_err(|e| io(&given.folder, e))?;
+        let (session, model, text) = begin(&folder, given.model.as_deref())?;
+        let mut inner = Inner {
+            session,
+            model,
+            text,
+            flights: Vec::new(),
+            comparison: None,
+            tuned: None,
+            diagnosis: None,
+            estimate: None,
+            fits: BTreeMap::new(),
+            failures: BTreeMap::new(),
+            jobs: Vec::new(),
+            next_job: 1,
+            reading: given.reading,
+            words: given.words,
+            mapping: String::new(),
+        };
+        inner.take_mapping(&folder)?;
+        inner.reread(&folder);
+        inner.session.write(&folder)?;
+        let bench = Arc::new(Bench {
+            folder,
+            hear: Box::new(hear),
+            inner: Mutex::new(inner),
+            _claim: claim,
+        });
+        for log in &given.logs {
+            bench.add_file(log)?;
+        }
+        bench.remember();
+        Ok(bench)
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Inner> {
+        // what a panicking job left behind is whole: it changes the state in single steps
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The session's revision.
+    pub fn revision(&self) -> u64 {
+        self.lock().session.revision
+    }
+
+    /// Changes the session if `seen` is its revision, and writes it; all or nothing.
+    pub(super) fn change<T>(
+        &self,
+        seen: u64,
+        edit: impl FnOnce(&mut Inner) -> Result<T, WorkbenchError>,
+    ) -> Result<T, WorkbenchError> {
+        let mut inner = self.lock();
+        let now = inner.session.revision;
+        if now != seen {
+            return Err(WorkbenchError::Conflict { now, seen });
+        }
+        let (session, flights) = (inner.session.clone(), inner.flights.clone());
+        let edited = edit(&mut inner);
+        inner.session.revision += 1;
+        let revision = inner.session.revision;
+        match edited.and_then(|t| inner.session.write(&self.folder).map(|()| t)) {
+            Ok(t) => {
+                drop(inner);
+                (self.hear)(Event::Changed { revision });
+                Ok(t)
+            }
+            Err(error) => {
+                (inner.session, inner.flights) = (session, flights);
+                Err(error)
+            }
+        }
+    }
+
+    /// Adds the log at `path`, unless it is there.
+    fn add_file(&self, path: &Path) -> Result<(), WorkbenchError> {
+        let path = fs::canonicalize(path).map_err(|e| io(path, e))?;
+        let bytes = fs::read(&path).map_err(|e| io(&path, e))?;
+        match self.add(self.revision(), path, &bytes) {
+            Err(WorkbenchError::Twice(_)) => Ok(()),
+            other => other,
+        }
+    }
+
+    /// Adds a log with its content; `path` is where it stands.
+    pub(super) fn add(&self, seen: u64, path: PathBuf, bytes: &[u8]) -> Result<(), WorkbenchError> {
+        let sha256 = sha256(bytes);
+        let entry = LogEntry { path, sha256, role: Role::Unused };
+        let name = entry.name();
+        let (model, reading) = {
+            let inner = self.lock();
+            let same = inner.session.logs.iter().find(|l| l.sha256 == entry.sha256);
+            if let Some(same) = same {
+                return Err(WorkbenchError::Twice(same.name()));
+            }
+            (inner.model.clone(), inner.reading.clone())
+        };
+        let loaded = Loaded::parse(bytes, &name, &reading, &model)?;
+        self.change(seen, |inner| {
+            // what makes every figure wrong serves for nothing until its user has looked at it
+            let role = match loaded.in_doubt() {
+                true => Role::Unused,
+                false => inner.session.usual_role(&name),
+            };
+            inner.session.logs.push(LogEntry { role, ..entry });
+            inner.flights.push(Ok(loaded));
+            Ok(())
+        })
+    }
+
+    /// The comparison of the model as given, and as amended if it is, with the flights that may be seen.
+    pub(super) fn comparison(&self) -> Result<Arc<Comparison>, WorkbenchError> {
+        let (key, models, flights) = {
+            let inner = self.lock();
+            let key = inner.key("comparison", &inner.session.effects) + &inner.shown();
+            if let Some((_, known)) = inner.comparison.as_ref().filter(|(k, _)| *k == key) {
+                return Ok(known.clone());
+            }
+            let seen = inner.session.with(Role::Fit).chain(inner.session.with(Role::HoldOut));
+            let mut places: Vec<usize> = seen.collect();
+            places.sort_unstable();
+            (key, inner.models(), inner.reconstructions(places.into_iter()))
+        };
+        let options = compare::Options::default();
+        let made = Arc::new(compare(&models, &flights, &options, &unheard)?);
+        self.lock().comparison = Some((key, made.clone()));
+        Ok(made)
+    }
+
+    /// Takes up what earlier runs have left in the folder.
+    fn remember(&self) {
+        let mut inner = self.lock();
+        let key = inner.key("diagnosis", &[]);
+        let stored = fs::read_to_string(self.diagnosis_file(&key)).ok();
+        let stored = stored.and_then(|text| serde_json::from_str::<Value>(&text).ok());
+        inner.diagnosis = stored.map(|value| (key, Arc::new(value)));
+        for count in 1..=inner.session.effects.len() {
+            let key = inner.key("fit", &inner.session.effects[..count]);
+            if let Some(fitted) = Fitted::read(&self.fit_folder(&key)) {
+                inner.fits.insert(key, Arc::new(fitted));
+            }
+        }
+    }
+
+    pub(super) fn diagnosis_file(&self, key: &str) -> PathBuf {
+        self.folder.join(format!("{key}.json"))
+    }
+
+    pub(super) fn fit_folder(&self, key: &str) -> PathBuf {
+        self.folder.join("fits").join(key)
+    }
+
+    /// An error if the model file is not what was read.
+    pub(super) fn same_model(&self) -> Result<(), WorkbenchError> {
+        let inner = self.lock();
+        match inner.model_changed() {
+            false => Ok(()),
+            true => Err(WorkbenchError::ModelChanged { path: inner.session.model.clone() }),
+        }
+    }
+}
+
+/// The session with its model; one that was edited meanwhile is taken as it is now.
+fn begin(
+    folder: &Path,
+    model: Option<&Path>,
+) -> Result<(Session, GreyBox, String), WorkbenchError> {
+    let known = Session::read(folder)?;
+    let given = model.map(|m| fs::canonicalize(m).map_err(|e| io(m, e))).transpose()?;
+    let path = match (&known, given) {
+        (Some(session), Some(given)) if given != session.model => {
+            return Err(WorkbenchError::Session {
+                path: folder.join(super::session::FILE),
+                why: format!("it is about the model {}", session.model.display()),
+            });
+        }
+        (Some(session), _) => session.model.clone(),
+        (None, Some(given)) => given,
+        (None, None) => return Err(WorkbenchError::NoModel),
+    };
+    let (grey_box, text) = load(&path)?;
+    let sha256 = sha256(text.as_bytes());
+    let mut session = known.unwrap_or_else(|| Session::new(path, sha256.clone()));
+    session.model_sha256 = sha256;
+    Ok((session, grey_box, text))
+}
+
+/// The model at `path` with its text.
+pub(super) fn load(path: &Path) -> Result<(GreyBox, String), WorkbenchError> {
+    let text = fs::read_to_string(path).map_err(|e| io(path, e))?;
+    Ok((GreyBox::load(path)?, text))
+}
+
+impl Inner {
+    /// What a result is about: model, flights by role, effects.
+    pub fn key(&self, what: &str, effects: &[Accepted]) -> String {
+        let logs = |role: Role| -> String {
+            self.session.with(role).map(|k| self.session.logs[k].sha256.as_str()).collect()
+        };
+        let effects: Vec<String> =
+            effects.iter().map(|e| format!("{}{}", e.id, e.anyway)).collect();
+        let all = [
+            env!("CARGO_PKG_VERSION"),
+            &self.session.model_sha256,
+            &self.mapping,
+            &logs(Role::Fit),
+            // a diagnosis does not look at flights held out
+            &if what == "diagnosis" { String::new() } else { logs(Role::HoldOut) },
+            &effects.join("+"),
+        ];
+        format!("{what}-{}", &sha256(all.join("|").as_bytes())[..16])
+    }
+
+    /// Whether the file of the model is not what was read.
+    pub fn model_changed(&self) -> bool {
+        let now = fs::read(&self.session.model).map(|bytes| sha256(&bytes));
+        now.map_or(true, |now| now != self.session.model_sha256)
+    }
+
+    /// What stands in for the amended model now.
+    fn shown(&self) -> String {
+        let key = self.key("fit", &self.session.effects);
+        match (self.fits.contains_key(&key), &self.estimate) {
+            (true, _) => "fitted".into(),
+            (false, Some((of, _))) if *of == key => "estimated".into(),
+            _ => "given".into(),
+        }
+    }
+
+    /// The model as given; behind it as amended, by equation error as long as the fit is not done.
+    pub fn models(&self) -> Vec<GreyBox> {
+        let key = self.key("fit", &self.session.effects);
+        let estimate = self.estimate.as_ref().filter(|(of, _)| *of == key).map(|(_, e)| &e.model);
+        let amended = self.fits.get(&key).map(|f| &f.model).or(estimate);
+        std::iter::once(&self.model).chain(amended).cloned().collect()
+    }
+
+    /// The flights at `places` that can be used.
+    pub fn reconstructions(&self, places: impl Iterator<Item = usize>) -> Vec<Reconstruction> {
+        places.filter_map(|k| Some(self.flights[k].as_ref().ok()?.flight.clone())).collect()
+    }
+
+    /// The flights to fit to and those to judge by, as `greylag amend` divides them.
+    pub fn divided(&self) -> Result<Divided, WorkbenchError> {
+        let of = |role| self.reconstructions(self.session.with(role));
+        let (fit, held_out) = (of(Role::Fit), of(Role::HoldOut));
+        match (fit.len(), held_out.len()) {
+            (0, _) => Err(WorkbenchError::NoRole("fit the model to")),
+            (1, 0) => {
+                let [first, last] = split(&fit[0]);
+                Ok(Divided { fit: vec![first], held_out: vec![last] })
+            }
+            (_, 0) => Err(WorkbenchError::NoRole("be held out, for effects to be judged by")),
+            _ => Ok(Divided { fit, held_out }),
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! Why the workbench cannot do what it is asked.
+
+use std::io;
+use std::path::PathBuf;
+
+use crate::logs::LogError;
+use crate::logs::mapping::MappingError;
+use crate::model::edit::EditError;
+use crate::physics::airframe::FileError;
+use crate::report::WriteError;
+use crate::sysid::amend::AmendError;
+use crate::sysid::compare::CompareError;
+use crate::sysid::diagnose::DiagnoseError;
+use crate::sysid::flight_path::ReconstructError;
+
+/// What kind of failure it is, for whoever answers a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The request does not fit the session, for example a log that is none.
+    Bad,
+    /// The session has moved on since the requester looked.
+    Conflict,
+    /// It may not be seen yet.
+    Locked,
+    /// There is no such thing.
+    Missing,
+    /// The disk or the program failed.
+    Failed,
+}
+
+/// Why the workbench cannot do what it is asked.
+#[derive(Debug, thiserror::Error)]
+pub enum WorkbenchError {
+    /// Someone else changed the session first.
+    #[error(
+        "the session was changed in another window: it is at revision {now}, this page was at {seen}; the page \
+         shows it as it is now, so do it again if you still mean it"
+    )]
+    Conflict {
+        /// The session's revision.
+        now: u64,
+        /// The requester's.
+        seen: u64,
+    },
+    /// The model file is not what was read.
+    #[error(
+        "{} changed on disk since it was read, so what is shown is not about it; reload the model", path.display()
+    )]
+    ModelChanged {
+        /// The model file.
+        path: PathBuf,
+    },
+    /// A log is not what it was.
+    #[error(
+        "{} is not the log that the session knows: its content changed; take it out of the session and add it again", path.display()
+    )]
+    LogChanged {
+        /// The log.
+        path: PathBuf,
+    },
+    /// The log is there already.
+    #[error("this log is in the session already, as {0}")]
+    Twice(String),
+    /// A name that no file may have.
+    #[error("{0:?} is no name for a log; give it a name of letters, digits, dots and dashes")]
+    Name(String),
+    /// No flight of that number.
+    #[error(
+        "there is no flight number {0} in the session; it may have been taken out in another window"
+    )]
+    NoFlight(usize),
+    /// The test is not open.
+    #[error(
+        "{0} is a test flight, which stays unseen until the models are judged by it; press Judge, or give it another role"
+    )]
+    Locked(String),
+    /// A role has no flight.
+    #[error("no flight serves to {0}; give one that role")]
+    NoRole(&'static str),
+    /// No model.
+    #[error(
+        "a new session needs a model: name one, as in `greylag workbench --model params/x8/prior.toml`"
+    )]
+    NoModel,
+    /// Nothing to take back or to do.
+    #[error("there is nothing to {0}")]
+    Nothing(&'static str),
+    /// The effect is there.
+    #[error("{0} is in the model already")]
+    Present(String),
+    /// The mapping is the user's own.
+    #[error(
+        "the logs are read by a mapping of your own; add this line to its [columns] and start again: {0}"
+    )]
+    MappingGiven(String),
+    /// The session's mapping is broken.
+    #[error("cannot add to the mapping {}: it is no mapping; mend or remove it", .0.display())]
+    NoMapping(PathBuf),
+    /// The moment is not flown.
+    #[error(
+        "no free run can start at {0:.1} s: the aircraft is not in the air there, or the log has a gap"
+    )]
+    NotFlown(f64),
+    /// The fit is not done.
+    #[error("the fit of the accepted effects is not done; wait for it, or take the effect back")]
+    Unfitted,
+    /// The session is open elsewhere.
+    #[error(
+        "another workbench has the session in {} open; use its window, or give --dir another folder", .0.display()
+    )]
+    Open(PathBuf),
+    /// The session file is broken.
+    #[error("cannot read the session {}: {why}; mend the file, or give --dir another folder", path.display())]
+    Session {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A file could not be read or a folder not be made.
+    #[error("cannot use {}: {source}; check that it exists and may be read and written", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A result has no place in JSON.
+    #[error("cannot write a result as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    /// The log cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The mapping cannot be read.
+    #[error(transparent)]
+    Mapping(#[from] MappingError),
+    /// The log cannot be used.
+    #[error(transparent)]
+    Reconstruct(#[from] ReconstructError),
+    /// The model cannot be read.
+    #[error(transparent)]
+    Model(#[from] FileError),
+    /// The model file cannot be edited.
+    #[error(transparent)]
+    Edit(#[from] EditError),
+    /// A file was not written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// No comparison.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
+    /// No diagnosis.
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
+    /// No fit.
+    #[error(transparent)]
+    Amend(#[from] AmendError),
+}
+
+impl WorkbenchError {
+    /// What kind of failure it is.
+    pub fn kind(&self) -> Kind {
+        use WorkbenchError as E;
+        match self {
+            E::Conflict { .. } | E::ModelChanged { .. } | E::LogChanged { .. } => Kind::Conflict,
+            E::Locked(_) => Kind::Locked,
+            E::NoFlight(_) => Kind::Missing,
+            E::Io { .. } | E::Json(_) | E::Write(_) | E::Session { .. } => Kind::Failed,
+            _ => Kind::Bad,
+        }
+    }
+}
+
+/// A failure of the system at `path`.
+pub(super) fn io(path: &std::path::Path, source: io::Error) -> WorkbenchError {
+    WorkbenchError::Io { path: path.into(), source }
+}

@@ -1,0 +1,101 @@
+//! The session's logs in memory: read, reconstructed, ready to be compared.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::error::{WorkbenchError, io};
+use super::session::LogEntry;
+use crate::logs::finding::Severity;
+use crate::logs::info::Info;
+use crate::logs::{self, Log};
+use crate::model::GreyBox;
+use crate::sysid::amend::document::sha256;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
+use crate::sysid::weak_form::prepared::Prepared;
+
+/// Points of the strip that shows a flight at a glance.
+const STRIP: usize = 160;
+
+/// A log in memory.
+pub struct Loaded {
+    /// What the log says of itself.
+    pub info: Info,
+    /// The flight, deflections as recorded.
+    pub flight: Reconstruction,
+    /// The flight on the models' clock.
+    pub prepared: Prepared,
+}
+
+/// The flight at a glance: a few values over its length.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Strip {
+    /// Angle of attack, °.
+    pub alpha: Vec<f32>,
+    /// Sideslip, °.
+    pub beta: Vec<f32>,
+    /// Airspeed, m/s.
+    pub airspeed: Vec<f32>,
+    /// Aileron, °.
+    pub aileron: Vec<f32>,
+    /// Elevator, °.
+    pub elevator: Vec<f32>,
+}
+
+impl Loaded {
+    /// Reads `bytes`, the log called `name`, for `model`.
+    pub fn parse(
+        bytes: &[u8],
+        name: &str,
+        reading: &logs::Options,
+        model: &GreyBox,
+    ) -> Result<Arc<Loaded>, WorkbenchError> {
+        let log = logs::parse(bytes, Path::new(name), reading)?;
+        Loaded::of(&log, name, model)
+    }
+
+    fn of(log: &Log, name: &str, model: &GreyBox) -> Result<Arc<Loaded>, WorkbenchError> {
+        let options = flight_path::Options::of(name, model, ActuatorClock::AsRecorded);
+        let flight = reconstruct(&log.flight, &options)?;
+        let slowest = 0.5 * model.airframe.envelope.airspeed_min_mps;
+        let prepared = Prepared::new(&flight, slowest)?;
+        Ok(Arc::new(Loaded { info: Info::of(log), flight, prepared }))
+    }
+
+    /// Reads the log of `entry`, whose relative path is below `folder`.
+    pub fn read(
+        entry: &LogEntry,
+        folder: &Path,
+        reading: &logs::Options,
+        model: &GreyBox,
+    ) -> Result<Arc<Loaded>, WorkbenchError> {
+        let path = folder.join(&entry.path);
+        let bytes = std::fs::read(&path).map_err(|e| io(&path, e))?;
+        if sha256(&bytes) != entry.sha256 {
+            return Err(WorkbenchError::LogChanged { path });
+        }
+        Loaded::parse(&bytes, &entry.name(), reading, model)
+    }
+
+    /// Whether the log holds what makes figures wrong.
+    pub fn in_doubt(&self) -> bool {
+        self.info.severity() == Severity::Problem
+    }
+
+    /// The flight at a glance.
+    pub fn strip(&self) -> Strip {
+        let all: Vec<_> = self.prepared.segments.iter().flatten().collect();
+        let every = all.len().div_ceil(STRIP).max(1);
+        let mut strip = Strip::default();
+        for i in all.iter().step_by(every) {
+            strip.alpha.push(i.state.alpha.to_degrees() as f32);
+            strip.beta.push(i.state.beta.to_degrees() as f32);
+            strip.airspeed.push(i.state.airspeed as f32);
+            strip.aileron.push(i.controls.aileron.to_degrees() as f32);
+            strip.elevator.push(i.controls.elevator.to_degrees() as f32);
+        }
+        strip
+    }
+}

@@ -1,0 +1,199 @@
+//! Long works in the background: how far they are, and how they are cancelled.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::Serialize;
+
+use super::bench::Bench;
+use super::error::WorkbenchError;
+use crate::report::write_over;
+use crate::sysid::amend::{AmendError, tune};
+use crate::sysid::diagnose::{Options, diagnose};
+use crate::sysid::progress::{Cancelled, FirstLook, Progress, Stage, part};
+
+/// What a job works out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Work {
+    /// Which effect the model lacks.
+    Diagnosis,
+    /// The model with the accepted effects.
+    Fit,
+}
+
+/// A job as the page sees it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Job {
+    /// Its number.
+    pub id: u64,
+    /// What it works out.
+    pub work: Work,
+    /// What it works it out of: no second job does the same.
+    #[serde(skip)]
+    pub key: String,
+    /// What it does now.
+    pub doing: String,
+    /// Share done, 0 to 1.
+    pub fraction: f64,
+    /// Candidates as ranked so far.
+    pub ranking: Vec<FirstLook>,
+    #[serde(skip)]
+    pub(super) stop: Stop,
+}
+
+/// Tells a job to end.
+#[derive(Clone, Debug, Default)]
+pub struct Stop(Arc<AtomicBool>);
+
+impl Stop {
+    /// Ends the job at its next stage.
+    pub fn stop(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// What a stage of the job is answered.
+    pub fn answer(&self) -> ControlFlow<()> {
+        match self.0.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    }
+}
+
+/// What the page is sent while it waits.
+#[derive(Clone, Debug, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum Event {
+    /// A job is farther.
+    Progress {
+        /// The job.
+        job: Job,
+    },
+    /// Something has changed: look at the state again.
+    Changed {
+        /// The session's revision.
+        revision: u64,
+    },
+}
+
+/// An error if a job shall end.
+pub(super) fn go_on(answer: ControlFlow<()>) -> Result<(), WorkbenchError> {
+    match answer {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(WorkbenchError::Amend(AmendError::Cancelled(Cancelled))),
+    }
+}
+
+impl Bench {
+    /// Tells that results have changed, not the session.
+    pub(super) fn changed(&self) {
+        (self.hear)(Event::Changed { revision: self.revision() });
+    }
+
+    /// Starts a job, unless one does the same.
+    pub(super) fn start(self: &Arc<Self>, work: Work) {
+        let (id, stop) = {
+            let mut inner = self.lock();
+            let effects = if work == Work::Fit { &inner.session.effects[..] } else { &[] };
+            let key = inner.key(work.word(), effects);
+            if inner.jobs.iter().any(|job| job.key == key) {
+                return;
+            }
+            // what is superseded ends
+            inner.jobs.iter().filter(|job| job.work == work).for_each(|job| job.stop.stop());
+            inner.failures.remove(&key);
+            let (id, stop) = (inner.next_job, Stop::default());
+            inner.next_job += 1;
+            let doing = "waiting".into();
+            inner.jobs.push(Job {
+                id,
+                work,
+                key,
+                doing,
+                fraction: 0.0,
+                ranking: Vec::new(),
+                stop: stop.clone(),
+            });
+            (id, stop)
+        };
+        self.changed();
+        let bench = self.clone();
+        std::thread::spawn(move || bench.work(id, work, &stop));
+    }
+
+    /// Ends the job `id` as far as anyone can see; it lets go of the processor at its next stage.
+    pub(super) fn cancel(&self, id: u64) {
+        let mut inner = self.lock();
+        inner.jobs.iter().filter(|job| job.id == id).for_each(|job| job.stop.stop());
+        inner.jobs.retain(|job| job.id != id);
+        drop(inner);
+        self.changed();
+    }
+
+    fn work(self: &Arc<Self>, id: u64, work: Work, stop: &Stop) {
+        let progress = |stage: Stage<'_>| {
+            self.farther(id, stage);
+            stop.answer()
+        };
+        let outcome = match work {
+            Work::Diagnosis => self.diagnose(&progress),
+            Work::Fit => self.fit(&progress),
+        };
+        let mut inner = self.lock();
+        let job = inner.jobs.iter().position(|job| job.id == id).map(|k| inner.jobs.remove(k));
+        if let (Some(job), Err(error)) = (job, outcome)
+            && stop.answer().is_continue()
+        {
+            inner.failures.insert(job.key, error.to_string());
+        }
+        drop(inner);
+        self.changed();
+    }
+
+    /// Notes how far a job is.
+    fn farther(&self, id: u64, stage: Stage<'_>) {
+        let mut inner = self.lock();
+        let Some(job) = inner.jobs.iter_mut().find(|job| job.id == id) else { return };
+        job.doing = stage.doing.to_owned();
+        job.fraction = stage.fraction.max(job.fraction);
+        if !stage.ranking.is_empty() {
+            job.ranking = stage.ranking.to_vec();
+        }
+        let job = job.clone();
+        drop(inner);
+        (self.hear)(Event::Progress { job });
+    }
+
+    /// Diagnoses the model as given over the flights to fit to; the prior is tuned behind it, for fits to come.
+    fn diagnose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
+        let ([key, tuned_key], model, flights) = {
+            let inner = self.lock();
+            let keys = [Work::Diagnosis.word(), "tuned"].map(|what| inner.key(what, &[]));
+            (keys, inner.model.clone(), inner.divided()?.fit)
+        };
+        let diagnosis = diagnose(&model, &flights, &Options::default(), progress)?;
+        let value = serde_json::to_value(&diagnosis)?;
+        write_over(&self.diagnosis_file(&key), &value.to_string())?;
+        self.lock().diagnosis = Some((key, Arc::new(value)));
+        self.changed();
+        if self.lock().tuned.as_ref().is_none_or(|(of, _)| *of != tuned_key) {
+            // what tunes badly is said when an effect is ticked
+            if let Ok(tuned) = tune(&model, &flights, &part(progress, [0.95, 1.0])) {
+                self.lock().tuned = Some((tuned_key, tuned));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Work {
+    /// What keys of its results begin with.
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Work::Diagnosis => "diagnosis",
+            Work::Fit => "fit",
+        }
+    }
+}

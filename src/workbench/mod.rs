@@ -1,0 +1,21 @@
+//! The workbench: flights, where a model fails, what it lacks and the amended model, in one session.
+//!
+//! [`Bench`] is the session with what was worked out; it knows no network. [`server`] serves it to a browser on
+//! this machine. What is done here, the commands `compare`, `diagnose` and `amend` do too, by the same functions.
+
+mod act;
+mod bench;
+mod commands;
+mod error;
+mod fit;
+mod flights;
+mod jobs;
+mod mapping;
+pub mod server;
+pub mod session;
+mod view;
+
+pub use act::{Act, Request};
+pub use bench::{Bench, Given};
+pub use error::{Kind, WorkbenchError};
+pub use view::{FlightData, FreeRun, RunRequest};

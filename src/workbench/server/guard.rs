@@ -1,0 +1,111 @@
+//! Who may ask: a page of this program on this machine, by its token.
+
+use axum::extract::{Request, State};
+use axum::http::header::{
+    AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, COOKIE, HOST, LOCATION, ORIGIN,
+    REFERRER_POLICY, SET_COOKIE, X_CONTENT_TYPE_OPTIONS,
+};
+use axum::http::{HeaderMap, HeaderValue, StatusCode};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use super::Shared;
+use super::routes::failure;
+
+/// What a page may load: this program's own files, nothing from elsewhere, nothing written into the page.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
+                      img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// Lets a request pass that has the token and comes from this program's own page.
+pub async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+    let answer = match allowed(&shared, &request) {
+        Ok(Entry::Known) => next.run(request).await,
+        Ok(Entry::New(cookie)) => {
+            // the token leaves the address bar at once
+            let headers = [(SET_COOKIE, cookie), (LOCATION, "/".to_owned())];
+            (StatusCode::SEE_OTHER, headers).into_response()
+        }
+        Err(answer) => *answer,
+    };
+    safe(answer)
+}
+
+/// How a request shows its token.
+enum Entry {
+    /// By the cookie, or a header.
+    Known,
+    /// In the address, to be given this cookie.
+    New(String),
+}
+
+fn allowed(shared: &Shared, request: &Request) -> Result<Entry, Box<Response>> {
+    let headers = request.headers();
+    let port = shared.address.port();
+    let hosts = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
+    let text = |name| headers.get(name).and_then(|v: &HeaderValue| v.to_str().ok());
+    // another site's name that points here, or another site's page
+    let host = text(HOST).is_some_and(|h| hosts.iter().any(|own| own == h));
+    let origin = text(ORIGIN).is_none_or(|o| hosts.iter().any(|own| o == format!("http://{own}")));
+    if !host || !origin {
+        let why = "the workbench answers only its own page on this machine";
+        return Err(Box::new(failure(StatusCode::FORBIDDEN, why)));
+    }
+    let name = format!("greylag-{port}");
+    if cookie(headers, &name).is_some_and(|c| same(c, &shared.token)) {
+        return Ok(Entry::Known);
+    }
+    let bearer = text(AUTHORIZATION).and_then(|a| a.strip_prefix("Bearer "));
+    if bearer.is_some_and(|b| same(b, &shared.token)) {
+        return Ok(Entry::Known);
+    }
+    let query = request.uri().query().unwrap_or_default();
+    let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
+    if request.uri().path() == "/" && token.is_some_and(|t| same(t, &shared.token)) {
+        let token = &shared.token;
+        return Ok(Entry::New(format!("{name}={token}; Path=/; HttpOnly; SameSite=Strict")));
+    }
+    let why = "wrong or missing token: open the address that `greylag workbench` printed";
+    Err(Box::new(failure(StatusCode::UNAUTHORIZED, why)))
+}
+
+/// The cookie `name`.
+fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    let all = headers.get_all(COOKIE).into_iter().filter_map(|v| v.to_str().ok());
+    all.flat_map(|line| line.split("; ")).find_map(|pair| {
+        let (own, value) = pair.split_once('=')?;
+        (own == name).then_some(value)
+    })
+}
+
+/// Whether two tokens are the same, in a time that does not tell where they differ.
+fn same(a: &str, b: &str) -> bool {
+    a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |off, (a, b)| off | (a ^ b)) == 0
+}
+
+/// An answer with the headers that all have.
+fn safe(mut answer: Response) -> Response {
+    let headers = answer.headers_mut();
+    for (name, value) in [
+        (CONTENT_SECURITY_POLICY, POLICY),
+        (X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (REFERRER_POLICY, "no-referrer"),
+        (CACHE_CONTROL, "no-store"),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    answer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tokens_and_cookies_are_compared_whole() {
+        assert!(same("abc", "abc") && !same("abc", "abd") && !same("ab", "abc") && !same("", "a"));
+        let mut headers = HeaderMap::new();
+        headers.insert(COOKIE, HeaderValue::from_static("a=1; greylag-80=xyz; b=2"));
+        assert_eq!(cookie(&headers, "greylag-80"), Some("xyz"));
+        assert_eq!(cookie(&headers, "greylag-8"), None);
+    }
+}

@@ -1,0 +1,112 @@
+//! The workbench served to a browser on this machine: loopback only, a token, no file from elsewhere.
+
+mod assets;
+mod guard;
+mod routes;
+
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+
+use axum::Router;
+use axum::extract::DefaultBodyLimit;
+use axum::routing::{get, post};
+use tokio::sync::broadcast::{self, Sender};
+
+use super::bench::{Bench, Given};
+use super::error::WorkbenchError;
+use super::jobs::Event;
+
+/// Largest log that a page may send, bytes.
+pub const LARGEST_LOG: usize = 256 << 20;
+/// Largest other request, bytes.
+const LARGEST_REQUEST: usize = 64 << 10;
+/// Events that a slow page may lag behind.
+const LAG: usize = 256;
+
+/// Why the workbench cannot be served.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// The session cannot be opened.
+    #[error(transparent)]
+    Bench(#[from] WorkbenchError),
+    /// The port is taken, or the system refused.
+    #[error(
+        "cannot serve the workbench on 127.0.0.1 port {port}: {source}; give another --port, or 0 for any"
+    )]
+    Socket {
+        /// The port that was asked for.
+        port: u16,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// What all requests share.
+#[derive(Clone)]
+struct Shared {
+    bench: Arc<Bench>,
+    events: Sender<Arc<str>>,
+    token: Arc<str>,
+    address: SocketAddr,
+}
+
+/// Serves the session of `given` on `port` of this machine (0 for any that is free) with `token`, until the
+/// program ends; `ready` hears the page's address.
+///
+/// # Errors
+/// The session cannot be opened, or the port not be had.
+pub fn serve(
+    given: Given,
+    port: u16,
+    token: &str,
+    ready: impl FnOnce(&str),
+) -> Result<(), ServeError> {
+    let socket = |source| ServeError::Socket { port, source };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    runtime.map_err(socket)?.block_on(async {
+        let listener =
+            tokio::net::TcpListener::bind((Ipv4Addr::LOCALHOST, port)).await.map_err(socket)?;
+        let address = listener.local_addr().map_err(socket)?;
+        let (events, _) = broadcast::channel(LAG);
+        let shout = events.clone();
+        let hear = move |event: Event| {
+            if let Ok(text) = serde_json::to_string(&event) {
+                // nobody listens as long as no page is open
+                let _ = shout.send(text.into());
+            }
+        };
+        let bench = Bench::open(given, hear)?;
+        let shared = Shared { bench, events, token: token.into(), address };
+        ready(&format!("http://{address}/?token={token}"));
+        axum::serve(listener, router(shared)).await.map_err(socket)
+    })
+}
+
+/// A token that nobody guesses, hexadecimal.
+///
+/// # Errors
+/// The system has no random numbers.
+pub fn random_token() -> io::Result<String> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes).map_err(io::Error::other)?;
+    Ok(bytes.iter().map(|b| format!("{b:02x}")).collect())
+}
+
+fn router(shared: Shared) -> Router {
+    Router::new()
+        .route("/", get(assets::page))
+        .route("/assets/{name}", get(assets::asset))
+        .route("/api/state", get(routes::state))
+        .route("/api/failing", get(routes::failing))
+        .route("/api/diagnosis", get(routes::diagnosis))
+        .route("/api/flight/{place}", get(routes::flight))
+        .route("/api/free-run", post(routes::free_run))
+        .route("/api/act", post(routes::act))
+        .route("/api/events", get(routes::events))
+        .fallback(routes::nothing)
+        .layer(DefaultBodyLimit::max(LARGEST_REQUEST))
+        .route("/api/logs", post(routes::take))
+        .layer(axum::middleware::from_fn_with_state(shared.clone(), guard::guard))
+        .with_state(shared)
+}

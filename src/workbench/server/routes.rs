@@ -1,0 +1,142 @@
+//! What is answered to which request.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use axum::Json;
+use axum::body::{Body, to_bytes};
+use axum::extract::{Path, Query, State};
+use axum::http::header::CONTENT_LENGTH;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::sse::{self, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use tokio_stream::wrappers::BroadcastStream;
+use tokio_stream::{Stream, StreamExt};
+
+use super::{LARGEST_LOG, Shared};
+use crate::workbench::act::Request;
+use crate::workbench::bench::Bench;
+use crate::workbench::error::{Kind, WorkbenchError};
+use crate::workbench::view::RunRequest;
+
+/// A failure in words.
+pub fn failure(status: StatusCode, why: &str) -> Response {
+    (status, Json(json!({ "error": why }))).into_response()
+}
+
+impl IntoResponse for WorkbenchError {
+    fn into_response(self) -> Response {
+        let status = match self.kind() {
+            Kind::Bad => StatusCode::UNPROCESSABLE_ENTITY,
+            Kind::Conflict => StatusCode::CONFLICT,
+            Kind::Locked => StatusCode::LOCKED,
+            Kind::Missing => StatusCode::NOT_FOUND,
+            Kind::Failed => StatusCode::INTERNAL_SERVER_ERROR,
+        };
+        failure(status, &self.to_string())
+    }
+}
+
+/// Works on a thread of its own, so that other requests are answered meanwhile.
+async fn aside<T: Serialize + Send + 'static>(
+    shared: Shared,
+    work: impl FnOnce(&Arc<Bench>) -> Result<T, WorkbenchError> + Send + 'static,
+) -> Response {
+    match tokio::task::spawn_blocking(move || work(&shared.bench)).await {
+        Ok(Ok(answer)) => Json(answer).into_response(),
+        Ok(Err(error)) => error.into_response(),
+        Err(error) => failure(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            &format!("a fault of the program, please report it: {error}"),
+        ),
+    }
+}
+
+/// The session.
+pub async fn state(State(shared): State<Shared>) -> Response {
+    aside(shared, |bench| bench.state()).await
+}
+
+/// Where the models fail.
+pub async fn failing(State(shared): State<Shared>) -> Response {
+    aside(shared, |bench| bench.failing()).await
+}
+
+/// The diagnosis.
+pub async fn diagnosis(State(shared): State<Shared>) -> Response {
+    aside(shared, |bench| Ok(bench.diagnosis())).await
+}
+
+/// A flight over time.
+pub async fn flight(State(shared): State<Shared>, Path(place): Path<usize>) -> Response {
+    aside(shared, move |bench| bench.flight(place)).await
+}
+
+/// Free runs from a moment.
+pub async fn free_run(State(shared): State<Shared>, Json(request): Json<RunRequest>) -> Response {
+    aside(shared, move |bench| bench.free_run(request)).await
+}
+
+/// A change, answered with the session as it is then.
+pub async fn act(State(shared): State<Shared>, Json(request): Json<Request>) -> Response {
+    aside(shared, move |bench| {
+        bench.act(request)?;
+        bench.state()
+    })
+    .await
+}
+
+/// The log's name, and the revision that its sender saw.
+#[derive(Deserialize)]
+pub struct Sent {
+    name: String,
+    revision: u64,
+}
+
+/// A log, answered with the session as it is then.
+pub async fn take(
+    State(shared): State<Shared>,
+    Query(sent): Query<Sent>,
+    headers: HeaderMap,
+    body: Body,
+) -> Response {
+    let announced = headers.get(CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
+    // one that says so is refused before it is sent
+    if announced.is_some_and(|bytes: usize| bytes > LARGEST_LOG) {
+        return too_large(&sent.name);
+    }
+    let Ok(bytes) = to_bytes(body, LARGEST_LOG).await else { return too_large(&sent.name) };
+    aside(shared, move |bench| {
+        bench.take(sent.revision, &sent.name, &bytes)?;
+        bench.state()
+    })
+    .await
+}
+
+fn too_large(name: &str) -> Response {
+    let most = LARGEST_LOG >> 20;
+    let why = format!(
+        "{name} did not come whole, or is over {most} MB, which a page may not send; name its file: greylag workbench {name}"
+    );
+    failure(StatusCode::PAYLOAD_TOO_LARGE, &why)
+}
+
+/// What happens, as it happens.
+pub async fn events(
+    State(shared): State<Shared>,
+) -> Sse<impl Stream<Item = Result<sse::Event, Infallible>>> {
+    let now = json!({ "event": "changed", "revision": shared.bench.revision() });
+    let first = tokio_stream::once(Arc::from(now.to_string()));
+    // a page that lags misses stages, not changes: each has the revision
+    let later = BroadcastStream::new(shared.events.subscribe()).filter_map(Result::ok);
+    let all = first.chain(later).map(|text: Arc<str>| Ok(sse::Event::default().data(&*text)));
+    Sse::new(all).keep_alive(KeepAlive::default())
+}
+
+/// Any other request.
+pub async fn nothing() -> Response {
+    let body: Value = json!({ "error": "there is nothing of that name" });
+    (StatusCode::NOT_FOUND, Json(body)).into_response()
+}

@@ -1,0 +1,251 @@
+//! What a session remembers, as it stands in `session.toml`.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::error::{WorkbenchError, io};
+use crate::report;
+
+/// The file in the session's folder.
+pub const FILE: &str = "session.toml";
+/// Its schema.
+const SCHEMA: u32 = 1;
+
+/// What a flight serves for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// The model is fitted to it.
+    Fit,
+    /// Effects are judged by it; the fit does not see it.
+    HoldOut,
+    /// It stays unseen until the models are judged by it.
+    Test,
+    /// It serves for nothing.
+    Unused,
+}
+
+/// A log of the session.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogEntry {
+    /// Its file; a relative path is below the session's folder.
+    pub path: PathBuf,
+    /// SHA-256 of its content.
+    pub sha256: String,
+    /// What it serves for.
+    pub role: Role,
+}
+
+impl LogEntry {
+    /// What the flight is called: the file's name.
+    pub fn name(&self) -> String {
+        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+}
+
+/// An effect that was accepted.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Accepted {
+    /// Its id.
+    pub id: String,
+    /// Whether it stays though the data refuse it.
+    #[serde(default)]
+    pub anyway: bool,
+}
+
+/// A look at the test flights.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Opening {
+    /// When, seconds since 1970 (UTC).
+    pub unix_s: u64,
+    /// The effects that were in the model.
+    pub effects: Vec<String>,
+    /// The flights.
+    pub flights: Vec<String>,
+    /// Normalised root mean square error of the model as given at `horizon_s`; NaN if no run gets there.
+    pub given: f64,
+    /// The same of the amended model.
+    pub amended: f64,
+    /// Horizon of the free runs, s.
+    pub horizon_s: f64,
+}
+
+/// A session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Session {
+    /// 1.
+    pub schema: u32,
+    /// Goes up by one with each change.
+    pub revision: u64,
+    /// The model to start from.
+    pub model: PathBuf,
+    /// SHA-256 of its file.
+    pub model_sha256: String,
+    /// The logs.
+    #[serde(default)]
+    pub logs: Vec<LogEntry>,
+    /// The accepted effects, in order.
+    #[serde(default)]
+    pub effects: Vec<Accepted>,
+    /// Effects that were taken back, the one that comes back first last.
+    #[serde(default)]
+    pub undone: Vec<Accepted>,
+    /// Looks at the test flights, in order.
+    #[serde(default)]
+    pub openings: Vec<Opening>,
+}
+
+impl Session {
+    /// A session that begins with the file `model`.
+    pub fn new(model: PathBuf, model_sha256: String) -> Session {
+        Session {
+            schema: SCHEMA,
+            revision: 0,
+            model,
+            model_sha256,
+            logs: Vec::new(),
+            effects: Vec::new(),
+            undone: Vec::new(),
+            openings: Vec::new(),
+        }
+    }
+
+    /// The session of `folder`; `None` if there is none yet.
+    ///
+    /// # Errors
+    /// The file cannot be read or is no session.
+    pub fn read(folder: &Path) -> Result<Option<Session>, WorkbenchError> {
+        let path = folder.join(FILE);
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(io(&path, e)),
+        };
+        let broken = |why: String| WorkbenchError::Session { path: path.clone(), why };
+        let session: Session = toml::from_str(&text).map_err(|e| broken(e.to_string()))?;
+        match session.schema {
+            SCHEMA => Ok(Some(session)),
+            other => Err(broken(format!("its schema is {other}, this program knows {SCHEMA}"))),
+        }
+    }
+
+    /// Writes the session to `folder`, whole or not at all.
+    ///
+    /// # Errors
+    /// The folder or the disk refuses.
+    pub fn write(&self, folder: &Path) -> Result<(), WorkbenchError> {
+        let path = folder.join(FILE);
+        let text = toml::to_string(self)
+            .map_err(|e| WorkbenchError::Session { path: path.clone(), why: e.to_string() })?;
+        Ok(report::write_over(&path, &text)?)
+    }
+
+    /// Places of the logs with a role, in order.
+    pub fn with(&self, role: Role) -> impl Iterator<Item = usize> {
+        self.logs.iter().enumerate().filter(move |(_, log)| log.role == role).map(|(k, _)| k)
+    }
+
+    /// The role that a log takes when it comes: one that is called a test is one, the second that comes is
+    /// held out.
+    pub fn usual_role(&self, name: &str) -> Role {
+        let has = |role| self.with(role).next().is_some();
+        match name.to_lowercase().starts_with("test") {
+            true => Role::Test,
+            false if has(Role::Fit) && !has(Role::HoldOut) => Role::HoldOut,
+            false => Role::Fit,
+        }
+    }
+}
+
+/// A session's folder, which no other workbench may open as long as this is kept.
+pub struct Claim(#[allow(dead_code)] File);
+
+impl Claim {
+    /// Claims `folder`, which is made if there is none.
+    ///
+    /// # Errors
+    /// Another workbench has it, or it cannot be made.
+    pub fn of(folder: &Path) -> Result<Claim, WorkbenchError> {
+        fs::create_dir_all(folder.join("logs")).map_err(|e| io(folder, e))?;
+        let path = folder.join(".lock");
+        let file = File::create(&path).map_err(|e| io(&path, e))?;
+        match file.try_lock() {
+            Ok(()) => Ok(Claim(file)),
+            Err(fs::TryLockError::WouldBlock) => Err(WorkbenchError::Open(folder.into())),
+            Err(fs::TryLockError::Error(e)) => Err(io(&path, e)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn log(name: &str, role: Role) -> LogEntry {
+        LogEntry { path: name.into(), sha256: "0".into(), role }
+    }
+
+    #[test]
+    fn what_is_written_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(Session::read(folder.path()).unwrap(), None);
+        let mut session = Session::new("m.toml".into(), "abc".into());
+        session.revision = 7;
+        session.logs = vec![log("logs/a.csv", Role::Fit), log("/b.ulg", Role::Test)];
+        session.effects = vec![Accepted { id: "drag_beta2".into(), anyway: true }];
+        session.openings.push(Opening {
+            unix_s: 1,
+            effects: vec!["drag_beta2".into()],
+            flights: vec!["b.ulg".into()],
+            given: 0.1,
+            amended: 0.01,
+            horizon_s: 5.0,
+        });
+        session.write(folder.path()).unwrap();
+        assert_eq!(Session::read(folder.path()).unwrap(), Some(session));
+    }
+
+    #[test]
+    fn a_file_that_is_no_session_is_said_and_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(FILE), "schema = 1\nrevison = 3\n").unwrap();
+        let error = Session::read(folder.path()).unwrap_err().to_string();
+        assert!(error.contains(FILE) && error.contains("--dir"), "{error}");
+        fs::write(
+            folder.path().join(FILE),
+            "schema = 9\nrevision = 3\nmodel = 'm'\nmodel_sha256 = ''\n",
+        )
+        .unwrap();
+        assert!(Session::read(folder.path()).unwrap_err().to_string().contains("schema is 9"));
+    }
+
+    #[test]
+    fn roles_as_logs_come() {
+        let mut session = Session::new("m.toml".into(), String::new());
+        for (name, expected) in [
+            ("train-1.csv", Role::Fit),
+            ("train-2.csv", Role::HoldOut),
+            ("train-3.csv", Role::Fit),
+            ("test-1.csv", Role::Test),
+        ] {
+            let role = session.usual_role(name);
+            assert_eq!(role, expected, "{name}");
+            session.logs.push(log(name, role));
+        }
+    }
+
+    #[test]
+    fn a_folder_is_claimed_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let claim = Claim::of(folder.path()).unwrap();
+        assert!(matches!(Claim::of(folder.path()), Err(WorkbenchError::Open(_))));
+        drop(claim);
+        assert!(Claim::of(folder.path()).is_ok());
+    }
+}

@@ -1,0 +1,347 @@
+//! `greylag workbench` over real HTTP: drop, see, tick, judge, save, and everything that must be refused.
+#![cfg(feature = "sitl")]
+
+mod amend_support;
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use amend_support::{Manoeuvres, errors, fly, sensors};
+use greylag::logs::csv;
+use serde_json::{Value, json};
+
+const MODEL: &str = "params/x8/jsbsim.toml";
+/// What any answer of the program may take here: other tests run beside this one on two cores.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// The program with its address and token; it is killed when dropped, as by `kill -9`.
+struct Bench {
+    child: Child,
+    host: String,
+    token: String,
+}
+
+impl Bench {
+    fn open(folder: &Path, more: &[&str]) -> Bench {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_greylag"))
+            .args(["workbench", "--dir", folder.to_str().unwrap()])
+            .args(more)
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let address = line.split_whitespace().last().unwrap_or_default();
+        let (host, token) =
+            address.strip_prefix("http://").unwrap().split_once("/?token=").unwrap();
+        Bench { child, host: host.into(), token: token.into() }
+    }
+
+    /// A request with these header lines; status, head and body of the answer.
+    fn raw(&self, method: &str, path: &str, headers: &str, body: &[u8]) -> (u16, String, Vec<u8>) {
+        let mut stream = TcpStream::connect(&self.host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let length = body.len();
+        let head = format!(
+            "{method} {path} HTTP/1.1\r\nConnection: close\r\nContent-Length: {length}\r\n{headers}\r\n"
+        );
+        stream.write_all(head.as_bytes()).unwrap();
+        // a request that is refused early is not read to its end
+        let _ = stream.write_all(body);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        let end = answer.windows(4).position(|w| w == b"\r\n\r\n").expect("an answer with a head");
+        let head = String::from_utf8_lossy(&answer[..end]).into_owned();
+        let status = head.split(' ').nth(1).unwrap().parse().unwrap();
+        (status, head, answer[end + 4..].to_vec())
+    }
+
+    fn headers(&self) -> String {
+        format!(
+            "Host: {}\r\nAuthorization: Bearer {}\r\nContent-Type: application/json\r\n",
+            self.host, self.token
+        )
+    }
+
+    fn ask(&self, method: &str, path: &str, body: &[u8]) -> (u16, Value) {
+        let (status, _, body) = self.raw(method, path, &self.headers(), body);
+        (status, serde_json::from_slice(&body).unwrap_or(Value::Null))
+    }
+
+    fn get(&self, path: &str) -> (u16, Value) {
+        self.ask("GET", path, b"")
+    }
+
+    fn state(&self) -> Value {
+        self.get("/api/state").1
+    }
+
+    /// Asks for a change at the session's present revision.
+    fn act(&self, act: Value) -> (u16, Value) {
+        self.act_at(self.state()["revision"].as_u64().unwrap(), act)
+    }
+
+    fn act_at(&self, revision: u64, act: Value) -> (u16, Value) {
+        let request = json!({ "revision": revision, "act": act });
+        self.ask("POST", "/api/act", request.to_string().as_bytes())
+    }
+
+    fn drop_file(&self, name: &str, content: &[u8]) -> (u16, Value) {
+        let revision = self.state()["revision"].as_u64().unwrap();
+        self.ask("POST", &format!("/api/logs?name={name}&revision={revision}"), content)
+    }
+
+    /// Waits until the state is as wanted.
+    fn until(&self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
+        let begun = Instant::now();
+        loop {
+            let state = self.state();
+            if wanted(&state) {
+                return state;
+            }
+            assert!(begun.elapsed() < PATIENCE, "{what}: {state}");
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Three logs of an aircraft whose actuators lag by 50 ms, which the model does not know.
+fn logs(folder: &Path) -> Vec<PathBuf> {
+    let log = |k: u64| {
+        let flown = fly("actuator_lag=0.05", 25.0, Manoeuvres::Usual, 20 + k);
+        let name = if k < 2 { format!("flight-{k}.csv") } else { "test-2.csv".into() };
+        let path = folder.join(name);
+        csv::save(&sensors::spoil(&flown, &errors(20 + k), k), &path).unwrap();
+        path
+    };
+    (0..3).map(log).collect()
+}
+
+fn word(value: &Value) -> &str {
+    value["error"].as_str().unwrap_or_default()
+}
+
+/// The error at 5 s.
+fn at_5_s(scores: &Value) -> f64 {
+    let five = scores.as_array().unwrap().iter().find(|s| s["horizon_s"] == 5.0);
+    five.unwrap()["rmse_scaled"].as_f64().unwrap()
+}
+
+#[test]
+fn drop_see_tick_judge_save_and_go_on_after_a_kill() {
+    let scratch = tempfile::tempdir().unwrap();
+    let (session, logs) = (scratch.path().join("session"), logs(scratch.path()));
+    let bench = Bench::open(&session, &["--model", MODEL]);
+
+    // drop: roles as they come, the test unseen
+    for log in &logs {
+        let name = log.file_name().unwrap().to_str().unwrap();
+        let (status, state) = bench.drop_file(name, &fs::read(log).unwrap());
+        assert_eq!(status, 200, "{state}");
+    }
+    let state = bench.state();
+    let roles: Vec<_> = (0..3).map(|k| state["flights"][k]["role"].as_str().unwrap()).collect();
+    assert_eq!(roles, ["fit", "hold_out", "test"]);
+    assert_eq!(state["flights"][2]["locked"], true);
+    assert!(state["flights"][2]["strip"].is_null());
+    let (status, said) = bench.get("/api/flight/2");
+    assert_eq!((status, word(&said).contains("press Judge")), (423, true), "{said}");
+    // the same log under another name is no other log
+    let (status, said) = bench.drop_file("copy.csv", &fs::read(&logs[0]).unwrap());
+    assert_eq!((status, word(&said).contains("flight-0.csv")), (422, true), "{said}");
+
+    // see
+    let (status, failing) = bench.get("/api/failing");
+    assert_eq!(status, 200, "{failing}");
+    assert_eq!(failing["flights"], json!([0, 1]));
+    let channels = failing["models"][0]["channels"].as_array().unwrap();
+    assert!(channels.len() >= 6 && !channels[0]["bins"].as_array().unwrap().is_empty());
+    let (_, flight) = bench.get("/api/flight/0");
+    let (windows, lift) = (&flight["window_s"], &flight["channels"]["L"]);
+    // measured and one model
+    assert_eq!(lift.as_array().unwrap().len(), 2);
+    assert_eq!(lift[0].as_array().unwrap().len(), windows.as_array().unwrap().len());
+    let run = json!({ "flight": 0, "time_s": 10.0, "seconds": 5.0 }).to_string();
+    let (status, run) = bench.ask("POST", "/api/free-run", run.as_bytes());
+    assert_eq!(status, 200, "{run}");
+    let (times, speed) = (&run["runs"][0]["time_s"], &run["runs"][0]["states"]["V"]);
+    assert!((times[0].as_f64().unwrap() - 10.0).abs() < 0.01);
+    // 5 s at 100 Hz with both ends
+    assert_eq!((times.as_array().unwrap().len(), speed.as_array().unwrap().len()), (501, 501));
+    let nowhere = json!({ "flight": 0, "time_s": 9e9, "seconds": 5.0 }).to_string();
+    assert_eq!(bench.ask("POST", "/api/free-run", nowhere.as_bytes()).0, 422);
+
+    // tick
+    let (status, said) = bench.act(json!({ "do": "tick", "effect": "flubber" }));
+    assert_eq!((status, word(&said).contains("effects list")), (422, true), "{said}");
+    let (status, said) = bench.act(json!({ "do": "tick", "effect": "actuator_lag" }));
+    assert_eq!(status, 200, "{said}");
+    let state = bench.until("the fit", |s| s["stack"][0]["status"] == "fitted");
+    let step = &state["stack"][0];
+    let (before, after) = (at_5_s(&step["story"]["before"]), at_5_s(&step["story"]["after"]));
+    // a tenth of the error would be an effect that hardly acts; the lag is most of it
+    assert!(after < 0.5 * before, "{before} to {after}");
+    assert!(at_5_s(&step["on_fit"]["amended"]) < at_5_s(&step["on_fit"]["given"]));
+    let (_, failing) = bench.get("/api/failing");
+    assert_eq!(failing["models"][1]["name"], "jsbsim+actuator_lag");
+
+    // judge: counted and written before it is told
+    let (status, state) = bench.act(json!({ "do": "judge" }));
+    assert_eq!(status, 200, "{state}");
+    let opening = &state["openings"][0];
+    assert_eq!(opening["flights"], json!(["test-2.csv"]));
+    assert!(opening["amended"].as_f64().unwrap() < opening["given"].as_f64().unwrap());
+    assert!(fs::read_to_string(session.join("session.toml")).unwrap().contains("[[openings]]"));
+    assert_eq!(bench.get("/api/flight/2").0, 200);
+
+    // save: the file of the command, to the bit
+    assert_eq!(bench.act(json!({ "do": "save" })).0, 200);
+    let line = state["commands"]["amend"].as_str().unwrap();
+    let out = scratch.path().join("by-command");
+    let said = session.canonicalize().unwrap().join("model").display().to_string();
+    let line = line.replace(&format!("--out {said}"), &format!("--out {}", out.display()));
+    let words: Vec<&str> = line.split(' ').skip(1).collect();
+    let made = Command::new(env!("CARGO_BIN_EXE_greylag")).args(&words).output().unwrap();
+    assert!(made.status.success(), "{line}: {}", String::from_utf8_lossy(&made.stderr));
+    for file in ["model.toml", "airframe.toml", "amend.json"] {
+        let [by_page, by_command] =
+            [session.join("model"), out.clone()].map(|f| fs::read_to_string(f.join(file)).unwrap());
+        assert_eq!(by_page, by_command, "{file}");
+    }
+
+    // kill -9, and on
+    let revision = bench.state()["revision"].clone();
+    drop(bench);
+    let bench = Bench::open(&session, &[]);
+    let state = bench.state();
+    assert_eq!(state["revision"], revision);
+    assert_eq!(state["stack"][0]["status"], "fitted");
+    assert_eq!(state["openings"].as_array().unwrap().len(), 1);
+    assert_eq!(bench.act(json!({ "do": "undo" })).1["redo"], "actuator_lag");
+    let (status, state) = bench.act(json!({ "do": "redo" }));
+    assert_eq!((status, &state["stack"][0]["status"]), (200, &json!("fitted")));
+}
+
+#[test]
+fn what_must_be_refused_is_refused_in_words() {
+    let scratch = tempfile::tempdir().unwrap();
+    let (session, place) = (scratch.path().join("session"), scratch.path());
+    let model = place.join("model.toml");
+    fs::copy(MODEL, &model).unwrap();
+    fs::copy("params/x8/airframe.toml", place.join("airframe.toml")).unwrap();
+    let bench = Bench::open(&session, &["--model", model.to_str().unwrap()]);
+    let host = format!("Host: {}\r\n", bench.host);
+    let token = &bench.token;
+
+    // who may ask
+    for headers in [
+        host.clone(),
+        format!("{host}Authorization: Bearer wrong\r\n"),
+        format!("{host}Cookie: greylag-1={token}\r\n"),
+    ] {
+        let (status, _, body) = bench.raw("GET", "/api/state", &headers, b"");
+        assert_eq!(status, 401, "{headers}");
+        assert!(String::from_utf8_lossy(&body).contains("token"));
+    }
+    let right = format!("Authorization: Bearer {token}\r\n");
+    let evil = format!("Host: evil.example\r\n{right}");
+    assert_eq!(bench.raw("GET", "/api/state", &evil, b"").0, 403);
+    let evil = format!("{host}{right}Origin: http://127.0.0.1:1\r\n");
+    assert_eq!(bench.raw("POST", "/api/act", &evil, b"{}").0, 403);
+    // the token of the address becomes a cookie, and nothing else may be loaded
+    let (status, head, _) = bench.raw("GET", &format!("/?token={token}"), &host, b"");
+    let head = head.to_lowercase();
+    assert!(status == 303 && head.contains("httponly") && head.contains("samesite=strict"));
+    assert!(head.contains("default-src 'none'"), "{head}");
+    let port = bench.host.rsplit(':').next().unwrap();
+    let cookie = format!("{host}Cookie: greylag-{port}={token}\r\n");
+    let (status, _, page) = bench.raw("GET", "/", &cookie, b"");
+    assert!(status == 200 && String::from_utf8_lossy(&page).contains("Where it fails"));
+
+    // what may be dropped
+    let (status, said) = bench.drop_file("picture.csv", b"\x89PNG\r\n\x1a\n0000000000");
+    assert_eq!((status, word(&said).contains("picture.csv")), (422, true), "{said}");
+    assert!(fs::read_dir(session.join("logs")).unwrap().next().is_none(), "kept what is no log");
+    for name in ["..%2Fout.csv", "%2Fetc%2Fpasswd", ".hidden"] {
+        assert_eq!(bench.drop_file(name, b"time_s\n").0, 422, "{name}");
+    }
+    let large = format!("{}Content-Length: 1073741824\r\n", bench.headers());
+    let (status, _, body) = {
+        // 1 GB announced is refused before it is sent
+        let mut stream = TcpStream::connect(&bench.host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        write!(
+            stream,
+            "POST /api/logs?name=large.csv&revision=0 HTTP/1.1\r\nConnection: close\r\n{large}\r\n"
+        )
+        .unwrap();
+        let mut answer = String::new();
+        let _ = stream.read_to_string(&mut answer);
+        (answer.split(' ').nth(1).unwrap().to_owned(), (), answer)
+    };
+    assert!(status == "413" && body.contains("greylag workbench large.csv"), "{body}");
+    for (method, path) in
+        [("GET", "/api/none"), ("GET", "/assets/none.js"), ("GET", "/api/flight/7")]
+    {
+        assert_eq!(bench.get(path).0, 404, "{method} {path}");
+    }
+    assert!(bench.act(json!({ "do": "dance" })).0 >= 400);
+    for (act, why) in [
+        (json!({ "do": "diagnose" }), "fit the model to"),
+        (json!({ "do": "judge" }), "test"),
+        (json!({ "do": "undo" }), "nothing"),
+        (json!({ "do": "save" }), "accept an effect first"),
+    ] {
+        let (status, said) = bench.act(act.clone());
+        assert_eq!((status, word(&said).contains(why)), (422, true), "{act}: {said}");
+    }
+
+    // two browsers: the second one is told
+    let log = fs::read(&logs(place)[0]).unwrap();
+    assert_eq!(bench.drop_file("a.csv", &log).0, 200);
+    let seen = bench.state()["revision"].as_u64().unwrap();
+    let role = |role: &str| json!({ "do": "role", "flight": 0, "role": role });
+    assert_eq!(bench.act_at(seen, role("unused")).0, 200);
+    let (status, said) = bench.act_at(seen, role("test"));
+    assert_eq!((status, word(&said).contains("another window")), (409, true), "{said}");
+    assert_eq!(bench.state()["flights"][0]["role"], "unused");
+    assert_eq!(bench.act(role("fit")).0, 200);
+
+    // two programs: the second one is told
+    let second = Command::new(env!("CARGO_BIN_EXE_greylag"))
+        .args(["workbench", "--dir", session.to_str().unwrap()])
+        .output()
+        .unwrap();
+    assert!(!second.status.success());
+    assert!(String::from_utf8_lossy(&second.stderr).contains("another workbench"));
+
+    // a model edited outside
+    let text = fs::read_to_string(&model).unwrap();
+    fs::write(&model, text.replace("name = \"jsbsim\"", "name = \"edited\"")).unwrap();
+    assert_eq!(bench.state()["model"]["changed_outside"], true);
+    let (status, said) = bench.act(json!({ "do": "diagnose" }));
+    assert_eq!((status, word(&said).contains("changed on disk")), (409, true), "{said}");
+    let (status, state) = bench.act(json!({ "do": "reload_model" }));
+    assert_eq!((status, &state["model"]["name"]), (200, &json!("edited")), "{state}");
+
+    // a diagnosis is cancelled at once
+    assert_eq!(bench.act(json!({ "do": "diagnose" })).0, 200);
+    let job = bench.state()["jobs"][0]["id"].clone();
+    let begun = Instant::now();
+    let (_, state) = bench.act(json!({ "do": "cancel", "job": job }));
+    assert_eq!(state["jobs"], json!([]));
+    // 100 ms is asked of an idle machine
+    assert!(begun.elapsed() < Duration::from_secs(2), "{:?}", begun.elapsed());
+}

@@ -1,0 +1,234 @@
+#!/usr/bin/env python3
+"""Walks through the workbench in headless Chromium: drop, see, tick, judge, save; prints how long each step took.
+
+    tests/workbench_walk.py GREYLAG FLIGHTS FOLDER
+
+GREYLAG is the program, FLIGHTS a folder made by `greylag mystery`. Writes FOLDER/*.png at 1400 and 390 pixels, light and
+dark, and fails on any console message of level error, exception, request to another address, text wider than the page,
+or step that does not come to its end. Needs Debian's `chromium` (or $CHROMIUM); no Python package.
+"""
+
+import base64
+import filecmp
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+
+from report_screenshot import Browser, complaints
+
+SIZES = {1400: 900, 390: 844}
+# One entry a step: its name, seconds, and what the workbench aims at.
+timings = []
+
+
+class Workbench:
+    """`greylag workbench` with its address."""
+
+    def __init__(self, greylag, model, folder):
+        self.process = subprocess.Popen(
+            [greylag, "workbench", "--model", model, "--dir", folder], stdout=subprocess.PIPE, text=True)
+        line = self.process.stdout.readline()
+        if "http" not in line:
+            sys.exit(f"the workbench did not open: {line}")
+        self.address = line.split()[-1]
+        self.origin = self.address.split("/?")[0]
+
+    def kill(self):
+        os.kill(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+
+
+def wait(browser, expression, seconds, what):
+    """Waits until the page says so; how long it took, s."""
+    begun = time.monotonic()
+    # an element would come back as an empty object
+    while not browser.value(f"!!({expression})"):
+        if time.monotonic() - begun > seconds:
+            text = browser.value("document.body.innerText")
+            sys.exit(f"{what}: not within {seconds} s; the page says\n{text}")
+        time.sleep(0.01)
+    return time.monotonic() - begun
+
+
+def took(step, seconds, aim):
+    timings.append((step, seconds, aim))
+
+
+def drop(browser, files):
+    """Drops files on the page as a hand does."""
+    data = {"items": [], "files": [str(f) for f in files], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        browser.call("Input.dispatchDragEvent", type=kind, x=120, y=100, data=data)
+
+
+def click(browser, selector):
+    if not browser.value(f"(() => {{ const e = document.querySelector({selector!r}); e?.click(); return !!e && !e.disabled; }})()"):
+        sys.exit(f"cannot click {selector}")
+
+
+def shoot(browser, folder, name):
+    """Screenshots of the page at all widths and themes; texts that are wider than the page."""
+    found = []
+    for width, height in SIZES.items():
+        browser.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=2 if width == 390 else 1, mobile=width == 390)
+        for theme in ("light", "dark"):
+            browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": theme}])
+            time.sleep(0.4)
+            shot = browser.call("Page.captureScreenshot", captureBeyondViewport=width == 390)
+            (folder / f"{name}-{width}-{theme}.png").write_bytes(base64.b64decode(shot["data"]))
+        wide = browser.value("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        if wide > 0:
+            found.append(f"{name}: the page is {wide} px wider than {width}")
+    browser.call("Emulation.setDeviceMetricsOverride", width=1400, height=900, deviceScaleFactor=1, mobile=False)
+    return found
+
+
+def refused(origin, path, token="wrong"):
+    """Whether a request with a wrong token is refused."""
+    try:
+        urllib.request.urlopen(urllib.request.Request(origin + path, headers={"Authorization": f"Bearer {token}"}))
+    except urllib.error.HTTPError as error:
+        return error.code == 401
+    return False
+
+
+def foreign_sockets(pid):
+    """Sockets of a process that are not on the loopback, as /proc/net has them."""
+    own = set()
+    for fd in pathlib.Path(f"/proc/{pid}/fd").iterdir():
+        link = os.readlink(fd)
+        if link.startswith("socket:["):
+            own.add(link[8:-1])
+    found = []
+    for table in ("tcp", "tcp6", "udp", "udp6"):
+        for line in pathlib.Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            # 127.0.0.1, least byte first
+            if fields[9] in own and not fields[1].startswith("0100007F:"):
+                found.append(f"{table} socket on {fields[1]}")
+    return found
+
+
+def walk(browser, bench, greylag, flights, folder, session):
+    found = []
+    logs = sorted(flights.glob("train-*.csv")) + sorted(flights.glob("test-*.csv"))
+    browser.call("Emulation.setDeviceMetricsOverride", width=1400, height=900, deviceScaleFactor=1, mobile=False)
+    browser.call("Page.navigate", url=bench.address)
+    wait(browser, "document.documentElement?.dataset.ready == 'yes'", 20, "the empty page")
+    foreign = folder / "picture.csv"
+    foreign.write_bytes(b"\x89PNG\r\n" + bytes(500))
+    drop(browser, [foreign])
+    wait(browser, "document.getElementById('trouble').textContent.includes('no flight log')", 10, "a foreign file is refused")
+    found += shoot(browser, folder, "1-empty")
+
+    drop(browser, logs)
+    seconds = wait(browser, f"document.querySelectorAll('.flight').length == {len(logs)}", 60, "the flights are in the list")
+    took(f"{len(logs)} logs dropped, read and reconstructed", seconds, "0.3 s each")
+    seconds = wait(browser, "document.querySelectorAll('.grid button').length > 20", 60, "the failing grid")
+    took("failing grid behind them", seconds, "1 s")
+    if browser.value("document.querySelectorAll('.locked').length") != 2:
+        found.append("the test flights are not locked")
+    wait(browser, "document.documentElement.dataset.freeRunMs", 10, "the first free run")
+    box = browser.value("(r => [r.x, r.y, r.width, r.height])(document.querySelector('[data-plot=time] .u-over').getBoundingClientRect())")
+    browser.value("delete document.documentElement.dataset.freeRunMs")
+    for kind in ("mousePressed", "mouseReleased"):
+        browser.call("Input.dispatchMouseEvent", type=kind, x=box[0] + 0.3 * box[2], y=box[1] + 0.5 * box[3], button="left", clickCount=1)
+    wait(browser, "document.documentElement.dataset.freeRunMs", 10, "a free run from a click")
+    took("free run from a click", float(browser.value("document.documentElement.dataset.freeRunMs")) / 1000, "0.1 s")
+    found += shoot(browser, folder, "2-flights")
+
+    click(browser, "#diagnose")
+    begun = time.monotonic()
+    wait(browser, "document.querySelector('.first') || document.querySelector('.verdict')", 120, "the first ranking")
+    took("first ranking", time.monotonic() - begun, "2 s")
+    wait(browser, "document.querySelector('.suspect')", 300, "the diagnosis")
+    took("whole diagnosis", time.monotonic() - begun, "8 s")
+    wait(browser, "!document.querySelector('#job progress')", 300, "the prior is tuned")
+    found += shoot(browser, folder, "3-diagnosed")
+
+    effect = browser.value("document.querySelector('.suspect input').dataset.effect")
+    click(browser, ".suspect input")
+    begun = time.monotonic()
+    wait(browser, "document.querySelector('.bars.estimated') || document.querySelector('.bars.amended')", 60, "the estimate")
+    took("tick to equation error", time.monotonic() - begun, "0.3 s")
+    wait(browser, "document.querySelector('.bars.amended')", 300, "the fit")
+    took("tick to output error", time.monotonic() - begun, "2 s")
+    wait(browser, "document.querySelector('.key.after') && !document.querySelector('#job progress')", 60, "the curves after")
+    click(browser, "#judge")
+    wait(browser, "document.getElementById('opened')", 60, "the judgement")
+    if browser.value("document.querySelectorAll('.locked').length"):
+        found.append("the test flights stay locked after Judge")
+    click(browser, "#save")
+    wait(browser, "document.getElementById('saved')", 60, "the model is saved")
+    time.sleep(0.5)
+    found += shoot(browser, folder, "4-saved")
+
+    # the same command gives the same file, to the bit
+    out = folder / "by-command"
+    train = [p for p in logs if p.name.startswith("train")]
+    fit, held = [session / "logs" / p.name for p in (train[0], *train[2:])], session / "logs" / train[1].name
+    made = subprocess.run([greylag, "amend", "--model", flights / "model.toml", "--log", *fit, "--hold-out", held, "--effect", effect,
+                           "--out", out], capture_output=True, text=True)
+    if not (out / "model.toml").exists():
+        found.append(f"amend: {made.stderr}")
+    elif not filecmp.cmp(out / "model.toml", session / "model" / "model.toml", shallow=False):
+        found.append("the saved model is not the command's")
+
+    found += foreign_sockets(bench.process.pid)
+    if not refused(bench.origin, "/api/state"):
+        found.append("a wrong token is answered")
+    return found
+
+
+def again(browser, bench, folder):
+    """After kill -9 and a new start, everything is there."""
+    browser.call("Page.navigate", url=bench.address)
+    wait(browser, "document.documentElement?.dataset.ready == 'yes'", 20, "the page after kill -9")
+    wait(browser, "document.querySelector('.suspect') && document.querySelector('.bars.amended') && document.getElementById('opened')", 20,
+         "diagnosis, fit and opening after kill -9")
+    return []
+
+
+def main():
+    greylag, flights, folder = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as profile, tempfile.TemporaryDirectory() as place:
+        session = pathlib.Path(place) / "session"
+        bench = Workbench(greylag, flights / "model.toml", session)
+        browser = Browser(profile)
+        try:
+            found = walk(browser, bench, greylag, flights, folder, session)
+            origins = [bench.origin]
+            bench.kill()
+            events = list(browser.events)
+            browser.events.clear()
+            begun = time.monotonic()
+            bench = Workbench(greylag, flights / "model.toml", session)
+            origins.append(bench.origin)
+            found += again(browser, bench, folder)
+            took("start again after kill -9, page drawn", time.monotonic() - begun, "1 s")
+            events += browser.events
+        finally:
+            browser.close()
+            bench.kill()
+    allowed = tuple(f"request: {o}/" for o in origins)
+    # a refused file is answered 422, which the browser logs; the events' stream breaks with the killed program
+    expected = ("422", "423", "ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED_ENCODING", "ERR_CONNECTION_RESET")
+    for complaint in complaints(events):
+        if not complaint.startswith(allowed) and not any(e in complaint for e in expected):
+            found.append(complaint)
+    for step, seconds, aim in timings:
+        print(f"{step:50} {seconds:8.2f} s   (aim {aim})")
+    for text in found:
+        print(f"workbench: {text}", file=sys.stderr)
+    sys.exit(1 if found else 0)
+
+
+if __name__ == "__main__":
+    main()
