@@ -10,7 +10,7 @@ use crate::learn::dynamics::windows::Track;
 use crate::logs::csv::{self, Tolerance};
 use crate::model::{GreyBox, STEP};
 use crate::sysid::flight_path::ActuatorClock;
-use crate::sysid::reconstruction::Reconstruction;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
 
 /// One track in so many is held out, where there are that many.
 const HELD_OUT: usize = 10;
