@@ -80,7 +80,7 @@ impl Budget {
                 "--critic",
                 "32,32",
                 "--updates",
-                "150",
+                "300",
                 "--window",
                 "60",
                 "--flock",

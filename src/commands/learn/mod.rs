@@ -169,6 +169,7 @@ impl Arguments {
         controller::assemble(&self.out, &command_line(), prior, stages, &reached)?;
         println!("{}", times(record));
         let folder = self.out.join(controller::CONTROLLER);
+        println!("reports: {}/training.html, {}/policy.html", model.display(), policy.display());
         println!("controller in {}", folder.display());
         println!("fly it: greylag demo {}", options(&folder));
         println!(
