@@ -37,16 +37,9 @@ fn at(rows: &[Row], place: f64) -> Row {
         State { roll: state.roll - turns * std::f64::consts::TAU, ..*state }.to_array()
     });
     let state = std::array::from_fn(|i| cubic(states.map(|s| s[i]), part));
-    let between = |get: &dyn Fn(&Row) -> f64| {
-        let [low, high] = [around[1], around[2]].map(get);
-        low + part * (high - low)
-    };
-    let controls = Controls {
-        aileron: between(&|row| row.1.aileron),
-        elevator: between(&|row| row.1.elevator),
-        throttle: between(&|row| row.1.throttle),
-    };
-    (State::from_array(state), controls, between(&|row| row.2))
+    let controls = around[1].1.towards(&around[2].1, part);
+    let altitude = around[1].2 + part * (around[2].2 - around[1].2);
+    (State::from_array(state), controls, altitude)
 }
 
 /// The cubic through the two middle ones of four values, its slopes there those of their neighbours.
