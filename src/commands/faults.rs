@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let ledger = arguments.resume.as_deref().map(Ledger::open).transpose()?;
     let mut entries = Vec::new();
     for &controller in &arguments.controller {
-        let companion = companion_with(controller, &model, POLICY.as_ref(), &[])?;
+        let companion = companion_with(controller, &model, POLICY.as_ref())?;
         let factory = CompanionFactory::new(companion, &model)?;
         let before = entries.len();
         for &counterpart in &arguments.counterpart {
@@ -180,7 +180,7 @@ mod tests {
     fn factory() -> CompanionFactory {
         let model = fly::model("params/x8/jsbsim.toml".as_ref(), None).unwrap();
         CompanionFactory::new(
-            companion_with(ControllerKind::Lqi, &model, POLICY.as_ref(), &[]).unwrap(),
+            companion_with(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap(),
             &model,
         )
         .unwrap()
@@ -244,7 +244,7 @@ mod tests {
     fn what_a_controller_does_without_any_fault_is_laid_to_no_fault() {
         roomy(|| {
             let model = fly::model("params/x8/jsbsim.toml".as_ref(), None).unwrap();
-            let lqi = companion_with(ControllerKind::Lqi, &model, POLICY.as_ref(), &[]).unwrap();
+            let lqi = companion_with(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap();
             let hardover = Companion { controller: Box::new(Hardover), ..lqi };
             let factory = CompanionFactory::new(hardover, &model).unwrap();
             let case =

@@ -168,7 +168,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let model = model(&arguments.model, arguments.airframe.as_deref())?;
     let Arguments { controller, policy, changes, .. } = arguments;
-    let mut companion = companion_with(*controller, &model, policy, changes)?;
+    let mut companion = companion_with_planner(*controller, &model, policy, changes)?;
     if let Some(path) = &arguments.schedule {
         companion.pilot.follow(Schedule::load(path)?);
     }
@@ -274,7 +274,15 @@ pub fn check_changes(kinds: &[Kind], changes: &[Change]) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// If the policy cannot be used, the model does not allow a controller, or has no level flight.
-pub fn companion_with(
+pub fn companion_with(kind: Kind, model: &GreyBox, folder: &Path) -> anyhow::Result<Companion> {
+    companion_with_planner(kind, model, folder, &[])
+}
+
+/// The same with `changes` of the planner's settings.
+///
+/// # Errors
+/// As [`companion_with`], and if there are changes and no planner.
+pub fn companion_with_planner(
     kind: Kind,
     model: &GreyBox,
     folder: &Path,

@@ -54,7 +54,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, arguments.airframe.as_deref())?;
     let Arguments { controller, policy, changes, .. } = arguments;
-    let mut companion = fly::companion_with(*controller, &model, policy, changes)?;
+    let mut companion = fly::companion_with_planner(*controller, &model, policy, changes)?;
     if let Some(path) = &arguments.schedule {
         companion.pilot.follow(Schedule::load(path)?);
     }

@@ -72,7 +72,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, None)?;
     let Arguments { controller, policy, changes, .. } = arguments;
-    let set_up = || fly::companion_with(*controller, &model, policy, changes);
+    let set_up = || fly::companion_with_planner(*controller, &model, policy, changes);
     let mut flying = set_up()?;
     let schedule = arguments.schedule.as_deref().map(Schedule::load).transpose()?;
     let legs = schedule.as_ref().map_or_else(Legs::demonstration, Legs::during);

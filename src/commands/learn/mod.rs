@@ -125,11 +125,11 @@ impl Arguments {
         Ok(wish.stages())
     }
 
-    /// The coefficients that are learned, by their full names.
+    /// The coefficients that are learned, by their full names or as `all`.
     fn trained(&self, prior: &GreyBox) -> Result<Vec<String>> {
         let known = trainable(prior);
         let names = match self.trainable.as_slice() {
-            [all] if all == "all" => return Ok(known),
+            [all] if all == "all" => return Ok(vec![all.clone()]),
             [none] if none == "none" => return Ok(Vec::new()),
             names => names,
         };
