@@ -188,7 +188,10 @@ fn main() -> Result<()> {
             let names: Vec<String> =
                 trainer.coefficients(None).into_iter().map(|c| c.name).collect();
             let origin = export::origin(&model, trainer.data(), arguments.seed);
-            export::save(&model, &path, &names, &origin, &folder)?;
+            let about =
+                format!("Learned from {transitions} samples of flight, prior {}.", way.prior);
+            let said = export::Text { about: &about, trained: &names };
+            export::save(&model, &path, said, &origin, &folder)?;
         }
         let lqi = steered(&model, &params.join("targets.csv"))?;
         let score = |model: &GreyBox| {

@@ -123,8 +123,10 @@ fn what_is_missing_goes_into_the_residual_and_into_the_files() {
         let folder = tempfile::tempdir().unwrap();
         let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior.toml");
         let origin = export::origin(&learned, trainer.data(), 1);
-        export::save(&learned, &source, &[], &origin, folder.path()).unwrap();
+        let said = export::Text { about: "Learned here.", trained: &[] };
+        export::save(&learned, &source, said, &origin, folder.path()).unwrap();
         let read = GreyBox::load(&folder.path().join(export::MODEL)).unwrap();
+        assert_eq!(read.description, "Learned here.");
         assert_eq!(read.residual, learned.residual);
         assert_eq!(free_run(&read, &held_out, &[50]), free_run(&learned, &held_out, &[50]));
         std::fs::remove_file(folder.path().join(export::RESIDUAL)).unwrap();

@@ -222,6 +222,7 @@ impl Program {
             .args(["fly", "--vehicle", &format!("udpin:127.0.0.1:{vehicle}")])
             .args(["--client", &format!("udpin:127.0.0.1:{client}")])
             .args(["--record", folder.to_str().unwrap()])
+            .args(["--controller", "lqi", "--model", "params/x8/jsbsim.toml"])
             .args(profile)
             .stdout(Stdio::piped())
             .spawn()

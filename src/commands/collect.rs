@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
@@ -12,6 +11,7 @@ use greylag_sitl::plant_arguments::PlantArgs;
 
 use crate::commands::aircraft::{self, StartArguments};
 use crate::commands::files::shipped;
+use crate::commands::interruption::{Ended, Interruption};
 use crate::control::{self, Kind};
 use crate::logs::csv;
 use crate::model::GreyBox;
@@ -45,6 +45,11 @@ pub struct Arguments {
 
 /// Flies the episodes that are not there yet.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    Ok(fly(arguments, &Interruption::watch()?)?.into())
+}
+
+/// As [`run`], until `stop` is set.
+pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let load = |path: &PathBuf| GreyBox::load(&shipped(path));
     let models: Vec<GreyBox> = arguments.model.iter().map(load).collect::<Result<_, _>>()?;
     let planner = match (models.first(), arguments.round) {
@@ -58,9 +63,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let folder = arguments.out.join(format!("round-{:02}", arguments.round));
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make {}", folder.display()))?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let seen = stop.clone();
-    ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))?;
     let count = arguments.episodes.unwrap_or(if arguments.round == 0 { 175 } else { 25 });
     let mut plant = arguments.plant.options(arguments.seed);
     plant.start = arguments.start.start(&plant.aircraft, &models)?;
@@ -70,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         || (Simulator::new(&plant), planner.as_ref().map(|p| p.boxed_clone())),
         |(simulator, planner), episode| -> Result<()> {
             let path = folder.join(format!("episode-{episode:03}.csv"));
-            if stop.load(Ordering::Relaxed) || path.exists() {
+            if stop.is_set() || path.exists() {
                 return Ok(());
             }
             let simulator = simulator.as_mut().map_err(|e| anyhow::anyhow!("{e}"))?;
@@ -87,11 +89,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     )?;
     let there = (0..count).filter(|e| folder.join(format!("episode-{e:03}.csv")).exists()).count();
     println!("{} episodes flown, {there} of {count} in {}", flown.into_inner(), folder.display());
-    if stop.load(Ordering::Relaxed) {
+    if stop.is_set() {
         eprintln!("interrupted; the same command flies the rest");
-        return Ok(ExitCode::from(130));
+        return Ok(Ended::Interrupted);
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(Ended::Done)
 }
 
 /// An episode's file is there whole or not at all: what is there need not be flown again.

@@ -32,7 +32,7 @@ pub struct Arguments {
     #[arg(long = "controller", value_name = "NAME", num_args = 1.., required = true, value_parser = choices::controller())]
     controllers: Vec<Kind>,
     /// Models that the controllers are designed from or plan with.
-    #[arg(long = "model", num_args = 1.., default_values_os_t = [PathBuf::from("params/x8/jsbsim.toml")])]
+    #[arg(long = "model", num_args = 1.., default_values_os_t = [PathBuf::from(fly::MODEL)])]
     models: Vec<PathBuf>,
     /// Folders of trained policies, for controllers that need one.
     #[arg(long = "policy", value_name = "DIR", num_args = 1.., default_values_os_t = [PathBuf::from(fly::POLICY)])]
@@ -82,15 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     for path in arguments.json.iter().chain(&arguments.report) {
         files::writable(path, overwrite)?;
     }
-    if !arguments.changes.is_empty() && !arguments.controllers.iter().any(|k| k.searches()) {
-        let searching: Vec<&str> =
-            Kind::ALL.iter().filter(|k| k.searches()).map(|k| k.name()).collect();
-        bail!(
-            "--planner changes the settings of a search, and none of the controllers has one; evaluate one \
-             of {} or leave --planner out",
-            searching.join(", ")
-        );
-    }
+    fly::check_changes(&arguments.controllers, &arguments.changes)?;
     let targets = targets(arguments)?;
     let mut plant = arguments.plant.options(arguments.seed);
     // everything that can be wrong is found before the first flight

@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(
         long,
         value_name = "FILE",
-        default_value = "params/x8/jsbsim.toml",
+        default_value = fly::MODEL,
         conflicts_with = "resume"
     )]
     model: PathBuf,
@@ -77,8 +77,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let ledger = arguments.resume.as_deref().map(Ledger::open).transpose()?;
     let mut entries = Vec::new();
     for &controller in &arguments.controller {
-        let factory =
-            CompanionFactory::new(companion_with(controller, &model, POLICY.as_ref())?, &model)?;
+        let companion = companion_with(controller, &model, POLICY.as_ref())?;
+        let factory = CompanionFactory::new(companion, &model)?;
         let before = entries.len();
         for &counterpart in &arguments.counterpart {
             let seeds = arguments.first..arguments.first + arguments.flights;

@@ -6,14 +6,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use crossbeam_channel::RecvTimeoutError;
 
 use crate::commands::choices;
 use crate::commands::files::shipped;
 use crate::control::cem::Change;
-use crate::control::policy::Agent;
+use crate::control::policy::{Agent, Origin};
 use crate::control::{self, Controller, Kind, Needs, Source, build};
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
@@ -27,8 +27,12 @@ use crate::manoeuvres::Schedule;
 use crate::model::GreyBox;
 use crate::physics::Airframe;
 
-/// The policy that is flown where no other is named.
-pub const POLICY: &str = "params/x8/policy";
+/// The model that is flown where no other is named: learned from flights, from an imperfect prior.
+pub const MODEL: &str = "params/x8/learned/model.toml";
+/// The policy that is flown where no other is named, trained in that model.
+pub const POLICY: &str = "params/x8/learned/policy";
+/// The controller that flies where no other is named.
+pub const CONTROLLER: &str = "hybrid-lqi";
 
 /// The arguments of `greylag fly`.
 #[derive(Args, Debug)]
@@ -56,14 +60,17 @@ pub struct Arguments {
     #[arg(long, value_name = "ADDRESS", requires = "sign")]
     local: Vec<Address>,
     /// Controller.
-    #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
+    #[arg(long, value_name = "NAME", default_value = CONTROLLER, value_parser = choices::controller())]
     controller: Kind,
     /// Model that the controller is designed from or plans with.
-    #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
+    #[arg(long, value_name = "FILE", default_value = MODEL)]
     model: PathBuf,
     /// Folder of the trained policy, for controllers that need one.
     #[arg(long, value_name = "DIR", default_value = POLICY)]
     policy: PathBuf,
+    /// Settings of the planner in other than their usual size, as KEY=VALUE.
+    #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
+    changes: Vec<Change>,
     /// Airframe file in place of the one that the model names.
     #[arg(long, value_name = "FILE")]
     airframe: Option<PathBuf>,
@@ -160,7 +167,8 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// has been started then.
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let model = model(&arguments.model, arguments.airframe.as_deref())?;
-    let mut companion = companion_with(arguments.controller, &model, &arguments.policy)?;
+    let Arguments { controller, policy, changes, .. } = arguments;
+    let mut companion = companion_with_planner(*controller, &model, policy, changes)?;
     if let Some(path) = &arguments.schedule {
         companion.pilot.follow(Schedule::load(path)?);
     }
@@ -170,7 +178,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
         .context("setting the handler of Ctrl-C")?;
     let flight = Flight::start(&options, companion, stop)?;
-    announce(arguments, &flight);
+    announce(arguments, &model, &flight);
     show_events(&flight, &arguments.vehicle);
     let summary =
         flight.join().context("the control thread has died; the recording holds all up to then")?;
@@ -224,7 +232,41 @@ pub fn controller(
         return Ok(build(kind, Source { model, agent: None, changes })?);
     }
     let agent = Agent::load(&shipped(folder), &model.airframe)?;
+    if let Some(note) = stranger(&agent.origin, model, folder) {
+        eprintln!("{note}");
+    }
     Ok(build(kind, Source { model, agent: Some(&agent), changes })?)
+}
+
+/// What is to be said of a policy that was trained in another model than the one that flies with it.
+fn stranger(origin: &Origin, model: &GreyBox, folder: &Path) -> Option<String> {
+    (origin.model_sha256 != model.sha256).then(|| {
+        format!(
+            "note: policy {} was trained in {}, not in model {} as its files are now; its proposals and \
+             values are those of another model: train one with `greylag train policy --env model:FILE`, or name \
+             the model it belongs to",
+            folder.display(),
+            origin.model,
+            model.name
+        )
+    })
+}
+
+/// Refuses settings of a planner where none of `kinds` searches.
+///
+/// # Errors
+/// If there are `changes` that change nothing.
+pub fn check_changes(kinds: &[Kind], changes: &[Change]) -> anyhow::Result<()> {
+    if changes.is_empty() || kinds.iter().any(|kind| kind.searches()) {
+        return Ok(());
+    }
+    let searching: Vec<&str> =
+        Kind::ALL.iter().filter(|k| k.searches()).map(|k| k.name()).collect();
+    bail!(
+        "--planner changes the settings of a search, and none of the controllers has one; choose one of {} \
+         or leave --planner out",
+        searching.join(", ")
+    )
 }
 
 /// A pilot with its controllers: `kind` flies, with the policy in `folder` if it needs one; an LQI of
@@ -233,7 +275,21 @@ pub fn controller(
 /// # Errors
 /// If the policy cannot be used, the model does not allow a controller, or has no level flight.
 pub fn companion_with(kind: Kind, model: &GreyBox, folder: &Path) -> anyhow::Result<Companion> {
-    let controller = controller(kind, model, folder, &[])?;
+    companion_with_planner(kind, model, folder, &[])
+}
+
+/// The same with `changes` of the planner's settings.
+///
+/// # Errors
+/// As [`companion_with`], and if there are changes and no planner.
+pub fn companion_with_planner(
+    kind: Kind,
+    model: &GreyBox,
+    folder: &Path,
+    changes: &[Change],
+) -> anyhow::Result<Companion> {
+    check_changes(&[kind], changes)?;
+    let controller = controller(kind, model, folder, changes)?;
     // The design of an LQI takes a moment; it is not made twice.
     let fallback = if matches!(kind, Kind::Lqi | Kind::LqiDamped) {
         controller.boxed_clone()
@@ -256,8 +312,9 @@ fn fallback(model: &GreyBox) -> anyhow::Result<Box<dyn Controller>> {
     }
 }
 
-fn announce(arguments: &Arguments, flight: &Flight) {
+fn announce(arguments: &Arguments, model: &GreyBox, flight: &Flight) {
     println!("controller {}, model {}", arguments.controller, arguments.model.display());
+    println!("model      {}: {}", model.name, model.description);
     println!("vehicle    {}", arguments.vehicle);
     for client in arguments.all_clients() {
         println!("clients    {client}");

@@ -23,6 +23,10 @@ mod faults;
 mod files;
 pub mod fly;
 mod intake;
+#[cfg(any(feature = "learn", feature = "sitl"))]
+mod interruption;
+#[cfg(feature = "learn")]
+mod learn;
 mod link;
 mod log_once;
 mod logs;
@@ -38,12 +42,16 @@ mod targets;
 mod train;
 mod workbench;
 
+#[cfg(feature = "learn")]
+use std::ffi::OsString;
 use std::io::IsTerminal;
 
 use std::panic;
 use std::process::{self, ExitCode};
 use std::sync::LazyLock;
 
+#[cfg(feature = "learn")]
+use anyhow::{Result, bail};
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
@@ -57,6 +65,8 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
     let commit = option_env!("GREYLAG_COMMIT").unwrap_or("unknown");
     format!("{} (commit {commit}; features: {})", env!("CARGO_PKG_VERSION"), built.join(", "))
 });
+#[cfg(feature = "learn")]
+use interruption::{Ended, Interruption};
 
 /// A MAVLink offboard autopilot companion for fixed-wing aircraft.
 #[derive(Parser)]
@@ -95,6 +105,9 @@ enum Command {
     Faults(faults::Arguments),
     /// Fly a vehicle, serving ground stations and offboard programs.
     Fly(fly::Arguments),
+    /// Learn a controller that flies from a prior: flights, model, policy, in one command.
+    #[cfg(feature = "learn")]
+    Learn(learn::Arguments),
     /// Check the link to a flight controller.
     Link(link::Arguments),
     /// Say what a flight log holds, or write it as a CSV table.
@@ -161,6 +174,8 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "sitl")]
         Command::Faults(arguments) => faults::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),
+        #[cfg(feature = "learn")]
+        Command::Learn(arguments) => learn::run(&arguments),
         Command::Link(arguments) => link::run(&arguments),
         Command::Logs(arguments) => logs::run(&arguments),
         #[cfg(feature = "sitl")]
@@ -181,4 +196,33 @@ pub fn main() -> ExitCode {
         eprintln!("greylag: {}", said_once::said_once(&error));
         ExitCode::FAILURE
     })
+}
+
+/// The subcommand of a line that does not hold the program's name.
+#[cfg(feature = "learn")]
+fn command_of(line: &[OsString]) -> Result<Command> {
+    let words = std::iter::once(OsString::from("greylag")).chain(line.iter().cloned());
+    Ok(Arguments::try_parse_from(words)?.command)
+}
+
+/// Refuses a line that is no stage of a learning.
+#[cfg(feature = "learn")]
+fn check_line(line: &[OsString]) -> Result<()> {
+    match command_of(line)? {
+        #[cfg(feature = "sitl")]
+        Command::Collect(_) => Ok(()),
+        Command::Train(_) => Ok(()),
+        _ => bail!("greylag {} is no stage of a learning", line[0].display()),
+    }
+}
+
+/// Carries a stage of a learning out, until `stop` is set.
+#[cfg(feature = "learn")]
+fn carry_out(line: &[OsString], stop: &Interruption) -> Result<Ended> {
+    match command_of(line)? {
+        #[cfg(feature = "sitl")]
+        Command::Collect(arguments) => collect::fly(&arguments, stop),
+        Command::Train(arguments) => train::learn(&arguments, stop),
+        _ => bail!("greylag {} is no stage of a learning", line[0].display()),
+    }
 }

@@ -9,6 +9,7 @@ use clap::Args;
 use crate::commands::choices;
 use crate::commands::fly::{self, CommandName, ProfileName};
 use crate::control::Kind;
+use crate::control::cem::Change;
 use crate::flight::replay::{Outcome, replay};
 use crate::link::vehicle::{Profile, Real, Sitl, Vehicle};
 use crate::manoeuvres::Schedule;
@@ -21,14 +22,17 @@ pub struct Arguments {
     #[arg(value_name = "DIR")]
     folder: PathBuf,
     /// Controller that flew.
-    #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
+    #[arg(long, value_name = "NAME", default_value = fly::CONTROLLER, value_parser = choices::controller())]
     controller: Kind,
     /// Model that it was designed from.
-    #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
+    #[arg(long, value_name = "FILE", default_value = fly::MODEL)]
     model: PathBuf,
     /// Folder of the trained policy, for controllers that need one.
     #[arg(long, value_name = "DIR", default_value = fly::POLICY)]
     policy: PathBuf,
+    /// Settings of the planner that were not of their usual size.
+    #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
+    changes: Vec<Change>,
     /// Airframe file in place of the one that the model names.
     #[arg(long, value_name = "FILE")]
     airframe: Option<PathBuf>,
@@ -49,7 +53,8 @@ pub struct Arguments {
 /// If a file cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, arguments.airframe.as_deref())?;
-    let mut companion = fly::companion_with(arguments.controller, &model, &arguments.policy)?;
+    let Arguments { controller, policy, changes, .. } = arguments;
+    let mut companion = fly::companion_with_planner(*controller, &model, policy, changes)?;
     if let Some(path) = &arguments.schedule {
         companion.pilot.follow(Schedule::load(path)?);
     }
@@ -91,7 +96,7 @@ fn print(outcome: &Outcome) {
     }
     if outcome.different > 0 && outcome.plans_different > 0 {
         println!(
-            "{} plans differ: were --controller, --model, --schedule those of the flight, and was it \
+            "{} plans differ: were --controller, --model, --planner, --schedule those of the flight, and was it \
              this version of the program?",
             outcome.plans_different
         );

@@ -13,6 +13,11 @@ use crate::physics::actuators::Actuators;
 pub(crate) const NONE: State =
     State { roll: 0.0, pitch: 0.0, airspeed: 0.0, p: 0.0, q: 0.0, r: 0.0, alpha: 0.0, beta: 0.0 };
 
+/// Time over which predictions are compared with what happened, s: a few responses of the short period.
+const MEMORY_S: f64 = 0.5;
+/// Accelerations below which nothing is compared, in x_c a second: calm flight shows no model to be wrong.
+const CALM: f64 = 0.02;
+
 /// Its estimate.
 #[derive(Clone, Debug)]
 pub(crate) struct Disturbance {
@@ -21,12 +26,17 @@ pub(crate) struct Disturbance {
     last: Option<Observation>,
     memory: Memory,
     rate: State,
+    /// Mean squares over [`MEMORY_S`] of what the predictions missed and of what happened, x_c a second.
+    missed: f64,
+    happened: f64,
 }
 
 impl Disturbance {
     /// None yet; the estimate follows with `time_constant` (s).
     pub fn new(time_constant: f64) -> Disturbance {
-        Disturbance { time_constant, last: None, memory: Memory::default(), rate: NONE }
+        let (missed, happened) = (0.0, 0.0);
+        let memory = Memory::default();
+        Disturbance { time_constant, last: None, memory, rate: NONE, missed, happened }
     }
 
     /// Compares what is seen with what the model expected a tick ago. A gap between ticks is no
@@ -48,6 +58,8 @@ impl Disturbance {
         let mut error = seen.state.advance(&expected, -1.0);
         error.roll = (error.roll + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
             - std::f64::consts::PI;
+        let step = seen.state.advance(&last.state, -1.0);
+        self.compare(model, &error.advance(&self.rate, -STEP), &step);
         // e is what one step added beside the model: its rate is e / STEP
         let part = STEP / self.time_constant;
         let moved = self.rate.advance(&self.rate, -part).advance(&error, part / STEP);
@@ -56,6 +68,26 @@ impl Disturbance {
         } else {
             self.memory = Memory::default();
         }
+    }
+
+    /// Notes what a prediction missed, and what happened, in a step.
+    fn compare(&mut self, model: &GreyBox, missed: &State, happened: &State) {
+        let size = |change: &State| -> f64 {
+            // rates and flow angles: attitude and airspeed only follow
+            let scaled = change.to_array().into_iter().zip(model.scale()).skip(3);
+            scaled.map(|(x, scale)| (x / scale / STEP).powi(2)).sum()
+        };
+        let part = STEP / MEMORY_S;
+        let (missed, happened) = (size(missed), size(happened));
+        if missed.is_finite() && happened.is_finite() {
+            self.missed += part * (missed - self.missed);
+            self.happened += part * (happened - self.happened);
+        }
+    }
+
+    /// What the predictions of the last half second missed, as a part of what happened (root mean squares).
+    pub fn missed_part(&self) -> f64 {
+        (self.missed / (self.happened + CALM * CALM)).sqrt()
     }
 
     /// What the state's rate has beside the model's, per second.

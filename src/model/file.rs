@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::grey_box::Term;
+use super::residual::hash;
 use super::{GreyBox, Integrator, Named, Residual};
 use crate::num::Table;
 use crate::physics::Airframe;
@@ -20,8 +21,7 @@ use crate::physics::{catalogue, inputs};
 struct File {
     schema: u32,
     name: String,
-    #[serde(rename = "description")]
-    _description: String,
+    description: String,
     airframe: String,
     integrator: Integrator,
     force_axes: ForceAxes,
@@ -109,10 +109,14 @@ impl GreyBox {
         }
         let learned = file.residual.clone();
         let mut model = file.into_model(airframe).map_err(content)?;
+        let mut bytes = text.as_bytes().to_vec();
         if let Some(name) = learned {
-            let read = Residual::load(&folder.join(name), &model.airframe, model.scale());
+            let path = folder.join(name);
+            let read = Residual::load(&path, &model.airframe, model.scale());
             model.residual = Some(read.map_err(|e| content(e.to_string()))?.0);
+            bytes.extend(std::fs::read(&path).map_err(|e| content(e.to_string()))?);
         }
+        model.sha256 = hash(&bytes);
         Ok(model)
     }
 }
@@ -148,6 +152,8 @@ impl File {
         let body = self.rigid_body.checked()?;
         let mut model = GreyBox {
             name: named(self.name)?,
+            description: self.description,
+            sha256: String::new(),
             airframe,
             body,
             bare_body: body,

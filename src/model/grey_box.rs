@@ -58,6 +58,10 @@ impl Term {
 pub struct GreyBox {
     /// The model's name, from its file.
     pub name: String,
+    /// What its file says that it is.
+    pub description: String,
+    /// SHA-256 of the files that it was read from, hexadecimal: model and residual.
+    pub sha256: String,
     /// The aircraft it describes.
     pub airframe: Airframe,
     /// Mass and inertia as the model believes them, its effects on them included.

@@ -73,8 +73,8 @@ impl LearningReport<'_> {
         let options = over.map(|(name, figures)| ChoiceOption { name: name.into(), figures });
         let choice =
             Choice { anchor: "over".into(), label: "Over".into(), options: options.into() };
-        let note = "The policy as it is at each evaluation, flown in JSBSim on targets that are none of \
-                    those it is scored on at last. Lines: interquartile mean of the seeds; shaded: their \
+        let note = "The policy as it is at each evaluation, flown in what it is trained in on targets that \
+                    are none of those it is scored on at last. Lines: interquartile mean of the seeds; shaded: their \
                     least and most.";
         let ends = "TD3 keeps its policy with the least error, the analytic gradient its last. The knee is \
                     where nine tenths of the way from the first error to the least are made.";

@@ -38,6 +38,8 @@ pub trait Environment {
     /// # Errors
     /// If the aircraft has left the numbers.
     fn step(&mut self, command: Command) -> Result<Observation, Trouble>;
+    /// The seed of what is random in it from the next reset on; a world without chance has none.
+    fn reseed(&mut self, _seed: u32) {}
 }
 
 /// A model with the exact actuator filters as its state.

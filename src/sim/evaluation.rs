@@ -2,17 +2,22 @@
 
 use std::time::Duration;
 
+#[cfg(feature = "sitl")]
 use greylag_sitl::plant::PlantOptions;
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::control::{Controller, Target};
+use crate::model::GreyBox;
 use crate::num::statistics::{interquartile_mean, mean, quantile};
 use crate::num::{bootstrap, stream};
+use crate::physics::State;
+#[cfg(feature = "sitl")]
+use crate::sim::Simulator;
 use crate::sim::episode::DIVERGED_DEG;
 use crate::sim::targets::Row;
-use crate::sim::{Episode, Group, Outcome, Simulator, Trouble};
+use crate::sim::{Environment, Episode, Group, Imagined, Outcome, Trouble};
 
 /// Seed of the intervals' resamples: the same scores have the same intervals.
 const SEED: u64 = 95;
@@ -73,33 +78,69 @@ pub struct Cost {
     pub p999: f64,
 }
 
+/// Makes a controller for a core.
+pub type Make<'a> = &'a (dyn Fn() -> Box<dyn Controller> + Sync);
+
 /// Flies `rows` in JSBSim with clones of a controller, on all cores; `done` is called after each.
 /// Every row has random numbers of its own, whatever core it is flown on and whatever is flown
 /// beside it.
 ///
 /// # Errors
 /// If the plant cannot be built or reset.
+#[cfg(feature = "sitl")]
 pub fn evaluate(
     plant: &PlantOptions,
-    make: &(dyn Fn() -> Box<dyn Controller> + Sync),
+    make: Make,
     rows: &[Row],
     seed: u32,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Outcome>, Trouble> {
     // what cannot be flown is said before anything is
     Simulator::new(plant)?;
+    let world = || Simulator::new(plant);
+    fly(&world, make, rows, Chance { airspeed: plant.start.airspeed_mps, seed }, done)
+}
+
+/// Flies `rows` in `model` in JSBSim's place, as [`evaluate`] does: nothing but the model decides the score.
+///
+/// # Errors
+/// Not for a controller that can be built: an aircraft that is lost is an outcome.
+pub fn imagine(
+    model: &GreyBox,
+    make: Make,
+    rows: &[Row],
+    seed: u32,
+) -> Result<Vec<Outcome>, Trouble> {
+    let world = || Ok(Imagined::new(model.clone()));
+    fly(&world, make, rows, Chance { airspeed: State::NEUTRAL.airspeed, seed }, &|| ())
+}
+
+/// What all flights have in common: the airspeed wanted (m/s) and the seed.
+#[derive(Clone, Copy)]
+struct Chance {
+    airspeed: f64,
+    seed: u32,
+}
+
+fn fly<E: Environment>(
+    world: &(dyn Fn() -> Result<E, Trouble> + Sync),
+    make: Make,
+    rows: &[Row],
+    chance: Chance,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Outcome>, Trouble> {
     rows.par_iter()
         .map_init(
-            || Simulator::new(plant).map(|simulator| (simulator, make())),
+            || world().map(|environment| (environment, make())),
             |worker, row| {
                 let (environment, controller) =
                     worker.as_mut().map_err(|e| Trouble::Worker(e.to_string()))?;
                 let target = Target {
                     roll: row.roll_deg.to_radians(),
                     pitch: row.pitch_deg.to_radians(),
-                    airspeed: plant.start.airspeed_mps,
+                    airspeed: chance.airspeed,
                 };
-                let seed: u64 = stream::stream(seed.into(), &[row.number.into()]).random();
+                let seed: u64 = stream::stream(chance.seed.into(), &[row.number.into()]).random();
                 environment.reseed(seed as u32);
                 let controller = controller.as_mut();
                 let outcome = Episode { environment, controller, seed }.fly(&target, |_, _| ())?;

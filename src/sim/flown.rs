@@ -37,8 +37,7 @@ impl Flown {
     }
 
     fn begin(&mut self) -> Result<(), Trouble> {
-        let [roll, pitch] = self.targets.next_target();
-        self.target = Target { roll, pitch, ..self.target };
+        self.target = self.targets.next_target();
         self.seen = self.simulator.reset()?;
         self.step = 0;
         Ok(())

@@ -128,9 +128,10 @@ impl Imagination {
     /// Gives an aircraft its next target.
     fn aim(&mut self, batch: usize, lane: usize) {
         if batch * WIDTH + lane < self.instances {
-            let [roll, pitch] = self.targets.next_target();
+            let Target { roll, pitch, airspeed } = self.targets.next_target();
             let target = &mut self.batches[batch].target;
             (target.roll.0[lane], target.pitch.0[lane]) = (roll as f32, pitch as f32);
+            target.airspeed.0[lane] = airspeed as f32;
         }
     }
 

@@ -6,7 +6,6 @@ pub mod collect;
 pub mod design;
 pub mod environment;
 pub mod episode;
-#[cfg(feature = "sitl")]
 pub mod evaluation;
 #[cfg(feature = "sitl")]
 pub mod faults;

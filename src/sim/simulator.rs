@@ -23,11 +23,6 @@ impl Simulator {
         Ok(Simulator { plant, start: options.start, previous: [Command::IDLE; 2] })
     }
 
-    /// The seed of the turbulence from the next reset on.
-    pub fn reseed(&mut self, seed: u32) {
-        self.plant.reseed(seed);
-    }
-
     /// Where its episodes start.
     pub fn start(&self) -> Start {
         self.start
@@ -79,5 +74,9 @@ impl Environment for Simulator {
         let truth = self.plant.step(Inputs { aileron, elevator, throttle, rudder })?;
         self.previous = [command, self.previous[0]];
         Ok(self.observe(&truth))
+    }
+
+    fn reseed(&mut self, seed: u32) {
+        self.plant.reseed(seed);
     }
 }

@@ -6,7 +6,10 @@ use rand::RngExt;
 use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 
+use crate::control::Target;
 use crate::num::stream;
+use crate::physics::State;
+use crate::physics::airframe::Envelope;
 
 /// How hard a target is, Table II of \[GSFM26\] in both its readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -48,14 +51,28 @@ pub struct Stratified {
     seed: u64,
     count: u64,
     corners: f64,
+    airspeeds: [f64; 2],
     bins: Vec<usize>,
 }
+
+/// Part of the targets that want the airspeed of the start, where others want another.
+const SLOW: f64 = 0.5;
+/// Lowest wanted airspeed over the envelope's lowest, the highest over its cruise: what a pilot asks for.
+const WANTED: [f64; 2] = [1.15, 1.25];
 
 impl Stratified {
     /// Targets of `seed` after the first `count`; a part `corners` of them (0..1) lies in the hard
     /// corners instead, which are 4 % of the envelope (0 is the paper's).
     pub fn new(seed: u64, count: u64, corners: f64) -> Stratified {
-        Stratified { seed, count, corners, bins: Vec::new() }
+        let airspeeds = [State::NEUTRAL.airspeed; 2];
+        Stratified { seed, count, corners, airspeeds, bins: Vec::new() }
+    }
+
+    /// The same targets, half of them at airspeeds that `envelope` allows instead of the start's.
+    pub fn at_airspeeds_of(self, envelope: &Envelope) -> Stratified {
+        let [low, high] = WANTED;
+        let airspeeds = [low * envelope.airspeed_min_mps, high * envelope.airspeed_cruise_mps];
+        Stratified { airspeeds, ..self }
     }
 
     /// Goes on after `count` targets, wherever it stands.
@@ -68,8 +85,8 @@ impl Stratified {
         self.count
     }
 
-    /// The next commanded roll and pitch, rad.
-    pub fn next_target(&mut self) -> [f64; 2] {
+    /// The next target.
+    pub fn next_target(&mut self) -> Target {
         let (cycle, place) = (self.count / 25, (self.count % 25) as usize);
         if self.bins.is_empty() || place == 0 {
             self.bins = (0..BINS * BINS).collect();
@@ -86,7 +103,18 @@ impl Stratified {
         } else {
             [60.0 * x, 30.0 * y]
         };
-        [roll.to_radians(), pitch.to_radians()]
+        let airspeed = self.airspeed(self.count - 1);
+        Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed }
+    }
+
+    /// The airspeed wanted with the target of that number, m/s.
+    fn airspeed(&self, number: u64) -> f64 {
+        let [low, high] = self.airspeeds;
+        let mut rng = stream::stream(self.seed, &[STRATIFIED, 2, number]);
+        if low >= high || rng.random_range(0.0..1.0) < SLOW {
+            return State::NEUTRAL.airspeed;
+        }
+        rng.random_range(low..high)
     }
 }
 
@@ -229,7 +257,7 @@ mod tests {
         let all: Vec<_> = (0..75).map(|_| targets.next_target()).collect();
         for cycle in all.chunks(25) {
             let mut seen = [false; 25];
-            for [roll, pitch] in cycle {
+            for Target { roll, pitch, .. } in cycle {
                 let bin = |x: f64, most: f64| ((x.to_degrees() / most + 1.0) * 2.5) as usize;
                 assert!(!std::mem::replace(
                     &mut seen[bin(*pitch, 30.0) * 5 + bin(*roll, 60.0)],
@@ -241,9 +269,28 @@ mod tests {
         assert_eq!(later.next_target(), all[31]);
         let mut hard = Stratified::new(3, 0, 1.0);
         for _ in 0..50 {
-            let [roll, pitch] = hard.next_target().map(f64::to_degrees);
+            let target = hard.next_target();
+            let [roll, pitch] = [target.roll, target.pitch].map(f64::to_degrees);
             assert!(Group::HardCorners.contains(roll, pitch), "{roll} {pitch}");
         }
+    }
+
+    #[test]
+    fn half_the_targets_want_another_airspeed_of_the_envelope() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/airframe.toml");
+        let envelope = crate::physics::Airframe::load(&path).unwrap().envelope;
+        let mut targets = Stratified::new(3, 0, 0.0).at_airspeeds_of(&envelope);
+        let mut plain = Stratified::new(3, 0, 0.0);
+        let mut others = 0;
+        for _ in 0..400 {
+            let (target, same) = (targets.next_target(), plain.next_target());
+            assert_eq!([target.roll, target.pitch], [same.roll, same.pitch]);
+            assert_eq!(same.airspeed, State::NEUTRAL.airspeed);
+            others += usize::from(target.airspeed != same.airspeed);
+            assert!((1.15 * 13.0..=25.0).contains(&target.airspeed));
+        }
+        // 200 expected, 10 the standard deviation
+        assert!((160..240).contains(&others), "{others}");
     }
 
     #[test]

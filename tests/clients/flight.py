@@ -136,6 +136,8 @@ class Flight:
 
     def _start(self):
         command = [self.arguments.greylag, "fly", "--vehicle", f"udpin:127.0.0.1:{self.vehicle_port}"]
+        # what is tested is the link: a planner may be late where the program is not optimised
+        command += ["--controller", "lqi", "--model", "params/x8/jsbsim.toml"]
         for client in self.clients:
             command += ["--client", client]
         if self.personality:

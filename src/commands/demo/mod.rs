@@ -21,6 +21,7 @@ use greylag_sitl::shim::{self, ShimOptions};
 use crate::commands::choices;
 use crate::commands::files::Overwrite;
 use crate::commands::{files, fly};
+use crate::control::cem::Change;
 use crate::control::{self, Kind};
 use crate::flight::recorder::Place;
 use crate::flight::runtime::{Flight, Options, Pace};
@@ -36,14 +37,17 @@ use summary::{TOLERANCE_DEG, Teller};
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Controller that flies.
-    #[arg(long, value_name = "NAME", default_value = "hybrid-lqi", value_parser = choices::controller())]
+    #[arg(long, value_name = "NAME", default_value = fly::CONTROLLER, value_parser = choices::controller())]
     controller: Kind,
     /// Model that the controller is designed from or plans with.
-    #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
+    #[arg(long, value_name = "FILE", default_value = fly::MODEL)]
     model: PathBuf,
     /// Folder of the trained policy, for controllers that need one.
     #[arg(long, value_name = "DIR", default_value = fly::POLICY)]
     policy: PathBuf,
+    /// Settings of the planner in other than their usual size, as KEY=VALUE.
+    #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
+    changes: Vec<Change>,
     /// Fly this flight-test schedule in place of the six attitudes.
     #[arg(long, value_name = "FILE")]
     schedule: Option<PathBuf>,
@@ -67,7 +71,8 @@ pub struct Arguments {
 /// If something cannot be opened, or the flight ends before the schedule does.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, None)?;
-    let set_up = || fly::companion_with(arguments.controller, &model, &arguments.policy);
+    let Arguments { controller, policy, changes, .. } = arguments;
+    let set_up = || fly::companion_with_planner(*controller, &model, policy, changes);
     let mut flying = set_up()?;
     let schedule = arguments.schedule.as_deref().map(Schedule::load).transpose()?;
     let legs = schedule.as_ref().map_or_else(Legs::demonstration, Legs::during);
@@ -82,9 +87,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let companion = flight.clients.first().copied().flatten().context("no client link")?;
     let vehicle = flight.vehicle.context("no vehicle link")?;
     println!(
-        "companion: controller {}, model {}, clients on udp {companion}",
-        arguments.controller, model.name
+        "companion: controller {controller}, model {}, clients on udp {companion}",
+        model.name
     );
+    println!("model: {}", model.description);
     println!("shim: aircraft {} in JSBSim, real time, towards udp {vehicle}", plant.aircraft);
     let simulator = simulate(arguments, &format!("udpout:{vehicle}"), stop.clone())?;
     let mut table = Live::begin(&legs);

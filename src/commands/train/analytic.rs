@@ -2,13 +2,13 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use super::policy::{evaluation, reached};
-use crate::control::policy::{Actor, Critic};
+use super::policy::reached;
+use crate::commands::interruption::Interruption;
+use crate::control::policy::{Actor, Critic, Evaluated};
 use crate::learn::policy::learning_curve::{CURVE, CurveFile, CurvePoint};
 use crate::learn::{AnalyticRecipe, AnalyticTrainer, Valuation, ValuationRecipe};
 use crate::model::GreyBox;
@@ -19,8 +19,9 @@ const LINE: u64 = 50;
 /// Updates of the critics between two lines.
 const CRITICS: u64 = 1000;
 
-/// Climbs the reward's slope in `model`; the curve goes into `folder`. Gives the last actor, the learning
-/// rate having fallen to nothing, or `None` if interrupted: what takes minutes begins anew.
+/// Climbs the reward's slope in `model`; the curve of what `judge` says goes into `folder`. Gives the last
+/// actor, the learning rate having fallen to nothing, or `None` if interrupted: what takes minutes begins
+/// anew.
 ///
 /// # Errors
 /// If a parameter is no longer finite or the curve cannot be written.
@@ -28,7 +29,8 @@ pub fn climb(
     recipe: &AnalyticRecipe,
     model: &GreyBox,
     folder: &Path,
-    stop: &AtomicBool,
+    judge: &dyn Fn(Arc<Actor>) -> Result<Evaluated>,
+    stop: &Interruption,
 ) -> Result<Option<Arc<Actor>>> {
     let path = folder.join(CURVE);
     let context = || format!("cannot write {}", path.display());
@@ -54,13 +56,13 @@ pub fn climb(
             reward,
             episodes: steps / recipe.episode as u64,
             lost: progress.lost,
-            ..reached(evaluation(actor)?)
+            ..reached(judge(actor)?)
         };
         curve.add(point).with_context(context)?;
         let left = seconds / update as f64 * (recipe.updates - update) as f64;
         println!("{:>8} {}  {:.0} min left", recipe.seed, point.line(), left / 60.0);
         reward = 0.0;
-        if stop.load(Ordering::Relaxed) {
+        if stop.is_set() {
             return Ok(None);
         }
     }
@@ -75,7 +77,7 @@ pub fn value(
     recipe: ValuationRecipe,
     actor: &Actor,
     world: Imagination,
-    stop: &AtomicBool,
+    stop: &Interruption,
 ) -> Result<Option<[Critic; 2]>> {
     let (seed, updates) = (recipe.seed, recipe.updates);
     println!("{:>8} critics: updates,seconds,relative error", "seed");
@@ -88,7 +90,7 @@ pub fn value(
         if progress.updates == updates {
             return Ok(Some(valuation.critics()?));
         }
-        if stop.load(Ordering::Relaxed) {
+        if stop.is_set() {
             return Ok(None);
         }
     }

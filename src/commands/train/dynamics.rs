@@ -2,8 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
@@ -12,6 +10,7 @@ use serde::Serialize;
 
 use super::flights::{FlightArguments, Flights};
 use crate::commands::files::{self, Overwrite, shipped};
+use crate::commands::interruption::{Ended, Interruption};
 use crate::learn::dynamics::export;
 use crate::learn::dynamics::residual_map::{ResidualMap, residual_map};
 use crate::learn::dynamics::score::{Horizon, free_run};
@@ -120,6 +119,11 @@ struct Document<'a> {
 
 /// Trains, prints what came of it, writes the model.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    Ok(learn(arguments, &Interruption::watch()?)?.into())
+}
+
+/// As [`run`], until `stop` is set.
+pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let path = shipped(&arguments.prior);
     let mut prior = GreyBox::load(&path)?;
     if let Some(scheme) = &arguments.integrator {
@@ -149,15 +153,22 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let past = arguments.out.join(HISTORY);
     let mut history = history(&past, trainer.update());
-    if !train(&mut trainer, &kept, &past, &mut history)? {
+    if !train(&mut trainer, &kept, &past, &mut history, stop)? {
         eprintln!("interrupted; the same command goes on from {}", kept.display());
-        return Ok(ExitCode::from(130));
+        return Ok(Ended::Interrupted);
     }
     let model = trainer.model()?;
     let learned = trainer.coefficients(truth.as_ref());
     let names: Vec<String> = learned.iter().map(|c| c.name.clone()).collect();
     let origin = export::origin(&model, trainer.data(), trainer.recipe().seed);
-    export::save(&model, &path, &names, &origin, &arguments.out)?;
+    let about = format!("Learned from {samples} samples of flight, prior {}.", prior.name);
+    export::save(
+        &model,
+        &path,
+        export::Text { about: &about, trained: &names },
+        &origin,
+        &arguments.out,
+    )?;
     let scores = [&prior, &model].map(|m| free_run(m, &judge, &HORIZONS));
     println!("{}", coefficients(&learned));
     println!("{}", horizons(&scores));
@@ -203,7 +214,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     files::write(&page, &report.page().render(), Overwrite::Force)?;
     println!("report in {}", page.display());
     println!("model in {}", arguments.out.join(export::MODEL).display());
-    Ok(ExitCode::SUCCESS)
+    Ok(Ended::Done)
 }
 
 impl Arguments {
@@ -248,10 +259,8 @@ fn train(
     kept: &Path,
     past: &Path,
     history: &mut Vec<Moment>,
+    stop: &Interruption,
 ) -> Result<bool> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let seen = stop.clone();
-    ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))?;
     let mut lines = 0;
     while !trainer.is_done() {
         let start = Instant::now();
@@ -264,7 +273,7 @@ fn train(
         println!("{}", line(&progress, trainer, 1e3 * start.elapsed().as_secs_f64() / made));
         history.push(trainer.moment(&progress));
         lines += 1;
-        let interrupted = stop.load(Ordering::Relaxed);
+        let interrupted = stop.is_set();
         if lines % KEEP == 0 || interrupted || trainer.is_done() {
             // first what a checkpoint leaves out: more of it than the checkpoint knows does no harm
             files::write(past, &serde_json::to_string(&history)?, Overwrite::Force)?;

@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 use crate::commands::intake::Reading;
+use crate::learn::dynamics::resample::{SLOWEST_S, resampled};
 use crate::learn::dynamics::windows::Track;
 use crate::logs::csv::{self, Tolerance};
 use crate::model::{GreyBox, STEP};
 use crate::sysid::flight_path::ActuatorClock;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
 
 /// One track in so many is held out, where there are that many.
 const HELD_OUT: usize = 10;
@@ -51,16 +53,11 @@ impl FlightArguments {
             let intake = self.reading.take_in(&self.logs, model, ActuatorClock::Estimated)?;
             notes.extend(intake.notes);
             for flight in &intake.flights {
-                if (flight.step_s / STEP - 1.0).abs() > 1e-3 {
-                    bail!(
-                        "{} has a sample every {:.4} s; learning takes logs of 100 Hz or more",
-                        flight.name,
-                        flight.step_s
-                    );
-                }
+                notes.extend(slow(flight)?);
                 tracks.extend(flight.segments.iter().map(|segment| {
                     let rows = segment.instants.iter().map(|i| (i.state, i.controls, i.altitude));
-                    Track::new(model, rows)
+                    let rows = resampled(&rows.collect::<Vec<_>>(), flight.step_s);
+                    Track::new(model, rows.into_iter())
                 }));
             }
         }
@@ -79,6 +76,26 @@ impl FlightArguments {
         }
         Ok(Flights { learn, judge, notes })
     }
+}
+
+/// What must be known of a flight that was sampled more slowly than the model steps.
+///
+/// # Errors
+/// If it was sampled too slowly.
+fn slow(flight: &Reconstruction) -> Result<Option<String>> {
+    let (name, step_s) = (&flight.name, flight.step_s);
+    if step_s > 1.001 * SLOWEST_S {
+        bail!(
+            "cannot learn from {name}: it has a sample every {step_s:.3} s, and learning takes 10 a second or \
+             more; log attitude and rates faster"
+        );
+    }
+    let note = format!(
+        "{name} has {:.0} samples a second; the states between them are interpolated: faster motions than \
+         a fifth of that are not learned",
+        1.0 / step_s
+    );
+    Ok((step_s > 1.001 * STEP).then_some(note))
 }
 
 /// The episodes below a folder of `greylag collect`, in the order of their names.

@@ -8,7 +8,9 @@ mod policy;
 
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
+
+use crate::commands::interruption::{Ended, Interruption};
 
 /// Options of `greylag train`.
 #[derive(clap::Args)]
@@ -25,6 +27,15 @@ enum What {
     Policy(Box<policy::Arguments>),
     /// Draw the learning curves of policies side by side.
     Curves(curves::Arguments),
+}
+
+/// Trains until `stop` is set; curves are no training.
+pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
+    match &arguments.what {
+        What::Dynamics(arguments) => dynamics::learn(arguments, stop),
+        What::Policy(arguments) => policy::learn(arguments, stop),
+        What::Curves(_) => bail!("drawing curves is no stage of a learning"),
+    }
 }
 
 /// Trains.

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
@@ -12,7 +11,9 @@ use serde::Serialize;
 
 use super::{analytic, curves};
 use crate::commands::files::{self, Overwrite, shipped};
-use crate::control::policy::{Actor, Agent, Critic, Evaluated, Origin};
+use crate::commands::interruption::{Ended, Interruption};
+use crate::control::Controller;
+use crate::control::policy::{Actor, Agent, Critic, Evaluated, Origin, Policy};
 use crate::learn::policy::learning_curve::{COLUMNS, CURVE, CurveFile, CurvePoint};
 use crate::learn::{
     AnalyticRecipe, Hyperparameters, PolicyProgress, PolicyRecipe, PolicyStanding, PolicyTrainer,
@@ -20,9 +21,12 @@ use crate::learn::{
 };
 use crate::model::GreyBox;
 use crate::model::residual::{fingerprint, hash};
+use crate::physics::airframe::Envelope;
+use crate::sim::evaluation::{Evaluation, Make, imagine};
 use crate::sim::imagined::Imagination;
-use crate::sim::targets::Stratified;
+use crate::sim::targets::{Row, Stratified};
 use crate::sim::world::World;
+use crate::sim::{Group, Outcome, TargetFile};
 
 /// The file that a training goes on from.
 const CHECKPOINT: &str = "checkpoint.safetensors";
@@ -106,7 +110,7 @@ pub struct Arguments {
     /// Part of the targets that lie in the hard corners, 0 to 1; 0 is the paper's.
     #[arg(long, default_value_t = 0.0)]
     corners: f64,
-    /// Steps between two evaluations in JSBSim.
+    /// Steps between two evaluations, flown in what it is trained in.
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
     evaluate: u64,
     /// Steps between two checkpoints.
@@ -158,16 +162,19 @@ enum Method<'a> {
 struct Ground {
     model: Option<Arc<GreyBox>>,
     origin: Origin,
+    envelope: Envelope,
 }
 
 /// Trains, prints the curve, writes the best policy.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    Ok(learn(arguments, &Interruption::watch()?)?.into())
+}
+
+/// As [`run`], until `stop` is set.
+pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let ground = arguments.ground()?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = stop.clone();
-    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
     println!("{:>8} {COLUMNS}", "seed");
-    let one = |seed: u64| arguments.train(&ground, seed, &stop);
+    let one = |seed: u64| arguments.train(&ground, seed, stop);
     let seeds = arguments.seed..arguments.seed + arguments.seeds;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(cores).build()?;
@@ -184,9 +191,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let ended = ended?;
     if ended.contains(&false) {
         eprintln!("interrupted; the same command goes on from the last checkpoint");
-        return Ok(ExitCode::from(130));
+        return Ok(Ended::Interrupted);
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(Ended::Done)
 }
 
 impl Arguments {
@@ -287,9 +294,11 @@ impl Arguments {
                 bail!("this program was built without JSBSim; train in model:DIR");
             }
             let airframe = GreyBox::load(&shipped(Path::new("params/x8/jsbsim.toml")))?.airframe;
+            let envelope = airframe.envelope;
             return Ok(Ground {
                 model: None,
                 origin: origin(fingerprint(&airframe), "jsbsim", String::new()),
+                envelope,
             });
         };
         let mut path = shipped(path);
@@ -297,24 +306,20 @@ impl Arguments {
             path = path.join("model.toml");
         }
         let model = GreyBox::load(&path)?;
-        let mut bytes = std::fs::read(&path)?;
-        if model.residual.is_some() {
-            let residual = path.with_file_name(crate::learn::dynamics::export::RESIDUAL);
-            bytes.extend(std::fs::read(&residual).unwrap_or_default());
-        }
-        let origin = origin(fingerprint(&model.airframe), &model.name, hash(&bytes));
-        Ok(Ground { model: Some(Arc::new(model)), origin })
+        let origin = origin(fingerprint(&model.airframe), &model.name, model.sha256.clone());
+        let envelope = model.airframe.envelope;
+        Ok(Ground { model: Some(Arc::new(model)), origin, envelope })
     }
 
     /// Trains the policy of one seed; `false` if interrupted.
-    fn train(&self, ground: &Ground, seed: u64, stop: &AtomicBool) -> Result<bool> {
+    fn train(&self, ground: &Ground, seed: u64, stop: &Interruption) -> Result<bool> {
         let folder = match self.seeds {
             1 => self.out.clone(),
             _ => self.out.join(format!("seed-{seed}")),
         };
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make {}", folder.display()))?;
-        let targets = Stratified::new(seed, 0, self.corners);
+        let targets = Stratified::new(seed, 0, self.corners).at_airspeeds_of(&ground.envelope);
         let run = Run { folder, seed, evaluate: self.evaluate, ground, stop };
         let recipe = self.recipe(seed);
         match &ground.model {
@@ -342,7 +347,7 @@ struct Run<'a> {
     seed: u64,
     evaluate: u64,
     ground: &'a Ground,
-    stop: &'a AtomicBool,
+    stop: &'a Interruption,
 }
 
 impl Run<'_> {
@@ -354,7 +359,8 @@ impl Run<'_> {
         model: &GreyBox,
         world: Imagination,
     ) -> Result<bool> {
-        let Some(actor) = analytic::climb(recipe, model, &self.folder, self.stop)? else {
+        let judge = |actor| self.ground.evaluate(actor);
+        let Some(actor) = analytic::climb(recipe, model, &self.folder, &judge, self.stop)? else {
             return Ok(false);
         };
         let method = Method::Analytic { climb: recipe, valuation: &valuation.clone() };
@@ -362,8 +368,8 @@ impl Run<'_> {
             return Ok(false);
         };
         let steps = recipe.updates * (recipe.window * recipe.instances) as u64;
-        let evaluation = evaluation(actor.clone())?;
-        self.save(&method, actor, critics.into(), steps, evaluation)?;
+        let evaluated = self.ground.evaluate(actor.clone())?;
+        self.save(&method, actor, critics.into(), steps, evaluated)?;
         println!("{:>8} policy in {}", self.seed, self.folder.display());
         Ok(true)
     }
@@ -394,7 +400,7 @@ impl Run<'_> {
                 false => format!("seed {}: no checkpoint was written yet", self.seed),
             })?;
             let seconds = start.elapsed().as_secs_f64();
-            let evaluated = evaluation(trainer.actor())?;
+            let evaluated = self.ground.evaluate(trainer.actor())?;
             let made = (progress.steps - first) as f64;
             let left = seconds / made * goal.saturating_sub(progress.steps) as f64;
             let point = CurvePoint {
@@ -419,7 +425,7 @@ impl Run<'_> {
             if trainer.at_checkpoint() {
                 trainer.standing().save(&kept)?;
             }
-            if self.stop.load(Ordering::Relaxed) && trainer.steps() < goal {
+            if self.stop.is_set() && trainer.steps() < goal {
                 return Ok(false);
             }
         }
@@ -434,8 +440,9 @@ impl Run<'_> {
         actor: Arc<Actor>,
         critics: Arc<[Critic; 2]>,
         steps: u64,
-        evaluation: Option<Evaluated>,
+        evaluated: Evaluated,
     ) -> Result<()> {
+        let evaluation = Some(evaluated);
         let origin = Origin { seed: self.seed, steps, evaluation, ..self.ground.origin.clone() };
         let agent = Agent { actor, critics, origin };
         for (name, bytes) in agent.to_files().map_err(|e| anyhow!("the policy's files: {e}"))? {
@@ -469,37 +476,44 @@ fn warn(seed: u64, progress: &PolicyProgress) {
 }
 
 /// A point of the curve that says what was reached, and nothing else.
-pub fn reached(e: Option<Evaluated>) -> CurvePoint {
-    let [easy_deg, hard_deg, divergence_rate] =
-        e.map_or([f64::NAN; 3], |e| [e.easy_deg, e.hard_deg, e.divergence_rate]);
+pub fn reached(e: Evaluated) -> CurvePoint {
+    let Evaluated { easy_deg, hard_deg, divergence_rate, .. } = e;
     CurvePoint { easy_deg, hard_deg, divergence_rate, ..CurvePoint::default() }
 }
 
-/// A tenth of the targets of a file that is not the one that policies are scored on, so that the choice
-/// of the best is no part of its score.
-#[cfg(feature = "sitl")]
-pub fn evaluation(actor: Arc<Actor>) -> Result<Option<Evaluated>> {
-    use crate::control::policy::Policy;
-    use crate::sim::evaluation::{Evaluation, evaluate};
-    use crate::sim::{Group, TargetFile};
-    const OTHER: u64 = 2;
-    let mut rows = TargetFile::generate(OTHER).rows;
-    rows.retain(|row| row.group != Group::HardOutside && row.number % 10 == row.number / 10 % 10);
-    let plant = greylag_sitl::plant::PlantOptions::default();
-    let make = || -> Box<dyn crate::control::Controller> { Box::new(Policy::of(actor.clone())) };
-    let outcomes = evaluate(&plant, &make, &rows, 1, &|| ())?;
-    let scores = Evaluation::new("policy", "-", &rows, &outcomes);
-    let mean = |group: &str| scores.score(group).map_or(f64::NAN, |s| s.mean_deg);
-    Ok(Some(Evaluated {
-        targets: rows.len(),
-        easy_deg: mean("easy"),
-        hard_deg: mean("hard_corners"),
-        divergence_rate: scores.score("all").map_or(f64::NAN, |s| s.divergence_rate),
-    }))
+/// Seed of the targets that a training is judged by: none of those that policies are scored on.
+const OTHER: u64 = 2;
+
+impl Ground {
+    /// What `actor` reaches in what it is trained in, on a tenth of a target file: a policy that is trained
+    /// in a model is chosen without a flight in any simulator.
+    fn evaluate(&self, actor: Arc<Actor>) -> Result<Evaluated> {
+        let mut rows = TargetFile::generate(OTHER).rows;
+        rows.retain(|r| r.group != Group::HardOutside && r.number % 10 == r.number / 10 % 10);
+        let make = || -> Box<dyn Controller> { Box::new(Policy::of(actor.clone())) };
+        let outcomes = match &self.model {
+            Some(model) => imagine(model, &make, &rows, 1)?,
+            None => flown(&make, &rows)?,
+        };
+        let scores = Evaluation::new("policy", &self.origin.model, &rows, &outcomes);
+        let mean = |group: &str| scores.score(group).map_or(f64::NAN, |s| s.mean_deg);
+        Ok(Evaluated {
+            targets: rows.len(),
+            easy_deg: mean("easy"),
+            hard_deg: mean("hard_corners"),
+            divergence_rate: scores.score("all").map_or(f64::NAN, |s| s.divergence_rate),
+        })
+    }
 }
 
-/// Without JSBSim there is none: the best policy is the one that earns most in its model.
+/// What came of flights in JSBSim, where the policy was trained there.
+#[cfg(feature = "sitl")]
+fn flown(make: Make, rows: &[Row]) -> Result<Vec<Outcome>> {
+    let plant = greylag_sitl::plant::PlantOptions::default();
+    Ok(crate::sim::evaluation::evaluate(&plant, make, rows, 1, &|| ())?)
+}
+
 #[cfg(not(feature = "sitl"))]
-pub fn evaluation(_: Arc<Actor>) -> Result<Option<Evaluated>> {
-    Ok(None)
+fn flown(_: Make, _: &[Row]) -> Result<Vec<Outcome>> {
+    bail!("this program was built without JSBSim")
 }

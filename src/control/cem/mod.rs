@@ -439,6 +439,14 @@ impl Cem {
         }
     }
 
+    /// Whether the model has predicted the last half second well enough to plan with.
+    fn is_trusted(&self) -> bool {
+        let (Some(most), Some(disturbance)) = (self.settings.trust, &self.disturbance) else {
+            return true;
+        };
+        disturbance.missed_part() <= most
+    }
+
     /// The base's command, or that of a plan that is surely better.
     fn over_base(&mut self, mut base: Base, seen: &Observation, target: &Target) -> Command {
         let begun = Instant::now();
@@ -449,6 +457,10 @@ impl Cem {
         self.base = Some(base);
         // the base's throttle takes the place of what stands here
         let action = |[aileron, elevator]: [f64; 2]| [aileron, elevator, 0.0];
+        if !self.is_trusted() {
+            self.last = None;
+            return alone;
+        }
         let advised = self.ilqr.as_mut().and_then(|ilqr| ilqr.plan(seen, target));
         self.last = self.search_around_base(seen, target, advised.map(|plan| plan.map(action)));
         match (self.last, &mut self.base) {

@@ -86,6 +86,9 @@ pub struct Settings {
     pub ilqr: bool,
     /// Time constant (s) with which what the model leaves unexplained is estimated; `None`: it is not.
     pub disturbance: Option<f64>,
+    /// Largest part of the motion that the model's one-step predictions may have missed in the last half second
+    /// for plans to be made; above it the base flies alone. It needs a base and the estimate of the disturbance.
+    pub trust: Option<f64>,
     /// What flies the candidates.
     pub instructions: Instructions,
     /// Cores that fly them, one or two; the commands are the same.
@@ -112,6 +115,7 @@ impl Settings {
         margin: 0.0,
         ilqr: false,
         disturbance: None,
+        trust: None,
         instructions: Instructions::Widest,
         cores: 1,
     };
@@ -147,6 +151,7 @@ impl Settings {
         steps: 80,
         margin: 5e-2,
         disturbance: Some(0.3),
+        trust: Some(0.5),
         ..Settings::PAPER
     };
 
@@ -200,6 +205,8 @@ pub enum Change {
     Ilqr(bool),
     /// [`Settings::disturbance`].
     Disturbance(Option<f64>),
+    /// [`Settings::trust`].
+    Trust(Option<f64>),
     /// [`Settings::instructions`].
     Instructions(Instructions),
     /// [`Settings::cores`].
@@ -227,6 +234,7 @@ impl Change {
             Change::Margin(margin) => Settings { margin, ..s },
             Change::Ilqr(ilqr) => Settings { ilqr, ..s },
             Change::Disturbance(disturbance) => Settings { disturbance, ..s },
+            Change::Trust(trust) => Settings { trust, ..s },
             Change::Instructions(instructions) => Settings { instructions, ..s },
             Change::Cores(cores) => Settings { cores, ..s },
         }
@@ -239,7 +247,7 @@ impl Change {
     "{text:?} changes no setting of the planner: {why}; give KEY=VALUE with population, elites, \
      temperature, iterations, start (neutral, policy, last), spread, persistence, kept, proposals, noise, \
      alpha (or none), value (critics, fitted), steps, chunk, delay (yes, no), margin, \
-     ilqr (yes, no), disturbance (s, or none), instructions (widest, portable), cores (1, 2)"
+     ilqr (yes, no), disturbance (s, or none), trust (or none), instructions (widest, portable), cores (1, 2)"
 )]
 pub struct ChangeError {
     text: String,
@@ -307,6 +315,7 @@ fn parse(text: &str) -> Result<Change, String> {
             "portable" => Instructions::Portable,
             _ => return Err(format!("there are no instructions {value:?}")),
         }),
+        "trust" => Change::Trust(unless_none([0.0, 1e3])?),
         "disturbance" => Change::Disturbance(unless_none([0.01, 60.0])?),
         _ => return Err(format!("there is no setting {key:?}")),
     })

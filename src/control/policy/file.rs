@@ -37,7 +37,7 @@ pub struct Origin {
     pub program: String,
 }
 
-/// What a policy reached in JSBSim at the end of its training.
+/// What a policy reached at the end of its training, in what it was trained in.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Evaluated {

@@ -195,7 +195,7 @@ mod tests {
     fn networks_of_another_shape_are_refused() {
         let network = || Dense::uniform(&[15, 8, 2], &mut stream::stream(2, &[])).unwrap();
         let said = Actor::new(network()).unwrap_err().to_string();
-        assert!(said.contains("15 inputs and 3 outputs, not [15, 8, 2]"), "{said}");
+        assert!(said.contains("16 inputs and 3 outputs, not [15, 8, 2]"), "{said}");
         assert!(Critic::new(network()).is_err());
     }
 }

@@ -37,15 +37,24 @@ pub const AIRFRAME: &str = "airframe.toml";
 /// The residual.
 pub const RESIDUAL: &str = "residual.safetensors";
 
-/// Writes `model`, learned from the prior in the file `prior`, into `folder`, `trained` being the full
-/// names of its trained coefficients. What stands there is replaced, the model file last.
+/// What a model's file says in words.
+#[derive(Clone, Copy, Debug)]
+pub struct Text<'a> {
+    /// What it was learned from, one sentence.
+    pub about: &'a str,
+    /// Full names of the coefficients that were trained.
+    pub trained: &'a [String],
+}
+
+/// Writes `model`, learned from the prior in the file `prior`, into `folder`. What stands there is replaced,
+/// the model file last.
 ///
 /// # Errors
 /// If a file cannot be read or written.
 pub fn save(
     model: &GreyBox,
     prior: &Path,
-    trained: &[String],
+    said: Text,
     origin: &Origin,
     folder: &Path,
 ) -> Result<(), ExportError> {
@@ -62,7 +71,7 @@ pub fn save(
     let name: String = format!("{}-learned", model.name).chars().take(64).collect();
     let mut set = |key: &str, value: &str| table.insert(key.into(), value.into());
     set("name", &name);
-    set("description", &format!("{}, with what {} learned beside it.", model.name, origin.program));
+    set("description", said.about);
     set("airframe", AIRFRAME);
     set(
         "integrator",
@@ -72,7 +81,7 @@ pub fn save(
         },
     );
     set("residual", RESIDUAL);
-    for name in trained {
+    for name in said.trained {
         let value = model.coefficients().iter().find(|c| c.name == *name).map(|c| c.value);
         let path: Vec<&str> = match name.as_str() {
             JXZ => name.split('.').collect(),

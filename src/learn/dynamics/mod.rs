@@ -10,6 +10,7 @@ pub(super) mod network;
 pub(super) mod packet;
 pub(super) mod prior;
 pub(super) mod recipe;
+pub mod resample;
 pub mod residual_map;
 pub(super) mod rollout;
 pub mod score;

@@ -7,6 +7,7 @@
 //! explain, which is exact but for the first step off a stop.
 
 use burn::tensor::{Device, Tensor, TensorData};
+use rayon::prelude::*;
 
 use crate::control::Target;
 use crate::control::policy::{ACTIONS, Actor, OBSERVATIONS, command, observe};
@@ -110,6 +111,13 @@ const MOVED: [(usize, f32); 14] = [
     (19, 0.2),
     (20, 0.2),
 ];
+
+/// What the steps of all instances have in common; any core may fly them.
+#[derive(Clone, Copy)]
+struct Flyer<'a> {
+    model: &'a GreyBox,
+    recipe: &'a AnalyticRecipe,
+}
 
 /// What an update saw.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -216,14 +224,13 @@ impl AnalyticTrainer {
             previous: [Command::IDLE; 2],
             memory,
         };
-        let mut targets = Stratified::new(recipe.seed, 0, recipe.corners);
-        let airspeed = State::NEUTRAL.airspeed;
+        let mut targets = Stratified::new(recipe.seed, 0, recipe.corners)
+            .at_airspeeds_of(&model.airframe.envelope);
         let instances = (0..recipe.instances)
             .map(|k| {
-                let [roll, pitch] = targets.next_target();
                 // ends spread over time, so that no window holds all starts
                 let left = recipe.episode * (k + 1) / recipe.instances;
-                Instance { aircraft: neutral, target: Target { roll, pitch, airspeed }, left }
+                Instance { aircraft: neutral, target: targets.next_target(), left }
             })
             .collect();
         Ok(AnalyticTrainer {
@@ -255,19 +262,27 @@ impl AnalyticTrainer {
     /// If a parameter is no longer finite.
     pub fn update(&mut self) -> Result<AnalyticProgress, DenseError> {
         let actor = self.actor()?;
-        let mut units = Units::new(0.0);
         let (count, window) = (self.instances.len(), self.recipe.window);
         let mut seen = vec![[0.0_f32; OBSERVATIONS]; count * window];
         let mut steps: Vec<Option<Step>> = Vec::with_capacity(count * window);
         let mut reward = 0.0;
-        // forward: step after step, instance after instance
+        // forward: step after step; the instances of a step are shared by the cores
+        let mut flown = Vec::with_capacity(count);
         for t in 0..window {
-            for k in 0..count {
-                let Instance { aircraft, target, .. } = &self.instances[k];
+            let flyer = Flyer { model: &self.model, recipe: &self.recipe };
+            let fly = |units: &mut Units<f32>, Instance { aircraft, target, .. }: &Instance| {
                 let observed = aircraft.observe(target).map(|x| x as f32);
+                let action = actor.act_one(units, &observed);
+                (observed, flyer.slopes(aircraft, target, action.map(f64::from)))
+            };
+            self.instances
+                .par_iter()
+                .with_min_len(8)
+                .map_init(|| Units::new(0.0), fly)
+                .collect_into_vec(&mut flown);
+            // the order of targets and sums is that of one core
+            for (k, (observed, (next, step, earned))) in flown.drain(..).enumerate() {
                 seen[t * count + k] = observed;
-                let action = actor.act_one(&mut units, &observed);
-                let (next, step, earned) = self.slopes(aircraft, target, action.map(f64::from));
                 reward += earned / (count * window) as f64;
                 steps.push(self.advance(k, next).then_some(step));
             }
@@ -278,6 +293,88 @@ impl AnalyticTrainer {
         Ok(AnalyticProgress { update: self.update, reward, lost: self.lost })
     }
 
+    /// Puts an instance into its next step; `false` if its episode ended there.
+    fn advance(&mut self, k: usize, next: Aircraft) -> bool {
+        let State { pitch, airspeed, alpha, beta, p, q, r, .. } = next.state;
+        let inside = pitch.abs() < 1.4
+            && (5.0..60.0).contains(&airspeed)
+            && alpha.abs() < 0.8
+            && beta.abs() < 0.8
+            && [p, q, r].iter().all(|x| x.abs() < 20.0);
+        let instance = &mut self.instances[k];
+        instance.aircraft = next;
+        instance.left = instance.left.saturating_sub(1);
+        if inside && instance.left > 0 {
+            return true;
+        }
+        self.lost += u64::from(!inside);
+        let target = self.targets.next_target();
+        *instance = Instance { aircraft: self.neutral, target, left: self.recipe.episode };
+        false
+    }
+
+    /// Backward through the windows: the slope of the sum of rewards by every action.
+    fn reverse(&self, seen: &[[f32; OBSERVATIONS]], steps: &[Option<Step>]) -> Vec<f32> {
+        let count = self.instances.len();
+        let actor = self.actor.passed();
+        let mut slopes = vec![0.0_f32; steps.len() * ACTIONS];
+        let mut behind = vec![[0.0_f32; NUMBERS]; count];
+        let observation = observation_slopes();
+        for t in (0..self.recipe.window).rev() {
+            let range = t * count..(t + 1) * count;
+            let mut of_action = vec![0.0_f32; count * ACTIONS];
+            let mut before = vec![[0.0_f32; NUMBERS]; count];
+            for (k, step) in steps[range.clone()].iter().enumerate() {
+                // what follows the end of an episode is another one's
+                let Some(step) = step else { continue };
+                let mut sum = [0.0_f32; INPUTS];
+                for ((row, behind), reward) in step.next.iter().zip(behind[k]).zip(step.reward) {
+                    sum.iter_mut().zip(row).for_each(|(s, x)| *s += (behind + reward) * x);
+                }
+                before[k].copy_from_slice(&sum[..NUMBERS]);
+                of_action[k * ACTIONS..][..ACTIONS].copy_from_slice(&sum[NUMBERS..]);
+            }
+            slopes[t * count * ACTIONS..][..count * ACTIONS].copy_from_slice(&of_action);
+            // through the actor: what it saw then decided what it did
+            let rows =
+                self.rows(seen[range].as_flattened(), OBSERVATIONS).autodiff().require_grad();
+            let weights = self.rows(&of_action, ACTIONS).autodiff();
+            let sum = (actor.forward(rows.clone()).tanh() * weights).sum();
+            let mut gradients = sum.backward();
+            let through = rows.grad_remove(&mut gradients).map(|g| g.into_data());
+            if let Some(Ok(through)) = through.map(|data| data.try_into_vec::<f32>()) {
+                for (before, through) in before.iter_mut().zip(through.chunks_exact(OBSERVATIONS)) {
+                    for (o, (place, factor)) in observation.iter().enumerate() {
+                        before[*place] += factor * through[o];
+                    }
+                }
+            }
+            behind = before;
+        }
+        slopes
+    }
+
+    /// Moves the actor up the slopes.
+    fn climb(&mut self, seen: &[[f32; OBSERVATIONS]], slopes: &[f32]) {
+        let followed = self.actor.followed();
+        let rows = self.rows(seen.as_flattened(), OBSERVATIONS).autodiff();
+        let scale = 1.0 / self.instances.len() as f64;
+        let weights = self.rows(slopes, ACTIONS).autodiff() * scale;
+        let loss = -(followed.forward(rows).tanh() * weights).sum();
+        let mut gradients = loss.backward();
+        let part = self.update as f64 / self.recipe.updates.max(1) as f64;
+        let fall = 0.5 * (1.0 + (std::f64::consts::PI * part.min(1.0)).cos());
+        self.optimiser.set_rate(self.recipe.rate * (0.01 + 0.99 * fall));
+        self.optimiser.step(&mut self.actor, followed, &mut gradients);
+    }
+
+    fn rows(&self, numbers: &[f32], width: usize) -> Tensor<2> {
+        let data = TensorData::new(numbers.to_vec(), [numbers.len() / width, width]);
+        Tensor::from_data(data, &self.device)
+    }
+}
+
+impl Flyer<'_> {
     /// A step with its slopes, and the reward of eq. (30).
     fn slopes(
         &self,
@@ -371,87 +468,6 @@ impl AnalyticTrainer {
             (effort(new.aileron - old.aileron), effort(new.elevator - old.elevator));
         (all[16], all[17]) = (-all[13], -all[14]);
         all.map(|x| x as f32)
-    }
-
-    /// Puts an instance into its next step; `false` if its episode ended there.
-    fn advance(&mut self, k: usize, next: Aircraft) -> bool {
-        let State { pitch, airspeed, alpha, beta, p, q, r, .. } = next.state;
-        let inside = pitch.abs() < 1.4
-            && (5.0..60.0).contains(&airspeed)
-            && alpha.abs() < 0.8
-            && beta.abs() < 0.8
-            && [p, q, r].iter().all(|x| x.abs() < 20.0);
-        let instance = &mut self.instances[k];
-        instance.aircraft = next;
-        instance.left = instance.left.saturating_sub(1);
-        if inside && instance.left > 0 {
-            return true;
-        }
-        self.lost += u64::from(!inside);
-        let [roll, pitch] = self.targets.next_target();
-        let target = Target { roll, pitch, ..instance.target };
-        *instance = Instance { aircraft: self.neutral, target, left: self.recipe.episode };
-        false
-    }
-
-    /// Backward through the windows: the slope of the sum of rewards by every action.
-    fn reverse(&self, seen: &[[f32; OBSERVATIONS]], steps: &[Option<Step>]) -> Vec<f32> {
-        let count = self.instances.len();
-        let actor = self.actor.passed();
-        let mut slopes = vec![0.0_f32; steps.len() * ACTIONS];
-        let mut behind = vec![[0.0_f32; NUMBERS]; count];
-        let observation = observation_slopes();
-        for t in (0..self.recipe.window).rev() {
-            let range = t * count..(t + 1) * count;
-            let mut of_action = vec![0.0_f32; count * ACTIONS];
-            let mut before = vec![[0.0_f32; NUMBERS]; count];
-            for (k, step) in steps[range.clone()].iter().enumerate() {
-                // what follows the end of an episode is another one's
-                let Some(step) = step else { continue };
-                let mut sum = [0.0_f32; INPUTS];
-                for ((row, behind), reward) in step.next.iter().zip(behind[k]).zip(step.reward) {
-                    sum.iter_mut().zip(row).for_each(|(s, x)| *s += (behind + reward) * x);
-                }
-                before[k].copy_from_slice(&sum[..NUMBERS]);
-                of_action[k * ACTIONS..][..ACTIONS].copy_from_slice(&sum[NUMBERS..]);
-            }
-            slopes[t * count * ACTIONS..][..count * ACTIONS].copy_from_slice(&of_action);
-            // through the actor: what it saw then decided what it did
-            let rows =
-                self.rows(seen[range].as_flattened(), OBSERVATIONS).autodiff().require_grad();
-            let weights = self.rows(&of_action, ACTIONS).autodiff();
-            let sum = (actor.forward(rows.clone()).tanh() * weights).sum();
-            let mut gradients = sum.backward();
-            let through = rows.grad_remove(&mut gradients).map(|g| g.into_data());
-            if let Some(Ok(through)) = through.map(|data| data.try_into_vec::<f32>()) {
-                for (before, through) in before.iter_mut().zip(through.chunks_exact(OBSERVATIONS)) {
-                    for (o, (place, factor)) in observation.iter().enumerate() {
-                        before[*place] += factor * through[o];
-                    }
-                }
-            }
-            behind = before;
-        }
-        slopes
-    }
-
-    /// Moves the actor up the slopes.
-    fn climb(&mut self, seen: &[[f32; OBSERVATIONS]], slopes: &[f32]) {
-        let followed = self.actor.followed();
-        let rows = self.rows(seen.as_flattened(), OBSERVATIONS).autodiff();
-        let scale = 1.0 / self.instances.len() as f64;
-        let weights = self.rows(slopes, ACTIONS).autodiff() * scale;
-        let loss = -(followed.forward(rows).tanh() * weights).sum();
-        let mut gradients = loss.backward();
-        let part = self.update as f64 / self.recipe.updates.max(1) as f64;
-        let fall = 0.5 * (1.0 + (std::f64::consts::PI * part.min(1.0)).cos());
-        self.optimiser.set_rate(self.recipe.rate * (0.01 + 0.99 * fall));
-        self.optimiser.step(&mut self.actor, followed, &mut gradients);
-    }
-
-    fn rows(&self, numbers: &[f32], width: usize) -> Tensor<2> {
-        let data = TensorData::new(numbers.to_vec(), [numbers.len() / width, width]);
-        Tensor::from_data(data, &self.device)
     }
 }
 

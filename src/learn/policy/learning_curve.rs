@@ -1,4 +1,4 @@
-//! The learning curve of a policy: what it reached in JSBSim, evaluation by evaluation, as a table on disk.
+//! The learning curve of a policy: what it reached in what it is trained in, as a table on disk.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -59,7 +59,7 @@ impl CurvePoint {
         )
     }
 
-    /// Both errors together, by which the best is chosen; without JSBSim, what it failed to earn.
+    /// Both errors together, by which the best is chosen; where there is none, what it failed to earn.
     pub fn badness(&self) -> f64 {
         let error = self.easy_deg + self.hard_deg;
         if error.is_nan() { -self.reward } else { error }

@@ -122,7 +122,13 @@ mod tests {
 
     fn transition(k: usize) -> Transition {
         let x = k as f32;
-        Transition { observed: [x; 15], action: [x; 3], reward: x, next: [-x; 15], goes_on: 1.0 }
+        Transition {
+            observed: [x; OBSERVATIONS],
+            action: [x; 3],
+            reward: x,
+            next: [-x; OBSERVATIONS],
+            goes_on: 1.0,
+        }
     }
 
     #[test]
@@ -136,9 +142,9 @@ mod tests {
         for k in 0..400 {
             let x = batch.reward[k];
             seen[x as usize] = true;
-            assert!(batch.observed[15 * k..15 * k + 15].iter().all(|o| *o == x));
+            assert!(batch.observed[OBSERVATIONS * k..][..OBSERVATIONS].iter().all(|o| *o == x));
             assert!(batch.action[3 * k..3 * k + 3].iter().all(|a| *a == x));
-            assert!(batch.next[15 * k..15 * k + 15].iter().all(|o| *o == -x));
+            assert!(batch.next[OBSERVATIONS * k..][..OBSERVATIONS].iter().all(|o| *o == -x));
         }
         // each of ten is missed by 400 draws once in 10^18
         assert_eq!(seen.iter().position(|s| *s), Some(15));

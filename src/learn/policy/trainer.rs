@@ -6,7 +6,7 @@ use rand::RngExt as _;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::control::policy::{ACTIONS, Actor, Critic, ShapeError};
+use crate::control::policy::{ACTIONS, Actor, Critic, OBSERVATIONS, ShapeError};
 use crate::control::task::Task;
 use crate::learn::policy::replay::{Batch, Replay, Transition};
 use crate::learn::policy::td3::{Hyperparameters, Standing, Td3};
@@ -220,7 +220,7 @@ impl<W: World> PolicyTrainer<W> {
     }
 
     /// Random actions in the warm-up, then the actor's with noise.
-    fn explore(&mut self, observed: &[Block; 15], rng: &mut Stream) -> [Block; ACTIONS] {
+    fn explore(&mut self, observed: &[Block; OBSERVATIONS], rng: &mut Stream) -> [Block; ACTIONS] {
         if self.steps < self.recipe.warmup {
             let mut action = [Block::zero(); ACTIONS];
             action.iter_mut().flat_map(|a| &mut a.0).for_each(|a| *a = rng.random_range(-1.0..1.0));
@@ -237,12 +237,12 @@ impl<W: World> PolicyTrainer<W> {
     fn remember(
         &mut self,
         lane: usize,
-        observed: &[Block; 15],
+        observed: &[Block; OBSERVATIONS],
         action: &[Block; ACTIONS],
         stepped: &Stepped,
     ) {
         let lost = stepped.ended[lane] == Ended::Lost;
-        let of = |numbers: &[Block; 15]| numbers.map(|x| x.0[lane]);
+        let of = |numbers: &[Block; OBSERVATIONS]| numbers.map(|x| x.0[lane]);
         let task = Task::PAPER;
         let worst = -(task.roll_cap + task.pitch_cap + task.airspeed_cap);
         // a lost aircraft earns the worst for ever; where it is then may be no number

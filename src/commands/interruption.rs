@@ -1,0 +1,48 @@
+//! Ctrl-C during long work: the work ends at its next safe point.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context, Result};
+
+/// A flag that Ctrl-C sets.
+#[derive(Clone, Debug, Default)]
+pub struct Interruption(Arc<AtomicBool>);
+
+/// How long work ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// It is done.
+    Done,
+    /// Ctrl-C ended it; the same command goes on.
+    Interrupted,
+}
+
+impl Interruption {
+    /// The flag of this program; to be called once.
+    ///
+    /// # Errors
+    /// If the handler cannot be set.
+    pub fn watch() -> Result<Interruption> {
+        let flag = Interruption::default();
+        let seen = flag.0.clone();
+        ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
+            .context("setting the handler of Ctrl-C")?;
+        Ok(flag)
+    }
+
+    /// Whether Ctrl-C was typed.
+    pub fn is_set(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+impl From<Ended> for ExitCode {
+    fn from(ended: Ended) -> ExitCode {
+        match ended {
+            Ended::Done => ExitCode::SUCCESS,
+            Ended::Interrupted => ExitCode::from(130),
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! How much work a learning takes: how many flights, updates and units.
+
+use clap::ValueEnum;
+
+/// A budget by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Budget {
+    /// Tens of seconds: to see it work.
+    Quick,
+    /// Minutes of two cores: a controller worth flying.
+    Standard,
+    /// The paper's numbers of flights and updates: hours with td3.
+    Paper,
+}
+
+/// How the policy is found, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Algorithm {
+    /// The gradient of the reward through the model, then critics of the policy found.
+    Analytic,
+    /// The paper's TD3.
+    Td3,
+}
+
+/// What a budget buys before the policy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sizes {
+    /// Random episodes.
+    pub episodes: u32,
+    /// Planned episodes of a round.
+    pub planned: u32,
+    /// Planned rounds.
+    pub rounds: u32,
+    /// Updates of a model that only flies the next round.
+    pub passing_updates: u64,
+    /// Updates of the last model.
+    pub updates: u64,
+    /// Units of the residual's hidden layers.
+    pub hidden: &'static str,
+}
+
+impl Budget {
+    /// The numbers of flights and updates.
+    pub const fn sizes(self) -> Sizes {
+        match self {
+            Budget::Quick => Sizes {
+                episodes: 24,
+                planned: 4,
+                rounds: 1,
+                passing_updates: 200,
+                updates: 1500,
+                hidden: "16,16",
+            },
+            Budget::Standard => Sizes {
+                episodes: 175,
+                planned: 25,
+                rounds: 5,
+                passing_updates: 1500,
+                updates: 20_000,
+                hidden: "32,32",
+            },
+            Budget::Paper => Sizes {
+                episodes: 175,
+                planned: 25,
+                rounds: 5,
+                passing_updates: 20_000,
+                updates: 20_000,
+                hidden: "64,64",
+            },
+        }
+    }
+
+    /// The options of `train policy`.
+    pub const fn policy(self, algorithm: Algorithm) -> &'static [&'static str] {
+        use Algorithm::{Analytic, Td3};
+        match (self, algorithm) {
+            (Budget::Quick, Analytic) => &[
+                "--actor",
+                "32,32",
+                "--critic",
+                "32,32",
+                "--updates",
+                "300",
+                "--window",
+                "60",
+                "--flock",
+                "16",
+                "--valuation",
+                "500",
+                "--corners",
+                "0.3",
+            ],
+            (Budget::Standard, Analytic) => &[
+                "--actor",
+                "64,64",
+                "--critic",
+                "64,64",
+                "--updates",
+                "800",
+                "--window",
+                "200",
+                "--flock",
+                "64",
+                "--valuation",
+                "10000",
+                "--corners",
+                "0.3",
+            ],
+            (Budget::Paper, Analytic) => &[
+                "--actor",
+                "128,128",
+                "--critic",
+                "128,128",
+                "--updates",
+                "2000",
+                "--window",
+                "200",
+                "--flock",
+                "64",
+                "--valuation",
+                "20000",
+                "--corners",
+                "0.3",
+            ],
+            (Budget::Quick, Td3) => {
+                &["--actor", "32,32", "--critic", "32,32", "--steps", "20000", "--warmup", "4000"]
+            }
+            (Budget::Standard, Td3) => {
+                &["--actor", "128,128", "--critic", "128,128", "--steps", "100000"]
+            }
+            (Budget::Paper, Td3) => &["--steps", "700000", "--evaluate", "20000"],
+        }
+    }
+}

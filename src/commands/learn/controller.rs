@@ -1,0 +1,93 @@
+//! The folder that flies: model and policy together, with a file that says where they come from.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde::Serialize;
+
+use super::imagined::Reached;
+use super::plan::{MODEL, POLICY, Stage};
+use crate::learn::write_whole;
+use crate::model::GreyBox;
+use crate::model::residual::hash;
+
+/// Its name below the folder of a learning.
+pub const CONTROLLER: &str = "controller";
+/// The file that says where it comes from.
+pub const ORIGIN: &str = "learned.toml";
+
+/// The files that fly, below the folder of the learning.
+const FILES: [(&str, &str); 6] = [
+    (MODEL, "airframe.toml"),
+    (MODEL, "residual.safetensors"),
+    (POLICY, "critic1.safetensors"),
+    (POLICY, "critic2.safetensors"),
+    (POLICY, "actor.safetensors"),
+    (MODEL, "model.toml"),
+];
+
+/// Where a controller comes from.
+#[derive(Serialize)]
+struct Origin<'a> {
+    schema: u32,
+    program: &'static str,
+    command: &'a str,
+    prior: &'a str,
+    prior_sha256: &'a str,
+    model: &'a str,
+    stages: Vec<String>,
+    files: Vec<Content>,
+    /// In the model itself, no simulator taking part.
+    imagined: &'a [Reached],
+}
+
+#[derive(Serialize)]
+struct Content {
+    name: String,
+    sha256: String,
+}
+
+/// Puts the files of the learning in `out` together, the model last: where it is, the others are.
+///
+/// # Errors
+/// If a file cannot be read or written.
+pub fn assemble(
+    out: &Path,
+    command: &str,
+    prior: &GreyBox,
+    stages: &[Stage],
+    imagined: &[Reached],
+) -> Result<()> {
+    let folder = out.join(CONTROLLER);
+    std::fs::create_dir_all(folder.join(POLICY))
+        .with_context(|| format!("cannot make {}", folder.display()))?;
+    let mut files = Vec::new();
+    for (from, name) in FILES {
+        let source = out.join(from).join(name);
+        let bytes =
+            std::fs::read(&source).with_context(|| format!("cannot read {}", source.display()))?;
+        let name = if from == POLICY { format!("{POLICY}/{name}") } else { name.to_owned() };
+        write(&folder.join(&name), &bytes)?;
+        files.push(Content { name, sha256: hash(&bytes) });
+    }
+    let model = GreyBox::load(&folder.join("model.toml"))?;
+    let origin = Origin {
+        schema: 1,
+        program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+        command,
+        prior: &prior.name,
+        prior_sha256: &prior.sha256,
+        model: &model.description,
+        stages: stages.iter().map(Stage::command).collect(),
+        files,
+        imagined,
+    };
+    let text = "# Where the files of this folder come from; `greylag learn` writes it.\n"
+        .to_owned()
+        + &toml::to_string(&origin)?;
+    write(&folder.join(ORIGIN), text.as_bytes())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_whole(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}

@@ -1,0 +1,63 @@
+//! What the controllers of a learned model and its policy reach in that model.
+
+use std::path::Path;
+
+use anyhow::Result;
+use serde::Serialize;
+
+use crate::commands::fly;
+use crate::control::Kind;
+use crate::model::GreyBox;
+use crate::sim::evaluation::{Evaluation, imagine};
+use crate::sim::{Group, TargetFile};
+
+/// Seed of the targets: neither those that controllers are scored on nor those that trainings are judged by.
+const TARGETS: u64 = 3;
+/// Targets are thinned for planners, which take milliseconds a step: one in so many is flown.
+const EVERY: [(Kind, u32); 3] = [(Kind::Policy, 1), (Kind::Lqi, 4), (Kind::HybridLqi, 24)];
+
+/// What a controller reached in the model.
+#[derive(Clone, Debug, Serialize)]
+pub struct Reached {
+    /// The controller's name.
+    pub controller: String,
+    /// Targets flown.
+    pub targets: usize,
+    /// Mean settled error on easy targets, degrees.
+    pub easy_deg: f64,
+    /// Mean settled error in the hard corners, degrees.
+    pub hard_deg: f64,
+    /// Share of the targets that were lost.
+    pub divergence_rate: f64,
+}
+
+/// Flies the controllers in the model of `folder` with the policy in `policy`.
+///
+/// # Errors
+/// If a file cannot be used. A model that an LQI cannot be designed on leaves that row out.
+pub fn reached(folder: &Path, policy: &Path, seed: u32) -> Result<Vec<Reached>> {
+    let model = GreyBox::load(&folder.join("model.toml"))?;
+    let mut all = Vec::new();
+    for (kind, every) in EVERY {
+        let controller = match fly::controller(kind, &model, policy, &[]) {
+            Ok(controller) => controller,
+            Err(error) => {
+                eprintln!("{kind} is not flown in the model: {error:#}");
+                continue;
+            }
+        };
+        let mut rows = TargetFile::generate(TARGETS).rows;
+        rows.retain(|r| r.group != Group::HardOutside && r.number % every == 0);
+        let outcomes = imagine(&model, &|| controller.boxed_clone(), &rows, seed)?;
+        let scores = Evaluation::new(kind.name(), &model.name, &rows, &outcomes);
+        let mean = |group: &str| scores.score(group).map_or(f64::NAN, |s| s.mean_deg);
+        all.push(Reached {
+            controller: kind.name().into(),
+            targets: rows.len(),
+            easy_deg: mean(Group::Easy.name()),
+            hard_deg: mean(Group::HardCorners.name()),
+            divergence_rate: scores.score("all").map_or(f64::NAN, |s| s.divergence_rate),
+        });
+    }
+    Ok(all)
+}

@@ -1,0 +1,221 @@
+//! `greylag learn`: from a prior to a controller that flies, in one command.
+
+mod budget;
+mod controller;
+mod imagined;
+mod plan;
+mod record;
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use comfy_table::Table;
+
+use crate::commands::files::{command_line, shipped};
+use crate::commands::interruption::{Ended, Interruption};
+use crate::learn::trainable;
+use crate::model::GreyBox;
+use budget::{Algorithm, Budget};
+use imagined::Reached;
+use plan::{Source, Stage, Wish};
+use record::Record;
+
+/// Options of `greylag learn`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Stages: flights with random actions; a model learned from them; rounds of flights \
+    planned through that model, which is then learned anew from all flights; the last model; a policy with \
+    its critics, trained in the model alone; their scores in the model; the folder OUT/controller, which \
+    `fly`, `demo` and `evaluate` take as --model OUT/controller/model.toml --policy OUT/controller/policy. \
+    Each stage is a command of its own, which is printed; an interrupted learning goes on with the same \
+    command; the same seed gives the same model and policy to the bit."
+)]
+pub struct Arguments {
+    /// The prior: a model file that may be wrong.
+    #[arg(long, value_name = "FILE")]
+    prior: PathBuf,
+    /// Fly the flights to learn from in JSBSim.
+    #[arg(long, conflicts_with = "logs", required_unless_present = "logs")]
+    collect: bool,
+    /// Learn from these flight logs instead; no rounds are flown.
+    #[arg(long = "log", value_name = "LOG", num_args = 1..)]
+    logs: Vec<PathBuf>,
+    /// Folder of everything that comes of it; a learning found there goes on.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Rounds of flights planned through the model learned so far [default: the budget's].
+    #[arg(long, conflicts_with = "logs", value_parser = clap::value_parser!(u32).range(0..=20))]
+    rounds: Option<u32>,
+    /// How the policy is found.
+    #[arg(long, default_value = "analytic", value_enum)]
+    algorithm: Algorithm,
+    /// How much work: quick, standard (minutes of two cores) or paper (the paper's numbers).
+    #[arg(long, default_value = "standard", value_enum)]
+    budget: Budget,
+    /// Coefficients of the prior that are learned with the residual: full names, `all`, or `none`.
+    #[arg(long, num_args = 1.., value_delimiter = ',', default_value = "all", value_name = "NAME")]
+    trainable: Vec<String>,
+    /// Seed of everything.
+    #[arg(long, default_value_t = 1)]
+    seed: u32,
+    /// Folder that holds NAME/NAME.xml of the aircraft that flies in JSBSim.
+    #[arg(long, value_name = "DIR", requires_all = ["aircraft", "collect"])]
+    aircraft_dir: Option<PathBuf>,
+    /// Name of that aircraft [default: the X8].
+    #[arg(long, value_name = "NAME", requires = "collect")]
+    aircraft: Option<String>,
+    /// Hide an effect in that aircraft (may be repeated), as in `greylag collect`.
+    #[arg(long, value_name = "ID=AMPLITUDE", allow_hyphen_values = true, requires = "collect")]
+    hide: Vec<String>,
+}
+
+/// Learns; what is done already is not done again.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let stop = Interruption::watch()?;
+    let prior = GreyBox::load(&shipped(&arguments.prior))?;
+    let stages = arguments.stages(&prior)?;
+    // what is wrong with an option is found before the first flight
+    stages.iter().try_for_each(|stage| super::check_line(&stage.line))?;
+    std::fs::create_dir_all(&arguments.out)
+        .with_context(|| format!("cannot make {}", arguments.out.display()))?;
+    let mut record = Record::open(&arguments.out, &stages, &prior.sha256)?;
+    for (k, stage) in stages.iter().enumerate() {
+        let place = format!("stage {} of {}: {}", k + 1, stages.len(), stage.what);
+        if k < record.done().len() {
+            println!("{place}: done before");
+            continue;
+        }
+        println!("{place}\n    {}", stage.command());
+        let begun = Instant::now();
+        let ended = super::carry_out(&stage.line, &stop).with_context(|| place.clone())?;
+        if ended == Ended::Interrupted {
+            eprintln!(
+                "interrupted in stage {} of {}; the same command goes on there",
+                k + 1,
+                stages.len()
+            );
+            return Ok(ended.into());
+        }
+        record.add(stage, begun.elapsed().as_secs_f64())?;
+    }
+    arguments.finish(&prior, &stages, &record)
+}
+
+impl Arguments {
+    fn stages(&self, prior: &GreyBox) -> Result<Vec<Stage>> {
+        let trainable = self.trained(prior)?;
+        let source = if self.collect {
+            Source::Simulator(self.aircraft_options())
+        } else {
+            Source::Logs(self.logs.clone())
+        };
+        let wish = Wish {
+            prior: &self.prior,
+            out: &self.out,
+            source,
+            rounds: self.rounds.unwrap_or(self.budget.sizes().rounds),
+            trainable: &trainable,
+            algorithm: self.algorithm,
+            budget: self.budget,
+            seed: self.seed,
+        };
+        Ok(wish.stages())
+    }
+
+    /// The coefficients that are learned, by their full names or as `all`.
+    fn trained(&self, prior: &GreyBox) -> Result<Vec<String>> {
+        let known = trainable(prior);
+        let names = match self.trainable.as_slice() {
+            [all] if all == "all" => return Ok(vec![all.clone()]),
+            [none] if none == "none" => return Ok(Vec::new()),
+            names => names,
+        };
+        match names.iter().find(|name| !known.contains(name)) {
+            None => Ok(names.to_vec()),
+            Some(name) => bail!(
+                "prior {} has no coefficient {name} that can be learned; it has {}",
+                prior.name,
+                known.join(", ")
+            ),
+        }
+    }
+
+    fn aircraft_options(&self) -> Vec<OsString> {
+        let mut words: Vec<OsString> = Vec::new();
+        let mut add = |name: &str, value: OsString| words.extend([name.into(), value]);
+        self.aircraft_dir.iter().for_each(|dir| add("--aircraft-dir", dir.into()));
+        self.aircraft.iter().for_each(|name| add("--aircraft", name.into()));
+        self.hide.iter().for_each(|effect| add("--hide", effect.into()));
+        words
+    }
+
+    /// Scores the result in its model, puts the folder that flies together, says what came of it.
+    fn finish(&self, prior: &GreyBox, stages: &[Stage], record: &Record) -> Result<ExitCode> {
+        println!("scores in the model, on targets of their own");
+        let (model, policy) = (self.out.join(plan::MODEL), self.out.join(plan::POLICY));
+        let reached = imagined::reached(&model, &policy, self.seed)?;
+        println!("{}", scores(&reached));
+        let lost = reached.iter().find(|r| r.controller == "policy" && r.divergence_rate > 0.5);
+        if let Some(lost) = lost {
+            bail!(
+                "the policy loses {:.0} % of its flights in the model: the model does not hold, or the training \
+                 was too short; collect more flights or give a larger --budget, with another --out",
+                100.0 * lost.divergence_rate
+            );
+        }
+        controller::assemble(&self.out, &command_line(), prior, stages, &reached)?;
+        println!("{}", times(record));
+        let folder = self.out.join(controller::CONTROLLER);
+        println!("reports: {}/training.html, {}/policy.html", model.display(), policy.display());
+        println!("controller in {}", folder.display());
+        println!("fly it: greylag demo {}", options(&folder));
+        println!(
+            "score it in JSBSim: greylag evaluate --controller policy hybrid-lqi {}",
+            options(&folder)
+        );
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// The options with which a command flies the controller in `folder`.
+fn options(folder: &Path) -> String {
+    let [model, policy] = ["model.toml", plan::POLICY].map(|name| folder.join(name));
+    format!("--model {} --policy {}", model.display(), policy.display())
+}
+
+fn scores(reached: &[Reached]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header([
+        "controller",
+        "targets",
+        "easy, mean °",
+        "hard corners, mean °",
+        "diverged %",
+    ]);
+    for r in reached {
+        table.add_row([
+            r.controller.clone(),
+            r.targets.to_string(),
+            format!("{:.3}", r.easy_deg),
+            format!("{:.3}", r.hard_deg),
+            format!("{:.1}", 100.0 * r.divergence_rate),
+        ]);
+    }
+    table
+}
+
+fn times(record: &Record) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["stage", "s"]);
+    for done in record.done() {
+        table.add_row([done.what.clone(), format!("{:.0}", done.seconds)]);
+    }
+    let all: f64 = record.done().iter().map(|done| done.seconds).sum();
+    table.add_row(["all stages".into(), format!("{all:.0}")]);
+    table
+}

@@ -1,0 +1,213 @@
+//! The stages from a prior to a flying controller, each a command line of this program.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use super::budget::{Algorithm, Budget};
+
+/// Folders below that of a learning.
+pub const FLIGHTS: &str = "flights";
+/// The last model.
+pub const MODEL: &str = "model";
+/// The policy.
+pub const POLICY: &str = "policy";
+
+/// Where the flights come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// JSBSim, with these further options of `greylag collect`.
+    Simulator(Vec<OsString>),
+    /// Recorded logs.
+    Logs(Vec<PathBuf>),
+}
+
+/// What decides the stages.
+#[derive(Clone, Debug)]
+pub struct Wish<'a> {
+    /// The prior's file.
+    pub prior: &'a Path,
+    /// The folder of everything.
+    pub out: &'a Path,
+    /// Where flights come from.
+    pub source: Source,
+    /// Planned rounds.
+    pub rounds: u32,
+    /// Coefficients of the prior that are learned; none leaves it frozen.
+    pub trainable: &'a [String],
+    /// How the policy is found.
+    pub algorithm: Algorithm,
+    /// How much work.
+    pub budget: Budget,
+    /// Seed of everything.
+    pub seed: u32,
+}
+
+/// A stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stage {
+    /// What it gives, in words.
+    pub what: String,
+    /// Its command line, without the program's name.
+    pub line: Vec<OsString>,
+}
+
+/// A command line that is put together.
+struct Line(Vec<OsString>);
+
+impl Line {
+    fn of(words: &[&str]) -> Line {
+        Line(words.iter().map(OsString::from).collect())
+    }
+
+    fn with(mut self, name: &str, value: impl Into<OsString>) -> Line {
+        self.0.extend([name.into(), value.into()]);
+        self
+    }
+
+    fn and(mut self, words: impl IntoIterator<Item = OsString>) -> Line {
+        self.0.extend(words);
+        self
+    }
+}
+
+impl Wish<'_> {
+    /// The stages in order: flights, model, flights planned through that model, model, …, policy.
+    pub fn stages(&self) -> Vec<Stage> {
+        let mut stages = Vec::new();
+        if let Source::Simulator(_) = self.source {
+            stages.push(self.flights(0));
+            for round in 1..=self.rounds {
+                stages.push(self.model(Some(round)));
+                stages.push(self.flights(round));
+            }
+        }
+        stages.push(self.model(None));
+        stages.push(self.policy());
+        stages
+    }
+
+    /// The folder of the model that flies `round`, or of the last one.
+    fn folder(&self, round: Option<u32>) -> PathBuf {
+        match round {
+            Some(round) => self.out.join(format!("{MODEL}-{round}")),
+            None => self.out.join(MODEL),
+        }
+    }
+
+    fn flights(&self, round: u32) -> Stage {
+        let sizes = self.budget.sizes();
+        let episodes = if round == 0 { sizes.episodes } else { sizes.planned };
+        let mut line = Line::of(&["collect"])
+            .with("--out", self.out.join(FLIGHTS))
+            .with("--round", round.to_string())
+            .with("--episodes", episodes.to_string())
+            .with("--seed", self.seed.to_string());
+        if round > 0 {
+            line = line.with("--model", self.folder(Some(round)).join("model.toml"));
+        }
+        if let Source::Simulator(options) = &self.source {
+            line = line.and(options.iter().cloned());
+        }
+        let how = if round == 0 { "with random actions" } else { "planned through that model" };
+        Stage { what: format!("{episodes} flights {how}"), line: line.0 }
+    }
+
+    /// The training of the model that flies `round`, or of the last one.
+    fn model(&self, round: Option<u32>) -> Stage {
+        let sizes = self.budget.sizes();
+        let updates = round.map_or(sizes.updates, |_| sizes.passing_updates);
+        let mut line = Line::of(&["train", "dynamics"])
+            .with("--prior", self.prior)
+            .with("--updates", updates.to_string())
+            .with("--hidden", sizes.hidden)
+            .with("--seed", self.seed.to_string())
+            .with("--out", self.folder(round));
+        match &self.source {
+            Source::Simulator(_) => {
+                line = line.with("--collect", self.out.join(FLIGHTS));
+                line = line.with("--integrator", "jsbsim");
+            }
+            Source::Logs(logs) => {
+                line = line.and(["--log".into()]);
+                line = line.and(logs.iter().map(OsString::from));
+            }
+        }
+        if !self.trainable.is_empty() {
+            line = line.with("--trainable", self.trainable.join(","));
+        }
+        let what = match round {
+            Some(round) => format!("a model to plan round {round} with"),
+            None => "the model".into(),
+        };
+        Stage { what, line: line.0 }
+    }
+
+    fn policy(&self) -> Stage {
+        let algorithm = match self.algorithm {
+            Algorithm::Analytic => "analytic",
+            Algorithm::Td3 => "td3",
+        };
+        let mut environment = OsString::from("model:");
+        environment.push(self.folder(None));
+        let line = Line::of(&["train", "policy"])
+            .with("--env", environment)
+            .with("--algorithm", algorithm)
+            .and(self.budget.policy(self.algorithm).iter().map(OsString::from))
+            .with("--seed", self.seed.to_string())
+            .with("--out", self.out.join(POLICY));
+        Stage { what: "a policy with its critics, trained in the model".into(), line: line.0 }
+    }
+}
+
+impl Stage {
+    /// The command as one would type it.
+    pub fn command(&self) -> String {
+        self.line.iter().fold("greylag".into(), |line, word| line + " " + &word.to_string_lossy())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wish(source: Source, trainable: &[String]) -> Vec<Stage> {
+        let wish = Wish {
+            prior: Path::new("prior.toml"),
+            out: Path::new("out"),
+            source,
+            rounds: 2,
+            trainable,
+            algorithm: Algorithm::Analytic,
+            budget: Budget::Quick,
+            seed: 7,
+        };
+        wish.stages()
+    }
+
+    #[test]
+    fn every_round_is_flown_by_the_model_of_the_rounds_before() {
+        let stages = wish(Source::Simulator(vec!["--hide".into(), "gain=0.1".into()]), &[]);
+        let lines: Vec<String> = stages.iter().map(Stage::command).collect();
+        assert_eq!(lines.len(), 7, "{lines:#?}");
+        for (k, round) in [(0, 0), (2, 1), (4, 2)] {
+            assert!(lines[k].contains(&format!("--round {round} ")), "{}", lines[k]);
+            assert!(lines[k].ends_with("--hide gain=0.1"), "{}", lines[k]);
+        }
+        for (k, folder) in [(1, "out/model-1"), (3, "out/model-2"), (5, "out/model")] {
+            assert!(lines[k].contains(&format!("--out {folder} --collect")), "{}", lines[k]);
+        }
+        assert!(lines[2].contains("--model out/model-1/model.toml"), "{}", lines[2]);
+        assert!(lines[4].contains("--model out/model-2/model.toml"), "{}", lines[4]);
+        assert!(lines[6].contains("--env model:out/model ") && lines[6].contains("--seed 7"));
+    }
+
+    #[test]
+    fn logs_are_learned_from_once() {
+        let names = ["roll_linear.Clp".into(), "roll_linear.Clda".into()];
+        let stages = wish(Source::Logs(vec!["a.ulg".into(), "b.ulg".into()]), &names);
+        assert_eq!(stages.len(), 2);
+        let line = stages[0].command();
+        assert!(line.contains("--log a.ulg b.ulg --trainable roll_linear.Clp,roll_linear.Clda"));
+        assert!(!line.contains("--integrator"), "{line}");
+    }
+}

@@ -1,0 +1,117 @@
+//! What a learning has done so far, on disk, so that it goes on where it was interrupted.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use serde::{Deserialize, Serialize};
+
+use super::plan::Stage;
+use crate::commands::files::{self, Overwrite};
+use crate::model::residual::hash;
+
+/// The file's name.
+pub const RECORD: &str = "learn.json";
+/// The layout that this program reads and writes.
+const SCHEMA: &str = "greylag.learn/1";
+
+/// The file.
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    schema: String,
+    program: String,
+    /// SHA-256 of all that decides the result.
+    identity: String,
+    stages: Vec<Done>,
+}
+
+/// A stage that is done.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Done {
+    /// What it gave.
+    pub what: String,
+    /// Its command.
+    pub command: String,
+    /// How long it took, all sessions together, s.
+    pub seconds: f64,
+}
+
+/// The record of a learning in its folder.
+#[derive(Debug)]
+pub struct Record {
+    path: PathBuf,
+    file: File,
+}
+
+impl Record {
+    /// The record in `folder` of the learning that has `stages` and begins at the prior of hash `prior`; an
+    /// empty one if there is none.
+    ///
+    /// # Errors
+    /// If the folder holds another learning, or what is there cannot be read.
+    pub fn open(folder: &Path, stages: &[Stage], prior: &str) -> Result<Record> {
+        let path = folder.join(RECORD);
+        let lines = stages.iter().map(|s| s.command() + "\n").collect::<String>();
+        let identity = hash(format!("{prior}\n{lines}").as_bytes());
+        let program = concat!("greylag ", env!("CARGO_PKG_VERSION")).into();
+        let empty = File { schema: SCHEMA.into(), program, identity, stages: Vec::new() };
+        if !path.exists() {
+            return Ok(Record { path, file: empty });
+        }
+        let text = std::fs::read_to_string(&path)
+            .with_context(|| format!("cannot read {}", path.display()))?;
+        let file: File = serde_json::from_str(&text).with_context(|| {
+            format!("{} is no record of a learning; give another --out", path.display())
+        })?;
+        if (&file.schema, &file.identity) != (&empty.schema, &empty.identity) {
+            bail!(
+                "{} holds a learning with other options, another prior or another version of this program; \
+                 give the same ones, or another --out",
+                folder.display()
+            );
+        }
+        Ok(Record { path, file })
+    }
+
+    /// The stages that are done.
+    pub fn done(&self) -> &[Done] {
+        &self.file.stages
+    }
+
+    /// Notes that a further stage is done.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn add(&mut self, stage: &Stage, seconds: f64) -> Result<()> {
+        let (what, command) = (stage.what.clone(), stage.command());
+        self.file.stages.push(Done { what, command, seconds });
+        let text = serde_json::to_string_pretty(&self.file)? + "\n";
+        files::write(&self.path, &text, Overwrite::Force)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stage(line: &str) -> Stage {
+        Stage { what: "flights".into(), line: vec![line.into()] }
+    }
+
+    #[test]
+    fn a_learning_goes_on_and_another_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let stages = [stage("one"), stage("two")];
+        let open = |stages: &[Stage], prior| Record::open(folder.path(), stages, prior);
+        open(&stages, "p").unwrap().add(&stages[0], 1.5).unwrap();
+        let again = open(&stages, "p").unwrap();
+        assert_eq!(again.done().len(), 1);
+        assert_eq!(again.done()[0].command, "greylag one");
+        for other in [open(&stages[..1], "p"), open(&stages, "q")] {
+            assert!(other.unwrap_err().to_string().contains("another --out"));
+        }
+        std::fs::write(folder.path().join(RECORD), "{").unwrap();
+        assert!(open(&stages, "p").unwrap_err().to_string().contains(RECORD));
+    }
+}
