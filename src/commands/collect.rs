@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use greylag_sitl::plant_arguments::PlantArgs;
 
-use crate::commands::aircraft::{self, StartArguments};
 use crate::commands::files::shipped;
+use crate::commands::start::{self, StartArguments};
 use crate::control::{self, Kind};
 use crate::logs::csv;
 use crate::model::GreyBox;
@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let count = arguments.episodes.unwrap_or(if arguments.round == 0 { 175 } else { 25 });
     let mut plant = arguments.plant.options(arguments.seed);
     plant.start = arguments.start.start(&plant.aircraft, &models)?;
-    aircraft::introduce(&plant, &models)?;
+    start::introduce(&plant, &models)?;
     let flown = AtomicU32::new(0);
     (0..count).into_par_iter().try_for_each_init(
         || (Simulator::new(&plant), planner.as_ref().map(|p| p.boxed_clone())),

@@ -1,6 +1,5 @@
 //! Subcommands: arguments, then a few lines of work.
 
-#[cfg(feature = "sitl")]
 mod aircraft;
 mod amend;
 mod choices;
@@ -30,6 +29,8 @@ mod propose;
 mod replay;
 mod said_once;
 #[cfg(feature = "sitl")]
+mod start;
+#[cfg(feature = "sitl")]
 mod targets;
 #[cfg(feature = "learn")]
 mod train;
@@ -50,6 +51,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Describe an aircraft of your own, and check how it flies.
+    Aircraft(aircraft::Arguments),
     /// Refit a model to flights and add missing effects to it, judged on flights it has not seen.
     Amend(amend::Arguments),
     /// Explore in JSBSim, to have flights to learn from.
@@ -104,6 +107,7 @@ pub fn main() -> ExitCode {
         .with_writer(|| log_once::LogOnce)
         .init();
     let result = match Arguments::parse().command {
+        Command::Aircraft(arguments) => aircraft::run(&arguments),
         Command::Amend(arguments) => amend::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Collect(arguments) => collect::run(&arguments),

@@ -8,8 +8,10 @@ mod grey_box;
 mod integrator;
 mod join;
 mod linear;
+pub mod modes;
 mod newton;
 pub mod residual;
+pub mod textbook;
 mod trim;
 pub mod weights;
 
