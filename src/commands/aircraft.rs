@@ -1,6 +1,7 @@
 //! `greylag aircraft`: files of an aircraft of one's own, and what they say of it.
 
 mod check;
+mod export;
 #[cfg(feature = "sitl")]
 mod import;
 mod new;
@@ -21,6 +22,8 @@ pub struct Arguments {
 enum Command {
     /// Say how a model's aircraft flies: trim, modes, authority of the surfaces, margins of the LQI.
     Check(check::Arguments),
+    /// Write a model as an aircraft of another program.
+    Export(export::Arguments),
     /// Make airframe and model of another program's aircraft.
     #[cfg(feature = "sitl")]
     Import(import::Arguments),
@@ -35,6 +38,7 @@ enum Command {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.command {
         Command::Check(arguments) => check::run(arguments),
+        Command::Export(arguments) => export::run(arguments),
         #[cfg(feature = "sitl")]
         Command::Import(arguments) => import::run(arguments),
         Command::New(arguments) => new::run(arguments),

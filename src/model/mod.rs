@@ -8,6 +8,7 @@ mod grey_box;
 mod integrator;
 mod join;
 mod linear;
+pub mod jsbsim;
 pub mod modes;
 mod newton;
 pub mod residual;

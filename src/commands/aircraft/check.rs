@@ -59,7 +59,7 @@ pub fn print(found: &AircraftCheck) {
 
 fn table(header: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Table {
     let mut table = Table::new();
-    table.load_preset(NOTHING).set_header(header.iter().copied());
+    table.load_style(NOTHING).set_header(header.iter().copied());
     rows.for_each(|row| {
         table.add_row(row);
     });

@@ -85,7 +85,7 @@ impl Weights {
         integral: 0.02,
         rate: 2.0,
         sideslip: 0.3,
-        sideslip_by_rudder: 0.05,
+        sideslip_by_rudder: 0.03,
         deflection: 0.3,
     };
     /// Softer loops that bear more delay: the pitch loop 104 ms where the default bears 46, and 78 where
