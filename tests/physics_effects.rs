@@ -34,7 +34,7 @@ const STATE: State = State {
     alpha: 0.12,
     beta: -0.08,
 };
-const CONTROLS: Controls = Controls { aileron: 0.2, elevator: -0.1, throttle: 0.6, rudder: 0.0 };
+const CONTROLS: Controls = Controls { aileron: 0.2, elevator: -0.1, throttle: 0.6, rudder: 0.1 };
 
 fn catalogue() -> Vec<Description> {
     let effects = Kind::ALL.iter().map(|k| k.describe()).filter(|about| about.entry.is_some());

@@ -1,5 +1,6 @@
 //! The plant: one aircraft flown by JSBSim in this process, step by step in its own time.
 
+mod loads;
 mod nodes;
 mod options;
 mod state;
@@ -10,6 +11,7 @@ use jsbsim::Fdm;
 use crate::air::AirError;
 use crate::aircraft;
 pub use crate::aircraft::AircraftError;
+pub use loads::{Loads, MassProperties};
 use nodes::Nodes;
 pub(crate) use nodes::to_body;
 pub use options::{PlantOptions, Properties};

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use greylag_sitl::plant_arguments::PlantArgs;
 
-use crate::commands::aircraft::{self, StartArguments};
 use crate::commands::files::shipped;
 use crate::commands::interruption::{Ended, Interruption};
+use crate::commands::start::{self, StartArguments};
 use crate::control::{self, Kind};
 use crate::logs::csv;
 use crate::model::GreyBox;
@@ -66,7 +66,7 @@ pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let count = arguments.episodes.unwrap_or(if arguments.round == 0 { 175 } else { 25 });
     let mut plant = arguments.plant.options(arguments.seed);
     plant.start = arguments.start.start(&plant.aircraft, &models)?;
-    aircraft::introduce(&plant, &models)?;
+    start::introduce(&plant, &models)?;
     let flown = AtomicU32::new(0);
     (0..count).into_par_iter().try_for_each_init(
         || (Simulator::new(&plant), planner.as_ref().map(|p| p.boxed_clone())),

@@ -12,8 +12,8 @@ use serde::Serialize;
 use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::plant_arguments::PlantArgs;
 
-use crate::commands::aircraft::{self, StartArguments};
 use crate::commands::files::{self, shipped};
+use crate::commands::start::{self, StartArguments};
 use crate::commands::{choices, fly};
 use crate::control::cem::Change;
 use crate::control::{Controller, Kind, Needs, Target};
@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let models = arguments.models.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     plant.start = arguments.start.start(&plant.aircraft, &models)?;
     let entrants = entrants(arguments, &models)?;
-    aircraft::introduce(&plant, &models)
+    start::introduce(&plant, &models)
         .with_context(|| format!("cannot fly aircraft {}", plant.aircraft))?;
     let evaluations = entrants
         .iter()

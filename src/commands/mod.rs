@@ -1,6 +1,5 @@
 //! Subcommands: arguments, then a few lines of work.
 
-#[cfg(feature = "sitl")]
 mod aircraft;
 mod amend;
 mod bar;
@@ -36,6 +35,8 @@ mod propose;
 mod replay;
 mod said_once;
 mod status;
+#[cfg(feature = "sitl")]
+mod start;
 #[cfg(feature = "sitl")]
 mod targets;
 #[cfg(feature = "learn")]
@@ -78,6 +79,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Describe an aircraft of your own, and check how it flies.
+    Aircraft(aircraft::Arguments),
     /// Refit a model to flights and add missing effects to it, judged on flights it has not seen.
     Amend(amend::Arguments),
     /// Explore in JSBSim, to have flights to learn from.
@@ -156,6 +159,7 @@ pub fn main() -> ExitCode {
         end_with_the_reader();
     }
     let result = match command {
+        Command::Aircraft(arguments) => aircraft::run(&arguments),
         Command::Amend(arguments) => amend::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Collect(arguments) => collect::run(&arguments),

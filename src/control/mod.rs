@@ -1,5 +1,6 @@
 //! Controllers: from what is observed and what is wanted to a command, once every 10 ms.
 
+pub mod aircraft_check;
 pub mod cem;
 mod disturbance;
 pub mod ilqr;

@@ -154,6 +154,11 @@ impl GreyBox {
         self.written().find(|e| e.status == Status::Proposed).map(|e| e.about.id)
     }
 
+    /// The tables of its effects, with the effects' ids.
+    pub fn tables(&self) -> impl Iterator<Item = (&'static str, &Table)> {
+        self.terms.iter().filter_map(|t| Some((t.kind.describe().id, t.table.as_ref()?)))
+    }
+
     /// Whether the model is linear in each of its coefficients, in their order.
     pub fn linear(&self) -> Vec<bool> {
         let mut linear = vec![false; self.coefficients.len()];

@@ -8,8 +8,11 @@ mod grey_box;
 mod integrator;
 mod join;
 mod linear;
+pub mod jsbsim;
+pub mod modes;
 mod newton;
 pub mod residual;
+pub mod textbook;
 mod trim;
 pub mod weights;
 

@@ -60,6 +60,20 @@ impl Table {
         Ok(Table { floor: y[0], segments })
     }
 
+    /// The points through which it goes.
+    pub fn points(&self) -> Vec<(f64, f64)> {
+        let mut y = self.floor;
+        let mut points = Vec::with_capacity(self.segments.len() + 1);
+        let mut end = 0.0;
+        for &(x, length, slope) in &self.segments {
+            points.push((x, y));
+            y += length * slope;
+            end = x + length;
+        }
+        points.push((end, y));
+        points
+    }
+
     /// The function's value at `x`, NaN if `x` is. A sum of clipped ramps: no search, hence no
     /// branch per lane. On an abscissa the derivative is the right segment's.
     #[inline(always)]

@@ -17,6 +17,8 @@ pub mod flown;
 mod hidden_formula;
 pub mod imagined;
 #[cfg(feature = "sitl")]
+pub mod import;
+#[cfg(feature = "sitl")]
 pub mod instruments;
 #[cfg(feature = "sitl")]
 pub mod missing;

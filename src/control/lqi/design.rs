@@ -13,7 +13,7 @@ pub(super) const STATES: usize = 17;
 /// Further states of a design with a rudder: its deflection now and one step ago with the two last
 /// commanded deflections.
 pub(super) const RUDDER_STATES: usize = 4;
-const ALL: usize = STATES + RUDDER_STATES;
+pub(super) const ALL: usize = STATES + RUDDER_STATES;
 
 /// The gain of one condition.
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +85,7 @@ impl Weights {
         integral: 0.02,
         rate: 2.0,
         sideslip: 0.3,
-        sideslip_by_rudder: 0.05,
+        sideslip_by_rudder: 0.03,
         deflection: 0.3,
     };
     /// Softer loops that bear more delay: the pitch loop 104 ms where the default bears 46, and 78 where
@@ -97,24 +97,45 @@ impl Weights {
 
 /// The gain that holds `trim`, or `None` if the model cannot be stabilised there.
 pub(super) fn design(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -> Option<Gain> {
+    Some(match loops(model, trim, altitude, w)? {
+        Loops::Two(_, _, k) => Gain { surfaces: k, rudder: None },
+        Loops::Three(_, _, k) => {
+            let rudder = RudderGain {
+                coupling: k.fixed_view::<2, RUDDER_STATES>(0, STATES).into(),
+                row: k.fixed_view::<1, STATES>(2, 0).into(),
+                own: k.fixed_view::<1, RUDDER_STATES>(2, STATES).into(),
+            };
+            Gain { surfaces: k.fixed_view::<2, STATES>(0, 0).into(), rudder: Some(rudder) }
+        }
+    })
+}
+
+/// A linear system with the gain that closes its loops: x₊ = a x + b u, u = −k x.
+type Closed<const N: usize, const M: usize> =
+    (SMatrix<f64, N, N>, SMatrix<f64, N, M>, SMatrix<f64, M, N>);
+
+/// The loops of one condition.
+pub(super) enum Loops {
+    /// Aileron and elevator.
+    Two(SMatrix<f64, STATES, STATES>, SMatrix<f64, STATES, 2>, SMatrix<f64, 2, STATES>),
+    /// Aileron, elevator and rudder.
+    Three(SMatrix<f64, ALL, ALL>, SMatrix<f64, ALL, 3>, SMatrix<f64, 3, ALL>),
+}
+
+/// The loops that hold `trim`, or `None` if the model cannot be stabilised there.
+pub(super) fn loops(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -> Option<Loops> {
     let linear = linearise(model, trim, altitude);
     let figures = &model.airframe.actuators;
     let (aileron, elevator) = ((0, 7, &figures.aileron), (1, 11, &figures.elevator));
     match &figures.rudder {
         Some(rudder) if model.has_rudder() => {
             let surfaces = [aileron, elevator, (3, STATES, rudder)];
-            let sideslip = w.sideslip_by_rudder;
-            let k: SMatrix<f64, 3, ALL> = solve(&linear, surfaces, sideslip, w)?;
-            let rudder = RudderGain {
-                coupling: k.fixed_view::<2, RUDDER_STATES>(0, STATES).into(),
-                row: k.fixed_view::<1, STATES>(2, 0).into(),
-                own: k.fixed_view::<1, RUDDER_STATES>(2, STATES).into(),
-            };
-            Some(Gain { surfaces: k.fixed_view::<2, STATES>(0, 0).into(), rudder: Some(rudder) })
+            let (a, b, k) = solve(&linear, surfaces, w.sideslip_by_rudder, w)?;
+            Some(Loops::Three(a, b, k))
         }
         _ => {
-            let k = solve::<STATES, 2>(&linear, [aileron, elevator], w.sideslip, w)?;
-            Some(Gain { surfaces: k, rudder: None })
+            let (a, b, k) = solve(&linear, [aileron, elevator], w.sideslip, w)?;
+            Some(Loops::Two(a, b, k))
         }
     }
 }
@@ -122,13 +143,13 @@ pub(super) fn design(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -
 /// A surface of the design: its column in the linear model, the place of its states, its filter.
 type Actuated<'a> = (usize, usize, &'a Surface);
 
-/// The gain over N states by M `surfaces`.
+/// The system of N states under M `surfaces` with its gain.
 fn solve<const N: usize, const M: usize>(
     linear: &Linear,
     surfaces: [Actuated; M],
     sideslip: f64,
     w: &Weights,
-) -> Option<SMatrix<f64, M, N>> {
+) -> Option<Closed<N, M>> {
     let (a, b) = augmented(linear, surfaces);
     let square = |x: f64| 1.0 / (x * x);
     let mut q = SVector::<f64, N>::zeros();
@@ -137,7 +158,8 @@ fn solve<const N: usize, const M: usize>(
     q[6] = square(sideslip);
     (q[15], q[16]) = (square(w.integral), square(w.integral));
     let r = SMatrix::<f64, M, M>::from_diagonal_element(square(w.deflection));
-    riccati::gain(&a, &b, &SMatrix::from_diagonal(&q), &r)
+    let k = riccati::gain(&a, &b, &SMatrix::from_diagonal(&q), &r)?;
+    Some((a, b, k))
 }
 
 /// Attitude dynamics, actuator filters and integrators as one linear system.

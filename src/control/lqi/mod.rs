@@ -1,6 +1,7 @@
 //! LQI: linear-quadratic attitude control with integral action, scheduled over the envelope.
 
 mod gain_schedule;
+mod margins;
 
 mod ahead;
 mod design;
@@ -15,6 +16,7 @@ pub(crate) use ahead::Ahead;
 use ahead::{HOLD, Inner, Law, Surfaces};
 pub use design::Weights;
 use gain_schedule::Schedule;
+pub use margins::{LoopMargins, MarginsError, margins};
 
 /// Largest rates of the reference, rad/s: commanded steps become ramps that the surfaces can
 /// follow, so the integrators never see a large error.

@@ -6,9 +6,6 @@ use crate::physics::airframe::Envelope;
 
 /// Airspeed between two rows of the trim table, m/s: pitch errs by less than 0.1° between them.
 const TRIM_SPACING: f64 = 1.0;
-/// Altitude at which the trim table is made, m: that of the simulator's start. Trim depends on
-/// equivalent airspeed, which differs by 5 % from true airspeed a thousand metres away.
-const TRIM_ALTITUDE: f64 = 600.0;
 
 /// The pilot's settings. Units are in the names, since parameters and files show them as they are.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,7 +95,8 @@ impl Config {
 }
 
 fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
-    let trim = Trim::level(model, airspeed, TRIM_ALTITUDE)?;
+    // trim depends on equivalent airspeed, which differs by 5 % from true airspeed a thousand metres away
+    let trim = Trim::level(model, airspeed, model.airframe.reference.altitude)?;
     let command = model.airframe.actuators.command(&trim.controls);
     Ok(TrimPoint {
         airspeed_mps: airspeed,

@@ -59,6 +59,9 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
                 .noting("commands are HIL_ACTUATOR_CONTROLS in the order of the sitl profile"),
         );
     }
+    if sent_travel(topics, system).is_some_and(|[.., rudder]| rudder > 0.0) {
+        commands.push(Rule::linear("rudder_cmd", "HIL_ACTUATOR_CONTROLS", "controls3", 1.0));
+    }
     commands.extend(servos::rules(topics, "SERVO_OUTPUT_RAW", |n| format!("servo{n}_raw")));
     for rule in &mut commands {
         let of_system = |i: &u16| i.to_be_bytes()[0] == system;
@@ -133,7 +136,8 @@ fn states() -> Vec<Rule> {
 /// Positions of the actuators in the order of the sitl profile, which sends the travel of the
 /// surfaces where it is not the X8's.
 fn deflections(topics: &Topics, system: u8) -> Vec<Rule> {
-    let [aileron, elevator] = sent_travel(topics, system).unwrap_or([DEFLECTION; 2]);
+    let [aileron, elevator, rudder] =
+        sent_travel(topics, system).unwrap_or([DEFLECTION, DEFLECTION, 0.0]);
     let note = format!(
         "deflections are ACTUATOR_OUTPUT_STATUS in the order of the sitl profile, {aileron:.4} rad \
          (aileron), {elevator:.4} rad (elevator) at 1; another order needs a mapping"
@@ -141,17 +145,21 @@ fn deflections(topics: &Topics, system: u8) -> Vec<Rule> {
     [("aileron_rad", "actuator0", aileron), ("elevator_rad", "actuator1", elevator)]
         .into_iter()
         .chain([("throttle", "actuator2", 1.0)])
+        .chain((rudder > 0.0).then_some(("rudder_rad", "actuator7", rudder)))
         .map(|(column, field, gain)| {
             Rule::linear(column, "ACTUATOR_OUTPUT_STATUS", field, gain).noting(&note)
         })
         .collect()
 }
 
-/// Travel of aileron and elevator as the vehicle sends it, rad.
-fn sent_travel(topics: &Topics, system: u8) -> Option<[f64; 2]> {
+/// Travel of aileron, elevator and rudder as the vehicle sends it, rad; zero of a rudder that it lacks.
+fn sent_travel(topics: &Topics, system: u8) -> Option<[f64; 3]> {
     let (_, topic) = topics
         .instances("ACTUATOR_OUTPUT_STATUS")
         .find(|(instance, _)| instance.to_be_bytes()[0] == system)?;
     let last = |name| topic.field(name)?.last().copied();
-    (last("active")? == 7.0).then_some([last("actuator5")?, last("actuator6")?])
+    let active = last("active")?;
+    let rudder =
+        if active >= 15.0 { last("actuator11")?.abs().max(last("actuator14")?.abs()) } else { 0.0 };
+    (active >= 7.0).then_some([last("actuator5")?, last("actuator6")?, rudder])
 }

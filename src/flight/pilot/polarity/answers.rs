@@ -8,8 +8,6 @@ use crate::physics::Command;
 const SPAN: usize = 41;
 /// Step of a command, of −1..1: small enough to be linear, large beside the rounding.
 const STEP: f64 = 0.01;
-/// Altitude of the start, m: a thousand metres change an answer by a tenth.
-const ALTITUDE: f64 = 600.0;
 
 /// Roll rate after a step of the aileron command by one, pitch rate after one of the elevator
 /// command, rad/s, state by state of 10 ms, from level flight.
@@ -25,10 +23,12 @@ impl Answers {
     /// # Errors
     /// If the model cannot fly level there.
     pub fn of(model: &GreyBox, airspeed: f64) -> Result<Answers, TrimError> {
-        let trim = Trim::level(model, airspeed, ALTITUDE)?;
+        // a thousand metres change an answer by a tenth
+        let altitude = model.airframe.reference.altitude;
+        let trim = Trim::level(model, airspeed, altitude)?;
         let command = model.airframe.actuators.command(&trim.controls);
         let rates = |command: Command| {
-            let mut twin = Twin::at_rest(trim.state, &trim.controls, ALTITUDE);
+            let mut twin = Twin::at_rest(trim.state, &trim.controls, altitude);
             let mut rates = [[0.0; 2]; SPAN];
             for rates in &mut rates {
                 *rates = [twin.state.p, twin.state.q];

@@ -1,0 +1,97 @@
+//! Loads: the forces and moments of the air on an aircraft that is held in a state.
+
+use super::nodes::STILL_S;
+use super::{Inputs, Plant, PlantError, Start, Truth, jsbsim};
+
+/// Newtons per pound of force, and newton metres per foot pound.
+const LBF: f64 = 4.448_221_615_260_5;
+const FT_LBF: f64 = LBF * 0.3048;
+/// Steps in which surfaces come to rest at their command: 20 s of steps of 10 ms.
+const STEPS: usize = 2000;
+/// Steps without movement after which they are at rest.
+const AT_REST: usize = 50;
+/// Movement in one step that is none, rad.
+const STILL_RAD: f64 = 1e-12;
+
+/// What the air does to an aircraft in a state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Loads {
+    /// Aerodynamic force, body axes, N.
+    pub force_n: [f64; 3],
+    /// Aerodynamic moment about the centre of gravity, body axes, N m.
+    pub moment_nm: [f64; 3],
+    /// State and deflections in which they act.
+    pub truth: Truth,
+}
+
+/// Mass properties as JSBSim has them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MassProperties {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Jx, Jy, Jz and Jxz (the inertia matrix holds −Jxz), kg m².
+    pub inertia_kgm2: [f64; 4],
+}
+
+impl Plant {
+    /// The loads in `start` with the surfaces at rest where `inputs` command them. The aircraft is
+    /// put back at its start afterwards.
+    ///
+    /// # Errors
+    /// [`PlantError`] when the aircraft cannot be evaluated there.
+    pub fn loads(&mut self, start: &Start, inputs: &Inputs) -> Result<Loads, PlantError> {
+        self.reset(start)?;
+        // Filters keep the step for which they were laid out; nothing else moves in so short a one.
+        self.fdm.set_dt(STILL_S);
+        let found = self.held(inputs);
+        self.fdm.set_dt(self.options.step_s);
+        found
+    }
+
+    fn held(&mut self, inputs: &Inputs) -> Result<Loads, PlantError> {
+        let (mut last, mut at_rest) = ([f64::INFINITY; 3], 0);
+        for _ in 0..STEPS {
+            self.nodes.command(&mut self.fdm, inputs).map_err(jsbsim("writing the commands"))?;
+            self.fdm.run().map_err(jsbsim("holding a state"))?;
+            let truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the state"))?;
+            let now = [truth.aileron_rad, truth.elevator_rad, truth.rudder_rad];
+            let moved = now.iter().zip(&last).any(|(a, b)| (a - b).abs() >= STILL_RAD);
+            at_rest = if moved { 0 } else { at_rest + 1 };
+            if at_rest == AT_REST {
+                break;
+            }
+            last = now;
+        }
+        let three =
+            |plant: &mut Plant, names: [&str; 3], unit: f64| -> Result<[f64; 3], PlantError> {
+                let [a, b, c] = names.map(|name| plant.property(name));
+                Ok([a? * unit, b? * unit, c? * unit])
+            };
+        let force = ["forces/fbx-aero-lbs", "forces/fby-aero-lbs", "forces/fbz-aero-lbs"];
+        let moment = ["moments/l-aero-lbsft", "moments/m-aero-lbsft", "moments/n-aero-lbsft"];
+        Ok(Loads {
+            force_n: three(self, force, LBF)?,
+            moment_nm: three(self, moment, FT_LBF)?,
+            truth: self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the state"))?,
+        })
+    }
+
+    /// Mass and inertia at the start, with full tanks where there are any.
+    ///
+    /// # Errors
+    /// [`PlantError::Property`] when JSBSim does not tell.
+    pub fn mass_properties(&mut self) -> Result<MassProperties, PlantError> {
+        const SLUG: f64 = LBF / 0.3048;
+        const SLUG_FT2: f64 = SLUG * 0.3048 * 0.3048;
+        let mut of = |name: &str| self.property(name);
+        let mass_kg = of("inertia/mass-slugs")? * SLUG;
+        let mut inertia = [0.0; 4];
+        let names = ["ixx", "iyy", "izz", "ixz"];
+        for (value, name) in inertia.iter_mut().zip(names) {
+            *value = of(&format!("inertia/{name}-slugs_ft2"))? * SLUG_FT2;
+        }
+        // the property is the element of the inertia matrix, which holds -Jxz
+        inertia[3] = -inertia[3];
+        Ok(MassProperties { mass_kg, inertia_kgm2: inertia })
+    }
+}

@@ -1,0 +1,121 @@
+//! `greylag aircraft check`: how a model's aircraft flies.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use comfy_table::Table;
+use comfy_table::presets::NOTHING;
+
+use crate::commands::files;
+use crate::control::aircraft_check::{self, AircraftCheck};
+use crate::model::GreyBox;
+use crate::model::modes::Mode;
+
+/// Options of `greylag aircraft check`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Model of the aircraft.
+    #[arg(long, value_name = "FILE")]
+    model: PathBuf,
+}
+
+/// Checks, prints, and fails if something should be mended before a flight.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let model = GreyBox::load(&files::shipped(&arguments.model))?;
+    println!(
+        "{} ({}) at {:.1} m/s and {:.0} m",
+        model.name,
+        model.airframe.name,
+        model.airframe.envelope.airspeed_cruise_mps,
+        model.airframe.reference.altitude
+    );
+    let found = aircraft_check::check(&model)?;
+    print(&found);
+    Ok(if found.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Prints what was found.
+pub fn print(found: &AircraftCheck) {
+    println!("\n{}", levels(found));
+    println!("\n{}", modes(found));
+    let authority = found.authority;
+    println!(
+        "\nfull aileron rolls at {:.0} deg/s, full elevator pitches by {:.0} deg/s2{}",
+        authority.roll_rate.to_degrees(),
+        authority.pitch_acceleration.to_degrees(),
+        authority.yaw_acceleration.map_or_else(String::new, |yaw| format!(
+            ", full rudder yaws by {:.0} deg/s2",
+            yaw.to_degrees()
+        ))
+    );
+    println!("\n{}", loops(found));
+    println!();
+    match found.findings.is_empty() {
+        true => println!("nothing to mend"),
+        false => found.findings.iter().for_each(|finding| println!("mend: {finding}")),
+    }
+}
+
+fn table(header: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Table {
+    let mut table = Table::new();
+    table.load_style(NOTHING).set_header(header.iter().copied());
+    rows.for_each(|row| {
+        table.add_row(row);
+    });
+    table
+}
+
+fn levels(found: &AircraftCheck) -> Table {
+    let rows = found.levels.iter().map(|l| {
+        vec![
+            format!("{:.1}", l.airspeed),
+            format!("{:.1}", l.alpha.to_degrees()),
+            format!("{:.0}", 100.0 * l.elevator),
+            format!("{:.0}", 100.0 * l.throttle),
+        ]
+    });
+    table(&["level flight, m/s", "incidence, deg", "elevator, %", "throttle, %"], rows)
+}
+
+fn modes(found: &AircraftCheck) -> Table {
+    let oscillating =
+        |m: &Mode, x: f64| if m.oscillates() { format!("{x:.2}") } else { "-".into() };
+    let rows = found.modes.iter().map(|m| {
+        let constant = m.time_constant();
+        let fate = if constant < 0.0 { "grows" } else { "decays" };
+        vec![
+            m.name.to_owned(),
+            oscillating(m, m.frequency()),
+            oscillating(m, m.damping()),
+            format!("{:.2}", constant.abs()),
+            fate.to_owned(),
+        ]
+    });
+    table(&["mode", "frequency, rad/s", "damping", "time constant, s", ""], rows)
+}
+
+fn loops(found: &AircraftCheck) -> Table {
+    let decibel =
+        |x: f64| if x.is_finite() { format!("{:.1}", 20.0 * x.log10()) } else { "any".into() };
+    let rows = found.loops.iter().map(|l| {
+        let [least, most] = l.gain;
+        vec![
+            l.surface.to_owned(),
+            format!("{:.1}", l.crossover),
+            if least > 0.0 { decibel(least) } else { "any".into() },
+            decibel(most),
+            format!("{:.0}", l.phase.to_degrees()),
+            format!("{:.0}", 1e3 * l.delay),
+        ]
+    });
+    let header = [
+        "LQI loop",
+        "crossover, rad/s",
+        "least gain, dB",
+        "most gain, dB",
+        "phase, deg",
+        "delay, ms",
+    ];
+    table(&header, rows)
+}

@@ -1,0 +1,59 @@
+//! `greylag aircraft export`: a model as an aircraft of another program.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, Subcommand};
+
+use crate::commands::files::{self, Overwrite};
+use crate::model::GreyBox;
+use crate::model::jsbsim::export;
+
+/// The arguments of `greylag aircraft export`.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    to: To,
+}
+
+#[derive(Subcommand)]
+enum To {
+    /// As a JSBSim aircraft: NAME/NAME.xml with its engine.
+    Jsbsim(Jsbsim),
+}
+
+/// The arguments of `greylag aircraft export jsbsim`.
+#[derive(Args)]
+struct Jsbsim {
+    /// The model.
+    #[arg(long, value_name = "FILE")]
+    model: PathBuf,
+    /// Folder in which the aircraft's folder is made.
+    dir: PathBuf,
+    /// The aircraft's name there: letters, digits, `_` and `-`.
+    name: String,
+}
+
+/// Writes the files, says what they do not have.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let To::Jsbsim(jsbsim) = &arguments.to;
+    let Jsbsim { dir, name, .. } = jsbsim;
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if name.is_empty() || !name.chars().all(plain) {
+        bail!("cannot name an aircraft '{name}': use letters, digits, _ and -");
+    }
+    let model = GreyBox::load(&files::shipped(&jsbsim.model))?;
+    let exported = export(&model, name);
+    let folder = dir.join(name);
+    let engines = folder.join("Engines");
+    std::fs::create_dir_all(&engines)
+        .with_context(|| format!("cannot make the folder {}", engines.display()))?;
+    for (path, text) in &exported.files {
+        files::write(&folder.join(path), text, Overwrite::Never)?;
+    }
+    println!("wrote {}", folder.join(format!("{name}.xml")).display());
+    exported.left_out.iter().for_each(|what| println!("left out: {what}"));
+    println!("fly it: greylag-sitl --aircraft-dir {} --aircraft {name}", dir.display());
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,83 @@
+//! `greylag aircraft import`: an aircraft of another program as airframe and model.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, Subcommand};
+use greylag_sitl::plant::{Plant, PlantOptions, Start};
+
+use crate::commands::files::{self, Overwrite};
+use crate::control::aircraft_check;
+use crate::model::GreyBox;
+use crate::sim::import::import;
+
+/// The arguments of `greylag aircraft import`.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    from: From,
+}
+
+#[derive(Subcommand)]
+enum From {
+    /// From a JSBSim aircraft, by central differences of its loads.
+    Jsbsim(Jsbsim),
+}
+
+/// The arguments of `greylag aircraft import jsbsim`.
+#[derive(Args)]
+struct Jsbsim {
+    /// Folder that holds NAME/NAME.xml.
+    dir: PathBuf,
+    /// The aircraft.
+    name: String,
+    /// Folder to make, with airframe.toml and model.toml.
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// True airspeed about which it is taken.
+    #[arg(long, value_name = "MPS")]
+    cruise_mps: f64,
+    /// Altitude at which it is taken, above mean sea level.
+    #[arg(long, value_name = "M", default_value_t = 600.0)]
+    altitude_m: f64,
+    /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does.
+    #[arg(long, value_name = "KEY=NAME")]
+    property: Vec<String>,
+}
+
+/// Imports, writes, says what is left out.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let From::Jsbsim(jsbsim) = &arguments.from;
+    let mut options = PlantOptions {
+        aircraft_dir: Some(jsbsim.dir.clone()),
+        aircraft: jsbsim.name.clone(),
+        start: Start { airspeed_mps: jsbsim.cruise_mps, ..Start::NEUTRAL },
+        ..PlantOptions::default()
+    };
+    for named in &jsbsim.property {
+        let Some((key, name)) = named.split_once('=') else {
+            bail!("--property {named} is no KEY=NAME");
+        };
+        let Some(place) = options.properties.name_mut(key) else {
+            bail!(
+                "--property {named}: the keys are {}",
+                greylag_sitl::plant::Properties::KEYS.join(", ")
+            );
+        };
+        *place = name.to_owned();
+    }
+    let out = &jsbsim.out;
+    std::fs::create_dir_all(out)
+        .with_context(|| format!("cannot make the folder {}", out.display()))?;
+    let model = out.join("model.toml");
+    files::writable(&model, Overwrite::Never)?;
+    let mut plant = Plant::new(&options)?;
+    let found = import(&mut plant, &jsbsim.name, jsbsim.cruise_mps, jsbsim.altitude_m)?;
+    files::write(&out.join("airframe.toml"), &found.airframe, Overwrite::Never)?;
+    files::write(&model, &found.model, Overwrite::Never)?;
+    println!("wrote {} and airframe.toml beside it", model.display());
+    found.left_out.iter().for_each(|what| println!("left out: {what}"));
+    super::check::print(&aircraft_check::check(&GreyBox::load(&model)?)?);
+    Ok(ExitCode::SUCCESS)
+}

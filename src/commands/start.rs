@@ -1,0 +1,118 @@
+//! Where an episode in JSBSim begins, and what is said of its aircraft before.
+
+use anyhow::{Result, bail};
+use greylag_sitl::plant::{Plant, PlantOptions, Start};
+
+use crate::model::GreyBox;
+use crate::physics::servos::Travels;
+
+/// The aircraft whose start is the paper's.
+const X8: &str = "x8";
+/// Share by which the travel of airframe and aircraft may differ: a file holds four digits of it.
+const TRAVEL_TOLERANCE: f64 = 1e-3;
+
+/// Where an episode begins.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Start")]
+pub struct StartArguments {
+    /// True airspeed at the start, which is also the one that is wanted [default: 16.67 for the X8,
+    /// else the cruise airspeed of the model's airframe].
+    #[arg(long, value_name = "MPS")]
+    start_airspeed_mps: Option<f64>,
+    /// Altitude at the start, above mean sea level.
+    #[arg(long, value_name = "M", default_value_t = Start::NEUTRAL.altitude_m, allow_negative_numbers = true)]
+    start_altitude_m: f64,
+}
+
+impl StartArguments {
+    /// The start of `aircraft`, flown with controllers of `models`.
+    ///
+    /// # Errors
+    /// If no airspeed is known, or one of the models does not fly that slowly.
+    pub fn start(&self, aircraft: &str, models: &[GreyBox]) -> Result<Start> {
+        let cruise = models.first().map(|m| m.airframe.envelope.airspeed_cruise_mps);
+        let default = if aircraft == X8 { Some(Start::NEUTRAL.airspeed_mps) } else { cruise };
+        let Some(airspeed_mps) = self.start_airspeed_mps.or(default) else {
+            bail!(
+                "no model says how fast the aircraft '{aircraft}' flies: give --start-airspeed-mps"
+            );
+        };
+        for model in models {
+            let slowest = model.airframe.envelope.airspeed_min_mps;
+            if airspeed_mps < slowest {
+                bail!(
+                    "cannot start at {airspeed_mps} m/s: the airframe of model {} flies no slower than \
+                     {slowest} m/s (airspeed_min_mps); give a larger --start-airspeed-mps",
+                    model.name
+                );
+            }
+        }
+        Ok(Start { airspeed_mps, altitude_m: self.start_altitude_m, ..Start::NEUTRAL })
+    }
+}
+
+/// Says on standard error what is to be known of the aircraft, and where a model's airframe is not its.
+///
+/// # Errors
+/// If the aircraft cannot be loaded.
+pub fn introduce(options: &PlantOptions, models: &[GreyBox]) -> Result<()> {
+    let mut plant = Plant::new(options)?;
+    plant.notes().iter().for_each(|note| eprintln!("note: {note}"));
+    let Ok(travel) = plant.travel() else { return Ok(()) };
+    for model in models {
+        let Travels { aileron, elevator, rudder } = model.airframe.actuators.travels();
+        let rudders = rudder.zip(travel.rudder);
+        let surfaces = [
+            Some(("aileron", aileron, travel.aileron)),
+            Some(("elevator", elevator, travel.elevator)),
+            rudders.map(|(said, measured)| ("rudder", said, measured)),
+        ];
+        for (surface, said, measured) in surfaces.into_iter().flatten() {
+            let close = |a: f64, b: f64| (a - b).abs() <= TRAVEL_TOLERANCE * b.abs();
+            if !(close(measured.least_rad, said.least) && close(measured.most_rad, said.most)) {
+                eprintln!(
+                    "note: the {surface} of the aircraft goes from {:.4} to {:.4} rad, the airframe of model \
+                     {} says {:.4} to {:.4}: its controllers take a command for another deflection",
+                    measured.least_rad, measured.most_rad, model.name, said.least, said.most
+                );
+            }
+        }
+        if rudder.is_some() && travel.rudder.is_none() {
+            eprintln!("note: the airframe of model {} has a rudder, the aircraft none", model.name);
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn x8() -> Vec<GreyBox> {
+        vec![GreyBox::load("params/x8/jsbsim.toml".as_ref()).unwrap()]
+    }
+
+    fn start(airspeed: Option<f64>, aircraft: &str, models: &[GreyBox]) -> Result<Start> {
+        let arguments = StartArguments { start_airspeed_mps: airspeed, start_altitude_m: 600.0 };
+        arguments.start(aircraft, models)
+    }
+
+    #[test]
+    fn the_x8_starts_as_in_the_paper_and_another_aircraft_at_its_cruise() {
+        let models = x8();
+        assert_eq!(start(None, "x8", &models).unwrap(), Start::NEUTRAL);
+        let cruise = models[0].airframe.envelope.airspeed_cruise_mps;
+        assert_eq!(start(None, "other", &models).unwrap().airspeed_mps, cruise);
+        assert_eq!(start(Some(25.0), "other", &models).unwrap().airspeed_mps, 25.0);
+    }
+
+    #[test]
+    fn a_start_without_an_airspeed_or_below_the_models_is_refused() {
+        let models = x8();
+        let slow = 0.9 * models[0].airframe.envelope.airspeed_min_mps;
+        let message = start(Some(slow), "x8", &models).unwrap_err().to_string();
+        assert!(message.contains("airspeed_min_mps"), "{message}");
+        let message = start(None, "other", &[]).unwrap_err().to_string();
+        assert!(message.contains("--start-airspeed-mps"), "{message}");
+    }
+}

@@ -1,0 +1,143 @@
+//! Modes of steady level flight: what the aircraft does by itself, with names and time constants.
+
+use nalgebra::{Complex, Matrix4, SMatrix};
+
+use super::{GreyBox, Trim, TrimError};
+use crate::num::Dual;
+use crate::physics::{Controls, State};
+
+/// Places of θ, V, q, α and of φ, p, r, β in the state of eq. (4).
+const LONGITUDINAL: [usize; 4] = [1, 2, 4, 6];
+const LATERAL: [usize; 4] = [0, 3, 5, 7];
+
+/// The linear model in continuous time about a condition: δṡ = a δs + b δz, z = (δa, δe, δt, δr).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rates {
+    /// ∂ṡ/∂s, states in the order of eq. (4), 1/s.
+    pub a: SMatrix<f64, 8, 8>,
+    /// ∂ṡ/∂(δa, δe, δt, δr).
+    pub b: SMatrix<f64, 8, 4>,
+}
+
+/// A mode of motion: an oscillation, or one that grows or decays without.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mode {
+    /// Its name.
+    pub name: &'static str,
+    /// Its eigenvalue, 1/s; the one with the positive imaginary part of a pair.
+    pub eigenvalue: Complex<f64>,
+}
+
+impl Mode {
+    /// Whether it oscillates.
+    pub fn oscillates(&self) -> bool {
+        self.eigenvalue.im > 0.0
+    }
+
+    /// Natural frequency, rad/s.
+    pub fn frequency(&self) -> f64 {
+        self.eigenvalue.norm()
+    }
+
+    /// Damping ratio; below zero it grows.
+    pub fn damping(&self) -> f64 {
+        -self.eigenvalue.re / self.eigenvalue.norm()
+    }
+
+    /// Time constant of its decay, s; below zero that of its growth.
+    pub fn time_constant(&self) -> f64 {
+        -1.0 / self.eigenvalue.re
+    }
+}
+
+/// Linearises the rates of `model` about `trim` at `altitude` (m).
+pub fn rates(model: &GreyBox, trim: &Trim, altitude: f64) -> Rates {
+    let (x, z) = (trim.state.to_array(), trim.controls);
+    let state = State::from_array(std::array::from_fn(|i| Dual::<12>::variable(x[i], i)));
+    let z = [z.aileron, z.elevator, z.throttle, z.rudder];
+    let [aileron, elevator, throttle, rudder] =
+        std::array::from_fn(|i| Dual::variable(z[i], 8 + i));
+    let controls = Controls { aileron, elevator, throttle, rudder };
+    let rate = model.rate(&state, &controls, altitude).to_array();
+    Rates {
+        a: SMatrix::from_fn(|i, j| rate[i].gradient[j]),
+        b: SMatrix::from_fn(|i, j| rate[i].gradient[8 + j]),
+    }
+}
+
+/// The modes of level flight at `airspeed` (m/s) and `altitude` (m): longitudinal, then lateral.
+///
+/// # Errors
+/// If the model cannot fly level there.
+pub fn modes(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Vec<Mode>, TrimError> {
+    let trim = Trim::level(model, airspeed, altitude)?;
+    let a = rates(model, &trim, altitude).a;
+    let part =
+        |places: [usize; 4]| eigenvalues(&Matrix4::from_fn(|i, j| a[(places[i], places[j])]));
+    let mut all = longitudinal(&part(LONGITUDINAL));
+    all.extend(lateral(&part(LATERAL)));
+    Ok(all)
+}
+
+/// Eigenvalues from fast to slow, of pairs the one with the positive imaginary part.
+fn eigenvalues(a: &Matrix4<f64>) -> Vec<Complex<f64>> {
+    let mut all: Vec<Complex<f64>> = a.complex_eigenvalues().iter().copied().collect();
+    // rounding may leave a real one a trace of an imaginary part
+    for x in &mut all {
+        if x.im.abs() < 1e-9 * x.norm() {
+            x.im = 0.0;
+        }
+    }
+    all.retain(|x| x.im >= 0.0);
+    all.sort_by(|x, y| y.norm().total_cmp(&x.norm()));
+    all
+}
+
+fn longitudinal(all: &[Complex<f64>]) -> Vec<Mode> {
+    let names: &[&'static str] = match all.len() {
+        2 => &["short period", "phugoid"],
+        3 if all[2].im > 0.0 => &["fast pitch", "slow pitch", "phugoid"],
+        3 => &["short period", "airspeed", "slow airspeed"],
+        _ => &["fast pitch", "slow pitch", "airspeed", "slow airspeed"],
+    };
+    named(all, names)
+}
+
+fn lateral(all: &[Complex<f64>]) -> Vec<Mode> {
+    let pairs = all.iter().filter(|x| x.im > 0.0).count();
+    let real = |k: usize| all.iter().filter(|x| x.im == 0.0).nth(k).copied();
+    match (pairs, real(0), real(1)) {
+        (1, Some(fast), Some(slow)) => {
+            let dutch = all.iter().find(|x| x.im > 0.0).copied().unwrap_or(fast);
+            named(&[fast, dutch, slow], &["roll", "Dutch roll", "spiral"])
+        }
+        (2, ..) => named(all, &["Dutch roll", "roll and spiral together"]),
+        _ => named(all, &["roll", "yaw", "sideslip", "spiral"]),
+    }
+}
+
+fn named(all: &[Complex<f64>], names: &[&'static str]) -> Vec<Mode> {
+    all.iter().zip(names).map(|(x, name)| Mode { name, eigenvalue: *x }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn an_aerosonde_has_the_modes_of_a_conventional_aircraft() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/aerosonde/prior.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let modes = modes(&model, 25.0, 100.0).unwrap();
+        let names: Vec<_> = modes.iter().map(|m| m.name).collect();
+        assert_eq!(names, ["short period", "phugoid", "roll", "Dutch roll", "spiral"]);
+        // Lanchester: the phugoid's frequency is sqrt(2) g / V; the book's roll damping gives
+        // 1/Lp = Jx 4 V / (rho V^2 S b^2 |Clp|), about 0.05 s
+        let (phugoid, roll) = (&modes[1], &modes[2]);
+        assert!((phugoid.frequency() / (2.0_f64.sqrt() * 9.806 / 25.0) - 1.0).abs() < 0.25);
+        let lanchester = 4.0 * 0.8244 / (1.213 * 25.0 * 0.55 * 2.8956 * 2.8956 * 0.51);
+        assert!((roll.time_constant() / lanchester - 1.0).abs() < 0.1, "{roll:?}");
+        assert!(modes[0].oscillates() && modes[0].damping() > 0.3 && modes[3].oscillates());
+    }
+}

@@ -1,0 +1,390 @@
+//! A model from a few measures of an aircraft, by formulas of textbooks, with honest widths.
+//!
+//! B. Etkin, L. D. Reid, "Dynamics of Flight", 3rd ed., 1996; J. Roskam, "Airplane Design" part V, 1985
+//! (radii of gyration); \[BM12\]. The ratios for roll and for surfaces of a flying wing are those of the
+//! published X8 and Aerosonde.
+
+use std::fmt::Write;
+
+use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
+
+/// What balances and steers an aircraft.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tail {
+    /// A tailplane and a fin.
+    Conventional,
+    /// Elevons.
+    FlyingWing,
+}
+
+/// Measures of an aircraft.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measures {
+    /// Its name.
+    pub name: String,
+    /// Mass, kg.
+    pub mass: f64,
+    /// Span, m.
+    pub span: f64,
+    /// Wing area, m².
+    pub area: f64,
+    /// What balances it.
+    pub tail: Tail,
+    /// Travel of the rudder to both sides, rad; `None` without one.
+    pub rudder: Option<f64>,
+    /// Travel of aileron and elevator to both sides, rad.
+    pub travel: f64,
+    /// Thrust at rest at full throttle, N.
+    pub static_thrust: f64,
+    /// Airspeed at which full throttle gives no thrust, m/s.
+    pub pitch_speed: f64,
+}
+
+/// An estimated number: its name, value, standard deviation as a share of the value, source.
+pub(crate) type Estimate = (&'static str, f64, f64, &'static str);
+
+/// Lift coefficient at which a small wing stalls.
+const LIFT_MAX: f64 = 1.2;
+/// Tailplane's volume, distance in chords, efficiency and share of its chord that moves, as lift.
+const TAIL: [f64; 4] = [0.5, 2.8, 0.95, 0.5];
+/// Fin's volume, distance in spans, lift slope, and share of its chord that moves, as lift.
+const FIN: [f64; 4] = [0.04, 0.4, 3.0, 0.55];
+/// Span efficiency.
+const EFFICIENCY: f64 = 0.85;
+
+/// Derived figures that several coefficients share.
+struct Figures {
+    aspect: f64,
+    chord: f64,
+    stall: f64,
+    cruise: f64,
+    /// Lift slope of the wing alone, 1/rad.
+    wing: f64,
+    /// Lift coefficient at the cruise airspeed.
+    lift: f64,
+}
+
+/// Lift slope (1/rad) of a straight wing of this aspect ratio, by Helmbold.
+fn helmbold(aspect: f64) -> f64 {
+    std::f64::consts::TAU * aspect / (2.0 + (4.0 + aspect * aspect).sqrt())
+}
+
+impl Measures {
+    fn figures(&self) -> Figures {
+        let aspect = self.span * self.span / self.area;
+        let weight = self.mass * STANDARD_GRAVITY;
+        let loading = 2.0 * weight / (SEA_LEVEL_DENSITY * self.area);
+        let stall = (loading / LIFT_MAX).sqrt();
+        let cruise = 1.6 * stall;
+        let (chord, wing) = (self.area / self.span, helmbold(aspect));
+        Figures { aspect, chord, stall, cruise, wing, lift: loading / (cruise * cruise) }
+    }
+
+    /// The airframe file.
+    pub fn airframe(&self) -> String {
+        let f = self.figures();
+        let mut out = format!(
+            "# Written by `greylag aircraft new`: measure what is marked as an estimate.\nschema = 2\nname = {:?}\n\n\
+             [geometry]\nwing_area_m2 = {{ value = {:?}, source = \"given\" }}\nspan_m = {{ value = {:?}, source = \
+             \"given\" }}\nmean_chord_m = {{ value = {:.5}, source = \"area over span\" }}\n\n[reference]\n\
+             airspeed_mps = {{ value = {:.2}, source = \"cruise\" }}\naltitude_m = {{ value = 100.0, source = \
+             \"estimate\" }}\nthrottle = {{ value = {:.3}, source = \"estimate\" }}\n\n",
+            self.name,
+            self.area,
+            self.span,
+            f.chord,
+            f.cruise,
+            self.throttle(&f)
+        );
+        let servo = "estimate: a hobby servo";
+        let surfaces = [
+            ("aileron", Some(self.travel)),
+            ("elevator", Some(self.travel)),
+            ("rudder", self.rudder),
+        ];
+        for (name, travel) in surfaces {
+            if let Some(travel) = travel {
+                let _ = write!(
+                    out,
+                    "[controls.{name}]\nfrequency_radps = {{ value = 40.0, source = \"{servo}\" }}\n\
+                     damping = {{ value = 0.7, source = \"{servo}\" }}\ntravel_rad = {{ value = {travel:.5}, \
+                     source = \"given\" }}\n\n"
+                );
+            }
+        }
+        let _ = write!(
+            out,
+            "[controls.throttle]\nlag_s = {{ value = 0.2, source = \"estimate: an electric motor\" }}\n\n\
+             # The stall at a lift coefficient of {LIFT_MAX} is at {:.1} m/s.\n[envelope]\nbank_max_deg = 45.0\n\
+             pitch_max_deg = 20.0\npitch_min_deg = -20.0\nload_factor_max = 2.0\nairspeed_min_mps = {:.1}\n\
+             airspeed_max_mps = {:.1}\nairspeed_cruise_mps = {:.1}\nsurface_slew_per_s = 20.0\n",
+            f.stall,
+            1.25 * f.stall,
+            2.2 * f.stall,
+            f.cruise
+        );
+        out
+    }
+
+    /// Throttle of level flight at the cruise airspeed, by the estimated drag.
+    fn throttle(&self, f: &Figures) -> f64 {
+        let drag = self.mass * STANDARD_GRAVITY * (0.03 / f.lift + f.lift / induced(f));
+        // T = Ts (δ² − δ V/Vp)
+        let lost = f.cruise / self.pitch_speed;
+        let square = lost * lost + 4.0 * drag / self.static_thrust;
+        ((lost + square.sqrt()) / 2.0).min(1.0)
+    }
+
+    /// The model file, beside the airframe file `airframe.toml`.
+    pub fn model(&self) -> String {
+        let f = self.figures();
+        let mut out = format!(
+            "# Written by `greylag aircraft new`: fly, then `greylag amend --tune-only`.\nschema = 1\nname = {:?}\n\
+             description = \"Textbook estimates from mass, span, area and tail.\"\nairframe = \"airframe.toml\"\n\
+             integrator = \"rk4\"\nforce_axes = \"wind\"\n\n[rigid_body]\n",
+            format!("{}-prior", self.name)
+        );
+        let given: [Estimate; 1] = [("mass_kg", self.mass, 0.01, "given")];
+        numbers(&mut out, &given);
+        numbers(&mut out, &self.inertia());
+        let _ = write!(
+            out,
+            "\n[air]\ngravity_mps2 = {{ value = 9.806, source = \"middle latitudes\" }}\ndensity = \"standard\"\n"
+        );
+        let mut effects = vec![
+            ("lift_linear", self.lift(&f)),
+            ("drag_linear", self.drag(&f)),
+            ("drag_alpha2", vec![self.induced_drag(&f)]),
+            ("side_force_linear", self.side(&f)),
+            ("roll_linear", self.roll(&f)),
+            ("pitch_linear", self.pitch(&f)),
+            ("yaw_linear", self.yaw(&f)),
+            ("propeller", self.thrust()),
+        ];
+        if self.rudder.is_some() {
+            effects.push(("rudder_linear", rudder()));
+        }
+        for (effect, estimates) in effects {
+            let _ = write!(out, "\n[effects.{effect}]\n");
+            numbers(&mut out, &estimates);
+        }
+        out
+    }
+
+    /// Radii of gyration as shares of half span, half length and half their mean.
+    fn inertia(&self) -> [Estimate; 4] {
+        let length =
+            if self.tail == Tail::Conventional { 0.7 * self.span } else { 0.35 * self.span };
+        let about = |share: f64, reach: f64| self.mass * (share * reach / 2.0).powi(2);
+        let source = "radius of gyration of light aircraft, Roskam part V";
+        [
+            ("jx_kgm2", about(0.22, self.span), 0.4, source),
+            ("jy_kgm2", about(0.34, length), 0.4, source),
+            ("jz_kgm2", about(0.38, 0.5 * (self.span + length)), 0.4, source),
+            ("jxz_kgm2", 0.0, 0.0, "estimate: axes are principal ones"),
+        ]
+    }
+
+    /// Lift slope of wing and tailplane, 1/rad.
+    fn slope(&self, f: &Figures) -> f64 {
+        match self.tail {
+            Tail::FlyingWing => f.wing,
+            Tail::Conventional => f.wing + tailplane() * TAIL[0] / TAIL[1] * (1.0 - downwash(f)),
+        }
+    }
+
+    /// Lift and pitching moment (about a chord) of the elevator, 1/rad.
+    fn elevator(&self, f: &Figures) -> [f64; 2] {
+        match self.tail {
+            Tail::Conventional => {
+                let lift = tailplane() * TAIL[3] * TAIL[0] / TAIL[1];
+                [lift, -lift * TAIL[1]]
+            }
+            Tail::FlyingWing => [0.07 * f.wing, -0.8 * 0.07 * f.wing],
+        }
+    }
+
+    fn zero_lift(&self) -> f64 {
+        if self.tail == Tail::Conventional { 0.25 } else { 0.08 }
+    }
+
+    fn lift(&self, f: &Figures) -> Vec<Estimate> {
+        let rate = match self.tail {
+            Tail::Conventional => 2.0 * tailplane() * TAIL[0],
+            Tail::FlyingWing => 0.9 * f.wing,
+        };
+        vec![
+            ("CL0", self.zero_lift(), 0.5, "estimate: camber and incidence of the wing"),
+            ("CLalpha", self.slope(f), 0.1, "Helmbold, with the tailplane behind its downwash"),
+            ("CLq", rate, 0.5, "Etkin and Reid 5.4"),
+            ("CLde", self.elevator(f)[0], 0.5, "tail volume 0.5, half of it by the elevator"),
+        ]
+    }
+
+    fn drag(&self, f: &Figures) -> Vec<Estimate> {
+        let (base, zero) = (0.03, self.zero_lift());
+        let k = 1.0 / induced(f);
+        vec![
+            ("CD0", base + k * zero * zero, 0.5, "estimate: a small clean aircraft"),
+            ("CDalpha", 2.0 * k * zero * self.slope(f), 0.5, "lift squared over pi e AR, e = 0.85"),
+            ("CDq", 0.0, 0.0, "none"),
+            ("CDde", 0.0, 0.0, "none"),
+        ]
+    }
+
+    fn induced_drag(&self, f: &Figures) -> Estimate {
+        let value = self.slope(f).powi(2) / induced(f);
+        ("CDalpha2", value, 0.25, "lift squared over pi e AR, e = 0.85")
+    }
+
+    fn side(&self, _: &Figures) -> Vec<Estimate> {
+        let fin = if self.tail == Tail::Conventional { FIN[2] * FIN[0] / FIN[1] } else { 0.15 };
+        vec![
+            ("CY0", 0.0, 0.0, "symmetric"),
+            ("CYbeta", -fin - 0.05, 0.5, "fin volume 0.04, and the fuselage"),
+            ("CYp", 0.0, 0.0, "small"),
+            ("CYr", 2.0 * fin * FIN[1], 0.5, "Etkin and Reid 5.8"),
+            ("CYda", 0.0, 0.0, "small"),
+        ]
+    }
+
+    fn roll(&self, f: &Figures) -> Vec<Estimate> {
+        vec![
+            ("Cl0", 0.0, 0.0, "symmetric"),
+            ("Clbeta", -0.08, 0.5, "estimate: some dihedral"),
+            ("Clp", -0.1 * f.wing, 0.25, "strip theory at the ratio of published small aircraft"),
+            ("Clr", f.lift / 4.0, 0.5, "Etkin and Reid 5.8"),
+            ("Clda", 0.032 * f.wing, 0.5, "at the ratio of published small aircraft"),
+        ]
+    }
+
+    fn pitch(&self, f: &Figures) -> Vec<Estimate> {
+        let (margin, damping) = match self.tail {
+            Tail::Conventional => (0.12, -2.2 * tailplane() * TAIL[0] * TAIL[1]),
+            Tail::FlyingWing => (0.08, -0.35 * f.wing),
+        };
+        let slope = -margin * self.slope(f);
+        let alpha = (f.lift - self.zero_lift()) / self.slope(f);
+        vec![
+            ("Cm0", -slope * alpha, 0.5, "trimmed at the cruise airspeed without elevator"),
+            ("Cmalpha", slope, 0.5, "estimate: static margin"),
+            ("Cmq", damping, 0.3, "Etkin and Reid 5.4"),
+            ("Cmde", self.elevator(f)[1], 0.5, "tail volume 0.5, half of it by the elevator"),
+        ]
+    }
+
+    fn yaw(&self, f: &Figures) -> Vec<Estimate> {
+        let conventional = self.tail == Tail::Conventional;
+        let fin = FIN[0] * FIN[2];
+        let (stiffness, damping) =
+            if conventional { (fin - 0.05, -2.0 * FIN[1] * fin) } else { (0.03, -0.04) };
+        vec![
+            ("Cn0", 0.0, 0.0, "symmetric"),
+            ("Cnbeta", stiffness, 0.5, "fin volume 0.04 less the fuselage"),
+            ("Cnp", -f.lift / 8.0, 0.5, "Etkin and Reid 5.8"),
+            ("Cnr", damping, 0.5, "fin volume 0.04"),
+            ("Cnda", -0.005, 1.0, "adverse yaw of published small aircraft"),
+        ]
+    }
+
+    /// T = Ts (δ² − δ V/Vp): thrust of a fixed pitch, voltage in proportion to the throttle.
+    fn thrust(&self) -> Vec<Estimate> {
+        let (rest, source) = (self.static_thrust, "static thrust and pitch speed");
+        vec![
+            ("T0_n", 0.0, 0.0, source),
+            ("Tt_n", 0.0, 0.0, source),
+            ("Ttt_n", rest, 0.2, source),
+            ("TV_nspm", 0.0, 0.0, source),
+            ("TtV_nspm", -rest / self.pitch_speed, 0.3, source),
+            ("TVV_ns2pm2", 0.0, 0.0, source),
+        ]
+    }
+}
+
+/// Side force, rolling and yawing moment of a rudder on the fin.
+fn rudder() -> Vec<Estimate> {
+    let force = FIN[2] * FIN[3] * FIN[0] / FIN[1];
+    let source = "fin volume 0.04, half of it by the rudder";
+    vec![
+        ("CYdr", force, 0.5, source),
+        ("Cldr", 0.05 * force, 1.0, source),
+        ("Cndr", -force * FIN[1], 0.5, source),
+    ]
+}
+
+/// Lift slope of the tailplane with its efficiency, 1/rad.
+fn tailplane() -> f64 {
+    TAIL[2] * helmbold(4.5)
+}
+
+/// Change of the downwash at the tailplane with incidence.
+fn downwash(f: &Figures) -> f64 {
+    2.0 * f.wing / (std::f64::consts::PI * f.aspect)
+}
+
+/// π e AR.
+fn induced(f: &Figures) -> f64 {
+    std::f64::consts::PI * EFFICIENCY * f.aspect
+}
+
+/// Lines of a model file; a width of nothing is left out.
+pub(crate) fn numbers(out: &mut String, estimates: &[Estimate]) {
+    for (name, value, width, source) in estimates {
+        let _ = write!(out, "{name} = {{ value = {value:.5}, source = \"{source}\"");
+        let sd = width * value.abs();
+        if sd > 0.0 {
+            let _ = write!(out, ", sd = {sd:.6}");
+        }
+        out.push_str(" }\n");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::GreyBox;
+
+    fn made(tail: Tail, rudder: Option<f64>) -> GreyBox {
+        let measures = Measures {
+            name: "Own".into(),
+            mass: 11.0,
+            span: 2.9,
+            area: 0.55,
+            tail,
+            rudder,
+            travel: 0.4363,
+            static_thrust: 60.0,
+            pitch_speed: 50.0,
+        };
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("airframe.toml"), measures.airframe()).unwrap();
+        std::fs::write(folder.path().join("model.toml"), measures.model()).unwrap();
+        GreyBox::load(&folder.path().join("model.toml")).unwrap()
+    }
+
+    #[test]
+    fn an_aerosondes_measures_give_its_published_coefficients_within_their_widths() {
+        let model = made(Tail::Conventional, Some(0.4363));
+        let published = [
+            ("lift_linear.CLalpha", 5.61),
+            ("pitch_linear.Cmde", -0.99),
+            ("roll_linear.Clp", -0.51),
+            ("roll_linear.Clda", 0.17),
+            ("yaw_linear.Cnbeta", 0.073),
+            ("yaw_linear.Cnr", -0.095),
+            ("rudder_linear.CYdr", 0.19),
+            ("rudder_linear.Cndr", -0.069),
+        ];
+        for (name, value) in published {
+            let ours = model.coefficients().iter().find(|c| c.name == name).unwrap();
+            // within two standard deviations: what an honest width says
+            assert!((ours.value - value).abs() < 2.0 * ours.width(), "{ours:?} for {value}");
+        }
+    }
+
+    #[test]
+    fn both_kinds_of_tail_make_files_that_load() {
+        assert!(made(Tail::Conventional, Some(0.4)).has_rudder());
+        assert!(!made(Tail::FlyingWing, None).has_rudder());
+    }
+}

@@ -1,0 +1,99 @@
+//! Aircraft from JSBSim and to it: an import has the coefficients, an export flies as its model says.
+#![cfg(feature = "sitl")]
+
+use std::path::Path;
+
+use greylag::control::{self, Kind, Target};
+use greylag::model::jsbsim::export;
+use greylag::model::{GreyBox, Memory, STEP};
+use greylag::physics::Command;
+use greylag::sim::import::import;
+use greylag::sim::{Environment, Simulator};
+use greylag_sitl::plant::{Plant, PlantOptions, Start};
+
+fn shipped(path: &str) -> GreyBox {
+    GreyBox::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+}
+
+fn options(aircraft: &str) -> PlantOptions {
+    let start = Start { airspeed_mps: 25.0, ..Start::NEUTRAL };
+    PlantOptions { aircraft: aircraft.into(), start, ..PlantOptions::default() }
+}
+
+/// The largest rms of a state's rate beside that of `model` over 10 s, in x_c a second.
+fn apart(model: &GreyBox, simulator: &mut Simulator) -> f64 {
+    let scale = model.scale();
+    let mut lqi = control::build(Kind::Lqi, model).unwrap();
+    let target = Target { roll: 0.3, pitch: 0.05, airspeed: 25.0 };
+    let mut seen = simulator.reset().unwrap();
+    let (mut memory, mut squares) = (Memory::default(), [0.0; 8]);
+    for k in 0..1000 {
+        let wave = |f: f64| 0.1 * (f * f64::from(k)).sin();
+        let own = lqi.command(&seen, &target);
+        let command = Command {
+            aileron: own.aileron + wave(0.11),
+            elevator: own.elevator + wave(0.13),
+            throttle: own.throttle + wave(0.05),
+            rudder: own.rudder + wave(0.07),
+        };
+        let controls = seen.actuators.controls();
+        let expected = model.step(&seen.state, &controls, seen.altitude, &mut memory);
+        seen = simulator.step(command.clamped()).unwrap();
+        for (i, (a, b)) in seen.state.to_array().iter().zip(expected.to_array()).enumerate() {
+            squares[i] += ((a - b) / STEP / scale[i]).powi(2) / 1000.0;
+        }
+    }
+    let rms = squares.map(f64::sqrt);
+    println!("{rms:?}");
+    rms.into_iter().fold(0.0, f64::max)
+}
+
+#[test]
+fn an_import_has_the_coefficients_of_the_aircraft() {
+    let mut plant = Plant::new(&options("aerosonde")).unwrap();
+    let found = import(&mut plant, "aerosonde", 25.0, 600.0).unwrap();
+    println!("{:#?}", found.left_out);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("airframe.toml"), &found.airframe).unwrap();
+    std::fs::write(folder.path().join("model.toml"), &found.model).unwrap();
+    let model = GreyBox::load(&folder.path().join("model.toml")).unwrap();
+    let truth = shipped("params/aerosonde/jsbsim.toml");
+    for c in truth.coefficients().iter().filter(|c| !c.name.starts_with("propeller")) {
+        let ours = model.coefficients().iter().find(|x| x.name == c.name);
+        let Some(ours) = ours else { continue };
+        // five decimals are written
+        assert!((ours.value - c.value).abs() < 0.002 * c.value.abs() + 2e-5, "{ours:?} for {c:?}");
+    }
+    let (ours, theirs) = (model.airframe.actuators.travels(), truth.airframe.actuators.travels());
+    assert!((ours.elevator.least - theirs.elevator.least).abs() < 1e-5, "{ours:?}");
+    assert!(ours.rudder.is_some());
+    // 1 % of x_c a second is asked for
+    assert!(apart(&model, &mut Simulator::new(&options("aerosonde")).unwrap()) < 0.01);
+}
+
+#[test]
+fn an_export_flies_as_its_model_says() {
+    for (path, own) in
+        [("params/aerosonde/jsbsim.toml", "gander"), ("params/x8/jsbsim.toml", "wing")]
+    {
+        let model = shipped(path);
+        let folder = tempfile::tempdir().unwrap();
+        let exported = export(&model, own);
+        assert_eq!(exported.left_out, Vec::<String>::new());
+        std::fs::create_dir_all(folder.path().join(own).join("Engines")).unwrap();
+        for (file, text) in &exported.files {
+            std::fs::write(folder.path().join(own).join(file), text).unwrap();
+        }
+        let aircraft_dir = Some(folder.path().to_owned());
+        let mut simulator = Simulator::new(&PlantOptions { aircraft_dir, ..options(own) }).unwrap();
+        // rounding of units, of gravity and of the density: 5 parts in a million
+        assert!(apart(&model, &mut simulator) < 1e-4);
+    }
+}
+
+#[test]
+fn what_an_export_cannot_hold_is_named() {
+    let mut model = shipped("params/x8/jsbsim.toml");
+    model.join("dihedral_alpha", &[0.5]).unwrap();
+    assert_eq!(export(&model, "wing").left_out, ["dihedral_alpha"]);
+}
