@@ -11,7 +11,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use amend_support::{Manoeuvres, errors, fly, sensors};
-use greylag::logs::csv;
+use greylag::logs::{Flight, csv};
 use serde_json::{Value, json};
 
 const MODEL: &str = "params/x8/jsbsim.toml";
@@ -120,13 +120,17 @@ impl Drop for Bench {
 /// Three logs of an aircraft whose actuators lag by 50 ms, which the model does not know.
 fn logs(folder: &Path) -> Vec<PathBuf> {
     let log = |k: u64| {
-        let flown = fly("actuator_lag=0.05", 25.0, Manoeuvres::Usual, 20 + k);
         let name = if k < 2 { format!("flight-{k}.csv") } else { "test-2.csv".into() };
         let path = folder.join(name);
-        csv::save(&sensors::spoil(&flown, &errors(20 + k), k), &path).unwrap();
+        csv::save(&flown(k), &path).unwrap();
         path
     };
     (0..3).map(log).collect()
+}
+
+fn flown(k: u64) -> Flight {
+    let flown = fly("actuator_lag=0.05", 25.0, Manoeuvres::Usual, 20 + k);
+    sensors::spoil(&flown, &errors(20 + k), k)
 }
 
 fn word(value: &Value) -> &str {
@@ -309,7 +313,12 @@ fn what_must_be_refused_is_refused_in_words() {
     }
 
     // two browsers: the second one is told
-    let log = fs::read(&logs(place)[0]).unwrap();
+    let mut flight = flown(0);
+    let csv_of = |flight: &Flight, name: &str| {
+        csv::save(flight, &place.join(name)).unwrap();
+        fs::read(place.join(name)).unwrap()
+    };
+    let log = csv_of(&flight, "a.csv");
     assert_eq!(bench.drop_file("a.csv", &log).0, 200);
     let seen = bench.state()["revision"].as_u64().unwrap();
     let role = |role: &str| json!({ "do": "role", "flight": 0, "role": role });
@@ -318,6 +327,22 @@ fn what_must_be_refused_is_refused_in_words() {
     assert_eq!((status, word(&said).contains("another window")), (409, true), "{said}");
     assert_eq!(bench.state()["flights"][0]["role"], "unused");
     assert_eq!(bench.act(role("fit")).0, 200);
+
+    // a wrong sign: the log serves for nothing until its finding's factor is in the session's mapping
+    flight.samples.iter_mut().for_each(|s| s.specific_force_mps2[2] *= -1.0);
+    let (status, state) = bench.drop_file("turned.csv", &csv_of(&flight, "turned.csv"));
+    assert_eq!((status, &state["flights"][1]["role"]), (200, &json!("unused")), "{state}");
+    let findings = state["flights"][1]["findings"].as_array().unwrap();
+    let cure = findings.iter().map(|f| &f["cure"]).find(|c| c["column"] == "az_mps2").unwrap();
+    assert_eq!(cure["scale"], -1.0);
+    let map = json!({ "do": "map", "flight": 1, "column": "az_mps2", "scale": cure["scale"] });
+    let (status, state) = bench.act(map);
+    assert_eq!((status, &state["flights"][1]["in_doubt"]), (200, &json!(false)), "{state}");
+    assert_eq!(state["flights"][1]["role"], "hold_out");
+    // as on a command line, a mapping holds for all logs: the other one is wrong now, and says so
+    assert_eq!(state["flights"][0]["in_doubt"], true);
+    let line = state["commands"]["diagnose"].as_str().unwrap();
+    assert!(line.contains("--mapping") && line.contains("--despite-problems"), "{line}");
 
     // two programs: the second one is told
     let second = Command::new(env!("CARGO_BIN_EXE_greylag"))

@@ -35,6 +35,10 @@ impl Cure {
         let (line, _) = line.split_once('}')?;
         let table: toml::Table = toml::from_str(&format!("{line}}}")).ok()?;
         let (column, entry) = table.iter().next()?;
+        // a turned axis needs more than a factor: its user writes that mapping
+        if entry.get("offset").is_some() {
+            return None;
+        }
         Some(Cure { column: column.clone(), scale: number(entry.get("scale")?)? })
     }
 }
@@ -136,6 +140,9 @@ mod tests {
         let sign =
             Finding::problem("[columns] has az_mps2 = { from = \"csv.az_mps2\", scale = -1 }");
         assert_eq!(Cure::of(&sign).unwrap().scale, -1.0);
+        let turned =
+            "[columns] has yaw_rad = { from = \"csv.yaw_rad\", scale = -1, offset = 1.5708 }";
+        assert_eq!(Cure::of(&Finding::problem(turned)), None);
         assert_eq!(Cure::of(&Finding::problem("the log has no flight")), None);
     }
 
