@@ -3,6 +3,7 @@
 #[path = "../tests/compare_support/mod.rs"]
 mod compare_support;
 
+use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -12,6 +13,7 @@ use greylag::report::{ComparisonReport, DiagnosisReport};
 use greylag::sysid::compare::{Options, compare};
 use greylag::sysid::diagnose::{self, diagnose};
 use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
+use greylag::sysid::progress::Stage;
 
 fn main() {
     let mut text = Vec::new();
@@ -99,8 +101,10 @@ fn ranking() {
     let wrong = |(k, x): (usize, &f64)| if Some(k) == thrust { 0.2 * x } else { *x };
     model.set_coefficients(&values.iter().enumerate().map(wrong).collect::<Vec<f64>>());
     let remarks = Mutex::new(Vec::new());
-    let hear =
-        |remark: &str| remarks.lock().expect("one").push((remark.to_owned(), Instant::now()));
+    let hear = |stage: Stage<'_>| {
+        remarks.lock().expect("one").push((stage.doing.to_owned(), Instant::now()));
+        ControlFlow::Continue(())
+    };
     diagnose(&model, &[flight], &diagnose::Options::default(), &hear).expect("a diagnosis");
     let remarks = remarks.into_inner().expect("one");
     let at = remarks.iter().position(|(remark, _)| remark.starts_with("ranking")).expect("ranked");
