@@ -122,7 +122,8 @@ fn rebuilt(log: &Flight) -> Reconstruction {
 
 fn asked(model: &GreyBox) -> Diagnosis {
     let flights: Vec<Reconstruction> = [1, 2].map(|seed| rebuilt(&flown(seed, 60.0))).into();
-    let found = diagnose(model, &flights, &Options::default(), &|_| {}).unwrap();
+    let found =
+        diagnose(model, &flights, &Options::default(), &greylag::sysid::progress::unheard).unwrap();
     println!("{:?} {:#?}", found.verdict, found.sentences);
     found
 }

@@ -75,7 +75,8 @@ fn rebuilt(log: &Flight) -> Reconstruction {
 }
 
 fn asked(seed: u64, flights: &[Reconstruction], options: &Options) -> Diagnosis {
-    let found = diagnose(&wrong(seed), flights, options, &|_| {}).unwrap();
+    let found =
+        diagnose(&wrong(seed), flights, options, &greylag::sysid::progress::unheard).unwrap();
     println!("{:?} {:#?}", found.verdict, found.sentences);
     found
 }
@@ -152,7 +153,9 @@ fn searched_for(id: &str, amplitude: f64, seed: u64, options: &Options) -> Diagn
     let path = start.path().join("model.toml");
     std::fs::write(&path, starting_model(&reference, "start", seed, &missing).unwrap()).unwrap();
     let model = GreyBox::load(&path).unwrap();
-    let found = diagnose(&model, &trained(seed, missing), options, &|_| {}).unwrap();
+    let found =
+        diagnose(&model, &trained(seed, missing), options, &greylag::sysid::progress::unheard)
+            .unwrap();
     println!("{:#?}", found.sentences);
     found
 }
@@ -221,7 +224,13 @@ fn what_cannot_be_diagnosed_is_said() {
     let model = wrong(6);
     let of = |flights: &[Reconstruction], without: &[&str]| {
         let without = without.iter().map(|id| (*id).to_owned()).collect();
-        diagnose(&model, flights, &Options { without, ..Options::default() }, &|_| {}).unwrap_err()
+        diagnose(
+            &model,
+            flights,
+            &Options { without, ..Options::default() },
+            &greylag::sysid::progress::unheard,
+        )
+        .unwrap_err()
     };
     assert!(matches!(of(&[], &[]), DiagnoseError::NoFlight));
     let unknown = of(&flights, &["flutter"]);
@@ -252,7 +261,13 @@ fn printed() -> GreyBox {
 #[test]
 fn the_prior_as_printed_has_its_thrust_and_its_inertia_wrong() {
     let printed = printed();
-    let found = diagnose(&printed, &trained(5, Vec::new()), &Options::default(), &|_| {}).unwrap();
+    let found = diagnose(
+        &printed,
+        &trained(5, Vec::new()),
+        &Options::default(),
+        &greylag::sysid::progress::unheard,
+    )
+    .unwrap();
     println!("{:#?}", found.sentences);
     let of = |id: &str| {
         let effect = found.effects.iter().find(|e| e.id == id).unwrap();
@@ -276,8 +291,13 @@ fn the_prior_as_printed_has_its_thrust_and_its_inertia_wrong() {
 /// too little of it, and of each flight something else.
 #[test]
 fn an_inertia_of_the_wrong_sign_is_found_where_the_models_accelerations_mislead() {
-    let found =
-        diagnose(&printed(), &trained(63, Vec::new()), &Options::default(), &|_| {}).unwrap();
+    let found = diagnose(
+        &printed(),
+        &trained(63, Vec::new()),
+        &Options::default(),
+        &greylag::sysid::progress::unheard,
+    )
+    .unwrap();
     println!("{:#?}", found.sentences);
     let effect = found.effects.iter().find(|e| e.id == "inertia_xz").unwrap();
     assert!(effect.asserted, "{:?}", effect.refused);
