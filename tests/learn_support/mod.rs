@@ -28,7 +28,12 @@ pub fn moved(truth: &GreyBox, seen_by: &GreyBox, seed: u64, samples: usize, size
         .map(|k| {
             if k % 25 == 0 {
                 let [aileron, elevator] = [size, size].map(|w| rng.random_range(-w..w));
-                command = Command { aileron, elevator, throttle: rng.random_range(0.0..1.0) };
+                command = Command {
+                    aileron,
+                    elevator,
+                    throttle: rng.random_range(0.0..1.0),
+                    rudder: 0.0,
+                };
             }
             let row = (twin.state, twin.actuators.controls(), twin.altitude);
             twin.step(truth, &command);
