@@ -35,6 +35,8 @@ const FAILING: f64 = 5e-4;
 /// Shares of the work after the diagnosis, and before the test.
 const SEARCHED: f64 = 0.3;
 const TESTED: f64 = 0.9;
+/// The same beside the worst channel: what a lesser one lacks is searched for once that is mended.
+const BESIDE: f64 = 0.05;
 /// Channels that are searched.
 const CHANNELS: usize = 3;
 /// Channels of forces and moments in the order of the regression.
@@ -126,7 +128,9 @@ fn failing(found: &Found) -> Vec<Channel> {
         let of = &found.first_remainder;
         of.removable[c] / of.threshold[c].max(f64::MIN_POSITIVE)
     };
-    let mut all: Vec<usize> = (0..ORDER.len()).filter(|c| tuned[*c] >= FAILING).collect();
+    let worst = tuned.iter().fold(0.0_f64, |a, b| a.max(*b));
+    let least = FAILING.max(BESIDE * worst);
+    let mut all: Vec<usize> = (0..ORDER.len()).filter(|c| tuned[*c] >= least).collect();
     all.sort_by(|a, b| removable(*b).total_cmp(&removable(*a)));
     all.truncate(CHANNELS);
     all.into_iter().map(|c| ORDER[c]).collect()
