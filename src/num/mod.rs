@@ -4,6 +4,7 @@ pub mod bootstrap;
 pub mod dense;
 mod dual;
 mod lanes;
+mod least_squares;
 mod real;
 mod register;
 mod table;
@@ -15,6 +16,7 @@ pub use dual::Dual;
 #[cfg(target_arch = "x86_64")]
 pub use lanes::{Avx2, Avx512};
 pub use lanes::{BASE_FUSED, Base, Lanes, Packed, ROW};
+pub use least_squares::least_squares;
 pub use real::{Real, each};
 pub use register::{Pair, Register};
 pub use table::{Table, TableError};

@@ -1,13 +1,15 @@
 //! An aircraft of JSBSim as airframe and model: central differences of its loads.
 
-use std::f64::consts::FRAC_PI_2;
+mod files;
+mod fits;
 
 use greylag_sitl::plant::{Inputs, Loads, MassProperties, Plant, PlantError, Start, Stops, Travel};
-use nalgebra::{DMatrix, DVector};
 
-use crate::model::textbook::{Estimate, numbers};
-use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
-use crate::physics::servos::{self, Surface};
+use crate::model::textbook::Estimate;
+use crate::num::least_squares;
+use crate::physics::atmosphere::SEA_LEVEL_DENSITY;
+use files::{airframe, model_file};
+use fits::{LINE_DEG, first_order, line, second_order};
 
 /// Metres per foot, square metres per square foot.
 const FT: f64 = 0.3048;
@@ -24,8 +26,6 @@ const TABLE_DEG: [f64; 24] = [
     -24.0, -20.0, -17.0, -14.0, -12.0, -10.0, -8.0, -6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0, 8.0,
     10.0, 12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 25.0, 30.0,
 ];
-/// Incidences over which the pitching moment is taken as a line, degrees.
-const LINE_DEG: [f64; 2] = [-4.0, 10.0];
 /// Share of a channel's variation that is worth a word when it is left.
 const WORTH_SAYING: f64 = 0.02;
 
@@ -116,11 +116,11 @@ pub fn import(
     if lift_max <= 0.0 {
         return Err(ImportError::Lift { airspeed: cruise });
     }
-    let effects = subject.effects(&polar, &travel, &mut left_out)?;
+    let effects = effects(&polar, &subject.slopes(&travel)?, &mut left_out);
     let (thrust, level) = subject.thrust(&mass, &mut left_out)?;
     let lags = subject.lags(&travel)?;
     Ok(Imported {
-        airframe: subject.airframe(name, &travel, &lags, lift_max, &mass, level),
+        airframe: airframe(&subject, name, &travel, &lags, lift_max, &mass, level),
         model: model_file(name, &mass, &polar, &effects, &thrust, travel.rudder.is_some()),
         left_out,
     })
@@ -132,6 +132,21 @@ struct Polar {
     lift: Vec<f64>,
     drag: Vec<f64>,
     pitch: Vec<f64>,
+}
+
+/// Slopes of the coefficients by what they depend on, at the incidence [`ALPHA`].
+struct Slopes {
+    base: Coefficients,
+    beta: Coefficients,
+    p: Coefficients,
+    q: Coefficients,
+    r: Coefficients,
+    aileron: Coefficients,
+    elevator: Coefficients,
+    rudder: Option<Coefficients>,
+    /// Drag by the square of sideslip and by the size of the elevator.
+    drag_beta: f64,
+    drag_elevator: f64,
 }
 
 /// An effect of the model file with its numbers.
@@ -192,96 +207,31 @@ impl Subject<'_> {
         Ok((odd, even))
     }
 
-    fn effects(
-        &mut self,
-        polar: &Polar,
-        travel: &Travel,
-        left_out: &mut Vec<String>,
-    ) -> Result<Vec<Effect>, PlantError> {
+    /// The coefficients' slopes about the reference state.
+    fn slopes(&mut self, travel: &Travel) -> Result<Slopes, PlantError> {
         let base = self.at(&Start { alpha_rad: ALPHA, ..self.start }, &Inputs::default())?;
         let v = self.start.airspeed_mps;
         let (per_span, per_chord) = (2.0 * v / self.span, 2.0 * v / self.chord);
-        let (beta, even_beta) = self.slope(ANGLE, |k, s, _| s.beta_rad = k * ANGLE)?;
-        let (p, _) = self.slope(RATE, |k, s, _| s.p_radps = k * RATE * per_span)?;
-        let (q, _) = self.slope(RATE, |k, s, _| s.q_radps = k * RATE * per_chord)?;
-        let (r, _) = self.slope(RATE, |k, s, _| s.r_radps = k * RATE * per_span)?;
         let mean = |s: Stops| COMMAND * 0.5 * (s.most_rad - s.least_rad);
-        let (a, _) = self.slope(mean(travel.aileron), |k, _, i| i.aileron = k * COMMAND)?;
-        let (e, even_e) = self.slope(mean(travel.elevator), |k, _, i| i.elevator = k * COMMAND)?;
-        let exact = |name, value| -> Estimate { (name, value, 0.02, SOURCE) };
-        let [zero, slope, bent] = line(polar);
-        if bent > WORTH_SAYING {
-            left_out.push(format!(
-                "the pitching moment over incidence is a line in the model; {:.0} % of its variation from {} \
-                 to {} deg is left out",
-                100.0 * bent,
-                LINE_DEG[0],
-                LINE_DEG[1]
-            ));
-        }
-        let drag_beta = ((even_beta[0] - base[0]) / (ANGLE * ANGLE)).max(0.0);
-        let drag_elevator = ((even_e[0] - base[0]) / mean(travel.elevator)).max(0.0);
-        let mut all = vec![
-            (
-                "lift_linear",
-                vec![
-                    ("CL0", 0.0, 0.0, "lift_table stands in its place"),
-                    ("CLalpha", 0.0, 0.0, "lift_table stands in its place"),
-                    exact("CLq", q[2]),
-                    exact("CLde", e[2]),
-                ],
-            ),
-            (
-                "drag_beta2",
-                vec![("CDbeta", 0.0, 0.0, "none"), exact("CDbeta2", drag_beta.min(10.0))],
-            ),
-            ("drag_elevator_abs", vec![exact("CDde", drag_elevator.min(0.5))]),
-            (
-                "side_force_linear",
-                vec![
-                    exact("CY0", base[1]),
-                    exact("CYbeta", beta[1]),
-                    exact("CYp", p[1]),
-                    exact("CYr", r[1]),
-                    exact("CYda", a[1]),
-                ],
-            ),
-            (
-                "roll_linear",
-                vec![
-                    exact("Cl0", base[3]),
-                    exact("Clbeta", beta[3]),
-                    exact("Clp", p[3]),
-                    exact("Clr", r[3]),
-                    exact("Clda", a[3]),
-                ],
-            ),
-            (
-                "pitch_linear",
-                vec![
-                    exact("Cm0", zero),
-                    exact("Cmalpha", slope),
-                    exact("Cmq", q[4]),
-                    exact("Cmde", e[4]),
-                ],
-            ),
-            (
-                "yaw_linear",
-                vec![
-                    exact("Cn0", base[5]),
-                    exact("Cnbeta", beta[5]),
-                    exact("Cnp", p[5]),
-                    exact("Cnr", r[5]),
-                    exact("Cnda", a[5]),
-                ],
-            ),
-        ];
-        if let Some(rudder) = travel.rudder {
-            let (d, _) = self.slope(mean(rudder), |k, _, i| i.rudder = k * COMMAND)?;
-            let numbers = vec![exact("CYdr", d[1]), exact("Cldr", d[3]), exact("Cndr", d[5])];
-            all.push(("rudder_linear", numbers));
-        }
-        Ok(all)
+        let (beta, even_beta) = self.slope(ANGLE, |k, s, _| s.beta_rad = k * ANGLE)?;
+        let (elevator, even_elevator) =
+            self.slope(mean(travel.elevator), |k, _, i| i.elevator = k * COMMAND)?;
+        let rudder = match travel.rudder {
+            Some(stops) => Some(self.slope(mean(stops), |k, _, i| i.rudder = k * COMMAND)?.0),
+            None => None,
+        };
+        Ok(Slopes {
+            base,
+            beta,
+            p: self.slope(RATE, |k, s, _| s.p_radps = k * RATE * per_span)?.0,
+            q: self.slope(RATE, |k, s, _| s.q_radps = k * RATE * per_chord)?.0,
+            r: self.slope(RATE, |k, s, _| s.r_radps = k * RATE * per_span)?.0,
+            aileron: self.slope(mean(travel.aileron), |k, _, i| i.aileron = k * COMMAND)?.0,
+            elevator,
+            rudder,
+            drag_beta: ((even_beta[0] - base[0]) / (ANGLE * ANGLE)).clamp(0.0, 10.0),
+            drag_elevator: ((even_elevator[0] - base[0]) / mean(travel.elevator)).clamp(0.0, 0.5),
+        })
     }
 
     /// The thrust's polynomial over throttle and airspeed, and the throttle of level flight.
@@ -312,15 +262,11 @@ impl Subject<'_> {
                 }
             }
         }
-        let matrix = DMatrix::from_fn(rows.len(), 6, |i, j| rows[i][j]);
-        let target = DVector::from_column_slice(&thrusts);
-        let fit = matrix
-            .clone()
-            .svd(true, true)
-            .solve(&target, 1e-9)
-            .unwrap_or_else(|_| DVector::zeros(6));
-        let left = (&matrix * &fit - &target).norm() / (target.len() as f64).sqrt();
-        let most = target.amax().max(1e-9);
+        let fit = least_squares(&rows, &thrusts).unwrap_or_default();
+        let along = |row: &[f64; 6]| row.iter().zip(&fit).map(|(a, b)| a * b).sum::<f64>();
+        let missed = rows.iter().zip(&thrusts).map(|(row, t)| (along(row) - t).powi(2));
+        let left = (missed.sum::<f64>() / thrusts.len() as f64).sqrt();
+        let most = thrusts.iter().fold(1e-9_f64, |most, t| most.max(t.abs()));
         if left > WORTH_SAYING * most {
             left_out.push(format!(
                 "the thrust is a polynomial in the model; {left:.1} N (rms) of up to {most:.0} N are left out"
@@ -357,151 +303,55 @@ impl Subject<'_> {
         let throttle: Vec<f64> = traces.iter().map(|t| t[3]).collect();
         Ok(([of(0, travel.aileron), of(1, travel.elevator), rudder], first_order(&throttle)))
     }
+}
 
-    fn airframe(
-        &self,
-        name: &str,
-        travel: &Travel,
-        (surfaces, lag): &([[f64; 2]; 3], f64),
-        lift_max: f64,
-        mass: &MassProperties,
-        throttle: f64,
-    ) -> String {
-        let cruise = self.start.airspeed_mps;
-        let density = crate::physics::atmosphere::standard_density(self.start.altitude_m);
-        let stall =
-            (2.0 * mass.mass_kg * STANDARD_GRAVITY / (density * self.area * lift_max)).sqrt();
-        let slowest = (1.25 * stall).min(0.9 * cruise);
-        let mut out = format!(
-            "# Written by `greylag aircraft import jsbsim`.\nschema = 2\nname = {name:?}\n\n[geometry]\n\
-             wing_area_m2 = {{ value = {:.6}, source = \"JSBSim\" }}\nspan_m = {{ value = {:.6}, source = \"JSBSim\" \
-             }}\nmean_chord_m = {{ value = {:.6}, source = \"JSBSim\" }}\n\n[reference]\nairspeed_mps = {{ value = \
-             {cruise:?}, source = \"given\" }}\naltitude_m = {{ value = {:?}, source = \"given\" }}\nthrottle = {{ \
-             value = {throttle:.3}, source = \"drag at the reference airspeed\" }}\n\n",
-            self.area, self.span, self.chord, self.start.altitude_m
-        );
-        let stops = [Some(travel.aileron), Some(travel.elevator), travel.rudder];
-        for ((surface, stops), [frequency, damping]) in
-            ["aileron", "elevator", "rudder"].into_iter().zip(stops).zip(surfaces)
-        {
-            if let Some(Stops { least_rad, most_rad }) = stops {
-                out += &format!(
-                    "[controls.{surface}]\nfrequency_radps = {{ value = {frequency:.2}, source = \"step of the \
-                     command\" }}\ndamping = {{ value = {damping:.3}, source = \"step of the command\" }}\n\
-                     travel_min_rad = {{ value = {least_rad:.6}, source = \"JSBSim\" }}\ntravel_max_rad = {{ value \
-                     = {most_rad:.6}, source = \"JSBSim\" }}\n\n"
-                );
-            }
-        }
-        out += &format!(
-            "[controls.throttle]\nlag_s = {{ value = {lag:.4}, source = \"step of the command\" }}\n\n\
-             # The lift table's largest coefficient stalls at {stall:.1} m/s. Correct the rest to your mission.\n\
-             [envelope]\nbank_max_deg = 45.0\npitch_max_deg = 15.0\npitch_min_deg = -15.0\nload_factor_max = 2.0\n\
-             airspeed_min_mps = {slowest:.2}\nairspeed_max_mps = {:.2}\nairspeed_cruise_mps = {cruise:?}\n\
-             surface_slew_per_s = 20.0\n",
-            1.4 * cruise
-        );
-        out
+/// The effects of the model with their coefficients; what is left of the pitching moment is said.
+fn effects(polar: &Polar, slopes: &Slopes, left_out: &mut Vec<String>) -> Vec<Effect> {
+    let [zero, slope, bent] = line(polar);
+    if bent > WORTH_SAYING {
+        left_out.push(format!(
+            "the pitching moment over incidence is a line in the model; {:.0} % of its variation from {} \
+             to {} deg is left out",
+            100.0 * bent,
+            LINE_DEG[0],
+            LINE_DEG[1]
+        ));
     }
-}
-
-/// Intercept and slope of the pitching moment over incidence, and the share of its variation beside.
-fn line(polar: &Polar) -> [f64; 3] {
-    let [low, high] = LINE_DEG.map(|a| a.to_radians() + 1e-9);
-    let inside: Vec<(f64, f64)> = polar
-        .alpha
-        .iter()
-        .copied()
-        .zip(polar.pitch.iter().copied())
-        .filter(|(a, _)| *a >= low - 2e-9 && *a <= high)
-        .collect();
-    let count = inside.len() as f64;
-    let (ma, mm) = inside.iter().fold((0.0, 0.0), |(x, y), (a, m)| (x + a / count, y + m / count));
-    let moment =
-        |f: &dyn Fn(f64, f64) -> f64| inside.iter().map(|(a, m)| f(a - ma, m - mm)).sum::<f64>();
-    let slope = moment(&|a, m| a * m) / moment(&|a, _| a * a);
-    let left = moment(&|a, m| (m - slope * a).powi(2)) / moment(&|_, m| m * m).max(1e-30);
-    [mm - slope * ma, slope, left.sqrt()]
-}
-
-/// Frequency and damping of the filter whose step response is closest to `observed`.
-fn second_order(observed: &[f64], end: f64) -> [f64; 2] {
-    let miss = |frequency: f64, damping: f64| {
-        let Surface { filter: [b, a1, a2], .. } =
-            Surface::tustin(frequency, damping, servos::Travel::symmetric(FRAC_PI_2), 0.01);
-        let (mut y, mut u) = ([0.0; 2], [0.0; 2]);
-        let errors = observed.iter().map(|x| {
-            let next = b * (end + 2.0 * u[0] + u[1]) - a1 * y[0] - a2 * y[1];
-            (y, u) = ([next, y[0]], [end, u[0]]);
-            (x - next).powi(2)
-        });
-        errors.sum::<f64>()
+    let Slopes { base, beta, p, q, r, aileron: a, elevator: e, .. } = slopes;
+    let exact = |name, value| -> Estimate { (name, value, 0.02, SOURCE) };
+    let lateral = |names: [&'static str; 5], k: usize| -> Vec<Estimate> {
+        let values = [base[k], beta[k], p[k], r[k], a[k]];
+        names.into_iter().zip(values).map(|(name, value)| exact(name, value)).collect()
     };
-    let frequencies = (0..60).map(|k| 5.0 * 1.09_f64.powi(k));
-    let all = frequencies.flat_map(|w| [0.5, 0.6, 0.707, 0.8, 1.0, 1.4].map(|z| [w, z]));
-    all.min_by(|a, b| miss(a[0], a[1]).total_cmp(&miss(b[0], b[1]))).unwrap_or([50.0, 0.7])
-}
-
-/// Time constant (s) by which `observed` follows a step, by the time to 63 % of its end.
-fn first_order(observed: &[f64]) -> f64 {
-    let end = 0.5;
-    match observed.iter().position(|x| *x >= 0.632 * end) {
-        Some(k) => (0.01 * k as f64).max(0.01),
-        // slower than was waited for: by what it has done
-        None => {
-            let last = observed.last().copied().unwrap_or(0.0) / end;
-            0.01 * observed.len() as f64 / -(1.0 - last.clamp(1e-3, 0.99)).ln()
-        }
+    let none = "lift_table stands in its place";
+    let mut all = vec![
+        (
+            "lift_linear",
+            vec![
+                ("CL0", 0.0, 0.0, none),
+                ("CLalpha", 0.0, 0.0, none),
+                exact("CLq", q[2]),
+                exact("CLde", e[2]),
+            ],
+        ),
+        ("drag_beta2", vec![("CDbeta", 0.0, 0.0, "none"), exact("CDbeta2", slopes.drag_beta)]),
+        ("drag_elevator_abs", vec![exact("CDde", slopes.drag_elevator)]),
+        ("side_force_linear", lateral(["CY0", "CYbeta", "CYp", "CYr", "CYda"], 1)),
+        ("roll_linear", lateral(["Cl0", "Clbeta", "Clp", "Clr", "Clda"], 3)),
+        (
+            "pitch_linear",
+            vec![
+                exact("Cm0", zero),
+                exact("Cmalpha", slope),
+                exact("Cmq", q[4]),
+                exact("Cmde", e[4]),
+            ],
+        ),
+        ("yaw_linear", lateral(["Cn0", "Cnbeta", "Cnp", "Cnr", "Cnda"], 5)),
+    ];
+    if let Some(d) = &slopes.rudder {
+        let numbers = vec![exact("CYdr", d[1]), exact("Cldr", d[3]), exact("Cndr", d[5])];
+        all.push(("rudder_linear", numbers));
     }
-}
-
-fn model_file(
-    name: &str,
-    mass: &MassProperties,
-    polar: &Polar,
-    effects: &[Effect],
-    thrust: &[Estimate],
-    has_rudder: bool,
-) -> String {
-    let mut out = format!(
-        "# Written by `greylag aircraft import jsbsim`{}.\nschema = 1\nname = {:?}\ndescription = \"Central \
-         differences of JSBSim's loads.\"\nairframe = \"airframe.toml\"\nintegrator = \"jsbsim\"\nforce_axes = \
-         \"wind\"\n\n[rigid_body]\n",
-        if has_rudder { "" } else { "; the aircraft has no rudder" },
-        format!("{name}-import")
-    );
-    let [jx, jy, jz, jxz] = mass.inertia_kgm2;
-    let of = |name, value| -> Estimate { (name, value, 0.01, "JSBSim") };
-    numbers(
-        &mut out,
-        &[
-            of("mass_kg", mass.mass_kg),
-            of("jx_kgm2", jx),
-            of("jy_kgm2", jy),
-            of("jz_kgm2", jz),
-            of("jxz_kgm2", jxz),
-        ],
-    );
-    out += "\n[air]\ngravity_mps2 = { value = 9.806, source = \"effective gravity in middle latitudes\" }\ndensity \
-            = \"standard\"\n";
-    for (effect, estimates) in effects {
-        out += &format!("\n[effects.{effect}]\n");
-        numbers(&mut out, estimates);
-    }
-    out += "\n[effects.propeller]\n";
-    numbers(&mut out, thrust);
-    for (effect, ordinate, values) in
-        [("lift_table", "CL", &polar.lift), ("drag_table", "CD", &polar.drag)]
-    {
-        let list = |values: &[f64]| {
-            values.iter().map(|x| format!("{x:.6}")).collect::<Vec<_>>().join(", ")
-        };
-        out += &format!(
-            "\n[effects.{effect}]\nk = {{ value = 1.0, source = \"the table as it is\" }}\n\n[effects.{effect}.{ordinate}]\n\
-             alpha_rad = [{}]\nvalue = [{}]\nsource = \"JSBSim's loads\"\n",
-            list(&polar.alpha),
-            list(values)
-        );
-    }
-    out
+    all
 }

@@ -1,0 +1,29 @@
+//! Least squares of a few unknowns.
+
+use nalgebra::{DMatrix, DVector};
+
+/// The coefficients with which `rows` come closest to `values`; of several the smallest. `None` if a
+/// number is not finite.
+pub fn least_squares<const N: usize>(rows: &[[f64; N]], values: &[f64]) -> Option<[f64; N]> {
+    if !rows.iter().flatten().chain(values).all(|x| x.is_finite()) {
+        return None;
+    }
+    let matrix = DMatrix::from_fn(rows.len(), N, |i, j| rows[i][j]);
+    let target = DVector::from_column_slice(values);
+    let found = matrix.svd(true, true).solve(&target, 1e-9).ok()?;
+    Some(std::array::from_fn(|i| found[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_is_found_again() {
+        let rows: Vec<[f64; 3]> = (0..9).map(|k| f64::from(k)).map(|x| [1.0, x, x * x]).collect();
+        let values: Vec<f64> = rows.iter().map(|r| 2.0 - 0.5 * r[1] + 0.25 * r[2]).collect();
+        let found = least_squares(&rows, &values).unwrap();
+        assert!((found[0] - 2.0).abs() < 1e-9 && (found[2] - 0.25).abs() < 1e-9, "{found:?}");
+        assert_eq!(least_squares(&[[f64::NAN]], &[1.0]), None);
+    }
+}

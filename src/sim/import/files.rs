@@ -1,0 +1,106 @@
+//! The files of an imported aircraft.
+
+use greylag_sitl::plant::{MassProperties, Stops, Travel};
+
+use super::{Effect, Polar, Subject};
+use crate::model::textbook::{Estimate, numbers};
+use crate::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
+
+/// The airframe file.
+pub(super) fn airframe(
+    subject: &Subject,
+    name: &str,
+    travel: &Travel,
+    (surfaces, lag): &([[f64; 2]; 3], f64),
+    lift_max: f64,
+    mass: &MassProperties,
+    throttle: f64,
+) -> String {
+    let cruise = subject.start.airspeed_mps;
+    let density = standard_density(subject.start.altitude_m);
+    let stall =
+        (2.0 * mass.mass_kg * STANDARD_GRAVITY / (density * subject.area * lift_max)).sqrt();
+    let slowest = (1.25 * stall).min(0.9 * cruise);
+    let mut out = format!(
+        "# Written by `greylag aircraft import jsbsim`.\nschema = 2\nname = {name:?}\n\n[geometry]\n\
+         wing_area_m2 = {{ value = {:.6}, source = \"JSBSim\" }}\nspan_m = {{ value = {:.6}, source = \"JSBSim\" \
+         }}\nmean_chord_m = {{ value = {:.6}, source = \"JSBSim\" }}\n\n[reference]\nairspeed_mps = {{ value = \
+         {cruise:?}, source = \"given\" }}\naltitude_m = {{ value = {:?}, source = \"given\" }}\nthrottle = {{ \
+         value = {throttle:.3}, source = \"drag at the reference airspeed\" }}\n\n",
+        subject.area, subject.span, subject.chord, subject.start.altitude_m
+    );
+    let stops = [Some(travel.aileron), Some(travel.elevator), travel.rudder];
+    for ((surface, stops), [frequency, damping]) in
+        ["aileron", "elevator", "rudder"].into_iter().zip(stops).zip(surfaces)
+    {
+        if let Some(Stops { least_rad, most_rad }) = stops {
+            out += &format!(
+                "[controls.{surface}]\nfrequency_radps = {{ value = {frequency:.2}, source = \"step of the \
+                 command\" }}\ndamping = {{ value = {damping:.3}, source = \"step of the command\" }}\n\
+                 travel_min_rad = {{ value = {least_rad:.6}, source = \"JSBSim\" }}\ntravel_max_rad = {{ value \
+                 = {most_rad:.6}, source = \"JSBSim\" }}\n\n"
+            );
+        }
+    }
+    out += &format!(
+        "[controls.throttle]\nlag_s = {{ value = {lag:.4}, source = \"step of the command\" }}\n\n\
+         # The lift table's largest coefficient stalls at {stall:.1} m/s. Correct the rest to your mission.\n\
+         [envelope]\nbank_max_deg = 45.0\npitch_max_deg = 15.0\npitch_min_deg = -15.0\nload_factor_max = 2.0\n\
+         airspeed_min_mps = {slowest:.2}\nairspeed_max_mps = {:.2}\nairspeed_cruise_mps = {cruise:?}\n\
+         surface_slew_per_s = 20.0\n",
+        1.4 * cruise
+    );
+    out
+}
+
+/// The model file.
+pub(super) fn model_file(
+    name: &str,
+    mass: &MassProperties,
+    polar: &Polar,
+    effects: &[Effect],
+    thrust: &[Estimate],
+    has_rudder: bool,
+) -> String {
+    let mut out = format!(
+        "# Written by `greylag aircraft import jsbsim`{}.\nschema = 1\nname = {:?}\ndescription = \"Central \
+         differences of JSBSim's loads.\"\nairframe = \"airframe.toml\"\nintegrator = \"jsbsim\"\nforce_axes = \
+         \"wind\"\n\n[rigid_body]\n",
+        if has_rudder { "" } else { "; the aircraft has no rudder" },
+        format!("{name}-import")
+    );
+    let [jx, jy, jz, jxz] = mass.inertia_kgm2;
+    let of = |name, value| -> Estimate { (name, value, 0.01, "JSBSim") };
+    numbers(
+        &mut out,
+        &[
+            of("mass_kg", mass.mass_kg),
+            of("jx_kgm2", jx),
+            of("jy_kgm2", jy),
+            of("jz_kgm2", jz),
+            of("jxz_kgm2", jxz),
+        ],
+    );
+    out += "\n[air]\ngravity_mps2 = { value = 9.806, source = \"effective gravity in middle latitudes\" }\ndensity \
+            = \"standard\"\n";
+    for (effect, estimates) in effects {
+        out += &format!("\n[effects.{effect}]\n");
+        numbers(&mut out, estimates);
+    }
+    out += "\n[effects.propeller]\n";
+    numbers(&mut out, thrust);
+    for (effect, ordinate, values) in
+        [("lift_table", "CL", &polar.lift), ("drag_table", "CD", &polar.drag)]
+    {
+        let list = |values: &[f64]| {
+            values.iter().map(|x| format!("{x:.6}")).collect::<Vec<_>>().join(", ")
+        };
+        out += &format!(
+            "\n[effects.{effect}]\nk = {{ value = 1.0, source = \"the table as it is\" }}\n\n[effects.{effect}.{ordinate}]\n\
+             alpha_rad = [{}]\nvalue = [{}]\nsource = \"JSBSim's loads\"\n",
+            list(&polar.alpha),
+            list(values)
+        );
+    }
+    out
+}
