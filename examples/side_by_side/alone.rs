@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use greylag::control::cem::{Aids, Cem, Instructions, Settings};
-use greylag::control::policy::{Actor, Policy};
+use greylag::control::policy::{Actor, OBSERVATIONS, Policy};
 use greylag::control::{Controller, Observation, Target};
 use greylag::learn::{Batch, Hyperparameters, Replay, Td3, Transition};
 use greylag::model::GreyBox;
@@ -95,7 +95,7 @@ fn act(width: usize) -> Result<()> {
         seen.state.roll = 0.1 * policy.command(&seen, &target).aileron;
     }
     let one = 1e6 * (clock::now() - start) / 2e4;
-    let (mut units, mut x) = (Units::new(Block::zero()), [Block::from_f64(0.1); 15]);
+    let (mut units, mut x) = (Units::new(Block::zero()), [Block::from_f64(0.1); OBSERVATIONS]);
     let start = clock::now();
     for _ in 0..2_000 {
         x[0] = actor.act_block(&mut units, &x)[0];

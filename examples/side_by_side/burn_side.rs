@@ -96,8 +96,8 @@ impl Scorer {
             let controls = [surfaces[0][4].clone(), surfaces[1][4].clone(), throttle[1].clone()];
             (state, ..) = self.model.step_rk4(&state, &controls, [&self.density, &self.one]);
             for (surface, action) in surfaces.iter_mut().zip([aileron, elevator]) {
-                let limit = figures.deflection_max;
-                let [b, a1, a2] = figures.surface;
+                let limit = figures.aileron.travel.largest();
+                let [b, a1, a2] = figures.aileron.filter;
                 let [in1, in2, out1, out2, clipped, _] = surface.clone();
                 let input = action * limit;
                 let y =
@@ -139,7 +139,7 @@ impl Scorer {
         let seen = vec![
             roll.clone(),
             pitch.clone(),
-            airspeed - State::NEUTRAL.airspeed,
+            airspeed.clone() - State::NEUTRAL.airspeed,
             p,
             q,
             r,
@@ -152,6 +152,7 @@ impl Scorer {
             throttle.clone() - 0.5,
             -roll + problem.target.roll,
             -pitch + problem.target.pitch,
+            -airspeed.clone() + problem.target.airspeed,
         ];
         Column::cat(seen, 1) / self.unit.clone()
     }

@@ -239,8 +239,8 @@ impl Scoring {
             "actor": told_layers(self.agent.actor.network()),
             "critic1": told_layers(one.network()),
             "critic2": told_layers(two.network()),
-            "limit": figures.deflection_max,
-            "surface": figures.surface,
+            "limit": figures.aileron.travel.largest(),
+            "surface": figures.aileron.filter,
             "throttle": figures.throttle,
             "target": [self.target.roll, self.target.pitch, self.target.airspeed],
             "reward": [

@@ -244,7 +244,7 @@ class Scoring:
         seen = [
             roll, pitch, s[:, 2] - p["airspeed"], *columns(s[:, 3:]),
             z[:, 4], (z[:, 4] - z[:, 5]) / STEP, z[:, 10], (z[:, 10] - z[:, 11]) / STEP, z[:, 13] - 0.5,
-            p["target"][0] - roll, p["target"][1] - pitch,
+            p["target"][0] - roll, p["target"][1] - pitch, p["target"][2] - s[:, 2],
         ]
         seen = torch.stack(seen, 1) / self.unit
         there = torch.cat([seen, self.actor(seen).tanh()], 1)
