@@ -44,11 +44,11 @@ impl Budget {
     pub const fn sizes(self) -> Sizes {
         match self {
             Budget::Quick => Sizes {
-                episodes: 24,
+                episodes: 12,
                 planned: 4,
                 rounds: 1,
-                passing_updates: 200,
-                updates: 1500,
+                passing_updates: 100,
+                updates: 600,
                 hidden: "16,16",
             },
             Budget::Standard => Sizes {
@@ -70,6 +70,11 @@ impl Budget {
         }
     }
 
+    /// Whether planners, which take milliseconds a step, are flown in the model as well.
+    pub fn flies_planners(self) -> bool {
+        self != Budget::Quick
+    }
+
     /// The options of `train policy`.
     pub const fn policy(self, algorithm: Algorithm) -> &'static [&'static str] {
         use Algorithm::{Analytic, Td3};
@@ -80,13 +85,13 @@ impl Budget {
                 "--critic",
                 "32,32",
                 "--updates",
-                "300",
+                "200",
                 "--window",
-                "60",
+                "50",
                 "--flock",
                 "16",
                 "--valuation",
-                "500",
+                "300",
                 "--corners",
                 "0.3",
             ],

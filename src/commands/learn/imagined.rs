@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Result;
 use serde::Serialize;
 
+use super::budget::Budget;
 use crate::commands::fly;
 use crate::control::Kind;
 use crate::model::GreyBox;
@@ -35,10 +36,11 @@ pub struct Reached {
 ///
 /// # Errors
 /// If a file cannot be used. A model that an LQI cannot be designed on leaves that row out.
-pub fn reached(folder: &Path, policy: &Path, seed: u32) -> Result<Vec<Reached>> {
+pub fn reached(folder: &Path, policy: &Path, seed: u32, budget: Budget) -> Result<Vec<Reached>> {
     let model = GreyBox::load(&folder.join("model.toml"))?;
     let mut all = Vec::new();
-    for (kind, every) in EVERY {
+    let flown = |kind: &Kind| budget.flies_planners() || !kind.searches();
+    for (kind, every) in EVERY.into_iter().filter(|(kind, _)| flown(kind)) {
         let controller = match fly::controller(kind, &model, policy, &[]) {
             Ok(controller) => controller,
             Err(error) => {

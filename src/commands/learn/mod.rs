@@ -156,7 +156,7 @@ impl Arguments {
     fn finish(&self, prior: &GreyBox, stages: &[Stage], record: &Record) -> Result<ExitCode> {
         println!("scores in the model, on targets of their own");
         let (model, policy) = (self.out.join(plan::MODEL), self.out.join(plan::POLICY));
-        let reached = imagined::reached(&model, &policy, self.seed)?;
+        let reached = imagined::reached(&model, &policy, self.seed, self.budget)?;
         println!("{}", scores(&reached));
         let lost = reached.iter().find(|r| r.controller == "policy" && r.divergence_rate > 0.5);
         if let Some(lost) = lost {
