@@ -179,7 +179,7 @@ mod tests {
     #[test]
     fn a_slow_sensor_beside_a_fast_one_costs_no_row() {
         // airspeed at 5 Hz in rows of 50 Hz: nine of ten fields are empty
-        let airspeed = |k: usize| if k % 10 == 0 { 17.0 } else { f64::NAN };
+        let airspeed = |k: usize| if k.is_multiple_of(10) { 17.0 } else { f64::NAN };
         let all: Vec<Sample> = (0..1000).map(|k| row(k as f64 * 0.02, airspeed(k))).collect();
         let mut rows = Rows::with_sparse_columns_of(&all);
         all.iter().enumerate().for_each(|(k, s)| rows.take(k + 1, Some(*s)));

@@ -79,9 +79,9 @@ fn signs(windows: &[&[Sample]]) -> Vec<Finding> {
         )));
     }
     if turned(yaw) {
-        out.push(Finding::problem(format!(
-            "yaw falls while the aircraft turns right: yaw looks counted from east to the left (ENU), while the log format counts from north to the right (NED); read it with --mapping FILE, in which [columns] has yaw_rad = {{ from = \"csv.yaw_rad\", scale = -1, offset = 1.5708 }}"
-        )));
+        out.push(Finding::problem(
+            "yaw falls while the aircraft turns right: yaw looks counted from east to the left (ENU), while the log format counts from north to the right (NED); read it with --mapping FILE, in which [columns] has yaw_rad = { from = \"csv.yaw_rad\", scale = -1, offset = 1.5708 }",
+        ));
     }
     out
 }

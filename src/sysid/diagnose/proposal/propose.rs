@@ -87,6 +87,10 @@ pub fn propose(
         proposal.sentences.push(nothing(&proposal));
         return Ok(proposal);
     };
+    if let Some(grades) = proposal.grades.as_mut() {
+        // further terms say that the first one's form is not the whole
+        grades.form &= terms.len() == 1;
+    }
     say(progress, "testing the formula on flights that the search has not seen", TESTED)?;
     let (test, used, more) = self::problem(model, held_out, options)?;
     proposal.notes.extend(more);
