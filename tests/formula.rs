@@ -104,10 +104,13 @@ fn a_formula_gives_what_the_same_effect_of_the_catalogue_gives() {
     }
 }
 
+/// What a formula of the angle of attack must give.
+type Native = fn(f64) -> f64;
+
 #[test]
 fn every_function_is_what_it_says() {
     let w = 0.1;
-    let cases: [(&str, fn(f64) -> f64); 12] = [
+    let cases: [(&str, Native); 12] = [
         ("k*max(alpha - w, 0)^2", |a| (a - 0.1_f64).max(0.0).powi(2)),
         ("k*min(alpha, w)", |a| a.min(0.1)),
         ("k*sign(alpha)", |a| if a == 0.0 { 0.0 } else { a.signum() }),

@@ -20,7 +20,7 @@ mod tests {
 
     #[test]
     fn a_parabola_is_found_again() {
-        let rows: Vec<[f64; 3]> = (0..9).map(|k| f64::from(k)).map(|x| [1.0, x, x * x]).collect();
+        let rows: Vec<[f64; 3]> = (0..9).map(f64::from).map(|x| [1.0, x, x * x]).collect();
         let values: Vec<f64> = rows.iter().map(|r| 2.0 - 0.5 * r[1] + 0.25 * r[2]).collect();
         let found = least_squares(&rows, &values).unwrap();
         assert!((found[0] - 2.0).abs() < 1e-9 && (found[2] - 0.25).abs() < 1e-9, "{found:?}");

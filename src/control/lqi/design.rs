@@ -115,6 +115,7 @@ type Closed<const N: usize, const M: usize> =
     (SMatrix<f64, N, N>, SMatrix<f64, N, M>, SMatrix<f64, M, N>);
 
 /// The loops of one condition.
+#[expect(clippy::large_enum_variant, reason = "one lives at a time, while a gain is designed")]
 pub(super) enum Loops {
     /// Aileron and elevator.
     Two(SMatrix<f64, STATES, STATES>, SMatrix<f64, STATES, 2>, SMatrix<f64, 2, STATES>),
