@@ -332,8 +332,9 @@ pub(crate) fn numbers(out: &mut String, estimates: &[Estimate]) {
     for (name, value, width, source) in estimates {
         let _ = write!(out, "{name} = {{ value = {value:.5}, source = \"{source}\"");
         let sd = width * value.abs();
-        if sd > 0.0 {
-            let _ = write!(out, ", sd = {sd:.6}");
+        // a value that is written as zero is held
+        if sd > 0.0 && value.abs() >= 5e-6 {
+            let _ = write!(out, ", sd = {sd:.3e}");
         }
         out.push_str(" }\n");
     }

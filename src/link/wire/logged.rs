@@ -44,7 +44,7 @@ pub enum Logged {
 
 /// The names of the actuator fields.
 const CONTROLS: [&str; 4] = ["controls0", "controls1", "controls2", "controls3"];
-const ACTUATORS: [&str; 8] = [
+const ACTUATORS: [&str; 16] = [
     "actuator0",
     "actuator1",
     "actuator2",
@@ -52,6 +52,14 @@ const ACTUATORS: [&str; 8] = [
     "actuator4",
     "actuator5",
     "actuator6",
+    "actuator7",
+    "actuator8",
+    "actuator9",
+    "actuator10",
+    "actuator11",
+    "actuator12",
+    "actuator13",
+    "actuator14",
     "active",
 ];
 const SERVOS: [&str; 16] = [
@@ -158,8 +166,10 @@ pub fn read(frame: &Frame<'_>) -> Option<Logged> {
             floats("AOA_SSA", Own::Micros(m.time_usec), &["AOA", "SSA"], &[m.AOA, m.SSA])
         }
         MavMessage::ACTUATOR_OUTPUT_STATUS(m) => {
-            let [a, b, c, d, e, f, g, ..] = m.actuator;
-            let numbers = [a, b, c, d, e, f, g, m.active as f32];
+            let mut numbers = [0.0; ACTUATORS.len()];
+            let last = numbers.len() - 1;
+            numbers[..last].copy_from_slice(&m.actuator[..last]);
+            numbers[last] = m.active as f32;
             floats("ACTUATOR_OUTPUT_STATUS", Own::Micros(m.time_usec), &ACTUATORS, &numbers)
         }
         MavMessage::HIL_ACTUATOR_CONTROLS(m) => floats(
