@@ -384,6 +384,15 @@ mod tests {
     }
 
     #[test]
+    fn level_flight_takes_a_throttle_within_its_stops() {
+        // at little throttle the propeller brakes, so the thrust of level flight has a second, negative solution
+        let model = made(Tail::Conventional, Some(0.4363));
+        let speed = model.airframe.reference.airspeed;
+        let trim = crate::model::Trim::level(&model, speed, 0.0).unwrap();
+        assert!((0.1..1.0).contains(&trim.controls.throttle), "{trim:?}");
+    }
+
+    #[test]
     fn both_kinds_of_tail_make_files_that_load() {
         assert!(made(Tail::Conventional, Some(0.4)).has_rudder());
         assert!(!made(Tail::FlyingWing, None).has_rudder());

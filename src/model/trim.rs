@@ -46,16 +46,16 @@ impl Trim {
             return Err(failure(model, 0.0, 0.0, airspeed));
         }
         let condition = |x: [Dual<3>; 3]| level_condition(x, airspeed);
-        newton::solve([0.03, 0.0, 0.2], [0.1, 0.2, 0.5], |x| {
-            let (state, controls) = condition(x);
-            let rate = model.rate(&state, &controls, altitude);
-            [rate.airspeed, rate.q, rate.alpha]
-        })
-        .map(|x| {
+        let from = |throttle: f64| {
+            let x = newton::solve([0.03, 0.0, throttle], [0.1, 0.2, 0.5], |x| {
+                let (state, controls) = condition(x);
+                let rate = model.rate(&state, &controls, altitude);
+                [rate.airspeed, rate.q, rate.alpha]
+            })?;
             let (state, controls) = level_condition(x, airspeed);
-            Trim { state, controls, acceleration: 0.0 }
-        })
-        .ok_or_else(|| failure(model, 0.0, 0.0, airspeed))
+            Some(Trim { state, controls, acceleration: 0.0 })
+        };
+        within_stops(from, 0.2).ok_or_else(|| failure(model, 0.0, 0.0, airspeed))
     }
 
     /// A steady turn that holds roll and pitch (rad) at `airspeed` (m/s) and `altitude` (m).
@@ -73,16 +73,39 @@ impl Trim {
         altitude: f64,
     ) -> Result<Trim, TrimError> {
         let fail = || failure(model, roll, pitch, airspeed);
-        let free = solve_attitude(model, roll, pitch, airspeed, altitude, None).ok_or_else(fail)?;
+        let from =
+            |start| solve_attitude(model, roll, pitch, [airspeed, altitude], Thrust::From(start));
+        let free = within_stops(from, 0.3).ok_or_else(fail)?;
         if (0.0..=1.0).contains(&free.controls.throttle) {
             return Ok(free);
         }
         let stop = free.controls.throttle.clamp(0.0, 1.0);
-        let mut held =
-            solve_attitude(model, roll, pitch, airspeed, altitude, Some(stop)).ok_or_else(fail)?;
+        let mut held = solve_attitude(model, roll, pitch, [airspeed, altitude], Thrust::Held(stop))
+            .ok_or_else(fail)?;
         held.acceleration = model.rate(&held.state, &held.controls, altitude).airspeed;
         Ok(held)
     }
+}
+
+/// What a search for a trim finds from the throttle `start`; from full throttle where that lies beyond the
+/// stops and this within: thrust that falls before it rises with throttle, as a windmilling propeller's does,
+/// has two trims.
+fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> {
+    let holds = |trim: &Trim| (0.0..=1.0).contains(&trim.controls.throttle);
+    let first = from(start);
+    if first.as_ref().is_some_and(holds) {
+        return first;
+    }
+    from(1.0).filter(holds).or(first)
+}
+
+/// The throttle of an attitude's trim.
+#[derive(Clone, Copy)]
+enum Thrust {
+    /// It holds the airspeed; the search starts here.
+    From(f64),
+    /// It is held here.
+    Held(f64),
 }
 
 fn level_condition<R: Real>(
@@ -104,15 +127,14 @@ fn level_condition<R: Real>(
 }
 
 /// Unknowns: α, the sideways unknown, p, q, r, δa, δe, δt. The sideways unknown is δr at β = 0 where the
-/// model has a rudder that yaws (a coordinated turn), else β at δr = 0. With `throttle` given,
+/// model has a rudder that yaws (a coordinated turn), else β at δr = 0. Where the throttle is held,
 /// δt = throttle replaces V̇ = 0.
 fn solve_attitude(
     model: &GreyBox,
     roll: f64,
     pitch: f64,
-    airspeed: f64,
-    altitude: f64,
-    throttle: Option<f64>,
+    [airspeed, altitude]: [f64; 2],
+    thrust: Thrust,
 ) -> Option<Trim> {
     let sideways = Sideways::of(model);
     // the coordinated turn of a point mass starts the search close by
@@ -125,14 +147,17 @@ fn solve_attitude(
         turn * pitch.cos() * roll.cos(),
         0.0,
         0.0,
-        0.3,
+        match thrust {
+            Thrust::From(start) => start,
+            Thrust::Held(_) => 0.3,
+        },
     ];
     let x = newton::solve(start, [0.1, 0.1, 0.5, 0.5, 0.5, 0.2, 0.2, 0.5], |x| {
         let (state, controls) = attitude_condition(x, roll, pitch, airspeed, sideways);
         let rate = model.rate(&state, &controls, altitude);
-        let along = match throttle {
-            Some(t) => x[7] - Dual::from_f64(t),
-            None => rate.airspeed,
+        let along = match thrust {
+            Thrust::Held(t) => x[7] - Dual::from_f64(t),
+            Thrust::From(_) => rate.airspeed,
         };
         [rate.roll, rate.pitch, rate.p, rate.q, rate.r, rate.alpha, rate.beta, along]
     })?;

@@ -43,7 +43,7 @@ def floats(row: dict[str, str], *names: str) -> list[float]:
 
 SOURCES = {
     "vehicle_attitude": (["roll_rad", "pitch_rad", "yaw_rad"], euler),
-    "airspeed": (["airspeed_mps"], lambda r: floats(r, "true_airspeed_m_s")),
+    "airspeed_validated": (["airspeed_mps"], lambda r: floats(r, "true_airspeed_m_s")),
     "vehicle_acceleration": (
         ["ax_mps2", "ay_mps2", "az_mps2"],
         lambda r: floats(r, "xyz[0]", "xyz[1]", "xyz[2]"),
