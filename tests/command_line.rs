@@ -35,7 +35,10 @@ fn evaluate_writes_scores_as_json_and_never_over_a_file() {
     let scores: serde_json::Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
     assert_eq!(scores["schema"], "greylag.evaluation/1");
     let lqi = &scores["controllers"][1];
-    assert_eq!((&lqi["controller"], &lqi["model"]), (&"lqi".into(), &"jsbsim".into()));
+    assert_eq!(
+        (&lqi["controller"], &lqi["model"]),
+        (&"lqi".into(), &"prior-severe-learned".into())
+    );
     let groups: Vec<_> =
         lqi["groups"].as_array().unwrap().iter().map(|g| g["targets"].clone()).collect();
     assert_eq!(groups, ["easy", "hard_corners", "all"]);

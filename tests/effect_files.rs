@@ -44,8 +44,11 @@ fn a_model_takes_part_of_what_its_effect_file_says() {
     let rate = model.rate(&turn.state, &turn.controls, ALTITUDE);
     assert!(rate.r.abs() < 1e-9 && rate.p.abs() < 1e-9, "{rate:?}");
     let (a, b) = (linearise(&model, &trim, ALTITUDE).b, linearise(&plain, &trim, ALTITUDE).b);
-    // r over throttle: a step of 0.01 s of 1.16 N m on some 0.9 kg m²
-    assert!(((a - b)[(5, 2)] - 0.01 * 1.16 / 0.88).abs() < 5e-3, "{}", (a - b)[(5, 2)]);
+    // r over throttle: 0.01 s of 1.16 N m by Jx / (Jx Jz − Jxz²), of which the damping of the roll that Jxz
+    // couples in takes a sixth within the step
+    let rigid = 0.01 * 1.16 * 1.229 / (1.229 * 0.8808 - 0.9343_f64.powi(2));
+    let share = (a - b)[(5, 2)] / rigid;
+    assert!((0.75..1.0).contains(&share), "{share}");
     let linear = model.linear();
     let place = model.coefficients().iter().position(|c| c.name == "yaw_by_throttle.k").unwrap();
     assert!(linear[place]);

@@ -259,7 +259,9 @@ mod tests {
             let found = signature(&model, &about, about.entry.unwrap().example).unwrap();
             let first = found.sweeps.first().map(|pair| (pair.x_label, pair.y_label));
             println!("{:25} {first:?}", about.id);
-            assert!(first.is_some() && !found.manoeuvre.is_empty(), "{}", about.id);
+            // the manoeuvre moves no rudder, which the X8 has not
+            let moves = about.id == "rudder_linear" || !found.manoeuvre.is_empty();
+            assert!(first.is_some() && moves, "{}", about.id);
         }
         for about in inputs::Kind::ALL.iter().map(|kind| kind.describe()) {
             let found = signature(&model, &about, about.entry.unwrap().example).unwrap();

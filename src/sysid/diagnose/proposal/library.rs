@@ -222,7 +222,7 @@ mod tests {
     fn every_form_is_an_effect_with_an_id_of_its_own() {
         let mut ids = Vec::new();
         for channel in Channel::ALL {
-            for form in forms(channel, &|_, quantile| 0.1 * quantile) {
+            for form in forms(channel, &|_, quantile| (100.0 * quantile).round() / 1000.0) {
                 let effect = form.effect().unwrap_or_else(|why| panic!("{form:?}: {why}"));
                 assert_eq!(effect.about.shape, 0, "{form:?}");
                 ids.push(form.id());
