@@ -2,7 +2,7 @@
 //!
 //! A text becomes a tree ([`parser`]), its units are balanced ([`units`]), it is divided into what each coefficient
 //! multiplies ([`split`]), and that becomes a list of operations over [`Real`](crate::num::Real) ([`tape`]). An
-//! effect file ([`file`]) holds one effect; once read, [`Kind::Written`](crate::physics::effects::Kind::Written)
+//! effect file ([`mod@file`]) holds one effect; once read, [`Kind::Written`](crate::physics::effects::Kind::Written)
 //! is an effect like all others.
 
 mod corners;

@@ -62,7 +62,7 @@ pub struct Options {
     pub horizons_s: Vec<f64>,
     /// Whether the model's other conventions are tried too.
     pub conventions: bool,
-    /// The model tuned to the same flights without any effect ([`tune`]), where that is known already.
+    /// The model tuned to the same flights without any effect ([`tune`](super::tune)), where that is known already.
     pub tuned: Option<Fit>,
 }
 
