@@ -189,7 +189,7 @@ fn main() -> Result<()> {
                 trainer.coefficients(None).into_iter().map(|c| c.name).collect();
             let origin = export::origin(&model, trainer.data(), arguments.seed);
             let about =
-                format!("Learned from {transitions} samples of flight, prior {}.", way.prior);
+                format!("Learned from {transitions} transitions of flight, prior {}.", way.prior);
             let said = export::Text { about: &about, trained: &names };
             export::save(&model, &path, said, &origin, &folder)?;
         }

@@ -82,7 +82,7 @@ fn an_unknown_effect_says_where_its_file_goes() {
 }
 
 #[test]
-fn a_joined_effect_of_a_file_starts_at_nought() {
+fn a_joined_effect_of_a_file_starts_at_zero() {
     let effects = register::load(&root().join("effects")).unwrap();
     assert!(effects.iter().any(|e| e.about.id == "yaw_by_throttle"));
     let mut model = GreyBox::load(&root().join("x8/prior.toml")).unwrap();

@@ -158,7 +158,7 @@ fn a_second_client_watches_and_a_restarted_one_takes_over() {
     }
     second.wait_for_text("another client");
     drop(client);
-    // From a new port. The helm is free after one second of silence, when the setpoints count as
+    // From a new port. Authority is free after one second of silence, when the setpoints count as
     // lost as well: the restarted client may find the aircraft in HOLD, and asks for OFFBOARD.
     let mut restarted = Client::new(companion.client(0));
     restarted.steer(15.0, 2.0, 1.5);

@@ -47,10 +47,9 @@ fn the_files_are_those_that_were_learned_and_belong_together() {
     assert!(model.description.contains("prior-severe"), "{}", model.description);
     let oracle = GreyBox::load(&params("jsbsim.toml")).unwrap();
     assert!(oracle.description.starts_with("Oracle"), "{}", oracle.description);
-    assert_ne!(oracle.sha256, model.sha256);
 }
 
-/// A corner of the envelope to 0.05°: half of what the demonstration needs.
+/// A corner of the envelope to 0.05°: a tenth of what the demonstration needs.
 #[test]
 fn the_default_controller_reaches_a_hard_attitude() {
     let [error, _] = flown(Kind::HybridLqi, "learned/model.toml", [57.0, 28.0], 16.67);

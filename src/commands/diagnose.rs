@@ -38,7 +38,7 @@ pub struct Arguments {
     /// Write the report, one HTML page.
     #[arg(long)]
     report: Option<PathBuf>,
-    /// Nulls, drawn so that they lack no effect, that set the thresholds.
+    /// Bootstrap draws under the null hypothesis (no effect missing) that set the thresholds.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
     /// Seed of everything that is drawn.

@@ -62,7 +62,7 @@ impl LogArguments {
 }
 
 impl Reading {
-    /// What the readers of logs are told.
+    /// The settings of the readers of logs.
     ///
     /// # Errors
     /// If the mapping cannot be read.

@@ -58,7 +58,7 @@ use tracing_subscriber::EnvFilter;
 
 use crate::sysid::progress::Cancelled;
 
-/// What `-V` says: version, commit where the build was told (`GREYLAG_COMMIT`), features.
+/// What `-V` says: version, commit where the build was given one (`GREYLAG_COMMIT`), features.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let features = [("sitl", cfg!(feature = "sitl")), ("learn", cfg!(feature = "learn"))];
     let built: Vec<&str> =

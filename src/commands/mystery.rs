@@ -129,7 +129,7 @@ fn missing(arguments: &Arguments, seed: u64) -> Result<Missing> {
     }
     if values.iter().all(|v| *v == 0.0) {
         bail!(
-            "all values of {} are nought, so nothing would be hidden; give --amplitude",
+            "all values of {} are zero, so nothing would be hidden; give --amplitude",
             effect.about.id
         );
     }

@@ -43,7 +43,7 @@ pub struct Arguments {
     /// Ids to be left out of the catalogue.
     #[arg(long, num_args = 1..)]
     without: Vec<String>,
-    /// Nulls, drawn so that they lack no effect, that set the thresholds.
+    /// Bootstrap draws under the null hypothesis (no effect missing) that set the thresholds.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
     /// Seed of everything that is drawn.

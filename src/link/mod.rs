@@ -18,6 +18,7 @@
 //! use greylag::link::transport::{Arrival, Network};
 //! use greylag::link::vehicle::{Demand, Outputs, Sitl, Vehicle};
 //! use greylag::physics::Time;
+//! use greylag::physics::servos::Travels;
 //!
 //! fn serve(pilot: &mut dyn Autopilot) -> Result<(), Box<dyn std::error::Error>> {
 //!     let network = Network::start()?;
@@ -28,7 +29,7 @@
 //!         network.open(LinkId(0), &"udpin:127.0.0.1:14600".parse()?, "--vehicle", to_vehicle)?;
 //!     let client_link =
 //!         network.open(LinkId(1), &"udpin:0.0.0.0:14550".parse()?, "--client", to_clients)?;
-//!     let mut vehicle = Vehicle::Sitl(Sitl::new(1, 0.5235));
+//!     let mut vehicle = Vehicle::Sitl(Sitl::new(1, Travels::alike(0.5235)));
 //!     let mut clients = Clients::new(Source { system: 1, component: 1 });
 //!     let start = Instant::now();
 //!     let mut now = Now { host: start.elapsed(), vehicle: Time::default() };

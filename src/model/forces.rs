@@ -2,7 +2,7 @@
 //!
 //! Effects that need only the point are summed first, in code that holds nothing else: a planner
 //! spends most of its time there. Only a model with other effects goes on to work out what those
-//! needs, [`Base`].
+//! need, [`Base`].
 //!
 //! Functions named `…_inlined` become part of their caller, so that a kernel compiled for several
 //! instruction sets stays in its own; everyone else calls the plain ones, which are compiled once.

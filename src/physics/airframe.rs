@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use crate::physics::State;
+
 pub use controls::Yaw;
 use controls::{Alike, Each};
 
@@ -223,6 +225,11 @@ impl File {
 }
 
 impl Airframe {
+    /// Straight flight with level wings at the reference airspeed: where imagined flights begin.
+    pub fn start(&self) -> State {
+        State { airspeed: self.reference.airspeed, ..State::NEUTRAL }
+    }
+
     /// Reads an airframe file (`schema = 2`, or 1 of earlier programs).
     ///
     /// # Errors

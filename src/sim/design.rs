@@ -14,10 +14,9 @@ use crate::physics::{Controls, State};
 use crate::sim::instruments::{Group, Instruments};
 use crate::sim::missing::{Kind, Missing};
 use crate::sim::{Environment, Imagined};
-use crate::sysid::compare::CompareError;
 use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 use crate::sysid::separation::{Separation, separation};
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::sysid::weak_form::prepared::{ClockError, Prepared};
 
 /// Evidence that settles which of two effects it is.
 pub const ENOUGH: f64 = 10.0;
@@ -44,7 +43,7 @@ pub enum DesignError {
     },
     /// The imagined flights cannot be compared.
     #[error("comparing imagined flights: {0}")]
-    Compare(#[from] CompareError),
+    Compare(#[from] ClockError),
 }
 
 /// One of the two effects.
@@ -174,7 +173,7 @@ fn imagine(
     truth: &GreyBox,
     controller: &dyn Controller,
     schedule: &Schedule,
-) -> Result<Option<Prepared>, CompareError> {
+) -> Result<Option<Prepared>, ClockError> {
     let mut world = Imagined::new(truth.clone());
     let mut pilot = Scheduled::new(controller.boxed_clone(), schedule.clone());
     pilot.reset(0);

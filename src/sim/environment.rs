@@ -5,8 +5,7 @@ use greylag_sitl::plant::PlantError;
 
 use crate::control::Observation;
 use crate::model::{GreyBox, Twin};
-use crate::physics::{Command, State, Time};
-use crate::sim::START_ALTITUDE;
+use crate::physics::{Command, Time};
 
 /// Why an environment cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -54,7 +53,7 @@ pub struct Imagined {
 impl Imagined {
     /// An aircraft that flies as `model` says.
     pub fn new(model: GreyBox) -> Imagined {
-        let twin = Twin::new(State::NEUTRAL, START_ALTITUDE);
+        let twin = Twin::new(model.airframe.start(), model.airframe.reference.altitude);
         Imagined { model, twin, previous: [Command::IDLE; 2], steps: 0 }
     }
 
@@ -71,7 +70,8 @@ impl Imagined {
 
 impl Environment for Imagined {
     fn reset(&mut self) -> Result<Observation, Trouble> {
-        self.twin = Twin::new(State::NEUTRAL, START_ALTITUDE);
+        let airframe = &self.model.airframe;
+        self.twin = Twin::new(airframe.start(), airframe.reference.altitude);
         (self.previous, self.steps) = ([Command::IDLE; 2], 0);
         Ok(self.observe())
     }

@@ -12,7 +12,6 @@ use crate::control::{Controller, Target};
 use crate::model::GreyBox;
 use crate::num::statistics::{interquartile_mean, mean, quantile};
 use crate::num::{bootstrap, stream};
-use crate::physics::State;
 #[cfg(feature = "sitl")]
 use crate::sim::Simulator;
 use crate::sim::episode::DIVERGED_DEG;
@@ -98,7 +97,7 @@ pub fn evaluate(
     // what cannot be flown is said before anything is
     Simulator::new(plant)?;
     let world = || Simulator::new(plant);
-    fly(&world, make, rows, Chance { airspeed: plant.start.airspeed_mps, seed }, done)
+    fly(&world, make, rows, Conditions { airspeed: plant.start.airspeed_mps, seed }, done)
 }
 
 /// Flies `rows` in `model` in JSBSim's place, as [`evaluate`] does: nothing but the model decides the score.
@@ -112,12 +111,18 @@ pub fn imagine(
     seed: u32,
 ) -> Result<Vec<Outcome>, Trouble> {
     let world = || Ok(Imagined::new(model.clone()));
-    fly(&world, make, rows, Chance { airspeed: State::NEUTRAL.airspeed, seed }, &|| ())
+    fly(
+        &world,
+        make,
+        rows,
+        Conditions { airspeed: model.airframe.reference.airspeed, seed },
+        &|| (),
+    )
 }
 
 /// What all flights have in common: the airspeed wanted (m/s) and the seed.
 #[derive(Clone, Copy)]
-struct Chance {
+struct Conditions {
     airspeed: f64,
     seed: u32,
 }
@@ -126,7 +131,7 @@ fn fly<E: Environment>(
     world: &(dyn Fn() -> Result<E, Trouble> + Sync),
     make: Make,
     rows: &[Row],
-    chance: Chance,
+    conditions: Conditions,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Outcome>, Trouble> {
     rows.par_iter()
@@ -138,9 +143,10 @@ fn fly<E: Environment>(
                 let target = Target {
                     roll: row.roll_deg.to_radians(),
                     pitch: row.pitch_deg.to_radians(),
-                    airspeed: chance.airspeed,
+                    airspeed: conditions.airspeed,
                 };
-                let seed: u64 = stream::stream(chance.seed.into(), &[row.number.into()]).random();
+                let seed: u64 =
+                    stream::stream(conditions.seed.into(), &[row.number.into()]).random();
                 environment.reseed(seed as u32);
                 let controller = controller.as_mut();
                 let outcome = Episode { environment, controller, seed }.fly(&target, |_, _| ())?;

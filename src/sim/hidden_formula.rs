@@ -158,7 +158,7 @@ fn call(function: Function, all: &[String]) -> String {
     }
 }
 
-/// −1, 0 or 1; JSBSim's own sign is 1 at nought.
+/// −1, 0 or 1; JSBSim's own sign is 1 at zero.
 fn sign(x: &str) -> String {
     let above = element("gt", &[x.to_owned(), number(0.0)]);
     let below = element("lt", &[x.to_owned(), number(0.0)]);

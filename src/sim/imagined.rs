@@ -11,7 +11,6 @@ use crate::num::{ROW, Real};
 use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
 use crate::physics::{Controls, State};
-use crate::sim::START_ALTITUDE;
 use crate::sim::targets::Stratified;
 
 /// Aircraft that move together.
@@ -86,10 +85,10 @@ impl Imagination {
     /// episode's.
     pub fn new(model: Arc<GreyBox>, instances: usize, targets: Stratified) -> Imagination {
         let lane = Block::from_f64;
-        let (state, rest) = (State::NEUTRAL, Controls::default());
+        let (state, rest) = (model.airframe.start(), Controls::default());
         let mut memory = Memory::default();
         // what the scheme remembers at the start is the acceleration there
-        model.step(&state, &rest, START_ALTITUDE, &mut memory);
+        model.step(&state, &rest, model.airframe.reference.altitude, &mut memory);
         let zero = lane(0.0);
         let rest = Controls { aileron: zero, elevator: zero, throttle: zero, rudder: zero };
         let neutral = Batch {
@@ -211,7 +210,8 @@ impl Batch {
         if let Some(inputs) = &mut self.inputs {
             controls = model.act(&controls, inputs);
         }
-        let next = model.step_block(&self.state, &controls, START_ALTITUDE, &mut self.memory);
+        let altitude = model.airframe.reference.altitude;
+        let next = model.step_block(&self.state, &controls, altitude, &mut self.memory);
         self.state = State { roll: wrapped(next.roll), ..next };
         let mut limited = *action;
         for x in &mut limited {

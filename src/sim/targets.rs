@@ -8,8 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::Target;
 use crate::num::stream;
-use crate::physics::State;
-use crate::physics::airframe::Envelope;
+use crate::physics::{Airframe, State};
 
 /// How hard a target is, Table II of \[GSFM26\] in both its readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -51,6 +50,7 @@ pub struct Stratified {
     seed: u64,
     count: u64,
     corners: f64,
+    start: f64,
     airspeeds: [f64; 2],
     bins: Vec<usize>,
 }
@@ -64,15 +64,15 @@ impl Stratified {
     /// Targets of `seed` after the first `count`; a part `corners` of them (0..1) lies in the hard
     /// corners instead, which are 4 % of the envelope (0 is the paper's).
     pub fn new(seed: u64, count: u64, corners: f64) -> Stratified {
-        let airspeeds = [State::NEUTRAL.airspeed; 2];
-        Stratified { seed, count, corners, airspeeds, bins: Vec::new() }
+        let start = State::NEUTRAL.airspeed;
+        Stratified { seed, count, corners, start, airspeeds: [start; 2], bins: Vec::new() }
     }
 
-    /// The same targets, half of them at airspeeds that `envelope` allows instead of the start's.
-    pub fn at_airspeeds_of(self, envelope: &Envelope) -> Stratified {
-        let [low, high] = WANTED;
+    /// The same targets at the reference airspeed of `airframe`, half of them at others that its envelope allows.
+    pub fn at_airspeeds_of(self, airframe: &Airframe) -> Stratified {
+        let ([low, high], envelope) = (WANTED, &airframe.envelope);
         let airspeeds = [low * envelope.airspeed_min_mps, high * envelope.airspeed_cruise_mps];
-        Stratified { airspeeds, ..self }
+        Stratified { start: airframe.reference.airspeed, airspeeds, ..self }
     }
 
     /// Goes on after `count` targets, wherever it stands.
@@ -112,7 +112,7 @@ impl Stratified {
         let [low, high] = self.airspeeds;
         let mut rng = stream::stream(self.seed, &[STRATIFIED, 2, number]);
         if low >= high || rng.random_range(0.0..1.0) < SLOW {
-            return State::NEUTRAL.airspeed;
+            return self.start;
         }
         rng.random_range(low..high)
     }
@@ -278,8 +278,8 @@ mod tests {
     #[test]
     fn half_the_targets_want_another_airspeed_of_the_envelope() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/airframe.toml");
-        let envelope = crate::physics::Airframe::load(&path).unwrap().envelope;
-        let mut targets = Stratified::new(3, 0, 0.0).at_airspeeds_of(&envelope);
+        let airframe = Airframe::load(&path).unwrap();
+        let mut targets = Stratified::new(3, 0, 0.0).at_airspeeds_of(&airframe);
         let mut plain = Stratified::new(3, 0, 0.0);
         let mut others = 0;
         for _ in 0..400 {

@@ -221,7 +221,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Looks at the test flights: free runs of the model as given and as amended, recorded before they are told.
+    /// Looks at the test flights: free runs of the model as given and as amended, recorded before they are shown.
     fn judge(&self, seen: u64) -> Result<(), WorkbenchError> {
         self.same_model()?;
         let (given, amended, flights, names, effects) = {

@@ -12,6 +12,7 @@ use crate::sysid::amend::AmendError;
 use crate::sysid::compare::CompareError;
 use crate::sysid::diagnose::DiagnoseError;
 use crate::sysid::flight_path::ReconstructError;
+use crate::sysid::weak_form::prepared::ClockError;
 
 /// What kind of failure it is, for whoever answers a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,6 +150,9 @@ pub enum WorkbenchError {
     /// No comparison.
     #[error(transparent)]
     Compare(#[from] CompareError),
+    /// A flight without a clock.
+    #[error(transparent)]
+    Clock(#[from] ClockError),
     /// No diagnosis.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),

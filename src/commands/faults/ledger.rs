@@ -109,7 +109,7 @@ impl Ledger {
             while lines.read_line(&mut line)? > 0 && line.ends_with('\n') {
                 let entry: Entry = serde_json::from_str(&line).with_context(|| {
                     format!(
-                        "{} is not a file of `greylag faults --resume`; give another name",
+                        "{} is not a file of `greylag faults --resume`, or one of an earlier version; give another name",
                         path.display()
                     )
                 })?;
@@ -119,7 +119,7 @@ impl Ledger {
             }
             ensure!(
                 whole > 0 || line.is_empty() || line.starts_with('{'),
-                "{} is not a file of `greylag faults --resume`; give another name",
+                "{} is not a file of `greylag faults --resume`, or one of an earlier version; give another name",
                 path.display()
             );
         }

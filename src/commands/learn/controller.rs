@@ -10,6 +10,7 @@ use super::plan::{MODEL, POLICY, Stage};
 use crate::learn::write_whole;
 use crate::model::GreyBox;
 use crate::model::residual::hash;
+use crate::sysid::amend::document::effect_file;
 
 /// Its name below the folder of a learning.
 pub const CONTROLLER: &str = "controller";
@@ -62,7 +63,9 @@ pub fn assemble(
     std::fs::create_dir_all(folder.join(POLICY))
         .with_context(|| format!("cannot make {}", folder.display()))?;
     let mut files = Vec::new();
-    for (from, name) in FILES {
+    let effects: Vec<String> = prior.written().map(effect_file).collect();
+    let effects = effects.iter().map(|name| (MODEL, name.as_str()));
+    for (from, name) in effects.chain(FILES) {
         let source = out.join(from).join(name);
         let bytes =
             std::fs::read(&source).with_context(|| format!("cannot read {}", source.display()))?;

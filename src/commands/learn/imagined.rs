@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::budget::Budget;
 use crate::commands::fly;
+use crate::commands::interruption::Interruption;
 use crate::control::Kind;
 use crate::model::GreyBox;
 use crate::sim::evaluation::{Evaluation, imagine};
@@ -14,7 +15,7 @@ use crate::sim::{Group, TargetFile};
 
 /// Seed of the targets: neither those that controllers are scored on nor those that trainings are judged by.
 const TARGETS: u64 = 3;
-/// Targets are thinned for planners, which take milliseconds a step: one in so many is flown.
+/// One target in so many is flown: a planner takes milliseconds a step, and the LQI needs few to be judged.
 const EVERY: [(Kind, u32); 3] = [(Kind::Policy, 1), (Kind::Lqi, 4), (Kind::HybridLqi, 24)];
 
 /// What a controller reached in the model.
@@ -32,17 +33,27 @@ pub struct Reached {
     pub divergence_rate: f64,
 }
 
-/// Flies the controllers in the model of `folder` with the policy in `policy`.
+/// Flies the controllers in the model of `folder` with the policy in `policy`; `None` if interrupted.
 ///
 /// # Errors
-/// If a file cannot be used. A model that an LQI cannot be designed on leaves that row out.
-pub fn reached(folder: &Path, policy: &Path, seed: u32, budget: Budget) -> Result<Vec<Reached>> {
+/// If a file cannot be used. A model that an LQI cannot be designed on leaves the rows of LQI and planner out.
+pub fn reached(
+    folder: &Path,
+    policy: &Path,
+    seed: u32,
+    budget: Budget,
+    stop: &Interruption,
+) -> Result<Option<Vec<Reached>>> {
     let model = GreyBox::load(&folder.join("model.toml"))?;
     let mut all = Vec::new();
     let flown = |kind: &Kind| budget.flies_planners() || !kind.searches();
     for (kind, every) in EVERY.into_iter().filter(|(kind, _)| flown(kind)) {
+        if stop.is_set() {
+            return Ok(None);
+        }
         let controller = match fly::controller(kind, &model, policy, &[]) {
             Ok(controller) => controller,
+            Err(error) if kind == Kind::Policy => return Err(error),
             Err(error) => {
                 eprintln!("{kind} is not flown in the model: {error:#}");
                 continue;
@@ -61,5 +72,5 @@ pub fn reached(folder: &Path, policy: &Path, seed: u32, budget: Budget) -> Resul
             divergence_rate: scores.score("all").map_or(f64::NAN, |s| s.divergence_rate),
         });
     }
-    Ok(all)
+    Ok(Some(all))
 }

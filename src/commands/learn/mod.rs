@@ -18,6 +18,7 @@ use crate::commands::files::{command_line, shipped};
 use crate::commands::interruption::{Ended, Interruption};
 use crate::learn::trainable;
 use crate::model::GreyBox;
+use crate::model::residual::hash;
 use budget::{Algorithm, Budget};
 use imagined::Reached;
 use plan::{Source, Stage, Wish};
@@ -81,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     stages.iter().try_for_each(|stage| super::check_line(&stage.line))?;
     std::fs::create_dir_all(&arguments.out)
         .with_context(|| format!("cannot make {}", arguments.out.display()))?;
-    let mut record = Record::open(&arguments.out, &stages, &prior.sha256)?;
+    let mut record = Record::open(&arguments.out, &stages, &arguments.inputs(&prior)?)?;
     for (k, stage) in stages.iter().enumerate() {
         let place = format!("stage {} of {}: {}", k + 1, stages.len(), stage.what);
         if k < record.done().len() {
@@ -101,14 +102,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
         record.add(stage, begun.elapsed().as_secs_f64())?;
     }
-    arguments.finish(&prior, &stages, &record)
+    arguments.finish(&prior, &stages, &record, &stop)
 }
 
 impl Arguments {
     fn stages(&self, prior: &GreyBox) -> Result<Vec<Stage>> {
         let trainable = self.trained(prior)?;
         let source = if self.collect {
-            Source::Simulator(self.aircraft_options())
+            Source::Simulator(self.aircraft_options(prior))
         } else {
             Source::Logs(self.logs.clone())
         };
@@ -123,6 +124,17 @@ impl Arguments {
             seed: self.seed,
         };
         Ok(wish.stages())
+    }
+
+    /// Hashes of the files that a learning begins with: prior, airframe, logs.
+    fn inputs(&self, prior: &GreyBox) -> Result<Vec<String>> {
+        let mut hashes = vec![prior.sha256.clone(), format!("{:?}", prior.airframe)];
+        for log in &self.logs {
+            let bytes =
+                std::fs::read(log).with_context(|| format!("cannot read {}", log.display()))?;
+            hashes.push(hash(&bytes));
+        }
+        Ok(hashes)
     }
 
     /// The coefficients that are learned, by their full names or as `all`.
@@ -143,20 +155,35 @@ impl Arguments {
         }
     }
 
-    fn aircraft_options(&self) -> Vec<OsString> {
+    /// Which aircraft flies, from which airspeed: that of the prior, as the first round has no model to take it from.
+    fn aircraft_options(&self, prior: &GreyBox) -> Vec<OsString> {
         let mut words: Vec<OsString> = Vec::new();
         let mut add = |name: &str, value: OsString| words.extend([name.into(), value]);
         self.aircraft_dir.iter().for_each(|dir| add("--aircraft-dir", dir.into()));
         self.aircraft.iter().for_each(|name| add("--aircraft", name.into()));
+        if self.aircraft.is_some() {
+            let airspeed = prior.airframe.reference.airspeed.to_string();
+            add("--start-airspeed-mps", airspeed.into());
+        }
         self.hide.iter().for_each(|effect| add("--hide", effect.into()));
         words
     }
 
     /// Scores the result in its model, puts the folder that flies together, says what came of it.
-    fn finish(&self, prior: &GreyBox, stages: &[Stage], record: &Record) -> Result<ExitCode> {
+    fn finish(
+        &self,
+        prior: &GreyBox,
+        stages: &[Stage],
+        record: &Record,
+        stop: &Interruption,
+    ) -> Result<ExitCode> {
         println!("scores in the model, on targets of their own");
         let (model, policy) = (self.out.join(plan::MODEL), self.out.join(plan::POLICY));
-        let reached = imagined::reached(&model, &policy, self.seed, self.budget)?;
+        let Some(reached) = imagined::reached(&model, &policy, self.seed, self.budget, stop)?
+        else {
+            eprintln!("interrupted while scoring; the same command goes on there");
+            return Ok(Ended::Interrupted.into());
+        };
         println!("{}", scores(&reached));
         let lost = reached.iter().find(|r| r.controller == "policy" && r.divergence_rate > 0.5);
         if let Some(lost) = lost {

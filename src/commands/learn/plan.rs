@@ -160,9 +160,15 @@ impl Wish<'_> {
 }
 
 impl Stage {
-    /// The command as one would type it.
+    /// The command as one would type it in a shell.
     pub fn command(&self) -> String {
-        self.line.iter().fold("greylag".into(), |line, word| line + " " + &word.to_string_lossy())
+        let quoted = |word: &OsString| match word.to_string_lossy() {
+            word if word.contains([' ', '\'', '"', '$', '*']) => {
+                format!("'{}'", word.replace('\'', "'\\''"))
+            }
+            word => word.into_owned(),
+        };
+        self.line.iter().fold("greylag".into(), |line, word| line + " " + &quoted(word))
     }
 }
 

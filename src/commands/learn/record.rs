@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 
-use super::plan::Stage;
+use super::plan::{FLIGHTS, Stage};
 use crate::commands::files::{self, Overwrite};
 use crate::model::residual::hash;
 
@@ -20,7 +20,7 @@ const SCHEMA: &str = "greylag.learn/1";
 struct File {
     schema: String,
     program: String,
-    /// SHA-256 of all that decides the result.
+    /// SHA-256 of prior, airframe, logs, commands and program version.
     identity: String,
     stages: Vec<Done>,
 }
@@ -33,7 +33,7 @@ pub struct Done {
     pub what: String,
     /// Its command.
     pub command: String,
-    /// How long it took, all sessions together, s.
+    /// How long it took in the session that ended it, s.
     pub seconds: f64,
 }
 
@@ -45,19 +45,27 @@ pub struct Record {
 }
 
 impl Record {
-    /// The record in `folder` of the learning that has `stages` and begins at the prior of hash `prior`; an
-    /// empty one if there is none.
+    /// The record in `folder` of the learning that has `stages` and is made of `inputs` (hashes of the files that it
+    /// begins with); where there is none an empty one, which is written before anything is flown.
     ///
     /// # Errors
-    /// If the folder holds another learning, or what is there cannot be read.
-    pub fn open(folder: &Path, stages: &[Stage], prior: &str) -> Result<Record> {
+    /// If the folder holds another learning or flights of nobody knows what, or cannot be read or written.
+    pub fn open(folder: &Path, stages: &[Stage], inputs: &[String]) -> Result<Record> {
         let path = folder.join(RECORD);
         let lines = stages.iter().map(|s| s.command() + "\n").collect::<String>();
-        let identity = hash(format!("{prior}\n{lines}").as_bytes());
-        let program = concat!("greylag ", env!("CARGO_PKG_VERSION")).into();
+        let program = concat!("greylag ", env!("CARGO_PKG_VERSION")).to_owned();
+        let identity = hash(format!("{program}\n{}\n{lines}", inputs.join("\n")).as_bytes());
         let empty = File { schema: SCHEMA.into(), program, identity, stages: Vec::new() };
         if !path.exists() {
-            return Ok(Record { path, file: empty });
+            if folder.join(FLIGHTS).exists() {
+                bail!(
+                    "{} holds flights without a record of the learning that they belong to; give another --out",
+                    folder.display()
+                );
+            }
+            let record = Record { path, file: empty };
+            record.save()?;
+            return Ok(record);
         }
         let text = std::fs::read_to_string(&path)
             .with_context(|| format!("cannot read {}", path.display()))?;
@@ -86,6 +94,10 @@ impl Record {
     pub fn add(&mut self, stage: &Stage, seconds: f64) -> Result<()> {
         let (what, command) = (stage.what.clone(), stage.command());
         self.file.stages.push(Done { what, command, seconds });
+        self.save()
+    }
+
+    fn save(&self) -> Result<()> {
         let text = serde_json::to_string_pretty(&self.file)? + "\n";
         files::write(&self.path, &text, Overwrite::Force)
     }
@@ -103,7 +115,11 @@ mod tests {
     fn a_learning_goes_on_and_another_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let stages = [stage("one"), stage("two")];
-        let open = |stages: &[Stage], prior| Record::open(folder.path(), stages, prior);
+        let open =
+            |stages: &[Stage], prior: &str| Record::open(folder.path(), stages, &[prior.into()]);
+        // what was interrupted in its first stage is no other learning's either
+        open(&stages, "p").unwrap();
+        assert!(open(&stages, "q").unwrap_err().to_string().contains("another --out"));
         open(&stages, "p").unwrap().add(&stages[0], 1.5).unwrap();
         let again = open(&stages, "p").unwrap();
         assert_eq!(again.done().len(), 1);

@@ -21,7 +21,7 @@ use crate::learn::{
 };
 use crate::model::GreyBox;
 use crate::model::residual::{fingerprint, hash};
-use crate::physics::airframe::Envelope;
+use crate::physics::Airframe;
 use crate::sim::evaluation::{Evaluation, Make, imagine};
 use crate::sim::imagined::Imagination;
 use crate::sim::targets::{Row, Stratified};
@@ -53,9 +53,9 @@ pub struct Arguments {
     /// Steps of a window of the analytic policy gradient.
     #[arg(long, default_value_t = AnalyticRecipe::default().window as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
     window: u64,
-    /// Aircraft of the analytic policy gradient.
-    #[arg(long, default_value_t = AnalyticRecipe::default().instances as u64, value_parser = clap::value_parser!(u64).range(1..=4096))]
-    flock: u64,
+    /// Aircraft flown in parallel for an update of the analytic policy gradient.
+    #[arg(long, alias = "flock", default_value_t = AnalyticRecipe::default().instances as u64, value_parser = clap::value_parser!(u64).range(1..=4096))]
+    gradient_batch: u64,
     /// Learning rate of the analytic policy gradient at the start.
     #[arg(long, default_value_t = AnalyticRecipe::default().rate)]
     climb: f64,
@@ -162,7 +162,7 @@ enum Method<'a> {
 struct Ground {
     model: Option<Arc<GreyBox>>,
     origin: Origin,
-    envelope: Envelope,
+    airframe: Airframe,
 }
 
 /// Trains, prints the curve, writes the best policy.
@@ -190,7 +190,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     }
     let ended = ended?;
     if ended.contains(&false) {
-        eprintln!("interrupted; the same command goes on from the last checkpoint");
+        eprintln!("interrupted; the same command {}", arguments.next_time());
         return Ok(Ended::Interrupted);
     }
     Ok(Ended::Done)
@@ -225,6 +225,14 @@ impl Arguments {
         }
     }
 
+    /// What the same command does after an interruption.
+    fn next_time(&self) -> &'static str {
+        match self.is_analytic() {
+            true => "begins this policy anew",
+            false => "goes on from the last checkpoint",
+        }
+    }
+
     fn is_analytic(&self) -> bool {
         self.algorithm == "analytic"
     }
@@ -232,7 +240,7 @@ impl Arguments {
     fn analytic(&self, seed: u64) -> AnalyticRecipe {
         AnalyticRecipe {
             actor: self.actor.clone(),
-            instances: self.flock as usize,
+            instances: self.gradient_batch as usize,
             window: self.window as usize,
             updates: self.updates,
             rate: self.climb,
@@ -294,11 +302,10 @@ impl Arguments {
                 bail!("this program was built without JSBSim; train in model:DIR");
             }
             let airframe = GreyBox::load(&shipped(Path::new("params/x8/jsbsim.toml")))?.airframe;
-            let envelope = airframe.envelope;
             return Ok(Ground {
                 model: None,
                 origin: origin(fingerprint(&airframe), "jsbsim", String::new()),
-                envelope,
+                airframe,
             });
         };
         let mut path = shipped(path);
@@ -307,8 +314,8 @@ impl Arguments {
         }
         let model = GreyBox::load(&path)?;
         let origin = origin(fingerprint(&model.airframe), &model.name, model.sha256.clone());
-        let envelope = model.airframe.envelope;
-        Ok(Ground { model: Some(Arc::new(model)), origin, envelope })
+        let airframe = model.airframe.clone();
+        Ok(Ground { model: Some(Arc::new(model)), origin, airframe })
     }
 
     /// Trains the policy of one seed; `false` if interrupted.
@@ -319,7 +326,7 @@ impl Arguments {
         };
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make {}", folder.display()))?;
-        let targets = Stratified::new(seed, 0, self.corners).at_airspeeds_of(&ground.envelope);
+        let targets = Stratified::new(seed, 0, self.corners).at_airspeeds_of(&ground.airframe);
         let run = Run { folder, seed, evaluate: self.evaluate, ground, stop };
         let recipe = self.recipe(seed);
         match &ground.model {

@@ -68,6 +68,14 @@ pub fn save(
     let airframe = table.get("airframe").and_then(|a| a.as_str()).unwrap_or(AIRFRAME);
     let airframe = prior.parent().unwrap_or(Path::new(".")).join(airframe);
     let airframe_text = std::fs::read(&airframe).map_err(fail("read", &airframe))?;
+    let mut own = Vec::new();
+    for effect in table.get("effect_files").and_then(|e| e.as_array()).into_iter().flatten() {
+        let path =
+            prior.parent().unwrap_or(Path::new(".")).join(effect.as_str().unwrap_or_default());
+        let bytes = std::fs::read(&path).map_err(fail("read", &path))?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        own.push((name, bytes));
+    }
     let name: String = format!("{}-learned", model.name).chars().take(64).collect();
     let mut set = |key: &str, value: &str| table.insert(key.into(), value.into());
     set("name", &name);
@@ -81,6 +89,10 @@ pub fn save(
         },
     );
     set("residual", RESIDUAL);
+    if !own.is_empty() {
+        let names = own.iter().map(|(name, _)| toml::Value::from(name.as_str())).collect();
+        table.insert("effect_files".into(), toml::Value::Array(names));
+    }
     for name in said.trained {
         let value = model.coefficients().iter().find(|c| c.name == *name).map(|c| c.value);
         let path: Vec<&str> = match name.as_str() {
@@ -108,6 +120,7 @@ pub fn save(
         write_whole(&path, bytes).map_err(fail("write", &path))
     };
     write(AIRFRAME, &airframe_text)?;
+    own.iter().try_for_each(|(name, bytes)| write(name, bytes))?;
     write(RESIDUAL, &residual)?;
     write(MODEL, text.as_bytes())
 }

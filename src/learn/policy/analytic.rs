@@ -19,7 +19,6 @@ use crate::num::dense::{DenseError, Units};
 use crate::num::{Dense, Dual, Real, stream};
 use crate::physics::actuators::Actuators;
 use crate::physics::{ActuatorState, Command, Controls, State};
-use crate::sim::START_ALTITUDE;
 use crate::sim::targets::Stratified;
 
 /// Numbers of an aircraft: state, actuators, last commands, the integrator's memory.
@@ -217,15 +216,16 @@ impl AnalyticTrainer {
         network.parameters_mut()[first..].iter_mut().for_each(|p| *p *= 0.1);
         let actor = Mlp::new(&network, &device);
         let mut memory = Memory::default();
-        model.step(&State::NEUTRAL, &Controls::default(), START_ALTITUDE, &mut memory);
+        let (start, altitude) = (model.airframe.start(), model.airframe.reference.altitude);
+        model.step(&start, &Controls::default(), altitude, &mut memory);
         let neutral = Aircraft {
-            state: State::NEUTRAL,
+            state: start,
             actuators: ActuatorState::default(),
             previous: [Command::IDLE; 2],
             memory,
         };
-        let mut targets = Stratified::new(recipe.seed, 0, recipe.corners)
-            .at_airspeeds_of(&model.airframe.envelope);
+        let mut targets =
+            Stratified::new(recipe.seed, 0, recipe.corners).at_airspeeds_of(&model.airframe);
         let instances = (0..recipe.instances)
             .map(|k| {
                 // ends spread over time, so that no window holds all starts
@@ -401,7 +401,8 @@ impl Flyer<'_> {
         });
         let mut memory = at.memory;
         let controls = at.actuators.controls();
-        let state = self.model.step_block(&at.state, &controls, START_ALTITUDE, &mut memory);
+        let altitude = self.model.airframe.reference.altitude;
+        let state = self.model.step_block(&at.state, &controls, altitude, &mut memory);
         let after = Aircraft { state, memory, ..at };
         let (before, all) = (at.to_array(), after.to_array());
         for row in (0..8).chain(18..21) {

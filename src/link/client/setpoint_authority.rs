@@ -8,7 +8,7 @@ use crate::link::peer::PeerId;
 /// setpoint stream ends OFFBOARD, so that a restarted client waits no longer than the aircraft.
 const RELEASE: Duration = Duration::from_secs(1);
 
-/// The helm of one kind of setpoint: two clients that send at once must not shake the surfaces.
+/// Who may send one kind of setpoint: two clients that send at once must not shake the surfaces.
 #[derive(Debug, Default)]
 pub struct SetpointAuthority {
     holder: Option<(PeerId, Duration)>,

@@ -186,7 +186,7 @@ fn built(
     let count = linear.iter().filter(|l| **l).count();
     if count == 0 {
         return Err(
-            "no parameter multiplies the shape, so the effect could not be nought; write k*(…)"
+            "no parameter multiplies the shape, so the effect could not be zero; write k*(…)"
                 .into(),
         );
     }
@@ -265,7 +265,7 @@ fn balance(
 ) -> Result<(), Fault> {
     let wanted = measured_in(channel);
     let (Some(factor), Some(inside)) = (factor, units::dimension(part, dimensions)?) else {
-        let why = "this term is always nought; take it out".into();
+        let why = "this term is always zero; take it out".into();
         return Err(Fault { at: part.at, why });
     };
     let made = factor.times(inside);
@@ -351,7 +351,7 @@ fn formula(lines: &[Line], names: &[&str]) -> String {
 }
 
 /// Where a search over shape constants starts: at the values of the file, and each constant a width to either
-/// side of its own. Coefficients of nought start at their width, since a shape without an amount says nothing.
+/// side of its own. Coefficients of zero start at their width, since a shape without an amount says nothing.
 fn starts(
     parameters: &[&Parameter],
     linear: usize,

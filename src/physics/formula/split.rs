@@ -56,7 +56,7 @@ fn bend(of: &Expression, linear: &mut [bool]) {
 /// What each parameter of `linear` multiplies in `formula`.
 ///
 /// # Errors
-/// If a term has no such parameter: without one, the effect could not be nought.
+/// If a term has no such parameter: without one, the effect could not be zero.
 pub fn parts(formula: &Expression, linear: &[bool]) -> Result<Parts, Fault> {
     let mut all: Parts = Vec::new();
     for (parameter, part) in divided(formula, linear) {

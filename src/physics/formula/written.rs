@@ -49,7 +49,7 @@ pub struct Written {
 }
 
 impl Written {
-    /// What it must be told: never only the point, so that a planner's sum over the effects that need no more
+    /// What it needs: never only the point, so that a planner's sum over the effects that need no more
     /// holds no code of formulas.
     pub const fn needs(&self) -> Needs {
         self.needs

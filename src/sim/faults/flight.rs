@@ -114,7 +114,7 @@ impl CompanionFactory {
     }
 
     /// Flies `case`; a panic of the companion is a finding. What an aircraft did is laid to a cause if it
-    /// was in that exposure, and does not do it when the same flight is flown without the faults of that kind; to none
+    /// was exposed to it, and does not do it when the same flight is flown without the faults of that kind; to none
     /// of them if it does it without any.
     ///
     /// # Errors
@@ -288,7 +288,7 @@ impl Flight {
         }
     }
 
-    /// In which exposure the aircraft is at this step, through no fault of who steers it.
+    /// What the aircraft is exposed to at this step, through no fault of who steers it.
     fn exposure(&mut self, acting: &[Fault]) -> Exposure {
         let inputs = self.aircraft.inputs();
         let same = std::mem::replace(&mut self.flown, inputs) == inputs;

@@ -20,7 +20,7 @@ const RECOVERED_DEG: f64 = 3.0;
 const ROUNDING: f64 = 1e-9;
 /// Steps of the actuators standing still that are a stretch in which nobody steers: 0.2 s.
 const UNSTEERED: u32 = 20;
-/// A exposure of so long ago no longer explains anything, steps. Bank and pitch are arrested within half a
+/// An exposure that ended so many steps ago no longer explains anything. Bank and pitch are arrested within half a
 /// second once somebody steers again; airspeed and altitude take longer to come back.
 const MEMORY: u64 = 300;
 const MEMORY_OF_ATTITUDE: u64 = 100;

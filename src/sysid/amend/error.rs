@@ -1,8 +1,8 @@
 //! Why a model cannot be amended.
 
 use crate::model::JoinError;
-use crate::sysid::compare::CompareError;
 use crate::sysid::progress::Cancelled;
+use crate::sysid::weak_form::prepared::ClockError;
 
 /// Why a model cannot be amended.
 #[derive(Debug, thiserror::Error)]
@@ -12,7 +12,7 @@ pub enum AmendError {
     Effect(#[from] JoinError),
     /// A flight cannot be put on the models' clock.
     #[error("cannot amend the model: {0}")]
-    Flight(#[from] CompareError),
+    Flight(#[from] ClockError),
     /// There is too little flight to fit to.
     #[error(
         "cannot fit {model}: {flown_s:.0} s in the air without gaps, where {needed_s:.0} s are the \

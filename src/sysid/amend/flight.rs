@@ -1,9 +1,8 @@
 //! A flight with what is left in doubt of its sensors.
 
-use crate::sysid::compare::CompareError;
 use crate::sysid::diagnose::search::clocks::{BLURRED, Doubt};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::sysid::weak_form::prepared::{ClockError, Prepared};
 
 /// Constants of a flight's sensors that are estimated along.
 pub(super) const SENSORS: usize = 8;
@@ -46,8 +45,8 @@ impl Flight {
     /// Puts `flight` on the models' clock and keeps what was flown faster than `slowest` (m/s).
     ///
     /// # Errors
-    /// [`CompareError::Clock`] if it has no clock.
-    pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Flight, CompareError> {
+    /// It has no clock.
+    pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Flight, ClockError> {
         let mut doubt = [[0.0, SKEW_SD]; SENSORS];
         doubt[BLUR] = BLURRED;
         for (k, (name, default)) in NAMES.iter().zip(DOUBT).enumerate() {

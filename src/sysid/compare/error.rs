@@ -1,6 +1,7 @@
 //! Why a comparison cannot be made.
 
 use crate::sysid::progress::Cancelled;
+use crate::sysid::weak_form::prepared::ClockError;
 
 /// Why a comparison cannot be made.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -17,15 +18,8 @@ pub enum CompareError {
     )]
     NoFlight(String),
     /// The flight has no clock.
-    #[error(
-        "flight {flight} is said to have a sample every {step_s} s, which is no clock to compare on: it must lie in 1e-6 to 1 s"
-    )]
-    Clock {
-        /// The flight.
-        flight: String,
-        /// Its step, s.
-        step_s: f64,
-    },
+    #[error(transparent)]
+    Clock(#[from] ClockError),
     /// A horizon cannot be flown.
     #[error("horizon {0} s cannot be flown: give horizons from 0.01 to 600 s")]
     Horizon(f64),

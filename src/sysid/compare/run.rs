@@ -7,6 +7,7 @@ use super::bins::{self, Residual, SUPPORT};
 use super::bootstrap::{BLOCK_S, RESAMPLES};
 use super::doubt::{self, Shift};
 use super::finding;
+use super::flight;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
 use super::result::{ChannelResult, ChannelTrace, Comparison, ModelResult, ModelTrace, Settings};
 use super::sentence::{Subject, sentence};
@@ -75,7 +76,7 @@ pub fn compare(
         seed: options.seed,
         sentences: models[0].sentences.clone(),
         models,
-        flights: prepared.iter().zip(used).map(|(p, from)| p.result(from)).collect(),
+        flights: prepared.iter().zip(used).map(|(p, from)| flight::result(p, from)).collect(),
         settings: Settings {
             start_every_s: START_EVERY_S,
             horizons_s: options.horizons_s.clone(),

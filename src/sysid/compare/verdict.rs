@@ -23,8 +23,8 @@ pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<S
         ([path_lead, moment_lead].concat(), [path_rest, moment_rest].concat());
     leading.sort_by(worst_first);
     rest.sort_by(worst_first);
-    let weight = leading.iter().chain(&rest).map(|c| capital(&c.worst_regime) + ".");
-    diverges(free_run).into_iter().chain(weight).collect()
+    let stated = leading.iter().chain(&rest).map(|c| capital(&c.worst_regime) + ".");
+    diverges(free_run).into_iter().chain(stated).collect()
 }
 
 /// The part of a channel's effect that its sentence accounts for: what its offset and its most

@@ -1,7 +1,7 @@
 //! Why a diagnosis cannot be made.
 
-use crate::sysid::compare::CompareError;
 use crate::sysid::progress::Cancelled;
+use crate::sysid::weak_form::prepared::ClockError;
 
 /// Why a diagnosis cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -11,7 +11,7 @@ pub enum DiagnoseError {
     NoFlight,
     /// The flights cannot be brought to the model's clock.
     #[error(transparent)]
-    Flight(#[from] CompareError),
+    Flight(#[from] ClockError),
     /// Too little was flown.
     #[error(
         "cannot diagnose from {seconds:.0} s of flight: {least:.0} s in the air without gaps is the least; \

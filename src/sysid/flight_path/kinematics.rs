@@ -7,7 +7,7 @@ use crate::sysid::flight_path::band::{Block, Wide};
 use crate::sysid::flight_path::intake::Track;
 use crate::sysid::flight_path::nuisance::{EARTH, FORCE, GYRO, INERTIAL, SKEW_FORCE, Values};
 use crate::sysid::flight_path::path::Path;
-use crate::sysid::flight_path::rotation::{cross, exp, log};
+use crate::sysid::flight_path::rotation::{self, cross, exp, log};
 
 /// Time over which a gust is forgotten, s: the length scale of turbulence some hundred metres up over
 /// the airspeed of a small aircraft.
@@ -156,7 +156,7 @@ impl Drive {
 /// The specific force that holds the velocity where it is.
 fn weight(track: &Track, k: usize, gravity: f64) -> Vector3<f64> {
     let [roll, pitch, _] = track.attitude[k].map(|x| if x.is_finite() { x } else { 0.0 });
-    let r = crate::sysid::flight_path::rotation::from_euler([roll, pitch, 0.0]);
+    let r = rotation::from_euler([roll, pitch, 0.0]);
     r.transpose() * Vector3::new(0.0, 0.0, -gravity)
 }
 

@@ -7,14 +7,24 @@ use crate::logs::Sampling;
 use crate::model::{GreyBox, Integrator, Memory, STEP};
 use crate::physics::State;
 use crate::physics::inputs::InputMemory;
-use crate::sysid::compare::CompareError;
-use crate::sysid::compare::result::{FlightResult, FlightTrace, NuisanceResult};
 use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction};
 use crate::sysid::weak_form::channels::RegimeVariable;
 use crate::sysid::weak_form::kernel::{Kernel, weigh};
 
 /// Slower than this (m/s) an aircraft of any size is taken to stand, not to fly.
 const FLYING_FLOOR: f64 = 3.0;
+
+/// A flight that has no clock.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "flight {flight} is said to have a sample every {step_s} s, which is no clock to compare on: it must lie in 1e-6 to 1 s"
+)]
+pub struct ClockError {
+    /// The flight.
+    pub flight: String,
+    /// Its step, s.
+    pub step_s: f64,
+}
 
 /// A flight on the models' clock.
 #[derive(Clone, Debug)]
@@ -57,8 +67,8 @@ impl Prepared {
     /// Puts `flight` on the models' clock and keeps what was flown faster than `slowest` (m/s).
     ///
     /// # Errors
-    /// [`CompareError::Clock`] if it has no clock.
-    pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Prepared, CompareError> {
+    /// It has no clock.
+    pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Prepared, ClockError> {
         let substeps = substeps(flight)?;
         let dt = STEP * substeps as f64;
         let segments: Vec<Vec<Instant>> = flight
@@ -171,53 +181,13 @@ impl Prepared {
     pub fn sample_count(&self) -> usize {
         self.segments.iter().map(Vec::len).sum()
     }
-
-    /// What the result says of it, `from` being what it was made from.
-    pub fn result(&self, from: &Reconstruction) -> FlightResult {
-        let ends = |s: &Vec<Instant>| Some([s.first()?.time_s, s.last()?.time_s]);
-        let nuisance = |n: &crate::sysid::flight_path::reconstruction::Nuisance| NuisanceResult {
-            name: n.name.clone(),
-            value: n.value,
-            sd: n.sd,
-            unit: n.unit,
-        };
-        FlightResult {
-            name: self.name.clone(),
-            step_s: self.dt,
-            samples: self.sample_count(),
-            segments_s: self.segments.iter().filter_map(ends).collect(),
-            nuisances: from.nuisances.iter().map(nuisance).collect(),
-            notes: from.notes.clone(),
-            trace: self.trace(),
-        }
-    }
-
-    fn trace(&self) -> FlightTrace {
-        let mut trace = FlightTrace::default();
-        for segment in &self.segments {
-            for i in segment {
-                let z = i.controls;
-                push(&mut trace, i.time_s, i.state.to_array(), [z.aileron, z.elevator, z.throttle]);
-            }
-            if let Some(last) = segment.last() {
-                push(&mut trace, last.time_s + self.dt, [f64::NAN; 8], [f64::NAN; 3]);
-            }
-        }
-        trace
-    }
-}
-
-fn push(trace: &mut FlightTrace, time_s: f64, state: [f64; 8], controls: [f64; 3]) {
-    trace.time_s.push(time_s);
-    trace.states.iter_mut().zip(state).for_each(|(list, x)| list.push(x));
-    trace.controls.iter_mut().zip(controls).for_each(|(list, x)| list.push(x));
 }
 
 /// Model steps of [`STEP`] between samples of the models' clock: the nearest whole number.
-fn substeps(flight: &Reconstruction) -> Result<usize, CompareError> {
+fn substeps(flight: &Reconstruction) -> Result<usize, ClockError> {
     let step_s = flight.step_s;
     if !(1e-6..=1.0).contains(&step_s) {
-        return Err(CompareError::Clock { flight: flight.name.clone(), step_s });
+        return Err(ClockError { flight: flight.name.clone(), step_s });
     }
     Ok(((step_s / STEP).round() as usize).max(1))
 }

@@ -67,7 +67,7 @@ enum Stage {
     Rest,
     /// Somebody wants to steer; control authority has not been given over.
     Waiting,
-    /// The helm is ours, the first state since may be to come.
+    /// We have control authority; the first state since may be still to come.
     Running { begun: Option<Begun>, evidence: Evidence, last: Command },
 }
 
@@ -94,7 +94,7 @@ impl Check {
         self.stage = Stage::Rest;
     }
 
-    /// The helm is ours: `in_force` is what was last commanded to the surfaces.
+    /// We have control authority: `in_force` is what was last commanded to the surfaces.
     pub(super) fn begin(&mut self, in_force: Command) {
         if matches!(self.stage, Stage::Waiting) {
             let evidence = Evidence::default();

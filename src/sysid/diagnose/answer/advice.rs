@@ -1,7 +1,8 @@
 //! What to fly next.
-use crate::physics::catalogue::describe;
 
+use crate::physics::catalogue::describe;
 use crate::sysid::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
+use crate::sysid::diagnose::answer::sentences::figures;
 use crate::sysid::diagnose::search::stepwise::Found;
 
 /// Pieces of advice on effects that these data could not have shown.
@@ -50,7 +51,7 @@ pub fn advice(
             Some(least) => format!(
                 "{} is near the threshold; less than {} of it could not be seen",
                 c.id,
-                crate::sysid::diagnose::answer::sentences::figures(least)
+                figures(least)
             ),
             None => format!("{} is near the threshold", c.id),
         },

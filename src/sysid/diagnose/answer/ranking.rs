@@ -9,6 +9,7 @@ use crate::sysid::diagnose::answer::curves;
 use crate::sysid::diagnose::answer::detectable::detectable;
 use crate::sysid::diagnose::answer::result::{Candidate, FlightEstimate, Parameter};
 use crate::sysid::diagnose::options::{Detail, Options};
+use crate::sysid::diagnose::regression::columns::Ready;
 use crate::sysid::diagnose::regression::rank::{Score, Trial};
 use crate::sysid::diagnose::search::checks;
 use crate::sysid::diagnose::search::round::Round;
@@ -168,9 +169,10 @@ fn names(channels: &[usize]) -> Vec<String> {
 }
 
 fn flights(round: &Round, values: &[[f64; 2]]) -> Vec<FlightEstimate> {
-    let of = |(flight, [value, sd]): (
-        &crate::sysid::diagnose::regression::columns::Ready,
-        &[f64; 2],
-    )| FlightEstimate { flight: flight.measured.name.clone(), value: *value, sd: *sd };
+    let of = |(flight, [value, sd]): (&Ready, &[f64; 2])| FlightEstimate {
+        flight: flight.measured.name.clone(),
+        value: *value,
+        sd: *sd,
+    };
     round.flights.iter().zip(values).map(of).collect()
 }

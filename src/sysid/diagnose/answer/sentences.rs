@@ -2,7 +2,10 @@
 
 use crate::model::GreyBox;
 use crate::physics::catalogue::describe;
-use crate::sysid::diagnose::answer::result::{Candidate, ChannelLeft, Measurement, Verdict};
+use crate::sysid::diagnose::answer::result::{
+    Candidate, ChannelLeft, Measurement, Parameter, Verdict,
+};
+use crate::sysid::diagnose::answer::shares;
 use crate::sysid::diagnose::options::Options;
 use crate::sysid::diagnose::search::stepwise::Found;
 
@@ -71,7 +74,7 @@ pub fn sentences(
 }
 
 fn asserted(c: &Candidate) -> String {
-    let of = |p: &crate::sysid::diagnose::answer::result::Parameter| {
+    let of = |p: &Parameter| {
         let sd = (p.ci95[1] - p.ci95[0]) / (2.0 * 1.96);
         let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
         if sd > 0.0 {
@@ -133,7 +136,7 @@ pub fn figures(x: f64) -> String {
 /// Notes on coefficients that the data pull far from their prior, and on what was not searched.
 pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
     let mut notes = Vec::new();
-    for t in crate::sysid::diagnose::answer::shares::tuned(found, model) {
+    for t in shares::tuned(found, model) {
         let off = (t.value - t.prior).abs() / t.prior_sd;
         if off > FAR {
             notes.push(format!(

@@ -4,9 +4,9 @@ use crate::model::GreyBox;
 use crate::num::statistics::mean;
 use crate::sysid::compare::{ChannelId, RegimeVariable};
 use crate::sysid::diagnose::answer::result::{ChannelLeft, Tuned};
+use crate::sysid::diagnose::regression::gather::Column;
 use crate::sysid::diagnose::search::round::Round;
 use crate::sysid::diagnose::search::stepwise::Found;
-use crate::sysid::weak_form::windows;
 
 /// Bins over a regime variable.
 const BINS: usize = 5;
@@ -28,37 +28,8 @@ pub fn channels(found: &Found) -> Vec<ChannelLeft> {
     (0..SYMBOLS.len()).filter(|k| before[*k].is_finite()).map(of).collect()
 }
 
-/// Share of each channel's variance beyond noise that `residual`, a column a flight, leaves unexplained under
-/// the model of `first`; NaN where the flights do not measure the channel.
-pub fn unexplained(
-    first: &Round,
-    residual: &[crate::sysid::diagnose::regression::gather::Column],
-) -> [f64; 6] {
-    let series: Vec<Vec<windows::Series>> =
-        first.flights.iter().map(|f| windows::channels(&first.model, &f.measured)).collect();
-    std::array::from_fn(|k| {
-        let own: Vec<&windows::Series> =
-            series.iter().flatten().filter(|s| s.channel == ChannelId::ALL[k]).collect();
-        let measured: Vec<f64> =
-            own.iter().flat_map(|s| s.measured.iter().copied()).filter(|x| x.is_finite()).collect();
-        if measured.is_empty() {
-            return f64::NAN;
-        }
-        let noise = mean(&own.iter().map(|s| s.noise_variance).collect::<Vec<_>>());
-        let middle = mean(&measured);
-        let deviations: Vec<f64> = measured.iter().map(|x| (x - middle).powi(2)).collect();
-        let left = residual.iter().flat_map(|c| c[k].iter()).filter(|x| x.is_finite());
-        let squares: Vec<f64> = left.map(|x| x * x).collect();
-        ((mean(&squares) - noise) / (mean(&deviations) - noise).max(1e-12)).max(0.0)
-    })
-}
-
 /// The regime in which the mean residual of a channel stands out most, in words.
-fn worst(
-    round: &Round,
-    residual: &[crate::sysid::diagnose::regression::gather::Column],
-    channel: usize,
-) -> Option<String> {
+fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
     let mut points: Vec<([f64; RegimeVariable::CONTINUOUS.len()], f64)> = Vec::new();
     for (flight, left) in round.flights.iter().zip(residual) {
         for (window, r) in flight.acting.windows.iter().zip(&left[channel]) {

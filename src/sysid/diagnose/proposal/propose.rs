@@ -10,7 +10,6 @@ use crate::physics::Channel;
 use crate::physics::formula::{Variable, Written};
 use crate::sysid::diagnose::answer::run::{problem, verdict};
 use crate::sysid::diagnose::answer::sentences::figures;
-use crate::sysid::diagnose::answer::shares;
 use crate::sysid::diagnose::regression::catalogue::Entry;
 use crate::sysid::diagnose::regression::rank::{Draw, Score, quadratic};
 use crate::sysid::diagnose::search::checks;
@@ -127,7 +126,7 @@ fn settled(found: &Found, verdict: Verdict) -> Option<String> {
 
 /// The channels that the diagnosis leaves unexplained, the worst first.
 fn failing(found: &Found) -> Vec<Channel> {
-    let tuned = shares::unexplained(&found.first, &found.first.tuned_residual());
+    let tuned = &found.unexplained;
     let removable = |c: usize| {
         let of = &found.first_remainder;
         of.removable[c] / of.threshold[c].max(f64::MIN_POSITIVE)
@@ -324,7 +323,7 @@ fn tested(
     chance.sort_by(f64::total_cmp);
     let channels = std::array::from_fn(|c| terms.iter().any(|t| t.form.channel == ORDER[c]));
     let excess = checks::excess(&round, &channels).max(measured).max(1.0);
-    // nothing is gained by a fall below nought
+    // nothing is gained by a fall below zero
     let threshold = chance.last().copied().unwrap_or(f64::INFINITY).max(0.0);
     Some(HeldOut { flights, removed: measured / excess, fall: measured, threshold })
 }

@@ -3,7 +3,7 @@
 use crate::sysid::diagnose::regression::columns::SENSORS;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// Names of the sensor errors, in the order of [`crate::sysid::diagnose::regression::columns::Ready::sensors`].
+/// Names of the sensor errors, in the order of [`Ready::sensors`](super::columns::Ready::sensors).
 pub const NAMES: [&str; SENSORS] = [
     "gyro_bias_p",
     "gyro_bias_q",

@@ -9,3 +9,4 @@ pub(super) mod round;
 pub(super) mod settling;
 pub(super) mod shape;
 pub(super) mod stepwise;
+pub(super) mod unexplained;

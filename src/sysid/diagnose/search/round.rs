@@ -36,7 +36,7 @@ pub struct Problem {
     /// Errors of the reconstructed paths.
     pub path: Vec<shared::PathError>,
     /// Prior widths of the sensors' errors, flight by flight.
-    pub sensors: Vec<[f64; crate::sysid::diagnose::regression::columns::SENSORS]>,
+    pub sensors: Vec<[f64; SENSORS]>,
     /// Seed of everything random.
     pub seed: u64,
 }

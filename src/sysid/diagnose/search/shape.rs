@@ -1,8 +1,8 @@
 //! What products of what was flown still explain beside an effect, so that its formula has another shape than
 //! what is missing.
 //!
-//! The flexible model of [`crate::sysid::diagnose::search::remainder`] must show on other flights what it learned, and sees only what
-//! is large. Here the question is one of a few terms, those that aerodynamic tables are made of, and a fit on
+//! The flexible model of [`remainder`](super::remainder) must show on other flights what it learned, and sees
+//! only what is large. Here the question is one of a few terms, those that aerodynamic tables are made of, and a fit on
 //! the same flights is held against the noise of these.
 
 use nalgebra::{DMatrix, DVector};

@@ -3,10 +3,10 @@
 use crate::model::{GreyBox, RUDDER};
 use crate::physics::inputs::Kind;
 use crate::sysid::compare::ChannelId;
-use crate::sysid::diagnose::answer::shares;
 use crate::sysid::diagnose::error::DiagnoseError;
 use crate::sysid::diagnose::options::Options;
 use crate::sysid::diagnose::regression::catalogue::{self, Entry};
+use crate::sysid::diagnose::regression::gather::Column;
 use crate::sysid::diagnose::regression::rank::Score;
 use crate::sysid::diagnose::search::checks;
 use crate::sysid::diagnose::search::excitation;
@@ -14,6 +14,7 @@ use crate::sysid::diagnose::search::remainder::{Remainder, remainder};
 use crate::sysid::diagnose::search::round::{Problem, Round};
 use crate::sysid::diagnose::search::settling::{Ranked, SETTLING, ranked, settled};
 use crate::sysid::diagnose::search::shape::{Shape, shape};
+use crate::sysid::diagnose::search::unexplained::unexplained;
 use crate::sysid::progress::{Cancelled, FirstLook, Progress, Stage, said, say};
 
 /// Share of the search that is done once all candidates have been ranked.
@@ -83,7 +84,7 @@ pub struct Selected {
     /// Whether it is not linear in its constants.
     pub curved: bool,
     /// What it added to the residual, fitted, flight by flight.
-    pub contribution: Vec<crate::sysid::diagnose::regression::gather::Column>,
+    pub contribution: Vec<Column>,
 }
 
 /// How a search ended.
@@ -152,7 +153,7 @@ pub fn search(
     said(progress(Stage { doing, fraction: RANKED, ranking: &ranking }))?;
     let first_remainder = remainder(&first, options.nulls, options.level);
     let mut found = Found {
-        unexplained: shares::unexplained(&first, &first.tuned_residual()),
+        unexplained: unexplained(&first, &first.tuned_residual()),
         remainder: first_remainder.clone(),
         first,
         first_remainder,
@@ -508,7 +509,7 @@ impl Found {
 
     /// Share of each channel's variance beyond noise that the last round leaves unexplained.
     pub fn left(&self) -> [f64; 6] {
-        shares::unexplained(&self.first, &self.round().tuned_residual())
+        unexplained(&self.first, &self.round().tuned_residual())
     }
 
     /// Whether the last round leaves a channel that is not adequate.
