@@ -30,7 +30,6 @@ lag_s = { value = 0.2, source = \"s\" }
 [reference]
 airspeed_mps = { value = 25.0, source = \"s\" }
 altitude_m = { value = 100.0, source = \"s\" }
-throttle = { value = 0.5, source = \"s\" }
 ";
 
 /// A surface that is named, with its travel.
@@ -58,12 +57,12 @@ fn of(controls: &[String]) -> Result<Airframe, String> {
 #[test]
 fn each_control_has_its_own_travel_and_a_rudder_is_there_if_it_is_described() {
     let with = of(&[both("aileron"), sides("elevator", -0.44, 0.26), both("rudder")]).unwrap();
-    assert_eq!(with.yaw, Yaw::Rudder);
+    assert_eq!(with.yaw, Yaw::Stated);
     assert_eq!(with.actuators.aileron.travel, Travel::symmetric(0.35));
     assert_eq!(with.actuators.elevator.travel, Travel { least: -0.44, most: 0.26 });
     assert!(with.actuators.rudder.is_some());
     let without = of(&[both("aileron"), both("elevator")]).unwrap();
-    assert_eq!((without.yaw, without.actuators.rudder), (Yaw::NoRudder, None));
+    assert_eq!((without.yaw, without.actuators.rudder), (Yaw::Stated, None));
 }
 
 #[test]

@@ -79,7 +79,7 @@ fn a_rudder_that_moves_is_said_first() {
         assert_eq!(said[1..], quiet.sentences);
     }
     // firmware of an aircraft without a rudder commands one all the same
-    assert_eq!(model("jsbsim").airframe.yaw, Yaw::NoRudder);
+    assert_eq!(model("jsbsim").airframe.yaw, Yaw::Stated);
     assert_eq!(against(&[model("jsbsim")], &flights).sentences, quiet.sentences);
     // a deflection is more than a command: somebody must be wrong
     flights[2].rudder = Some(RudderMotion::Deflection(0.07));

@@ -29,7 +29,7 @@ struct AircraftArgs {
     #[arg(long, value_name = "NAME")]
     aircraft: Option<String>,
     /// Name a property of the aircraft (may be repeated): KEY is aileron_command, elevator_command,
-    /// throttle_command, aileron_position, elevator_position or throttle_position.
+    /// throttle_command, rudder_command, or the same with _position.
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
     /// Hide an effect in the aircraft (may be repeated); a wrong ID is answered with all that are known.
@@ -62,7 +62,7 @@ struct AirArgs {
 }
 
 /// Reads KEY=NAME.
-fn property(text: &str) -> Result<(String, String), String> {
+pub fn property(text: &str) -> Result<(String, String), String> {
     let (key, name) = text.split_once('=').ok_or("write it as KEY=NAME")?;
     match Properties::default().name_mut(key) {
         Some(_) => Ok((key.to_owned(), name.to_owned())),

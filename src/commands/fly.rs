@@ -26,6 +26,7 @@ use crate::link::vehicle::{Authority, Profile, Stack};
 use crate::manoeuvres::Schedule;
 use crate::model::GreyBox;
 use crate::physics::Airframe;
+use crate::physics::airframe::ActuatorFigures;
 
 /// The model that is flown where no other is named: learned from flights, from an imperfect prior.
 pub const MODEL: &str = "params/x8/learned/model.toml";
@@ -147,7 +148,8 @@ impl Arguments {
     }
 
     fn controller_profile(&self, model: &GreyBox) -> Option<Profile> {
-        let actuators = model.airframe.actuators;
+        // no message of a real controller's link commands a rudder
+        let actuators = ActuatorFigures { rudder: None, ..model.airframe.actuators };
         let authority = self.command.authority();
         self.profile.stack().map(|stack| Profile { stack, authority, actuators })
     }
@@ -166,7 +168,10 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// If a file cannot be used, a link cannot be opened or a recording cannot be created; nothing
 /// has been started then.
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let model = model(&arguments.model, arguments.airframe.as_deref())?;
+    let mut model = model(&arguments.model, arguments.airframe.as_deref())?;
+    if arguments.profile.stack().is_some() {
+        model = model.leaving_rudder();
+    }
     let Arguments { controller, policy, changes, .. } = arguments;
     let mut companion = companion_with_planner(*controller, &model, policy, changes)?;
     if let Some(path) = &arguments.schedule {

@@ -14,6 +14,7 @@ use crate::flight::replay::{Outcome, replay};
 use crate::link::vehicle::{Profile, Real, Sitl, Vehicle};
 use crate::manoeuvres::Schedule;
 use crate::model::GreyBox;
+use crate::physics::airframe::ActuatorFigures;
 
 /// The arguments of `greylag replay`: those that the flight was flown with.
 #[derive(Args)]
@@ -52,7 +53,10 @@ pub struct Arguments {
 /// # Errors
 /// If a file cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let model = fly::model(&arguments.model, arguments.airframe.as_deref())?;
+    let mut model = fly::model(&arguments.model, arguments.airframe.as_deref())?;
+    if arguments.profile.stack().is_some() {
+        model = model.leaving_rudder();
+    }
     let Arguments { controller, policy, changes, .. } = arguments;
     let mut companion = fly::companion_with_planner(*controller, &model, policy, changes)?;
     if let Some(path) = &arguments.schedule {
@@ -65,10 +69,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 fn vehicle(arguments: &Arguments, model: &GreyBox) -> Vehicle {
-    let actuators = model.airframe.actuators;
+    let figures = model.airframe.actuators;
     match arguments.profile.stack() {
-        None => Vehicle::Sitl(Sitl::new(1, actuators.travels())),
+        None => Vehicle::Sitl(Sitl::new(1, figures.travels())),
         Some(stack) => {
+            let actuators = ActuatorFigures { rudder: None, ..figures };
             let authority = arguments.command.authority();
             Vehicle::Real(Box::new(Real::new(Profile { stack, authority, actuators })))
         }

@@ -6,8 +6,8 @@ use crate::model::{GreyBox, Trim, TrimError};
 
 /// Airspeeds of the trim table.
 const SPEEDS: usize = 7;
-/// Part of a surface's travel above which level flight leaves too little of it.
-const MUCH_TRAVEL: f64 = 0.7;
+/// Part of a surface's travel above which level flight leaves too little of it: a fifth for everything else.
+const MUCH_TRAVEL: f64 = 0.8;
 /// Delay that sensing, link and servo of a small aircraft have together, s.
 const USUAL_DELAY: f64 = 0.04;
 /// Roll rate at full aileron below which an aircraft is slow to roll, rad/s (20°/s).
@@ -108,6 +108,14 @@ fn authority(model: &GreyBox, trim: &Trim, altitude: f64) -> Authority {
 
 fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String> {
     let mut out = Vec::new();
+    let Authority { roll_rate, pitch_acceleration, yaw_acceleration } = check.authority;
+    if roll_rate < 0.0 || pitch_acceleration > 0.0 || yaw_acceleration.is_some_and(|y| y > 0.0) {
+        out.push(
+            "a surface acts against its sign: positive aileron must roll right, positive elevator pitch \
+             down, positive rudder yaw left; correct Clda, Cmde or Cndr"
+                .into(),
+        );
+    }
     let missing = speeds - check.levels.len();
     if missing > 0 {
         out.push(format!(
@@ -124,7 +132,10 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
                 100.0 * elevator.abs()
             ));
         }
-        if !(0.0..=1.0).contains(&throttle) {
+        // above the cruise airspeed the envelope allows dives
+        if airspeed <= model.airframe.envelope.airspeed_cruise_mps
+            && !(0.0..=1.0).contains(&throttle)
+        {
             out.push(format!(
                 "level flight at {airspeed:.1} m/s takes {:.0} % of throttle: the aircraft climbs or sinks \
                  there; correct thrust, drag or the envelope",
@@ -137,13 +148,6 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
             "full aileron rolls at {:.0} deg/s only: correct Clda or Clp",
             check.authority.roll_rate.to_degrees().abs()
         ));
-    }
-    if check.authority.roll_rate < 0.0 || check.authority.pitch_acceleration > 0.0 {
-        out.push(
-            "a surface acts against its sign: positive aileron must roll right, positive elevator pitch \
-             down; correct Clda or Cmde"
-                .into(),
-        );
     }
     for LoopMargins { surface, delay, .. } in &check.loops {
         if *delay < USUAL_DELAY {
@@ -195,6 +199,8 @@ mod tests {
                 found.loops
             );
             assert!(found.authority.roll_rate > SLOW_ROLL);
+            // what may be said of them is the delay that the LQI bears
+            assert!(found.findings.iter().all(|f| f.contains("of delay")), "{:?}", found.findings);
             assert_eq!(found.modes.iter().filter(|m| m.name == "short period").count(), 1);
         }
     }

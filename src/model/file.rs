@@ -116,6 +116,7 @@ impl GreyBox {
             model.residual = Some(read.map_err(|e| content(e.to_string()))?.0);
             bytes.extend(std::fs::read(&path).map_err(|e| content(e.to_string()))?);
         }
+        model.written().for_each(|own| bytes.extend(own.text.as_bytes()));
         model.sha256 = hash(&bytes);
         Ok(model)
     }
@@ -151,6 +152,7 @@ impl File {
         }
         let body = self.rigid_body.checked()?;
         let mut model = GreyBox {
+            rudder_is_left: false,
             name: named(self.name)?,
             description: self.description,
             sha256: String::new(),

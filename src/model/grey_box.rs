@@ -60,7 +60,7 @@ pub struct GreyBox {
     pub name: String,
     /// What its file says that it is.
     pub description: String,
-    /// SHA-256 of the files that it was read from, hexadecimal: model and residual.
+    /// SHA-256 of the files that it was read from, hexadecimal: model, residual, effect files.
     pub sha256: String,
     /// The aircraft it describes.
     pub airframe: Airframe,
@@ -83,6 +83,8 @@ pub struct GreyBox {
     /// Input effects with the place of their constant, in the order of [`inputs::Kind::ALL`].
     pub(super) inputs: Vec<(inputs::Kind, usize)>,
     pub(super) coefficients: Vec<Named>,
+    /// Whether the link that it is flown through carries no command for a rudder.
+    pub(super) rudder_is_left: bool,
 }
 
 impl GreyBox {
@@ -133,9 +135,18 @@ impl GreyBox {
         self.effects().any(|about| about.id == id)
     }
 
-    /// Whether the aircraft has a rudder and the model knows what it does.
+    /// Whether the aircraft has a rudder that yaws it, as far as the model knows, and that is commanded.
     pub fn has_rudder(&self) -> bool {
-        self.airframe.actuators.rudder.is_some() && self.has(RUDDER)
+        let yaws = |c: &Named| c.name == "rudder_linear.Cndr" && c.value != 0.0;
+        self.airframe.actuators.rudder.is_some()
+            && !self.rudder_is_left
+            && self.coefficients.iter().any(yaws)
+    }
+
+    /// The same aircraft flown through a link that carries no command for a rudder: it stays where it is.
+    pub fn leaving_rudder(mut self) -> GreyBox {
+        self.rudder_is_left = true;
+        self
     }
 
     /// The effects that the model names.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::GreyBox;
 use crate::num::Table;
-use crate::physics::airframe::Yaw;
+use crate::physics::airframe::ActuatorFigures;
 use crate::physics::rigid_body::ForceAxes;
 use crate::physics::servos::Surface;
 
@@ -107,6 +107,12 @@ pub fn export(model: &GreyBox, name: &str) -> Exported {
     if model.residual.is_some() {
         left_out.push("the residual network".into());
     }
+    let ActuatorFigures { aileron, elevator, rudder, .. } = &model.airframe.actuators;
+    let surfaces =
+        [("aileron", Some(aileron)), ("elevator", Some(elevator)), ("rudder", rudder.as_ref())];
+    for (surface, _) in surfaces.iter().filter(|(_, s)| s.is_some_and(|s| s.rate_max.is_some())) {
+        left_out.push(format!("the largest rate of the {surface}"));
+    }
     let (motor, thruster) = (format!("{name}_motor"), format!("{name}_direct"));
     let files = vec![
         (format!("{name}.xml"), document(model, name, [&motor, &thruster])),
@@ -190,7 +196,7 @@ fn controls(model: &GreyBox, name: &str) -> String {
     let mut out = format!("  <flight_control name=\"{name}\">\n");
     out.push_str(&surface("aileron", &figures.aileron, figures.step, AILERON));
     out.push_str(&surface("elevator", &figures.elevator, figures.step, ELEVATOR));
-    if let (Yaw::Rudder, Some(rudder)) = (model.airframe.yaw, &figures.rudder) {
+    if let Some(rudder) = &figures.rudder {
         out.push_str(&surface("rudder", rudder, figures.step, RUDDER));
     }
     // b = k/(2 + k), k = step/lag

@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use crate::model::weights;
 use crate::num::dense::{DenseError, ON_STACK};
 use crate::num::{Dense, Real};
-use crate::physics::airframe::{ActuatorFigures, Geometry};
+use crate::physics::airframe::{ActuatorFigures, Geometry, Reference};
 use crate::physics::{Airframe, Controls, State};
 
 /// Inputs of the network: V, p, q, r, α, β, then δa, δe, δt.
@@ -119,6 +119,10 @@ fn fingerprinted(airframe: &Airframe) -> String {
     if !says_all(&airframe.actuators) {
         let rudder = airframe.actuators.rudder;
         text += &format!(" aileron {aileron:?} elevator {elevator:?} rudder {rudder:?}");
+    }
+    // it scales a residual's inputs and outputs
+    if airframe.reference != Reference::OF_SCHEMA_1 {
+        text += &format!(" reference airspeed {:?}", airframe.reference.airspeed);
     }
     text
 }
@@ -266,6 +270,9 @@ mod tests {
         let mut other = airframe.clone();
         other.actuators.elevator.travel.least *= 0.9;
         assert_ne!(fingerprint(&other), shipped);
+        let mut faster = airframe.clone();
+        faster.reference.airspeed = 25.0;
+        assert_ne!(fingerprint(&faster), shipped);
     }
 
     fn residual(model: &GreyBox) -> Residual {

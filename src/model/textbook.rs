@@ -1,8 +1,8 @@
 //! A model from a few measures of an aircraft, by formulas of textbooks, with honest widths.
 //!
 //! B. Etkin, L. D. Reid, "Dynamics of Flight", 3rd ed., 1996; J. Roskam, "Airplane Design" part V, 1985
-//! (radii of gyration); \[BM12\]. The ratios for roll and for surfaces of a flying wing are those of the
-//! published X8 and Aerosonde.
+//! (radii of gyration); \[BM12\]. The ratios for roll are those of the published X8 and Aerosonde; the
+//! elevons of a flying wing those of the X8.
 
 use std::fmt::Write;
 
@@ -64,6 +64,18 @@ struct Figures {
     lift: f64,
 }
 
+/// The table `[incidence]` of an airframe file from the incidences (rad) of cruise and stall.
+pub(crate) fn incidence_limits(cruise: f64, stall: f64) -> String {
+    let up_to = |share: f64| (cruise + share * (stall - cruise)).max(0.01);
+    format!(
+        "# Cruise is flown at {cruise:.3} rad; the wing stalls at {stall:.3} rad.\n[incidence]\ncomfortable_rad = \
+         {:.3}\ntolerable_rad = {:.3}\npush_from_rad = {:.3}\npush_gain = 3.0\n\n",
+        up_to(0.2),
+        up_to(0.5),
+        up_to(0.8)
+    )
+}
+
 /// Lift slope (1/rad) of a straight wing of this aspect ratio, by Helmbold.
 fn helmbold(aspect: f64) -> f64 {
     std::f64::consts::TAU * aspect / (2.0 + (4.0 + aspect * aspect).sqrt())
@@ -88,13 +100,8 @@ impl Measures {
              [geometry]\nwing_area_m2 = {{ value = {:?}, source = \"given\" }}\nspan_m = {{ value = {:?}, source = \
              \"given\" }}\nmean_chord_m = {{ value = {:.5}, source = \"area over span\" }}\n\n[reference]\n\
              airspeed_mps = {{ value = {:.2}, source = \"cruise\" }}\naltitude_m = {{ value = 100.0, source = \
-             \"estimate\" }}\nthrottle = {{ value = {:.3}, source = \"estimate\" }}\n\n",
-            self.name,
-            self.area,
-            self.span,
-            f.chord,
-            f.cruise,
-            self.throttle(&f)
+             \"estimate\" }}\n\n",
+            self.name, self.area, self.span, f.chord, f.cruise
         );
         let servo = "estimate: a hobby servo";
         let surfaces = [
@@ -112,9 +119,11 @@ impl Measures {
                 );
             }
         }
+        let incidence = |lift: f64| (lift - self.zero_lift()) / self.slope(&f);
+        let limits = incidence_limits(incidence(f.lift), incidence(LIFT_MAX));
         let _ = write!(
             out,
-            "[controls.throttle]\nlag_s = {{ value = 0.2, source = \"estimate: an electric motor\" }}\n\n\
+            "[controls.throttle]\nlag_s = {{ value = 0.2, source = \"estimate: an electric motor\" }}\n\n{limits}\
              # The stall at a lift coefficient of {LIFT_MAX} is at {:.1} m/s.\n[envelope]\nbank_max_deg = 45.0\n\
              pitch_max_deg = 20.0\npitch_min_deg = -20.0\nload_factor_max = 2.0\nairspeed_min_mps = {:.1}\n\
              airspeed_max_mps = {:.1}\nairspeed_cruise_mps = {:.1}\nsurface_slew_per_s = 20.0\n",
@@ -124,15 +133,6 @@ impl Measures {
             f.cruise
         );
         out
-    }
-
-    /// Throttle of level flight at the cruise airspeed, by the estimated drag.
-    fn throttle(&self, f: &Figures) -> f64 {
-        let drag = self.mass * STANDARD_GRAVITY * (0.03 / f.lift + f.lift / induced(f));
-        // T = Ts (δ² − δ V/Vp)
-        let lost = f.cruise / self.pitch_speed;
-        let square = lost * lost + 4.0 * drag / self.static_thrust;
-        ((lost + square.sqrt()) / 2.0).min(1.0)
     }
 
     /// The model file, beside the airframe file `airframe.toml`.

@@ -53,13 +53,11 @@ pub struct Reference {
     pub airspeed: f64,
     /// Altitude of designs and checks, m above mean sea level.
     pub altitude: f64,
-    /// Throttle of steady flight there, 0..1.
-    pub throttle: f64,
 }
 
 impl Reference {
     /// That of files of schema 1: the start of an episode in section V-A of \[GSFM26\].
-    const OF_SCHEMA_1: Reference = Reference { airspeed: 16.67, altitude: 600.0, throttle: 0.118 };
+    pub const OF_SCHEMA_1: Reference = Reference { airspeed: 16.67, altitude: 600.0 };
 }
 
 /// Incidence that a controller keeps to, rad.
@@ -176,7 +174,6 @@ struct File {
 struct ReferenceFile {
     airspeed_mps: Sourced,
     altitude_m: Sourced,
-    throttle: Sourced,
 }
 
 #[derive(Deserialize)]
@@ -219,7 +216,6 @@ impl File {
         Ok(Reference {
             airspeed: positive("reference.airspeed_mps", &reference.airspeed_mps, 1000.0)?,
             altitude,
-            throttle: positive("reference.throttle", &reference.throttle, 1.0)?,
         })
     }
 }
@@ -251,9 +247,7 @@ impl Airframe {
         check_schema(file.schema, 2)?;
         let file = File { name: named(file.name)?, ..file };
         if file.schema == 2 && file.reference.is_none() {
-            return Err(
-                "schema 2 needs [reference] with airspeed_mps, altitude_m and throttle".into()
-            );
+            return Err("schema 2 needs [reference] with airspeed_mps and altitude_m".into());
         }
         let (actuators, yaw) = file.controls()?;
         let reference = file.reference()?;

@@ -11,8 +11,10 @@ use crate::physics::atmosphere::SEA_LEVEL_DENSITY;
 use files::{airframe, model_file};
 use fits::{LINE_DEG, first_order, line, second_order};
 
-/// Metres per foot, square metres per square foot.
+/// Metres per foot.
 const FT: f64 = 0.3048;
+/// Newtons per pound of force.
+const LBF: f64 = 4.448_221_615_260_5;
 /// Incidence at which derivatives are taken, rad: 3°.
 const ALPHA: f64 = 0.052;
 /// Half the interval of angles, rad: 2°.
@@ -117,10 +119,10 @@ pub fn import(
         return Err(ImportError::Lift { airspeed: cruise });
     }
     let effects = effects(&polar, &subject.slopes(&travel)?, &mut left_out);
-    let (thrust, level) = subject.thrust(&mass, &mut left_out)?;
+    let thrust = subject.thrust(&mass, &mut left_out)?;
     let lags = subject.lags(&travel)?;
     Ok(Imported {
-        airframe: airframe(&subject, name, &travel, &lags, lift_max, &mass, level),
+        airframe: airframe(&subject, name, &travel, &lags, lift_max, &mass, &polar),
         model: model_file(name, &mass, &polar, &effects, &thrust, travel.rudder.is_some()),
         left_out,
     })
@@ -132,6 +134,17 @@ struct Polar {
     lift: Vec<f64>,
     drag: Vec<f64>,
     pitch: Vec<f64>,
+}
+
+impl Polar {
+    /// The first incidence (rad) at which the lift coefficient reaches `lift`, between the table's points.
+    fn incidence(&self, lift: f64) -> f64 {
+        let reaches = self.lift.windows(2).position(|w| w[0] < lift && lift <= w[1]);
+        reaches.map_or(0.0, |k| {
+            let share = (lift - self.lift[k]) / (self.lift[k + 1] - self.lift[k]);
+            self.alpha[k] + share * (self.alpha[k + 1] - self.alpha[k])
+        })
+    }
 }
 
 /// Slopes of the coefficients by what they depend on, at the incidence [`ALPHA`].
@@ -234,13 +247,13 @@ impl Subject<'_> {
         })
     }
 
-    /// The thrust's polynomial over throttle and airspeed, and the throttle of level flight.
+    /// The thrust's polynomial over throttle and airspeed.
     fn thrust(
         &mut self,
         mass: &MassProperties,
         left_out: &mut Vec<String>,
-    ) -> Result<(Vec<Estimate>, f64), PlantError> {
-        let (mut rows, mut thrusts, mut drags) = (Vec::new(), Vec::new(), Vec::new());
+    ) -> Result<Vec<Estimate>, PlantError> {
+        let (mut rows, mut thrusts) = (Vec::new(), Vec::new());
         for speed in [0.8, 1.0, 1.25] {
             for throttle in [0.0, 0.25, 0.5, 0.75, 1.0] {
                 let airspeed_mps = speed * self.start.airspeed_mps;
@@ -251,14 +264,11 @@ impl Subject<'_> {
                     if step < 200 || step % 10 != 0 {
                         continue;
                     }
-                    let ahead = self.plant.property("forces/fbx-aero-lbs")? * 4.448_221_615_260_5;
+                    let ahead = self.plant.property("forces/fbx-aero-lbs")? * LBF;
                     let (d, v) = (truth.throttle, truth.airspeed_mps);
                     let share = truth.air_density_kgpm3 / SEA_LEVEL_DENSITY;
                     rows.push([1.0, d, d * d, v, d * v, v * v].map(|x| x * share));
                     thrusts.push(mass.mass_kg * truth.specific_force_mps2[0] - ahead);
-                    if speed == 1.0 {
-                        drags.push(-ahead);
-                    }
                 }
             }
         }
@@ -274,16 +284,7 @@ impl Subject<'_> {
         }
         let names = ["T0_n", "Tt_n", "Ttt_n", "TV_nspm", "TtV_nspm", "TVV_ns2pm2"];
         let source = "least squares over JSBSim's thrust, 0.8 to 1.25 of the cruise airspeed";
-        let thrust = |d: f64| {
-            let v = self.start.airspeed_mps;
-            [1.0, d, d * d, v, d * v, v * v].iter().zip(fit.iter()).map(|(a, b)| a * b).sum::<f64>()
-        };
-        let drag = drags.iter().sum::<f64>() / drags.len().max(1) as f64;
-        let level =
-            (0..=100).map(|k| f64::from(k) / 100.0).find(|d| thrust(*d) >= drag).unwrap_or(1.0);
-        let estimates =
-            names.into_iter().zip(fit.iter()).map(|(n, x)| (n, *x, 0.02, source)).collect();
-        Ok((estimates, level.max(0.01)))
+        Ok(names.into_iter().zip(fit.iter()).map(|(n, x)| (n, *x, 0.02, source)).collect())
     }
 
     /// Frequency (rad/s) and damping of aileron, elevator and rudder, then the throttle's lag (s).

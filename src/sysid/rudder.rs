@@ -19,7 +19,9 @@ pub fn unmodelled(flights: &[Reconstruction], model: &GreyBox) -> Option<RudderM
         return None;
     }
     let moves = |motion: &RudderMotion| match motion {
-        RudderMotion::Command(_) => model.airframe.yaw != Yaw::NoRudder,
+        RudderMotion::Command(_) => {
+            model.airframe.yaw == Yaw::Unstated || model.airframe.actuators.rudder.is_some()
+        }
         RudderMotion::Deflection(_) => true,
     };
     let all = flights.iter().filter_map(|f| f.rudder).filter(moves);

@@ -34,8 +34,8 @@ pub struct MassProperties {
 }
 
 impl Plant {
-    /// The loads in `start` with the surfaces at rest where `inputs` command them. The aircraft is
-    /// put back at its start afterwards.
+    /// The loads in `start` with the surfaces at rest where `inputs` command them. Reset
+    /// it before it is stepped.
     ///
     /// # Errors
     /// [`PlantError`] when the aircraft cannot be evaluated there.
@@ -76,7 +76,7 @@ impl Plant {
         })
     }
 
-    /// Mass and inertia at the start, with full tanks where there are any.
+    /// Mass and inertia at the start, as the aircraft's file loads it.
     ///
     /// # Errors
     /// [`PlantError::Property`] when JSBSim does not tell.

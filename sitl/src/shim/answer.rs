@@ -23,9 +23,11 @@ impl Answer {
     /// Reads an answer; `None` when a control that is used is not a finite number.
     pub fn read(message: &HilActuatorControls) -> Option<Self> {
         let [aileron, elevator, throttle, rudder, ..] = message.controls;
-        if ![aileron, elevator, throttle, rudder].iter().all(|control| control.is_finite()) {
+        if ![aileron, elevator, throttle].iter().all(|control| control.is_finite()) {
             return None;
         }
+        // a companion of an aircraft without a rudder may leave its control unset
+        let rudder = if rudder.is_finite() { rudder } else { 0.0 };
         let sent = Inputs {
             aileron: f64::from(aileron),
             elevator: f64::from(elevator),

@@ -16,7 +16,7 @@ const REPEAT: Duration = Duration::from_secs(1);
 /// A frame that was lost on purpose is repeated after this time.
 const REPEAT_LOST: Duration = Duration::from_millis(20);
 
-/// Flies until told to stop or until the flight is over.
+/// Flies until asked to stop or until the flight is over.
 pub fn fly(
     session: &mut Session<'_>,
     flight: &mut Flight,

@@ -47,7 +47,7 @@ struct Cycle<'s, 'o> {
     now_us: u64,
 }
 
-/// Flies until told to stop or until the flight is over.
+/// Flies until asked to stop or until the flight is over.
 pub fn fly(
     session: &mut Session<'_>,
     flight: &mut Flight,

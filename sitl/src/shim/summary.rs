@@ -8,7 +8,7 @@ use super::flight::Over;
 use super::link::{Address, Transport};
 use super::px4_sim::Px4Event;
 
-/// A change of state, told to the observer of a run.
+/// A change of state, reported to the observer of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// The link is open; this side's own address where there is one.

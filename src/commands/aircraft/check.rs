@@ -7,7 +7,7 @@ use anyhow::Result;
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 
-use crate::commands::files;
+use crate::commands::{files, status};
 use crate::control::aircraft_check::{self, AircraftCheck};
 use crate::model::GreyBox;
 use crate::model::modes::Mode;
@@ -20,7 +20,7 @@ pub struct Arguments {
     model: PathBuf,
 }
 
-/// Checks, prints, and fails if something should be mended before a flight.
+/// Checks and prints; the exit status is 3 if something should be mended before a flight.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = GreyBox::load(&files::shipped(&arguments.model))?;
     println!(
@@ -32,7 +32,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     );
     let found = aircraft_check::check(&model)?;
     print(&found);
-    Ok(if found.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if found.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(status::IN_DOUBT) })
 }
 
 /// Prints what was found.

@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
+use greylag_sitl::plant_arguments::property;
 
 use crate::commands::files::{self, Overwrite};
 use crate::control::aircraft_check;
 use crate::model::GreyBox;
-use crate::sim::import::import;
+use crate::sim::import::{Imported, import};
 
 /// The arguments of `greylag aircraft import`.
 #[derive(Args)]
@@ -42,8 +43,8 @@ struct Jsbsim {
     #[arg(long, value_name = "M", default_value_t = 600.0)]
     altitude_m: f64,
     /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does.
-    #[arg(long, value_name = "KEY=NAME")]
-    property: Vec<String>,
+    #[arg(long, value_name = "KEY=NAME", value_parser = property)]
+    property: Vec<(String, String)>,
 }
 
 /// Imports, writes, says what is left out.
@@ -55,29 +56,32 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         start: Start { airspeed_mps: jsbsim.cruise_mps, ..Start::NEUTRAL },
         ..PlantOptions::default()
     };
-    for named in &jsbsim.property {
-        let Some((key, name)) = named.split_once('=') else {
-            bail!("--property {named} is no KEY=NAME");
-        };
-        let Some(place) = options.properties.name_mut(key) else {
-            bail!(
-                "--property {named}: the keys are {}",
-                greylag_sitl::plant::Properties::KEYS.join(", ")
-            );
-        };
-        *place = name.to_owned();
+    for (key, name) in &jsbsim.property {
+        if let Some(place) = options.properties.name_mut(key) {
+            place.clone_from(name);
+        }
     }
     let out = &jsbsim.out;
-    std::fs::create_dir_all(out)
-        .with_context(|| format!("cannot make the folder {}", out.display()))?;
     let model = out.join("model.toml");
     files::writable(&model, Overwrite::Never)?;
     let mut plant = Plant::new(&options)?;
     let found = import(&mut plant, &jsbsim.name, jsbsim.cruise_mps, jsbsim.altitude_m)?;
+    let read = read_back(&found)?;
+    std::fs::create_dir_all(out)
+        .with_context(|| format!("cannot make the folder {}", out.display()))?;
     files::write(&out.join("airframe.toml"), &found.airframe, Overwrite::Never)?;
     files::write(&model, &found.model, Overwrite::Never)?;
     println!("wrote {} and airframe.toml beside it", model.display());
     found.left_out.iter().for_each(|what| println!("left out: {what}"));
-    super::check::print(&aircraft_check::check(&GreyBox::load(&model)?)?);
+    super::check::print(&aircraft_check::check(&read)?);
     Ok(ExitCode::SUCCESS)
+}
+
+/// The model as it reads from files: what cannot be read back is not written.
+fn read_back(found: &Imported) -> Result<GreyBox> {
+    let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
+    let model = folder.path().join("model.toml");
+    std::fs::write(folder.path().join("airframe.toml"), &found.airframe)?;
+    std::fs::write(&model, &found.model)?;
+    GreyBox::load(&model).context("what was imported is no model that Greylag can read")
 }

@@ -14,7 +14,7 @@ use crate::physics::atmosphere::STANDARD_GRAVITY;
 
 /// Static thrust by default, as a share of the weight.
 const THRUST: f64 = 0.5;
-/// Pitch speed by default, in wing loadings' own airspeed: twice that of level flight at CL = 0.6.
+/// Pitch speed by default, as a multiple of the airspeed of level flight at a lift coefficient of 0.6.
 const PITCH_SPEED: f64 = 2.0;
 
 /// What balances the aircraft.
@@ -83,12 +83,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 
 fn measures(arguments: &Arguments) -> Result<Measures> {
     let Arguments { mass_kg, span_m, area_m2, travel_deg, .. } = *arguments;
-    for (name, value, most) in [
+    let thrust = arguments.static_thrust_n.map(|n| ("--static-thrust-n", n, 1e6));
+    let pitch = arguments.pitch_speed_mps.map(|v| ("--pitch-speed-mps", v, 1000.0));
+    let given = [
         ("--mass-kg", mass_kg, 1e5),
         ("--span-m", span_m, 100.0),
         ("--area-m2", area_m2, 1000.0),
         ("--travel-deg", travel_deg, 90.0),
-    ] {
+    ];
+    for (name, value, most) in given.into_iter().chain(thrust).chain(pitch) {
         if !(value > 0.0 && value <= most) {
             bail!("{name} = {value} is not physical: give a number above 0 and at most {most}");
         }

@@ -35,7 +35,7 @@ pub(super) struct RudderGain {
 }
 
 impl Gain {
-    /// No feedback, of a model as `model`.
+    /// No feedback; with a rudder or without.
     pub fn zeros(with_rudder: bool) -> Gain {
         let rudder = with_rudder.then(|| RudderGain {
             coupling: SMatrix::zeros(),

@@ -20,6 +20,8 @@ struct Axis {
 const AIRSPEEDS: usize = 20;
 /// Spacing of the designs over roll and pitch, degrees.
 const SPACING_DEG: f64 = 10.0;
+/// Last spacing: there is no steady turn at 90°.
+const STEEPEST: f64 = 8.0;
 
 /// Airspeed in m/s, roll in rad, pitch in rad: the envelope with a margin, in whole spacings.
 #[derive(Clone, Copy, Debug)]
@@ -34,9 +36,9 @@ impl Grid {
         let slowest = (0.95 * envelope.airspeed_min_mps).floor().max(1.0);
         let fastest = (1.1 * envelope.airspeed_max_mps).ceil();
         let step = (fastest - slowest) / (AIRSPEEDS - 1) as f64;
-        let bank = (envelope.bank_max_deg / SPACING_DEG).ceil();
-        let low = (envelope.pitch_min_deg / SPACING_DEG).floor();
-        let high = (envelope.pitch_max_deg / SPACING_DEG).ceil();
+        let bank = (envelope.bank_max_deg / SPACING_DEG).ceil().min(STEEPEST);
+        let low = (envelope.pitch_min_deg / SPACING_DEG).floor().max(-STEEPEST);
+        let high = (envelope.pitch_max_deg / SPACING_DEG).ceil().min(STEEPEST);
         Grid {
             airspeed: Axis { first: slowest, step, count: AIRSPEEDS },
             roll: Axis::attitude(-bank, bank),

@@ -14,15 +14,13 @@ const FREQUENCY: f64 = 1000.0;
 /// Largest rate of a surface, rad/s.
 const RATE: f64 = 200.0;
 
-/// What an airframe file says of a rudder.
+/// Whether an airframe file states if there is a rudder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Yaw {
-    /// Nothing: a file of schema 1 cannot.
+    /// A file of schema 1 has no place for a rudder.
     Unstated,
-    /// The aircraft has none.
-    NoRudder,
-    /// The aircraft has one.
-    Rudder,
+    /// A file of schema 2: the rudder is there if its figures are.
+    Stated,
 }
 
 /// `[actuators]` of schema 1: ailerons and elevator alike, no word on a rudder.
@@ -93,7 +91,7 @@ impl Each {
             throttle: ActuatorFigures::lag(lag, STEP),
             step: STEP,
         };
-        Ok((figures, if rudder.is_some() { Yaw::Rudder } else { Yaw::NoRudder }))
+        Ok((figures, Yaw::Stated))
     }
 }
 

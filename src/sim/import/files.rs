@@ -3,7 +3,7 @@
 use greylag_sitl::plant::{MassProperties, Stops, Travel};
 
 use super::{Effect, Polar, Subject};
-use crate::model::textbook::{Estimate, numbers};
+use crate::model::textbook::{Estimate, incidence_limits, numbers};
 use crate::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
 
 /// The airframe file.
@@ -14,7 +14,7 @@ pub(super) fn airframe(
     (surfaces, lag): &([[f64; 2]; 3], f64),
     lift_max: f64,
     mass: &MassProperties,
-    throttle: f64,
+    polar: &Polar,
 ) -> String {
     let cruise = subject.start.airspeed_mps;
     let density = standard_density(subject.start.altitude_m);
@@ -25,8 +25,7 @@ pub(super) fn airframe(
         "# Written by `greylag aircraft import jsbsim`.\nschema = 2\nname = {name:?}\n\n[geometry]\n\
          wing_area_m2 = {{ value = {:.6}, source = \"JSBSim\" }}\nspan_m = {{ value = {:.6}, source = \"JSBSim\" \
          }}\nmean_chord_m = {{ value = {:.6}, source = \"JSBSim\" }}\n\n[reference]\nairspeed_mps = {{ value = \
-         {cruise:?}, source = \"given\" }}\naltitude_m = {{ value = {:?}, source = \"given\" }}\nthrottle = {{ \
-         value = {throttle:.3}, source = \"drag at the reference airspeed\" }}\n\n",
+         {cruise:?}, source = \"given\" }}\naltitude_m = {{ value = {:?}, source = \"given\" }}\n\n",
         subject.area, subject.span, subject.chord, subject.start.altitude_m
     );
     let stops = [Some(travel.aileron), Some(travel.elevator), travel.rudder];
@@ -42,8 +41,10 @@ pub(super) fn airframe(
             );
         }
     }
+    let lift = 2.0 * mass.mass_kg * STANDARD_GRAVITY / (density * subject.area * cruise * cruise);
+    let limits = incidence_limits(polar.incidence(lift), polar.incidence(lift_max));
     out += &format!(
-        "[controls.throttle]\nlag_s = {{ value = {lag:.4}, source = \"step of the command\" }}\n\n\
+        "[controls.throttle]\nlag_s = {{ value = {lag:.4}, source = \"step of the command\" }}\n\n{limits}\
          # The lift table's largest coefficient stalls at {stall:.1} m/s. Correct the rest to your mission.\n\
          [envelope]\nbank_max_deg = 45.0\npitch_max_deg = 15.0\npitch_min_deg = -15.0\nload_factor_max = 2.0\n\
          airspeed_min_mps = {slowest:.2}\nairspeed_max_mps = {:.2}\nairspeed_cruise_mps = {cruise:?}\n\

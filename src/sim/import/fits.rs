@@ -3,6 +3,8 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::Polar;
+use crate::num::least_squares;
+use crate::num::statistics::mean;
 use crate::physics::servos::{Surface, Travel};
 
 /// Incidences over which the pitching moment is taken as a line, degrees.
@@ -10,21 +12,15 @@ pub(super) const LINE_DEG: [f64; 2] = [-4.0, 10.0];
 
 /// Intercept and slope of the pitching moment over incidence, and the share of its variation beside.
 pub(super) fn line(polar: &Polar) -> [f64; 3] {
-    let [low, high] = LINE_DEG.map(|a| a.to_radians() + 1e-9);
-    let inside: Vec<(f64, f64)> = polar
-        .alpha
-        .iter()
-        .copied()
-        .zip(polar.pitch.iter().copied())
-        .filter(|(a, _)| *a >= low - 2e-9 && *a <= high)
-        .collect();
-    let count = inside.len() as f64;
-    let (ma, mm) = inside.iter().fold((0.0, 0.0), |(x, y), (a, m)| (x + a / count, y + m / count));
-    let moment =
-        |f: &dyn Fn(f64, f64) -> f64| inside.iter().map(|(a, m)| f(a - ma, m - mm)).sum::<f64>();
-    let slope = moment(&|a, m| a * m) / moment(&|a, _| a * a);
-    let left = moment(&|a, m| (m - slope * a).powi(2)) / moment(&|_, m| m * m).max(1e-30);
-    [mm - slope * ma, slope, left.sqrt()]
+    let [low, high] = LINE_DEG;
+    let inside = |a: &f64| (low - 1e-6..=high + 1e-6).contains(&a.to_degrees());
+    let pairs = polar.alpha.iter().zip(&polar.pitch).filter(|(a, _)| inside(a));
+    let (rows, moments): (Vec<[f64; 2]>, Vec<f64>) = pairs.map(|(a, m)| ([1.0, *a], *m)).unzip();
+    let [first, slope] = least_squares(&rows, &moments).unwrap_or_default();
+    let middle = mean(&moments);
+    let square = |f: &dyn Fn(usize) -> f64| (0..rows.len()).map(|k| f(k).powi(2)).sum::<f64>();
+    let left = square(&|k| moments[k] - first - slope * rows[k][1]);
+    [first, slope, (left / square(&|k| moments[k] - middle).max(1e-30)).sqrt()]
 }
 
 /// Frequency and damping of the filter whose step response is closest to `observed`.
@@ -45,6 +41,11 @@ pub(super) fn second_order(observed: &[f64], end: f64) -> [f64; 2] {
     all.min_by(|a, b| miss(a[0], a[1]).total_cmp(&miss(b[0], b[1]))).unwrap_or([50.0, 0.7])
 }
 
+/// Part of a step below which a throttle does not answer: a glider has none.
+const NO_ANSWER: f64 = 0.01;
+/// Lag of a throttle that shows none, s.
+const USUAL_LAG_S: f64 = 0.2;
+
 /// Time constant (s) by which `observed` follows a step, by the time to 63 % of its end.
 pub(super) fn first_order(observed: &[f64]) -> f64 {
     let end = 0.5;
@@ -53,6 +54,9 @@ pub(super) fn first_order(observed: &[f64]) -> f64 {
         // slower than was waited for: by what it has done
         None => {
             let last = observed.last().copied().unwrap_or(0.0) / end;
+            if last < NO_ANSWER {
+                return USUAL_LAG_S;
+            }
             0.01 * observed.len() as f64 / -(1.0 - last.clamp(1e-3, 0.99)).ln()
         }
     }

@@ -22,7 +22,7 @@ const LOOK: Duration = Duration::from_micros(500);
 /// Arrivals taken at one look.
 const ARRIVALS: usize = 200;
 
-/// Flies until told to stop or until the flight is over.
+/// Flies until asked to stop or until the flight is over.
 pub(in crate::shim) fn fly(
     mut link: Link,
     options: &ShimOptions,

@@ -86,7 +86,7 @@ struct Run<'a> {
     sent: Instant,
 }
 
-/// Flies whoever connects until reported to stop or until the flight is over.
+/// Flies whoever connects until asked to stop or until the flight is over.
 pub(super) fn fly(
     link: Link,
     options: &ShimOptions,

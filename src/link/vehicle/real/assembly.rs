@@ -76,7 +76,7 @@ impl Assembly {
     }
 
     /// Takes a measurement; an attitude completes a state. `command` is what the actuators have
-    /// been reported since the last state.
+    /// been commanded since the last state.
     pub(super) fn take(
         &mut self,
         host: Duration,
