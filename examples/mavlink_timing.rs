@@ -78,7 +78,7 @@ struct Arguments {
 
 fn main() -> Result<ExitCode> {
     let Arguments { controller: kind, planner: changes, load } = Arguments::parse();
-    let model = fly::model(Path::new("params/x8/jsbsim.toml"), None)?;
+    let model = fly::model(Path::new(fly::MODEL), None)?;
     let in_process = settled_in_process(kind, &model, &changes)?;
     println!(
         "target {ROLL_DEG} / {PITCH_DEG} deg, {kind}, JSBSim; in process {in_process:.4} deg; {load} busy \

@@ -15,8 +15,9 @@ use greylag::flight::recorder::Place;
 use greylag::flight::runtime::Pace;
 use greylag::logs::csv::{self, Tolerance};
 use greylag::logs::{Options, Sample, load};
+use greylag::model::GreyBox;
 use greylag::physics::servos::Travel;
-use greylag_sitl::plant::PlantOptions;
+use greylag_sitl::plant::{PlantOptions, Start};
 use greylag_sitl::shim::{self, Existing, TruthFile};
 use mavlink::dialects::ardupilotmega::*;
 use shim_support::{Shim, parameter};
@@ -53,15 +54,43 @@ fn recorded_deflections_are_those_flown_at_another_travel() {
     for surface in [&mut model.airframe.actuators.aileron, &mut model.airframe.actuators.elevator] {
         surface.travel = Travel::symmetric(TRAVEL_RAD);
     }
+    let logs = flown(folder.path(), &model, plant, Start::NEUTRAL);
+    check_deflections(&logs, SURFACES);
+}
+
+/// The Aerosonde's rudder moves in turns, and every log of the flight shows it.
+#[test]
+fn the_rudder_of_an_aircraft_that_has_one_is_flown_and_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = GreyBox::load(Path::new("params/aerosonde/jsbsim.toml")).unwrap();
+    let start = Start { airspeed_mps: 25.0, ..Start::NEUTRAL };
+    let plant = PlantOptions { aircraft: "aerosonde".into(), start, ..PlantOptions::default() };
+    let logs = flown(folder.path(), &model, plant, start);
+    check_deflections(&logs, &[SURFACES[0], SURFACES[1], |row| row.rudder_rad]);
+    let rudder = logs.truth.iter().map(|row| row.rudder_rad.abs()).fold(0.0, f64::max);
+    // the turn to 30 degrees of bank takes 3 degrees of it
+    assert!(rudder > 0.02, "the rudder moved by {rudder} rad");
+}
+
+/// What the companion recorded of a flight, by its table and by its telemetry, beside the truth.
+struct Logs {
+    table: Vec<Sample>,
+    telemetry: Vec<Sample>,
+    truth: Vec<Sample>,
+}
+
+/// Flies 10 s by the LQI on `model` to 30 degrees of bank, recorded in `folder`.
+fn flown(folder: &Path, model: &GreyBox, plant: PlantOptions, start: Start) -> Logs {
     let mut options = options(Pace::Lockstep);
     options.travels = model.airframe.actuators.travels();
-    options.record = Some(Place::Exactly(folder.path().join("flight")));
+    options.record = Some(Place::Exactly(folder.join("flight")));
     let companion =
-        Companion::with(&options, companion_with(Kind::Lqi, &model, Path::new("")).unwrap());
-    let truth = folder.path().join("truth.csv");
+        Companion::with(&options, companion_with(Kind::Lqi, model, Path::new("")).unwrap());
+    let truth = folder.join("truth.csv");
     let link = format!("udpout:{}", companion.vehicle());
     let shim = Shim::start(&link, shim::Pace::Lockstep, 10.0, |shim| {
         shim.plant = plant;
+        shim.start = start;
         shim.truth = Some(TruthFile { path: truth.clone(), existing: Existing::Keep });
     });
     let mut client = Client::new(companion.client(0));
@@ -75,23 +104,34 @@ fn recorded_deflections_are_those_flown_at_another_travel() {
     shim.end();
     companion.end();
     let samples = |path: &Path| csv::load(path, Tolerance::Strict).unwrap().flight.samples;
-    let flown = samples(&truth);
-    check_deflections(&samples(&folder.path().join("flight/flight.csv")), &flown);
-    // The telemetry log holds the travel as well.
-    let log = load(&folder.path().join("flight/flight.tlog"), &Options::default()).unwrap();
-    check_deflections(&log.flight.samples, &flown);
+    let telemetry = load(&folder.join("flight/flight.tlog"), &Options::default()).unwrap();
+    Logs {
+        table: samples(&folder.join("flight/flight.csv")),
+        telemetry: telemetry.flight.samples,
+        truth: samples(&truth),
+    }
+}
+
+/// A deflection of a sample, rad.
+type Deflection = fn(&Sample) -> f64;
+
+const SURFACES: &[Deflection] = &[|row| row.aileron_rad, |row| row.elevator_rad];
+
+/// Both logs show the true deflections.
+fn check_deflections(logs: &Logs, surfaces: &[Deflection]) {
+    for recorded in [&logs.table, &logs.telemetry] {
+        check_rows(recorded, &logs.truth, surfaces);
+    }
 }
 
 /// Every row that shows a time of the truth shows its deflections.
-fn check_deflections(recorded: &[Sample], truth: &[Sample]) {
+fn check_rows(recorded: &[Sample], truth: &[Sample], surfaces: &[Deflection]) {
     let (mut rows, mut largest) = (0, 0.0_f64);
     for row in recorded {
         let Some(flown) = truth.iter().find(|t| (t.time_s - row.time_s).abs() < 1e-4) else {
             continue;
         };
-        for (got, want) in
-            [(row.aileron_rad, flown.aileron_rad), (row.elevator_rad, flown.elevator_rad)]
-        {
+        for (got, want) in surfaces.iter().map(|of| (of(row), of(flown))) {
             // Floats on the wire: 24 bits of 0.44 rad.
             assert!((got - want).abs() < 1e-6, "{got} for {want} at {} s", row.time_s);
         }

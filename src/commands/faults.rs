@@ -43,7 +43,7 @@ pub struct Arguments {
     /// What is at the other end of the vehicle's link.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["sitl", "px4", "ardupilot"], value_enum)]
     counterpart: Vec<Counterpart>,
-    /// Show what befell each flight with a finding, and what was said.
+    /// Show the faults and the messages of each flight with a finding.
     #[arg(long)]
     show: bool,
     /// Note each flight in this file, and do not fly again those that are there (of the same program).
@@ -139,7 +139,7 @@ fn print_findings(entries: &[Entry]) {
         println!("  {finding}, {standing}: {count}");
     }
     println!(
-        "of them, panic, command, slew, hand-back or untold: {}",
+        "of them, panic, command, slew, hand-back or unreported: {}",
         entries.iter().flat_map(|e| &e.findings).filter(|f| f.is_own()).count()
     );
     for entry in entries.iter().filter(|entry| entry.findings.iter().any(|f| f.is_failure())) {
@@ -147,7 +147,7 @@ fn print_findings(entries: &[Entry]) {
     }
 }
 
-/// What befell a flight, and what was said.
+/// The faults of a flight, and its messages.
 fn show(report: &Report) {
     let mut lines = vec![format!("greylag faults {}", Entry::from(report).options())];
     for f in &report.findings {
@@ -272,7 +272,7 @@ mod tests {
                 report.texts.iter().any(|(_, t)| t.contains("recording of flight")),
                 "{report:?}"
             );
-            assert!(!report.findings.iter().any(|f| f.finding == Finding::Untold));
+            assert!(!report.findings.iter().any(|f| f.finding == Finding::Unreported));
         });
     }
 }

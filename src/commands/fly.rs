@@ -237,14 +237,14 @@ pub fn controller(
         return Ok(build(kind, Source { model, agent: None, changes })?);
     }
     let agent = Agent::load(&shipped(folder), &model.airframe)?;
-    if let Some(note) = stranger(&agent.origin, model, folder) {
+    if let Some(note) = foreign_policy_note(&agent.origin, model, folder) {
         eprintln!("{note}");
     }
     Ok(build(kind, Source { model, agent: Some(&agent), changes })?)
 }
 
 /// What is to be said of a policy that was trained in another model than the one that flies with it.
-fn stranger(origin: &Origin, model: &GreyBox, folder: &Path) -> Option<String> {
+fn foreign_policy_note(origin: &Origin, model: &GreyBox, folder: &Path) -> Option<String> {
     (origin.model_sha256 != model.sha256).then(|| {
         format!(
             "note: policy {} was trained in {}, not in model {} as its files are now; its proposals and \

@@ -31,7 +31,7 @@ use crate::manoeuvres::Schedule;
 use crate::report::FlightReport;
 use client::{Client, View};
 use schedule::Legs;
-use summary::{TOLERANCE_DEG, Teller};
+use summary::{Reporter, TOLERANCE_DEG};
 
 /// Options of `greylag demo`.
 #[derive(clap::Args)]
@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             Vec::new()
         });
     }
-    let teller = Teller {
+    let reporter = Reporter {
         controller: arguments.controller.name(),
         seed: arguments.seed.into(),
         model: &model,
@@ -124,7 +124,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         sights,
     };
     let recorded = summary::read(&folder)?;
-    let report = teller.tell(&folder, &recorded)?;
+    let report = reporter.report(&folder, &recorded)?;
     let page = folder.join("report.html");
     files::write(&page, &report.page().render(), Overwrite::Never)?;
     println!("report: {}", page.display());

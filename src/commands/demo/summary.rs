@@ -25,7 +25,7 @@ use crate::sysid::flight_path;
 pub const TOLERANCE_DEG: f64 = 0.5;
 
 /// What the report needs besides the recording.
-pub struct Teller<'a> {
+pub struct Reporter<'a> {
     /// Name of the controller.
     pub controller: &'a str,
     /// The model that the controller is designed from.
@@ -42,9 +42,9 @@ pub struct Teller<'a> {
     pub sights: Vec<Sight>,
 }
 
-impl Teller<'_> {
+impl Reporter<'_> {
     /// Reads the recording in `folder` and makes the report's material of it.
-    pub fn tell<'f>(&self, folder: &Path, flight: &'f Flight) -> Result<FlightReport<'f>> {
+    pub fn report<'f>(&self, folder: &Path, flight: &'f Flight) -> Result<FlightReport<'f>> {
         let travels = self.model.airframe.actuators.travels();
         Ok(FlightReport {
             title: format!(
@@ -71,7 +71,7 @@ impl Teller<'_> {
     }
 }
 
-impl Teller<'_> {
+impl Reporter<'_> {
     /// How well the model predicts `flight`; a flight that cannot be compared is still reported.
     fn compared(&self, flight: &Flight) -> Option<Comparison> {
         let options = flight_path::Options {
@@ -95,7 +95,7 @@ impl Teller<'_> {
 }
 
 /// Ticks after a command at which the planner's view is taken: the search has begun to move the aircraft.
-const TOLD_AFTER: usize = 20;
+const REPORTED_AFTER: usize = 20;
 
 /// What the planner of `companion` saw a moment after each command: the recording in `folder` is replayed, which
 /// also says whether its commands come out to the bit.
@@ -106,7 +106,7 @@ pub fn sights(folder: &Path, companion: Companion, vehicle: Vehicle) -> Result<V
     let outcome = replay_watched(folder, companion, vehicle, &mut |time, request, controller| {
         let now = [request.target.roll, request.target.pitch];
         (target, ticks) = if now == target { (now, ticks + 1) } else { (now, 0) };
-        if ticks == TOLD_AFTER
+        if ticks == REPORTED_AFTER
             && let Some(insight) = controller.insight(&request.observation)
         {
             all.push(Sight { time_s: time.as_secs_f64(), target, insight });

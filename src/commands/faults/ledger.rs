@@ -52,7 +52,7 @@ impl From<&Report> for Entry {
 }
 
 impl Entry {
-    /// What befell it.
+    /// The faults that it met.
     pub fn faults(&self) -> Vec<Fault> {
         draw(self.seed)
     }

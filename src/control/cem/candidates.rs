@@ -10,14 +10,14 @@ use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
 
 /// Candidates kept for the report, spread over all.
-const TOLD: usize = 48;
+const SHOWN: usize = 48;
 
 impl Cem {
     /// What the tick that was planned from `seen` had before it. It flies some thousand steps, and
     /// allocates.
     pub(super) fn last_insight(&self, seen: &Observation) -> Insight {
         let all = self.blocks.len() * WIDTH;
-        let every = all.div_ceil(TOLD).max(1);
+        let every = all.div_ceil(SHOWN).max(1);
         let plans = (0..all).step_by(every).map(|index| self.candidate(index).plan);
         Insight {
             candidates: plans.map(|plan| self.path(seen, Some(&plan))).collect(),

@@ -13,12 +13,13 @@ const WIDTH: usize = 16;
 
 /// Why a network is none of a policy's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{what} takes a network of {inputs} inputs and {outputs} outputs, not {found:?}")]
+#[error("{what} takes a network of {inputs} inputs and {outputs} outputs, not {found:?}{why}")]
 pub struct ShapeError {
     what: &'static str,
     inputs: usize,
     outputs: usize,
     found: Vec<usize>,
+    why: &'static str,
 }
 
 /// π: from an observation to an action.
@@ -44,7 +45,12 @@ fn check(
     if (found[0], found[found.len() - 1]) == (inputs, outputs) {
         return Ok(network);
     }
-    Err(ShapeError { what, inputs, outputs, found: found.into() })
+    let why = if found[0] + 1 == inputs {
+        "; it was trained before policies observed the airspeed error"
+    } else {
+        ""
+    };
+    Err(ShapeError { what, inputs, outputs, found: found.into(), why })
 }
 
 /// The command that an action stands for; throttle = (a + 1)/2. A policy does not steer a rudder.
@@ -196,6 +202,10 @@ mod tests {
         let network = || Dense::uniform(&[15, 8, 2], &mut stream::stream(2, &[])).unwrap();
         let said = Actor::new(network()).unwrap_err().to_string();
         assert!(said.contains("16 inputs and 3 outputs, not [15, 8, 2]"), "{said}");
+        assert!(said.contains("before policies observed the airspeed error"), "{said}");
+        let other = Dense::uniform(&[12, 8, 3], &mut stream::stream(2, &[])).unwrap();
+        let said = Actor::new(other).unwrap_err().to_string();
+        assert!(!said.contains("before"), "{said}");
         assert!(Critic::new(network()).is_err());
     }
 }

@@ -76,7 +76,7 @@ pub struct Case {
 pub struct Report {
     /// The flight.
     pub case: Case,
-    /// What befell it.
+    /// The faults that it met.
     pub faults: Vec<Fault>,
     /// What was found wrong.
     pub findings: Vec<Found>,
@@ -317,7 +317,7 @@ impl Flight {
             }
             std::thread::sleep(Duration::from_millis(10));
         }
-        self.judge.note(now_s, Finding::Untold);
+        self.judge.note(now_s, Finding::Unreported);
     }
 
     /// The client: arms when it can, then sends its legs.

@@ -47,7 +47,7 @@ pub enum Finding {
     /// Not level, or not at its target, at the end.
     NotRecovered,
     /// A disk was full, and it was not reported.
-    Untold,
+    Unreported,
 }
 
 /// What an aircraft suffers that its companion cannot help.
@@ -131,13 +131,13 @@ impl Finding {
         Finding::Airspeed,
         Finding::Altitude,
         Finding::NotRecovered,
-        Finding::Untold,
+        Finding::Unreported,
     ];
 
     /// Whether it is the companion's own, which nothing excuses.
     pub fn is_own(self) -> bool {
         use Finding::*;
-        matches!(self, Panic | Command | Slew | SlowHandBack | Untold)
+        matches!(self, Panic | Command | Slew | SlowHandBack | Unreported)
     }
 
     /// Its name in tables.
@@ -152,7 +152,7 @@ impl Finding {
             Finding::Airspeed => "airspeed",
             Finding::Altitude => "altitude",
             Finding::NotRecovered => "recovery",
-            Finding::Untold => "untold",
+            Finding::Unreported => "unreported",
         }
     }
 }

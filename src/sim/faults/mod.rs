@@ -3,10 +3,10 @@
 //! A case is a seed, a controller, a counterpart; [`CompanionFactory::fly`] flies it for 60 s in lockstep in this
 //! process, with the companion's own pilot and vehicle session and the shim's own aircraft.
 
+mod counterpart;
 mod flight;
 mod judge;
 mod mix;
-mod counterpart;
 mod wire;
 
 pub use counterpart::Counterpart;

@@ -24,8 +24,8 @@ pub const CLOSE: f64 = 10.0;
 const UNSURE: f64 = 0.1;
 /// Standard deviations of the noise's square beyond which what an effect leaves is no chance.
 const DOUBT: f64 = 4.0;
-/// Least share of what a flight seems to tell that is more than the noise of its columns.
-const TOLD: f64 = 0.5;
+/// Least share of a flight's information on an amount that its excitation gives, and not the noise of its columns.
+const LEAST_SIGNAL: f64 = 0.5;
 /// Prior standard deviations by which the model's own figures are wrong, if a candidate in their place is more
 /// than an error of the prior,
 const STRAIN: f64 = 5.0;
@@ -239,7 +239,7 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let (all, left) = (scaled_inverse(&gram)?, scaled_inverse(&corrected)?);
     let share = all[(0, 0)] / left[(0, 0)];
     let amounts = &left * grams.total.view((0, n), (n, 1)).column(0);
-    (share > TOLD).then(|| [amounts[0], sd / share])
+    (share > LEAST_SIGNAL).then(|| [amounts[0], sd / share])
 }
 
 /// By how much what is left in `channels` once a candidate has taken `fall` exceeds the noise, at least 1.
