@@ -2,6 +2,7 @@
 #![cfg(feature = "sitl")]
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use greylag::control::{self, Kind, Target};
 use greylag::logs::{Flight, Sample};
@@ -120,10 +121,13 @@ fn rebuilt(log: &Flight) -> Reconstruction {
     reconstruct(log, &options).unwrap()
 }
 
+/// Two flights, flown once for all tests.
+static FLIGHTS: LazyLock<[Reconstruction; 2]> =
+    LazyLock::new(|| [1, 2].map(|seed| rebuilt(&flown(seed, 60.0))));
+
 fn asked(model: &GreyBox) -> Diagnosis {
-    let flights: Vec<Reconstruction> = [1, 2].map(|seed| rebuilt(&flown(seed, 60.0))).into();
-    let found =
-        diagnose(model, &flights, &Options::default(), &greylag::sysid::progress::unheard).unwrap();
+    let (options, unheard) = (Options::default(), &greylag::sysid::progress::unheard);
+    let found = diagnose(model, &*FLIGHTS, &options, unheard).unwrap();
     println!("{:?} {:#?}", found.verdict, found.sentences);
     found
 }

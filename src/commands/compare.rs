@@ -96,7 +96,7 @@ fn print(comparison: &Comparison) {
         model.sentences.iter().for_each(|sentence| println!("  {sentence}"));
         println!();
     }
-    println!("{}\n{}", free_run_table(&comparison.models), channel_table(&comparison.models));
+    println!("{}\n{}", free_run_table(comparison), channel_table(&comparison.models));
     for flight in &comparison.flights {
         flight.notes.iter().for_each(|note| println!("{}: {note}", flight.name));
     }
@@ -114,11 +114,11 @@ fn empty_table<const N: usize>(header: [&str; N], words: usize) -> Table {
 }
 
 /// Free-run errors in the units of a flight.
-fn free_run_table(models: &[ModelResult]) -> Table {
+fn free_run_table(comparison: &Comparison) -> Table {
     let header = [
         "model",
         "horizon s",
-        "RMSE / x_c",
+        "NRMSE",
         "diverged",
         "roll °",
         "pitch °",
@@ -130,10 +130,10 @@ fn free_run_table(models: &[ModelResult]) -> Table {
         "β °",
     ];
     let mut table = empty_table(header, 1);
-    for model in models {
-        for score in model.free_run.iter().filter(|s| s.runs > 0) {
+    for (name, scores) in comparison.free_runs() {
+        for score in scores.iter().filter(|s| s.runs > 0) {
             let mut row = vec![
-                model.name.clone(),
+                name.to_owned(),
                 format!("{}", score.horizon_s),
                 format!("{:.5}", score.rmse_scaled),
                 format!("{}/{}", score.diverged, score.runs),

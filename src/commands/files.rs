@@ -1,18 +1,12 @@
 //! The files a user names on the command line.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Result, bail};
 
+pub use super::shipped::shipped;
 use crate::report;
-
-/// A path as given, or, if there is no such file below the working folder, the one of that name in
-/// the source tree that the program was built from.
-pub fn shipped(path: &Path) -> PathBuf {
-    let built = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
-    if !path.exists() && built.exists() { built } else { path.into() }
-}
 
 /// Whether an existing file may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

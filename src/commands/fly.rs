@@ -210,8 +210,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Options {
     }
 }
 
-/// A model file, with another airframe if one is given. Paths are looked for in the working
-/// folder, then in the program's source folder.
+/// A model file, with another airframe if one is given. Paths below `params/` are looked for as [`shipped`] does.
 ///
 /// # Errors
 /// If a file cannot be used.

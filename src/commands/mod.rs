@@ -34,6 +34,7 @@ mod mystery;
 mod propose;
 mod replay;
 mod said_once;
+mod shipped;
 mod status;
 #[cfg(feature = "sitl")]
 mod start;

@@ -51,7 +51,7 @@ impl TrainingReport<'_> {
         let figure = Curves {
             title: "Error over the horizon".into(),
             x_label: "Steps of 0.01 s".into(),
-            y_label: "RMSE / x_c".into(),
+            y_label: "NRMSE".into(),
             x: self.prior.iter().map(|h| h.steps as f64).collect(),
             series: vec![
                 Series::new("bare prior", Style::nth(0), rms(self.prior)),

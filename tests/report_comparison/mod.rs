@@ -1,5 +1,6 @@
 //! A made-up comparison: two models with two flights, one of them wrong in ways put in by hand.
 
+use greylag::sysid::compare::forecast::ForecastResult;
 use greylag::sysid::compare::{
     Bin, ChannelId, ChannelResult, ChannelTrace, Comparison, FlightResult, FlightTrace,
     GrowthPoint, HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, RegimeBins,
@@ -23,6 +24,10 @@ pub fn comparison(seconds: f64) -> Comparison {
         seed: 1,
         sentences: models[0].sentences.clone(),
         models,
+        forecasts: vec![ForecastResult {
+            name: "hold the state",
+            free_run: [1.0, 2.0, 5.0, 10.0].map(|h| score(h, 3.0)).into(),
+        }],
         flights,
         settings: Settings {
             start_every_s: RESTART_S,
@@ -136,6 +141,7 @@ fn score(horizon_s: f64, size: f64) -> HorizonScore {
     let state = |(k, state): (usize, &&'static str)| StateScore {
         state,
         rmse: size * horizon_s * [0.01, 0.008, 0.2, 0.03, 0.03, 0.02, 0.006, 0.004][k],
+        r2: 1.0 - 0.05 * size * horizon_s,
         rmse_scaled: rmse_scaled * (0.5 + 0.15 * k as f64),
         theil_u: (0.04 * size * horizon_s).min(1.0),
         bias_share: 0.5,

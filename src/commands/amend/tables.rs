@@ -41,7 +41,7 @@ fn parameter_table(parameters: &[Parameter]) -> Table {
 
 /// Free-run errors on the flights that the fit did not see.
 fn error_table(story: &Amendment) -> Table {
-    let header = ["RMSE / x_c on held-out flights", "1 s", "2 s", "5 s", "10 s", "diverged"];
+    let header = ["NRMSE on held-out flights", "1 s", "2 s", "5 s", "10 s", "diverged"];
     let mut table = empty_table(header);
     let rows = [("as given", &story.given), ("tuned", &story.before), ("amended", &story.after)];
     for (name, scores) in rows {

@@ -49,7 +49,7 @@ fn before_and_after(a: &Amendment) -> Section {
         ("Horizon (s)", Right),
         ("Runs", Right),
         ("Diverged (%)", Right),
-        ("RMSE / x_c", Right),
+        ("NRMSE", Right),
     ];
     let mut table = Table::new("Errors on flights that no fit has seen", &columns);
     for (name, scores) in models {
@@ -72,7 +72,7 @@ fn before_and_after(a: &Amendment) -> Section {
     let curves = Curves {
         title: "Error over the horizon".into(),
         x_label: "Time after the start (s)".into(),
-        y_label: "RMSE / x_c".into(),
+        y_label: "NRMSE".into(),
         x: horizons.clone(),
         series: series.collect(),
         ..Curves::default()

@@ -13,18 +13,19 @@ pub(in crate::report) fn summary(c: &Comparison) -> Section {
             ("Horizon (s)", Align::Right),
             ("Runs", Align::Right),
             ("Diverged (%)", Align::Right),
-            ("RMSE / x_c", Align::Right),
+            ("NRMSE", Align::Right),
             ("Worst state", Align::Left),
             ("its RMSE", Align::Right),
+            ("R²", Align::Right),
             ("Theil's U", Align::Right),
             ("bias (%)", Align::Right),
             ("variance (%)", Align::Right),
             ("covariance (%)", Align::Right),
         ],
     );
-    for model in &c.models {
-        for score in &model.free_run {
-            table.push(summary_row(&model.name, score));
+    for (name, scores) in c.free_runs() {
+        for score in scores {
+            table.push(summary_row(name, score));
         }
     }
     let mut figures = vec![Figure::Table(table)];
@@ -34,7 +35,9 @@ pub(in crate::report) fn summary(c: &Comparison) -> Section {
         let (anchor, label) = ("states".into(), "Every state at horizon".into());
         figures.push(Figure::Choice(Choice { anchor, label, options }));
     }
-    let note = "Free runs from reconstructed states. Theil's U: 0 is perfect, 1 is no relation; \
+    let note = "Free runs from reconstructed states. NRMSE: root mean square over the eight states of RMSE over the \
+                reference scale x_c. The last rows are forecasts without aerodynamics: a model has to beat them. R²: 1 is \
+                perfect, below 0 the mean is better. Theil's U: 0 is perfect, 1 is no relation; \
                 its shares say whether the error is an offset (bias), too much or too little \
                 movement (variance) or movement at the wrong time (covariance).";
     Section::new("Free runs", note, figures)
@@ -51,17 +54,17 @@ fn summary_row(model: &str, score: &HorizonScore) -> Vec<String> {
     let finite = score.states.iter().filter(|s| s.rmse_scaled.is_finite());
     let worst = finite.max_by(|a, b| a.rmse_scaled.total_cmp(&b.rmse_scaled));
     match worst {
-        None => row.extend(std::iter::repeat_n("–".to_string(), 6)),
+        None => row.extend(std::iter::repeat_n("–".to_string(), 7)),
         Some(state) => row.extend(state_cells(state)),
     }
     row
 }
 
-/// Name, RMSE with its unit, U, and the three shares.
+/// Name, RMSE with its unit, R², U, and the three shares.
 fn state_cells(s: &StateScore) -> Vec<String> {
     let (name, unit, factor) = people(s.state);
     let mut cells = vec![name.to_string(), format!("{} {unit}", number(factor * s.rmse))];
-    cells.push(number(s.theil_u));
+    cells.extend([s.r2, s.theil_u].map(number));
     cells.extend([s.bias_share, s.variance_share, s.covariance_share].map(percent));
     cells
 }
@@ -92,17 +95,18 @@ fn by_state(c: &Comparison, horizon_s: f64) -> Option<ChoiceOption> {
             ("Model", Align::Left),
             ("State", Align::Left),
             ("RMSE", Align::Right),
+            ("R²", Align::Right),
             ("Theil's U", Align::Right),
             ("bias (%)", Align::Right),
             ("variance (%)", Align::Right),
             ("covariance (%)", Align::Right),
-            ("RMSE / x_c", Align::Right),
+            ("NRMSE", Align::Right),
         ],
     );
-    for model in &c.models {
-        let at = model.free_run.iter().find(|s| s.horizon_s == horizon_s);
+    for (name, scores) in c.free_runs() {
+        let at = scores.iter().find(|s| s.horizon_s == horizon_s);
         for state in at.iter().flat_map(|s| &s.states) {
-            let mut row = vec![model.name.clone()];
+            let mut row = vec![name.to_owned()];
             row.extend(state_cells(state));
             row.push(number(state.rmse_scaled));
             table.push(row);

@@ -20,7 +20,7 @@ pub const DIVERGENCE_BOUND: f64 = 1.0;
 pub const GROWTH_POINTS: usize = 25;
 
 /// Where a run stands at a moment: measured and predicted state; `None` once diverged.
-type Look = Option<[[f64; 8]; 2]>;
+pub(super) type Look = Option<[[f64; 8]; 2]>;
 
 /// All free runs of a model over all flights.
 pub struct Runs {
@@ -155,18 +155,23 @@ fn run(
 }
 
 /// Predicted − measured; roll the short way round.
-fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
+pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
     error
 }
 
 /// Root mean square of error / x_c; NaN if anything is.
-fn scaled(error: &[f64; 8], scale: &[f64; 8]) -> f64 {
+pub(super) fn scaled(error: &[f64; 8], scale: &[f64; 8]) -> f64 {
     (error.iter().zip(scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0).sqrt()
 }
 
 impl Runs {
+    /// The `runs`, each looked at at the `times` (s), states over `scale`.
+    pub(super) fn new(times: Vec<f64>, runs: Vec<Vec<Look>>, scale: [f64; 8]) -> Runs {
+        Runs { times, runs, scale }
+    }
+
     fn at(&self, time: f64) -> Vec<Look> {
         let place = self.times.iter().position(|t| (t - time).abs() < 1e-9);
         place.map_or(Vec::new(), |k| self.runs.iter().filter_map(|r| r.get(k).copied()).collect())
@@ -213,7 +218,7 @@ impl Runs {
         self.times.iter().map(point).filter(|p| p.runs > 0).collect()
     }
 
-    /// RMSE and Theil's U with its shares for one state.
+    /// RMSE, R² and Theil's U with its shares for one state.
     fn state_score(&self, k: usize, runs: &[[[f64; 8]; 2]]) -> StateScore {
         let measured: Vec<f64> = runs.iter().map(|r| r[0][k]).collect();
         // through the error, so that a roll across ±180° counts the short way round
@@ -228,6 +233,7 @@ impl Runs {
             state: State::NAMES[k],
             rmse,
             rmse_scaled: rmse / self.scale[k],
+            r2: 1.0 - (rmse / sd_b).powi(2),
             theil_u: rmse / (root_mean_square(&predicted) + root_mean_square(&measured)),
             bias_share: bias,
             variance_share: variance,

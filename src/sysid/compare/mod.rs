@@ -10,6 +10,7 @@ mod doubt;
 mod error;
 mod finding;
 mod flight;
+pub mod forecast;
 pub mod free_run;
 mod result;
 mod run;

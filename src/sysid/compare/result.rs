@@ -5,6 +5,7 @@
 
 use serde::Serialize;
 
+use super::forecast::ForecastResult;
 use crate::sysid::weak_form::channels::{ChannelId, RegimeVariable};
 
 /// The comparison of one or several models with one or several flights.
@@ -20,6 +21,8 @@ pub struct Comparison {
     pub sentences: Vec<String>,
     /// The models, in the order of the command line.
     pub models: Vec<ModelResult>,
+    /// What a model has to beat: the same free runs by forecasts that know no aerodynamics.
+    pub forecasts: Vec<ForecastResult>,
     /// The flights, in the order of the command line.
     pub flights: Vec<FlightResult>,
     /// Lengths and bounds that the figures depend on.
@@ -38,6 +41,12 @@ pub struct Document<'a> {
 }
 
 impl Comparison {
+    /// The free-run errors of the models, then those of the forecasts, each with its name.
+    pub fn free_runs(&self) -> impl Iterator<Item = (&str, &[HorizonScore])> {
+        let models = self.models.iter().map(|m| (m.name.as_str(), m.free_run.as_slice()));
+        models.chain(self.forecasts.iter().map(|f| (f.name, f.free_run.as_slice())))
+    }
+
     /// The JSON document.
     pub fn document(&self) -> Document<'_> {
         let first = self.models.first();
@@ -113,6 +122,9 @@ pub struct StateScore {
     pub rmse: f64,
     /// Root mean square error divided by x_c.
     pub rmse_scaled: f64,
+    /// Coefficient of determination over the runs: 1 − mean square error / variance of the measured state at
+    /// that time. 1 is perfect; at 0 or below the measured mean is the better forecast.
+    pub r2: f64,
     /// Theil's U: RMSE / (RMS of measured + RMS of predicted), 0 (perfect) to 1.
     pub theil_u: f64,
     /// Share of the mean square error that is a constant offset, 0..1.

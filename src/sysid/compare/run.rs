@@ -8,6 +8,7 @@ use super::bootstrap::{BLOCK_S, RESAMPLES};
 use super::doubt::{self, Shift};
 use super::finding;
 use super::flight;
+use super::forecast::forecasts;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
 use super::result::{ChannelResult, ChannelTrace, Comparison, ModelResult, ModelTrace, Settings};
 use super::sentence::{Subject, sentence};
@@ -57,6 +58,7 @@ pub fn compare(
     let slowest = 0.5 * first.airframe.envelope.airspeed_min_mps;
     let (used, prepared, mut notes) = usable(flights, slowest)?;
     notes.extend(short_of(&prepared, &options.horizons_s));
+    let forecasts = forecasts(&prepared, first.scale(), &options.horizons_s);
     let share = 1.0 / models.len() as f64;
     let models = models
         .iter()
@@ -65,6 +67,7 @@ pub fn compare(
             let doing = format!("comparing {} with {} flight(s)", model.name, prepared.len());
             say(progress, &doing, k as f64 * share)?;
             let mut result = one_model(model, &prepared, &used, options);
+            result.sentences.extend(verdict::beaten(&result.free_run, &forecasts));
             let rudder = rudder::unmodelled(flights, model).map(rudder::warning);
             result.sentences.splice(0..0, rudder);
             Ok(result)
@@ -76,6 +79,7 @@ pub fn compare(
         seed: options.seed,
         sentences: models[0].sentences.clone(),
         models,
+        forecasts,
         flights: prepared.iter().zip(used).map(|(p, from)| flight::result(p, from)).collect(),
         settings: Settings {
             start_every_s: START_EVERY_S,

@@ -1,5 +1,6 @@
 //! The findings of a model in the order in which they are stated.
 
+use super::forecast::ForecastResult;
 use super::result::{ChannelResult, HorizonScore};
 use crate::sysid::weak_form::channels::ChannelId;
 
@@ -49,4 +50,20 @@ fn diverges(scores: &[HorizonScore]) -> Option<String> {
             first.diverged, first.runs, first.horizon_s
         )
     })
+}
+
+/// Says so if a forecast that knows no aerodynamics is better than the model at the longest horizon.
+pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option<String> {
+    let score = free_run.iter().rev().find(|s| s.runs > 0 && s.rmse_scaled.is_finite())?;
+    let horizon = score.horizon_s;
+    let at = |f: &ForecastResult| {
+        let there = f.free_run.iter().find(|s| s.horizon_s == horizon)?;
+        (there.rmse_scaled < score.rmse_scaled).then_some((there.rmse_scaled, f.name))
+    };
+    let (error, name) = forecasts.iter().filter_map(at).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!(
+        "A forecast without aerodynamics is better than the model {horizon} s ahead: \u{201c}{name}\u{201d} errs by {error:.3} \
+         of the reference scale, the model by {:.3}.",
+        score.rmse_scaled
+    ))
 }

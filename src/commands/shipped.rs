@@ -1,0 +1,122 @@
+//! The folder `params/` as the program ships it: looked for on the machine, else unpacked from the program.
+
+use std::ffi::OsString;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use include_dir::{Dir, File, include_dir};
+
+use crate::model::residual::hash;
+
+static PARAMS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/params");
+
+/// Name of the folder, in the source tree and below the folders that are looked through.
+const FOLDER: &str = "params";
+
+/// A path as given, if it exists. A relative path below `params/` is looked for in `$XDG_CONFIG_HOME/greylag` and
+/// `/etc/greylag` next; last comes the program's own copy, unpacked into `$XDG_CACHE_HOME/greylag`.
+pub fn shipped(path: &Path) -> PathBuf {
+    if path.exists() || !path.starts_with(FOLDER) {
+        return path.into();
+    }
+    let home = |variable: &str, below: &str| home(variable, below, &|name| std::env::var_os(name));
+    let configured = [home("XDG_CONFIG_HOME", ".config"), Some(PathBuf::from("/etc"))];
+    let mut places = configured.into_iter().flatten().map(|p| p.join("greylag").join(path));
+    if let Some(found) = places.find(|p| p.exists()) {
+        return found;
+    }
+    let cache = home("XDG_CACHE_HOME", ".cache").unwrap_or_else(std::env::temp_dir);
+    match unpacked(&cache.join("greylag")) {
+        Ok(folder) => folder.join(path),
+        Err(why) => {
+            tracing::warn!("cannot unpack the shipped parameters into {}: {why}", cache.display());
+            path.into()
+        }
+    }
+}
+
+/// The folder that `variable` names, or `below` in the home folder.
+fn home(variable: &str, below: &str, of: &dyn Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
+    let named = of(variable).map(PathBuf::from).filter(|p| p.is_absolute());
+    named.or_else(|| Some(Path::new(&of("HOME")?).join(below)))
+}
+
+/// The folder below `cache` that holds the program's `params/`, unpacked there if it does not yet.
+fn unpacked(cache: &Path) -> io::Result<PathBuf> {
+    let folder = cache.join(format!("{}-{}", env!("CARGO_PKG_VERSION"), &fingerprint()[..12]));
+    if is_whole(&folder) {
+        return Ok(folder);
+    }
+    std::fs::create_dir_all(cache)?;
+    let part = tempfile::Builder::new().prefix(".part-").tempdir_in(cache)?;
+    let params = part.path().join(FOLDER);
+    std::fs::create_dir(&params)?;
+    PARAMS.extract(&params)?;
+    if folder.exists() {
+        std::fs::remove_dir_all(&folder)?;
+    }
+    match std::fs::rename(part.path(), &folder) {
+        // another greylag was faster
+        Err(_) if is_whole(&folder) => Ok(folder),
+        done => done.map(|()| folder),
+    }
+}
+
+/// Whether `folder` holds every file as the program does.
+fn is_whole(folder: &Path) -> bool {
+    let same = |file: &&File<'_>| {
+        let path = folder.join(FOLDER).join(file.path());
+        std::fs::read(path).is_ok_and(|there| there == file.contents())
+    };
+    files(&PARAMS).iter().all(same)
+}
+
+/// SHA-256 over names and contents, hexadecimal.
+fn fingerprint() -> String {
+    let one =
+        |file: &File<'_>| [file.path().as_os_str().as_encoded_bytes(), file.contents()].concat();
+    hash(&files(&PARAMS).into_iter().flat_map(one).collect::<Vec<u8>>())
+}
+
+/// Every file below `folder`.
+fn files<'a>(folder: &'a Dir<'a>) -> Vec<&'a File<'a>> {
+    folder.files().chain(folder.dirs().flat_map(files)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_programs_copy_is_unpacked_once_and_mended() {
+        let cache = tempfile::tempdir().unwrap();
+        let folder = unpacked(cache.path()).unwrap();
+        let model = folder.join("params/x8/learned/model.toml");
+        let written = std::fs::metadata(&model).unwrap().modified().unwrap();
+        crate::model::GreyBox::load(&model).unwrap();
+        assert_eq!(unpacked(cache.path()).unwrap(), folder);
+        assert_eq!(std::fs::metadata(&model).unwrap().modified().unwrap(), written);
+        std::fs::write(&model, "spoiled").unwrap();
+        unpacked(cache.path()).unwrap();
+        crate::model::GreyBox::load(&model).unwrap();
+        // nothing half written is left
+        assert_eq!(std::fs::read_dir(cache.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_folder_named_by_the_environment_comes_before_the_home_folder() {
+        let both = |name: &str| match name {
+            "HOME" => Some(OsString::from("/home/me")),
+            _ => Some(OsString::from("/elsewhere")),
+        };
+        assert_eq!(home("XDG_CACHE_HOME", ".cache", &both), Some("/elsewhere".into()));
+        let bare = |name: &str| (name == "HOME").then(|| OsString::from("/home/me"));
+        assert_eq!(home("XDG_CACHE_HOME", ".cache", &bare), Some("/home/me/.cache".into()));
+        assert_eq!(home("XDG_CACHE_HOME", ".cache", &|_| None), None);
+    }
+
+    #[test]
+    fn a_path_that_is_none_of_the_programs_stays_as_given() {
+        assert_eq!(shipped(Path::new("my/model.toml")), Path::new("my/model.toml"));
+    }
+}

@@ -1,0 +1,206 @@
+//! Forecasts that know no aerodynamics: what a model has to beat.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use super::free_run::{DIVERGENCE_BOUND, Look, Runs, START_EVERY_S, error, scaled};
+use super::result::HorizonScore;
+use crate::sysid::flight_path::reconstruction::Instant;
+use crate::sysid::weak_form::prepared::Prepared;
+
+/// Regressors of the linear model: the eight states, the four deflections, one.
+const REGRESSORS: usize = 13;
+/// Singular values below this part of the largest are taken as zero: a rudder that never moves.
+const RANK: f64 = 1e-9;
+
+/// The free-run error of a trivial forecast, over the same starts as those of the models.
+#[derive(Clone, Debug, Serialize)]
+pub struct ForecastResult {
+    /// What it does.
+    pub name: &'static str,
+    /// Its error, one entry a horizon.
+    pub free_run: Vec<HorizonScore>,
+}
+
+/// A rule for the next state.
+enum Forecast {
+    /// The state stays as it is at the start.
+    Hold,
+    /// The aircraft flies straight on: attitude, airspeed and flow angles stay, rates are zero.
+    Straight,
+    /// A linear model of first order with the deflections as inputs (ARX), fitted by least squares to the
+    /// flights that it is judged on: the figure flatters it.
+    Linear(DMatrix<f64>),
+}
+
+impl Forecast {
+    fn name(&self) -> &'static str {
+        match self {
+            Forecast::Hold => "hold the state",
+            Forecast::Straight => "fly straight on",
+            Forecast::Linear(_) => "linear (ARX), fitted to these flights",
+        }
+    }
+
+    /// The state `dt` (s) after `state`, the deflections being those of `at`.
+    fn next(&self, state: &[f64; 8], at: &Instant, dt: f64) -> [f64; 8] {
+        match self {
+            Forecast::Hold => *state,
+            Forecast::Straight => {
+                let [roll, pitch, airspeed, _, _, _, alpha, beta] = *state;
+                [roll, pitch, airspeed, 0.0, 0.0, 0.0, alpha, beta]
+            }
+            Forecast::Linear(slopes) => {
+                let rate = slopes * DVector::from_column_slice(&regressors(state, at));
+                std::array::from_fn(|k| state[k] + dt * rate[k])
+            }
+        }
+    }
+
+    /// One run from sample `start` of `segment`, looked at after each number of samples in `looks`.
+    fn run(
+        &self,
+        segment: &[Instant],
+        dt: f64,
+        start: usize,
+        looks: &[usize],
+        scale: &[f64; 8],
+    ) -> Vec<Look> {
+        let mut state = segment[start].state.to_array();
+        let (mut seen, mut lost) = (Vec::new(), false);
+        let reached = looks.iter().filter(|l| start + **l < segment.len());
+        let mut at = start;
+        for look in reached {
+            while at < start + look && !lost {
+                state = self.next(&state, &segment[at], dt);
+                at += 1;
+                let miss = error(&segment[at].state.to_array(), &state);
+                // a NaN is lost as well
+                lost = !(scaled(&miss, scale) <= DIVERGENCE_BOUND);
+            }
+            seen.push((!lost).then(|| [segment[at].state.to_array(), state]));
+        }
+        seen
+    }
+}
+
+fn regressors(state: &[f64; 8], at: &Instant) -> [f64; REGRESSORS] {
+    let c = at.controls;
+    let [roll, pitch, airspeed, p, q, r, alpha, beta] = *state;
+    let rudder = if c.rudder.is_finite() { c.rudder } else { 0.0 };
+    [roll, pitch, airspeed, p, q, r, alpha, beta, c.aileron, c.elevator, c.throttle, rudder, 1.0]
+}
+
+/// Rates of the eight states over the regressors, by least squares over all steps of `flights`.
+fn linear(flights: &[Prepared]) -> Option<DMatrix<f64>> {
+    let mut gram = DMatrix::<f64>::zeros(REGRESSORS, REGRESSORS);
+    let mut moments = DMatrix::<f64>::zeros(REGRESSORS, 8);
+    for flight in flights {
+        for pair in flight.segments.iter().flat_map(|s| s.windows(2)) {
+            let state = pair[0].state.to_array();
+            let row = DVector::from_column_slice(&regressors(&state, &pair[0]));
+            let step = error(&state, &pair[1].state.to_array()).map(|x| x / flight.dt);
+            gram.ger(1.0, &row, &row, 1.0);
+            moments.ger(1.0, &row, &DVector::from_column_slice(&step), 1.0);
+        }
+    }
+    let size = gram.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+    let size = DMatrix::from_diagonal(&size);
+    let solved = (&size * gram * &size).svd(true, true).solve(&(&size * moments), RANK).ok()?;
+    let slopes = (size * solved).transpose();
+    slopes.iter().all(|x| x.is_finite()).then_some(slopes)
+}
+
+/// The errors of all forecasts at the `horizons` (s), states over `scale`.
+pub fn forecasts(flights: &[Prepared], scale: [f64; 8], horizons: &[f64]) -> Vec<ForecastResult> {
+    let linear = linear(flights).map(Forecast::Linear);
+    let all = [Forecast::Hold, Forecast::Straight].into_iter().chain(linear);
+    all.map(|forecast| {
+        let runs = flights.iter().flat_map(|f| flown(&forecast, f, scale, horizons)).collect();
+        let runs = Runs::new(horizons.to_vec(), runs, scale);
+        let free_run = horizons.iter().map(|h| runs.score(*h)).collect();
+        ForecastResult { name: forecast.name(), free_run }
+    })
+    .collect()
+}
+
+/// The runs of one flight, from the starts that the models have.
+fn flown(
+    forecast: &Forecast,
+    flight: &Prepared,
+    scale: [f64; 8],
+    horizons: &[f64],
+) -> Vec<Vec<Look>> {
+    let every = ((START_EVERY_S / flight.dt).round() as usize).max(1);
+    let looks: Vec<usize> =
+        horizons.iter().map(|t| ((t / flight.dt).round() as usize).max(1)).collect();
+    let of = |segment: &Vec<Instant>| {
+        let starts = (0..segment.len() - 1).step_by(every);
+        starts.map(|s| forecast.run(segment, flight.dt, s, &looks, &scale)).collect::<Vec<_>>()
+    };
+    flight.segments.iter().flat_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::logs::Sampling;
+    use crate::physics::{Controls, State};
+    use crate::sysid::flight_path::reconstruction::{Reconstruction, Segment};
+
+    /// 20 s at 100 Hz in which each state follows its own linear law, the elevator moving.
+    fn flight() -> Prepared {
+        let mut state = State::NEUTRAL.to_array();
+        let instants = (0..2000).map(|k| {
+            let elevator = 0.1 * (0.013 * f64::from(k)).sin();
+            let controls = Controls { elevator, throttle: 0.1, ..Controls::default() };
+            let now = Instant {
+                time_s: 0.01 * f64::from(k),
+                state: State::from_array(state),
+                controls,
+                altitude: 600.0,
+                density: 1.15,
+                yaw: f64::NAN,
+                command: None,
+                specific_force: [f64::NAN; 3],
+            };
+            state[4] += 0.01 * (-4.0 * state[4] - 8.0 * elevator);
+            state[1] += 0.01 * now.state.q;
+            now
+        });
+        let flight = Reconstruction {
+            name: "f".into(),
+            step_s: 0.01,
+            sampling: Sampling::Held,
+            segments: vec![Segment { instants: instants.collect() }],
+            nuisances: Vec::new(),
+            noise: [f64::NAN; 8],
+            left: [f64::NAN; 8],
+            force_noise: [f64::NAN; 3],
+            rudder: None,
+            notes: Vec::new(),
+        };
+        Prepared::new(&flight, 5.0).unwrap()
+    }
+
+    #[test]
+    fn a_linear_flight_is_forecast_by_the_linear_model_alone() {
+        let all = forecasts(&[flight()], [1.0; 8], &[1.0, 5.0]);
+        let at_5: Vec<f64> = all.iter().map(|f| f.free_run[1].rmse_scaled).collect();
+        let [hold, straight, linear] = at_5[..] else { panic!("{at_5:?}") };
+        // pitch goes up and down by a tenth of a radian; throttle and airspeed never move
+        assert!(hold > 0.01 && straight > 0.01 && linear < 1e-6, "{at_5:?}");
+        // 20 s from the start on every 3 s
+        assert_eq!(all[0].free_run[0].runs, 7);
+    }
+
+    #[test]
+    fn what_is_held_errs_by_what_the_flight_does() {
+        let flight = flight();
+        let pitch = |k: usize| flight.segments[0][k].state.pitch;
+        let hold = &forecasts(&[flight.clone()], [1.0; 8], &[1.0])[0].free_run[0];
+        let squares = (0..7).map(|k| (pitch(300 * k + 100) - pitch(300 * k)).powi(2));
+        let expected = (squares.sum::<f64>() / 7.0).sqrt();
+        assert!((hold.states[1].rmse - expected).abs() < 1e-12);
+    }
+}
