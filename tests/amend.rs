@@ -9,7 +9,7 @@ use std::process::{Command, Output};
 use amend_support::{Manoeuvres, errors, flight, fly, off, sensors};
 use greylag::logs::csv;
 use greylag::model::{GreyBox, Integrator};
-use greylag::sysid::amend::{Added, AmendError, Options, amend};
+use greylag::sysid::amend::{Added, AmendError, Options, Prior, amend};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 
 fn added(id: &str) -> Options {
@@ -49,6 +49,47 @@ fn validate_a_hidden_lag_is_measured_and_the_error_falls() {
 
 fn at_5s(scores: &[greylag::sysid::compare::HorizonScore]) -> f64 {
     scores.iter().find(|s| s.horizon_s == 5.0).unwrap().rmse_scaled
+}
+
+/// Coefficients of half their size, roll and pitch damping gone: 15 % of prior width reaches none of them.
+#[test]
+fn validate_a_model_of_guesses_is_fitted_from_scratch() {
+    let exact = sensors::model();
+    let half: Vec<f64> = exact
+        .coefficients()
+        .iter()
+        .map(|c| match c.name.as_str() {
+            "roll_linear.Clp" | "pitch_linear.Cmq" => 0.0,
+            _ => 0.5 * c.value,
+        })
+        .collect();
+    let mut guess = exact.clone();
+    guess.set_coefficients(&half);
+    let all = flights("", 71);
+    let fitted = |prior| {
+        let options = Options { prior, ..Options::default() };
+        amend(&guess, &all[..2], &all[2..], &options, &greylag::sysid::progress::unheard).unwrap()
+    };
+    let (file, scratch) = (fitted(Prior::File), fitted(Prior::Bounds));
+    let horizons = [5.0];
+    let compared = greylag::sysid::compare::compare(
+        std::slice::from_ref(&exact),
+        &all[2..],
+        &greylag::sysid::compare::Options { horizons_s: horizons.to_vec(), seed: 1 },
+        &greylag::sysid::progress::unheard,
+    );
+    let best = at_5s(&compared.unwrap().models[0].free_run);
+    let [file_error, error] = [&file, &scratch].map(|f| at_5s(&f.amendment.before));
+    println!("exact {best:.4}, widths of the file {file_error:.4}, from scratch {error:.4}");
+    assert!(
+        file.amendment
+            .notes
+            .iter()
+            .any(|n| n.contains("roll_linear.Clp") && n.contains("--from-scratch"))
+    );
+    assert!(error < 0.5 * file_error, "{error} {file_error}");
+    let clp = scratch.amendment.parameters.iter().find(|p| p.name == "roll_linear.Clp").unwrap();
+    assert!((clp.value / -0.4042 - 1.0).abs() < 0.05, "{clp:?}");
 }
 
 /// JSBSim steps by a scheme of its own, its forces act in wind axes.

@@ -143,6 +143,14 @@ impl GreyBox {
             && self.coefficients.iter().any(yaws)
     }
 
+    /// The same model with other prior standard deviations: `sd` gives that of a coefficient, or `None` to leave it.
+    pub fn with_widths(mut self, sd: impl Fn(&Named) -> Option<f64>) -> GreyBox {
+        for c in &mut self.coefficients {
+            c.sd = sd(c).or(c.sd);
+        }
+        self
+    }
+
     /// The same aircraft flown through a link that carries no command for a rudder: it stays where it is.
     pub fn leaving_rudder(mut self) -> GreyBox {
         self.rudder_is_left = true;

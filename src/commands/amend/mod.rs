@@ -20,7 +20,7 @@ use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::report::AmendmentReport;
-use crate::sysid::amend::{self, Added, Amended, Refused};
+use crate::sysid::amend::{self, Added, Amended, Prior, Refused};
 use crate::sysid::compare::{self, compare};
 use crate::sysid::diagnose::{self, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
@@ -59,6 +59,10 @@ pub struct Arguments {
     /// those that the flights bear out, the atmosphere unless they deny it.
     #[arg(long)]
     conventions: bool,
+    /// Take nothing from the model's coefficients but what is physically possible: all that it is linear in are free,
+    /// zeros too. For a model whose numbers are guesses.
+    #[arg(long)]
+    from_scratch: bool,
     /// Write effects into the model that the data refuse.
     #[arg(long)]
     accept_anyway: bool,
@@ -121,6 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let options = amend::Options {
         effects: wanted(arguments, &effects, &model, &flights)?,
         conventions: arguments.conventions,
+        prior: if arguments.from_scratch { Prior::Bounds } else { Prior::File },
         refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
         ..amend::Options::default()
     };

@@ -51,11 +51,23 @@ pub enum Refused {
     Kept,
 }
 
+/// What is known of the model's coefficients before the flights are seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Prior {
+    /// The values of its file, with their standard deviations.
+    #[default]
+    File,
+    /// What is physically possible.
+    Bounds,
+}
+
 /// What an amendment is asked for.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Effects to add, in this order; none to tune the prior only.
     pub effects: Vec<Added>,
+    /// What is known of the coefficients beforehand.
+    pub prior: Prior,
     /// What becomes of those that the data refuse.
     pub refused: Refused,
     /// Horizons of the free runs, s.
@@ -76,6 +88,7 @@ impl Default for Options {
         let horizons_s = vec![1.0, 2.0, JUDGED_AT_S, 10.0];
         Options {
             effects: Vec::new(),
+            prior: Prior::File,
             refused: Refused::Left,
             horizons_s,
             conventions: false,
@@ -132,6 +145,8 @@ pub fn amend(
     let judge = Judge { test: &test, horizons_s: &options.horizons_s };
     let ask = Ask { options, train: &train, judge: &judge, progress, begun: AtomicUsize::new(0) };
     let given = judge.scores(model);
+    let scratch = (options.prior == Prior::Bounds).then(|| parameters::from_scratch(model));
+    let model = scratch.as_ref().unwrap_or(model);
     let best = ask.selected(model)?;
     let (tuned, before) = best.tuned.clone();
     let (best, conventions) = match options.conventions {
@@ -148,6 +163,13 @@ pub fn amend(
     notes.extend(parameters::taken_over(&fit.model).map(|(of, by)| {
         format!("The shape constants of {of} stay as they were fitted without {by}, which can take up whatever they could.")
     }));
+    let held = parameters::held_at_zero(model);
+    if !held.is_empty() {
+        notes.push(format!(
+            "Held at zero, for their file states no standard deviation (sd): {}. --from-scratch frees them.",
+            held.join(", ")
+        ));
+    }
     notes.extend(judge::contradictions(&fit.parameters));
     let mut amendment = Amendment {
         schema: "greylag.amend/1",

@@ -20,7 +20,7 @@ mod result;
 mod shooting;
 mod story;
 
-pub use amendment::{Added, Amended, Options, Refused, amend, split};
+pub use amendment::{Added, Amended, Options, Prior, Refused, amend, split};
 pub use conventions::{Convention, Tried};
 pub use error::AmendError;
 pub use flight::Flight;

@@ -1,6 +1,6 @@
 //! The coefficients that a fit may change, with their priors, bounds and steps.
 
-use crate::model::GreyBox;
+use crate::model::{GreyBox, Named};
 use crate::physics::catalogue;
 use crate::physics::effects::Description;
 use crate::physics::inputs;
@@ -98,6 +98,29 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
             })
         })
         .collect()
+}
+
+/// `model` with nothing known of its coefficients beforehand but what is physically possible: the prior of every
+/// coefficient that the model is linear in is as wide as its bounds, zero or not.
+pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
+    let linear = model.linear();
+    let names: Vec<&str> = model.coefficients().iter().map(|c| c.name.as_str()).collect();
+    let range = |c: &Named| {
+        let place = names.iter().position(|name| *name == c.name)?;
+        let (id, short) = c.name.split_once('.').filter(|_| linear[place])?;
+        let (about, _) = describe(id)?;
+        let (low, high) = about.coefficients.iter().find(|k| k.name == short)?.bounds;
+        Some(high - low)
+    };
+    model.clone().with_widths(range)
+}
+
+/// Coefficients of `model` that no fit changes: they are zero and their file states no standard deviation.
+pub(super) fn held_at_zero(model: &GreyBox) -> Vec<String> {
+    let held = model.coefficients().iter().filter(|c| c.width() == 0.0 && c.sd.is_none());
+    let known =
+        held.filter(|c| c.name.split_once('.').is_some_and(|(id, _)| describe(id).is_some()));
+    known.map(|c| c.name.clone()).collect()
 }
 
 /// Effects of `model` whose shape constants are held, each with the curve that takes their shape over.
