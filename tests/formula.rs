@@ -203,3 +203,48 @@ fn no_text_makes_the_reader_panic() {
     // 3000 mutations take a second; examples/fuzz_effect_files.rs runs a million
     greylag::physics::formula::fuzz::run(3000, 7, &mut |_, _| ());
 }
+
+/// The shipped effect file with one text of it replaced.
+fn changed(from: &str, to: &str) -> Result<(), String> {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("params/effects/yaw_by_throttle.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    assert!(text.contains(from), "{from}");
+    greylag::physics::formula::file::parse(&text.replace(from, to)).map(drop)
+}
+
+const SHAPED: &str = "\n[parameters.w]\nvalue = 0.1\nbounds = [0.0, 0.5]\nunit = \"\"\nmeaning = \"m\"\n[[channels]]";
+
+#[test]
+fn a_constant_whose_bound_makes_the_formula_no_number_is_refused() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("params/effects/yaw_by_throttle.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    let with = |shape: &str, bounds: &str| {
+        let text = text.replacen("[[channels]]", &SHAPED.replace("[0.0, 0.5]", bounds), 1);
+        let line = text.lines().find(|l| l.starts_with("shape")).unwrap().to_owned();
+        greylag::physics::formula::file::parse(
+            &text.replace(&line, &format!("shape = \"{shape}\"")),
+        )
+    };
+    // a search may move w to 0, where alpha = 0 divides by it
+    let said = with("k*throttle*exp(-alpha/w)", "[0.0, 0.5]").unwrap_err();
+    assert!(said.contains("with w at its bound 0"), "{said}");
+    with("k*throttle*exp(-alpha/w)", "[0.01, 0.5]").unwrap();
+}
+
+#[test]
+fn a_unit_of_a_power_beyond_reason_is_an_error() {
+    assert!(changed("unit = \"N m\"", "unit = \"m^-32768\"").unwrap_err().contains("unit"));
+}
+
+#[test]
+fn a_formula_that_never_ends_is_refused() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("params/effects/yaw_by_throttle.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    let line = text.lines().find(|l| l.starts_with("shape")).unwrap().to_owned();
+    let long = format!("shape = \"k*throttle{}\"", "*throttle^4".repeat(2000));
+    let said = greylag::physics::formula::file::parse(&text.replace(&line, &long)).unwrap_err();
+    assert!(said.contains("operations"), "{said}");
+}

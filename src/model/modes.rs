@@ -72,6 +72,15 @@ pub fn rates(model: &GreyBox, trim: &Trim, altitude: f64) -> Rates {
 pub fn modes(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Vec<Mode>, TrimError> {
     let trim = Trim::level(model, airspeed, altitude)?;
     let a = rates(model, &trim, altitude).a;
+    // the search for eigenvalues does not end on what is no number
+    if !a.iter().all(|x| x.is_finite()) {
+        return Err(TrimError {
+            model: model.name.clone(),
+            roll_deg: 0.0,
+            pitch_deg: trim.state.pitch.to_degrees(),
+            airspeed_mps: airspeed,
+        });
+    }
     let part =
         |places: [usize; 4]| eigenvalues(&Matrix4::from_fn(|i, j| a[(places[i], places[j])]));
     let mut all = longitudinal(&part(LONGITUDINAL));

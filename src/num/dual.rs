@@ -118,7 +118,9 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
-        self.chain(root, T::from_f64(0.5) / root)
+        // at zero the slope of what stands under the root decides, and 0 · ∞ would be no number
+        let slope = T::where_less(T::zero(), root, T::from_f64(0.5) / root, T::zero());
+        self.chain(root, slope)
     }
     #[inline(always)]
     fn exp(self) -> Self {

@@ -10,6 +10,8 @@ use crate::physics::formula::{Variable, Written};
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
+/// Characters of a function: JSBSim reads it once, but a formula nested a few times deeper has a thousand times more.
+const LONGEST: usize = 200_000;
 /// Metres per foot.
 const FT: f64 = 0.3048;
 
@@ -108,7 +110,14 @@ fn xml(of: &Expression, values: &[f64]) -> Result<String, String> {
         Node::Table(x, points) => Ok(table(&xml(x, values)?, points)),
         Node::Call(function, all) => {
             let all = all.iter().map(|e| xml(e, values)).collect::<Result<Vec<_>, _>>()?;
-            Ok(call(*function, &all))
+            let written = call(*function, &all);
+            match written.len() > LONGEST {
+                true => Err(format!(
+                    "the formula takes more than {LONGEST} characters as a function of JSBSim, which repeats what \
+                     stands inside smoothstep, tanh, sign and deadband; nest them less"
+                )),
+                false => Ok(written),
+            }
         }
     }
 }
@@ -151,8 +160,9 @@ fn call(function: Function, all: &[String]) -> String {
         }
         Function::Smoothstep => smoothstep(&all[0], &all[1], &all[2]),
         Function::Deadband => {
-            let held = element("min", &[all[0].clone(), all[1].clone()]);
-            let low = element("product", &[number(-1.0), all[1].clone()]);
+            let width = element("abs", &[all[1].clone()]);
+            let held = element("min", &[all[0].clone(), width.clone()]);
+            let low = element("product", &[number(-1.0), width]);
             element("difference", &[all[0].clone(), element("max", &[held, low])])
         }
     }

@@ -20,14 +20,30 @@ impl Terms<f64> for Finite {
     }
 }
 
-/// Refuses an effect that is no number somewhere: at the ends and in the middle of what its variables reach.
+/// Refuses an effect that is no number somewhere: at the ends and in the middle of what its variables reach, with its
+/// shape constants as the file has them and with each of them at its bounds, up to which a fit may move it.
 ///
 /// # Errors
 /// The place, and what to do.
 pub fn check(effect: &Written) -> Result<(), String> {
-    let variables = effect.variables();
     let linear = effect.about.coefficients.len() - effect.about.shape;
-    let shape = &effect.values[linear..];
+    let own = &effect.values[linear..];
+    everywhere(effect, own)?;
+    for (k, constant) in effect.about.coefficients[linear..].iter().enumerate() {
+        for bound in [constant.bounds.0, constant.bounds.1] {
+            let mut moved = own.to_vec();
+            moved[k] = bound;
+            everywhere(effect, &moved).map_err(|why| {
+                format!("with {} at its bound {bound}, {why}; or narrow its bounds", constant.name)
+            })?;
+        }
+    }
+    Ok(())
+}
+
+/// The same for given shape constants.
+fn everywhere(effect: &Written, shape: &[f64]) -> Result<(), String> {
+    let variables = effect.variables();
     let tried = 1usize << variables.len().min(ALL_CORNERS);
     for corner in 0..tried {
         // a bit a variable; those behind the twelfth go with the first ones

@@ -88,7 +88,7 @@ fn exponent(text: &str) -> Option<(i16, &str)> {
         [('¹', 1), ('²', 2), ('³', 3), ('⁴', 4), ('⁵', 5), ('⁶', 6), ('⁷', 7), ('⁸', 8)];
     if let Some(digits) = text.strip_prefix('^') {
         let end = digits.find(|c: char| !c.is_ascii_digit() && c != '-').unwrap_or(digits.len());
-        let power: i16 = digits[..end].parse().ok().filter(|p| i16::abs(*p) <= 8)?;
+        let power: i16 = digits[..end].parse().ok().filter(|p| (-8..=8).contains(p))?;
         return Some((power, &digits[end..]));
     }
     let (sign, raised) = text.strip_prefix('⁻').map_or((1, text), |behind| (-1, behind));

@@ -364,7 +364,9 @@ fn starts(
     let mut first = values.to_vec();
     for k in 0..linear {
         if first[k] == 0.0 {
-            first[k] = widths[k].min(parameters[k].bounds[1].abs().max(f64::MIN_POSITIVE));
+            let [low, high] = parameters[k].bounds;
+            // towards the side on which there is more room
+            first[k] = if high >= -low { widths[k].min(high) } else { (-widths[k]).max(low) };
         }
     }
     let mut all = vec![first.clone()];
@@ -420,7 +422,7 @@ fn checked_parameter(name: &str, p: &Parameter) -> Result<(), String> {
         return Err(format!("parameters.{name} has the name of a variable of flight; rename it"));
     }
     let [low, high] = p.bounds;
-    if !(low.is_finite() && high.is_finite() && low < high) {
+    if !((high - low).is_finite() && low < high) {
         return Err(format!("parameters.{name}.bounds must be two numbers, the lower first"));
     }
     if !(low..=high).contains(&p.value) {

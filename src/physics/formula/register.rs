@@ -46,7 +46,7 @@ pub fn load(path: &Path) -> Result<Vec<&'static Written>, FileError> {
         what,
         path: path.into(),
         why,
-        example: "../examples/yaw_by_throttle.toml",
+        example: "../effects/yaw_by_throttle.toml",
     };
     let mut files: Vec<PathBuf> = vec![path.into()];
     if path.is_dir() {

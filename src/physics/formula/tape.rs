@@ -11,6 +11,9 @@ use crate::physics::{Channel, Point};
 /// Numbers that wait below the top.
 const DEPTH: usize = 12;
 
+/// Operations and multiplied variables of an effect: what a model can carry in every step.
+const LONGEST: usize = 4000;
+
 /// One operation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Operation {
@@ -86,7 +89,7 @@ impl Tape {
         }
         self.operations.push(Operation::Report(index, channel));
         self.depth -= 1;
-        Ok(())
+        self.checked_length()
     }
 
     /// Adds the evaluation of a factor that several parts share.
@@ -108,6 +111,16 @@ impl Tape {
     /// Whether it has none.
     pub fn is_empty(&self) -> bool {
         self.operations.is_empty()
+    }
+
+    fn checked_length(&self) -> Result<(), String> {
+        let length = self.operations.len() + self.variables.len();
+        match length > LONGEST {
+            true => Err(format!(
+                "the formulas take more than {LONGEST} operations; divide them into several effects"
+            )),
+            false => Ok(()),
+        }
     }
 
     fn deeper(&mut self) -> Result<(), String> {

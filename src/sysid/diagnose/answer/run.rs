@@ -86,7 +86,7 @@ pub fn diagnose(
 }
 
 /// Whether every id is one of the catalogue.
-fn known(ids: &[String]) -> Result<(), DiagnoseError> {
+pub fn known(ids: &[String]) -> Result<(), DiagnoseError> {
     match ids.iter().find(|id| physics::catalogue::describe(id).is_none()) {
         None => Ok(()),
         Some(id) => Err(DiagnoseError::UnknownEffect { id: id.clone() }),

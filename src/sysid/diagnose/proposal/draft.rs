@@ -42,12 +42,12 @@ pub fn formula(terms: &[Term]) -> String {
         let factor = if t.form.of_air { format!("{}*", t.form.factor()) } else { String::new() };
         format!("{} = k*{factor}{}", channel_name(t.form.channel), t.form.shape.text(None))
     };
-    terms.iter().map(one).collect::<Vec<_>>().join(" + ")
+    terms.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
 /// The effect file of `terms`, thresholds free; `from` says of which flights.
 pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> String {
-    let quoted = |text: &str| format!("{:?}", text);
+    let quoted = |text: &str| toml::Value::from(text).to_string();
     let mut text = format!(
         "# Proposed by `greylag propose`. `greylag amend --effect` takes it; nothing flies with it until somebody has\n\
          # looked at it and written status = \"accepted\".\n\
@@ -107,7 +107,9 @@ mod tests {
             term(false, Shape::Linear(Variable::Throttle), 0.53),
             term(true, Shape::Beyond(Variable::Beta, 0.07), -0.01),
         ];
-        let text = file(&terms, "It \"yaws\".", &["yaw = k*throttle^2".into()], "a.csv");
+        // a name as macOS writes it, which Rust and TOML escape in different ways
+        let text =
+            file(&terms, "It \"yaws\".", &["yaw = k*throttle^2".into()], "e\u{301}te\u{301}.csv");
         let effect = reader::parse(&text).unwrap_or_else(|why| panic!("{why}\n{text}"));
         assert_eq!(effect.status, Status::Proposed);
         assert_eq!(effect.about.id, "proposed_yaw_by_throttle_beta");

@@ -11,18 +11,22 @@ fn trend(form: &Form) -> String {
     match form.shape {
         // a positive variable: linear, square and threshold all grow with it
         Shape::Linear(v) | Shape::Square(v) | Shape::Above(v, _) if positive(&v) => {
-            format!("grows {}", v.name())
+            format!("grows {}", plain(v))
         }
         Shape::Linear(v) | Shape::SignedSquare(v) | Shape::Beyond(v, _) => {
-            format!("odd {}", v.name())
+            format!("odd {}", plain(v))
         }
-        Shape::Magnitude(v) | Shape::Square(v) => format!("even {}", v.name()),
-        Shape::Above(v, _) => format!("one-sided {}", v.name()),
-        Shape::Product(v, w) if positive(&v) || positive(&w) => {
-            format!("odd {} grows {}", v.name(), w.name())
+        Shape::Magnitude(v) | Shape::Square(v) => format!("even {}", plain(v)),
+        Shape::Above(v, _) => format!("one-sided {}", plain(v)),
+        Shape::Product(v, w) => {
+            let one = |v: Variable| {
+                format!("{} {}", if positive(&v) { "grows" } else { "odd" }, plain(v))
+            };
+            let mut both = [one(v), one(w)];
+            both.sort();
+            both.join(" ")
         }
-        Shape::Product(v, w) => format!("odd {} odd {}", v.name(), w.name()),
-        Shape::ByMagnitude(v, w) => format!("odd {} even {}", v.name(), w.name()),
+        Shape::ByMagnitude(v, w) => format!("odd {} even {}", plain(v), plain(w)),
     }
 }
 
@@ -38,14 +42,18 @@ pub fn grades(best: &Form, alike: &[Form]) -> Grades {
     }
 }
 
-/// The variables of the shape: a rate is the same one whether it is divided by the airspeed or not.
-fn sorted(form: &Form) -> Vec<&'static str> {
-    let plain = |v: Variable| match v {
+/// The name of a variable: a rate is the same one whether it is divided by the airspeed or not.
+fn plain(v: Variable) -> &'static str {
+    match v {
         Variable::RollRateHat => "p",
         Variable::PitchRateHat => "q",
         Variable::YawRateHat => "r",
         v => v.name(),
-    };
+    }
+}
+
+/// The variables of the shape.
+fn sorted(form: &Form) -> Vec<&'static str> {
     let mut all: Vec<&str> = form.shape.variables().into_iter().map(plain).collect();
     all.sort_unstable();
     all
@@ -111,6 +119,9 @@ mod tests {
         assert!(alone.form && alone.trend && alone.variables && alone.channel);
         let square = grades(&best, &[form(false, Shape::Square(Variable::Throttle))]);
         assert!(!square.form && square.trend && square.variables);
+        let [v, w] = [Variable::Throttle, Variable::Beta];
+        let turned = [form(true, Shape::Product(v, w)), form(true, Shape::Product(w, v))];
+        assert!(grades(&turned[0], &turned[1..]).trend);
         let other = grades(&best, &[form(true, Shape::Linear(Variable::Beta))]);
         assert!(!other.trend && !other.variables && other.channel);
         assert_eq!(

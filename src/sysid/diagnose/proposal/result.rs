@@ -26,7 +26,7 @@ pub struct Alternative {
     pub evidence: f64,
 }
 
-/// A formula of the front: the best of its size.
+/// A step of the search: the formula with one term more.
 #[derive(Clone, Debug, Serialize)]
 pub struct Rung {
     /// Its formula.
@@ -56,6 +56,17 @@ pub struct HeldOut {
     pub threshold: f64,
 }
 
+/// What a search was asked for.
+#[derive(Clone, Debug, Serialize)]
+pub struct Settings {
+    /// Seed of everything that is drawn.
+    pub seed: u64,
+    /// Bootstrap draws under the null hypothesis that set the thresholds.
+    pub nulls: usize,
+    /// Ids that were left out of the catalogue.
+    pub without: Vec<String>,
+}
+
 /// What was found.
 #[derive(Clone, Debug, Serialize)]
 pub struct Proposal {
@@ -69,7 +80,7 @@ pub struct Proposal {
     pub verdict: Verdict,
     /// The answer in plain sentences.
     pub sentences: Vec<String>,
-    /// Formulas by size, each the best of its own.
+    /// The formulas of the search, each with one term more than the one before.
     pub front: Vec<Rung>,
     /// Forms of the first term that these flights cannot tell from it.
     pub alike: Vec<Alternative>,
@@ -79,6 +90,10 @@ pub struct Proposal {
     pub held_out: Option<HeldOut>,
     /// Forms that were tried.
     pub tried: usize,
+    /// Why the formula that was found is not proposed; empty if it is.
+    pub refused: Vec<String>,
+    /// What the search was asked for.
+    pub settings: Settings,
     /// Best evidence in flights that lack nothing, over all forms.
     pub nulls: Vec<f64>,
     /// The effect file, if one is proposed.

@@ -1,0 +1,68 @@
+//! The test of a formula on flights that were not searched.
+
+use super::draft::Term;
+use super::forward::ORDER;
+use super::result::HeldOut;
+use crate::model::GreyBox;
+use crate::physics::formula::Written;
+use crate::sysid::diagnose::Options;
+use crate::sysid::diagnose::regression::catalogue::Entry;
+use crate::sysid::diagnose::regression::rank::{Draw, quadratic};
+use crate::sysid::diagnose::search::checks;
+use crate::sysid::diagnose::search::nulls;
+use crate::sysid::diagnose::search::round::{Problem, Round};
+use crate::sysid::diagnose::search::stepwise::HELD_OUT;
+
+/// What `terms`, their coefficients as they are, take of what `model` leaves in flights that were not searched.
+pub(super) fn tested(
+    problem: &Problem,
+    model: &GreyBox,
+    terms: &[Term],
+    options: &Options,
+    flights: Vec<String>,
+) -> Option<HeldOut> {
+    let effects: Vec<&'static Written> =
+        terms.iter().filter_map(|t| t.form.effect().ok()).collect();
+    let entries: Vec<Entry> =
+        effects.iter().map(|e| Entry { about: e.about, operator: false }).collect();
+    let round = Round::new(problem, model.clone(), &entries)?;
+    let grams = round.projected.grams();
+    let weight =
+        |id: &str| terms.iter().zip(&effects).find(|(_, e)| e.about.id == id).map(|(t, _)| t.value);
+    let weights: Vec<(usize, f64)> =
+        round.trials.iter().filter_map(|t| Some((t.points[0].free[0].1, weight(t.id)?))).collect();
+    let square = quadratic(&weights, &weights, &grams.total);
+    let fall =
+        |draw: &Draw| 2.0 * weights.iter().map(|(c, w)| w * draw.total[*c]).sum::<f64>() - square;
+    let measured = fall(&Draw::measured(&grams));
+    let mut chance: Vec<f64> =
+        (0..options.nulls).map(|k| fall(&nulls::draw(&round.projected, options.seed, k))).collect();
+    chance.sort_by(f64::total_cmp);
+    let channels = std::array::from_fn(|c| terms.iter().any(|t| t.form.channel == ORDER[c]));
+    let left = |model: GreyBox| Some(checks::excess(&Round::new(problem, model, &[])?, &channels));
+    let mut with = model.clone();
+    for term in terms {
+        with.join_most(&term.form.id(), &[term.value]).ok()?;
+    }
+    let removed = 1.0 - left(with)? / left(model.clone())?.max(1.0);
+    // nothing is gained by a fall below zero
+    let threshold = chance.last().copied().unwrap_or(f64::INFINITY).max(0.0);
+    Some(HeldOut { flights, removed, fall: measured, threshold })
+}
+
+/// Why flights that were not searched do not bear a formula out.
+pub(super) fn objection(tested: &HeldOut) -> Option<String> {
+    if tested.fall <= tested.threshold {
+        return Some(format!(
+            "on flights that were not searched it takes no more than chance does (fall {:.0}, by chance {:.0})",
+            tested.fall, tested.threshold
+        ));
+    }
+    (tested.removed < HELD_OUT || tested.removed.is_nan()).then(|| {
+        format!(
+            "on flights that were not searched it removes {:.1} % of the error beyond noise, under {:.0} %",
+            100.0 * tested.removed,
+            100.0 * HELD_OUT
+        )
+    })
+}
