@@ -7,6 +7,7 @@ use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
 
 use crate::commands::bar::Bar;
+use crate::commands::distinct::distinct;
 use crate::commands::effect_files::named_effects;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
@@ -61,6 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     for path in arguments.json.iter().chain(&arguments.report) {
         files::writable(path, overwrite)?;
     }
+    distinct(&arguments.logs.paths, &[])?;
     let model = GreyBox::load(&shipped(&arguments.model))?;
     let Intake { flights, mut notes, in_doubt } =
         arguments.logs.take_in(&model, ActuatorClock::AsRecorded)?;

@@ -15,6 +15,7 @@ mod effects;
 #[cfg(feature = "sitl")]
 mod design;
 mod diagnose;
+mod distinct;
 #[cfg(feature = "sitl")]
 mod evaluate;
 #[cfg(feature = "sitl")]

@@ -7,6 +7,7 @@ use anyhow::{Result, bail};
 use comfy_table::{CellAlignment, Table};
 
 use crate::commands::bar::Bar;
+use crate::commands::distinct::distinct;
 use crate::commands::effect_files::named_effects;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
@@ -101,9 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// Logs to search in, logs to test on: the last one if none are named.
 fn divided(arguments: &Arguments) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let (logs, held) = (&arguments.logs.paths, &arguments.hold_out);
-    if let Some(twice) = held.iter().find(|p| logs.contains(p)) {
-        bail!("{} cannot be searched and held out at once; name it in one place", twice.display());
-    }
+    distinct(logs, held)?;
     match (&logs[..], &held[..]) {
         ([first @ .., last], []) if !first.is_empty() => Ok((first.to_vec(), vec![last.clone()])),
         ([only], []) => bail!(

@@ -13,6 +13,7 @@ use places::{Places, hashed};
 use tables::print;
 
 use crate::commands::bar::Bar;
+use crate::commands::distinct::distinct;
 use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
@@ -86,9 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::writable(path, overwrite)?;
     }
     let places = Places::new(&path, &arguments.out, overwrite)?;
-    if let Some(twice) = arguments.hold_out.iter().find(|p| arguments.logs.paths.contains(p)) {
-        bail!("{} cannot be fitted to and held out at once; name it in one place", twice.display());
-    }
+    distinct(&arguments.logs.paths, &arguments.hold_out)?;
     let effects = named_effects(&arguments.effects)?;
     for id in &effects {
         if catalogue::describe(id).is_none() {

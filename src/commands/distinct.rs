@@ -1,0 +1,63 @@
+//! Logs that hold the same flight: counted twice, or judged by what was fitted.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+
+use crate::model::residual::hash;
+
+/// Refuses a flight that is named twice in `fitted`, or in `fitted` and in `held`, by its content: a name can be
+/// spelled in several ways, and a file copied.
+///
+/// # Errors
+/// The two names. A file that cannot be read is left to whoever reads it.
+pub fn distinct(fitted: &[PathBuf], held: &[PathBuf]) -> Result<()> {
+    let known = |paths: &[PathBuf]| -> Vec<(PathBuf, String)> {
+        let content = |p: &PathBuf| Some((p.clone(), hash(&std::fs::read(p).ok()?)));
+        paths.iter().filter_map(content).collect()
+    };
+    let (fitted, held) = (known(fitted), known(held));
+    for (k, (path, content)) in fitted.iter().enumerate() {
+        if let Some(other) = named(&fitted[..k], content) {
+            bail!("{}, so it would count twice; name it once", same(other, path));
+        }
+        if let Some(other) = named(&held, content) {
+            bail!(
+                "{}, which cannot be fitted to and held out at once; name it in one place",
+                same(path, other)
+            );
+        }
+    }
+    Ok(())
+}
+
+fn named<'a>(all: &'a [(PathBuf, String)], content: &str) -> Option<&'a Path> {
+    all.iter().find(|(_, other)| other == content).map(|(path, _)| path.as_path())
+}
+
+fn same(one: &Path, other: &Path) -> String {
+    format!("{} and {} hold the same flight", one.display(), other.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flight_is_known_by_its_content() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let (a, copy, b) = (file("a.csv", "1"), file("copy.csv", "1"), file("b.csv", "2"));
+        distinct(&[a.clone(), b.clone()], &[]).unwrap();
+        distinct(std::slice::from_ref(&a), std::slice::from_ref(&b)).unwrap();
+        let twice = distinct(&[a.clone(), b.clone(), copy.clone()], &[]).unwrap_err().to_string();
+        assert!(twice.contains("a.csv") && twice.contains("copy.csv") && twice.contains("twice"));
+        let spelled = folder.path().join("./a.csv");
+        assert!(distinct(&[a, b], &[spelled]).unwrap_err().to_string().contains("held out"));
+        distinct(&["missing.csv".into()], &["missing.csv".into()]).unwrap();
+    }
+}
