@@ -244,7 +244,10 @@ fn a_formula_that_never_ends_is_refused() {
         .join("params/effects/yaw_by_throttle.toml");
     let text = std::fs::read_to_string(path).unwrap();
     let line = text.lines().find(|l| l.starts_with("shape")).unwrap().to_owned();
-    let long = format!("shape = \"k*throttle{}\"", "*throttle^4".repeat(2000));
-    let said = greylag::physics::formula::file::parse(&text.replace(&line, &long)).unwrap_err();
+    // each of a hundred parts multiplies by 268 variables
+    let long = format!("shape = \"(k{})*throttle{}\"", "+k".repeat(99), "*alpha^4".repeat(67));
+    let four = format!("\n[[channels]]\nchannel = \"yaw\"\n{long}\n").repeat(4);
+    let said =
+        greylag::physics::formula::file::parse(&(text.replace(&line, &long) + &four)).unwrap_err();
     assert!(said.contains("operations"), "{said}");
 }
