@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::process;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, Once};
@@ -10,7 +11,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::commands::status::INTERRUPTED;
-use crate::sysid::progress::Stage;
+use crate::sysid::progress::{Cancelled, Stage, said};
 
 /// Steps of a whole bar.
 const STEPS: u64 = 1000;
@@ -28,15 +29,15 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// A bar for a work that begins; from here on Ctrl-C ends the work, a second one the program.
+    /// A bar for a long task that begins; from here on Ctrl-C ends the task, a second one the program.
     pub fn new() -> Bar {
         LISTENING.call_once(|| {
-            let pressed = || {
+            let press = || {
                 if PRESSED.fetch_add(1, Ordering::Relaxed) > 0 {
                     process::exit(INTERRUPTED.into());
                 }
             };
-            if let Err(error) = ctrlc::set_handler(pressed) {
+            if let Err(error) = ctrlc::set_handler(press) {
                 tracing::warn!("Ctrl-C ends the program at once: {error}");
             }
         });
@@ -52,7 +53,7 @@ impl Bar {
         Bar { bar, last: Mutex::default() }
     }
 
-    /// Shows a stage; ends the work if Ctrl-C was pressed.
+    /// Shows a stage; ends the task if Ctrl-C was pressed.
     pub fn hear(&self, stage: Stage<'_>) -> ControlFlow<()> {
         match &self.bar {
             Some(bar) => {
@@ -61,10 +62,15 @@ impl Bar {
             }
             None => self.line(stage.doing),
         }
-        match PRESSED.load(Ordering::Relaxed) {
-            0 => ControlFlow::Continue(()),
-            _ => ControlFlow::Break(()),
-        }
+        pressed()
+    }
+
+    /// An error if Ctrl-C was pressed since the last stage: what comes next writes files.
+    ///
+    /// # Errors
+    /// Ctrl-C was pressed.
+    pub fn go_on(&self) -> Result<(), Cancelled> {
+        said(pressed())
     }
 
     /// Writes a stage that differs from the one before.
@@ -74,6 +80,20 @@ impl Bar {
             eprintln!("{doing}");
             doing.clone_into(&mut last);
         }
+    }
+}
+
+/// Shares of a bar: of the work, then of the report, if one is asked for.
+pub fn shares(report: Option<&Path>) -> [[f64; 2]; 2] {
+    let end = if report.is_some() { 0.9 } else { 1.0 };
+    [[0.0, end], [end, 1.0]]
+}
+
+/// Whether the work shall go on.
+fn pressed() -> ControlFlow<()> {
+    match PRESSED.load(Ordering::Relaxed) {
+        0 => ControlFlow::Continue(()),
+        _ => ControlFlow::Break(()),
     }
 }
 

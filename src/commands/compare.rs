@@ -35,6 +35,10 @@ pub struct Arguments {
     /// Write the report, one HTML page.
     #[arg(long)]
     report: Option<PathBuf>,
+    /// Take the deflections at the times that the log has for them, as `diagnose`, `amend` and the workbench do;
+    /// without it a delay of the log's actuator clock that is beyond doubt is put right.
+    #[arg(long)]
+    recorded_clock: bool,
     /// Seed of the bootstrap intervals.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -54,11 +58,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .iter()
         .map(|path| GreyBox::load(&shipped(path)).map_err(Into::into))
         .collect::<Result<Vec<_>>>()?;
-    let Intake { flights, mut notes, mut in_doubt } =
-        arguments.logs.take_in(&models[0], ActuatorClock::Estimated)?;
+    let clock = match arguments.recorded_clock {
+        true => ActuatorClock::AsRecorded,
+        false => ActuatorClock::Estimated,
+    };
+    let Intake { flights, mut notes, mut in_doubt } = arguments.logs.take_in(&models[0], clock)?;
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let bar = Bar::new();
     let mut comparison = compare(&models, &flights, &options, &|stage| bar.hear(stage))?;
+    bar.go_on()?;
     drop(bar);
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();
     notes.append(&mut comparison.notes);

@@ -17,6 +17,9 @@ pub struct Arguments {
 
 /// Writes the completions of `command`.
 pub fn run(arguments: &Arguments, command: &mut clap::Command) -> Result<ExitCode> {
-    clap_complete::generate(arguments.shell, command, "greylag", &mut std::io::stdout());
+    // not straight to standard output, whose reader may have gone: the generator panics then
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, command, "greylag", &mut script);
+    print!("{}", String::from_utf8(script)?);
     Ok(ExitCode::SUCCESS)
 }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
 
-use crate::commands::bar::Bar;
+use crate::commands::bar::{Bar, shares};
 use crate::commands::distinct::distinct;
 use crate::commands::effect_files::named_effects;
 use crate::commands::files::{self, shipped};
@@ -18,6 +18,7 @@ use crate::sysid::compare::{self, compare};
 use crate::sysid::diagnose::{Candidate, Diagnosis, Options, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::progress::{Progress, Stage, part};
 
 /// Candidates in the table.
 const ROWS: usize = 12;
@@ -74,21 +75,30 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         ..Options::default()
     };
     let bar = Bar::new();
-    let mut diagnosis = diagnose(&model, &flights, &options, &|stage| bar.hear(stage))?;
-    drop(bar);
+    let hear = |stage: Stage<'_>| bar.hear(stage);
+    let [searching, drawing] = shares(arguments.report.as_deref());
+    let mut diagnosis = diagnose(&model, &flights, &options, &part(&hear, searching))?;
     for flight in &flights {
         notes.extend(flight.notes.iter().map(|note| format!("{}: {note}", flight.name)));
     }
     notes.append(&mut diagnosis.notes);
     diagnosis.notes = notes;
+    // drawn before anything is written, so that Ctrl-C leaves nothing behind
+    let drawn = arguments.report.as_ref().map(|path| {
+        let page = page(arguments, &diagnosis, &model, &flights, &part(&hear, drawing))?;
+        Ok::<_, anyhow::Error>((path, page))
+    });
+    let drawn = drawn.transpose()?;
+    bar.go_on()?;
+    drop(bar);
     if !files::is_stdout(arguments.json.as_deref()) {
         print(&diagnosis);
     }
     if let Some(path) = &arguments.json {
         files::write(path, &(serde_json::to_string_pretty(&diagnosis)? + "\n"), overwrite)?;
     }
-    if let Some(path) = &arguments.report {
-        files::write(path, &page(arguments, &diagnosis, &model, &flights)?, overwrite)?;
+    if let Some((path, page)) = drawn {
+        files::write(path, &page, overwrite)?;
     }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
@@ -99,10 +109,10 @@ fn page(
     diagnosis: &Diagnosis,
     model: &GreyBox,
     flights: &[Reconstruction],
+    progress: &Progress,
 ) -> Result<String> {
     let models = std::slice::from_ref(model);
-    let failing =
-        compare(models, flights, &compare::Options::default(), &crate::sysid::progress::unheard)?;
+    let failing = compare(models, flights, &compare::Options::default(), progress)?;
     let report = DiagnosisReport {
         title: format!("What {} lacks", diagnosis.model),
         diagnosis,

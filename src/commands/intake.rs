@@ -10,6 +10,7 @@ use crate::logs::{self, csv::Tolerance};
 use crate::model::GreyBox;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
+use crate::workbench;
 
 /// Which logs, read how.
 #[derive(Clone, clap::Args)]
@@ -68,16 +69,20 @@ impl Reading {
     /// If the mapping cannot be read.
     pub fn options(&self) -> Result<logs::Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
-        let tolerance = if self.lenient { Tolerance::Lenient } else { Tolerance::Strict };
-        Ok(logs::Options { tolerance, mapping })
+        Ok(logs::Options { tolerance: self.tolerance(), mapping })
     }
 
-    /// The options as a command line has them, each with a space before it.
-    pub fn words(&self) -> String {
-        let mapping = self.mapping.iter().map(|m| format!(" --mapping {}", m.display()));
-        let lenient = self.lenient.then(|| " --lenient".to_owned());
-        let despite = self.despite_problems.then(|| " --despite-problems".to_owned());
-        mapping.chain(lenient).chain(despite).collect()
+    /// The same for a workbench.
+    pub fn of_workbench(&self) -> workbench::Reading {
+        workbench::Reading {
+            mapping: self.mapping.clone(),
+            tolerance: self.tolerance(),
+            despite_problems: self.despite_problems,
+        }
+    }
+
+    fn tolerance(&self) -> Tolerance {
+        if self.lenient { Tolerance::Lenient } else { Tolerance::Strict }
     }
 
     /// As [`LogArguments::take_in`], of `paths`.
@@ -92,7 +97,7 @@ impl Reading {
     ) -> Result<Intake> {
         let reading = self.options()?;
         let mut intake = Intake::default();
-        for (k, (path, name)) in paths.iter().zip(names(paths)).enumerate() {
+        for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {
             eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
             match self.reconstruct_one(path, &name, &reading, model, clock) {
                 Ok((flight, findings)) => {
@@ -134,18 +139,4 @@ impl Reading {
             .with_context(|| format!("cannot use flight log {}", path.display()))?;
         Ok((flight, log.findings))
     }
-}
-
-/// What the flights are called: the file's name, or the whole path where two share it.
-fn names(logs: &[PathBuf]) -> Vec<String> {
-    let short = |path: &PathBuf| {
-        path.file_name().map_or(path.display().to_string(), |n| n.to_string_lossy().into_owned())
-    };
-    let all: Vec<String> = logs.iter().map(short).collect();
-    let alone = |name: &String| all.iter().filter(|n| *n == name).count() == 1;
-    let pick = |(path, name): (&PathBuf, &String)| match alone(name) {
-        true => name.clone(),
-        false => path.display().to_string(),
-    };
-    logs.iter().zip(&all).map(pick).collect()
 }

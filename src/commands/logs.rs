@@ -26,12 +26,13 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Say what a log holds, at which rates, with which gaps, and what it is missing for which
-    /// purpose. Exit status 3 when something makes its numbers wrong.
+    /// Say what logs hold, at which rates, with which gaps, and what each is missing for which
+    /// purpose. Exit status 3 when something makes the numbers of one wrong.
     Info {
         /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
-        file: PathBuf,
-        /// As JSON.
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        /// As JSON: an object, of several logs a list of them.
         #[arg(long)]
         json: bool,
         #[command(flatten)]
@@ -88,13 +89,16 @@ impl Reading {
 /// Does what the verb says.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.verb {
-        Verb::Info { file, json, reading } => {
-            let info = Info::of(&crate::logs::inspect(file, &reading.options()?)?);
-            match json {
-                true => println!("{}", serde_json::to_string_pretty(&info)?),
-                false => print(&info),
+        Verb::Info { files, json, reading } => {
+            let options = reading.options()?;
+            let of = |file: &PathBuf| Ok(Info::of(&crate::logs::inspect(file, &options)?));
+            let all = files.iter().map(of).collect::<Result<Vec<Info>>>()?;
+            match (json, &all[..]) {
+                (true, [only]) => println!("{}", serde_json::to_string_pretty(only)?),
+                (true, all) => println!("{}", serde_json::to_string_pretty(all)?),
+                (false, all) => print_all(all),
             }
-            Ok(status(&info))
+            Ok(status(all.iter().map(Info::severity).max()))
         }
         Verb::Convert { input, output, force, reading } => {
             files::writable(output, (*force).into())?;
@@ -138,11 +142,24 @@ fn convert(log: &Log, output: &Path, force: bool) -> Result<ExitCode> {
     csv_file(&log.flight, output, force)?;
     log.findings.iter().for_each(|finding| eprintln!("{finding}"));
     println!("{} rows of {} in {}", log.flight.samples.len(), log.flight.name, output.display());
-    Ok(status(&Info::of(log)))
+    Ok(status(Some(Info::of(log).severity())))
 }
 
-fn status(info: &Info) -> ExitCode {
-    if info.severity() == Severity::Problem { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS }
+/// What the worst of the findings makes the exit status.
+fn status(worst: Option<Severity>) -> ExitCode {
+    match worst {
+        Some(Severity::Problem) => ExitCode::from(IN_DOUBT),
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+fn print_all(all: &[Info]) {
+    for (k, info) in all.iter().enumerate() {
+        if k > 0 {
+            println!();
+        }
+        print(info);
+    }
 }
 
 fn print(info: &Info) {

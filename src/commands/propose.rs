@@ -11,17 +11,15 @@ use crate::commands::distinct::distinct;
 use crate::commands::effect_files::named_effects;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::sysid::diagnose::{Options, Proposal, propose};
 use crate::sysid::flight_path::ActuatorClock;
 
-/// Exit status when no formula is proposed.
-const NOTHING: u8 = 2;
-
 /// Options of `greylag propose`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit status: 0 a formula is proposed, 1 the search could not be made, 2 none is proposed: the output says why."
+    after_help = "Exit status: 0 a formula is proposed, 1 the search could not be made, 3 none is proposed, or a log was left out or holds what makes the figures wrong: the output says which."
 )]
 pub struct Arguments {
     /// The model file.
@@ -68,8 +66,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let with = named_effects(&arguments.effects)?;
     let (search, test) = divided(arguments)?;
     let clock = ActuatorClock::AsRecorded;
-    let Intake { flights, mut notes, .. } = arguments.logs.of(search).take_in(&model, clock)?;
+    let Intake { flights, mut notes, mut in_doubt } =
+        arguments.logs.of(search).take_in(&model, clock)?;
     let tests = arguments.logs.of(test).take_in(&model, clock)?;
+    in_doubt |= tests.in_doubt;
     notes.extend(tests.notes);
     let options = Options {
         seed: arguments.seed,
@@ -81,6 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let bar = Bar::new();
     let mut proposal =
         propose(&model, &flights, &tests.flights, &options, &|stage| bar.hear(stage))?;
+    bar.go_on()?;
     drop(bar);
     notes.append(&mut proposal.notes);
     proposal.notes = notes;
@@ -88,7 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.json {
         files::write(path, &(serde_json::to_string_pretty(&proposal)? + "\n"), overwrite)?;
     }
-    let Some(effect) = &proposal.effect else { return Ok(ExitCode::from(NOTHING)) };
+    let Some(effect) = &proposal.effect else { return Ok(ExitCode::from(IN_DOUBT)) };
     match &arguments.out {
         Some(path) => {
             files::write(path, effect, overwrite)?;
@@ -96,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
         None => println!("\n{effect}"),
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
 /// Logs to search in, logs to test on: the last one if none are named.

@@ -10,6 +10,7 @@ use crate::commands::files::shipped;
 use crate::commands::intake::Reading;
 use crate::workbench::Given;
 use crate::workbench::server::{random_token, serve};
+use crate::workbench::session::FILE;
 
 /// Options of `greylag workbench`.
 #[derive(clap::Args)]
@@ -19,8 +20,9 @@ use crate::workbench::server::{random_token, serve};
 pub struct Arguments {
     /// Flight logs to begin with: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog; more can be dropped on the page.
     logs: Vec<PathBuf>,
-    /// The model file; an existing session knows its own.
-    #[arg(long, env = "GREYLAG_MODEL", hide_env_values = true)]
+    /// The model file. An existing session knows its own; a new one takes that of the environment variable
+    /// GREYLAG_MODEL where this is left out.
+    #[arg(long)]
     model: Option<PathBuf>,
     /// Port on 127.0.0.1; 0 for any that is free.
     #[arg(long, default_value_t = 0)]
@@ -32,14 +34,20 @@ pub struct Arguments {
     reading: Reading,
 }
 
+/// The model that is named, for a new session also by the environment.
+fn model(arguments: &Arguments) -> Option<PathBuf> {
+    let new = !arguments.folder.join(FILE).exists();
+    let environment = || std::env::var_os("GREYLAG_MODEL").filter(|_| new).map(PathBuf::from);
+    arguments.model.clone().or_else(environment)
+}
+
 /// Opens the session and serves it until Ctrl-C.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let given = Given {
         folder: arguments.folder.clone(),
-        model: arguments.model.as_deref().map(shipped),
+        model: model(arguments).as_deref().map(shipped),
         logs: arguments.logs.clone(),
-        reading: arguments.reading.options()?,
-        words: arguments.reading.words(),
+        reading: arguments.reading.of_workbench(),
     };
     let token = random_token().context("cannot draw a token for the page")?;
     serve(given, arguments.port, &token, |address| {

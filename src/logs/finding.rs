@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::mapping::TEXT;
+
 /// How much a finding matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -14,27 +16,56 @@ pub enum Severity {
     Problem,
 }
 
+/// The mapping that puts a column right.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cure {
+    /// The column.
+    pub column: String,
+    /// The factor.
+    pub scale: f64,
+}
+
+impl std::fmt::Display for Cure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Cure { column, scale } = self;
+        write!(
+            f,
+            "read it with --mapping FILE, in which [columns] has {column} = {{ from = \"{TEXT}.{column}\", scale = {scale} }} (in a binary log its topic and field stand in place of {TEXT}.{column})"
+        )
+    }
+}
+
 /// Something about a log that its user should know.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// How much it matters.
     pub severity: Severity,
     /// What it is, with what would help.
     pub text: String,
+    /// The factor that puts it right, where one does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cure: Option<Cure>,
 }
 
 impl Finding {
     /// A note.
     pub fn note(text: impl Into<String>) -> Self {
-        Finding { severity: Severity::Note, text: text.into() }
+        Finding { severity: Severity::Note, text: text.into(), cure: None }
     }
     /// A warning.
     pub fn warning(text: impl Into<String>) -> Self {
-        Finding { severity: Severity::Warning, text: text.into() }
+        Finding { severity: Severity::Warning, text: text.into(), cure: None }
     }
     /// A problem.
     pub fn problem(text: impl Into<String>) -> Self {
-        Finding { severity: Severity::Problem, text: text.into() }
+        Finding { severity: Severity::Problem, text: text.into(), cure: None }
+    }
+}
+
+impl Finding {
+    /// The same with more to say.
+    pub fn with(self, more: &str) -> Self {
+        Finding { text: self.text + more, ..self }
     }
 }
 

@@ -46,6 +46,14 @@ pub struct Envelope {
     pub surface_slew_per_s: f64,
 }
 
+impl Envelope {
+    /// Airspeed from which a log's rows count as flight, m/s: half the least one, so that a stall is flight and
+    /// taxiing is not.
+    pub fn flying_from_mps(&self) -> f64 {
+        0.5 * self.airspeed_min_mps
+    }
+}
+
 /// The condition about which an aircraft's quantities are scaled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {

@@ -3,20 +3,25 @@
 use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Deserialize;
 
-use super::bench::{Bench, load};
-use super::error::{WorkbenchError, io};
+use super::bench::{Bench, Inner, load};
+use super::error::WorkbenchError;
 use super::fit::scores;
 use super::jobs::Work;
-use super::session::{Accepted, Opening, Role};
+use super::roles::now_s;
+use super::session::{Accepted, LogEntry, Occasion, Opening, Role};
+use crate::model::GreyBox;
 use crate::physics::catalogue;
+use crate::report::write_over;
 use crate::sysid::amend::Options;
 use crate::sysid::amend::document::sha256;
 use crate::sysid::compare::HorizonScore;
 use crate::sysid::weak_form::prepared::Prepared;
+
+/// The folder of the saved model, below the session's.
+pub(super) const SAVED: &str = "model";
 
 /// A request, made by a page that saw the session at a revision.
 #[derive(Clone, Debug, Deserialize)]
@@ -70,12 +75,8 @@ pub enum Act {
     Fit,
     /// Judge the models by the test flights.
     Judge,
-    /// Write the amended model.
-    Save {
-        /// Folder, below the session's if relative; `model` by default.
-        #[serde(default)]
-        folder: Option<PathBuf>,
-    },
+    /// Write the amended model into the folder `model` of the session's.
+    Save,
     /// Read the model file again.
     ReloadModel,
     /// End a job.
@@ -93,11 +94,7 @@ impl Bench {
     pub fn act(self: &Arc<Self>, request: Request) -> Result<(), WorkbenchError> {
         let seen = request.revision;
         match request.act {
-            Act::Role { flight, role } => self.change(seen, |inner| {
-                let log = inner.session.logs.get_mut(flight);
-                log.ok_or(WorkbenchError::NoFlight(flight))?.role = role;
-                Ok(())
-            }),
+            Act::Role { flight, role } => self.change(seen, |inner| inner.give_role(flight, role)),
             Act::Remove { flight } => self.change(seen, |inner| {
                 if flight >= inner.session.logs.len() {
                     return Err(WorkbenchError::NoFlight(flight));
@@ -109,7 +106,7 @@ impl Bench {
             Act::Map { flight, column, scale } => self.map(seen, flight, &column, scale),
             Act::Diagnose => {
                 self.same_model()?;
-                self.lock().divided()?;
+                self.lock().to_fit()?;
                 self.start(Work::Diagnosis);
                 Ok(())
             }
@@ -123,13 +120,17 @@ impl Bench {
                 self.start(Work::Fit);
                 Ok(())
             }
-            Act::Undo => self.change(seen, |inner| {
-                let last = inner.session.effects.pop();
-                inner.session.undone.push(last.ok_or(WorkbenchError::Nothing("take back"))?);
-                inner.jobs.iter().filter(|j| j.work == Work::Fit).for_each(|j| j.stop.stop());
-                inner.jobs.retain(|j| j.work != Work::Fit);
+            Act::Undo => {
+                self.change(seen, |inner| {
+                    let last = inner.session.effects.pop();
+                    inner.session.undone.push(last.ok_or(WorkbenchError::Nothing("take back"))?);
+                    inner.supersede(Work::Fit);
+                    Ok(())
+                })?;
+                // what is left may not be fitted: the fit of all of it was cut off, or a flight has another role
+                self.start(Work::Fit);
                 Ok(())
-            }),
+            }
             Act::Redo => {
                 self.change(seen, |inner| {
                     let last = inner.session.undone.pop();
@@ -148,9 +149,9 @@ impl Bench {
                 Ok(())
             }
             Act::Judge => self.judge(seen),
-            Act::Save { folder } => {
+            Act::Save => {
                 self.same_model()?;
-                self.save(&self.folder.join(folder.unwrap_or_else(|| "model".into())))
+                self.save(&self.folder.join(SAVED))
             }
             Act::ReloadModel => self.reload(seen),
             Act::Cancel { job } => {
@@ -188,10 +189,7 @@ impl Bench {
             return Err(WorkbenchError::Conflict { now: revision, seen });
         }
         if !known {
-            let part = file.with_extension("part");
-            fs::write(&part, bytes)
-                .and_then(|()| fs::rename(&part, &file))
-                .map_err(|e| io(&file, e))?;
+            write_over(&file, bytes)?;
         }
         self.add(seen, place, bytes).inspect_err(|_| {
             if !known {
@@ -224,49 +222,59 @@ impl Bench {
     /// Looks at the test flights: free runs of the model as given and as amended, recorded before they are shown.
     fn judge(&self, seen: u64) -> Result<(), WorkbenchError> {
         self.same_model()?;
-        let (given, amended, flights, names, effects) = {
+        let (given, amended, effects, places, flights) = {
             let inner = self.lock();
-            let places: Vec<usize> = inner.session.with(Role::Test).collect();
+            let places = inner.usable(&[Role::Test]);
+            if places.is_empty() {
+                return Err(WorkbenchError::NoRole(Role::Test));
+            }
             let used = |k: &usize| inner.flights[*k].as_ref().ok().map(|f| f.prepared.clone());
             let flights: Vec<Prepared> = places.iter().filter_map(used).collect();
-            if flights.is_empty() {
-                return Err(WorkbenchError::NoRole("test"));
-            }
-            let key = inner.key("fit", &inner.session.effects);
-            let amended = match inner.session.effects.is_empty() {
-                true => inner.model.clone(),
-                false => inner.fits.get(&key).ok_or(WorkbenchError::Unfitted)?.model.clone(),
-            };
-            let names: Vec<String> = places.iter().map(|k| inner.session.logs[*k].name()).collect();
-            let effects: Vec<String> = inner.session.effects.iter().map(|e| e.id.clone()).collect();
-            (inner.model.clone(), amended, flights, names, effects)
+            let (amended, effects) = inner.amended()?;
+            (inner.model.clone(), amended, effects, places, flights)
         };
         let (horizon_s, given) = judged(&scores(&given, &flights));
         let (_, amended) = judged(&scores(&amended, &flights));
-        let unix_s = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_secs());
         self.change(seen, |inner| {
-            inner.session.openings.push(Opening {
-                unix_s,
+            let logs = || places.iter().map(|k| &inner.session.logs[*k]);
+            let opening = Opening {
+                unix_s: now_s(),
+                occasion: Occasion::Judged,
                 effects,
-                flights: names,
+                flights: logs().map(LogEntry::name).collect(),
+                sha256: logs().map(|l| l.sha256.clone()).collect(),
                 given,
                 amended,
                 horizon_s,
-            });
+            };
+            inner.session.openings.push(opening);
             Ok(())
         })
     }
 
-    /// Reads the model file again; what was worked out of the old one goes.
+    /// Reads the model's files again, and the logs by them; what was worked out of the old ones goes.
     fn reload(&self, seen: u64) -> Result<(), WorkbenchError> {
         let path = self.lock().session.model.clone();
-        let (model, text) = load(&path)?;
+        let read = load(&path)?;
         self.change(seen, |inner| {
-            inner.session.model_sha256 = sha256(text.as_bytes());
-            (inner.model, inner.text) = (model, text);
-            (inner.tuned, inner.estimate, inner.comparison) = (None, None, None);
+            inner.session.model_sha256 = read.fingerprint;
+            (inner.model, inner.original) = (read.model, read.original);
+            // gravity, actuators and the least airspeed are the model's
+            inner.reread();
             Ok(())
         })
+    }
+}
+
+impl Inner {
+    /// The model as amended, with the accepted effects that are in it.
+    fn amended(&self) -> Result<(GreyBox, Vec<String>), WorkbenchError> {
+        if self.session.effects.is_empty() {
+            return Ok((self.model.clone(), Vec::new()));
+        }
+        let key = self.key("fit", &self.session.effects);
+        let fitted = self.fits.get(&key).ok_or(WorkbenchError::Unfitted)?;
+        Ok((fitted.model.clone(), fitted.joined()))
     }
 }
 

@@ -11,13 +11,14 @@ use super::error::{WorkbenchError, io};
 use super::fit::Fitted;
 use super::flights::Loaded;
 use super::jobs::{Event, Job};
-use super::session::{Accepted, Claim, LogEntry, Role, Session};
+use super::key::fingerprint;
+use super::reading::{InUse, Reading};
+use super::session::{Claim, LogEntry, Role, Session};
 use crate::logs;
 use crate::model::GreyBox;
-use crate::sysid::amend::document::sha256;
-use crate::sysid::amend::{Estimate, Fit, split};
+use crate::sysid::amend::document::{Original, sha256};
+use crate::sysid::amend::{Estimate, Fit};
 use crate::sysid::compare::{self, Comparison, compare};
-use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::progress::unheard;
 
 /// What a workbench begins with.
@@ -29,9 +30,7 @@ pub struct Given {
     /// Logs to add, those that are there already left out.
     pub logs: Vec<PathBuf>,
     /// How logs are read.
-    pub reading: logs::Options,
-    /// The same as words of a command line.
-    pub words: String,
+    pub reading: Reading,
 }
 
 /// The session with what was worked out of it.
@@ -44,10 +43,11 @@ pub struct Bench {
 
 /// What changes.
 pub(super) struct Inner {
+    pub folder: PathBuf,
     pub session: Session,
     pub model: GreyBox,
-    /// The model file's text.
-    pub text: String,
+    /// The model's files.
+    pub original: Original,
     /// The session's logs, in its order, or why one cannot be used.
     pub flights: Vec<Result<Arc<Loaded>, String>>,
     pub comparison: Option<(String, Arc<Comparison>)>,
@@ -59,18 +59,11 @@ pub(super) struct Inner {
     pub failures: BTreeMap<String, String>,
     pub jobs: Vec<Job>,
     pub next_job: u64,
-    /// How logs are read.
-    pub reading: logs::Options,
-    /// The same as words of a command line.
-    pub words: String,
-    /// The text of the session's mapping; empty if it has none.
-    pub mapping: String,
-}
-
-/// The flights that a fit sees and those that it is judged by.
-pub(super) struct Divided {
-    pub fit: Vec<Reconstruction>,
-    pub held_out: Vec<Reconstruction>,
+    /// How logs are read, as the command line says it.
+    pub given: Reading,
+    /// The same as their readers take it.
+    pub options: logs::Options,
+    pub mapping: InUse,
 }
 
 impl Bench {
@@ -84,11 +77,12 @@ impl Bench {
     ) -> Result<Arc<Bench>, WorkbenchError> {
         let claim = Claim::of(&given.folder)?;
         let folder = fs::canonicalize(&given.folder).map_err(|e| io(&given.folder, e))?;
-        let (session, model, text) = begin(&folder, given.model.as_deref())?;
+        let (session, model, original) = begin(&folder, given.model.as_deref())?;
         let mut inner = Inner {
+            folder: folder.clone(),
             session,
             model,
-            text,
+            original,
             flights: Vec::new(),
             comparison: None,
             tuned: None,
@@ -98,12 +92,12 @@ impl Bench {
             failures: BTreeMap::new(),
             jobs: Vec::new(),
             next_job: 1,
-            reading: given.reading,
-            words: given.words,
-            mapping: String::new(),
+            options: Inner::options_of(&given.reading),
+            given: given.reading.absolute()?,
+            mapping: InUse::default(),
         };
-        inner.take_mapping(&folder)?;
-        inner.reread(&folder);
+        inner.take_mapping()?;
+        inner.reread();
         inner.session.write(&folder)?;
         let bench = Arc::new(Bench {
             folder,
@@ -139,7 +133,7 @@ impl Bench {
         if now != seen {
             return Err(WorkbenchError::Conflict { now, seen });
         }
-        let (session, flights) = (inner.session.clone(), inner.flights.clone());
+        let before = Before::of(&inner);
         let edited = edit(&mut inner);
         inner.session.revision += 1;
         let revision = inner.session.revision;
@@ -150,7 +144,7 @@ impl Bench {
                 Ok(t)
             }
             Err(error) => {
-                (inner.session, inner.flights) = (session, flights);
+                before.back_to(&mut inner);
                 Err(error)
             }
         }
@@ -171,23 +165,17 @@ impl Bench {
         let sha256 = sha256(bytes);
         let entry = LogEntry { path, sha256, role: Role::Unused };
         let name = entry.name();
-        let (model, reading) = {
+        let (model, options) = {
             let inner = self.lock();
             let same = inner.session.logs.iter().find(|l| l.sha256 == entry.sha256);
             if let Some(same) = same {
                 return Err(WorkbenchError::Twice(same.name()));
             }
-            (inner.model.clone(), inner.reading.clone())
+            (inner.model.clone(), inner.options.clone())
         };
-        let loaded = Loaded::parse(bytes, &name, &reading, &model)?;
+        let loaded = Loaded::parse(bytes, &name, &options, &model)?;
         self.change(seen, |inner| {
-            // what makes every figure wrong serves for nothing until its user has looked at it
-            let role = match loaded.in_doubt() {
-                true => Role::Unused,
-                false => inner.session.usual_role(&name),
-            };
-            inner.session.logs.push(LogEntry { role, ..entry });
-            inner.flights.push(Ok(loaded));
+            inner.take_in(entry, loaded);
             Ok(())
         })
     }
@@ -200,10 +188,7 @@ impl Bench {
             if let Some((_, known)) = inner.comparison.as_ref().filter(|(k, _)| *k == key) {
                 return Ok(known.clone());
             }
-            let seen = inner.session.with(Role::Fit).chain(inner.session.with(Role::HoldOut));
-            let mut places: Vec<usize> = seen.collect();
-            places.sort_unstable();
-            (key, inner.models(), inner.reconstructions(places.into_iter()))
+            (key, inner.models(), inner.reconstructions(&inner.seen()))
         };
         let options = compare::Options::default();
         let made = Arc::new(compare(&models, &flights, &options, &unheard)?);
@@ -244,63 +229,72 @@ impl Bench {
     }
 }
 
+/// What a change that fails goes back to.
+struct Before {
+    session: Session,
+    model: GreyBox,
+    original: Original,
+    flights: Vec<Result<Arc<Loaded>, String>>,
+    options: logs::Options,
+    mapping: InUse,
+}
+
+impl Before {
+    fn of(inner: &Inner) -> Before {
+        Before {
+            session: inner.session.clone(),
+            model: inner.model.clone(),
+            original: inner.original.clone(),
+            flights: inner.flights.clone(),
+            options: inner.options.clone(),
+            mapping: inner.mapping.clone(),
+        }
+    }
+
+    fn back_to(self, inner: &mut Inner) {
+        let Before { session, model, original, flights, options, mapping } = self;
+        (inner.session, inner.model, inner.original) = (session, model, original);
+        (inner.flights, inner.options, inner.mapping) = (flights, options, mapping);
+    }
+}
+
 /// The session with its model; one that was edited meanwhile is taken as it is now.
 fn begin(
     folder: &Path,
     model: Option<&Path>,
-) -> Result<(Session, GreyBox, String), WorkbenchError> {
+) -> Result<(Session, GreyBox, Original), WorkbenchError> {
     let known = Session::read(folder)?;
     let given = model.map(|m| fs::canonicalize(m).map_err(|e| io(m, e))).transpose()?;
     let path = match (&known, given) {
         (Some(session), Some(given)) if given != session.model => {
-            return Err(WorkbenchError::Session {
-                path: folder.join(super::session::FILE),
-                why: format!("it is about the model {}", session.model.display()),
-            });
+            let model = session.model.clone();
+            return Err(WorkbenchError::OtherModel { folder: folder.into(), model });
         }
         (Some(session), _) => session.model.clone(),
         (None, Some(given)) => given,
         (None, None) => return Err(WorkbenchError::NoModel),
     };
-    let (grey_box, text) = load(&path)?;
-    let sha256 = sha256(text.as_bytes());
-    let mut session = known.unwrap_or_else(|| Session::new(path, sha256.clone()));
-    session.model_sha256 = sha256;
-    Ok((session, grey_box, text))
+    let read = load(&path)?;
+    let mut session = known.unwrap_or_else(|| Session::new(path, read.fingerprint.clone()));
+    session.model_sha256 = read.fingerprint;
+    Ok((session, read.model, read.original))
 }
 
-/// The model at `path` with its text.
-pub(super) fn load(path: &Path) -> Result<(GreyBox, String), WorkbenchError> {
-    let text = fs::read_to_string(path).map_err(|e| io(path, e))?;
-    Ok((GreyBox::load(path)?, text))
+/// A model with its files as they were read.
+pub(super) struct Read {
+    pub model: GreyBox,
+    pub original: Original,
+    pub fingerprint: String,
+}
+
+/// The model at `path`.
+pub(super) fn load(path: &Path) -> Result<Read, WorkbenchError> {
+    // first, so that a file that is edited meanwhile is noticed later
+    let fingerprint = fingerprint(path).map_err(|e| io(path, e))?;
+    Ok(Read { model: GreyBox::load(path)?, original: Original::read(path)?, fingerprint })
 }
 
 impl Inner {
-    /// What a result is about: model, flights by role, effects.
-    pub fn key(&self, what: &str, effects: &[Accepted]) -> String {
-        let logs = |role: Role| -> String {
-            self.session.with(role).map(|k| self.session.logs[k].sha256.as_str()).collect()
-        };
-        let effects: Vec<String> =
-            effects.iter().map(|e| format!("{}{}", e.id, e.anyway)).collect();
-        let all = [
-            env!("CARGO_PKG_VERSION"),
-            &self.session.model_sha256,
-            &self.mapping,
-            &logs(Role::Fit),
-            // a diagnosis does not look at flights held out
-            &if what == "diagnosis" { String::new() } else { logs(Role::HoldOut) },
-            &effects.join("+"),
-        ];
-        format!("{what}-{}", &sha256(all.join("|").as_bytes())[..16])
-    }
-
-    /// Whether the file of the model is not what was read.
-    pub fn model_changed(&self) -> bool {
-        let now = fs::read(&self.session.model).map(|bytes| sha256(&bytes));
-        now.map_or(true, |now| now != self.session.model_sha256)
-    }
-
     /// What stands in for the amended model now.
     fn shown(&self) -> String {
         let key = self.key("fit", &self.session.effects);
@@ -317,25 +311,5 @@ impl Inner {
         let estimate = self.estimate.as_ref().filter(|(of, _)| *of == key).map(|(_, e)| &e.model);
         let amended = self.fits.get(&key).map(|f| &f.model).or(estimate);
         std::iter::once(&self.model).chain(amended).cloned().collect()
-    }
-
-    /// The flights at `places` that can be used.
-    pub fn reconstructions(&self, places: impl Iterator<Item = usize>) -> Vec<Reconstruction> {
-        places.filter_map(|k| Some(self.flights[k].as_ref().ok()?.flight.clone())).collect()
-    }
-
-    /// The flights to fit to and those to judge by, as `greylag amend` divides them.
-    pub fn divided(&self) -> Result<Divided, WorkbenchError> {
-        let of = |role| self.reconstructions(self.session.with(role));
-        let (fit, held_out) = (of(Role::Fit), of(Role::HoldOut));
-        match (fit.len(), held_out.len()) {
-            (0, _) => Err(WorkbenchError::NoRole("fit the model to")),
-            (1, 0) => {
-                let [first, last] = split(&fit[0]);
-                Ok(Divided { fit: vec![first], held_out: vec![last] })
-            }
-            (_, 0) => Err(WorkbenchError::NoRole("be held out, for effects to be judged by")),
-            _ => Ok(Divided { fit, held_out }),
-        }
     }
 }

@@ -4,8 +4,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::act::SAVED;
 use super::bench::{Bench, Inner};
 use super::session::Role;
+use crate::logs::csv::Tolerance;
+use crate::sysid::amend::document::MODEL;
 
 /// The commands for the session as it is.
 #[derive(Clone, Debug, Serialize)]
@@ -27,13 +30,13 @@ impl Bench {
     pub(super) fn commands(&self, inner: &Inner) -> Commands {
         let model = quoted(&inner.session.model);
         let logs = |roles: &[Role]| -> String {
-            let all = inner.session.logs.iter().filter(|l| roles.contains(&l.role));
-            all.map(|l| format!(" {}", quoted(&self.folder.join(&l.path)))).collect()
+            inner.usable(roles).iter().map(|k| format!(" {}", quoted(&inner.file(*k)))).collect()
         };
-        let words = self.reading_words(inner);
         let (fit, held, test) = (logs(&[Role::Fit]), logs(&[Role::HoldOut]), logs(&[Role::Test]));
         let seen = logs(&[Role::Fit, Role::HoldOut]);
-        let out = quoted(&self.folder.join("model"));
+        let all: String =
+            (0..inner.session.logs.len()).map(|k| format!(" {}", quoted(&inner.file(k)))).collect();
+        let folder = self.folder.join(SAVED);
         let effects: String = inner.session.effects.iter().map(|e| format!(" {}", e.id)).collect();
         let anyway = match inner.session.effects.iter().any(|e| e.anyway) {
             true => " --accept-anyway",
@@ -42,45 +45,48 @@ impl Bench {
         let held = if held.is_empty() { held } else { format!(" --hold-out{held}") };
         let amended = match effects.is_empty() {
             true => String::new(),
-            false => format!(" {out}/model.toml"),
+            false => format!(" {}", quoted(&folder.join(MODEL))),
         };
         let some = |needed: &str, command: String| match needed.is_empty() {
             true => String::new(),
             false => command,
         };
-        let all = logs(&[Role::Fit, Role::HoldOut, Role::Test, Role::Unused]);
+        // the workbench leaves the deflections on the log's clock everywhere
+        let compare = |logs: &str, roles: &[Role]| {
+            let words = inner.reading_words(roles);
+            format!("greylag compare --model {model}{amended} --log{logs} --recorded-clock{words}")
+        };
+        let out = quoted(&folder);
+        let to_fit = inner.reading_words(&[Role::Fit]);
+        let both = inner.reading_words(&[Role::Fit, Role::HoldOut]);
         Commands {
-            flights: some(&all, format!("greylag logs info{all}")),
-            compare: some(
-                &seen,
-                format!("greylag compare --model {model}{amended} --log{seen}{words}"),
-            ),
-            diagnose: some(&fit, format!("greylag diagnose --model {model} --log{fit}{words}")),
+            flights: some(&all, format!("greylag logs info{all}{}", inner.mapping_words())),
+            compare: some(&seen, compare(&seen, &[Role::Fit, Role::HoldOut])),
+            diagnose: some(&fit, format!("greylag diagnose --model {model} --log{fit}{to_fit}")),
             amend: some(
                 &effects,
                 format!(
-                    "greylag amend --model {model} --log{fit}{held} --effect{effects}{anyway}{words} --out {out}"
+                    "greylag amend --model {model} --log{fit}{held} --effect{effects}{anyway}{both} --out {out}"
                 ),
             ),
-            judge: some(
-                &test,
-                format!("greylag compare --model {model}{amended} --log{test}{words}"),
-            ),
+            judge: some(&test, compare(&test, &[Role::Test])),
         }
     }
 }
 
-impl Bench {
-    /// How the commands must read the logs; those with problems need a word more.
-    fn reading_words(&self, inner: &Inner) -> String {
-        let used = inner.session.logs.iter().zip(&inner.flights);
-        let mut used = used.filter(|(log, _)| log.role != Role::Unused);
-        let doubt = used.any(|(_, flight)| flight.as_ref().is_ok_and(|f| f.in_doubt()));
-        let despite = " --despite-problems";
-        match doubt && !inner.words.contains(despite) {
-            true => format!("{}{despite}", inner.words),
-            false => inner.words.clone(),
-        }
+impl Inner {
+    /// How a command must read logs.
+    fn mapping_words(&self) -> String {
+        let mapping = self.mapping.file.iter().map(|file| format!(" --mapping {}", quoted(file)));
+        let lenient = (self.given.tolerance == Tolerance::Lenient).then(|| " --lenient".to_owned());
+        mapping.chain(lenient).collect()
+    }
+
+    /// How a command must read the logs of these roles; those with problems need a word more.
+    fn reading_words(&self, roles: &[Role]) -> String {
+        let doubtful = |k: &usize| self.flights[*k].as_ref().is_ok_and(|f| f.in_doubt());
+        let despite = self.given.despite_problems || self.usable(roles).iter().any(doubtful);
+        self.mapping_words() + if despite { " --despite-problems" } else { "" }
     }
 }
 

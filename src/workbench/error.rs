@@ -3,15 +3,17 @@
 use std::io;
 use std::path::PathBuf;
 
+use super::session::Role;
 use crate::logs::LogError;
 use crate::logs::mapping::MappingError;
-use crate::model::edit::EditError;
 use crate::physics::airframe::FileError;
 use crate::report::WriteError;
 use crate::sysid::amend::AmendError;
+use crate::sysid::amend::document::DocumentError;
 use crate::sysid::compare::CompareError;
 use crate::sysid::diagnose::DiagnoseError;
 use crate::sysid::flight_path::ReconstructError;
+use crate::sysid::progress::Cancelled;
 use crate::sysid::weak_form::prepared::ClockError;
 
 /// What kind of failure it is, for whoever answers a request.
@@ -76,8 +78,42 @@ pub enum WorkbenchError {
     )]
     Locked(String),
     /// A role has no flight.
-    #[error("no flight serves to {0}; give one that role")]
-    NoRole(&'static str),
+    #[error("no flight that can be used has the role {}; give one that role", .0.word())]
+    NoRole(Role),
+    /// The session is about another model.
+    #[error(
+        "the session in {} is about the model {}; leave --model out, or give --dir another folder",
+        folder.display(),
+        model.display()
+    )]
+    OtherModel {
+        /// The session's folder.
+        folder: PathBuf,
+        /// Its model.
+        model: PathBuf,
+    },
+    /// The amended model would stand in the place of the one it was made of.
+    #[error("{} is the model to start from, which stays as it is; move it out of the session's folder", .0.display())]
+    OverModel(PathBuf),
+    /// No effect joined the model.
+    #[error(
+        "no effect was accepted by the data, so there is nothing to save: keep a refused one anyway, or take it back"
+    )]
+    AllRefused,
+    /// A written fit is another one.
+    #[error("the fit written to {} read back with another {what}; report this", folder.display())]
+    Lost {
+        /// Its folder.
+        folder: PathBuf,
+        /// What is not the same.
+        what: String,
+    },
+    /// The program failed.
+    #[error("a fault of the program, please report it: {0}")]
+    Fault(String),
+    /// Whoever waited has ended it.
+    #[error("cancelled")]
+    Cancelled(#[from] Cancelled),
     /// No model.
     #[error(
         "a new session needs a model: name one, as in `greylag workbench --model params/x8/prior.toml`"
@@ -141,9 +177,9 @@ pub enum WorkbenchError {
     /// The model cannot be read.
     #[error(transparent)]
     Model(#[from] FileError),
-    /// The model file cannot be edited.
+    /// The files of an amended model cannot be made.
     #[error(transparent)]
-    Edit(#[from] EditError),
+    Document(#[from] DocumentError),
     /// A file was not written.
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -170,6 +206,7 @@ impl WorkbenchError {
             E::Locked(_) => Kind::Locked,
             E::NoFlight(_) => Kind::Missing,
             E::Io { .. } | E::Json(_) | E::Write(_) | E::Session { .. } => Kind::Failed,
+            E::Lost { .. } | E::Fault(_) | E::Document(_) => Kind::Failed,
             _ => Kind::Bad,
         }
     }

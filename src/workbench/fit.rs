@@ -6,17 +6,20 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use super::bench::{Bench, Divided, Inner};
+use super::bench::{Bench, Inner};
 use super::error::{WorkbenchError, io};
+use super::roles::Divided;
 use super::session::{Accepted, Role};
 use crate::model::GreyBox;
 use crate::report::write_over;
-use crate::sysid::amend::document::{self, Hashed};
+use crate::sysid::amend::document::{self, Hashed, MODEL, Original, STORY, differs};
 use crate::sysid::amend::{self, Added, Amended, Options, Refused, amend, estimate, tune};
 use crate::sysid::compare::{HorizonScore, free_run};
-use crate::sysid::progress::{Progress, Stage, part};
+use crate::sysid::progress::{Progress, part, say};
 use crate::sysid::weak_form::prepared::Prepared;
 
+/// The file of a fit's errors over the flights that it saw.
+const ON_FIT: &str = "on_fit.json";
 /// Share of a first fit's time that tuning the prior takes.
 const TUNING: f64 = 0.4;
 
@@ -36,8 +39,20 @@ impl Fitted {
         let json = |name: &str| -> Option<Value> {
             serde_json::from_str(&fs::read_to_string(folder.join(name)).ok()?).ok()
         };
-        let model = GreyBox::load(&folder.join("model.toml")).ok()?;
-        Some(Fitted { model, story: json("amend.json")?, on_fit: json("on_fit.json")? })
+        let model = GreyBox::load(&folder.join(MODEL)).ok()?;
+        Some(Fitted { model, story: json(STORY)?, on_fit: json(ON_FIT)? })
+    }
+
+    /// Whether effects were asked for and none of them joined the model.
+    pub fn all_refused(&self) -> bool {
+        self.joined().is_empty()
+    }
+
+    /// The effects that joined the model.
+    pub fn joined(&self) -> Vec<String> {
+        let all = self.story["effects"].as_array().into_iter().flatten();
+        let joined = all.filter(|e| e["joined"] == true);
+        joined.filter_map(|e| Some(e["id"].as_str()?.to_owned())).collect()
     }
 }
 
@@ -45,14 +60,12 @@ impl Fitted {
 struct Task {
     key: String,
     model: GreyBox,
-    text: String,
+    original: Original,
     effects: Vec<Accepted>,
     flights: Divided,
     tuned_key: String,
     tuned: Option<amend::Fit>,
     logs: [Vec<Hashed>; 2],
-    airframe: (String, String),
-    original: std::path::PathBuf,
 }
 
 impl Bench {
@@ -72,10 +85,15 @@ impl Bench {
 
     /// The fit of the first `count` effects; `None` if it is there, or they are no longer so many.
     fn task(&self, count: usize) -> Result<Option<Task>, WorkbenchError> {
-        let inner = self.lock();
+        let mut inner = self.lock();
         let Some(effects) = inner.session.effects.get(..count) else { return Ok(None) };
         let key = inner.key("fit", effects);
         if inner.fits.contains_key(&key) {
+            return Ok(None);
+        }
+        // an earlier run may have left it there
+        if let Some(fitted) = Fitted::read(&self.fit_folder(&key)) {
+            inner.fits.insert(key, Arc::new(fitted));
             return Ok(None);
         }
         let tuned_key = inner.key("tuned", &[]);
@@ -83,22 +101,20 @@ impl Bench {
         Ok(Some(Task {
             key,
             model: inner.model.clone(),
-            text: inner.text.clone(),
+            original: inner.original.clone(),
             effects: effects.to_vec(),
             flights: inner.divided()?,
             tuned: tuned.map(|(_, fit)| fit.clone()),
             tuned_key,
-            logs: [Role::Fit, Role::HoldOut].map(|role| hashed(&inner, role, &self.folder)),
-            airframe: airframe(&inner.text, &inner.session.model)?,
-            original: inner.session.model.clone(),
+            logs: [Role::Fit, Role::HoldOut].map(|role| hashed(&inner, role)),
         }))
     }
 
     fn one_fit(&self, task: Task, progress: &Progress) -> Result<(), WorkbenchError> {
-        let Divided { fit, held_out } = &task.flights;
+        let Divided { fit, held_out, notes } = &task.flights;
         let effects: Vec<Added> =
             task.effects.iter().map(|e| Added { id: e.id.clone(), start: None }).collect();
-        super::jobs::go_on(progress(Stage::new("equation error", 0.0)))?;
+        say(progress, "equation error", 0.0)?;
         let at_once = estimate(&task.model, fit, held_out, &effects)?;
         self.lock().estimate = Some((task.key.clone(), at_once));
         self.changed();
@@ -117,7 +133,9 @@ impl Bench {
             tuned: Some(tuned),
             ..Options::default()
         };
-        let amended = amend(&task.model, fit, held_out, &options, &part(progress, [TUNING, 1.0]))?;
+        let progress = part(progress, [TUNING, 1.0]);
+        let mut amended = amend(&task.model, fit, held_out, &options, &progress)?;
+        amended.amendment.notes.splice(0..0, notes.iter().cloned());
         let folder = self.fit_folder(&task.key);
         write(&task, &amended, &folder)?;
         let fitted = Fitted::read(&folder).ok_or_else(|| {
@@ -136,14 +154,21 @@ impl Bench {
                 return Err(WorkbenchError::Nothing("save: accept an effect first"));
             }
             let key = inner.key("fit", &inner.session.effects);
-            inner.fits.get(&key).ok_or(WorkbenchError::Unfitted)?;
+            let fitted = inner.fits.get(&key).ok_or(WorkbenchError::Unfitted)?;
+            if fitted.all_refused() {
+                return Err(WorkbenchError::AllRefused);
+            }
+            let there = fs::canonicalize(folder.join(MODEL));
+            if there.is_ok_and(|there| there == inner.session.model) {
+                return Err(WorkbenchError::OverModel(inner.session.model.clone()));
+            }
             self.fit_folder(&key)
         };
         fs::create_dir_all(folder).map_err(|e| io(folder, e))?;
         let files = fs::read_dir(&from).map_err(|e| io(&from, e))?;
         for file in files {
             let path = file.map_err(|e| io(&from, e))?.path();
-            let Some(name) = path.file_name().filter(|n| *n != "on_fit.json") else { continue };
+            let Some(name) = path.file_name().filter(|n| *n != ON_FIT) else { continue };
             let text = fs::read_to_string(&path).map_err(|e| io(&path, e))?;
             write_over(&folder.join(name), &text)?;
         }
@@ -159,31 +184,18 @@ pub(super) fn scores(model: &GreyBox, flights: &[Prepared]) -> Vec<HorizonScore>
 }
 
 /// The logs of a role with their hashes.
-fn hashed(inner: &Inner, role: Role, folder: &Path) -> Vec<Hashed> {
-    let of = |k: usize| {
-        let log = &inner.session.logs[k];
-        let path = folder.join(&log.path).display().to_string();
-        Hashed { path, sha256: log.sha256.clone() }
+fn hashed(inner: &Inner, role: Role) -> Vec<Hashed> {
+    let of = |k: &usize| {
+        let path = inner.file(*k).display().to_string();
+        Hashed { path, sha256: inner.session.logs[*k].sha256.clone() }
     };
-    inner.session.with(role).map(of).collect()
-}
-
-/// The name and the text of the airframe file that the model at `path` names.
-fn airframe(text: &str, path: &Path) -> Result<(String, String), WorkbenchError> {
-    let table: toml::Table = toml::from_str(text)
-        .map_err(|e| WorkbenchError::Session { path: path.into(), why: e.to_string() })?;
-    let named = table.get("airframe").and_then(toml::Value::as_str).unwrap_or_default();
-    let file = path.parent().unwrap_or(Path::new(".")).join(named);
-    let name = file.file_name().unwrap_or("airframe.toml".as_ref()).to_string_lossy().into_owned();
-    Ok((name, fs::read_to_string(&file).map_err(|e| io(&file, e))?))
+    inner.usable(&[role]).iter().map(of).collect()
 }
 
 /// Writes a fit to `folder`, whole or not at all.
 fn write(task: &Task, amended: &Amended, folder: &Path) -> Result<(), WorkbenchError> {
     let [logs, hold_out] = &task.logs;
-    let (airframe, body) = &task.airframe;
-    let text = document::model(&task.text, &task.model, amended, logs, airframe.clone())?;
-    let slowest = 0.5 * task.model.airframe.envelope.airspeed_min_mps;
+    let slowest = task.model.airframe.envelope.flying_from_mps();
     let flights: Vec<Prepared> =
         task.flights.fit.iter().map(|f| Prepared::new(f, slowest)).collect::<Result<_, _>>()?;
     let on_fit = json!({
@@ -193,11 +205,13 @@ fn write(task: &Task, amended: &Amended, folder: &Path) -> Result<(), WorkbenchE
     let part = folder.with_extension("part");
     let _ = fs::remove_dir_all(&part);
     fs::create_dir_all(&part).map_err(|e| io(&part, e))?;
-    write_over(&part.join("model.toml"), &text)?;
-    write_over(&part.join(airframe), body)?;
-    let story = document::story(amended, &task.original, logs, hold_out)?;
-    write_over(&part.join("amend.json"), &story)?;
-    write_over(&part.join("on_fit.json"), &on_fit.to_string())?;
+    for (name, text) in document::files(&task.original, &task.model, amended, [logs, hold_out])? {
+        write_over(&part.join(name), text)?;
+    }
+    write_over(&part.join(ON_FIT), on_fit.to_string())?;
+    if let Some(what) = differs(&GreyBox::load(&part.join(MODEL))?, &amended.model) {
+        return Err(WorkbenchError::Lost { folder: part, what });
+    }
     let _ = fs::remove_dir_all(folder);
     fs::rename(&part, folder).map_err(|e| io(folder, e))
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::error::{WorkbenchError, io};
 use super::session::LogEntry;
-use crate::logs::finding::Severity;
+use crate::logs::finding::{Finding, Severity};
 use crate::logs::info::Info;
 use crate::logs::{self, Log};
 use crate::model::GreyBox;
@@ -23,6 +23,8 @@ const STRIP: usize = 160;
 pub struct Loaded {
     /// What the log says of itself.
     pub info: Info,
+    /// What is odd about the file, without what [`Info`] adds.
+    pub findings: Vec<Finding>,
     /// The flight, deflections as recorded.
     pub flight: Reconstruction,
     /// The flight on the models' clock.
@@ -59,9 +61,14 @@ impl Loaded {
     fn of(log: &Log, name: &str, model: &GreyBox) -> Result<Arc<Loaded>, WorkbenchError> {
         let options = flight_path::Options::of(name, model, ActuatorClock::AsRecorded);
         let flight = reconstruct(&log.flight, &options)?;
-        let slowest = 0.5 * model.airframe.envelope.airspeed_min_mps;
+        let slowest = model.airframe.envelope.flying_from_mps();
         let prepared = Prepared::new(&flight, slowest)?;
-        Ok(Arc::new(Loaded { info: Info::of(log), flight, prepared }))
+        Ok(Arc::new(Loaded {
+            info: Info::of(log),
+            findings: log.findings.clone(),
+            flight,
+            prepared,
+        }))
     }
 
     /// Reads the log of `entry`, whose relative path is below `folder`.

@@ -1,17 +1,19 @@
-//! Long works in the background: how far they are, and how they are cancelled.
+//! Long tasks in the background: how far they are, and how they are cancelled.
 
 use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 
-use super::bench::Bench;
+use super::bench::{Bench, Inner};
 use super::error::WorkbenchError;
+use super::roles::Divided;
 use crate::report::write_over;
-use crate::sysid::amend::{AmendError, tune};
+use crate::sysid::amend::tune;
 use crate::sysid::diagnose::{Options, diagnose};
-use crate::sysid::progress::{Cancelled, FirstLook, Progress, Stage, part};
+use crate::sysid::progress::{FirstLook, Progress, Stage, part};
 
 /// What a job works out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -66,7 +68,7 @@ impl Stop {
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
-    /// A job is farther.
+    /// A job is further.
     Progress {
         /// The job.
         job: Job,
@@ -78,16 +80,31 @@ pub enum Event {
     },
 }
 
-/// An error if a job shall end.
-pub(super) fn go_on(answer: ControlFlow<()>) -> Result<(), WorkbenchError> {
-    match answer {
-        ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(WorkbenchError::Amend(AmendError::Cancelled(Cancelled))),
+impl Inner {
+    /// Ends the jobs of a kind, as far as anyone can see; each lets go of the processor at its next stage.
+    pub(super) fn supersede(&mut self, work: Work) {
+        self.jobs.iter().filter(|job| job.work == work).for_each(|job| job.stop.stop());
+        self.jobs.retain(|job| job.work != work);
+    }
+
+    /// Whether every fit of the accepted effects is there.
+    fn fitted(&self) -> bool {
+        let all = &self.session.effects;
+        (1..=all.len()).all(|count| self.fits.contains_key(&self.key("fit", &all[..count])))
     }
 }
 
+/// What came of a job; a panic of it is an error, so that it does not run for ever in the eyes of its user.
+fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), WorkbenchError> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let said = panic.downcast_ref::<&str>().map(ToString::to_string);
+        let said = said.or_else(|| panic.downcast_ref::<String>().cloned());
+        Err(WorkbenchError::Fault(said.unwrap_or_else(|| "a panic without a word".into())))
+    })
+}
+
 impl Bench {
-    /// Tells that results have changed, not the session.
+    /// Announces that results have changed, not the session.
     pub(super) fn changed(&self) {
         (self.hear)(Event::Changed { revision: self.revision() });
     }
@@ -98,11 +115,11 @@ impl Bench {
             let mut inner = self.lock();
             let effects = if work == Work::Fit { &inner.session.effects[..] } else { &[] };
             let key = inner.key(work.word(), effects);
-            if inner.jobs.iter().any(|job| job.key == key) {
+            let there = work == Work::Fit && inner.fitted();
+            if there || inner.jobs.iter().any(|job| job.key == key) {
                 return;
             }
-            // what is superseded ends
-            inner.jobs.iter().filter(|job| job.work == work).for_each(|job| job.stop.stop());
+            inner.supersede(work);
             inner.failures.remove(&key);
             let (id, stop) = (inner.next_job, Stop::default());
             inner.next_job += 1;
@@ -134,13 +151,13 @@ impl Bench {
 
     fn work(self: &Arc<Self>, id: u64, work: Work, stop: &Stop) {
         let progress = |stage: Stage<'_>| {
-            self.farther(id, stage);
+            self.further(id, stage);
             stop.answer()
         };
-        let outcome = match work {
+        let outcome = outcome(|| match work {
             Work::Diagnosis => self.diagnose(&progress),
             Work::Fit => self.fit(&progress),
-        };
+        });
         let mut inner = self.lock();
         let job = inner.jobs.iter().position(|job| job.id == id).map(|k| inner.jobs.remove(k));
         if let (Some(job), Err(error)) = (job, outcome)
@@ -153,7 +170,7 @@ impl Bench {
     }
 
     /// Notes how far a job is.
-    fn farther(&self, id: u64, stage: Stage<'_>) {
+    fn further(&self, id: u64, stage: Stage<'_>) {
         let mut inner = self.lock();
         let Some(job) = inner.jobs.iter_mut().find(|job| job.id == id) else { return };
         job.doing = stage.doing.to_owned();
@@ -168,21 +185,22 @@ impl Bench {
 
     /// Diagnoses the model as given over the flights to fit to; the prior is tuned behind it, for fits to come.
     fn diagnose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
-        let ([key, tuned_key], model, flights) = {
+        let ([key, tuned_key], model, flights, divided) = {
             let inner = self.lock();
             let keys = [Work::Diagnosis.word(), "tuned"].map(|what| inner.key(what, &[]));
-            (keys, inner.model.clone(), inner.divided()?.fit)
+            (keys, inner.model.clone(), inner.to_fit()?, inner.divided())
         };
         let diagnosis = diagnose(&model, &flights, &Options::default(), progress)?;
         let value = serde_json::to_value(&diagnosis)?;
         write_over(&self.diagnosis_file(&key), &value.to_string())?;
         self.lock().diagnosis = Some((key, Arc::new(value)));
         self.changed();
-        if self.lock().tuned.as_ref().is_none_or(|(of, _)| *of != tuned_key) {
-            // what tunes badly is said when an effect is ticked
-            if let Ok(tuned) = tune(&model, &flights, &part(progress, [0.95, 1.0])) {
-                self.lock().tuned = Some((tuned_key, tuned));
-            }
+        let there = self.lock().tuned.as_ref().is_some_and(|(of, _)| *of == tuned_key);
+        // what divides or tunes badly is said when an effect is ticked
+        if let (false, Ok(Divided { fit, .. })) = (there, divided)
+            && let Ok(tuned) = tune(&model, &fit, &part(progress, [0.95, 1.0]))
+        {
+            self.lock().tuned = Some((tuned_key, tuned));
         }
         Ok(())
     }
@@ -195,5 +213,19 @@ impl Work {
             Work::Diagnosis => "diagnosis",
             Work::Fit => "fit",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_that_panics_ends_with_an_error() {
+        let said =
+            |work: fn() -> Result<(), WorkbenchError>| outcome(work).unwrap_err().to_string();
+        assert!(said(|| panic!("no such row")).contains("report it: no such row"));
+        assert!(said(|| panic!("no row {}", 7)).contains("no row 7"));
+        assert!(outcome(|| Ok(())).is_ok());
     }
 }

@@ -1,47 +1,18 @@
 //! The mapping that the session writes where a log's units or signs are wrong.
 
 use std::fs;
-use std::path::{Path, PathBuf};
-
-use serde::Serialize;
+use std::path::PathBuf;
 
 use super::bench::{Bench, Inner};
 use super::error::WorkbenchError;
 use super::flights::Loaded;
 use super::session::Role;
 use crate::logs::Format;
-use crate::logs::finding::Finding;
-use crate::logs::mapping::{Mapping, TEXT};
+use crate::logs::mapping::TEXT;
 use crate::report::write_over;
 
 /// The file in the session's folder.
-const FILE: &str = "mapping.toml";
-/// The option that names it on a command line.
-const OPTION: &str = " --mapping ";
-
-/// What would put a column right.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Cure {
-    /// The column.
-    pub column: String,
-    /// The factor.
-    pub scale: f64,
-}
-
-impl Cure {
-    /// The cure that a finding names: the line of a mapping in its text.
-    pub fn of(finding: &Finding) -> Option<Cure> {
-        let (_, line) = finding.text.split_once("[columns] has ")?;
-        let (line, _) = line.split_once('}')?;
-        let table: toml::Table = toml::from_str(&format!("{line}}}")).ok()?;
-        let (column, entry) = table.iter().next()?;
-        // a turned axis needs more than a factor: its user writes that mapping
-        if entry.get("offset").is_some() {
-            return None;
-        }
-        Some(Cure { column: column.clone(), scale: number(entry.get("scale")?)? })
-    }
-}
+pub(super) const FILE: &str = "mapping.toml";
 
 fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|n| n as f64))
@@ -69,31 +40,6 @@ fn with_column(text: &str, column: &str, from: &str, scale: f64) -> Option<Strin
     toml::to_string(&table).ok()
 }
 
-impl Inner {
-    /// Takes up the session's mapping, if it has one and none was named besides.
-    pub fn take_mapping(&mut self, folder: &Path) -> Result<(), WorkbenchError> {
-        let path = folder.join(FILE);
-        let own = format!("{OPTION}{}", path.display());
-        if !path.exists() || (self.words.contains(OPTION) && !self.words.contains(&own)) {
-            return Ok(());
-        }
-        self.reading.mapping = Mapping::load(&path)?;
-        self.mapping = fs::read_to_string(&path).map_err(|e| super::error::io(&path, e))?;
-        if !self.words.contains(&own) {
-            self.words.push_str(&own);
-        }
-        Ok(())
-    }
-
-    /// Reads all logs again.
-    pub fn reread(&mut self, folder: &Path) {
-        let read = |entry: &super::session::LogEntry| {
-            Loaded::read(entry, folder, &self.reading, &self.model).map_err(|e| e.to_string())
-        };
-        self.flights = self.session.logs.iter().map(read).collect();
-    }
-}
-
 impl Bench {
     /// Writes a factor for a column into the session's mapping, and reads the logs again by it.
     pub(super) fn map(
@@ -104,47 +50,53 @@ impl Bench {
         scale: f64,
     ) -> Result<(), WorkbenchError> {
         let path: PathBuf = self.folder.join(FILE);
-        self.change(seen, |inner| {
-            let flight = inner.flights.get(place).and_then(|f| f.as_ref().ok());
-            let from = origin(flight.ok_or(WorkbenchError::NoFlight(place))?, column);
-            if inner.words.contains(OPTION) && inner.mapping.is_empty() {
-                return Err(WorkbenchError::MappingGiven(format!(
-                    "{column} = {{ from = \"{from}\", scale = {scale} }}"
-                )));
-            }
-            let text = with_column(&inner.mapping, column, &from, scale);
-            let text = text.ok_or_else(|| WorkbenchError::NoMapping(path.clone()))?;
-            write_over(&path, &text)?;
-            inner.take_mapping(&self.folder)?;
-            inner.reread(&self.folder);
-            let right = inner.flights[place].as_ref().is_ok_and(|f| !f.in_doubt());
-            if right && inner.session.logs[place].role == Role::Unused {
-                let name = inner.session.logs[place].name();
-                inner.session.logs[place].role = inner.session.usual_role(&name);
-            }
-            Ok(())
+        let before = fs::read_to_string(&path).ok();
+        let mapped = self.change(seen, |inner| {
+            inner.map(place, column, scale)?;
+            // last, for what stands there is read at the next start
+            Ok(write_over(&path, &inner.mapping.text)?)
+        });
+        mapped.inspect_err(|_| {
+            let _ = match &before {
+                Some(text) => write_over(&path, text).map_err(|_| ()),
+                None => fs::remove_file(&path).map_err(|_| ()),
+            };
         })
+    }
+}
+
+impl Inner {
+    /// Reads the logs by a factor more. A log that is in doubt then serves for nothing; the one at `place`, if it is
+    /// right now, for what it usually would.
+    fn map(&mut self, place: usize, column: &str, scale: f64) -> Result<(), WorkbenchError> {
+        let path = self.folder.join(FILE);
+        let flight = self.flights.get(place).and_then(|f| f.as_ref().ok());
+        let from = origin(flight.ok_or(WorkbenchError::NoFlight(place))?, column);
+        if self.given.mapping.is_some() {
+            return Err(WorkbenchError::MappingGiven(format!(
+                "{column} = {{ from = \"{from}\", scale = {scale} }}"
+            )));
+        }
+        let text = with_column(&self.mapping.text, column, &from, scale);
+        self.read_by(&path, text.ok_or_else(|| WorkbenchError::NoMapping(path.clone()))?)?;
+        self.reread();
+        let all = self.flights.iter().enumerate();
+        let doubtful = all.filter(|(_, flight)| flight.as_ref().is_ok_and(|f| f.in_doubt()));
+        for k in doubtful.map(|(k, _)| k).collect::<Vec<_>>() {
+            self.give_role(k, Role::Unused)?;
+        }
+        let right = self.flights[place].as_ref().is_ok_and(|f| !f.in_doubt());
+        if right && self.session.logs[place].role == Role::Unused {
+            let usual = self.session.usual_role(&self.session.logs[place].name());
+            self.give_role(place, usual)?;
+        }
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_cure_of_a_finding_is_its_line_of_a_mapping() {
-        let text = "airspeed looks like knots: read it with --mapping FILE, in which [columns] has airspeed_mps = \
-                    { from = \"csv.airspeed_mps\", scale = 0.514444 } (in a binary log …)";
-        let cure = Cure::of(&Finding::problem(text)).unwrap();
-        assert_eq!(cure, Cure { column: "airspeed_mps".into(), scale: 0.514444 });
-        let sign =
-            Finding::problem("[columns] has az_mps2 = { from = \"csv.az_mps2\", scale = -1 }");
-        assert_eq!(Cure::of(&sign).unwrap().scale, -1.0);
-        let turned =
-            "[columns] has yaw_rad = { from = \"csv.yaw_rad\", scale = -1, offset = 1.5708 }";
-        assert_eq!(Cure::of(&Finding::problem(turned)), None);
-        assert_eq!(Cure::of(&Finding::problem("the log has no flight")), None);
-    }
 
     #[test]
     fn a_column_that_is_mapped_already_is_scaled_once_more() {

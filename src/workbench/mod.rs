@@ -6,16 +6,22 @@
 mod act;
 mod bench;
 mod commands;
+mod curves;
 mod error;
 mod fit;
 mod flights;
 mod jobs;
+mod key;
 mod mapping;
+mod reading;
+mod roles;
 pub mod server;
 pub mod session;
 mod view;
 
 pub use act::{Act, Request};
 pub use bench::{Bench, Given};
+pub use curves::FlightData;
 pub use error::{Kind, WorkbenchError};
-pub use view::{FlightData, FreeRun, RunRequest};
+pub use reading::Reading;
+pub use view::{FreeRun, RunRequest};

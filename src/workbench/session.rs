@@ -27,6 +27,18 @@ pub enum Role {
     Unused,
 }
 
+impl Role {
+    /// What the page calls it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Role::Fit => "Fit",
+            Role::HoldOut => "Hold out",
+            Role::Test => "Test",
+            Role::Unused => "Unused",
+        }
+    }
+}
+
 /// A log of the session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -57,17 +69,35 @@ pub struct Accepted {
     pub anyway: bool,
 }
 
-/// A look at the test flights.
+/// Why test flights can be seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Occasion {
+    /// Models were judged by them.
+    #[default]
+    Judged,
+    /// One was given another role.
+    OtherRole,
+}
+
+/// A look at test flights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Opening {
     /// When, seconds since 1970 (UTC).
     pub unix_s: u64,
+    /// Why.
+    #[serde(default)]
+    pub occasion: Occasion,
     /// The effects that were in the model.
     pub effects: Vec<String>,
-    /// The flights.
+    /// What the flights were called.
     pub flights: Vec<String>,
-    /// Normalised root mean square error of the model as given at `horizon_s`; NaN if no run gets there.
+    /// SHA-256 of their logs, by which they are known.
+    #[serde(default)]
+    pub sha256: Vec<String>,
+    /// Normalised root mean square error of the model as given at `horizon_s`; NaN if no run gets there, or no model
+    /// was judged.
     pub given: f64,
     /// The same of the amended model.
     pub amended: f64,
@@ -85,7 +115,7 @@ pub struct Session {
     pub revision: u64,
     /// The model to start from.
     pub model: PathBuf,
-    /// SHA-256 of its file.
+    /// SHA-256 over its files: with airframe, residual and effects of files.
     pub model_sha256: String,
     /// The logs.
     #[serde(default)]
@@ -164,7 +194,10 @@ impl Session {
 }
 
 /// A session's folder, which no other workbench may open as long as this is kept.
-pub struct Claim(#[allow(dead_code)] File);
+pub struct Claim {
+    /// The lock is given up when this is closed.
+    _lock: File,
+}
 
 impl Claim {
     /// Claims `folder`, which is made if there is none.
@@ -176,7 +209,7 @@ impl Claim {
         let path = folder.join(".lock");
         let file = File::create(&path).map_err(|e| io(&path, e))?;
         match file.try_lock() {
-            Ok(()) => Ok(Claim(file)),
+            Ok(()) => Ok(Claim { _lock: file }),
             Err(fs::TryLockError::WouldBlock) => Err(WorkbenchError::Open(folder.into())),
             Err(fs::TryLockError::Error(e)) => Err(io(&path, e)),
         }
@@ -201,8 +234,10 @@ mod tests {
         session.effects = vec![Accepted { id: "drag_beta2".into(), anyway: true }];
         session.openings.push(Opening {
             unix_s: 1,
+            occasion: Occasion::Judged,
             effects: vec!["drag_beta2".into()],
             flights: vec!["b.ulg".into()],
+            sha256: vec!["0".into()],
             given: 0.1,
             amended: 0.01,
             horizon_s: 5.0,

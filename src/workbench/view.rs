@@ -8,23 +8,18 @@ use serde_json::{Value, json};
 
 use super::bench::{Bench, Inner};
 use super::commands::Commands;
+use super::curves::{FlightData, data, named};
 use super::error::WorkbenchError;
 use super::flights::{Loaded, Strip};
 use super::jobs::{Job, Work};
-use super::mapping::Cure;
-use super::session::{LogEntry, Opening, Role};
+use super::session::{Opening, Role};
 use crate::logs::Format;
 use crate::logs::finding::Finding;
 use crate::logs::info::Purpose;
 use crate::logs::phases::Phase;
-use crate::sysid::compare::{
-    self, ChannelId, Comparison, FlightResult, ModelResult, RegimeVariable, compare, free_run,
-};
+use crate::sysid::compare::{self, FlightResult, ModelResult, compare, free_run};
 use crate::sysid::progress::unheard;
-use crate::sysid::weak_form::prepared::Prepared;
 
-/// Rows of a flight that are drawn at most.
-const ROWS: usize = 2500;
 /// Longest free run, s.
 const LONGEST_S: f64 = 60.0;
 
@@ -52,24 +47,10 @@ struct About<'a> {
     in_doubt: bool,
     phases: &'a [Phase],
     purposes: &'a [Purpose],
-    findings: Vec<FindingView<'a>>,
+    findings: &'a [Finding],
     nuisances: Vec<Value>,
     notes: &'a [String],
     strip: Option<Strip>,
-}
-
-/// A finding with what would put it right.
-#[derive(Serialize)]
-struct FindingView<'a> {
-    #[serde(flatten)]
-    finding: &'a Finding,
-    cure: Option<Cure>,
-}
-
-impl FindingView<'_> {
-    fn of(finding: &Finding) -> FindingView<'_> {
-        FindingView { finding, cure: Cure::of(finding) }
-    }
 }
 
 /// An accepted effect with what its fit says.
@@ -112,28 +93,6 @@ struct FailingView<'a> {
     notes: &'a [String],
 }
 
-/// A flight over time, drawn.
-#[derive(Clone, Debug, Serialize)]
-pub struct FlightData {
-    /// Its name.
-    pub name: String,
-    /// Time on the log's clock, s.
-    pub time_s: Vec<Option<f64>>,
-    /// The states by name, in °, °/s and m/s.
-    pub states: BTreeMap<&'static str, Vec<Option<f32>>>,
-    /// The deflections in °, the throttle as a share.
-    pub controls: BTreeMap<&'static str, Vec<Option<f32>>>,
-    /// Middles of the windows, s.
-    pub window_s: Vec<Option<f64>>,
-    /// Where each window lies, by variable.
-    pub regimes: BTreeMap<String, Vec<Option<f32>>>,
-    /// Channels by symbol: measured, then each model.
-    pub channels: BTreeMap<&'static str, Vec<Vec<Option<f32>>>>,
-}
-
-/// Short names of the states, in their order.
-const STATES: [&str; 8] = ["phi", "theta", "V", "p", "q", "r", "alpha", "beta"];
-
 /// A free run that is asked for.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -172,6 +131,7 @@ impl Bench {
     pub fn state(&self) -> Result<Value, WorkbenchError> {
         let inner = self.lock();
         let session = &inner.session;
+        let names = inner.names(&(0..session.logs.len()).collect::<Vec<_>>());
         let key = inner.key("diagnosis", &[]);
         let state = StateView {
             schema: "greylag.workbench/1",
@@ -183,7 +143,7 @@ impl Bench {
                 "path": session.model.display().to_string(),
                 "changed_outside": inner.model_changed(),
             }),
-            flights: (0..session.logs.len()).map(|k| self.flight_view(&inner, k)).collect(),
+            flights: names.into_iter().enumerate().map(|n| flight_view(&inner, n)).collect(),
             diagnosis: json!({
                 "there": inner.diagnosis.as_ref().is_some_and(|(of, _)| *of == key),
                 "error": inner.failures.get(&key),
@@ -196,20 +156,6 @@ impl Bench {
             commands: self.commands(&inner),
         };
         Ok(serde_json::to_value(&state)?)
-    }
-
-    fn flight_view<'a>(&self, inner: &'a Inner, k: usize) -> FlightView<'a> {
-        let log = &inner.session.logs[k];
-        let locked = locked(inner, log);
-        let loaded = inner.flights[k].as_ref();
-        FlightView {
-            name: log.name(),
-            path: self.folder.join(&log.path).display().to_string(),
-            role: log.role,
-            locked,
-            error: loaded.err().map(String::as_str),
-            about: loaded.ok().map(|flight| about(flight, locked)),
-        }
     }
 
     /// The diagnosis as `greylag diagnose --json` writes it; `null` if there is none.
@@ -227,7 +173,9 @@ impl Bench {
     pub fn failing(&self) -> Result<Value, WorkbenchError> {
         let comparison = self.comparison()?;
         let inner = self.lock();
-        let place = |f: &FlightResult| inner.session.logs.iter().position(|l| l.name() == f.name);
+        let seen = inner.seen();
+        let names = inner.names(&seen);
+        let place = |f: &FlightResult| Some(seen[names.iter().position(|n| *n == f.name)?]);
         let view = FailingView {
             flights: comparison.flights.iter().filter_map(place).collect(),
             models: &comparison.models,
@@ -241,20 +189,24 @@ impl Bench {
     /// # Errors
     /// There is no such flight, or it may not be seen yet.
     pub fn flight(&self, place: usize) -> Result<FlightData, WorkbenchError> {
-        let (flight, role) = self.seen(place)?;
-        let name = flight.flight.name.clone();
-        let of = |comparison: &Comparison| {
-            let k = comparison.flights.iter().position(|f| f.name == name)?;
-            Some(data(&flight.prepared, comparison, k))
+        let flight = self.may_be_seen(place)?;
+        let missing = WorkbenchError::NoFlight(place);
+        let (models, shared) = {
+            let inner = self.lock();
+            let seen = inner.seen();
+            let k = seen.iter().position(|k| *k == place);
+            (inner.models(), k.map(|k| inner.names(&seen).swap_remove(k)))
         };
-        if matches!(role, Role::Fit | Role::HoldOut) {
-            let comparison = self.comparison()?;
-            return of(&comparison).ok_or(WorkbenchError::NoFlight(place));
-        }
-        let models = self.lock().models();
-        let flights = std::slice::from_ref(&flight.flight);
-        let comparison = compare(&models, flights, &compare::Options::default(), &unheard)?;
-        of(&comparison).ok_or(WorkbenchError::NoFlight(place))
+        let (comparison, name) = match shared {
+            Some(name) => (self.comparison()?, name),
+            None => {
+                let flights = std::slice::from_ref(&flight.flight);
+                let made = compare(&models, flights, &compare::Options::default(), &unheard)?;
+                (Arc::new(made), flight.flight.name.clone())
+            }
+        };
+        let k = comparison.flights.iter().position(|f| f.name == name).ok_or(missing)?;
+        Ok(data(&flight.prepared, &comparison, k))
     }
 
     /// Free runs of the models from a moment of a flight.
@@ -262,7 +214,7 @@ impl Bench {
     /// # Errors
     /// The flight may not be seen, or is not flown at that moment.
     pub fn free_run(&self, request: RunRequest) -> Result<FreeRun, WorkbenchError> {
-        let (flight, _) = self.seen(request.flight)?;
+        let flight = self.may_be_seen(request.flight)?;
         let models = self.lock().models();
         let seconds = request.seconds.clamp(0.1, LONGEST_S);
         let run = |model: &crate::model::GreyBox| {
@@ -278,21 +230,29 @@ impl Bench {
     }
 
     /// A flight whose data may be seen.
-    fn seen(&self, place: usize) -> Result<(Arc<Loaded>, Role), WorkbenchError> {
+    fn may_be_seen(&self, place: usize) -> Result<Arc<Loaded>, WorkbenchError> {
         let inner = self.lock();
         let log = inner.session.logs.get(place).ok_or(WorkbenchError::NoFlight(place))?;
-        if locked(&inner, log) {
+        if inner.locked(log) {
             return Err(WorkbenchError::Locked(log.name()));
         }
         let flight = inner.flights[place].as_ref().ok().cloned();
-        Ok((flight.ok_or(WorkbenchError::NoFlight(place))?, log.role))
+        flight.ok_or(WorkbenchError::NoFlight(place))
     }
 }
 
-/// Whether a flight is a test that no judgement has opened.
-fn locked(inner: &Inner, log: &LogEntry) -> bool {
-    let opened = inner.session.openings.iter().any(|o| o.flights.contains(&log.name()));
-    log.role == Role::Test && !opened
+fn flight_view(inner: &Inner, (k, name): (usize, String)) -> FlightView<'_> {
+    let log = &inner.session.logs[k];
+    let locked = inner.locked(log);
+    let loaded = inner.flights[k].as_ref();
+    FlightView {
+        name,
+        path: inner.file(k).display().to_string(),
+        role: log.role,
+        locked,
+        error: loaded.err().map(String::as_str),
+        about: loaded.ok().map(|flight| about(flight, locked)),
+    }
 }
 
 fn about(flight: &Loaded, locked: bool) -> About<'_> {
@@ -307,7 +267,7 @@ fn about(flight: &Loaded, locked: bool) -> About<'_> {
         in_doubt: flight.in_doubt(),
         phases: &info.phases,
         purposes: &info.purposes,
-        findings: info.findings.iter().map(FindingView::of).collect(),
+        findings: &info.findings,
         nuisances: flight.flight.nuisances.iter().map(nuisance).collect(),
         notes: &flight.flight.notes,
         strip: (!locked).then(|| flight.strip()),
@@ -339,88 +299,4 @@ fn step(inner: &Inner, count: usize) -> StepView {
         story: fitted.map(|f| f.story.clone()),
         on_fit: fitted.map(|f| f.on_fit.clone()),
     }
-}
-
-/// A flight over time, number `k` of the comparison.
-fn data(flight: &Prepared, comparison: &Comparison, k: usize) -> FlightData {
-    let trace = &comparison.flights[k].trace;
-    let every = trace.time_s.len().div_ceil(ROWS).max(1);
-    let gap = |i: usize| trace.states[2][i].is_nan();
-    let kept: Vec<usize> =
-        (0..trace.time_s.len()).filter(|i| i.is_multiple_of(every) || gap(*i)).collect();
-    let take = |list: &[f64], factor: f64| kept.iter().map(|i| some(factor * list[*i])).collect();
-    let degrees = 1_f64.to_degrees();
-    let [aileron, elevator, throttle] = &trace.controls;
-    let controls = [
-        ("aileron", take(aileron, degrees)),
-        ("elevator", take(elevator, degrees)),
-        ("throttle", take(throttle, 1.0)),
-    ];
-    let channels = |id: &ChannelId| {
-        let of = |m: &ModelResult| m.traces[k].channels.iter().find(|c| c.channel == *id).cloned();
-        let all: Vec<_> = comparison.models.iter().filter_map(of).collect();
-        let measured = all.first()?.measured.iter().map(|x| some(*x)).collect();
-        let predicted = all.iter().map(|c| c.predicted.iter().map(|x| some(*x)).collect());
-        Some((id.symbol(), std::iter::once(measured).chain(predicted).collect()))
-    };
-    let windows = rows(flight);
-    let regime = |(v, variable): (usize, &RegimeVariable)| {
-        let values = windows.iter().map(|w| w.and_then(|w| some(flight.windows[w].regime[v])));
-        (word(*variable), values.collect())
-    };
-    FlightData {
-        name: comparison.flights[k].name.clone(),
-        time_s: kept.iter().map(|i| clock(trace.time_s[*i])).collect(),
-        states: named(&trace.states, &kept),
-        controls: controls.into_iter().collect(),
-        window_s: comparison.models[0].traces[k]
-            .channels
-            .first()
-            .map_or_else(Vec::new, |c| c.time_s.iter().map(|t| clock(*t)).collect()),
-        regimes: RegimeVariable::CONTINUOUS.iter().enumerate().map(regime).collect(),
-        channels: ChannelId::ALL.iter().filter_map(channels).collect(),
-    }
-}
-
-/// The windows in the rows of a channel's trace, which has one of its own between segments.
-fn rows(flight: &Prepared) -> Vec<Option<usize>> {
-    let mut rows = Vec::with_capacity(flight.windows.len());
-    for (k, window) in flight.windows.iter().enumerate() {
-        if k > 0 && flight.windows[k - 1].segment != window.segment {
-            rows.push(None);
-        }
-        rows.push(Some(k));
-    }
-    rows
-}
-
-/// The states by name, in °, °/s and m/s, at `kept` rows.
-fn named(states: &[Vec<f64>; 8], kept: &[usize]) -> BTreeMap<&'static str, Vec<Option<f32>>> {
-    let of = |(name, list): (&&'static str, &Vec<f64>)| {
-        let factor = if *name == "V" { 1.0 } else { 1_f64.to_degrees() };
-        (*name, kept.iter().map(|i| some(factor * list[*i])).collect())
-    };
-    STATES.iter().zip(states).map(of).collect()
-}
-
-/// A variable as JSON has it.
-fn word(variable: RegimeVariable) -> String {
-    match serde_json::to_value(variable) {
-        Ok(Value::String(word)) => word,
-        _ => variable.name().to_owned(),
-    }
-}
-
-/// Five digits of a number, which a screen does not show; nothing of what is none.
-fn some(x: f64) -> Option<f32> {
-    if x == 0.0 {
-        return Some(0.0);
-    }
-    let unit = 10_f64.powi(4 - x.abs().log10().floor() as i32);
-    Some(((x * unit).round() / unit) as f32).filter(|x| x.is_finite())
-}
-
-/// A time to 0.1 ms.
-fn clock(time_s: f64) -> Option<f64> {
-    Some((time_s * 1e4).round() / 1e4).filter(|t| t.is_finite())
 }

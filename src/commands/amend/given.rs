@@ -5,7 +5,6 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
-use crate::physics::catalogue;
 use crate::sysid::amend::Added;
 
 /// What is read of it.
@@ -48,8 +47,5 @@ pub fn asserted(path: &Path, model: &str) -> Result<Vec<Added>> {
 }
 
 fn added(effect: &Effect) -> Added {
-    let value = |name: &str| effect.parameters.iter().find(|p| p.name == name)?.value;
-    let about = catalogue::describe(&effect.id);
-    let start = about.and_then(|a| a.coefficients.iter().map(|c| value(c.name)).collect());
-    Added { id: effect.id.clone(), start }
+    Added::near(&effect.id, |name| effect.parameters.iter().find(|p| p.name == name)?.value)
 }

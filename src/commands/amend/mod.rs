@@ -12,7 +12,7 @@ use anyhow::{Result, bail};
 use places::{Places, hashed};
 use tables::print;
 
-use crate::commands::bar::Bar;
+use crate::commands::bar::{Bar, shares};
 use crate::commands::distinct::distinct;
 use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
@@ -26,6 +26,7 @@ use crate::sysid::compare::{self, compare};
 use crate::sysid::diagnose::{self, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::progress::{Progress, Stage, part};
 
 /// Options of `greylag amend`.
 #[derive(clap::Args)]
@@ -129,23 +130,32 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         ..amend::Options::default()
     };
     let bar = Bar::new();
-    let mut amended = amend::amend(&model, &flights, &tests, &options, &|stage| bar.hear(stage))?;
-    drop(bar);
+    let hear = |stage: Stage<'_>| bar.hear(stage);
+    let [fitting, drawing] = shares(arguments.report.as_deref());
+    let mut amended = amend::amend(&model, &flights, &tests, &options, &part(&hear, fitting))?;
     let story = &mut amended.amendment;
     story.notes.splice(0..0, notes);
     in_doubt |= story.effects.iter().any(|e| !e.refused.is_empty());
     in_doubt |= !amend::contradictions(&story.parameters).is_empty();
-    print(story);
-    let all_refused = !story.effects.is_empty() && !story.effects.iter().any(|e| e.joined);
+    let all_refused = story.all_refused();
+    // drawn before anything is written, so that Ctrl-C leaves nothing behind
+    let drawn = arguments.report.as_ref().filter(|_| !all_refused).map(|path| {
+        let page = page(arguments, &model, &amended, &tests, &places, &part(&hear, drawing))?;
+        Ok::<_, anyhow::Error>((path, page))
+    });
+    let drawn = drawn.transpose()?;
+    bar.go_on()?;
+    drop(bar);
+    print(&amended.amendment);
     if all_refused {
         bail!(
             "no effect was accepted, so nothing was written; --tune-only writes the tuned model, \
              --accept-anyway writes a refused effect"
         );
     }
-    places.write(&model, &amended, &logs, &hold_out, overwrite)?;
-    if let Some(path) = &arguments.report {
-        files::write(path, &page(arguments, &model, &amended, &tests, &places)?, overwrite)?;
+    places.write(&model, &amended, [&logs, &hold_out], overwrite)?;
+    if let Some((path, page)) = drawn {
+        files::write(path, &page, overwrite)?;
     }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
@@ -157,11 +167,11 @@ fn page(
     amended: &Amended,
     tests: &[Reconstruction],
     places: &Places,
+    progress: &Progress,
 ) -> Result<String> {
     let mut models = [model.clone(), amended.tuned.clone(), amended.model.clone()];
     models[1].name = format!("{}-tuned", model.name);
-    let held_out =
-        compare(&models, tests, &compare::Options::default(), &crate::sysid::progress::unheard)?;
+    let held_out = compare(&models, tests, &compare::Options::default(), progress)?;
     let paths = arguments.logs.paths.iter().chain(&arguments.hold_out);
     let report = AmendmentReport {
         title: format!("{} amended", model.name),

@@ -1,6 +1,6 @@
 //! Airspeed, vanes, climb and density: units and signs.
 
-use super::cure;
+use super::cured;
 use super::relation::{
     Relation, change, integral, near, quantile, through_origin, values, windows, with_intercept,
 };
@@ -70,10 +70,11 @@ fn other_unit(ratio: Option<f64>, shown: &str) -> Option<Finding> {
     if miss(scale) > 0.15 {
         return None;
     }
-    Some(Finding::problem(format!(
-        "airspeed looks like {unit}, not m/s (it is {ratio:.2} times what {shown}): {}",
-        cure("airspeed_mps", (scale * 1e6).round() / 1e6)
-    )))
+    Some(cured(
+        format!("airspeed looks like {unit}, not m/s (it is {ratio:.2} times what {shown})"),
+        "airspeed_mps",
+        (scale * 1e6).round() / 1e6,
+    ))
 }
 
 fn vanes(rows: &[Sample]) -> Vec<Finding> {
@@ -82,10 +83,11 @@ fn vanes(rows: &[Sample]) -> Vec<Finding> {
         .into_iter()
         .filter_map(|(column, size)| Some((column, size.filter(|x| *x > VANE_LARGE)?)))
         .map(|(column, size)| {
-            Finding::problem(format!(
-                "{column} looks like degrees, not radians (95 % of it below {size:.1}): {}",
-                cure(column, 0.0174533)
-            ))
+            cured(
+                format!("{column} looks like degrees, not radians (95 % of it below {size:.1})"),
+                column,
+                0.0174533,
+            )
         })
         .collect()
 }
@@ -106,29 +108,23 @@ fn climb(rows: &[Sample], speed_is_right: bool) -> Option<Finding> {
     let (down, air) = (sure(down), sure(air));
     let feet = |slope: Option<f64>| slope.is_some_and(|s| near(s, 1.0 / FOOT, 0.3));
     if feet(air) && speed_is_right || feet(down) && air.is_none() {
-        return Some(Finding::problem(format!(
-            "altitude looks like feet, not metres (it climbs {:.1} times as fast as the aircraft): {}",
-            air.or(down).unwrap_or_default(),
-            cure("altitude_m", FOOT)
-        )));
+        return Some(cured(
+            format!(
+                "altitude looks like feet, not metres (it climbs {:.1} times as fast as the aircraft)",
+                air.or(down).unwrap_or_default()
+            ),
+            "altitude_m",
+            FOOT,
+        ));
     }
     if speed_is_right && air.is_some_and(|s| near(s, FOOT, 0.3)) {
-        return Some(Finding::problem(format!(
-            "airspeed looks like ft/s, not m/s (the altitude climbs 0.3 times as fast as airspeed and pitch say): {}",
-            cure("airspeed_mps", FOOT)
-        )));
+        return Some(cured("airspeed looks like ft/s, not m/s (the altitude climbs 0.3 times as fast as airspeed and pitch say)".into(), "airspeed_mps", FOOT));
     }
     if air.is_some_and(|s| s < 0.0) && down.is_none_or(|s| s < 0.0) {
-        return Some(Finding::problem(format!(
-            "altitude falls while the nose is up and the aircraft flies: it looks positive down, while the log format's is positive up: {}",
-            cure("altitude_m", -1.0)
-        )));
+        return Some(cured("altitude falls while the nose is up and the aircraft flies: it looks positive down, while the log format's is positive up".into(), "altitude_m", -1.0));
     }
     if down.is_some_and(|s| s < 0.0) {
-        return Some(Finding::problem(format!(
-            "altitude rises while vd_mps is positive: the velocity looks positive up (ENU), while the log format's is positive down (NED): {}",
-            cure("vd_mps", -1.0)
-        )));
+        return Some(cured("altitude rises while vd_mps is positive: the velocity looks positive up (ENU), while the log format's is positive down (NED)".into(), "vd_mps", -1.0));
     }
     density(rows)
 }
@@ -142,15 +138,12 @@ fn density(rows: &[Sample]) -> Option<Finding> {
         )
     };
     let metres = ratio(1.0).filter(|r| !(0.75..1.3).contains(r))?;
-    let text = if ratio(FOOT).is_some_and(|r| near(r, 1.0, 0.12)) {
-        format!(
-            "altitude looks like feet, not metres (the logged air density fits it so): {}",
-            cure("altitude_m", FOOT)
-        )
+    Some(if ratio(FOOT).is_some_and(|r| near(r, 1.0, 0.12)) {
+        let text = "altitude looks like feet, not metres (the logged air density fits it so)";
+        cured(text.into(), "altitude_m", FOOT)
     } else {
-        format!(
+        Finding::problem(format!(
             "the logged air density is {metres:.2} times that of the standard atmosphere at the logged altitude: one of air_density_kgpm3 and altitude_m is in another unit; map it, or leave the density out"
-        )
-    };
-    Some(Finding::problem(text))
+        ))
+    })
 }

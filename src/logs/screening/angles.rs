@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::cure;
+use super::cured;
 use super::relation::{
     Relation, change, integral, near, quantile, through_origin, values, windows,
 };
@@ -42,16 +42,19 @@ fn units(rows: &[Sample], windows: &[&[Sample]]) -> Vec<Finding> {
         || rate > 12.0
         || large && ratio.is_some_and(|r| near(r, 1.0, 0.4));
     if angles {
-        out.push(Finding::problem(format!(
-            "roll and pitch look like degrees, not radians (99 % of |roll| below {roll:.1}): {}; pitch_rad and yaw_rad likewise",
-            cure("roll_rad", 0.0174533)
-        )));
+        out.push(
+            cured(
+                format!(
+                    "roll and pitch look like degrees, not radians (99 % of |roll| below {roll:.1})"
+                ),
+                "roll_rad",
+                0.0174533,
+            )
+            .with("; pitch_rad and yaw_rad likewise"),
+        );
     }
     if rates {
-        out.push(Finding::problem(format!(
-            "p, q, r look like degrees a second, not radians a second (99 % of |p| below {rate:.1}): {}; q_radps and r_radps likewise",
-            cure("p_radps", 0.0174533)
-        )));
+        out.push(cured(format!("p, q, r look like degrees a second, not radians a second (99 % of |p| below {rate:.1})"), "p_radps", 0.0174533).with("; q_radps and r_radps likewise"));
     }
     if let Some(r) = ratio.filter(|r| !angles && !rates && !near(*r, 1.0, 0.4)) {
         out.push(Finding::warning(format!(
@@ -67,16 +70,10 @@ fn signs(windows: &[&[Sample]]) -> Vec<Finding> {
     let turned = |r: Option<Relation>| r.is_some_and(|r| r.correlation < -CERTAIN);
     let mut out = Vec::new();
     if turned(roll) {
-        out.push(Finding::problem(format!(
-            "roll falls while p is positive: one of them has the wrong sign (positive is right wing down). If it is roll: {}",
-            cure("roll_rad", -1.0)
-        )));
+        out.push(cured("roll falls while p is positive: one of them has the wrong sign (positive is right wing down). If it is roll".into(), "roll_rad", -1.0));
     }
     if turned(pitch) {
-        out.push(Finding::problem(format!(
-            "pitch falls while q is positive: one of them has the wrong sign (positive is nose up). If it is pitch: {}",
-            cure("pitch_rad", -1.0)
-        )));
+        out.push(cured("pitch falls while q is positive: one of them has the wrong sign (positive is nose up). If it is pitch".into(), "pitch_rad", -1.0));
     }
     if turned(yaw) {
         out.push(Finding::problem(

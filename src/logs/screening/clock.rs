@@ -1,6 +1,6 @@
 //! The clock: seconds, milliseconds or microseconds.
 
-use super::cure;
+use super::cured;
 use super::relation::{near, quantile, through_origin, values};
 use crate::logs::Sample;
 use crate::logs::finding::Finding;
@@ -30,9 +30,10 @@ pub fn check(rows: &[Sample]) -> Option<Finding> {
         .into_iter()
         .find(|(_, factor)| near(slope, *factor, 0.7))
         .map(|(unit, factor)| {
-            Finding::problem(format!(
-                "time_s looks like {unit}, not seconds (its rows are {period:.0} apart): {}",
-                cure("time_s", factor)
-            ))
+            cured(
+                format!("time_s looks like {unit}, not seconds (its rows are {period:.0} apart)"),
+                "time_s",
+                factor,
+            )
         })
 }

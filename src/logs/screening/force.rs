@@ -1,6 +1,6 @@
 //! Accelerometers: unit and sign of each axis.
 
-use super::cure;
+use super::cured;
 use super::relation::{change, mean, quantile, values, windows, with_intercept};
 use crate::logs::Sample;
 use crate::logs::finding::Finding;
@@ -17,10 +17,16 @@ pub fn check(rows: &[Sample]) -> Vec<Finding> {
     let size = |s: &Sample| s.specific_force_mps2.iter().map(|a| a * a).sum::<f64>().sqrt();
     let Some(middle) = quantile(&values(rows, size), 0.5) else { return Vec::new() };
     if let Some((unit, scale)) = unit(middle) {
-        return vec![Finding::problem(format!(
-            "specific force looks like {unit}, not m/s² (its median size is {middle:.2}): {}; ay_mps2 and az_mps2 likewise",
-            cure("ax_mps2", scale)
-        ))];
+        return vec![
+            cured(
+                format!(
+                    "specific force looks like {unit}, not m/s² (its median size is {middle:.2})"
+                ),
+                "ax_mps2",
+                scale,
+            )
+            .with("; ay_mps2 and az_mps2 likewise"),
+        ];
     }
     if let Some(vertical) = vertical(rows) {
         return vec![vertical];
@@ -39,15 +45,16 @@ fn unit(middle: f64) -> Option<(&'static str, f64)> {
 fn vertical(rows: &[Sample]) -> Option<Finding> {
     let z = quantile(&values(rows, |s| s.specific_force_mps2[2]), 0.5).filter(|z| *z > 5.0)?;
     let left = turns_left(rows);
-    let text = if left {
-        "the axes look forward-left-up (FLU): az is positive, and r is negative in right turns; read ay_mps2, az_mps2, q_radps, r_radps, pitch_rad and yaw_rad with scale = -1 in a mapping (--mapping FILE)".to_owned()
-    } else {
-        format!(
-            "az is {z:.2} in the middle: the z accelerometer looks positive up, while the log format's reads about -9.81 in level flight: {}",
-            cure("az_mps2", -1.0)
+    Some(if left {
+        Finding::problem(
+            "the axes look forward-left-up (FLU): az is positive, and r is negative in right turns; read ay_mps2, az_mps2, q_radps, r_radps, pitch_rad and yaw_rad with scale = -1 in a mapping (--mapping FILE)",
         )
-    };
-    Some(Finding::problem(text))
+    } else {
+        let text = format!(
+            "az is {z:.2} in the middle: the z accelerometer looks positive up, while the log format's reads about -9.81 in level flight"
+        );
+        cured(text, "az_mps2", -1.0)
+    })
 }
 
 /// Whether r is negative in banks to the right: ψ̇ = g tan φ / V in coordinated flight.
@@ -86,10 +93,7 @@ fn along_and_across(rows: &[Sample]) -> Vec<Finding> {
             with_intercept(pairs).is_some_and(|r| r.correlation < TURNED)
         })
         .map(|(_, column, looks, right)| {
-            Finding::problem(format!(
-                "{column} contradicts how the aircraft accelerates: it looks {looks}, while the log format's is positive {right}: {}",
-                cure(column, -1.0)
-            ))
+            cured(format!("{column} contradicts how the aircraft accelerates: it looks {looks}, while the log format's is positive {right}"), column, -1.0)
         })
         .collect()
 }

@@ -14,7 +14,7 @@ mod relation;
 mod surfaces;
 
 use super::Sample;
-use super::finding::Finding;
+use super::finding::{Cure, Finding};
 use super::phases::{self, Kind};
 
 /// Rows below which nothing is said about units.
@@ -65,9 +65,8 @@ fn flight(rows: &[Sample]) -> Option<Finding> {
     })
 }
 
-/// The mapping that multiplies `column` by `scale`.
-fn cure(column: &str, scale: f64) -> String {
-    format!(
-        "read it with --mapping FILE, in which [columns] has {column} = {{ from = \"csv.{column}\", scale = {scale} }} (in a binary log its topic and field stand in place of csv.{column})"
-    )
+/// The problem `what`, which the mapping that multiplies `column` by `scale` puts right.
+fn cured(what: String, column: &str, scale: f64) -> Finding {
+    let cure = Cure { column: column.into(), scale };
+    Finding { cure: Some(cure.clone()), ..Finding::problem(format!("{what}: {cure}")) }
 }

@@ -1,6 +1,6 @@
 //! Surfaces and throttle: units, and whether they move the aircraft in their own direction.
 
-use super::cure;
+use super::cured;
 use super::relation::{change, mean, partial_correlation, quantile, values, windows};
 use crate::logs::Sample;
 use crate::logs::finding::Finding;
@@ -46,10 +46,11 @@ fn units(rows: &[Sample]) -> Vec<Finding> {
     };
     let mut out = Vec::new();
     for (column, x) in large(&deflections, DEFLECTION_LARGE) {
-        out.push(Finding::problem(format!(
-            "{column} looks like degrees, not radians (99 % of it below {x:.1}): {}",
-            cure(column, 0.0174533)
-        )));
+        out.push(cured(
+            format!("{column} looks like degrees, not radians (99 % of it below {x:.1})"),
+            column,
+            0.0174533,
+        ));
     }
     for (column, x) in large(&commands, COMMAND_LARGE) {
         out.push(Finding::problem(format!(
@@ -63,15 +64,16 @@ fn units(rows: &[Sample]) -> Vec<Finding> {
 }
 
 fn throttle(column: &str, size: f64) -> Finding {
-    Finding::problem(match size {
-        0.0..=130.0 => format!(
-            "{column} looks like per cent, not 0..1 (99 % of it below {size:.0}): {}",
-            cure(column, 0.01)
+    match size {
+        0.0..=130.0 => cured(
+            format!("{column} looks like per cent, not 0..1 (99 % of it below {size:.0})"),
+            column,
+            0.01,
         ),
-        _ => format!(
+        _ => Finding::problem(format!(
             "{column} looks like microseconds of a pulse, not 0..1 (99 % of it below {size:.0}): read it with --mapping FILE, in which [columns] has {column} = {{ from = \"csv.{column}\", scale = 0.001, offset = -1 }}"
-        ),
-    })
+        )),
+    }
 }
 
 /// ṗ on p, r, β and the aileron: positive is right wing down.
@@ -87,10 +89,7 @@ fn aileron(rows: &[Sample]) -> Option<Finding> {
     };
     let found = polarity(rows, 0, regressors)?;
     (found < -TURNED).then(|| {
-        Finding::problem(format!(
-            "{column} acts the other way: the aircraft rolls left where it is positive, while the log format's is positive for right wing down: {}",
-            cure(column, -1.0)
-        ))
+        cured(format!("{column} acts the other way: the aircraft rolls left where it is positive, while the log format's is positive for right wing down"), column, -1.0)
     })
 }
 
@@ -106,10 +105,7 @@ fn elevator(rows: &[Sample]) -> Option<Finding> {
         |w: &[Sample]| vec![mean(w, |s| s.rates_radps[1]), mean(w, alpha), mean(w, get)];
     let found = polarity(rows, 1, regressors)?;
     (found > TURNED).then(|| {
-        Finding::problem(format!(
-            "{column} acts the other way: the nose rises where it is positive, while the log format's is positive for nose down: {}",
-            cure(column, -1.0)
-        ))
+        cured(format!("{column} acts the other way: the nose rises where it is positive, while the log format's is positive for nose down"), column, -1.0)
     })
 }
 

@@ -30,16 +30,16 @@ pub enum WriteError {
 /// Writes `text` to `path`, which must not exist yet: [`WriteError::Exists`] otherwise. A reader
 /// never sees half of it.
 pub fn write_new(path: &Path, text: &str) -> Result<(), WriteError> {
-    let file = written_beside(path, text).map_err(|source| io_error(path, source))?;
+    let file = written_beside(path, text.as_bytes()).map_err(|source| io_error(path, source))?;
     file.persist_noclobber(path).map(sync).map_err(|e| match e.error.kind() {
         io::ErrorKind::AlreadyExists => WriteError::Exists { path: path.into() },
         _ => io_error(path, e.error),
     })
 }
 
-/// Writes `text` to `path` in place of any file there. A reader sees the old file or the new one.
-pub fn write_over(path: &Path, text: &str) -> Result<(), WriteError> {
-    let file = written_beside(path, text).map_err(|source| io_error(path, source))?;
+/// Writes `content` to `path` in place of any file there. A reader sees the old file or the new one.
+pub fn write_over(path: &Path, content: impl AsRef<[u8]>) -> Result<(), WriteError> {
+    let file = written_beside(path, content.as_ref()).map_err(|source| io_error(path, source))?;
     file.persist(path).map(sync).map_err(|e| io_error(path, e.error))
 }
 
@@ -47,8 +47,8 @@ fn io_error(path: &Path, source: io::Error) -> WriteError {
     WriteError::Io { path: path.into(), source }
 }
 
-/// The text in a temporary file of the same folder, so that renaming it is atomic.
-fn written_beside(path: &Path, text: &str) -> io::Result<NamedTempFile> {
+/// The content in a temporary file of the same folder, so that renaming it is atomic.
+fn written_beside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -61,7 +61,7 @@ fn written_beside(path: &Path, text: &str) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(everyone);
     let mut file = builder.tempfile_in(folder)?;
-    file.write_all(text.as_bytes())?;
+    file.write_all(content)?;
     Ok(file)
 }
 

@@ -34,11 +34,15 @@ pub struct Added {
 impl Added {
     /// A candidate of a diagnosis, to be searched for near where the diagnosis has it.
     pub fn of(candidate: &Candidate) -> Added {
-        let coefficients = catalogue::describe(&candidate.id).map(|about| about.coefficients);
-        let value =
-            |name: &str| candidate.parameters.iter().find(|p| p.name == name).map(|p| p.value);
+        let of = |name: &str| candidate.parameters.iter().find(|p| p.name == name);
+        Added::near(&candidate.id, |name| of(name).map(|p| p.value))
+    }
+
+    /// The effect `id`, to be searched for near `value` of its coefficients' names, if that knows them all.
+    pub fn near(id: &str, value: impl Fn(&str) -> Option<f64>) -> Added {
+        let coefficients = catalogue::describe(id).map(|about| about.coefficients);
         let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
-        Added { id: candidate.id.clone(), start }
+        Added { id: id.into(), start }
     }
 }
 
@@ -137,7 +141,7 @@ pub fn amend(
     for added in &options.effects {
         joined(&mut model.clone(), added)?;
     }
-    let slowest = 0.5 * model.airframe.envelope.airspeed_min_mps;
+    let slowest = model.airframe.envelope.flying_from_mps();
     let ready = |all: &[Reconstruction]| {
         all.iter().map(|f| Flight::new(f, slowest)).collect::<Result<Vec<_>, _>>()
     };

@@ -1,6 +1,6 @@
 //! An amendment as files hold it: the model file's new text, and the story as JSON.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -47,33 +47,87 @@ struct Document<'a> {
     hold_out: &'a [Hashed],
 }
 
-/// What was done, as JSON: of the model file `original`, fitted to `logs`, judged by `hold_out`.
-///
-/// # Errors
-/// A number of the story has no place in JSON.
-pub fn story(
-    amended: &Amended,
-    original: &Path,
-    logs: &[Hashed],
-    hold_out: &[Hashed],
-) -> serde_json::Result<String> {
-    let model_file = original.display().to_string();
-    let document = Document { story: &amended.amendment, model_file, logs, hold_out };
-    Ok(serde_json::to_string_pretty(&document)? + "\n")
+/// The file of the amended model.
+pub const MODEL: &str = "model.toml";
+/// The file of what was done.
+pub const STORY: &str = "amend.json";
+
+/// Why the files of an amended model cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum DocumentError {
+    /// A file of the model amended cannot be read.
+    #[error("cannot read {}: {source}; check that it exists and may be read", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The model file cannot be edited.
+    #[error(transparent)]
+    Edit(#[from] EditError),
+    /// A number of the story has no place in JSON.
+    #[error("cannot write {STORY}: {0}")]
+    Json(#[from] serde_json::Error),
 }
 
-/// `text`, the file of the model `before`, as amended; `airframe` is what the new file calls its airframe.
+/// The model to start from, as its files have it.
+#[derive(Clone, Debug)]
+pub struct Original {
+    /// The model file.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+    /// The name of its airframe's file.
+    pub airframe: String,
+    /// The airframe's text.
+    pub airframe_text: String,
+}
+
+impl Original {
+    /// Reads the model file at `path` with its airframe.
+    ///
+    /// # Errors
+    /// One of them cannot be read.
+    pub fn read(path: &Path) -> Result<Original, DocumentError> {
+        let read = |path: &Path| {
+            let unread = |source| DocumentError::Read { path: path.into(), source };
+            std::fs::read_to_string(path).map_err(unread)
+        };
+        let text = read(path)?;
+        let table: toml::Table = toml::from_str(&text).unwrap_or_default();
+        let named = table.get("airframe").and_then(toml::Value::as_str).unwrap_or_default();
+        let airframe = path.parent().unwrap_or(Path::new(".")).join(named);
+        let name = airframe.file_name().unwrap_or("airframe.toml".as_ref());
+        Ok(Original {
+            path: path.into(),
+            airframe: name.to_string_lossy().into_owned(),
+            airframe_text: read(&airframe)?,
+            text,
+        })
+    }
+}
+
+/// The files of an amended model, name and text: airframe, effects, model, story. `logs` are those fitted to and
+/// those held out.
 ///
 /// # Errors
-/// The text is no model file.
-pub fn model(
-    text: &str,
+/// The original is no model file, or a number of the story has no place in JSON.
+pub fn files(
+    original: &Original,
     before: &GreyBox,
     amended: &Amended,
-    logs: &[Hashed],
-    airframe: String,
-) -> Result<String, EditError> {
-    edit(before, amended, logs, airframe).apply(text)
+    [logs, hold_out]: [&[Hashed]; 2],
+) -> Result<Vec<(String, String)>, DocumentError> {
+    let airframe = original.airframe.clone();
+    let text = edit(before, amended, logs, airframe.clone()).apply(&original.text)?;
+    let model_file = original.path.display().to_string();
+    let document = Document { story: &amended.amendment, model_file, logs, hold_out };
+    let story = serde_json::to_string_pretty(&document)? + "\n";
+    let mut files = vec![(airframe, original.airframe_text.clone())];
+    files.extend(amended.model.written().map(|own| (effect_file(own), own.text.clone())));
+    files.extend([(MODEL.into(), text), (STORY.into(), story)]);
+    Ok(files)
 }
 
 /// What changes in the model file.

@@ -82,6 +82,7 @@ pub enum AmendError {
         model: String,
     },
     /// Whoever listened ended it.
-    #[error(transparent)]
+    // not transparent: this error itself must stand in the chain of causes
+    #[error("cancelled")]
     Cancelled(#[from] Cancelled),
 }

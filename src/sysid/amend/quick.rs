@@ -59,6 +59,6 @@ pub fn estimate(
 
 /// The flights as a fit takes them.
 fn ready(model: &GreyBox, flights: &[Reconstruction]) -> Result<Vec<Flight>, AmendError> {
-    let slowest = 0.5 * model.airframe.envelope.airspeed_min_mps;
+    let slowest = model.airframe.envelope.flying_from_mps();
     Ok(flights.iter().map(|f| Flight::new(f, slowest)).collect::<Result<_, _>>()?)
 }

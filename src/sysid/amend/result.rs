@@ -135,3 +135,10 @@ pub struct Amendment {
     /// What was asked for.
     pub settings: Settings,
 }
+
+impl Amendment {
+    /// Whether effects were asked for and none of them joined the model.
+    pub fn all_refused(&self) -> bool {
+        !self.effects.is_empty() && !self.effects.iter().any(|e| e.joined)
+    }
+}

@@ -24,6 +24,7 @@ pub enum CompareError {
     #[error("horizon {0} s cannot be flown: give horizons from 0.01 to 600 s")]
     Horizon(f64),
     /// Whoever listened ended it.
-    #[error(transparent)]
+    // not transparent: this error itself must stand in the chain of causes
+    #[error("cancelled")]
     Cancelled(#[from] Cancelled),
 }

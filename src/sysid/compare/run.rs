@@ -55,7 +55,7 @@ pub fn compare(
     if let Some(h) = options.horizons_s.iter().find(|h| !(0.01..=600.0).contains(*h)) {
         return Err(CompareError::Horizon(*h));
     }
-    let slowest = 0.5 * first.airframe.envelope.airspeed_min_mps;
+    let slowest = first.airframe.envelope.flying_from_mps();
     let (used, prepared, mut notes) = usable(flights, slowest)?;
     notes.extend(short_of(&prepared, &options.horizons_s));
     let forecasts = forecasts(&prepared, first.scale(), &options.horizons_s);

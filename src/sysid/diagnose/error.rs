@@ -50,6 +50,7 @@ pub enum DiagnoseError {
         id: String,
     },
     /// Whoever listened ended it.
-    #[error(transparent)]
+    // not transparent: this error itself must stand in the chain of causes
+    #[error("cancelled")]
     Cancelled(#[from] Cancelled),
 }

@@ -205,7 +205,7 @@ export function freshFailing(of) {
     return;
   }
   parts.where.hidden = parts.tools.hidden = parts.states.hidden = false;
-  if (pick.flight !== bench.chosen) Object.assign(pick, { window: null, run: null, at: null, flight: bench.chosen });
+  if (pick.flight !== bench.chosen_path) Object.assign(pick, { window: null, run: null, at: null, flight: bench.chosen_path });
   bench.light(lit);
   time();
   const times = bench.flight.time_s.filter((t) => t != null);

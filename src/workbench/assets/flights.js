@@ -21,7 +21,7 @@ function one(bench, flight, place, kept) {
     type: "button", class: "name", disabled: flight.locked || !!flight.error, title: flight.path, onclick: () => { bench.by_hand = true; bench.choose(place); },
   }, flight.name);
   const remove = el("button", { type: "button", class: "quiet", title: "Take out of the session; the file stays", onclick: () => bench.act({ do: "remove", flight: place }) }, "Remove");
-  const roles = el("fieldset", { class: "roles", "aria-label": `${flight.name} serves to` }, Object.entries(ROLES).map(([role, word]) => {
+  const roles = el("fieldset", { class: "roles", "aria-label": `role of ${flight.name}` }, Object.entries(ROLES).map(([role, word]) => {
     const radio = el("input", { type: "radio", name: `role-${place}`, value: role, checked: flight.role === role, onchange: () => bench.act({ do: "role", flight: place, role }) });
     return el("label", {}, radio, word);
   }));
@@ -42,7 +42,7 @@ function one(bench, flight, place, kept) {
 /** What is wrong with the log, what it serves for, which errors its sensors have. */
 function about(bench, flight, place, kept) {
   const details = (key, summary, lines, open) => {
-    const id = `${place}-${key}`;
+    const id = `${flight.path}-${key}`;
     return lines.length ? el("details", { open: open || kept.has(id), "data-key": id }, el("summary", {}, summary), el("ul", {}, lines.map((l) => el("li", { class: l.class }, l.text, l.fix)))) : null;
   };
   const findings = flight.findings.map((f) => ({

@@ -47,11 +47,14 @@ export const SYMBOL = {
   alpha: "α", beta: "β", airspeed: "V", throttle: "δt", p: "p", q: "q", r: "r", aileron: "δa", elevator: "δe",
   aileron_rate: "δ̇a", elevator_rate: "δ̇e", altitude: "h", time: "t", flight: "flight",
 };
-/** The error at the horizon of judgement: the longest up to 5 s that runs reach. */
-export function judged(scores) {
-  const reached = (scores ?? []).filter((s) => s.runs > 0 && s.horizon_s <= 5.001 && s.rmse_scaled != null);
-  return reached.length ? reached[reached.length - 1].rmse_scaled : null;
-}
+/** The score at the horizon of judgement: the longest up to 5 s that runs reach. */
+const reached = (scores) => (scores ?? []).filter((s) => s.runs > 0 && s.horizon_s <= 5.001 && s.rmse_scaled != null).pop();
+/** The error there. */
+export const judged = (scores) => reached(scores)?.rmse_scaled ?? null;
+/** The horizon itself in words. */
+export const horizon = (scores) => (reached(scores) ? ` at ${show(reached(scores).horizon_s, 1)} s` : "");
+/** What the fit of the most effects says: it has the last word on each of them. */
+export const verdicts = (state) => [...state.stack].reverse().find((s) => s.story)?.story ?? null;
 
 /** The command that does the same, with a button that copies it. */
 export function command(text, what = "The same") {

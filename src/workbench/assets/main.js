@@ -1,6 +1,6 @@
 // The workbench: one session, four panes, kept as the program has it.
 
-import { complain, el, get, hush, judged, percent, post, redraw, send, show } from "./kit.js";
+import { complain, el, get, horizon, hush, judged, percent, post, redraw, send, show, verdicts } from "./kit.js";
 import { flights } from "./flights.js";
 import { failing, freshFailing, repaint } from "./failing.js";
 import { suspects } from "./suspects.js";
@@ -18,7 +18,7 @@ function wear(theme) {
 
 /** What the panes share. */
 const bench = {
-  state: null, failing: null, diagnosis: null, flight: null, chosen: 0, data: new Map(), lit: new Map(), act, upload, choose, light, choose_lit, by_hand: false,
+  state: null, failing: null, diagnosis: null, flight: null, chosen: 0, chosen_path: null, data: new Map(), lit: new Map(), act, upload, choose, light, choose_lit, by_hand: false,
 };
 
 root.dataset.theme = dark.matches ? "dark" : "light";
@@ -50,7 +50,10 @@ async function refresh(state) {
 async function load_flight(own = fresh) {
   const all = bench.state.flights;
   const open = (f) => f && !f.error && !f.locked;
+  // by its path: places shift where a flight is taken out
+  bench.chosen = all.findIndex((f) => f.path === bench.chosen_path);
   if (!open(all[bench.chosen])) bench.chosen = Math.max(0, all.findIndex(open));
+  bench.chosen_path = all[bench.chosen]?.path ?? null;
   bench.data.clear();
   bench.flight = open(all[bench.chosen]) ? await data(bench.chosen) : null;
   if (own !== fresh) return;
@@ -95,12 +98,13 @@ function show_all() {
 function answer() {
   const { state } = bench;
   const place = document.getElementById("answer");
-  const last = [...state.stack].reverse().find((s) => s.story);
+  const story = verdicts(state);
   const name = el("b", {}, state.model.name);
-  if (!last) return place.replaceChildren(name);
-  const [before, after] = [judged(last.story.given), judged(last.story.after)];
+  if (!story) return place.replaceChildren(name);
+  const [before, after] = [judged(story.given), judged(story.after)];
   const fall = before && after != null ? percent(after / before - 1) : "–";
-  place.replaceChildren(name, ` with ${state.stack.filter((s) => s.story).map((s) => s.id).join(", ")}: NRMSE at 5 s on held-out flight `,
+  const joined = story.effects.filter((e) => e.joined).map((e) => e.id);
+  place.replaceChildren(name, ` ${joined.length ? `with ${joined.join(", ")}` : "tuned, no effect accepted"}: NRMSE${horizon(story.after)} on held-out flight `,
     el("b", {}, `${show(before)} → ${show(after)}`), ` (${fall})`);
 }
 function job() {
@@ -142,6 +146,7 @@ async function upload(files) {
 }
 async function choose(place) {
   bench.chosen = place;
+  bench.chosen_path = bench.state.flights[place]?.path ?? null;
   flights(bench);
   try {
     bench.flight = await data(place);
@@ -156,15 +161,15 @@ async function choose(place) {
 let later = 0;
 const events = new EventSource("/api/events");
 events.addEventListener("message", (message) => {
-  const told = JSON.parse(message.data);
-  if (told.event === "progress" && bench.state) {
-    const known = bench.state.jobs.findIndex((j) => j.id === told.job.id);
+  const news = JSON.parse(message.data);
+  if (news.event === "progress" && bench.state) {
+    const known = bench.state.jobs.findIndex((j) => j.id === news.job.id);
     if (known < 0) return;
-    const first = told.job.ranking.length !== bench.state.jobs[known].ranking.length;
-    bench.state.jobs[known] = told.job;
+    const first = news.job.ranking.length !== bench.state.jobs[known].ranking.length;
+    bench.state.jobs[known] = news.job;
     job();
     if (first) suspects(bench);
-  } else if (told.event === "changed") {
+  } else if (news.event === "changed") {
     clearTimeout(later);
     later = setTimeout(() => refresh(), 30);
   }

@@ -1,6 +1,6 @@
 // The model: the accepted effects with the error after each, judged, taken back, saved.
 
-import { command, el, judged, show } from "./kit.js";
+import { command, el, horizon, judged, show, verdicts } from "./kit.js";
 
 export function model(bench) {
   const body = document.querySelector("#model .body");
@@ -10,6 +10,8 @@ export function model(bench) {
     el("div", { class: "row" }, el("button", { type: "button", class: "main", onclick: () => bench.act({ do: "reload_model" }) }, "Reload the model")));
   const base = el("p", { class: "note" }, el("b", {}, about.name), `, ${about.path}`);
   const tests = state.flights.filter((f) => f.role === "test" && !f.error);
+  const current = key(state);
+  if (saved.key !== current) saved = { key: current, note: null };
   const unfitted = stack.some((s) => s.status === "unfitted" || s.status === "failed");
   const buttons = el("div", { class: "row" },
     el("button", { type: "button", disabled: !stack.length, onclick: () => bench.act({ do: "undo" }) }, "Undo"),
@@ -18,19 +20,21 @@ export function model(bench) {
     el("button", { type: "button", id: "judge", disabled: !tests.length || state.jobs.length > 0, title: "Opens the test flights; each opening is counted and recorded", onclick: () => bench.act({ do: "judge" }) }, "Judge"),
     el("button", { type: "button", id: "save", class: stack.length && !unfitted ? "main" : "", disabled: !stack.length || unfitted || state.jobs.length > 0, onclick: () => save(bench) }, "Save"));
   body.replaceChildren(...[outside, base, errors(state), ...stack.map((s) => step(bench, s)), !stack.length && el("p", { class: "empty" }, "No effect is accepted yet: tick a suspect."),
-    buttons, saved, opened(state), command(state.commands.amend, "Model and Save"), command(state.commands.judge, "Judge")].filter(Boolean));
+    buttons, saved.note, opened(state), command(state.commands.amend, "Model and Save"), command(state.commands.judge, "Judge")].filter(Boolean));
 }
 
-let saved = null;
+/** What a saved model is about: it is another one when the stack or the model changes. */
+const key = (state) => JSON.stringify([state.model, state.diagnosis.key, state.stack.map((s) => [s.id, s.anyway, s.status])]);
+let saved = { key: null, note: null };
 async function save(bench) {
-  saved = null;
+  saved.note = null;
   if (await bench.act({ do: "save" })) {
-    saved = el("p", { class: "good", id: "saved" }, `Saved ${bench.state.folder}/model/model.toml, the same file as the command writes.`);
+    saved.note = el("p", { class: "good", id: "saved" }, `Saved ${bench.state.folder}/model/model.toml, the same file as the command writes.`);
     model(bench);
   }
 }
 
-/** NRMSE at 5 s: as given, tuned, and after each effect, on fit, held-out and test flights. */
+/** NRMSE: as given, tuned, and after each effect, on fit, held-out and test flights. */
 function errors(state) {
   const rows = [];
   const fitted = state.stack.filter((s) => s.story);
@@ -38,30 +42,32 @@ function errors(state) {
     const { story, on_fit } = fitted[0];
     rows.push(["as given", "given", judged(on_fit.given), judged(story.given)], ["tuned", "tuned", null, judged(story.before)]);
   }
+  const story = verdicts(state);
+  const refused = (id) => (story?.effects.find((e) => e.id === id)?.joined === false ? ", refused" : "");
   for (const s of state.stack) {
-    if (s.story) rows.push([`+ ${s.id}`, "amended", judged(s.on_fit.amended), judged(s.story.after)]);
+    if (s.story) rows.push([`+ ${s.id}${refused(s.id)}`, "amended", judged(s.on_fit.amended), judged(s.story.after)]);
     else if (s.estimated) rows.push([`+ ${s.id}, equation error`, "estimated", null, judged(s.estimated)]);
   }
   if (!rows.length) return null;
-  const test = (name) => {
-    const last = state.openings[state.openings.length - 1];
-    const now = state.stack.map((s) => s.id).join();
-    if (!last) return null;
-    return name === "as given" ? last.given : last.effects.join() === now && name === `+ ${last.effects[last.effects.length - 1]}` ? last.amended : null;
-  };
-  const all = rows.map((r) => [...r, test(r[0])]);
+  const last = state.openings.filter((o) => o.occasion === "judged").pop();
+  const joined = (story?.effects ?? []).filter((e) => e.joined).map((e) => e.id);
+  // the amended model is the last row's, if its fit is done
+  const about = last && state.stack.every((s) => s.story) && last.effects.join() === joined.join();
+  const test = (k) => (last && k === 0 ? last.given : about && k === rows.length - 1 ? last.amended : null);
+  const all = rows.map((r, k) => [...r, test(k)]);
   const most = Math.max(...all.flatMap((r) => r.slice(2)).filter((v) => v != null));
   const bar = (tone, v) => el("td", {}, v != null && el("div", { class: `bars ${tone}` }, el("span", {}, show(v)), el("i", { vars: { width: `${100 * v / most}%` } })));
-  const head = ["NRMSE at 5 s", "Fit", "Held out", state.openings.length > 0 && "Test"].filter(Boolean);
+  const head = [`NRMSE${horizon(story?.after ?? state.stack.find((s) => s.estimated)?.estimated)}`, "Fit", "Held out", last && "Test"].filter(Boolean);
   return el("table", { class: "errors" }, el("thead", {}, el("tr", {}, head.map((h) => el("th", { scope: "col" }, h)))),
     el("tbody", {}, all.map(([name, tone, ...values]) => el("tr", {}, el("th", { scope: "row" }, name.replaceAll("_", " ")), values.slice(0, head.length - 1).map((v) => bar(tone, v))))));
 }
 
 function step(bench, s) {
-  const own = s.story?.effects.find((e) => e.id === s.id);
+  const story = s.story && verdicts(bench.state);
+  const own = story?.effects.find((e) => e.id === s.id);
   const refused = own?.refused ?? [];
   const last = bench.state.stack[bench.state.stack.length - 1].id === s.id;
-  const values = (s.story?.parameters ?? []).filter((p) => p.added && p.name.startsWith(`${s.id}.`));
+  const values = (story?.parameters ?? []).filter((p) => p.added && p.name.startsWith(`${s.id}.`));
   const tag = { fitting: "fitting …", failed: "failed", unfitted: "not fitted" }[s.status];
   return el("article", { class: "step" }, el("h3", {}, s.id.replaceAll("_", " "), " ", tag && el("span", { class: "tag" }, tag), refused.length > 0 && el("span", { class: "tag bad" }, own.joined ? "kept though refused" : "refused, not in the model")),
     ...values.map((p) => el("p", { class: "note" }, `${p.name.split(".")[1]} = ${show(p.value, 4)} (95 %: ${show(p.ci95[0])} to ${show(p.ci95[1])})`)),
@@ -74,6 +80,7 @@ function opened(state) {
   const count = state.openings.length;
   const tests = state.flights.filter((f) => f.role === "test");
   if (!count) return tests.length ? el("p", { class: "note" }, `Judge opens ${tests.map((f) => f.name).join(", ")}. Each opening is counted and recorded.`) : null;
-  const list = state.openings.map((o) => el("li", {}, `${new Date(1000 * o.unix_s).toISOString().slice(0, 16).replace("T", " ")} UTC, ${o.effects.join(" + ") || "as given"}: NRMSE at ${show(o.horizon_s)} s ${show(o.given)} → ${show(o.amended)}`));
+  const found = (o) => (o.occasion === "judged" ? `${o.effects.join(" + ") || "no effect"}: NRMSE at ${show(o.horizon_s)} s ${show(o.given)} → ${show(o.amended)}` : `${o.flights.join(", ")} took another role`);
+  const list = state.openings.map((o) => el("li", {}, `${new Date(1000 * o.unix_s).toISOString().slice(0, 16).replace("T", " ")} UTC, ${found(o)}`));
   return el("div", { id: "opened" }, el("p", {}, `The test flights were opened ${count === 1 ? "once" : `${count} times`}.`), el("ul", { class: "note" }, list));
 }

@@ -123,14 +123,21 @@ fn too_large(name: &str) -> Response {
     failure(StatusCode::PAYLOAD_TOO_LARGE, &why)
 }
 
+/// An event by which a page looks at the state again; without a revision it may be of any.
+fn changed(revision: Option<u64>) -> Arc<str> {
+    json!({ "event": "changed", "revision": revision }).to_string().into()
+}
+
 /// What happens, as it happens.
 pub async fn events(
     State(shared): State<Shared>,
 ) -> Sse<impl Stream<Item = Result<sse::Event, Infallible>>> {
-    let now = json!({ "event": "changed", "revision": shared.bench.revision() });
-    let first = tokio_stream::once(Arc::from(now.to_string()));
-    // a page that lags misses stages, not changes: each has the revision
-    let later = BroadcastStream::new(shared.events.subscribe()).filter_map(Result::ok);
+    let later = BroadcastStream::new(shared.events.subscribe());
+    // the session may be held by whoever changes it; other requests go on meanwhile
+    let revision = tokio::task::spawn_blocking(move || shared.bench.revision()).await;
+    let first = tokio_stream::once(changed(revision.ok()));
+    // what a page that lags has missed may be a change
+    let later = later.map(|event| event.unwrap_or_else(|_| changed(None)));
     let all = first.chain(later).map(|text: Arc<str>| Ok(sse::Event::default().data(&*text)));
     Sse::new(all).keep_alive(KeepAlive::default())
 }

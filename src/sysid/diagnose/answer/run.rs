@@ -105,7 +105,7 @@ pub fn problem<'a>(
     if flights.is_empty() {
         return Err(DiagnoseError::NoFlight);
     }
-    let slowest = 0.5 * model.airframe.envelope.airspeed_min_mps;
+    let slowest = model.airframe.envelope.flying_from_mps();
     let (mut prepared, mut used, mut notes) = (Vec::new(), Vec::new(), Vec::new());
     for flight in flights {
         let ready = Prepared::new(flight, slowest)?;

@@ -1,0 +1,88 @@
+//! What a result is about, as a key: it holds as long as nothing of that changes.
+
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use super::bench::Inner;
+use super::session::{Accepted, Role};
+use crate::sysid::amend::document::sha256;
+
+impl Inner {
+    /// What a result is about: model, how logs are read, flights by role, effects.
+    pub fn key(&self, what: &str, effects: &[Accepted]) -> String {
+        let logs = |role: Role| -> String {
+            self.session.with(role).map(|k| self.session.logs[k].sha256.as_str()).collect()
+        };
+        let effects: Vec<String> =
+            effects.iter().map(|e| format!("{}{}", e.id, e.anyway)).collect();
+        let all = [
+            env!("CARGO_PKG_VERSION"),
+            &self.session.model_sha256,
+            &self.mapping.text,
+            &format!("{:?}", self.given.tolerance),
+            &logs(Role::Fit),
+            // a diagnosis does not look at flights held out
+            &if what == "diagnosis" { String::new() } else { logs(Role::HoldOut) },
+            &effects.join("+"),
+        ];
+        format!("{what}-{}", &sha256(all.join("|").as_bytes())[..16])
+    }
+
+    /// Whether a file of the model is not what was read.
+    pub fn model_changed(&self) -> bool {
+        fingerprint(&self.session.model).map_or(true, |now| now != self.session.model_sha256)
+    }
+}
+
+/// SHA-256 over all files that make the model at `path`: itself, its airframe, its residual, its own effects.
+pub fn fingerprint(path: &Path) -> io::Result<String> {
+    let text = fs::read_to_string(path)?;
+    let table: toml::Table = toml::from_str(&text).unwrap_or_default();
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let named = ["airframe", "residual"].into_iter().filter_map(|key| table.get(key));
+    let own = table.get("effect_files").and_then(toml::Value::as_array).into_iter().flatten();
+    let mut all = sha256(text.as_bytes());
+    for name in named.chain(own).filter_map(toml::Value::as_str) {
+        for file in files(&folder.join(name))? {
+            all += &sha256(&fs::read(file)?);
+        }
+    }
+    Ok(sha256(all.as_bytes()))
+}
+
+/// The file, or every `.toml` of the folder, at `path`.
+fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return Ok(vec![path.into()]);
+    }
+    let all = fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
+    let mut files: Vec<_> =
+        all.into_iter().filter(|p| p.extension().is_some_and(|e| e == "toml")).collect();
+    files.sort();
+    Ok(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_file_that_makes_a_model_is_in_its_fingerprint() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("effects")).unwrap();
+        let model = "airframe = 'a.toml'\nresidual = 'r.safetensors'\neffect_files = ['effects']\n";
+        let names = ["model.toml", "a.toml", "r.safetensors", "effects/own.toml"];
+        for (name, text) in names.iter().zip([model, "a", "r", "e"]) {
+            fs::write(at(name), text).unwrap();
+        }
+        let mut seen = vec![fingerprint(&at("model.toml")).unwrap()];
+        for name in names {
+            let text = fs::read_to_string(at(name)).unwrap();
+            fs::write(at(name), text + "\n").unwrap();
+            let now = fingerprint(&at("model.toml")).unwrap();
+            assert!(!seen.contains(&now), "{name}");
+            seen.push(now);
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! How the session's logs are read: as its command line says, by the session's own mapping if that names none.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::bench::Inner;
+use super::error::{WorkbenchError, io};
+use super::flights::Loaded;
+use super::mapping::FILE;
+use crate::logs::csv::Tolerance;
+use crate::logs::mapping::Mapping;
+use crate::logs::{self};
+
+/// How logs are read, as a command line says it.
+#[derive(Clone, Debug, Default)]
+pub struct Reading {
+    /// The mapping that is named there.
+    pub mapping: Option<PathBuf>,
+    /// What to do with many unusable rows.
+    pub tolerance: Tolerance,
+    /// Whether logs are used in which wrong units, signs or axes were found.
+    pub despite_problems: bool,
+}
+
+/// The mapping that logs are read by.
+#[derive(Clone, Debug, Default)]
+pub struct InUse {
+    /// Its file; none without a mapping.
+    pub file: Option<PathBuf>,
+    /// Its text.
+    pub text: String,
+}
+
+impl Reading {
+    /// The same with a path that holds in any folder.
+    pub(super) fn absolute(self) -> Result<Reading, WorkbenchError> {
+        let whole = |path: PathBuf| fs::canonicalize(&path).map_err(|e| io(&path, e));
+        Ok(Reading { mapping: self.mapping.map(whole).transpose()?, ..self })
+    }
+}
+
+impl Inner {
+    /// Takes up the mapping that was named, or the session's if it has one.
+    pub fn take_mapping(&mut self) -> Result<(), WorkbenchError> {
+        let own = Some(self.folder.join(FILE)).filter(|path| path.exists());
+        let Some(file) = self.given.mapping.clone().or(own) else { return Ok(()) };
+        let text = fs::read_to_string(&file).map_err(|e| io(&file, e))?;
+        self.read_by(&file, text)
+    }
+
+    /// Reads logs by the mapping `text`, which stands, or will stand, in `file`.
+    pub fn read_by(&mut self, file: &Path, text: String) -> Result<(), WorkbenchError> {
+        self.options.mapping = Mapping::parse(&text, file)?;
+        self.mapping = InUse { file: Some(file.into()), text };
+        Ok(())
+    }
+
+    /// The settings of the readers of logs.
+    pub fn options_of(given: &Reading) -> logs::Options {
+        logs::Options { tolerance: given.tolerance, ..Default::default() }
+    }
+
+    /// Reads all logs again.
+    pub fn reread(&mut self) {
+        let read = |entry: &super::session::LogEntry| {
+            Loaded::read(entry, &self.folder, &self.options, &self.model).map_err(|e| e.to_string())
+        };
+        self.flights = self.session.logs.iter().map(read).collect();
+    }
+}

@@ -1,0 +1,144 @@
+//! The session's logs by what they serve for, and what the commands of this program would call them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use super::bench::Inner;
+use super::error::WorkbenchError;
+use super::flights::Loaded;
+use super::session::{LogEntry, Occasion, Opening, Role};
+use crate::logs::names;
+use crate::sysid::amend::split;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+
+/// The flights that a fit sees and those that it is judged by, with what is odd about their logs.
+pub struct Divided {
+    pub fit: Vec<Reconstruction>,
+    pub held_out: Vec<Reconstruction>,
+    pub notes: Vec<String>,
+}
+
+impl Inner {
+    /// Takes a log into the session; one that stood at the same place before goes.
+    pub fn take_in(&mut self, entry: LogEntry, loaded: Arc<Loaded>) {
+        let file = self.folder.join(&entry.path);
+        let before = self.session.logs.iter().position(|l| self.folder.join(&l.path) == file);
+        let usual = match before {
+            Some(place) => self.session.logs[place].role,
+            None => self.session.usual_role(&entry.name()),
+        };
+        // what makes every figure wrong serves for nothing until its user has looked at it
+        let role = if loaded.in_doubt() { Role::Unused } else { usual };
+        let entry = LogEntry { role, ..entry };
+        match before {
+            Some(place) => {
+                self.session.logs[place] = entry;
+                self.flights[place] = Ok(loaded);
+            }
+            None => {
+                self.session.logs.push(entry);
+                self.flights.push(Ok(loaded));
+            }
+        }
+    }
+
+    /// Gives a log another role. A test flight that nobody has seen can be seen then, which is recorded.
+    pub fn give_role(&mut self, place: usize, role: Role) -> Result<(), WorkbenchError> {
+        let log = self.session.logs.get(place).ok_or(WorkbenchError::NoFlight(place))?;
+        if role != Role::Test && self.locked(log) && self.flights[place].is_ok() {
+            let opening = Opening {
+                unix_s: now_s(),
+                occasion: Occasion::OtherRole,
+                effects: Vec::new(),
+                flights: vec![log.name()],
+                sha256: vec![log.sha256.clone()],
+                given: f64::NAN,
+                amended: f64::NAN,
+                horizon_s: f64::NAN,
+            };
+            self.session.openings.push(opening);
+        }
+        self.session.logs[place].role = role;
+        Ok(())
+    }
+
+    /// Whether a flight is a test that nobody has opened.
+    pub fn locked(&self, log: &LogEntry) -> bool {
+        let opened = self.session.openings.iter().any(|o| o.sha256.contains(&log.sha256));
+        log.role == Role::Test && !opened
+    }
+
+    /// The file of a log.
+    pub fn file(&self, place: usize) -> PathBuf {
+        self.folder.join(&self.session.logs[place].path)
+    }
+
+    /// What a command that names these logs calls their flights.
+    pub fn names(&self, places: &[usize]) -> Vec<String> {
+        names(&places.iter().map(|k| self.file(*k)).collect::<Vec<_>>())
+    }
+
+    /// The logs of some roles that can be used, in their order.
+    pub fn usable(&self, roles: &[Role]) -> Vec<usize> {
+        let logs = self.session.logs.iter().zip(&self.flights).enumerate();
+        let usable = logs.filter(|(_, (log, flight))| roles.contains(&log.role) && flight.is_ok());
+        usable.map(|(k, _)| k).collect()
+    }
+
+    /// The flights that models are compared with.
+    pub fn seen(&self) -> Vec<usize> {
+        self.usable(&[Role::Fit, Role::HoldOut])
+    }
+
+    /// The flights at `places` that can be used.
+    pub fn reconstructions(&self, places: &[usize]) -> Vec<Reconstruction> {
+        let of = |(k, name): (&usize, String)| {
+            let flight = self.flights[*k].as_ref().ok()?.flight.clone();
+            Some(Reconstruction { name, ..flight })
+        };
+        places.iter().zip(self.names(places)).filter_map(of).collect()
+    }
+
+    /// The flights with the role Fit, whole.
+    pub fn to_fit(&self) -> Result<Vec<Reconstruction>, WorkbenchError> {
+        match self.usable(&[Role::Fit])[..] {
+            [] => Err(WorkbenchError::NoRole(Role::Fit)),
+            ref places => Ok(self.reconstructions(places)),
+        }
+    }
+
+    /// The flights to fit to and those to judge by, as `greylag amend` divides them, with its notes.
+    pub fn divided(&self) -> Result<Divided, WorkbenchError> {
+        let fit = self.to_fit()?;
+        let held = self.usable(&[Role::HoldOut]);
+        let mut notes = self.findings(&self.usable(&[Role::Fit]));
+        match (&fit[..], &held[..]) {
+            ([only], []) => {
+                let name = &only.name;
+                notes.push(format!("{name}: fitted to its first two thirds, judged by the last"));
+                let [first, last] = split(only);
+                Ok(Divided { fit: vec![first], held_out: vec![last], notes })
+            }
+            (_, []) => Err(WorkbenchError::NoRole(Role::HoldOut)),
+            (_, held) => {
+                notes.extend(self.findings(held));
+                Ok(Divided { held_out: self.reconstructions(held), fit, notes })
+            }
+        }
+    }
+
+    /// What is odd about the logs at `places`, as a command notes it.
+    fn findings(&self, places: &[usize]) -> Vec<String> {
+        let of = |(k, name): (&usize, String)| {
+            let all = self.flights[*k].iter().flat_map(|flight| flight.findings.clone());
+            all.map(|finding| format!("{name}: {finding}")).collect::<Vec<_>>()
+        };
+        places.iter().zip(self.names(places)).flat_map(of).collect()
+    }
+}
+
+/// Seconds since 1970 (UTC).
+pub fn now_s() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_secs())
+}
