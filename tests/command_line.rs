@@ -1,9 +1,15 @@
 //! The program as a user runs it: bad input is one line on standard error with a failing status.
 #![cfg(feature = "sitl")]
 
+mod compare_support;
+
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+
+use compare_support::{REALISTIC, fly};
+use greylag::logs::csv;
 
 fn greylag(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_greylag")).args(arguments).output().unwrap()
@@ -192,14 +198,48 @@ fn completions_know_the_commands() {
 
 #[test]
 fn a_reader_that_leaves_is_no_fault() {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_greylag"))
-        .args(["effects", "list"])
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    drop(child.stdout.take());
-    let output = child.wait_with_output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && said.is_empty(), "{said}");
+    for arguments in [["effects", "list"], ["completions", "bash"]] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_greylag"))
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && said.is_empty(), "{arguments:?}: {said}");
+    }
+}
+
+/// Each of the long tasks has its own error around the cancellation, and each must be recognised.
+#[test]
+#[cfg(unix)]
+fn ctrl_c_ends_long_tasks_with_status_130_and_nothing_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    csv::save(&fly(1, 25.0, REALISTIC), Path::new(&at("a.csv"))).unwrap();
+    fs::create_dir(at("out")).unwrap();
+    let (json, out) = (at("out/found.json"), at("out"));
+    for task in [
+        vec!["compare", "--json", &json],
+        vec!["diagnose", "--json", &json],
+        vec!["amend", "--tune-only", "--out", &out],
+    ] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_greylag"))
+            .args(&task)
+            .args(["--model", "params/x8/prior.toml", "--log", &at("a.csv")])
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+        // the first line is of the log, which is read before anything can be cancelled
+        let stage = lines.find(|line| !line.starts_with("log 1")).unwrap();
+        let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(kill.success(), "{task:?} had ended after {stage:?}");
+        let said: Vec<String> = lines.collect();
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{task:?}: {said:?}");
+        assert!(said.last().is_some_and(|l| l.contains("stopped by Ctrl-C")), "{said:?}");
+        assert_eq!(fs::read_dir(&out).unwrap().count(), 0, "{task:?}");
+    }
 }

@@ -53,6 +53,23 @@ fn info_says_what_every_format_holds() {
 }
 
 #[test]
+fn info_takes_several_logs() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = put(folder.path(), "good.csv", &csv(&samples(1000)));
+    let parked = put(folder.path(), "parked.csv", &csv(&samples(20)));
+    let both = [good.to_str().unwrap(), parked.to_str().unwrap()];
+    let output = greylag(&["info", both[0], both[1]]);
+    let said = text(&output.stdout);
+    assert!(said.contains("good.csv: CSV") && said.contains("parked.csv: CSV"), "{said}");
+    // the worse of the two: 0.2 s are no flight
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    let output = greylag(&["info", both[0], both[1], "--json"]);
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(found[0]["rows"], 1000);
+    assert_eq!(found[1]["name"], "parked.csv");
+}
+
+#[test]
 fn info_says_of_a_table_without_a_column_what_it_still_serves_for() {
     let folder = tempfile::tempdir().unwrap();
     let table = text(&csv(&samples(1000)));

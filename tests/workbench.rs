@@ -137,6 +137,36 @@ fn word(value: &Value) -> &str {
     value["error"].as_str().unwrap_or_default()
 }
 
+/// The model with an effect of a file in it, which is zero and so stays as it is, in `folder`.
+fn model_with_a_file(folder: &Path) -> PathBuf {
+    let model = fs::read_to_string(MODEL).unwrap();
+    let model = model.replace("schema = 1\n", "schema = 1\neffect_files = [\"own.toml\"]\n")
+        + "\n[effects.yaw_by_throttle]\nk = { value = 0.0, source = \"a test\" }\n";
+    fs::copy("params/effects/yaw_by_throttle.toml", folder.join("own.toml")).unwrap();
+    fs::copy("params/x8/airframe.toml", folder.join("airframe.toml")).unwrap();
+    fs::write(folder.join("model.toml"), model).unwrap();
+    folder.join("model.toml")
+}
+
+/// Runs the commands that a page shows in a shell, about a model that is gone, so that each ends as soon as its line
+/// is understood: 2 would be a wrong command line.
+fn commands_are_understood(state: &Value, model: &Path, shown: &[&str]) {
+    let model = model.canonicalize().unwrap().display().to_string();
+    for (name, line) in state["commands"].as_object().unwrap() {
+        let line = line.as_str().unwrap();
+        assert_eq!(!line.is_empty(), shown.contains(&name.as_str()), "{name}: {line}");
+        if line.is_empty() {
+            continue;
+        }
+        let expected = if name == "flights" { [0, 3] } else { [1, 1] };
+        let line = line.replace(&model, "gone.toml");
+        let line = line.replacen("greylag", env!("CARGO_BIN_EXE_greylag"), 1);
+        let made = Command::new("sh").args(["-c", &line]).output().unwrap();
+        let said = String::from_utf8_lossy(&made.stderr);
+        assert!(made.status.code().is_some_and(|c| expected.contains(&c)), "{line}: {said}");
+    }
+}
+
 /// The error at 5 s.
 fn at_5_s(scores: &Value) -> f64 {
     let five = scores.as_array().unwrap().iter().find(|s| s["horizon_s"] == 5.0);
@@ -147,7 +177,8 @@ fn at_5_s(scores: &Value) -> f64 {
 fn drop_see_tick_judge_save_and_go_on_after_a_kill() {
     let scratch = tempfile::tempdir().unwrap();
     let (session, logs) = (scratch.path().join("session"), logs(scratch.path()));
-    let bench = Bench::open(&session, &["--model", MODEL]);
+    let model = model_with_a_file(scratch.path());
+    let bench = Bench::open(&session, &["--model", model.to_str().unwrap()]);
 
     // drop: roles as they come, the test unseen
     for log in &logs {
@@ -201,11 +232,14 @@ fn drop_see_tick_judge_save_and_go_on_after_a_kill() {
     let (_, failing) = bench.get("/api/failing");
     assert_eq!(failing["models"][1]["name"], "jsbsim+actuator_lag");
 
-    // judge: counted and written before it is told
+    commands_are_understood(&state, &model, &["flights", "compare", "diagnose", "amend", "judge"]);
+
+    // judge: counted and written before it is shown
     let (status, state) = bench.act(json!({ "do": "judge" }));
     assert_eq!(status, 200, "{state}");
     let opening = &state["openings"][0];
     assert_eq!(opening["flights"], json!(["test-2.csv"]));
+    assert_eq!(opening["effects"], json!(["actuator_lag"]));
     assert!(opening["amended"].as_f64().unwrap() < opening["given"].as_f64().unwrap());
     assert!(fs::read_to_string(session.join("session.toml")).unwrap().contains("[[openings]]"));
     assert_eq!(bench.get("/api/flight/2").0, 200);
@@ -219,7 +253,7 @@ fn drop_see_tick_judge_save_and_go_on_after_a_kill() {
     let words: Vec<&str> = line.split(' ').skip(1).collect();
     let made = Command::new(env!("CARGO_BIN_EXE_greylag")).args(&words).output().unwrap();
     assert!(made.status.success(), "{line}: {}", String::from_utf8_lossy(&made.stderr));
-    for file in ["model.toml", "airframe.toml", "amend.json"] {
+    for file in ["model.toml", "airframe.toml", "yaw_by_throttle.toml", "amend.json"] {
         let [by_page, by_command] =
             [session.join("model"), out.clone()].map(|f| fs::read_to_string(f.join(file)).unwrap());
         assert_eq!(by_page, by_command, "{file}");
@@ -241,7 +275,8 @@ fn drop_see_tick_judge_save_and_go_on_after_a_kill() {
 #[test]
 fn what_must_be_refused_is_refused_in_words() {
     let scratch = tempfile::tempdir().unwrap();
-    let (session, place) = (scratch.path().join("session"), scratch.path());
+    // a shell would take it for two words
+    let (session, place) = (scratch.path().join("my session"), scratch.path());
     let model = place.join("model.toml");
     fs::copy(MODEL, &model).unwrap();
     fs::copy("params/x8/airframe.toml", place.join("airframe.toml")).unwrap();
@@ -296,15 +331,13 @@ fn what_must_be_refused_is_refused_in_words() {
         (answer.split(' ').nth(1).unwrap().to_owned(), (), answer)
     };
     assert!(status == "413" && body.contains("greylag workbench large.csv"), "{body}");
-    for (method, path) in
-        [("GET", "/api/none"), ("GET", "/assets/none.js"), ("GET", "/api/flight/7")]
-    {
-        assert_eq!(bench.get(path).0, 404, "{method} {path}");
+    for path in ["/api/none", "/assets/none.js", "/api/flight/7"] {
+        assert_eq!(bench.get(path).0, 404, "{path}");
     }
     assert!(bench.act(json!({ "do": "dance" })).0 >= 400);
     for (act, why) in [
-        (json!({ "do": "diagnose" }), "fit the model to"),
-        (json!({ "do": "judge" }), "test"),
+        (json!({ "do": "diagnose" }), "has the role Fit"),
+        (json!({ "do": "judge" }), "has the role Test"),
         (json!({ "do": "undo" }), "nothing"),
         (json!({ "do": "save" }), "accept an effect first"),
     ] {
@@ -312,7 +345,7 @@ fn what_must_be_refused_is_refused_in_words() {
         assert_eq!((status, word(&said).contains(why)), (422, true), "{act}: {said}");
     }
 
-    // two browsers: the second one is told
+    // two browsers: the second one is refused
     let mut flight = flown(0);
     let csv_of = |flight: &Flight, name: &str| {
         csv::save(flight, &place.join(name)).unwrap();
@@ -335,16 +368,24 @@ fn what_must_be_refused_is_refused_in_words() {
     let findings = state["flights"][1]["findings"].as_array().unwrap();
     let cure = findings.iter().map(|f| &f["cure"]).find(|c| c["column"] == "az_mps2").unwrap();
     assert_eq!(cure["scale"], -1.0);
+    // a mapping that cannot be is not written
+    let wrong = json!({ "do": "map", "flight": 1, "column": "no_column", "scale": 2.0 });
+    let (status, said) = bench.act(wrong);
+    assert_eq!((status, word(&said).contains("no_column")), (422, true), "{said}");
+    assert!(!session.join("mapping.toml").exists());
     let map = json!({ "do": "map", "flight": 1, "column": "az_mps2", "scale": cure["scale"] });
     let (status, state) = bench.act(map);
     assert_eq!((status, &state["flights"][1]["in_doubt"]), (200, &json!(false)), "{state}");
-    assert_eq!(state["flights"][1]["role"], "hold_out");
-    // as on a command line, a mapping holds for all logs: the other one is wrong now, and says so
+    // as on a command line, a mapping holds for all logs: the other one is wrong now, and serves for nothing
     assert_eq!(state["flights"][0]["in_doubt"], true);
+    assert_eq!([&state["flights"][0]["role"], &state["flights"][1]["role"]], ["unused", "fit"]);
+    commands_are_understood(&state, &model, &["flights", "compare", "diagnose"]);
+    let (_, state) = bench.act(role("fit"));
     let line = state["commands"]["diagnose"].as_str().unwrap();
-    assert!(line.contains("--mapping") && line.contains("--despite-problems"), "{line}");
+    assert!(line.contains("--mapping '") && line.contains("--despite-problems"), "{line}");
+    commands_are_understood(&state, &model, &["flights", "compare", "diagnose"]);
 
-    // two programs: the second one is told
+    // two programs: the second one is refused
     let second = Command::new(env!("CARGO_BIN_EXE_greylag"))
         .args(["workbench", "--dir", session.to_str().unwrap()])
         .output()
@@ -360,6 +401,14 @@ fn what_must_be_refused_is_refused_in_words() {
     assert_eq!((status, word(&said).contains("changed on disk")), (409, true), "{said}");
     let (status, state) = bench.act(json!({ "do": "reload_model" }));
     assert_eq!((status, &state["model"]["name"]), (200, &json!("edited")), "{state}");
+    // the airframe is a file of the model too, and what logs are read by: a turned log is no flight below its least airspeed
+    let airframe = fs::read_to_string(place.join("airframe.toml")).unwrap();
+    fs::write(place.join("airframe.toml"), airframe + "\n# looked at again\n").unwrap();
+    let state = bench.state();
+    assert_eq!(state["model"]["changed_outside"], true);
+    let (_, reloaded) = bench.act(json!({ "do": "reload_model" }));
+    assert_eq!(reloaded["model"]["changed_outside"], false);
+    assert_ne!(reloaded["diagnosis"]["key"], state["diagnosis"]["key"]);
 
     // a diagnosis is cancelled at once
     assert_eq!(bench.act(json!({ "do": "diagnose" })).0, 200);
@@ -369,4 +418,72 @@ fn what_must_be_refused_is_refused_in_words() {
     assert_eq!(state["jobs"], json!([]));
     // 100 ms is asked of an idle machine
     assert!(begun.elapsed() < Duration::from_secs(2), "{:?}", begun.elapsed());
+}
+
+#[test]
+fn two_logs_of_one_name_are_two_flights() {
+    let scratch = tempfile::tempdir().unwrap();
+    let place = scratch.path();
+    let log = |k: u64| {
+        let folder = place.join(k.to_string());
+        fs::create_dir(&folder).unwrap();
+        csv::save(&flown(k), &folder.join("flight.csv")).unwrap();
+        folder.join("flight.csv").display().to_string()
+    };
+    let logs = [log(0), log(1)];
+    let session = place.join("session");
+    let bench = Bench::open(&session, &["--model", MODEL, &logs[0], &logs[1]]);
+    let state = bench.state();
+    let names = [&state["flights"][0]["name"], &state["flights"][1]["name"]];
+    assert!(names[0] != names[1], "{names:?}");
+    assert_eq!(bench.get("/api/failing").1["flights"], json!([0, 1]));
+    let lift = |k: usize| bench.get(&format!("/api/flight/{k}")).1["channels"]["L"][0].clone();
+    assert_ne!(lift(0), lift(1));
+
+    // a test flight is opened by itself, not by its name
+    let role = |k: usize, role: &str| bench.act(json!({ "do": "role", "flight": k, "role": role }));
+    role(0, "test");
+    let (status, state) = bench.act(json!({ "do": "judge" }));
+    assert_eq!((status, &state["openings"][0]["occasion"]), (200, &json!("judged")), "{state}");
+    let locked = |state: &Value| [0, 1].map(|k| state["flights"][k]["locked"] == true);
+    assert_eq!(locked(&role(1, "test").1), [false, true]);
+    // another role shows it, which is recorded as a look
+    let (_, state) = role(1, "fit");
+    assert_eq!(state["openings"][1]["occasion"], "other_role", "{state}");
+    assert_eq!(state["openings"][1]["flights"], json!(["flight.csv"]));
+    assert_eq!(locked(&role(1, "test").1), [false, false]);
+
+    // two flights to fit to and none held out: nothing to judge effects by, but enough for a diagnosis
+    role(0, "fit");
+    let (_, before) = role(1, "unused");
+    let (_, state) = role(1, "fit");
+    assert_ne!(before["diagnosis"]["key"], state["diagnosis"]["key"]);
+    let (status, said) = bench.act(json!({ "do": "tick", "effect": "actuator_lag" }));
+    assert_eq!((status, word(&said).contains("role Hold out")), (422, true), "{said}");
+    let (status, state) = bench.act(json!({ "do": "diagnose" }));
+    assert_eq!((status, &state["jobs"][0]["work"]), (200, &json!("diagnosis")), "{state}");
+    let job = state["jobs"][0]["id"].clone();
+    assert_eq!(bench.act(json!({ "do": "cancel", "job": job })).0, 200);
+    drop(bench);
+
+    // a model in the environment is for new sessions; one on the command line must be the session's
+    let program = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_greylag"));
+        command.args(["workbench", "--dir", session.to_str().unwrap()]);
+        command.current_dir(env!("CARGO_MANIFEST_DIR"));
+        command
+    };
+    let other = program().args(["--model", "params/x8/prior.toml"]).output().unwrap();
+    let said = String::from_utf8_lossy(&other.stderr).into_owned();
+    assert!(!other.status.success() && said.contains("leave --model out"), "{said}");
+    let mut child = program()
+        .env("GREYLAG_MODEL", "params/x8/prior.toml")
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+    let _ = child.kill();
+    let _ = child.wait();
+    assert!(line.contains("http://127.0.0.1"), "{line}");
 }

@@ -89,7 +89,7 @@ pub fn shares(report: Option<&Path>) -> [[f64; 2]; 2] {
     [[0.0, end], [end, 1.0]]
 }
 
-/// Whether the work shall go on.
+/// Whether the task shall go on.
 fn pressed() -> ControlFlow<()> {
     match PRESSED.load(Ordering::Relaxed) {
         0 => ControlFlow::Continue(()),

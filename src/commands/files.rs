@@ -28,7 +28,7 @@ pub fn is_stdout(path: Option<&Path>) -> bool {
     path == Some(Path::new("-"))
 }
 
-/// Fails at once if `path` may not be written later, so that no long work is lost to it.
+/// Fails at once if `path` may not be written later, so that no long task is lost to it.
 pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     if is_stdout(Some(path)) {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Ctrl-C during long work: the work ends at its next safe point.
+//! Ctrl-C during a long task: the task ends at its next safe point.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 #[derive(Clone, Debug, Default)]
 pub struct Interruption(Arc<AtomicBool>);
 
-/// How long work ended.
+/// How a long task ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
     /// It is done.

@@ -79,3 +79,23 @@ impl std::fmt::Display for Finding {
         write!(f, "{word}: {}", self.text)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::logs::mapping::Mapping;
+
+    #[test]
+    fn the_sentence_of_a_cure_holds_a_line_of_a_mapping() {
+        let cure = Cure { column: "airspeed_mps".into(), scale: 0.514444 };
+        let said = cure.to_string();
+        let (_, line) = said.split_once("[columns] has ").unwrap();
+        let (line, _) = line.split_once('}').unwrap();
+        let text = format!("schema = 1\n[columns]\n{line}}}\n");
+        let mapping = Mapping::parse(&text, Path::new("m.toml")).unwrap();
+        assert!(mapping.get("airspeed_mps").is_some(), "{text}");
+        assert!(line.contains("scale = 0.514444"), "{line}");
+    }
+}

@@ -1,13 +1,13 @@
-//! How far a long work has come, and whether it shall go on.
+//! How far a long task has come, and whether it shall go on.
 
 use std::ops::ControlFlow;
 
-/// What a long work is doing.
+/// What a long task is doing.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a> {
     /// What is being done, in words.
     pub doing: &'a str,
-    /// Share of the whole work that is done, 0 to 1; it never falls.
+    /// Share of the whole task that is done, 0 to 1; it never falls.
     pub fraction: f64,
     /// The candidates of a diagnosis as ranked so far, the best first; empty before that and elsewhere.
     pub ranking: &'a [FirstLook],
@@ -31,20 +31,20 @@ pub struct FirstLook {
     pub threshold: f64,
 }
 
-/// Hears the stages of a long work; `Break` ends it at the next one.
+/// Hears the stages of a long task; `Break` ends it at the next one.
 pub type Progress<'a> = dyn Fn(Stage<'_>) -> ControlFlow<()> + Sync + 'a;
 
-/// Hears nothing, and lets the work go on.
+/// Hears nothing, and lets the task go on.
 pub fn unheard(_: Stage<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// A long work that was ended by whoever listened to it.
+/// A long task that was ended by whoever listened to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cancelled")]
 pub struct Cancelled;
 
-/// Says a stage; an error if the work shall end.
+/// Says a stage; an error if the task shall end.
 pub(crate) fn say(progress: &Progress, doing: &str, fraction: f64) -> Result<(), Cancelled> {
     said(progress(Stage::new(doing, fraction)))
 }
@@ -57,7 +57,7 @@ pub(crate) fn said(answer: ControlFlow<()>) -> Result<(), Cancelled> {
     }
 }
 
-/// Hears the stages of a part of a work as stages of the whole, from one share of it to another.
+/// Hears the stages of a part of a task as stages of the whole, from one share of it to another.
 pub(crate) fn part<'a>(
     progress: &'a Progress<'a>,
     [from, to]: [f64; 2],

@@ -215,3 +215,23 @@ fn write(task: &Task, amended: &Amended, folder: &Path) -> Result<(), WorkbenchE
     let _ = fs::remove_dir_all(folder);
     fs::rename(&part, folder).map_err(|e| io(folder, e))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_data_refuse_has_not_joined() {
+        let model = GreyBox::load(Path::new("params/x8/prior.toml")).unwrap();
+        let fitted = |joined: bool| {
+            let effects = json!([{ "id": "actuator_lag", "joined": joined }, { "id": "drag_beta2", "joined": false }]);
+            Fitted {
+                model: model.clone(),
+                story: json!({ "effects": effects }),
+                on_fit: Value::Null,
+            }
+        };
+        assert_eq!(fitted(true).joined(), ["actuator_lag"]);
+        assert!(!fitted(true).all_refused() && fitted(false).all_refused());
+    }
+}

@@ -1,7 +1,8 @@
 //! The workbench: flights, where a model fails, what it lacks and the amended model, in one session.
 //!
 //! [`Bench`] is the session with what was worked out; it knows no network. [`server`] serves it to a browser on
-//! this machine. What is done here, the commands `compare`, `diagnose` and `amend` do too, by the same functions.
+//! this machine. What is done here, the commands `compare --recorded-clock`, `diagnose` and `amend` do too, by the same
+//! functions.
 
 mod act;
 mod bench;

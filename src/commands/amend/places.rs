@@ -28,7 +28,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// Fails at once if something could not be written later, so that no long work is lost to it.
+    /// Fails at once if something could not be written later, so that no long task is lost to it.
     pub fn new(original: &Path, folder: &Path, overwrite: Overwrite) -> Result<Places> {
         fs::create_dir_all(folder).with_context(|| {
             format!("cannot make the folder {}; name another one", folder.display())
