@@ -464,6 +464,13 @@ fn two_logs_of_one_name_are_two_flights() {
     assert_eq!((status, &state["jobs"][0]["work"]), (200, &json!("diagnosis")), "{state}");
     let job = state["jobs"][0]["id"].clone();
     assert_eq!(bench.act(json!({ "do": "cancel", "job": job })).0, 200);
+    let key = bench.state()["diagnosis"]["key"].clone();
+    drop(bench);
+    // what was worked out of logs that were read in another way is not taken up
+    let bench = Bench::open(&session, &["--lenient"]);
+    let state = bench.state();
+    assert_ne!(state["diagnosis"]["key"], key);
+    assert!(state["commands"]["diagnose"].as_str().unwrap().contains(" --lenient"), "{state}");
     drop(bench);
 
     // a model in the environment is for new sessions; one on the command line must be the session's

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use super::bench::{Bench, Inner};
-use super::error::WorkbenchError;
+use super::error::{WorkbenchError, io};
 use super::flights::Loaded;
 use super::session::Role;
 use crate::logs::Format;
@@ -50,16 +50,19 @@ impl Bench {
         scale: f64,
     ) -> Result<(), WorkbenchError> {
         let path: PathBuf = self.folder.join(FILE);
-        let before = fs::read_to_string(&path).ok();
+        let mut replaced = None;
         let mapped = self.change(seen, |inner| {
+            let before = inner.mapping.text.clone();
             inner.map(place, column, scale)?;
             // last, for what stands there is read at the next start
+            replaced = Some(before);
             Ok(write_over(&path, &inner.mapping.text)?)
         });
         mapped.inspect_err(|_| {
-            let _ = match &before {
-                Some(text) => write_over(&path, text).map_err(|_| ()),
-                None => fs::remove_file(&path).map_err(|_| ()),
+            let _ = match replaced.as_deref() {
+                None => Ok(()),
+                Some("") => fs::remove_file(&path).map_err(|e| io(&path, e)),
+                Some(text) => write_over(&path, text).map_err(Into::into),
             };
         })
     }
