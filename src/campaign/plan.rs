@@ -102,7 +102,11 @@ impl Draft<'_> {
         for word in self.stage.command.split_whitespace() {
             match self.level_of(word) {
                 // a level may stand for several words, or for none
-                Some(level) => words.extend(level.words.split_whitespace().map(str::to_owned)),
+                Some(level) => {
+                    for word in level.words.split_whitespace() {
+                        words.push(self.word(word, &mut after)?);
+                    }
+                }
                 None => words.push(self.word(word, &mut after)?),
             }
         }

@@ -4,12 +4,11 @@ set -euo pipefail
 export GREYLAG=@PROGRAM@ CAMPAIGN=@FILE@ OUT=@OUT@ RAYON_NUM_THREADS=1
 mkdir -p "$OUT/logs"
 one() {
-  # status 75: a later attempt may succeed; 1: none will
+  # status 75: a later attempt may succeed; above 128: killed, as for want of memory; 1: none will
   for attempt in $(seq @ATTEMPTS@); do
     "$GREYLAG" campaign run "$CAMPAIGN" --out "$OUT" --cell "$1" > "$OUT/logs/$1.txt" 2>&1 && return 0
     status=$?
-    [ "$status" = 75 ] || return "$status"
-    sleep 5
+    case $status in 75 | 1[3-9]?) sleep 5 ;; *) return "$status" ;; esac
   done
   return 75
 }

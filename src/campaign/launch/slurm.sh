@@ -5,7 +5,7 @@ export GREYLAG=@PROGRAM@ CAMPAIGN=@FILE@ OUT=@OUT@
 mkdir -p "$OUT/logs"
 before=
 stage() {
-  # status 75: a later attempt may succeed; 1: none will
+  # status 75: a later attempt may succeed; above 128: killed, as for want of memory; 1: none will
   job=$(sbatch --parsable --job-name="@NAME@-$1" --array="$2-$3" --requeue --open-mode=append \
     --output="$OUT/logs/$1-%a.txt" ${before:+--dependency=afterany:$before} @OPTIONS@ <<'JOB'
 #!/usr/bin/env bash
@@ -14,8 +14,7 @@ export RAYON_NUM_THREADS="${SLURM_CPUS_PER_TASK:-1}"
 for attempt in $(seq @ATTEMPTS@); do
   "$GREYLAG" campaign run "$CAMPAIGN" --out "$OUT" --cell "$SLURM_ARRAY_TASK_ID" && exit 0
   status=$?
-  [ "$status" = 75 ] || exit "$status"
-  sleep 5
+  case $status in 75 | 1[3-9]?) sleep 5 ;; *) exit "$status" ;; esac
 done
 exit 75
 JOB
