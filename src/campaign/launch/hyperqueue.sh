@@ -6,7 +6,7 @@ mkdir -p "$OUT/logs"
 stage() {
   # status 75: a later attempt may succeed; above 128: killed, as for want of memory; 1: none will
   hq submit --wait --name "@NAME@-$1" --array "$2-$3" --crash-limit @ATTEMPTS@ \
-    --stdout "$OUT/logs/$1-%{TASK_ID}.txt" --stderr "$OUT/logs/$1-%{TASK_ID}.txt" \
+    --stdout "$OUT/logs/$1-%{TASK_ID}.txt" --stderr "$OUT/logs/$1-%{TASK_ID}.err.txt" \
     --env GREYLAG="$GREYLAG" --env CAMPAIGN="$CAMPAIGN" --env OUT="$OUT" --env RAYON_NUM_THREADS=1 @OPTIONS@ \
     -- bash -c 'for attempt in $(seq @ATTEMPTS@); do
         "$GREYLAG" campaign run "$CAMPAIGN" --out "$OUT" --cell "$HQ_TASK_ID" && exit 0

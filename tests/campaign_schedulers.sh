@@ -2,12 +2,13 @@
 # A campaign on a real Slurm of one node and on HyperQueue: jobs are killed by scancel and by SIGKILL, and the results are
 # those of a local run to the bit.
 #
-#   tests/campaign_slurm.sh GREYLAG FILE.toml [slurm|hyperqueue]...
+#   tests/campaign_schedulers.sh GREYLAG FILE.toml [slurm|hyperqueue]...
 #
-# Needs root for munged (Debian: slurm-wlm, munge), and `hq` on the path for HyperQueue (pip install hyperqueue).
+# Needs root for munged (Debian: slurm-wlm, munge), and for HyperQueue `hq` or a Python ($PYTHON) with the package hyperqueue.
 # Exit status 77: a scheduler that was asked for is not installed.
 set -euo pipefail
 greylag=$(realpath "$1") file=$(realpath "$2")
+here=$(dirname "$(realpath "$0")")
 shift 2
 [ $# -gt 0 ] || set -- slurm hyperqueue
 work=$(mktemp -d)
@@ -29,7 +30,7 @@ one_node_slurm() {
   dd if=/dev/urandom of="$work/munge/key" bs=1024 count=1 status=none
   chmod 400 "$work/munge/key"
   munged --foreground --force --key-file="$work/munge/key" --socket="$work/munge/socket" \
-    --pid-file="$work/munge/pid" --log-file="$work/munge/log" --seed-file="$work/munge/seed" &
+    --pid-file="$work/munge/pid" --log-file="$work/munge/log" --seed-file="$work/munge/seed" > "$work/munged.txt" 2>&1 &
   started+=($!)
   host=$(hostname -s)
   cat > "$work/slurm.conf" <<CONF
@@ -84,28 +85,42 @@ on_slurm() {
     if [ "$kill" != none ]; then
       for _ in $(seq 100); do [ -n "$(cells slurm)" ] && break; sleep 0.1; done
       sleep 0.7
-      if [ "$kill" = scancel ]; then scancel --user="$(id -un)"; else kill -KILL $(cells slurm) || true; fi
+      if [ "$kill" = scancel ]; then scancel --user="$(id -un)"; else kill -KILL $(cells slurm) && echo "slurm: killed" || true; fi
     fi
     wait_slurm
-    "$greylag" campaign gather "$file" --out "$work/slurm" | head -1
+    "$greylag" campaign gather "$file" --out "$work/slurm" | head -1 || true
   done
 }
 
-on_hyperqueue() {
-  need hq
+# The program hq with a server and a worker here, or the package of PyPI, which has the engine without the program.
+one_node_hyperqueue() {
+  if ! command -v hq > /dev/null; then
+    "${PYTHON:-python3}" -c 'import hyperqueue' 2> /dev/null || { echo "no hq and no Python package hyperqueue"; exit 77; }
+    mkdir -p "$work/bin"
+    printf '#!/bin/sh\nexec "%s" "%s" "$@"\n' "${PYTHON:-python3}" "$here/hq_through_python.py" > "$work/bin/hq"
+    chmod +x "$work/bin/hq"
+    PATH=$work/bin:$PATH
+    return
+  fi
   export HQ_SERVER_DIR="$work/hq"
   hq server start > "$work/hq-server.txt" 2>&1 &
   started+=($!)
-  for _ in $(seq 50); do hq server info >/dev/null 2>&1 && break; sleep 0.2; done
+  for _ in $(seq 50); do hq server info > /dev/null 2>&1 && break; sleep 0.2; done
   hq worker start --cpus 2 > "$work/hq-worker.txt" 2>&1 &
   started+=($!)
+}
+
+on_hyperqueue() {
+  one_node_hyperqueue
   "$greylag" campaign run "$file" --out "$work/hyperqueue" --launcher hyperqueue --submit > "$work/hq.txt" 2>&1 &
   submit=$!
-  for _ in $(seq 100); do [ -n "$(cells hyperqueue)" ] && break; sleep 0.1; done
-  sleep 0.7
-  kill -KILL $(cells hyperqueue) || true
-  wait "$submit" || true
-  "$greylag" campaign run "$file" --out "$work/hyperqueue" --launcher hyperqueue --submit
+  # two rounds of kills: tasks are tried again by the launcher's script
+  for _ in 1 2; do
+    for _ in $(seq 200); do [ -n "$(cells hyperqueue)" ] && break; sleep 0.1; done
+    sleep 0.7
+    kill -KILL $(cells hyperqueue) 2> /dev/null && echo "hyperqueue: killed" || true
+  done
+  wait "$submit"
 }
 
 "$greylag" campaign run "$file" --out "$work/local" --local
