@@ -256,9 +256,7 @@ impl Local<'_> {
     /// Shows how far it is; whether Ctrl-C was pressed.
     fn show(&self) -> Result<bool> {
         let done = self.count(State::Done) as f64 / self.states.len() as f64;
-        let stage = self.running.keys().next().map(|index| self.plan.cells[*index].stage.as_str());
-        let doing =
-            stage.map_or("looking at the cells".into(), |stage| format!("cells of stage {stage}"));
+        let doing = format!("running campaign {}", self.plan.file.name);
         Ok(self.bar.hear(Stage::new(&doing, done)).is_break())
     }
 
