@@ -15,7 +15,8 @@ work=$(mktemp -d)
 started=()
 finish() {
   for pid in "${started[@]}"; do kill "$pid" 2>/dev/null || true; done
-  [ -z "${KEEP:-}" ] && rm -rf "$work"
+  sleep 1
+  if [ -z "${KEEP:-}" ]; then rm -rf "$work" || true; fi
 }
 trap finish EXIT
 
@@ -85,7 +86,7 @@ on_slurm() {
     if [ "$kill" != none ]; then
       for _ in $(seq 100); do [ -n "$(cells slurm)" ] && break; sleep 0.1; done
       sleep 0.7
-      if [ "$kill" = scancel ]; then scancel --user="$(id -un)"; else kill -KILL $(cells slurm) && echo "slurm: killed" || true; fi
+      if [ "$kill" = scancel ]; then scancel --user="$(id -un)"; else kill -KILL $(cells slurm) 2> /dev/null && echo "slurm: killed" || true; fi
     fi
     wait_slurm
     "$greylag" campaign gather "$file" --out "$work/slurm" | head -1 || true
