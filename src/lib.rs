@@ -73,6 +73,7 @@ pub mod sysid;
 pub mod sim;
 #[cfg(feature = "learn")]
 pub mod learn;
+pub mod campaign;
 pub mod report;
 pub mod workbench;
 pub mod commands;

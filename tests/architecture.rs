@@ -16,6 +16,7 @@ const LAYERS: &[&str] = &[
     "sysid",
     "sim",
     "learn",
+    "campaign",
     "report",
     "workbench",
     "commands",

@@ -73,6 +73,14 @@ impl Bar {
         said(pressed())
     }
 
+    /// Prints a line of the result above the bar.
+    pub fn say(&self, line: &str) {
+        match &self.bar {
+            Some(bar) => bar.suspend(|| println!("{line}")),
+            None => println!("{line}"),
+        }
+    }
+
     /// Writes a stage that differs from the one before.
     fn line(&self, doing: &str) {
         let Ok(mut last) = self.last.lock() else { return };

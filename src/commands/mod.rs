@@ -3,6 +3,7 @@
 mod aircraft;
 mod amend;
 mod bar;
+mod campaign;
 mod choices;
 #[cfg(feature = "sitl")]
 mod collect;
@@ -23,7 +24,6 @@ mod faults;
 mod files;
 pub mod fly;
 mod intake;
-#[cfg(any(feature = "learn", feature = "sitl"))]
 mod interruption;
 #[cfg(feature = "learn")]
 mod learn;
@@ -45,7 +45,6 @@ mod targets;
 mod train;
 mod workbench;
 
-#[cfg(feature = "learn")]
 use std::ffi::OsString;
 use std::io::IsTerminal;
 
@@ -53,7 +52,6 @@ use std::panic;
 use std::process::{self, ExitCode};
 use std::sync::LazyLock;
 
-#[cfg(feature = "learn")]
 use anyhow::{Result, bail};
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
@@ -68,7 +66,6 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
     let commit = option_env!("GREYLAG_COMMIT").unwrap_or("unknown");
     format!("{} (commit {commit}; features: {})", env!("CARGO_PKG_VERSION"), built.join(", "))
 });
-#[cfg(feature = "learn")]
 use interruption::{Ended, Interruption};
 
 /// A MAVLink offboard autopilot companion for fixed-wing aircraft.
@@ -85,6 +82,8 @@ enum Command {
     Aircraft(aircraft::Arguments),
     /// Refit a model to flights and add missing effects to it, judged on flights it has not seen.
     Amend(amend::Arguments),
+    /// Run a campaign over priors, controllers and seeds; gather and tabulate it.
+    Campaign(campaign::Arguments),
     /// Explore in JSBSim, to have flights to learn from.
     #[cfg(feature = "sitl")]
     Collect(collect::Arguments),
@@ -163,6 +162,7 @@ pub fn main() -> ExitCode {
     let result = match command {
         Command::Aircraft(arguments) => aircraft::run(&arguments),
         Command::Amend(arguments) => amend::run(&arguments),
+        Command::Campaign(arguments) => campaign::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Collect(arguments) => collect::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
@@ -205,30 +205,32 @@ pub fn main() -> ExitCode {
 }
 
 /// The subcommand of a line that does not hold the program's name.
-#[cfg(feature = "learn")]
 fn command_of(line: &[OsString]) -> Result<Command> {
     let words = std::iter::once(OsString::from("greylag")).chain(line.iter().cloned());
     Ok(Arguments::try_parse_from(words)?.command)
 }
 
-/// Refuses a line that is no stage of a learning.
-#[cfg(feature = "learn")]
+/// Refuses a line that is no stage of a learning and no cell of a campaign.
 fn check_line(line: &[OsString]) -> Result<()> {
     match command_of(line)? {
         #[cfg(feature = "sitl")]
-        Command::Collect(_) => Ok(()),
+        Command::Collect(_) | Command::Evaluate(_) => Ok(()),
+        #[cfg(feature = "learn")]
         Command::Train(_) => Ok(()),
-        _ => bail!("greylag {} is no stage of a learning", line[0].display()),
+        _ => bail!("greylag {} cannot be a stage", line[0].display()),
     }
 }
 
-/// Carries a stage of a learning out, until `stop` is set.
-#[cfg(feature = "learn")]
+/// Carries a stage of a learning or a cell of a campaign out, until `stop` is set.
+#[cfg_attr(not(any(feature = "sitl", feature = "learn")), expect(unused_variables))]
 fn carry_out(line: &[OsString], stop: &Interruption) -> Result<Ended> {
     match command_of(line)? {
         #[cfg(feature = "sitl")]
         Command::Collect(arguments) => collect::fly(&arguments, stop),
+        #[cfg(feature = "sitl")]
+        Command::Evaluate(arguments) => evaluate::run(&arguments).map(|_| Ended::Done),
+        #[cfg(feature = "learn")]
         Command::Train(arguments) => train::learn(&arguments, stop),
-        _ => bail!("greylag {} is no stage of a learning", line[0].display()),
+        _ => bail!("greylag {} cannot be a stage", line[0].display()),
     }
 }

@@ -3,5 +3,7 @@
 /// Done, but in doubt: a log was left out or holds what makes figures wrong, an effect was refused, flights contradict
 /// one another.
 pub const IN_DOUBT: u8 = 3;
+/// Not done, and a later attempt may succeed: `EX_TEMPFAIL` of sysexits.h.
+pub const TRY_AGAIN: u8 = 75;
 /// Ended by Ctrl-C.
 pub const INTERRUPTED: u8 = 130;

@@ -11,14 +11,29 @@ const RESAMPLES: usize = 2000;
 /// The 95 % percentile interval of `statistic` over `samples`, resampled with replacement from `seed`
 /// (Efron 1979; section VI of \[GSFM26\]); NaN for no samples.
 pub fn interval(samples: &[f64], seed: u64, statistic: impl Fn(&[f64]) -> f64) -> [f64; 2] {
-    if samples.is_empty() {
+    stratified_interval(std::slice::from_ref(&samples), seed, statistic)
+}
+
+/// As [`interval`], of the samples of all `strata` in order, each of which is resampled by itself: it keeps its size
+/// (rliable, Agarwal et al. 2021).
+pub fn stratified_interval<S: AsRef<[f64]>>(
+    strata: &[S],
+    seed: u64,
+    statistic: impl Fn(&[f64]) -> f64,
+) -> [f64; 2] {
+    let count = strata.iter().map(|s| s.as_ref().len()).sum();
+    if count == 0 {
         return [f64::NAN; 2];
     }
     let mut random = stream::stream(seed, &[]);
-    let mut drawn = vec![0.0; samples.len()];
+    let mut drawn = Vec::with_capacity(count);
     let values: Vec<f64> = (0..RESAMPLES)
         .map(|_| {
-            drawn.iter_mut().for_each(|x| *x = samples[random.random_range(0..samples.len())]);
+            drawn.clear();
+            for samples in strata.iter().map(AsRef::as_ref) {
+                let mut draw = || samples[random.random_range(0..samples.len())];
+                drawn.extend((0..samples.len()).map(|_| draw()));
+            }
             statistic(&drawn)
         })
         .collect();

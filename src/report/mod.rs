@@ -4,13 +4,15 @@
 //! [`Page::render`] turns them into one string with style, script and data inside.
 //! [`FlightReport`] is the page of one flight, [`ComparisonReport`] that of models against flights,
 //! [`DiagnosisReport`] that of what a model lacks, [`AmendmentReport`] that of a model with it added, `TrainingReport`
-//! that of a model that was learned, `LearningReport` that of policies being learned, `EvaluationReport` that of controllers side by side.
+//! that of a model that was learned, `LearningReport` that of policies being learned, `EvaluationReport` that of controllers side by side,
+//! [`CampaignReport`] that of a campaign.
 //! The plots are drawn in the reader's browser by uPlot
 //! 1.6.32 (MIT, `kit/assets/uPlot.LICENSE`), which is embedded.
 //!
 //! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
 
 mod amendment;
+mod campaign_page;
 mod comparison;
 mod effect_page;
 mod diagnosis;
@@ -26,6 +28,7 @@ mod training_page;
 
 pub use amendment::AmendmentReport;
 pub use amendment::page::amendment_page;
+pub use campaign_page::CampaignReport;
 pub use comparison::ComparisonReport;
 pub use comparison::page::comparison_page;
 pub use diagnosis::DiagnosisReport;

@@ -37,6 +37,7 @@ pub(in crate::report) fn section(report: &FlightReport) -> Section {
                 tracked.into(),
             ],
             span_s: Some([s.start_s, s.end_s]),
+            ..Row::default()
         });
     }
     Section::new(

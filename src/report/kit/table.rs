@@ -41,6 +41,10 @@ pub struct Row {
     pub cells: Vec<String>,
     /// Start and end, s, of the time it speaks of: its first cell then zooms the time figures there.
     pub span_s: Option<[f64; 2]>,
+    /// What a link of the page calls it.
+    pub anchor: Option<String>,
+    /// The anchor that its first cell leads to.
+    pub link: Option<String>,
 }
 
 impl Table {
@@ -56,7 +60,7 @@ impl Table {
 
     /// Adds a row of text.
     pub fn push<I: IntoIterator<Item = String>>(&mut self, cells: I) {
-        self.rows.push(Row { cells: cells.into_iter().collect(), span_s: None });
+        self.rows.push(Row { cells: cells.into_iter().collect(), ..Row::default() });
     }
 
     pub(in crate::report) fn html(&self) -> String {
@@ -86,7 +90,9 @@ impl Table {
                 format!("<td{}>{}</td>", class(i), row.cell_html(i, text))
             };
             let cells: String = row.cells.iter().enumerate().map(cell).collect();
-            html.push_str(&format!("<tr>{cells}</tr>\n"));
+            let anchor = row.anchor.as_ref();
+            let id = anchor.map_or(String::new(), |a| format!(" id=\"{}\"", escape(a)));
+            html.push_str(&format!("<tr{id}>{cells}</tr>\n"));
         }
         html.push_str("</tbody></table></div>\n");
         html
@@ -95,6 +101,9 @@ impl Table {
 
 impl Row {
     fn cell_html(&self, index: usize, text: &str) -> String {
+        if let (Some(to), 0) = (&self.link, index) {
+            return format!("<a href=\"#{}\">{}</a>", escape(to), escape(text));
+        }
         match self.span_s {
             Some([from, to]) if index == 0 && from.is_finite() && to.is_finite() => format!(
                 "<button type=\"button\" class=\"zoom\" data-from=\"{from}\" data-to=\"{to}\" \

@@ -1,0 +1,285 @@
+//! The campaign file: axes, seeds, stages, and what is summed up of them.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::error::CampaignError;
+use crate::model::residual::hash;
+
+/// The layout that this program reads.
+const SCHEMA: u32 = 1;
+/// The axis that every campaign has.
+pub const SEED: &str = "seed";
+
+/// A campaign as its file says it.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CampaignFile {
+    schema: u32,
+    /// Its name: that of its folder.
+    pub name: String,
+    /// What it is for, in a sentence.
+    #[serde(default)]
+    pub about: String,
+    /// The seeds.
+    pub seeds: Vec<u64>,
+    /// What is varied beside the seed.
+    #[serde(default)]
+    pub axes: BTreeMap<String, Vec<Level>>,
+    /// The stages in order: a stage uses those before it.
+    #[serde(rename = "stage")]
+    pub stages: Vec<StageFile>,
+    /// What is summed up.
+    #[serde(default, rename = "table")]
+    pub tables: Vec<TableFile>,
+    /// What is asked of the results.
+    #[serde(default, rename = "claim")]
+    pub claims: Vec<ClaimFile>,
+    /// SHA-256 of the file.
+    #[serde(skip)]
+    pub sha256: String,
+}
+
+/// A level of an axis: its name, and the words that it puts into a command.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(from = "LevelFile")]
+pub struct Level {
+    /// The name in tables.
+    pub name: String,
+    /// The words, which may be none.
+    pub words: String,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum LevelFile {
+    Word(String),
+    Named { name: String, words: String },
+}
+
+impl From<LevelFile> for Level {
+    fn from(file: LevelFile) -> Level {
+        match file {
+            LevelFile::Word(word) => Level { name: word.clone(), words: word },
+            LevelFile::Named { name, words } => Level { name, words },
+        }
+    }
+}
+
+/// A stage: one command over some axes.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StageFile {
+    /// Its name; `{name}` in a later command is the folder that it wrote.
+    pub name: String,
+    /// The axes that it varies.
+    pub over: Vec<String>,
+    /// The command line, without `greylag`; `{out}`, `{seed}`, `{axis}` and `{stage}` are filled in.
+    pub command: String,
+    /// Files that the command reads without naming them.
+    #[serde(default)]
+    pub inputs: Vec<String>,
+    /// Time of a core that a cell takes, s, until cells have been measured.
+    pub core_seconds: Option<f64>,
+}
+
+/// A table: a quantity of a stage, summed up over seeds.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableFile {
+    /// Its title.
+    pub title: String,
+    /// The stage whose cells it sums up.
+    pub stage: String,
+    /// The axes that make its rows; cells of a row that differ in others are its strata.
+    pub rows: Vec<String>,
+    /// The quantities by their names in a result, such as `easy.mean_deg`.
+    pub metrics: Vec<String>,
+    /// Their unit.
+    #[serde(default)]
+    pub unit: String,
+    /// The published table that stands beside: one of those in [`super::published`].
+    pub paper: Option<String>,
+}
+
+/// A claim: one row of a stage is less than another in a quantity.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClaimFile {
+    /// The claim in words.
+    pub says: String,
+    /// The quantity.
+    pub metric: String,
+    /// Stage and levels of the cells that are said to have less of it: `stage axis=level …`.
+    pub less: String,
+    /// Those that they are compared with.
+    pub than: String,
+}
+
+impl CampaignFile {
+    /// Reads and checks a campaign file.
+    ///
+    /// # Errors
+    /// If it cannot be read, is no campaign, or names what there is not.
+    pub fn load(path: &Path) -> Result<CampaignFile, CampaignError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| CampaignError::Read { path: path.into(), source })?;
+        CampaignFile::parse(&text).map_err(|why| CampaignError::File { path: path.into(), why })
+    }
+
+    /// [`load`](Self::load) from the file's text; the error is what is wrong with it.
+    ///
+    /// # Errors
+    /// If it is no campaign or names what there is not.
+    pub fn parse(text: &str) -> Result<CampaignFile, String> {
+        let mut file: CampaignFile =
+            toml::from_str(text).map_err(|e| crate::physics::airframe::toml_error(text, &e))?;
+        file.sha256 = hash(text.as_bytes());
+        file.check()?;
+        Ok(file)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if self.schema != SCHEMA {
+            return Err(format!("schema {}: this program reads schema {SCHEMA}", self.schema));
+        }
+        plain("name", &self.name)?;
+        distinct("seed", self.seeds.iter().map(ToString::to_string))?;
+        distinct("stage", self.stages.iter().map(|s| s.name.clone()))?;
+        for (axis, levels) in &self.axes {
+            plain("axis", axis)?;
+            if [SEED, "out"].contains(&axis.as_str()) {
+                return Err(format!(
+                    "axis {axis}: every campaign has {{{axis}}}; choose another name"
+                ));
+            }
+            levels.iter().try_for_each(|level| plain("level", &level.name))?;
+            distinct(&format!("level of axis {axis}"), levels.iter().map(|l| l.name.clone()))?;
+        }
+        self.stages.iter().try_for_each(|stage| self.check_stage(stage))?;
+        self.tables.iter().try_for_each(|table| self.check_table(table))?;
+        self.claims.iter().try_for_each(|claim| {
+            [&claim.less, &claim.than].into_iter().try_for_each(|of| self.choice(of).map(|_| ()))
+        })
+    }
+
+    fn check_stage(&self, stage: &StageFile) -> Result<(), String> {
+        plain("stage", &stage.name)?;
+        distinct(&format!("axis of stage {}", stage.name), stage.over.iter().cloned())?;
+        for axis in &stage.over {
+            self.known_axis(axis).map_err(|why| format!("stage {}: {why}", stage.name))?;
+        }
+        match stage.core_seconds {
+            Some(s) if !(s.is_finite() && s > 0.0) => Err(format!(
+                "stage {}: core_seconds = {s}: give the seconds of a core that a cell takes, or leave it out",
+                stage.name
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_table(&self, table: &TableFile) -> Result<(), String> {
+        let about = |why: String| format!("table {:?}: {why}", table.title);
+        let stage = self.stage(&table.stage).map_err(about)?;
+        if let Some(axis) = table.rows.iter().find(|axis| !stage.over.contains(axis)) {
+            let over = stage.over.join(", ");
+            return Err(about(format!("stage {} does not vary {axis}, only {over}", stage.name)));
+        }
+        match &table.paper {
+            Some(id) if !super::published::tables().contains(&id.as_str()) => Err(about(format!(
+                "paper = {id:?} is none of {}",
+                super::published::tables().join(", ")
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    fn known_axis(&self, axis: &str) -> Result<(), String> {
+        if axis == SEED || self.axes.contains_key(axis) {
+            return Ok(());
+        }
+        let known: Vec<&str> = self.axes.keys().map(String::as_str).chain([SEED]).collect();
+        Err(format!("there is no axis {axis}; there are {}", known.join(", ")))
+    }
+
+    /// The stage of that name.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn stage(&self, name: &str) -> Result<&StageFile, String> {
+        self.stages.iter().find(|stage| stage.name == name).ok_or_else(|| {
+            let known: Vec<&str> = self.stages.iter().map(|s| s.name.as_str()).collect();
+            format!("there is no stage {name}; there are {}", known.join(", "))
+        })
+    }
+
+    /// The stage and the levels that `text` names: `stage axis=level …`.
+    ///
+    /// # Errors
+    /// If there is no such stage, axis or level.
+    pub fn choice(&self, text: &str) -> Result<(String, BTreeMap<String, String>), String> {
+        let about = |why: String| format!("claim on {text:?}: {why}");
+        let mut words = text.split_whitespace();
+        let stage = self.stage(words.next().unwrap_or_default()).map_err(about)?;
+        let levels = levels(words).map_err(about)?;
+        levels.iter().try_for_each(|(axis, level)| self.known_level(axis, level)).map_err(about)?;
+        Ok((stage.name.clone(), levels))
+    }
+
+    /// Fails if the axis has no such level.
+    pub(super) fn known_level(&self, axis: &str, level: &str) -> Result<(), String> {
+        self.known_axis(axis)?;
+        let known = self.levels(axis);
+        match known.iter().any(|l| l.name == level) {
+            true => Ok(()),
+            false => {
+                let names: Vec<&str> = known.iter().map(|l| l.name.as_str()).collect();
+                Err(format!("axis {axis} has no level {level}; it has {}", names.join(", ")))
+            }
+        }
+    }
+
+    /// The levels of an axis, the seeds too.
+    pub fn levels(&self, axis: &str) -> Vec<Level> {
+        if axis != SEED {
+            return self.axes.get(axis).cloned().unwrap_or_default();
+        }
+        let level = |seed: &u64| Level { name: seed.to_string(), words: seed.to_string() };
+        self.seeds.iter().map(level).collect()
+    }
+}
+
+/// Levels written as `axis=level`.
+pub(super) fn levels<'a>(
+    words: impl Iterator<Item = &'a str>,
+) -> Result<BTreeMap<String, String>, String> {
+    words
+        .map(|word| match word.split_once('=') {
+            Some((axis, level)) => Ok((axis.to_owned(), level.to_owned())),
+            None => Err(format!("{word}: write axis=level")),
+        })
+        .collect()
+}
+
+/// Fails for a name that could not be that of a folder everywhere.
+fn plain(what: &str, name: &str) -> Result<(), String> {
+    let good = |c: char| c.is_ascii_alphanumeric() || "_-.+".contains(c);
+    match !name.is_empty() && name.chars().all(good) {
+        true => Ok(()),
+        false => Err(format!("{what} {name:?}: use letters, digits, - _ . + only")),
+    }
+}
+
+fn distinct(what: &str, names: impl Iterator<Item = String>) -> Result<(), String> {
+    let mut names: Vec<String> = names.collect();
+    if names.is_empty() {
+        return Err(format!("there is no {what}; name at least one"));
+    }
+    names.sort();
+    match names.windows(2).find(|pair| pair[0] == pair[1]) {
+        None => Ok(()),
+        Some(pair) => Err(format!("{what} {} is there twice", pair[0])),
+    }
+}

@@ -1,0 +1,186 @@
+//! Joins what the cells of a campaign gave, and says which are missing.
+
+use std::path::Path;
+
+use super::cell::{Cell, Record};
+use super::error::CampaignError;
+use super::plan::Plan;
+use super::store::{Failure, Standing, Store, Times, whole};
+
+/// How a campaign stands.
+#[derive(Clone, Debug, Default)]
+pub struct Gathered {
+    /// The results, in the order of the cells.
+    pub records: Vec<Record>,
+    /// What they took, in the same order, where it is known.
+    pub times: Vec<Times>,
+    /// Cells that failed, and why.
+    pub failed: Vec<(String, Failure)>,
+    /// Cells that began and are not done.
+    pub begun: Vec<String>,
+    /// Cells whose results are of another command or of other inputs.
+    pub stale: Vec<String>,
+    /// Cells of which there is nothing.
+    pub missing: Vec<String>,
+}
+
+/// Looks at every cell.
+///
+/// # Errors
+/// If a file of the campaign's folder cannot be read.
+pub fn gather(plan: &Plan, store: &Store) -> Result<Gathered, CampaignError> {
+    let mut all = Gathered::default();
+    for cell in &plan.cells {
+        all.add(cell, store)?;
+    }
+    Ok(all)
+}
+
+impl Gathered {
+    fn add(&mut self, cell: &Cell, store: &Store) -> Result<(), CampaignError> {
+        let id = cell.id.clone();
+        match store.standing(cell)? {
+            Standing::Done(record) => {
+                self.records.push(*record);
+                self.times.extend(store.times(cell)?);
+            }
+            Standing::Failed(failure) => self.failed.push((id, failure)),
+            Standing::Begun => self.begun.push(id),
+            Standing::Stale => self.stale.push(id),
+            Standing::Missing => self.missing.push(id),
+        }
+        Ok(())
+    }
+
+    /// Whether every cell is done.
+    pub fn is_whole(&self) -> bool {
+        let rest = [&self.begun, &self.stale, &self.missing];
+        self.failed.is_empty() && rest.iter().all(|cells| cells.is_empty())
+    }
+}
+
+/// Writes a line for each of `lines`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_lines<T: serde::Serialize>(path: &Path, lines: &[T]) -> Result<(), CampaignError> {
+    let mut text = String::new();
+    for line in lines {
+        text += &serde_json::to_string(line).map_err(|e| CampaignError::content(path, e))?;
+        text.push('\n');
+    }
+    whole(path, text)
+}
+
+/// The results in a file that [`write_lines`] wrote.
+///
+/// # Errors
+/// If it cannot be read, or a line of it is no result.
+pub fn read_lines(path: &Path) -> Result<Vec<Record>, CampaignError> {
+    let text = std::fs::read_to_string(path).map_err(CampaignError::io("cannot read", path))?;
+    let line = |(number, line): (usize, &str)| {
+        let wrong =
+            |e| CampaignError::content(path, format!("line {}: is no result: {e}", number + 1));
+        serde_json::from_str(line).map_err(wrong)
+    };
+    text.lines().enumerate().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::path::PathBuf;
+
+    use super::super::file::CampaignFile;
+    use super::super::plan::plan;
+    use super::super::tables::{Outcome, findings, summaries};
+    use super::*;
+
+    const TEXT: &str = "schema = 1\nname = \"a\"\nseeds = [1, 2, 3]\n[axes]\nkind = [\"x\", \"y\"]\n\
+        [[stage]]\nname = \"first\"\nover = [\"seed\"]\ncommand = \"collect --from INPUT --out {out}\"\n\
+        [[stage]]\nname = \"last\"\nover = [\"kind\", \"seed\"]\ncommand = \"evaluate {first} {kind} {first:seed=1}\"\n\
+        [[table]]\ntitle = \"t\"\nstage = \"last\"\nrows = [\"kind\"]\nmetrics = [\"easy.mean_deg\"]\n\
+        [[claim]]\nsays = \"x is less\"\nmetric = \"easy.mean_deg\"\nless = \"last kind=x\"\nthan = \"last kind=y\"\n";
+
+    fn planned(input: &Path) -> Plan {
+        let text = TEXT.replace("INPUT", &input.display().to_string());
+        let file = CampaignFile::parse(&text).unwrap();
+        plan(file, Path::new("a.toml"), &|path: &Path| PathBuf::from(path)).unwrap()
+    }
+
+    /// Gives a cell the result `value`.
+    fn finish(store: &Store, cell: &Cell, value: f64) {
+        let claimed = store.claim(cell).unwrap().unwrap();
+        assert!(store.claim(cell).unwrap().is_none(), "a cell is run by one process");
+        let record = Record {
+            schema: Record::SCHEMA.into(),
+            campaign: "a".into(),
+            cell: cell.id.clone(),
+            stage: cell.stage.clone(),
+            levels: cell.levels.clone(),
+            seed: cell.seed(),
+            identity: cell.identity.clone(),
+            program: "greylag".into(),
+            command: cell.command(),
+            inputs: cell.inputs.clone(),
+            files: BTreeMap::new(),
+            metrics: [("easy.mean_deg".to_owned(), value)].into(),
+            curve: BTreeMap::new(),
+        };
+        let times = Times {
+            cell: cell.id.clone(),
+            seconds: 1.0,
+            core_seconds: 1.0,
+            resumed: claimed.resumed,
+            ended_unix_s: 0,
+            processor: String::new(),
+            program: String::new(),
+        };
+        claimed.finish(&record, &times).unwrap();
+    }
+
+    #[test]
+    fn cells_are_gathered_named_and_summed_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let input = folder.path().join("input.csv");
+        std::fs::write(&input, "1").unwrap();
+        let store = Store::new(&folder.path().join("out"));
+        let planned_first = planned(&input);
+        assert_eq!(planned_first.cells.len(), 3 + 6);
+        let last = &planned_first.cells[4];
+        assert_eq!((last.id.as_str(), last.after.as_slice()), ("last/x/2", &[1, 2][..]));
+        for (cell, value) in planned_first.cells.iter().zip([0., 0., 0., 1., 2., 3., 11., 12., 13.])
+        {
+            finish(&store, cell, value);
+        }
+        let all = gather(&planned_first, &store).unwrap();
+        assert!(all.is_whole() && all.records.len() == 9 && all.times.len() == 9);
+        let path = folder.path().join("all.jsonl");
+        write_lines(&path, &all.records).unwrap();
+        assert_eq!(read_lines(&path).unwrap(), all.records);
+
+        let summary = &summaries(&planned_first.file, &all.records)[0];
+        assert_eq!(summary.rows[1].ours.mean.value, 12.0);
+        assert_eq!(summary.rows[1].runs[2].cell, "last/y/3");
+        let found = &findings(&planned_first.file, &all.records).unwrap()[0];
+        assert_eq!(found.outcome, Outcome::Holds, "{}", found.because);
+
+        // another input makes other cells: nothing of the old ones is mixed in
+        std::fs::write(&input, "2").unwrap();
+        let planned_again = planned(&input);
+        finish(&store, &planned_again.cells[0], 0.0);
+        store.claim(&planned_again.cells[1]).unwrap().unwrap();
+        let all = gather(&planned_again, &store).unwrap();
+        assert_eq!(all.records.len(), 1);
+        assert_eq!(all.begun, ["first/2"]);
+        assert_eq!((all.stale.len(), all.missing.len()), (7, 0));
+    }
+
+    #[test]
+    fn a_line_that_is_no_result_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.jsonl");
+        std::fs::write(&path, "{}\n").unwrap();
+        assert!(read_lines(&path).unwrap_err().to_string().contains("line 1: is no result"));
+    }
+}

@@ -1,0 +1,159 @@
+//! What a finished command left in its folder: the quantities and files that count.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::error::CampaignError;
+use crate::model::residual::hash;
+
+/// Where `greylag evaluate` writes its scores in a cell's folder.
+pub const SCORES: &str = "evaluation.json";
+/// Where `greylag train dynamics` does.
+const TRAINING: &str = "training.json";
+/// Where `greylag train policy` writes its learning curve.
+const CURVE: &str = "curve.csv";
+/// Columns of a curve that do not depend on the machine.
+const COLUMNS: [&str; 5] = ["steps", "easy_deg", "hard_deg", "divergence_rate", "reward"];
+/// The files that later cells read, by their ends.
+const READ_LATER: [&str; 3] = ["safetensors", "toml", "csv"];
+/// What is none of them: it holds times, or what only this cell goes on from.
+const OWN: [&str; 2] = ["checkpoint.safetensors", CURVE];
+
+/// What a cell gave.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Harvest {
+    /// SHA-256 of the files that later cells read, by their names in the folder.
+    pub files: BTreeMap<String, String>,
+    /// What was measured.
+    pub metrics: BTreeMap<String, f64>,
+    /// Points of a learning curve.
+    pub curve: BTreeMap<String, Vec<f64>>,
+}
+
+/// What the commands of a cell left in `folder`.
+///
+/// # Errors
+/// If a file cannot be read or is not what it should be.
+pub fn harvest(folder: &Path) -> Result<Harvest, CampaignError> {
+    let mut harvest = Harvest { files: files(folder)?, ..Harvest::default() };
+    if let Some(scores) = document(&folder.join(SCORES))? {
+        harvest.metrics.extend(evaluated(&scores));
+    }
+    if let Some(training) = document(&folder.join(TRAINING))? {
+        harvest.metrics.extend(trained(&training));
+    }
+    let curve = folder.join(CURVE);
+    if curve.exists() {
+        harvest.curve = columns(&curve)?;
+    }
+    Ok(harvest)
+}
+
+/// The scores of each controller: `easy.mean_deg`, with the controller before it if there are several.
+fn evaluated(document: &Value) -> Vec<(String, f64)> {
+    let controllers = list(document, "controllers");
+    let mut all = Vec::new();
+    for controller in controllers {
+        let name = controller["controller"].as_str().unwrap_or_default();
+        let before = if controllers.len() > 1 { format!("{name}.") } else { String::new() };
+        for score in list(controller, "groups") {
+            let group = score["targets"].as_str().unwrap_or_default();
+            let quantity =
+                |key: &str| Some((format!("{before}{group}.{key}"), score[key].as_f64()?));
+            let keys = ["count", "mean_deg", "min_deg", "max_deg", "divergence_rate", "settling_s"];
+            all.extend(keys.into_iter().filter_map(quantity));
+        }
+    }
+    all
+}
+
+/// The errors of a learned model on flights that it has not seen, after some steps, with those of its prior.
+fn trained(document: &Value) -> Vec<(String, f64)> {
+    let mut all = Vec::new();
+    for (who, before) in [("learned", ""), ("prior", "prior.")] {
+        for horizon in list(document, who) {
+            let Some(steps) = horizon["steps"].as_u64() else { continue };
+            let named = [("rms", "nrmse"), ("median", "median"), ("lost", "divergence")];
+            all.extend(named.into_iter().filter_map(|(key, name)| {
+                Some((format!("{before}after_{steps}.{name}"), horizon[key].as_f64()?))
+            }));
+        }
+    }
+    let errors: Vec<f64> = list(document, "coefficients").iter().filter_map(relative).collect();
+    if !errors.is_empty() {
+        let median = crate::num::statistics::quantile(&errors, 0.5);
+        all.push(("coefficient_error".into(), median));
+    }
+    all
+}
+
+/// How far a learned coefficient is off the true one, in parts of it.
+fn relative(coefficient: &Value) -> Option<f64> {
+    let (value, truth) = (coefficient["value"].as_f64()?, coefficient["truth"].as_f64()?);
+    (truth != 0.0).then(|| (value / truth - 1.0).abs())
+}
+
+fn list<'a>(document: &'a Value, key: &str) -> &'a [Value] {
+    document[key].as_array().map_or(&[], Vec::as_slice)
+}
+
+fn document(path: &Path) -> Result<Option<Value>, CampaignError> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(path).map_err(CampaignError::io("cannot read", path))?;
+    serde_json::from_str(&text)
+        .map(Some)
+        .map_err(|e| CampaignError::content(path, format!("is no JSON: {e}")))
+}
+
+fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>, CampaignError> {
+    let wrong = |e: csv::Error| CampaignError::content(path, format!("is no table: {e}"));
+    let mut reader = csv::Reader::from_path(path).map_err(wrong)?;
+    let mut columns: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for row in reader.deserialize() {
+        let row: BTreeMap<String, f64> = row.map_err(wrong)?;
+        // JSON has no number for what was not measured
+        let finite = |x: &f64| x.is_finite();
+        if !COLUMNS.iter().all(|column| row.get(*column).is_some_and(finite)) {
+            continue;
+        }
+        for column in COLUMNS {
+            columns.entry(column.into()).or_default().push(row[column]);
+        }
+    }
+    Ok(columns)
+}
+
+/// SHA-256 of what later cells read; a folder of flights counts as one.
+fn files(folder: &Path) -> Result<BTreeMap<String, String>, CampaignError> {
+    let mut all = BTreeMap::new();
+    for path in sorted(folder)? {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if path.is_dir() {
+            let inner = files(&path)?;
+            if !inner.is_empty() {
+                all.insert(name + "/", hash(format!("{inner:?}").as_bytes()));
+            }
+        } else if path.extension().is_some_and(|e| READ_LATER.iter().any(|end| e == *end))
+            && !OWN.contains(&name.as_str())
+        {
+            let bytes = std::fs::read(&path).map_err(CampaignError::io("cannot read", &path))?;
+            all.insert(name, hash(&bytes));
+        }
+    }
+    Ok(all)
+}
+
+fn sorted(folder: &Path) -> Result<Vec<PathBuf>, CampaignError> {
+    let cannot = || CampaignError::io("cannot read", folder);
+    let entries = std::fs::read_dir(folder).map_err(cannot())?;
+    let mut paths = entries
+        .map(|entry| entry.map(|e| e.path()))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(cannot())?;
+    paths.sort();
+    Ok(paths)
+}

@@ -1,0 +1,220 @@
+//! From a campaign file to its cells.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::cell::{Cell, OUT};
+use super::error::CampaignError;
+use super::file::{CampaignFile, Level, StageFile, levels};
+use crate::model::GreyBox;
+use crate::model::residual::hash;
+
+/// The placeholder of the folder that a cell writes.
+const OWN: &str = "{out}";
+
+/// A campaign with its cells.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The file.
+    pub file: CampaignFile,
+    /// The cells; a cell stands after those that it reads.
+    pub cells: Vec<Cell>,
+}
+
+/// The cells of `file`, read from `path`; `find` says where a file that a command names lies.
+///
+/// # Errors
+/// If a command has a placeholder that stands for nothing, or names a file that there is not.
+pub fn plan(
+    file: CampaignFile,
+    path: &Path,
+    find: &dyn Fn(&Path) -> PathBuf,
+) -> Result<Plan, CampaignError> {
+    let mut cells: Vec<Cell> = Vec::new();
+    let mut hashes = BTreeMap::new();
+    for stage in &file.stages {
+        for levels in combinations(&file, stage) {
+            let about = |why: String| CampaignError::File {
+                path: path.into(),
+                why: format!("stage {}: {why}", stage.name),
+            };
+            let draft = Draft { file: &file, stage, levels: &levels, cells: &cells };
+            let (words, after) = draft.words().map_err(about)?;
+            let mut inputs = BTreeMap::new();
+            for name in named_files(&words, stage) {
+                if !hashes.contains_key(&name) {
+                    hashes.insert(name.clone(), content(&find(Path::new(&name))).map_err(about)?);
+                }
+                inputs.insert(name.clone(), hashes[&name].clone());
+            }
+            cells.push(cell(cells.len() + 1, stage, &levels, words, inputs, after));
+        }
+    }
+    Ok(Plan { file, cells })
+}
+
+impl Plan {
+    /// The cell of that number or that id.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn cell(&self, name: &str) -> Result<&Cell, String> {
+        let number: Option<usize> = name.parse().ok();
+        let wanted = |cell: &&Cell| cell.id == name || Some(cell.number) == number;
+        self.cells.iter().find(wanted).ok_or_else(|| {
+            format!(
+                "campaign {} has no cell {name}: it has 1 to {}; `greylag campaign plan` lists them",
+                self.file.name,
+                self.cells.len()
+            )
+        })
+    }
+
+    /// The cells of a stage.
+    pub fn of_stage<'a>(&'a self, stage: &'a str) -> impl Iterator<Item = &'a Cell> {
+        self.cells.iter().filter(move |cell| cell.stage == stage)
+    }
+}
+
+/// Every combination of the levels of a stage's axes, the last axis fastest.
+fn combinations(file: &CampaignFile, stage: &StageFile) -> Vec<Vec<(String, Level)>> {
+    stage.over.iter().fold(vec![Vec::new()], |all, axis| {
+        let with = |start: &Vec<(String, Level)>| {
+            let add = |level: Level| [start.clone(), vec![(axis.clone(), level)]].concat();
+            file.levels(axis).into_iter().map(add).collect::<Vec<_>>()
+        };
+        all.iter().flat_map(with).collect()
+    })
+}
+
+/// A cell whose command is being put together.
+struct Draft<'a> {
+    file: &'a CampaignFile,
+    stage: &'a StageFile,
+    levels: &'a [(String, Level)],
+    cells: &'a [Cell],
+}
+
+impl Draft<'_> {
+    /// The words of the command, and the numbers of the cells whose folders they name.
+    fn words(&self) -> Result<(Vec<String>, Vec<usize>), String> {
+        let (mut words, mut after) = (Vec::new(), Vec::new());
+        for word in self.stage.command.split_whitespace() {
+            match self.level_of(word) {
+                // a level may stand for several words, or for none
+                Some(level) => {
+                    for word in level.words.split_whitespace() {
+                        words.push(self.word(word, &mut after)?);
+                    }
+                }
+                None => words.push(self.word(word, &mut after)?),
+            }
+        }
+        after.sort_unstable();
+        after.dedup();
+        Ok((words, after))
+    }
+
+    fn level_of(&self, word: &str) -> Option<&Level> {
+        let axis = word.strip_prefix('{')?.strip_suffix('}')?;
+        self.levels.iter().find(|(name, _)| name == axis).map(|(_, level)| level)
+    }
+
+    /// A word with its placeholders filled in.
+    fn word(&self, word: &str, after: &mut Vec<usize>) -> Result<String, String> {
+        let (mut text, mut rest) = (String::new(), word);
+        while let Some(start) = rest.find('{') {
+            let end = rest.find('}').filter(|end| *end > start);
+            let end = end.ok_or_else(|| format!("{word}: a {{ without its }}"))?;
+            let name = &rest[start + 1..end];
+            text += &rest[..start];
+            text += &match self.levels.iter().find(|(axis, _)| axis == name) {
+                Some((_, level)) => level.words.clone(),
+                None if name == "out" => OWN.to_owned(),
+                None => self.upstream(name, after)?,
+            };
+            rest = &rest[end + 1..];
+        }
+        Ok(text + rest)
+    }
+
+    /// The folder of the cell of an earlier stage: `stage`, or `stage:axis=level,…` for other levels than its own.
+    fn upstream(&self, name: &str, after: &mut Vec<usize>) -> Result<String, String> {
+        let (stage, chosen) = name.split_once(':').unwrap_or((name, ""));
+        let given = levels(chosen.split(',').filter(|part| !part.is_empty()))?;
+        given.iter().try_for_each(|(axis, level)| self.file.known_level(axis, level))?;
+        let earlier: Vec<&Cell> = self.cells.iter().filter(|c| c.stage == stage).collect();
+        let Some(first) = earlier.first() else {
+            return Err(format!(
+                "{{{name}}} is no axis of this stage and no stage before it; the axes are {}",
+                self.stage.over.join(", ")
+            ));
+        };
+        let own: BTreeMap<&String, &String> =
+            self.levels.iter().map(|(axis, level)| (axis, &level.name)).collect();
+        let wanted = |axis: &String| given.get(axis).or_else(|| own.get(axis).copied());
+        if let Some(axis) = first.levels.keys().find(|axis| wanted(axis).is_none()) {
+            return Err(format!(
+                "{{{name}}} varies {axis}, this stage does not: write {{{stage}:{axis}=LEVEL}}"
+            ));
+        }
+        let same = |cell: &&&Cell| cell.levels.iter().all(|(axis, l)| wanted(axis) == Some(l));
+        let Some(cell) = earlier.iter().find(same) else {
+            return Err(format!("{{{name}}}: there is no such cell"));
+        };
+        after.push(cell.number);
+        Ok(format!("{OUT}/{}", cell.folder()))
+    }
+}
+
+fn cell(
+    number: usize,
+    stage: &StageFile,
+    levels: &[(String, Level)],
+    words: Vec<String>,
+    inputs: BTreeMap<String, String>,
+    after: Vec<usize>,
+) -> Cell {
+    let names = levels.iter().map(|(_, level)| level.name.as_str());
+    let id = std::iter::once(stage.name.as_str()).chain(names).collect::<Vec<_>>().join("/");
+    let what = (concat!("greylag ", env!("CARGO_PKG_VERSION")), &words, &inputs);
+    let identity = hash(format!("{what:?}").as_bytes());
+    let levels = levels.iter().map(|(axis, level)| (axis.clone(), level.name.clone())).collect();
+    let stage = stage.name.clone();
+    let mut cell = Cell { number, id, stage, levels, words, inputs, after, identity };
+    let own = format!("{OUT}/{}", cell.folder());
+    cell.words.iter_mut().for_each(|word| *word = word.replace(OWN, &own));
+    cell
+}
+
+/// The files that a command names: words with a slash that are no folder of the campaign, and what its stage adds.
+fn named_files(words: &[String], stage: &StageFile) -> Vec<String> {
+    let named = words.iter().filter(|w| w.contains('/') && !w.contains(OUT) && !w.contains(OWN));
+    // `--env model:FOLDER`
+    let path = |word: &String| word.rsplit_once(':').map_or(word.as_str(), |(_, p)| p).to_owned();
+    named.map(path).chain(stage.inputs.iter().cloned()).collect()
+}
+
+/// SHA-256 of a file, of a folder's files, or of a model with all files that it reads.
+fn content(path: &Path) -> Result<String, String> {
+    let cannot = |e: std::io::Error| format!("cannot read {}: {e}", path.display());
+    if path.extension().is_some_and(|e| e == "toml")
+        && let Ok(model) = GreyBox::load(path)
+    {
+        return Ok(hash(format!("{} {:?}", model.sha256, model.airframe).as_bytes()));
+    }
+    if !path.is_dir() {
+        return Ok(hash(&std::fs::read(path).map_err(cannot)?));
+    }
+    let entries = std::fs::read_dir(path).map_err(cannot)?;
+    let mut paths = entries
+        .map(|entry| entry.map(|e| e.path()))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(cannot)?;
+    paths.sort();
+    let mut all = String::new();
+    for path in paths {
+        all += &format!("{:?} {}\n", path.file_name(), content(&path)?);
+    }
+    Ok(hash(all.as_bytes()))
+}

@@ -1,0 +1,75 @@
+//! The paper's tables of statistics over seeds, to stand beside a campaign's.
+//!
+//! `published.csv` holds Tables IV, VIII, IX, X (with III in it) and XI of \[GSFM26\] as printed. Rows have the names of
+//! levels here: `severe/trainable`, `parallel`, `hybrid`; targets those of `greylag evaluate`.
+
+use std::sync::LazyLock;
+
+use super::statistics::Estimate;
+
+/// A line of the file.
+struct Line {
+    table: &'static str,
+    row: &'static str,
+    targets: &'static str,
+    statistic: &'static str,
+    estimate: Estimate,
+}
+
+static LINES: LazyLock<Vec<Line>> =
+    LazyLock::new(|| include_str!("published.csv").lines().skip(1).filter_map(line).collect());
+
+fn line(text: &'static str) -> Option<Line> {
+    let parts: Vec<&str> = text.split(',').collect();
+    let [table, row, targets, statistic, value, low, high] = parts[..] else { return None };
+    let number = |text: &str| text.parse::<f64>().ok();
+    let estimate = Estimate { value: number(value)?, ci95: [number(low)?, number(high)?] };
+    Some(Line { table, row, targets, statistic, estimate })
+}
+
+/// The tables by their numbers.
+pub fn tables() -> Vec<&'static str> {
+    let mut tables: Vec<&str> = LINES.iter().map(|line| line.table).collect();
+    tables.dedup();
+    tables
+}
+
+/// Median, interquartile mean and mean of a row of a table in a quantity by its name in a result, such as
+/// `easy.mean_deg`; of `easy.divergence_rate` the mean, as a part of one.
+pub fn published(table: &str, row: &str, metric: &str) -> [Option<Estimate>; 3] {
+    let (targets, quantity) = metric.rsplit_once('.').unwrap_or(("", metric));
+    let find = |statistic: &str| {
+        let same = |l: &&Line| (l.table, l.row, l.targets) == (table, row, targets);
+        Some(LINES.iter().filter(same).find(|l| l.statistic == statistic)?.estimate)
+    };
+    match quantity {
+        "mean_deg" => ["median", "iqm", "mean"].map(find),
+        "divergence_rate" => [None, None, find("divergence").map(part)],
+        _ => [None; 3],
+    }
+}
+
+/// Percent as a part of one.
+fn part(percent: Estimate) -> Estimate {
+    Estimate { value: percent.value / 100.0, ci95: percent.ci95.map(|end| end / 100.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_line_is_read_and_lies_in_its_interval() {
+        // 3 statistics of 15 rows in IV and XI, 18 in X, 9 in IX; one of 15 in VIII
+        assert_eq!(LINES.len(), 3 * (15 + 15 + 18 + 9) + 15);
+        assert_eq!(tables(), ["X", "IX", "XI", "IV", "VIII"]);
+        for Line { table, row, estimate: Estimate { value, ci95: [low, high] }, .. } in LINES.iter()
+        {
+            assert!(low <= value && value <= high, "{table} {row} {value}");
+        }
+        let [_, _, mean] = published("X", "severe/trainable", "hard_corners.mean_deg");
+        assert_eq!(mean, Some(Estimate { value: 1.94, ci95: [1.53, 2.40] }));
+        let [_, _, lost] = published("VIII", "cem", "easy.divergence_rate");
+        assert!((lost.unwrap().value - 0.071).abs() < 1e-12);
+    }
+}

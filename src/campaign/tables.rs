@@ -1,0 +1,210 @@
+//! The tables of a campaign: each quantity summed up over seeds, the paper's beside it; and what becomes of its claims.
+
+use std::collections::BTreeMap;
+
+use super::cell::Record;
+use super::file::{CampaignFile, ClaimFile, SEED, TableFile};
+use super::published::published;
+use super::statistics::{Aggregate, Estimate, aggregate, difference};
+
+/// A table.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// Its title.
+    pub title: String,
+    /// The unit of its quantities.
+    pub unit: String,
+    /// The paper's table that stands beside.
+    pub paper: Option<String>,
+    /// Its rows.
+    pub rows: Vec<SummaryRow>,
+}
+
+/// A quantity of the cells that share some levels.
+#[derive(Clone, Debug)]
+pub struct SummaryRow {
+    /// The levels, joined by `/`.
+    pub name: String,
+    /// The quantity.
+    pub metric: String,
+    /// What the seeds reached.
+    pub ours: Aggregate,
+    /// Where it comes from.
+    pub runs: Vec<Run>,
+    /// The paper's median, interquartile mean and mean.
+    pub paper: [Option<Estimate>; 3],
+}
+
+/// One number of one cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// The cell.
+    pub cell: String,
+    /// Its seed.
+    pub seed: Option<u64>,
+    /// The number.
+    pub value: f64,
+}
+
+/// What the results say to a claim.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// The claim.
+    pub says: String,
+    /// How it came out.
+    pub outcome: Outcome,
+    /// The numbers.
+    pub because: String,
+}
+
+/// How a claim came out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The interval of the difference is above zero.
+    Holds,
+    /// It is below zero.
+    Contradicted,
+    /// It holds zero.
+    Undecided,
+    /// There are no cells to decide by.
+    NoData,
+}
+
+impl Outcome {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Outcome::Holds => "holds",
+            Outcome::Contradicted => "contradicted",
+            Outcome::Undecided => "undecided",
+            Outcome::NoData => "no data",
+        }
+    }
+}
+
+/// The tables that a campaign file asks for.
+pub fn summaries(file: &CampaignFile, records: &[Record]) -> Vec<Summary> {
+    file.tables.iter().map(|table| summary(file, table, records)).collect()
+}
+
+fn summary(file: &CampaignFile, table: &TableFile, records: &[Record]) -> Summary {
+    let mut rows = Vec::new();
+    for metric in &table.metrics {
+        for levels in row_levels(file, table) {
+            rows.extend(row(table, metric, &levels, records));
+        }
+    }
+    Summary {
+        title: table.title.clone(),
+        unit: table.unit.clone(),
+        paper: table.paper.clone(),
+        rows,
+    }
+}
+
+/// Every combination of levels that makes a row, in the order of the file.
+fn row_levels(file: &CampaignFile, table: &TableFile) -> Vec<Vec<(String, String)>> {
+    table.rows.iter().fold(vec![Vec::new()], |all, axis| {
+        let levels = file.levels(axis);
+        let with = |start: &Vec<(String, String)>| {
+            let add = |l: &super::file::Level| {
+                [start.clone(), vec![(axis.clone(), l.name.clone())]].concat()
+            };
+            levels.iter().map(add).collect::<Vec<_>>()
+        };
+        all.iter().flat_map(with).collect()
+    })
+}
+
+fn row(
+    table: &TableFile,
+    metric: &str,
+    levels: &[(String, String)],
+    records: &[Record],
+) -> Option<SummaryRow> {
+    let wanted: BTreeMap<String, String> = levels.iter().cloned().collect();
+    let mut strata: BTreeMap<Vec<&String>, Vec<f64>> = BTreeMap::new();
+    let mut runs = Vec::new();
+    for record in records.iter().filter(|r| r.has(&table.stage, &wanted)) {
+        let Some(value) = record.metrics.get(metric) else { continue };
+        let others =
+            record.levels.iter().filter(|(axis, _)| *axis != SEED && !wanted.contains_key(*axis));
+        strata.entry(others.map(|(_, level)| level).collect()).or_default().push(*value);
+        runs.push(Run { cell: record.cell.clone(), seed: record.seed, value: *value });
+    }
+    let ours = aggregate(&strata.into_values().collect::<Vec<_>>())?;
+    let name = levels.iter().map(|(_, level)| level.as_str()).collect::<Vec<_>>().join("/");
+    let paper = table.paper.as_ref().map_or([None; 3], |id| published(id, &name, metric));
+    Some(SummaryRow { name, metric: metric.into(), ours, runs, paper })
+}
+
+impl Summary {
+    /// Where the intervals of ours and of the paper have nothing in common, a sentence each.
+    pub fn departures(&self) -> Vec<String> {
+        self.rows.iter().filter_map(SummaryRow::departure).collect()
+    }
+}
+
+impl SummaryRow {
+    fn departure(&self) -> Option<String> {
+        let (ours, theirs) = (self.ours.mean, self.paper[2]?);
+        let [[a, b], [c, d]] = [ours.ci95, theirs.ci95];
+        let word = if b < c { "less" } else { "more" };
+        (b < c || d < a).then(|| {
+            format!(
+                "{}, {}: mean {} here ({} runs), {} in the paper: {word}, the intervals have nothing in common.",
+                self.name,
+                self.metric,
+                said(&ours),
+                self.ours.count,
+                said(&theirs)
+            )
+        })
+    }
+}
+
+/// A value with its interval.
+pub fn said(estimate: &Estimate) -> String {
+    let Estimate { value, ci95: [low, high] } = estimate;
+    format!("{value:.3} [{low:.3}, {high:.3}]")
+}
+
+/// What the results say to the claims of a campaign file.
+///
+/// # Errors
+/// If a claim names a stage or a level that there is not.
+pub fn findings(file: &CampaignFile, records: &[Record]) -> Result<Vec<Finding>, String> {
+    file.claims.iter().map(|claim| finding(file, claim, records)).collect()
+}
+
+fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result<Finding, String> {
+    let values = |of: &str| -> Result<Vec<f64>, String> {
+        let (stage, levels) = file.choice(of)?;
+        let cells = records.iter().filter(|r| r.has(&stage, &levels));
+        Ok(cells.filter_map(|r| r.metrics.get(&claim.metric)).copied().collect())
+    };
+    let (less, than) = (values(&claim.less)?, values(&claim.than)?);
+    let says = claim.says.clone();
+    let Some(gap) = difference(&less, &than) else {
+        let because = format!("no cell of both sides has {}", claim.metric);
+        return Ok(Finding { says, outcome: Outcome::NoData, because });
+    };
+    let outcome = match gap.ci95 {
+        [low, _] if low > 0.0 => Outcome::Holds,
+        [_, high] if high < 0.0 => Outcome::Contradicted,
+        _ => Outcome::Undecided,
+    };
+    let mean = crate::num::statistics::mean;
+    let because = format!(
+        "{}: {} has {:.3} (n = {}), {} has {:.3} (n = {}); difference {}",
+        claim.metric,
+        claim.less,
+        mean(&less),
+        less.len(),
+        claim.than,
+        mean(&than),
+        than.len(),
+        said(&gap)
+    );
+    Ok(Finding { says, outcome, because })
+}

@@ -1,0 +1,63 @@
+//! What the cells of a campaign cost: as measured on cells of the same stage, else as their file says.
+
+use anyhow::Result;
+
+use crate::campaign::file::StageFile;
+use crate::campaign::{Plan, Store};
+use crate::num::statistics::quantile;
+
+/// What a cell of a stage costs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cost {
+    /// Time of a core, s.
+    pub core_seconds: f64,
+    /// How it is known.
+    pub from: Source,
+}
+
+/// How a cost is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The median of so many cells.
+    Measured(usize),
+    /// The campaign file says so.
+    Stated,
+}
+
+impl Cost {
+    /// What a cell of `stage` costs; `None` if nothing is known of it. A cell that was interrupted counts for none: its
+    /// last session is not the whole.
+    ///
+    /// # Errors
+    /// If the times of a cell cannot be read.
+    pub fn of(plan: &Plan, store: &Store, stage: &StageFile) -> Result<Option<Cost>> {
+        let mut measured = Vec::new();
+        for cell in plan.of_stage(&stage.name) {
+            measured.extend(store.times(cell)?.filter(|t| !t.resumed).map(|t| t.core_seconds));
+        }
+        if !measured.is_empty() {
+            let core_seconds = quantile(&measured, 0.5);
+            return Ok(Some(Cost { core_seconds, from: Source::Measured(measured.len()) }));
+        }
+        Ok(stage.core_seconds.map(|core_seconds| Cost { core_seconds, from: Source::Stated }))
+    }
+}
+
+impl std::fmt::Display for Source {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Source::Measured(1) => write!(f, "measured on 1 cell"),
+            Source::Measured(cells) => write!(f, "measured on {cells} cells"),
+            Source::Stated => write!(f, "stated in the file"),
+        }
+    }
+}
+
+/// A time in words.
+pub fn time(seconds: f64) -> String {
+    match seconds {
+        s if s < 99.5 => format!("{s:.0} s"),
+        s if s < 99.5 * 60.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}

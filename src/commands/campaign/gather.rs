@@ -1,0 +1,75 @@
+//! `greylag campaign gather`: join the results, say which cells are missing.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+
+use super::Which;
+use crate::campaign::gather::{Gathered, gather, write_lines};
+use crate::commands::files::{self, Overwrite};
+use crate::commands::status::IN_DOUBT;
+
+/// Cells of a kind that are named; of more only the number is said.
+const NAMED: usize = 20;
+
+/// Options of `greylag campaign gather`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    which: Which,
+    /// Write the results as JSON lines: the same cells give the same file to the bit.
+    #[arg(long, value_name = "FILE.jsonl")]
+    results: Option<PathBuf>,
+    /// Write what each cell took, when, and on which processor.
+    #[arg(long, value_name = "FILE.jsonl")]
+    times: Option<PathBuf>,
+    /// Replace the files if they exist.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Joins what there is.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let overwrite: Overwrite = arguments.force.into();
+    for path in arguments.results.iter().chain(&arguments.times) {
+        files::writable(path, overwrite)?;
+    }
+    let (plan, store) = arguments.which.open()?;
+    let all = gather(&plan, &store)?;
+    println!(
+        "{} of {} cells are done in {}",
+        all.records.len(),
+        plan.cells.len(),
+        store.folder().display()
+    );
+    say(&all);
+    if let Some(path) = &arguments.results {
+        write_lines(path, &all.records)?;
+        println!("results in {}", path.display());
+    }
+    if let Some(path) = &arguments.times {
+        write_lines(path, &all.times)?;
+        println!("times in {}", path.display());
+    }
+    Ok(if all.is_whole() { ExitCode::SUCCESS } else { ExitCode::from(IN_DOUBT) })
+}
+
+/// Names the cells that are not done.
+pub fn say(all: &Gathered) {
+    for (cell, failure) in &all.failed {
+        println!("failed: {cell}: {}", failure.error);
+    }
+    for (what, cells) in [
+        ("begun and not done", &all.begun),
+        ("stale: its command or an input has changed since", &all.stale),
+        ("missing", &all.missing),
+    ] {
+        for cell in cells.iter().take(NAMED) {
+            println!("{what}: {cell}");
+        }
+        if cells.len() > NAMED {
+            println!("{what}: {} more", cells.len() - NAMED);
+        }
+    }
+}

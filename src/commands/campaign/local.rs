@@ -1,0 +1,277 @@
+//! All cells of a campaign on this machine: each in a process of its own, as a scheduler would run it.
+
+use std::collections::BTreeMap;
+use std::fs::OpenOptions;
+use std::path::Path;
+use std::process::{Child, Command, ExitCode, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+
+use super::cost::{Cost, time};
+use crate::campaign::gather::gather;
+use crate::campaign::{Cell, Plan, Record, Standing, Store};
+use crate::commands::bar::Bar;
+use crate::commands::status;
+use crate::sysid::progress::Stage;
+
+/// Time between two looks at the processes.
+const LOOK: Duration = Duration::from_millis(50);
+/// Time before a cell that shall be tried again is.
+const PAUSE: Duration = Duration::from_secs(2);
+/// Time that a process has to come to its checkpoint after Ctrl-C.
+const GRACE: Duration = Duration::from_secs(20);
+/// Sessions of a cell that ends without a word, as one that is killed for memory does.
+const KILLS: u32 = 3;
+/// Where what the cells print goes, below the campaign's folder.
+const LOGS: &str = "logs";
+
+/// What becomes of cells that failed before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failed {
+    /// They are left.
+    Leave,
+    /// They are tried again.
+    Again,
+}
+
+/// Where a cell stands in this run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Waiting { not_before: Option<Instant>, kills: u32 },
+    Running { kills: u32 },
+    Done,
+    Failed,
+}
+
+/// A run of all cells.
+struct Local<'a> {
+    plan: &'a Plan,
+    store: &'a Store,
+    file: &'a Path,
+    jobs: usize,
+    states: Vec<State>,
+    running: BTreeMap<usize, Child>,
+    bar: Bar,
+}
+
+/// Runs all cells that are not done.
+pub fn run(
+    plan: &Plan,
+    store: &Store,
+    file: &Path,
+    jobs: usize,
+    failed: Failed,
+) -> Result<ExitCode> {
+    let logs = store.folder().join(LOGS);
+    std::fs::create_dir_all(&logs).with_context(|| format!("cannot make {}", logs.display()))?;
+    let states =
+        plan.cells.iter().map(|cell| begin(store, cell, failed)).collect::<Result<Vec<_>>>()?;
+    let bar = Bar::new();
+    let mut local = Local { plan, store, file, jobs, states, running: BTreeMap::new(), bar };
+    let interrupted = local.all();
+    // whatever went wrong, no process is left behind
+    local.end();
+    let interrupted = interrupted?;
+    drop(local);
+    if interrupted {
+        eprintln!("interrupted; the same command goes on");
+        return Ok(ExitCode::from(status::INTERRUPTED));
+    }
+    ended(plan, store)
+}
+
+fn begin(store: &Store, cell: &Cell, failed: Failed) -> Result<State> {
+    Ok(match store.standing(cell)? {
+        Standing::Done(_) => State::Done,
+        Standing::Failed(_) if failed == Failed::Leave => State::Failed,
+        _ => State::Waiting { not_before: None, kills: 0 },
+    })
+}
+
+/// Says what became of the cells.
+fn ended(plan: &Plan, store: &Store) -> Result<ExitCode> {
+    let all = gather(plan, store)?;
+    println!(
+        "{} of {} cells are done in {}",
+        all.records.len(),
+        plan.cells.len(),
+        store.folder().display()
+    );
+    for (cell, failure) in &all.failed {
+        println!("cell {cell} failed: {}", failure.error);
+    }
+    if all.is_whole() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("what the cells printed is in {}", store.folder().join(LOGS).display());
+    Ok(ExitCode::FAILURE)
+}
+
+impl Local<'_> {
+    /// Runs until nothing is left that can be run; whether Ctrl-C ended it.
+    fn all(&mut self) -> Result<bool> {
+        self.show()?;
+        loop {
+            let now = Instant::now();
+            while self.running.len() < self.jobs
+                && let Some(next) = self.next(now)
+            {
+                self.start(next)?;
+            }
+            if self.running.is_empty() && !self.is_waiting() {
+                return Ok(false);
+            }
+            std::thread::sleep(LOOK);
+            self.reap()?;
+            if self.show()? {
+                return Ok(true);
+            }
+        }
+    }
+
+    /// The first cell that can be run at once.
+    fn next(&self, now: Instant) -> Option<usize> {
+        let ready = |i: &usize| {
+            let State::Waiting { not_before, .. } = self.states[*i] else { return false };
+            not_before.is_none_or(|time| time <= now) && self.after(*i, |s| s == State::Done)
+        };
+        (0..self.states.len()).find(ready)
+    }
+
+    /// Whether a cell waits for what may still come.
+    fn is_waiting(&self) -> bool {
+        let waits = |i: &usize| matches!(self.states[*i], State::Waiting { .. });
+        (0..self.states.len()).filter(waits).any(|i| self.may_come(i))
+    }
+
+    /// Whether none of the cells before this one failed.
+    fn may_come(&self, index: usize) -> bool {
+        self.states[index] != State::Failed
+            && self.plan.cells[index].after.iter().all(|number| self.may_come(number - 1))
+    }
+
+    fn after(&self, index: usize, is: impl Fn(State) -> bool) -> bool {
+        self.plan.cells[index].after.iter().all(|number| is(self.states[number - 1]))
+    }
+
+    fn start(&mut self, index: usize) -> Result<()> {
+        let cell = &self.plan.cells[index];
+        let path = self.store.folder().join(LOGS).join(cell.stem() + ".txt");
+        let log = OpenOptions::new().create(true).append(true).open(&path);
+        let log = log.with_context(|| format!("cannot write {}", path.display()))?;
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let child = Command::new(std::env::current_exe().context("finding this program")?)
+            .args(["campaign", "run"])
+            .arg(self.file)
+            .arg("--out")
+            .arg(self.store.folder())
+            .args(["--cell", &cell.number.to_string()])
+            .env("RAYON_NUM_THREADS", (cores / self.jobs).max(1).to_string())
+            .stdin(Stdio::null())
+            .stdout(log.try_clone().context("opening the log twice")?)
+            .stderr(log)
+            .spawn()
+            .context("starting a process for a cell")?;
+        let kills = if let State::Waiting { kills, .. } = self.states[index] { kills } else { 0 };
+        self.states[index] = State::Running { kills };
+        self.running.insert(index, child);
+        Ok(())
+    }
+
+    /// Looks which processes have ended.
+    fn reap(&mut self) -> Result<()> {
+        let mut ended = Vec::new();
+        for (index, child) in &mut self.running {
+            if let Some(status) = child.try_wait().context("waiting for a cell")? {
+                ended.push((*index, status.code()));
+            }
+        }
+        for (index, code) in ended {
+            self.running.remove(&index);
+            let kills = if let State::Running { kills } = self.states[index] { kills } else { 0 };
+            self.states[index] = self.state_after(index, code, kills)?;
+            self.row(index)?;
+        }
+        Ok(())
+    }
+
+    fn state_after(&self, index: usize, code: Option<i32>, kills: u32) -> Result<State> {
+        let again = |kills| State::Waiting { not_before: Some(Instant::now() + PAUSE), kills };
+        Ok(match (code, self.store.standing(&self.plan.cells[index])?) {
+            (_, Standing::Done(_)) => State::Done,
+            (Some(code), _) if code == i32::from(status::TRY_AGAIN) => again(kills),
+            (None, _) if kills + 1 < KILLS => again(kills + 1),
+            _ => State::Failed,
+        })
+    }
+
+    /// Prints the line of a cell that has ended.
+    fn row(&self, index: usize) -> Result<()> {
+        let cell = &self.plan.cells[index];
+        let what = match (self.states[index], self.store.standing(cell)?) {
+            (State::Done, Standing::Done(record)) => self.reached(&record),
+            (State::Failed, Standing::Failed(failure)) => format!("failed: {}", failure.error),
+            (State::Failed, _) => "ended without a word; see its log".into(),
+            _ => return Ok(()),
+        };
+        let took = self.store.times(cell)?.map_or(String::new(), |t| time(t.seconds));
+        let (done, cells) = (self.count(State::Done), self.states.len());
+        let left = self.left()?.map_or(String::new(), |[_, left]| format!("{} left", time(left)));
+        self.bar.say(&format!("{done:>4}/{cells}  {:<40} {took:>7}  {left:>11}  {what}", cell.id));
+        Ok(())
+    }
+
+    /// The quantities of a result that the tables ask for.
+    fn reached(&self, record: &Record) -> String {
+        let tables = self.plan.file.tables.iter().filter(|t| t.stage == record.stage);
+        let metrics = tables
+            .flat_map(|t| &t.metrics)
+            .filter_map(|metric| Some(format!("{metric} {:.4}", record.metrics.get(metric)?)));
+        metrics.take(3).collect::<Vec<_>>().join("  ")
+    }
+
+    fn count(&self, state: State) -> usize {
+        self.states.iter().filter(|s| **s == state).count()
+    }
+
+    /// Time of all cells, and the time left of this run, s; `None` if the cost of a stage is not known.
+    fn left(&self) -> Result<Option<[f64; 2]>> {
+        let (mut all, mut left) = (0.0, 0.0);
+        for stage in &self.plan.file.stages {
+            let Some(cost) = Cost::of(self.plan, self.store, stage)? else { return Ok(None) };
+            let indices = self.plan.of_stage(&stage.name).map(|cell| cell.number - 1);
+            for state in indices.map(|index| self.states[index]) {
+                all += cost.core_seconds;
+                left += if matches!(state, State::Done | State::Failed) {
+                    0.0
+                } else {
+                    cost.core_seconds
+                };
+            }
+        }
+        Ok(Some([all, left / self.jobs as f64]))
+    }
+
+    /// Shows how far it is; whether Ctrl-C was pressed.
+    fn show(&self) -> Result<bool> {
+        let done = self.count(State::Done) as f64 / self.states.len() as f64;
+        let doing = format!("running campaign {}", self.plan.file.name);
+        Ok(self.bar.hear(Stage::new(&doing, done)).is_break())
+    }
+
+    /// Lets the processes come to their checkpoints; ends those that do not.
+    fn end(&mut self) {
+        let begun = Instant::now();
+        while !self.running.is_empty() && begun.elapsed() < GRACE {
+            self.running.retain(|_, child| matches!(child.try_wait(), Ok(None)));
+            std::thread::sleep(LOOK);
+        }
+        for child in self.running.values_mut() {
+            // what it has written is whole, and it goes on from there
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+        self.running.clear();
+    }
+}

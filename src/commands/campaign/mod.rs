@@ -1,0 +1,75 @@
+//! `greylag campaign`: many runs over priors, controllers and seeds; their tables.
+
+mod cost;
+mod gather;
+mod local;
+mod one;
+mod plan;
+mod report;
+mod run;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+
+use crate::campaign::{self, CampaignFile, Plan, Store};
+use crate::commands::files::shipped;
+
+/// Options of `greylag campaign`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "A campaign file names axes, seeds and stages; a cell is the command line of a stage at some levels. \
+    A cell's folder carries a hash of its command, its inputs and the cells before it: a changed campaign makes new cells \
+    and mixes nothing. A cell that is done is not done again; one that was killed goes on from its checkpoint."
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(clap::Subcommand)]
+enum What {
+    /// Say what a campaign holds: its cells, what each costs, what each writes.
+    Plan(plan::Arguments),
+    /// Run cells: all on this machine, one, or by the script of a scheduler.
+    Run(run::Arguments),
+    /// Join the results, and say which cells are missing.
+    Gather(gather::Arguments),
+    /// Write the tables and the page.
+    Report(report::Arguments),
+}
+
+/// Which campaign.
+#[derive(clap::Args)]
+struct Which {
+    /// The campaign file.
+    #[arg(value_name = "FILE.toml")]
+    file: PathBuf,
+    /// Folder of its cells [default: campaign-NAME].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Plans, runs, joins or reports.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    match &arguments.what {
+        What::Plan(arguments) => plan::run(arguments),
+        What::Run(arguments) => run::run(arguments),
+        What::Gather(arguments) => gather::run(arguments),
+        What::Report(arguments) => report::run(arguments),
+    }
+}
+
+impl Which {
+    /// The campaign with its cells, each command found to be one, and the folder of its results.
+    fn open(&self) -> Result<(Plan, Store)> {
+        let path = shipped(&self.file);
+        let plan = campaign::plan(CampaignFile::load(&path)?, &path, &shipped)?;
+        let folder =
+            self.out.clone().unwrap_or_else(|| format!("campaign-{}", plan.file.name).into());
+        let store = Store::new(&folder);
+        one::check(&plan, &store, &path)?;
+        Ok((plan, store))
+    }
+}

@@ -1,0 +1,115 @@
+//! `greylag campaign run`: cells on this machine, one cell, or the script of a scheduler.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
+
+use super::{Which, local, one};
+use crate::campaign::launch::{Job, Launcher, script};
+use crate::campaign::{Plan, Store};
+use crate::commands::files::shipped;
+
+/// Options of `greylag campaign run`.
+#[derive(clap::Args)]
+#[command(group(clap::ArgGroup::new("how").required(true).args(["local", "cell", "launcher"])))]
+pub struct Arguments {
+    #[command(flatten)]
+    which: Which,
+    /// Run all cells on this machine.
+    #[arg(long)]
+    local: bool,
+    /// Cells at once on this machine [default: its cores].
+    #[arg(long, value_name = "N", requires = "local", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Try cells again that failed for good.
+    #[arg(long, requires = "local")]
+    failed: bool,
+    /// Run one cell, by its number or id, as a scheduler does; status 75: try again, 1: never.
+    #[arg(long, value_name = "ID")]
+    cell: Option<String>,
+    /// Print the script that hands the cells to a scheduler.
+    #[arg(long, value_enum)]
+    launcher: Option<Launch>,
+    /// Run that script at once.
+    #[arg(long, requires = "launcher")]
+    submit: bool,
+    /// Further options of the scheduler, such as `--partition=short --time=02:00:00`.
+    #[arg(
+        long,
+        value_name = "TEXT",
+        requires = "launcher",
+        default_value = "",
+        allow_hyphen_values = true
+    )]
+    options: String,
+}
+
+/// A scheduler.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Launch {
+    /// Arrays of Slurm.
+    Slurm,
+    /// Arrays of HyperQueue.
+    Hyperqueue,
+    /// GNU parallel.
+    Parallel,
+}
+
+/// Attempts at a cell whose status says that a later one may succeed.
+const ATTEMPTS: usize = 20;
+
+/// Runs what was asked for.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let (plan, store) = arguments.which.open()?;
+    if let Some(name) = &arguments.cell {
+        let cell = plan.cell(name).map_err(anyhow::Error::msg)?;
+        return one::run(&plan, &store, cell);
+    }
+    if let Some(launcher) = arguments.launcher {
+        return arguments.launch(launcher, &plan, &store);
+    }
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let jobs = arguments.jobs.map_or(cores, usize::from);
+    let again = if arguments.failed { local::Failed::Again } else { local::Failed::Leave };
+    local::run(&plan, &store, &arguments.which.file, jobs, again)
+}
+
+impl Arguments {
+    /// Prints or runs the script.
+    fn launch(&self, launcher: Launch, plan: &Plan, store: &Store) -> Result<ExitCode> {
+        let launcher = match launcher {
+            Launch::Slurm => Launcher::Slurm,
+            Launch::Hyperqueue => Launcher::Hyperqueue,
+            Launch::Parallel => Launcher::Parallel,
+        };
+        // a job begins in another folder
+        let job = Job {
+            program: absolute(&std::env::current_exe().context("finding this program")?)?,
+            file: absolute(&shipped(&self.which.file))?,
+            out: absolute(store.folder())?,
+            attempts: ATTEMPTS,
+            options: self.options.clone(),
+        };
+        let text = script(launcher, plan, &job);
+        if !self.submit {
+            print!("{text}");
+            return Ok(ExitCode::SUCCESS);
+        }
+        let status = Command::new("bash").arg("-c").arg(&text).status();
+        let status = status.context("running the script with bash")?;
+        if !status.success() {
+            bail!(
+                "the script ended with {status}; print it with --launcher alone and run its lines by hand"
+            );
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn absolute(path: &Path) -> Result<String> {
+    let path: PathBuf = std::path::absolute(path)
+        .with_context(|| format!("cannot find the folder of {}", path.display()))?;
+    Ok(path.display().to_string())
+}

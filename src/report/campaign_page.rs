@@ -1,0 +1,279 @@
+//! The page of a campaign: its findings, its tables beside the paper's, the cell behind each number.
+
+use std::collections::BTreeMap;
+
+use super::Align::{Left, Right};
+use super::kit::numbers::number;
+use super::{
+    Curves, Figure, Finding, Findings, Page, Range, Row, Scale, Section, Series, Style, Table,
+    Whisker, Whiskers,
+};
+use crate::campaign::statistics::{Estimate, aggregate};
+use crate::campaign::tables::{self, Summary, SummaryRow};
+use crate::campaign::{CampaignFile, Record};
+
+/// Names of the three statistics.
+const STATISTICS: [&str; 3] = ["median", "interquartile mean", "mean"];
+
+/// A campaign's results.
+#[derive(Clone, Debug)]
+pub struct CampaignReport<'a> {
+    /// The campaign.
+    pub file: &'a CampaignFile,
+    /// Cells that it has.
+    pub cells: usize,
+    /// Results of those that are done.
+    pub records: &'a [Record],
+    /// Its tables.
+    pub summaries: &'a [Summary],
+    /// What becomes of its claims.
+    pub findings: &'a [tables::Finding],
+    /// The command that wrote the page.
+    pub command: String,
+}
+
+impl CampaignReport<'_> {
+    /// The page.
+    pub fn page(&self) -> Page {
+        let mut sections = vec![self.said()];
+        sections.extend(self.summaries.iter().enumerate().map(|(t, s)| summary(t, s)));
+        sections.extend(self.curves());
+        sections.extend([self.runs(), self.done(), self.provenance()]);
+        let subtitle =
+            format!("{} {} of {} cells are done.", self.file.about, self.records.len(), self.cells);
+        Page { title: format!("Campaign {}", self.file.name), subtitle, sections }
+    }
+
+    /// The claims, and where the tables depart from the paper's.
+    fn said(&self) -> Section {
+        let sentence = |sentence: String| Finding { sentence, link: None };
+        let claims = self
+            .findings
+            .iter()
+            .map(|f| sentence(format!("{}: {}. {}.", f.says, f.outcome.words(), f.because)));
+        let departures = self.summaries.iter().flat_map(Summary::departures).map(sentence);
+        let note = "A claim holds if the 95 % interval of the difference of means, resampled over seeds, lies above \
+                    zero. With three seeds such an interval is too narrow; ten are the paper's.";
+        let findings = Findings { lead: claims.collect(), rest: departures.collect() };
+        Section::new("Findings", note, vec![Figure::Findings(findings)])
+    }
+
+    /// A figure for each stage that has learning curves.
+    fn curves(&self) -> Option<Section> {
+        let mut stages: Vec<&str> =
+            self.records.iter().filter(|r| !r.curve.is_empty()).map(|r| r.stage.as_str()).collect();
+        stages.dedup();
+        let quantities = [
+            ("easy_deg", "settled error, easy targets (°)"),
+            ("hard_deg", "settled error, hard targets (°)"),
+            ("reward", "reward of a step"),
+        ];
+        let figures: Vec<Figure> = stages
+            .iter()
+            .flat_map(|stage| quantities.map(|(column, label)| self.curve(stage, column, label)))
+            .map(Figure::Curves)
+            .collect();
+        let note = "Lines: interquartile mean of the seeds. Shaded: its 95 % bootstrap interval over seeds. Flown in what \
+                    the policy is trained in.";
+        (!figures.is_empty()).then(|| Section::new("Learning curves", note, figures))
+    }
+
+    fn curve(&self, stage: &str, column: &str, label: &str) -> Curves {
+        let mut groups: BTreeMap<String, Vec<&Record>> = BTreeMap::new();
+        for record in self.records.iter().filter(|r| r.stage == stage && !r.curve.is_empty()) {
+            let levels = record.levels.iter().filter(|(axis, _)| *axis != "seed");
+            let name = levels.map(|(_, level)| level.as_str()).collect::<Vec<_>>().join("/");
+            groups.entry(name).or_default().push(record);
+        }
+        let mut x: Vec<f64> =
+            groups.values().flatten().flat_map(|r| r.curve["steps"].iter().copied()).collect();
+        x.sort_by(f64::total_cmp);
+        x.dedup();
+        let mut figure = Curves {
+            title: format!("{stage}: {label}"),
+            x_label: "steps".into(),
+            y_label: label.into(),
+            x: x.clone(),
+            linear: column == "reward",
+            ..Curves::default()
+        };
+        for (k, (name, records)) in groups.iter().enumerate() {
+            let at = |steps: &f64| middle(records, column, *steps);
+            let estimates: Vec<Option<Estimate>> = x.iter().map(at).collect();
+            let get = |f: &dyn Fn(&Estimate) -> f64| {
+                estimates.iter().map(|e| e.as_ref().map_or(f64::NAN, f)).collect::<Vec<f64>>()
+            };
+            let name = if name.is_empty() { stage } else { name };
+            figure.series.push(Series::new(name, Style::nth(k), get(&|e| e.value)));
+            figure.ranges.push(Range {
+                of: k,
+                low: get(&|e| e.ci95[0]),
+                high: get(&|e| e.ci95[1]),
+            });
+        }
+        figure
+    }
+
+    /// The numbers behind the tables, each with its seed and a link to its cell.
+    fn runs(&self) -> Section {
+        let columns =
+            [("Cell", Left), ("Seed", Right), ("Row", Left), ("Quantity", Left), ("Value", Right)];
+        let mut table = Table::new("Numbers", &columns);
+        for (t, summary) in self.summaries.iter().enumerate() {
+            for (r, row) in summary.rows.iter().enumerate() {
+                for (k, run) in row.runs.iter().enumerate() {
+                    let cells = vec![
+                        run.cell.clone(),
+                        run.seed.map_or("–".into(), |seed| seed.to_string()),
+                        row.name.clone(),
+                        row.metric.clone(),
+                        number(run.value),
+                    ];
+                    let anchor = (k == 0).then(|| numbers_of(t, r));
+                    let link = Some(anchor_of(&run.cell));
+                    table.rows.push(Row { cells, anchor, link, span_s: None });
+                }
+            }
+        }
+        let note =
+            "The numbers that each row of the tables sums up. A cell's name leads to its command.";
+        Section::new("Numbers", note, vec![Figure::Table(table)])
+    }
+
+    /// The cells with their commands.
+    fn done(&self) -> Section {
+        let columns = [
+            ("Cell", Left),
+            ("Seed", Right),
+            ("Identity", Left),
+            ("Build", Left),
+            ("Command", Left),
+        ];
+        let mut table = Table::new("Cells", &columns);
+        for r in self.records {
+            let cells = vec![
+                r.cell.clone(),
+                r.seed.map_or("–".into(), |seed| seed.to_string()),
+                r.identity.chars().take(12).collect(),
+                r.program.clone(),
+                r.command.clone(),
+            ];
+            table.rows.push(Row { cells, anchor: Some(anchor_of(&r.cell)), ..Row::default() });
+        }
+        let note = "The command of each cell; $OUT is the campaign's folder. The same identity gives the same numbers.";
+        Section::new("Cells", note, vec![Figure::Table(table)])
+    }
+
+    fn provenance(&self) -> Section {
+        let mut table = Table::new("Provenance", &[("Item", Left), ("Value", Left)]);
+        let mut builds: Vec<&str> = self.records.iter().map(|r| r.program.as_str()).collect();
+        builds.sort_unstable();
+        builds.dedup();
+        for (item, value) in [
+            ("Campaign file", format!("SHA-256 {}", self.file.sha256)),
+            ("Seeds", format!("{:?}", self.file.seeds)),
+            ("Builds", builds.join("; ")),
+            ("Command line", self.command.clone()),
+            ("Plots", "uPlot 1.6.32 (MIT)".into()),
+        ] {
+            table.push([item.into(), value]);
+        }
+        Section::new("Provenance", "", vec![Figure::Table(table)])
+    }
+}
+
+/// The interquartile mean of a column over the seeds that have a point at `steps`, if all have.
+fn middle(records: &[&Record], column: &str, steps: f64) -> Option<Estimate> {
+    let value = |record: &&Record| {
+        let at = record.curve["steps"].iter().position(|s| *s == steps)?;
+        record.curve.get(column)?.get(at).copied()
+    };
+    let values: Vec<f64> = records.iter().map(value).collect::<Option<_>>()?;
+    Some(aggregate(&[values])?.iqm)
+}
+
+fn anchor_of(cell: &str) -> String {
+    format!("cell-{}", cell.replace('/', "-"))
+}
+
+fn numbers_of(table: usize, row: usize) -> String {
+    format!("numbers-{table}-{row}")
+}
+
+fn summary(index: usize, summary: &Summary) -> Section {
+    let mut metrics: Vec<&str> = summary.rows.iter().map(|r| r.metric.as_str()).collect();
+    metrics.dedup();
+    let mut figures: Vec<Figure> =
+        metrics.iter().map(|metric| Figure::Whiskers(intervals(summary, metric))).collect();
+    figures.push(Figure::Table(table(index, summary)));
+    let beside = match &summary.paper {
+        Some(id) => format!(" Grey: Table {id} of the paper."),
+        None => String::new(),
+    };
+    let note = format!(
+        "Median, interquartile mean and mean over the runs, with 95 % percentile bootstrap intervals over seeds, \
+         each stratum resampled by itself. A row's name leads to its numbers.{beside}"
+    );
+    Section::new(&summary.title, &note, figures)
+}
+
+/// The three statistics of each row in a quantity, the paper's under them.
+fn intervals(summary: &Summary, metric: &str) -> Whiskers {
+    let mut rows = Vec::new();
+    for row in summary.rows.iter().filter(|r| r.metric == metric) {
+        let ours = [row.ours.median, row.ours.iqm, row.ours.mean];
+        for (k, name) in STATISTICS.iter().enumerate() {
+            rows.push(whisker(format!("{}, {name}", row.name), Style::Actual, ours[k]));
+            if let Some(theirs) = row.paper[k] {
+                rows.push(whisker(format!("{}, {name}, paper", row.name), Style::Measured, theirs));
+            }
+        }
+    }
+    let positive = rows.iter().all(|r: &Whisker| r.value > 0.0);
+    Whiskers {
+        title: metric.into(),
+        unit: summary.unit.clone(),
+        scale: if positive { Scale::Log { floor: 1e-4 } } else { Scale::Linear },
+        lines: Vec::new(),
+        legend: String::new(),
+        rows,
+    }
+}
+
+fn whisker(label: String, style: Style, estimate: Estimate) -> Whisker {
+    Whisker { label, style, value: estimate.value, interval: estimate.ci95, text: text(&estimate) }
+}
+
+fn text(Estimate { value, ci95: [low, high] }: &Estimate) -> String {
+    format!("{} [{}, {}]", number(*value), number(*low), number(*high))
+}
+
+fn table(index: usize, summary: &Summary) -> Table {
+    let columns = [
+        ("Row", Left),
+        ("Quantity", Left),
+        ("Runs", Right),
+        ("Median", Right),
+        ("IQM", Right),
+        ("Mean", Right),
+        ("Least, most", Right),
+        ("Paper's median", Right),
+        ("Paper's IQM", Right),
+        ("Paper's mean", Right),
+    ];
+    let mut table = Table::new(&summary.title, &columns);
+    for (k, row) in summary.rows.iter().enumerate() {
+        let link = Some(numbers_of(index, k));
+        table.rows.push(Row { cells: cells(row), link, ..Row::default() });
+    }
+    table
+}
+
+fn cells(row: &SummaryRow) -> Vec<String> {
+    let ours = &row.ours;
+    let mut cells = vec![row.name.clone(), row.metric.clone(), ours.count.to_string()];
+    cells.extend([ours.median, ours.iqm, ours.mean].iter().map(text));
+    cells.push(format!("{}, {}", number(ours.min), number(ours.max)));
+    cells.extend(row.paper.iter().map(|p| p.as_ref().map_or("–".into(), text)));
+    cells
+}
