@@ -53,7 +53,7 @@ impl AttitudeTrim {
 
 /// Whether two attitudes differ by more than `by` in an axis; true of what is no number.
 fn far(a: [f64; 2], b: [f64; 2], by: f64) -> bool {
-    a.iter().zip(b).any(|(a, b)| !((a - b).abs() <= by))
+    !a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by)
 }
 
 #[cfg(test)]
