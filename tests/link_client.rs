@@ -101,6 +101,26 @@ fn heartbeats_go_on_while_the_vehicle_clock_stands() {
 }
 
 #[test]
+fn each_residual_that_is_known_comes_once_a_second_under_its_name() {
+    let (mut clients, mut double) = new();
+    clients.handle(at_ms(0), peer(1), &hello(V2), &mut double);
+    assert_eq!(count(&run(&mut clients, &mut double, 0, 3000), 251), 0, "none is known");
+    double.status.residuals = [0.5, 0.0, -0.25, f64::NAN, 1.5, 0.0];
+    let seen = run(&mut clients, &mut double, 3000, 6000);
+    let named = |wanted: &str| -> Vec<f32> {
+        seen.iter()
+            .filter_map(|s| match s.message() {
+                MavMessage::NAMED_VALUE_FLOAT(m) if m.name.to_str() == Ok(wanted) => Some(m.value),
+                _ => None,
+            })
+            .collect()
+    };
+    assert_eq!(named("res_pitch"), [1.5; 3]);
+    assert_eq!(named("res_fz"), [-0.25; 3]);
+    assert_eq!((named("res_roll").len(), count(&seen, 251)), (0, 15), "five of six for 3 s");
+}
+
+#[test]
 fn the_default_streams_have_the_agreed_rates() {
     let (mut clients, mut double) = new();
     clients.handle(at_ms(0), peer(1), &hello(V2), &mut double);

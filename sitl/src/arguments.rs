@@ -7,8 +7,8 @@ use greylag_sitl::error_arguments::{FaultArgs, SensorArgs};
 use greylag_sitl::plant::Start;
 use greylag_sitl::plant_arguments::PlantArgs;
 use greylag_sitl::shim::{
-    Address, Existing, Launch, OutputMap, Pace, Personality, Px4Noise, Px4Options, ShimOptions,
-    TruthFile,
+    Address, ArdupilotOptions, ChannelRange, Existing, Launch, OutputMap, Pace, Personality,
+    Px4Noise, Px4Options, ShimOptions, TruthFile,
 };
 
 /// Flies an aircraft in JSBSim and plays its flight controller over MAVLink.
@@ -31,6 +31,8 @@ pub struct Cli {
     parameter: Vec<(String, f64)>,
     #[command(flatten)]
     px4: Px4Args,
+    #[command(flatten)]
+    ardupilot: ArdupilotArgs,
     /// Step on the companion's answers alone, as fast as they come, instead of in real time.
     #[arg(long)]
     lockstep: bool,
@@ -89,8 +91,8 @@ struct Px4Args {
           conflicts_with_all = ["link", "personality"])]
     px4_sim: Option<Address>,
     /// Which of PX4's outputs (PWM_MAIN_FUNCn) moves what: aileron, left-aileron, right-aileron,
-    /// elevator, left-elevon, right-elevon, throttle; a minus reverses.
-    #[arg(long, value_name = "WHAT=N,..", requires = "px4_sim", default_value_t)]
+    /// elevator, left-elevon, right-elevon, rudder, throttle; a minus reverses.
+    #[arg(long, value_name = "WHAT=N,..", requires = "px4_sim", default_value_t = OutputMap::px4())]
     px4_outputs: OutputMap,
     /// Sensor noise.
     #[arg(long, value_name = "PRESET", requires = "px4_sim", default_value = "standard")]
@@ -119,6 +121,38 @@ impl Px4Args {
     }
 }
 
+/// ArduPilot's JSON interface.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "ArduPilot JSON interface (instead of a companion)")]
+struct ArdupilotArgs {
+    /// Be the simulator of stock ArduPlane SITL, which sends its servo packets here and flies in
+    /// lockstep at its own pace; without ADDRESS that is udpin:127.0.0.1:9002. The aircraft stands
+    /// until ArduPlane opens the throttle, then a catapult brings it to its start.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = ARDUPILOT_ADDRESS,
+          conflicts_with_all = ["link", "personality", "px4_sim", "lockstep"])]
+    ardupilot_sim: Option<Address>,
+    /// Which of ArduPilot's channels (SERVOn_FUNCTION) moves what: names as for --px4-outputs;
+    /// elevons as ArduPilot mixes them are left-elevon=1,right-elevon=2.
+    #[arg(long, value_name = "WHAT=N,..", requires = "ardupilot_sim", default_value_t = OutputMap::ardupilot())]
+    ardupilot_outputs: OutputMap,
+    /// Pulse widths in us at the stops and at neutral, of all channels or, with N=, of channel N
+    /// (may be repeated): SERVOn_MIN, SERVOn_TRIM, SERVOn_MAX. 1000:1500:2000 where nothing is given.
+    #[arg(long, value_name = "[N=]MIN:TRIM:MAX", requires = "ardupilot_sim")]
+    ardupilot_pwm: Vec<ChannelRange>,
+}
+
+/// Where ArduPilot looks for its simulator.
+const ARDUPILOT_ADDRESS: &str = "udpin:127.0.0.1:9002";
+
+impl ArdupilotArgs {
+    fn options(&self) -> Option<ArdupilotOptions> {
+        self.ardupilot_sim.as_ref().map(|_| ArdupilotOptions {
+            outputs: self.ardupilot_outputs.clone(),
+            ranges: self.ardupilot_pwm.clone(),
+        })
+    }
+}
+
 /// The state at the start.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Start", allow_negative_numbers = true)]
@@ -144,11 +178,18 @@ struct StartArgs {
 }
 
 impl Cli {
+    /// Where the other side is met.
+    fn address(&self) -> &Address {
+        let simulated = self.px4.px4_sim.as_ref().or(self.ardupilot.ardupilot_sim.as_ref());
+        simulated.unwrap_or(&self.link)
+    }
+
     /// What the command line asks for.
     pub fn options(&self) -> ShimOptions {
         ShimOptions {
-            link: self.px4.px4_sim.as_ref().unwrap_or(&self.link).clone(),
+            link: self.address().clone(),
             px4: self.px4.options(),
+            ardupilot: self.ardupilot.options(),
             pace: if self.lockstep { Pace::Lockstep } else { Pace::RealTime },
             launch: if self.no_hold { Launch::Immediate } else { Launch::WhenArmed },
             duration_s: self.duration_s,

@@ -53,8 +53,9 @@ fn intent(options: &ShimOptions) -> String {
         Launch::WhenArmed => "held at the start until the companion arms",
         Launch::Immediate => "flying at once",
     };
-    if options.px4.is_some() {
-        return format!("{} as the simulator of PX4; Ctrl-C ends it", options.plant.aircraft);
+    let stacks = [("PX4", options.px4.is_some()), ("ArduPilot", options.ardupilot.is_some())];
+    if let Some((stack, _)) = stacks.into_iter().find(|(_, flies)| *flies) {
+        return format!("{} as the simulator of {stack}; Ctrl-C ends it", options.plant.aircraft);
     }
     match options.personality {
         Some(personality) => format!(

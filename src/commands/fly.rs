@@ -15,6 +15,7 @@ use crate::commands::files::shipped;
 use crate::control::cem::Change;
 use crate::control::policy::{Agent, Origin};
 use crate::control::{self, Controller, Kind, Needs, Source, build};
+use crate::flight::monitor::Monitor;
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
 use crate::flight::runtime::{
@@ -177,6 +178,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if let Some(path) = &arguments.schedule {
         companion.pilot.follow(Schedule::load(path)?);
     }
+    companion.pilot.monitor_with(Monitor::new(model.clone()));
     let options = options(arguments, &model);
     let stop = Arc::new(AtomicBool::new(false));
     let asked = stop.clone();

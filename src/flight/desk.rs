@@ -83,9 +83,13 @@ impl Desk {
             let demand = decision.demand();
             self.outputs = demand.outputs;
             out.extend(self.vehicle.answer(host, state.time, &demand));
+            let shown = self.vehicle.flies_surfaces();
+            if shown {
+                self.pilot.monitor(state);
+            }
             if let Some(recorder) = &self.recorder {
-                let row = Row::new(state, &decision, 0.0);
-                let shown = self.vehicle.flies_surfaces();
+                let mut row = Row::new(state, &decision, 0.0);
+                row.residuals = self.pilot.residual_shares();
                 recorder.row(if shown { row } else { row.without_surfaces() });
             }
             watch(state, &decision);

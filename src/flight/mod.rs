@@ -2,6 +2,7 @@
 //! desk on which it is tested.
 
 pub mod desk;
+pub mod monitor;
 pub mod pilot;
 pub mod recorder;
 pub mod replay;

@@ -123,7 +123,13 @@ pub struct Status {
     pub actuators: ActuatorState,
     /// Share of the 10 ms cycle the control task needed lately, 0..1.
     pub load: f64,
+    /// What is measured less what the model predicts, by its band, in the order of [`RESIDUALS`]; beyond
+    /// −1..1 is outside.
+    pub residuals: [f64; 6],
 }
+
+/// Names of the residuals: specific forces along body x, y, z, then angular accelerations.
+pub const RESIDUALS: [&str; 6] = ["res_fx", "res_fy", "res_fz", "res_roll", "res_pitch", "res_yaw"];
 
 /// An autopilot as the client side sees it. Implemented by `flight::pilot::Pilot`, and by a double
 /// in the tests of the protocol.

@@ -49,6 +49,7 @@ impl Double {
                 command: Command { aileron: 0.25, elevator: -0.5, throttle: 0.6, rudder: 0.0 },
                 actuators: ActuatorState::default(),
                 load: 0.2,
+                residuals: [f64::NAN; 6],
             },
             parameters: vec![
                 parameter("GL_BANK_MAX", ParameterValue::Real(60.0)),

@@ -11,6 +11,7 @@
 //! ```
 
 mod answer;
+mod ardupilot_sim;
 pub mod bench;
 pub mod codec;
 pub mod controller;
@@ -18,9 +19,11 @@ mod distortion;
 mod error;
 mod faults;
 mod flight;
+mod launch;
 mod link;
 mod lockstep;
 mod options;
+mod outputs;
 mod px4_sim;
 mod realtime;
 mod sensors;
@@ -30,12 +33,16 @@ mod telemetry;
 mod truth_log;
 
 pub use crate::plant::FULL_DEFLECTION_RAD;
+pub use ardupilot_sim::{
+    ArdupilotEvent, ArdupilotOptions, ChannelRange, Home, PwmRange, PwmRangeError,
+};
 pub use distortion::Distortion;
 pub use error::ShimError;
 pub use flight::Over;
 pub use link::{Address, AddressError, LinkError, Transport};
 pub use options::{Bias, Existing, FrameFaults, Launch, Noise, Pace, ShimOptions, TruthFile};
-pub use px4_sim::{FIRST_US, OutputMap, OutputMapError, Px4Event, Px4Noise, Px4Options, STEP_US};
+pub use outputs::{OutputMap, OutputMapError};
+pub use px4_sim::{FIRST_US, Px4Event, Px4Noise, Px4Options, STEP_US};
 pub use session::{COMPANION, SHIM};
 pub use summary::{Event, Latency, Notice, Summary};
 
@@ -68,6 +75,10 @@ pub fn run(
         // A step is due every 4 ms, which is shorter than a patient wait.
         let link = Link::open(&options.link, Wait::Never)?;
         return px4_sim::fly(link, options, px4, stop, observer);
+    }
+    if let Some(ardupilot) = &options.ardupilot {
+        let link = Link::open(&options.link, Wait::Patient)?;
+        return ardupilot_sim::fly(link, options, ardupilot, stop, observer);
     }
     let link = Link::open(&options.link, wait)?;
     let mut flight = Flight::new(options)?;

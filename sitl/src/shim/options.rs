@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::ardupilot_sim::ArdupilotOptions;
 use super::controller::Personality;
 use super::error::ShimError;
 use super::link::{Address, Transport};
@@ -169,6 +170,8 @@ pub struct ShimOptions {
     pub parameters: Vec<(String, f64)>,
     /// Be the simulator of PX4 SITL instead; `None` speaks to a companion.
     pub px4: Option<Px4Options>,
+    /// Be the simulator of ArduPilot SITL instead; `None` speaks to a companion.
+    pub ardupilot: Option<ArdupilotOptions>,
     /// What the vehicle's clock shows at the start, s: near a wrap of a counter, to fly across it.
     pub clock_start_s: f64,
 }
@@ -196,6 +199,7 @@ impl ShimOptions {
             personality: None,
             parameters: Vec::new(),
             px4: None,
+            ardupilot: None,
             clock_start_s: 0.0,
         }
     }
@@ -221,23 +225,7 @@ impl ShimOptions {
             (0.0..=1.0).contains(&faults.late_probability),
             "the probability of a late frame must lie in 0..1",
         )?;
-        if self.px4.is_some() {
-            demand(
-                self.link.transport == Transport::TcpIn,
-                "PX4 connects to its simulator by TCP: listen with tcpin:HOST:PORT",
-            )?;
-            demand(
-                self.personality.is_none(),
-                "PX4 itself flies through its simulator API: leave --personality out",
-            )?;
-            let FrameFaults { delay_ms, drop_probability, jitter_ms, late_probability, .. } =
-                faults;
-            let spared = [delay_ms, drop_probability, jitter_ms, late_probability];
-            demand(
-                spared.into_iter().all(|&x| x == 0.0) && self.noise == Noise::NONE,
-                "the PX4 simulator API sends every message, with noise of its own (--px4-noise)",
-            )?;
-        }
+        self.check_simulators()?;
         demand(
             self.personality.is_none() || self.pace == Pace::RealTime,
             "a personality flies in real time, as the flight controller it plays does",
@@ -272,6 +260,52 @@ impl ShimOptions {
         demand(state.iter().all(|x| x.is_finite()), "the start must be made of finite numbers")?;
         demand(start.airspeed_mps > 0.0, "the airspeed at the start must be positive")?;
         demand(start.altitude_m > 0.0, "the altitude at the start must be positive")
+    }
+
+    /// Refuses what the simulator interfaces of PX4 and ArduPilot cannot be asked for.
+    fn check_simulators(&self) -> Result<(), ShimError> {
+        if let Some(px4) = &self.px4 {
+            demand(
+                self.link.transport == Transport::TcpIn,
+                "PX4 connects to its simulator by TCP: listen with tcpin:HOST:PORT",
+            )?;
+            demand(
+                self.personality.is_none(),
+                "PX4 itself flies through its simulator API: leave --personality out",
+            )?;
+            demand(
+                self.frames_are_spared() && self.noise == Noise::NONE,
+                "the PX4 simulator API sends every message, with noise of its own (--px4-noise)",
+            )?;
+            demand(
+                px4.outputs.highest() <= 16,
+                "PX4 has outputs 1 to 16 at its simulator API (--px4-outputs)",
+            )?;
+        }
+        if self.ardupilot.is_some() {
+            demand(
+                self.link.transport == Transport::UdpIn,
+                "ArduPilot sends its servo packets by UDP: listen with udpin:HOST:PORT",
+            )?;
+            demand(
+                self.personality.is_none() && self.px4.is_none(),
+                "ArduPilot itself flies through its JSON interface: leave --personality and --px4-sim out",
+            )?;
+            demand(
+                self.frames_are_spared()
+                    && self.noise == Noise::NONE
+                    && self.bias == Bias::default(),
+                "ArduPilot makes the errors of its sensors itself: set its parameters SIM_* instead",
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Whether nothing befalls state frames.
+    fn frames_are_spared(&self) -> bool {
+        let FrameFaults { delay_ms, drop_probability, jitter_ms, late_probability, .. } =
+            self.faults;
+        [delay_ms, drop_probability, jitter_ms, late_probability].iter().all(|&x| x == 0.0)
     }
 }
 

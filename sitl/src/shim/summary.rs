@@ -4,6 +4,7 @@ use std::fmt;
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use super::ardupilot_sim::ArdupilotEvent;
 use super::flight::Over;
 use super::link::{Address, Transport};
 use super::px4_sim::Px4Event;
@@ -35,6 +36,8 @@ pub enum Event {
     Mode(String),
     /// Something of a run against PX4.
     Px4(Px4Event),
+    /// Something of a run against ArduPilot.
+    Ardupilot(ArdupilotEvent),
     /// The clock was so late that it was set anew, by so much.
     Skipped(Duration),
 }
@@ -64,6 +67,7 @@ impl fmt::Display for Event {
             Event::Resumed => write!(f, "answered: simulated time goes on"),
             Event::Mode(mode) => write!(f, "mode {mode}"),
             Event::Px4(event) => event.fmt(f),
+            Event::Ardupilot(event) => event.fmt(f),
             Event::Skipped(by) => {
                 write!(
                     f,

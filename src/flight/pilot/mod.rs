@@ -16,6 +16,7 @@ mod estimate;
 mod failsafe;
 mod polarity_hold;
 mod limits;
+mod model_watch;
 mod modes;
 mod oscillation;
 mod parameters;
@@ -31,6 +32,7 @@ pub use modes::mode_name;
 pub use polarity::Answers;
 
 use crate::control::{Controller, Observation, Target};
+use crate::flight::monitor::Monitor;
 use crate::link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
 use crate::link::vehicle::{Fault, Telemetry};
 use crate::manoeuvres::Schedule;
@@ -78,6 +80,8 @@ pub struct Pilot {
     oscillation: Option<Oscillation>,
     /// What the check, or the guard, has found wrong.
     refused: Option<Fault>,
+    /// The model that says what it has not predicted, where there is one.
+    monitor: Option<Monitor>,
 }
 
 /// What `observe` found, for `decide`.
@@ -140,6 +144,7 @@ impl Pilot {
             check: None,
             oscillation: None,
             refused: None,
+            monitor: None,
         })
     }
 

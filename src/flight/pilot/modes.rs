@@ -196,6 +196,7 @@ impl Autopilot for Pilot {
             command: self.in_force,
             actuators: seen.map_or_else(ActuatorState::default, |t| t.actuators),
             load: self.load,
+            residuals: self.residual_shares(),
         }
     }
 

@@ -269,7 +269,7 @@ mod tests {
             failsafe: false,
             refused: None,
         };
-        Row { sample, decision, latency_us: 123.4 }
+        Row { sample, decision, latency_us: 123.4, residuals: [0.5, -2.0, 0.0, 0.0, 0.0, f64::NAN] }
     }
 
     /// A heartbeat of system 1, component 1 in MAVLink 2, written by rust-mavlink.
@@ -300,7 +300,8 @@ mod tests {
         assert_eq!(reading.flight.samples.len(), 300);
         assert_eq!(reading.unknown_columns, Row::EXTRA);
         let text = std::fs::read_to_string(folder.join("flight.csv")).unwrap();
-        assert!(text.lines().nth(1).unwrap().ends_with(",20,OFFBOARD,1,planned,0,123.4"), "{text}");
+        let end = ",20,OFFBOARD,1,planned,0,123.4,0.500,-2.000,0.000,0.000,0.000,";
+        assert!(text.lines().nth(1).unwrap().ends_with(end), "{text}");
         let record = [&[0, 1, 2, 3, 4, 5, 6, 7][..], &frame()].concat();
         assert_eq!(
             std::fs::read(folder.join("flight.tlog")).unwrap(),

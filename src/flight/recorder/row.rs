@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use crate::flight::pilot::{Decision, mode_name};
+use crate::link::autopilot::RESIDUALS;
 use crate::link::vehicle::{Faults, Telemetry};
 use crate::logs::Sample;
 use crate::logs::csv::Rows;
@@ -16,16 +17,31 @@ pub struct Row {
     pub decision: Decision,
     /// From the arrival of the state frame to the sending of the command, µs.
     pub latency_us: f64,
+    /// Residuals of the model by their bands; NaN when not known.
+    pub residuals: [f64; 6],
 }
 
 impl Row {
     /// The columns beside those of the log format.
-    pub const EXTRA: [&'static str; 6] =
-        ["airspeed_target_mps", "mode", "armed", "source", "failsafe", "latency_us"];
+    pub const EXTRA: [&'static str; 12] = [
+        "airspeed_target_mps",
+        "mode",
+        "armed",
+        "source",
+        "failsafe",
+        "latency_us",
+        RESIDUALS[0],
+        RESIDUALS[1],
+        RESIDUALS[2],
+        RESIDUALS[3],
+        RESIDUALS[4],
+        RESIDUALS[5],
+    ];
 
     /// The row of a tick: a state with what was decided on it, after `latency_us` µs.
     pub fn new(state: &Telemetry, decision: &Decision, latency_us: f64) -> Self {
-        Row { sample: sample(state, decision), decision: *decision, latency_us }
+        let residuals = [f64::NAN; 6];
+        Row { sample: sample(state, decision), decision: *decision, latency_us, residuals }
     }
 
     /// The row without surfaces, for a controller that is commanded attitudes: what the companion's
@@ -52,6 +68,11 @@ impl Row {
         let digit = |flag: bool| if flag { "1" } else { "0" };
         let airspeed = format!("{}", d.target.airspeed);
         let latency = format!("{:.1}", self.latency_us);
+        let residuals = self.residuals.map(|share| match share.is_finite() {
+            true => format!("{share:.3}"),
+            false => String::new(),
+        });
+        let [fx, fy, fz, roll, pitch, yaw] = residuals.each_ref().map(String::as_str);
         let extra = [
             &*airspeed,
             mode_name(d.mode),
@@ -59,6 +80,12 @@ impl Row {
             d.source.name(),
             digit(d.failsafe),
             &*latency,
+            fx,
+            fy,
+            fz,
+            roll,
+            pitch,
+            yaw,
         ];
         out.row(&self.sample, &extra)
     }

@@ -219,10 +219,15 @@ impl Control {
         self.timing.late_plans += u64::from(matches!(plan, Plan::Late | Plan::Busy));
         let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
         self.load += LOAD_WEIGHT * (share - self.load);
+        // What surfaces do that were not commanded by us is not known.
+        let shown = self.vehicle.flies_surfaces();
+        if shown {
+            self.pilot.monitor(state);
+        }
         if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {
             let latency_us = latency.as_secs_f64() * 1e6;
-            let row = Row::new(state, decision, latency_us);
-            let shown = self.vehicle.flies_surfaces();
+            let mut row = Row::new(state, decision, latency_us);
+            row.residuals = self.pilot.residual_shares();
             recorder.row(if shown { row } else { row.without_surfaces() });
         }
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{Clients, Now};
 use crate::link::autopilot::Status;
 use crate::link::wire::mode::{self, Pulse};
-use crate::link::wire::telemetry::{self, Home, STREAMS, Scene};
+use crate::link::wire::telemetry::{self, Home, NAMED_VALUE_FLOAT, STREAMS, Scene};
 
 /// Between heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
@@ -43,10 +43,13 @@ impl Clients {
         let scene = self.scene(now);
         for session in &mut self.sessions {
             for (at, stream) in STREAMS.iter().enumerate() {
-                if session.streams.is_due(at, now.host)
-                    && let Some(message) = telemetry::message(stream.id, status, &scene)
-                {
-                    session.send(&message, self.identity, &mut self.outbox);
+                if !session.streams.is_due(at, now.host) {
+                    continue;
+                }
+                let mut send = |message| session.send(&message, self.identity, &mut self.outbox);
+                match stream.id {
+                    NAMED_VALUE_FLOAT => telemetry::residuals(status, &scene).for_each(send),
+                    id => telemetry::message(id, status, &scene).into_iter().for_each(&mut send),
                 }
             }
         }

@@ -6,6 +6,7 @@
 
 pub mod air_data;
 mod assembly;
+mod attitude_trim;
 mod engagement;
 pub mod parameters;
 pub mod profile;
@@ -25,6 +26,7 @@ use crate::link::wire::Message;
 use crate::link::wire::controller::{self as wire, ControllerMessage};
 use crate::physics::{Command, Time};
 use assembly::Assembly;
+use attitude_trim::AttitudeTrim;
 use engagement::{Engagement, Shown};
 use parameters::{Parameters, Standing};
 use profile::{Authority, Profile, Stack};
@@ -81,6 +83,7 @@ pub struct Real {
     assembly: Assembly,
     engagement: Engagement,
     sticks: Sticks,
+    trim: AttitudeTrim,
     /// The command that the actuators got last.
     sent: Command,
     last_state: Option<Duration>,
@@ -110,6 +113,7 @@ impl Real {
             assembly: Assembly::new(profile.actuators),
             engagement: Engagement::new(profile.stack.lead()),
             sticks: Sticks::default(),
+            trim: AttitudeTrim::default(),
             sent: Command::IDLE,
             last_state: None,
             pulse: Pulse::default(),
@@ -308,6 +312,7 @@ impl Real {
     pub fn answer(&mut self, host: Duration, time: Time, demand: &Demand) -> Vec<u8> {
         let Outputs::Armed(command) = demand.outputs else {
             self.engagement.rest();
+            self.trim.rest();
             return Vec::new();
         };
         if let Some(fault) = demand.fault.filter(|_| self.engagement.steers()) {
@@ -323,6 +328,7 @@ impl Real {
             self.bad_commands += 1;
         }
         let every = self.profile.stack.frames_per_command(self.profile.authority);
+        let attitude = self.trimmed(time, demand.attitude);
         let due = self.engagement.steers() && self.states.is_multiple_of(every);
         let Some(to) = self.target().filter(|_| due) else {
             return Vec::new();
@@ -336,10 +342,19 @@ impl Real {
             }
             (Authority::Attitude, _) => {
                 let time_ms = (time.as_micros() / 1000) as u32;
-                wire::attitude_target(to, time_ms, demand.attitude, self.sent.throttle)
+                wire::attitude_target(to, time_ms, attitude, self.sent.throttle)
             }
         };
         self.write(&message)
+    }
+
+    /// The attitude to command where `wanted` (rad) is wanted: trimmed while the controller flies it.
+    fn trimmed(&mut self, time: Time, wanted: [f64; 2]) -> [f64; 2] {
+        if !self.engagement.is_engaged() {
+            self.trim.rest();
+            return wanted;
+        }
+        self.trim.command(time, wanted, self.assembly.attitude())
     }
 
     /// What is due at `host` besides answers: heartbeat, requests, the hand-back.

@@ -3,12 +3,12 @@
 use mavlink::dialects::ardupilotmega::{
     ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, ATTITUDE_TARGET_DATA, AttitudeTargetTypemask,
     BATTERY_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA,
-    GpsFixType, MavLandedState, MavMessage, MavSysStatusSensor, SERVO_OUTPUT_RAW_DATA,
-    SYS_STATUS_DATA, SYSTEM_TIME_DATA, VFR_HUD_DATA,
+    GpsFixType, MavLandedState, MavMessage, MavSysStatusSensor, NAMED_VALUE_FLOAT_DATA,
+    SERVO_OUTPUT_RAW_DATA, SYS_STATUS_DATA, SYSTEM_TIME_DATA, VFR_HUD_DATA,
 };
 
 use super::{Message, answer, mode, setpoint};
-use crate::link::autopilot::Status;
+use crate::link::autopilot::{RESIDUALS, Status};
 use crate::physics::Time;
 
 /// A message that can be streamed.
@@ -27,7 +27,7 @@ const fn stream(id: u32, default_hz: f64, group: u8) -> Stream {
 }
 
 /// Every stream, with its default rate.
-pub const STREAMS: [Stream; 13] = [
+pub const STREAMS: [Stream; 14] = [
     stream(30, 10.0, 10), // ATTITUDE
     stream(31, 10.0, 10), // ATTITUDE_QUATERNION
     stream(83, 5.0, 4),   // ATTITUDE_TARGET
@@ -41,7 +41,11 @@ pub const STREAMS: [Stream; 13] = [
     stream(242, 0.5, 2),  // HOME_POSITION (MAVSDK waits for it rather than asks)
     stream(2, 0.0, 12),   // SYSTEM_TIME
     stream(436, 0.0, 12), // CURRENT_MODE
+    stream(NAMED_VALUE_FLOAT, 1.0, 12),
 ];
+
+/// The message of the residuals, one for each that is known.
+pub const NAMED_VALUE_FLOAT: u32 = 251;
 
 /// The place of a message in [`STREAMS`].
 pub fn position(id: u32) -> Option<usize> {
@@ -66,6 +70,19 @@ pub struct Scene {
     pub home: Option<Home>,
     /// Frames from clients that could not be used, counted.
     pub bad_frames: u64,
+}
+
+/// NAMED_VALUE_FLOAT for each residual that is known.
+pub fn residuals(status: &Status, scene: &Scene) -> impl Iterator<Item = Message> {
+    let time_boot_ms = boot_ms(scene.now);
+    let known = RESIDUALS.iter().zip(status.residuals).filter(|(_, value)| value.is_finite());
+    known.map(move |(name, value)| {
+        Message::coded(MavMessage::NAMED_VALUE_FLOAT(NAMED_VALUE_FLOAT_DATA {
+            time_boot_ms,
+            value: value as f32,
+            name: (*name).into(),
+        }))
+    })
 }
 
 /// One streamed message; `None` when it is not a stream or its content is not known (yet).

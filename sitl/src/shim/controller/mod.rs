@@ -533,6 +533,7 @@ impl FlightController {
         let wish = self.wish.filter(|_| self.mode == Mode::Guided && self.wish_alive());
         match wish {
             Some(Wish { roll, pitch, thrust, .. }) => {
+                let [roll, pitch] = law::left_off(roll, pitch);
                 self.law.attitude(&self.measured, roll, pitch, thrust)
             }
             // Without targets ArduPilot goes back to the point at which GUIDED was entered.

@@ -2,13 +2,14 @@
 
 use std::time::Instant;
 
+use super::actuation::Actuation;
 use super::clock::{Answers, Clock};
 use super::events::Px4Event;
-use super::outputs::{Actuation, OutputMap};
 use crate::shim::codec::{
     CommandAck, CommandLong, Encoder, Frame, Heartbeat, HilActuatorControls, HilStateQuaternion,
     Message, Parser, Version,
 };
+use crate::shim::outputs::OutputMap;
 use crate::shim::session::SHIM;
 use crate::shim::summary::Summary;
 
@@ -81,7 +82,7 @@ impl Client {
             counts.foreign_frames += 1;
             self.refuse(OLD_PROTOCOL, events);
         } else if let Some(message) = frame.decode::<HilActuatorControls>() {
-            match outputs.read(&message) {
+            match Actuation::read(outputs, &message) {
                 Some(actuation) => self.actuate(actuation, shown_us, counts, events),
                 None => counts.unusable_answers += 1,
             }

@@ -6,12 +6,11 @@
 //! step is made on its answer and never without. The protocol is that of PX4's public
 //! documentation (Simulator MAVLink API) as its module `simulator_mavlink` speaks it.
 
+mod actuation;
 mod client;
 mod clock;
 mod events;
-mod launch;
 mod magnetism;
-mod outputs;
 mod sensors;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,15 +20,15 @@ use std::time::{Duration, Instant};
 use super::codec::Frame;
 use super::error::ShimError;
 use super::flight::Over;
+use super::launch::Launcher;
 use super::link::{Arrival, Link};
 use super::options::{Pace, ShimOptions};
+use super::outputs::OutputMap;
 use super::summary::{Event, Notice, Summary};
 use super::truth_log::TruthLog;
-use crate::plant::{Inputs, Travel};
+use crate::plant::Inputs;
 use client::Client;
 pub use events::Px4Event;
-use launch::Launcher;
-pub use outputs::{OutputMap, OutputMapError};
 pub use sensors::Px4Noise;
 use sensors::Sensors;
 
@@ -61,12 +60,9 @@ pub struct Px4Options {
 impl Default for Px4Options {
     /// The outputs of the stock fixed-wing airframes, the noise of PX4's own simulators.
     fn default() -> Self {
-        Px4Options { outputs: OutputMap::default(), noise: Px4Noise::STANDARD }
+        Px4Options { outputs: OutputMap::px4(), noise: Px4Noise::STANDARD }
     }
 }
-
-/// Travel of an aircraft as its truth shows it here: no output of PX4 moves a rudder.
-const CENTRED: Travel = Travel::X8;
 
 /// A run.
 struct Run<'a> {
@@ -96,7 +92,8 @@ pub(super) fn fly(
 ) -> Result<Summary, ShimError> {
     let mut plant = options.plant.clone();
     plant.step_s = STEP_US as f64 * 1e-6;
-    let launcher = Launcher::new(&plant, &options.start, options.launch)?;
+    let mut launcher = Launcher::new(&plant, &options.start, options.launch)?;
+    let travel = launcher.travel()?;
     let field = magnetism::field_ned_gauss(
         plant.latitude_deg,
         plant.longitude_deg,
@@ -113,7 +110,7 @@ pub(super) fn fly(
         log: options
             .truth
             .as_ref()
-            .map(|t| TruthLog::create(t, STEP_US as f64 * 1e-6, &CENTRED))
+            .map(|t| TruthLog::create(t, STEP_US as f64 * 1e-6, &travel))
             .transpose()?,
         client: None,
         connection: 0,

@@ -75,6 +75,14 @@ impl Assembly {
         }
     }
 
+    /// Roll and pitch of the last state, rad; NaN where they cannot be believed.
+    pub(super) fn attitude(&self) -> [f64; 2] {
+        match self.last.faults.contains(Faults::ATTITUDE) {
+            true => [f64::NAN; 2],
+            false => [self.last.state.roll, self.last.state.pitch],
+        }
+    }
+
     /// Takes a measurement; an attitude completes a state. `command` is what the actuators have
     /// been commanded since the last state.
     pub(super) fn take(

@@ -76,6 +76,11 @@ impl Engagement {
         matches!(self.phase, Phase::Entering { .. } | Phase::Engaged { .. })
     }
 
+    /// Whether the controller flies what is commanded.
+    pub(super) fn is_engaged(&self) -> bool {
+        matches!(self.phase, Phase::Engaged { .. })
+    }
+
     /// Somebody wants to steer; whether that is new.
     pub(super) fn begin(&mut self, host: Duration) -> bool {
         let begins = !self.barred && !self.steers();

@@ -1,15 +1,12 @@
-//! Which of PX4's outputs moves what.
+//! Which output of a flight controller moves what.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::plant::Inputs;
-use crate::shim::codec::HilActuatorControls;
 
-/// MAV_MODE_FLAG_SAFETY_ARMED.
-const ARMED: u8 = 128;
-
-/// Something that an output moves. As PX4 has it, a positive output lifts a trailing edge.
+/// Something that an output moves. A positive output lifts a trailing edge, as PX4 and ArduPilot
+/// have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Effector {
     /// Both ailerons on one channel; positive rolls right.
@@ -20,18 +17,21 @@ enum Effector {
     Elevator,
     LeftElevon,
     RightElevon,
+    /// Positive yaws right.
+    Rudder,
     /// 0 to 1.
     Throttle,
 }
 
 impl Effector {
-    const ALL: [(&'static str, Effector); 7] = [
+    const ALL: [(&'static str, Effector); 8] = [
         ("aileron", Effector::Aileron),
         ("left-aileron", Effector::LeftAileron),
         ("right-aileron", Effector::RightAileron),
         ("elevator", Effector::Elevator),
         ("left-elevon", Effector::LeftElevon),
         ("right-elevon", Effector::RightElevon),
+        ("rudder", Effector::Rudder),
         ("throttle", Effector::Throttle),
     ];
 
@@ -47,12 +47,15 @@ impl Effector {
             Effector::Elevator => (0.0, 1.0),
             Effector::LeftElevon => (-1.0, 1.0),
             Effector::RightElevon => (1.0, 1.0),
-            Effector::Throttle => (0.0, 0.0),
+            Effector::Rudder | Effector::Throttle => (0.0, 0.0),
         }
     }
 }
 
-/// One output: what it moves, its place in `controls`, its sign.
+/// ArduPilot has 32 outputs, PX4's simulator interface 16.
+const OUTPUTS: usize = 32;
+
+/// One output: what it moves, its place counted from 0, its sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Output {
     effector: Effector,
@@ -60,33 +63,48 @@ struct Output {
     sign: f64,
 }
 
-/// Which outputs move aileron, elevator and throttle.
+/// Which outputs move aileron, elevator, rudder and throttle.
 ///
 /// Written as `left-aileron=6,right-aileron=7,elevator=8,throttle=5`: the number is that of
-/// PX4's PWM_MAIN_FUNCn, 1 to 16, a minus before it reverses. These are the default, for so the
-/// stock fixed-wing airframes have it (1030, 1033, 1036).
+/// PX4's PWM_MAIN_FUNCn or of ArduPilot's SERVOn_FUNCTION, 1 to 32, a minus before it reverses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutputMap(Vec<Output>);
 
 /// A map of outputs that cannot be flown by.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "cannot read the outputs '{given}': {fault}; write them like left-aileron=6,right-aileron=7,elevator=8,throttle=5, with the numbers of PWM_MAIN_FUNCn (aileron, left-aileron, right-aileron, elevator, left-elevon, right-elevon, throttle; a minus reverses)"
+    "cannot read the outputs '{given}': {fault}; write them like left-aileron=6,right-aileron=7,elevator=8,throttle=5, with the numbers of PX4's PWM_MAIN_FUNCn or of ArduPilot's SERVOn_FUNCTION (aileron, left-aileron, right-aileron, elevator, left-elevon, right-elevon, rudder, throttle; a minus reverses)"
 )]
 pub struct OutputMapError {
     given: String,
     fault: &'static str,
 }
 
-impl Default for OutputMap {
-    fn default() -> Self {
-        let output = |effector, place| Output { effector, place, sign: 1.0 };
+impl OutputMap {
+    /// The outputs of PX4's stock fixed-wing airframes (1030, 1033, 1036).
+    pub fn px4() -> Self {
         OutputMap(vec![
-            output(Effector::LeftAileron, 5),
-            output(Effector::RightAileron, 6),
-            output(Effector::Elevator, 7),
-            output(Effector::Throttle, 4),
+            Output::plain(Effector::LeftAileron, 6),
+            Output::plain(Effector::RightAileron, 7),
+            Output::plain(Effector::Elevator, 8),
+            Output::plain(Effector::Throttle, 5),
         ])
+    }
+
+    /// The outputs that ArduPlane has by default (SERVO1_FUNCTION 4, 19, 70, 21).
+    pub fn ardupilot() -> Self {
+        OutputMap(vec![
+            Output::plain(Effector::Aileron, 1),
+            Output::plain(Effector::Elevator, 2),
+            Output::plain(Effector::Throttle, 3),
+            Output::plain(Effector::Rudder, 4),
+        ])
+    }
+}
+
+impl Output {
+    fn plain(effector: Effector, number: usize) -> Self {
+        Output { effector, place: number - 1, sign: 1.0 }
     }
 }
 
@@ -118,8 +136,8 @@ impl FromStr for OutputMap {
                 None => (1.0, number),
             };
             let number: usize = number.parse().map_err(|_| fail("an output is not a number"))?;
-            if !(1..=16).contains(&number) {
-                return Err(fail("outputs are numbered 1 to 16"));
+            if !(1..=OUTPUTS).contains(&number) {
+                return Err(fail("outputs are numbered 1 to 32"));
             }
             if outputs.iter().any(|output| output.effector == effector) {
                 return Err(fail("something is moved by two outputs"));
@@ -137,52 +155,71 @@ impl FromStr for OutputMap {
     }
 }
 
-/// What an actuator message asks for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Actuation {
-    /// The controller's time, µs.
-    pub time_us: u64,
-    /// Whether the controller is in lockstep: bit 0 of the flags.
-    pub lockstep: bool,
-    /// Whether it is armed.
-    pub armed: bool,
-    /// Commands of the plant, zero when disarmed.
+/// What the outputs ask for together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mixed {
+    /// Commands of the plant.
     pub inputs: Inputs,
-    /// Whether a control lay outside its range and was limited.
+    /// Whether an output lay outside its range and was limited.
     pub limited: bool,
 }
 
 impl OutputMap {
-    /// Reads an actuator message; `None` when an output that is used is not a finite number.
-    pub fn read(&self, message: &HilActuatorControls) -> Option<Actuation> {
-        let (mut roll, mut pitch, mut throttle, mut limited) =
-            (Mean::default(), Mean::default(), 0.0, false);
+    /// Mixes outputs, which `at` reads by their place counted from 0: surfaces −1..1, throttle
+    /// 0..1 with [`Range::Throttle`]. `None` when an output that is used is not a finite number.
+    pub fn mix(&self, at: impl Fn(usize, Range) -> f64) -> Option<Mixed> {
+        let (mut roll, mut pitch, mut mixed) = (Mean::default(), Mean::default(), Mixed::default());
         for Output { effector, place, sign } in &self.0 {
-            let control = f64::from(message.controls[*place]);
-            if !control.is_finite() {
+            let range = effector.range();
+            let asked = sign * at(*place, range);
+            if !asked.is_finite() {
                 return None;
             }
-            let lowest = if *effector == Effector::Throttle { 0.0 } else { -1.0 };
-            let within = (sign * control).clamp(lowest, 1.0);
-            limited |= within != sign * control;
+            let within = asked.clamp(range.lowest(), 1.0);
+            mixed.limited |= within != asked;
             let (rolls, pitches) = effector.acts();
             roll.take(rolls, within);
             pitch.take(pitches, within);
-            if *effector == Effector::Throttle {
-                throttle = within;
+            match effector {
+                Effector::Throttle => mixed.inputs.throttle = within,
+                // The plant's rudder yaws left when positive.
+                Effector::Rudder => mixed.inputs.rudder = -within,
+                _ => {}
             }
         }
-        let armed = message.mode & ARMED != 0;
+        mixed.inputs.aileron = roll.value();
         // The plant's elevator pitches down when positive.
-        let actuation =
-            Inputs { aileron: roll.value(), elevator: -pitch.value(), throttle, rudder: 0.0 };
-        Some(Actuation {
-            time_us: message.time_usec,
-            lockstep: message.flags & 1 != 0,
-            armed,
-            inputs: if armed { actuation } else { Inputs::default() },
-            limited,
-        })
+        mixed.inputs.elevator = -pitch.value();
+        Some(mixed)
+    }
+
+    /// The highest number of an output that moves something.
+    pub fn highest(&self) -> usize {
+        self.0.iter().map(|output| output.place + 1).max().unwrap_or(0)
+    }
+}
+
+/// The range of an output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Range {
+    /// −1..1.
+    Surface,
+    /// 0..1.
+    Throttle,
+}
+
+impl Range {
+    fn lowest(self) -> f64 {
+        match self {
+            Range::Surface => -1.0,
+            Range::Throttle => 0.0,
+        }
+    }
+}
+
+impl Effector {
+    fn range(self) -> Range {
+        if self == Effector::Throttle { Range::Throttle } else { Range::Surface }
     }
 }
 
@@ -208,10 +245,9 @@ impl Mean {
 mod tests {
     use super::*;
 
-    fn actuation(map: &str, outputs: &[(usize, f32)], mode: u8) -> Option<Actuation> {
-        let mut message = HilActuatorControls { mode, ..Default::default() };
-        outputs.iter().for_each(|(number, value)| message.controls[number - 1] = *value);
-        map.parse::<OutputMap>().unwrap().read(&message)
+    fn mixed(map: &str, outputs: &[(usize, f64)]) -> Option<Mixed> {
+        let value = |place: usize| outputs.iter().find(|(number, _)| number - 1 == place);
+        map.parse::<OutputMap>().unwrap().mix(|place, _| value(place).map_or(0.0, |(_, v)| *v))
     }
 
     #[test]
@@ -219,46 +255,48 @@ mod tests {
         // Control allocation of a flying wing (torques ∓0.5 and 0.5): roll r and pitch p come as
         // left = p − r, right = p + r.
         let (roll, pitch) = (0.25, 0.5);
-        let wing = actuation(
+        let wing = mixed(
             "left-elevon=1,right-elevon=2,throttle=3",
             &[(1, pitch - roll), (2, pitch + roll), (3, 0.75)],
-            129,
         );
         let inputs = Inputs { aileron: 0.25, elevator: -0.5, throttle: 0.75, rudder: 0.0 };
         assert_eq!(wing.unwrap().inputs, inputs);
         // Of a plane: left = −r, right = r, elevator = p; the default of the stock airframes.
-        let plane = OutputMap::default().to_string();
-        let plane = actuation(&plane, &[(6, -roll), (7, roll), (8, pitch), (5, 0.75)], 129);
+        let plane = OutputMap::px4().to_string();
+        let plane = mixed(&plane, &[(6, -roll), (7, roll), (8, pitch), (5, 0.75)]);
         assert_eq!(plane.unwrap().inputs, inputs);
         // One channel, reversed.
-        let single = actuation(
-            "aileron=-1,elevator=2,throttle=3",
-            &[(1, -roll), (2, pitch), (3, 0.75)],
-            129,
-        );
+        let single =
+            mixed("aileron=-1,elevator=2,throttle=3", &[(1, -roll), (2, pitch), (3, 0.75)]);
         assert_eq!(single.unwrap().inputs, inputs);
     }
 
     #[test]
     fn what_is_no_number_is_not_flown_and_what_is_too_large_is_limited() {
         let map = "aileron=1,elevator=2,throttle=3";
-        assert_eq!(actuation(map, &[(2, f32::NAN)], 129), None);
-        assert!(actuation(map, &[(4, f32::NAN)], 129).is_some(), "an output that moves nothing");
-        let wild = actuation(map, &[(1, 1e30), (3, -4.0)], 129).unwrap();
+        assert_eq!(mixed(map, &[(2, f64::NAN)]), None);
+        assert!(mixed(map, &[(4, f64::NAN)]).is_some(), "an output that moves nothing");
+        let wild = mixed(map, &[(1, 1e30), (3, -4.0)]).unwrap();
         assert_eq!((wild.inputs.aileron, wild.inputs.throttle, wild.limited), (1.0, 0.0, true));
-        assert_eq!(actuation(map, &[(1, 1.0), (3, 1.0)], 1).unwrap().inputs, Inputs::default());
+    }
+
+    #[test]
+    fn a_positive_rudder_yaws_right_which_is_the_plants_negative() {
+        let rudder = mixed("aileron=1,elevator=2,throttle=3,rudder=4", &[(4, 0.5)]).unwrap();
+        assert_eq!(rudder.inputs, Inputs { rudder: -0.5, ..Inputs::default() });
     }
 
     #[test]
     fn reads_what_it_writes_and_refuses_what_cannot_fly() {
-        let default = OutputMap::default();
-        assert_eq!(default.to_string().parse(), Ok(default));
+        for map in [OutputMap::px4(), OutputMap::ardupilot()] {
+            assert_eq!(map.to_string().parse(), Ok(map));
+        }
         for map in [
             "",
             "aileron",
             "aileron=1",
             "aileron=1,elevator=2",
-            "aileron=1,elevator=17,throttle=3",
+            "aileron=1,elevator=33,throttle=3",
             "aileron=0,elevator=2,throttle=3",
             "aileron=1,aileron=4,elevator=2,throttle=3",
             "flap=1,elevator=2,throttle=3",

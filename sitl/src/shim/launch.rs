@@ -1,11 +1,11 @@
 //! The aircraft on its stand, on the catapult, in flight.
 
-use crate::plant::{Inputs, Plant, PlantError, PlantOptions, Start, Truth, to_body};
+use crate::plant::{Inputs, Plant, PlantError, PlantOptions, Start, Travel, Truth, to_body};
 use crate::shim::options::Launch;
 
 /// How long the catapult pulls, s: 1.7 g for 16.67 m/s, within 8.3 m.
 const PULL_S: f64 = 1.0;
-/// The catapult is let go at this throttle; PX4 idles below it before a take-off.
+/// The catapult is let go at this throttle; PX4 and ArduPlane idle below it before a take-off.
 const LAUNCH_THROTTLE: f64 = 0.1;
 /// Radius of the earth's equator, m, and its first eccentricity squared (WGS 84).
 const EQUATOR_M: f64 = 6_378_137.0;
@@ -69,6 +69,19 @@ impl Launcher {
         };
         self.shown = self.state();
         Ok(())
+    }
+
+    /// Travel of the aircraft's surfaces.
+    ///
+    /// # Errors
+    /// If a surface does not follow its command.
+    pub fn travel(&mut self) -> Result<Travel, PlantError> {
+        self.plant.travel()
+    }
+
+    /// What is to be known of the aircraft.
+    pub fn notes(&self) -> Vec<String> {
+        self.plant.notes()
     }
 
     /// The state now.
@@ -150,7 +163,7 @@ impl Launcher {
 }
 
 /// Metres per degree of latitude and of longitude on the WGS 84 ellipsoid.
-fn metres_per_degree(latitude_deg: f64) -> (f64, f64) {
+pub(super) fn metres_per_degree(latitude_deg: f64) -> (f64, f64) {
     let (sin, cos) = latitude_deg.to_radians().sin_cos();
     let flat = 1.0 - ECCENTRICITY_2 * sin * sin;
     let meridian_m = EQUATOR_M * (1.0 - ECCENTRICITY_2) / flat.powf(1.5);

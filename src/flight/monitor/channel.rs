@@ -1,0 +1,88 @@
+//! The six channels, in words, with what is to be suspected when one departs.
+
+use std::fmt;
+
+/// A component of what accelerates the aircraft.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// Specific force along body x.
+    Forward,
+    /// Specific force along body y.
+    Side,
+    /// Specific force along body z.
+    Normal,
+    /// Angular acceleration about body x.
+    Roll,
+    /// Angular acceleration about body y.
+    Pitch,
+    /// Angular acceleration about body z.
+    Yaw,
+}
+
+impl Channel {
+    /// All, in the order of their numbers.
+    pub const ALL: [Channel; 6] = [
+        Channel::Forward,
+        Channel::Side,
+        Channel::Normal,
+        Channel::Roll,
+        Channel::Pitch,
+        Channel::Yaw,
+    ];
+}
+
+impl fmt::Display for Channel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Channel::Forward => "drag and thrust",
+            Channel::Side => "side force",
+            Channel::Normal => "lift",
+            Channel::Roll => "rolling moment",
+            Channel::Pitch => "pitching moment",
+            Channel::Yaw => "yawing moment",
+        })
+    }
+}
+
+/// A channel has left its band.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Warning {
+    /// Which.
+    pub channel: Channel,
+    /// Its residual by its band, signed; beyond −1..1 is outside.
+    pub share: f64,
+    /// Whether the residual follows the deflection of the channel's surface.
+    pub follows_surface: bool,
+}
+
+impl Warning {
+    /// What is to be suspected.
+    pub fn suspect(&self) -> &'static str {
+        match (self.channel, self.follows_surface) {
+            (Channel::Roll, true) => "an aileron that sticks or moves less than commanded",
+            (Channel::Pitch, true) => "an elevator that sticks or moves less than commanded",
+            (Channel::Yaw, true) => "a rudder that sticks or moves less than commanded",
+            // z points down: a positive residual is too little lift.
+            (Channel::Normal, _) if self.share > 0.0 => {
+                "ice on the wing, a heavier load, a wrong airspeed or incidence"
+            }
+            (Channel::Normal, _) => "a lighter load, a wrong airspeed or incidence",
+            (Channel::Forward, _) if self.share < 0.0 => {
+                "ice or damage, a failing motor, a wrong airspeed"
+            }
+            (Channel::Forward, _) => "a wrong airspeed or throttle, a lighter load",
+            (Channel::Side, _) => "a wrong sideslip, damage on one side",
+            (Channel::Roll, _) => "a load shifted sideways, ice on one wing, a stuck aileron",
+            (Channel::Pitch, _) => "a load shifted fore or aft, ice, a stuck elevator",
+            (Channel::Yaw, _) => "thrust or drag on one side, a wrong sideslip, a stuck rudder",
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Warning { channel, share, .. } = self;
+        let (share, suspect) = (share.abs(), self.suspect());
+        write!(f, "{channel} is not the model's ({share:.1} times its band): suspect {suspect}")
+    }
+}

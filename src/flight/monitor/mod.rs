@@ -1,0 +1,223 @@
+//! The model as a monitor: what is measured in flight against what the model predicts.
+//!
+//! For each channel, specific force and angular acceleration, the residual is what is measured less what the model
+//! predicts at the measured state and surfaces. Its band is two standard deviations of the prediction: of the model's
+//! coefficients by the widths that its file states (15 % where it states none) and of the measured inputs. A channel that
+//! leaves its band for 2 s departs; that is reported once, until it has been well inside for 5 s.
+//!
+//! The monitor decides nothing: no command depends on it.
+
+mod channel;
+mod prediction;
+mod watch;
+
+pub use channel::{Channel, Warning};
+use prediction::{Predictor, Six};
+use watch::Watch;
+
+use crate::link::vehicle::{Faults, Telemetry};
+use crate::model::GreyBox;
+use crate::physics::{State, Time};
+
+/// Steps from which angular acceleration is taken, s.
+const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
+/// Below this share of the least airspeed of the envelope the model is not asked.
+const SLOWEST: f64 = 0.8;
+
+/// Watches one aircraft with one model.
+#[derive(Clone, Debug)]
+pub struct Monitor {
+    predictor: Predictor,
+    slowest: f64,
+    last: Option<Seen>,
+    watches: [Watch; 6],
+}
+
+/// The sample before.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    time: Time,
+    state: State,
+    predicted: Six,
+}
+
+impl Monitor {
+    /// A monitor by `model`.
+    pub fn new(model: GreyBox) -> Self {
+        let slowest = SLOWEST * model.airframe.envelope.airspeed_min_mps;
+        let predictor = Predictor::new(model);
+        Monitor { predictor, slowest, last: None, watches: [Watch::default(); 6] }
+    }
+
+    /// Takes a state; the channel that departs most, if one departs now. A state that cannot be used, or that comes
+    /// after a gap, begins a new difference. It does not allocate.
+    pub fn see(&mut self, frame: &Telemetry) -> Option<Warning> {
+        if frame.faults != Faults::NONE
+            || frame.state.airspeed.is_nan()
+            || frame.state.airspeed < self.slowest
+        {
+            self.last = None;
+            return None;
+        }
+        let predicted = self.predictor.mean(frame);
+        let now = Seen { time: frame.time, state: frame.state, predicted };
+        let before = self.last.replace(now)?;
+        let dt = now.time.since(before.time).as_secs_f64();
+        if !STEPS_S.contains(&dt) {
+            return None;
+        }
+        self.compare(frame, &before, &predicted, dt);
+        self.due()
+    }
+
+    /// Forgets all, as when somebody else takes the aircraft.
+    pub fn forget(&mut self) {
+        self.last = None;
+        self.watches = [Watch::default(); 6];
+    }
+
+    /// Residuals by their bands, in the order of [`Channel::ALL`]; beyond −1..1 is outside, NaN when not known.
+    pub fn shares(&self) -> Six {
+        self.watches.map(|watch| watch.share())
+    }
+
+    fn compare(&mut self, frame: &Telemetry, before: &Seen, predicted: &Six, dt: f64) {
+        let variance = self.predictor.variance(frame, predicted);
+        let [p, q, r] = [
+            frame.state.p - before.state.p,
+            frame.state.q - before.state.q,
+            frame.state.r - before.state.r,
+        ]
+        .map(|change| change / dt);
+        let [x, y, z] = frame.specific_force;
+        let measured = [x, y, z, p, q, r];
+        let surfaces = [
+            0.0,
+            0.0,
+            0.0,
+            frame.actuators.aileron,
+            frame.actuators.elevator,
+            frame.actuators.rudder,
+        ];
+        for (k, watch) in self.watches.iter_mut().enumerate() {
+            // Differences of rates are means over the step, forces are of its end.
+            let expected =
+                if k < 3 { predicted[k] } else { 0.5 * (predicted[k] + before.predicted[k]) };
+            let residual = measured[k] - expected;
+            if residual.is_finite() && variance[k].is_finite() {
+                watch.see(residual, variance[k], surfaces[k], dt);
+            }
+        }
+    }
+
+    fn due(&mut self) -> Option<Warning> {
+        let size = |watch: &Watch| watch.share().abs();
+        let due = self.watches.iter().enumerate().filter(|(_, watch)| watch.is_due());
+        let (k, _) = due.max_by(|(_, a), (_, b)| size(a).total_cmp(&size(b)))?;
+        let watch = &mut self.watches[k];
+        watch.report();
+        let (channel, share) = (Channel::ALL[k], watch.share());
+        Some(Warning { channel, share, follows_surface: watch.follows_surface() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::vehicle::Order;
+    use crate::model::Trim;
+    use crate::physics::{ActuatorState, Controls};
+    use std::path::Path;
+    use std::time::Duration;
+
+    const DT: f64 = 0.01;
+
+    fn model() -> GreyBox {
+        GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap()
+    }
+
+    /// A flight of `truth` for so many seconds, watched with the model: `commanded` are the surfaces that are reported,
+    /// of time and trim; `acting` makes of them those that act.
+    fn warnings(
+        seconds: f64,
+        truth: &GreyBox,
+        commanded: impl Fn(f64, &State, Controls) -> Controls,
+        acting: impl Fn(Controls, Controls) -> Controls,
+    ) -> Vec<(f64, Warning)> {
+        let trim = Trim::level(&model(), 18.0, 600.0).unwrap();
+        let (mut state, altitude) = (trim.state, 600.0);
+        let (mut monitor, mut found) = (Monitor::new(model()), Vec::new());
+        for i in 0..(seconds / DT) as u64 {
+            let at = i as f64 * DT;
+            let reported = commanded(at, &state, trim.controls);
+            let controls = acting(reported, trim.controls);
+            let air = truth.air(&state, altitude);
+            let (linear, _) = truth.accelerations(&state, &controls, &air);
+            let gravity =
+                crate::physics::rigid_body::gravity_in_body(&state, truth.atmosphere.gravity);
+            let Controls { aileron, elevator, throttle, rudder } = reported;
+            let frame = Telemetry {
+                time: Time::default().plus(Duration::from_millis(10 * i)),
+                order: Order::Next { lost: 0 },
+                faults: Faults::NONE,
+                state,
+                yaw: 0.0,
+                rate_hold_s: 0.0,
+                specific_force: std::array::from_fn(|k| linear[k] - gravity[k]),
+                actuators: ActuatorState {
+                    aileron,
+                    elevator,
+                    throttle,
+                    rudder,
+                    ..ActuatorState::default()
+                },
+                altitude,
+                position: [f64::NAN; 2],
+                velocity: [f64::NAN; 3],
+                wind: [f64::NAN; 3],
+            };
+            found.extend(monitor.see(&frame).map(|warning| (at, warning)));
+            state = state.advance(&truth.rate(&state, &controls, altitude), DT);
+        }
+        found
+    }
+
+    /// Surfaces of a flight that is flown: a simple law holds level flight and follows a slow doublet of pitch.
+    fn flown(at: f64, state: &State, trim: Controls) -> Controls {
+        let wanted = 0.04 + if at % 8.0 < 4.0 { 0.06 } else { -0.06 };
+        let elevator = trim.elevator + 0.8 * (state.pitch - wanted) + 0.15 * state.q;
+        let aileron = trim.aileron - 0.6 * state.roll - 0.1 * state.p;
+        Controls { aileron: aileron.clamp(-0.5, 0.5), elevator: elevator.clamp(-0.5, 0.5), ..trim }
+    }
+
+    #[test]
+    fn a_flight_of_the_models_own_aircraft_is_quiet() {
+        assert_eq!(warnings(60.0, &model(), flown, |reported, _| reported), []);
+    }
+
+    #[test]
+    fn an_elevator_that_sticks_is_found_in_the_pitching_moment() {
+        let stuck = |reported, trim: Controls| Controls { elevator: trim.elevator, ..reported };
+        let found = warnings(30.0, &model(), flown, stuck);
+        let (at, first) = found.first().expect("a warning");
+        assert_eq!(first.channel, Channel::Pitch, "{found:?}");
+        assert!(*at < 10.0, "{found:?}");
+        assert!(first.to_string().contains("elevator"), "{first}");
+    }
+
+    #[test]
+    fn a_load_that_has_shifted_and_drag_of_ice_are_found_in_their_channels() {
+        let changed = |name: &str, value: f64| {
+            let mut truth = model();
+            assert!(truth.set_coefficient(name, value), "{name}");
+            truth
+        };
+        // Cm0 by −0.08 moves the neutral pitch by 10°: 6 cm of the centre of gravity.
+        let found = warnings(30.0, &changed("pitch_linear.Cm0", -0.08), flown, |r, _| r);
+        assert!(found.iter().any(|(at, w)| w.channel == Channel::Pitch && *at < 10.0), "{found:?}");
+        let found = warnings(30.0, &changed("drag_table.k", 3.0), flown, |r, _| r);
+        let (at, first) = found.first().expect("a warning");
+        assert!(first.channel == Channel::Forward && first.share < 0.0 && *at < 10.0, "{found:?}");
+        assert!(first.to_string().contains("ice"), "{first}");
+    }
+}

@@ -1,0 +1,131 @@
+//! What the model predicts of accelerations, with the width of that prediction.
+
+use crate::link::vehicle::Telemetry;
+use crate::model::GreyBox;
+use crate::physics::Channel as Part;
+use crate::physics::rigid_body::{RigidBody, acceleration_of, gravity_in_body};
+use crate::physics::{AirData, Controls, State};
+
+/// Specific force (m/s², body x, y, z), then angular acceleration (rad/s², about x, y, z).
+pub type Six = [f64; 6];
+
+/// Standard deviations of what the model is asked with: α, β (rad), airspeed (share of it), surfaces (rad), throttle.
+/// Customary for vanes, a pitot tube and servos of small aircraft.
+const INCIDENCE_SD: f64 = 0.3 * DEGREE;
+const AIRSPEED_SD: f64 = 0.02;
+const SURFACE_SD: f64 = 0.3 * DEGREE;
+const THROTTLE_SD: f64 = 0.02;
+/// Rotation of the air, which no sensor shows, rad/s: σ_p of MIL-F-8785C, 1.9 σ_w / √(L b), for gusts of 1.5 m/s, a scale
+/// of 533 m and a span of 2 m.
+const AIR_ROTATION_SD: f64 = 0.085;
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// A model that is asked for accelerations.
+#[derive(Clone, Debug)]
+pub struct Predictor {
+    model: GreyBox,
+    /// The prior width of each coefficient.
+    widths: Vec<f64>,
+}
+
+/// What the model is asked with.
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    state: State,
+    controls: Controls,
+    altitude: f64,
+}
+
+/// An input that is not known exactly: what one standard deviation makes of it.
+type Change = fn(&mut Asked);
+
+const CHANGES: [Change; 10] = [
+    |a| a.state.alpha += INCIDENCE_SD,
+    |a| a.state.beta += INCIDENCE_SD,
+    |a| a.state.airspeed *= 1.0 + AIRSPEED_SD,
+    |a| a.controls.aileron += SURFACE_SD,
+    |a| a.controls.elevator += SURFACE_SD,
+    |a| a.controls.rudder += SURFACE_SD,
+    |a| a.controls.throttle += THROTTLE_SD,
+    |a| a.state.p += AIR_ROTATION_SD,
+    |a| a.state.q += AIR_ROTATION_SD,
+    |a| a.state.r += AIR_ROTATION_SD,
+];
+
+impl Predictor {
+    /// A predictor of what `model` says of itself.
+    pub fn new(model: GreyBox) -> Self {
+        let widths = model.coefficients().iter().map(crate::model::Named::width).collect();
+        Predictor { model, widths }
+    }
+
+    /// The accelerations at `frame`.
+    pub fn mean(&self, frame: &Telemetry) -> Six {
+        self.accelerations(&Asked::at(frame))
+    }
+
+    /// The variance of the accelerations at `frame`: of the model's coefficients by their widths, of what it is asked
+    /// with by the sensors'.
+    pub fn variance(&self, frame: &Telemetry, mean: &Six) -> Six {
+        let asked = Asked::at(frame);
+        let mut variance = self.of_coefficients(&asked);
+        for change in CHANGES {
+            let mut changed = asked;
+            change(&mut changed);
+            let moved = self.accelerations(&changed);
+            (0..6).for_each(|k| variance[k] += (moved[k] - mean[k]).powi(2));
+        }
+        variance
+    }
+
+    fn accelerations(&self, asked: &Asked) -> Six {
+        let Asked { state, controls, altitude } = asked;
+        let air = self.model.air(state, *altitude);
+        let (mut linear, mut spin) = self.model.accelerations(state, controls, &air);
+        let gravity = gravity_in_body(state, self.model.atmosphere.gravity);
+        let learned = self.model.residual.as_ref().map(|r| r.rate(state, controls));
+        if let Some(rate) = learned {
+            let more = acceleration_of(state, &air, &rate);
+            (0..3).for_each(|k| linear[k] += more[k]);
+            [rate.p, rate.q, rate.r].iter().zip(&mut spin).for_each(|(more, s)| *s += more);
+        }
+        let force: [f64; 3] = std::array::from_fn(|k| linear[k] - gravity[k]);
+        [force[0], force[1], force[2], spin[0], spin[1], spin[2]]
+    }
+
+    fn of_coefficients(&self, asked: &Asked) -> Six {
+        let Asked { state, controls, altitude } = asked;
+        let air = self.model.air(state, *altitude);
+        let mut parts = [0.0; 7];
+        self.model.contributions(state, controls, &air, |at, part, amount: f64| {
+            parts[part as usize] += (self.widths[at] * amount).powi(2);
+        });
+        to_accelerations(&parts, &self.model.body, &air)
+    }
+}
+
+impl Asked {
+    fn at(frame: &Telemetry) -> Self {
+        let controls = frame.actuators.controls();
+        Asked { state: frame.state, controls, altitude: frame.altitude }
+    }
+}
+
+/// Variances of accelerations from those of independent forces (N²) and moments (N² m²). Sideslip is small enough to
+/// be left out.
+fn to_accelerations(parts: &[f64; 7], body: &RigidBody, air: &AirData) -> Six {
+    let of = |part: Part| parts[part as usize];
+    let (sin2, cos2) = (air.sin_alpha.powi(2), air.cos_alpha.powi(2));
+    let (drag, lift) = (of(Part::Drag), of(Part::Lift));
+    let mass2 = body.mass.powi(2);
+    let gamma2 = (body.jx * body.jz - body.jxz.powi(2)).powi(2);
+    let (roll, yaw, cross2) = (of(Part::Roll), of(Part::Yaw), body.jxz.powi(2));
+    [
+        (cos2 * drag + sin2 * lift + of(Part::BodyX)) / mass2,
+        of(Part::Side) / mass2,
+        (sin2 * drag + cos2 * lift) / mass2,
+        (body.jz.powi(2) * roll + cross2 * yaw) / gamma2,
+        of(Part::Pitch) / body.jy.powi(2),
+        (cross2 * roll + body.jx.powi(2) * yaw) / gamma2,
+    ]
+}

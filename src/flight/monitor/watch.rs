@@ -1,0 +1,163 @@
+//! One channel: how far its residual is from its band, for how long.
+
+/// The residual is smoothed by this time, s: five samples of a gyro's differences.
+const SMOOTHED_S: f64 = 0.1;
+/// Its effective value, and that of its width, are taken over this time, s, so that a residual that swings with a
+/// surface counts as one that stands.
+const EFFECTIVE_S: f64 = 0.5;
+/// Times for which surface and residual are compared, s.
+const COMPARED_S: f64 = 3.0;
+/// The band is so many standard deviations to either side.
+const BAND: f64 = 2.0;
+/// A channel that was outside for this time departs, s.
+const OUTSIDE_S: f64 = 2.0;
+/// It may depart again once it was below this share of its band for so long, s.
+const QUIET: f64 = 0.7;
+const QUIET_S: f64 = 5.0;
+/// Correlation from which a residual follows a surface, and the least movement that shows it, rad.
+const FOLLOWS: f64 = 0.8;
+const MOVES: f64 = 0.5 * std::f64::consts::PI / 180.0;
+
+/// A channel that is watched.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Watch {
+    residual: f64,
+    power: f64,
+    variance: Option<f64>,
+    outside_s: f64,
+    quiet_s: f64,
+    departed: bool,
+    follows: Follows,
+}
+
+/// Running moments of a surface's deflection and the residual.
+#[derive(Clone, Copy, Debug, Default)]
+struct Follows {
+    mean: [f64; 2],
+    square: [f64; 2],
+    product: f64,
+    seen_s: f64,
+}
+
+impl Watch {
+    /// Takes the residual of a step of `dt` (s), the variance of its prediction, and the deflection (rad) of the
+    /// channel's surface.
+    pub fn see(&mut self, residual: f64, variance: f64, surface: f64, dt: f64) {
+        let towards = |from: &mut f64, to: f64, time: f64| *from += (to - *from) * dt / (time + dt);
+        towards(&mut self.residual, residual, SMOOTHED_S);
+        towards(&mut self.power, self.residual.powi(2), EFFECTIVE_S);
+        towards(self.variance.get_or_insert(variance), variance, EFFECTIVE_S);
+        self.follows.see(surface, self.residual, dt);
+        let share = self.share().abs();
+        self.outside_s = if share > 1.0 { self.outside_s + dt } else { 0.0 };
+        self.quiet_s = if share < QUIET { self.quiet_s + dt } else { 0.0 };
+        self.departed &= self.quiet_s < QUIET_S;
+    }
+
+    /// The residual by its band, with its sign; beyond −1..1 is outside, NaN before the first.
+    pub fn share(&self) -> f64 {
+        let band = self.variance.map_or(f64::NAN, |variance| BAND * variance.sqrt());
+        (self.power.sqrt() / band).copysign(self.residual)
+    }
+
+    /// Whether it has departed now, and has not been reported.
+    pub fn is_due(&self) -> bool {
+        self.outside_s >= OUTSIDE_S && !self.departed
+    }
+
+    /// It has been reported.
+    pub fn report(&mut self) {
+        self.departed = true;
+    }
+
+    /// Whether the residual follows its surface.
+    pub fn follows_surface(&self) -> bool {
+        self.follows.correlation().is_some_and(|c| c.abs() >= FOLLOWS)
+    }
+}
+
+impl Follows {
+    fn see(&mut self, surface: f64, residual: f64, dt: f64) {
+        // Plain means at first, so that the beginning has no weight of its own.
+        self.seen_s += dt;
+        let weight = dt / self.seen_s.min(COMPARED_S);
+        let towards = |from: &mut f64, to: f64| *from += (to - *from) * weight;
+        for (k, value) in [surface, residual].into_iter().enumerate() {
+            towards(&mut self.mean[k], value);
+            towards(&mut self.square[k], value * value);
+        }
+        towards(&mut self.product, surface * residual);
+    }
+
+    /// The correlation; `None` while the surface stands.
+    fn correlation(&self) -> Option<f64> {
+        let spread = |k: usize| (self.square[k] - self.mean[k].powi(2)).max(0.0).sqrt();
+        let moves = spread(0) >= MOVES && spread(1) > 0.0;
+        moves.then(|| (self.product - self.mean[0] * self.mean[1]) / (spread(0) * spread(1)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    const DT: f64 = 0.01;
+
+    /// When a watch departs for each time, s, on a residual and a surface of time; width 1, so a band of 2.
+    fn departures(seconds: f64, residual: impl Fn(f64) -> f64) -> Vec<f64> {
+        let (mut watch, mut times) = (Watch::default(), Vec::new());
+        for i in 0..(seconds / DT) as usize {
+            let at = i as f64 * DT;
+            watch.see(residual(at), 1.0, 0.0, DT);
+            if watch.is_due() {
+                watch.report();
+                times.push(at);
+            }
+        }
+        times
+    }
+
+    #[test]
+    fn a_residual_outside_its_band_departs_after_two_seconds_and_once() {
+        let times = departures(60.0, |_| 3.0);
+        // 2 s outside, after the filters have come from 0 to the band, two thirds of the way.
+        assert!(times.len() == 1 && (2.2..3.0).contains(&times[0]), "{times:?}");
+        assert_eq!(departures(60.0, |_| 1.8), [0.0; 0], "inside");
+        let burst = |t: f64| if (10.0..11.0).contains(&t) { 6.0 } else { 0.0 };
+        assert_eq!(departures(60.0, burst), [0.0; 0], "a second is a gust");
+    }
+
+    #[test]
+    fn a_residual_that_swings_about_zero_is_outside_all_the_same() {
+        let times = departures(20.0, |t| 5.0 * (TAU * 0.5 * t).sin());
+        assert_eq!(times.len(), 1, "{times:?}");
+        // Noise of a gyro's differences, ten times the band from sample to sample.
+        let noise = |t: f64| if (t / DT).round() as i64 % 2 == 0 { 20.0 } else { -20.0 };
+        assert_eq!(departures(20.0, noise), [0.0; 0]);
+    }
+
+    #[test]
+    fn it_departs_again_only_after_it_was_quiet() {
+        let flutter = |t: f64| if t % 4.0 < 3.5 { 3.0 } else { 1.6 };
+        assert_eq!(departures(60.0, flutter).len(), 1, "never below the quiet share for 5 s");
+        let twice = |t: f64| if t % 20.0 < 8.0 { 3.0 } else { 0.0 };
+        assert_eq!(departures(40.0, twice).len(), 2);
+    }
+
+    #[test]
+    fn a_residual_that_follows_the_surface_is_known_by_it() {
+        let follows = |surface: fn(f64) -> f64, residual: fn(f64) -> f64| {
+            let mut watch = Watch::default();
+            for i in 0..600 {
+                let at = f64::from(i) * DT;
+                watch.see(residual(at), 1.0, surface(at), DT);
+            }
+            watch.follows_surface()
+        };
+        let moving = |t: f64| 0.1 * (0.5 * TAU * t).sin();
+        assert!(follows(moving, |t| 60.0 * 0.1 * (0.5 * TAU * t).sin() + 3.0));
+        assert!(!follows(moving, |_| 5.0), "it stands");
+        assert!(!follows(|_| 0.02, |_| 5.0), "the surface stands");
+    }
+}

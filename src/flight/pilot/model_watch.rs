@@ -1,0 +1,29 @@
+//! The pilot's ear for its model: what departs from it is said to the ground stations.
+
+use super::Pilot;
+use crate::flight::monitor::Monitor;
+use crate::link::autopilot::Severity;
+use crate::link::vehicle::Telemetry;
+
+impl Pilot {
+    /// Compares what is measured with what `monitor` predicts from now on, whenever the aircraft is flown.
+    pub fn monitor_with(&mut self, monitor: Monitor) {
+        self.monitor = Some(monitor);
+    }
+
+    /// Takes a state whose surfaces are known, once its command is out: no command depends on it.
+    pub fn monitor(&mut self, frame: &Telemetry) {
+        let Some(monitor) = &mut self.monitor else { return };
+        if !self.armed {
+            return monitor.forget();
+        }
+        if let Some(warning) = monitor.see(frame) {
+            self.texts.say(Severity::Warning, warning.to_string());
+        }
+    }
+
+    /// Residuals by their bands, in the order of the monitor's channels; NaN when not known.
+    pub fn residual_shares(&self) -> [f64; 6] {
+        self.monitor.as_ref().map_or([f64::NAN; 6], Monitor::shares)
+    }
+}
