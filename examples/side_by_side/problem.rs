@@ -164,10 +164,15 @@ fn agent(model: &GreyBox, actor: &[usize], critic: &[usize]) -> Result<Agent> {
         evaluation: None,
         program: "greylag".into(),
     };
-    Ok(Agent { actor: actor.into(), critics: critics.into(), origin })
+    Ok(Agent { actor: actor.into(), critics: Some(critics.into()), origin })
 }
 
 impl Scoring {
+    /// The critics of its policy, which has some.
+    pub fn critics(&self) -> &[Critic; 2] {
+        self.agent.critics.as_deref().expect("made with critics")
+    }
+
     pub fn new(name: &'static str, actor: &[usize], critic: &[usize]) -> Result<Scoring> {
         let mut model = prior()?;
         let network = residual()?;
