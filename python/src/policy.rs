@@ -12,7 +12,7 @@ use numpy::{
     IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::{PyFileExistsError, PyOSError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::batch::{gather, scatter};
@@ -74,10 +74,9 @@ impl Policy {
     }
 }
 
-/// Writes a policy's folder.
+/// Writes a policy's folder, over a policy that is there.
 #[pyfunction]
-#[pyo3(signature = (folder, model, actor, critics, trained_in, seed, steps, replace))]
-#[expect(clippy::too_many_arguments, reason = "the Python layer names them")]
+#[pyo3(signature = (folder, model, actor, critics, trained_in, seed, steps))]
 pub fn export_policy(
     folder: PathBuf,
     model: &Model,
@@ -86,7 +85,6 @@ pub fn export_policy(
     trained_in: &str,
     seed: u64,
     steps: u64,
-    replace: bool,
 ) -> PyResult<()> {
     let critics = match critics {
         None => None,
@@ -105,7 +103,7 @@ pub fn export_policy(
     };
     let actor = Arc::new(Actor::new(dense(&actor)?).map_err(raised)?);
     let agent = Agent { actor, critics, origin };
-    write(&folder, &agent.to_files().map_err(raised)?, replace)
+    write(&folder, &agent.to_files().map_err(raised)?)
 }
 
 fn critic(layers: &Layers<'_>) -> PyResult<Critic> {
@@ -133,25 +131,18 @@ fn dense(layers: &Layers<'_>) -> PyResult<Dense> {
     Dense::new(&sizes, parameters).map_err(raised)
 }
 
-/// Writes each file whole, the actor last: where it is, the others are.
-fn write(folder: &Path, files: &[(&str, Vec<u8>)], replace: bool) -> PyResult<()> {
+/// Writes each file whole, the actor last: where it is, the others are. None of an older policy is left.
+fn write(folder: &Path, files: &[(&str, Vec<u8>)]) -> PyResult<()> {
     let said = |what: &Path, e: std::io::Error| {
         PyOSError::new_err(format!("cannot write the policy {}: {e}", what.display()))
     };
-    let there = ["actor", "critic1", "critic2"]
-        .map(|name| folder.join(format!("{name}.safetensors")))
-        .into_iter()
-        .filter(|path| path.exists());
-    for path in there {
-        if !replace {
-            return Err(PyFileExistsError::new_err(format!(
-                "{} exists; name another folder, or give replace=True",
-                path.display()
-            )));
-        }
-        std::fs::remove_file(&path).map_err(|e| said(&path, e))?;
-    }
     std::fs::create_dir_all(folder).map_err(|e| said(folder, e))?;
+    for name in ["actor", "critic1", "critic2"] {
+        let old = folder.join(format!("{name}.safetensors"));
+        if old.exists() {
+            std::fs::remove_file(&old).map_err(|e| said(&old, e))?;
+        }
+    }
     for (name, bytes) in files {
         let (path, part) = (folder.join(name), folder.join(format!("{name}.part")));
         std::fs::write(&part, bytes).map_err(|e| said(&part, e))?;

@@ -76,7 +76,6 @@ def export_policy(
     trained_in: str,
     seed: int,
     steps: int,
-    replace: bool,
 ) -> None: ...
 def load(path: str, reading: object) -> tuple[str, str, list[str], list[tuple[str, NDArray[np.float64]]]]: ...
 def compare(

@@ -92,6 +92,9 @@ def export_policy(
         GreylagError: The network cannot be exported.
         FileExistsError: The folder holds a policy.
     """
+    file = Path(folder) / "actor.safetensors"
+    if file.exists() and not replace:
+        raise FileExistsError(f"{file} exists; name another folder, or give replace=True")
     simulated = isinstance(trained_in, str) and trained_in == "jsbsim"
     if isinstance(trained_in, Model):
         model = trained_in
@@ -111,7 +114,6 @@ def export_policy(
         "jsbsim" if simulated else model.name,
         seed,
         steps,
-        replace,
     )
     return Path(folder)
 
