@@ -63,7 +63,8 @@ def test_a_lost_aircraft_ends_its_episode_and_earns_the_worst_for_ever():
 
 def test_both_worlds_are_the_same_where_the_model_is_exact():
     one, other = gym.make(NAMES[0]).unwrapped, gym.make(NAMES[1], model=greylag.EXACT_MODEL).unwrapped
-    assert np.array_equal(one.reset(seed=5)[0], other.reset(seed=5)[0])
+    # JSBSim computes its start from earth axes: the last bits differ
+    assert np.abs(one.reset(seed=5)[0] - other.reset(seed=5)[0]).max() < 1e-6
     random = np.random.default_rng(2)
     for _ in range(50):
         action = random.uniform(-0.3, 0.3, 3).astype(np.float32)

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 
-def _read(kind: type[_T], document: dict[str, Any], **more: Any) -> _T:
-    """An instance of the fields that the document has; a number that cannot be given (``null``) is NaN."""
-    given = {f.name: document[f.name] for f in fields(kind) if f.name in document and f.name not in more}  # type: ignore[arg-type]
+def _read(kind: type[_T], found: dict[str, Any], /, **more: Any) -> _T:
+    """An instance of the fields that were found; a number that cannot be given (``null``) is NaN."""
+    given = {f.name: found[f.name] for f in fields(kind) if f.name in found and f.name not in more}  # type: ignore[arg-type]
     for f in fields(kind):  # type: ignore[arg-type]
         if f.type == "float" and f.name in given and given[f.name] is None:
             given[f.name] = float("nan")
