@@ -9,7 +9,7 @@ use greylag::logs::{self, Log};
 use greylag::model::GreyBox;
 use greylag::physics::catalogue;
 use greylag::sysid;
-use greylag::sysid::amend::{Added, Amended, Refused, document};
+use greylag::sysid::amend::{Added, Amended, Prior, Refused, document};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag::sysid::progress::{Progress, Stage};
@@ -37,6 +37,7 @@ pub struct Wanted {
     /// Effects to add with the values of coefficients near which to search; `None` for what a diagnosis asserts.
     effects: Option<Vec<(String, HashMap<String, f64>)>>,
     conventions: bool,
+    from_scratch: bool,
     keep_refused: bool,
 }
 
@@ -200,6 +201,7 @@ pub fn amend(
         let options = sysid::amend::Options {
             effects: effects(&wanted, &model, &flights, &stages)?,
             conventions: wanted.conventions,
+            prior: if wanted.from_scratch { Prior::Bounds } else { Prior::File },
             refused: if wanted.keep_refused { Refused::Kept } else { Refused::Left },
             ..Default::default()
         };

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 OBSERVATION_UNITS: list[float]
 STATE_NAMES: list[str]
-SOURCE: str
 VERSION: str
 
 Layers = Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]]
@@ -68,6 +67,7 @@ class Policy:
     def sizes(self) -> list[int]: ...
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]: ...
 
+def shipped(path: str) -> str: ...
 def export_policy(
     folder: str,
     model: Model,

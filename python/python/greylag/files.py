@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ._greylag import SOURCE, GreylagError
+from . import _greylag
+from ._greylag import GreylagError
 
 #: The model that flies by default: learned from flights, starting at an imperfect prior.
 LEARNED_MODEL = "params/x8/learned/model.toml"
@@ -14,19 +15,14 @@ EXACT_MODEL = "params/x8/jsbsim.toml"
 
 
 def shipped(path: str | os.PathLike[str]) -> Path:
-    """``path`` as given, or, if there is no such file, the one of that name in the source tree that the package was built
-    from.
+    """``path`` as given, or, of a path below ``params/`` that does not exist, the file that comes with the package.
+
+    ``$XDG_CONFIG_HOME/greylag`` and ``/etc/greylag`` come before the package's own copy, as for the program.
 
     Raises:
-        GreylagError: There is neither.
+        GreylagError: There is none.
     """
-    given = Path(path)
-    built = Path(SOURCE).resolve() / given
-    if not given.exists() and built.exists():
-        return built
-    if not given.exists():
-        raise GreylagError(
-            f"cannot find {given}, neither here nor in the source tree {Path(SOURCE).resolve()} that this package was built from; "
-            "give the path of an existing file"
-        )
-    return given
+    found = Path(_greylag.shipped(os.fspath(path)))
+    if not found.exists():
+        raise GreylagError(f"cannot find {found}; give the path of an existing file, or one of those shipped below params/")
+    return found

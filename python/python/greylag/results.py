@@ -138,6 +138,8 @@ class Comparison:
 
     models: list[ModelResult]
     """The models, in the order given."""
+    forecasts: dict[str, list[HorizonScore]]
+    """What a model has to beat: free runs by forecasts that know no aerodynamics, by name."""
     notes: list[str]
     """What the reader must know: what was skipped, assumed or lost."""
     document: dict[str, Any]
@@ -150,7 +152,8 @@ class Comparison:
             return _read(ModelResult, found, free_run=_scores(found["free_run"]), channels=channels)
 
         models = [model(found) for found in document["models"]]
-        return cls(models=models, notes=document["notes"], document=document)
+        forecasts = {found["name"]: _scores(found["free_run"]) for found in document["forecasts"]}
+        return cls(models=models, forecasts=forecasts, notes=document["notes"], document=document)
 
     @property
     def sentences(self) -> list[str]:
@@ -158,8 +161,9 @@ class Comparison:
         return self.models[0].sentences
 
     def frame(self) -> pd.DataFrame:
-        """Free-run errors, a row a model and horizon; states in their units."""
-        return _table([{"model": m.name, **_score_row(s)} for m in self.models for s in m.free_run])
+        """Free-run errors, a row a model and horizon, then the forecasts'; states in their units."""
+        runs = [(m.name, m.free_run) for m in self.models] + [*self.forecasts.items()]
+        return _table([{"model": name, **_score_row(s)} for name, scores in runs for s in scores])
 
     def channels_frame(self) -> pd.DataFrame:
         """What each model leaves unexplained, a row a model and channel."""

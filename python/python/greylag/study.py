@@ -32,6 +32,7 @@ class _Reading:
 class _Wanted:
     effects: list[tuple[str, dict[str, float]]] | None
     conventions: bool
+    from_scratch: bool
     keep_refused: bool
 
 
@@ -137,6 +138,7 @@ def amend(
     effects: Diagnosis | Sequence[str] | None = None,
     hold_out: _Path | Sequence[_Path] = (),
     conventions: bool = False,
+    from_scratch: bool = False,
     keep_refused: bool = False,
     replace: bool = False,
     mapping: _Path | None = None,
@@ -155,6 +157,7 @@ def amend(
         hold_out: Files to judge by, which the fit does not see. Left out, the last of ``logs``; of a single one, its last
             third.
         conventions: Also try the model's other conventions (integrator, axes of the forces, the standard atmosphere).
+        from_scratch: The model holds guesses: fit its coefficients without their priors.
         keep_refused: Write effects into the model that the data refuse.
         replace: Replace an amended model in ``out``.
         mapping, lenient, despite_problems: As for :func:`load`.
@@ -173,7 +176,7 @@ def amend(
     fit, judged = _paths(logs), _paths(hold_out)
     if not judged and len(fit) > 1:
         fit, judged = fit[:-1], fit[-1:]
-    wanted = _Wanted(_effects(effects), conventions, keep_refused)
+    wanted = _Wanted(_effects(effects), conventions, from_scratch, keep_refused)
     reading = _reading(mapping, lenient, despite_problems)
     found = _greylag.amend(
         start._native, os.fspath(start.path), fit, judged, os.fspath(folder), wanted, reading, progress
