@@ -219,7 +219,7 @@ impl Scoring {
             }
             let view = observe(&state, &actuators.observed(figures), &self.target);
             let action = self.agent.actor.act(&mut units, &view);
-            let [one, two] = &*self.agent.critics;
+            let [one, two] = self.critics();
             let values = [one, two].map(|critic| critic.value(&mut units, &view, &action));
             sum + weight * values[0].min(values[1])
         };
@@ -233,7 +233,7 @@ impl Scoring {
     /// For PyTorch.
     pub fn told(&self) -> Value {
         let (figures, task) = (&self.model.airframe.actuators, Task::PAPER);
-        let [one, two] = &*self.agent.critics;
+        let [one, two] = self.critics();
         json!({
             "model": told_model(&self.model, &self.scales, &self.residual),
             "actions": self.actions,
