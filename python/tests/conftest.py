@@ -9,7 +9,7 @@ import pytest
 import greylag
 from flights import fly, write_model
 
-#: An effect that the prior lacks, strong enough to be found in two minutes.
+#: An effect that the prior lacks, strong enough to be found in a minute and a half.
 MISSING = '\n[effects.pitch_break]\nCmalpha3 = { value = -40.0, source = "test" }\n'
 
 
@@ -20,7 +20,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_model(folder, "prior.toml")
     truth = greylag.Model.load(write_model(folder, "truth.toml", MISSING))
     for seed in (1, 2, 3):
-        fly(truth, folder / f"flight-{seed}.csv", 40.0, seed)
+        fly(truth, folder / f"flight-{seed}.csv", 32.0, seed)
     return folder
 
 
