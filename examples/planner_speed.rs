@@ -130,5 +130,5 @@ fn agent(model: &GreyBox) -> Result<Agent> {
         evaluation: None,
         program: "greylag".into(),
     };
-    Ok(Agent { actor: actor.into(), critics: critics.into(), origin })
+    Ok(Agent { actor: actor.into(), critics: Some(critics.into()), origin })
 }

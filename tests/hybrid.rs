@@ -40,7 +40,7 @@ fn agent(model: &GreyBox, weight: f32) -> Agent {
         evaluation: None,
         program: "test".into(),
     };
-    Agent { actor: Arc::new(actor), critics: Arc::new(critics), origin }
+    Agent { actor: Arc::new(actor), critics: Some(Arc::new(critics)), origin }
 }
 
 fn seen() -> Observation {
@@ -353,6 +353,16 @@ fn a_planner_without_its_policy_is_refused() {
     let model = model();
     let refused = control::build(Kind::Hybrid, &model);
     assert!(matches!(refused, Err(SetupError::Untrained)));
+}
+
+#[test]
+fn a_policy_without_critics_flies_alone_and_proposes_but_does_not_value() {
+    let model = model();
+    let alone = Agent { critics: None, ..agent(&model, 1.0) };
+    let build = |kind| control::build(kind, Source { agent: Some(&alone), ..(&model).into() });
+    assert!(build(Kind::Policy).is_ok() && build(Kind::CemPolicy).is_ok());
+    assert!(build(Kind::HybridLqi).is_ok());
+    assert!(matches!(build(Kind::Hybrid), Err(SetupError::Criticless { name: "hybrid" })));
 }
 
 /// iLQR leaves no steady error either.

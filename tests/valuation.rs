@@ -65,7 +65,7 @@ fn compare(model: &Arc<GreyBox>, actor: &Actor, critic: &Critic) -> (f64, [f64; 
 #[test]
 fn the_shipped_critics_say_what_is_flown() {
     let (model, agent) = ground();
-    for critic in agent.critics.iter() {
+    for critic in agent.critics.iter().flat_map(|both| both.iter()) {
         let (correlation, [said, earned]) = compare(&model, &agent.actor, critic);
         println!("correlation {correlation:.4}, said {said:.2}, earned {earned:.2}");
         assert!(correlation > 0.98, "{correlation}");

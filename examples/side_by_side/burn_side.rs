@@ -53,7 +53,7 @@ type Surface = [Column; 6];
 pub fn scoring(problem: &Scoring) -> impl FnMut(usize) -> Result<Timed> + '_ {
     let place = Place::new(DType::F32);
     let repeated = |row: &[f64]| place.rows(row.repeat(PLANS), row.len());
-    let [one, two] = &*problem.agent.critics;
+    let [one, two] = problem.critics();
     assert_eq!(problem.model.integrator, Integrator::Rk4);
     let scorer = Scorer {
         model: InBurn::new(&place, &problem.model, &problem.scales, &problem.residual),

@@ -192,8 +192,7 @@ fn main() -> Result<()> {
                 methods.push(Method::new(name, run).finds(value).asked(4.0));
             }
         }
-        let Scoring { agent, .. } = problem;
-        let sizes = [agent.actor.network().sizes(), agent.critics[0].network().sizes()];
+        let sizes = [problem.agent.actor.network().sizes(), problem.critics()[0].network().sizes()];
         compare(&format!("{PLANS} plans scored, {sizes:?}"), [rounds, 5], methods)?;
     }
     let mut methods = vec![Method::new("ours, on burn", alone::updates()?)];

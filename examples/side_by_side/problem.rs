@@ -164,10 +164,15 @@ fn agent(model: &GreyBox, actor: &[usize], critic: &[usize]) -> Result<Agent> {
         evaluation: None,
         program: "greylag".into(),
     };
-    Ok(Agent { actor: actor.into(), critics: critics.into(), origin })
+    Ok(Agent { actor: actor.into(), critics: Some(critics.into()), origin })
 }
 
 impl Scoring {
+    /// The critics of its policy, which has some.
+    pub fn critics(&self) -> &[Critic; 2] {
+        self.agent.critics.as_deref().expect("made with critics")
+    }
+
     pub fn new(name: &'static str, actor: &[usize], critic: &[usize]) -> Result<Scoring> {
         let mut model = prior()?;
         let network = residual()?;
@@ -214,7 +219,7 @@ impl Scoring {
             }
             let view = observe(&state, &actuators.observed(figures), &self.target);
             let action = self.agent.actor.act(&mut units, &view);
-            let [one, two] = &*self.agent.critics;
+            let [one, two] = self.critics();
             let values = [one, two].map(|critic| critic.value(&mut units, &view, &action));
             sum + weight * values[0].min(values[1])
         };
@@ -228,7 +233,7 @@ impl Scoring {
     /// For PyTorch.
     pub fn told(&self) -> Value {
         let (figures, task) = (&self.model.airframe.actuators, Task::PAPER);
-        let [one, two] = &*self.agent.critics;
+        let [one, two] = self.critics();
         json!({
             "model": told_model(&self.model, &self.scales, &self.residual),
             "actions": self.actions,

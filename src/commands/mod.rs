@@ -35,7 +35,7 @@ mod mystery;
 mod propose;
 mod replay;
 mod said_once;
-mod shipped;
+pub mod shipped;
 mod status;
 #[cfg(feature = "sitl")]
 mod start;

@@ -43,6 +43,15 @@ pub enum SetupError {
     /// The controller is a trained one, and none was given.
     #[error("a controller that was trained needs its files; give their folder with --policy")]
     Untrained,
+    /// The planner values the end of its plans, and the policy has no critics.
+    #[error(
+        "controller {name} values the end of its plans with critics, and this policy has none; fly it as \
+         `policy` or `cem-policy`, or export it with its critics"
+    )]
+    Criticless {
+        /// The controller.
+        name: &'static str,
+    },
 }
 
 /// What a controller may be built from.
@@ -88,6 +97,10 @@ impl<'a> Source<'a> {
     ) -> Result<cem::Cem, SetupError> {
         let settings = settings.with(self.changes);
         let agent = if settings.needs_policy() { Some(self.agent()?.clone()) } else { None };
+        let criticless = agent.as_ref().is_some_and(|agent| agent.critics.is_none());
+        if settings.alpha.is_some() && criticless {
+            return Err(SetupError::Criticless { name });
+        }
         let ilqr = base.clone().filter(|_| settings.ilqr);
         let ilqr = ilqr.map(|lqi| ilqr::Ilqr::new(self.model, lqi));
         Ok(cem::Cem::new(name, self.model, settings, cem::Aids { agent, base, ilqr }))

@@ -35,6 +35,17 @@ impl Task {
         discount: 0.99,
     };
 
+    /// The lowest reward of a step: every term at its cap.
+    pub fn worst(&self) -> f64 {
+        -(self.roll_cap + self.pitch_cap + self.airspeed_cap)
+    }
+
+    /// The reward of the step that loses the aircraft: the worst for ever, discounted. Without it, whoever
+    /// ends an episode early would escape what the rest of it costs.
+    pub fn of_loss(&self) -> f64 {
+        self.worst() / (1.0 - self.discount)
+    }
+
     /// The reward of being in `state` when `target` is wanted: 0 at best.
     #[inline(always)]
     pub fn reward<R: Real>(&self, state: &State<R>, target: &Target<R>) -> R {
@@ -61,6 +72,8 @@ mod tests {
         // 0.33/3.3 + 0.225/2.25 + 2.4/48
         assert!((Task::PAPER.reward(&off, &target) + 0.25).abs() < 1e-12);
         let far = State { roll: -3.0, pitch: 1.5, airspeed: 99.0, ..on };
-        assert!((Task::PAPER.reward(&far, &target) + 1.1).abs() < 1e-12);
+        assert!((Task::PAPER.reward(&far, &target) - Task::PAPER.worst()).abs() < 1e-12);
+        // 0.5 + 0.5 + 0.1, for ever at γ = 0.99
+        assert!((Task::PAPER.of_loss() + 110.0).abs() < 1e-9);
     }
 }

@@ -1,5 +1,6 @@
 //! A flight as a table: one sample a row, the columns of the log format.
 
+use crate::logs::columns::{COLUMNS, Get, Place};
 use crate::num::statistics::quantile;
 
 /// One row of a flight log. SI units, radians, body axes FRD, earth axes NED; a missing value is NaN.
@@ -119,6 +120,14 @@ pub struct Flight {
 }
 
 impl Flight {
+    /// The columns of the CSV format that hold a number in some row, each with its values.
+    pub fn columns(&self) -> Vec<(&'static str, Vec<f64>)> {
+        let column = |c: &(&'static str, Get, Place)| (c.0, self.samples.iter().map(c.1).collect());
+        let mut all: Vec<(_, Vec<f64>)> = COLUMNS.iter().map(column).collect();
+        all.retain(|(_, values)| values.iter().any(|x| x.is_finite()));
+        all
+    }
+
     /// What the log's own column `rate_hold_s` says of its rates; `None` if it says nothing.
     ///
     /// A simulator that holds its rates for less than half a sample period samples at instants.
@@ -139,5 +148,18 @@ impl From<Vec<Sample>> for Flight {
     /// A flight without a name.
     fn from(samples: Vec<Sample>) -> Self {
         Flight { samples, ..Flight::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_those_that_hold_a_number() {
+        let row = |time_s| Sample { time_s, airspeed_mps: 2.0 * time_s, ..Sample::default() };
+        let flight = Flight::from(vec![row(0.0), row(1.0)]);
+        let expected = vec![("time_s", vec![0.0, 1.0]), ("airspeed_mps", vec![0.0, 2.0])];
+        assert_eq!(flight.columns(), expected);
     }
 }

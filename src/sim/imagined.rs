@@ -238,6 +238,16 @@ pub fn outside(state: &State<Block>) -> Block {
     ENVELOPE.left(state)
 }
 
+/// The least and the greatest of each state of an episode that goes on.
+pub fn bounds() -> [State; 2] {
+    let Envelope { pitch, incidence, rate, airspeed: [slow, fast] } = ENVELOPE;
+    let roll = std::f64::consts::PI;
+    let most = [roll, pitch, fast, rate, rate, rate, incidence, incidence];
+    let mut least = most.map(|x| -x);
+    least[2] = slow;
+    [State::from_array(least), State::from_array(most)]
+}
+
 impl Envelope {
     /// 1 where a state is outside or no number, else 0.
     #[inline(always)]

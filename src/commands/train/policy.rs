@@ -451,7 +451,7 @@ impl Run<'_> {
     ) -> Result<()> {
         let evaluation = Some(evaluated);
         let origin = Origin { seed: self.seed, steps, evaluation, ..self.ground.origin.clone() };
-        let agent = Agent { actor, critics, origin };
+        let agent = Agent { actor, critics: Some(critics), origin };
         for (name, bytes) in agent.to_files().map_err(|e| anyhow!("the policy's files: {e}"))? {
             let path = self.folder.join(name);
             write_whole(&path, &bytes)

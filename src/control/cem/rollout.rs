@@ -323,14 +323,15 @@ fn rollout<R: Packed>(
         step += 1;
     }
     let mut doubt = R::zero();
-    if let (Some(alpha), Some(agent)) = (scene.alpha, scene.agent) {
+    let valued = scene.agent.and_then(|agent| Some((&agent.actor, agent.critics.as_ref()?)));
+    if let (Some(alpha), Some((actor, critics))) = (scene.alpha, valued) {
         let view = observe(&flight.state, &flight.observed(scene), &flight.target);
         let value = match &scene.surrogate {
             Some(surrogate) => surrogate.value(&view),
             None => {
-                let advised = agent.actor.act(units, &view);
-                let first = agent.critics[0].value(units, &view, &advised);
-                let second = agent.critics[1].value(units, &view, &advised);
+                let advised = actor.act(units, &view);
+                let first = critics[0].value(units, &view, &advised);
+                let second = critics[1].value(units, &view, &advised);
                 doubt = (first - second).abs().scale(alpha * flight.weight);
                 // a number that is lost stays lost
                 first + (second - first).min(R::zero())

@@ -1,4 +1,4 @@
-//! A policy's folder: `actor.safetensors`, `critic1.safetensors`, `critic2.safetensors`.
+//! A policy's folder: `actor.safetensors` and, for planners, `critic1.safetensors`, `critic2.safetensors`.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,6 +14,9 @@ use crate::physics::Airframe;
 
 /// The files of a folder, the actor last: where it is, the others are.
 const FILES: [&str; 3] = ["critic1.safetensors", "critic2.safetensors", "actor.safetensors"];
+
+/// Place of the actor among them.
+const ACTOR: usize = 2;
 
 /// What each of a policy's files says of where it comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,7 +58,7 @@ pub struct Evaluated {
 #[derive(Debug, thiserror::Error)]
 pub enum AgentError {
     /// A file cannot be read.
-    #[error("cannot read policy {path}: {why}; a policy folder holds {}", FILES.join(", "), path = path.display())]
+    #[error("cannot read policy {path}: {why}; a policy folder holds {}, or the last one alone", FILES.join(", "), path = path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -98,26 +101,24 @@ impl Agent {
     ///
     /// # Errors
     /// What the writer of the format says.
-    pub fn to_files(&self) -> Result<[(&'static str, Vec<u8>); 3], SafeTensorError> {
-        let [one, two] = &*self.critics;
-        let bytes = |network| weights::to_bytes(network, &self.origin);
-        Ok([
-            (FILES[0], bytes(one.network())?),
-            (FILES[1], bytes(two.network())?),
-            (FILES[2], bytes(self.actor.network())?),
-        ])
+    pub fn to_files(&self) -> Result<Vec<(&'static str, Vec<u8>)>, SafeTensorError> {
+        let critics = self.critics.iter().flat_map(|both| both.iter().map(Critic::network));
+        let first = if self.critics.is_some() { 0 } else { ACTOR };
+        let networks = critics.chain([self.actor.network()]);
+        FILES[first..]
+            .iter()
+            .zip(networks)
+            .map(|(name, network)| Ok((*name, weights::to_bytes(network, &self.origin)?)))
+            .collect()
     }
 
-    /// Reads the policy in `folder` for `airframe`.
+    /// Reads the policy in `folder` for `airframe`: its actor, and its critics unless it has neither.
     ///
     /// # Errors
     /// A file is missing, none of a policy's, or of another airframe or training than the others.
     pub fn load(folder: &Path, airframe: &Airframe) -> Result<Agent, AgentError> {
-        let [one, two, actor] = FILES.map(|name| read(&folder.join(name)));
-        let ((one, origin), (two, second), (actor, third)) = (one?, two?, actor?);
-        if origin != second || origin != third {
-            return Err(AgentError::Mixed { path: folder.into() });
-        }
+        let alone = FILES[..ACTOR].iter().all(|name| !folder.join(name).exists());
+        let (actor, origin) = read(&folder.join(FILES[ACTOR]))?;
         if origin.airframe != fingerprint(airframe) {
             let (path, airframe) = (folder.into(), airframe.name.clone());
             return Err(AgentError::Airframe { path, airframe, model: origin.model });
@@ -126,12 +127,19 @@ impl Agent {
             let path = folder.join(name);
             move |e: ShapeError| AgentError::Content { path, why: e.to_string() }
         };
-        let critics = [
-            Critic::new(one).map_err(shape(FILES[0]))?,
-            Critic::new(two).map_err(shape(FILES[1]))?,
-        ];
-        let actor = Actor::new(actor).map_err(shape(FILES[2]))?;
-        Ok(Agent { actor: Arc::new(actor), critics: Arc::new(critics), origin })
+        let critic = |name: &str| {
+            let (network, of) = read(&folder.join(name))?;
+            match of == origin {
+                true => Critic::new(network).map_err(shape(name)),
+                false => Err(AgentError::Mixed { path: folder.into() }),
+            }
+        };
+        let critics = match alone {
+            true => None,
+            false => Some(Arc::new([critic(FILES[0])?, critic(FILES[1])?])),
+        };
+        let actor = Arc::new(Actor::new(actor).map_err(shape(FILES[ACTOR]))?);
+        Ok(Agent { actor, critics, origin })
     }
 }
 
@@ -179,7 +187,7 @@ mod tests {
             }),
             program: "greylag 0".into(),
         };
-        let critics = Arc::new([critic(), critic()]);
+        let critics = Some(Arc::new([critic(), critic()]));
         Agent { actor: Arc::new(actor), critics, origin }
     }
 
@@ -197,6 +205,17 @@ mod tests {
         let agent = agent(3);
         write(&agent, folder.path(), |_| true);
         assert_eq!(Agent::load(folder.path(), &airframe()).unwrap(), agent);
+    }
+
+    #[test]
+    fn a_policy_alone_has_no_critics_and_one_critic_is_too_few() {
+        let folder = tempfile::tempdir().unwrap();
+        let alone = Agent { critics: None, ..agent(3) };
+        write(&alone, folder.path(), |_| true);
+        assert_eq!(Agent::load(folder.path(), &airframe()).unwrap(), alone);
+        write(&agent(3), folder.path(), |name| name.starts_with("critic1"));
+        let said = Agent::load(folder.path(), &airframe()).unwrap_err().to_string();
+        assert!(said.contains("critic2.safetensors"), "{said}");
     }
 
     #[test]

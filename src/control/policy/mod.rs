@@ -21,8 +21,8 @@ use crate::physics::Command;
 pub struct Agent {
     /// π.
     pub actor: Arc<Actor>,
-    /// Q1, Q2.
-    pub critics: Arc<[Critic; 2]>,
+    /// Q1, Q2; a policy that flies alone needs none.
+    pub critics: Option<Arc<[Critic; 2]>>,
     /// Where it comes from.
     pub origin: Origin,
 }

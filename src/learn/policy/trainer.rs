@@ -243,14 +243,13 @@ impl<W: World> PolicyTrainer<W> {
     ) {
         let lost = stepped.ended[lane] == Ended::Lost;
         let of = |numbers: &[Block; OBSERVATIONS]| numbers.map(|x| x.0[lane]);
-        let task = Task::PAPER;
-        let worst = -(task.roll_cap + task.pitch_cap + task.airspeed_cap);
-        // a lost aircraft earns the worst for ever; where it is then may be no number
+        let task = Task { discount: self.recipe.td3.discount, ..Task::PAPER };
+        // where a lost aircraft is may be no number
         let reward = match lost {
-            true => (worst / (1.0 - self.recipe.td3.discount)) as f32,
+            true => task.of_loss() as f32,
             false => stepped.reward.0[lane],
         };
-        self.rewards.push(if lost { worst } else { reward.into() });
+        self.rewards.push(if lost { task.worst() } else { reward.into() });
         let observed = of(observed);
         self.replay.add(&Transition {
             observed,

@@ -1,0 +1,86 @@
+"""Logs: read, compared, diagnosed, amended."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import greylag
+from page import EXAMPLES, run
+
+LOGS = ["flight-1.csv", "flight-2.csv", "flight-3.csv"]
+
+
+def test_a_log_is_a_table(here):
+    log = greylag.load("flight-1.csv")
+    assert log.format == "CSV table" and len(log) == 3200 and log.columns["time_s"][-1] == pytest.approx(31.99)
+    frame = log.frame()
+    assert frame.index.name == "time_s" and frame["airspeed_mps"].between(8, 40).all()
+    assert log.states.shape == (3200, 8) and np.isnan(log.controls[:, 3]).all()
+    with pytest.raises(greylag.GreylagError, match="flight-9.csv"):
+        greylag.load("flight-9.csv")
+
+
+def test_a_comparison_shows_the_better_model(here):
+    heard = []
+    found = greylag.compare(["prior.toml", "truth.toml"], LOGS[:2], progress=lambda *stage: heard.append(stage))
+    frame = found.frame()
+    assert list(frame["horizon_s"]) == [1, 2, 5, 10] * (2 + len(found.forecasts))
+    prior, truth, *forecasts = frame[frame["horizon_s"] == 1]["rmse_scaled"]
+    # the prior lacks an effect: at least twice the error of the model that flew
+    assert prior > 2 * truth and min(forecasts) > truth
+    assert found.channels_frame()["unexplained_fraction"].between(-1, 2).any()
+    assert found.sentences and found.document["schema"] == "greylag.comparison/1"
+    assert heard and all(0 <= share <= 1 for _, share in heard)
+
+
+def test_the_missing_effect_is_found_and_added(here):
+    names = run(next(example for example in EXAMPLES if "greylag.diagnose" in example))
+    found, amended = names["found"], names["amended"]
+    assert found.verdict == "effect"
+    assert "pitch_break" in [effect.id for effect in found.asserted]
+    frame = found.frame()
+    assert frame.loc[0, "asserted"] and {"evidence", "threshold", "value"} <= set(frame.columns)
+    assert "pitch_break" in amended.added and amended.path.exists()
+    assert "pitch_break" in amended.model.effects
+    judged = {row["model"]: row["rmse_scaled"] for _, row in amended.frame().query("horizon_s == 1").iterrows()}
+    assert judged["amended"] < 0.7 * judged["given"]
+    # the truth is -40
+    value = amended.parameters_frame().set_index("name").loc["pitch_break.Cmalpha3", "value"]
+    assert value == pytest.approx(-40, rel=0.2)
+    with pytest.raises(FileExistsError, match="replace=True"):
+        greylag.amend("prior.toml", LOGS, "better", effects=found)
+
+
+def test_progress_that_raises_ends_the_work(here):
+    def stop(doing: str, share: float) -> None:
+        raise RuntimeError(f"stopped at {doing}")
+
+    with pytest.raises(RuntimeError, match="stopped at"):
+        greylag.diagnose("prior.toml", LOGS[:1], progress=stop)
+
+
+def test_an_interrupt_ends_the_work_and_other_threads_go_on_meanwhile(here):
+    turns, over = [], threading.Event()
+
+    def count() -> None:
+        while not over.wait(0.01):
+            turns.append(time.monotonic())
+
+    def interrupt() -> None:
+        time.sleep(0.5)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=count, daemon=True).start()
+    threading.Thread(target=interrupt, daemon=True).start()
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        greylag.diagnose("prior.toml", LOGS, nulls=2000)
+    over.set()
+    # 2000 nulls take minutes; half of the turns of half a second are proof enough on a busy machine
+    assert time.monotonic() - begun < 30 and len(turns) > 25
