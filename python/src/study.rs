@@ -271,22 +271,15 @@ fn write(
     out: &Path,
 ) -> Result<String, String> {
     let cannot = |e: std::io::Error| format!("cannot write the model to {}: {e}", out.display());
-    let text = std::fs::read_to_string(original).map_err(cannot)?;
-    let airframe = airframe(&text, original)?;
-    let name = airframe.file_name().unwrap_or("airframe.toml".as_ref()).to_string_lossy();
-    let new =
-        document::model(&text, model, amended, logs, name.clone().into_owned()).map_err(said)?;
-    let story = document::story(amended, original, logs, hold_out).map_err(said)?;
+    let original = document::Original::read(original).map_err(said)?;
+    let files = document::files(&original, model, amended, [logs, hold_out]).map_err(said)?;
     let part = out.with_extension("part");
     let _ = std::fs::remove_dir_all(&part);
     std::fs::create_dir_all(&part).map_err(cannot)?;
-    std::fs::copy(&airframe, part.join(&*name)).map_err(cannot)?;
-    for effect in amended.model.written() {
-        std::fs::write(part.join(document::effect_file(effect)), &effect.text).map_err(cannot)?;
+    for (name, text) in &files {
+        std::fs::write(part.join(name), text).map_err(cannot)?;
     }
-    std::fs::write(part.join("amend.json"), &story).map_err(cannot)?;
-    std::fs::write(part.join("model.toml"), new).map_err(cannot)?;
-    let read = GreyBox::load(&part.join("model.toml")).map_err(said)?;
+    let read = GreyBox::load(&part.join(document::MODEL)).map_err(said)?;
     if let Some(lost) = document::differs(&read, &amended.model) {
         let _ = std::fs::remove_dir_all(&part);
         return Err(format!(
@@ -294,7 +287,8 @@ fn write(
         ));
     }
     put(&part, out).map_err(cannot)?;
-    Ok(story)
+    let story = files.into_iter().find(|(name, _)| name == document::STORY);
+    Ok(story.map(|(_, text)| text).unwrap_or_default())
 }
 
 /// Moves the files of the folder `part` to the folder `out`, over those of the same names there.
@@ -307,11 +301,4 @@ fn put(part: &Path, out: &Path) -> std::io::Result<()> {
         std::fs::rename(entry.path(), out.join(entry.file_name()))?;
     }
     std::fs::remove_dir(part)
-}
-
-/// The airframe file that the model at `original` names.
-fn airframe(text: &str, original: &Path) -> Result<PathBuf, String> {
-    let table: toml::Table = toml::from_str(text).map_err(said)?;
-    let named = table.get("airframe").and_then(toml::Value::as_str).unwrap_or_default();
-    Ok(original.parent().unwrap_or(Path::new(".")).join(named))
 }
