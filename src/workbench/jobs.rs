@@ -192,7 +192,7 @@ impl Bench {
         };
         let diagnosis = diagnose(&model, &flights, &Options::default(), progress)?;
         let value = serde_json::to_value(&diagnosis)?;
-        write_over(&self.diagnosis_file(&key), &value.to_string())?;
+        write_over(&self.diagnosis_file(&key), value.to_string())?;
         self.lock().diagnosis = Some((key, Arc::new(value)));
         self.changed();
         let there = self.lock().tuned.as_ref().is_some_and(|(of, _)| *of == tuned_key);

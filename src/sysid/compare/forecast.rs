@@ -74,9 +74,8 @@ impl Forecast {
             while at < start + look && !lost {
                 state = self.next(&state, &segment[at], dt);
                 at += 1;
-                let miss = error(&segment[at].state.to_array(), &state);
-                // a NaN is lost as well
-                lost = !(scaled(&miss, scale) <= DIVERGENCE_BOUND);
+                let miss = scaled(&error(&segment[at].state.to_array(), &state), scale);
+                lost = miss.is_nan() || miss > DIVERGENCE_BOUND;
             }
             seen.push((!lost).then(|| [segment[at].state.to_array(), state]));
         }
@@ -198,7 +197,7 @@ mod tests {
     fn what_is_held_errs_by_what_the_flight_does() {
         let flight = flight();
         let pitch = |k: usize| flight.segments[0][k].state.pitch;
-        let hold = &forecasts(&[flight.clone()], [1.0; 8], &[1.0])[0].free_run[0];
+        let hold = &forecasts(std::slice::from_ref(&flight), [1.0; 8], &[1.0])[0].free_run[0];
         let squares = (0..7).map(|k| (pitch(300 * k + 100) - pitch(300 * k)).powi(2));
         let expected = (squares.sum::<f64>() / 7.0).sqrt();
         assert!((hold.states[1].rmse - expected).abs() < 1e-12);
