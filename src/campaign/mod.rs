@@ -1,6 +1,6 @@
 //! A campaign: many runs of this program over priors, controllers and seeds, and what they say together.
 //!
-//! A campaign file names axes, seeds and stages. [`plan`] makes of it *cells*: command lines of this program, each
+//! A campaign file names axes, seeds and stages. [`plan`](plan()) makes of it *cells*: command lines of this program, each
 //! with an identity that its command, its input files and the cells before it decide. [`store`] keeps what a cell
 //! gave: one JSON line, written whole. [`gather`] joins the lines; [`tables`] sums them up over seeds.
 //!

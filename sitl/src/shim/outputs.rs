@@ -166,7 +166,7 @@ pub struct Mixed {
 
 impl OutputMap {
     /// Mixes outputs, which `at` reads by their place counted from 0: surfaces −1..1, throttle
-    /// 0..1 with [`Range::Throttle`]. `None` when an output that is used is not a finite number.
+    /// 0..1 with `Range::Throttle`. `None` when an output that is used is not a finite number.
     pub fn mix(&self, at: impl Fn(usize, Range) -> f64) -> Option<Mixed> {
         let (mut roll, mut pitch, mut mixed) = (Mean::default(), Mean::default(), Mixed::default());
         for Output { effector, place, sign } in &self.0 {
