@@ -5,6 +5,7 @@ use std::path::Path;
 
 use greylag::control::{self, Kind, Target};
 use greylag::model::jsbsim::export;
+use greylag::model::textbook::{Measures, Tail};
 use greylag::model::{GreyBox, Memory, STEP};
 use greylag::physics::Command;
 use greylag::sim::import::import;
@@ -96,4 +97,44 @@ fn what_an_export_cannot_hold_is_named() {
     let mut model = shipped("params/x8/jsbsim.toml");
     model.join("dihedral_alpha", &[0.5]).unwrap();
     assert_eq!(export(&model, "wing").left_out, ["dihedral_alpha"]);
+}
+
+/// From 0.8 to 25 kg, with tail and without: what the textbook gives can be flown by its LQI as it is written.
+#[test]
+fn an_aircraft_from_its_measures_has_an_lqi_over_its_whole_envelope() {
+    let small = Measures {
+        name: "small".into(),
+        mass: 2.4,
+        span: 1.8,
+        area: 0.45,
+        tail: Tail::Conventional,
+        rudder: Some(0.43),
+        travel: 0.43,
+        static_thrust: 12.0,
+        pitch_speed: 30.0,
+    };
+    let light = Measures {
+        mass: 0.8,
+        span: 1.2,
+        area: 0.25,
+        static_thrust: 4.0,
+        pitch_speed: 22.0,
+        ..small.clone()
+    };
+    let heavy = Measures {
+        mass: 25.0,
+        span: 4.0,
+        area: 1.6,
+        static_thrust: 120.0,
+        pitch_speed: 50.0,
+        ..small.clone()
+    };
+    let wing = Measures { tail: Tail::FlyingWing, rudder: None, ..small.clone() };
+    for measures in [small, light, heavy, wing] {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("airframe.toml"), measures.airframe()).unwrap();
+        std::fs::write(folder.path().join("model.toml"), measures.model()).unwrap();
+        let model = GreyBox::load(&folder.path().join("model.toml")).unwrap();
+        control::build(Kind::Lqi, &model).unwrap_or_else(|why| panic!("{measures:?}: {why}"));
+    }
 }

@@ -1,6 +1,7 @@
 //! What a model says of its aircraft before anybody flies it: trim, modes, authority, loops.
 
 use crate::control::lqi::{self, LoopMargins, MarginsError, Weights};
+use crate::control::{Kind, build};
 use crate::model::modes::{Mode, modes, rates};
 use crate::model::{GreyBox, Trim, TrimError};
 
@@ -148,6 +149,9 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
             "full aileron rolls at {:.0} deg/s only: correct Clda or Clp",
             check.authority.roll_rate.to_degrees().abs()
         ));
+    }
+    if let Err(why) = build(Kind::Lqi, model) {
+        out.push(format!("{why}; give the envelope less bank or a pitch_min_deg nearer to 0"));
     }
     for LoopMargins { surface, delay, .. } in &check.loops {
         if *delay < USUAL_DELAY {

@@ -125,7 +125,7 @@ impl Measures {
             out,
             "[controls.throttle]\nlag_s = {{ value = 0.2, source = \"estimate: an electric motor\" }}\n\n{limits}\
              # The stall at a lift coefficient of {LIFT_MAX} is at {:.1} m/s.\n[envelope]\nbank_max_deg = 45.0\n\
-             pitch_max_deg = 20.0\npitch_min_deg = -20.0\nload_factor_max = 2.0\nairspeed_min_mps = {:.1}\n\
+             pitch_max_deg = 20.0\npitch_min_deg = -10.0\nload_factor_max = 2.0\nairspeed_min_mps = {:.1}\n\
              airspeed_max_mps = {:.1}\nairspeed_cruise_mps = {:.1}\nsurface_slew_per_s = 20.0\n",
             f.stall,
             1.25 * f.stall,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
 use greylag_sitl::plant_arguments::property;
@@ -63,7 +63,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let out = &jsbsim.out;
     let model = out.join("model.toml");
-    files::writable(&model, Overwrite::Never)?;
+    if model.exists() {
+        bail!("{} exists; name another folder with --out", model.display());
+    }
     let mut plant = Plant::new(&options)?;
     let found = import(&mut plant, &jsbsim.name, jsbsim.cruise_mps, jsbsim.altitude_m)?;
     let read = read_back(&found)?;
