@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release --ignore-rust-version --no-default-features --features sitl --example propose_hidden --
 //! effects 9000 10 >> results/propose-hidden.jsonl`; `nulls` in place of `effects` hides nothing. One line of JSON a
-//! seed; seeds must not be those of earlier runs.
+//! seed; seeds must not be those of earlier runs. Nothing has been recorded since the tests of a proposal were tightened.
 
 use std::error::Error;
 
@@ -130,6 +130,36 @@ fn variables(formula: &str) -> Vec<&'static str> {
     all
 }
 
+/// The shape of a formula: what follows its coefficient and the factor of its channel.
+fn shape(formula: &str) -> &str {
+    let (_, product) = formula.split_once("k*").unwrap_or(("", formula));
+    let factors = CHANNELS.iter().filter_map(|(_, factor, _)| {
+        product.strip_prefix(factor).and_then(|rest| rest.strip_prefix('*'))
+    });
+    factors.min_by_key(|rest| rest.len()).unwrap_or(product)
+}
+
+/// Whether two shapes are the same up to the order of a product and a fifth of a threshold.
+fn same_form(found: &str, hidden: &str) -> bool {
+    let parts = |text: &str| {
+        let (mut words, mut numbers) = (Vec::new(), Vec::new());
+        for word in text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.')) {
+            match word.parse::<f64>() {
+                Ok(number) => numbers.push(number),
+                Err(_) => words.push(word.to_owned()),
+            }
+        }
+        words.retain(|w| !w.is_empty());
+        words.sort();
+        (words, numbers)
+    };
+    let ((words, numbers), (wanted, thresholds)) = (parts(found), parts(hidden));
+    let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 0.2 * b.abs();
+    words == wanted
+        && numbers.len() == thresholds.len()
+        && numbers.iter().zip(&thresholds).all(near)
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
     let [_, what, first, count] = &arguments[..] else {
@@ -151,11 +181,10 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let proposed = p.effect.is_some();
                 let one = p.front.first().filter(|_| proposed).map(|r| r.formula.as_str());
                 let right = hidden.as_ref().zip(one).map(|(h, formula)| {
-                    let shape = formula.rsplit(['*', '=']).next().unwrap_or_default();
                     [
                         formula.starts_with(h.channel),
                         variables(formula) == h.variables,
-                        formula.ends_with(&h.shape) || shape.trim() == h.shape,
+                        same_form(shape(formula), &h.shape),
                     ]
                 });
                 serde_json::json!({

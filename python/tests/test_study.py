@@ -66,6 +66,8 @@ def test_progress_that_raises_ends_the_work(here):
 
 
 def test_an_interrupt_ends_the_work_and_other_threads_go_on_meanwhile(here):
+    # a shell without a terminal starts what runs in its background with the interrupt ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     turns, over = [], threading.Event()
 
     def count() -> None:
