@@ -25,6 +25,10 @@ pub fn shipped(path: &Path) -> PathBuf {
     if let Some(found) = places.find(|p| p.exists()) {
         return found;
     }
+    // what is in no place is missed where it was asked for, not in the cache
+    if !path.strip_prefix(FOLDER).is_ok_and(|inside| PARAMS.contains(inside)) {
+        return path.into();
+    }
     let cache = home("XDG_CACHE_HOME", ".cache").unwrap_or_else(std::env::temp_dir);
     match unpacked(&cache.join("greylag")) {
         Ok(folder) => folder.join(path),
@@ -118,5 +122,9 @@ mod tests {
     #[test]
     fn a_path_that_is_none_of_the_programs_stays_as_given() {
         assert_eq!(shipped(Path::new("my/model.toml")), Path::new("my/model.toml"));
+        assert_eq!(
+            shipped(Path::new("params/x8/missing.toml")),
+            Path::new("params/x8/missing.toml")
+        );
     }
 }

@@ -49,14 +49,14 @@ class Watcher:
         """Waits for a heartbeat in a mode."""
         self.until("HEARTBEAT", lambda m: m.custom_mode == custom_mode, f"mode {custom_mode:#x}")
 
-    def until_attitude(self, roll_deg, pitch_deg):
+    def until_attitude(self, roll_deg, pitch_deg, near_deg=NEAR_DEG):
         """Waits until the attitude has been near for two seconds."""
         since = last = None
 
         def settled(message):
             nonlocal since, last
             last = (math.degrees(message.roll), math.degrees(message.pitch))
-            near = max(abs(last[0] - roll_deg), abs(last[1] - pitch_deg)) <= NEAR_DEG
+            near = max(abs(last[0] - roll_deg), abs(last[1] - pitch_deg)) <= near_deg
             since = (since or time.monotonic()) if near else None
             return since is not None and time.monotonic() - since >= 2.0
 
