@@ -244,8 +244,8 @@ fn a_formula_that_never_ends_is_refused() {
         .join("params/effects/yaw_by_throttle.toml");
     let text = std::fs::read_to_string(path).unwrap();
     let line = text.lines().find(|l| l.starts_with("shape")).unwrap().to_owned();
-    // each of a hundred parts multiplies by 268 variables
-    let long = format!("shape = \"(k{})*throttle{}\"", "+k".repeat(99), "*alpha^4".repeat(67));
+    // each of sixty parts multiplies by 161 variables
+    let long = format!("shape = \"(k{})*throttle{}\"", "+k".repeat(59), "*alpha^4".repeat(40));
     let four = format!("\n[[channels]]\nchannel = \"yaw\"\n{long}\n").repeat(4);
     let said =
         greylag::physics::formula::file::parse(&(text.replace(&line, &long) + &four)).unwrap_err();
