@@ -28,8 +28,8 @@ fn a_policy_that_is_not_there_or_is_none_is_named() {
         std::fs::write(folder.path().join(format!("{name}.safetensors")), b"no weights").unwrap();
     }
     let path = folder.path().to_str().unwrap();
-    refused(&[&evaluate[..], &[path]].concat(), &["critic1.safetensors", "train it again"]);
-    refused(&["fly", "--controller", "policy", "--policy", path], &["critic1.safetensors"]);
+    refused(&[&evaluate[..], &[path]].concat(), &["actor.safetensors", "train it again"]);
+    refused(&["fly", "--controller", "policy", "--policy", path], &["actor.safetensors"]);
 }
 
 #[cfg(feature = "learn")]
