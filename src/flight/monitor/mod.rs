@@ -30,6 +30,8 @@ pub struct Monitor {
     predictor: Predictor,
     slowest: f64,
     last: Option<Seen>,
+    /// Whether the last state could be compared: old residuals are not shown as present ones.
+    compared: bool,
     watches: [Watch; 6],
 }
 
@@ -46,12 +48,13 @@ impl Monitor {
     pub fn new(model: GreyBox) -> Self {
         let slowest = SLOWEST * model.airframe.envelope.airspeed_min_mps;
         let predictor = Predictor::new(model);
-        Monitor { predictor, slowest, last: None, watches: [Watch::default(); 6] }
+        Monitor { predictor, slowest, last: None, compared: false, watches: [Watch::default(); 6] }
     }
 
     /// Takes a state; the channel that departs most, if one departs now. A state that cannot be used, or that comes
     /// after a gap, begins a new difference. It does not allocate.
     pub fn see(&mut self, frame: &Telemetry) -> Option<Warning> {
+        self.compared = false;
         if frame.faults != Faults::NONE
             || frame.state.airspeed.is_nan()
             || frame.state.airspeed < self.slowest
@@ -67,18 +70,22 @@ impl Monitor {
             return None;
         }
         self.compare(frame, &before, &predicted, dt);
+        self.compared = true;
         self.due()
     }
 
     /// Forgets all, as when somebody else takes the aircraft.
     pub fn forget(&mut self) {
-        self.last = None;
+        (self.last, self.compared) = (None, false);
         self.watches = [Watch::default(); 6];
     }
 
     /// Residuals by their bands, in the order of [`Channel::ALL`]; beyond −1..1 is outside, NaN when not known.
     pub fn shares(&self) -> Six {
-        self.watches.map(|watch| watch.share())
+        match self.compared {
+            true => self.watches.map(|watch| watch.share()),
+            false => [f64::NAN; 6],
+        }
     }
 
     fn compare(&mut self, frame: &Telemetry, before: &Seen, predicted: &Six, dt: f64) {

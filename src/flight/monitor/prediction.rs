@@ -15,9 +15,10 @@ const INCIDENCE_SD: f64 = 0.3 * DEGREE;
 const AIRSPEED_SD: f64 = 0.02;
 const SURFACE_SD: f64 = 0.3 * DEGREE;
 const THROTTLE_SD: f64 = 0.02;
-/// Rotation of the air, which no sensor shows, rad/s: σ_p of MIL-F-8785C, 1.9 σ_w / √(L b), for gusts of 1.5 m/s, a scale
-/// of 533 m and a span of 2 m.
-const AIR_ROTATION_SD: f64 = 0.085;
+/// Gusts whose rotation of the air, which no sensor shows, is allowed for, m/s, and their scale, m: σ_p of MIL-F-8785C
+/// is 1.9 σ_w / √(L b).
+const GUSTS_MPS: f64 = 1.5;
+const GUST_SCALE_M: f64 = 533.0;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// A model that is asked for accelerations.
@@ -26,6 +27,8 @@ pub struct Predictor {
     model: GreyBox,
     /// The prior width of each coefficient.
     widths: Vec<f64>,
+    /// Standard deviation of the rotation of the air, rad/s.
+    air_rotation: f64,
 }
 
 /// What the model is asked with.
@@ -36,27 +39,29 @@ struct Asked {
     altitude: f64,
 }
 
-/// An input that is not known exactly: what one standard deviation makes of it.
-type Change = fn(&mut Asked);
+/// An input that is not known exactly: what one standard deviation makes of it; that of the rotation of the air is given.
+type Change = fn(&mut Asked, f64);
 
 const CHANGES: [Change; 10] = [
-    |a| a.state.alpha += INCIDENCE_SD,
-    |a| a.state.beta += INCIDENCE_SD,
-    |a| a.state.airspeed *= 1.0 + AIRSPEED_SD,
-    |a| a.controls.aileron += SURFACE_SD,
-    |a| a.controls.elevator += SURFACE_SD,
-    |a| a.controls.rudder += SURFACE_SD,
-    |a| a.controls.throttle += THROTTLE_SD,
-    |a| a.state.p += AIR_ROTATION_SD,
-    |a| a.state.q += AIR_ROTATION_SD,
-    |a| a.state.r += AIR_ROTATION_SD,
+    |a, _| a.state.alpha += INCIDENCE_SD,
+    |a, _| a.state.beta += INCIDENCE_SD,
+    |a, _| a.state.airspeed *= 1.0 + AIRSPEED_SD,
+    |a, _| a.controls.aileron += SURFACE_SD,
+    |a, _| a.controls.elevator += SURFACE_SD,
+    |a, _| a.controls.rudder += SURFACE_SD,
+    |a, _| a.controls.throttle += THROTTLE_SD,
+    |a, rotation| a.state.p += rotation,
+    |a, rotation| a.state.q += rotation,
+    |a, rotation| a.state.r += rotation,
 ];
 
 impl Predictor {
     /// A predictor of what `model` says of itself.
     pub fn new(model: GreyBox) -> Self {
         let widths = model.coefficients().iter().map(crate::model::Named::width).collect();
-        Predictor { model, widths }
+        let span = model.airframe.geometry.span;
+        let air_rotation = 1.9 * GUSTS_MPS / (GUST_SCALE_M * span).sqrt();
+        Predictor { model, widths, air_rotation }
     }
 
     /// The accelerations at `frame`.
@@ -71,7 +76,7 @@ impl Predictor {
         let mut variance = self.of_coefficients(&asked);
         for change in CHANGES {
             let mut changed = asked;
-            change(&mut changed);
+            change(&mut changed, self.air_rotation);
             let moved = self.accelerations(&changed);
             (0..6).for_each(|k| variance[k] += (moved[k] - mean[k]).powi(2));
         }

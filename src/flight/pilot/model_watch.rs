@@ -1,4 +1,4 @@
-//! The pilot's ear for its model: what departs from it is said to the ground stations.
+//! The model monitor of the pilot: channels that depart from the model are reported to the ground stations.
 
 use super::Pilot;
 use crate::flight::monitor::Monitor;
