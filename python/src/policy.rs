@@ -82,7 +82,7 @@ pub fn export_policy(
     model: &Model,
     actor: Layers<'_>,
     critics: Option<[Layers<'_>; 2]>,
-    trained_in: &str,
+    trained_in: Option<&str>,
     seed: u64,
     steps: u64,
 ) -> PyResult<()> {
@@ -90,12 +90,11 @@ pub fn export_policy(
         None => None,
         Some([one, two]) => Some(Arc::new([critic(&one)?, critic(&two)?])),
     };
-    let simulated = trained_in == "jsbsim";
     let origin = Origin {
         schema: Origin::SCHEMA.into(),
         airframe: fingerprint(&model.model.airframe),
-        model: trained_in.into(),
-        model_sha256: if simulated { String::new() } else { model.model.sha256.clone() },
+        model: trained_in.unwrap_or("jsbsim").into(),
+        model_sha256: trained_in.map_or(String::new(), |_| model.model.sha256.clone()),
         seed,
         steps,
         evaluation: None,

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use greylag::commands::distinct::distinct;
 use greylag::logs::csv::Tolerance;
 use greylag::logs::mapping::Mapping;
 use greylag::logs::{self, Log};
@@ -158,6 +159,7 @@ pub fn diagnose(
     done(py, progress, move |progress| {
         let mut notes = Vec::new();
         let clock = ActuatorClock::AsRecorded;
+        distinct(&logs, &[]).map_err(said)?;
         let flights = reading.flights(&logs, &model, clock, &mut notes, progress)?;
         let options = sysid::diagnose::Options { seed, nulls, without, ..Default::default() };
         let stages = after_intake(progress);
@@ -185,6 +187,7 @@ pub fn amend(
 ) -> PyResult<String> {
     let model = model.model.clone();
     done(py, progress, move |progress| {
+        distinct(&logs, &hold_out).map_err(said)?;
         let hashed = |paths: &[PathBuf]| paths.iter().map(hash).collect::<Result<Vec<_>, _>>();
         let hashes = [hashed(&logs)?, hashed(&hold_out)?];
         let clock = ActuatorClock::AsRecorded;
@@ -273,32 +276,22 @@ fn write(
     let cannot = |e: std::io::Error| format!("cannot write the model to {}: {e}", out.display());
     let original = document::Original::read(original).map_err(said)?;
     let files = document::files(&original, model, amended, [logs, hold_out]).map_err(said)?;
-    let part = out.with_extension("part");
-    let _ = std::fs::remove_dir_all(&part);
-    std::fs::create_dir_all(&part).map_err(cannot)?;
+    std::fs::create_dir_all(out).map_err(cannot)?;
+    // in the same folder, so that renaming is atomic; it removes itself
+    let part = tempfile::Builder::new().prefix(".part-").tempdir_in(out).map_err(cannot)?;
+    let part = part.path();
     for (name, text) in &files {
         std::fs::write(part.join(name), text).map_err(cannot)?;
     }
     let read = GreyBox::load(&part.join(document::MODEL)).map_err(said)?;
     if let Some(lost) = document::differs(&read, &amended.model) {
-        let _ = std::fs::remove_dir_all(&part);
         return Err(format!(
             "the written model read back with another {lost}, and was removed; report this"
         ));
     }
-    put(&part, out).map_err(cannot)?;
+    for (name, _) in &files {
+        std::fs::rename(part.join(name), out.join(name)).map_err(cannot)?;
+    }
     let story = files.into_iter().find(|(name, _)| name == document::STORY);
     Ok(story.map(|(_, text)| text).unwrap_or_default())
-}
-
-/// Moves the files of the folder `part` to the folder `out`, over those of the same names there.
-fn put(part: &Path, out: &Path) -> std::io::Result<()> {
-    if !out.exists() {
-        return std::fs::rename(part, out);
-    }
-    for entry in std::fs::read_dir(part)? {
-        let entry = entry?;
-        std::fs::rename(entry.path(), out.join(entry.file_name()))?;
-    }
-    std::fs::remove_dir(part)
 }

@@ -117,6 +117,9 @@ impl World {
             return Err(PyValueError::new_err(said));
         }
         let actions = actions.as_slice()?;
+        if !actions.iter().all(|a| a.is_finite()) {
+            return Err(PyValueError::new_err("an action is no number"));
+        }
         let Rows { now, reward, ended, before } =
             py.detach(|| self.advance(actions))?.map_err(raised)?;
         let table = |rows: Vec<f32>| rows.into_pyarray(py).reshape([self.instances, OBSERVATIONS]);

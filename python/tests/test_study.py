@@ -57,6 +57,24 @@ def test_the_missing_effect_is_found_and_added(here):
         greylag.amend("prior.toml", LOGS, "better", effects=found)
 
 
+def test_a_flight_that_is_named_twice_or_judges_itself_is_refused(here):
+    with pytest.raises(greylag.GreylagError, match="same flight"):
+        greylag.amend("prior.toml", LOGS[:1], "twice", effects=[], hold_out=LOGS[:1])
+    with pytest.raises(greylag.GreylagError, match="count twice"):
+        greylag.diagnose("prior.toml", [LOGS[0], LOGS[0]])
+
+
+def test_amend_leaves_what_stands_in_the_folder(here):
+    kept = here / "kept" / "notes.txt"
+    kept.parent.mkdir()
+    kept.write_text("mine")
+    greylag.amend("prior.toml", LOGS, kept.parent, effects=[])
+    assert kept.read_text() == "mine"
+    assert sorted(p.name for p in kept.parent.iterdir()) == ["airframe.toml", "amend.json", "model.toml", "notes.txt"]
+    with pytest.raises(FileExistsError):
+        greylag.amend("prior.toml", LOGS, kept.parent, effects=[])
+
+
 def test_progress_that_raises_ends_the_work(here):
     def stop(doing: str, share: float) -> None:
         raise RuntimeError(f"stopped at {doing}")

@@ -138,6 +138,9 @@ fn row(
     Some(SummaryRow { name, metric: metric.into(), ours, runs, paper })
 }
 
+/// Runs below which an interval over seeds says nothing: that of one run has no width.
+const FEWEST: usize = 3;
+
 impl Summary {
     /// Where the intervals of ours and of the paper have nothing in common, a sentence each.
     pub fn departures(&self) -> Vec<String> {
@@ -147,6 +150,9 @@ impl Summary {
 
 impl SummaryRow {
     fn departure(&self) -> Option<String> {
+        if self.ours.count < FEWEST {
+            return None;
+        }
         let (ours, theirs) = (self.ours.mean, self.paper[2]?);
         let [[a, b], [c, d]] = [ours.ci95, theirs.ci95];
         let word = if b < c { "less" } else { "more" };
@@ -190,6 +196,7 @@ fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result
         return Ok(Finding { says, outcome: Outcome::NoData, because });
     };
     let outcome = match gap.ci95 {
+        _ if less.len().min(than.len()) < FEWEST => Outcome::Undecided,
         [low, _] if low > 0.0 => Outcome::Holds,
         [_, high] if high < 0.0 => Outcome::Contradicted,
         _ => Outcome::Undecided,

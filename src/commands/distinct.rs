@@ -17,10 +17,14 @@ pub fn distinct(fitted: &[PathBuf], held: &[PathBuf]) -> Result<()> {
         paths.iter().filter_map(content).collect()
     };
     let (fitted, held) = (known(fitted), known(held));
-    for (k, (path, content)) in fitted.iter().enumerate() {
-        if let Some(other) = named(&fitted[..k], content) {
-            bail!("{}, so it would count twice; name it once", same(other, path));
+    for all in [&fitted, &held] {
+        for (k, (path, content)) in all.iter().enumerate() {
+            if let Some(other) = named(&all[..k], content) {
+                bail!("{}, so it would count twice; name it once", same(other, path));
+            }
         }
+    }
+    for (path, content) in &fitted {
         if let Some(other) = named(&held, content) {
             bail!(
                 "{}, which cannot be fitted to and held out at once; name it in one place",
@@ -56,6 +60,7 @@ mod tests {
         distinct(std::slice::from_ref(&a), std::slice::from_ref(&b)).unwrap();
         let twice = distinct(&[a.clone(), b.clone(), copy.clone()], &[]).unwrap_err().to_string();
         assert!(twice.contains("a.csv") && twice.contains("copy.csv") && twice.contains("twice"));
+        assert!(distinct(std::slice::from_ref(&b), &[a.clone(), copy]).is_err());
         let spelled = folder.path().join("./a.csv");
         assert!(distinct(&[a, b], &[spelled]).unwrap_err().to_string().contains("held out"));
         distinct(&["missing.csv".into()], &["missing.csv".into()]).unwrap();

@@ -16,7 +16,7 @@ mod effects;
 #[cfg(feature = "sitl")]
 mod design;
 mod diagnose;
-mod distinct;
+pub mod distinct;
 #[cfg(feature = "sitl")]
 mod evaluate;
 #[cfg(feature = "sitl")]

@@ -83,10 +83,11 @@ impl Desk {
             let demand = decision.demand();
             self.outputs = demand.outputs;
             out.extend(self.vehicle.answer(host, state.time, &demand));
-            let shown = self.vehicle.flies_surfaces();
-            if shown {
-                self.pilot.monitor(state);
+            match self.vehicle.moves_surfaces() {
+                true => self.pilot.monitor(state),
+                false => self.pilot.forget_residuals(),
             }
+            let shown = self.vehicle.flies_surfaces();
             if let Some(recorder) = &self.recorder {
                 let mut row = Row::new(state, &decision, 0.0);
                 row.residuals = self.pilot.residual_shares();

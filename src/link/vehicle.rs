@@ -162,6 +162,14 @@ impl Vehicle {
         matches!(self, Vehicle::Sitl(_)) || self.has_channels()
     }
 
+    /// Whether the surfaces do now what they are commanded: a real controller must have been seen to give them over.
+    pub fn moves_surfaces(&self) -> bool {
+        match self {
+            Vehicle::Sitl(_) => true,
+            Vehicle::Real(real) => self.has_channels() && real.flies(),
+        }
+    }
+
     /// Why the vehicle cannot be engaged now, if it cannot.
     pub fn obstacle(&self) -> Option<String> {
         match self {

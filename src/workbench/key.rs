@@ -10,8 +10,11 @@ use crate::sysid::amend::document::sha256;
 impl Inner {
     /// What a result is about: model, how logs are read, flights by role, effects.
     pub fn key(&self, what: &str, effects: &[Accepted]) -> String {
+        // a result names its flights, and is of those that can be read
         let logs = |role: Role| -> String {
-            self.session.with(role).map(|k| self.session.logs[k].sha256.as_str()).collect()
+            let places = self.usable(&[role]);
+            let named = places.iter().zip(self.names(&places));
+            named.map(|(k, name)| self.session.logs[*k].sha256.clone() + &name).collect()
         };
         let effects: Vec<String> =
             effects.iter().map(|e| format!("{}{}", e.id, e.anyway)).collect();

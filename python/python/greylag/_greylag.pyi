@@ -73,7 +73,7 @@ def export_policy(
     model: Model,
     actor: Layers,
     critics: Sequence[Layers] | None,
-    trained_in: str,
+    trained_in: str | None,
     seed: int,
     steps: int,
 ) -> None: ...

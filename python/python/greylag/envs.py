@@ -68,7 +68,7 @@ class _AttitudeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One step of 0.01 s; ``info`` holds what is left to the target."""
-        _, reward, ended, seen = self._world.step(np.asarray(action, np.float32).reshape(1, 3))
+        _, reward, ended, seen = self._world.step(np.ascontiguousarray(action, np.float32).reshape(1, 3))
         # an episode that ended has begun anew already, with the next target
         self._fresh = bool(ended[0])
         return (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ from . import _greylag
 from ._greylag import GreylagError
 from .files import EXACT_MODEL, shipped
 from .model import Model
+
+#: The discount of the task, which planners value plans with.
+DISCOUNT = 0.99
 
 #: A network: for each layer its weights, (outputs, inputs) as PyTorch's ``Linear`` has them, and its biases.
 Layers = Sequence[tuple[ArrayLike, ArrayLike]]
@@ -102,6 +106,12 @@ def export_policy(
         model = Model.load(EXACT_MODEL if simulated else trained_in)
     if hasattr(policy, "policy") and hasattr(policy, "num_timesteps"):
         actor, found = _of_stable_baselines3(policy)
+        if found is not None and policy.gamma != DISCOUNT:
+            warnings.warn(
+                f"the critics are left out: they were trained for a discount of {policy.gamma}, planners use {DISCOUNT}",
+                stacklevel=2,
+            )
+            found = None
         critics = critics or found
         steps, seed = steps or policy.num_timesteps, seed or policy.seed or 0
     else:
@@ -111,7 +121,7 @@ def export_policy(
         model._native,
         _arrays(actor),
         None if critics is None else [_arrays(critic) for critic in critics],
-        "jsbsim" if simulated else model.name,
+        None if simulated else model.name,
         seed,
         steps,
     )

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import _greylag
+from ._greylag import GreylagError
 from .model import Model
 from .results import Amendment, Comparison, Diagnosis, Log
 
@@ -169,8 +170,11 @@ def amend(
     """
     start, folder = _model(model), Path(out)
     file = folder / "model.toml"
-    if file.exists() and not replace:
-        raise FileExistsError(f"{file} exists; name another folder, or give replace=True")
+    for there in (file, folder / "airframe.toml", folder / "amend.json"):
+        if there.exists() and not replace:
+            raise FileExistsError(f"{there} exists; name another folder, or give replace=True")
+    if isinstance(effects, Diagnosis):
+        _checked(effects, start)
     if file.exists() and file.samefile(start.path):
         raise FileExistsError(f"{file} is the model to start from; name another folder")
     fit, judged = _paths(logs), _paths(hold_out)
@@ -182,6 +186,14 @@ def amend(
         start._native, os.fspath(start.path), fit, judged, os.fspath(folder), wanted, reading, progress
     )
     return Amendment._of(json.loads(found), file)
+
+
+def _checked(diagnosis: Diagnosis, model: Model) -> None:
+    """Refuses a diagnosis that has nothing to add, or is of another model."""
+    if diagnosis.model != model.name:
+        raise GreylagError(f"the diagnosis is of model {diagnosis.model}, not of {model.name}; diagnose this one")
+    if not diagnosis.asserted:
+        raise GreylagError("the diagnosis asserts no effect, so there is none to add; effects=[] fits the model's own")
 
 
 def _effects(effects: Diagnosis | Sequence[str] | None) -> list[tuple[str, dict[str, float]]] | None:

@@ -96,7 +96,7 @@ impl Launcher {
 
     /// Lets the catapult go when it is wanted; says whether it has just been.
     pub fn let_go(&mut self, armed: bool, throttle: f64) -> bool {
-        let wanted = self.phase == Phase::Stand && armed && throttle >= LAUNCH_THROTTLE;
+        let wanted = self.phase == Phase::Stand && armed && throttle > LAUNCH_THROTTLE;
         if wanted {
             self.phase = Phase::Catapult(0);
         }

@@ -1,5 +1,6 @@
 //! `greylag campaign report`: the tables and the page.
 
+use std::collections::{BTreeSet, HashSet};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -44,6 +45,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if records.is_empty() {
         bail!("no cell of campaign {} is done; greylag campaign run does them", plan.file.name);
     }
+    let programs: BTreeSet<&str> = records.iter().map(|r| r.program.as_str()).collect();
+    if programs.len() > 1 {
+        let all: Vec<&str> = programs.into_iter().collect();
+        println!(
+            "the results come from several programs: {}; run the cells of one of them again",
+            all.join(", ")
+        );
+    }
     let summaries = summaries(&plan.file, &records);
     let findings = findings(&plan.file, &records).map_err(anyhow::Error::msg)?;
     print!("{}", text(&summaries, &findings, comfy_table::presets::UTF8_FULL_CONDENSED));
@@ -85,6 +94,8 @@ impl Arguments {
                 path.display()
             );
         }
+        let mut known = HashSet::new();
+        records.retain(|r| known.insert(r.identity.clone()));
         let missing = plan.cells.len() - records.len();
         if missing > 0 {
             println!("{missing} of {} cells are missing in {}", plan.cells.len(), path.display());

@@ -176,8 +176,8 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     println!("{:>8} {COLUMNS}", "seed");
     let one = |seed: u64| arguments.train(&ground, seed, stop);
     let seeds = arguments.seed..arguments.seed + arguments.seeds;
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(cores).build()?;
+    // RAYON_NUM_THREADS says how many cores a scheduler has given
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build()?;
     use rayon::prelude::*;
     let seeds: Vec<u64> = seeds.collect();
     let ended = pool.install(|| seeds.into_par_iter().map(one).collect::<Result<Vec<bool>>>());

@@ -30,8 +30,8 @@ pub struct Monitor {
     predictor: Predictor,
     slowest: f64,
     last: Option<Seen>,
-    /// Whether the last state could be compared: old residuals are not shown as present ones.
-    compared: bool,
+    /// Channels that the last state could be compared in: old residuals are not shown as present ones.
+    compared: [bool; 6],
     watches: [Watch; 6],
 }
 
@@ -48,13 +48,19 @@ impl Monitor {
     pub fn new(model: GreyBox) -> Self {
         let slowest = SLOWEST * model.airframe.envelope.airspeed_min_mps;
         let predictor = Predictor::new(model);
-        Monitor { predictor, slowest, last: None, compared: false, watches: [Watch::default(); 6] }
+        Monitor {
+            predictor,
+            slowest,
+            last: None,
+            compared: [false; 6],
+            watches: [Watch::default(); 6],
+        }
     }
 
     /// Takes a state; the channel that departs most, if one departs now. A state that cannot be used, or that comes
     /// after a gap, begins a new difference. It does not allocate.
     pub fn see(&mut self, frame: &Telemetry) -> Option<Warning> {
-        self.compared = false;
+        self.compared = [false; 6];
         if frame.faults != Faults::NONE
             || frame.state.airspeed.is_nan()
             || frame.state.airspeed < self.slowest
@@ -70,22 +76,18 @@ impl Monitor {
             return None;
         }
         self.compare(frame, &before, &predicted, dt);
-        self.compared = true;
         self.due()
     }
 
     /// Forgets all, as when somebody else takes the aircraft.
     pub fn forget(&mut self) {
-        (self.last, self.compared) = (None, false);
+        (self.last, self.compared) = (None, [false; 6]);
         self.watches = [Watch::default(); 6];
     }
 
     /// Residuals by their bands, in the order of [`Channel::ALL`]; beyond −1..1 is outside, NaN when not known.
     pub fn shares(&self) -> Six {
-        match self.compared {
-            true => self.watches.map(|watch| watch.share()),
-            false => [f64::NAN; 6],
-        }
+        std::array::from_fn(|k| if self.compared[k] { self.watches[k].share() } else { f64::NAN })
     }
 
     fn compare(&mut self, frame: &Telemetry, before: &Seen, predicted: &Six, dt: f64) {
@@ -113,13 +115,14 @@ impl Monitor {
             let residual = measured[k] - expected;
             if residual.is_finite() && variance[k].is_finite() {
                 watch.see(residual, variance[k], surfaces[k], dt);
+                self.compared[k] = true;
             }
         }
     }
 
     fn due(&mut self) -> Option<Warning> {
         let size = |watch: &Watch| watch.share().abs();
-        let due = self.watches.iter().enumerate().filter(|(_, watch)| watch.is_due());
+        let due = self.watches.iter().enumerate().filter(|(k, w)| self.compared[*k] && w.is_due());
         let (k, _) = due.max_by(|(_, a), (_, b)| size(a).total_cmp(&size(b)))?;
         let watch = &mut self.watches[k];
         watch.report();

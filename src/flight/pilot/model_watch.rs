@@ -22,6 +22,13 @@ impl Pilot {
         }
     }
 
+    /// The surfaces are not known to do what is commanded: earlier residuals say nothing of what comes.
+    pub fn forget_residuals(&mut self) {
+        if let Some(monitor) = &mut self.monitor {
+            monitor.forget();
+        }
+    }
+
     /// Residuals by their bands, in the order of the monitor's channels; NaN when not known.
     pub fn residual_shares(&self) -> [f64; 6] {
         self.monitor.as_ref().map_or([f64::NAN; 6], Monitor::shares)

@@ -220,10 +220,11 @@ impl Control {
         let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
         self.load += LOAD_WEIGHT * (share - self.load);
         // What surfaces do that were not commanded by us is not known.
-        let shown = self.vehicle.flies_surfaces();
-        if shown {
-            self.pilot.monitor(state);
+        match self.vehicle.moves_surfaces() {
+            true => self.pilot.monitor(state),
+            false => self.pilot.forget_residuals(),
         }
+        let shown = self.vehicle.flies_surfaces();
         if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {
             let latency_us = latency.as_secs_f64() * 1e6;
             let mut row = Row::new(state, decision, latency_us);

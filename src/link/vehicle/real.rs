@@ -328,7 +328,10 @@ impl Real {
             self.bad_commands += 1;
         }
         let every = self.profile.stack.frames_per_command(self.profile.authority);
-        let attitude = self.trimmed(time, demand.attitude);
+        let attitude = match self.profile.authority {
+            Authority::Attitude => self.trimmed(time, demand.attitude),
+            _ => demand.attitude,
+        };
         let due = self.engagement.steers() && self.states.is_multiple_of(every);
         let Some(to) = self.target().filter(|_| due) else {
             return Vec::new();
@@ -350,7 +353,7 @@ impl Real {
 
     /// The attitude to command where `wanted` (rad) is wanted: trimmed while the controller flies it.
     fn trimmed(&mut self, time: Time, wanted: [f64; 2]) -> [f64; 2] {
-        if !self.engagement.is_engaged() {
+        if !self.flies() {
             self.trim.rest();
             return wanted;
         }
@@ -522,6 +525,11 @@ impl Real {
     /// The oldest notice that was not fetched.
     pub fn take_notice(&mut self) -> Option<Notice> {
         self.notices.pop_front()
+    }
+
+    /// Whether the controller was seen to fly what it is commanded.
+    pub fn flies(&self) -> bool {
+        self.engagement.is_engaged()
     }
 
     /// Whether we steer, or are about to.

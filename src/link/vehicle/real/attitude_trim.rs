@@ -23,6 +23,8 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AttitudeTrim {
     added: [f64; 2],
+    /// The wanted attitude at which that was found, rad.
+    found_at: [f64; 2],
     last: Option<Time>,
     /// The wanted attitude that stands, since when.
     standing: Option<([f64; 2], Time)>,
@@ -41,10 +43,17 @@ impl AttitudeTrim {
         let (stood, since) = stands.unwrap_or((wanted, now));
         self.standing = Some((stood, since));
         let settled = now.since(since).as_secs_f64() >= SETTLING_S;
-        if settled && dt <= GAP_S && !far(wanted, seen, NEAR) {
-            for (axis, added) in self.added.iter_mut().enumerate() {
-                let error = wanted[axis] - seen[axis];
-                *added = (*added + error * dt / TIME_S).clamp(-MOST, MOST);
+        for axis in 0..2 {
+            let added = &mut self.added[axis];
+            // what was found in a turn to the right is wrong in one to the left
+            if (self.found_at[axis] - wanted[axis]).abs() > NEAR {
+                *added = 0.0;
+            }
+            // what the controller leaves of what it is commanded, the trim included
+            let left = (wanted[axis] + *added - seen[axis]).abs();
+            if settled && dt <= GAP_S && left <= NEAR {
+                *added = (*added + (wanted[axis] - seen[axis]) * dt / TIME_S).clamp(-MOST, MOST);
+                self.found_at[axis] = wanted[axis];
             }
         }
         std::array::from_fn(|axis| wanted[axis] + self.added[axis])
@@ -96,6 +105,26 @@ mod tests {
             let at = tick as f64 * 0.01;
             plain += (sine(at) + 0.01 - plain) * 0.02;
             assert!((error - (sine(at) - plain)).abs() < 1e-12, "{at} s");
+        }
+    }
+
+    /// A controller that reaches 95 % of what it is commanded, in turns to both sides.
+    #[test]
+    fn a_turn_that_is_reversed_is_trimmed_anew() {
+        for ramp_s in [0.01, 9.0] {
+            let wanted =
+                |t: f64| 45.0 * DEGREE * (1.0 - 2.0 * ((t - 20.0) / ramp_s).clamp(0.0, 1.0));
+            let (mut trim, mut roll) = (AttitudeTrim::default(), wanted(0.0));
+            for tick in 0..5000 {
+                let at = f64::from(tick) * 0.01;
+                let now = Time::from_micros(10_000 * tick as u64);
+                let [commanded, _] = trim.command(now, [wanted(at), 0.0], [roll, 0.0]);
+                roll += (0.95 * commanded - roll) * 0.02;
+                if tick == 1999 || tick == 4999 {
+                    let error = (wanted(at) - roll) / DEGREE;
+                    assert!(error.abs() < 0.1, "{error} degrees at {at} s, reversed in {ramp_s} s");
+                }
+            }
         }
     }
 
