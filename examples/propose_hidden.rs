@@ -179,7 +179,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             Ok(p) => {
                 let chosen = p.front.iter().find(|r| r.chosen).map(|r| r.formula.as_str());
                 let proposed = p.effect.is_some();
-                let one = p.front.first().filter(|_| proposed).map(|r| r.formula.as_str());
+                let one = p
+                    .front
+                    .first()
+                    .filter(|r| r.chosen || p.front.iter().skip(1).any(|r| r.chosen))
+                    .map(|r| r.formula.as_str());
                 let right = hidden.as_ref().zip(one).map(|(h, formula)| {
                     [
                         formula.starts_with(h.channel),
@@ -192,6 +196,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     "hidden": hidden.as_ref().map(|h| format!("{} {} k={:.4}", h.channel, h.shape, h.effect.values[0])),
                     "verdict": p.verdict, "proposed": proposed, "formula": chosen, "grades": p.grades,
                     "channel_variables_form": right,
+                    "refused": p.refused, "found": p.front.first().map(|r| r.formula.as_str()),
                     "held_out_removed": p.held_out.as_ref().map(|h| h.removed),
                     "threshold": p.front.first().map(|r| r.threshold),
                 })

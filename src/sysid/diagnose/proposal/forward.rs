@@ -2,6 +2,7 @@
 
 use super::draft::{self, Term};
 use super::grades;
+use super::held_out;
 use super::library::{self, Form};
 use super::result::{Alternative, Proposal, Rung};
 use crate::model::GreyBox;
@@ -103,6 +104,7 @@ impl Ask<'_> {
         proposal.tried = self.forms.len();
         let mut terms: Vec<Term> = Vec::new();
         let channels = self.channels();
+        let given = model.clone();
         let excess = self.excess(&model, &channels)?.max(1.0);
         let mut first_fall = 0.0;
         while terms.len() < MOST {
@@ -136,9 +138,13 @@ impl Ask<'_> {
             }
             if terms.len() == 1 {
                 let alike = self.alike(&round, &scores, place);
-                proposal.refused = self.objections(&round, &scores, place);
+                proposal.refused.extend(contradicted(&round, *trial, score));
+                let steady = self.selected(&round, &scores, place) >= SELECTED;
                 proposal.grades =
                     Some(grades::grades(&form, &alike.iter().map(|a| a.0).collect::<Vec<_>>()));
+                if let Some(grades) = &mut proposal.grades {
+                    grades.form &= steady;
+                }
                 proposal.alike = alike
                     .iter()
                     .map(|(form, evidence)| Alternative {
@@ -148,8 +154,7 @@ impl Ask<'_> {
                     .collect();
             }
             let Some(tuned) = self.tuned(&round, *trial, score)? else { break };
-            let left = self.excess(&tuned, &channels)? / excess;
-            let removed = 1.0 - left;
+            let removed = held_out::removed(self.problem, &given, &tuned, &channels)?;
             // a term that pulls the others far off, or makes things worse, is one of them again
             if terms.iter().any(|t| moved(t, &tuned)) || removed <= before {
                 terms.pop();
@@ -189,27 +194,16 @@ impl Ask<'_> {
         Some(Some(model))
     }
 
-    /// What speaks against the form in `place`, as against an effect of the catalogue.
-    fn objections(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> Vec<String> {
-        let (trial, score) = &scores[place];
-        let mut all = Vec::new();
+    /// Share of the block bootstraps in which the form in `place` or a look-alike is the best.
+    fn selected(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> f64 {
         let alike = checks::class(round, scores, place);
         let members: Vec<usize> =
-            std::iter::once(*trial).chain(alike.iter().map(|k| scores[*k].0)).collect();
+            std::iter::once(&place).chain(&alike).map(|k| scores[*k].0).collect();
         let open: Vec<usize> = scores.iter().map(|(t, _)| *t).collect();
-        let selected = checks::selected(round, &open, &members, self.options.bootstraps);
-        if selected < SELECTED && self.options.bootstraps > 0 {
-            all.push(format!(
-                "it or one of its look-alikes is the best in {:.0} % of the block bootstraps, under {:.0} %",
-                100.0 * selected,
-                100.0 * SELECTED
-            ));
+        match self.options.bootstraps {
+            0 => 1.0,
+            count => checks::selected(round, &open, &members, count),
         }
-        let by_flight = checks::by_flight(round, &round.trials[*trial], score);
-        if checks::contradict(score.values[0], &by_flight) {
-            all.push("the flights contradict one another about its amount".into());
-        }
-        all
     }
 
     /// The simplest of those that are as good as the best one.
@@ -252,6 +246,13 @@ impl Ask<'_> {
         }
         terms
     }
+}
+
+/// Why a form is not proposed whose amount differs from flight to flight, as for an effect of the catalogue.
+fn contradicted(round: &Round, trial: usize, score: &Score) -> Option<String> {
+    let by_flight = checks::by_flight(round, &round.trials[trial], score);
+    checks::contradict(score.values[0], &by_flight)
+        .then(|| "the flights contradict one another about its amount".into())
 }
 
 /// Whether tuning has moved the coefficient of `term` in `model` further than its own uncertainty allows.

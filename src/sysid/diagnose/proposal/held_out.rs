@@ -10,8 +10,23 @@ use crate::sysid::diagnose::regression::catalogue::Entry;
 use crate::sysid::diagnose::regression::rank::{Draw, quadratic};
 use crate::sysid::diagnose::search::checks;
 use crate::sysid::diagnose::search::nulls;
-use crate::sysid::diagnose::search::round::{Problem, Round};
+use crate::sysid::diagnose::search::round::{Beside, Problem, Round};
 use crate::sysid::diagnose::search::stepwise::HELD_OUT;
+
+/// The share of the error of `before` beyond noise in `channels` that `after` does not have. Both are measured by the noise
+/// that `after` leaves: each by its own would count a better model's smaller noise against it.
+pub(super) fn removed(
+    problem: &Problem,
+    before: &GreyBox,
+    after: &GreyBox,
+    channels: &[bool; 6],
+) -> Option<f64> {
+    let with = Round::new(problem, after.clone(), &[])?;
+    let beside = Beside { noise: Some(&with.noise), ..Beside::default() };
+    let without = Round::beside(problem, before.clone(), &[], beside)?;
+    let [left, all] = [&with, &without].map(|round| checks::excess(round, channels));
+    Some(1.0 - left / all.max(1.0))
+}
 
 /// What `terms`, their coefficients as they are, take of what `model` leaves in flights that were not searched.
 pub(super) fn tested(
@@ -39,12 +54,11 @@ pub(super) fn tested(
         (0..options.nulls).map(|k| fall(&nulls::draw(&round.projected, options.seed, k))).collect();
     chance.sort_by(f64::total_cmp);
     let channels = std::array::from_fn(|c| terms.iter().any(|t| t.form.channel == ORDER[c]));
-    let left = |model: GreyBox| Some(checks::excess(&Round::new(problem, model, &[])?, &channels));
     let mut with = model.clone();
     for term in terms {
         with.join_most(&term.form.id(), &[term.value]).ok()?;
     }
-    let removed = 1.0 - left(with)? / left(model.clone())?.max(1.0);
+    let removed = removed(problem, model, &with, &channels)?;
     // nothing is gained by a fall below zero
     let threshold = chance.last().copied().unwrap_or(f64::INFINITY).max(0.0);
     Some(HeldOut { flights, removed, fall: measured, threshold })

@@ -59,7 +59,7 @@ pub(super) fn sentences(
                 let alike = proposal.alike.iter().take(3).map(|a| a.formula.as_str());
                 let alike = alike.collect::<Vec<_>>().join(" or ");
                 match alike.is_empty() {
-                    true => format!("Sure: {sure}. Open: {open}; one term was not enough."),
+                    true => format!("Sure: {sure}. Open: {open}."),
                     false => {
                         format!(
                             "Sure: {sure}. Open: {open}; these flights cannot tell it from {alike}."
