@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release --ignore-rust-version --no-default-features --features sitl --example propose_hidden --
 //! effects 9000 10 >> results/propose-hidden.jsonl`; `nulls` in place of `effects` hides nothing. One line of JSON a
-//! seed; seeds must not be those of earlier runs. Nothing has been recorded since the tests of a proposal were tightened.
+//! seed; seeds must not be those of earlier runs.
 
 use std::error::Error;
 
