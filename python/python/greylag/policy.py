@@ -145,6 +145,11 @@ def _of_stable_baselines3(algorithm: Any) -> tuple[Layers, tuple[Layers, Layers]
     actor = getattr(algorithm.policy, "actor", None)
     if actor is None or not hasattr(actor, "mu"):
         raise _refuse(f"{type(algorithm).__name__} has no deterministic actor that ends in tanh")
+    if algorithm.get_env() is None:
+        raise _refuse("it has no environment, so a normalisation of its observations cannot be seen; load it with env=")
+    space = algorithm.action_space
+    if space.shape != (3,) or not (np.all(space.low == -1) and np.all(space.high == 1)):
+        raise _refuse("its actions are not three numbers from -1 to 1")
     if algorithm.get_vec_normalize_env() is not None:
         raise _refuse("its observations are normalised by VecNormalize, which greylag does not do")
     if getattr(actor, "use_sde", False):
