@@ -9,7 +9,7 @@ use greylag::flight::pilot::{Answers, Config, Decision, Pilot, Plan, Source, Tri
 use greylag::link::autopilot::{
     AttitudeSetpoint, Autopilot, Mode, ParameterValue, Sticks, Verdict,
 };
-use greylag::link::vehicle::{Faults, Order, Telemetry};
+use greylag::link::vehicle::{Faults, Order, Telemetry, VANE_SD};
 use greylag::manoeuvres::{Axis, Excitation, Schedule, Shape, Step};
 use greylag::model::GreyBox;
 use greylag::physics::{ActuatorState, Airframe, Command, State, Time};
@@ -72,6 +72,7 @@ fn frame(time: Time) -> Telemetry {
     let ripple = (time.as_micros() % 1000 + time.as_micros() / 10_000) as f64 * 1e-6;
     Telemetry {
         state: State { p: ripple, airspeed: 20.0, ..State::NEUTRAL },
+        incidence_sd: VANE_SD,
         time,
         order: Order::Next { lost: 0 },
         faults: Faults::NONE,

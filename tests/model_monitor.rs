@@ -7,7 +7,7 @@ use greylag::control::{Controller, Kind, build};
 use greylag::flight::monitor::Monitor;
 use greylag::flight::pilot::{Config, Pilot, Plan};
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
-use greylag::link::vehicle::{Faults, Order, Telemetry};
+use greylag::link::vehicle::{Faults, Order, Telemetry, VANE_SD};
 use greylag::model::GreyBox;
 use greylag::physics::actuators::Actuators;
 use greylag::physics::{Controls, State, Time};
@@ -114,6 +114,7 @@ fn telemetry(time: Time, truth: &Truth) -> Telemetry {
             alpha: truth.alpha_rad,
             beta: truth.beta_rad,
         },
+        incidence_sd: VANE_SD,
         yaw: truth.yaw_rad,
         rate_hold_s: 0.0,
         specific_force: truth.specific_force_mps2,

@@ -64,6 +64,16 @@ pub fn difference(a: &[f64], b: &[f64]) -> Option<Estimate> {
     Some(Estimate { value: gap(&strata.concat()), ci95 })
 }
 
+/// The mean of the gaps of paired runs, resampled within each stratum; `None` without pairs.
+pub fn paired_difference(strata: &[Vec<f64>]) -> Option<Estimate> {
+    let gaps = strata.concat();
+    if gaps.is_empty() {
+        return None;
+    }
+    let ci95 = bootstrap::stratified_interval(strata, SEED, mean);
+    Some(Estimate { value: mean(&gaps), ci95 })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

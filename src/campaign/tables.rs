@@ -1,11 +1,11 @@
 //! The tables of a campaign: each quantity summed up over seeds, the paper's beside it; and what becomes of its claims.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::cell::Record;
 use super::file::{CampaignFile, ClaimFile, SEED, TableFile};
 use super::published::published;
-use super::statistics::{Aggregate, Estimate, aggregate, difference};
+use super::statistics::{Aggregate, Estimate, aggregate, difference, paired_difference};
 
 /// A table.
 #[derive(Clone, Debug)]
@@ -183,35 +183,96 @@ pub fn findings(file: &CampaignFile, records: &[Record]) -> Result<Vec<Finding>,
     file.claims.iter().map(|claim| finding(file, claim, records)).collect()
 }
 
+/// The levels of a cell that a claim leaves open, its seed among them.
+type Levels = BTreeMap<String, String>;
+
 fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result<Finding, String> {
-    let values = |of: &str| -> Result<Vec<f64>, String> {
-        let (stage, levels) = file.choice(of)?;
-        let cells = records.iter().filter(|r| r.has(&stage, &levels));
-        Ok(cells.filter_map(|r| r.metrics.get(&claim.metric)).copied().collect())
+    let (stage_a, levels_a) = file.choice(&claim.less)?;
+    let (stage_b, levels_b) = file.choice(&claim.than)?;
+    let fixed = |axis: &str| levels_a.contains_key(axis) || levels_b.contains_key(axis);
+    let side = |stage: &str, levels: &BTreeMap<String, String>| -> Vec<(Levels, f64)> {
+        let cells = records.iter().filter(|r| r.has(stage, levels));
+        let of = |r: &Record| Some((left(r, &fixed), *r.metrics.get(&claim.metric)?));
+        cells.filter_map(of).collect()
     };
-    let (less, than) = (values(&claim.less)?, values(&claim.than)?);
+    let (less, than) = (side(&stage_a, &levels_a), side(&stage_b, &levels_b));
     let says = claim.says.clone();
-    let Some(gap) = difference(&less, &than) else {
+    let values = |of: &[(Levels, f64)]| of.iter().map(|(_, v)| *v).collect::<Vec<_>>();
+    let (a, b) = (values(&less), values(&than));
+    let pairs = pairs(&less, &than);
+    let gap = match &pairs {
+        Some(pairs) => paired_difference(pairs),
+        None => difference(&a, &b),
+    };
+    let Some(gap) = gap else {
         let because = format!("no cell of both sides has {}", claim.metric);
         return Ok(Finding { says, outcome: Outcome::NoData, because });
     };
     let outcome = match gap.ci95 {
-        _ if less.len().min(than.len()) < FEWEST => Outcome::Undecided,
+        _ if a.len().min(b.len()) < FEWEST => Outcome::Undecided,
         [low, _] if low > 0.0 => Outcome::Holds,
         [_, high] if high < 0.0 => Outcome::Contradicted,
         _ => Outcome::Undecided,
     };
     let mean = crate::num::statistics::mean;
     let because = format!(
-        "{}: {} has {:.3} (n = {}), {} has {:.3} (n = {}); difference {}",
+        "{}: {} has {:.3} (n = {}), {} has {:.3} (n = {}); difference{} {}",
         claim.metric,
         claim.less,
-        mean(&less),
-        less.len(),
+        mean(&a),
+        a.len(),
         claim.than,
-        mean(&than),
-        than.len(),
+        mean(&b),
+        b.len(),
+        if pairs.is_some() { ", paired by seed," } else { "" },
         said(&gap)
     );
     Ok(Finding { says, outcome, because })
+}
+
+fn left(record: &Record, fixed: &dyn Fn(&str) -> bool) -> Levels {
+    let open = record.levels.iter().filter(|(axis, _)| !fixed(axis));
+    open.map(|(axis, level)| (axis.clone(), level.clone())).collect()
+}
+
+/// The gaps `than − less` of cells that agree in all open levels, by stratum (all of them but the seed); `None` unless
+/// every cell of both sides has exactly one partner.
+fn pairs(less: &[(Levels, f64)], than: &[(Levels, f64)]) -> Option<Vec<Vec<f64>>> {
+    let of: BTreeMap<&Levels, f64> = than.iter().map(|(key, value)| (key, *value)).collect();
+    let own: BTreeSet<&Levels> = less.iter().map(|(key, _)| key).collect();
+    if own.len() != less.len() || of.len() != than.len() || own.len() != of.len() {
+        return None;
+    }
+    let mut strata: BTreeMap<Levels, Vec<f64>> = BTreeMap::new();
+    for (key, value) in less {
+        let gap = of.get(key)? - value;
+        let stratum = key.iter().filter(|(axis, _)| *axis != SEED);
+        strata.entry(stratum.map(|(a, l)| (a.clone(), l.clone())).collect()).or_default().push(gap);
+    }
+    Some(strata.into_values().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cell(prior: &str, seed: u64) -> Levels {
+        [("prior", prior.to_owned()), (SEED, seed.to_string())].map(|(a, l)| (a.into(), l)).into()
+    }
+
+    /// Seeds differ by 10, the two sides by 1 in each: only pairs show it.
+    #[test]
+    fn cells_of_one_seed_are_compared_with_each_other() {
+        let side = |more: f64| -> Vec<(Levels, f64)> {
+            (1..=4).map(|seed| (cell("mild", seed), 10.0 * seed as f64 + more)).collect()
+        };
+        let (less, than) = (side(0.0), side(1.0));
+        let gap = paired_difference(&pairs(&less, &than).unwrap()).unwrap();
+        assert_eq!((gap.value, gap.ci95), (1.0, [1.0, 1.0]));
+        let values = |side: &[(Levels, f64)]| side.iter().map(|(_, v)| *v).collect::<Vec<_>>();
+        let apart = difference(&values(&less), &values(&than)).unwrap();
+        assert!(apart.ci95[0] < 0.0 && apart.ci95[1] > 2.0, "{apart:?}");
+        assert!(pairs(&less[1..], &than).is_none());
+        assert!(pairs(&[(cell("true", 1), 0.0)], &[(cell("mild", 1), 0.0)]).is_none());
+    }
 }

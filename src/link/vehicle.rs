@@ -20,6 +20,9 @@ pub use sitl::{Sitl, VehicleCounts};
 
 pub use super::wire::sitl::Outputs;
 
+/// Standard deviation of angles of attack and sideslip by vanes, rad: customary for small aircraft.
+pub const VANE_SD: f64 = 0.3 * std::f64::consts::PI / 180.0;
+
 /// The vehicle's state at one instant, complete and in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Telemetry {
@@ -32,6 +35,8 @@ pub struct Telemetry {
     pub faults: Faults,
     /// The eight variables of flight.
     pub state: State,
+    /// Standard deviation of angle of attack and sideslip in `state`, rad.
+    pub incidence_sd: f64,
     /// Yaw, rad.
     pub yaw: f64,
     /// Time for which a simulator holds the body rates from this instant, s; 0 where they are sampled.

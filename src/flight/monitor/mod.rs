@@ -134,7 +134,7 @@ impl Monitor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::vehicle::Order;
+    use crate::link::vehicle::{Order, VANE_SD};
     use crate::model::Trim;
     use crate::physics::{ActuatorState, Controls};
     use std::path::Path;
@@ -171,6 +171,7 @@ mod tests {
                 order: Order::Next { lost: 0 },
                 faults: Faults::NONE,
                 state,
+                incidence_sd: VANE_SD,
                 yaw: 0.0,
                 rate_hold_s: 0.0,
                 specific_force: std::array::from_fn(|k| linear[k] - gravity[k]),

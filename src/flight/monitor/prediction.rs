@@ -9,9 +9,8 @@ use crate::physics::{AirData, Controls, State};
 /// Specific force (m/s², body x, y, z), then angular acceleration (rad/s², about x, y, z).
 pub type Six = [f64; 6];
 
-/// Standard deviations of what the model is asked with: α, β (rad), airspeed (share of it), surfaces (rad), throttle.
-/// Customary for vanes, a pitot tube and servos of small aircraft.
-const INCIDENCE_SD: f64 = 0.3 * DEGREE;
+/// Standard deviations of what the model is asked with: airspeed (share of it), surfaces (rad), throttle. Customary for a
+/// pitot tube and servos of small aircraft. That of α and β comes with the state.
 const AIRSPEED_SD: f64 = 0.02;
 const SURFACE_SD: f64 = 0.3 * DEGREE;
 const THROTTLE_SD: f64 = 0.02;
@@ -39,20 +38,29 @@ struct Asked {
     altitude: f64,
 }
 
-/// An input that is not known exactly: what one standard deviation makes of it; that of the rotation of the air is given.
-type Change = fn(&mut Asked, f64);
+/// An input that is not known exactly: what one standard deviation makes of it.
+type Change = fn(&mut Asked, &Deviations);
+
+/// Standard deviations that are not constants.
+#[derive(Clone, Copy, Debug)]
+struct Deviations {
+    /// α and β, rad.
+    incidence: f64,
+    /// Rotation of the air, rad/s.
+    air_rotation: f64,
+}
 
 const CHANGES: [Change; 10] = [
-    |a, _| a.state.alpha += INCIDENCE_SD,
-    |a, _| a.state.beta += INCIDENCE_SD,
+    |a, sd| a.state.alpha += sd.incidence,
+    |a, sd| a.state.beta += sd.incidence,
     |a, _| a.state.airspeed *= 1.0 + AIRSPEED_SD,
     |a, _| a.controls.aileron += SURFACE_SD,
     |a, _| a.controls.elevator += SURFACE_SD,
     |a, _| a.controls.rudder += SURFACE_SD,
     |a, _| a.controls.throttle += THROTTLE_SD,
-    |a, rotation| a.state.p += rotation,
-    |a, rotation| a.state.q += rotation,
-    |a, rotation| a.state.r += rotation,
+    |a, sd| a.state.p += sd.air_rotation,
+    |a, sd| a.state.q += sd.air_rotation,
+    |a, sd| a.state.r += sd.air_rotation,
 ];
 
 impl Predictor {
@@ -74,9 +82,11 @@ impl Predictor {
     pub fn variance(&self, frame: &Telemetry, mean: &Six) -> Six {
         let asked = Asked::at(frame);
         let mut variance = self.of_coefficients(&asked);
+        let deviations =
+            Deviations { incidence: frame.incidence_sd, air_rotation: self.air_rotation };
         for change in CHANGES {
             let mut changed = asked;
-            change(&mut changed, self.air_rotation);
+            change(&mut changed, &deviations);
             let moved = self.accelerations(&changed);
             (0..6).for_each(|k| variance[k] += (moved[k] - mean[k]).powi(2));
         }

@@ -52,7 +52,7 @@ const HALF_TURN: f64 = std::f64::consts::PI + 1e-3;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::vehicle::Order;
+    use crate::link::vehicle::{Order, VANE_SD};
     use crate::physics::{ActuatorState, State, Time};
 
     fn good() -> Telemetry {
@@ -61,6 +61,7 @@ mod tests {
             order: Order::First,
             faults: Faults::NONE,
             state: State::NEUTRAL,
+            incidence_sd: VANE_SD,
             yaw: 0.0,
             rate_hold_s: 0.0,
             specific_force: [0.0, 0.0, -9.81],

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Faults, Notice, Order, Outputs, Telemetry, limits};
+use super::{Faults, Notice, Order, Outputs, Telemetry, VANE_SD, limits};
 use crate::link::autopilot::Severity;
 use crate::link::framing::{Frame, FrameCounts, Frames, Source, Version};
 use crate::link::peer::PeerId;
@@ -89,6 +89,7 @@ impl Sitl {
             order: Order::First,
             faults: Faults::NONE,
             state: State::NEUTRAL,
+            incidence_sd: VANE_SD,
             yaw: 0.0,
             rate_hold_s: PERIOD_US as f64 * 1e-6,
             specific_force: [0.0, 0.0, -9.81],

@@ -11,8 +11,9 @@ use crate::sysid::flight_path::intake::{Log, Track};
 use crate::sysid::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST, Step, gust_kept};
 use crate::sysid::flight_path::levels::{CALM, Levels};
 use crate::sysid::flight_path::measurement::{self, AT, OTHERS, Others, Reading};
+use crate::sysid::flight_path::noise;
 use crate::sysid::flight_path::nuisance::{COUNT, INERTIAL, Values, WIND};
-use crate::sysid::flight_path::path::Path;
+use crate::sysid::flight_path::path::{CHANNELS, Path};
 use crate::sysid::flight_path::{Options, ReconstructError};
 
 /// Columns where the constants are free: all, those between instants; right-hand side last.
@@ -54,10 +55,14 @@ pub struct Solved<const N: usize> {
     /// Moves of the constants; zero where they are held.
     constants: Values,
     /// Standard deviations of the constants; zero where they are held.
-    deviations: Values,
+    pub deviations: Values,
     /// The readings before the move.
     pub readings: Vec<Vec<Reading>>,
 }
+
+/// Beyond so many of the measurements' bounds a step of the kinematics counts less: a launcher, an impact or an estimator that aligns
+/// itself moves the logged path by more than gyros and accelerometers say.
+const PROCESS: f64 = 1.5;
 
 /// A path with an error like that of the one found.
 #[derive(Clone, Debug)]
@@ -77,6 +82,49 @@ impl Problem<'_> {
     /// Motion with gusts, the constants held.
     pub fn held(&self, found: &Found, bound: f64) -> Option<Solved<MOTION_AND_GUST>> {
         self.solve::<MOTION_AND_GUST, 1, 1, 1>(found, bound)
+    }
+
+    /// −2 ln L of the path and the constants at levels that are held, up to a constant: what a step has to lessen.
+    pub fn merit(&self, found: &Found, bound: f64) -> f64 {
+        let before = |i: usize| ((found.values[i] - self.means[i]) / self.widths[i]).powi(2);
+        let pairs = self.log.tracks.par_iter().zip(&found.paths);
+        let tracks: Vec<f64> =
+            pairs.map(|(track, path)| self.misfit_of(track, path, found, bound)).collect();
+        tracks.iter().sum::<f64>() + (0..COUNT).map(before).sum::<f64>()
+    }
+
+    fn misfit_of(&self, track: &Track, path: &Path, found: &Found, bound: f64) -> f64 {
+        let (step, gravity) = (self.log.step, self.options.gravity);
+        let (values, l) = (&found.values, &found.levels);
+        let readings = measurement::readings(track, path, values, step);
+        let drive = Drive::new(track, values, step, self.sampling, gravity);
+        let spread: [f64; CHANNELS] = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
+        let sd = step_deviations::<MOTION>(l, step);
+        let size = |r: &Reading, i: usize| (r.residual[i] / spread[i]).abs();
+        let measured = readings.iter().flat_map(|r| (0..CHANNELS).map(move |i| size(r, i)));
+        let measured: f64 =
+            measured.filter(|size| !size.is_nan()).map(|size| huber(size, bound)).sum();
+        let between = (0..path.len().saturating_sub(1)).map(|k| {
+            let left = drive.step::<MOTION, 1>(path, values, k, step, gravity).rest;
+            (0..MOTION).map(|i| huber((left[i][0] / sd[i]).abs(), PROCESS * bound)).sum::<f64>()
+        });
+        measured + between.sum::<f64>()
+    }
+
+    /// What the steps between samples leave, in the standard deviations that gyros and accelerometers are given: robust
+    /// scale of each axis of turn and velocity. It is below one where these are large enough.
+    pub fn strain(&self, found: &Found) -> [f64; MOTION] {
+        let (step, gravity) = (self.log.step, self.options.gravity);
+        let sd = step_deviations::<MOTION>(&found.levels, step);
+        let mut left: [Vec<f64>; MOTION] = Default::default();
+        for (track, path) in self.log.tracks.iter().zip(&found.paths) {
+            let drive = Drive::new(track, &found.values, step, self.sampling, gravity);
+            for k in 0..path.len().saturating_sub(1) {
+                let rest = drive.step::<MOTION, 1>(path, &found.values, k, step, gravity).rest;
+                (0..MOTION).for_each(|i| left[i].push(rest[i][0] / sd[i]));
+            }
+        }
+        left.map(|mut left| noise::level(&mut left))
     }
 
     /// −2 ln L of the levels, up to what does not change with the gusts' level, with the constants held.
@@ -177,7 +225,7 @@ impl Problem<'_> {
                 };
                 step.rest[i][0] = sd[i] * unit;
             }
-            weigh(step, &sd, corner)
+            weigh(step, &sd, f64::INFINITY, corner)
         };
         let (stretch, _) = band::eliminate(along.len(), instant, link)?;
         for (k, x) in stretch.substitute(&[1.0]).iter().enumerate() {
@@ -263,11 +311,16 @@ impl Problem<'_> {
         };
         let link = |k: usize, corner: &mut band::Corner<W>| {
             let step = drive.step::<N, D>(path, values, k, step, gravity);
-            weigh(step, &sd, corner)
+            weigh(step, &sd, PROCESS * bound, corner)
         };
         let (stretch, left) = band::eliminate(path.len(), instant, link)?;
         Some((stretch, readings, left))
     }
+}
+
+/// Huber's loss of a residual of so many standard deviations: its square, beyond `bound` linear.
+fn huber(size: f64, bound: f64) -> f64 {
+    if size <= bound { size * size } else { bound * (2.0 * size - bound) }
 }
 
 /// Standard deviations of the differences between samples `step` (s) apart.
@@ -298,14 +351,16 @@ fn start<const N: usize, const W: usize>(
     }
 }
 
-/// The equations of a step whose rows have the standard deviations `sd`.
+/// The equations of a step whose rows have the standard deviations `sd`; a residual beyond `bound` of them counts less.
 fn weigh<const N: usize, const W: usize, const D: usize>(
     mut step: Step<N, D>,
     sd: &[f64; N],
+    bound: f64,
     corner: &mut band::Corner<W>,
 ) -> Link<N, W> {
     for (i, sd) in sd.iter().enumerate() {
-        let weight = sd.recip();
+        let size = (step.rest[i][D - 1] / sd).abs();
+        let weight = (bound / size).min(1.0).sqrt() / sd;
         step.first[i].iter_mut().for_each(|x| *x *= weight);
         step.second[i].iter_mut().for_each(|x| *x *= weight);
         step.rest[i].iter_mut().for_each(|x| *x *= weight);
@@ -330,14 +385,20 @@ fn weigh<const N: usize, const W: usize, const D: usize>(
 }
 
 impl<const N: usize> Solved<N> {
-    /// Moves the path and the constants; returns the largest move of a constant in its deviation.
+    /// Moves the path and the constants by a `part` of the step; returns the largest move of a constant in its
+    /// deviation.
     ///
     /// # Errors
     /// The path left the numbers.
-    pub fn apply(&self, found: &mut Found, flight: &str) -> Result<f64, ReconstructError> {
+    pub fn apply(
+        &self,
+        found: &mut Found,
+        part: f64,
+        flight: &str,
+    ) -> Result<f64, ReconstructError> {
         let mut largest = 0.0_f64;
         for place in 0..COUNT {
-            let (step, deviation) = (self.constants[place], self.deviations[place]);
+            let (step, deviation) = (part * self.constants[place], self.deviations[place]);
             if deviation > 0.0 {
                 found.deviations[place] = deviation;
             }
@@ -349,7 +410,7 @@ impl<const N: usize> Solved<N> {
         for (path, moves) in found.paths.iter_mut().zip(&self.moves) {
             path.wind = wind;
             for (k, x) in moves.iter().enumerate() {
-                path.shift(k, x);
+                path.shift(k, &x.map(|x| part * x));
             }
         }
         if largest.is_finite() {

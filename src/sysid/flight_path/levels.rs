@@ -16,6 +16,9 @@ const FLOORS: [f64; CHANNELS] = [2e-5, 2e-5, 2e-5, 1e-3, 5e-5, 5e-5, 1e-3, 1e-3,
 const CARRIED: f64 = 30.0;
 /// Levels where too few samples tell: rad, m/s, rad, m/s.
 const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 0.5];
+/// Largest levels, colour included: errors of attitude, airspeed, vanes and velocity that somebody would still log. Without them a path
+/// that departs from a sensor makes that sensor count less, and departs further.
+const WIDEST: [f64; CHANNELS] = [0.05, 0.05, 0.1, 2.0, 0.1, 0.1, 1.0, 1.0, 1.0];
 /// What the velocity may do where no accelerometer says it, m/s².
 const UNKNOWN_FORCE: f64 = 3.0;
 /// Gusts of calm air, m/s.
@@ -95,6 +98,16 @@ impl Levels {
         }
     }
 
+    /// Raises the levels of gyros and accelerometers whose steps strain the path by more than they allow: one level for the
+    /// three axes of each. Returns the largest relative change.
+    pub fn loosen(&mut self, strain: &[f64; 6]) -> f64 {
+        let worst = |of: &[f64]| of.iter().copied().fold(1.0, f64::max);
+        let (turn, pull) = (worst(&strain[..3]), worst(&strain[3..]));
+        self.gyro.iter_mut().for_each(|level| *level *= turn);
+        self.force.iter_mut().for_each(|level| *level *= pull);
+        turn.max(pull).ln()
+    }
+
     /// Takes the levels anew from the residuals of every stretch; returns the largest relative change.
     pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
         let mut change = 0.0_f64;
@@ -107,7 +120,8 @@ impl Levels {
             if level.is_nan() {
                 continue;
             }
-            let level = level.max(self.white[channel]);
+            let level = level.max(self.white[channel]).min(WIDEST[channel]);
+            let colour = colour.min(WIDEST[channel] / level);
             change = change.max((level / self.measured[channel]).ln().abs());
             (self.measured[channel], self.colour[channel]) = (level, colour);
         }

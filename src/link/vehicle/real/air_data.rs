@@ -28,6 +28,9 @@ const CLIMB: f64 = 0.5;
 const SIDEWAYS: f64 = 5.0;
 /// Standard deviation of the sideways velocity by wind and ground velocity, m/s: that of the wind.
 const SIDEWAYS_BY_WIND: f64 = 0.5;
+/// Standard deviation of the angles that come out, rad: 0.2° and 0.4° beside real ArduPlane
+/// (`tests/firmware/acceptance.py`), 0.2° beside real PX4, in calm air; gusts add to it.
+pub const DEVIATION: f64 = 0.5 * std::f64::consts::PI / 180.0;
 /// Slowest airspeed at which angles mean anything, m/s.
 const SLOWEST: f64 = 3.0;
 
