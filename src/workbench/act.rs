@@ -2,13 +2,14 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use serde::Deserialize;
 
 use super::bench::{Bench, Inner, load};
 use super::error::WorkbenchError;
 use super::fit::scores;
+use super::fly::Order;
 use super::jobs::Work;
 use super::roles::now_s;
 use super::session::{Accepted, LogEntry, Occasion, Opening, Role};
@@ -84,6 +85,37 @@ pub enum Act {
         /// Its number.
         job: u64,
     },
+    /// Keep an effect that was written as text.
+    Write {
+        /// The text of its file.
+        text: String,
+    },
+    /// Take an effect that was written as text out of the session.
+    Forget {
+        /// Its id.
+        effect: String,
+    },
+    /// Search a formula for what no effect explains.
+    Propose,
+    /// Make a schedule that tells two effects apart.
+    Design {
+        /// Their ids.
+        between: [String; 2],
+    },
+    /// Fly the model in the simulator.
+    Fly(Order),
+    /// Watch a recording that another program is writing.
+    Watch {
+        /// Its folder.
+        folder: PathBuf,
+    },
+    /// End the flight.
+    StopFlight,
+    /// Take a recording as a log.
+    TakeFlight {
+        /// The flight, by its place in the session.
+        flown: usize,
+    },
 }
 
 impl Bench {
@@ -158,6 +190,19 @@ impl Bench {
                 self.cancel(job);
                 Ok(())
             }
+            Act::Write { text } => self.write_effect(seen, &text),
+            Act::Forget { effect } => self.forget(seen, &effect),
+            Act::Propose => {
+                self.same_model()?;
+                self.lock().searched_places()?;
+                self.start(Work::Proposal);
+                Ok(())
+            }
+            Act::Design { between } => self.start_design(between),
+            Act::Fly(order) => self.fly(seen, &order),
+            Act::Watch { folder } => self.watch(seen, &folder),
+            Act::StopFlight => self.stop_flight(),
+            Act::TakeFlight { flown } => self.take_flight(seen, flown),
         }
     }
 
@@ -171,6 +216,7 @@ impl Bench {
         {
             return Err(WorkbenchError::Name(name.into()));
         }
+        let _one_at_a_time = self.taking.lock().unwrap_or_else(PoisonError::into_inner);
         let place = PathBuf::from("logs").join(name);
         let file = self.folder.join(&place);
         // another log of that name keeps it

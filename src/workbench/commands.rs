@@ -19,6 +19,8 @@ pub struct Commands {
     pub compare: String,
     /// What it lacks.
     pub diagnose: String,
+    /// A formula for what is left; empty without a flight to test it on.
+    pub propose: String,
     /// The amended model; empty without accepted effects.
     pub amend: String,
     /// Both models on the test flights; empty without any.
@@ -37,7 +39,10 @@ impl Bench {
         let all: String =
             (0..inner.session.logs.len()).map(|k| format!(" {}", quoted(&inner.file(k)))).collect();
         let folder = self.folder.join(SAVED);
-        let effects: String = inner.session.effects.iter().map(|e| format!(" {}", e.id)).collect();
+        let word = |id: &str| format!(" {}", quoted(&inner.effect_word(id)));
+        let effects: String = inner.session.effects.iter().map(|e| word(&e.id)).collect();
+        let own: String = inner.session.own.iter().map(|id| word(id)).collect();
+        let own = if own.is_empty() { own } else { format!(" --effect{own}") };
         let anyway = match inner.session.effects.iter().any(|e| e.anyway) {
             true => " --accept-anyway",
             false => "",
@@ -62,7 +67,16 @@ impl Bench {
         Commands {
             flights: some(&all, format!("greylag logs info{all}{}", inner.mapping_words())),
             compare: some(&seen, compare(&seen, &[Role::Fit, Role::HoldOut])),
-            diagnose: some(&fit, format!("greylag diagnose --model {model} --log{fit}{to_fit}")),
+            diagnose: some(&fit, format!("greylag diagnose --model {model} --log{fit}{own}{to_fit}")),
+            propose: inner.searched_places().map_or_else(
+                |_| String::new(),
+                |places| {
+                    let [search, test] = places.map(|places| {
+                        places.iter().map(|k| format!(" {}", quoted(&inner.file(*k)))).collect::<String>()
+                    });
+                    format!("greylag propose --model {model} --log{search} --hold-out{test}{own}{both}")
+                },
+            ),
             amend: some(
                 &effects,
                 format!(
@@ -91,7 +105,7 @@ impl Inner {
 }
 
 /// A path as a shell takes it.
-fn quoted(path: &Path) -> String {
+pub(super) fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:@%,".contains(c);
     match text.chars().all(plain) {

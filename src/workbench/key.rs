@@ -5,6 +5,7 @@ use std::{fs, io};
 
 use super::bench::Inner;
 use super::session::{Accepted, Role};
+use crate::physics::formula::register;
 use crate::sysid::amend::document::sha256;
 
 impl Inner {
@@ -16,8 +17,14 @@ impl Inner {
             let named = places.iter().zip(self.names(&places));
             named.map(|(k, name)| self.session.logs[*k].sha256.clone() + &name).collect()
         };
-        let effects: Vec<String> =
-            effects.iter().map(|e| format!("{}{}", e.id, e.anyway)).collect();
+        let text = |id: &str| register::find(id).map_or("", |effect| effect.text.as_str());
+        let accepted = |e: &Accepted| format!("{}{}{}", e.id, e.anyway, text(&e.id));
+        let effects: Vec<String> = effects.iter().map(accepted).collect();
+        // what is searched for an effect tries those of files too
+        let tried: Vec<&str> = match what {
+            "diagnosis" | "proposal" => self.session.own.iter().map(|id| text(id)).collect(),
+            _ => Vec::new(),
+        };
         let all = [
             env!("CARGO_PKG_VERSION"),
             &self.session.model_sha256,
@@ -27,6 +34,7 @@ impl Inner {
             // a diagnosis does not look at flights held out
             &if what == "diagnosis" { String::new() } else { logs(Role::HoldOut) },
             &effects.join("+"),
+            &tried.concat(),
         ];
         format!("{what}-{}", &sha256(all.join("|").as_bytes())[..16])
     }
