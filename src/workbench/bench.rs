@@ -174,7 +174,10 @@ impl Bench {
     }
 
     /// Changes the session whatever its revision is, as when something ends by itself, and writes it.
-    pub(super) fn amend_session(&self, edit: impl FnOnce(&mut Inner)) -> Result<(), WorkbenchError> {
+    pub(super) fn amend_session(
+        &self,
+        edit: impl FnOnce(&mut Inner),
+    ) -> Result<(), WorkbenchError> {
         let mut inner = self.lock();
         edit(&mut inner);
         inner.session.revision += 1;

@@ -67,14 +67,22 @@ impl Bench {
         Commands {
             flights: some(&all, format!("greylag logs info{all}{}", inner.mapping_words())),
             compare: some(&seen, compare(&seen, &[Role::Fit, Role::HoldOut])),
-            diagnose: some(&fit, format!("greylag diagnose --model {model} --log{fit}{own}{to_fit}")),
+            diagnose: some(
+                &fit,
+                format!("greylag diagnose --model {model} --log{fit}{own}{to_fit}"),
+            ),
             propose: inner.searched_places().map_or_else(
                 |_| String::new(),
                 |places| {
                     let [search, test] = places.map(|places| {
-                        places.iter().map(|k| format!(" {}", quoted(&inner.file(*k)))).collect::<String>()
+                        places
+                            .iter()
+                            .map(|k| format!(" {}", quoted(&inner.file(*k))))
+                            .collect::<String>()
                     });
-                    format!("greylag propose --model {model} --log{search} --hold-out{test}{own}{both}")
+                    format!(
+                        "greylag propose --model {model} --log{search} --hold-out{test}{own}{both}"
+                    )
                 },
             ),
             amend: some(

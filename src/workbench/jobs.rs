@@ -16,6 +16,9 @@ use crate::sysid::amend::tune;
 use crate::sysid::diagnose::{Options, diagnose};
 use crate::sysid::progress::{FirstLook, Progress, Stage, part};
 
+/// The effects of files that a diagnosis has tried, in what the workbench keeps of it.
+pub(super) const TRIED: &str = "tried";
+
 /// What a job works out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -200,13 +203,22 @@ impl Bench {
 
     /// Diagnoses the model as given over the flights to fit to; the prior is tuned behind it, for fits to come.
     fn diagnose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
-        let ([key, tuned_key], model, flights, divided, with) = {
+        let ([key, tuned_key], model, flights, divided, with, tried) = {
             let inner = self.lock();
             let keys = [Work::Diagnosis.word(), "tuned"].map(|what| inner.key(what, &[]));
-            (keys, inner.model.clone(), inner.to_fit()?, inner.divided(), inner.session.own.clone())
+            (
+                keys,
+                inner.model.clone(),
+                inner.to_fit()?,
+                inner.divided(),
+                inner.session.own.clone(),
+                inner.tried(),
+            )
         };
-        let diagnosis = diagnose(&model, &flights, &Options { with, ..Options::default() }, progress)?;
-        let value = serde_json::to_value(&diagnosis)?;
+        let diagnosis =
+            diagnose(&model, &flights, &Options { with, ..Options::default() }, progress)?;
+        let mut value = serde_json::to_value(&diagnosis)?;
+        value[TRIED] = tried;
         write_over(&self.result_file(&key), value.to_string())?;
         self.lock().diagnosis = Some((key, Arc::new(value)));
         self.changed();

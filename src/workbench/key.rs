@@ -20,11 +20,6 @@ impl Inner {
         let text = |id: &str| register::find(id).map_or("", |effect| effect.text.as_str());
         let accepted = |e: &Accepted| format!("{}{}{}", e.id, e.anyway, text(&e.id));
         let effects: Vec<String> = effects.iter().map(accepted).collect();
-        // what is searched for an effect tries those of files too
-        let tried: Vec<&str> = match what {
-            "diagnosis" | "proposal" => self.session.own.iter().map(|id| text(id)).collect(),
-            _ => Vec::new(),
-        };
         let all = [
             env!("CARGO_PKG_VERSION"),
             &self.session.model_sha256,
@@ -34,7 +29,6 @@ impl Inner {
             // a diagnosis does not look at flights held out
             &if what == "diagnosis" { String::new() } else { logs(Role::HoldOut) },
             &effects.join("+"),
-            &tried.concat(),
         ];
         format!("{what}-{}", &sha256(all.join("|").as_bytes())[..16])
     }

@@ -17,6 +17,7 @@ use crate::physics::effects::Description;
 use crate::physics::formula::expression::Function;
 use crate::physics::formula::{Status, Variable, file, register};
 use crate::report::write_over;
+use crate::sysid::amend::document::sha256;
 use crate::sysid::compare::{self, ChannelId, compare};
 use crate::sysid::diagnose::{Curve, over_the_best};
 use crate::sysid::progress::unheard;
@@ -203,6 +204,12 @@ impl Inner {
             register::load(&effect_file(&self.folder, id))?;
         }
         Ok(())
+    }
+
+    /// The effects of files as a diagnosis tries them now.
+    pub(super) fn tried(&self) -> Value {
+        let text = |id: &String| register::find(id).map_or("", |effect| effect.text.as_str());
+        self.session.own.iter().map(|id| json!([id, sha256(text(id).as_bytes())])).collect()
     }
 
     /// The effects that were written as text.

@@ -12,7 +12,7 @@ use super::curves::{FlightData, data, named};
 use super::error::WorkbenchError;
 use super::flights::{Loaded, Strip};
 use super::fly;
-use super::jobs::{Job, Work};
+use super::jobs::{Job, TRIED, Work};
 use super::own::OwnView;
 use super::proposal::Designed;
 use super::session::{Flown, Opening, Role};
@@ -254,8 +254,12 @@ impl Bench {
 /// Whether a result is there, or why not.
 fn result(inner: &Inner, known: &Option<(String, Arc<Value>)>, work: Work) -> Value {
     let key = inner.key(work.word(), &[]);
+    let known = known.as_ref().filter(|(of, _)| *of == key);
+    let tried = known.map_or(&Value::Null, |(_, value)| &value[TRIED]);
     json!({
-        "there": known.as_ref().is_some_and(|(of, _)| *of == key),
+        "there": known.is_some(),
+        // a diagnosis of before the last effect was written does not rank it
+        "behind": tried.is_array() && *tried != inner.tried(),
         "error": inner.failures.get(&key),
         "key": key,
     })

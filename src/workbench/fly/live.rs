@@ -161,10 +161,8 @@ impl Watcher {
     }
 
     fn empty(&self) -> Live {
-        let watched = |(model, _): &(String, Monitor)| Watched {
-            model: model.clone(),
-            ..Watched::default()
-        };
+        let watched =
+            |(model, _): &(String, Monitor)| Watched { model: model.clone(), ..Watched::default() };
         Live { models: self.models.iter().map(watched).collect(), ..Live::default() }
     }
 

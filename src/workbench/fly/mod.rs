@@ -13,9 +13,9 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+pub(super) use live::channels;
 pub use live::{Heard, Live};
 pub use order::Order;
-pub(super) use live::channels;
 pub(super) use order::{AIRCRAFT, SCHEDULES, controllers};
 
 use super::bench::Bench;
@@ -97,9 +97,7 @@ impl Bench {
             command: order::line(&words),
             ..Flown::new(PathBuf::from(FLIGHTS).join(number.to_string()))
         };
-        self.begin(seen, begun, || {
-            Program::start(&words).map(Some).map_err(|e| io(&record, e))
-        })
+        self.begin(seen, begun, || Program::start(&words).map(Some).map_err(|e| io(&record, e)))
     }
 
     /// Watches the recording in `folder`, which another program is writing.

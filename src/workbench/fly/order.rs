@@ -52,15 +52,19 @@ impl Inner {
     pub fn schedules(&self) -> Vec<Choice> {
         let attitudes = Choice {
             id: ATTITUDES.into(),
-            description: "Six attitudes of 8 s each, easy ones first, as greylag demo flies them.".into(),
+            description: "Six attitudes of 8 s each, easy ones first, as greylag demo flies them."
+                .into(),
         };
-        let of_menu = MENU.iter().map(|m| Choice {
-            id: m.name.into(),
-            description: m.description.into(),
-        });
+        let of_menu =
+            MENU.iter().map(|m| Choice { id: m.name.into(), description: m.description.into() });
         let own = self.designed.iter().map(|d| Choice {
             id: d.name.clone(),
-            description: format!("{} {} times: tells {} apart.", d.manoeuvre, d.times, d.between.join(" and ")),
+            description: format!(
+                "{} {} times: tells {} apart.",
+                d.manoeuvre,
+                d.times,
+                d.between.join(" and ")
+            ),
         });
         std::iter::once(attitudes).chain(own).chain(of_menu).collect()
     }
@@ -70,7 +74,9 @@ impl Inner {
         let key = self.key("fit", &self.session.effects);
         let fitted = self.fits.get(&key).filter(|f| !f.all_refused());
         match fitted {
-            Some(_) => self.folder.join("fits").join(key).join(crate::sysid::amend::document::MODEL),
+            Some(_) => {
+                self.folder.join("fits").join(key).join(crate::sysid::amend::document::MODEL)
+            }
             None => self.session.model.clone(),
         }
     }
@@ -94,8 +100,7 @@ impl Order {
         model: &Path,
         record: &Path,
     ) -> Result<Vec<String>, WorkbenchError> {
-        Kind::from_str(&self.controller)
-            .map_err(|e| WorkbenchError::Order(format!("{e}")))?;
+        Kind::from_str(&self.controller).map_err(|e| WorkbenchError::Order(format!("{e}")))?;
         if !AIRCRAFT.contains(&self.aircraft.as_str()) {
             return Err(WorkbenchError::Order(format!("there is no aircraft {:?}", self.aircraft)));
         }
@@ -109,7 +114,9 @@ impl Order {
         for hidden in self.hide.split_whitespace() {
             let plain = |c: char| c.is_ascii_alphanumeric() || "_=.,+-".contains(c);
             if !hidden.contains('=') || !hidden.chars().all(plain) {
-                let why = format!("{hidden:?} is no hidden effect; write ID=AMPLITUDE, such as drag_beta2=1.0");
+                let why = format!(
+                    "{hidden:?} is no hidden effect; write ID=AMPLITUDE, such as drag_beta2=1.0"
+                );
                 return Err(WorkbenchError::Order(why));
             }
             words.push(format!("--hide={hidden}"));
