@@ -65,8 +65,11 @@ pub fn channels() -> [[String; 2]; 6] {
     std::array::from_fn(|k| [RESIDUALS[k].to_owned(), Channel::ALL[k].to_string()])
 }
 
+/// A value of a row.
+type Get = fn(&Sample) -> f64;
+
 /// States and targets of a row, °, m/s, m.
-const STATES: [(&str, fn(&Sample) -> f64); 9] = [
+const STATES: [(&str, Get); 9] = [
     ("V", |s| s.airspeed_mps),
     ("alpha", |s| s.alpha_rad.to_degrees()),
     ("beta", |s| s.beta_rad.to_degrees()),

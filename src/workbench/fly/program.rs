@@ -63,8 +63,8 @@ impl Program {
     pub fn last_words(&self) -> String {
         let [out, errors] = [self.lines(0), self.lines(1)];
         let words = if self.is_whole() { &out } else { &errors };
-        let useful = words.iter().filter(|l| !l.trim().is_empty() && !l.starts_with(WHOLE));
-        useful.last().cloned().unwrap_or_default()
+        let mut useful = words.iter().filter(|l| !l.trim().is_empty() && !l.starts_with(WHOLE));
+        useful.next_back().cloned().unwrap_or_default()
     }
 
     fn lines(&self, of: usize) -> Vec<String> {
