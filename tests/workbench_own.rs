@@ -160,6 +160,7 @@ fn a_flight_is_watched_stopped_recorded_and_taken_as_a_log() {
     assert!(state["flown"][0]["seconds"].as_f64().unwrap() >= 4.0);
     let (status, state) = bench.act(json!({ "do": "take_flight", "flown": 0 }));
     assert_eq!((status, &state["flights"][0]["name"]), (200, &json!("flown-1.csv")), "{state}");
+    assert_eq!(state["flights"][0]["role"], "unused");
 
     // the recording of any program is watched in the same way
     let folder = session.join("flights/1");

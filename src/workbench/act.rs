@@ -211,6 +211,17 @@ impl Bench {
     /// # Errors
     /// It is no log or cannot be used, is there already, or cannot be kept.
     pub fn take(&self, seen: u64, name: &str, bytes: &[u8]) -> Result<(), WorkbenchError> {
+        self.take_as(seen, name, bytes, None)
+    }
+
+    /// Takes a log with a role, or with the usual one.
+    pub(super) fn take_as(
+        &self,
+        seen: u64,
+        name: &str,
+        bytes: &[u8],
+        role: Option<Role>,
+    ) -> Result<(), WorkbenchError> {
         let plain = |c: char| c.is_alphanumeric() || "._- +()".contains(c);
         if name.is_empty() || name.starts_with('.') || name.len() > 200 || !name.chars().all(plain)
         {
@@ -237,7 +248,7 @@ impl Bench {
         if !known {
             write_over(&file, bytes)?;
         }
-        self.add(seen, place, bytes).inspect_err(|_| {
+        self.add(seen, place, bytes, role).inspect_err(|_| {
             if !known {
                 let _ = fs::remove_file(&file);
             }

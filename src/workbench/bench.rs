@@ -192,14 +192,20 @@ impl Bench {
     fn add_file(&self, path: &Path) -> Result<(), WorkbenchError> {
         let path = fs::canonicalize(path).map_err(|e| io(path, e))?;
         let bytes = fs::read(&path).map_err(|e| io(&path, e))?;
-        match self.add(self.revision(), path, &bytes) {
+        match self.add(self.revision(), path, &bytes, None) {
             Err(WorkbenchError::Twice(_)) => Ok(()),
             other => other,
         }
     }
 
-    /// Adds a log with its content; `path` is where it stands.
-    pub(super) fn add(&self, seen: u64, path: PathBuf, bytes: &[u8]) -> Result<(), WorkbenchError> {
+    /// Adds a log with its content; `path` is where it stands. Without a `role` it takes the usual one.
+    pub(super) fn add(
+        &self,
+        seen: u64,
+        path: PathBuf,
+        bytes: &[u8],
+        role: Option<Role>,
+    ) -> Result<(), WorkbenchError> {
         let sha256 = sha256(bytes);
         let entry = LogEntry { path, sha256, role: Role::Unused };
         let name = entry.name();
@@ -213,7 +219,7 @@ impl Bench {
         };
         let loaded = Loaded::parse(bytes, &name, &options, &model)?;
         self.change(seen, |inner| {
-            inner.take_in(entry, loaded);
+            inner.take_in(entry, role, loaded);
             Ok(())
         })
     }

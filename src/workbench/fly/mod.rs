@@ -22,7 +22,7 @@ use super::bench::Bench;
 use super::error::{WorkbenchError, io};
 use super::jobs::{Event, Stop};
 use super::roles::now_s;
-use super::session::{Flown, Outcome};
+use super::session::{Flown, Outcome, Role};
 use crate::logs::Growing;
 use crate::model::GreyBox;
 use live::Watcher;
@@ -173,7 +173,8 @@ impl Bench {
             (self.folder.join(&flown.folder).join(LOG), format!("flown-{name}.csv"))
         };
         let bytes = std::fs::read(&file).map_err(|e| io(&file, e))?;
-        self.take(seen, &name, &bytes)
+        // results are about the flights with a role: they stay until this one is given one
+        self.take_as(seen, &name, &bytes, Some(Role::Unused))
     }
 
     /// The whole flight that is flown, or was last.
