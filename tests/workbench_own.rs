@@ -9,7 +9,8 @@ use std::path::Path;
 use std::process::Command;
 
 use amend_support::{Manoeuvres, errors, fly, sensors};
-use greylag::logs::csv;
+use greylag::logs::{Flight, Growing, Sample, csv};
+use greylag::workbench::Order;
 use serde_json::{Value, json};
 use workbench_support::{Bench, MODEL, word};
 
@@ -264,4 +265,51 @@ fn a_schedule_tells_two_effects_apart_as_the_command_does() {
     assert_eq!(status, 200, "{said}");
     let state = bench.until("the failure", |s| s["schedule"]["error"].is_string());
     assert!(state["schedule"]["error"].as_str().unwrap().contains("name two effects"));
+}
+
+#[test]
+fn rows_of_a_growing_log_come_whole_and_once_wherever_it_is_cut() {
+    let sample = |k: u32| Sample { time_s: f64::from(k), airspeed_mps: 20.0, ..Default::default() };
+    let flight = Flight { samples: (0..20).map(sample).collect(), ..Default::default() };
+    let mut text = Vec::new();
+    csv::write(&flight, &mut text).unwrap();
+    for size in [1, 7, 100, text.len()] {
+        let mut growing = Growing::default();
+        let parts = text.chunks(size).map(|part| growing.take(part, Path::new("a.csv")).unwrap());
+        let times: Vec<f64> = parts.flatten().map(|s| s.time_s).collect();
+        assert_eq!(times, (0..20).map(f64::from).collect::<Vec<_>>(), "in parts of {size}");
+    }
+}
+
+#[test]
+fn an_order_is_words_that_a_command_line_takes_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let order = |schedule: &str, controller: &str, aircraft: &str, hide: &str| Order {
+        schedule: schedule.into(),
+        controller: controller.into(),
+        aircraft: aircraft.into(),
+        hide: hide.into(),
+        turbulence: Some(3),
+        seed: 1,
+    };
+    let words =
+        |order: &Order| order.words(folder.path(), Path::new("model.toml"), Path::new("out"));
+    let said = words(&order("attitudes", "lqi", "x8", "drag_beta2=1 actuator_lag=0.05")).unwrap();
+    let said = said.join(" ");
+    assert!(said.ends_with("--hide=drag_beta2=1 --hide=actuator_lag=0.05 --turbulence-severity 3 --seed 1 --out out"), "{said}");
+    assert!(!said.contains("--schedule"), "{said}");
+    // a manoeuvre of the menu becomes a file
+    let said = words(&order("elevator-3211", "lqi", "x8", "")).unwrap();
+    let at = said.iter().position(|w| w == "--schedule").unwrap();
+    assert!(Path::new(&said[at + 1]).exists());
+    for wrong in [
+        order("attitudes", "lqi", "x8", "--out=/etc/x"),
+        order("attitudes", "lqi", "x8", "nothing"),
+        order("../model", "lqi", "x8", ""),
+        order("none", "lqi", "x8", ""),
+        order("attitudes", "--help", "x8", ""),
+        order("attitudes", "lqi", "/etc", ""),
+    ] {
+        assert!(words(&wrong).is_err(), "{wrong:?}");
+    }
 }

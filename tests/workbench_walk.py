@@ -242,6 +242,7 @@ def fly(browser, folder):
     click(browser, "[data-flown]")
     wait(browser, f"document.querySelectorAll('.flight').length == {flights + 1}", 60, "the flight is a log")
     found += accessible(browser, "flown")
+    found += by_keyboard(browser)
     browser.value("document.getElementById('flown').scrollIntoView()")
     found += shoot(browser, folder, "8-flown")
     click(browser, "#show-failing")

@@ -36,25 +36,3 @@ impl Growing {
         Ok(csv::raw(&table, path, &Mapping::default())?.rows)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::logs::Flight;
-
-    #[test]
-    fn rows_come_whole_and_once_wherever_the_file_is_cut() {
-        let sample =
-            |k: u32| Sample { time_s: f64::from(k), airspeed_mps: 20.0, ..Default::default() };
-        let flight = Flight { samples: (0..20).map(sample).collect(), ..Default::default() };
-        let mut text = Vec::new();
-        csv::write(&flight, &mut text).unwrap();
-        for size in [1, 7, 100, text.len()] {
-            let mut growing = Growing::default();
-            let parts =
-                text.chunks(size).map(|part| growing.take(part, Path::new("a.csv")).unwrap());
-            let times: Vec<f64> = parts.flatten().map(|s| s.time_s).collect();
-            assert_eq!(times, (0..20).map(f64::from).collect::<Vec<_>>(), "in parts of {size}");
-        }
-    }
-}

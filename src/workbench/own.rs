@@ -251,30 +251,3 @@ impl Inner {
 fn effect_file(folder: &Path, id: &str) -> PathBuf {
     folder.join(EFFECTS).join(format!("{id}.toml"))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_wrong_text_is_answered_with_its_line_and_a_cure() {
-        assert_eq!(check(EXAMPLE).unwrap().id, "yaw_by_throttle");
-        let wrong = EXAMPLE.replace("k*throttle", "k*throtle");
-        let said = check(&wrong).unwrap_err().to_string();
-        assert!(said.contains("line") && said.contains("throtle"), "{said}");
-    }
-
-    #[test]
-    fn an_effect_is_taken_out_of_a_model_whole() {
-        let mut model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
-        register::read(EXAMPLE).unwrap();
-        model.join("yaw_by_throttle", &[1.5]).unwrap();
-        let without = zeroed(&model, "yaw_by_throttle").unwrap();
-        let value = |m: &GreyBox| {
-            m.coefficients().iter().find(|c| c.name == "yaw_by_throttle.k").unwrap().value
-        };
-        assert_eq!([value(&model), value(&without)], [1.5, 0.0]);
-        // a lag has no coefficient that multiplies it
-        assert!(zeroed(&model, "actuator_lag").is_none());
-    }
-}

@@ -74,12 +74,16 @@ async function check() {
     mark(found.error);
   } catch (error) { complain(error.message); }
 }
-/** The line that the parser names stands marked in the gutter of the text. */
+/** A way to the line that the parser names. */
 function mark(error) {
   const line = +(/line (\d+)/.exec(error ?? "")?.[1] ?? 0);
-  parts.area.dataset.line = line || "";
-  if (!line || document.activeElement === parts.area) return;
-  parts.area.scrollTop = Math.max(0, (line - 4) * 17);
+  if (line) parts.said.append(" ", el("button", { type: "button", onclick: () => go_to(line) }, `Go to line ${line}`));
+}
+function go_to(line) {
+  const lines = parts.area.value.split("\n");
+  const start = lines.slice(0, line - 1).reduce((sum, l) => sum + l.length + 1, 0);
+  parts.area.focus();
+  parts.area.setSelectionRange(start, start + (lines[line - 1] ?? "").length);
 }
 async function keep(and_try) {
   const found = await post("/api/check", { text: parts.area.value }).catch((error) => ({ error: error.message }));
