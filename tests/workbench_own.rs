@@ -241,7 +241,7 @@ fn a_schedule_tells_two_effects_apart_as_the_command_does() {
     let scratch = tempfile::tempdir().unwrap();
     let session = scratch.path().join("session");
     let bench = Bench::open(&session, &["--model", MODEL]);
-    let between = ["actuator_lag", "drag_beta2"];
+    let between = ["actuator_lag", "time_delay"];
     assert_eq!(bench.act(json!({ "do": "design", "between": between })).0, 200);
     let state = bench.until("the schedule", |s| s["designed"][0]["name"].is_string());
     let designed = &state["designed"][0];

@@ -158,7 +158,7 @@ def measure(browser, greylag, flights, place):
     row("cancel a diagnosis", time.monotonic() - begun, "s", 0.1)
 
     click(browser, "input[name=role-1][value=hold_out]")
-    wait(browser, "document.querySelector('input[name=role-1][value=hold_out]').checked", 30, "the role")
+    wait(browser, "!document.querySelector('.suspect')", 30, "the diagnosis of the other roles goes")
     click(browser, "#diagnose")
     wait(browser, "document.querySelector('.suspect')", 300, "the diagnosis")
     wait(browser, "!document.querySelector('#job progress')", 300, "the prior is tuned")
