@@ -282,7 +282,7 @@ fn what_must_be_refused_is_refused_in_words() {
     let (_, state) = bench.act(role("fit"));
     let line = state["commands"]["diagnose"].as_str().unwrap();
     assert!(line.contains("--mapping '") && line.contains("--despite-problems"), "{line}");
-    commands_are_understood(&state, &model, &["flights", "compare", "diagnose"]);
+    commands_are_understood(&state, &model, &["flights", "compare", "diagnose", "propose"]);
 
     // two programs: the second one is refused
     let second = Command::new(env!("CARGO_BIN_EXE_greylag"))
