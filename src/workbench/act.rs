@@ -127,14 +127,7 @@ impl Bench {
         let seen = request.revision;
         match request.act {
             Act::Role { flight, role } => self.change(seen, |inner| inner.give_role(flight, role)),
-            Act::Remove { flight } => self.change(seen, |inner| {
-                if flight >= inner.session.logs.len() {
-                    return Err(WorkbenchError::NoFlight(flight));
-                }
-                inner.session.logs.remove(flight);
-                drop(inner.flights.remove(flight));
-                Ok(())
-            }),
+            Act::Remove { flight } => self.remove(seen, flight),
             Act::Map { flight, column, scale } => self.map(seen, flight, &column, scale),
             Act::Diagnose => {
                 self.same_model()?;
@@ -143,38 +136,9 @@ impl Bench {
                 Ok(())
             }
             Act::Tick { effect } => self.tick(seen, effect),
-            Act::Keep => {
-                self.change(seen, |inner| {
-                    let last = inner.session.effects.last_mut();
-                    last.ok_or(WorkbenchError::Nothing("keep"))?.anyway = true;
-                    Ok(())
-                })?;
-                self.start(Work::Fit);
-                Ok(())
-            }
-            Act::Undo => {
-                self.change(seen, |inner| {
-                    let last = inner.session.effects.pop();
-                    inner.session.undone.push(last.ok_or(WorkbenchError::Nothing("take back"))?);
-                    inner.supersede(Work::Fit);
-                    Ok(())
-                })?;
-                // what is left may not be fitted: the fit of all of it was cut off, or a flight has another role
-                self.start(Work::Fit);
-                Ok(())
-            }
-            Act::Redo => {
-                self.change(seen, |inner| {
-                    let last = inner.session.undone.pop();
-                    inner
-                        .session
-                        .effects
-                        .push(last.ok_or(WorkbenchError::Nothing("accept again"))?);
-                    Ok(())
-                })?;
-                self.start(Work::Fit);
-                Ok(())
-            }
+            Act::Keep => self.keep(seen),
+            Act::Undo => self.undo(seen),
+            Act::Redo => self.redo(seen),
             Act::Fit => {
                 self.same_model()?;
                 self.start(Work::Fit);
@@ -204,6 +168,53 @@ impl Bench {
             Act::StopFlight => self.stop_flight(),
             Act::TakeFlight { flown } => self.take_flight(seen, flown),
         }
+    }
+
+    /// Takes a log out of the session.
+    fn remove(&self, seen: u64, flight: usize) -> Result<(), WorkbenchError> {
+        self.change(seen, |inner| {
+            if flight >= inner.session.logs.len() {
+                return Err(WorkbenchError::NoFlight(flight));
+            }
+            inner.session.logs.remove(flight);
+            drop(inner.flights.remove(flight));
+            Ok(())
+        })
+    }
+
+    /// Keeps the effect accepted last though the data refuse it.
+    fn keep(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
+        self.change(seen, |inner| {
+            let last = inner.session.effects.last_mut();
+            last.ok_or(WorkbenchError::Nothing("keep"))?.anyway = true;
+            Ok(())
+        })?;
+        self.start(Work::Fit);
+        Ok(())
+    }
+
+    /// Takes the effect accepted last back.
+    fn undo(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
+        self.change(seen, |inner| {
+            let last = inner.session.effects.pop();
+            inner.session.undone.push(last.ok_or(WorkbenchError::Nothing("take back"))?);
+            inner.supersede(Work::Fit);
+            Ok(())
+        })?;
+        // what is left may not be fitted: the fit of all of it was cut off, or a flight has another role
+        self.start(Work::Fit);
+        Ok(())
+    }
+
+    /// Accepts again what was taken back last.
+    fn redo(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
+        self.change(seen, |inner| {
+            let last = inner.session.undone.pop();
+            inner.session.effects.push(last.ok_or(WorkbenchError::Nothing("accept again"))?);
+            Ok(())
+        })?;
+        self.start(Work::Fit);
+        Ok(())
     }
 
     /// Takes a log that a page has sent, called `name`.

@@ -71,20 +71,7 @@ impl Bench {
                 &fit,
                 format!("greylag diagnose --model {model} --log{fit}{own}{to_fit}"),
             ),
-            propose: inner.searched_places().map_or_else(
-                |_| String::new(),
-                |places| {
-                    let [search, test] = places.map(|places| {
-                        places
-                            .iter()
-                            .map(|k| format!(" {}", quoted(&inner.file(*k))))
-                            .collect::<String>()
-                    });
-                    format!(
-                        "greylag propose --model {model} --log{search} --hold-out{test}{own}{both}"
-                    )
-                },
-            ),
+            propose: inner.propose_command(&own),
             amend: some(
                 &effects,
                 format!(
@@ -97,6 +84,19 @@ impl Bench {
 }
 
 impl Inner {
+    /// The command that searches a formula, with the options that name the `own` effects; empty if no flight is left to
+    /// test it on.
+    fn propose_command(&self, own: &str) -> String {
+        let Ok(places) = self.searched_places() else { return String::new() };
+        let named = |places: Vec<usize>| -> String {
+            places.iter().map(|k| format!(" {}", quoted(&self.file(*k)))).collect()
+        };
+        let [search, test] = places.map(named);
+        let model = quoted(&self.session.model);
+        let both = self.reading_words(&[Role::Fit, Role::HoldOut]);
+        format!("greylag propose --model {model} --log{search} --hold-out{test}{own}{both}")
+    }
+
     /// How a command must read logs.
     fn mapping_words(&self) -> String {
         let mapping = self.mapping.file.iter().map(|file| format!(" --mapping {}", quoted(file)));
