@@ -137,10 +137,9 @@ function proposal() {
   const said = state.proposal.error && el("p", { class: "bad" }, state.proposal.error);
   const list = [el("div", { class: "row" }, ask), said];
   if (found) {
-    const { effect, refused, sentences, front, grades, held_out } = found;
-    const sure = grades && `Sure: ${Object.entries(grades).filter(([, yes]) => yes).map(([what]) => what).join(", ") || "nothing"}; open: ${Object.entries(grades).filter(([, yes]) => !yes).map(([what]) => what).join(", ") || "nothing"}.`;
-    const test = held_out && `On ${held_out.flights.join(", ")} it removes ${show(100 * held_out.removed)} % of the error (fall ${show(held_out.fall)}, chance reaches ${show(held_out.threshold)}).`;
-    list.push(el("div", { class: `verdict ${effect ? "effect" : "unexplained"}` }, sentences.map((s) => el("p", {}, s)), refused.map((s) => el("p", { class: "bad" }, s)), sure && el("p", {}, sure), test && el("p", {}, test)));
+    const { effect, refused, sentences, front } = found;
+    // the sentences say how far it may be trusted, and what the test found
+    list.push(el("div", { class: `verdict ${effect ? "effect" : "unexplained"}` }, sentences.map((s) => el("p", {}, s)), refused.filter((s) => !sentences.includes(s)).map((s) => el("p", { class: "bad" }, s))));
     if (front.length) list.push(el("details", {}, el("summary", {}, "Formulas by size"), el("ul", {}, front.map((r) => el("li", {}, `${r.formula}: removes ${show(100 * r.removed)} %, evidence of its last term ${show(r.evidence)}, chance reaches ${show(r.threshold)}${r.chosen ? " (chosen)" : ""}`)))));
     if (effect) list.push(el("div", { class: "row" }, el("button", { type: "button", id: "proposal-edit", onclick: () => put(effect) }, "Open it as text")));
     // as it comes, unless something is being written
