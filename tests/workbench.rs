@@ -2,120 +2,19 @@
 #![cfg(feature = "sitl")]
 
 mod amend_support;
+mod workbench_support;
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use amend_support::{Manoeuvres, errors, fly, sensors};
 use greylag::logs::{Flight, csv};
 use serde_json::{Value, json};
-
-const MODEL: &str = "params/x8/jsbsim.toml";
-/// What any answer of the program may take here: other tests run beside this one on two cores.
-const PATIENCE: Duration = Duration::from_secs(300);
-
-/// The program with its address and token; it is killed when dropped, as by `kill -9`.
-struct Bench {
-    child: Child,
-    host: String,
-    token: String,
-}
-
-impl Bench {
-    fn open(folder: &Path, more: &[&str]) -> Bench {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_greylag"))
-            .args(["workbench", "--dir", folder.to_str().unwrap()])
-            .args(more)
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let address = line.split_whitespace().last().unwrap_or_default();
-        let (host, token) =
-            address.strip_prefix("http://").unwrap().split_once("/?token=").unwrap();
-        Bench { child, host: host.into(), token: token.into() }
-    }
-
-    /// A request with these header lines; status, head and body of the answer.
-    fn raw(&self, method: &str, path: &str, headers: &str, body: &[u8]) -> (u16, String, Vec<u8>) {
-        let mut stream = TcpStream::connect(&self.host).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
-        let length = body.len();
-        let head = format!(
-            "{method} {path} HTTP/1.1\r\nConnection: close\r\nContent-Length: {length}\r\n{headers}\r\n"
-        );
-        stream.write_all(head.as_bytes()).unwrap();
-        // a request that is refused early is not read to its end
-        let _ = stream.write_all(body);
-        let mut answer = Vec::new();
-        let _ = stream.read_to_end(&mut answer);
-        let end = answer.windows(4).position(|w| w == b"\r\n\r\n").expect("an answer with a head");
-        let head = String::from_utf8_lossy(&answer[..end]).into_owned();
-        let status = head.split(' ').nth(1).unwrap().parse().unwrap();
-        (status, head, answer[end + 4..].to_vec())
-    }
-
-    fn headers(&self) -> String {
-        format!(
-            "Host: {}\r\nAuthorization: Bearer {}\r\nContent-Type: application/json\r\n",
-            self.host, self.token
-        )
-    }
-
-    fn ask(&self, method: &str, path: &str, body: &[u8]) -> (u16, Value) {
-        let (status, _, body) = self.raw(method, path, &self.headers(), body);
-        (status, serde_json::from_slice(&body).unwrap_or(Value::Null))
-    }
-
-    fn get(&self, path: &str) -> (u16, Value) {
-        self.ask("GET", path, b"")
-    }
-
-    fn state(&self) -> Value {
-        self.get("/api/state").1
-    }
-
-    /// Asks for a change at the session's present revision.
-    fn act(&self, act: Value) -> (u16, Value) {
-        self.act_at(self.state()["revision"].as_u64().unwrap(), act)
-    }
-
-    fn act_at(&self, revision: u64, act: Value) -> (u16, Value) {
-        let request = json!({ "revision": revision, "act": act });
-        self.ask("POST", "/api/act", request.to_string().as_bytes())
-    }
-
-    fn drop_file(&self, name: &str, content: &[u8]) -> (u16, Value) {
-        let revision = self.state()["revision"].as_u64().unwrap();
-        self.ask("POST", &format!("/api/logs?name={name}&revision={revision}"), content)
-    }
-
-    /// Waits until the state is as wanted.
-    fn until(&self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
-        let begun = Instant::now();
-        loop {
-            let state = self.state();
-            if wanted(&state) {
-                return state;
-            }
-            assert!(begun.elapsed() < PATIENCE, "{what}: {state}");
-            std::thread::sleep(Duration::from_millis(100));
-        }
-    }
-}
-
-impl Drop for Bench {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
+use workbench_support::{Bench, MODEL, PATIENCE, word};
 
 /// Three logs of an aircraft whose actuators lag by 50 ms, which the model does not know.
 fn logs(folder: &Path) -> Vec<PathBuf> {
@@ -131,10 +30,6 @@ fn logs(folder: &Path) -> Vec<PathBuf> {
 fn flown(k: u64) -> Flight {
     let flown = fly("actuator_lag=0.05", 25.0, Manoeuvres::Usual, 20 + k);
     sensors::spoil(&flown, &errors(20 + k), k)
-}
-
-fn word(value: &Value) -> &str {
-    value["error"].as_str().unwrap_or_default()
 }
 
 /// The model with an effect of a file in it, which is zero and so stays as it is, in `folder`.
@@ -232,7 +127,11 @@ fn drop_see_tick_judge_save_and_go_on_after_a_kill() {
     let (_, failing) = bench.get("/api/failing");
     assert_eq!(failing["models"][1]["name"], "jsbsim+actuator_lag");
 
-    commands_are_understood(&state, &model, &["flights", "compare", "diagnose", "amend", "judge"]);
+    commands_are_understood(
+        &state,
+        &model,
+        &["flights", "compare", "diagnose", "propose", "amend", "judge"],
+    );
 
     // judge: counted and written before it is shown
     let (status, state) = bench.act(json!({ "do": "judge" }));
@@ -383,7 +282,7 @@ fn what_must_be_refused_is_refused_in_words() {
     let (_, state) = bench.act(role("fit"));
     let line = state["commands"]["diagnose"].as_str().unwrap();
     assert!(line.contains("--mapping '") && line.contains("--despite-problems"), "{line}");
-    commands_are_understood(&state, &model, &["flights", "compare", "diagnose"]);
+    commands_are_understood(&state, &model, &["flights", "compare", "diagnose", "propose"]);
 
     // two programs: the second one is refused
     let second = Command::new(env!("CARGO_BIN_EXE_greylag"))

@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""Walks through the workbench in headless Chromium: drop, see, tick, judge, save; prints how long each step took.
+"""Walks through the workbench in headless Chromium: drop, see, tick, judge, save, fly, write an effect, cancel a search;
+prints how long each step took.
 
     tests/workbench_walk.py GREYLAG FLIGHTS FOLDER
 
 GREYLAG is the program, FLIGHTS a folder made by `greylag mystery`. Writes FOLDER/*.png at 1400 and 390 pixels, light and
 dark, and fails on any console message of level error, exception, request to another address, text wider than the page,
-or step that does not come to its end. Needs Debian's `chromium` (or $CHROMIUM); no Python package.
+or step that does not come to its end. The page is walked by the Tab key, and looked through by axe-core where $AXE_CORE
+names its axe.min.js (npm install axe-core). Needs Debian's `chromium` (or $CHROMIUM); no Python package.
 """
 
 import base64
@@ -115,6 +117,138 @@ def foreign_sockets(pid):
     return found
 
 
+# Everything that a mouse can press and that is drawn.
+PRESSABLE = """
+[...document.querySelectorAll('a[href], button, input, select, textarea, summary')].filter(e => e.checkVisibility() && !e.disabled)
+"""
+# What stands for an element among the others; a group of radio buttons is one stop of the Tab key.
+NAME = "(e => e.type === 'radio' ? e.name : e.id || [e.tagName, e.dataset.channel, e.dataset.variable, e.dataset.effect, e.textContent.slice(0, 60), e.closest('article')?.querySelector('.name')?.title].join(' '))"
+
+
+def press(browser, key, code, number):
+    for kind in ("keyDown", "keyUp"):
+        browser.call("Input.dispatchKeyEvent", type=kind, key=key, code=code, windowsVirtualKeyCode=number)
+
+
+def by_keyboard(browser):
+    """Walks the page by the Tab key; what it does not reach, and stops that do not show."""
+    wanted = set(browser.value(f"{PRESSABLE}.map({NAME})"))
+    browser.value("document.activeElement.blur(); scrollTo(0, 0)")
+    reached, hidden = set(), set()
+    for _ in range(4 * len(wanted) + 20):
+        press(browser, "Tab", "Tab", 9)
+        stop = browser.value(f"""(() => {{ const e = document.activeElement; if (e === document.body) return null;
+            const shown = (n) => n && (getComputedStyle(n).outlineStyle !== 'none');
+            return [{NAME}(e), !!(shown(e) || shown(e.closest('label')))]; }})()""")
+        if stop is None:
+            continue
+        name, shown = stop
+        if name in reached and wanted <= reached:
+            break
+        reached.add(name)
+        if not shown:
+            hidden.add(name)
+    found = [f"the Tab key does not reach {name!r}" for name in sorted(wanted - reached)]
+    return found + [f"the focus on {name!r} does not show" for name in sorted(hidden)]
+
+
+def accessible(browser, where):
+    """What axe-core finds that is serious, in both themes."""
+    script = os.environ.get("AXE_CORE")
+    if not script:
+        return []
+    found = []
+    for theme in ("light", "dark"):
+        browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": theme}])
+        time.sleep(0.4)
+        browser.value(pathlib.Path(script).read_text() + "; true")
+        answer = browser.call("Runtime.evaluate", awaitPromise=True, returnByValue=True, expression="""
+            axe.run(document, {resultTypes: ['violations']}).then(r => r.violations.filter(v => ['serious', 'critical'].includes(v.impact))
+              .map(v => `${v.id} (${v.impact}): ${v.help}: ${v.nodes.slice(0, 4).map(n => n.target.join(' ') + ' ' + (n.any[0]?.message ?? '')).join('; ')}`))""")
+        found += [f"axe-core, {where}, {theme}: {text}" for text in answer["result"]["value"]]
+    browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "light"}])
+    return found
+
+
+WRONG = """schema = 1
+id = "own_yaw"
+description = "The thrust acts beside the centre of gravity."
+source = "the walk"
+status = "accepted"
+
+[parameters.k]
+value = 1.2
+width = 2.0
+bounds = [-20.0, 20.0]
+unit = "N m"
+meaning = "yawing moment at full throttle"
+
+[[channels]]
+channel = "yaw"
+shape = "k*throtle"
+"""
+
+
+def write(browser, folder):
+    """An effect as text: a fault is said with its line, the cured text is tried."""
+    found = []
+    click(browser, "#editor > summary")
+    wait(browser, "document.getElementById('effect-said').className == 'good'", 10, "the example is an effect file")
+    set_text = "(text => {{ const a = document.getElementById('effect-text'); a.value = text; a.dispatchEvent(new Event('input')); }})({!r})"
+    browser.value(set_text.format(WRONG))
+    wait(browser, "document.getElementById('effect-said').textContent.includes('line 16')", 10, "the fault is said with its line")
+    browser.value("document.getElementById('effect-text').scrollIntoView()")
+    found += shoot(browser, folder, "5-text-fault")
+    browser.value(set_text.format(WRONG.replace("throtle", "throttle")))
+    wait(browser, "document.getElementById('effect-said').textContent.startsWith('own_yaw')", 10, "the cured text is an effect")
+    begun = time.monotonic()
+    click(browser, "#effect-try")
+    wait(browser, "document.querySelector('[data-shape=own_yaw][data-drawn]')", 300, "the curve of the written effect")
+    took("written effect to its curve", time.monotonic() - begun, "0.3 s")
+    wait(browser, "!document.querySelector('#job progress')", 300, "the fit with the written effect")
+    wait(browser, "document.querySelector('[data-shape=own_yaw][data-drawn]') && document.querySelector('[data-own=own_yaw] figcaption').textContent.includes('output error')", 60, "the curve by the fit")
+    browser.value("document.getElementById('own').scrollIntoView()")
+    found += shoot(browser, folder, "6-text-tried")
+    browser.value("[...document.querySelectorAll('#model button')].find(b => b.textContent == 'Undo').click()")
+    wait(browser, "!document.querySelector('#own input:checked')", 60, "the written effect is taken back")
+    return found
+
+
+def search(browser):
+    """A search for a formula is started and cancelled."""
+    click(browser, "#propose")
+    wait(browser, "document.querySelector('#job progress')", 60, "the search for a formula")
+    time.sleep(1)
+    begun = time.monotonic()
+    click(browser, "#job button")
+    wait(browser, "!document.querySelector('#job progress')", 60, "the search is cancelled")
+    took("cancel a search", time.monotonic() - begun, "0.1 s")
+
+
+def fly(browser, folder):
+    """A flight in the simulator, watched, stopped, taken as a log."""
+    found = []
+    flights = browser.value("document.querySelectorAll('.flight').length")
+    click(browser, "#fly-it")
+    browser.value("document.getElementById('fly-hide').value = 'drag_beta2=1.0'")
+    begun = time.monotonic()
+    click(browser, "#fly-start")
+    wait(browser, "+document.documentElement.dataset.livePoints > 0", 60, "the first rows of the flight")
+    took("from Fly to the first point", time.monotonic() - begun, "–")
+    wait(browser, "+document.documentElement.dataset.livePoints > 120", 60, "twelve seconds of flight")
+    found += shoot(browser, folder, "7-flying")
+    click(browser, "#fly-stop")
+    wait(browser, "document.querySelector('[data-flown]')", 180, "the flight's end")
+    click(browser, "[data-flown]")
+    wait(browser, f"document.querySelectorAll('.flight').length == {flights + 1}", 60, "the flight is a log")
+    found += accessible(browser, "flown")
+    found += by_keyboard(browser)
+    browser.value("document.getElementById('flown').scrollIntoView()")
+    found += shoot(browser, folder, "8-flown")
+    click(browser, "#show-failing")
+    return found
+
+
 def walk(browser, bench, greylag, flights, folder, session):
     found = []
     logs = sorted(flights.glob("train-*.csv")) + sorted(flights.glob("test-*.csv"))
@@ -180,6 +314,11 @@ def walk(browser, bench, greylag, flights, folder, session):
     elif not filecmp.cmp(out / "model.toml", session / "model" / "model.toml", shallow=False):
         found.append("the saved model is not the command's")
 
+    found += accessible(browser, "a fitted model")
+    found += by_keyboard(browser)
+    found += write(browser, folder)
+    search(browser)
+    found += fly(browser, folder)
     found += foreign_sockets(bench.process.pid)
     if not refused(bench.origin, "/api/state"):
         found.append("a wrong token is answered")
@@ -190,8 +329,8 @@ def again(browser, bench, folder):
     """After kill -9 and a new start, everything is there."""
     browser.call("Page.navigate", url=bench.address)
     wait(browser, "document.documentElement?.dataset.ready == 'yes'", 20, "the page after kill -9")
-    wait(browser, "document.querySelector('.suspect') && document.querySelector('.bars.amended') && document.getElementById('opened')", 20,
-         "diagnosis, fit and opening after kill -9")
+    wait(browser, "document.querySelector('.suspect') && document.querySelector('.bars.amended') && document.getElementById('opened') && document.querySelector('#own input') && document.querySelector('[data-flown]')", 20,
+         "diagnosis, fit, opening, written effect and flight after kill -9")
     return []
 
 
@@ -225,6 +364,8 @@ def main():
             found.append(complaint)
     for step, seconds, aim in timings:
         print(f"{step:50} {seconds:8.2f} s   (aim {aim})")
+    if not os.environ.get("AXE_CORE"):
+        print("accessibility: not checked, for AXE_CORE names no axe.min.js (npm install axe-core)")
     for text in found:
         print(f"workbench: {text}", file=sys.stderr)
     sys.exit(1 if found else 0)

@@ -6,17 +6,12 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use comfy_table::{CellAlignment, Table};
 
+use crate::commands::bar::Bar;
+use crate::commands::effect_files::named_effects;
 use crate::commands::files::{self, shipped};
 use crate::control::{Kind, build};
-use crate::manoeuvres::{Schedule, menu};
 use crate::model::GreyBox;
-use crate::sim::design::{ENOUGH, Prospect, Suspect, prospects};
-
-/// Longest schedule that is written, s: beyond it the manoeuvre is repeated by hand.
-const LONGEST_S: f64 = 600.0;
-
-/// Fewest passes: one on each of two opposite headings.
-const LEAST: f64 = 2.0;
+use crate::sim::design::{ENOUGH, LONGEST_S, Plan, Prospect, Suspect, plan, prospects};
 
 /// Options of `greylag design`.
 #[derive(clap::Args)]
@@ -24,8 +19,8 @@ pub struct Arguments {
     /// The model that lacks both effects.
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
-    /// The two effects, by id.
-    #[arg(long, value_name = "ID", num_args = 2, required = true)]
+    /// The two effects: ids of the catalogue, or effect files (TOML).
+    #[arg(long, value_name = "ID|FILE", num_args = 2, required = true)]
     between: Vec<String>,
     /// Values of an effect's constants, in its own order, in place of typical ones (may be repeated).
     #[arg(long, value_name = "ID=V,V…", allow_hyphen_values = true)]
@@ -49,25 +44,30 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let model = GreyBox::load(&shipped(&arguments.model))?;
     let suspects = suspects(arguments)?;
-    let all = prospects(&model, build(Kind::Lqi, &model)?.as_ref(), &suspects)?;
+    let lqi = build(Kind::Lqi, &model)?;
+    let bar = Bar::new();
+    let all = prospects(&model, lqi.as_ref(), &suspects, &|stage| bar.hear(stage))?;
+    bar.go_on()?;
+    drop(bar);
     println!("{}", table(&all));
     let [a, b] = &suspects;
-    let best = all.first().and_then(|best| Some((best, best.seconds()?)));
-    let Some((best, seconds)) = best.filter(|(_, seconds)| *seconds < LONGEST_S) else {
+    let Some(Plan { manoeuvre, seconds, times, schedule }) = plan(&all) else {
         bail!(
             "no manoeuvre of the menu tells {} from {} within {LONGEST_S} s; name larger --values, or take both as one",
             a.id,
             b.id
         );
     };
-    let manoeuvre = menu::named(best.name).context("the menu has lost a manoeuvre")?;
-    let times = (seconds / best.duration_s).ceil().max(LEAST) as usize;
     println!(
         "{}: {}\n{seconds:.1} s of it tell {} from {} (evidence {ENOUGH}); one pass takes {:.0} s",
-        best.name, manoeuvre.description, a.id, b.id, best.duration_s
+        manoeuvre.name,
+        manoeuvre.description,
+        a.id,
+        b.id,
+        manoeuvre.schedule().duration()
     );
     if let Some(path) = &arguments.out {
-        files::write(path, &repeated(manoeuvre, times).to_toml(), overwrite)?;
+        files::write(path, &schedule.to_toml(), overwrite)?;
         println!(
             "written to {} ({times} times, on opposite headings); fly it with `greylag demo --schedule {}`",
             path.display(),
@@ -79,11 +79,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 
 fn suspects(arguments: &Arguments) -> Result<[Suspect; 2]> {
     let values = arguments.values.iter().map(|text| read(text)).collect::<Result<Vec<_>>>()?;
-    if let Some((id, _)) = values.iter().find(|(id, _)| !arguments.between.contains(id)) {
+    let between = named_effects(&arguments.between)?;
+    if between.len() != 2 {
+        bail!("--between names {} effects; name two, each by its id or its file", between.len());
+    }
+    if let Some((id, _)) = values.iter().find(|(id, _)| !between.contains(id)) {
         bail!("--values {id}=… names neither of the two effects of --between");
     }
     let suspect = |k: usize| {
-        let id = arguments.between[k].clone();
+        let id = between[k].clone();
         let given = values.iter().find(|(of, _)| *of == id).map(|(_, v)| v.clone());
         Suspect { id, values: given.unwrap_or_default() }
     };
@@ -96,13 +100,6 @@ fn read(text: &str) -> Result<(String, Vec<f64>)> {
     let (id, values) = text.split_once('=').with_context(wrong)?;
     let values: Result<Vec<f64>, _> = values.split(',').map(|v| v.trim().parse()).collect();
     Ok((id.trim().into(), values.with_context(wrong)?))
-}
-
-/// The manoeuvre so many times, each on the heading opposite to the last one: on a single heading the
-/// wind cannot be distinguished from an airspeed sensor's scale.
-fn repeated(manoeuvre: &menu::Manoeuvre, times: usize) -> Schedule {
-    let again = |all: Schedule, _| all.then(menu::TURN.schedule()).then(manoeuvre.schedule());
-    (1..times).fold(manoeuvre.schedule(), again)
 }
 
 fn table(all: &[Prospect]) -> Table {

@@ -8,6 +8,7 @@ mod columns;
 mod dataflash;
 mod flight;
 mod format;
+mod growing;
 pub mod info;
 mod load;
 pub mod mapping;
@@ -24,5 +25,6 @@ mod ulog;
 
 pub use flight::{Flight, FlowAngles, Sample, Sampling};
 pub use format::Format;
+pub use growing::Growing;
 pub use load::{Channel, Log, LogError, Options, inspect, load, parse};
 pub use names::names;

@@ -1,10 +1,12 @@
 //! Which manoeuvre tells two effects apart: the menu flown in models that have one or the other.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use rayon::prelude::*;
 
 use crate::control::{Controller, Observation, Target};
 use crate::logs::Sampling;
-use crate::manoeuvres::menu::{MENU, Manoeuvre};
+use crate::manoeuvres::menu::{self, MENU, Manoeuvre};
 use crate::manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use crate::model::{GreyBox, JoinError};
 use crate::physics::catalogue;
@@ -15,11 +17,16 @@ use crate::sim::instruments::{Group, Instruments};
 use crate::sim::missing::{Kind, Missing};
 use crate::sim::{Environment, Imagined};
 use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
+use crate::sysid::progress::{Cancelled, Progress, say};
 use crate::sysid::separation::{Separation, separation};
 use crate::sysid::weak_form::prepared::{ClockError, Prepared};
 
 /// Evidence that settles which of two effects it is.
 pub const ENOUGH: f64 = 10.0;
+/// Longest schedule that is made, s.
+pub const LONGEST_S: f64 = 600.0;
+/// Fewest passes: one on each of two opposite headings.
+const LEAST: f64 = 2.0;
 /// The step of the imagined aircraft, s.
 const STEP_S: f64 = 0.01;
 
@@ -44,6 +51,9 @@ pub enum DesignError {
     /// The imagined flights cannot be compared.
     #[error("comparing imagined flights: {0}")]
     Compare(#[from] ClockError),
+    /// Whoever waited has ended it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// One of the two effects.
@@ -82,20 +92,23 @@ impl Prospect {
 
 /// What the menu is expected to tell of `suspects`, both missing from `model`, the quickest first.
 ///
-/// `controller` flies; noise is that of a small autopilot.
+/// `controller` flies; noise is that of a small autopilot. `progress` hears how many manoeuvres were flown.
 ///
 /// # Errors
-/// If an effect is unknown, there already, or its amplitude is not known.
+/// If an effect is unknown, there already, or its amplitude is not known, or `progress` ended it.
 pub fn prospects(
     model: &GreyBox,
     controller: &dyn Controller,
     suspects: &[Suspect; 2],
+    progress: &Progress,
 ) -> Result<Vec<Prospect>, DesignError> {
     if suspects[0].id == suspects[1].id {
         return Err(DesignError::Same { id: suspects[0].id.clone() });
     }
     let truths = [truth(model, &suspects[0])?, truth(model, &suspects[1])?];
     let ways = [alternatives(model, &suspects[0])?, alternatives(model, &suspects[1])?];
+    say(progress, "imagining each manoeuvre", 0.0)?;
+    let flown = AtomicUsize::new(0);
     let prospect = |manoeuvre: &Manoeuvre| -> Result<Prospect, DesignError> {
         let schedule = manoeuvre.schedule();
         let separation_of = |k: usize| -> Result<Option<Separation>, DesignError> {
@@ -103,12 +116,43 @@ pub fn prospects(
             Ok(flight.map(|f| separation(model, &truths[k], &ways[1 - k], &f)))
         };
         let separations = [separation_of(0)?, separation_of(1)?];
+        let done = flown.fetch_add(1, Ordering::Relaxed) + 1;
+        say(progress, "imagining each manoeuvre", done as f64 / MENU.len() as f64)?;
         Ok(Prospect { name: manoeuvre.name, duration_s: schedule.duration(), separations })
     };
     let mut all = MENU.par_iter().map(prospect).collect::<Result<Vec<_>, _>>()?;
     let seconds = |p: &Prospect| p.seconds().unwrap_or(f64::INFINITY);
     all.sort_by(|a, b| seconds(a).total_cmp(&seconds(b)));
     Ok(all)
+}
+
+/// A manoeuvre that tells two effects apart, repeated as often as it takes.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The manoeuvre.
+    pub manoeuvre: &'static Manoeuvre,
+    /// Seconds of it for an evidence of [`ENOUGH`].
+    pub seconds: f64,
+    /// How often it is flown, on opposite headings.
+    pub times: usize,
+    /// The whole schedule.
+    pub schedule: Schedule,
+}
+
+/// The quickest of `prospects`, which come as [`prospects`] sorts them; `None` if none tells within [`LONGEST_S`].
+pub fn plan(prospects: &[Prospect]) -> Option<Plan> {
+    let best = prospects.first()?;
+    let seconds = best.seconds().filter(|seconds| *seconds < LONGEST_S)?;
+    let manoeuvre = menu::named(best.name)?;
+    let times = (seconds / best.duration_s).ceil().max(LEAST) as usize;
+    Some(Plan { manoeuvre, seconds, times, schedule: repeated(manoeuvre, times) })
+}
+
+/// The manoeuvre so many times, each on the heading opposite to the last one: on a single heading the
+/// wind cannot be distinguished from an airspeed sensor's scale.
+fn repeated(manoeuvre: &Manoeuvre, times: usize) -> Schedule {
+    let again = |all: Schedule, _| all.then(menu::TURN.schedule()).then(manoeuvre.schedule());
+    (1..times).fold(manoeuvre.schedule(), again)
 }
 
 /// `model` with the effect.

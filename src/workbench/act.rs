@@ -2,13 +2,14 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use serde::Deserialize;
 
 use super::bench::{Bench, Inner, load};
 use super::error::WorkbenchError;
 use super::fit::scores;
+use super::fly::Order;
 use super::jobs::Work;
 use super::roles::now_s;
 use super::session::{Accepted, LogEntry, Occasion, Opening, Role};
@@ -84,6 +85,37 @@ pub enum Act {
         /// Its number.
         job: u64,
     },
+    /// Keep an effect that was written as text.
+    Write {
+        /// The text of its file.
+        text: String,
+    },
+    /// Take an effect that was written as text out of the session.
+    Forget {
+        /// Its id.
+        effect: String,
+    },
+    /// Search a formula for what no effect explains.
+    Propose,
+    /// Make a schedule that tells two effects apart.
+    Design {
+        /// Their ids.
+        between: [String; 2],
+    },
+    /// Fly the model in the simulator.
+    Fly(Order),
+    /// Watch a recording that another program is writing.
+    Watch {
+        /// Its folder.
+        folder: PathBuf,
+    },
+    /// End the flight.
+    StopFlight,
+    /// Take a recording as a log.
+    TakeFlight {
+        /// The flight, by its place in the session.
+        flown: usize,
+    },
 }
 
 impl Bench {
@@ -95,14 +127,7 @@ impl Bench {
         let seen = request.revision;
         match request.act {
             Act::Role { flight, role } => self.change(seen, |inner| inner.give_role(flight, role)),
-            Act::Remove { flight } => self.change(seen, |inner| {
-                if flight >= inner.session.logs.len() {
-                    return Err(WorkbenchError::NoFlight(flight));
-                }
-                inner.session.logs.remove(flight);
-                drop(inner.flights.remove(flight));
-                Ok(())
-            }),
+            Act::Remove { flight } => self.remove(seen, flight),
             Act::Map { flight, column, scale } => self.map(seen, flight, &column, scale),
             Act::Diagnose => {
                 self.same_model()?;
@@ -111,38 +136,9 @@ impl Bench {
                 Ok(())
             }
             Act::Tick { effect } => self.tick(seen, effect),
-            Act::Keep => {
-                self.change(seen, |inner| {
-                    let last = inner.session.effects.last_mut();
-                    last.ok_or(WorkbenchError::Nothing("keep"))?.anyway = true;
-                    Ok(())
-                })?;
-                self.start(Work::Fit);
-                Ok(())
-            }
-            Act::Undo => {
-                self.change(seen, |inner| {
-                    let last = inner.session.effects.pop();
-                    inner.session.undone.push(last.ok_or(WorkbenchError::Nothing("take back"))?);
-                    inner.supersede(Work::Fit);
-                    Ok(())
-                })?;
-                // what is left may not be fitted: the fit of all of it was cut off, or a flight has another role
-                self.start(Work::Fit);
-                Ok(())
-            }
-            Act::Redo => {
-                self.change(seen, |inner| {
-                    let last = inner.session.undone.pop();
-                    inner
-                        .session
-                        .effects
-                        .push(last.ok_or(WorkbenchError::Nothing("accept again"))?);
-                    Ok(())
-                })?;
-                self.start(Work::Fit);
-                Ok(())
-            }
+            Act::Keep => self.keep(seen),
+            Act::Undo => self.undo(seen),
+            Act::Redo => self.redo(seen),
             Act::Fit => {
                 self.same_model()?;
                 self.start(Work::Fit);
@@ -158,7 +154,67 @@ impl Bench {
                 self.cancel(job);
                 Ok(())
             }
+            Act::Write { text } => self.write_effect(seen, &text),
+            Act::Forget { effect } => self.forget(seen, &effect),
+            Act::Propose => {
+                self.same_model()?;
+                self.lock().searched_places()?;
+                self.start(Work::Proposal);
+                Ok(())
+            }
+            Act::Design { between } => self.start_design(between),
+            Act::Fly(order) => self.fly(seen, &order),
+            Act::Watch { folder } => self.watch(seen, &folder),
+            Act::StopFlight => self.stop_flight(),
+            Act::TakeFlight { flown } => self.take_flight(seen, flown),
         }
+    }
+
+    /// Takes a log out of the session.
+    fn remove(&self, seen: u64, flight: usize) -> Result<(), WorkbenchError> {
+        self.change(seen, |inner| {
+            if flight >= inner.session.logs.len() {
+                return Err(WorkbenchError::NoFlight(flight));
+            }
+            inner.session.logs.remove(flight);
+            drop(inner.flights.remove(flight));
+            Ok(())
+        })
+    }
+
+    /// Keeps the effect accepted last though the data refuse it.
+    fn keep(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
+        self.change(seen, |inner| {
+            let last = inner.session.effects.last_mut();
+            last.ok_or(WorkbenchError::Nothing("keep"))?.anyway = true;
+            Ok(())
+        })?;
+        self.start(Work::Fit);
+        Ok(())
+    }
+
+    /// Takes the effect accepted last back.
+    fn undo(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
+        self.change(seen, |inner| {
+            let last = inner.session.effects.pop();
+            inner.session.undone.push(last.ok_or(WorkbenchError::Nothing("take back"))?);
+            inner.supersede(Work::Fit);
+            Ok(())
+        })?;
+        // what is left may not be fitted: the fit of all of it was cut off, or a flight has another role
+        self.start(Work::Fit);
+        Ok(())
+    }
+
+    /// Accepts again what was taken back last.
+    fn redo(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
+        self.change(seen, |inner| {
+            let last = inner.session.undone.pop();
+            inner.session.effects.push(last.ok_or(WorkbenchError::Nothing("accept again"))?);
+            Ok(())
+        })?;
+        self.start(Work::Fit);
+        Ok(())
     }
 
     /// Takes a log that a page has sent, called `name`.
@@ -166,11 +222,23 @@ impl Bench {
     /// # Errors
     /// It is no log or cannot be used, is there already, or cannot be kept.
     pub fn take(&self, seen: u64, name: &str, bytes: &[u8]) -> Result<(), WorkbenchError> {
+        self.take_as(seen, name, bytes, None)
+    }
+
+    /// Takes a log with a role, or with the usual one.
+    pub(super) fn take_as(
+        &self,
+        seen: u64,
+        name: &str,
+        bytes: &[u8],
+        role: Option<Role>,
+    ) -> Result<(), WorkbenchError> {
         let plain = |c: char| c.is_alphanumeric() || "._- +()".contains(c);
         if name.is_empty() || name.starts_with('.') || name.len() > 200 || !name.chars().all(plain)
         {
             return Err(WorkbenchError::Name(name.into()));
         }
+        let _one_at_a_time = self.taking.lock().unwrap_or_else(PoisonError::into_inner);
         let place = PathBuf::from("logs").join(name);
         let file = self.folder.join(&place);
         // another log of that name keeps it
@@ -191,7 +259,7 @@ impl Bench {
         if !known {
             write_over(&file, bytes)?;
         }
-        self.add(seen, place, bytes).inspect_err(|_| {
+        self.add(seen, place, bytes, role).inspect_err(|_| {
             if !known {
                 let _ = fs::remove_file(&file);
             }

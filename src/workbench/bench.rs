@@ -10,10 +10,12 @@ use serde_json::Value;
 use super::error::{WorkbenchError, io};
 use super::fit::Fitted;
 use super::flights::Loaded;
-use super::jobs::{Event, Job};
+use super::fly::Flying;
+use super::jobs::{Event, Job, Work};
 use super::key::fingerprint;
+use super::proposal::Designed;
 use super::reading::{InUse, Reading};
-use super::session::{Claim, LogEntry, Role, Session};
+use super::session::{Claim, LogEntry, Outcome, Role, Session};
 use crate::logs;
 use crate::model::GreyBox;
 use crate::sysid::amend::document::{Original, sha256};
@@ -38,6 +40,8 @@ pub struct Bench {
     pub(super) folder: PathBuf,
     pub(super) hear: Box<dyn Fn(Event) + Send + Sync>,
     inner: Mutex<Inner>,
+    /// Held while a log is taken: two that come at once have one name each.
+    pub(super) taking: Mutex<()>,
     _claim: Claim,
 }
 
@@ -53,6 +57,14 @@ pub(super) struct Inner {
     pub comparison: Option<(String, Arc<Comparison>)>,
     pub tuned: Option<(String, Fit)>,
     pub diagnosis: Option<(String, Arc<Value>)>,
+    /// What a search for a formula found.
+    pub proposal: Option<(String, Arc<Value>)>,
+    /// The two effects that a schedule is made for.
+    pub between: Option<[String; 2]>,
+    /// Schedules that were made.
+    pub designed: Vec<Designed>,
+    /// The flight that is flown, or was last.
+    pub flying: Option<Flying>,
     pub estimate: Option<(String, Estimate)>,
     pub fits: BTreeMap<String, Arc<Fitted>>,
     /// What went wrong with the job of a key.
@@ -87,6 +99,10 @@ impl Bench {
             comparison: None,
             tuned: None,
             diagnosis: None,
+            proposal: None,
+            between: None,
+            designed: Vec::new(),
+            flying: None,
             estimate: None,
             fits: BTreeMap::new(),
             failures: BTreeMap::new(),
@@ -97,18 +113,24 @@ impl Bench {
             mapping: InUse::default(),
         };
         inner.take_mapping()?;
+        inner.read_own()?;
+        inner.read_designed();
+        // what another run was flying when it ended
+        let cut = inner.session.flown.iter_mut().filter(|f| f.outcome == Outcome::Flying);
+        cut.for_each(|flown| flown.outcome = Outcome::CutOff);
         inner.reread();
         inner.session.write(&folder)?;
         let bench = Arc::new(Bench {
             folder,
             hear: Box::new(hear),
             inner: Mutex::new(inner),
+            taking: Mutex::new(()),
             _claim: claim,
         });
         for log in &given.logs {
             bench.add_file(log)?;
         }
-        bench.remember();
+        bench.lock().recall();
         Ok(bench)
     }
 
@@ -139,6 +161,7 @@ impl Bench {
         let revision = inner.session.revision;
         match edited.and_then(|t| inner.session.write(&self.folder).map(|()| t)) {
             Ok(t) => {
+                inner.recall();
                 drop(inner);
                 (self.hear)(Event::Changed { revision });
                 Ok(t)
@@ -150,18 +173,39 @@ impl Bench {
         }
     }
 
+    /// Changes the session whatever its revision is, as when something ends by itself, and writes it.
+    pub(super) fn amend_session(
+        &self,
+        edit: impl FnOnce(&mut Inner),
+    ) -> Result<(), WorkbenchError> {
+        let mut inner = self.lock();
+        edit(&mut inner);
+        inner.session.revision += 1;
+        let revision = inner.session.revision;
+        let written = inner.session.write(&self.folder);
+        drop(inner);
+        (self.hear)(Event::Changed { revision });
+        written
+    }
+
     /// Adds the log at `path`, unless it is there.
     fn add_file(&self, path: &Path) -> Result<(), WorkbenchError> {
         let path = fs::canonicalize(path).map_err(|e| io(path, e))?;
         let bytes = fs::read(&path).map_err(|e| io(&path, e))?;
-        match self.add(self.revision(), path, &bytes) {
+        match self.add(self.revision(), path, &bytes, None) {
             Err(WorkbenchError::Twice(_)) => Ok(()),
             other => other,
         }
     }
 
-    /// Adds a log with its content; `path` is where it stands.
-    pub(super) fn add(&self, seen: u64, path: PathBuf, bytes: &[u8]) -> Result<(), WorkbenchError> {
+    /// Adds a log with its content; `path` is where it stands. Without a `role` it takes the usual one.
+    pub(super) fn add(
+        &self,
+        seen: u64,
+        path: PathBuf,
+        bytes: &[u8],
+        role: Option<Role>,
+    ) -> Result<(), WorkbenchError> {
         let sha256 = sha256(bytes);
         let entry = LogEntry { path, sha256, role: Role::Unused };
         let name = entry.name();
@@ -175,7 +219,7 @@ impl Bench {
         };
         let loaded = Loaded::parse(bytes, &name, &options, &model)?;
         self.change(seen, |inner| {
-            inner.take_in(entry, loaded);
+            inner.take_in(entry, role, loaded);
             Ok(())
         })
     }
@@ -196,23 +240,8 @@ impl Bench {
         Ok(made)
     }
 
-    /// Takes up what earlier runs have left in the folder.
-    fn remember(&self) {
-        let mut inner = self.lock();
-        let key = inner.key("diagnosis", &[]);
-        let stored = fs::read_to_string(self.diagnosis_file(&key)).ok();
-        let stored = stored.and_then(|text| serde_json::from_str::<Value>(&text).ok());
-        inner.diagnosis = stored.map(|value| (key, Arc::new(value)));
-        for count in 1..=inner.session.effects.len() {
-            let key = inner.key("fit", &inner.session.effects[..count]);
-            if let Some(fitted) = Fitted::read(&self.fit_folder(&key)) {
-                inner.fits.insert(key, Arc::new(fitted));
-            }
-        }
-    }
-
-    pub(super) fn diagnosis_file(&self, key: &str) -> PathBuf {
-        self.folder.join(format!("{key}.json"))
+    pub(super) fn result_file(&self, key: &str) -> PathBuf {
+        result_file(&self.folder, key)
     }
 
     pub(super) fn fit_folder(&self, key: &str) -> PathBuf {
@@ -294,9 +323,39 @@ pub(super) fn load(path: &Path) -> Result<Read, WorkbenchError> {
     Ok(Read { model: GreyBox::load(path)?, original: Original::read(path)?, fingerprint })
 }
 
+/// Where a result is kept.
+fn result_file(folder: &Path, key: &str) -> PathBuf {
+    folder.join(format!("{key}.json"))
+}
+
 impl Inner {
+    /// Takes up results that lie in the folder: of earlier runs, or of a time when the flights had these roles.
+    pub fn recall(&mut self) {
+        let stored = |key: &str, known: &Option<(String, Arc<Value>)>| {
+            if known.as_ref().is_some_and(|(of, _)| of == key) {
+                return None;
+            }
+            let text = fs::read_to_string(result_file(&self.folder, key)).ok()?;
+            Some((key.to_owned(), Arc::new(serde_json::from_str::<Value>(&text).ok()?)))
+        };
+        let key = |work: Work| self.key(work.word(), &[]);
+        let diagnosis = stored(&key(Work::Diagnosis), &self.diagnosis);
+        let proposal = stored(&key(Work::Proposal), &self.proposal);
+        self.diagnosis = diagnosis.or(self.diagnosis.take());
+        self.proposal = proposal.or(self.proposal.take());
+        for count in 1..=self.session.effects.len() {
+            let key = self.key("fit", &self.session.effects[..count]);
+            let folder = self.folder.join("fits").join(&key);
+            if !self.fits.contains_key(&key)
+                && let Some(fitted) = Fitted::read(&folder)
+            {
+                self.fits.insert(key, Arc::new(fitted));
+            }
+        }
+    }
+
     /// What stands in for the amended model now.
-    fn shown(&self) -> String {
+    pub fn shown(&self) -> String {
         let key = self.key("fit", &self.session.effects);
         match (self.fits.contains_key(&key), &self.estimate) {
             (true, _) => "fitted".into(),

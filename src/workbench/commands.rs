@@ -19,6 +19,8 @@ pub struct Commands {
     pub compare: String,
     /// What it lacks.
     pub diagnose: String,
+    /// A formula for what is left; empty without a flight to test it on.
+    pub propose: String,
     /// The amended model; empty without accepted effects.
     pub amend: String,
     /// Both models on the test flights; empty without any.
@@ -37,7 +39,10 @@ impl Bench {
         let all: String =
             (0..inner.session.logs.len()).map(|k| format!(" {}", quoted(&inner.file(k)))).collect();
         let folder = self.folder.join(SAVED);
-        let effects: String = inner.session.effects.iter().map(|e| format!(" {}", e.id)).collect();
+        let word = |id: &str| format!(" {}", quoted(&inner.effect_word(id)));
+        let effects: String = inner.session.effects.iter().map(|e| word(&e.id)).collect();
+        let own: String = inner.session.own.iter().map(|id| word(id)).collect();
+        let own = if own.is_empty() { own } else { format!(" --effect{own}") };
         let anyway = match inner.session.effects.iter().any(|e| e.anyway) {
             true => " --accept-anyway",
             false => "",
@@ -62,7 +67,11 @@ impl Bench {
         Commands {
             flights: some(&all, format!("greylag logs info{all}{}", inner.mapping_words())),
             compare: some(&seen, compare(&seen, &[Role::Fit, Role::HoldOut])),
-            diagnose: some(&fit, format!("greylag diagnose --model {model} --log{fit}{to_fit}")),
+            diagnose: some(
+                &fit,
+                format!("greylag diagnose --model {model} --log{fit}{own}{to_fit}"),
+            ),
+            propose: inner.propose_command(&own),
             amend: some(
                 &effects,
                 format!(
@@ -75,6 +84,19 @@ impl Bench {
 }
 
 impl Inner {
+    /// The command that searches a formula, with the options that name the `own` effects; empty if no flight is left to
+    /// test it on.
+    fn propose_command(&self, own: &str) -> String {
+        let Ok(places) = self.searched_places() else { return String::new() };
+        let named = |places: Vec<usize>| -> String {
+            places.iter().map(|k| format!(" {}", quoted(&self.file(*k)))).collect()
+        };
+        let [search, test] = places.map(named);
+        let model = quoted(&self.session.model);
+        let both = self.reading_words(&[Role::Fit, Role::HoldOut]);
+        format!("greylag propose --model {model} --log{search} --hold-out{test}{own}{both}")
+    }
+
     /// How a command must read logs.
     fn mapping_words(&self) -> String {
         let mapping = self.mapping.file.iter().map(|file| format!(" --mapping {}", quoted(file)));
@@ -91,7 +113,7 @@ impl Inner {
 }
 
 /// A path as a shell takes it.
-fn quoted(path: &Path) -> String {
+pub(super) fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:@%,".contains(c);
     match text.chars().all(plain) {

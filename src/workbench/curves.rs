@@ -75,7 +75,7 @@ pub(super) fn data(flight: &Prepared, comparison: &Comparison, k: usize) -> Flig
 }
 
 /// The windows in the rows of a channel's trace, which has one of its own between segments.
-fn rows(flight: &Prepared) -> Vec<Option<usize>> {
+pub(super) fn rows(flight: &Prepared) -> Vec<Option<usize>> {
     let mut rows = Vec::with_capacity(flight.windows.len());
     for (k, window) in flight.windows.iter().enumerate() {
         if k > 0 && flight.windows[k - 1].segment != window.segment {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::session::Role;
 use crate::logs::LogError;
+use crate::logs::csv::CsvError;
 use crate::logs::mapping::MappingError;
 use crate::physics::airframe::FileError;
 use crate::report::WriteError;
@@ -141,6 +142,27 @@ pub enum WorkbenchError {
     /// The fit is not done.
     #[error("the fit of the accepted effects is not done; wait for it, or take the effect back")]
     Unfitted,
+    /// A text is no effect file.
+    #[error("{0}")]
+    EffectText(String),
+    /// The effect is accepted.
+    #[error("{0} is accepted; take it back first")]
+    Accepted(String),
+    /// No manoeuvre tells two effects apart.
+    #[error("no manoeuvre of the menu tells {} from {} within ten minutes; take both as one, or give `greylag design` larger --values", .0[0], .0[1])]
+    NotApart([String; 2]),
+    /// A flight is on.
+    #[error("a flight is on; stop it, or wait for its end")]
+    Flying,
+    /// The order of a flight cannot be carried out.
+    #[error("cannot fly: {0}")]
+    Order(String),
+    /// The program has no simulator.
+    #[error("this program was built without the simulator; build it with the feature sitl")]
+    NoSimulator,
+    /// There is no recording.
+    #[error("there is no recording in {}: name the folder that `greylag fly` printed, which holds flight.csv", .0.display())]
+    NoRecording(PathBuf),
     /// The session is open elsewhere.
     #[error(
         "another workbench has the session in {} open; use its window, or give --dir another folder", .0.display()
@@ -168,6 +190,9 @@ pub enum WorkbenchError {
     /// The log cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// A recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] CsvError),
     /// The mapping cannot be read.
     #[error(transparent)]
     Mapping(#[from] MappingError),
@@ -195,6 +220,13 @@ pub enum WorkbenchError {
     /// No fit.
     #[error(transparent)]
     Amend(#[from] AmendError),
+    /// No controller for the model.
+    #[error(transparent)]
+    Control(#[from] crate::control::SetupError),
+    /// No schedule.
+    #[cfg(feature = "sitl")]
+    #[error(transparent)]
+    Design(#[from] crate::sim::design::DesignError),
 }
 
 impl WorkbenchError {

@@ -9,11 +9,15 @@ use serde::Serialize;
 
 use super::bench::{Bench, Inner};
 use super::error::WorkbenchError;
+use super::fly::Part;
 use super::roles::Divided;
 use crate::report::write_over;
 use crate::sysid::amend::tune;
 use crate::sysid::diagnose::{Options, diagnose};
 use crate::sysid::progress::{FirstLook, Progress, Stage, part};
+
+/// The effects of files that a diagnosis has tried, in what the workbench keeps of it.
+pub(super) const TRIED: &str = "tried";
 
 /// What a job works out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -23,6 +27,10 @@ pub enum Work {
     Diagnosis,
     /// The model with the accepted effects.
     Fit,
+    /// A formula for what no effect explains.
+    Proposal,
+    /// A schedule that tells two effects apart.
+    Schedule,
 }
 
 /// A job as the page sees it.
@@ -73,6 +81,11 @@ pub enum Event {
         /// The job.
         job: Job,
     },
+    /// A flight is further.
+    Flight {
+        /// What came of it.
+        part: Part,
+    },
     /// Something has changed: look at the state again.
     Changed {
         /// The session's revision.
@@ -114,7 +127,10 @@ impl Bench {
         let (id, stop) = {
             let mut inner = self.lock();
             let effects = if work == Work::Fit { &inner.session.effects[..] } else { &[] };
-            let key = inner.key(work.word(), effects);
+            let mut key = inner.key(work.word(), effects);
+            if let (Work::Schedule, Some(between)) = (work, &inner.between) {
+                key += &between.join("-");
+            }
             let there = work == Work::Fit && inner.fitted();
             if there || inner.jobs.iter().any(|job| job.key == key) {
                 return;
@@ -157,6 +173,8 @@ impl Bench {
         let outcome = outcome(|| match work {
             Work::Diagnosis => self.diagnose(&progress),
             Work::Fit => self.fit(&progress),
+            Work::Proposal => self.propose(&progress),
+            Work::Schedule => self.design(&progress),
         });
         let mut inner = self.lock();
         let job = inner.jobs.iter().position(|job| job.id == id).map(|k| inner.jobs.remove(k));
@@ -185,14 +203,23 @@ impl Bench {
 
     /// Diagnoses the model as given over the flights to fit to; the prior is tuned behind it, for fits to come.
     fn diagnose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
-        let ([key, tuned_key], model, flights, divided) = {
+        let ([key, tuned_key], model, flights, divided, with, tried) = {
             let inner = self.lock();
             let keys = [Work::Diagnosis.word(), "tuned"].map(|what| inner.key(what, &[]));
-            (keys, inner.model.clone(), inner.to_fit()?, inner.divided())
+            (
+                keys,
+                inner.model.clone(),
+                inner.to_fit()?,
+                inner.divided(),
+                inner.session.own.clone(),
+                inner.tried(),
+            )
         };
-        let diagnosis = diagnose(&model, &flights, &Options::default(), progress)?;
-        let value = serde_json::to_value(&diagnosis)?;
-        write_over(&self.diagnosis_file(&key), value.to_string())?;
+        let diagnosis =
+            diagnose(&model, &flights, &Options { with, ..Options::default() }, progress)?;
+        let mut value = serde_json::to_value(&diagnosis)?;
+        value[TRIED] = tried;
+        write_over(&self.result_file(&key), value.to_string())?;
         self.lock().diagnosis = Some((key, Arc::new(value)));
         self.changed();
         let there = self.lock().tuned.as_ref().is_some_and(|(of, _)| *of == tuned_key);
@@ -212,6 +239,8 @@ impl Work {
         match self {
             Work::Diagnosis => "diagnosis",
             Work::Fit => "fit",
+            Work::Proposal => "proposal",
+            Work::Schedule => "schedule",
         }
     }
 }

@@ -5,6 +5,7 @@ use std::{fs, io};
 
 use super::bench::Inner;
 use super::session::{Accepted, Role};
+use crate::physics::formula::register;
 use crate::sysid::amend::document::sha256;
 
 impl Inner {
@@ -16,8 +17,9 @@ impl Inner {
             let named = places.iter().zip(self.names(&places));
             named.map(|(k, name)| self.session.logs[*k].sha256.clone() + &name).collect()
         };
-        let effects: Vec<String> =
-            effects.iter().map(|e| format!("{}{}", e.id, e.anyway)).collect();
+        let text = |id: &str| register::find(id).map_or("", |effect| effect.text.as_str());
+        let accepted = |e: &Accepted| format!("{}{}{}", e.id, e.anyway, text(&e.id));
+        let effects: Vec<String> = effects.iter().map(accepted).collect();
         let all = [
             env!("CARGO_PKG_VERSION"),
             &self.session.model_sha256,

@@ -20,13 +20,14 @@ pub struct Divided {
 }
 
 impl Inner {
-    /// Takes a log into the session; one that stood at the same place before goes.
-    pub fn take_in(&mut self, entry: LogEntry, loaded: Arc<Loaded>) {
+    /// Takes a log into the session with `role`, or the usual one; one that stood at the same place before goes.
+    pub fn take_in(&mut self, entry: LogEntry, role: Option<Role>, loaded: Arc<Loaded>) {
         let file = self.folder.join(&entry.path);
         let before = self.session.logs.iter().position(|l| self.folder.join(&l.path) == file);
-        let usual = match before {
-            Some(place) => self.session.logs[place].role,
-            None => self.session.usual_role(&entry.name()),
+        let usual = match (role, before) {
+            (Some(role), _) => role,
+            (None, Some(place)) => self.session.logs[place].role,
+            (None, None) => self.session.usual_role(&entry.name()),
         };
         // what makes every figure wrong serves for nothing until its user has looked at it
         let role = if loaded.in_doubt() { Role::Unused } else { usual };

@@ -105,6 +105,52 @@ pub struct Opening {
     pub horizon_s: f64,
 }
 
+/// How a flight went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// It is being flown.
+    Flying,
+    /// It was flown to its end.
+    Flown,
+    /// It was stopped.
+    Stopped,
+    /// It could not begin, or ended early.
+    Failed,
+    /// The workbench ended before it.
+    CutOff,
+}
+
+/// A flight with the model of the session, or another program's that was watched.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Flown {
+    /// When it began, seconds since 1970 (UTC).
+    pub unix_s: u64,
+    /// The folder of its recording; a relative path is below the session's folder.
+    pub folder: PathBuf,
+    /// The model that flew, or that a watched flight was compared with.
+    pub model: String,
+    /// The effects that were accepted.
+    pub effects: Vec<String>,
+    /// What was flown; empty of a watched flight.
+    #[serde(default)]
+    pub schedule: String,
+    /// The command that flies the same; empty of a watched flight.
+    #[serde(default)]
+    pub command: String,
+    /// How it went.
+    pub outcome: Outcome,
+    /// Time in the recording, s.
+    pub seconds: f64,
+    /// What the models' monitors said, each with its time and model.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+    /// What the flying program said last.
+    #[serde(default)]
+    pub said: String,
+}
+
 /// A session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -129,6 +175,12 @@ pub struct Session {
     /// Looks at the test flights, in order.
     #[serde(default)]
     pub openings: Vec<Opening>,
+    /// Ids of effects that were written as text, in the folder `effects`.
+    #[serde(default)]
+    pub own: Vec<String>,
+    /// Flights, in order.
+    #[serde(default)]
+    pub flown: Vec<Flown>,
 }
 
 impl Session {
@@ -143,6 +195,8 @@ impl Session {
             effects: Vec::new(),
             undone: Vec::new(),
             openings: Vec::new(),
+            own: Vec::new(),
+            flown: Vec::new(),
         }
     }
 
@@ -241,6 +295,19 @@ mod tests {
             given: 0.1,
             amended: 0.01,
             horizon_s: 5.0,
+        });
+        session.own.push("mine".into());
+        session.flown.push(Flown {
+            unix_s: 2,
+            folder: "flights/1".into(),
+            model: "m".into(),
+            effects: vec!["drag_beta2".into()],
+            schedule: "attitudes".into(),
+            command: "greylag demo".into(),
+            outcome: Outcome::Stopped,
+            seconds: 3.5,
+            warnings: vec!["lift".into()],
+            said: "tracked".into(),
         });
         session.write(folder.path()).unwrap();
         assert_eq!(Session::read(folder.path()).unwrap(), Some(session));

@@ -11,8 +11,11 @@ use super::commands::Commands;
 use super::curves::{FlightData, data, named};
 use super::error::WorkbenchError;
 use super::flights::{Loaded, Strip};
-use super::jobs::{Job, Work};
-use super::session::{Opening, Role};
+use super::fly;
+use super::jobs::{Job, TRIED, Work};
+use super::own::OwnView;
+use super::proposal::Designed;
+use super::session::{Flown, Opening, Role};
 use crate::logs::Format;
 use crate::logs::finding::Finding;
 use crate::logs::info::Purpose;
@@ -78,6 +81,12 @@ struct StateView<'a> {
     model: Value,
     flights: Vec<FlightView<'a>>,
     diagnosis: Value,
+    proposal: Value,
+    schedule: Value,
+    designed: &'a [Designed],
+    own: Vec<OwnView>,
+    fly: Value,
+    flown: &'a [Flown],
     stack: Vec<StepView>,
     redo: Option<&'a str>,
     openings: &'a [Opening],
@@ -132,7 +141,6 @@ impl Bench {
         let inner = self.lock();
         let session = &inner.session;
         let names = inner.names(&(0..session.logs.len()).collect::<Vec<_>>());
-        let key = inner.key("diagnosis", &[]);
         let state = StateView {
             schema: "greylag.workbench/1",
             version: env!("CARGO_PKG_VERSION"),
@@ -144,11 +152,13 @@ impl Bench {
                 "changed_outside": inner.model_changed(),
             }),
             flights: names.into_iter().enumerate().map(|n| flight_view(&inner, n)).collect(),
-            diagnosis: json!({
-                "there": inner.diagnosis.as_ref().is_some_and(|(of, _)| *of == key),
-                "error": inner.failures.get(&key),
-                "key": key,
-            }),
+            diagnosis: result(&inner, &inner.diagnosis, Work::Diagnosis),
+            proposal: result(&inner, &inner.proposal, Work::Proposal),
+            schedule: json!({ "error": design_failure(&inner) }),
+            designed: &inner.designed,
+            own: inner.own_views(),
+            fly: fly_view(&inner),
+            flown: &session.flown,
             stack: (1..=session.effects.len()).map(|count| step(&inner, count)).collect(),
             redo: session.undone.last().map(|e| e.id.as_str()),
             openings: &session.openings,
@@ -239,6 +249,41 @@ impl Bench {
         let flight = inner.flights[place].as_ref().ok().cloned();
         flight.ok_or(WorkbenchError::NoFlight(place))
     }
+}
+
+/// Whether a result is there, or why not.
+fn result(inner: &Inner, known: &Option<(String, Arc<Value>)>, work: Work) -> Value {
+    let key = inner.key(work.word(), &[]);
+    let known = known.as_ref().filter(|(of, _)| *of == key);
+    let tried = known.map_or(&Value::Null, |(_, value)| &value[TRIED]);
+    json!({
+        "there": known.is_some(),
+        // a diagnosis of before the last effect was written does not rank it
+        "behind": tried.is_array() && *tried != inner.tried(),
+        "error": inner.failures.get(&key),
+        "key": key,
+    })
+}
+
+/// Why no schedule was made for the last pair of effects.
+fn design_failure(inner: &Inner) -> Option<&String> {
+    let pair = inner.between.as_ref()?.join("-");
+    inner.failures.get(&(inner.key(Work::Schedule.word(), &[]) + &pair))
+}
+
+/// What can be flown, and what is.
+fn fly_view(inner: &Inner) -> Value {
+    let flying = inner.flying.as_ref();
+    json!({
+        "possible": cfg!(feature = "sitl"),
+        "on": flying.is_some_and(|f| f.on),
+        "number": flying.map(|f| f.number),
+        "place": flying.map(|f| f.place),
+        "schedules": inner.schedules(),
+        "controllers": fly::controllers().collect::<Vec<_>>(),
+        "aircraft": fly::AIRCRAFT,
+        "channels": fly::channels(),
+    })
 }
 
 fn flight_view(inner: &Inner, (k, name): (usize, String)) -> FlightView<'_> {

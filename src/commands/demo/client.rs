@@ -1,6 +1,7 @@
 //! The client of the demonstration: arms, enters offboard, flies the schedule over a real socket.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
@@ -67,10 +68,11 @@ impl Client {
     }
 
     /// Arms, enters offboard, flies every leg, and goes to hold. `watch` sees the view with the
-    /// number of the leg and the seconds flown on it.
+    /// number of the leg and the seconds flown on it. Once `ended`, the rest of the legs is left out.
     pub fn fly(
         &mut self,
         legs: &Legs,
+        ended: &AtomicBool,
         mut watch: impl FnMut(usize, f64, &View),
     ) -> Result<Vec<(f64, String)>> {
         legs.legs.first().into_iter().for_each(|leg| self.aim(leg));
@@ -86,7 +88,7 @@ impl Client {
             self.aim(leg);
             let start = self.view.time_s;
             let begun = Instant::now();
-            while self.view.time_s - start < legs.seconds {
+            while self.view.time_s - start < legs.seconds && !ended.load(Ordering::Relaxed) {
                 self.turn()?;
                 if begun.elapsed() > PATIENCE.mul_f64(2.0) + Duration::from_secs_f64(legs.seconds) {
                     bail!("the companion has fallen silent: {}", self.last_words());

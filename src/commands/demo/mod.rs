@@ -57,6 +57,9 @@ pub struct Arguments {
     /// Seed of everything random: turbulence, noise, lost frames.
     #[arg(long, default_value_t = 1)]
     seed: u32,
+    /// End the flight when standard input ends, for a program that starts this one.
+    #[arg(long)]
+    attached: bool,
     #[command(flatten)]
     plant: PlantArgs,
     #[command(flatten)]
@@ -94,8 +97,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     println!("shim: aircraft {} in JSBSim, real time, towards udp {vehicle}", plant.aircraft);
     let simulator = simulate(arguments, &format!("udpout:{vehicle}"), stop.clone())?;
     let mut table = Live::begin(&legs);
+    let ended = arguments.attached.then(input_ends).unwrap_or_default();
     let flown = Client::connect(companion)
-        .and_then(|mut c| c.fly(&legs, |leg, s, view| table.show(leg, s, view)));
+        .and_then(|mut c| c.fly(&legs, &ended, |leg, s, view| table.show(leg, s, view)));
     table.end();
     stop.store(true, Ordering::Relaxed);
     let summary =
@@ -129,6 +133,18 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     files::write(&page, &report.page().render(), Overwrite::Never)?;
     println!("report: {}", page.display());
     Ok(verdict(&report))
+}
+
+/// Becomes true when standard input ends.
+fn input_ends() -> Arc<AtomicBool> {
+    let ended = Arc::new(AtomicBool::new(false));
+    let heard = ended.clone();
+    thread::spawn(move || {
+        // what is written there means nothing, and what cannot be read has ended
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        heard.store(true, Ordering::Relaxed);
+    });
+    ended
 }
 
 fn options(arguments: &Arguments, model: &crate::model::GreyBox) -> Result<Options> {

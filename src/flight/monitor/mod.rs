@@ -24,6 +24,17 @@ const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
 /// Below this share of the least airspeed of the envelope the model is not asked.
 const SLOWEST: f64 = 0.8;
 
+/// What is measured in a channel, with what the model says of it: m/s² for forces, rad/s² for angular accelerations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Compared {
+    /// Measured: forces at the sample, angular accelerations as means over the step before it.
+    pub measured: f64,
+    /// What the model predicts of that.
+    pub predicted: f64,
+    /// Half width of the band about the prediction: two standard deviations.
+    pub band: f64,
+}
+
 /// Watches one aircraft with one model.
 #[derive(Clone, Debug)]
 pub struct Monitor {
@@ -32,6 +43,8 @@ pub struct Monitor {
     last: Option<Seen>,
     /// Channels that the last state could be compared in: old residuals are not shown as present ones.
     compared: [bool; 6],
+    /// Measured and predicted in the last state that could be compared.
+    values: [[f64; 2]; 6],
     watches: [Watch; 6],
 }
 
@@ -53,6 +66,7 @@ impl Monitor {
             slowest,
             last: None,
             compared: [false; 6],
+            values: [[f64::NAN; 2]; 6],
             watches: [Watch::default(); 6],
         }
     }
@@ -90,6 +104,14 @@ impl Monitor {
         std::array::from_fn(|k| if self.compared[k] { self.watches[k].share() } else { f64::NAN })
     }
 
+    /// The channels of the last state, in the order of [`Channel::ALL`]; `None` where nothing could be compared.
+    pub fn channels(&self) -> [Option<Compared>; 6] {
+        std::array::from_fn(|k| {
+            let [measured, predicted] = self.values[k];
+            self.compared[k].then(|| Compared { measured, predicted, band: self.watches[k].band() })
+        })
+    }
+
     fn compare(&mut self, frame: &Telemetry, before: &Seen, predicted: &Six, dt: f64) {
         let variance = self.predictor.variance(frame, predicted);
         let [p, q, r] = [
@@ -115,6 +137,7 @@ impl Monitor {
             let residual = measured[k] - expected;
             if residual.is_finite() && variance[k].is_finite() {
                 watch.see(residual, variance[k], surfaces[k], dt);
+                self.values[k] = [measured[k], expected];
                 self.compared[k] = true;
             }
         }

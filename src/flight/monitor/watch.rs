@@ -56,8 +56,12 @@ impl Watch {
 
     /// The residual by its band, with its sign; beyond −1..1 is outside, NaN before the first.
     pub fn share(&self) -> f64 {
-        let band = self.variance.map_or(f64::NAN, |variance| BAND * variance.sqrt());
-        (self.power.sqrt() / band).copysign(self.residual)
+        (self.power.sqrt() / self.band()).copysign(self.residual)
+    }
+
+    /// Half width of the band, in the residual's unit; NaN before the first.
+    pub fn band(&self) -> f64 {
+        self.variance.map_or(f64::NAN, |variance| BAND * variance.sqrt())
     }
 
     /// Whether it has departed now, and has not been reported.

@@ -12,6 +12,7 @@ mod proposal;
 mod regression;
 pub(in crate::sysid) mod search;
 
+pub use answer::curves::over_the_best;
 pub use answer::result::{
     Advice, Candidate, ChannelLeft, Curve, Decoy, Diagnosis, FlightEstimate, Measurement, Nulls,
     Parameter, Settings, Tuned, Verdict,

@@ -76,9 +76,9 @@ function cell(channel, bins, size) {
   const weight = bins.explained * size;
   const pressed = pick.channel === channel.channel && pick.variable === bins.variable;
   return el("button", {
-    type: "button", "aria-pressed": pressed ? "true" : "false", class: weight > 0.45 ? "strong" : "", vars: { "--weight": `${Math.round(100 * weight)}%` },
+    type: "button", "aria-pressed": pressed ? "true" : "false", class: weight > 0.58 ? "strong" : "", vars: { "--weight": `${Math.round(100 * weight)}%` },
     "data-channel": channel.channel, "data-variable": bins.variable,
-    "aria-label": `${channel.name} over ${bins.name}: ${percent(bins.explained)} of the residual's variance`,
+    "aria-label": `${channel.name} over ${bins.name}: ${Math.round(100 * bins.explained)} % of the residual's variance`,
     title: `${percent(bins.explained)} of the variance of what ${channel.name} leaves goes with ${bins.name}`,
     onclick: () => { Object.assign(pick, { channel: channel.channel, variable: bins.variable, by_hand: true }); pressed_cell(); },
   }, bins.explained >= 0.05 ? String(Math.round(100 * bins.explained)) : "");

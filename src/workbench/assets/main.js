@@ -3,7 +3,9 @@
 import { complain, el, get, horizon, hush, judged, percent, post, redraw, send, show, verdicts } from "./kit.js";
 import { flights } from "./flights.js";
 import { failing, freshFailing, repaint } from "./failing.js";
+import { fly, offer, part } from "./fly.js";
 import { suspects } from "./suspects.js";
+import { text } from "./text.js";
 import { model } from "./model.js";
 
 const root = document.documentElement;
@@ -18,7 +20,7 @@ function wear(theme) {
 
 /** What the panes share. */
 const bench = {
-  state: null, failing: null, diagnosis: null, flight: null, chosen: 0, chosen_path: null, data: new Map(), lit: new Map(), act, upload, choose, light, choose_lit, by_hand: false,
+  state: null, failing: null, diagnosis: null, proposal: null, waited_for: null, show: show_middle, flight: null, chosen: 0, chosen_path: null, data: new Map(), lit: new Map(), act, upload, choose, light, choose_lit, by_hand: false,
 };
 
 root.dataset.theme = dark.matches ? "dark" : "light";
@@ -34,12 +36,13 @@ async function refresh(state) {
     if (own !== fresh) return;
     show_all();
     const usable = bench.state.flights.some((f) => !f.error && (f.role === "fit" || f.role === "hold_out"));
-    const [failing_now, diagnosis] = await Promise.all([
+    const [failing_now, diagnosis, proposal] = await Promise.all([
       usable ? get("/api/failing") : null,
       bench.state.diagnosis.there ? get("/api/diagnosis") : null,
+      bench.state.proposal.there ? get("/api/proposal") : null,
     ]);
     if (own !== fresh) return;
-    Object.assign(bench, { failing: failing_now, diagnosis });
+    Object.assign(bench, { failing: failing_now, diagnosis, proposal });
     show_all();
     await load_flight(own);
     root.dataset.ready = "yes";
@@ -91,8 +94,19 @@ function show_all() {
   flights(bench);
   failing(bench);
   suspects(bench);
+  text(bench);
+  fly(bench);
   model(bench);
 }
+/** Shows one of the two middle panes, where there is room for one; a schedule to be flown is chosen. */
+function show_middle(pane, schedule) {
+  document.querySelector(".middle").dataset.shown = pane;
+  for (const name of ["failing", "fly"]) document.getElementById(`show-${name}`).setAttribute("aria-pressed", name === pane ? "true" : "false");
+  document.getElementById(pane).scrollIntoView({ block: "nearest" });
+  if (pane === "failing") repaint();
+  if (schedule) offer(schedule);
+}
+for (const name of ["failing", "fly"]) document.getElementById(`show-${name}`).addEventListener("click", () => show_middle(name));
 
 /** The session's answer in one line. */
 function answer() {
@@ -111,15 +125,16 @@ function job() {
   const place = document.getElementById("job");
   const jobs = bench.state.jobs;
   if (!jobs.length) return place.replaceChildren();
-  const [now] = jobs;
-  place.replaceChildren(
-    el("span", {}, now.doing), el("progress", { max: 1, value: now.fraction, "aria-label": now.work }),
-    el("button", { type: "button", onclick: () => act({ do: "cancel", job: now.id }) }, "Cancel"));
+  place.replaceChildren(...jobs.map((now) => el("div", { class: "one" },
+    el("span", {}, now.doing), el("progress", { max: 1, value: now.fraction, "aria-label": WORK[now.work] }),
+    el("button", { type: "button", "aria-label": `Cancel the ${WORK[now.work]}`, onclick: () => act({ do: "cancel", job: now.id }) }, "Cancel"))));
 }
+const WORK = { diagnosis: "diagnosis", fit: "fit", proposal: "search for a formula", schedule: "search for a schedule" };
 
 /** Asks for a change; whatever comes of it is shown. */
 async function act(what) {
   hush();
+  if (what.do === "propose") bench.waited_for = "proposal";
   try {
     await refresh(await post("/api/act", { revision: bench.state.revision, act: what }));
     return true;
@@ -129,13 +144,21 @@ async function act(what) {
     return false;
   }
 }
+async function take(file) {
+  const query = new URLSearchParams({ name: file.name, revision: bench.state.revision });
+  bench.state = await send(`/api/logs?${query}`, file);
+}
 async function upload(files) {
   hush();
   const said = [];
   for (const file of files) {
     try {
-      const query = new URLSearchParams({ name: file.name, revision: bench.state.revision });
-      bench.state = await send(`/api/logs?${query}`, file);
+      await take(file).catch(async (error) => {
+        // the session was changed meanwhile, as by a flight that ended: what a drop means is the same
+        if (error.status !== 409) throw error;
+        bench.state = await get("/api/state");
+        await take(file);
+      });
       flights(bench);
     } catch (error) {
       said.push(error.message);
@@ -169,6 +192,8 @@ events.addEventListener("message", (message) => {
     bench.state.jobs[known] = news.job;
     job();
     if (first) suspects(bench);
+  } else if (news.event === "flight") {
+    part(news.part);
   } else if (news.event === "changed") {
     clearTimeout(later);
     later = setTimeout(() => refresh(), 30);

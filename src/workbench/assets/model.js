@@ -18,7 +18,8 @@ export function model(bench) {
     el("button", { type: "button", disabled: !state.redo, onclick: () => bench.act({ do: "redo" }) }, state.redo ? `Redo ${state.redo}` : "Redo"),
     unfitted && el("button", { type: "button", class: "main", onclick: () => bench.act({ do: "fit" }) }, "Fit"),
     el("button", { type: "button", id: "judge", disabled: !tests.length || state.jobs.length > 0, title: "Opens the test flights; each opening is counted and recorded", onclick: () => bench.act({ do: "judge" }) }, "Judge"),
-    el("button", { type: "button", id: "save", class: stack.length && !unfitted ? "main" : "", disabled: !stack.length || unfitted || state.jobs.length > 0, onclick: () => save(bench) }, "Save"));
+    el("button", { type: "button", id: "save", class: stack.length && !unfitted ? "main" : "", disabled: !stack.length || unfitted || state.jobs.length > 0, onclick: () => save(bench) }, "Save"),
+    el("button", { type: "button", id: "fly-it", onclick: () => bench.show("fly") }, "Fly it"));
   body.replaceChildren(...[outside, base, errors(state), ...stack.map((s) => step(bench, s)), !stack.length && el("p", { class: "empty" }, "No effect is accepted yet: tick a suspect."),
     buttons, saved.note, opened(state), command(state.commands.amend, "Model and Save"), command(state.commands.judge, "Judge")].filter(Boolean));
 }

@@ -6,12 +6,13 @@ const open = new Set();
 let before = "";
 
 export function suspects(bench) {
-  const body = document.querySelector("#suspects .body");
+  const body = document.querySelector("#suspects .list");
   const { state, diagnosis } = bench;
   const running = state.jobs.find((j) => j.work === "diagnosis");
   const ready = state.flights.some((f) => f.role === "fit" && !f.error);
   const ask = el("button", { type: "button", class: state.diagnosis.there ? "" : "main", id: "diagnose", disabled: !ready || !!running, onclick: () => bench.act({ do: "diagnose" }) },
     state.diagnosis.there ? "Diagnose again" : "Diagnose: what is missing?");
+  const behind = state.diagnosis.behind && el("p", { class: "note" }, "The effects as text were changed since this diagnosis: Diagnose again ranks them too.");
   const end = [command(state.commands.diagnose)].filter(Boolean);
   if (running || !diagnosis) {
     before = "";
@@ -20,17 +21,18 @@ export function suspects(bench) {
     return body.replaceChildren(el("div", { class: "row" }, ask), ...[said, hint, running && first(running)].filter(Boolean), ...end);
   }
   // the list stays as it is while nothing of it changes, so that plots and focus stay
-  const now = JSON.stringify([state.diagnosis.key, state.stack.map((s) => [s.id, s.status]), state.commands.diagnose, state.jobs.length > 0]);
+  const now = JSON.stringify([state.diagnosis.key, state.diagnosis.behind, state.stack.map((s) => [s.id, s.status]), state.commands.diagnose, state.jobs.length > 0]);
   if (now === before) return;
   before = now;
-  const kept = body.scrollTop;
+  const pane = document.querySelector("#suspects .body");
+  const kept = pane.scrollTop;
   const passing = diagnosis.effects.filter((e) => e.asserted || e.evidence > e.threshold || ticked(bench, e.id));
   const others = diagnosis.effects.filter((e) => !passing.includes(e));
   const most = Math.max(...diagnosis.effects.map((e) => e.evidence), 1);
   body.replaceChildren(verdict(diagnosis), ...passing.map((e) => suspect(bench, e, most)),
     more(`${others.length} others stay under what chance reaches`, others.map((e) => suspect(bench, e, most))),
-    notes(diagnosis), el("div", { class: "row" }, ask), ...end);
-  body.scrollTop = kept;
+    notes(bench, diagnosis), behind || "", el("div", { class: "row" }, ask), ...end);
+  pane.scrollTop = kept;
   curves(body, diagnosis);
 }
 
@@ -73,6 +75,7 @@ function suspect(bench, e, most) {
     el("p", {}, `Evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)}. `, facts.filter(Boolean).join("; "), "."),
     ...e.refused.map((why) => el("p", { class: "bad" }, why)),
     e.indistinguishable_from.length ? el("p", {}, "These flights cannot tell it from ", el("b", {}, e.indistinguishable_from.join(", ")), ".") : "",
+    e.indistinguishable_from.length ? el("div", { class: "row" }, e.indistinguishable_from.map((other) => apart(bench, [e.id, other]))) : "",
     e.curve && above ? el("figure", {}, el("figcaption", {}, el("b", {}, `${e.curve.channel} (${e.curve.unit}) over ${e.curve.variable}`)), el("div", { class: "plot", "data-curve": e.id })) : "",
     e.by_flight.length > 1 ? more("Do the flights agree?", [el("ul", {}, e.by_flight.map((f) => el("li", {}, `${f.flight}: ${show(f.value)} ± ${show(1.96 * f.sd, 2)}`)))], `agree-${e.id}`) : "");
 }
@@ -82,31 +85,38 @@ function decisive(e) {
   const p = [...e.parameters].sort((a, b) => clear(b) - clear(a))[0];
   return p && `${p.name} = ${show(p.value)} (95 %: ${show(p.ci95[0])} to ${show(p.ci95[1])})${p.unit ? ` ${p.unit}` : ""}`;
 }
-function notes(diagnosis) {
-  const fly = diagnosis.advice.map((a) => el("p", {}, el("b", {}, a.manoeuvre), `: ${a.why}`, a.between ? ` (greylag design --between ${a.between.join(" ")})` : ""));
+/** Makes a schedule that tells two effects apart. */
+function apart(bench, between) {
+  return el("button", { type: "button", "data-between": between.join(" "), onclick: () => bench.act({ do: "design", between }) }, `Make a schedule that tells it from ${between[1].replaceAll("_", " ")}`);
+}
+function notes(bench, diagnosis) {
+  const fly = diagnosis.advice.map((a) => el("p", {}, el("b", {}, a.manoeuvre), `: ${a.why} `, a.between && el("button", { type: "button", "data-between": a.between.join(" "), onclick: () => bench.act({ do: "design", between: a.between }) }, `Make a schedule between ${a.between.join(" and ")}`)));
   return el("div", {}, more("What to fly next", fly, "fly"), more("Notes", diagnosis.notes.map((n) => el("p", {}, n)), "notes"));
 }
 
 /** What is left of the channel over the variable, and what the effect says of it. */
 function curves(body, diagnosis) {
   for (const holder of body.querySelectorAll("[data-curve]")) {
-    const { x, residual, at, contribution } = diagnosis.effects.find((e) => e.id === holder.dataset.curve).curve;
-    const order = x.map((_, i) => i).sort((a, b) => x[a] - x[b]);
-    const band = (u) => {
-      const { ctx } = u;
-      const place = (k, i) => [u.valToPos(at[i], "x", true), u.valToPos(contribution[i][k], "y", true)];
-      ctx.save();
-      ctx.fillStyle = ink("band");
-      ctx.beginPath();
-      at.forEach((_, i) => ctx.lineTo(...place(1, i)));
-      for (let i = at.length - 1; i >= 0; i--) ctx.lineTo(...place(2, i));
-      ctx.fill();
-      ctx.restore();
-    };
-    const data = uPlot.join([[order.map((i) => x[i]), order.map((i) => residual[i])], [at, contribution.map((c) => c[0])]]);
-    draw(holder, {
-      scales: { x: { time: false } }, cursor: { drag: { x: false, y: false } }, hooks: { drawSeries: [(u, k) => k === 1 && band(u)] },
-      series: [{}, { stroke: () => ink("before"), paths: () => null, points: { show: true, size: 2.5, width: 0, fill: () => ink("before") } }, line("after", 2.5)],
-    }, data);
+    curve(holder, diagnosis.effects.find((e) => e.id === holder.dataset.curve).curve);
   }
+}
+/** Draws a curve with its interval over the residual. */
+export function curve(holder, { x, residual, at, contribution }) {
+  const order = x.map((_, i) => i).sort((a, b) => x[a] - x[b]);
+  const band = (u) => {
+    const { ctx } = u;
+    const place = (k, i) => [u.valToPos(at[i], "x", true), u.valToPos(contribution[i][k], "y", true)];
+    ctx.save();
+    ctx.fillStyle = ink("band");
+    ctx.beginPath();
+    at.forEach((_, i) => ctx.lineTo(...place(1, i)));
+    for (let i = at.length - 1; i >= 0; i--) ctx.lineTo(...place(2, i));
+    ctx.fill();
+    ctx.restore();
+  };
+  const data = uPlot.join([[order.map((i) => x[i]), order.map((i) => residual[i])], [at, contribution.map((c) => c[0])]]);
+  draw(holder, {
+    scales: { x: { time: false } }, cursor: { drag: { x: false, y: false } }, hooks: { drawSeries: [(u, k) => k === 1 && band(u)] },
+    series: [{}, { stroke: () => ink("before"), paths: () => null, points: { show: true, size: 2.5, width: 0, fill: () => ink("before") } }, line("after", 2.5)],
+  }, data);
 }

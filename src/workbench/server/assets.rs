@@ -8,7 +8,7 @@ use super::routes;
 
 const PAGE: &str = include_str!("../assets/page.html");
 /// Files by name, with their types.
-const FILES: [(&str, &str, &str); 9] = [
+const FILES: [(&str, &str, &str); 11] = [
     ("workbench.css", CSS, include_str!("../assets/workbench.css")),
     ("uplot.css", CSS, include_str!("../../report/kit/assets/uPlot.min.css")),
     ("uplot.js", JS, include_str!("../../report/kit/assets/uPlot.iife.min.js")),
@@ -16,6 +16,8 @@ const FILES: [(&str, &str, &str); 9] = [
     ("kit.js", JS, include_str!("../assets/kit.js")),
     ("flights.js", JS, include_str!("../assets/flights.js")),
     ("failing.js", JS, include_str!("../assets/failing.js")),
+    ("fly.js", JS, include_str!("../assets/fly.js")),
+    ("text.js", JS, include_str!("../assets/text.js")),
     ("suspects.js", JS, include_str!("../assets/suspects.js")),
     ("model.js", JS, include_str!("../assets/model.js")),
 ];

@@ -69,6 +69,42 @@ pub async fn diagnosis(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.diagnosis())).await
 }
 
+/// What a search for a formula found.
+pub async fn proposal(State(shared): State<Shared>) -> Response {
+    aside(shared, |bench| Ok(bench.proposal())).await
+}
+
+/// What an effect file may name.
+pub async fn grammar() -> Response {
+    Json(crate::workbench::grammar()).into_response()
+}
+
+/// A text that may be an effect file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Text {
+    text: String,
+}
+
+/// What an effect file says, or what is wrong with it.
+pub async fn check(Json(Text { text }): Json<Text>) -> Response {
+    match crate::workbench::check(&text) {
+        Ok(checked) => Json(checked).into_response(),
+        // a text that is being written is no failure of the request
+        Err(error) => Json(json!({ "error": error.to_string() })).into_response(),
+    }
+}
+
+/// The curve of an accepted effect.
+pub async fn curve(State(shared): State<Shared>, Path(effect): Path<String>) -> Response {
+    aside(shared, move |bench| bench.curve(&effect)).await
+}
+
+/// The flight that is flown, or was last.
+pub async fn flying(State(shared): State<Shared>) -> Response {
+    aside(shared, |bench| Ok(bench.flying())).await
+}
+
 /// A flight over time.
 pub async fn flight(State(shared): State<Shared>, Path(place): Path<usize>) -> Response {
     aside(shared, move |bench| bench.flight(place)).await

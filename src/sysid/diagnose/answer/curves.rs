@@ -38,6 +38,19 @@ pub fn curve(
             }
         }
     }
+    over_the_best(id, made, scatter, &regimes, relative)
+}
+
+/// The curve of an effect in a channel over the regime variable that shows it best: at each window what it makes
+/// (`made`), measured less the model without it (`scatter`), both in the channel's unit, and where the window lies.
+/// `relative` is the standard deviation of what it makes relative to itself.
+pub fn over_the_best(
+    id: ChannelId,
+    made: Vec<f64>,
+    scatter: Vec<f64>,
+    regimes: &[[f64; RegimeVariable::CONTINUOUS.len()]],
+    relative: f64,
+) -> Option<Curve> {
     let shown = |k: &usize| !NOT_SHOWN.contains(&RegimeVariable::CONTINUOUS[*k]);
     let best = (0..RegimeVariable::CONTINUOUS.len())
         .filter(shown)

@@ -1,0 +1,311 @@
+//! Flights in the simulator with the session's model, and recordings of other programs that are watched: what is
+//! measured is shown against what the models predict while it is flown.
+
+mod live;
+mod order;
+mod program;
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::Serialize;
+
+pub(super) use live::channels;
+pub use live::{Heard, Live};
+pub use order::Order;
+pub(super) use order::{AIRCRAFT, SCHEDULES, controllers};
+
+use super::bench::Bench;
+use super::error::{WorkbenchError, io};
+use super::jobs::{Event, Stop};
+use super::roles::now_s;
+use super::session::{Flown, Outcome, Role};
+use crate::logs::Growing;
+use crate::model::GreyBox;
+use live::Watcher;
+use program::Program;
+
+/// The folder of recordings, below the session's.
+const FLIGHTS: &str = "flights";
+/// The recording's log.
+const LOG: &str = "flight.csv";
+/// Time between two looks at the recording.
+const LOOK: Duration = Duration::from_millis(100);
+/// Characters that are kept of a program's last line.
+const SAID: usize = 400;
+
+/// The flight that is flown or watched, or that was last.
+pub struct Flying {
+    /// Its number.
+    pub number: u64,
+    /// Its place among the session's flights.
+    pub place: usize,
+    /// Whether it goes on.
+    pub on: bool,
+    /// What was seen of it.
+    pub live: Live,
+    /// Points that were let go.
+    pub gone: usize,
+    stop: Stop,
+}
+
+/// A part of a flight as a page is sent it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Part {
+    /// The flight's number.
+    pub number: u64,
+    /// Whether it goes on.
+    pub on: bool,
+    /// Points of the flight before this part.
+    pub from: usize,
+    /// The part.
+    pub live: Live,
+}
+
+/// What a flight is flown or watched with.
+struct Task {
+    number: u64,
+    log: PathBuf,
+    models: Vec<GreyBox>,
+    program: Option<Program>,
+    stop: Stop,
+}
+
+impl Bench {
+    /// Starts a flight in the simulator with the model of the accepted effects.
+    pub(super) fn fly(self: &Arc<Self>, seen: u64, order: &Order) -> Result<(), WorkbenchError> {
+        if !cfg!(feature = "sitl") {
+            return Err(WorkbenchError::NoSimulator);
+        }
+        self.same_model()?;
+        let (model, folder) = {
+            let inner = self.lock();
+            if inner.flying.as_ref().is_some_and(|f| f.on) {
+                return Err(WorkbenchError::Flying);
+            }
+            (inner.flying_model(), self.folder.join(FLIGHTS))
+        };
+        std::fs::create_dir_all(&folder).map_err(|e| io(&folder, e))?;
+        let number = free(&folder);
+        let record = folder.join(number.to_string());
+        let words = order.words(&self.folder, &model, &record)?;
+        let begun = Flown {
+            schedule: order.schedule.clone(),
+            command: order::line(&words),
+            ..Flown::new(PathBuf::from(FLIGHTS).join(number.to_string()))
+        };
+        self.begin(seen, begun, || Program::start(&words).map(Some).map_err(|e| io(&record, e)))
+    }
+
+    /// Watches the recording in `folder`, which another program is writing.
+    pub(super) fn watch(self: &Arc<Self>, seen: u64, folder: &Path) -> Result<(), WorkbenchError> {
+        let folder = match folder.file_name() {
+            Some(name) if name == LOG => folder.parent().unwrap_or(folder),
+            _ => folder,
+        };
+        if !folder.join(LOG).is_file() {
+            return Err(WorkbenchError::NoRecording(folder.into()));
+        }
+        let folder = std::fs::canonicalize(folder).map_err(|e| io(folder, e))?;
+        self.begin(seen, Flown::new(folder), || Ok(None))
+    }
+
+    fn begin(
+        self: &Arc<Self>,
+        seen: u64,
+        begun: Flown,
+        start: impl FnOnce() -> Result<Option<Program>, WorkbenchError>,
+    ) -> Result<(), WorkbenchError> {
+        let log = self.folder.join(&begun.folder).join(LOG);
+        let task = self.change(seen, |inner| {
+            if inner.flying.as_ref().is_some_and(|f| f.on) {
+                return Err(WorkbenchError::Flying);
+            }
+            let models = inner.models();
+            let effects = inner.session.effects.iter().map(|e| e.id.clone()).collect();
+            let model = models.last().map_or_else(String::new, |m| m.name.clone());
+            inner.session.flown.push(Flown { model, effects, ..begun });
+            let (number, stop) = (inner.next_job, Stop::default());
+            inner.next_job += 1;
+            let program = start()?;
+            inner.flying = Some(Flying {
+                number,
+                place: inner.session.flown.len() - 1,
+                on: true,
+                live: Live::default(),
+                gone: 0,
+                stop: stop.clone(),
+            });
+            Ok(Task { number, log, models, program, stop })
+        });
+        let task = task.inspect_err(|_| {
+            // what was not written has not begun
+            let mut inner = self.lock();
+            let flown = inner.session.flown.len();
+            inner.flying = inner.flying.take().filter(|f| f.place < flown);
+        })?;
+        let bench = self.clone();
+        std::thread::spawn(move || bench.attend(task));
+        Ok(())
+    }
+
+    /// Ends the flight.
+    pub(super) fn stop_flight(&self) -> Result<(), WorkbenchError> {
+        let inner = self.lock();
+        let flying = inner.flying.as_ref().filter(|f| f.on);
+        flying.ok_or(WorkbenchError::Nothing("stop"))?.stop.stop();
+        Ok(())
+    }
+
+    /// Takes the recording of the session's flight `place` as a log.
+    pub(super) fn take_flight(&self, seen: u64, place: usize) -> Result<(), WorkbenchError> {
+        let (file, name) = {
+            let inner = self.lock();
+            let flown = inner.session.flown.get(place);
+            let flown = flown.ok_or(WorkbenchError::NoFlight(place))?;
+            if flown.outcome == Outcome::Flying {
+                return Err(WorkbenchError::Flying);
+            }
+            let name = flown.folder.file_name().unwrap_or_default().to_string_lossy();
+            (self.folder.join(&flown.folder).join(LOG), format!("flown-{name}.csv"))
+        };
+        let bytes = std::fs::read(&file).map_err(|e| io(&file, e))?;
+        // results are about the flights with a role: they stay until this one is given one
+        self.take_as(seen, &name, &bytes, Some(Role::Unused))
+    }
+
+    /// The whole flight that is flown, or was last.
+    pub fn flying(&self) -> Option<Part> {
+        let inner = self.lock();
+        let Flying { number, on, live, gone, .. } = inner.flying.as_ref()?;
+        Some(Part { number: *number, on: *on, from: *gone, live: live.clone() })
+    }
+
+    /// Follows the recording until its end.
+    fn attend(self: &Arc<Self>, mut task: Task) {
+        let mut watcher = Watcher::new(&task.models);
+        let mut tail = Tail::default();
+        let mut trouble = None;
+        let outcome = loop {
+            let stopped = task.stop.answer().is_break();
+            // looked at before the last rows are read, so that none is missed
+            let ended = match &mut task.program {
+                Some(program) => {
+                    if stopped {
+                        program.stop();
+                    }
+                    program.ended().is_some()
+                }
+                None => stopped,
+            };
+            match tail.rows(&task.log) {
+                Ok(rows) if rows.is_empty() => {}
+                Ok(rows) => self.seen(task.number, watcher.take(&rows)),
+                Err(error) => trouble = Some(error.to_string()),
+            }
+            let whole = task.program.as_ref().is_none_or(Program::is_whole);
+            match (ended || trouble.is_some(), whole && trouble.is_none(), stopped) {
+                (false, ..) => std::thread::sleep(LOOK),
+                (true, true, false) => break Outcome::Flown,
+                (true, _, true) => break Outcome::Stopped,
+                (true, ..) => break Outcome::Failed,
+            }
+        };
+        self.seen(task.number, watcher.rest());
+        let said = trouble.or(task.program.as_ref().map(Program::last_words)).unwrap_or_default();
+        self.landed(task.number, outcome, &said, tail.seconds());
+    }
+
+    /// Notes a part of the flight, and sends it to the pages.
+    fn seen(&self, number: u64, later: Live) {
+        if later.time_s.is_empty() && later.warnings.is_empty() {
+            return;
+        }
+        let mut inner = self.lock();
+        let Some(flying) = inner.flying.as_mut().filter(|f| f.number == number) else { return };
+        let from = flying.gone + flying.live.time_s.len();
+        flying.gone += flying.live.append(later.clone());
+        drop(inner);
+        (self.hear)(Event::Flight { part: Part { number, on: true, from, live: later } });
+    }
+
+    /// Records how the flight went.
+    fn landed(&self, number: u64, outcome: Outcome, said: &str, seconds: f64) {
+        let recorded = self.amend_session(|inner| {
+            let Some(flying) = inner.flying.as_mut().filter(|f| f.number == number) else { return };
+            flying.on = false;
+            let name = |h: &Heard| flying.live.models.get(h.model).map_or("", |m| m.model.as_str());
+            let warning = |h: &Heard| format!("{:.1} s, {}: {}", h.time_s, name(h), h.text);
+            let warnings = flying.live.warnings.iter().map(warning).collect();
+            let place = flying.place;
+            let flown = &mut inner.session.flown[place];
+            (flown.outcome, flown.seconds, flown.warnings) = (outcome, seconds, warnings);
+            flown.said = said.chars().take(SAID).collect();
+        });
+        if let Err(error) = recorded {
+            tracing::warn!("the flight's end is not in the session: {error}");
+        }
+    }
+}
+
+impl Flown {
+    /// A flight that begins now, recorded in `folder`.
+    fn new(folder: PathBuf) -> Flown {
+        Flown {
+            unix_s: now_s(),
+            folder,
+            model: String::new(),
+            effects: Vec::new(),
+            schedule: String::new(),
+            command: String::new(),
+            outcome: Outcome::Flying,
+            seconds: 0.0,
+            warnings: Vec::new(),
+            said: String::new(),
+        }
+    }
+}
+
+/// The lowest number that no recording in `folder` has and none above it.
+fn free(folder: &Path) -> u64 {
+    let names = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let numbers = names.filter_map(|e| e.file_name().to_str()?.parse::<u64>().ok());
+    numbers.max().unwrap_or(0) + 1
+}
+
+/// What was read of a recording.
+#[derive(Default)]
+struct Tail {
+    growing: Growing,
+    read: u64,
+    span: Option<[f64; 2]>,
+}
+
+impl Tail {
+    /// The rows that came since the last look; none as long as there is no file.
+    fn rows(&mut self, log: &Path) -> Result<Vec<crate::logs::Sample>, WorkbenchError> {
+        let mut file = match File::open(log) {
+            Ok(file) => file,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(e) => return Err(io(log, e)),
+        };
+        let mut bytes = Vec::new();
+        file.seek(SeekFrom::Start(self.read)).map_err(|e| io(log, e))?;
+        file.read_to_end(&mut bytes).map_err(|e| io(log, e))?;
+        self.read += bytes.len() as u64;
+        let rows = self.growing.take(&bytes, log)?;
+        if let (Some(first), Some(last)) = (rows.first(), rows.last()) {
+            let begun = self.span.map_or(first.time_s, |[begun, _]| begun);
+            self.span = Some([begun, last.time_s]);
+        }
+        Ok(rows)
+    }
+
+    /// The time from its first row to its last, s.
+    fn seconds(&self) -> f64 {
+        self.span.map_or(0.0, |[first, last]| last - first)
+    }
+}

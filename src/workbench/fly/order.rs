@@ -1,0 +1,154 @@
+//! A flight that is asked for, and the command that flies it.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::super::bench::Inner;
+use super::super::commands::quoted;
+use super::super::error::WorkbenchError;
+use crate::control::{Kind, Needs};
+use crate::manoeuvres::menu::{self, MENU};
+
+/// The schedule of `greylag demo` where no other is named.
+pub const ATTITUDES: &str = "attitudes";
+/// The folder of schedules, below the session's.
+pub const SCHEDULES: &str = "schedules";
+/// Aircraft that the simulator holds.
+pub const AIRCRAFT: [&str; 2] = ["x8", "aerosonde"];
+
+/// A simulator flight that is asked for.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Order {
+    /// `attitudes`, a manoeuvre of the menu, or a schedule of the session.
+    pub schedule: String,
+    /// The controller, designed from the session's model.
+    pub controller: String,
+    /// The aircraft that the simulator flies.
+    pub aircraft: String,
+    /// Effects hidden in the aircraft, each ID=AMPLITUDE, with blanks between them.
+    #[serde(default)]
+    pub hide: String,
+    /// Turbulence, 1 to 7 (3 light, 4 moderate, 6 severe).
+    #[serde(default)]
+    pub turbulence: Option<u8>,
+    /// Seed of everything random.
+    pub seed: u32,
+}
+
+/// A schedule that can be chosen.
+#[derive(Clone, Debug, Serialize)]
+pub struct Choice {
+    /// What an [`Order`] calls it.
+    pub id: String,
+    /// What it is for.
+    pub description: String,
+}
+
+impl Inner {
+    /// The schedules that can be flown: the demonstration's, the menu's, those made in this session.
+    pub fn schedules(&self) -> Vec<Choice> {
+        let attitudes = Choice {
+            id: ATTITUDES.into(),
+            description: "Six attitudes of 8 s each, easy ones first, as greylag demo flies them."
+                .into(),
+        };
+        let of_menu =
+            MENU.iter().map(|m| Choice { id: m.name.into(), description: m.description.into() });
+        let own = self.designed.iter().map(|d| Choice {
+            id: d.name.clone(),
+            description: format!(
+                "{} {} times: tells {} apart.",
+                d.manoeuvre,
+                d.times,
+                d.between.join(" and ")
+            ),
+        });
+        std::iter::once(attitudes).chain(own).chain(of_menu).collect()
+    }
+
+    /// The model that flies: as amended if its fit is done, else as given.
+    pub fn flying_model(&self) -> PathBuf {
+        let key = self.key("fit", &self.session.effects);
+        let fitted = self.fits.get(&key).filter(|f| !f.all_refused());
+        match fitted {
+            Some(_) => {
+                self.folder.join("fits").join(key).join(crate::sysid::amend::document::MODEL)
+            }
+            None => self.session.model.clone(),
+        }
+    }
+}
+
+/// Controllers that need a model alone.
+pub fn controllers() -> impl Iterator<Item = &'static str> {
+    let alone = Kind::ALL.iter().filter(|k| !matches!(k.needs(), Needs::Policy | Needs::Both));
+    alone.map(|k| k.name())
+}
+
+impl Order {
+    /// The words of the command that flies it with the model in `model`, recording to `record`; a schedule of the
+    /// menu is written to `folder`, the session's, first.
+    ///
+    /// # Errors
+    /// A word is none that the simulator knows, or the schedule cannot be written.
+    pub fn words(
+        &self,
+        folder: &Path,
+        model: &Path,
+        record: &Path,
+    ) -> Result<Vec<String>, WorkbenchError> {
+        Kind::from_str(&self.controller).map_err(|e| WorkbenchError::Order(format!("{e}")))?;
+        if !AIRCRAFT.contains(&self.aircraft.as_str()) {
+            return Err(WorkbenchError::Order(format!("there is no aircraft {:?}", self.aircraft)));
+        }
+        let text = |path: &Path| path.display().to_string();
+        let mut words: Vec<String> = ["demo", "--model"].map(str::to_owned).into();
+        words.extend([text(model), "--controller".into(), self.controller.clone()]);
+        if let Some(file) = self.schedule(folder)? {
+            words.extend(["--schedule".into(), text(&file)]);
+        }
+        words.extend(["--aircraft".into(), self.aircraft.clone()]);
+        for hidden in self.hide.split_whitespace() {
+            let plain = |c: char| c.is_ascii_alphanumeric() || "_=.,+-".contains(c);
+            if !hidden.contains('=') || !hidden.chars().all(plain) {
+                let why = format!(
+                    "{hidden:?} is no hidden effect; write ID=AMPLITUDE, such as drag_beta2=1.0"
+                );
+                return Err(WorkbenchError::Order(why));
+            }
+            words.push(format!("--hide={hidden}"));
+        }
+        if let Some(severity) = self.turbulence {
+            words.extend(["--turbulence-severity".into(), severity.to_string()]);
+        }
+        words.extend(["--seed".into(), self.seed.to_string(), "--out".into(), text(record)]);
+        Ok(words)
+    }
+
+    /// The file of its schedule; none for the attitudes of the demonstration.
+    fn schedule(&self, folder: &Path) -> Result<Option<PathBuf>, WorkbenchError> {
+        if self.schedule == ATTITUDES {
+            return Ok(None);
+        }
+        let unknown = || WorkbenchError::Order(format!("there is no schedule {:?}", self.schedule));
+        let plain = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
+        if !self.schedule.chars().all(plain) {
+            return Err(unknown());
+        }
+        let file = folder.join(SCHEDULES).join(format!("{}.toml", self.schedule));
+        if let Some(manoeuvre) = menu::named(&self.schedule) {
+            let place = file.parent().unwrap_or(folder);
+            std::fs::create_dir_all(place).map_err(|e| super::super::error::io(place, e))?;
+            crate::report::write_over(&file, manoeuvre.schedule().to_toml())?;
+        }
+        if file.exists() { Ok(Some(file)) } else { Err(unknown()) }
+    }
+}
+
+/// The words as a shell takes them.
+pub fn line(words: &[String]) -> String {
+    words.iter().fold("greylag".into(), |line, word| line + " " + &quoted(Path::new(word)))
+}

@@ -1,0 +1,253 @@
+//! Effects that are written as text in the session: checked, kept, tried like those of the catalogue.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::bench::{Bench, Inner};
+use super::curves::rows;
+use super::error::{WorkbenchError, io};
+use super::jobs::Work;
+use super::session::Role;
+use crate::model::GreyBox;
+use crate::physics::catalogue;
+use crate::physics::effects::Description;
+use crate::physics::formula::expression::Function;
+use crate::physics::formula::{Status, Variable, file, register};
+use crate::report::write_over;
+use crate::sysid::amend::document::sha256;
+use crate::sysid::compare::{self, ChannelId, compare};
+use crate::sysid::diagnose::{Curve, over_the_best};
+use crate::sysid::progress::unheard;
+use crate::sysid::weak_form::prepared::Prepared;
+
+/// The folder of the effect files, below the session's.
+pub(super) const EFFECTS: &str = "effects";
+/// An effect file to begin with.
+const EXAMPLE: &str = include_str!("../../params/effects/yaw_by_throttle.toml");
+
+/// An effect that was written as text.
+#[derive(Clone, Debug, Serialize)]
+pub struct OwnView {
+    id: String,
+    description: &'static str,
+    formula: &'static str,
+    status: Option<Status>,
+    text: String,
+}
+
+/// What a text says, if it is an effect file.
+#[derive(Clone, Debug, Serialize)]
+pub struct Checked {
+    /// The effect's id.
+    pub id: &'static str,
+    /// What it is.
+    pub description: &'static str,
+    /// Its formula.
+    pub formula: &'static str,
+    /// Whether a model with it may fly.
+    pub status: Status,
+}
+
+/// What an effect file may name, with one to begin with.
+pub fn grammar() -> Value {
+    let variable = |v: &Variable| json!([v.name(), v.alias(), v.meaning()]);
+    let functions = Function::ALL.iter().filter(|f| !f.is_operator());
+    let functions: Vec<_> = functions.map(|f| json!([f.name(), f.meaning()])).collect();
+    let variables: Vec<_> = Variable::ALL.iter().map(variable).collect();
+    json!({ "example": EXAMPLE, "variables": variables, "functions": functions })
+}
+
+/// Reads a text as an effect file; nothing is kept.
+///
+/// # Errors
+/// What is wrong with it, in which line, and what to do.
+pub fn check(text: &str) -> Result<Checked, WorkbenchError> {
+    let written = file::parse(text).map_err(WorkbenchError::EffectText)?;
+    let Description { id, description, formula, .. } = written.about;
+    Ok(Checked { id, description, formula, status: written.status })
+}
+
+impl Bench {
+    /// Keeps an effect that was written as text; one of that id that is there is replaced.
+    pub(super) fn write_effect(
+        self: &std::sync::Arc<Self>,
+        seen: u64,
+        text: &str,
+    ) -> Result<(), WorkbenchError> {
+        let id = check(text)?.id;
+        let path = effect_file(&self.folder, id);
+        let mut before = None;
+        let kept = self.change(seen, |inner| {
+            // one that the model has stays what it was fitted with
+            if inner.model.has(id) {
+                return Err(WorkbenchError::Present(id.into()));
+            }
+            let folder = self.folder.join(EFFECTS);
+            fs::create_dir_all(&folder).map_err(|e| io(&folder, e))?;
+            before = Some(fs::read_to_string(&path).ok());
+            write_over(&path, text)?;
+            register::read(text).map_err(WorkbenchError::EffectText)?;
+            if !inner.session.own.iter().any(|own| own == id) {
+                inner.session.own.push(id.into());
+            }
+            Ok(inner.session.effects.iter().any(|e| e.id == id))
+        });
+        let accepted = kept.inspect_err(|_| match before {
+            Some(Some(text)) => {
+                let _ = write_over(&path, &text);
+                let _ = register::read(&text);
+            }
+            Some(None) => drop(fs::remove_file(&path)),
+            None => {}
+        })?;
+        if accepted {
+            self.start(Work::Fit);
+        }
+        Ok(())
+    }
+
+    /// Takes an effect that was written as text out of the session; its file stays.
+    pub(super) fn forget(&self, seen: u64, id: &str) -> Result<(), WorkbenchError> {
+        self.change(seen, |inner| {
+            if inner.session.effects.iter().any(|e| e.id == id) {
+                return Err(WorkbenchError::Accepted(id.into()));
+            }
+            inner.session.own.retain(|own| own != id);
+            inner.session.undone.retain(|e| e.id != id);
+            Ok(())
+        })
+    }
+
+    /// What the accepted effect `id` makes in the channel where it makes most, over the variable that shows it best,
+    /// with what is left without it; by the fit if it is done, else by the estimate. `None` without either, and of an
+    /// effect that cannot be zero.
+    ///
+    /// # Errors
+    /// The flights cannot be compared.
+    pub fn curve(&self, id: &str) -> Result<Option<Curve>, WorkbenchError> {
+        let (with, flights, relative) = {
+            let inner = self.lock();
+            let models = inner.models();
+            let Some(with) = models.into_iter().nth(1) else { return Ok(None) };
+            (with, inner.reconstructions(&inner.usable(&[Role::Fit])), inner.relative_sd(id))
+        };
+        let Some(without) = zeroed(&with, id) else { return Ok(None) };
+        let models = [without, with];
+        let comparison = compare(&models, &flights, &compare::Options::default(), &unheard)?;
+        let slowest = models[0].airframe.envelope.flying_from_mps();
+        let prepared = flights.iter().map(|f| Prepared::new(f, slowest));
+        let prepared = prepared.collect::<Result<Vec<_>, _>>()?;
+        let all = ChannelId::ALL.iter().filter_map(|id| made(&comparison, &prepared, *id));
+        let most = all.max_by(|a, b| a.weight().total_cmp(&b.weight()));
+        Ok(most.and_then(|m| over_the_best(m.id, m.made, m.left, &m.regimes, relative)))
+    }
+}
+
+/// What an effect makes of a channel, window by window.
+struct Made {
+    id: ChannelId,
+    made: Vec<f64>,
+    left: Vec<f64>,
+    regimes: Vec<[f64; compare::RegimeVariable::CONTINUOUS.len()]>,
+}
+
+impl Made {
+    /// What it makes, squared, by what the model without it leaves.
+    fn weight(&self) -> f64 {
+        let power = |list: &[f64]| list.iter().map(|x| x * x).sum::<f64>();
+        power(&self.made) / power(&self.left).max(f64::MIN_POSITIVE)
+    }
+}
+
+/// What the second model makes of a channel beyond the first one; `None` where it is not measured.
+fn made(comparison: &compare::Comparison, flights: &[Prepared], id: ChannelId) -> Option<Made> {
+    let mut all = Made { id, made: Vec::new(), left: Vec::new(), regimes: Vec::new() };
+    let [without, with] = &comparison.models[..] else { return None };
+    for (k, flight) in flights.iter().enumerate() {
+        let of = |m: &compare::ModelResult| {
+            m.traces.get(k)?.channels.iter().find(|c| c.channel == id).cloned()
+        };
+        let (without, with) = (of(without)?, of(with)?);
+        for (row, window) in rows(flight).into_iter().enumerate() {
+            let Some(window) = window else { continue };
+            let (less, more) = (without.predicted.get(row)?, with.predicted.get(row)?);
+            let left = without.measured.get(row)? - less;
+            if left.is_finite() && more.is_finite() {
+                all.made.push(more - less);
+                all.left.push(left);
+                all.regimes.push(flight.windows[window].regime);
+            }
+        }
+    }
+    (!all.made.is_empty()).then_some(all)
+}
+
+/// The model with the effect's coefficients zero; `None` if it has none that could be.
+fn zeroed(model: &GreyBox, id: &str) -> Option<GreyBox> {
+    let about = catalogue::describe(id)?;
+    let linear = about.coefficients.len().checked_sub(about.shape)?;
+    let mut without = model.clone();
+    let mut any = false;
+    for coefficient in &about.coefficients[..linear] {
+        any |= without.set_coefficient(&format!("{id}.{}", coefficient.name), 0.0);
+    }
+    any.then_some(without)
+}
+
+impl Inner {
+    /// Reads the session's effect files, so that their ids are known.
+    pub(super) fn read_own(&self) -> Result<(), WorkbenchError> {
+        for id in &self.session.own {
+            register::load(&effect_file(&self.folder, id))?;
+        }
+        Ok(())
+    }
+
+    /// The effects of files as a diagnosis tries them now.
+    pub(super) fn tried(&self) -> Value {
+        let text = |id: &String| register::find(id).map_or("", |effect| effect.text.as_str());
+        self.session.own.iter().map(|id| json!([id, sha256(text(id).as_bytes())])).collect()
+    }
+
+    /// The effects that were written as text.
+    pub(super) fn own_views(&self) -> Vec<OwnView> {
+        let view = |id: &String| {
+            let read = register::find(id);
+            OwnView {
+                id: id.clone(),
+                description: read.map_or("", |e| e.about.description),
+                formula: read.map_or("", |e| e.about.formula),
+                status: read.map(|e| e.status),
+                text: read.map(|e| e.text.clone()).unwrap_or_default(),
+            }
+        };
+        self.session.own.iter().map(view).collect()
+    }
+
+    /// What a command calls the effect: its file if it is one of the session's, else its id.
+    pub(super) fn effect_word(&self, id: &str) -> PathBuf {
+        match self.session.own.iter().any(|own| own == id) {
+            true => effect_file(&self.folder, id),
+            false => id.into(),
+        }
+    }
+
+    /// Standard deviation of an effect's clearest linear coefficient relative to its value; 0 as long as it is not
+    /// fitted.
+    fn relative_sd(&self, id: &str) -> f64 {
+        let key = self.key("fit", &self.session.effects);
+        let Some(fitted) = self.fits.get(&key) else { return 0.0 };
+        let all = fitted.story["parameters"].as_array().into_iter().flatten();
+        let of = |p: &&Value| p["name"].as_str().is_some_and(|n| n.split('.').next() == Some(id));
+        let relative = |p: &Value| Some((p["sd"].as_f64()? / p["value"].as_f64()?).abs());
+        all.filter(of).filter_map(relative).min_by(f64::total_cmp).unwrap_or(0.0)
+    }
+}
+
+/// The file of the effect `id` of the session in `folder`.
+fn effect_file(folder: &Path, id: &str) -> PathBuf {
+    folder.join(EFFECTS).join(format!("{id}.toml"))
+}

@@ -1,0 +1,165 @@
+//! A formula for what no effect of the catalogue explains, and a schedule that tells two effects apart.
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::bench::{Bench, Inner};
+use super::error::WorkbenchError;
+use super::fly::SCHEDULES;
+use super::jobs::Work;
+use super::session::Role;
+use crate::report::write_over;
+use crate::sysid::diagnose::{Options, propose};
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::progress::Progress;
+
+/// A schedule that was made to tell two effects apart.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Designed {
+    /// Its name, and that of its file.
+    pub name: String,
+    /// The two effects.
+    pub between: [String; 2],
+    /// The manoeuvre; empty if none tells the two apart.
+    pub manoeuvre: String,
+    /// What it is for.
+    pub description: String,
+    /// Seconds of it that suffice.
+    pub seconds: f64,
+    /// How often it is flown.
+    pub times: usize,
+    /// Its file.
+    pub file: PathBuf,
+    /// The command that does the same.
+    pub command: String,
+}
+
+impl Bench {
+    /// Searches a formula for what the model as given leaves unexplained, and keeps what was found.
+    pub(super) fn propose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
+        let (key, model, [search, test], with) = {
+            let inner = self.lock();
+            let key = inner.key(Work::Proposal.word(), &[]);
+            (key, inner.model.clone(), inner.searched()?, inner.session.own.clone())
+        };
+        let options = Options { with, ..Options::default() };
+        let found = propose(&model, &search, &test, &options, progress)?;
+        let value = serde_json::to_value(&found)?;
+        write_over(&self.result_file(&key), value.to_string())?;
+        self.lock().proposal = Some((key, Arc::new(value)));
+        self.changed();
+        Ok(())
+    }
+
+    /// What a search for a formula found, as `greylag propose --json` writes it; `null` if there was none.
+    pub fn proposal(&self) -> Value {
+        let inner = self.lock();
+        let key = inner.key(Work::Proposal.word(), &[]);
+        let known = inner.proposal.as_ref().filter(|(of, _)| *of == key);
+        known.map_or(Value::Null, |(_, value)| value.as_ref().clone())
+    }
+
+    /// Starts making a schedule that tells two effects apart.
+    pub(super) fn start_design(
+        self: &Arc<Self>,
+        between: [String; 2],
+    ) -> Result<(), WorkbenchError> {
+        if !cfg!(feature = "sitl") {
+            return Err(WorkbenchError::NoSimulator);
+        }
+        self.same_model()?;
+        self.lock().between = Some(between);
+        self.start(Work::Schedule);
+        Ok(())
+    }
+
+    /// Makes the schedule that tells the two effects of [`Bench::start_design`] apart.
+    #[cfg(feature = "sitl")]
+    pub(super) fn design(&self, progress: &Progress) -> Result<(), WorkbenchError> {
+        use super::commands::quoted;
+        use super::error::io;
+        use crate::control::{Kind, build};
+        use crate::sim::design::{Suspect, plan, prospects};
+
+        let (model, path, between, words) = {
+            let inner = self.lock();
+            let between = inner.between.clone().ok_or(WorkbenchError::Nothing("tell apart"))?;
+            let words = between.each_ref().map(|id| quoted(&inner.effect_word(id)));
+            (inner.model.clone(), inner.session.model.clone(), between, words)
+        };
+        let suspects = between.each_ref().map(|id| Suspect { id: id.clone(), values: Vec::new() });
+        let all = prospects(&model, build(Kind::Lqi, &model)?.as_ref(), &suspects, progress)?;
+        let [a, b] = &between;
+        let plan = plan(&all).ok_or_else(|| WorkbenchError::NotApart([a.clone(), b.clone()]))?;
+        let name = format!("{a}-or-{b}");
+        let folder = self.folder.join(SCHEDULES);
+        fs::create_dir_all(&folder).map_err(|e| io(&folder, e))?;
+        let file = folder.join(format!("{name}.toml"));
+        let [first, second] = words;
+        let designed = Designed {
+            command: format!(
+                "greylag design --model {} --between {first} {second} --out {}",
+                quoted(&path),
+                quoted(&file)
+            ),
+            manoeuvre: plan.manoeuvre.name.into(),
+            description: plan.manoeuvre.description.into(),
+            seconds: plan.seconds,
+            times: plan.times,
+            file: file.clone(),
+            between,
+            name,
+        };
+        write_over(&file, plan.schedule.to_toml())?;
+        write_over(&file.with_extension("json"), serde_json::to_string(&designed)?)?;
+        let mut inner = self.lock();
+        inner.designed.retain(|d| d.name != designed.name);
+        inner.designed.push(designed);
+        drop(inner);
+        self.changed();
+        Ok(())
+    }
+
+    /// No schedule without the simulator's instruments.
+    #[cfg(not(feature = "sitl"))]
+    pub(super) fn design(&self, _: &Progress) -> Result<(), WorkbenchError> {
+        Err(WorkbenchError::NoSimulator)
+    }
+}
+
+impl Inner {
+    /// The flights that a formula is searched in, and those that it is tested on, as `greylag propose` takes them: the
+    /// last one to fit to if none is held out.
+    pub(super) fn searched(&self) -> Result<[Vec<Reconstruction>; 2], WorkbenchError> {
+        let [fit, held] = self.searched_places()?;
+        Ok([self.reconstructions(&fit), self.reconstructions(&held)])
+    }
+
+    /// The places of those flights.
+    pub(super) fn searched_places(&self) -> Result<[Vec<usize>; 2], WorkbenchError> {
+        let (mut fit, held) = (self.usable(&[Role::Fit]), self.usable(&[Role::HoldOut]));
+        match (&fit[..], &held[..]) {
+            ([], _) => Err(WorkbenchError::NoRole(Role::Fit)),
+            ([_], []) => Err(WorkbenchError::NoRole(Role::HoldOut)),
+            (_, []) => {
+                let last = fit.pop();
+                Ok([fit, last.into_iter().collect()])
+            }
+            _ => Ok([fit, held]),
+        }
+    }
+
+    /// The schedules that were made in this session.
+    pub(super) fn read_designed(&mut self) {
+        let files = fs::read_dir(self.folder.join(SCHEDULES)).into_iter().flatten().flatten();
+        let mut paths: Vec<PathBuf> = files.map(|e| e.path()).collect();
+        paths.sort();
+        let read = paths.iter().filter(|p| p.extension().is_some_and(|e| e == "json"));
+        let read = read.filter_map(|p| serde_json::from_str(&fs::read_to_string(p).ok()?).ok());
+        self.designed = read.collect();
+    }
+}
