@@ -11,6 +11,7 @@ mod format;
 pub mod info;
 mod load;
 pub mod mapping;
+mod mixed;
 mod names;
 pub mod phases;
 pub mod rudder;

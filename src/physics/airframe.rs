@@ -226,7 +226,8 @@ impl File {
     }
 
     fn mixer(&self, actuators: &ActuatorFigures) -> Result<Option<Mixer>, String> {
-        let named = !(self.surfaces.is_empty() && self.motors.is_empty() && self.conditions.is_empty());
+        let named =
+            !(self.surfaces.is_empty() && self.motors.is_empty() && self.conditions.is_empty());
         if self.schema == 1 && named {
             return Err("[surfaces], [motors] and [conditions] are of schema = 2".into());
         }

@@ -71,13 +71,17 @@ impl Effector {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MixerError {
     /// A control moves nothing.
-    #[error("nothing moves the {control}: give a surface or motor {control} = …, its command for a full {control}")]
+    #[error(
+        "nothing moves the {control}: give a surface or motor {control} = …, its command for a full {control}"
+    )]
     Unmoved {
         /// The control.
         control: &'static str,
     },
     /// An effector moves a control that the aircraft does not have.
-    #[error("{effector} has {control} = …, but there is no [controls.{control}]: add that section or leave the gain out")]
+    #[error(
+        "{effector} has {control} = …, but there is no [controls.{control}]: add that section or leave the gain out"
+    )]
     NoSuchControl {
         /// The effector.
         effector: String,
@@ -120,7 +124,7 @@ pub enum MixerError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mixer {
     effectors: Vec<Effector>,
-    /// Command of each control for a position of each effector: g⁺ over the unit position.
+    /// g⁺: command of each control for a command of each effector.
     back: Vec<[f64; 4]>,
     /// Deflection of each control at a command of one, mean of the surfaces that it moves, rad; 1 of the throttle.
     unit: [f64; 4],
@@ -143,12 +147,7 @@ impl Mixer {
                 _ => {}
             }
         }
-        let pseudo = pseudo_inverse(&effectors)?;
-        let back = effectors
-            .iter()
-            .zip(pseudo)
-            .map(|(e, row)| row.map(|x| x / e.unit()))
-            .collect();
+        let back = pseudo_inverse(&effectors)?;
         let unit = std::array::from_fn(|j| unit(&effectors, j));
         Ok(Mixer { effectors, back, unit })
     }
@@ -177,7 +176,13 @@ impl Mixer {
     /// Share of each effector's position (rad; 0..1 of a motor) in the deflection of each control (rad; 0..1 of the
     /// throttle).
     pub fn shares(&self) -> impl Iterator<Item = [f64; 4]> {
-        self.back.iter().map(|row| std::array::from_fn(|j| row[j] * self.unit[j]))
+        let both = self.back.iter().zip(&self.effectors);
+        both.map(|(row, e)| std::array::from_fn(|j| row[j] * self.unit[j] / e.unit()))
+    }
+
+    /// Share of each effector's command in the command of each control.
+    pub fn command_shares(&self) -> &[[f64; 4]] {
+        &self.back
     }
 
     /// Where the controls' deflections end: at full commands of each alone.
@@ -274,8 +279,7 @@ fn pseudo_inverse(effectors: &[Effector]) -> Result<Vec<[f64; 4]>, MixerError> {
     for (i, row) in rows.iter_mut().enumerate() {
         // R x = Qᵀ e_i from the last unknown back
         for (place, (j, q)) in orthogonal.iter().enumerate().rev() {
-            let later: f64 =
-                orthogonal[place + 1..].iter().map(|(k, _)| r[*j][*k] * row[*k]).sum();
+            let later: f64 = orthogonal[place + 1..].iter().map(|(k, _)| r[*j][*k] * row[*k]).sum();
             row[*j] = (q[i] - later) / r[*j][*j];
         }
     }
@@ -396,7 +400,10 @@ mod tests {
             motor("motor", [0.0, 0.0, 0.0, 1.0]),
         ];
         let said = Mixer::new(alike.clone(), false).unwrap_err().to_string();
-        assert!(said.contains("singular: left, right move with the elevator as with aileron"), "{said}");
+        assert!(
+            said.contains("singular: left, right move with the elevator as with aileron"),
+            "{said}"
+        );
         let said = Mixer::new(alike[..1].to_vec(), false).unwrap_err().to_string();
         assert!(said.contains("nothing moves the throttle"), "{said}");
         let tail = vec![surface("tail", t, [1.0, 0.0, 1.0, 0.0])];

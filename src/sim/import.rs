@@ -42,6 +42,18 @@ pub struct Imported {
     pub left_out: Vec<String>,
 }
 
+impl Imported {
+    /// Writes the properties that were held into the airframe file.
+    pub fn hold(&mut self, held: &[(String, f64)]) {
+        if !held.is_empty() {
+            self.airframe.push_str("\n# Held in the simulator: the model is of the aircraft in this condition.\n[conditions]\n");
+        }
+        for (name, value) in held {
+            self.airframe.push_str(&format!("{name:?} = {value:?}\n"));
+        }
+    }
+}
+
 /// Why an aircraft could not be imported.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {

@@ -3,7 +3,7 @@
 //! The shim shares no code with the companion, so that the two check each other: here the way back is by normal
 //! equations.
 
-use super::Inputs;
+use super::{Inputs, Properties};
 
 /// A surface or motor of the aircraft.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +21,17 @@ pub struct Moved {
 }
 
 impl Moved {
+    /// The one motor that follows the aircraft's throttle.
+    pub fn throttle(properties: &Properties) -> Moved {
+        Moved {
+            name: "throttle".into(),
+            command: None,
+            position: properties.throttle_position.clone(),
+            gains: [0.0, 0.0, 0.0, 1.0],
+            travel: None,
+        }
+    }
+
     /// Half the travel, rad; one of a motor.
     fn unit(&self) -> f64 {
         self.travel.map_or(1.0, |[least, most]| 0.5 * (most - least))
@@ -50,7 +61,10 @@ impl Mixing {
     pub fn new(moved: Vec<Moved>) -> Result<Mixing, String> {
         let used: [bool; 4] = std::array::from_fn(|j| moved.iter().any(|m| m.gains[j] != 0.0));
         if let Some(j) = [0, 1, 3].into_iter().find(|j| !used[*j]) {
-            return Err(format!("no surface or motor moves the {}; give one a gain for it", CONTROLS[j]));
+            return Err(format!(
+                "no surface or motor moves the {}; give one a gain for it",
+                CONTROLS[j]
+            ));
         }
         let mut normal = [[0.0; 4]; 4];
         for (i, row) in normal.iter_mut().enumerate() {
@@ -157,7 +171,8 @@ mod tests {
 
     #[test]
     fn elevons_say_what_aileron_and_elevator_do() {
-        let mixing = Mixing::new(vec![elevon("left", 1.0), elevon("right", -1.0), motor()]).unwrap();
+        let mixing =
+            Mixing::new(vec![elevon("left", 1.0), elevon("right", -1.0), motor()]).unwrap();
         let inputs = Inputs { aileron: 0.25, elevator: -0.5, throttle: 0.7, rudder: 0.0 };
         let given: Vec<f64> = mixing.mix(&inputs).collect();
         assert_eq!(given, [-0.25, -0.75, 0.7]);

@@ -55,7 +55,11 @@ impl Steering {
                 positions: positions.collect::<Result<_, _>>()?,
                 commands,
                 mixing: mixing.clone(),
-                usual: [look(&p.aileron_command), look(&p.elevator_command), look(&p.rudder_command)],
+                usual: [
+                    look(&p.aileron_command),
+                    look(&p.elevator_command),
+                    look(&p.rudder_command),
+                ],
                 throttles,
             })));
         }

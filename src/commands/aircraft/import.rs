@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
-use greylag_sitl::plant_arguments::property;
+use greylag_sitl::plant_arguments::{held, property};
 
 use crate::commands::files::{self, Overwrite};
 use crate::control::aircraft_check;
@@ -45,6 +45,9 @@ struct Jsbsim {
     /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does.
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
+    /// Hold a property at a value (may be repeated): flaps, say. The airframe file keeps it.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = held)]
+    set: Vec<(String, f64)>,
 }
 
 /// Imports, writes, says what is left out.
@@ -53,6 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let mut options = PlantOptions {
         aircraft_dir: Some(jsbsim.dir.clone()),
         aircraft: jsbsim.name.clone(),
+        held: jsbsim.set.clone(),
         start: Start { airspeed_mps: jsbsim.cruise_mps, ..Start::NEUTRAL },
         ..PlantOptions::default()
     };
@@ -67,7 +71,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         bail!("{} exists; name another folder with --out", model.display());
     }
     let mut plant = Plant::new(&options)?;
-    let found = import(&mut plant, &jsbsim.name, jsbsim.cruise_mps, jsbsim.altitude_m)?;
+    let mut found = import(&mut plant, &jsbsim.name, jsbsim.cruise_mps, jsbsim.altitude_m)?;
+    found.hold(&jsbsim.set);
     let read = read_back(&found)?;
     std::fs::create_dir_all(out)
         .with_context(|| format!("cannot make the folder {}", out.display()))?;

@@ -113,7 +113,10 @@ impl SurfaceFile {
 }
 
 /// Travel of `name`: either the same to both sides, or the two sides (`both`, `min`, `max`).
-pub(super) fn travel(name: &str, [both, min, max]: [&Option<Sourced>; 3]) -> Result<Travel, String> {
+pub(super) fn travel(
+    name: &str,
+    [both, min, max]: [&Option<Sourced>; 3],
+) -> Result<Travel, String> {
     match (both, min, max) {
         (Some(both), None, None) => {
             Ok(Travel::symmetric(positive(&format!("{name}.travel_rad"), both, TRAVEL)?))

@@ -116,8 +116,7 @@ fn gain(of: &str, key: &str, value: f64) -> Result<f64, String> {
 impl SurfaceFile {
     fn effector(&self, name: &str) -> Result<Effector, String> {
         let of = format!("surfaces.{name}");
-        let travel =
-            travel(&of, [&self.travel_rad, &self.travel_min_rad, &self.travel_max_rad])?;
+        let travel = travel(&of, [&self.travel_rad, &self.travel_min_rad, &self.travel_max_rad])?;
         Ok(Effector {
             name: name.into(),
             does: Does::Deflects(travel),
