@@ -67,7 +67,13 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         best.name, manoeuvre.description, a.id, b.id, best.duration_s
     );
     if let Some(path) = &arguments.out {
-        files::write(path, &repeated(manoeuvre, times).to_toml(), overwrite)?;
+        files::write(
+            path,
+            &repeated(manoeuvre, times)
+                .at_cruise(model.airframe.envelope.airspeed_cruise_mps)
+                .to_toml(),
+            overwrite,
+        )?;
         println!(
             "written to {} ({times} times, on opposite headings); fly it with `greylag demo --schedule {}`",
             path.display(),

@@ -12,7 +12,7 @@ use crate::physics::inputs::InputMemory;
 use crate::physics::rigid_body;
 use crate::physics::{Controls, State};
 use crate::sim::instruments::{Group, Instruments};
-use crate::sim::missing::{Kind, Missing};
+use crate::sim::missing::{Craft, Kind, Missing};
 use crate::sim::{Environment, Imagined};
 use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 use crate::sysid::separation::{Separation, separation};
@@ -97,7 +97,8 @@ pub fn prospects(
     let truths = [truth(model, &suspects[0])?, truth(model, &suspects[1])?];
     let ways = [alternatives(model, &suspects[0])?, alternatives(model, &suspects[1])?];
     let prospect = |manoeuvre: &Manoeuvre| -> Result<Prospect, DesignError> {
-        let schedule = manoeuvre.schedule();
+        let cruise = model.airframe.envelope.airspeed_cruise_mps;
+        let schedule = manoeuvre.schedule().at_cruise(cruise);
         let separation_of = |k: usize| -> Result<Option<Separation>, DesignError> {
             let flight = imagine(&truths[k], controller, &schedule)?;
             Ok(flight.map(|f| separation(model, &truths[k], &ways[1 - k], &f)))
@@ -129,8 +130,9 @@ fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
         // joining it says what is known
         return Ok(model.clone().join(id, &[]).map(|()| Vec::new())?);
     };
-    let clear = Kind::from_id(id).map(|Kind { clear: [low, high], .. }| 0.5 * (low + high));
-    let clear = clear.and_then(|amplitude| Missing::new(id, amplitude).ok());
+    let craft = Craft::lacking(model);
+    let clear = craft.kind(id).map(|Kind { clear: [low, high], .. }| 0.5 * (low + high));
+    let clear = clear.and_then(|amplitude| Missing::new(&craft, id, amplitude).ok());
     if let Some(missing) = clear.filter(|missing| !missing.values.is_empty()) {
         return Ok(missing.values);
     }
