@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{AILERON, ELEVATOR, RUDDER, surface};
 use crate::physics::airframe::ActuatorFigures;
-use crate::physics::mixer::{Does, Effector, Mixer};
+use crate::physics::mixer::{CONTROLS, Does, Effector, Mixer};
 use crate::physics::servos::{Surface, Travel};
 
 /// The surfaces of `mixer` that have JSBSim properties, with these; none if one has not.
@@ -37,8 +37,9 @@ pub(super) fn channels(mixer: &Mixer, figures: &ActuatorFigures) -> Option<Strin
     }
     out.push_str("    <channel name=\"controls\">\n");
     let shares: Vec<[f64; 4]> = mixer.shares().collect();
-    let controls = [(0, AILERON, true), (1, ELEVATOR, true), (2, RUDDER, figures.rudder.is_some())];
-    for (j, control, _) in controls.into_iter().filter(|(_, _, is_there)| *is_there) {
+    let controls = [AILERON, ELEVATOR, RUDDER];
+    let count = if figures.rudder.is_some() { 3 } else { 2 };
+    for (j, (control, name)) in controls.into_iter().zip(CONTROLS).take(count).enumerate() {
         let terms: String = mixer
             .effectors()
             .iter()
@@ -54,8 +55,8 @@ pub(super) fn channels(mixer: &Mixer, figures: &ActuatorFigures) -> Option<Strin
             .collect();
         let _ = writeln!(
             out,
-            "      <fcs_function name=\"{control}\">\n        <function> <sum> <value>0</value>{terms} </sum> </function>\n      \
-             </fcs_function>"
+            "      <fcs_function name=\"fcs/{name}-of-surfaces\">\n        <function> <sum> <value>0</value>{terms} </sum> \
+             </function>\n        <output> {control} </output>\n      </fcs_function>"
         );
     }
     out.push_str("    </channel>\n");
