@@ -11,7 +11,7 @@ use greylag::model::jsbsim::export;
 use greylag::physics::Command;
 use greylag::sim::described::describe;
 use greylag::sim::{Environment, Simulator};
-use greylag_sitl::plant::{Plant, PlantOptions};
+use greylag_sitl::plant::{FULL_DEFLECTION_RAD as TRAVEL, Plant, PlantOptions};
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -47,8 +47,8 @@ fn the_simulators_aircraft_is_the_models_export() {
 fn the_controls_travel_is_that_of_the_elevons() {
     let travel = Plant::new(&plant()).unwrap().travel().unwrap();
     for stops in [travel.aileron, travel.elevator] {
-        assert!((stops.most_rad - 0.5235).abs() < 1e-6, "{travel:?}");
-        assert!((stops.least_rad + 0.5235).abs() < 1e-6, "{travel:?}");
+        assert!((stops.most_rad - TRAVEL).abs() < 1e-6, "{travel:?}");
+        assert!((stops.least_rad + TRAVEL).abs() < 1e-6, "{travel:?}");
     }
     assert!(travel.rudder.is_none());
 }
@@ -64,7 +64,9 @@ fn elevons_fly_as_the_x8_until_they_stop() {
         throttle: 0.3,
         rudder: 0.0,
     };
-    both.iter_mut().for_each(|simulator| drop(simulator.reset().unwrap()));
+    for simulator in &mut both {
+        simulator.reset().unwrap();
+    }
     for k in 0..300 {
         let [a, b] = both.each_mut().map(|s| s.step(command(k, 0.2)).unwrap());
         let apart = (a.state.roll - b.state.roll).abs().max((a.state.pitch - b.state.pitch).abs());
@@ -75,8 +77,8 @@ fn elevons_fly_as_the_x8_until_they_stop() {
     let full = Command { aileron: 1.0, elevator: -1.0, throttle: 0.3, rudder: 0.0 };
     let seen = (0..30).map(|_| both[0].step(full).unwrap()).last().unwrap();
     // left 1 − 1 = 0, right −1 − 1 stops at −1: half of each
-    assert!((seen.actuators.aileron - 0.5 * 0.5235).abs() < 1e-3, "{:?}", seen.actuators);
-    assert!((seen.actuators.elevator + 0.5 * 0.5235).abs() < 1e-3, "{:?}", seen.actuators);
+    assert!((seen.actuators.aileron - 0.5 * TRAVEL).abs() < 1e-3, "{:?}", seen.actuators);
+    assert!((seen.actuators.elevator + 0.5 * TRAVEL).abs() < 1e-3, "{:?}", seen.actuators);
 }
 
 #[test]
@@ -118,8 +120,8 @@ fn a_log_of_elevons_is_one_of_the_controls() {
         text += &format!(
             "{t:.3},{phi},{theta},{},0.0,0.0,{v},{},{},0.4,{left},{right},0.4\n",
             0.1 * (0.01 * k as f64).cos(),
-            0.5235 * left,
-            0.5235 * right
+            TRAVEL * left,
+            TRAVEL * right
         );
     }
     let path: PathBuf = folder.path().join("log.csv");
@@ -130,8 +132,8 @@ fn a_log_of_elevons_is_one_of_the_controls() {
     let log = load(&path, &Options { mapping, ..Options::default() }).unwrap();
     for (k, row) in log.flight.samples.iter().enumerate() {
         let wanted = asked(k);
-        assert!((row.aileron_rad - 0.5235 * wanted.aileron).abs() < 1e-9, "{row:?}");
-        assert!((row.elevator_rad - 0.5235 * wanted.elevator).abs() < 1e-9);
+        assert!((row.aileron_rad - TRAVEL * wanted.aileron).abs() < 1e-9, "{row:?}");
+        assert!((row.elevator_rad - TRAVEL * wanted.elevator).abs() < 1e-9);
         assert!((row.aileron_cmd - wanted.aileron).abs() < 1e-9 && row.throttle == 0.4);
     }
 }

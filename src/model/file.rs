@@ -180,10 +180,10 @@ impl File {
 impl BodyFile {
     fn checked(&self) -> Result<RigidBody, String> {
         let body = RigidBody {
-            mass: positive("rigid_body.mass_kg", &self.mass_kg, 10000.0)?,
-            jx: positive("rigid_body.jx_kgm2", &self.jx_kgm2, 100000.0)?,
-            jy: positive("rigid_body.jy_kgm2", &self.jy_kgm2, 100000.0)?,
-            jz: positive("rigid_body.jz_kgm2", &self.jz_kgm2, 100000.0)?,
+            mass: positive("rigid_body.mass_kg", &self.mass_kg, 1e6)?,
+            jx: positive("rigid_body.jx_kgm2", &self.jx_kgm2, 1e9)?,
+            jy: positive("rigid_body.jy_kgm2", &self.jy_kgm2, 1e9)?,
+            jz: positive("rigid_body.jz_kgm2", &self.jz_kgm2, 1e9)?,
             jxz: self.jxz_kgm2.value,
         };
         if body.is_physical() {

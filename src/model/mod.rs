@@ -1,7 +1,7 @@
 //! The grey box: a prior made of physical effects, its integrators, trim and linearisation.
 
 pub mod avl;
-mod block;
+pub mod block;
 pub mod edit;
 mod file;
 mod forces;
