@@ -93,7 +93,7 @@ fn fly(model: &GreyBox, plant: &PlantOptions) -> Result<String> {
     }
     let error = (seen.state.roll - target.roll).abs().max((seen.state.pitch - target.pitch).abs());
     let degrees = error.to_degrees();
-    if !(degrees < ENOUGH_DEG) {
+    if degrees.is_nan() || degrees >= ENOUGH_DEG {
         bail!("{degrees:.1} deg from its target after 20 s");
     }
     Ok(format!("{degrees:.3} deg from 20 deg of bank after 20 s"))

@@ -83,8 +83,8 @@ fn a_schedule_is_a_function_of_time() {
     let wanted =
         [(0.9, 0.0), (1.1, 0.2), (2.4, 0.2), (2.6, -0.2), (3.6, 0.2), (4.1, -0.2), (4.6, 0.0)];
     wanted.iter().for_each(|(t, value)| assert_eq!(elevator(*t), *value, "at {t} s"));
-    assert_eq!(schedule.at(1.1).authority, [1.0, 0.25, 1.0]);
-    assert_eq!(schedule.at(4.6).authority, [1.0; 3]);
+    assert_eq!(schedule.at(1.1).authority, [1.0, 0.25, 1.0, 1.0]);
+    assert_eq!(schedule.at(4.6).authority, [1.0; 4]);
     let roll = |t: f64| schedule.at(t).target.roll.to_degrees();
     assert!((roll(6.5) + 10.0).abs() < 1e-9 && (roll(7.5) + 30.0).abs() < 1e-9);
     assert_eq!([7.9, 8.1, 9.9].map(|t| schedule.at(t).added.throttle), [0.0, -0.5, -0.5]);
