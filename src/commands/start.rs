@@ -52,6 +52,15 @@ impl StartArguments {
     }
 }
 
+/// The start of `aircraft` where none is given.
+///
+/// # Errors
+/// As [`StartArguments::start`].
+pub fn usual(aircraft: &str, models: &[GreyBox]) -> Result<Start> {
+    let start_altitude_m = Start::NEUTRAL.altitude_m;
+    StartArguments { start_airspeed_mps: None, start_altitude_m }.start(aircraft, models)
+}
+
 /// The simulator's aircraft as the airframe of the first of `models` describes it.
 ///
 /// # Errors

@@ -360,10 +360,19 @@ pub(crate) fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
 
 /// A number that must lie above zero and at most at `most`, the largest that an aircraft has.
 pub(crate) fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String> {
+    within(field, number, [most * 1e-9, most])
+}
+
+/// A number that must lie between the smallest and the largest that an aircraft has, both above zero.
+pub(crate) fn within(
+    field: &str,
+    number: &Sourced,
+    [least, most]: [f64; 2],
+) -> Result<f64, String> {
     if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
         return Err(format!("{field}.sd must be a positive number"));
     }
-    if number.value >= most * 1e-9 && number.value <= most {
+    if number.value >= least && number.value <= most {
         return Ok(number.value);
     }
     Err(format!(

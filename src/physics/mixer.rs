@@ -189,11 +189,10 @@ impl Mixer {
     pub fn travels(&self) -> Travels {
         let travel = |j: usize| {
             let at = |value: f64| {
-                let positions: Vec<f64> = self
-                    .effectors
-                    .iter()
-                    .map(|e| e.position(e.limited(e.gains[j] * value)))
-                    .collect();
+                // in the middle of their range motors can turn the aircraft either way
+                let given = |e: &Effector| e.limited(e.gains[j] * value + 0.5 * e.gains[3]);
+                let positions: Vec<f64> =
+                    self.effectors.iter().map(|e| e.position(given(e))).collect();
                 self.deflections(&positions)[j]
             };
             Travel { least: at(-1.0), most: at(1.0) }
