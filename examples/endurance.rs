@@ -228,6 +228,7 @@ fn through_sockets(model: &GreyBox, hours: f64) -> Result<()> {
         plan_deadline: Options::PLAN_DEADLINE,
         controller: None,
         travels: model.airframe.actuators.travels(),
+        mixer: model.airframe.mixer.clone(),
         signing: None,
     };
     // The aircraft's minute is half a second of the client's.

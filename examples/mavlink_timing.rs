@@ -267,6 +267,7 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<Options> {
         controller: None,
         signing: None,
         travels: model.airframe.actuators.travels(),
+        mixer: model.airframe.mixer.clone(),
     })
 }
 

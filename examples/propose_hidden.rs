@@ -108,7 +108,8 @@ fn proposal(seed: u64, missing: Vec<Missing>) -> Result<Proposal, Box<dyn Error>
     let exact = GreyBox::load(&folder.join("jsbsim.toml"))?;
     let text = starting_model(&reference, &format!("hidden-{seed}"), seed, &missing)?;
     let model = GreyBox::parse(&text, &folder.join("hidden.toml"))?;
-    let logs = Trial { seed, missing, turbulence: None }.fly(build(Kind::Lqi, &exact)?.as_ref())?;
+    let logs = Trial { seed, missing, turbulence: None, ..Trial::default() }
+        .fly(build(Kind::Lqi, &exact)?.as_ref())?;
     let (search, test) = (flights(&model, &logs.training)?, flights(&model, &logs.testing)?);
     Ok(propose(
         &model,

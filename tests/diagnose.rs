@@ -10,6 +10,7 @@ use greylag::model::GreyBox;
 use greylag::num::stream::stream;
 use greylag::sim::flight_test::fly_within_bounds;
 use greylag::sim::instruments::Instruments;
+use greylag::sim::missing::Craft;
 use greylag::sim::missing::Missing;
 use greylag::sim::starting_model::starting_model;
 use greylag::sim::trial::Trial;
@@ -131,7 +132,7 @@ fn a_rudder_that_moves_is_said_first_and_nothing_is_asserted_where_it_acts() {
 
 /// The three training flights of a trial.
 fn trained(seed: u64, missing: Vec<Missing>) -> Vec<Reconstruction> {
-    let trial = Trial { seed, missing, turbulence: None };
+    let trial = Trial { seed, missing, turbulence: None, ..Trial::default() };
     let logs = trial.training(control::build(Kind::Lqi, &exact()).unwrap().as_ref()).unwrap();
     logs.iter().map(rebuilt).collect()
 }
@@ -145,7 +146,7 @@ fn benchmark(id: &str, amplitude: f64, seed: u64) -> Vec<(String, f64)> {
 
 /// The diagnosis of three flights under `id` by a model without it, as `examples/hide_and_find` has them.
 fn searched_for(id: &str, amplitude: f64, seed: u64, options: &Options) -> Diagnosis {
-    let missing = vec![Missing::new(id, amplitude).unwrap()];
+    let missing = vec![Missing::new(&craft(), id, amplitude).unwrap()];
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
     let reference = std::fs::read_to_string(folder.join("jsbsim.toml")).unwrap();
     let start = tempfile::tempdir().unwrap();
@@ -304,4 +305,9 @@ fn an_inertia_of_the_wrong_sign_is_found_where_the_models_accelerations_mislead(
     let jxz = 0.9343 + effect.parameters[0].value;
     assert!((jxz / -0.9343 - 1.0).abs() < 0.05, "{jxz}");
     assert!(found.effects.iter().any(|e| e.id == "lift_stall" && e.asserted));
+}
+
+/// The size of the X8.
+fn craft() -> Craft {
+    Craft::of(&greylag::model::GreyBox::load("params/x8/jsbsim.toml".as_ref()).unwrap())
 }

@@ -97,6 +97,29 @@ fn coefficients_are_wrong(path: &Path) {
     );
 }
 
+/// Another aircraft by its reference model: what the model of the folder lacks, and at which airspeeds is flown.
+#[test]
+fn a_mystery_of_another_aircraft_is_flown_at_its_airspeeds_with_its_rudder() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("mystery");
+    let reference = "params/aerosonde/jsbsim.toml";
+    let dir = out.to_str().unwrap();
+    let own =
+        ["mystery", "--seed", "4", "--out", dir, "--effect", "rudder_linear", "--model", reference];
+    refuses(&own, &["model of Aerosonde", "--aircraft"]);
+    says(&[&own[..], &["--aircraft", "aerosonde"]].concat());
+    let model = GreyBox::load(&out.join("model.toml")).unwrap();
+    assert!(!model.has_rudder() && model.airframe.actuators.rudder.is_some());
+    let log = csv::load(&out.join("train-2.csv"), Tolerance::Strict).unwrap().flight;
+    let mean = |of: fn(&greylag::logs::Sample) -> f64| {
+        log.samples.iter().map(of).sum::<f64>() / log.samples.len() as f64
+    };
+    // the X8 flies these flights about 20 m/s, the Aerosonde cruises at 25
+    assert!((20.0..32.0).contains(&mean(|s| s.airspeed_mps)), "{}", mean(|s| s.airspeed_mps));
+    assert!(mean(|s| s.rudder_cmd * s.rudder_cmd).sqrt() > 0.05);
+    assert!(says(&["mystery", "--open", dir]).contains("rudder_linear"));
+}
+
 #[test]
 fn what_cannot_be_hidden_is_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -38,7 +38,7 @@ fn a_thrust_line_to_the_left_is_named_and_tested() {
     let text = starting_model(&reference, "lacks", SEED, &missing).unwrap();
     let model = GreyBox::parse(&text, &params.join("x8/lacks.toml")).unwrap();
     let exact = GreyBox::load(&params.join("x8/jsbsim.toml")).unwrap();
-    let trial = Trial { seed: SEED, missing, turbulence: None };
+    let trial = Trial { seed: SEED, missing, turbulence: None, ..Trial::default() };
     let logs = trial.fly(build(Kind::Lqi, &exact).unwrap().as_ref()).unwrap();
     let search = reconstructed(&model, &logs.training);
     let test = reconstructed(&model, &logs.testing);

@@ -9,6 +9,7 @@ use greylag::model::GreyBox;
 use greylag::physics::Command;
 use greylag::sim::flight_test::{FlightTestError, Flown, fly};
 use greylag::sim::instruments::{Group, Instruments};
+use greylag::sim::missing::Craft;
 use greylag::sim::missing::{KINDS, Missing};
 use greylag::sim::trial::Trial;
 use greylag_sitl::plant::{PlantOptions, Truth};
@@ -82,8 +83,8 @@ fn a_schedule_is_a_function_of_time() {
     let wanted =
         [(0.9, 0.0), (1.1, 0.2), (2.4, 0.2), (2.6, -0.2), (3.6, 0.2), (4.1, -0.2), (4.6, 0.0)];
     wanted.iter().for_each(|(t, value)| assert_eq!(elevator(*t), *value, "at {t} s"));
-    assert_eq!(schedule.at(1.1).authority, [1.0, 0.25, 1.0]);
-    assert_eq!(schedule.at(4.6).authority, [1.0; 3]);
+    assert_eq!(schedule.at(1.1).authority, [1.0, 0.25, 1.0, 1.0]);
+    assert_eq!(schedule.at(4.6).authority, [1.0; 4]);
     let roll = |t: f64| schedule.at(t).target.roll.to_degrees();
     assert!((roll(6.5) + 10.0).abs() < 1e-9 && (roll(7.5) + 30.0).abs() < 1e-9);
     assert_eq!([7.9, 8.1, 9.9].map(|t| schedule.at(t).added.throttle), [0.0, -0.5, -0.5]);
@@ -187,8 +188,9 @@ fn the_aircraft_stays_flyable_with_every_effect_hidden() {
         // the largest clear amplitude of each
         let largest =
             if kind.clear[0].abs() > kind.clear[1].abs() { kind.clear[0] } else { kind.clear[1] };
-        let missing = vec![Missing::new(kind.id, largest).unwrap()];
-        let logs = Trial { seed: 3, missing, turbulence: None }.fly(lqi.as_ref());
+        let missing = vec![Missing::new(&craft(), kind.id, largest).unwrap()];
+        let logs =
+            Trial { seed: 3, missing, turbulence: None, ..Trial::default() }.fly(lqi.as_ref());
         let logs = logs.unwrap_or_else(|e| panic!("{}: {e}", kind.id));
         assert_eq!((logs.training.len(), logs.testing.len()), (3, 2));
     }
@@ -239,4 +241,9 @@ fn instruments_err_as_they_are_told() {
     let drawn = Instruments::drawn(5);
     assert!(drawn.late.iter().all(|l| (0.0..=0.01).contains(l)) && drawn.late[1] == 0.0);
     assert_ne!(drawn, Instruments::drawn(6));
+}
+
+/// The size of the X8.
+fn craft() -> Craft {
+    Craft::of(&greylag::model::GreyBox::load("params/x8/jsbsim.toml".as_ref()).unwrap())
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use greylag::num::statistics::quantile;
 use greylag::num::stream::stream;
-use greylag::sim::missing::{KINDS, Kind, Missing};
+use greylag::sim::missing::{Craft, Kind, Missing};
 use rand::RngExt;
 
 use crate::record::Record;
@@ -49,19 +49,22 @@ impl Case {
     }
 }
 
-/// The minimum detectable amplitude of each effect: the median over nulls and probes.
-pub struct Seen(BTreeMap<String, f64>);
+/// The aircraft, with the minimum detectable amplitude of each effect: the median over nulls and probes.
+pub struct Seen(BTreeMap<String, f64>, Craft);
 
 impl Seen {
     /// What the nulls and probes among `records` say.
-    pub fn of(records: &[Record]) -> Seen {
+    pub fn of(records: &[Record], craft: &Craft) -> Seen {
         let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::new();
         for record in records.iter().filter(|r| r.part == "nulls" || r.part == "probes") {
             for (id, least) in &record.minimum_detectable {
                 all.entry(id.clone()).or_default().push(*least);
             }
         }
-        Seen(all.into_iter().map(|(id, least)| (id, quantile(&least, 0.5))).collect())
+        Seen(
+            all.into_iter().map(|(id, least)| (id, quantile(&least, 0.5))).collect(),
+            craft.clone(),
+        )
     }
 
     /// The amplitude of `factor` times the minimum detectable one, as far as it can be flown, and what
@@ -72,7 +75,7 @@ impl Seen {
         let least = self.0.get(kind.id).copied().filter(|x| x.is_finite() && *x > 0.0);
         let (size, least) = match kind.id {
             // it cannot be hidden in part
-            "lift_stall" => return (1.0, factor),
+            "lift_stall" | "rudder_linear" | "propeller" => return (1.0, factor),
             // a slower rate is more of it
             "rate_limit" => {
                 let least = least.unwrap_or(largest / ASSUMED.sqrt());
@@ -92,14 +95,14 @@ impl Seen {
     /// The effect with the multiple of its minimum detectable amplitude that it has.
     fn missing(&self, kind: &Kind, factor: f64, seed: u64) -> Option<(Missing, f64)> {
         let (amplitude, reached) = self.amplitude(kind, factor, seed);
-        Some((Missing::new(kind.id, amplitude).ok()?, reached))
+        Some((Missing::new(&self.1, kind.id, amplitude).ok()?, reached))
     }
 }
 
 /// Flights on which nothing is missing. In every other one aircraft and model both lack an effect that the
 /// aircraft has of its own, so that it is a candidate in some.
-pub fn nulls(seeds: Range<u64>) -> Vec<Case> {
-    let absent = |id: &str| Missing::new(id, 0.0).ok();
+pub fn nulls(craft: &Craft, seeds: Range<u64>) -> Vec<Case> {
+    let absent = |id: &str| Missing::new(craft, id, 0.0).ok();
     seeds
         .map(|seed| {
             let even = seed.is_multiple_of(2);
@@ -110,8 +113,8 @@ pub fn nulls(seeds: Range<u64>) -> Vec<Case> {
 
 /// Flights that tell how much of `drag_beta2` could have been seen. They are no nulls: the part of it that
 /// goes with |β| cannot be taken from the aircraft.
-pub fn probes(seeds: Range<u64>) -> Vec<Case> {
-    let absent = || Missing::new("drag_beta2", 0.0).ok();
+pub fn probes(craft: &Craft, seeds: Range<u64>) -> Vec<Case> {
+    let absent = || Missing::new(craft, "drag_beta2", 0.0).ok();
     seeds.map(|seed| nothing("probes", seed, absent())).collect()
 }
 
@@ -131,7 +134,7 @@ pub fn effects(
     factors.sort_by(|a, b| b.total_cmp(a));
     let mut all = Vec::new();
     for seed in seeds {
-        for kind in KINDS.iter().filter(|kind| wanted(kind.id)) {
+        for kind in seen.1.kinds().iter().filter(|kind| wanted(kind.id)) {
             // the largest first, so that what cannot be larger counts once, under the largest factor
             let mut flown: Vec<f64> = Vec::new();
             for &factor in &factors {
@@ -160,9 +163,10 @@ pub fn pairs(seeds: Range<u64>, seen: &Seen, wanted: impl Fn(&str) -> bool) -> V
     let mut all = Vec::new();
     for seed in seeds {
         let mut random = stream(seed, &[84]);
-        let by = random.random_range(1..KINDS.len() as u32) as usize;
-        for (k, kind) in KINDS.iter().enumerate().filter(|(_, kind)| wanted(kind.id)) {
-            let other = KINDS[(k + by) % KINDS.len()];
+        let kinds = seen.1.kinds();
+        let by = random.random_range(1..kinds.len() as u32) as usize;
+        for (k, kind) in kinds.iter().enumerate().filter(|(_, kind)| wanted(kind.id)) {
+            let other = kinds[(k + by) % kinds.len()];
             let both = [kind, &other].map(|kind| seen.missing(kind, CLEAR, seed));
             if let [Some(a), Some(b)] = both {
                 all.push(Case {

@@ -30,6 +30,7 @@ use clap::{Parser, ValueEnum};
 use rayon::prelude::*;
 
 use cases::{Case, Seen};
+use greylag::sim::missing::Craft;
 use record::Record;
 use search::Bench;
 
@@ -57,6 +58,12 @@ struct Arguments {
     /// Nulls that each diagnosis simulates, in place of the usual number.
     #[arg(long)]
     simulated_nulls: Option<usize>,
+    /// Model that flies as the simulator's aircraft does.
+    #[arg(long, default_value = "params/x8/jsbsim.toml")]
+    model: PathBuf,
+    /// The simulator's aircraft, built in.
+    #[arg(long, default_value = "x8")]
+    aircraft: String,
     /// Only these effects.
     #[arg(long, num_args = 1..)]
     effects: Vec<String>,
@@ -102,15 +109,15 @@ fn main() -> Result<()> {
             .with_context(|| format!("creating {}", folder.display()))?;
     }
     if !arguments.table {
-        let bench = Bench::new(arguments.simulated_nulls)?;
+        let bench = Bench::new(&arguments.model, &arguments.aircraft, arguments.simulated_nulls)?;
         // amplitudes of the other parts hang on what the nulls could have seen
         for parts in
             [[Part::Nulls, Part::Probes].as_slice(), &[Part::Effects, Part::Without, Part::Pairs]]
         {
             let done = record::load(&arguments.results)?;
-            let seen = Seen::of(&done);
+            let seen = Seen::of(&done, bench.craft());
             let mut cases: Vec<Case> =
-                parts.iter().flat_map(|p| list(&arguments, *p, &seen)).collect();
+                parts.iter().flat_map(|p| list(&arguments, *p, &seen, bench.craft())).collect();
             cases.retain(|case| arguments.export_only || done.iter().all(|d| d.key != case.key()));
             run(&arguments, &bench, &cases)?;
         }
@@ -120,7 +127,7 @@ fn main() -> Result<()> {
 }
 
 /// The cases of a part of the campaign, if it is asked for.
-fn list(arguments: &Arguments, part: Part, seen: &Seen) -> Vec<Case> {
+fn list(arguments: &Arguments, part: Part, seen: &Seen, craft: &Craft) -> Vec<Case> {
     // probes go with nulls
     let asked = if part == Part::Probes { Part::Nulls } else { part };
     if arguments.part != asked && arguments.part != Part::All {
@@ -131,8 +138,8 @@ fn list(arguments: &Arguments, part: Part, seen: &Seen) -> Vec<Case> {
     let (seeds, first) = (arguments.seeds.0..arguments.seeds.1, arguments.null_seed);
     match part {
         // the nulls' seeds are apart from all others
-        Part::Nulls => cases::nulls(first..first + arguments.nulls),
-        Part::Probes => cases::probes(first..first + PROBES),
+        Part::Nulls => cases::nulls(craft, first..first + arguments.nulls),
+        Part::Probes => cases::probes(craft, first..first + PROBES),
         Part::Effects => cases::effects(seeds, &arguments.factors, seen, wanted),
         Part::Without => cases::without(seeds, seen, wanted),
         Part::Pairs => cases::pairs(seeds, seen, wanted),

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow};
@@ -9,22 +10,20 @@ use greylag::control::{Controller, Kind, build};
 use greylag::logs::Flight as Log;
 use greylag::model::GreyBox;
 use greylag::sim::design::{Suspect, alternatives};
-use greylag::sim::missing::Missing;
+use greylag::sim::missing::{Craft, Missing};
 use greylag::sim::starting_model::starting_model;
-use greylag::sim::trial::Trial;
+use greylag::sim::trial::{Subject, Trial};
 use greylag::sysid::amend::{self, Fit, FitOptions};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag::sysid::weak_form::prepared::Prepared;
+use greylag_sitl::plant::PlantOptions;
 
 use crate::ask::{Answer, ask};
 use crate::cases::Case;
 use crate::held_out;
 use crate::record::{Found, HeldOut, Record, Seconds};
 
-/// The model that flies as the simulator does, and its airframe.
-const REFERENCE: &str = include_str!("../../params/x8/jsbsim.toml");
-const AIRFRAME: &str = include_str!("../../params/x8/airframe.toml");
 /// Slower than this is not flight, m/s.
 const SLOWEST: f64 = 5.0;
 
@@ -33,6 +32,11 @@ type Starts = BTreeMap<String, Vec<f64>>;
 
 /// What all cases share.
 pub struct Bench {
+    /// The model that flies as the simulator does: its file with its text.
+    path: PathBuf,
+    reference: String,
+    craft: Craft,
+    subject: Subject,
     controller: Box<dyn Controller>,
     /// Simulated nulls of each diagnosis; as many as usual if none is said.
     nulls: Option<usize>,
@@ -50,28 +54,40 @@ pub struct Flown {
     seconds: f64,
 }
 
-/// The model of a file's text, read as a user's would be.
-fn load(text: &str) -> Result<GreyBox> {
-    let folder = tempfile::tempdir()?;
-    std::fs::write(folder.path().join("airframe.toml"), AIRFRAME)?;
-    let path = folder.path().join("model.toml");
-    std::fs::write(&path, text)?;
-    Ok(GreyBox::load(&path)?)
-}
-
 impl Bench {
-    /// Designs the controller that flies all cases; every diagnosis simulates so many `nulls`.
-    pub fn new(nulls: Option<usize>) -> Result<Bench> {
-        Ok(Bench { controller: build(Kind::Lqi, &load(REFERENCE)?)?, nulls })
+    /// Designs the controller that flies all cases with the simulator's `aircraft`, of which the file at `path` is the
+    /// model; every diagnosis simulates so many `nulls`.
+    pub fn new(path: &Path, aircraft: &str, nulls: Option<usize>) -> Result<Bench> {
+        let model = GreyBox::load(path)?;
+        let plant = PlantOptions { aircraft: aircraft.to_owned(), ..PlantOptions::default() };
+        Ok(Bench {
+            path: path.to_owned(),
+            reference: std::fs::read_to_string(path)?,
+            craft: Craft::of(&model),
+            subject: Subject::new(plant, &model.airframe).map_err(|why| anyhow!("{why}"))?,
+            controller: build(Kind::Lqi, &model)?,
+            nulls,
+        })
+    }
+
+    /// The sizes of the aircraft.
+    pub fn craft(&self) -> &Craft {
+        &self.craft
     }
 
     /// Flies a case and reconstructs its logs; test flights are left out of nulls.
     pub fn fly(&self, case: &Case) -> Result<Flown> {
         let begun = Instant::now();
         let Case { seed, missing, .. } = case;
-        let text = starting_model(REFERENCE, "start", *seed, missing);
-        let model = load(&text.map_err(|why| anyhow!("making the model: {why}"))?)?;
-        let trial = Trial { seed: *seed, missing: missing.clone(), turbulence: None };
+        let text = starting_model(&self.reference, "start", *seed, missing);
+        let text = text.map_err(|why| anyhow!("making the model: {why}"))?;
+        let model = GreyBox::parse(&text, &self.path)?;
+        let trial = Trial {
+            subject: self.subject.clone(),
+            seed: *seed,
+            missing: missing.clone(),
+            turbulence: None,
+        };
         let logs = trial.fly(self.controller.as_ref())?;
         let testing = if case.factor == 0.0 { &[][..] } else { &logs.testing };
         let all = |logs: &[Log]| logs.iter().map(|log| rebuilt(log, &model)).collect::<Result<_>>();

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, ValueEnum};
+use greylag_sitl::airframe_file::{self, AirframeError};
 use greylag_sitl::error_arguments::{FaultArgs, SensorArgs};
 use greylag_sitl::plant::Start;
 use greylag_sitl::plant_arguments::PlantArgs;
@@ -56,6 +57,10 @@ pub struct Cli {
     force: bool,
     #[command(flatten)]
     plant: PlantArgs,
+    /// Airframe file of the companion: its [surfaces], [motors] and [conditions] say which JSBSim properties are moved
+    /// and held.
+    #[arg(long, value_name = "FILE", help_heading = "Aircraft")]
+    airframe: Option<PathBuf>,
     #[command(flatten)]
     start: StartArgs,
     #[command(flatten)]
@@ -185,8 +190,15 @@ impl Cli {
     }
 
     /// What the command line asks for.
-    pub fn options(&self) -> ShimOptions {
-        ShimOptions {
+    ///
+    /// # Errors
+    /// If the airframe file cannot be used.
+    pub fn options(&self) -> Result<ShimOptions, AirframeError> {
+        let mut plant = self.plant.options(self.seed);
+        if let Some(path) = &self.airframe {
+            airframe_file::apply(path, &mut plant)?;
+        }
+        Ok(ShimOptions {
             link: self.address().clone(),
             px4: self.px4.options(),
             ardupilot: self.ardupilot.options(),
@@ -194,7 +206,7 @@ impl Cli {
             launch: if self.no_hold { Launch::Immediate } else { Launch::WhenArmed },
             duration_s: self.duration_s,
             start: self.start.state(),
-            plant: self.plant.options(self.seed),
+            plant,
             seed: u64::from(self.seed),
             truth: self.truth.clone().map(|path| TruthFile {
                 path,
@@ -209,7 +221,7 @@ impl Cli {
             }),
             parameters: self.parameter.clone(),
             clock_start_s: self.clock_start_s,
-        }
+        })
     }
 }
 

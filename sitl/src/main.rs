@@ -25,7 +25,7 @@ fn main() -> ExitCode {
 }
 
 fn fly(cli: &Cli) -> anyhow::Result<()> {
-    let options = cli.options();
+    let options = cli.options()?;
     let stop = Arc::new(AtomicBool::new(false));
     let handler = Arc::clone(&stop);
     ctrlc::set_handler(move || handler.store(true, Ordering::Relaxed))

@@ -1,9 +1,11 @@
 //! The plant: one aircraft flown by JSBSim in this process, step by step in its own time.
 
 mod loads;
+mod mixing;
 mod nodes;
 mod options;
 mod state;
+mod steering;
 mod travel;
 
 use jsbsim::Fdm;
@@ -12,6 +14,7 @@ use crate::air::AirError;
 use crate::aircraft;
 pub use crate::aircraft::AircraftError;
 pub use loads::{Loads, MassProperties};
+pub use mixing::{Mixing, Moved};
 use nodes::Nodes;
 pub(crate) use nodes::to_body;
 pub use options::{PlantOptions, Properties};

@@ -22,7 +22,7 @@ pub struct PlantArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Aircraft")]
 struct AircraftArgs {
-    /// Folder that holds NAME/NAME.xml; without it one built into the program flies: x8, aerosonde.
+    /// Folder that holds NAME/NAME.xml; without it one built into the program flies: x8, aerosonde, x8-elevons.
     #[arg(long, value_name = "DIR", requires = "aircraft")]
     aircraft_dir: Option<PathBuf>,
     /// Name of the aircraft.
@@ -32,6 +32,9 @@ struct AircraftArgs {
     /// throttle_command, rudder_command, or the same with _position.
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
+    /// Hold a property of the aircraft at a value (may be repeated): flaps, say, by fcs/flap-cmd-norm=0.5.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = held)]
+    set: Vec<(String, f64)>,
     /// Hide an effect in the aircraft (may be repeated); a wrong ID is answered with all that are known.
     #[arg(long, value_name = "ID=AMPLITUDE", allow_hyphen_values = true)]
     hide: Vec<Hidden>,
@@ -70,6 +73,15 @@ pub fn property(text: &str) -> Result<(String, String), String> {
     }
 }
 
+/// Reads NAME=VALUE.
+pub fn held(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("write it as NAME=VALUE")?;
+    match value.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok((name.trim().to_owned(), number)),
+        _ => Err(format!("{value} is not a finite number")),
+    }
+}
+
 /// Numbers written with commas.
 #[derive(Clone, Copy, Debug)]
 pub struct Numbers<const N: usize>(pub [f64; N]);
@@ -98,6 +110,7 @@ impl PlantArgs {
                 property.clone_from(name);
             }
         }
+        plant.held.clone_from(&self.aircraft.set);
         plant.hidden = self.aircraft.hide.clone();
         plant
     }

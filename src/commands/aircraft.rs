@@ -2,8 +2,10 @@
 
 mod check;
 mod export;
-#[cfg(feature = "sitl")]
 mod import;
+mod import_avl;
+#[cfg(feature = "sitl")]
+mod import_jsbsim;
 mod new;
 
 use std::process::ExitCode;
@@ -25,7 +27,6 @@ enum Command {
     /// Write a model as an aircraft of another program.
     Export(export::Arguments),
     /// Make airframe and model of another program's aircraft.
-    #[cfg(feature = "sitl")]
     Import(import::Arguments),
     /// Write airframe and model from mass, span, area and tail: textbook estimates with their widths.
     New(new::Arguments),
@@ -39,7 +40,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.command {
         Command::Check(arguments) => check::run(arguments),
         Command::Export(arguments) => export::run(arguments),
-        #[cfg(feature = "sitl")]
         Command::Import(arguments) => import::run(arguments),
         Command::New(arguments) => new::run(arguments),
     }

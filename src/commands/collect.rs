@@ -65,6 +65,7 @@ pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
         .with_context(|| format!("cannot make {}", folder.display()))?;
     let count = arguments.episodes.unwrap_or(if arguments.round == 0 { 175 } else { 25 });
     let mut plant = arguments.plant.options(arguments.seed);
+    start::describe(&mut plant, &models)?;
     plant.start = arguments.start.start(&plant.aircraft, &models)?;
     start::introduce(&plant, &models)?;
     let flown = AtomicU32::new(0);

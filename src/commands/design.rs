@@ -51,7 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     drop(bar);
     println!("{}", table(&all));
     let [a, b] = &suspects;
-    let Some(Plan { manoeuvre, seconds, times, schedule }) = plan(&all) else {
+    let cruise = model.airframe.envelope.airspeed_cruise_mps;
+    let Some(Plan { manoeuvre, seconds, times, schedule }) = plan(&all, cruise) else {
         bail!(
             "no manoeuvre of the menu tells {} from {} within {LONGEST_S} s; name larger --values, or take both as one",
             a.id,

@@ -88,6 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     // everything that can be wrong is found before the first flight
     let load = |path: &PathBuf| GreyBox::load(&shipped(path));
     let models = arguments.models.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    start::describe(&mut plant, &models)?;
     plant.start = arguments.start.start(&plant.aircraft, &models)?;
     let entrants = entrants(arguments, &models)?;
     start::introduce(&plant, &models)

@@ -11,10 +11,11 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
+use greylag_sitl::plant::PlantOptions;
 use rayon::prelude::*;
 
-use crate::commands::choices;
 use crate::commands::fly::{self, POLICY, companion_with};
+use crate::commands::{choices, start};
 use crate::control::Kind as ControllerKind;
 use crate::sim::faults::{Case, Cause, CompanionFactory, Counterpart, Kind, Report};
 use ledger::{Entry, Ledger};
@@ -31,7 +32,11 @@ pub struct Arguments {
     /// Controllers.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["lqi"], value_parser = choices::controller())]
     controller: Vec<ControllerKind>,
-    /// Model that the controllers are designed from or plan with; the X8 flies.
+    /// The simulator's aircraft; the played flight controllers have gains for the X8, so others fly with the
+    /// counterpart sitl.
+    #[arg(long, value_name = "NAME", default_value = "x8", conflicts_with = "resume")]
+    aircraft: String,
+    /// Model that the controllers are designed from or plan with.
     /// Flights that `--resume` notes are all of the default model.
     #[arg(
         long,
@@ -74,11 +79,16 @@ impl ValueEnum for Counterpart {
 /// If an aircraft or a controller cannot be made, or the file of `--resume` cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, None)?;
+    let models = std::slice::from_ref(&model);
+    let mut plant =
+        PlantOptions { aircraft: arguments.aircraft.clone(), ..PlantOptions::default() };
+    start::describe(&mut plant, models)?;
+    plant.start = start::usual(&plant.aircraft, models)?;
     let ledger = arguments.resume.as_deref().map(Ledger::open).transpose()?;
     let mut entries = Vec::new();
     for &controller in &arguments.controller {
         let companion = companion_with(controller, &model, POLICY.as_ref())?;
-        let factory = CompanionFactory::new(companion, &model)?;
+        let factory = CompanionFactory::new(companion, &model)?.with_aircraft(plant.clone());
         let before = entries.len();
         for &counterpart in &arguments.counterpart {
             let seeds = arguments.first..arguments.first + arguments.flights;

@@ -207,6 +207,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Options {
         duration: arguments.duration_s,
         plan_deadline: Duration::from_millis(arguments.plan_deadline_ms),
         travels: model.airframe.actuators.travels(),
+        mixer: model.airframe.mixer.clone(),
         controller: arguments.controller_profile(model),
         signing: arguments.signing(),
     }

@@ -95,7 +95,8 @@ impl Reading {
         model: &GreyBox,
         clock: ActuatorClock,
     ) -> Result<Intake> {
-        let reading = self.options()?;
+        let mut reading = self.options()?;
+        reading.mapping = reading.mapping.with_mixer(model.airframe.mixer.clone());
         let mut intake = Intake::default();
         for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {
             eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());

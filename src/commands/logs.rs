@@ -14,6 +14,7 @@ use crate::logs::mapping::Mapping;
 use crate::logs::phases::Kind;
 use crate::logs::{Flight, Log, Options, csv};
 use crate::model::GreyBox;
+use crate::physics::Airframe;
 use crate::sysid::flight_path;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
@@ -73,6 +74,9 @@ struct Reading {
     /// A TOML file that says where columns come from.
     #[arg(long)]
     mapping: Option<PathBuf>,
+    /// Airframe file whose [surfaces] and [motors] the log names.
+    #[arg(long, value_name = "FILE")]
+    airframe: Option<PathBuf>,
     /// Read the log however many of its rows are unusable.
     #[arg(long)]
     lenient: bool,
@@ -81,6 +85,8 @@ struct Reading {
 impl Reading {
     fn options(&self) -> Result<Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
+        let airframe = self.airframe.as_deref().map(|path| Airframe::load(&files::shipped(path)));
+        let mapping = mapping.with_mixer(airframe.transpose()?.and_then(|airframe| airframe.mixer));
         let tolerance = if self.lenient { csv::Tolerance::Lenient } else { csv::Tolerance::Strict };
         Ok(Options { tolerance, mapping })
     }
@@ -107,8 +113,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
         Verb::Reconstruct { input, output, model, force, reading } => {
             files::writable(output, (*force).into())?;
-            let model = GreyBox::load(model)?;
-            let log = crate::logs::load(input, &reading.options()?)?;
+            let model = GreyBox::load(&files::shipped(model))?;
+            let mut options = reading.options()?;
+            options.mapping = options.mapping.with_mixer(model.airframe.mixer.clone());
+            let log = crate::logs::load(input, &options)?;
             let name = log.flight.name.clone();
             let options = flight_path::Options {
                 gravity: model.atmosphere.gravity,

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, anyhow, bail};
 use comfy_table::{CellAlignment, Table};
+use greylag_sitl::plant::PlantOptions;
 use serde::{Deserialize, Serialize};
 
 use crate::commands::files::shipped;
@@ -14,13 +15,10 @@ use crate::logs::csv;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::physics::formula::register;
-use crate::sim::missing::{Kind as MissingKind, Missing};
+use crate::sim::missing::{Craft, Kind as MissingKind, Missing};
 use crate::sim::starting_model::starting_model;
-use crate::sim::trial::Trial;
+use crate::sim::trial::{Subject, Trial};
 
-/// The model that flies as the simulator does, and its airframe.
-const REFERENCE: &str = include_str!("../../params/x8/jsbsim.toml");
-const AIRFRAME: &str = include_str!("../../params/x8/airframe.toml");
 /// The file of the answer.
 const SEALED: &str = "answer.sealed";
 /// The layout of the answer.
@@ -35,6 +33,16 @@ pub struct Arguments {
     /// New folder for the logs, the model and the sealed answer.
     #[arg(long, value_name = "DIR", required_unless_present = "open")]
     out: Option<PathBuf>,
+    /// Model that flies as the simulator's aircraft does: the answer is hidden in the aircraft, and the model of the
+    /// folder is this one with errors. Its airframe is copied beside it.
+    #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
+    model: PathBuf,
+    /// Folder that holds NAME/NAME.xml; without it one built into the program flies.
+    #[arg(long, value_name = "DIR", requires = "aircraft")]
+    aircraft_dir: Option<PathBuf>,
+    /// Name of the simulator's aircraft that the model is of [default: x8].
+    #[arg(long, value_name = "NAME", requires = "model")]
+    aircraft: Option<String>,
     /// Hide this effect instead of one drawn from the seed; a wrong ID is answered with all there are.
     #[arg(long, value_name = "ID", group = "what")]
     effect: Option<String>,
@@ -84,19 +92,24 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
     if !parent.is_dir() {
         bail!("cannot create {}: name a folder in one that exists", out.display());
     }
-    let missing = missing(arguments, seed)?;
-    let trial =
-        Trial { seed, missing: vec![missing.clone()], turbulence: arguments.turbulence_severity };
+    let path = shipped(&arguments.model);
+    let reference = GreyBox::load(&path)?;
+    let text =
+        std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))?;
+    let missing = missing(arguments, &reference, seed)?;
+    let trial = Trial {
+        subject: subject(arguments, &reference)?,
+        seed,
+        missing: vec![missing.clone()],
+        turbulence: arguments.turbulence_severity,
+    };
     // written beside it first: the folder is there complete, or not at all
     let beside = tempfile::Builder::new().prefix(".mystery").tempdir_in(parent);
     let beside = beside.with_context(|| format!("creating a folder in {}", parent.display()))?;
-    let (around, folder) = (beside.path(), beside.path().join("mystery"));
+    let folder = beside.path().join("mystery");
     std::fs::create_dir(&folder).with_context(|| format!("creating {}", folder.display()))?;
-    put(around, "airframe.toml", AIRFRAME)?;
-    put(around, "reference.toml", REFERENCE)?;
-    let reference = GreyBox::load(&around.join("reference.toml"))?;
-    put(&folder, "airframe.toml", AIRFRAME)?;
-    let model = starting_model(REFERENCE, &format!("mystery-{seed}"), seed, &trial.missing);
+    put(&folder, "airframe.toml", &airframe(&path, &text)?)?;
+    let model = starting_model(&text, &format!("mystery-{seed}"), seed, &trial.missing);
     put(&folder, "model.toml", &model.map_err(|why| anyhow!("making the model: {why}"))?)?;
     GreyBox::load(&folder.join("model.toml"))?;
     let logs = trial.fly(build(Kind::Lqi, &reference)?.as_ref())?;
@@ -114,10 +127,40 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// The simulator's aircraft.
+fn subject(arguments: &Arguments, reference: &GreyBox) -> Result<Subject> {
+    let mut plant =
+        PlantOptions { aircraft_dir: arguments.aircraft_dir.clone(), ..PlantOptions::default() };
+    if let Some(name) = &arguments.aircraft {
+        plant.aircraft.clone_from(name);
+    }
+    if arguments.aircraft.is_none() && !reference.airframe.name.to_lowercase().contains("x8") {
+        bail!(
+            "{} is a model of {}: name the simulator's aircraft that it is of with --aircraft",
+            arguments.model.display(),
+            reference.airframe.name
+        );
+    }
+    Subject::new(plant, &reference.airframe)
+        .map_err(|why| anyhow!("the airframe of model {}: {why}", reference.name))
+}
+
+/// The text of the airframe file that the model file at `path` names.
+fn airframe(path: &Path, model: &str) -> Result<String> {
+    #[derive(Deserialize)]
+    struct Named {
+        airframe: PathBuf,
+    }
+    let named: Named = toml::from_str(model)?;
+    let path = path.parent().unwrap_or(Path::new("")).join(named.airframe);
+    std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))
+}
+
 /// What is hidden: the effect of a file, one by its id, or one drawn.
-fn missing(arguments: &Arguments, seed: u64) -> Result<Missing> {
+fn missing(arguments: &Arguments, reference: &GreyBox, seed: u64) -> Result<Missing> {
     let Some(file) = &arguments.hide else {
-        return Ok(Missing::drawn(seed, arguments.effect.as_deref(), arguments.amplitude)?);
+        let craft = Craft::of(reference);
+        return Ok(Missing::drawn(&craft, seed, arguments.effect.as_deref(), arguments.amplitude)?);
     };
     let read = register::load(&shipped(file))?;
     let [effect] = read[..] else {

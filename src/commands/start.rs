@@ -5,6 +5,7 @@ use greylag_sitl::plant::{Plant, PlantOptions, Start};
 
 use crate::model::GreyBox;
 use crate::physics::servos::Travels;
+use crate::sim::described::describe as describe_aircraft;
 
 /// The aircraft whose start is the paper's.
 const X8: &str = "x8";
@@ -49,6 +50,25 @@ impl StartArguments {
         }
         Ok(Start { airspeed_mps, altitude_m: self.start_altitude_m, ..Start::NEUTRAL })
     }
+}
+
+/// The start of `aircraft` where none is given.
+///
+/// # Errors
+/// As [`StartArguments::start`].
+pub fn usual(aircraft: &str, models: &[GreyBox]) -> Result<Start> {
+    let start_altitude_m = Start::NEUTRAL.altitude_m;
+    StartArguments { start_airspeed_mps: None, start_altitude_m }.start(aircraft, models)
+}
+
+/// The simulator's aircraft as the airframe of the first of `models` describes it.
+///
+/// # Errors
+/// If its surfaces cannot be flown.
+pub fn describe(plant: &mut PlantOptions, models: &[GreyBox]) -> Result<()> {
+    let Some(model) = models.first() else { return Ok(()) };
+    describe_aircraft(plant, &model.airframe)
+        .map_err(|why| anyhow::anyhow!("the airframe of model {}: {why}", model.name))
 }
 
 /// Says on standard error what is to be known of the aircraft, and where a model's airframe is not its.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::columns::{COLUMNS, EITHER, NEEDED, Place, index};
 use super::mapping::{Mapping, TEXT};
+use super::mixed;
 use super::rows;
 pub use super::rows::Tolerance;
 use super::{Flight, Sample};
@@ -196,8 +197,15 @@ impl Raw {
     }
 }
 
-/// Where a field goes: place, scale, offset.
-type Target = (Place, f64, f64);
+/// Where a field goes: place, scale, offset; whether it is one part of a sum.
+type Target = (Place, f64, f64, Part);
+
+/// Whether a field is a column, or one of several surfaces that make one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Whole,
+    OneOfSeveral,
+}
 
 /// Reads the rows, taking columns under other names or in other units where `mapping` says so.
 pub(super) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, CsvError> {
@@ -208,8 +216,13 @@ pub(super) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, C
     let header = reader.byte_headers().map_err(text)?.clone();
     let names: Vec<String> =
         header.iter().map(|h| String::from_utf8_lossy(h).trim().to_owned()).collect();
-    let targets: Vec<Vec<Target>> = names.iter().map(|name| targets(name, mapping)).collect();
-    let missing = missing_columns(&names, mapping, path);
+    let mut targets: Vec<Vec<Target>> = names.iter().map(|name| targets(name, mapping)).collect();
+    let mixed = mixed::columns(&names, mapping);
+    for part in &mixed {
+        targets[part.field].push((part.place, part.share, 0.0, Part::OneOfSeveral));
+    }
+    let made: Vec<String> = mixed.iter().map(|part| part.column.to_owned()).collect();
+    let missing = missing_columns(&[names.clone(), made].concat(), mapping, path);
     let unknown = names.iter().zip(&targets).filter(|(_, targets)| targets.is_empty());
     let unknown_columns = unknown.map(|(name, _)| name.clone()).collect();
     let (mut rows, mut places, mut total) = (Vec::new(), Vec::new(), 0);
@@ -282,12 +295,12 @@ fn targets(name: &str, mapping: &Mapping) -> Vec<Target> {
     let mut targets: Vec<Target> = mapping
         .of_topic(TEXT)
         .filter(|(_, entry)| entry.field == name)
-        .filter_map(|(column, e)| Some((COLUMNS[index(column)?].2, e.scale, e.offset)))
+        .filter_map(|(column, e)| Some((COLUMNS[index(column)?].2, e.scale, e.offset, Part::Whole)))
         .collect();
     if mapping.get(name).is_none()
         && let Some(i) = index(name)
     {
-        targets.push((COLUMNS[i].2, 1.0, 0.0));
+        targets.push((COLUMNS[i].2, 1.0, 0.0, Part::Whole));
     }
     targets
 }
@@ -319,9 +332,11 @@ fn sample(record: &::csv::ByteRecord, targets: &[Vec<Target>]) -> Option<Sample>
         let field = std::str::from_utf8(field).ok()?.trim();
         if !field.is_empty() {
             let x: f64 = field.parse().ok()?;
-            for (place, scale, offset) in targets {
-                *place(&mut sample) =
-                    if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
+            for (place, scale, offset, part) in targets {
+                let value = if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
+                let place = place(&mut sample);
+                let sums = *part == Part::OneOfSeveral && !place.is_nan();
+                *place = if sums { *place + value } else { value };
             }
         }
     }

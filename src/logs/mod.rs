@@ -12,6 +12,7 @@ mod growing;
 pub mod info;
 mod load;
 pub mod mapping;
+mod mixed;
 mod names;
 pub mod phases;
 pub mod rudder;

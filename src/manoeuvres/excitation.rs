@@ -20,6 +20,8 @@ pub enum Axis {
     Elevator,
     /// The throttle command, 0..1.
     Throttle,
+    /// The rudder command, −1..1; moves nothing on an aircraft without a rudder.
+    Rudder,
     /// The roll target, rad.
     Roll,
     /// The pitch target, rad.
@@ -30,8 +32,15 @@ pub enum Axis {
 
 impl Axis {
     /// Every axis.
-    pub const ALL: [Axis; 6] =
-        [Axis::Aileron, Axis::Elevator, Axis::Throttle, Axis::Roll, Axis::Pitch, Axis::Airspeed];
+    pub const ALL: [Axis; 7] = [
+        Axis::Aileron,
+        Axis::Elevator,
+        Axis::Throttle,
+        Axis::Rudder,
+        Axis::Roll,
+        Axis::Pitch,
+        Axis::Airspeed,
+    ];
 
     /// Its name in schedule files.
     pub const fn name(self) -> &'static str {
@@ -39,6 +48,7 @@ impl Axis {
             Axis::Aileron => "aileron",
             Axis::Elevator => "elevator",
             Axis::Throttle => "throttle",
+            Axis::Rudder => "rudder",
             Axis::Roll => "roll",
             Axis::Pitch => "pitch",
             Axis::Airspeed => "airspeed",

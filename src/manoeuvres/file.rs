@@ -145,7 +145,9 @@ impl From<&Excitation> for ExcitationFile {
         match e.axis {
             Axis::Roll | Axis::Pitch => file.amplitude_deg = Some(tidy(e.amplitude.to_degrees())),
             Axis::Airspeed => file.amplitude_mps = Some(e.amplitude),
-            Axis::Aileron | Axis::Elevator | Axis::Throttle => file.amplitude = Some(e.amplitude),
+            Axis::Aileron | Axis::Elevator | Axis::Throttle | Axis::Rudder => {
+                file.amplitude = Some(e.amplitude)
+            }
         }
         let (shape, width) = match &e.shape {
             Shape::Step { width } => ("step", width.is_finite().then_some(*width)),
@@ -187,7 +189,9 @@ impl ExcitationFile {
             ("amplitude_mps", self.amplitude_mps),
         ];
         let (key, unit) = match axis {
-            Axis::Aileron | Axis::Elevator => ("amplitude", "as a share of the full command"),
+            Axis::Aileron | Axis::Elevator | Axis::Rudder => {
+                ("amplitude", "as a share of the full command")
+            }
             Axis::Throttle => ("amplitude", "as a share of full throttle"),
             Axis::Roll | Axis::Pitch => ("amplitude_deg", "in degrees"),
             Axis::Airspeed => ("amplitude_mps", "in m/s"),
@@ -278,7 +282,7 @@ fn check_step(step: &Step) -> Result<(), String> {
     within("pitch_deg with its excitation", farthest_pitch, 0.0, PITCH_MAX_DEG)?;
     for e in &step.excitations {
         let most = match e.axis {
-            Axis::Aileron | Axis::Elevator | Axis::Throttle => 1.0,
+            Axis::Aileron | Axis::Elevator | Axis::Throttle | Axis::Rudder => 1.0,
             Axis::Roll | Axis::Pitch => std::f64::consts::PI,
             Axis::Airspeed => AIRSPEED_AMPLITUDE_MAX_MPS,
         };

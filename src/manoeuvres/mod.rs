@@ -22,7 +22,9 @@ pub const ROLL_MAX_DEG: f64 = 70.0;
 /// Largest pitch angle (degrees) that a schedule may ask for.
 pub const PITCH_MAX_DEG: f64 = 35.0;
 /// Slowest and fastest airspeed (m/s) that a schedule may ask for.
-pub const AIRSPEED_MPS: [f64; 2] = [5.0, 100.0];
+pub const AIRSPEED_MPS: [f64; 2] = [5.0, 400.0];
+/// Cruise airspeed (m/s) of the aircraft for which the menu and the drawn flights are written.
+pub const CRUISE_MPS: f64 = 20.0;
 /// Longest schedule, s.
 pub const DURATION_MAX_S: f64 = 3600.0;
 
@@ -62,15 +64,15 @@ pub struct Demand {
     pub target: Target,
     /// What is added to the controller's command.
     pub added: Command,
-    /// Share (0..=1) of the controller's own reaction on aileron, elevator and throttle that is let
+    /// Share (0..=1) of the controller's own reaction on aileron, elevator, throttle and rudder that is let
     /// through, counted from its command when the excitation began.
-    pub authority: [f64; 3],
+    pub authority: [f64; 4],
 }
 
 impl Demand {
     /// `target` without excitation.
     pub fn hold(target: Target) -> Demand {
-        Demand { target, added: Command::IDLE, authority: [1.0; 3] }
+        Demand { target, added: Command::IDLE, authority: [1.0; 4] }
     }
 }
 
@@ -133,11 +135,33 @@ impl Schedule {
     /// in 0..=1.
     pub fn gentler(&self, factor: f64) -> Schedule {
         let mut gentler = self.clone();
-        let commands = [Axis::Aileron, Axis::Elevator, Axis::Throttle];
+        let commands = [Axis::Aileron, Axis::Elevator, Axis::Throttle, Axis::Rudder];
         let all = gentler.steps.iter_mut().flat_map(|step| &mut step.excitations);
         all.filter(|e| commands.contains(&e.axis))
             .for_each(|e| e.amplitude *= factor.clamp(0.0, 1.0));
         gentler
+    }
+
+    /// The same schedule for an aircraft that cruises at `cruise` (m/s): airspeeds in proportion, written for
+    /// [`CRUISE_MPS`].
+    pub fn at_cruise(mut self, cruise: f64) -> Schedule {
+        let factor = cruise / CRUISE_MPS;
+        for step in &mut self.steps {
+            step.target.airspeed *= factor;
+            let of_airspeed = step.excitations.iter_mut().filter(|e| e.axis == Axis::Airspeed);
+            of_airspeed.for_each(|e| e.amplitude *= factor);
+        }
+        self
+    }
+
+    /// The same schedule with sines of the rudder in every step, drawn from `seed`.
+    pub fn with_rudder(mut self, seed: u64) -> Schedule {
+        const AMPLITUDE: f64 = 0.12;
+        for (k, step) in self.steps.iter_mut().enumerate() {
+            let shape = Shape::multisine(0.2, 2.0, seed ^ ((k as u64 + 1) << 32));
+            step.excitations.push(Excitation::new(Axis::Rudder, AMPLITUDE, 0.0, shape));
+        }
+        self
     }
 
     /// This schedule, then `next`.
@@ -157,6 +181,7 @@ fn within(step: &Step, t: f64) -> Demand {
             Axis::Aileron => (&mut added.aileron, Some(&mut authority[0])),
             Axis::Elevator => (&mut added.elevator, Some(&mut authority[1])),
             Axis::Throttle => (&mut added.throttle, Some(&mut authority[2])),
+            Axis::Rudder => (&mut added.rudder, Some(&mut authority[3])),
             Axis::Roll => (&mut target.roll, None),
             Axis::Pitch => (&mut target.pitch, None),
             Axis::Airspeed => (&mut target.airspeed, None),

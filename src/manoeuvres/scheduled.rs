@@ -10,18 +10,18 @@ pub struct Overlay {
     schedule: Schedule,
     start: Option<Time>,
     /// The controller's commands when excitations began that hold it off.
-    held: [Option<f64>; 3],
+    held: [Option<f64>; 4],
 }
 
 impl Overlay {
     /// `schedule`, not begun.
     pub fn new(schedule: Schedule) -> Overlay {
-        Overlay { schedule, start: None, held: [None; 3] }
+        Overlay { schedule, start: None, held: [None; 4] }
     }
 
     /// Goes back to the start.
     pub fn reset(&mut self) {
-        (self.start, self.held) = (None, [None; 3]);
+        (self.start, self.held) = (None, [None; 4]);
     }
 
     /// What is asked for at `now`; the first call begins the schedule.
@@ -50,7 +50,7 @@ impl Overlay {
             aileron: of(0, own.aileron, demand.added.aileron),
             elevator: of(1, own.elevator, demand.added.elevator),
             throttle: of(2, own.throttle, demand.added.throttle),
-            rudder: own.rudder,
+            rudder: of(3, own.rudder, demand.added.rudder),
         }
         .clamped()
     }

@@ -9,7 +9,9 @@ use super::residual::hash;
 use super::{GreyBox, Integrator, Named, Residual};
 use crate::num::Table;
 use crate::physics::Airframe;
-use crate::physics::airframe::{FileError, Sourced, check_schema, named, positive, toml_error};
+use crate::physics::airframe::{
+    FileError, Sourced, check_schema, named, positive, toml_error, within,
+};
 use crate::physics::atmosphere::{Atmosphere, Density};
 use crate::physics::effects::{Description, Kind};
 use crate::physics::formula::{Written, register};
@@ -122,6 +124,13 @@ impl GreyBox {
     }
 }
 
+/// Moments of inertia of aircraft, kg m²: from those of a few grams to those of airliners.
+const INERTIA: [f64; 2] = [1e-7, 1e9];
+
+fn inertia(field: &str, number: &Sourced) -> Result<f64, String> {
+    within(field, number, INERTIA)
+}
+
 impl File {
     fn into_model(self, airframe: Airframe) -> Result<GreyBox, String> {
         let mut terms = Vec::new();
@@ -180,10 +189,10 @@ impl File {
 impl BodyFile {
     fn checked(&self) -> Result<RigidBody, String> {
         let body = RigidBody {
-            mass: positive("rigid_body.mass_kg", &self.mass_kg, 10000.0)?,
-            jx: positive("rigid_body.jx_kgm2", &self.jx_kgm2, 100000.0)?,
-            jy: positive("rigid_body.jy_kgm2", &self.jy_kgm2, 100000.0)?,
-            jz: positive("rigid_body.jz_kgm2", &self.jz_kgm2, 100000.0)?,
+            mass: positive("rigid_body.mass_kg", &self.mass_kg, 1e6)?,
+            jx: inertia("rigid_body.jx_kgm2", &self.jx_kgm2)?,
+            jy: inertia("rigid_body.jy_kgm2", &self.jy_kgm2)?,
+            jz: inertia("rigid_body.jz_kgm2", &self.jz_kgm2)?,
             jxz: self.jxz_kgm2.value,
         };
         if body.is_physical() {

@@ -1,5 +1,7 @@
 //! A model as an aircraft of JSBSim.
 
+mod effectors;
+
 use std::fmt::Write;
 
 use super::GreyBox;
@@ -194,11 +196,8 @@ fn thrust(model: &GreyBox) -> String {
 fn controls(model: &GreyBox, name: &str) -> String {
     let figures = &model.airframe.actuators;
     let mut out = format!("  <flight_control name=\"{name}\">\n");
-    out.push_str(&surface("aileron", &figures.aileron, figures.step, AILERON));
-    out.push_str(&surface("elevator", &figures.elevator, figures.step, ELEVATOR));
-    if let Some(rudder) = &figures.rudder {
-        out.push_str(&surface("rudder", rudder, figures.step, RUDDER));
-    }
+    let apart = model.airframe.mixer.as_ref().and_then(|m| effectors::channels(m, figures));
+    out.push_str(&apart.unwrap_or_else(|| usual_surfaces(figures)));
     // b = k/(2 + k), k = step/lag
     let [b, _] = figures.throttle;
     let lag = figures.step * (1.0 - b) / (2.0 * b);
@@ -217,6 +216,20 @@ fn controls(model: &GreyBox, name: &str) -> String {
     out
 }
 
+/// Aileron, elevator and rudder by JSBSim's usual commands.
+fn usual_surfaces(figures: &ActuatorFigures) -> String {
+    let surfaces = [
+        ("aileron", Some(&figures.aileron), AILERON),
+        ("elevator", Some(&figures.elevator), ELEVATOR),
+        ("rudder", figures.rudder.as_ref(), RUDDER),
+    ];
+    let one = |(name, figure, position): (&str, Option<&Surface>, &str)| {
+        let command = format!("fcs/{name}-cmd-norm");
+        figure.map(|figure| surface(name, figure, figures.step, &command, position))
+    };
+    surfaces.into_iter().filter_map(one).collect()
+}
+
 /// Frequency (rad/s) and damping of a surface's filter: the bilinear transform backwards.
 fn analogue(surface: &Surface, step: f64) -> [f64; 2] {
     let [b, _, a2] = surface.filter;
@@ -227,13 +240,13 @@ fn analogue(surface: &Surface, step: f64) -> [f64; 2] {
     [w / step, (d - 4.0 - square) / (4.0 * w)]
 }
 
-fn surface(name: &str, surface: &Surface, step: f64, position: &str) -> String {
+fn surface(name: &str, surface: &Surface, step: f64, command: &str, position: &str) -> String {
     let [w, damping] = analogue(surface, step);
     let (least, most) = (surface.travel.least, surface.travel.most);
     let (square, middle) = (w * w, 2.0 * damping * w);
     format!(
         "    <channel name=\"{name}\">\n      <aerosurface_scale name=\"fcs/{name}-cmd-rad\">\n        <input> \
-         fcs/{name}-cmd-norm </input>\n        <range> <min> {least:?} </min> <max> {most:?} </max> </range>\n      \
+         {command} </input>\n        <range> <min> {least:?} </min> <max> {most:?} </max> </range>\n      \
          </aerosurface_scale>\n      <second_order_filter name=\"fcs/{name}-actuator\">\n        <input> fcs/{name}-cmd-rad \
          </input>\n        <c1> 0 </c1> <c2> 0 </c2> <c3> {square:?} </c3>\n        <c4> 1 </c4> <c5> {middle:?} </c5> <c6> \
          {square:?} </c6>\n        <clipto> <min> {least:?} </min> <max> {most:?} </max> </clipto>\n        <output> {position} \

@@ -1,5 +1,6 @@
 //! The grey box: a prior made of physical effects, its integrators, trim and linearisation.
 
+pub mod avl;
 pub mod block;
 pub mod edit;
 mod file;

@@ -43,6 +43,9 @@ pub struct Measures {
 /// An estimated number: its name, value, standard deviation as a share of the value, source.
 pub(crate) type Estimate = (&'static str, f64, f64, &'static str);
 
+/// An effect of the model file with its estimates.
+pub(crate) type Section = (&'static str, Vec<Estimate>);
+
 /// Lift coefficient at which a small wing stalls.
 const LIFT_MAX: f64 = 1.2;
 /// Tailplane's volume, distance in chords, efficiency and share of its chord that moves, as lift.
@@ -95,13 +98,19 @@ impl Measures {
     /// The airframe file.
     pub fn airframe(&self) -> String {
         let f = self.figures();
+        self.airframe_with_chord(f.chord, [self.slope(&f), self.zero_lift()])
+    }
+
+    /// The same with the mean chord (m), the slope of the lift (1/rad) and the lift at no incidence of another source.
+    pub(crate) fn airframe_with_chord(&self, chord: f64, [slope, zero_lift]: [f64; 2]) -> String {
+        let f = self.figures();
         let mut out = format!(
-            "# Written by `greylag aircraft new`: measure what is marked as an estimate.\nschema = 2\nname = {:?}\n\n\
+            "# Written by `greylag aircraft`: measure what is marked as an estimate.\nschema = 2\nname = {:?}\n\n\
              [geometry]\nwing_area_m2 = {{ value = {:?}, source = \"given\" }}\nspan_m = {{ value = {:?}, source = \
              \"given\" }}\nmean_chord_m = {{ value = {:.5}, source = \"area over span\" }}\n\n[reference]\n\
              airspeed_mps = {{ value = {:.2}, source = \"cruise\" }}\naltitude_m = {{ value = 100.0, source = \
              \"estimate\" }}\n\n",
-            self.name, self.area, self.span, f.chord, f.cruise
+            self.name, self.area, self.span, chord, f.cruise
         );
         let servo = "estimate: a hobby servo";
         let surfaces = [
@@ -119,7 +128,7 @@ impl Measures {
                 );
             }
         }
-        let incidence = |lift: f64| (lift - self.zero_lift()) / self.slope(&f);
+        let incidence = |lift: f64| (lift - zero_lift) / slope;
         let limits = incidence_limits(incidence(f.lift), incidence(LIFT_MAX));
         let _ = write!(
             out,
@@ -137,10 +146,14 @@ impl Measures {
 
     /// The model file, beside the airframe file `airframe.toml`.
     pub fn model(&self) -> String {
-        let f = self.figures();
+        self.model_of(&self.sections(), "Textbook estimates from mass, span, area and tail.")
+    }
+
+    /// The model file of the effects `sections`, with mass and inertia of these measures.
+    pub(crate) fn model_of(&self, sections: &[Section], description: &str) -> String {
         let mut out = format!(
-            "# Written by `greylag aircraft new`: fly, then `greylag amend --tune-only`.\nschema = 1\nname = {:?}\n\
-             description = \"Textbook estimates from mass, span, area and tail.\"\nairframe = \"airframe.toml\"\n\
+            "# Written by `greylag aircraft`: fly, then `greylag amend --tune-only`.\nschema = 1\nname = {:?}\n\
+             description = {description:?}\nairframe = \"airframe.toml\"\n\
              integrator = \"rk4\"\nforce_axes = \"wind\"\n\n[rigid_body]\n",
             format!("{}-prior", self.name)
         );
@@ -151,6 +164,22 @@ impl Measures {
             out,
             "\n[air]\ngravity_mps2 = {{ value = 9.806, source = \"middle latitudes\" }}\ndensity = \"standard\"\n"
         );
+        for (effect, estimates) in sections {
+            let _ = write!(out, "\n[effects.{effect}]\n");
+            numbers(&mut out, estimates);
+        }
+        out
+    }
+
+    /// Induced drag with the incidence and its square, of a wing with this slope of the lift and this lift at none.
+    pub(crate) fn induced_by(&self, slope: f64, zero_lift: f64) -> [f64; 2] {
+        let k = 1.0 / induced(&self.figures());
+        [2.0 * k * zero_lift * slope, k * slope * slope]
+    }
+
+    /// The effects with their estimates.
+    pub(crate) fn sections(&self) -> Vec<Section> {
+        let f = self.figures();
         let mut effects = vec![
             ("lift_linear", self.lift(&f)),
             ("drag_linear", self.drag(&f)),
@@ -164,11 +193,7 @@ impl Measures {
         if self.rudder.is_some() {
             effects.push(("rudder_linear", rudder()));
         }
-        for (effect, estimates) in effects {
-            let _ = write!(out, "\n[effects.{effect}]\n");
-            numbers(&mut out, &estimates);
-        }
-        out
+        effects
     }
 
     /// Radii of gyration as shares of half span, half length and half their mean.

@@ -1,15 +1,19 @@
 //! The airframe: geometry, actuators and the envelope it may be flown in, from a TOML file.
 
 mod controls;
+mod effectors;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
 use crate::physics::State;
+use crate::physics::mixer::Mixer;
 
 pub use controls::Yaw;
 use controls::{Alike, Each};
+use effectors::{MotorFile, SurfaceFile};
 
 pub use crate::physics::servos::ActuatorFigures;
 
@@ -117,6 +121,10 @@ pub struct Airframe {
     pub actuators: ActuatorFigures,
     /// What is known of a rudder.
     pub yaw: Yaw,
+    /// The surfaces and motors that the controls move, where the file names them.
+    pub mixer: Option<Mixer>,
+    /// JSBSim's properties that are held while the aircraft flies: flaps, say.
+    pub conditions: BTreeMap<String, f64>,
     /// The condition about which quantities are scaled.
     pub reference: Reference,
     /// Incidence that controllers keep to.
@@ -175,6 +183,12 @@ struct File {
     reference: Option<ReferenceFile>,
     incidence: Option<Incidence>,
     envelope: Envelope,
+    #[serde(default)]
+    surfaces: BTreeMap<String, SurfaceFile>,
+    #[serde(default)]
+    motors: BTreeMap<String, MotorFile>,
+    #[serde(default)]
+    conditions: BTreeMap<String, f64>,
 }
 
 #[derive(Deserialize)]
@@ -209,6 +223,18 @@ impl File {
                     .into())
             }
         }
+    }
+
+    fn mixer(&self, actuators: &ActuatorFigures) -> Result<Option<Mixer>, String> {
+        let named =
+            !(self.surfaces.is_empty() && self.motors.is_empty() && self.conditions.is_empty());
+        if self.schema == 1 && named {
+            return Err("[surfaces], [motors] and [conditions] are of schema = 2".into());
+        }
+        if let Some((name, value)) = self.conditions.iter().find(|(_, value)| !value.is_finite()) {
+            return Err(format!("conditions.{name} = {value} must be a finite number"));
+        }
+        effectors::mixer(&self.surfaces, &self.motors, &actuators.travels())
     }
 
     fn reference(&self) -> Result<Reference, String> {
@@ -258,6 +284,7 @@ impl Airframe {
             return Err("schema 2 needs [reference] with airspeed_mps and altitude_m".into());
         }
         let (actuators, yaw) = file.controls()?;
+        let mixer = file.mixer(&actuators)?;
         let reference = file.reference()?;
         let g = &file.geometry;
         Ok(Airframe {
@@ -269,6 +296,8 @@ impl Airframe {
             },
             actuators,
             yaw,
+            mixer,
+            conditions: file.conditions,
             reference,
             incidence: file.incidence.unwrap_or(Incidence::DEFAULT).checked()?,
             envelope: file.envelope.checked()?,
@@ -331,10 +360,19 @@ pub(crate) fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
 
 /// A number that must lie above zero and at most at `most`, the largest that an aircraft has.
 pub(crate) fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String> {
+    within(field, number, [most * 1e-9, most])
+}
+
+/// A number that must lie between the smallest and the largest that an aircraft has, both above zero.
+pub(crate) fn within(
+    field: &str,
+    number: &Sourced,
+    [least, most]: [f64; 2],
+) -> Result<f64, String> {
     if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
         return Err(format!("{field}.sd must be a positive number"));
     }
-    if number.value >= most * 1e-9 && number.value <= most {
+    if number.value >= least && number.value <= most {
         return Ok(number.value);
     }
     Err(format!(

@@ -9,6 +9,7 @@ pub mod catalogue;
 pub mod effects;
 pub mod formula;
 pub mod inputs;
+pub mod mixer;
 pub mod point;
 pub mod rigid_body;
 pub mod servos;

@@ -14,7 +14,7 @@ use crate::physics::inputs::InputMemory;
 use crate::physics::rigid_body;
 use crate::physics::{Controls, State};
 use crate::sim::instruments::{Group, Instruments};
-use crate::sim::missing::{Kind, Missing};
+use crate::sim::missing::{Craft, Kind, Missing};
 use crate::sim::{Environment, Imagined};
 use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 use crate::sysid::progress::{Cancelled, Progress, say};
@@ -110,7 +110,8 @@ pub fn prospects(
     say(progress, "imagining each manoeuvre", 0.0)?;
     let flown = AtomicUsize::new(0);
     let prospect = |manoeuvre: &Manoeuvre| -> Result<Prospect, DesignError> {
-        let schedule = manoeuvre.schedule();
+        let cruise = model.airframe.envelope.airspeed_cruise_mps;
+        let schedule = manoeuvre.schedule().at_cruise(cruise);
         let separation_of = |k: usize| -> Result<Option<Separation>, DesignError> {
             let flight = imagine(&truths[k], controller, &schedule)?;
             Ok(flight.map(|f| separation(model, &truths[k], &ways[1 - k], &f)))
@@ -140,12 +141,13 @@ pub struct Plan {
 }
 
 /// The quickest of `prospects`, which come as [`prospects`] sorts them; `None` if none tells within [`LONGEST_S`].
-pub fn plan(prospects: &[Prospect]) -> Option<Plan> {
+pub fn plan(prospects: &[Prospect], cruise_mps: f64) -> Option<Plan> {
     let best = prospects.first()?;
     let seconds = best.seconds().filter(|seconds| *seconds < LONGEST_S)?;
     let manoeuvre = menu::named(best.name)?;
     let times = (seconds / best.duration_s).ceil().max(LEAST) as usize;
-    Some(Plan { manoeuvre, seconds, times, schedule: repeated(manoeuvre, times) })
+    let schedule = repeated(manoeuvre, times).at_cruise(cruise_mps);
+    Some(Plan { manoeuvre, seconds, times, schedule })
 }
 
 /// The manoeuvre so many times, each on the heading opposite to the last one: on a single heading the
@@ -173,8 +175,9 @@ fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
         // joining it says what is known
         return Ok(model.clone().join(id, &[]).map(|()| Vec::new())?);
     };
-    let clear = Kind::from_id(id).map(|Kind { clear: [low, high], .. }| 0.5 * (low + high));
-    let clear = clear.and_then(|amplitude| Missing::new(id, amplitude).ok());
+    let craft = Craft::lacking(model);
+    let clear = craft.kind(id).map(|Kind { clear: [low, high], .. }| 0.5 * (low + high));
+    let clear = clear.and_then(|amplitude| Missing::new(&craft, id, amplitude).ok());
     if let Some(missing) = clear.filter(|missing| !missing.values.is_empty()) {
         return Ok(missing.values);
     }

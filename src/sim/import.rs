@@ -8,6 +8,7 @@ use greylag_sitl::plant::{Inputs, Loads, MassProperties, Plant, PlantError, Star
 use crate::model::textbook::Estimate;
 use crate::num::least_squares;
 use crate::physics::atmosphere::SEA_LEVEL_DENSITY;
+use crate::physics::catalogue::describe;
 use files::{airframe, model_file};
 use fits::{LINE_DEG, first_order, line, second_order};
 
@@ -19,6 +20,8 @@ const LBF: f64 = 4.448_221_615_260_5;
 const ALPHA: f64 = 0.052;
 /// Half the interval of angles, rad: 2°.
 const ANGLE: f64 = 0.035;
+/// A larger sideslip, at which the drag is taken once more, rad: 8°.
+const FAR: f64 = 4.0 * ANGLE;
 /// Half the interval of dimensionless rates.
 const RATE: f64 = 0.005;
 /// Half the interval of commands.
@@ -40,6 +43,18 @@ pub struct Imported {
     pub model: String,
     /// What airframe and model do not hold, one sentence each.
     pub left_out: Vec<String>,
+}
+
+impl Imported {
+    /// Writes the properties that were held into the airframe file.
+    pub fn hold(&mut self, held: &[(String, f64)]) {
+        if !held.is_empty() {
+            self.airframe.push_str("\n# Held in the simulator: the model is of the aircraft in this condition.\n[conditions]\n");
+        }
+        for (name, value) in held {
+            self.airframe.push_str(&format!("{name:?} = {value:?}\n"));
+        }
+    }
 }
 
 /// Why an aircraft could not be imported.
@@ -157,8 +172,8 @@ struct Slopes {
     aileron: Coefficients,
     elevator: Coefficients,
     rudder: Option<Coefficients>,
-    /// Drag by the square of sideslip and by the size of the elevator.
-    drag_beta: f64,
+    /// Drag by the size of sideslip and its square, and by the size of the elevator.
+    drag_beta: [f64; 2],
     drag_elevator: f64,
 }
 
@@ -227,6 +242,7 @@ impl Subject<'_> {
         let (per_span, per_chord) = (2.0 * v / self.span, 2.0 * v / self.chord);
         let mean = |s: Stops| COMMAND * 0.5 * (s.most_rad - s.least_rad);
         let (beta, even_beta) = self.slope(ANGLE, |k, s, _| s.beta_rad = k * ANGLE)?;
+        let (_, far_beta) = self.slope(FAR, |k, s, _| s.beta_rad = k * FAR)?;
         let (elevator, even_elevator) =
             self.slope(mean(travel.elevator), |k, _, i| i.elevator = k * COMMAND)?;
         let rudder = match travel.rudder {
@@ -242,7 +258,7 @@ impl Subject<'_> {
             aileron: self.slope(mean(travel.aileron), |k, _, i| i.aileron = k * COMMAND)?.0,
             elevator,
             rudder,
-            drag_beta: ((even_beta[0] - base[0]) / (ANGLE * ANGLE)).clamp(0.0, 10.0),
+            drag_beta: size_and_square([even_beta[0] - base[0], far_beta[0] - base[0]]),
             drag_elevator: ((even_elevator[0] - base[0]) / mean(travel.elevator)).clamp(0.0, 0.5),
         })
     }
@@ -306,6 +322,29 @@ impl Subject<'_> {
     }
 }
 
+/// a and b of a |β| + b β² from its values at [`ANGLE`] and [`FAR`].
+fn size_and_square([near, far]: [f64; 2]) -> [f64; 2] {
+    let square = (far / FAR - near / ANGLE) / (FAR - ANGLE);
+    [near / ANGLE - square * ANGLE, square]
+}
+
+/// Keeps coefficients within what their effects take; what is cut off is said.
+fn bounded(effect: &str, estimates: &mut [Estimate], left_out: &mut Vec<String>) {
+    let coefficients = describe(effect).map_or(&[][..], |about| about.coefficients);
+    for estimate in estimates {
+        let Some(own) = coefficients.iter().find(|c| c.name == estimate.0) else { continue };
+        let (least, most) = own.bounds;
+        let within = estimate.1.clamp(least, most);
+        if within != estimate.1 {
+            left_out.push(format!(
+                "{effect}.{} = {:.4} lies outside of the model's {least} to {most}: {within} is written",
+                estimate.0, estimate.1
+            ));
+            estimate.1 = within;
+        }
+    }
+}
+
 /// The effects of the model with their coefficients; what is left of the pitching moment is said.
 fn effects(polar: &Polar, slopes: &Slopes, left_out: &mut Vec<String>) -> Vec<Effect> {
     let [zero, slope, bent] = line(polar);
@@ -335,7 +374,10 @@ fn effects(polar: &Polar, slopes: &Slopes, left_out: &mut Vec<String>) -> Vec<Ef
                 exact("CLde", e[2]),
             ],
         ),
-        ("drag_beta2", vec![("CDbeta", 0.0, 0.0, "none"), exact("CDbeta2", slopes.drag_beta)]),
+        (
+            "drag_beta2",
+            vec![exact("CDbeta", slopes.drag_beta[0]), exact("CDbeta2", slopes.drag_beta[1])],
+        ),
         ("drag_elevator_abs", vec![exact("CDde", slopes.drag_elevator)]),
         ("side_force_linear", lateral(["CY0", "CYbeta", "CYp", "CYr", "CYda"], 1)),
         ("roll_linear", lateral(["Cl0", "Clbeta", "Clp", "Clr", "Clda"], 3)),
@@ -354,5 +396,6 @@ fn effects(polar: &Polar, slopes: &Slopes, left_out: &mut Vec<String>) -> Vec<Ef
         let numbers = vec![exact("CYdr", d[1]), exact("Cldr", d[3]), exact("Cndr", d[5])];
         all.push(("rudder_linear", numbers));
     }
+    all.iter_mut().for_each(|(effect, estimates)| bounded(effect, estimates, left_out));
     all
 }

@@ -109,9 +109,21 @@ impl Instruments {
     /// What these instruments log of `flown`, with the noise of `seed`.
     pub fn log(&self, flown: &Flown, name: &str, seed: u64) -> Flight {
         let mut random = stream(seed, &[NOISE]);
-        let samples: Vec<Sample> =
+        let mut samples: Vec<Sample> =
             (0..flown.truth.len()).map(|k| self.row(flown, k, &mut random)).collect();
+        // an aircraft without a rudder has no column of it
+        if flown.truth.iter().any(|t| t.rudder_rad != 0.0) {
+            samples.iter_mut().enumerate().for_each(|(k, sample)| self.rudder(flown, k, sample));
+        }
         Flight { name: name.into(), ..Flight::from(samples) }
+    }
+
+    fn rudder(&self, flown: &Flown, k: usize, sample: &mut Sample) {
+        let (now, before) =
+            (flown.truth[k].rudder_rad, flown.truth[k.saturating_sub(1)].rudder_rad);
+        let late = self.late[Group::Actuators as usize] / DT_S;
+        sample.rudder_rad = now + late * (before - now);
+        sample.rudder_cmd = flown.commands[k].rudder;
     }
 
     fn row(&self, flown: &Flown, k: usize, random: &mut Stream) -> Sample {

@@ -3,19 +3,129 @@
 use greylag_sitl::hidden::{Hidden, HiddenError};
 use rand::RngExt;
 
+use crate::model::GreyBox;
 use crate::num::stream::{Stream, stream};
 use crate::physics::formula::Written;
 use crate::sim::hidden_formula;
 
-/// Side drag that the aircraft's own file has, which a hidden amplitude adds to (`params/x8/FACTS.md`).
-const OWN_CDBETA: f64 = -0.0058;
-/// Likewise, over β².
-const OWN_CDBETA2: f64 = 0.1478;
-/// Likewise, over |δe|.
-const OWN_CDDE: f64 = 0.0633;
-
 /// Stream of what is drawn about missing effects.
 const DRAW: u64 = 80;
+
+/// What the sizes of effects go by: those for which [`KINDS`] is written, and those of an aircraft.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Craft {
+    /// Factors on amplitudes by their unit: N, m, N m, N m s, kg m².
+    force: f64,
+    length: f64,
+    moment: f64,
+    momentum: f64,
+    inertia: f64,
+    /// Factors on the decay of thrust and of the surfaces' effectiveness with airspeed.
+    airspeed: f64,
+    /// On the stiffness in pitch.
+    stiffness: f64,
+    /// CDbeta, CDbeta2 and CDde of the aircraft's own file, which a hidden amplitude adds to.
+    own: [f64; 3],
+    /// Ids of effects that the model can be robbed of.
+    has: Vec<String>,
+}
+
+impl Craft {
+    /// That of `reference`, the model that flies as the simulator does.
+    pub fn of(reference: &GreyBox) -> Craft {
+        let value = |name: &str| {
+            reference.coefficients().iter().find(|c| c.name == name).map_or(0.0, |c| c.value)
+        };
+        let (body, geometry) = (&reference.body, &reference.airframe.geometry);
+        let ratio = |x: f64, written: f64| x / written;
+        let force = ratio(body.mass, WRITTEN.mass);
+        let speed = ratio(reference.airframe.reference.airspeed, WRITTEN.airspeed);
+        let stiffness = value("pitch_linear.Cmalpha");
+        let has = reference.coefficients().iter();
+        let has = has.filter_map(|c| c.name.split('.').next()).map(str::to_owned).collect();
+        Craft {
+            force,
+            length: ratio(geometry.chord, WRITTEN.chord),
+            moment: force * ratio(geometry.span, WRITTEN.span),
+            momentum: ratio(body.jy, WRITTEN.jy),
+            inertia: ratio(body.jx, WRITTEN.jx),
+            airspeed: 1.0 / speed,
+            stiffness: if stiffness < 0.0 { ratio(stiffness, WRITTEN.stiffness) } else { 1.0 },
+            own: [
+                value("drag_beta2.CDbeta"),
+                value("drag_beta2.CDbeta2"),
+                value("drag_elevator_abs.CDde"),
+            ],
+            has,
+        }
+    }
+
+    /// That of `model`, which lacks whatever it may be asked to have: for imagined aircraft.
+    pub fn lacking(model: &GreyBox) -> Craft {
+        let own = ["lift_table", "drag_beta2", "drag_elevator_abs"].map(str::to_owned);
+        let craft = Craft::of(model);
+        Craft { has: craft.has.iter().cloned().chain(own).collect(), ..craft }
+    }
+
+    /// Whether the reference has the effect `id`.
+    fn has(&self, id: &str) -> bool {
+        self.has.iter().any(|has| has == id)
+    }
+
+    /// Every effect that can be missing, at this aircraft's sizes. One that is hidden in place of the aircraft's own
+    /// needs the model to have it.
+    pub fn kinds(&self) -> Vec<Kind> {
+        let own = |kind: &&Kind| match kind.id {
+            "lift_stall" => self.has("lift_table"),
+            "drag_beta2" | "drag_elevator_abs" => self.has(kind.id),
+            _ => true,
+        };
+        let taken = OF_THE_MODEL.iter().filter(|kind| self.has(kind.id));
+        KINDS.iter().filter(own).chain(taken).map(|kind| self.sized(kind)).collect()
+    }
+
+    /// The effect of that id at this aircraft's size.
+    pub fn kind(&self, id: &str) -> Option<Kind> {
+        self.kinds().into_iter().find(|kind| kind.id == id)
+    }
+
+    fn sized(&self, kind: &Kind) -> Kind {
+        let factor = match kind.id {
+            "thrust_scale" => self.force,
+            "cg_shift" | "thrust_line_offset" => self.length,
+            "motor_torque" => self.moment,
+            "propeller_gyro" => self.momentum,
+            "inertia_xz" => self.inertia,
+            "thrust_decay" => self.airspeed,
+            "aeroelastic_loss" => self.airspeed * self.airspeed,
+            "pitch_break" => self.stiffness,
+            _ => 1.0,
+        };
+        Kind { clear: kind.clear.map(|x| x * factor), ..*kind }
+    }
+}
+
+/// Sizes of the aircraft for which the amplitudes of [`KINDS`] are written.
+struct Sizes {
+    mass: f64,
+    chord: f64,
+    span: f64,
+    jx: f64,
+    jy: f64,
+    airspeed: f64,
+    stiffness: f64,
+}
+
+/// The Skywalker X8: kg, m, kg m², m/s, Cmα.
+const WRITTEN: Sizes = Sizes {
+    mass: 3.364,
+    chord: 0.3571,
+    span: 2.1,
+    jx: 1.229,
+    jy: 0.1702,
+    airspeed: 16.67,
+    stiffness: -0.4629,
+};
 
 /// One effect that can be missing.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +148,11 @@ const fn both(id: &'static str, unit: &'static str, clear: [f64; 2]) -> Kind {
     Kind { id, unit, clear, either_sign: true }
 }
 
-/// Every effect that can be missing.
+/// Effects of an aircraft's own that its model is robbed of where it has them; nothing is hidden.
+const OF_THE_MODEL: [Kind; 2] =
+    [kind("rudder_linear", "", [1.0, 1.0]), kind("propeller", "", [1.0, 1.0])];
+
+/// Every effect that can be missing from any aircraft, with amplitudes for one of the size of the X8.
 pub const KINDS: [Kind; 25] = [
     kind("drag_alpha2", "1/rad²", [0.6, 1.2]),
     kind("drag_beta2", "1/rad²", [0.5, 1.2]),
@@ -69,9 +183,9 @@ pub const KINDS: [Kind; 25] = [
 ];
 
 impl Kind {
-    /// The effect of that id.
+    /// The effect of that id, with amplitudes for an aircraft of the size of the X8.
     pub fn from_id(id: &str) -> Option<Kind> {
-        KINDS.iter().copied().find(|kind| kind.id == id)
+        KINDS.iter().chain(&OF_THE_MODEL).copied().find(|kind| kind.id == id)
     }
 
     /// A clear amplitude drawn from `seed`.
@@ -152,30 +266,33 @@ pub enum MissingError {
 }
 
 impl Missing {
-    /// The effect `id`, so that the aircraft has `amplitude` of it in all.
+    /// The effect `id`, so that the aircraft `craft` has `amplitude` of it in all.
     ///
     /// # Errors
     /// If there is no such effect, or its amplitude is not one that can be hidden.
-    pub fn new(id: &str, amplitude: f64) -> Result<Missing, MissingError> {
-        let kind = Kind::from_id(id).ok_or_else(|| MissingError::Unknown {
+    pub fn new(craft: &Craft, id: &str, amplitude: f64) -> Result<Missing, MissingError> {
+        let kind = craft.kind(id).ok_or_else(|| MissingError::Unknown {
             id: id.into(),
-            known: KINDS.map(|kind| kind.id).join(", "),
+            known: craft.kinds().iter().map(|kind| kind.id).collect::<Vec<_>>().join(", "),
         })?;
+        let [own_beta, own_beta2, own_elevator] = craft.own;
         let a = kind.allowed(amplitude);
         // what the aircraft has of its own must go out of the model, and is part of the amplitude
         let (own, taken_out) = match kind.id {
-            "drag_beta2" => (OWN_CDBETA2, Some("drag_beta2")),
-            "drag_elevator_abs" => (OWN_CDDE, Some("drag_elevator_abs")),
+            "drag_beta2" => (own_beta2, Some("drag_beta2")),
+            "drag_elevator_abs" => (own_elevator, Some("drag_elevator_abs")),
             "lift_stall" => (0.0, Some("lift_table")),
+            "rudder_linear" => (0.0, Some("rudder_linear")),
+            "propeller" => (0.0, Some("propeller")),
             _ => (0.0, None),
         };
         let hidden = match kind.id {
-            "lift_stall" => None,
+            "lift_stall" | "rudder_linear" | "propeller" => None,
             id => Some(Hidden::new(id, a - own)?),
         };
         let values = match kind.id {
-            "drag_beta2" => vec![OWN_CDBETA, a],
-            "lift_stall" => Vec::new(),
+            "drag_beta2" => vec![own_beta, a],
+            "lift_stall" | "rudder_linear" | "propeller" => Vec::new(),
             "unsteady_lift" => vec![a, -0.5 * a],
             "asymmetry" => vec![a; 3],
             "roll_control_alpha" => vec![a, 0.0],
@@ -200,20 +317,22 @@ impl Missing {
         })
     }
 
-    /// An effect drawn from `seed`: any one, or `id`, with `amplitude` or one that shows clearly.
+    /// An effect of `craft` drawn from `seed`: any one, or `id`, with `amplitude` or one that shows clearly.
     ///
     /// # Errors
     /// As [`Missing::new`].
     pub fn drawn(
+        craft: &Craft,
         seed: u64,
         id: Option<&str>,
         amplitude: Option<f64>,
     ) -> Result<Missing, MissingError> {
         let mut random: Stream = stream(seed, &[DRAW]);
-        let any = KINDS[random.random_range(0..KINDS.len() as u32) as usize];
+        let kinds = craft.kinds();
+        let any = kinds[random.random_range(0..kinds.len() as u32) as usize];
         let id = id.unwrap_or(any.id);
-        let clear = Kind::from_id(id).map_or(0.0, |kind| kind.amplitude(seed));
-        Missing::new(id, amplitude.unwrap_or(clear))
+        let clear = craft.kind(id).map_or(0.0, |kind| kind.amplitude(seed));
+        Missing::new(craft, id, amplitude.unwrap_or(clear))
     }
 }
 
@@ -222,20 +341,41 @@ mod tests {
     use super::*;
     use greylag_sitl::hidden::EFFECTS;
 
+    fn craft(path: &str) -> Craft {
+        Craft::of(&GreyBox::load(path.as_ref()).unwrap())
+    }
+
     #[test]
     fn whatever_the_simulator_can_hide_can_be_missing() {
+        let x8 = craft("params/x8/jsbsim.toml");
+        assert_eq!(x8.kinds().len(), KINDS.len());
         for effect in &EFFECTS {
             let kind = Kind::from_id(effect.id).unwrap_or_else(|| panic!("no {}", effect.id));
             for seed in 0..20 {
-                let missing = Missing::drawn(seed, Some(kind.id), None).unwrap();
+                let missing = Missing::drawn(&x8, seed, Some(kind.id), None).unwrap();
                 assert!(missing.hidden.is_some() && missing.amplitude != 0.0, "{missing:?}");
             }
         }
         // the aircraft's own 0.1478 is part of what is asked for
-        let side = Missing::new("drag_beta2", 0.5).unwrap();
+        let side = Missing::new(&x8, "drag_beta2", 0.5).unwrap();
         assert!((side.hidden.unwrap().amplitude() - 0.3522).abs() < 1e-12);
-        assert_eq!(Missing::new("time_delay", 0.0234).unwrap().amplitude, 0.02);
-        assert!(Missing::new("flutter", 1.0).unwrap_err().to_string().contains("dead_zone"));
+        assert_eq!(Missing::new(&x8, "time_delay", 0.0234).unwrap().amplitude, 0.02);
+        assert!(Missing::new(&x8, "flutter", 1.0).unwrap_err().to_string().contains("dead_zone"));
+    }
+
+    /// The amplitudes are written for the X8: there they are as written, to the bit.
+    #[test]
+    fn amplitudes_go_by_the_size_of_the_aircraft() {
+        let x8 = craft("params/x8/jsbsim.toml").kinds();
+        assert!(x8.iter().zip(&KINDS).all(|(a, b)| a.id == b.id && a.clear == b.clear));
+        let aerosonde = craft("params/aerosonde/jsbsim.toml");
+        // 11 kg for 3.364
+        let thrust = aerosonde.kind("thrust_scale").unwrap().clear[0];
+        assert!((thrust / -10.0 - 11.0 / 3.364).abs() < 1e-9, "{thrust}");
+        let robbed = Missing::new(&aerosonde, "rudder_linear", 1.0).unwrap();
+        assert!(robbed.hidden.is_none() && robbed.taken_out == Some("rudder_linear"));
+        // its model has no side drag that could be taken out
+        assert!(Missing::new(&aerosonde, "drag_beta2", 0.5).is_err());
     }
 
     #[test]

@@ -3,6 +3,8 @@
 #[cfg(feature = "sitl")]
 pub mod collect;
 #[cfg(feature = "sitl")]
+pub mod described;
+#[cfg(feature = "sitl")]
 pub mod design;
 pub mod environment;
 pub mod episode;

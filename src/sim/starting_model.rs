@@ -11,10 +11,8 @@ use crate::sim::missing::{Missing, rounded};
 pub const WRONG: f64 = 0.15;
 /// Stream of the errors.
 const DRAW: u64 = 81;
-/// Lift of the X8 between the stalls, in place of its table (CL over α from −4° to 7°).
-const CL0: f64 = 0.1119;
-/// Likewise its slope, 1/rad.
-const CLALPHA: f64 = 3.93;
+/// Between these angles, rad, a line stands in place of the table of lift: −4° and 7°, between the stalls.
+const LINE: [f64; 2] = [-0.069_813_2, 0.122_173];
 
 /// The text of a model file made of `reference` (a model file's text): named `name`, every
 /// coefficient off by [`WRONG`] as `seed` draws it, without what is `missing`.
@@ -35,16 +33,53 @@ pub fn starting_model(
     let effects = file.get_mut("effects").and_then(|e| e.as_table_mut());
     let effects = effects.ok_or_else(|| broken("effects"))?;
     for id in missing.iter().filter_map(|missing| missing.taken_out) {
-        effects.remove(id).ok_or_else(|| broken(id))?;
+        let taken = effects.remove(id).ok_or_else(|| broken(id))?;
         if id == "lift_table" {
+            let [zero, slope] = line(&taken).ok_or_else(|| broken("lift_table.CL"))?;
             let lift = effects.get_mut("lift_linear").and_then(|e| e.as_table_mut());
             let lift = lift.ok_or_else(|| broken("lift_linear"))?;
-            set(lift, "CL0", CL0).ok_or_else(|| broken("lift_linear.CL0"))?;
-            set(lift, "CLalpha", CLALPHA).ok_or_else(|| broken("lift_linear.CLalpha"))?;
+            set(lift, "CL0", zero).ok_or_else(|| broken("lift_linear.CL0"))?;
+            set(lift, "CLalpha", slope).ok_or_else(|| broken("lift_linear.CLalpha"))?;
+        }
+        if id == "propeller" {
+            let most = most_thrust(&taken).ok_or_else(|| broken("propeller"))?;
+            effects.insert("thrust_linear".into(), linear_thrust(most));
         }
     }
     make_wrong(effects, seed);
     Ok(text(&file))
+}
+
+/// Intercept and slope (1/rad) of the line through the ends of [`LINE`] in the table of an effect `lift_table`.
+fn line(effect: &toml::Value) -> Option<[f64; 2]> {
+    let table = effect.get("CL")?;
+    let list = |key: &str| -> Option<Vec<f64>> {
+        let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|n| n as f64));
+        table.get(key)?.as_array()?.iter().map(number).collect()
+    };
+    let (alpha, lift) = (list("alpha_rad")?, list("value")?);
+    let at = |x: f64| {
+        let k = alpha.windows(2).position(|w| w[0] <= x && x <= w[1])?;
+        let share = (x - alpha[k]) / (alpha[k + 1] - alpha[k]);
+        Some(lift[k] + share * (lift[k + 1] - lift[k]))
+    };
+    let [low, high] = LINE;
+    let slope = (at(high)? - at(low)?) / (high - low);
+    Some([rounded(at(low)? - slope * low), rounded(slope)])
+}
+
+/// Thrust (N) of an effect `propeller` at full throttle at rest.
+fn most_thrust(effect: &toml::Value) -> Option<f64> {
+    let value = |name: &str| effect.get(name)?.get("value")?.as_float();
+    Some(value("T0_n")? + value("Tt_n")? + value("Ttt_n")?)
+}
+
+/// The effect `thrust_linear` that somebody writes who has not thought of the airspeed: half of the thrust at rest.
+fn linear_thrust(most: f64) -> toml::Value {
+    let number =
+        [("value", rounded(0.5 * most).into()), ("source", "half the thrust at rest".into())];
+    let number = number.map(|(k, v): (&str, toml::Value)| (k.to_owned(), v));
+    toml::Table::from_iter([("Cp_n".to_owned(), toml::Table::from_iter(number).into())]).into()
 }
 
 fn set(effect: &mut toml::Table, name: &str, value: f64) -> Option<()> {

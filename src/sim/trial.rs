@@ -3,27 +3,73 @@
 use std::f64::consts::TAU;
 
 use greylag_sitl::air::{Air, Turbulence};
-use greylag_sitl::plant::PlantOptions;
+use greylag_sitl::plant::{PlantOptions, Start};
 use rand::RngExt;
 
 use crate::control::Controller;
 use crate::logs::Flight;
-use crate::manoeuvres::{Schedule, flights};
+use crate::manoeuvres::{CRUISE_MPS, Schedule, flights};
 use crate::num::stream::stream;
+use crate::physics::Airframe;
+use crate::physics::airframe::Reference;
+use crate::sim::described::describe;
 use crate::sim::flight_test::{FlightTestError, fly_within_bounds};
 use crate::sim::instruments::Instruments;
 use crate::sim::missing::Missing;
 
 /// Stream of the wind.
 const WIND: u64 = 82;
-/// Strongest steady wind, m/s: a third of the airspeed.
+/// Strongest steady wind at the cruise airspeed for which the flights are written, m/s: a third of the airspeed.
 const WIND_MAX_MPS: f64 = 6.0;
 /// Wind 20 ft above ground of light turbulence, m/s (MIL-F-8785C).
 const LIGHT_20FT_MPS: f64 = 7.6;
 
-/// What is flown.
+/// The aircraft of a trial.
 #[derive(Clone, Debug)]
+pub struct Subject {
+    /// The simulator's aircraft at its start, with what is held; its air and hidden effects are the trial's.
+    pub plant: PlantOptions,
+    /// Airspeed at which it cruises, m/s.
+    pub cruise: f64,
+    /// Whether its rudder is moved.
+    pub rudder: bool,
+}
+
+impl Subject {
+    /// The aircraft of `plant` as `airframe` describes it, from its reference airspeed on.
+    ///
+    /// # Errors
+    /// If its surfaces cannot be flown.
+    pub fn new(mut plant: PlantOptions, airframe: &Airframe) -> Result<Subject, String> {
+        describe(&mut plant, airframe)?;
+        let Reference { airspeed, altitude } = airframe.reference;
+        plant.start = Start { airspeed_mps: airspeed, altitude_m: altitude, ..Start::NEUTRAL };
+        Ok(Subject {
+            plant,
+            cruise: airframe.envelope.airspeed_cruise_mps,
+            rudder: airframe.actuators.rudder.is_some(),
+        })
+    }
+
+    /// The schedule for this aircraft.
+    fn scaled(&self, schedule: &Schedule, seed: u64) -> Schedule {
+        let schedule = schedule.clone().at_cruise(self.cruise);
+        if self.rudder { schedule.with_rudder(seed) } else { schedule }
+    }
+}
+
+impl Default for Subject {
+    /// The simulator's own default.
+    fn default() -> Subject {
+        Subject { plant: PlantOptions::default(), cruise: CRUISE_MPS, rudder: false }
+    }
+}
+
+/// What is flown.
+#[derive(Clone, Debug, Default)]
 pub struct Trial {
+    /// The aircraft.
+    pub subject: Subject,
     /// What schedules, wind, instruments and noise are drawn from.
     pub seed: u64,
     /// What the aircraft has that its model lacks; none is a null.
@@ -72,6 +118,7 @@ impl Trial {
         schedule: &Schedule,
         controller: &dyn Controller,
     ) -> Result<Flight, FlightTestError> {
+        let schedule = &self.subject.scaled(schedule, self.seed);
         let flown = fly_within_bounds(&self.plant(k), controller, schedule)?;
         let seed = stream(self.seed, &[WIND, k as u64, 1]).random();
         Ok(Instruments::drawn(seed).log(&flown, &format!("{}.csv", schedule.name), seed))
@@ -80,8 +127,9 @@ impl Trial {
     /// The aircraft in the air of the `k`-th flight.
     fn plant(&self, k: usize) -> PlantOptions {
         let mut random = stream(self.seed, &[WIND, k as u64]);
+        let calm = self.subject.cruise / CRUISE_MPS;
         let (speed, course) =
-            (random.random_range(0.0..WIND_MAX_MPS), random.random_range(0.0..TAU));
+            (random.random_range(0.0..WIND_MAX_MPS) * calm, random.random_range(0.0..TAU));
         let turbulence = |severity| Turbulence { wind_20ft_mps: LIGHT_20FT_MPS, severity };
         PlantOptions {
             hidden: self.missing.iter().filter_map(|missing| missing.hidden).collect(),
@@ -91,7 +139,7 @@ impl Trial {
                 gusts: Vec::new(),
             },
             seed: random.random(),
-            ..PlantOptions::default()
+            ..self.subject.plant.clone()
         }
     }
 }

@@ -54,7 +54,12 @@ impl Loaded {
         reading: &logs::Options,
         model: &GreyBox,
     ) -> Result<Arc<Loaded>, WorkbenchError> {
-        let log = logs::parse(bytes, Path::new(name), reading)?;
+        let mixer = model.airframe.mixer.clone();
+        let reading = logs::Options {
+            mapping: reading.mapping.clone().with_mixer(mixer),
+            tolerance: reading.tolerance,
+        };
+        let log = logs::parse(bytes, Path::new(name), &reading)?;
         Loaded::of(&log, name, model)
     }
 

@@ -94,7 +94,8 @@ impl Bench {
         let suspects = between.each_ref().map(|id| Suspect { id: id.clone(), values: Vec::new() });
         let all = prospects(&model, build(Kind::Lqi, &model)?.as_ref(), &suspects, progress)?;
         let [a, b] = &between;
-        let plan = plan(&all).ok_or_else(|| WorkbenchError::NotApart([a.clone(), b.clone()]))?;
+        let plan = plan(&all, model.airframe.envelope.airspeed_cruise_mps)
+            .ok_or_else(|| WorkbenchError::NotApart([a.clone(), b.clone()]))?;
         let name = format!("{a}-or-{b}");
         let folder = self.folder.join(SCHEDULES);
         fs::create_dir_all(&folder).map_err(|e| io(&folder, e))?;

@@ -40,6 +40,7 @@ pub fn options(pace: Pace) -> Options {
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
         travels: x8().airframe.actuators.travels(),
+        mixer: None,
         controller: None,
         signing: None,
     }

@@ -2,8 +2,8 @@
 
 use jsbsim::{Error, Fdm, NodeId};
 
-use super::options::THROTTLE_COMMAND;
-use super::{Inputs, PlantError, PlantOptions, Properties, Start, Truth};
+use super::steering::Steering;
+use super::{Inputs, PlantError, PlantOptions, Start, Truth};
 use crate::air::Gust;
 
 /// Metres per foot (exact).
@@ -20,13 +20,9 @@ pub(super) const STILL_S: f64 = 1e-12;
 
 /// Nodes of everything that is read or written in a step.
 pub(super) struct Nodes {
-    surfaces: [NodeId; 2],
-    /// Command and position of the rudder.
-    rudder: Option<[NodeId; 2]>,
-    /// One a throttle; none on a glider.
-    throttles: Vec<NodeId>,
-    positions: [NodeId; 2],
-    throttle_position: Option<NodeId>,
+    steering: Steering,
+    /// Properties held at a value.
+    held: Vec<(NodeId, f64)>,
     attitude: [NodeId; 3],
     rates: [NodeId; 3],
     airspeed: NodeId,
@@ -61,24 +57,15 @@ impl Nodes {
                 let [a, b, c] = names.map(|name| node(&format!("{before}{name}{after}")));
                 Ok([a?, b?, c?])
             };
-        let each = |name: &str| numbered(fdm, name);
-        let p = &options.properties;
-        let throttles = each(&p.throttle_command);
-        let is_glider = throttles.is_empty() && p.throttle_command == THROTTLE_COMMAND;
-        if throttles.is_empty() && !is_glider {
-            node(&p.throttle_command)?;
-        }
         // Only these can stand still with their throttle open.
         let is_started = look("propulsion/starter_cmd").is_some();
         Ok(Nodes {
-            surfaces: [node(&p.aileron_command)?, node(&p.elevator_command)?],
-            rudder: rudder(&look, &node, p)?,
-            throttles,
-            positions: [
-                look(&p.aileron_position).map_or_else(|| node(p.aileron_fallback()), Ok)?,
-                node(&p.elevator_position)?,
-            ],
-            throttle_position: (!is_glider).then(|| node(&p.throttle_position)).transpose()?,
+            steering: Steering::find(fdm, options)?,
+            held: options
+                .held
+                .iter()
+                .map(|(name, value)| Ok((node(name)?, *value)))
+                .collect::<Result<_, PlantError>>()?,
             attitude: three("attitude/", ["phi", "theta", "psi"], "-rad")?,
             rates: three("velocities/", ["p", "q", "r"], "-rad_sec")?,
             airspeed: node("velocities/vt-fps")?,
@@ -99,21 +86,15 @@ impl Nodes {
 
     /// Writes the commands.
     pub(super) fn command(&self, fdm: &mut Fdm, inputs: &Inputs) -> Result<(), Error> {
-        let [aileron, elevator] = self.surfaces;
-        fdm.write_node(aileron, inputs.aileron)?;
-        fdm.write_node(elevator, inputs.elevator)?;
-        if let Some([rudder, _]) = self.rudder {
-            fdm.write_node(rudder, inputs.rudder)?;
+        for (node, value) in &self.held {
+            fdm.write_node(*node, *value)?;
         }
-        for throttle in &self.throttles {
-            fdm.write_node(*throttle, inputs.throttle)?;
-        }
-        Ok(())
+        self.steering.command(fdm, inputs)
     }
 
     /// Whether the aircraft has no throttle.
     pub(super) fn is_glider(&self) -> bool {
-        self.throttles.is_empty()
+        self.steering.is_glider()
     }
 
     /// Starts every engine that can stand still; the number of the first that does not run then.
@@ -208,11 +189,7 @@ impl Nodes {
     pub(super) fn truth(&self, fdm: &mut Fdm) -> Result<Truth, Error> {
         let [roll_rad, pitch_rad, yaw_rad] = read3(fdm, &self.attitude, 1.0)?;
         let [p_radps, q_radps, r_radps] = read3(fdm, &self.rates, 1.0)?;
-        let [aileron_rad, elevator_rad] = self.positions;
-        let (aileron_rad, elevator_rad) =
-            (fdm.read_node(aileron_rad)?, fdm.read_node(elevator_rad)?);
-        let throttle = self.throttle_position.map_or(Ok(0.0), |node| fdm.read_node(node))?;
-        let rudder_rad = self.rudder.map_or(Ok(0.0), |[_, node]| fdm.read_node(node))?;
+        let [aileron_rad, elevator_rad, rudder_rad, throttle] = self.steering.positions(fdm)?;
         let [latitude_deg, longitude_deg, altitude_ft] = read3(fdm, &self.place, 1.0)?;
         Ok(Truth {
             roll_rad,
@@ -254,26 +231,6 @@ impl Nodes {
         }
         Ok(total * LBF)
     }
-}
-
-/// Command and position of the rudder; one that is named must be there.
-fn rudder(
-    look: &impl Fn(&str) -> Option<NodeId>,
-    node: &impl Fn(&str) -> Result<NodeId, PlantError>,
-    names: &Properties,
-) -> Result<Option<[NodeId; 2]>, PlantError> {
-    let Properties { rudder_command, rudder_position, .. } = names;
-    let usual = Properties::default();
-    if (rudder_command, rudder_position) == (&usual.rudder_command, &usual.rudder_position) {
-        return Ok(look(rudder_command).zip(look(rudder_position)).map(|(c, p)| [c, p]));
-    }
-    Ok(Some([node(rudder_command)?, node(rudder_position)?]))
-}
-
-/// The nodes `NAME`, `NAME[1]`, … up to the first that is not there.
-fn numbered(fdm: &Fdm, name: &str) -> Vec<NodeId> {
-    let names = (0..).map(|i| if i == 0 { name.to_owned() } else { format!("{name}[{i}]") });
-    names.map_while(|name| fdm.node(&name).ok().flatten()).collect()
 }
 
 /// The nodes of that name of every engine.

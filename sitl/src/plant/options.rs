@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::Start;
+use super::{Mixing, Start};
 use crate::air::Air;
 use crate::aircraft;
 use crate::hidden::Hidden;
@@ -16,6 +16,10 @@ pub struct PlantOptions {
     pub aircraft: String,
     /// The properties through which the aircraft is flown.
     pub properties: Properties,
+    /// Surfaces and motors that are commanded one by one, in place of the aircraft's aileron, elevator and rudder.
+    pub mixing: Option<Mixing>,
+    /// Properties that are held at a value while the aircraft flies: flaps, say.
+    pub held: Vec<(String, f64)>,
     /// Wind, turbulence, gusts.
     pub air: Air,
     /// Effects hidden in the aircraft; empty flies the aircraft's file as it is.
@@ -41,6 +45,8 @@ impl Default for PlantOptions {
             aircraft_dir: None,
             aircraft: aircraft::BUILT_IN_NAME.to_owned(),
             properties: Properties::default(),
+            mixing: None,
+            held: Vec::new(),
             air: Air::default(),
             hidden: Vec::new(),
             seed: 1,

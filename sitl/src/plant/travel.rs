@@ -97,14 +97,28 @@ impl Plant {
         })
     }
 
-    /// Aileron, elevator and rudder where they come to rest at `command`, rad.
+    /// Aileron, elevator and rudder where they come to rest at `command`, rad. Surfaces that two controls move
+    /// would reach their stops before, so there each control is commanded alone.
     fn stops(&mut self, command: f64) -> Result<[f64; 3], PlantError> {
-        let inputs = Inputs { aileron: command, elevator: command, throttle: 0.0, rudder: command };
+        let [aileron, elevator, rudder] = [command; 3];
+        if self.options.mixing.is_none() {
+            return self.rest(&Inputs { aileron, elevator, throttle: 0.0, rudder });
+        }
+        let none = Inputs::default();
+        Ok([
+            self.rest(&Inputs { aileron, ..none })?[0],
+            self.rest(&Inputs { elevator, ..none })?[1],
+            self.rest(&Inputs { rudder, ..none })?[2],
+        ])
+    }
+
+    /// Aileron, elevator and rudder where they come to rest at `inputs`, rad.
+    fn rest(&mut self, inputs: &Inputs) -> Result<[f64; 3], PlantError> {
         // Filters keep the step for which they were laid out; nothing else moves in so short a one.
         self.fdm.set_dt(super::nodes::STILL_S);
         let (mut last, mut at_rest) = ([f64::INFINITY; 3], 0);
         for _ in 0..STEPS {
-            self.nodes.command(&mut self.fdm, &inputs).map_err(jsbsim("writing the commands"))?;
+            self.nodes.command(&mut self.fdm, inputs).map_err(jsbsim("writing the commands"))?;
             self.fdm.run().map_err(jsbsim("measuring the travel of the surfaces"))?;
             let truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the state"))?;
             let now = [truth.aileron_rad, truth.elevator_rad, truth.rudder_rad];

@@ -1,17 +1,9 @@
 //! `greylag aircraft import`: an aircraft of another program as airframe and model.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 use clap::{Args, Subcommand};
-use greylag_sitl::plant::{Plant, PlantOptions, Start};
-use greylag_sitl::plant_arguments::property;
-
-use crate::commands::files::{self, Overwrite};
-use crate::control::aircraft_check;
-use crate::model::GreyBox;
-use crate::sim::import::{Imported, import};
 
 /// The arguments of `greylag aircraft import`.
 #[derive(Args)]
@@ -22,68 +14,18 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum From {
+    /// From stability derivatives as AVL writes them (ST, SB), with textbook estimates for the rest.
+    Avl(super::import_avl::Avl),
     /// From a JSBSim aircraft, by central differences of its loads.
-    Jsbsim(Jsbsim),
-}
-
-/// The arguments of `greylag aircraft import jsbsim`.
-#[derive(Args)]
-struct Jsbsim {
-    /// Folder that holds NAME/NAME.xml.
-    dir: PathBuf,
-    /// The aircraft.
-    name: String,
-    /// Folder to make, with airframe.toml and model.toml.
-    #[arg(long, value_name = "FOLDER")]
-    out: PathBuf,
-    /// True airspeed about which it is taken.
-    #[arg(long, value_name = "MPS")]
-    cruise_mps: f64,
-    /// Altitude at which it is taken, above mean sea level.
-    #[arg(long, value_name = "M", default_value_t = 600.0)]
-    altitude_m: f64,
-    /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does.
-    #[arg(long, value_name = "KEY=NAME", value_parser = property)]
-    property: Vec<(String, String)>,
+    #[cfg(feature = "sitl")]
+    Jsbsim(super::import_jsbsim::Jsbsim),
 }
 
 /// Imports, writes, says what is left out.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let From::Jsbsim(jsbsim) = &arguments.from;
-    let mut options = PlantOptions {
-        aircraft_dir: Some(jsbsim.dir.clone()),
-        aircraft: jsbsim.name.clone(),
-        start: Start { airspeed_mps: jsbsim.cruise_mps, ..Start::NEUTRAL },
-        ..PlantOptions::default()
-    };
-    for (key, name) in &jsbsim.property {
-        if let Some(place) = options.properties.name_mut(key) {
-            place.clone_from(name);
-        }
+    match &arguments.from {
+        From::Avl(avl) => super::import_avl::run(avl),
+        #[cfg(feature = "sitl")]
+        From::Jsbsim(jsbsim) => super::import_jsbsim::run(jsbsim),
     }
-    let out = &jsbsim.out;
-    let model = out.join("model.toml");
-    if model.exists() {
-        bail!("{} exists; name another folder with --out", model.display());
-    }
-    let mut plant = Plant::new(&options)?;
-    let found = import(&mut plant, &jsbsim.name, jsbsim.cruise_mps, jsbsim.altitude_m)?;
-    let read = read_back(&found)?;
-    std::fs::create_dir_all(out)
-        .with_context(|| format!("cannot make the folder {}", out.display()))?;
-    files::write(&out.join("airframe.toml"), &found.airframe, Overwrite::Never)?;
-    files::write(&model, &found.model, Overwrite::Never)?;
-    println!("wrote {} and airframe.toml beside it", model.display());
-    found.left_out.iter().for_each(|what| println!("left out: {what}"));
-    super::check::print(&aircraft_check::check(&read)?);
-    Ok(ExitCode::SUCCESS)
-}
-
-/// The model as it reads from files: what cannot be read back is not written.
-fn read_back(found: &Imported) -> Result<GreyBox> {
-    let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
-    let model = folder.path().join("model.toml");
-    std::fs::write(folder.path().join("airframe.toml"), &found.airframe)?;
-    std::fs::write(&model, &found.model)?;
-    GreyBox::load(&model).context("what was imported is no model that Greylag can read")
 }

@@ -1,6 +1,6 @@
 //! `greylag aircraft new`: an airframe and a prior from a few measures.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -31,18 +31,25 @@ enum TailName {
 pub struct Arguments {
     /// Folder to make, with airframe.toml and model.toml.
     folder: PathBuf,
-    /// The aircraft's name [default: the folder's].
-    #[arg(long)]
-    name: Option<String>,
-    /// Mass as flown.
-    #[arg(long, value_name = "KG")]
-    mass_kg: f64,
     /// Span.
     #[arg(long, value_name = "M")]
     span_m: f64,
     /// Wing area.
     #[arg(long, value_name = "M2")]
     area_m2: f64,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What is asked of any aircraft that is not measured.
+#[derive(clap::Args)]
+pub struct Common {
+    /// The aircraft's name [default: the folder's].
+    #[arg(long)]
+    name: Option<String>,
+    /// Mass as flown.
+    #[arg(long, value_name = "KG")]
+    mass_kg: f64,
     /// What balances it.
     #[arg(long, value_enum, default_value = "conventional")]
     tail: TailName,
@@ -63,14 +70,19 @@ pub struct Arguments {
 
 /// Writes the files, then says what they make of the aircraft.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let measures = measures(arguments)?;
-    let folder = &arguments.folder;
+    let measures =
+        measures(&arguments.common, &arguments.folder, arguments.span_m, arguments.area_m2)?;
+    write(&arguments.folder, &measures.airframe(), &measures.model())
+}
+
+/// Writes both files into `folder`, then says what they make of the aircraft.
+pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode> {
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let model = folder.join("model.toml");
     files::writable(&model, Overwrite::Never)?;
-    files::write(&folder.join("airframe.toml"), &measures.airframe(), Overwrite::Never)?;
-    files::write(&model, &measures.model(), Overwrite::Never)?;
+    files::write(&folder.join("airframe.toml"), airframe, Overwrite::Never)?;
+    files::write(&model, model_text, Overwrite::Never)?;
     println!("wrote {} and airframe.toml beside it", model.display());
     let found = aircraft_check::check(&GreyBox::load(&model)?)?;
     super::check::print(&found);
@@ -81,8 +93,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn measures(arguments: &Arguments) -> Result<Measures> {
-    let Arguments { mass_kg, span_m, area_m2, travel_deg, .. } = *arguments;
+/// The measures, each checked.
+pub fn measures(arguments: &Common, folder: &Path, span_m: f64, area_m2: f64) -> Result<Measures> {
+    let Common { mass_kg, travel_deg, .. } = *arguments;
     let thrust = arguments.static_thrust_n.map(|n| ("--static-thrust-n", n, 1e6));
     let pitch = arguments.pitch_speed_mps.map(|v| ("--pitch-speed-mps", v, 1000.0));
     let given = [
@@ -103,9 +116,9 @@ fn measures(arguments: &Arguments) -> Result<Measures> {
              check --span-m and --area-m2"
         );
     }
-    let folder = arguments.folder.file_name().map(|name| name.to_string_lossy().into_owned());
-    let Some(name) = arguments.name.clone().or(folder) else {
-        bail!("{} names no folder: give --name", arguments.folder.display());
+    let own = folder.file_name().map(|name| name.to_string_lossy().into_owned());
+    let Some(name) = arguments.name.clone().or(own) else {
+        bail!("{} names no folder: give --name", folder.display());
     };
     let weight = mass_kg * STANDARD_GRAVITY;
     let travel = travel_deg.to_radians();

@@ -14,12 +14,13 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
 use greylag_sitl::error_arguments::{FaultArgs, SensorArgs};
-use greylag_sitl::plant::{Plant, Start};
+use greylag_sitl::plant::{Plant, PlantOptions};
 use greylag_sitl::plant_arguments::PlantArgs;
 use greylag_sitl::shim::{self, ShimOptions};
 
 use crate::commands::choices;
 use crate::commands::files::Overwrite;
+use crate::commands::start::{self, StartArguments};
 use crate::commands::{files, fly};
 use crate::control::cem::Change;
 use crate::control::{self, Kind};
@@ -28,6 +29,7 @@ use crate::flight::runtime::{Flight, Options, Pace};
 use crate::link::address::Address;
 use crate::link::vehicle::{Sitl, Vehicle};
 use crate::manoeuvres::Schedule;
+use crate::model::GreyBox;
 use crate::report::FlightReport;
 use client::{Client, View};
 use schedule::Legs;
@@ -63,6 +65,8 @@ pub struct Arguments {
     #[command(flatten)]
     plant: PlantArgs,
     #[command(flatten)]
+    start: StartArguments,
+    #[command(flatten)]
     sensors: SensorArgs,
     #[command(flatten)]
     faults: FaultArgs,
@@ -78,12 +82,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let set_up = || fly::companion_with_planner(*controller, &model, policy, changes);
     let mut flying = set_up()?;
     let schedule = arguments.schedule.as_deref().map(Schedule::load).transpose()?;
-    let legs = schedule.as_ref().map_or_else(Legs::demonstration, Legs::during);
+    let legs = schedule
+        .as_ref()
+        .map_or_else(|| Legs::demonstration(&model.airframe.envelope), Legs::during);
     let tracked = if schedule.is_none() { legs.legs.as_slice() } else { &[] };
     schedule.iter().for_each(|schedule| flying.pilot.follow(schedule.clone()));
     // an aircraft that cannot fly is found before anything is opened or written
-    let plant = arguments.plant.options(arguments.seed);
-    Plant::new(&plant)?.reset(&Start::NEUTRAL)?;
+    let plant = plant(arguments, &model)?;
+    Plant::new(&plant)?.reset(&plant.start)?;
     let stop = Arc::new(AtomicBool::new(false));
     let flight = Flight::start(&options(arguments, &model)?, flying, stop.clone())?;
     let folder = flight.recording.clone().context("the demonstration records")?;
@@ -95,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     );
     println!("model: {}", model.description);
     println!("shim: aircraft {} in JSBSim, real time, towards udp {vehicle}", plant.aircraft);
-    let simulator = simulate(arguments, &format!("udpout:{vehicle}"), stop.clone())?;
+    let simulator = simulate(arguments, plant.clone(), &format!("udpout:{vehicle}"), stop.clone())?;
     let mut table = Live::begin(&legs);
     let ended = arguments.attached.then(input_ends).unwrap_or_default();
     let flown = Client::connect(companion)
@@ -147,7 +153,7 @@ fn input_ends() -> Arc<AtomicBool> {
     ended
 }
 
-fn options(arguments: &Arguments, model: &crate::model::GreyBox) -> Result<Options> {
+fn options(arguments: &Arguments, model: &GreyBox) -> Result<Options> {
     let free_port: Address = "udpin:127.0.0.1:0".parse()?;
     Ok(Options {
         vehicle: free_port.clone(),
@@ -159,26 +165,37 @@ fn options(arguments: &Arguments, model: &crate::model::GreyBox) -> Result<Optio
         duration: None,
         plan_deadline: Options::PLAN_DEADLINE,
         travels: model.airframe.actuators.travels(),
+        mixer: model.airframe.mixer.clone(),
         controller: None,
         signing: None,
     })
 }
 
+/// The simulator's aircraft as the model's airframe describes it, at its start.
+fn plant(arguments: &Arguments, model: &GreyBox) -> Result<PlantOptions> {
+    let mut plant = arguments.plant.options(arguments.seed);
+    let models = std::slice::from_ref(model);
+    start::describe(&mut plant, models)?;
+    plant.start = arguments.start.start(&plant.aircraft, models)?;
+    Ok(plant)
+}
+
 /// Runs the shim on a thread of its own until `stop`.
 fn simulate(
     arguments: &Arguments,
+    plant: PlantOptions,
     link: &str,
     stop: Arc<AtomicBool>,
 ) -> Result<thread::JoinHandle<Result<shim::Summary, shim::ShimError>>> {
     let link = link.parse()?;
-    let plant = arguments.plant.options(arguments.seed);
+    let start = plant.start;
     let options = ShimOptions {
         link,
         seed: arguments.seed.into(),
         noise: arguments.sensors.noise(),
         bias: arguments.sensors.bias(),
         faults: arguments.faults.rule(),
-        ..ShimOptions::new(plant, Start::NEUTRAL)
+        ..ShimOptions::new(plant, start)
     };
     thread::Builder::new()
         .name("shim".into())

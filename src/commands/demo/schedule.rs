@@ -1,6 +1,7 @@
 //! The schedule of the demonstration: which attitudes, for how long.
 
 use crate::manoeuvres::Schedule;
+use crate::physics::airframe::Envelope;
 use crate::report::Difficulty;
 
 /// One attitude of the schedule.
@@ -16,6 +17,10 @@ pub struct Leg {
 
 /// Length of a leg, s: six of them with start-up stay under a minute.
 pub const LEG_S: f64 = 8.0;
+
+/// Largest bank and pitch for which the legs are written, degrees: the paper's hard targets.
+const BANK_DEG: f64 = 60.0;
+const PITCH_DEG: f64 = 30.0;
 
 /// Easy targets, then hard ones; climbs and dives alternate, so that the altitude comes back.
 pub const LEGS: [Leg; 6] = [
@@ -41,9 +46,18 @@ pub struct Legs {
 }
 
 impl Legs {
-    /// The demonstration's own.
-    pub fn demonstration() -> Legs {
-        Legs { legs: LEGS.to_vec(), seconds: LEG_S }
+    /// The demonstration's own: [`LEGS`] with roll and pitch in proportion to what `envelope` allows.
+    pub fn demonstration(envelope: &Envelope) -> Legs {
+        let Envelope { bank_max_deg, pitch_max_deg, pitch_min_deg, .. } = *envelope;
+        let within = |l: &Leg| {
+            let pitch = if l.pitch_deg > 0.0 { pitch_max_deg } else { -pitch_min_deg };
+            Leg {
+                roll_deg: l.roll_deg * (bank_max_deg / BANK_DEG).min(1.0),
+                pitch_deg: l.pitch_deg * (pitch / PITCH_DEG).min(1.0),
+                ..*l
+            }
+        };
+        Legs { legs: LEGS.iter().map(within).collect(), seconds: LEG_S }
     }
 
     /// Wings level while the companion flies `schedule`, and a little longer.

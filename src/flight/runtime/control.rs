@@ -67,7 +67,9 @@ impl Control {
         events: Sender<Event>,
     ) -> Self {
         let vehicle = match options.controller {
-            None => Vehicle::Sitl(Sitl::new(AUTOPILOT.system, options.travels)),
+            None => Vehicle::Sitl(
+                Sitl::new(AUTOPILOT.system, options.travels).with_mixer(options.mixer.clone()),
+            ),
             Some(profile) => Vehicle::Real(Box::new(Real::new(profile))),
         };
         if vehicle.has_channels() {

@@ -39,6 +39,7 @@ use crate::link::autopilot::Text;
 use crate::link::peer::PeerId;
 use crate::link::transport::TransportError;
 use crate::link::vehicle::Profile;
+use crate::physics::mixer::Mixer;
 use crate::physics::servos::Travels;
 use control::Control;
 use planner::{Planner, Threaded};
@@ -64,6 +65,8 @@ pub struct Options {
     pub plan_deadline: Duration,
     /// How far the airframe's surfaces go.
     pub travels: Travels,
+    /// Surfaces and motors of the airframe, where it names them: the `sitl` profile sends their commands too.
+    pub mixer: Option<Mixer>,
     /// How a real flight controller is flown; `None` is the simulator's shim.
     pub controller: Option<Profile>,
     /// How links are signed, if at all.

@@ -9,6 +9,7 @@ use crate::link::peer::PeerId;
 use crate::link::wire::Message;
 use crate::link::wire::setpoint::euler;
 use crate::link::wire::sitl::{self as wire, VehicleMessage};
+use crate::physics::mixer::Mixer;
 use crate::physics::servos::{Travel, Travels};
 use crate::physics::{ActuatorState, Command, State, Time};
 
@@ -66,6 +67,8 @@ pub struct Sitl {
     system: u8,
     /// Deflections at full command by the airframe.
     travels: Travels,
+    /// Surfaces and motors of the airframe, where it names them.
+    mixer: Option<Mixer>,
     /// Travel of the vehicle's surfaces when it is not the airframe's.
     foreign_travel: Option<Travels>,
     told_foreign_travel: bool,
@@ -102,6 +105,7 @@ impl Sitl {
         Sitl {
             system,
             travels,
+            mixer: None,
             foreign_travel: None,
             told_foreign_travel: false,
             parts: Parts::default(),
@@ -112,6 +116,11 @@ impl Sitl {
             next_heartbeat: Duration::ZERO,
             counts: VehicleCounts::default(),
         }
+    }
+
+    /// The same with the commands of the airframe's surfaces and motors behind those of the controls.
+    pub fn with_mixer(self, mixer: Option<Mixer>) -> Self {
+        Sitl { mixer, ..self }
     }
 
     /// See [`super::Vehicle::handle`].
@@ -283,7 +292,7 @@ impl Sitl {
                 outputs
             }
         };
-        self.write(&wire::actuator_controls(time, outputs))
+        self.write(&wire::actuator_controls(time, outputs, self.mixer.as_ref()))
     }
 
     /// See [`super::Vehicle::due`].

@@ -6,6 +6,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use super::{Frame, Message, decode};
+use crate::physics::mixer::Mixer;
 use crate::physics::servos::{Travel, Travels};
 use crate::physics::{Command, Time};
 
@@ -151,8 +152,12 @@ pub enum Outputs {
     Armed(Command),
 }
 
-/// HIL_ACTUATOR_CONTROLS in answer to the state frame of `time`.
-pub fn actuator_controls(time: Time, outputs: Outputs) -> Message {
+/// First place of a surface's or motor's own command.
+const OWN: usize = 4;
+
+/// HIL_ACTUATOR_CONTROLS in answer to the state frame of `time`; behind the four controls the commands of the surfaces
+/// and motors of `mixer`.
+pub fn actuator_controls(time: Time, outputs: Outputs, mixer: Option<&Mixer>) -> Message {
     let mut controls = [0.0; 16];
     let mut mode = 0;
     if let Outputs::Armed(command) = outputs {
@@ -161,6 +166,8 @@ pub fn actuator_controls(time: Time, outputs: Outputs) -> Message {
         controls[1] = command.elevator as f32;
         controls[2] = command.throttle as f32;
         controls[3] = command.rudder as f32;
+        let own = mixer.map(|mixer| mixer.mix(&command)).unwrap_or_default();
+        controls[OWN..].iter_mut().zip(own).for_each(|(control, x)| *control = x as f32);
         mode = ARMED;
     }
     Message::coded(MavMessage::HIL_ACTUATOR_CONTROLS(HIL_ACTUATOR_CONTROLS_DATA {

@@ -6,6 +6,7 @@
 use super::rule::Rule;
 use super::servos;
 use crate::logs::topics::Topics;
+use crate::physics::mixer::Mixer;
 
 /// The record types that the rules use.
 pub const TOPICS: [&str; 11] =
@@ -15,7 +16,7 @@ pub const TOPICS: [&str; 11] =
 const FULL: f64 = 4500.0;
 
 /// The rules, preferred ones first.
-pub fn rules(topics: &Topics) -> Vec<Rule> {
+pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     let degree = 1_f64.to_radians();
     let mut out = Vec::new();
     for (column, topic, field, gain) in [
@@ -60,6 +61,6 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
     ] {
         out.push(Rule::linear(column, "AETR", field, gain));
     }
-    out.extend(servos::rules(topics, "RCOU", |n| format!("C{n}")));
+    out.extend(servos::rules(topics, "RCOU", mixer, |n| format!("C{n}")));
     out
 }

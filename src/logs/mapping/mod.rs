@@ -27,6 +27,7 @@ use serde::Deserialize;
 use super::columns::index;
 use super::format::Format;
 use super::topics::Topics;
+use crate::physics::mixer::Mixer;
 use rule::Rule;
 
 /// The topic name by which a mapping means the columns of a CSV file.
@@ -68,9 +69,12 @@ pub struct Entry {
     pub instance: Option<u16>,
 }
 
-/// A user's mapping, by column.
+/// A user's mapping, by column, with the mixer of the aircraft.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Mapping(BTreeMap<String, Entry>);
+pub struct Mapping {
+    entries: BTreeMap<String, Entry>,
+    mixer: Option<Mixer>,
+}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -151,36 +155,50 @@ impl Mapping {
             entries
                 .insert(column, Entry { topic, field, scale: e.scale, offset: e.offset, instance });
         }
-        Ok(Mapping(entries))
+        Ok(Mapping { entries, mixer: None })
+    }
+
+    /// The same for an aircraft whose surfaces and motors the log names.
+    pub fn with_mixer(self, mixer: Option<Mixer>) -> Mapping {
+        Mapping { mixer, ..self }
+    }
+
+    /// The mixer of the aircraft.
+    pub(super) fn mixer(&self) -> Option<&Mixer> {
+        self.mixer.as_ref()
     }
 
     /// The entry of a column.
     pub fn get(&self, column: &str) -> Option<&Entry> {
-        self.0.get(column)
+        self.entries.get(column)
     }
 
     /// The entries of a topic, with their columns.
     pub fn of_topic<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = (&'a str, &'a Entry)> {
-        self.0.iter().filter(move |(_, e)| e.topic == topic).map(|(column, e)| (column.as_str(), e))
+        self.entries
+            .iter()
+            .filter(move |(_, e)| e.topic == topic)
+            .map(|(column, e)| (column.as_str(), e))
     }
 
     /// Whether a topic is used.
     pub(super) fn uses(&self, topic: &str) -> bool {
-        self.0.values().any(|e| e.topic == topic)
+        self.entries.values().any(|e| e.topic == topic)
     }
 
     /// The mapping's rules followed by the format's own for the other columns.
     pub(super) fn rules(&self, format: Format, topics: &Topics) -> Vec<Rule> {
-        let own = self.0.iter().map(|(column, e)| {
+        let own = self.entries.iter().map(|(column, e)| {
             Rule::linear(column, &e.topic, &e.field, e.scale).plus(e.offset).of(e.instance)
         });
         let others = match format {
             Format::Csv => Vec::new(),
             Format::Ulog => px4::rules(topics),
-            Format::Dataflash => ardupilot::rules(topics),
-            Format::Tlog => telemetry::rules(topics),
+            Format::Dataflash => ardupilot::rules(topics, self.mixer()),
+            Format::Tlog => telemetry::rules(topics, self.mixer()),
         };
-        let free = others.into_iter().filter_map(|rule| rule.without(|c| self.0.contains_key(c)));
+        let free =
+            others.into_iter().filter_map(|rule| rule.without(|c| self.entries.contains_key(c)));
         own.chain(free).collect()
     }
 

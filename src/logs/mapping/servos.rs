@@ -2,6 +2,7 @@
 
 use super::rule::{Rule, Shape, Term};
 use crate::logs::topics::Topics;
+use crate::physics::mixer::{Does, Effector, Mixer};
 
 /// Channels of RCOU.
 const CHANNELS: usize = 16;
@@ -17,7 +18,18 @@ const ELEVON_RIGHT: f64 = 78.0;
 ///
 /// Positive elevator is nose up in ArduPilot, nose down in the log format. Elevons: left =
 /// g (elevator − aileron), right = g (elevator + aileron), g = MIXING_GAIN (0.5).
-pub fn rules(topics: &Topics, topic: &str, field: impl Fn(usize) -> String) -> Vec<Rule> {
+///
+/// Where the airframe's `mixer` says which channel moves what, the commands are g⁺ of the pulses. A command of one is
+/// the longest pulse there: the airframe describes the servos, not the functions that the controller has for them.
+pub fn rules(
+    topics: &Topics,
+    topic: &str,
+    mixer: Option<&Mixer>,
+    field: impl Fn(usize) -> String,
+) -> Vec<Rule> {
+    if let Some(rules) = mixer.and_then(|mixer| mixed(topics, topic, mixer, &field)) {
+        return rules;
+    }
     let parameter =
         |n: usize, what: &str| topics.parameters.get(&format!("SERVO{n}_{what}")).copied();
     let channels =
@@ -59,4 +71,37 @@ pub fn rules(topics: &Topics, topic: &str, field: impl Fn(usize) -> String) -> V
         out.push(Rule::sum("throttle_cmd", topic, vec![term]).plus(reversed));
     }
     out
+}
+
+/// The commands behind the pulses of all the channels of `mixer`; `None` if it does not name them all.
+fn mixed(
+    topics: &Topics,
+    topic: &str,
+    mixer: &Mixer,
+    field: impl Fn(usize) -> String,
+) -> Option<Vec<Rule>> {
+    let term = |effector: &Effector, gain: f64| {
+        let n = usize::from(effector.channel?);
+        let read = |what: &str, usual: f64| {
+            topics.parameters.get(&format!("SERVO{n}_{what}")).copied().unwrap_or(usual)
+        };
+        let (min, trim, max) = (read("MIN", 1100.0), read("TRIM", 1500.0), read("MAX", 1900.0));
+        let shape = match effector.does {
+            Does::Deflects(_) => Shape::Surface { min, trim, max },
+            Does::Pulls => Shape::Range { min, max },
+        };
+        Some(Term { field: field(n), gain, shape })
+    };
+    let columns = ["aileron_cmd", "elevator_cmd", "rudder_cmd", "throttle_cmd"];
+    let both = || mixer.effectors().iter().zip(mixer.command_shares());
+    let rules = columns.into_iter().enumerate().map(|(j, column)| {
+        let moving = both().filter(|(_, share)| share[j] != 0.0);
+        let terms = moving.map(|(e, share)| term(e, share[j])).collect::<Option<Vec<_>>>()?;
+        let note = format!(
+            "{column} is the least-squares inverse of the airframe's mixer over servo pulses"
+        );
+        Some(Rule::sum(column, topic, terms).noting(note))
+    });
+    let rules = rules.collect::<Option<Vec<_>>>()?;
+    Some(rules.into_iter().filter(|rule| rule.origin() != format!("{topic}.")).collect())
 }

@@ -8,6 +8,7 @@ use super::rule::Rule;
 use super::servos;
 use crate::logs::topics::{Topic, Topics};
 use crate::physics::atmosphere::STANDARD_GRAVITY;
+use crate::physics::mixer::Mixer;
 
 /// The messages that the rules use.
 pub const TOPICS: [&str; 15] = [
@@ -37,7 +38,7 @@ const MILLI_G: f64 = STANDARD_GRAVITY / 1000.0;
 const DEFLECTION: f64 = 0.5235;
 
 /// The rules, preferred ones first.
-pub fn rules(topics: &Topics) -> Vec<Rule> {
+pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     let Some(vehicle) = vehicle(topics) else { return Vec::new() };
     let system = vehicle.to_be_bytes()[0];
     let mut out = states();
@@ -62,7 +63,7 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
     if sent_travel(topics, system).is_some_and(|[.., rudder]| rudder > 0.0) {
         commands.push(Rule::linear("rudder_cmd", "HIL_ACTUATOR_CONTROLS", "controls3", 1.0));
     }
-    commands.extend(servos::rules(topics, "SERVO_OUTPUT_RAW", |n| format!("servo{n}_raw")));
+    commands.extend(servos::rules(topics, "SERVO_OUTPUT_RAW", mixer, |n| format!("servo{n}_raw")));
     for rule in &mut commands {
         let of_system = |i: &u16| i.to_be_bytes()[0] == system;
         let found = topics.instances(&rule.topic).max_by_key(|(_, t)| t.time_s.len());

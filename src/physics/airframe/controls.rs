@@ -107,26 +107,33 @@ impl SurfaceFile {
         Ok(surface)
     }
 
-    /// Either the same to both sides, or the two sides.
     fn travel(&self, name: &str) -> Result<Travel, String> {
-        match (&self.travel_rad, &self.travel_min_rad, &self.travel_max_rad) {
-            (Some(both), None, None) => {
-                Ok(Travel::symmetric(positive(&format!("{name}.travel_rad"), both, TRAVEL)?))
-            }
-            (None, Some(min), Some(max)) => {
-                let most = positive(&format!("{name}.travel_max_rad"), max, TRAVEL)?;
-                let least = min.value;
-                if !(-TRAVEL..=-TRAVEL * 1e-9).contains(&least) {
-                    return Err(format!(
-                        "{name}.travel_min_rad = {least} is not physical: it is the deflection at the \
-                         command -1, below zero and at least -{TRAVEL}"
-                    ));
-                }
-                Ok(Travel { least, most })
-            }
-            _ => Err(format!(
-                "{name} needs travel_rad (the same to both sides), or travel_min_rad with travel_max_rad"
-            )),
+        travel(name, [&self.travel_rad, &self.travel_min_rad, &self.travel_max_rad])
+    }
+}
+
+/// Travel of `name`: either the same to both sides, or the two sides (`both`, `min`, `max`).
+pub(super) fn travel(
+    name: &str,
+    [both, min, max]: [&Option<Sourced>; 3],
+) -> Result<Travel, String> {
+    match (both, min, max) {
+        (Some(both), None, None) => {
+            Ok(Travel::symmetric(positive(&format!("{name}.travel_rad"), both, TRAVEL)?))
         }
+        (None, Some(min), Some(max)) => {
+            let most = positive(&format!("{name}.travel_max_rad"), max, TRAVEL)?;
+            let least = min.value;
+            if !(-TRAVEL..=-TRAVEL * 1e-9).contains(&least) {
+                return Err(format!(
+                    "{name}.travel_min_rad = {least} is not physical: it is the deflection at the \
+                     command -1, below zero and at least -{TRAVEL}"
+                ));
+            }
+            Ok(Travel { least, most })
+        }
+        _ => Err(format!(
+            "{name} needs travel_rad (the same to both sides), or travel_min_rad with travel_max_rad"
+        )),
     }
 }

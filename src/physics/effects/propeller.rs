@@ -20,12 +20,12 @@ impl Effect for Propeller {
         "T = ρ/ρ0 (T0 + Tt δt + Ttt δt² + TV V + TtV δt V + TVV V²), ρ0 = 1.225 kg/m³";
     const SOURCE: &'static str = "CT(J), CQ(J) and a motor to second degree: BM12 section 4.3";
     const COEFFICIENTS: &'static [Coefficient] = &[
-        coefficient("T0_n", "thrust at rest without throttle", "N", (-1e4, 1e4)),
-        coefficient("Tt_n", "slope over throttle", "N", (-1e5, 1e5)),
-        coefficient("Ttt_n", "curvature over throttle", "N", (-1e5, 1e5)),
-        coefficient("TV_nspm", "slope over airspeed", "N s/m", (-1e4, 1e4)),
-        coefficient("TtV_nspm", "slope over airspeed that comes with throttle", "N s/m", (-1e4, 1e4)),
-        coefficient("TVV_ns2pm2", "curvature over airspeed", "N s²/m²", (-100.0, 100.0)),
+        coefficient("T0_n", "thrust at rest without throttle", "N", (-1e6, 1e6)),
+        coefficient("Tt_n", "slope over throttle", "N", (-1e7, 1e7)),
+        coefficient("Ttt_n", "curvature over throttle", "N", (-1e7, 1e7)),
+        coefficient("TV_nspm", "slope over airspeed", "N s/m", (-1e5, 1e5)),
+        coefficient("TtV_nspm", "slope over airspeed that comes with throttle", "N s/m", (-1e5, 1e5)),
+        coefficient("TVV_ns2pm2", "curvature over airspeed", "N s²/m²", (-1e4, 1e4)),
     ];
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! What is at the other end of the vehicle's link: the shim, or a played flight controller.
 
-use greylag_sitl::plant::{Inputs, PlantOptions, Start, Truth};
+use greylag_sitl::plant::{Inputs, PlantOptions, Truth};
 use greylag_sitl::shim::bench::Bench;
 use greylag_sitl::shim::controller::{FlightController, Mode};
 use greylag_sitl::shim::{Distortion, Launch, Noise, Personality, ShimError, ShimOptions};
@@ -62,8 +62,12 @@ pub(super) enum Aircraft {
 }
 
 impl Aircraft {
-    pub(super) fn new(counterpart: Counterpart, seed: u64) -> Result<Self, ShimError> {
-        let mut options = ShimOptions::new(PlantOptions::default(), Start::NEUTRAL);
+    pub(super) fn new(
+        plant: &PlantOptions,
+        counterpart: Counterpart,
+        seed: u64,
+    ) -> Result<Self, ShimError> {
+        let mut options = ShimOptions::new(plant.clone(), plant.start);
         options.seed = seed;
         options.noise = Noise::REALISTIC;
         Ok(match counterpart.personality() {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use greylag_sitl::plant::Inputs;
+use greylag_sitl::plant::{Inputs, PlantOptions};
 use greylag_sitl::shim::{Distortion, ShimError};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -89,6 +89,7 @@ pub struct CompanionFactory {
     companion: Companion,
     fallback: Box<dyn Controller>,
     model: GreyBox,
+    plant: PlantOptions,
 }
 
 impl CompanionFactory {
@@ -102,7 +103,13 @@ impl CompanionFactory {
             true => companion.controller.boxed_clone(),
             false => build(ControllerKind::Lqi, model)?,
         };
-        Ok(CompanionFactory { companion, fallback, model: model.clone() })
+        let plant = PlantOptions::default();
+        Ok(CompanionFactory { companion, fallback, model: model.clone(), plant })
+    }
+
+    /// The same with the simulator's aircraft `plant`, from its start.
+    pub fn with_aircraft(self, plant: PlantOptions) -> Self {
+        CompanionFactory { plant, ..self }
     }
 
     fn desk(&self, counterpart: Counterpart) -> Result<Desk, FaultsError> {
@@ -153,12 +160,13 @@ impl CompanionFactory {
         let mut random = ChaCha8Rng::seed_from_u64(case.seed);
         random.set_stream(STARVED);
         let mut flight = Flight {
-            aircraft: Aircraft::new(case.counterpart, case.seed)?,
+            aircraft: Aircraft::new(&self.plant, case.counterpart, case.seed)?,
             desk,
             down: Wire::new(case.seed, 0),
             up: Wire::new(case.seed, 1),
             judge: Judge::new(self.model.airframe.envelope),
             faults: faults.clone(),
+            cruise: self.model.airframe.envelope.airspeed_cruise_mps,
             random,
             disk,
             asleep_until: 0,
@@ -204,6 +212,8 @@ struct Flight {
     up: Wire,
     judge: Judge,
     faults: Vec<Fault>,
+    /// Airspeed at which the aircraft cruises, m/s.
+    cruise: f64,
     random: ChaCha8Rng,
     disk: Option<Disk>,
     /// The companion gets no processor before this step.
@@ -351,7 +361,9 @@ impl Flight {
             match fault.kind {
                 Kind::Frozen => distortion.frozen = true,
                 // What a tube that has iced up shows: the speed of that moment, or less and less.
-                Kind::Airspeed => distortion.airspeed_mps = Some(8.0 + 20.0 * s),
+                Kind::Airspeed => {
+                    distortion.airspeed_mps = Some(0.4 * self.cruise + self.cruise * s)
+                }
                 Kind::Alpha => distortion.alpha_rad = 0.5 * (s - 0.5),
                 Kind::NotANumber => distortion.rate_not_a_number = true,
                 Kind::Clock => self.clock_us = (1e7 * s) as i64,

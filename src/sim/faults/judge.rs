@@ -10,8 +10,9 @@ use crate::physics::airframe::Envelope;
 /// Overshoot of bank and pitch beyond the envelope that is still no violation, degrees: a gust of
 /// the surfaces' full slew takes about so far.
 const OVERSHOOT_DEG: f64 = 15.0;
-/// Stall speed of the X8 in level flight, m/s.
-const STALL_MPS: f64 = 9.2;
+/// The least airspeed of the envelope over that at which an airspeed is a finding: half the dynamic pressure, about the
+/// stall.
+const ABOVE_STALL: f64 = std::f64::consts::SQRT_2;
 /// Altitude that a flight of turns, climbs and descents may lose, m, of the 600 it begins at.
 const ALTITUDE_LOSS_M: f64 = 200.0;
 /// Attitude error at the end that counts as recovered, degrees.
@@ -251,7 +252,8 @@ impl Judge {
         if !inside {
             self.note(now_s, Finding::Attitude);
         }
-        if !(STALL_MPS..=e.airspeed_max_mps).contains(&truth.airspeed_mps) {
+        let stall = e.airspeed_min_mps / ABOVE_STALL;
+        if !(stall..=e.airspeed_max_mps).contains(&truth.airspeed_mps) {
             self.note(now_s, Finding::Airspeed);
         }
         if start - truth.altitude_m > ALTITUDE_LOSS_M {

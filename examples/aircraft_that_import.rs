@@ -1,0 +1,107 @@
+//! Prints which aircraft of a JSBSim tree import, fly level and are flown by the LQI, with the reason for each that does not.
+//!
+//! ```text
+//! cargo run --release --ignore-rust-version --no-default-features --features sitl \
+//!     --example aircraft_that_import -- TREE/aircraft [--no-flights] [NAME…]
+//! ```
+//!
+//! Each is imported at 1000 m, at the airspeed of level flight at a lift coefficient of 0.4, and flown for 20 s from there
+//! in its own simulator.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use greylag::control::{Kind, Target, build};
+use greylag::model::{GreyBox, Trim};
+use greylag::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
+use greylag::sim::import::import;
+use greylag::sim::{Environment, Simulator};
+use greylag_sitl::plant::{Plant, PlantOptions, Start};
+
+/// Where the aircraft are imported and flown, m.
+const ALTITUDE_M: f64 = 1000.0;
+/// Lift coefficient there.
+const LIFT: f64 = 0.4;
+/// Length of a flight, steps of 0.01 s.
+const STEPS: usize = 2000;
+/// Attitude error at its end that counts as flown, degrees.
+const ENOUGH_DEG: f64 = 2.0;
+
+fn main() -> Result<()> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = PathBuf::from(arguments.next().context("give the folder of the aircraft")?);
+    let (options, mut names): (Vec<String>, Vec<String>) =
+        arguments.partition(|argument| argument.starts_with("--"));
+    let flights = match options.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] => true,
+        ["--no-flights"] => false,
+        _ => bail!("the only option is --no-flights"),
+    };
+    if names.is_empty() {
+        names = std::fs::read_dir(&folder)?
+            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+            .filter(|name| folder.join(name).join(format!("{name}.xml")).is_file())
+            .collect();
+        names.sort();
+    }
+    let (mut imported, mut flown) = (0, 0);
+    for name in &names {
+        match taken(&folder, name) {
+            Ok((model, plant, left_out)) => {
+                imported += 1;
+                let flight =
+                    if flights { fly(&model, &plant) } else { Ok("not asked to fly".into()) };
+                flown += usize::from(flights && flight.is_ok());
+                let flight = flight.unwrap_or_else(|why| format!("not flown: {why:#}"));
+                println!("{name:18} imported at {:.0} m/s; {flight}", plant.start.airspeed_mps);
+                left_out.iter().for_each(|what| println!("{:18}   left out: {what}", ""));
+            }
+            Err(why) => println!("{name:18} no: {why:#}"),
+        }
+    }
+    println!("{imported} of {} import, {flown} are flown by the LQI", names.len());
+    Ok(())
+}
+
+/// The imported model, its aircraft, and what the model does not hold.
+fn taken(folder: &Path, name: &str) -> Result<(GreyBox, PlantOptions, Vec<String>)> {
+    let mut options = PlantOptions {
+        aircraft_dir: Some(folder.to_owned()),
+        aircraft: name.to_owned(),
+        ..PlantOptions::default()
+    };
+    let mut plant = Plant::new(&options)?;
+    let mass = plant.mass_properties()?.mass_kg;
+    let area = plant.property("metrics/Sw-sqft")? * 0.3048 * 0.3048;
+    let pressure = mass * STANDARD_GRAVITY / (LIFT * area);
+    let airspeed_mps = (2.0 * pressure / standard_density(ALTITUDE_M)).sqrt();
+    options.start = Start { airspeed_mps, altitude_m: ALTITUDE_M, ..Start::NEUTRAL };
+    let found = import(&mut plant, name, airspeed_mps, ALTITUDE_M)?;
+    let copy = tempfile::tempdir()?;
+    std::fs::write(copy.path().join("airframe.toml"), &found.airframe)?;
+    std::fs::write(copy.path().join("model.toml"), &found.model)?;
+    let model = GreyBox::load(&copy.path().join("model.toml"))?;
+    Ok((model, options, found.left_out))
+}
+
+/// Flies level, then banked by 20°; the error at the end in words.
+fn fly(model: &GreyBox, plant: &PlantOptions) -> Result<String> {
+    let airspeed = plant.start.airspeed_mps;
+    let trim = Trim::level(model, airspeed, ALTITUDE_M)?;
+    let mut lqi = build(Kind::Lqi, model)?;
+    let start = Start { alpha_rad: trim.state.alpha, pitch_rad: trim.state.pitch, ..plant.start };
+    let mut simulator = Simulator::new(&PlantOptions { start, ..plant.clone() })?;
+    let mut seen = simulator.reset()?;
+    lqi.reset(1);
+    let mut target = Target { roll: 0.0, pitch: trim.state.pitch, airspeed };
+    for step in 0..STEPS {
+        target.roll = if step < STEPS / 2 { 0.0 } else { 20f64.to_radians() };
+        seen = simulator.step(lqi.command(&seen, &target))?;
+    }
+    let error = (seen.state.roll - target.roll).abs().max((seen.state.pitch - target.pitch).abs());
+    let degrees = error.to_degrees();
+    if degrees.is_nan() || degrees >= ENOUGH_DEG {
+        bail!("{degrees:.1} deg from its target after 20 s");
+    }
+    Ok(format!("{degrees:.3} deg from 20 deg of bank after 20 s"))
+}

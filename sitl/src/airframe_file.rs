@@ -1,0 +1,89 @@
+//! What an airframe file of the companion says of the simulator's aircraft: surfaces, motors, conditions.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::plant::{Mixing, Moved, PlantOptions};
+
+/// Why an airframe file says nothing of use.
+#[derive(Debug, thiserror::Error)]
+#[error("airframe file {}: {why}", path.display())]
+pub struct AirframeError {
+    path: PathBuf,
+    why: String,
+}
+
+#[derive(Deserialize)]
+struct File {
+    #[serde(default)]
+    surfaces: BTreeMap<String, Effector>,
+    #[serde(default)]
+    motors: BTreeMap<String, Effector>,
+    #[serde(default)]
+    conditions: BTreeMap<String, f64>,
+}
+
+#[derive(Deserialize)]
+struct Effector {
+    travel_rad: Option<Number>,
+    travel_min_rad: Option<Number>,
+    travel_max_rad: Option<Number>,
+    #[serde(default)]
+    aileron: f64,
+    #[serde(default)]
+    elevator: f64,
+    #[serde(default)]
+    rudder: f64,
+    #[serde(default)]
+    throttle: f64,
+    command: Option<String>,
+    position: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct Number {
+    value: f64,
+}
+
+impl Effector {
+    fn moved(&self, name: &str, is_surface: bool) -> Result<Moved, String> {
+        let position = self.position.clone().ok_or_else(|| {
+            format!("{name} has no position: name the JSBSim property that holds it, as other surfaces have it")
+        })?;
+        let travel = match (&self.travel_rad, &self.travel_min_rad, &self.travel_max_rad) {
+            _ if !is_surface => None,
+            (Some(both), ..) => Some([-both.value, both.value]),
+            (None, Some(least), Some(most)) => Some([least.value, most.value]),
+            _ => return Err(format!("surfaces.{name} has no travel_rad")),
+        };
+        let gains = [self.aileron, self.elevator, self.rudder, self.throttle];
+        Ok(Moved { name: name.into(), command: self.command.clone(), position, gains, travel })
+    }
+}
+
+/// Gives `plant` the surfaces and conditions of the airframe file at `path`; a file that names no JSBSim property
+/// leaves its surfaces to the aircraft's own channels.
+///
+/// # Errors
+/// If the file cannot be read, or describes surfaces that cannot be flown.
+pub fn apply(path: &Path, plant: &mut PlantOptions) -> Result<(), AirframeError> {
+    let fail = |why: String| AirframeError { path: path.to_owned(), why };
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| fail(format!("cannot be read: {e}; name an existing file")))?;
+    let file: File = toml::from_str(&text).map_err(|e| fail(e.message().to_owned()))?;
+    plant.held.extend(file.conditions);
+    let all = || file.surfaces.values().chain(file.motors.values());
+    if all().all(|e| e.position.is_none()) {
+        return Ok(());
+    }
+    let surfaces = file.surfaces.iter().map(|(name, e)| e.moved(name, true));
+    let motors = file.motors.iter().map(|(name, e)| e.moved(name, false));
+    let mut moved = surfaces.chain(motors).collect::<Result<Vec<_>, _>>().map_err(fail)?;
+    if file.motors.is_empty() {
+        moved.push(Moved::throttle(&plant.properties));
+    }
+    plant.mixing = Some(Mixing::new(moved).map_err(fail)?);
+    Ok(())
+}

@@ -1,0 +1,153 @@
+//! The properties by which an aircraft is steered: aileron, elevator, rudder and throttle, or surfaces one by one.
+
+use jsbsim::{Error, Fdm, NodeId};
+
+use super::mixing::Mixing;
+use super::options::THROTTLE_COMMAND;
+use super::{Inputs, PlantError, PlantOptions, Properties};
+
+/// Nodes of commands and positions.
+pub(super) enum Steering {
+    /// By JSBSim's usual properties.
+    Usual(Usual),
+    /// By surfaces and motors of their own.
+    Mixed(Box<Mixed>),
+}
+
+pub(super) struct Usual {
+    surfaces: [NodeId; 2],
+    /// Command and position of the rudder.
+    rudder: Option<[NodeId; 2]>,
+    /// One a throttle; none on a glider.
+    throttles: Vec<NodeId>,
+    positions: [NodeId; 2],
+    throttle_position: Option<NodeId>,
+}
+
+pub(super) struct Mixed {
+    mixing: Mixing,
+    /// Command of each surface and motor; `None` follows the usual commands.
+    commands: Vec<Option<NodeId>>,
+    positions: Vec<NodeId>,
+    /// The usual commands, for what has none of its own: aileron, elevator, rudder.
+    usual: [Option<NodeId>; 3],
+    throttles: Vec<NodeId>,
+}
+
+impl Steering {
+    /// Looks the properties up on a loaded aircraft.
+    pub(super) fn find(fdm: &Fdm, options: &PlantOptions) -> Result<Self, PlantError> {
+        let look = |name: &str| fdm.node(name).ok().flatten();
+        let node = |name: &str| {
+            look(name).ok_or_else(|| PlantError::Property {
+                aircraft: options.aircraft.clone(),
+                property: name.to_owned(),
+            })
+        };
+        let p = &options.properties;
+        let throttles = numbered(fdm, &p.throttle_command);
+        if let Some(mixing) = &options.mixing {
+            let of = |name: &Option<String>| name.as_deref().map(&node).transpose();
+            let commands =
+                mixing.moved().iter().map(|m| of(&m.command)).collect::<Result<Vec<_>, _>>()?;
+            let positions = mixing.moved().iter().map(|m| node(&m.position));
+            return Ok(Steering::Mixed(Box::new(Mixed {
+                positions: positions.collect::<Result<_, _>>()?,
+                commands,
+                mixing: mixing.clone(),
+                usual: [
+                    look(&p.aileron_command),
+                    look(&p.elevator_command),
+                    look(&p.rudder_command),
+                ],
+                throttles,
+            })));
+        }
+        let is_glider = throttles.is_empty() && p.throttle_command == THROTTLE_COMMAND;
+        if throttles.is_empty() && !is_glider {
+            node(&p.throttle_command)?;
+        }
+        Ok(Steering::Usual(Usual {
+            surfaces: [node(&p.aileron_command)?, node(&p.elevator_command)?],
+            rudder: rudder(&look, &node, p)?,
+            throttles,
+            positions: [
+                look(&p.aileron_position).map_or_else(|| node(p.aileron_fallback()), Ok)?,
+                node(&p.elevator_position)?,
+            ],
+            throttle_position: (!is_glider).then(|| node(&p.throttle_position)).transpose()?,
+        }))
+    }
+
+    /// Writes the commands.
+    pub(super) fn command(&self, fdm: &mut Fdm, inputs: &Inputs) -> Result<(), Error> {
+        let (throttles, surfaces) = match self {
+            Steering::Usual(usual) => {
+                let [aileron, elevator] = usual.surfaces.map(Some);
+                (&usual.throttles, [aileron, elevator, usual.rudder.map(|[command, _]| command)])
+            }
+            Steering::Mixed(mixed) => (&mixed.throttles, mixed.usual),
+        };
+        for (node, value) in surfaces.iter().zip([inputs.aileron, inputs.elevator, inputs.rudder]) {
+            if let Some(node) = node {
+                fdm.write_node(*node, value)?;
+            }
+        }
+        for throttle in throttles {
+            fdm.write_node(*throttle, inputs.throttle)?;
+        }
+        if let Steering::Mixed(mixed) = self {
+            for (command, given) in mixed.commands.iter().zip(mixed.mixing.mix(inputs)) {
+                if let Some(node) = command {
+                    fdm.write_node(*node, given)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Aileron, elevator, rudder (rad) and throttle (0..1) as they are.
+    pub(super) fn positions(&self, fdm: &mut Fdm) -> Result<[f64; 4], Error> {
+        match self {
+            Steering::Usual(usual) => {
+                let [aileron, elevator] = usual.positions;
+                let throttle = usual.throttle_position.map_or(Ok(0.0), |n| fdm.read_node(n));
+                let rudder = usual.rudder.map_or(Ok(0.0), |[_, node]| fdm.read_node(node));
+                Ok([fdm.read_node(aileron)?, fdm.read_node(elevator)?, rudder?, throttle?])
+            }
+            Steering::Mixed(mixed) => {
+                let positions: Result<Vec<f64>, Error> =
+                    mixed.positions.iter().map(|node| fdm.read_node(*node)).collect();
+                Ok(mixed.mixing.controls(&positions?))
+            }
+        }
+    }
+
+    /// Whether the aircraft has no throttle.
+    pub(super) fn is_glider(&self) -> bool {
+        match self {
+            Steering::Usual(usual) => usual.throttles.is_empty(),
+            Steering::Mixed(_) => false,
+        }
+    }
+}
+
+/// Command and position of the rudder; one that is named must be there.
+fn rudder(
+    look: &impl Fn(&str) -> Option<NodeId>,
+    node: &impl Fn(&str) -> Result<NodeId, PlantError>,
+    names: &Properties,
+) -> Result<Option<[NodeId; 2]>, PlantError> {
+    let Properties { rudder_command, rudder_position, .. } = names;
+    let usual = Properties::default();
+    if (rudder_command, rudder_position) == (&usual.rudder_command, &usual.rudder_position) {
+        return Ok(look(rudder_command).zip(look(rudder_position)).map(|(c, p)| [c, p]));
+    }
+    Ok(Some([node(rudder_command)?, node(rudder_position)?]))
+}
+
+/// The nodes `NAME`, `NAME[1]`, … up to the first that is not there.
+fn numbered(fdm: &Fdm, name: &str) -> Vec<NodeId> {
+    let names = (0..).map(|i| if i == 0 { name.to_owned() } else { format!("{name}[{i}]") });
+    names.map_while(|name| fdm.node(&name).ok().flatten()).collect()
+}

@@ -1,0 +1,59 @@
+//! Columns of the log format made of the columns of named surfaces and motors.
+
+use super::columns::{COLUMNS, Place, index};
+use super::mapping::Mapping;
+use crate::physics::mixer::{Does, Mixer};
+
+/// The share of one column of a file in one of the log format.
+pub(super) struct Share {
+    /// The column of the file, by its place.
+    pub field: usize,
+    /// The column that it is a part of.
+    pub column: &'static str,
+    /// That column's place in a sample.
+    pub place: Place,
+    /// The factor.
+    pub share: f64,
+}
+
+/// Deflections of the controls, then their commands.
+const DEFLECTIONS: [&str; 4] = ["aileron_rad", "elevator_rad", "rudder_rad", "throttle"];
+const COMMANDS: [&str; 4] = ["aileron_cmd", "elevator_cmd", "rudder_cmd", "throttle_cmd"];
+
+/// The columns that `names` make through the mixer of `mapping`: NAME_rad of a surface and NAME_throttle of a motor
+/// make deflections, NAME_cmd makes commands. What the file or the mapping has already is left as it is.
+pub(super) fn columns(names: &[String], mapping: &Mapping) -> Vec<Share> {
+    let Some(mixer) = mapping.mixer() else { return Vec::new() };
+    let deflections: Vec<[f64; 4]> = mixer.shares().collect();
+    let is_there =
+        |column: &str| names.iter().any(|n| n == column) || mapping.get(column).is_some();
+    let of = |columns: [&'static str; 4], shares: &[[f64; 4]], suffix: fn(Does) -> &'static str| {
+        let made = (0..4).filter(|j| !is_there(columns[*j]));
+        made.filter_map(|j| made_of(names, mixer, columns[j], j, shares, suffix))
+            .flatten()
+            .collect()
+    };
+    let position = |does| if does == Does::Pulls { "throttle" } else { "rad" };
+    let both: [Vec<Share>; 2] =
+        [of(DEFLECTIONS, &deflections, position), of(COMMANDS, mixer.command_shares(), |_| "cmd")];
+    both.into_iter().flatten().collect()
+}
+
+/// The shares of control `j`, if all columns that it takes are there.
+fn made_of(
+    names: &[String],
+    mixer: &Mixer,
+    column: &'static str,
+    j: usize,
+    shares: &[[f64; 4]],
+    suffix: fn(Does) -> &'static str,
+) -> Option<Vec<Share>> {
+    let place = COLUMNS[index(column)?].2;
+    let moving = mixer.effectors().iter().zip(shares).filter(|(_, share)| share[j] != 0.0);
+    let all = moving.map(|(effector, share)| {
+        let wanted = format!("{}_{}", effector.name, suffix(effector.does));
+        let field = names.iter().position(|n| *n == wanted)?;
+        Some(Share { field, column, place, share: share[j] })
+    });
+    all.collect()
+}

@@ -1,0 +1,302 @@
+//! The mixer: which named surfaces and motors the four virtual controls move, and what these say of the controls.
+//!
+//! Model, planner and logs have four controls: aileron, elevator, rudder, throttle. An aircraft may have others:
+//! two elevons, a V-tail, several motors. Effector i is given u_i = Σ_j g_ij c_j, c the commands of the controls; a
+//! surface goes to its deflection at u_i, −1..1. Backwards, c = g⁺ u: least squares, u_i the deflection over half the
+//! travel. Forces that are linear in the surfaces' deflections are then linear in those of the controls.
+
+use crate::physics::Command;
+use crate::physics::servos::{Travel, Travels};
+
+/// Names of the controls, in the order of an effector's gains.
+pub const CONTROLS: [&str; 4] = ["aileron", "elevator", "rudder", "throttle"];
+/// A column of gains shorter than this beside its own length, once the columns before it are taken out, is none.
+const DEPENDENT: f64 = 1e-6;
+/// Share by which a control's travel may differ from that which the surfaces give.
+const TRAVEL: f64 = 1e-3;
+
+/// What an effector does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Does {
+    /// A surface: its deflections at −1 and 1, rad.
+    Deflects(Travel),
+    /// A motor, 0..1.
+    Pulls,
+}
+
+/// A named surface or motor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effector {
+    /// Its name, which is also that of its columns in a log: `NAME_rad`, `NAME_cmd`.
+    pub name: String,
+    /// What it does.
+    pub does: Does,
+    /// Its command for a command of one on each of [`CONTROLS`].
+    pub gains: [f64; 4],
+    /// Servo output of the flight controller that moves it, from 1.
+    pub channel: Option<u8>,
+    /// JSBSim's property of its command, −1..1 or 0..1.
+    pub command: Option<String>,
+    /// JSBSim's property of its deflection, rad, or of the motor's throttle.
+    pub position: Option<String>,
+}
+
+impl Effector {
+    /// The command, limited to what the effector takes.
+    fn limited(&self, command: f64) -> f64 {
+        match self.does {
+            Does::Deflects(_) => command.clamp(-1.0, 1.0),
+            Does::Pulls => command.clamp(0.0, 1.0),
+        }
+    }
+
+    /// Its position at a command: rad, or 0..1 of a motor.
+    pub fn position(&self, command: f64) -> f64 {
+        match self.does {
+            Does::Deflects(travel) => travel.deflection(command),
+            Does::Pulls => command,
+        }
+    }
+
+    /// Position at a command of one: half the travel, rad; one of a motor.
+    fn unit(&self) -> f64 {
+        match self.does {
+            Does::Deflects(travel) => 0.5 * (travel.most - travel.least),
+            Does::Pulls => 1.0,
+        }
+    }
+}
+
+/// Why surfaces and motors cannot be flown by the controls.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MixerError {
+    /// A control moves nothing.
+    #[error(
+        "nothing moves the {control}: give a surface or motor {control} = …, its command for a full {control}"
+    )]
+    Unmoved {
+        /// The control.
+        control: &'static str,
+    },
+    /// An effector moves a control that the aircraft does not have.
+    #[error(
+        "{effector} has {control} = …, but there is no [controls.{control}]: add that section or leave the gain out"
+    )]
+    NoSuchControl {
+        /// The effector.
+        effector: String,
+        /// The control.
+        control: &'static str,
+    },
+    /// Two controls cannot be told apart.
+    #[error(
+        "the mixer is singular: {effectors} move with the {control} as with {others}, so that no setting gives one without \
+         the other; give one of them a gain of the other sign, or add what moves the {control} alone"
+    )]
+    Singular {
+        /// The control that is lost.
+        control: &'static str,
+        /// Those before it.
+        others: String,
+        /// What moves it.
+        effectors: String,
+    },
+    /// A control's travel is not that of its surfaces.
+    #[error(
+        "controls.{control} goes from {given_least:.4} to {given_most:.4} rad, its surfaces give {least:.4} to {most:.4}: \
+         write these"
+    )]
+    Travel {
+        /// The control.
+        control: &'static str,
+        /// By the file, rad.
+        given_least: f64,
+        /// By the file, rad.
+        given_most: f64,
+        /// By the surfaces, rad.
+        least: f64,
+        /// By the surfaces, rad.
+        most: f64,
+    },
+}
+
+/// Which surfaces and motors the controls move.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mixer {
+    effectors: Vec<Effector>,
+    /// g⁺: command of each control for a command of each effector.
+    back: Vec<[f64; 4]>,
+    /// Deflection of each control at a command of one, mean of the surfaces that it moves, rad; 1 of the throttle.
+    unit: [f64; 4],
+}
+
+impl Mixer {
+    /// The mixer of `effectors` on an aircraft with or without a `rudder`.
+    ///
+    /// # Errors
+    /// If a control moves nothing or does not exist, or two cannot be told apart.
+    pub fn new(effectors: Vec<Effector>, rudder: bool) -> Result<Mixer, MixerError> {
+        let has = [true, true, rudder, true];
+        for (j, control) in CONTROLS.into_iter().enumerate() {
+            let mover = effectors.iter().find(|e| e.gains[j] != 0.0);
+            match (has[j], mover) {
+                (true, None) => return Err(MixerError::Unmoved { control }),
+                (false, Some(e)) => {
+                    return Err(MixerError::NoSuchControl { effector: e.name.clone(), control });
+                }
+                _ => {}
+            }
+        }
+        let back = pseudo_inverse(&effectors)?;
+        let unit = std::array::from_fn(|j| unit(&effectors, j));
+        Ok(Mixer { effectors, back, unit })
+    }
+
+    /// The surfaces and motors.
+    pub fn effectors(&self) -> &[Effector] {
+        &self.effectors
+    }
+
+    /// What each effector is given for `command`, limited to its range.
+    pub fn mix(&self, command: &Command) -> Vec<f64> {
+        let asked = [command.aileron, command.elevator, command.rudder, command.throttle];
+        let sum = |e: &Effector| e.gains.iter().zip(asked).map(|(g, c)| g * c).sum::<f64>();
+        self.effectors.iter().map(|e| e.limited(sum(e))).collect()
+    }
+
+    /// How far the controls go, at [`Self::shares`] of the effectors' positions.
+    pub fn deflections(&self, positions: &[f64]) -> [f64; 4] {
+        let mut out = [0.0; 4];
+        for (shares, position) in self.shares().zip(positions) {
+            out.iter_mut().zip(shares).for_each(|(sum, share)| *sum += share * position);
+        }
+        out
+    }
+
+    /// Share of each effector's position (rad; 0..1 of a motor) in the deflection of each control (rad; 0..1 of the
+    /// throttle).
+    pub fn shares(&self) -> impl Iterator<Item = [f64; 4]> {
+        let both = self.back.iter().zip(&self.effectors);
+        both.map(|(row, e)| std::array::from_fn(|j| row[j] * self.unit[j] / e.unit()))
+    }
+
+    /// Share of each effector's command in the command of each control.
+    pub fn command_shares(&self) -> &[[f64; 4]] {
+        &self.back
+    }
+
+    /// Where the controls' deflections end: at full commands of each alone.
+    pub fn travels(&self) -> Travels {
+        let travel = |j: usize| {
+            let at = |value: f64| {
+                // in the middle of their range motors can turn the aircraft either way
+                let given = |e: &Effector| e.limited(e.gains[j] * value + 0.5 * e.gains[3]);
+                let positions: Vec<f64> =
+                    self.effectors.iter().map(|e| e.position(given(e))).collect();
+                self.deflections(&positions)[j]
+            };
+            Travel { least: at(-1.0), most: at(1.0) }
+        };
+        let moved = self.effectors.iter().any(|e| e.gains[2] != 0.0);
+        Travels { aileron: travel(0), elevator: travel(1), rudder: moved.then(|| travel(2)) }
+    }
+
+    /// Refuses `travels` of an airframe file that are not those of the surfaces.
+    ///
+    /// # Errors
+    /// The first that differs by more than 0.1 %.
+    pub fn checked(self, travels: &Travels) -> Result<Mixer, MixerError> {
+        let own = self.travels();
+        let pairs = [
+            (Some(own.aileron), Some(travels.aileron)),
+            (Some(own.elevator), Some(travels.elevator)),
+            // a motor's share of the throttle is no angle
+            (own.rudder.filter(|_| self.rudder_deflects()), travels.rudder),
+        ];
+        for (control, (own, given)) in CONTROLS.into_iter().zip(pairs) {
+            let (Some(own), Some(given)) = (own, given) else { continue };
+            let apart = |a: f64, b: f64| (a - b).abs() > TRAVEL * b.abs();
+            if apart(given.least, own.least) || apart(given.most, own.most) {
+                return Err(MixerError::Travel {
+                    control,
+                    given_least: given.least,
+                    given_most: given.most,
+                    least: own.least,
+                    most: own.most,
+                });
+            }
+        }
+        Ok(self)
+    }
+
+    fn rudder_deflects(&self) -> bool {
+        self.effectors.iter().any(|e| e.gains[2] != 0.0 && e.does != Does::Pulls)
+    }
+}
+
+/// Deflection of control `j` at a command of one: the mean over the surfaces that it moves, over the motors where
+/// it moves motors alone.
+fn unit(effectors: &[Effector], j: usize) -> f64 {
+    if j == 3 {
+        return 1.0;
+    }
+    let of = |motors: bool| -> Vec<f64> {
+        let moved = effectors.iter().filter(|e| e.gains[j] != 0.0);
+        moved
+            .filter(|e| (e.does == Does::Pulls) == motors)
+            .map(|e| e.gains[j].abs() * e.unit())
+            .collect()
+    };
+    let sizes = Some(of(false)).filter(|sizes| !sizes.is_empty()).unwrap_or_else(|| of(true));
+    sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
+}
+
+/// g⁺ by modified Gram–Schmidt: g = Q R, g⁺ = R⁻¹ Qᵀ; a row an effector. A control without gains has zeros.
+fn pseudo_inverse(effectors: &[Effector]) -> Result<Vec<[f64; 4]>, MixerError> {
+    let column = |j: usize| -> Vec<f64> { effectors.iter().map(|e| e.gains[j]).collect() };
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let mut orthogonal: Vec<(usize, Vec<f64>)> = Vec::new();
+    let mut r = [[0.0; 4]; 4];
+    for j in 0..4 {
+        let mut rest = column(j);
+        let whole = dot(&rest, &rest).sqrt();
+        if whole == 0.0 {
+            continue;
+        }
+        for (k, q) in &orthogonal {
+            r[*k][j] = dot(q, &rest);
+            rest.iter_mut().zip(q).for_each(|(x, y)| *x -= r[*k][j] * y);
+        }
+        r[j][j] = dot(&rest, &rest).sqrt();
+        if r[j][j] < DEPENDENT * whole {
+            return Err(singular(effectors, j, &r, orthogonal.iter().map(|(k, _)| *k)));
+        }
+        rest.iter_mut().for_each(|x| *x /= r[j][j]);
+        orthogonal.push((j, rest));
+    }
+    let mut rows = vec![[0.0; 4]; effectors.len()];
+    for (i, row) in rows.iter_mut().enumerate() {
+        // R x = Qᵀ e_i from the last unknown back
+        for (place, (j, q)) in orthogonal.iter().enumerate().rev() {
+            let later: f64 = orthogonal[place + 1..].iter().map(|(k, _)| r[*j][*k] * row[*k]).sum();
+            row[*j] = (q[i] - later) / r[*j][*j];
+        }
+    }
+    Ok(rows)
+}
+
+fn singular(
+    effectors: &[Effector],
+    j: usize,
+    r: &[[f64; 4]; 4],
+    before: impl Iterator<Item = usize>,
+) -> MixerError {
+    let alike: Vec<&str> =
+        before.filter(|k| r[*k][j].abs() > DEPENDENT).map(|k| CONTROLS[k]).collect();
+    let moving = effectors.iter().filter(|e| e.gains[j] != 0.0);
+    MixerError::Singular {
+        control: CONTROLS[j],
+        others: alike.join(" and "),
+        effectors: moving.map(|e| e.name.as_str()).collect::<Vec<_>>().join(", "),
+    }
+}

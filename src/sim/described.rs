@@ -1,0 +1,44 @@
+//! The simulator's aircraft as an airframe file describes it: surfaces, motors and conditions.
+
+use greylag_sitl::plant::{Mixing, Moved, PlantOptions};
+
+use crate::physics::Airframe;
+use crate::physics::mixer::{Does, Effector};
+
+/// Gives `plant` the surfaces, motors and conditions of `airframe`. Surfaces without JSBSim properties are left to the
+/// aircraft's own channels; what the command line holds is kept.
+///
+/// # Errors
+/// If some of the surfaces have a position and some have none, by name.
+pub fn describe(plant: &mut PlantOptions, airframe: &Airframe) -> Result<(), String> {
+    for (name, value) in &airframe.conditions {
+        if plant.held.iter().all(|(held, _)| held != name) {
+            plant.held.push((name.clone(), *value));
+        }
+    }
+    let Some(mixer) = &airframe.mixer else { return Ok(()) };
+    if mixer.effectors().iter().all(|e| e.position.is_none()) {
+        return Ok(());
+    }
+    let moved = mixer.effectors().iter().map(|e| moved(e, plant)).collect::<Result<_, _>>()?;
+    plant.mixing = Some(Mixing::new(moved)?);
+    Ok(())
+}
+
+fn moved(effector: &Effector, plant: &PlantOptions) -> Result<Moved, String> {
+    let Effector { name, does, gains, command, position, .. } = effector;
+    let travel = match does {
+        Does::Deflects(travel) => Some([travel.least, travel.most]),
+        // the motor that a file without [motors] has
+        Does::Pulls if position.is_none() && name == "throttle" => {
+            return Ok(Moved::throttle(&plant.properties));
+        }
+        Does::Pulls => None,
+    };
+    let position = position.clone().ok_or_else(|| {
+        format!(
+            "{name} of the airframe has no position, other surfaces have one: name the JSBSim property that holds it"
+        )
+    })?;
+    Ok(Moved { name: name.clone(), command: command.clone(), position, gains: *gains, travel })
+}
