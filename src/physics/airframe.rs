@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::physics::State;
+use crate::physics::{Sensors, State};
 
 pub use controls::Yaw;
 use controls::{Alike, Each};
@@ -123,6 +123,8 @@ pub struct Airframe {
     pub incidence: Incidence,
     /// Limits to fly within.
     pub envelope: Envelope,
+    /// What is known of its sensors beforehand.
+    pub sensors: Sensors,
 }
 
 /// A number in a parameter file, with where it comes from.
@@ -175,6 +177,8 @@ struct File {
     reference: Option<ReferenceFile>,
     incidence: Option<Incidence>,
     envelope: Envelope,
+    #[serde(default)]
+    sensors: Sensors,
 }
 
 #[derive(Deserialize)]
@@ -272,6 +276,7 @@ impl Airframe {
             reference,
             incidence: file.incidence.unwrap_or(Incidence::DEFAULT).checked()?,
             envelope: file.envelope.checked()?,
+            sensors: file.sensors,
         })
     }
 }

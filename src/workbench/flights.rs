@@ -9,6 +9,7 @@ use super::error::{WorkbenchError, io};
 use super::session::LogEntry;
 use crate::logs::finding::{Finding, Severity};
 use crate::logs::info::Info;
+use crate::logs::phases::Flying;
 use crate::logs::{self, Log};
 use crate::model::GreyBox;
 use crate::sysid::amend::document::sha256;
@@ -54,7 +55,9 @@ impl Loaded {
         reading: &logs::Options,
         model: &GreyBox,
     ) -> Result<Arc<Loaded>, WorkbenchError> {
-        let log = logs::parse(bytes, Path::new(name), reading)?;
+        let flies = Flying::from(model.airframe.envelope.flying_from_mps());
+        let reading = logs::Options { flies, ..reading.clone() };
+        let log = logs::parse(bytes, Path::new(name), &reading)?;
         Loaded::of(&log, name, model)
     }
 
