@@ -97,12 +97,10 @@ def smoothed(values):
 
 
 def windows(case, truth):
-    """Windows of all test flights: place in the regimes, measured, lacking."""
+    """Windows of all flights: place in the regimes, measured, lacking."""
     fly, step = make_cases.truth_of(truth["truth"])
     every, parts = round(STEP / step), []
     for flight in truth["flights"]:
-        if not flight.startswith("test"):
-            continue
         rows, _, _ = make_cases.fly_within_bounds(
             fly, truth["case"], truth["seed"], flight, truth["hidden"], truth["amount"], truth["duration_s"]
         )
@@ -140,8 +138,8 @@ def cells(case, truth, said):
 def counts(found, which):
     """True and false discoveries, misses."""
     known = [x for x in found if x[2] is not None]
-    hits = sum(x[2] and x[which] for x in known)
-    return {"hits": hits, "false": sum(not x[2] and x[which] for x in known), "missed": sum(x[2] and not x[which] for x in known)}
+    pairs = [(bool(x[2]), bool(x[which])) for x in known]
+    return {"hits": pairs.count((True, True)), "false": pairs.count((False, True)), "missed": pairs.count((True, False))}
 
 
 def score(greylag, case):
@@ -150,7 +148,7 @@ def score(greylag, case):
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "comparison.json"
         command = [greylag, "compare", "--model", case / "model.toml", "--json", out]
-        command += ["--log", *sorted(case.glob("test-*.csv"))]
+        command += ["--log", *sorted(case.glob("t*-*.csv"))]
         done = subprocess.run([str(x) for x in command], capture_output=True, text=True)
         if not out.exists():
             sys.exit(f"{case}: {done.stderr[-600:]}")
