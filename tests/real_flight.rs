@@ -51,7 +51,10 @@ fn motion_capture_alone_is_read_fitted_and_judged() {
     let mapping = data.join("mapping.toml").display().to_string();
     let prior = root.join("params/a430/prior.toml").display().to_string();
     let read = ["--mapping", mapping.as_str(), "--model", prior.as_str()];
-    greylag(folder.path(), &[&["logs", "reconstruct", fit[0].as_str(), "path.csv"][..], &read].concat());
+    greylag(
+        folder.path(),
+        &[&["logs", "reconstruct", fit[0].as_str(), "path.csv"][..], &read].concat(),
+    );
     let path = std::fs::read_to_string(folder.path().join("path.csv")).unwrap();
     let header: Vec<&str> = path.lines().next().unwrap().split(',').collect();
     let place = header.iter().position(|c| *c == "az_mps2").unwrap();
