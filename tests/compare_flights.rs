@@ -165,7 +165,7 @@ fn an_uncertain_bias_is_part_of_the_interval() {
         let mut flight = noisy()[0].clone();
         flight.segments[0].instants.iter_mut().for_each(|i| i.state.alpha += by);
         flight.nuisances =
-            vec![Nuisance { name: "alpha_bias".into(), value: 0.0, sd, unit: "rad" }];
+            vec![Nuisance { name: "alpha_bias".into(), value: 0.0, sd, unit: "rad", prior: None }];
         let mut result = one("jsbsim", &[flight]);
         let lift = result.channels.iter_mut().find(|c| c.channel == ChannelId::Lift).unwrap();
         let time = lift.bins.iter_mut().find(|b| b.variable == RegimeVariable::Time).unwrap();

@@ -46,7 +46,8 @@ impl Reading {
     fn options(&self) -> Result<logs::Options, String> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose();
         let tolerance = if self.lenient { Tolerance::Lenient } else { Tolerance::Strict };
-        Ok(logs::Options { tolerance, mapping: mapping.map_err(said)?.unwrap_or_default() })
+        let mapping = mapping.map_err(said)?.unwrap_or_default();
+        Ok(logs::Options { tolerance, mapping, ..logs::Options::default() })
     }
 
     /// A log, refused where wrong units, signs or axes were found.

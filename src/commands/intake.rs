@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::logs::finding::{Finding, Severity};
 use crate::logs::mapping::Mapping;
+use crate::logs::phases::Flying;
 use crate::logs::{self, csv::Tolerance};
 use crate::model::GreyBox;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
@@ -69,7 +70,7 @@ impl Reading {
     /// If the mapping cannot be read.
     pub fn options(&self) -> Result<logs::Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
-        Ok(logs::Options { tolerance: self.tolerance(), mapping })
+        Ok(logs::Options { tolerance: self.tolerance(), mapping, flies: Flying::default() })
     }
 
     /// The same for a workbench.
@@ -95,7 +96,8 @@ impl Reading {
         model: &GreyBox,
         clock: ActuatorClock,
     ) -> Result<Intake> {
-        let mut reading = self.options()?;
+        let flies = Flying::from(model.airframe.envelope.flying_from_mps());
+        let mut reading = logs::Options { flies, ..self.options()? };
         reading.mapping = reading.mapping.with_mixer(model.airframe.mixer.clone());
         let mut intake = Intake::default();
         for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {

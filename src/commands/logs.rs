@@ -11,12 +11,12 @@ use crate::commands::status::IN_DOUBT;
 use crate::logs::finding::Severity;
 use crate::logs::info::Info;
 use crate::logs::mapping::Mapping;
-use crate::logs::phases::Kind;
+use crate::logs::phases::{Flying, Kind};
 use crate::logs::{Flight, Log, Options, csv};
 use crate::model::GreyBox;
 use crate::physics::Airframe;
-use crate::sysid::flight_path;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::flight_path::{self, ActuatorClock};
 
 /// Options of `greylag logs`.
 #[derive(clap::Args)]
@@ -36,6 +36,10 @@ enum Verb {
         /// As JSON: an object, of several logs a list of them.
         #[arg(long)]
         json: bool,
+        /// The model file of the aircraft: its envelope says from which airspeed on it flies. Without it
+        /// that is 7 m/s.
+        #[arg(long)]
+        model: Option<PathBuf>,
         #[command(flatten)]
         reading: Reading,
     },
@@ -45,6 +49,10 @@ enum Verb {
         input: PathBuf,
         /// The table.
         output: PathBuf,
+        /// The model file of the aircraft: its envelope says from which airspeed on it flies. Without it
+        /// that is 7 m/s.
+        #[arg(long)]
+        model: Option<PathBuf>,
         /// Replace the table if it exists.
         #[arg(long)]
         force: bool,
@@ -83,20 +91,26 @@ struct Reading {
 }
 
 impl Reading {
-    fn options(&self) -> Result<Options> {
+    /// The settings of the readers for logs of the aircraft of `model`, if one is named.
+    fn options(&self, model: Option<&GreyBox>) -> Result<Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
         let airframe = self.airframe.as_deref().map(|path| Airframe::load(&files::shipped(path)));
-        let mapping = mapping.with_mixer(airframe.transpose()?.and_then(|airframe| airframe.mixer));
+        let own = airframe.transpose()?.and_then(|airframe| airframe.mixer);
+        let mapping =
+            mapping.with_mixer(own.or_else(|| model.and_then(|m| m.airframe.mixer.clone())));
         let tolerance = if self.lenient { csv::Tolerance::Lenient } else { csv::Tolerance::Strict };
-        Ok(Options { tolerance, mapping })
+        let flies = model.map(|m| Flying::from(m.airframe.envelope.flying_from_mps()));
+        Ok(Options { tolerance, mapping, flies: flies.unwrap_or_default() })
     }
 }
 
 /// Does what the verb says.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.verb {
-        Verb::Info { files, json, reading } => {
-            let options = reading.options()?;
+        Verb::Info { files, json, model, reading } => {
+            let model =
+                model.as_deref().map(|path| GreyBox::load(&files::shipped(path))).transpose()?;
+            let options = reading.options(model.as_ref())?;
             let of = |file: &PathBuf| Ok(Info::of(&crate::logs::inspect(file, &options)?));
             let all = files.iter().map(of).collect::<Result<Vec<Info>>>()?;
             match (json, &all[..]) {
@@ -106,22 +120,19 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             }
             Ok(status(all.iter().map(Info::severity).max()))
         }
-        Verb::Convert { input, output, force, reading } => {
+        Verb::Convert { input, output, model, force, reading } => {
             files::writable(output, (*force).into())?;
-            let log = crate::logs::load(input, &reading.options()?)?;
+            let model =
+                model.as_deref().map(|path| GreyBox::load(&files::shipped(path))).transpose()?;
+            let log = crate::logs::load(input, &reading.options(model.as_ref())?)?;
             convert(&log, output, *force)
         }
         Verb::Reconstruct { input, output, model, force, reading } => {
             files::writable(output, (*force).into())?;
             let model = GreyBox::load(&files::shipped(model))?;
-            let mut options = reading.options()?;
-            options.mapping = options.mapping.with_mixer(model.airframe.mixer.clone());
-            let log = crate::logs::load(input, &options)?;
-            let name = log.flight.name.clone();
-            let options = flight_path::Options {
-                gravity: model.atmosphere.gravity,
-                ..flight_path::Options::new(name, model.airframe.actuators)
-            };
+            let log = crate::logs::load(input, &reading.options(Some(&model))?)?;
+            let options =
+                flight_path::Options::of(&log.flight.name, &model, ActuatorClock::Estimated);
             let flight = flight_path::reconstruct(&log.flight, &options)?;
             csv_file(&flight.to_flight(), output, *force)?;
             print_reconstruction(&flight, output);
@@ -141,7 +152,11 @@ fn print_reconstruction(flight: &Reconstruction, output: &Path) {
     let rows: usize = flight.segments.iter().map(|s| s.instants.len()).sum();
     println!("{rows} reconstructed samples of {} in {}", flight.name, output.display());
     for n in &flight.nuisances {
-        println!("{:<22} {:>11.5} ± {:.5} {}", n.name, n.value, n.sd, n.unit);
+        let moved = n.prior.map(|p| {
+            format!("prior {} ± {:.5}, moved by {:.1} sd of it", p.value, p.sd, n.moved())
+        });
+        let found = format!("{:<22} {:>11.5} ± {:.5} {}", n.name, n.value, n.sd, n.unit);
+        println!("{found:<50} {}", moved.unwrap_or_default());
     }
     flight.notes.iter().for_each(|note| println!("{note}"));
 }

@@ -312,7 +312,7 @@ fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvE
         names.iter().any(|n| n == name)
     };
     let missing = |column, remedy| CsvError::Column { path: path.to_owned(), column, remedy };
-    let alone = NEEDED.into_iter().filter(|column| !has(column));
+    let alone = NEEDED.into_iter().filter(|column| !has(column) && !mapping.makes(column));
     let alone =
         alone.map(|column| missing(column, "add it, in the unit its name ends with".into()));
     let either = EITHER.into_iter().filter(|(command, position)| !has(command) && !has(position));

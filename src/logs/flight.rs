@@ -2,6 +2,7 @@
 
 use crate::logs::columns::{COLUMNS, Get, Place};
 use crate::num::statistics::quantile;
+use crate::physics::Sensors;
 
 /// One row of a flight log. SI units, radians, body axes FRD, earth axes NED; a missing value is NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,6 +114,8 @@ pub struct Flight {
     pub samples: Vec<Sample>,
     /// Where α and β come from.
     pub flow_angles: FlowAngles,
+    /// What is known of its sensors and of the wind.
+    pub sensors: Sensors,
     /// Channels of the file that the format does not name.
     pub unknown_columns: Vec<String>,
     /// What was assumed or derived while reading, one sentence each.

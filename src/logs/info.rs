@@ -6,7 +6,7 @@ use super::columns::COLUMNS;
 use super::finding::{Finding, Severity};
 use super::phases::{self, Kind, Phase};
 use super::rudder::RudderMotion;
-use super::{Channel, Format, Log};
+use super::{Channel, Format, Log, Sample};
 
 /// What `greylag logs info` says of a log.
 #[derive(Clone, Debug, Serialize)]
@@ -62,7 +62,7 @@ impl Info {
         let period = super::topics::period_s(&times);
         let split = phases::split_s(samples);
         let gaps = times.windows(2).filter(|w| w[1] - w[0] > split).map(|w| (w[0], w[1] - w[0]));
-        let phases = phases::phases(samples);
+        let phases = phases::phases(samples, &log.flies);
         let flown = phases.iter().filter(|p| p.kind == Kind::Flight).map(|p| p.to_s - p.from_s);
         Info {
             schema: "greylag.log-info/1",
@@ -129,7 +129,18 @@ fn purposes(log: &Log) -> Vec<Purpose> {
     let join = |a: &[String], b: &[String]| [a, b].concat();
     let incidence = lacking(&["alpha_rad", "beta_rad"]);
     let velocity = lacking(&["vn_mps", "ve_mps", "vd_mps"]);
-    let forces = lacking(&["ax_mps2", "ay_mps2", "az_mps2"]);
+    let mut forces = lacking(&["ax_mps2", "ay_mps2", "az_mps2"]);
+    let dense = |get: fn(&Sample) -> f64| {
+        2 * samples.iter().filter(|s| get(s).is_finite()).count() > samples.len()
+    };
+    let by_path = !forces.is_empty() && dense(|s| s.velocity_ned_mps[0]);
+    if by_path {
+        forces.clear();
+    }
+    let path: Vec<String> = by_path
+        .then(|| "specific force of the reconstructed path".to_owned())
+        .into_iter()
+        .collect();
     let density = if has("air_density_kgpm3") {
         Vec::new()
     } else if has("altitude_m") {
@@ -161,7 +172,7 @@ fn purposes(log: &Log) -> Vec<Purpose> {
         Purpose {
             name: "forces D, Y, L",
             missing: [&states[..], &actuators, &forces].concat(),
-            instead: [&instead[..], &density].concat(),
+            instead: [&instead[..], &path, &density].concat(),
         },
         Purpose { name: "alpha, beta", missing: no_incidence, instead: rebuilt },
     ]

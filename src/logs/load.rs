@@ -8,8 +8,9 @@ use super::csv::{self, CsvError, Tolerance};
 use super::finding::{Finding, Severity};
 use super::format::Format;
 use super::mapping::Mapping;
+use super::phases::Flying;
 use super::topics::{Topics, period_s};
-use super::{Flight, FlowAngles, Sample, dataflash, rows, screening, table, tlog, ulog};
+use super::{Flight, FlowAngles, Sample, dataflash, derive, rows, screening, table, tlog, ulog};
 use crate::logs::columns::COLUMNS;
 
 /// How a log is read.
@@ -19,6 +20,8 @@ pub struct Options {
     pub tolerance: Tolerance,
     /// Where columns come from, where that is not the format's usual place.
     pub mapping: Mapping,
+    /// From when on the aircraft flies.
+    pub flies: Flying,
 }
 
 /// A channel of the file that fills columns of the table.
@@ -53,6 +56,8 @@ pub struct Log {
     pub dropped_rows: Vec<usize>,
     /// What its user should know.
     pub findings: Vec<Finding>,
+    /// From when on the aircraft was taken to fly.
+    pub flies: Flying,
 }
 
 impl Log {
@@ -209,7 +214,9 @@ fn binary(
     to: Use,
 ) -> Result<Log, LogError> {
     let rules = o.mapping.rules(format, &topics);
-    let table = table::build(&topics, &rules);
+    let mut table = table::build(&topics, &rules);
+    table.missing.retain(|missing| !o.mapping.makes(missing.column));
+    table.notes.extend(derive::apply(&mut table.rows, &o.mapping));
     let mut findings = Vec::new();
     for missing in &table.missing {
         let error = missing_column(path, &topics, missing);
@@ -219,7 +226,7 @@ fn binary(
         findings.push(Finding::problem(error.to_string()));
     }
     findings.extend(topics.findings);
-    findings.extend(screening::screen(&table.rows));
+    findings.extend(screening::screen(&table.rows, &o.flies));
     let mut kept = rows::Rows::default();
     let mut looked_at = rows::Rows::default();
     for (i, sample) in table.rows.into_iter().enumerate() {
@@ -252,6 +259,7 @@ fn binary(
                 Format::Dataflash if o.mapping.get("alpha_rad").is_none() => FlowAngles::Estimated,
                 _ => FlowAngles::Measured,
             },
+            sensors: o.mapping.sensors().clone(),
             unknown_columns: Vec::new(),
             notes: table.notes,
         },
@@ -260,6 +268,7 @@ fn binary(
         dropped: kept.dropped,
         dropped_rows: kept.dropped_rows,
         findings,
+        flies: o.flies,
     })
 }
 
@@ -275,7 +284,9 @@ fn text(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Log, Lo
         }
         findings.push(Finding::problem(source.to_string()));
     }
-    findings.extend(screening::screen(&raw.rows));
+    let made = derive::apply(&mut raw.rows, &options.mapping);
+    findings.extend(screening::screen(&raw.rows, &options.flies));
+    findings.extend(made.iter().map(Finding::note));
     let reading = if lacking {
         csv::keep_all(raw, path)
     } else {
@@ -295,26 +306,29 @@ fn text(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Log, Lo
         findings.push(Finding::note(format!("columns that the log format does not name: {names}")));
     }
     findings.extend(dropped(reading.dropped, &reading.dropped_rows));
+    let channels = text_channels(&reading.flight, &options.mapping);
+    let (sensors, notes) = (options.mapping.sensors().clone(), made);
     Ok(Log {
         format: Format::Csv,
-        channels: text_channels(&reading.flight),
+        channels,
         topics: Vec::new(),
-        flight: reading.flight,
+        flight: Flight { sensors, notes, ..reading.flight },
         dropped: reading.dropped,
         dropped_rows: reading.dropped_rows,
         findings,
+        flies: options.flies,
     })
 }
 
 /// The columns of a CSV that hold anything.
-fn text_channels(flight: &Flight) -> Vec<Channel> {
+fn text_channels(flight: &Flight, mapping: &Mapping) -> Vec<Channel> {
     let channel = |(name, get, _): &(&str, fn(&Sample) -> f64, _)| {
         let seen = flight.samples.iter().filter(|s| get(s).is_finite()).map(|s| s.time_s);
         let times: Vec<f64> = seen.collect();
         let period = period_s(&times);
         (!times.is_empty()).then(|| Channel {
             columns: vec![(*name).to_owned()],
-            origin: (*name).to_owned(),
+            origin: mapping.origin(name),
             samples: times.len(),
             rate_hz: if period > 0.0 { 1.0 / period } else { 0.0 },
             largest_gap_s: times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max),

@@ -6,6 +6,7 @@ pub mod csv;
 pub mod finding;
 mod columns;
 mod dataflash;
+mod derive;
 mod flight;
 mod format;
 mod growing;

@@ -4,10 +4,40 @@ use serde::Serialize;
 
 use super::Sample;
 
-/// Airspeed above which an aircraft is taken to fly, m/s.
-pub const FLYING_MPS: f64 = 7.0;
-/// How long it must stay above, s.
-pub const SUSTAINED_S: f64 = 2.0;
+/// From when on an aircraft is taken to fly, and how much of it a study needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flying {
+    /// Airspeed above which it flies, m/s.
+    pub from_mps: f64,
+    /// How long it must stay above, s.
+    pub sustained_s: f64,
+    /// Flight below which a verdict would rest on too little, s.
+    pub shortest_s: f64,
+}
+
+impl Default for Flying {
+    /// For an aircraft that nothing is known of.
+    fn default() -> Flying {
+        Flying { from_mps: 7.0, sustained_s: 2.0, shortest_s: 5.0 }
+    }
+}
+
+impl Flying {
+    /// For an aircraft that flies from an airspeed on, m/s.
+    ///
+    /// The times of its motions go with V/g (Froude's law), so that a slower aircraft needs less time. A
+    /// faster one gets no more than the usual.
+    pub fn from(airspeed: f64) -> Flying {
+        let usual = Flying::default();
+        let share = (airspeed / usual.from_mps).min(1.0);
+        Flying {
+            from_mps: airspeed,
+            sustained_s: share * usual.sustained_s,
+            shortest_s: share * usual.shortest_s,
+        }
+    }
+}
+
 /// A gap that splits the log, s, unless the log is slower than that.
 const GAP_S: f64 = 0.1;
 
@@ -41,9 +71,10 @@ pub fn split_s(rows: &[Sample]) -> f64 {
 }
 
 /// The phases of a log in order.
-pub fn phases(rows: &[Sample]) -> Vec<Phase> {
+pub fn phases(rows: &[Sample], flies: &Flying) -> Vec<Phase> {
     let split = split_s(rows);
-    let flying = |airspeed: f64| if airspeed > FLYING_MPS { Kind::Flight } else { Kind::Ground };
+    let flying =
+        |airspeed: f64| if airspeed > flies.from_mps { Kind::Flight } else { Kind::Ground };
     let mut raw: Vec<Phase> = Vec::new();
     // an airspeed that comes more slowly than the rows holds until the next one
     let mut airspeed = f64::NAN;
@@ -65,7 +96,7 @@ pub fn phases(rows: &[Sample]) -> Vec<Phase> {
     // What is too short takes the kind of what it touches.
     let mut out: Vec<Phase> = Vec::new();
     for mut phase in raw {
-        let short = phase.to_s - phase.from_s < SUSTAINED_S;
+        let short = phase.to_s - phase.from_s < flies.sustained_s;
         match out.last_mut() {
             Some(last)
                 if phase.from_s - last.to_s <= split && (short || last.kind == phase.kind) =>

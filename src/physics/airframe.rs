@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::physics::State;
 use crate::physics::mixer::Mixer;
+use crate::physics::{Sensors, State};
 
 pub use controls::Yaw;
 use controls::{Alike, Each};
@@ -131,6 +131,8 @@ pub struct Airframe {
     pub incidence: Incidence,
     /// Limits to fly within.
     pub envelope: Envelope,
+    /// What is known of its sensors beforehand.
+    pub sensors: Sensors,
 }
 
 /// A number in a parameter file, with where it comes from.
@@ -189,6 +191,8 @@ struct File {
     motors: BTreeMap<String, MotorFile>,
     #[serde(default)]
     conditions: BTreeMap<String, f64>,
+    #[serde(default)]
+    sensors: Sensors,
 }
 
 #[derive(Deserialize)]
@@ -301,6 +305,7 @@ impl Airframe {
             reference,
             incidence: file.incidence.unwrap_or(Incidence::DEFAULT).checked()?,
             envelope: file.envelope.checked()?,
+            sensors: file.sensors,
         })
     }
 }

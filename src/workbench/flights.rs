@@ -9,6 +9,7 @@ use super::error::{WorkbenchError, io};
 use super::session::LogEntry;
 use crate::logs::finding::{Finding, Severity};
 use crate::logs::info::Info;
+use crate::logs::phases::Flying;
 use crate::logs::{self, Log};
 use crate::model::GreyBox;
 use crate::sysid::amend::document::sha256;
@@ -55,10 +56,9 @@ impl Loaded {
         model: &GreyBox,
     ) -> Result<Arc<Loaded>, WorkbenchError> {
         let mixer = model.airframe.mixer.clone();
-        let reading = logs::Options {
-            mapping: reading.mapping.clone().with_mixer(mixer),
-            tolerance: reading.tolerance,
-        };
+        let flies = Flying::from(model.airframe.envelope.flying_from_mps());
+        let mapping = reading.mapping.clone().with_mixer(mixer);
+        let reading = logs::Options { flies, mapping, ..reading.clone() };
         let log = logs::parse(bytes, Path::new(name), &reading)?;
         Loaded::of(&log, name, model)
     }

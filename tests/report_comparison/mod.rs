@@ -56,8 +56,15 @@ fn flight((name, start): (&str, f64), seconds: f64) -> FlightResult {
             list.push(0.1 * (0.7 * t + k as f64).sin());
         }
     }
-    let nuisance =
-        |name: &str, value, sd, unit| NuisanceResult { name: name.into(), value, sd, unit };
+    let nuisance = |name: &str, value, sd, unit| NuisanceResult {
+        name: name.into(),
+        value,
+        sd,
+        unit,
+        prior: Some(0.0),
+        prior_sd: Some(1.0),
+        moved_sd: Some(value),
+    };
     FlightResult {
         name: name.into(),
         step_s: STEP_S,
@@ -241,6 +248,7 @@ fn regime(variable: RegimeVariable, k: usize, channel: usize, scale: f64) -> Reg
             label: if flight { ["flight-a.csv", "flight-b.ulg"][i].into() } else { String::new() },
             mean,
             interval: [mean - half, mean + half],
+            q_value: f64::NAN,
             measured: 10.0 * scale,
             independent: samples as usize,
             supported: samples >= 20,

@@ -39,6 +39,37 @@ model lacks what the aircraft has of its own. Of `lift_stall`: the angle of atta
 `unsteady_lift`: CLalphadot; Cmalphadot is -1/2 of it.
 """
 
+PARAMETERS = {
+    "drag_alpha2": {"CDalpha2": 1.0},
+    "drag_beta2": {"CDbeta2": 1.0},
+    "drag_elevator_abs": {"CDde": 1.0},
+    "lift_stall": {"alpha0_rad": 1.0},
+    "pitch_break": {"Cmalpha3": 1.0},
+    "cg_shift": {"x_m": 1.0},
+    "unsteady_lift": {"CLalphadot": 1.0, "Cmalphadot": -0.5},
+    "thrust_decay": {"k": 1.0},
+    "thrust_line_offset": {"z_m": 1.0},
+    "motor_torque": {"k_nm": 1.0},
+    "propeller_gyro": {"h_nms": 1.0},
+    "propwash": {"k": 1.0},
+    "aeroelastic_loss": {"k": 1.0},
+    "actuator_lag": {"tau_s": 1.0},
+    "time_delay": {"delay_s": 1.0},
+    "dead_zone": {"halfwidth_rad": 1.0},
+    "backlash": {"width_rad": 1.0},
+    "rate_limit": {"rate_radps": 1.0},
+    "inertia_xz": {"dJxz_kgm2": 1.0},
+    "asymmetry": {"Cl0": 1.0, "Cn0": 1.0, "CY0": 1.0},
+    "dihedral_alpha": {"Clalphabeta": 1.0},
+    "roll_control_alpha": {"Clalphada": 1.0, "Cnalphada": 0.0},
+    "effectiveness_saturation": {"k_perrad2": 1.0},
+}
+"""The parameters in which the catalogue has a hidden effect, each as a multiple of the amplitude.
+
+`mass_error` and `thrust_scale` are left out: their true value depends on the coefficients of the model, which are
+wrong themselves. Of `lift_stall` only `alpha0_rad` is compared, and of `official` its table has no such formula.
+"""
+
 INPUTS = ("actuator_lag", "time_delay", "dead_zone", "backlash", "rate_limit")
 """Effects on what the surfaces do with their measured position."""
 

@@ -1,15 +1,19 @@
 """Puts cases of make_cases.py to `greylag diagnose` and counts what it finds.
 
     python tests/truth/score.py --greylag target/release/greylag --cases cases --jobs 2 --jsonl results.jsonl
+    python tests/truth/score.py --table results/second-truth.jsonl
 """
 
 import argparse
 import json
+import math
 import subprocess
 import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+from hidden import PARAMETERS
 
 
 def diagnose(greylag, case, nulls):
@@ -64,11 +68,11 @@ def wrong(r):
 def table(records):
     """The counts by truth, as Markdown."""
     rows = [
-        "| truth | effects | truth first | asserted right | cases with a wrong assertion | nulls | nulls with an assertion | nulls called adequate | failed |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| truth | rate, Hz | effects | truth first | asserted right | cases with a wrong assertion | nulls | nulls with an assertion | nulls called adequate | failed |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
-    for kind in sorted({r["truth"] for r in records}):
-        of = [r for r in records if r["truth"] == kind]
+    for kind, rate in sorted({(r["truth"], r["sensors"]["rate"]) for r in records}):
+        of = [r for r in records if (r["truth"], r["sensors"]["rate"]) == (kind, rate)]
         effects, nulls = [r for r in of if r["hidden"]], [r for r in of if not r["hidden"]]
         counts = (
             len(effects),
@@ -80,8 +84,42 @@ def table(records):
             sum(r["verdict"] == "adequate" for r in nulls),
             sum(r["verdict"] == "failed" for r in of),
         )
-        rows.append(f"| {kind} | " + " | ".join(map(str, counts)) + " |")
+        rows.append(f"| {kind} | {rate:g} | " + " | ".join(map(str, counts)) + " |")
     return "\n".join(rows)
+
+
+def intervals(records):
+    """Every parameter of an effect that was asserted rightly: case, name, truth, value, interval."""
+    for r in records:
+        if not r["hidden"] or r["hidden"] not in r["asserted"]:
+            continue
+        if r["hidden"] == "lift_stall" and r["truth"] != "continuous":
+            continue
+        for name, factor in PARAMETERS.get(r["hidden"], {}).items():
+            if name in r["values"][r["hidden"]]:
+                yield r, name, factor * r["amount"], r["values"][r["hidden"]][name]
+
+
+def coverage(records):
+    """How many 95 % intervals of rightly asserted effects hold the truth, as Markdown."""
+    rows = ["| truth | rate, Hz | intervals | hold the truth | share, % | 95 % interval of the share, % | outside, relative error |", "|---|---|---|---|---|---|---|"]
+    all_of = list(intervals(records))
+    for kind, rate in sorted({(r["truth"], r["sensors"]["rate"]) for r, *_ in all_of}):
+        of = [x for x in all_of if (x[0]["truth"], x[0]["sensors"]["rate"]) == (kind, rate)]
+        outside = [x for x in of if not x[3][1] <= x[2] <= x[3][2]]
+        held, n = len(of) - len(outside), len(of)
+        low, high = wilson(held, n)
+        named = (f"{r['hidden']}.{name} {100 * abs(got[0] / true - 1):.1f} %" if true else f"{r['hidden']}.{name}" for r, name, true, got in outside)
+        rows.append(f"| {kind} | {rate:g} | {n} | {held} | {100 * held / n:.0f} | {100 * low:.0f} to {100 * high:.0f} | {', '.join(named) or 'none'} |")
+    return "\n".join(rows)
+
+
+def wilson(held, n, z=1.96):
+    """Wilson's interval of a share (Wilson 1927)."""
+    share, weight = held / n, 1.0 + z * z / n
+    half = z * math.sqrt(share * (1.0 - share) / n + z * z / (4.0 * n * n)) / weight
+    middle = (share + z * z / (2.0 * n)) / weight
+    return middle - half, middle + half
 
 
 def answered(path, greylag):
@@ -113,21 +151,28 @@ def score(cases, a):
 def main():
     """Scores the cases of the command line."""
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument("--greylag", required=True, help="the program")
-    p.add_argument("--cases", type=Path, nargs="+", required=True, help="cases, or folders of cases")
+    p.add_argument("--greylag", help="the program")
+    p.add_argument("--cases", type=Path, nargs="+", default=[], help="cases, or folders of cases")
+    p.add_argument("--table", type=Path, help="only print the tables of the records in this file")
     p.add_argument("--jobs", type=int, default=2)
     p.add_argument("--nulls", type=int, help="simulated nulls of each diagnosis; the program's default without")
     p.add_argument("--jsonl", type=Path, help="append a record a case to this file")
     p.add_argument("--resume", action="store_true", help="keep what the JSONL file has of the same program and case")
     p.add_argument("--strict", action="store_true", help="exit with 1 if anything wrong is asserted or a case fails")
     a = p.parse_args()
+    if a.table:
+        records = [json.loads(text) for text in a.table.read_text().splitlines()]
+        print(table(records) + "\n\n" + coverage(records))
+        return
+    if not a.greylag:
+        p.error("name the program with --greylag, or a file of records with --table")
     cases = [case.parent for folder in a.cases for case in folder.rglob("truth.json")]
     # nulls first: a false alarm shows soonest
     cases.sort(key=lambda case: ("-null-" not in case.name, case.name.removeprefix("official-adams").split("-", 1)[1], case))
     if not cases:
         sys.exit("no cases there; make some with make_cases.py")
     records = score(cases, a)
-    print("\n" + table(records))
+    print("\n" + table(records) + "\n\n" + coverage(records))
     if a.strict and any(wrong(r) or r["verdict"] == "failed" for r in records):
         sys.exit(1)
 

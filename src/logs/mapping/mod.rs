@@ -11,7 +11,9 @@
 //! ```
 //!
 //! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash)
-//! or system/component (telemetry log).
+//! or system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field, by a
+//! parabola through so many seconds of rows. `[derive] body_rates_over_s` makes p, q, r from roll, pitch and
+//! yaw in the same way. `[sensors]` says what is known of sensors and wind, see [`Sensors`].
 
 mod ardupilot;
 mod telemetry;
@@ -25,8 +27,10 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::columns::index;
+use super::derive;
 use super::format::Format;
 use super::topics::Topics;
+use crate::physics::Sensors;
 use crate::physics::mixer::Mixer;
 use rule::Rule;
 
@@ -67,12 +71,20 @@ pub struct Entry {
     pub offset: f64,
     /// The topic's instance; the first one if none is named.
     pub instance: Option<u16>,
+    /// The column is the rate of change of the field, over so many s of rows.
+    pub rate_over_s: Option<f64>,
 }
 
-/// A user's mapping, by column, with the mixer of the aircraft.
+/// A user's mapping, with the mixer of the aircraft.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mapping {
+    /// Sources by column.
     entries: BTreeMap<String, Entry>,
+    /// Time over which body rates are made from the attitude, s.
+    body_rates_over_s: Option<f64>,
+    /// What is known of sensors and wind.
+    sensors: Sensors,
+    /// The mixer of the aircraft.
     mixer: Option<Mixer>,
 }
 
@@ -80,7 +92,18 @@ pub struct Mapping {
 #[serde(deny_unknown_fields)]
 struct Written {
     schema: u32,
+    #[serde(default)]
     columns: BTreeMap<String, WrittenEntry>,
+    #[serde(default)]
+    derive: Derive,
+    #[serde(default)]
+    sensors: Sensors,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct Derive {
+    body_rates_over_s: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -92,6 +115,7 @@ struct WrittenEntry {
     #[serde(default)]
     offset: f64,
     instance: Option<Instance>,
+    rate_over_s: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -128,34 +152,53 @@ impl Mapping {
         }
         let mut entries = BTreeMap::new();
         for (column, e) in written.columns {
-            if index(&column).is_none() {
-                return Err(wrong(format!(
-                    "`{column}` is no column of the log format; use one of its names, such as airspeed_mps"
-                )));
-            }
-            let Some((topic, field)) = e.from.split_once('.') else {
-                return Err(wrong(format!(
-                    "column `{column}`: from = \"{}\" is not \"topic.field\"",
-                    e.from
-                )));
-            };
-            if !e.scale.is_finite() || !e.offset.is_finite() {
-                return Err(wrong(format!("column `{column}`: scale and offset must be finite")));
-            }
-            let instance = match e.instance {
-                None => None,
-                Some(Instance::Number(n)) => Some(n),
-                Some(Instance::Source(text)) => Some(source(&text).ok_or_else(|| {
-                    wrong(format!(
-                        "column `{column}`: instance \"{text}\" is not \"system/component\""
-                    ))
-                })?),
-            };
-            let (topic, field) = (topic.to_owned(), field.to_owned());
-            entries
-                .insert(column, Entry { topic, field, scale: e.scale, offset: e.offset, instance });
+            let entry = entry(&column, e).map_err(wrong)?;
+            entries.insert(column, entry);
         }
-        Ok(Mapping { entries, mixer: None })
+        let body_rates_over_s = written.derive.body_rates_over_s;
+        over("derive.body_rates_over_s", body_rates_over_s).map_err(wrong)?;
+        let mut sensors = written.sensors;
+        if body_rates_over_s.is_some() {
+            // what is made from the attitude has no bias against it
+            ["gyro_bias_p", "gyro_bias_q", "gyro_bias_r"]
+                .into_iter()
+                .for_each(|name| sensors.hold(name, 0.0));
+        }
+        Ok(Mapping { entries, body_rates_over_s, sensors, mixer: None })
+    }
+
+    /// What is known of sensors and wind.
+    pub fn sensors(&self) -> &Sensors {
+        &self.sensors
+    }
+
+    /// Time over which body rates are made from the attitude, s.
+    pub(super) fn body_rates_over_s(&self) -> Option<f64> {
+        self.body_rates_over_s
+    }
+
+    /// The columns that are rates of change, each with the time over which it is taken, s.
+    pub(super) fn slopes(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.entries.iter().filter_map(|(column, e)| Some((column.as_str(), e.rate_over_s?)))
+    }
+
+    /// What a column of a CSV table is read from or made of.
+    pub(super) fn origin(&self, column: &str) -> String {
+        match self.get(column) {
+            Some(e) if e.rate_over_s.is_some() => format!("rate of {}", e.field),
+            Some(e) => e.field.clone(),
+            None if self.makes(column) && derive::RATES.contains(&column) => "attitude".into(),
+            None if self.makes(column) && self.get("vn_mps").is_some() => "velocity, wind".into(),
+            None => column.to_owned(),
+        }
+    }
+
+    /// Whether a column that a log lacks is made from others.
+    pub(super) fn makes(&self, column: &str) -> bool {
+        match column {
+            derive::AIRSPEED => self.sensors.wind().is_some() && self.get(column).is_none(),
+            _ => self.body_rates_over_s.is_some() && derive::RATES.contains(&column),
+        }
     }
 
     /// The same for an aircraft whose surfaces and motors the log names.
@@ -211,6 +254,46 @@ impl Mapping {
             Format::Tlog => &telemetry::TOPICS,
         };
         own.contains(&topic) || self.uses(topic)
+    }
+}
+
+fn entry(column: &str, e: WrittenEntry) -> Result<Entry, String> {
+    if index(column).is_none() {
+        return Err(format!(
+            "`{column}` is no column of the log format; use one of its names, such as airspeed_mps"
+        ));
+    }
+    let Some((topic, field)) = e.from.split_once('.') else {
+        return Err(format!("column `{column}`: from = \"{}\" is not \"topic.field\"", e.from));
+    };
+    if !e.scale.is_finite() || !e.offset.is_finite() {
+        return Err(format!("column `{column}`: scale and offset must be finite"));
+    }
+    over(&format!("column `{column}`: rate_over_s"), e.rate_over_s)?;
+    let instance = match e.instance {
+        None => None,
+        Some(Instance::Number(n)) => Some(n),
+        Some(Instance::Source(text)) => Some(source(&text).ok_or_else(|| {
+            format!("column `{column}`: instance \"{text}\" is not \"system/component\"")
+        })?),
+    };
+    Ok(Entry {
+        topic: topic.to_owned(),
+        field: field.to_owned(),
+        scale: e.scale,
+        offset: e.offset,
+        instance,
+        rate_over_s: e.rate_over_s,
+    })
+}
+
+/// Refuses a time over which no rate can be taken.
+fn over(what: &str, time: Option<f64>) -> Result<(), String> {
+    match time {
+        Some(x) if !(x > 0.0 && x <= 10.0) => {
+            Err(format!("{what} = {x} must lie above 0 and up to 10 s, and hold at least 5 rows"))
+        }
+        _ => Ok(()),
     }
 }
 

@@ -15,15 +15,13 @@ mod surfaces;
 
 use super::Sample;
 use super::finding::{Cure, Finding};
-use super::phases::{self, Kind};
+use super::phases::{self, Flying, Kind};
 
 /// Rows below which nothing is said about units.
 const ENOUGH: usize = 50;
-/// Flight below which a verdict would rest on too little, s.
-const SHORTEST_FLIGHT_S: f64 = 5.0;
 
-/// Everything found in the rows as they stand in the file.
-pub fn screen(rows: &[Sample]) -> Vec<Finding> {
+/// Everything found in the rows of an aircraft that is known to fly as `flies` says.
+pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     if rows.is_empty() {
         return vec![Finding::problem("the log has no rows with all needed channels")];
     }
@@ -37,30 +35,30 @@ pub fn screen(rows: &[Sample]) -> Vec<Finding> {
             out.extend(force::check(rows));
             let axes_are_right = out.is_empty();
             out.extend(air::check(rows));
-            out.extend(surfaces::check(rows, axes_are_right));
+            out.extend(surfaces::check(rows, axes_are_right, flies));
         }
         out.extend(dead::check(rows));
     }
-    out.extend(flight(rows));
+    out.extend(flight(rows, flies));
     out
 }
 
 /// Whether there is a flight, and one that is long enough.
-fn flight(rows: &[Sample]) -> Option<Finding> {
+fn flight(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let flights: Vec<_> =
-        phases::phases(rows).into_iter().filter(|p| p.kind == Kind::Flight).collect();
+        phases::phases(rows, flies).into_iter().filter(|p| p.kind == Kind::Flight).collect();
     if flights.is_empty() {
         let fastest = relation::values(rows, |s| s.airspeed_mps).into_iter().fold(0.0, f64::max);
         return Some(Finding::problem(format!(
-            "there is no flight in this log: airspeed never stays above {} m/s for {} s (largest value {fastest:.1} m/s); give a log with a flight, or check the airspeed channel",
-            phases::FLYING_MPS,
-            phases::SUSTAINED_S
+            "there is no flight in this log: airspeed never stays above {:.3} m/s for {:.1} s (largest value {fastest:.1} m/s); give a log with a flight, check the airspeed channel, or name the aircraft's model, whose envelope says from when on it flies",
+            flies.from_mps, flies.sustained_s
         )));
     }
     let flown: f64 = flights.iter().map(|p| p.to_s - p.from_s).sum();
-    (rows.len() >= ENOUGH && flown < SHORTEST_FLIGHT_S).then(|| {
+    (rows.len() >= ENOUGH && flown < flies.shortest_s).then(|| {
         Finding::problem(format!(
-            "the log holds {flown:.1} s of flight: a verdict needs at least {SHORTEST_FLIGHT_S} s, an effect about a minute; give a longer log"
+            "the log holds {flown:.1} s of flight: a verdict needs at least {:.1} s, an effect about a minute; give a longer log",
+            flies.shortest_s
         ))
     })
 }

@@ -4,6 +4,7 @@ use super::cured;
 use super::relation::{change, mean, partial_correlation, quantile, values, windows};
 use crate::logs::Sample;
 use crate::logs::finding::Finding;
+use crate::logs::phases::Flying;
 
 /// Deflection beyond which no surface is for a hundredth of the time, rad (69°).
 const DEFLECTION_LARGE: f64 = 1.2;
@@ -18,11 +19,11 @@ const TURNED: f64 = 0.6;
 type Get = fn(&Sample) -> f64;
 
 /// Units, then polarity where the units and the axes are right.
-pub fn check(rows: &[Sample], axes_are_right: bool) -> Vec<Finding> {
+pub fn check(rows: &[Sample], axes_are_right: bool, flies: &Flying) -> Vec<Finding> {
     let mut out: Vec<Finding> = units(rows);
     if out.is_empty() && axes_are_right {
-        out.extend(aileron(rows));
-        out.extend(elevator(rows));
+        out.extend(aileron(rows, flies));
+        out.extend(elevator(rows, flies));
     }
     out
 }
@@ -77,7 +78,7 @@ fn throttle(column: &str, size: f64) -> Finding {
 }
 
 /// ṗ on p, r, β and the aileron: positive is right wing down.
-fn aileron(rows: &[Sample]) -> Option<Finding> {
+fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let (column, get) =
         moving(rows, [("aileron_rad", |s| s.aileron_rad), ("aileron_cmd", |s| s.aileron_cmd)])?;
     let beta = has(rows, |s| s.beta_rad);
@@ -87,14 +88,14 @@ fn aileron(rows: &[Sample]) -> Option<Finding> {
         all.push(mean(w, get));
         all
     };
-    let found = polarity(rows, 0, regressors)?;
+    let found = polarity(rows, flies, 0, regressors)?;
     (found < -TURNED).then(|| {
         cured(format!("{column} acts the other way: the aircraft rolls left where it is positive, while the log format's is positive for right wing down"), column, -1.0)
     })
 }
 
 /// q̇ on q, α (or the normal force in its place) and the elevator: positive is nose down.
-fn elevator(rows: &[Sample]) -> Option<Finding> {
+fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let (column, get) =
         moving(rows, [("elevator_rad", |s| s.elevator_rad), ("elevator_cmd", |s| s.elevator_cmd)])?;
     let alpha: Get = match has(rows, |s| s.alpha_rad) {
@@ -103,7 +104,7 @@ fn elevator(rows: &[Sample]) -> Option<Finding> {
     };
     let regressors =
         |w: &[Sample]| vec![mean(w, |s| s.rates_radps[1]), mean(w, alpha), mean(w, get)];
-    let found = polarity(rows, 1, regressors)?;
+    let found = polarity(rows, flies, 1, regressors)?;
     (found > TURNED).then(|| {
         cured(format!("{column} acts the other way: the nose rises where it is positive, while the log format's is positive for nose down"), column, -1.0)
     })
@@ -125,12 +126,13 @@ fn moving(rows: &[Sample], columns: [(&'static str, Get); 2]) -> Option<(&'stati
 /// The partial correlation of the angular acceleration about `axis` with the last regressor.
 fn polarity(
     rows: &[Sample],
+    flies: &Flying,
     axis: usize,
     regressors: impl Fn(&[Sample]) -> Vec<f64>,
 ) -> Option<f64> {
     let equations: Vec<(Vec<f64>, f64)> = windows(rows, WINDOW_S)
         .into_iter()
-        .filter(|w| w.iter().all(|s| s.airspeed_mps > crate::logs::phases::FLYING_MPS))
+        .filter(|w| w.iter().all(|s| s.airspeed_mps > flies.from_mps))
         .map(|w| {
             let time = w[w.len() - 1].time_s - w[0].time_s;
             (regressors(w), change(w, |s| s.rates_radps[axis]) / time)

@@ -125,6 +125,7 @@ pub(in crate::report) fn nuisances(c: &Comparison) -> Section {
             ("Value", Align::Right),
             ("95 % interval", Align::Right),
             ("Unit", Align::Left),
+            ("Moved from its prior, sd", Align::Right),
         ],
     );
     for flight in &c.flights {
@@ -153,6 +154,7 @@ fn nuisance_row(flight: &str, n: &NuisanceResult) -> Vec<String> {
         number(value),
         interval(value - half, value + half),
         unit.to_string(),
+        n.moved_sd.map_or_else(String::new, |x| format!("{x:.1}")),
     ]
 }
 

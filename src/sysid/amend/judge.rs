@@ -85,8 +85,9 @@ impl Judge<'_> {
             && (a.is_nan() || a >= (1.0 - IMPROVED) * b)
         {
             effect.refused.push(format!(
-                "free runs of {JUDGED_AT_S} s on flights that the fit did not see come no closer \
+                "free runs of {} s on flights that the fit did not see come no closer \
                  ({b:.5} without it, {a:.5} with it){}",
+                judged_at(before).unwrap_or(JUDGED_AT_S),
                 said_by_the_model(&added.id, &fit.parameters)
             ));
         }
@@ -112,8 +113,17 @@ fn failed(why: &AmendError) -> bool {
 
 /// The error at the horizon of judgement, if any run gets there.
 pub fn judged(scores: &[HorizonScore]) -> Option<f64> {
+    judge_of(scores).map(|s| s.rmse_scaled)
+}
+
+/// The horizon of judgement, s: the longest up to [`JUDGED_AT_S`] that a run reaches.
+pub fn judged_at(scores: &[HorizonScore]) -> Option<f64> {
+    judge_of(scores).map(|s| s.horizon_s)
+}
+
+fn judge_of(scores: &[HorizonScore]) -> Option<&HorizonScore> {
     let reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= JUDGED_AT_S + 1e-9);
-    reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s)).map(|s| s.rmse_scaled)
+    reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))
 }
 
 /// Whether the error falls from `before` to `after` by more than is nothing.

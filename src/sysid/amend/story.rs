@@ -1,7 +1,7 @@
 //! An amendment in sentences.
 
 use super::conventions::Tried;
-use super::judge::{JUDGED_AT_S, judged};
+use super::judge::{judged, judged_at};
 use super::result::Amendment;
 
 /// The amendment in words: what became of the error, of the conventions, and of every effect.
@@ -14,8 +14,9 @@ pub fn sentences(story: &Amendment) -> Vec<String> {
     if let (Some(given), Some(before), Some(after)) = (given, before, after) {
         all.push(format!(
             "On flights that the fit did not see, {} once the coefficients are tuned ({given:.5} to \
-             {before:.5} of the reference scale, free runs of {JUDGED_AT_S} s).",
-            change(given, before)
+             {before:.5} of the reference scale, free runs of {} s).",
+            change(given, before),
+            judged_at(&story.given).unwrap_or_default()
         ));
         if !kept.is_empty() {
             let joined = kept.iter().map(|id| (*id).to_owned());

@@ -161,6 +161,7 @@ fn statistics(members: &[&Residual], seed: u64, path: &[u64]) -> Bin {
         label: String::new(),
         mean,
         interval,
+        q_value: f64::NAN,
         measured: members.iter().map(|r| r.measured).sum::<f64>() / members.len() as f64,
         independent,
         supported: independent >= SUPPORT,

@@ -1,6 +1,7 @@
 //! The worst regime of a channel: the variable that tells it apart, with the range that fails.
 
 use super::bins::{self, Residual, SUPPORT};
+use super::discovery;
 use super::result::{Bin, Regime, RegimeBins};
 use crate::sysid::weak_form::channels::RegimeVariable;
 use crate::sysid::weak_form::prepared::Prepared;
@@ -100,7 +101,7 @@ fn is_constant(residuals: &[Residual], decisive: &RegimeBins) -> bool {
 fn range(bins: &[Bin]) -> Option<(usize, usize)> {
     let sure = |b: &Bin| b.interval[0].abs().min(b.interval[1].abs());
     let peak = (0..bins.len())
-        .filter(|&k| bins[k].supported && excludes_zero(bins[k].interval))
+        .filter(|&k| discovery::found(&bins[k]))
         .max_by(|&a, &b| sure(&bins[a]).total_cmp(&sure(&bins[b])))?;
     let worst = bins[peak].mean;
     // thin neighbours may join: together with the worst bin they are supported
@@ -159,7 +160,7 @@ fn trend(bins: &[Bin]) -> Trend {
     }
     let signed = correlation(&known, |b| b.mean);
     let size = correlation(&known, |b| b.mean.abs());
-    let significant = || known.iter().filter(|b| excludes_zero(b.interval));
+    let significant = || known.iter().filter(|b| discovery::found(b));
     let reverses = significant().any(|b| b.mean > 0.0) && significant().any(|b| b.mean < 0.0);
     if reverses && signed.abs() > 0.9 && size.abs() < 0.9 {
         Trend::Reverses

@@ -12,6 +12,9 @@ pub fn result(flight: &Prepared, from: &Reconstruction) -> FlightResult {
         value: n.value,
         sd: n.sd,
         unit: n.unit,
+        prior: n.prior.map(|p| p.value),
+        prior_sd: n.prior.map(|p| p.sd),
+        moved_sd: n.prior.map(|_| n.moved()),
     };
     FlightResult {
         name: flight.name.clone(),

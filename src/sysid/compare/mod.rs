@@ -6,6 +6,7 @@
 
 mod bins;
 pub mod bootstrap;
+mod discovery;
 mod doubt;
 mod error;
 mod finding;

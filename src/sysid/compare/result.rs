@@ -220,6 +220,10 @@ pub struct Bin {
     /// 95 % interval of the mean: block bootstrap, widened by the uncertainty of the sensor errors that
     /// the reconstruction took out.
     pub interval: [f64; 2],
+    /// Expected share of false ones among the cells of the model that are at least as sure as this one, 0..1
+    /// (Benjamini and Hochberg); NaN if it is not supported. A cell up to 0.05 is one in which the model
+    /// fails.
+    pub q_value: f64,
     /// Mean of the measured channel, in its unit.
     pub measured: f64,
     /// Number of independent samples: kernel lengths that the windows cover.
@@ -309,6 +313,15 @@ pub struct NuisanceResult {
     pub sd: f64,
     /// The unit.
     pub unit: &'static str,
+    /// Its value before the flight; absent if it was not estimated along with the path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<f64>,
+    /// Its standard deviation before the flight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior_sd: Option<f64>,
+    /// How far it moved, in standard deviations of its prior.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moved_sd: Option<f64>,
 }
 
 /// A flight over time. All lists have one length; a row of NaN stands between segments.

@@ -5,12 +5,15 @@ use rayon::prelude::*;
 use super::CompareError;
 use super::bins::{self, Residual, SUPPORT};
 use super::bootstrap::{BLOCK_S, RESAMPLES};
+use super::discovery;
 use super::doubt::{self, Shift};
 use super::finding;
 use super::flight;
 use super::forecast::forecasts;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
-use super::result::{ChannelResult, ChannelTrace, Comparison, ModelResult, ModelTrace, Settings};
+use super::result::{
+    ChannelResult, ChannelTrace, Comparison, ModelResult, ModelTrace, RegimeBins, Settings,
+};
 use super::sentence::{Subject, sentence};
 use super::verdict;
 use crate::model::GreyBox;
@@ -173,11 +176,7 @@ fn one_model(
         .map(|(flight, from)| doubt::shifts(model, flight, &from.nuisances))
         .collect();
     let seen = Seen { flights, series: &series, shifts: &shifts };
-    let channels: Vec<ChannelResult> = ChannelId::ALL
-        .par_iter()
-        .enumerate()
-        .filter_map(|(k, id)| channel(model, *id, k as u64, &seen, options.seed))
-        .collect();
+    let channels = all_channels(model, &seen, options.seed);
     let traces = paths.into_iter().zip(flights).zip(&series);
     let free_run: Vec<_> = options.horizons_s.iter().map(|h| runs.score(*h)).collect();
     let sentences = verdict::sentences(&free_run, &channels);
@@ -203,20 +202,35 @@ struct Seen<'a> {
     shifts: &'a [Vec<[Shift; ChannelId::ALL.len()]>],
 }
 
+/// The channels that the flights have.
+fn all_channels(model: &GreyBox, seen: &Seen, seed: u64) -> Vec<ChannelResult> {
+    let Seen { flights, series, shifts } = *seen;
+    let cut = |(k, id): (usize, &ChannelId)| {
+        let residuals = bins::residuals(*id, flights, series, shifts);
+        let some = !residuals.is_empty();
+        some.then(|| (k, bins::all(&residuals, flights, seed, k as u64), residuals))
+    };
+    let cut: Vec<_> = ChannelId::ALL.par_iter().enumerate().filter_map(cut).collect();
+    let (places, rest): (Vec<usize>, Vec<_>) = cut.into_iter().map(|(k, b, r)| (k, (b, r))).unzip();
+    let (mut bins, residuals): (Vec<Vec<RegimeBins>>, Vec<Vec<Residual>>) =
+        rest.into_iter().unzip();
+    discovery::control(&mut bins);
+    let all: Vec<_> = places.into_iter().zip(bins).zip(residuals).collect();
+    all.into_par_iter()
+        .map(|((k, bins), residuals)| channel(model, k, (bins, &residuals), seen, seed))
+        .collect()
+}
+
 fn channel(
     model: &GreyBox,
-    id: ChannelId,
-    number: u64,
-    &Seen { flights, series, shifts }: &Seen,
+    place: usize,
+    (bins, residuals): (Vec<RegimeBins>, &[Residual]),
+    &Seen { flights, series, .. }: &Seen,
     seed: u64,
-) -> Option<ChannelResult> {
-    let residuals = bins::residuals(id, flights, series, shifts);
-    if residuals.is_empty() {
-        return None;
-    }
-    let power = Power::of(&residuals, noise(id, series));
-    let bins = bins::all(&residuals, flights, seed, number);
-    let found = finding::worst(&residuals, &bins, flights, seed, number);
+) -> ChannelResult {
+    let (id, number) = (ChannelId::ALL[place], place as u64);
+    let power = Power::of(residuals, noise(id, series));
+    let found = finding::worst(residuals, &bins, flights, seed, number);
     let worst_regime = sentence(&Subject {
         channel: id,
         unexplained: power.unexplained(),
@@ -227,7 +241,7 @@ fn channel(
         mass: model.body.mass,
         flights: flights.len(),
     });
-    Some(ChannelResult {
+    ChannelResult {
         channel: id,
         name: id.name(),
         unit: id.unit(),
@@ -241,8 +255,8 @@ fn channel(
         worst_regime,
         regime: found.map(|f| f.regime),
         bins,
-        map: bins::map(&residuals),
-    })
+        map: bins::map(residuals),
+    }
 }
 
 /// What one unit of a channel does to the state it drives: scaled error a second, 1/s.

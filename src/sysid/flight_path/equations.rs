@@ -96,7 +96,8 @@ impl Problem<'_> {
     fn misfit_of(&self, track: &Track, path: &Path, found: &Found, bound: f64) -> f64 {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let (values, l) = (&found.values, &found.levels);
-        let readings = measurement::readings(track, path, values, step);
+        let readings =
+            measurement::readings(track, path, values, step, self.log.sensors.vanes_at());
         let drive = Drive::new(track, values, step, self.sampling, gravity);
         let spread: [f64; CHANNELS] = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
         let sd = step_deviations::<MOTION>(l, step);
@@ -190,7 +191,8 @@ impl Problem<'_> {
         let mut unit = || -> f64 { StandardNormal.sample(random) };
         let noise: Vec<[f64; N]> =
             (0..path.len()).map(|_| std::array::from_fn(|_| unit())).collect();
-        let measured = measurement::readings(track, path, values, step);
+        let measured =
+            measurement::readings(track, path, values, step, self.log.sensors.vanes_at());
         let readings: Vec<Reading> = measured
             .into_iter()
             .map(|r| r.with(std::array::from_fn(|i| l.measured[i] * unit())))
@@ -289,7 +291,8 @@ impl Problem<'_> {
     ) -> Option<(Stretch<N, W>, Vec<Reading>, Left<W>)> {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let (values, l) = (&found.values, &found.levels);
-        let readings = measurement::readings(track, path, values, step);
+        let readings =
+            measurement::readings(track, path, values, step, self.log.sensors.vanes_at());
         let drive = Drive::new(track, values, step, self.sampling, gravity);
         let spread = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
         let sd = step_deviations::<N>(l, step);

@@ -5,8 +5,9 @@ use crate::logs::{Flight, FlowAngles, Sample};
 use crate::num::statistics::quantile;
 use crate::physics::actuators::Actuators;
 use crate::physics::atmosphere::{Atmosphere, Density};
-use crate::physics::{Command, Controls};
+use crate::physics::{Command, Controls, Sensors};
 use crate::sysid::flight_path::channel::{Channel, Kind, wrap};
+use crate::sysid::flight_path::lever_arm;
 use crate::sysid::flight_path::{Options, ReconstructError};
 
 /// Fewest samples of a sensor in a segment that are worth using.
@@ -28,18 +29,20 @@ pub struct Log {
     /// The stretches without gaps.
     pub tracks: Vec<Track>,
     /// Which sensors the log has.
-    pub has: Sensors,
+    pub has: Present,
     /// How often they measure.
     pub periods: Periods,
     /// How the rudder moves, if it does.
     pub rudder: Option<RudderMotion>,
+    /// What is known of its sensors and of the wind.
+    pub sensors: Sensors,
     /// What the reader must know.
     pub notes: Vec<String>,
 }
 
 /// Which of the optional sensors a log has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sensors {
+pub struct Present {
     /// Heading.
     pub yaw: bool,
     /// Accelerometers.
@@ -144,9 +147,9 @@ impl Channels {
         }
     }
 
-    fn sensors(&self) -> Sensors {
+    fn sensors(&self) -> Present {
         let all = |channels: &[Channel]| channels.iter().all(|c| !c.is_empty() && !c.stuck);
-        Sensors {
+        Present {
             yaw: all(&self.attitude[2..]),
             force: all(&self.force),
             alpha: all(&self.vanes[..1]),
@@ -221,7 +224,8 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     let (step, gap) = (step(&stretches, options), gap(flight, options));
     let rudder = RudderMotion::of(&flight.samples);
     let periods = channels.periods();
-    let mut log = Log { step, tracks: Vec::new(), has, periods, rudder, notes };
+    let sensors = options.sensors.overridden_by(&flight.sensors);
+    let mut log = Log { step, tracks: Vec::new(), has, periods, rudder, sensors, notes };
     let mut longest = 0.0_f64;
     for times in &stretches {
         let [start, end] = [times[0], times[times.len() - 1]];
@@ -238,7 +242,13 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
             Some(why) => log
                 .notes
                 .push(format!("The stretch from {start:.2} s to {end:.2} s is left out: {why}.")),
-            None => log.tracks.push(track(&channels, &has, [start, end], [step, gap], options)),
+            None => {
+                let mut track = track(&channels, &has, [start, end], [step, gap], options);
+                if let Some(at) = log.sensors.accelerometer_at() {
+                    lever_arm::to_the_centre(&mut track, at, step);
+                }
+                log.tracks.push(track);
+            }
         }
     }
     if log.tracks.is_empty() {
@@ -248,7 +258,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     Ok(log)
 }
 
-fn declare(channels: &Channels, has: &Sensors, options: &Options, notes: &mut Vec<String>) {
+fn declare(channels: &Channels, has: &Present, options: &Options, notes: &mut Vec<String>) {
     let mut stuck = |channels: &[Channel], what: &str| {
         if channels.iter().any(|c| c.stuck) {
             notes.push(format!("The {what} shows one and the same value all the time: left out."));
@@ -286,7 +296,7 @@ fn declare(channels: &Channels, has: &Sensors, options: &Options, notes: &mut Ve
 /// The times of the rows of each stretch in flight without a gap.
 fn stretches(
     flight: &Flight,
-    has: &Sensors,
+    has: &Present,
     options: &Options,
 ) -> Result<Vec<Vec<f64>>, ReconstructError> {
     let usable = |s: &&Sample| {
@@ -352,7 +362,7 @@ fn step(stretches: &[Vec<f64>], options: &Options) -> f64 {
 
 fn track(
     channels: &Channels,
-    has: &Sensors,
+    has: &Present,
     [start, end]: [f64; 2],
     [step, gap]: [f64; 2],
     options: &Options,

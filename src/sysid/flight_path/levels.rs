@@ -1,5 +1,6 @@
 //! The noise levels: first from the data alone, then from what the fit leaves.
 
+use crate::physics::sensors::Noisy;
 use crate::sysid::flight_path::intake::{Log, Track};
 use crate::sysid::flight_path::measurement::{self, Reading};
 use crate::sysid::flight_path::noise;
@@ -42,6 +43,8 @@ pub struct Levels {
     pub white: [f64; CHANNELS],
     /// How much wider than white noise their means scatter.
     pub colour: [f64; CHANNELS],
+    /// Whether a level is stated, not estimated.
+    pub stated: [bool; CHANNELS],
 }
 
 impl Levels {
@@ -95,7 +98,22 @@ impl Levels {
                 |i| if dense(i) { white[i].max(floor[i]) } else { floor[i] },
             ),
             colour: [1.0; CHANNELS],
+            stated: [false; CHANNELS],
         }
+        .as_stated(log)
+    }
+
+    /// The same with the noise that is stated for the log's sensors.
+    fn as_stated(mut self, log: &Log) -> Levels {
+        let kinds = [(Noisy::Attitude, 0..3), (Noisy::Airspeed, 3..4), (Noisy::Vanes, 4..6)];
+        for (kind, channels) in kinds.into_iter().chain([(Noisy::Velocity, 6..9)]) {
+            if let Some(sd) = log.sensors.noise(kind) {
+                self.measured[channels.clone()].fill(sd);
+                self.white[channels.clone()].fill(sd);
+                self.stated[channels].fill(true);
+            }
+        }
+        self
     }
 
     /// Raises the levels of gyros and accelerometers whose steps strain the path by more than they allow: one level for the
@@ -117,7 +135,7 @@ impl Levels {
             let over = |block: f64| noise::colour(&residuals, (block / step).round() as usize);
             let colour = COLOUR_BLOCKS.map(over).into_iter().fold(1.0, f64::max);
             let level = noise::level(&mut residuals);
-            if level.is_nan() {
+            if level.is_nan() || self.stated[channel] {
                 continue;
             }
             let level = level.max(self.white[channel]).min(WIDEST[channel]);

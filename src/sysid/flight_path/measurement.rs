@@ -7,6 +7,7 @@ use crate::sysid::flight_path::band::{Corner, Node, add_gram};
 use crate::sysid::flight_path::channel::wrap;
 use crate::sysid::flight_path::intake::Track;
 use crate::sysid::flight_path::kinematics::MOTION_AND_GUST;
+use crate::sysid::flight_path::lever_arm::air_at;
 use crate::sysid::flight_path::nuisance::{
     ALPHA, BETA, INERTIAL, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_VANES, SKEW_VELOCITY, Values,
     WIND,
@@ -71,11 +72,12 @@ fn air_slopes(u: &Vector3<f64>) -> Option<Matrix3<f64>> {
     })
 }
 
-/// What sensors without errors would show at sample `k`.
-fn shown(path: &Path, k: usize) -> [f64; CHANNELS] {
+/// What sensors without errors would show at sample `k`, vanes at `vanes_at`.
+fn shown(path: &Path, k: usize, rates: &[f64; 3], vanes_at: Option<[f64; 3]>) -> [f64; CHANNELS] {
     let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
     let u = path.air_velocity(k);
-    let [alpha, beta] = flow_angles(&u);
+    let at_vanes = vanes_at.map(|at| air_at(&u, &Vector3::from(*rates), at));
+    let [alpha, beta] = flow_angles(&at_vanes.unwrap_or(u));
     let ground = path.velocity[k];
     [roll, pitch, yaw, u.norm(), alpha, beta, ground.x, ground.y, ground.z]
 }
@@ -88,11 +90,20 @@ pub fn by_gust(path: &Path, k: usize, values: &Values) -> Option<Matrix3<f64>> {
 }
 
 /// The readings at every sample of `track`, samples `step` (s) apart.
-pub fn readings(track: &Track, path: &Path, values: &Values, step: f64) -> Vec<Reading> {
+pub fn readings(
+    track: &Track,
+    path: &Path,
+    values: &Values,
+    step: f64,
+    vanes_at: Option<[f64; 3]>,
+) -> Vec<Reading> {
     let none = Reading { residual: [f64::NAN; CHANNELS], by_late: [0.0; CHANNELS] };
     let n = path.len();
-    let shown: Vec<[f64; CHANNELS]> =
-        (0..n).into_par_iter().with_min_len(1000).map(|k| shown(path, k)).collect();
+    let shown: Vec<[f64; CHANNELS]> = (0..n)
+        .into_par_iter()
+        .with_min_len(1000)
+        .map(|k| shown(path, k, &track.rates[k], vanes_at))
+        .collect();
     let read = |j: usize| {
         let mut reading = none;
         if j == 0 || j + 1 >= n {

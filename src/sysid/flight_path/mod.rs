@@ -14,6 +14,7 @@ mod gusts;
 mod intake;
 mod kinematics;
 mod levels;
+mod lever_arm;
 mod manoeuvres;
 mod measurement;
 mod noise;
@@ -29,8 +30,10 @@ pub use manoeuvres::{Kind as ManoeuvreKind, Manoeuvre, manoeuvres};
 use equations::Problem;
 use sampling::Chosen;
 
+use crate::logs::phases::Flying;
 use crate::logs::{Flight, Sampling};
 use crate::model::GreyBox;
+use crate::physics::Sensors;
 use crate::physics::airframe::ActuatorFigures;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
@@ -68,6 +71,8 @@ pub struct Options {
     pub shortest_s: f64,
     /// Airspeed under which the aircraft is taken not to fly, m/s.
     pub airspeed_min_mps: f64,
+    /// What is known of the aircraft's sensors; what the flight itself says goes before it.
+    pub sensors: Sensors,
 }
 
 impl Options {
@@ -83,15 +88,24 @@ impl Options {
             gap_s: 0.1,
             shortest_s: 2.0,
             airspeed_min_mps: 5.0,
+            sensors: Sensors::default(),
         }
     }
 
     /// The same for the aircraft and the gravity of `model`, deflections on `clock`.
+    ///
+    /// An aircraft that flies more slowly than usual is followed to a lower airspeed and in shorter
+    /// stretches.
     pub fn of(name: &str, model: &GreyBox, clock: ActuatorClock) -> Options {
+        let usual = Options::new(name, model.airframe.actuators);
+        let flies = Flying::from(model.airframe.envelope.flying_from_mps());
         Options {
             gravity: model.atmosphere.gravity,
             actuators_clock: clock,
-            ..Options::new(name, model.airframe.actuators)
+            shortest_s: usual.shortest_s.min(flies.sustained_s),
+            airspeed_min_mps: usual.airspeed_min_mps.min(flies.from_mps),
+            sensors: model.airframe.sensors.clone(),
+            ..usual
         }
     }
 }
@@ -156,7 +170,7 @@ pub enum ReconstructError {
 /// its sensors contradict one another.
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
-    let (means, widths) = (nuisance::prior_means(), nuisance::prior_widths(&log));
+    let (means, widths) = (nuisance::prior_means(&log), nuisance::prior_widths(&log));
     let declared = options.sampling.or_else(|| flight.declared_sampling());
     let problem = Problem { log: &log, options, sampling: Sampling::Instants, means, widths };
     let Chosen { sampling, found, note } = sampling::choose(&problem, declared)?;

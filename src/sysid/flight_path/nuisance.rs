@@ -1,7 +1,7 @@
 //! The constants estimated along with the path: their names, units and prior widths.
 
 use crate::sysid::flight_path::Options;
-use crate::sysid::flight_path::intake::{Log, Sensors};
+use crate::sysid::flight_path::intake::{Log, Present};
 
 /// Number of constants.
 pub const COUNT: usize = 19;
@@ -70,8 +70,21 @@ pub const NAMES: [(&str, &str); COUNT] = [
 /// over about as long as it takes to measure.
 const SKEW_PERIODS: f64 = 0.5;
 
-/// Standard deviations before the data of `log` is seen.
+/// Part of its usual width to which a constant is held that is known exactly: the equations stay regular.
+const HELD: f64 = 1e-4;
+
+/// Standard deviations before the data of `log` is seen: those of its sensors, else the usual ones.
 pub fn prior_widths(log: &Log) -> Values {
+    let mut widths = usual_widths(log);
+    for (width, (name, _)) in widths.iter_mut().zip(NAMES) {
+        if let Some(known) = log.sensors.known(name) {
+            *width = known.sd.max(HELD * *width);
+        }
+    }
+    widths
+}
+
+fn usual_widths(log: &Log) -> Values {
     let least = SKEW_SAMPLES * log.step;
     let mut width = [least; COUNT];
     let slower = |period: f64| if period > 2.0 * log.step { SKEW_PERIODS * period } else { least };
@@ -90,16 +103,27 @@ pub fn prior_widths(log: &Log) -> Values {
     width
 }
 
-/// Means before the data is seen: zero but for the Earth's rate, 7.29e-5 rad/s at any latitude from −65°
-/// to 65°, whose north component is never negative. Its deviations are those of the same latitudes.
-pub fn prior_means() -> Values {
+/// Means before the data is seen: what is known of the log's sensors, else zero but for the Earth's rate,
+/// 7.29e-5 rad/s at any latitude from −65° to 65°, whose north component is never negative. Its deviations
+/// are those of the same latitudes.
+pub fn prior_means(log: &Log) -> Values {
     let mut mean = [0.0; COUNT];
     mean[EARTH] = 5.8e-5;
+    for (place, (name, _)) in NAMES.iter().enumerate() {
+        if let Some(known) = log.sensors.known(name) {
+            mean[place] = known.value - offset(place);
+        }
+    }
     mean
 }
 
+/// What is added to a constant where it is handed out: the airspeed scale is a factor there.
+pub fn offset(place: usize) -> f64 {
+    if place == SCALE { 1.0 } else { 0.0 }
+}
+
 /// Whether the log has the sensor that a constant belongs to.
-pub fn concerned(place: usize, has: &Sensors) -> bool {
+pub fn concerned(place: usize, has: &Present) -> bool {
     match place {
         ALPHA => has.alpha,
         BETA => has.beta,
@@ -112,7 +136,7 @@ pub fn concerned(place: usize, has: &Sensors) -> bool {
 }
 
 /// What would let the data see a constant that they do not.
-pub fn remedy(place: usize, has: &Sensors) -> &'static str {
+pub fn remedy(place: usize, has: &Present) -> &'static str {
     match place {
         SCALE | WIND..SKEW_ATTITUDE if !has.velocity => "log the velocity over ground",
         SCALE | WIND..SKEW_ATTITUDE if !has.yaw => "log the heading",
@@ -123,7 +147,7 @@ pub fn remedy(place: usize, has: &Sensors) -> &'static str {
 }
 
 /// The note on a constant that keeps its prior.
-pub fn unseen(place: usize, has: &Sensors, options: &Options) -> String {
+pub fn unseen(place: usize, has: &Present, options: &Options) -> String {
     format!(
         "The data of {} cannot tell {}: it keeps its prior; {} to see it.",
         options.name,

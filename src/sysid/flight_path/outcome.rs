@@ -1,23 +1,26 @@
 //! The outcome: what the smoother found, as a reconstruction with its notes.
 
+use nalgebra::Vector3;
+
 use crate::num::statistics::mean;
 use crate::num::stream::stream;
+use crate::physics::sensors::Known;
 use crate::physics::{Controls, State};
 use crate::sysid::flight_path::actuator_skew::{self, Skew};
 use crate::sysid::flight_path::channel::wrap;
 use crate::sysid::flight_path::equations::{Found, Problem, no_path};
 use crate::sysid::flight_path::intake::{Log, Track};
 use crate::sysid::flight_path::kinematics::shifted;
-use crate::sysid::flight_path::nuisance::{
-    self, COUNT, FORCE, GYRO, SCALE, SKEW_FORCE, Values, WIND,
-};
+use crate::sysid::flight_path::nuisance::{self, COUNT, FORCE, GYRO, SKEW_FORCE, Values, WIND};
 use crate::sysid::flight_path::path::{Path, flow_angles};
 use crate::sysid::flight_path::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
 use crate::sysid::flight_path::rotation::to_euler;
-use crate::sysid::flight_path::{ActuatorClock, Options, ReconstructError};
+use crate::sysid::flight_path::{ActuatorClock, ReconstructError};
 
 /// Part of the prior width above which the data is said not to see a constant.
 const UNSEEN: f64 = 0.7;
+/// Standard deviations of its prior from which a constant's place is worth a note.
+const FAR: f64 = 3.0;
 /// Gusts worth a note, m/s.
 const ROUGH: f64 = 0.1;
 /// Smallest delay of the actuators that is put right, samples: less is within what the regression that
@@ -33,10 +36,21 @@ const DRAWS: usize = 3;
 /// [`ReconstructError::NoPath`] if the path's errors cannot be drawn.
 pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, ReconstructError> {
     let Problem { log, options, .. } = *problem;
-    let mut segments = path_as_segments(log, found, &found.paths, None);
+    let mut segments = path_as_segments(problem, found, &found.paths, None);
+    let mut nuisances = nuisances(problem, found);
     let mut notes = log.notes.clone();
-    declare(log, found, options, &mut notes);
-    let mut nuisances = nuisances(log, found);
+    declare(problem, found, &nuisances, &mut notes);
+    let finite = |i: &Instant| i.specific_force.iter().all(|f| f.is_finite());
+    if !log.has.force {
+        notes.push(match segments.iter().flat_map(|s| &s.instants).any(finite) {
+            true => "No accelerometers: the specific force is that of the reconstructed path, from the velocity \
+                     over ground."
+                .into(),
+            false => "No accelerometers: the path between samples is smoothed, not driven, and forces cannot be \
+                      compared."
+                .into(),
+        });
+    }
     let erring = draws(problem, found)?;
     let left = left(&segments, &erring, &found.levels.gyro);
     nuisances.extend(unmeasured_angles(log, found, &segments, &left));
@@ -62,6 +76,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
         value: skew.late,
         sd: skew.deviation,
         unit: "s",
+        prior: None,
     });
     let l = &found.levels;
     let m = &l.measured;
@@ -73,7 +88,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
         nuisances,
         noise: [m[0], m[1], m[3], l.gyro[0], l.gyro[1], l.gyro[2], m[4], m[5]],
         left,
-        force_noise: if log.has.force { l.force } else { [f64::NAN; 3] },
+        force_noise: if log.has.force { l.force } else { [m[6].max(m[7]) / log.step; 3] },
         rudder: log.rudder,
         notes,
     })
@@ -84,7 +99,7 @@ fn draws(problem: &Problem, found: &Found) -> Result<Vec<Vec<Segment>>, Reconstr
     let mut random = stream(0, &[]);
     let draw = |_| {
         let erring = problem.erring(found, &mut random)?;
-        Some(path_as_segments(problem.log, found, &erring.paths, Some(&erring.gyro)))
+        Some(path_as_segments(problem, found, &erring.paths, Some(&erring.gyro)))
     };
     let all: Option<Vec<_>> = (0..DRAWS).map(draw).collect();
     all.ok_or_else(|| no_path(&problem.options.name, "the equations became singular"))
@@ -111,15 +126,18 @@ fn left(segments: &[Segment], erring: &[Vec<Segment>], gyro: &[f64; 3]) -> [f64;
 
 /// The tracks along `paths`, the rates with the gyros' noise `gyro` on top.
 fn path_as_segments(
-    log: &Log,
+    problem: &Problem,
     found: &Found,
     paths: &[Path],
     gyro: Option<&[Vec<[f64; 3]>]>,
 ) -> Vec<Segment> {
+    let Problem { log, options, .. } = *problem;
     let pairs = log.tracks.iter().zip(paths).enumerate();
-    pairs
-        .map(|(i, (track, path))| segment(track, path, &found.values, log, gyro.map(|g| &g[i][..])))
-        .collect()
+    let one = |(i, (track, path)): (usize, (&Track, &Path))| {
+        let gyro = gyro.map(|g| &g[i][..]);
+        segment(track, path, &found.values, log, options.gravity, gyro)
+    };
+    pairs.map(one).collect()
 }
 
 fn segment(
@@ -127,9 +145,13 @@ fn segment(
     path: &Path,
     values: &Values,
     log: &Log,
+    gravity: f64,
     gyro: Option<&[[f64; 3]]>,
 ) -> Segment {
-    let (force, _) = shifted(&track.force, values[SKEW_FORCE] / log.step);
+    let force = match log.has.force {
+        true => shifted(&track.force, values[SKEW_FORCE] / log.step).0,
+        false => path_force(track, path, log, gravity),
+    };
     let instant = |k: usize| {
         let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
         let air = path.air_velocity(k);
@@ -148,6 +170,21 @@ fn segment(
         }
     };
     Segment { instants: (0..track.len()).map(instant).collect() }
+}
+
+/// The specific force of a path without accelerometers: its acceleration less gravity, body axes; NaN where
+/// no velocity was measured, or at an end.
+fn path_force(track: &Track, path: &Path, log: &Log, gravity: f64) -> Vec<Vector3<f64>> {
+    let nan = Vector3::repeat(f64::NAN);
+    let down = Vector3::new(0.0, 0.0, gravity);
+    let at = |k: usize| {
+        if !log.has.velocity || k == 0 || k + 1 >= path.len() || !track.velocity[k][0].is_finite() {
+            return nan;
+        }
+        let gained = (path.velocity[k + 1] - path.velocity[k - 1]) / (2.0 * log.step);
+        path.attitude[k].transpose() * (gained - down)
+    };
+    (0..path.len()).map(at).collect()
 }
 
 /// Whether the recorded deflections came late by more than the estimate may err.
@@ -177,18 +214,20 @@ fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
 }
 
 /// The constants that the log's sensors have, the airspeed scale as a factor.
-fn nuisances(log: &Log, smoothed: &Found) -> Vec<Nuisance> {
+fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
     nuisance::ORDER
         .into_iter()
-        .filter(|place| nuisance::concerned(*place, &log.has))
+        .filter(|place| nuisance::concerned(*place, &problem.log.has))
         .map(|place| {
             let (name, unit) = nuisance::NAMES[place];
-            let offset = if place == SCALE { 1.0 } else { 0.0 };
+            let offset = nuisance::offset(place);
+            let value = offset + problem.means[place];
             Nuisance {
                 name: name.into(),
                 value: offset + smoothed.values[place],
                 sd: smoothed.deviations[place],
                 unit,
+                prior: Some(Known { value, sd: problem.widths[place] }),
             }
         })
         .collect()
@@ -217,22 +256,14 @@ fn unmeasured_angles(
             value: 0.0,
             sd: (wind / airspeed).hypot(path),
             unit: "rad",
+            prior: None,
         })
         .collect()
 }
 
-fn declare(log: &Log, smoothed: &Found, options: &Options, notes: &mut Vec<String>) {
+fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut Vec<String>) {
+    let Problem { log, options, .. } = *problem;
     let has = &log.has;
-    let mut note = |when: bool, text: &str| {
-        if when {
-            notes.push(text.into());
-        }
-    };
-    note(
-        !has.force,
-        "No accelerometers: the path between samples is smoothed, not driven, and forces cannot be \
-         compared.",
-    );
     let vanes = match (has.alpha, has.beta) {
         (true, true) => "",
         (false, true) => "angle of attack",
@@ -251,11 +282,21 @@ fn declare(log: &Log, smoothed: &Found, options: &Options, notes: &mut Vec<Strin
             }
         ));
     }
-    let widths = nuisance::prior_widths(log);
     for place in (0..COUNT).filter(|p| nuisance::concerned(*p, has)) {
-        if smoothed.deviations[place] > UNSEEN * widths[place] {
+        let stated = log.sensors.known(nuisance::NAMES[place].0).is_some();
+        if !stated && smoothed.deviations[place] > UNSEEN * problem.widths[place] {
             notes.push(nuisance::unseen(place, has, options));
         }
+    }
+    for n in found.iter().filter(|n| n.moved().abs() > FAR) {
+        notes.push(format!(
+            "{} is found at {:.4} {}, {:.1} standard deviations from what was known of it beforehand: check that \
+             sensor, or what [sensors] says of it.",
+            n.name,
+            n.value,
+            n.unit,
+            n.moved().abs()
+        ));
     }
     if smoothed.levels.gusts > ROUGH {
         notes.push(format!(

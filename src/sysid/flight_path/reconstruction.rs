@@ -2,6 +2,7 @@
 
 use crate::logs::rudder::RudderMotion;
 use crate::logs::{Flight, Sample, Sampling};
+use crate::physics::sensors::Known;
 use crate::physics::{Command, Controls, State};
 
 /// One instant of a reconstructed flight.
@@ -46,6 +47,15 @@ pub struct Nuisance {
     pub sd: f64,
     /// Unit, for example `rad/s`.
     pub unit: &'static str,
+    /// What was known of it before the flight; `None` if it was not estimated along with the path.
+    pub prior: Option<Known>,
+}
+
+impl Nuisance {
+    /// How far it moved from its prior, in standard deviations of the prior; zero without one.
+    pub fn moved(&self) -> f64 {
+        self.prior.filter(|p| p.sd > 0.0).map_or(0.0, |p| (self.value - p.value) / p.sd)
+    }
 }
 
 /// A reconstructed flight.

@@ -10,7 +10,6 @@ use nalgebra::Vector3;
 use crate::sysid::flight_path::ReconstructError;
 use crate::sysid::flight_path::equations::{Found, Problem, Solved, no_path};
 use crate::sysid::flight_path::gusts;
-use crate::sysid::flight_path::intake::Log;
 use crate::sysid::flight_path::kinematics::MOTION;
 use crate::sysid::flight_path::levels::{CALM, Levels};
 use crate::sysid::flight_path::nuisance::WIND;
@@ -46,7 +45,7 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
         deviations: widths,
         levels: Levels::first(log),
     };
-    start(&mut found, log);
+    start(&mut found, problem);
     for iteration in 0..LAST {
         let bound = if iteration < FIRST { f64::INFINITY } else { BOUND };
         let solved = problem.calm(&found, bound).ok_or_else(singular)?;
@@ -149,15 +148,16 @@ fn likeliest_gusts(problem: &Problem, found: &Found) -> Option<f64> {
     Some(best)
 }
 
-/// Sets out in the wind that the measurements leave.
-fn start(found: &mut Found, log: &Log) {
+/// Sets out in the wind that is stated, else in that which the measurements leave.
+fn start(found: &mut Found, problem: &Problem) {
     let mut sum = (Vector3::zeros(), 0.0);
-    for (path, track) in found.paths.iter().zip(&log.tracks) {
+    for (path, track) in found.paths.iter().zip(&problem.log.tracks) {
         let (left, count) = path.wind_left(track);
         sum = (sum.0 + left, sum.1 + count);
     }
-    if sum.1 > 0.0 {
-        let wind = sum.0 / sum.1;
+    let stated = problem.log.sensors.wind().map(Vector3::from);
+    let wind = stated.or((sum.1 > 0.0).then(|| sum.0 / sum.1));
+    if let Some(wind) = wind {
         found.values[WIND..WIND + 3].copy_from_slice(wind.as_slice());
         found.paths.iter_mut().for_each(|path| path.carry(wind));
     }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::flight::monitor::{Channel, Compared, Monitor};
 use crate::link::autopilot::RESIDUALS;
-use crate::link::vehicle::{Faults, Order, Telemetry};
+use crate::link::vehicle::{Faults, Order, Telemetry, VANE_SD};
 use crate::logs::Sample;
 use crate::model::GreyBox;
 use crate::physics::{ActuatorState, State, Time};
@@ -278,6 +278,7 @@ fn frame(row: &Sample) -> Telemetry {
         order: Order::Next { lost: 0 },
         faults,
         state,
+        incidence_sd: VANE_SD,
         yaw,
         rate_hold_s: row.rate_hold_s,
         specific_force: row.specific_force_mps2,

@@ -12,9 +12,10 @@ use crate::sysid::weak_form::prepared::Prepared;
 use crate::sysid::weak_form::windows::{gyroscopic, inertia, to_force_axes};
 
 /// Columns of sensor errors: gyros p, q, r, α, β, share of the airspeed, accelerometers x, y, z, then
-/// lateness of α, β, airspeed, accelerometers and recorded actuators (s), and how much the record of the
-/// actuators is a mean over time (half the variance of that time, squared samples).
-pub const SENSORS: usize = 15;
+/// lateness of α, β, airspeed, accelerometers, of the angular accelerations behind the moments and of the
+/// recorded actuators (s), and how much the record of the actuators is a mean over time (half the variance
+/// of that time, squared samples).
+pub const SENSORS: usize = 16;
 
 /// A flight under a model.
 #[derive(Clone, Debug)]
@@ -42,7 +43,7 @@ impl Ready {
             .iter()
             .map(|s| s.iter().map(|at| local::local(model, at, &at.controls)).collect())
             .collect();
-        let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 6, |place, add| {
+        let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 7, |place, add| {
             // the end of a step of RK4 is close to its start
             let here = &locals[place.segment][place.index];
             let value = if place.at.time_s == acting.segments[place.segment][place.index].time_s {
@@ -74,11 +75,17 @@ impl Ready {
                 differences(&acting, place.segment, place.index, steered).iter().enumerate()
             {
                 let slope = &here.slope[CONTROLS + i];
-                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 7, c, -rate * slope[c]));
+                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 8, c, -rate * slope[c]));
             }
             for (i, bend) in bends(&acting, place.segment, place.index).iter().enumerate() {
                 let slope = &here.slope[CONTROLS + i];
-                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 8, c, bend * slope[c]));
+                (0..CHANNELS).for_each(|c| add(1 + INPUTS + 9, c, bend * slope[c]));
+            }
+            // J ω̇ + ω × J ω = M(t − T), as explicit Euler steps of 2 T have it: T Σ ∂(ω × J ω − M)/∂x ẋ
+            for (slope, rate) in
+                here.slope.iter().zip(differences(&acting, place.segment, place.index, inputs))
+            {
+                (3..CHANNELS).for_each(|c| add(1 + INPUTS + 7, c, rate * slope[c]));
             }
             let force = differences(&acting, place.segment, place.index, |i| i.specific_force);
             if force.iter().all(|f| f.is_finite()) {
@@ -88,7 +95,7 @@ impl Ready {
         });
         let mut residual = std::mem::take(&mut columns[0]);
         add_spin(model, &acting, &mut residual);
-        let sensors = (1..=CONTROLS).chain(1 + INPUTS..1 + INPUTS + 9);
+        let sensors = (1..=CONTROLS).chain(1 + INPUTS..1 + INPUTS + 10);
         let sensors: Vec<Column> = sensors.map(|k| std::mem::take(&mut columns[k])).collect();
         let controls = locals
             .iter()
@@ -230,6 +237,12 @@ fn add_spin(model: &GreyBox, flight: &Prepared, residual: &mut Column) {
 fn steered(i: &Instant) -> [f64; 4] {
     let z = &i.controls;
     [z.aileron, z.elevator, z.throttle, z.rudder]
+}
+
+/// The inputs of [`local`](local::local), in their order.
+fn inputs(i: &Instant) -> [f64; INPUTS] {
+    let (s, [aileron, elevator, throttle, rudder]) = (&i.state, steered(i));
+    [s.p, s.q, s.r, s.alpha, s.beta, s.airspeed, aileron, elevator, throttle, rudder]
 }
 
 /// Second differences of aileron, elevator, throttle and rudder.

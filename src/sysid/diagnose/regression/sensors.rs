@@ -1,5 +1,6 @@
 //! What the sensors may still have wrong after the reconstruction.
 
+use crate::logs::Sampling;
 use crate::sysid::diagnose::regression::columns::SENSORS;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
@@ -18,6 +19,7 @@ pub const NAMES: [&str; SENSORS] = [
     "skew_beta",
     "skew_airspeed",
     "skew_accelerometer",
+    "skew_moments",
     LATE,
     "blur_actuators",
 ];
@@ -31,8 +33,13 @@ pub const BLUR_PLACE: usize = SENSORS - 1;
 
 /// Least standard deviations: rad/s, rad, a share, m/s², s; a filter that knows only its own errors states
 /// less than it has.
-const FLOOR: [f64; SENSORS - 2] =
+const FLOOR: [f64; SENSORS - 3] =
     [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01, 5e-4, 5e-4, 2e-3, 5e-4];
+/// Prior width of the time, s, by which angular accelerations follow the moments: a simulator that steps by
+/// explicit Euler at 400 Hz has 1.25 ms, a gyro's low-pass filter of 100 Hz 1.6 ms.
+const MOMENTS_LATE: f64 = 1.5e-3;
+/// The same where the log holds a simulator's own steps, which are compared as such.
+const MOMENTS_ON_TIME: f64 = 1e-6;
 /// Prior width of the actuators' clock, samples: ±1.5 samples are its 95 % interval.
 const SKEW_SAMPLES: f64 = 0.77;
 /// Mean and standard deviation of the actuators' blur, squared samples: a record that is late by a part of a
@@ -55,6 +62,10 @@ pub fn widths(flight: &Reconstruction, dt: f64) -> [f64; SENSORS] {
     std::array::from_fn(|k| match FLOOR.get(k) {
         Some(floor) => stated(NAMES[k]).max(*floor),
         None if NAMES[k] == LATE => SKEW_SAMPLES * dt,
+        None if k < LATE_PLACE => match flight.sampling {
+            Sampling::Instants => MOMENTS_LATE,
+            Sampling::Held => MOMENTS_ON_TIME,
+        },
         None => BLURRED[1],
     })
 }

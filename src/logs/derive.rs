@@ -1,0 +1,274 @@
+//! Columns that a log lacks, made from those it has, where a mapping asks for it.
+//!
+//! A motion capture measures position and attitude. Velocity is the slope of a parabola through the positions
+//! around a row; body rates are that of the turns from the row's attitude; the airspeed is the velocity over
+//! ground less a known wind. The window stands in the mapping. Nothing is made unasked.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use super::Sample;
+use super::columns::{COLUMNS, index};
+use super::mapping::Mapping;
+use crate::num::statistics::quantile;
+
+/// Fewest rows that a parabola is laid through.
+const FEWEST: usize = 5;
+/// Misfit of a parabola, in medians of the log's, beyond which the measurement is taken to have jumped.
+const JUMPED: f64 = 8.0;
+/// Smallest median misfit, relative to the size of what is fitted: below it there is rounding only.
+const ROUNDING: f64 = 1e-9;
+/// The columns of the body rates.
+pub(super) const RATES: [&str; 3] = ["p_radps", "q_radps", "r_radps"];
+/// The column of the airspeed.
+pub(super) const AIRSPEED: &str = "airspeed_mps";
+
+/// Fills the columns that `mapping` makes from others; says what was done.
+pub(super) fn apply(rows: &mut [Sample], mapping: &Mapping) -> Vec<String> {
+    let mut notes = Vec::new();
+    let slopes: Vec<(&str, f64)> = mapping.slopes().collect();
+    for (column, over_s) in &slopes {
+        let Some(i) = index(column) else { continue };
+        let samples: Vec<(f64, f64)> = rows.iter().map(|s| (s.time_s, COLUMNS[i].1(s))).collect();
+        let (slopes, jumped) = settle(slopes_of(&fresh(&samples), *over_s));
+        rows.iter_mut().zip(slopes).for_each(|(row, x)| *COLUMNS[i].2(row) = x);
+        if jumped > 0 {
+            notes.push(format!(
+                "{column}: {jumped} rows are left empty, for what it is made from jumps there"
+            ));
+        }
+    }
+    if !slopes.is_empty() {
+        let names: Vec<&str> = slopes.iter().map(|(column, _)| *column).collect();
+        notes.push(format!("rates of change, by a parabola around each row: {}", names.join(", ")));
+    }
+    if let Some(over_s) = mapping.body_rates_over_s() {
+        let jumped = body_rates(rows, over_s);
+        notes.push(format!("body rates are made from roll, pitch and yaw over {over_s} s"));
+        if jumped > 0 {
+            notes.push(format!(
+                "the attitude jumps or is lost in {jumped} rows: their body rates are left empty"
+            ));
+        }
+    }
+    if mapping.makes(AIRSPEED)
+        && let Some(wind) = mapping.sensors().wind()
+        && rows.iter().all(|s| s.airspeed_mps.is_nan())
+    {
+        for s in rows.iter_mut() {
+            s.airspeed_mps = (Vector3::from(s.velocity_ned_mps) - Vector3::from(wind)).norm();
+        }
+        notes.push("airspeed is made from the velocity over ground and the stated wind".into());
+    }
+    notes
+}
+
+/// A value that repeats the one before is none: a motion capture that has lost its object repeats it.
+fn fresh(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut last = f64::NAN;
+    let one = |(t, x): &(f64, f64)| {
+        let fresh = if *x == last { f64::NAN } else { *x };
+        if x.is_finite() {
+            last = *x;
+        }
+        (*t, fresh)
+    };
+    samples.iter().map(one).collect()
+}
+
+/// Slope and misfit at every sample that has a value, NaN elsewhere.
+fn slopes_of(samples: &[(f64, f64)], over_s: f64) -> Vec<[f64; 2]> {
+    let scale = samples.iter().map(|s| s.1.abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
+    around(
+        samples,
+        |s| s.0,
+        over_s,
+        |k, window| {
+            let (t, x) = samples[k];
+            if !x.is_finite() {
+                return [f64::NAN; 2];
+            }
+            let points = window.iter().filter(|s| s.1.is_finite()).map(|s| (s.0 - t, s.1 - x));
+            parabola(&points.collect::<Vec<_>>(), over_s)
+                .map_or([f64::NAN; 2], |[slope, misfit]| [slope, misfit.max(ROUNDING * scale)])
+        },
+    )
+}
+
+/// Fills p, q, r; returns in how many rows the attitude was lost or jumped.
+fn body_rates(rows: &mut [Sample], over_s: f64) -> usize {
+    let mut last = [f64::NAN; 3];
+    let turned: Vec<(f64, Option<UnitQuaternion<f64>>)> = rows
+        .iter()
+        .map(|s| {
+            let [roll, pitch, yaw] = s.attitude_rad;
+            let lost = s.attitude_rad == last || !s.attitude_rad.iter().all(|x| x.is_finite());
+            last = s.attitude_rad;
+            (s.time_s, (!lost).then(|| UnitQuaternion::from_euler_angles(roll, pitch, yaw)))
+        })
+        .collect();
+    let fits = around(
+        &turned,
+        |s| s.0,
+        over_s,
+        |k, window| {
+            let (t, Some(own)) = &turned[k] else { return [[f64::NAN; 2]; 3] };
+            let turns: Vec<(f64, Vector3<f64>)> = window
+                .iter()
+                .filter_map(|(time, other)| {
+                    Some((time - t, (own.inverse() * other.as_ref()?).scaled_axis()))
+                })
+                .collect();
+            std::array::from_fn(|axis| {
+                let points: Vec<(f64, f64)> =
+                    turns.iter().map(|(t, turn)| (*t, turn[axis])).collect();
+                parabola(&points, over_s)
+                    .map_or([f64::NAN; 2], |[slope, misfit]| [slope, misfit.max(ROUNDING)])
+            })
+        },
+    );
+    let mut empty = vec![false; rows.len()];
+    for axis in 0..3 {
+        let (slopes, _) = settle(fits.iter().map(|f| f[axis]).collect());
+        for (k, slope) in slopes.into_iter().enumerate() {
+            rows[k].rates_radps[axis] = slope;
+            empty[k] |= slope.is_nan();
+        }
+    }
+    let mut count = 0;
+    for (row, _) in rows.iter_mut().zip(&empty).filter(|(_, empty)| **empty) {
+        row.rates_radps = [f64::NAN; 3];
+        count += 1;
+    }
+    count
+}
+
+/// What `fit` makes of the samples within half of `over_s` around each.
+fn around<T, R>(
+    samples: &[T],
+    time: impl Fn(&T) -> f64,
+    over_s: f64,
+    fit: impl Fn(usize, &[T]) -> R,
+) -> Vec<R> {
+    let half = 0.5 * over_s * (1.0 + 1e-6);
+    let (mut from, mut to) = (0, 0);
+    let one = |k: usize| {
+        let t = time(&samples[k]);
+        while from < k && time(&samples[from]) < t - half {
+            from += 1;
+        }
+        to = to.max(k);
+        while to < samples.len() && time(&samples[to]) <= t + half {
+            to += 1;
+        }
+        fit(k, &samples[from..to])
+    };
+    (0..samples.len()).map(one).collect()
+}
+
+/// The slope at 0 of the parabola through `points` (time, value), with the root mean square of what it
+/// leaves; `None` with too few of them, or with none on one side.
+fn parabola(points: &[(f64, f64)], over_s: f64) -> Option<[f64; 2]> {
+    let sides = [points.iter().any(|p| p.0 < 0.0), points.iter().any(|p| p.0 > 0.0)];
+    if points.len() < FEWEST || sides != [true; 2] {
+        return None;
+    }
+    let row = |t: f64| Vector3::new(1.0, t / over_s, (t / over_s).powi(2));
+    let (mut gram, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for (t, x) in points {
+        let row = row(*t);
+        gram += row * row.transpose();
+        right += row * *x;
+    }
+    let fit = gram.cholesky()?.solve(&right);
+    let left: f64 = points.iter().map(|(t, x)| (x - row(*t).dot(&fit)).powi(2)).sum();
+    Some([fit[1] / over_s, (left / points.len() as f64).sqrt()])
+}
+
+/// The slopes, those left out whose misfit is far beyond the usual; how many these are.
+fn settle(fits: Vec<[f64; 2]>) -> (Vec<f64>, usize) {
+    let misfits: Vec<f64> = fits.iter().map(|f| f[1]).filter(|x| x.is_finite()).collect();
+    let limit = if misfits.is_empty() { f64::INFINITY } else { JUMPED * quantile(&misfits, 0.5) };
+    let mut jumped = 0;
+    let one = |[slope, misfit]: [f64; 2]| {
+        if misfit > limit {
+            jumped += 1;
+            return f64::NAN;
+        }
+        slope
+    };
+    (fits.into_iter().map(one).collect(), jumped)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    const MAPPING: &str = "schema = 1\n[columns]\nvn_mps = { from = \"csv.x\", rate_over_s = 0.07 }\n\
+        ve_mps = { from = \"csv.y\", rate_over_s = 0.07 }\nvd_mps = { from = \"csv.z\", rate_over_s = 0.07 }\n\
+        [derive]\nbody_rates_over_s = 0.07\n[sensors]\nwind_north_mps = { value = 2.0, sd = 0.1 }\n\
+        wind_east_mps = { value = 0.0, sd = 0.1 }\n";
+
+    /// A coordinated turn: pitch 0.1, bank 0.5, ψ̇ = 0.6 rad/s, 8 m/s over ground on its heading; positions
+    /// stand in the columns of the velocity, as a mapping puts them there.
+    fn turn(k: usize) -> Sample {
+        let (t, turn, v) = (0.01 * k as f64, 0.6, 8.0);
+        let yaw: f64 = turn * t;
+        Sample {
+            time_s: t,
+            attitude_rad: [
+                0.5,
+                0.1,
+                (yaw + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
+                    - std::f64::consts::PI,
+            ],
+            velocity_ned_mps: [v / turn * yaw.sin(), -v / turn * yaw.cos(), -0.3 * t],
+            ..Sample::default()
+        }
+    }
+
+    fn derived(mut rows: Vec<Sample>) -> (Vec<Sample>, Vec<String>) {
+        let mapping = Mapping::parse(MAPPING, Path::new("m.toml")).unwrap();
+        let notes = apply(&mut rows, &mapping);
+        (rows, notes)
+    }
+
+    #[test]
+    fn a_turn_has_the_rates_and_the_velocity_of_its_equations() {
+        let (rows, _) = derived((0..1000).map(turn).collect());
+        for s in &rows[10..990] {
+            // p = −ψ̇ sin θ, q = ψ̇ cos θ sin φ, r = ψ̇ cos θ cos φ; the parabola's error is ω³ T² / 40
+            let exact = [
+                -0.6 * 0.1_f64.sin(),
+                0.6 * 0.1_f64.cos() * 0.5_f64.sin(),
+                0.6 * 0.1_f64.cos() * 0.5_f64.cos(),
+            ];
+            assert!(s.rates_radps.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-4), "{s:?}");
+            let yaw = 0.6 * s.time_s;
+            let v = [8.0 * yaw.cos(), 8.0 * yaw.sin(), -0.3];
+            assert!(s.velocity_ned_mps.iter().zip(v).all(|(a, b)| (a - b).abs() < 1e-3), "{s:?}");
+            let airspeed = ((v[0] - 2.0).powi(2) + v[1] * v[1] + v[2] * v[2]).sqrt();
+            assert!((s.airspeed_mps - airspeed).abs() < 2e-3);
+        }
+    }
+
+    #[test]
+    fn rows_in_which_the_object_is_lost_or_jumps_are_left_empty() {
+        let mut rows: Vec<Sample> = (0..300).map(turn).collect();
+        for k in 100..150 {
+            (rows[k].attitude_rad, rows[k].velocity_ned_mps) =
+                (rows[99].attitude_rad, rows[99].velocity_ned_mps);
+        }
+        rows[220].attitude_rad[1] += 0.2;
+        let (rows, notes) = derived(rows);
+        assert!(
+            rows[102..148]
+                .iter()
+                .all(|s| s.rates_radps[0].is_nan() && s.velocity_ned_mps[0].is_nan())
+        );
+        assert!(rows[218..=222].iter().all(|s| s.rates_radps[1].is_nan()));
+        assert!(rows[10..90].iter().chain(&rows[160..210]).all(|s| s.rates_radps[1].is_finite()));
+        assert!(notes.iter().any(|n| n.contains("jumps")), "{notes:?}");
+    }
+}

@@ -1,0 +1,291 @@
+//! What is known of an aircraft's sensors and of the wind before a flight is looked at.
+//!
+//! ```toml
+//! [sensors]
+//! wind = "still"                                # the air stands still: the three wind_… are 0, held
+//! clocks = "one"                                # all sensors sample together: the skew_… are 0, held
+//! airspeed_scale = { value = 1.0, sd = 0.02 }   # measured by true airspeed; sd = 0 holds it
+//! alpha_bias_rad = { value = 0.01, sd = 0.005 }
+//! vanes_sd_rad = 0.005                          # noise of the vanes
+//! vanes_at_m = [0.6, 0.0, -0.02]                # from the centre of gravity: forward, right, down
+//! accelerometer_at_m = [0.05, 0.0, 0.01]
+//! ```
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+/// The constants of sensors and wind that a flight-path reconstruction estimates, with their units.
+pub const CONSTANTS: [(&str, &str); 17] = [
+    ("alpha_bias", "rad"),
+    ("beta_bias", "rad"),
+    ("airspeed_scale", ""),
+    ("wind_north", "m/s"),
+    ("wind_east", "m/s"),
+    ("wind_down", "m/s"),
+    ("skew_attitude", "s"),
+    ("skew_airspeed", "s"),
+    ("skew_vanes", "s"),
+    ("skew_velocity", "s"),
+    ("gyro_bias_p", "rad/s"),
+    ("gyro_bias_q", "rad/s"),
+    ("gyro_bias_r", "rad/s"),
+    ("accelerometer_bias_x", "m/s²"),
+    ("accelerometer_bias_y", "m/s²"),
+    ("accelerometer_bias_z", "m/s²"),
+    ("skew_accelerometer", "s"),
+];
+
+/// Keys of the noise of sensors, standard deviations.
+const NOISE: [&str; 4] = ["attitude_sd_rad", "airspeed_sd_mps", "vanes_sd_rad", "velocity_sd_mps"];
+
+/// Longest lever arm, m.
+const FARTHEST: f64 = 100.0;
+
+/// A constant as it is known beforehand.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Known {
+    /// Its mean, in the unit of [`CONSTANTS`]; an airspeed scale is measured by true.
+    pub value: f64,
+    /// Its standard deviation; 0 holds it.
+    pub sd: f64,
+}
+
+/// What is known of sensors and wind: the contents of a section `[sensors]`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(try_from = "BTreeMap<String, Written>")]
+pub struct Sensors {
+    constants: BTreeMap<&'static str, Known>,
+    noise: [Option<f64>; NOISE.len()],
+    vanes_at: Option<[f64; 3]>,
+    accelerometer_at: Option<[f64; 3]>,
+}
+
+/// A sensor whose noise may be stated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Noisy {
+    /// Roll, pitch, yaw, rad.
+    Attitude,
+    /// Airspeed, m/s.
+    Airspeed,
+    /// Angle of attack and sideslip, rad.
+    Vanes,
+    /// Velocity over ground, m/s.
+    Velocity,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a word, a number, [forward, right, down] or { value = …, sd = … }")]
+enum Written {
+    Word(String),
+    Number(f64),
+    Place([f64; 3]),
+    Known(Known),
+}
+
+/// The key of a constant in a file: its name with its unit.
+fn key((name, unit): (&str, &str)) -> String {
+    let suffix = match unit {
+        "rad" => "_rad",
+        "rad/s" => "_radps",
+        "m/s" => "_mps",
+        "m/s²" => "_mps2",
+        "s" => "_s",
+        _ => "",
+    };
+    format!("{name}{suffix}")
+}
+
+impl TryFrom<BTreeMap<String, Written>> for Sensors {
+    type Error = String;
+
+    fn try_from(written: BTreeMap<String, Written>) -> Result<Self, String> {
+        let mut sensors = Sensors::default();
+        // words first: a constant of its own goes before what a word says of all
+        for (name, value) in &written {
+            if let Written::Word(word) = value {
+                sensors.take_word(name, word)?;
+            }
+        }
+        for (name, value) in &written {
+            sensors.take(name, value)?;
+        }
+        Ok(sensors)
+    }
+}
+
+impl Sensors {
+    fn take_word(&mut self, name: &str, word: &str) -> Result<(), String> {
+        let prefix = match (name, word) {
+            ("wind", "still") => "wind_",
+            ("clocks", "one") => "skew_",
+            ("wind", _) => {
+                return Err(format!(
+                    "sensors.wind = \"{word}\" is not \"still\"; give wind_north_mps and wind_east_mps as {{ value = …, sd = … }} instead"
+                ));
+            }
+            ("clocks", _) => {
+                return Err(format!(
+                    "sensors.clocks = \"{word}\" is not \"one\"; give the skew_…_s as {{ value = …, sd = … }} instead"
+                ));
+            }
+            _ => {
+                return Err(format!("sensors.{name} = \"{word}\" takes no word; {}", known_keys()));
+            }
+        };
+        let all = CONSTANTS.iter().filter(|(name, _)| name.starts_with(prefix));
+        self.constants.extend(all.map(|(name, _)| (*name, Known { value: 0.0, sd: 0.0 })));
+        Ok(())
+    }
+
+    fn take(&mut self, name: &str, value: &Written) -> Result<(), String> {
+        match value {
+            Written::Word(_) => {}
+            Written::Number(sd) => {
+                let place = NOISE.iter().position(|key| *key == name);
+                let place = place.ok_or_else(|| {
+                    format!("sensors.{name} takes no single number; {}", known_keys())
+                })?;
+                if !(*sd > 0.0 && sd.is_finite()) {
+                    return Err(format!("sensors.{name} = {sd} must be positive"));
+                }
+                self.noise[place] = Some(*sd);
+            }
+            Written::Place(at) => {
+                if !at.iter().all(|x| x.abs() <= FARTHEST) {
+                    return Err(format!(
+                        "sensors.{name} must lie within {FARTHEST} m of the centre of gravity"
+                    ));
+                }
+                match name {
+                    "vanes_at_m" => self.vanes_at = Some(*at),
+                    "accelerometer_at_m" => self.accelerometer_at = Some(*at),
+                    _ => return Err(format!("sensors.{name} takes no place; {}", known_keys())),
+                }
+            }
+            Written::Known(known) => {
+                let found = CONSTANTS.into_iter().find(|c| key(*c) == name);
+                let (constant, _) = found.ok_or_else(|| {
+                    format!("sensors.{name} is no constant of a sensor; {}", known_keys())
+                })?;
+                if !(known.value.is_finite() && known.sd.is_finite() && known.sd >= 0.0) {
+                    return Err(format!(
+                        "sensors.{name} needs a finite value and an sd of 0 or more"
+                    ));
+                }
+                if constant == "airspeed_scale" && known.value <= 0.0 {
+                    return Err(
+                        "sensors.airspeed_scale is measured by true airspeed: 1 without an error"
+                            .into(),
+                    );
+                }
+                self.constants.insert(constant, *known);
+            }
+        }
+        Ok(())
+    }
+
+    /// The same with what `other` says in its place, where it says something.
+    pub fn overridden_by(&self, other: &Sensors) -> Sensors {
+        let mut all = self.clone();
+        all.constants.extend(other.constants.iter().map(|(name, known)| (*name, *known)));
+        for (own, others) in all.noise.iter_mut().zip(other.noise) {
+            *own = others.or(*own);
+        }
+        all.vanes_at = other.vanes_at.or(self.vanes_at);
+        all.accelerometer_at = other.accelerometer_at.or(self.accelerometer_at);
+        all
+    }
+
+    /// What is known of a constant of [`CONSTANTS`].
+    pub fn known(&self, name: &str) -> Option<Known> {
+        self.constants.get(name).copied()
+    }
+
+    /// Holds a constant of [`CONSTANTS`] at `value`, unless something is known of it.
+    pub fn hold(&mut self, name: &'static str, value: f64) {
+        self.constants.entry(name).or_insert(Known { value, sd: 0.0 });
+    }
+
+    /// The wind north, east, down (m/s), where its horizontal part is stated.
+    pub fn wind(&self) -> Option<[f64; 3]> {
+        let [north, east, down] =
+            ["wind_north", "wind_east", "wind_down"].map(|name| self.known(name).map(|k| k.value));
+        Some([north?, east?, down.unwrap_or(0.0)])
+    }
+
+    /// The stated noise of a sensor, a standard deviation.
+    pub fn noise(&self, of: Noisy) -> Option<f64> {
+        self.noise[of as usize]
+    }
+
+    /// Where the vanes are, m from the centre of gravity, body axes.
+    pub fn vanes_at(&self) -> Option<[f64; 3]> {
+        self.vanes_at
+    }
+
+    /// Where the accelerometer is, likewise.
+    pub fn accelerometer_at(&self) -> Option<[f64; 3]> {
+        self.accelerometer_at
+    }
+}
+
+fn known_keys() -> String {
+    let constants: Vec<String> = CONSTANTS.into_iter().map(key).collect();
+    format!(
+        "[sensors] knows wind, clocks, {}, vanes_at_m, accelerometer_at_m, and as {{ value = …, sd = … }} {}",
+        NOISE.join(", "),
+        constants.join(", ")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Sensors, String> {
+        toml::from_str(text).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_section_says_winds_clocks_constants_noise_and_places() {
+        let sensors = read(
+            "wind = \"still\"\nclocks = \"one\"\nwind_down_mps = { value = 0.1, sd = 0.2 }\n\
+             airspeed_scale = { value = 1.02, sd = 0 }\nvanes_sd_rad = 0.004\nvanes_at_m = [13.0, 0.0, 0.5]\n",
+        )
+        .unwrap();
+        assert_eq!(sensors.wind(), Some([0.0, 0.0, 0.1]));
+        assert_eq!(sensors.known("wind_down"), Some(Known { value: 0.1, sd: 0.2 }));
+        assert_eq!(sensors.known("skew_velocity"), Some(Known { value: 0.0, sd: 0.0 }));
+        assert_eq!(sensors.known("airspeed_scale"), Some(Known { value: 1.02, sd: 0.0 }));
+        assert_eq!((sensors.known("alpha_bias"), sensors.accelerometer_at()), (None, None));
+        assert_eq!(sensors.noise(Noisy::Vanes), Some(0.004));
+        assert_eq!(sensors.vanes_at(), Some([13.0, 0.0, 0.5]));
+    }
+
+    #[test]
+    fn what_it_cannot_mean_is_refused_with_what_it_could_be() {
+        for (text, said) in [
+            ("wind = \"calm\"", "still"),
+            ("airspeed_scale = { value = 0, sd = 0.1 }", "1 without an error"),
+            ("alpha_bias = { value = 0, sd = 0.1 }", "alpha_bias_rad"),
+            ("vanes_sd_rad = -1.0", "must be positive"),
+            ("vanes_at_m = [1.0, 2.0]", "a word, a number"),
+            ("nose = 3.0", "vanes_sd_rad"),
+            ("vanes_at_m = [1000.0, 0.0, 0.0]", "within 100 m"),
+        ] {
+            let error = read(text).unwrap_err();
+            assert!(error.contains(said), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_mapping_speaks_before_the_airframe() {
+        let airframe = read("vanes_sd_rad = 0.01\nwind_north_mps = { value = 1, sd = 1 }").unwrap();
+        let mapping = read("wind = \"still\"").unwrap();
+        let both = airframe.overridden_by(&mapping);
+        assert_eq!(both.known("wind_north"), Some(Known { value: 0.0, sd: 0.0 }));
+        assert_eq!(both.noise(Noisy::Vanes), Some(0.01));
+    }
+}
