@@ -129,7 +129,7 @@ fn what_no_schedule_may_ask_for_is_refused_with_its_place() {
     refused("duration_s = 10.0", "duration_s = -1.0", &["step 1", "duration_s"]);
     refused("duration_s = 10.0", "duration_s = 2.0", &["step 1", "width_s"]);
     refused("duration_s = 10.0", "length_s = 10.0", &["line", "length_s", "duration_s"]);
-    refused("\"elevator\"", "\"rudder\"", &["step 1", "rudder", "aileron"]);
+    refused("\"elevator\"", "\"flaps\"", &["step 1", "flaps", "aileron"]);
     refused("\"3-2-1-1\"", "\"3211\"", &["step 1", "3211", "doublet"]);
     refused("high_hz = 4.0", "high_hz = 60.0", &["step 2", "high_hz", "20"]);
     refused("high_hz = 4.0", "", &["step 2", "multisine", "high_hz"]);

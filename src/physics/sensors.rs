@@ -164,6 +164,10 @@ impl Sensors {
                     _ => return Err(format!("sensors.{name} takes no place; {}", known_keys())),
                 }
             }
+            // a row of two numbers reads as a value with its sd
+            Written::Known(_) if ["vanes_at_m", "accelerometer_at_m"].contains(&name) => {
+                return Err(format!("sensors.{name} is a place: [forward, right, down] in m"));
+            }
             Written::Known(known) => {
                 let found = CONSTANTS.into_iter().find(|c| key(*c) == name);
                 let (constant, _) = found.ok_or_else(|| {
@@ -271,7 +275,7 @@ mod tests {
             ("airspeed_scale = { value = 0, sd = 0.1 }", "1 without an error"),
             ("alpha_bias = { value = 0, sd = 0.1 }", "alpha_bias_rad"),
             ("vanes_sd_rad = -1.0", "must be positive"),
-            ("vanes_at_m = [1.0, 2.0]", "a word, a number"),
+            ("vanes_at_m = [1.0, 2.0]", "[forward, right, down]"),
             ("nose = 3.0", "vanes_sd_rad"),
             ("vanes_at_m = [1000.0, 0.0, 0.0]", "within 100 m"),
         ] {

@@ -20,6 +20,8 @@ const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 
 /// Largest levels, colour included: errors of attitude, airspeed, vanes and velocity that somebody would still log. Without them a path
 /// that departs from a sensor makes that sensor count less, and departs further.
 const WIDEST: [f64; CHANNELS] = [0.05, 0.05, 0.1, 2.0, 0.1, 0.1, 1.0, 1.0, 1.0];
+/// Strain of the path from which its gyros or accelerometers err by more than their noise; that of a launch is 8.
+const STRAINED: f64 = 2.0;
 /// What the velocity may do where no accelerometer says it, m/s².
 const UNKNOWN_FORCE: f64 = 3.0;
 /// Gusts of calm air, m/s.
@@ -116,10 +118,13 @@ impl Levels {
         self
     }
 
-    /// Raises the levels of gyros and accelerometers whose steps strain the path by more than they allow: one level for the
+    /// Raises the levels of gyros and accelerometers whose steps strain the path by more than chance: one level for the
     /// three axes of each. Returns the largest relative change.
     pub fn loosen(&mut self, strain: &[f64; 6]) -> f64 {
-        let worst = |of: &[f64]| of.iter().copied().fold(1.0, f64::max);
+        let worst = |of: &[f64]| {
+            let worst = of.iter().copied().fold(1.0, f64::max);
+            if worst > STRAINED { worst } else { 1.0 }
+        };
         let (turn, pull) = (worst(&strain[..3]), worst(&strain[3..]));
         self.gyro.iter_mut().for_each(|level| *level *= turn);
         self.force.iter_mut().for_each(|level| *level *= pull);
