@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::logs::Sampling;
 use crate::model::GreyBox;
 use crate::physics::rigid_body::{self, RigidBody, Vector};
 use crate::physics::{Channel, Wrench};
@@ -82,10 +83,11 @@ impl Ready {
                 (0..CHANNELS).for_each(|c| add(1 + INPUTS + 9, c, bend * slope[c]));
             }
             // J ω̇ + ω × J ω = M(t − T), as explicit Euler steps of 2 T have it: T Σ ∂(ω × J ω − M)/∂x ẋ
-            for (slope, rate) in
-                here.slope.iter().zip(differences(&acting, place.segment, place.index, inputs))
-            {
-                (3..CHANNELS).for_each(|c| add(1 + INPUTS + 7, c, rate * slope[c]));
+            if acting.sampling == Sampling::Instants {
+                let rates = differences(&acting, place.segment, place.index, inputs);
+                for (slope, rate) in here.slope.iter().zip(rates) {
+                    (3..CHANNELS).for_each(|c| add(1 + INPUTS + 7, c, rate * slope[c]));
+                }
             }
             let force = differences(&acting, place.segment, place.index, |i| i.specific_force);
             if force.iter().all(|f| f.is_finite()) {
