@@ -134,7 +134,7 @@ impl Levels {
     /// Takes the levels anew from the residuals of every stretch; returns the largest relative change.
     pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
         let mut change = 0.0_f64;
-        for channel in 0..CHANNELS {
+        for (channel, widest) in WIDEST.into_iter().enumerate() {
             let all = readings.iter().flatten().map(|r| r.residual[channel]);
             let mut residuals: Vec<f64> = all.filter(|x| !x.is_nan()).collect();
             let over = |block: f64| noise::colour(&residuals, (block / step).round() as usize);
@@ -143,8 +143,8 @@ impl Levels {
             if level.is_nan() || self.stated[channel] {
                 continue;
             }
-            let level = level.max(self.white[channel]).min(WIDEST[channel]);
-            let colour = colour.min(WIDEST[channel] / level);
+            let level = level.max(self.white[channel]).min(widest);
+            let colour = colour.min(widest / level);
             change = change.max((level / self.measured[channel]).ln().abs());
             (self.measured[channel], self.colour[channel]) = (level, colour);
         }
