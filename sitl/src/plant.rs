@@ -1,6 +1,7 @@
 //! The plant: one aircraft flown by JSBSim in this process, step by step in its own time.
 
 mod loads;
+mod lookup;
 mod mixing;
 mod nodes;
 mod options;

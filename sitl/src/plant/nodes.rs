@@ -2,6 +2,7 @@
 
 use jsbsim::{Error, Fdm, NodeId};
 
+use super::lookup::{look, needed};
 use super::steering::Steering;
 use super::{Inputs, PlantError, PlantOptions, Start, Truth};
 use crate::air::Gust;
@@ -45,13 +46,8 @@ pub(super) struct Nodes {
 impl Nodes {
     /// Looks every property up on a loaded aircraft.
     pub(super) fn find(fdm: &Fdm, options: &PlantOptions) -> Result<Self, PlantError> {
-        let look = |name: &str| fdm.node(name).ok().flatten();
-        let node = |name: &str| {
-            look(name).ok_or_else(|| PlantError::Property {
-                aircraft: options.aircraft.clone(),
-                property: name.to_owned(),
-            })
-        };
+        let look = |name: &str| look(fdm, name);
+        let node = |name: &str| needed(fdm, &options.aircraft, name);
         let three =
             |before: &str, names: [&str; 3], after: &str| -> Result<[NodeId; 3], PlantError> {
                 let [a, b, c] = names.map(|name| node(&format!("{before}{name}{after}")));

@@ -2,6 +2,7 @@
 
 use jsbsim::{Error, Fdm, NodeId};
 
+use super::lookup::{look, needed};
 use super::mixing::Mixing;
 use super::options::THROTTLE_COMMAND;
 use super::{Inputs, PlantError, PlantOptions, Properties};
@@ -37,13 +38,8 @@ pub(super) struct Mixed {
 impl Steering {
     /// Looks the properties up on a loaded aircraft.
     pub(super) fn find(fdm: &Fdm, options: &PlantOptions) -> Result<Self, PlantError> {
-        let look = |name: &str| fdm.node(name).ok().flatten();
-        let node = |name: &str| {
-            look(name).ok_or_else(|| PlantError::Property {
-                aircraft: options.aircraft.clone(),
-                property: name.to_owned(),
-            })
-        };
+        let look = |name: &str| look(fdm, name);
+        let node = |name: &str| needed(fdm, &options.aircraft, name);
         let p = &options.properties;
         let throttles = numbered(fdm, &p.throttle_command);
         if let Some(mixing) = &options.mixing {

@@ -193,9 +193,11 @@ impl Problem<'_> {
             (0..path.len()).map(|_| std::array::from_fn(|_| unit())).collect();
         let measured =
             measurement::readings(track, path, values, step, self.log.sensors.vanes_at());
+        // as the path was found: what is coloured counts as white that is so much wider
+        let spread: [f64; CHANNELS] = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
         let readings: Vec<Reading> = measured
             .into_iter()
-            .map(|r| r.with(std::array::from_fn(|i| l.measured[i] * unit())))
+            .map(|r| r.with(std::array::from_fn(|i| spread[i] * unit())))
             .collect();
         let drive = Drive::new(track, values, step, self.sampling, gravity);
         let sd = step_deviations::<N>(l, step);
@@ -205,13 +207,12 @@ impl Problem<'_> {
                 start::<N, 1>(&Vector3::zeros(), l.gusts, node, corner);
             }
             let reading = &readings[k];
-            let spread = &l.measured;
             measurement::add::<N, 1, 1>(
                 along,
                 values,
                 k,
                 reading,
-                spread,
+                &spread,
                 f64::INFINITY,
                 None,
                 node,

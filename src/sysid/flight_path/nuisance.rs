@@ -1,5 +1,6 @@
 //! The constants estimated along with the path: their names, units and prior widths.
 
+use crate::physics::sensors::CONSTANTS;
 use crate::sysid::flight_path::Options;
 use crate::sysid::flight_path::intake::{Log, Present};
 
@@ -43,28 +44,18 @@ pub const SKEW_SAMPLES: f64 = 0.77;
 /// Values of the constants.
 pub type Values = [f64; COUNT];
 
-/// Names and units, by place.
-pub const NAMES: [(&str, &str); COUNT] = [
-    ("alpha_bias", "rad"),
-    ("beta_bias", "rad"),
-    ("airspeed_scale", ""),
-    ("wind_north", "m/s"),
-    ("wind_east", "m/s"),
-    ("wind_down", "m/s"),
-    ("skew_attitude", "s"),
-    ("skew_airspeed", "s"),
-    ("skew_vanes", "s"),
-    ("skew_velocity", "s"),
-    ("gyro_bias_p", "rad/s"),
-    ("gyro_bias_q", "rad/s"),
-    ("gyro_bias_r", "rad/s"),
-    ("accelerometer_bias_x", "m/s²"),
-    ("accelerometer_bias_y", "m/s²"),
-    ("accelerometer_bias_z", "m/s²"),
-    ("skew_accelerometer", "s"),
-    ("earth_rate_north", "rad/s"),
-    ("earth_rate_down", "rad/s"),
-];
+/// Names and units, by place: what can be stated of sensors and wind, then the Earth's rate.
+pub const NAMES: [(&str, &str); COUNT] = {
+    let mut all = [("earth_rate_north", "rad/s"); COUNT];
+    all[COUNT - 1] = ("earth_rate_down", "rad/s");
+    assert!(CONSTANTS.len() + 2 == COUNT);
+    let mut place = 0;
+    while place < CONSTANTS.len() {
+        all[place] = CONSTANTS[place];
+        place += 1;
+    }
+    all
+};
 
 /// Prior width of the delay of a sensor slower than the log's rows, in its own sample periods: it filters
 /// over about as long as it takes to measure.

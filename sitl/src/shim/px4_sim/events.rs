@@ -51,7 +51,7 @@ impl fmt::Display for Px4Event {
             Px4Event::Catapult => write!(f, "armed with throttle: the catapult is let go"),
             Px4Event::Stopped => write!(
                 f,
-                "no actuator message for 1 s: simulated time stands still until one comes; see \
+                "no actuator message for 1 s: until one comes a step is made every 3 s; see \
                  whether PX4 is stopped, or end it and start it again"
             ),
             Px4Event::Resumed => write!(f, "answered: simulated time goes on"),

@@ -44,6 +44,9 @@ const SILENCE: Duration = Duration::from_secs(1);
 /// A clock that is further behind than this is set anew: no burst makes up for it.
 const HOPELESS: Duration = Duration::from_millis(100);
 /// How long an answer is waited for by yielding, then how often the link is looked at.
+/// Time without an answer after which lockstep makes a step all the same: PX4 that changed its mode may wait for a sensor
+/// before it sends actuators, and both would wait for ever.
+const NUDGE: Duration = Duration::from_secs(3);
 const SPIN: Duration = Duration::from_micros(300);
 const LOOK: Duration = Duration::from_micros(100);
 const IDLE: Duration = Duration::from_millis(5);
@@ -214,6 +217,9 @@ impl Run<'_> {
                 return Ok(true);
             }
             self.watch(now);
+            if !answered && now.saturating_duration_since(self.sent) >= NUDGE {
+                return Ok(true);
+            }
             if answered {
                 thread::sleep(LOOK.min(deadline.saturating_duration_since(now)));
             } else if now.saturating_duration_since(self.sent) < SPIN {

@@ -26,10 +26,8 @@ const CLIMB: f64 = 0.5;
 /// Standard deviation of a sideways velocity taken to be zero at every step, m/s: held against the
 /// process it draws the sideslip to zero within a few seconds, so that drifts end and turns show.
 const SIDEWAYS: f64 = 5.0;
-/// Standard deviation of the sideways velocity by wind and ground velocity, m/s: that of the wind.
-const SIDEWAYS_BY_WIND: f64 = 0.5;
-/// Standard deviation of the angles that come out, rad: 0.2° and 0.4° beside real ArduPlane
-/// (`tests/firmware/acceptance.py`), 0.2° beside real PX4, in calm air; gusts add to it.
+/// Standard deviation of the angles that come out, rad: 0.2° and 0.3 to 0.5° beside real ArduPlane, 0.1° and 0.2° beside real
+/// PX4, in calm air (`tests/firmware/angles.py`); gusts add to it.
 pub const DEVIATION: f64 = 0.5 * std::f64::consts::PI / 180.0;
 /// Slowest airspeed at which angles mean anything, m/s.
 const SLOWEST: f64 = 3.0;
@@ -52,6 +50,8 @@ pub struct Measured {
     pub velocity: [f64; 3],
     /// The air's velocity, NED, m/s; NaN when not reported.
     pub wind: [f64; 3],
+    /// Its standard deviation, and so that of the sideways velocity that follows from it, m/s.
+    pub wind_sd: f64,
 }
 
 /// The estimator.
@@ -131,7 +131,7 @@ impl AirData {
             let (sy, cy) = m.attitude[2].sin_cos();
             let side = [sr * sp * cy - cr * sy, sr * sp * sy + cr * cy, sr * cp];
             let measured: f64 = side.iter().zip(air).map(|(a, b)| a * b).sum();
-            self.scalar(sideways, measured - self.seen(sideways), SIDEWAYS_BY_WIND);
+            self.scalar(sideways, measured - self.seen(sideways), m.wind_sd);
         }
         self.scalar(sideways, -self.seen(sideways), SIDEWAYS);
     }
@@ -202,6 +202,7 @@ mod tests {
             climb: 0.0,
             velocity: [20.0, 0.0, 0.0],
             wind: [0.0; 3],
+            wind_sd: 0.5,
         }
     }
 

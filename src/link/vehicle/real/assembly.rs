@@ -38,6 +38,8 @@ pub(super) struct Assembly {
     actuators: Actuators,
     boot_ms: Option<u32>,
     last: Telemetry,
+    /// Standard deviation of its wind, m/s.
+    wind_sd: f64,
     /// What the last state was made of, as bits: sensors that stand still give the same again.
     shown: [u64; 13],
     pub(super) counts: VehicleCounts,
@@ -72,6 +74,7 @@ impl Assembly {
                 velocity: [nan; 3],
                 wind: [nan; 3],
             },
+            wind_sd: f64::NAN,
             counts: VehicleCounts::default(),
         }
     }
@@ -105,7 +108,9 @@ impl Assembly {
                 (self.last.position, self.last.velocity) = (position, velocity);
                 self.new_velocity = true;
             }
-            ControllerMessage::Wind(wind) if limits::wind(wind) => self.last.wind = wind,
+            ControllerMessage::Wind { velocity, sd } if limits::wind(velocity) => {
+                (self.last.wind, self.wind_sd) = (velocity, sd);
+            }
             ControllerMessage::Attitude { boot_ms, quaternion, rates } => {
                 return self.complete(host, boot_ms, quaternion, rates, command);
             }
@@ -208,6 +213,7 @@ impl Assembly {
                 false => [f64::NAN; 3],
             },
             wind: next.wind,
+            wind_sd: self.wind_sd,
         };
         let estimated = self.estimator.update(&measured, step);
         let whole = !next.faults.contains(Faults::SPECIFIC_FORCE);

@@ -1,0 +1,18 @@
+//! Properties of a loaded aircraft by their names.
+
+use jsbsim::{Fdm, NodeId};
+
+use super::PlantError;
+
+/// A property of a loaded aircraft, if it has it.
+pub(super) fn look(fdm: &Fdm, name: &str) -> Option<NodeId> {
+    fdm.node(name).ok().flatten()
+}
+
+/// A property that a loaded aircraft has to have.
+pub(super) fn needed(fdm: &Fdm, aircraft: &str, name: &str) -> Result<NodeId, PlantError> {
+    look(fdm, name).ok_or_else(|| PlantError::Property {
+        aircraft: aircraft.to_owned(),
+        property: name.to_owned(),
+    })
+}

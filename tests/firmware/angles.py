@@ -1,0 +1,82 @@
+"""How well angle of attack and sideslip were known in a flight of acceptance.py, judged by the simulator's truth.
+
+    python3 tests/firmware/angles.py DIR/arduplane-surfaces/recording-1
+
+Prints the error of the companion's estimate (flight.csv) and of ArduPilot's own (AOA_SSA in flight.tlog, where there is one) while
+Greylag steered: mean, standard deviation, largest, in degrees. The truth is truth.csv beside the recording: JSBSim's own angles.
+"""
+
+import bisect
+import csv
+import math
+import pathlib
+import statistics
+import sys
+
+from pymavlink import mavutil
+
+
+def table(path, columns):
+    """The rows of a CSV file in which all these columns are numbers."""
+    rows = []
+    with open(path, newline="") as file:
+        for row in csv.DictReader(file):
+            try:
+                rows.append([float(row[name]) for name in columns])
+            except (TypeError, ValueError):
+                continue
+    return rows
+
+
+def at(rows, time, column):
+    """A column of `rows` at a time, between two rows; None beyond them."""
+    k = bisect.bisect(rows, [time])
+    if not 0 < k < len(rows):
+        return None
+    (a, b), share = rows[k - 1 : k + 1], 0.0
+    share = (time - a[0]) / (b[0] - a[0])
+    return a[column] + share * (b[column] - a[column])
+
+
+def offset(truth, flown):
+    """Seconds by which the truth's clock is ahead: where its roll is that of the flight."""
+
+    def error(shift):
+        pairs = ((at(truth, row[0] + shift, 3), row[3]) for row in flown[::25])
+        gaps = [abs(a - b) for a, b in pairs if a is not None]
+        return statistics.fmean(gaps) if len(gaps) > 20 else math.inf
+
+    return min((error(0.02 * k), 0.02 * k) for k in range(-1000, 1001))[1]
+
+
+def show(name, truth, rows, shift):
+    """A line for each angle."""
+    for column, angle in ((1, "angle of attack"), (2, "sideslip")):
+        pairs = ((row[column], at(truth, row[0] + shift, column)) for row in rows)
+        errors = [math.degrees(a - b) for a, b in pairs if b is not None]
+        mean, sd, most = statistics.fmean(errors), statistics.pstdev(errors), max(map(abs, errors))
+        print(f"{name:24} {angle:16} mean {mean:+.2f}  sd {sd:.2f}  largest {most:.2f} deg  ({len(errors)} samples)")
+
+
+def main():
+    """Prints."""
+    folder = pathlib.Path(sys.argv[1])
+    truth = table(folder.parent / "truth.csv", ["time_s", "alpha_rad", "beta_rad", "roll_rad"])
+    # armed is 1 while Greylag steers or may
+    flown = table(folder / "flight.csv", ["time_s", "alpha_rad", "beta_rad", "roll_rad", "armed"])
+    flown = [row for row in flown if row[4] == 1]
+    shift = offset(truth, flown)
+    show("companion's estimate", truth, flown, shift)
+    own, time, steered = [], None, {round(row[0], 1) for row in flown}
+    log = mavutil.mavlink_connection(str(folder / "flight.tlog"))
+    while (message := log.recv_match(type=["AOA_SSA", "ATTITUDE_QUATERNION"])) is not None:
+        if message.get_type() == "ATTITUDE_QUATERNION":
+            time = message.time_boot_ms / 1000.0
+        elif time is not None and round(time, 1) in steered:
+            own.append([time, math.radians(message.AOA), math.radians(message.SSA)])
+    if own:
+        show("ArduPilot's AOA_SSA", truth, own, shift)
+
+
+if __name__ == "__main__":
+    main()
