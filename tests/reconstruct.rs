@@ -108,6 +108,27 @@ fn what_the_data_cannot_see_keeps_its_prior_and_is_named() {
 }
 
 #[test]
+fn sensors_of_the_air_that_meet_no_other_sensor_are_believed() {
+    let flown = fly(30.0, air([0.0; 3], None), 1);
+    let mut log = spoil(&flown, &Errors::NONE, 1);
+    for sample in &mut log.samples {
+        sample.specific_force_mps2 = [f64::NAN; 3];
+        sample.velocity_ned_mps = [f64::NAN; 3];
+    }
+    let found = reconstruct(&log, &options()).unwrap();
+    print(&found);
+    // nothing but the smoothness of the path says the scale of the airspeed: it is not to be sought in that
+    for n in found.nuisances.iter().filter(|n| !n.name.starts_with("gyro")) {
+        let moved = n.moved().abs();
+        assert!(moved < 0.1, "{n:?}");
+    }
+    let errors = state_errors(&flown, &found);
+    println!("{errors:?}");
+    assert!(errors[2][1] < 0.1 && errors[6][1] < 0.003 && errors[7][1] < 0.003, "{errors:?}");
+    assert_eq!(found.notes.iter().filter(|n| n.contains("cannot tell")).count(), 1);
+}
+
+#[test]
 fn little_is_enough_for_a_path() {
     type Strip = fn(&mut Sample);
     let strip: [(&str, Strip); 3] = [

@@ -12,7 +12,7 @@ use crate::sysid::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST, Step
 use crate::sysid::flight_path::levels::{CALM, Levels};
 use crate::sysid::flight_path::measurement::{self, AT, OTHERS, Others, Reading};
 use crate::sysid::flight_path::noise;
-use crate::sysid::flight_path::nuisance::{COUNT, INERTIAL, Values, WIND};
+use crate::sysid::flight_path::nuisance::{self, COUNT, INERTIAL, Values, WIND};
 use crate::sysid::flight_path::path::{CHANNELS, Path};
 use crate::sysid::flight_path::{Options, ReconstructError};
 
@@ -150,17 +150,22 @@ impl Problem<'_> {
         let (_, _, left) = eliminated?;
         let factor = self.information(&left)?.cholesky()?;
         Some(std::array::from_fn(|r| {
-            let right = SVector::<f64, COUNT>::from_fn(|i, _| left.corner[OTHERS + i][r]);
+            let seen = |i: usize| !nuisance::unseeable(i, &self.log.has);
+            let right = SVector::<f64, COUNT>::from_fn(|i, _| {
+                if seen(i) { left.corner[OTHERS + i][r] } else { 0.0 }
+            });
             factor.solve(&right).into()
         }))
     }
 
-    /// What is known of the constants, before the data and by them: the last columns but one.
+    /// What is known of the constants, before the data and by them (the last columns but one), those
+    /// that the log cannot tell before the data alone.
     fn information<const W: usize>(&self, left: &Left<W>) -> Option<SMatrix<f64, COUNT, COUNT>> {
         let first = W.checked_sub(WIDTH)?;
         Some(SMatrix::from_fn(|i, j| {
             let before = if i == j { self.widths[i].powi(-2) } else { 0.0 };
-            left.corner[first + i][first + j] + before
+            let seen = [i, j].iter().all(|i| !nuisance::unseeable(*i, &self.log.has));
+            before + if seen { left.corner[first + i][first + j] } else { 0.0 }
         }))
     }
 
@@ -248,7 +253,9 @@ impl Problem<'_> {
         by[W - 1] = 1.0;
         if W == WIDTH {
             let right = SVector::<f64, COUNT>::from_fn(|i, _| {
-                left.corner[i][W - 1] - (found.values[i] - self.means[i]) / self.widths[i].powi(2)
+                let data =
+                    if nuisance::unseeable(i, &self.log.has) { 0.0 } else { left.corner[i][W - 1] };
+                data - (found.values[i] - self.means[i]) / self.widths[i].powi(2)
             });
             let factor = self.information(&left)?.cholesky()?;
             constants = factor.solve(&right).into();

@@ -126,9 +126,18 @@ pub fn concerned(place: usize, has: &Present) -> bool {
     }
 }
 
+/// Whether nothing in the log can tell a constant. Without accelerometers and velocity over ground no
+/// sensor of the air meets another one: only the smoothness of the path is left, and that favours whatever
+/// makes the aircraft slower (an airspeed scale of four in a flight without any error).
+pub fn unseeable(place: usize, has: &Present) -> bool {
+    let of_the_air = place < SKEW_ATTITUDE || place == SKEW_AIRSPEED || place == SKEW_VANES;
+    of_the_air && !has.force && !has.velocity
+}
+
 /// What would let the data see a constant that they do not.
 pub fn remedy(place: usize, has: &Present) -> &'static str {
     match place {
+        _ if unseeable(place, has) => "log the accelerometers or the velocity over ground",
         SCALE | WIND..SKEW_ATTITUDE if !has.velocity => "log the velocity over ground",
         SCALE | WIND..SKEW_ATTITUDE if !has.yaw => "log the heading",
         SCALE | WIND..SKEW_ATTITUDE => "fly several headings",
@@ -137,12 +146,26 @@ pub fn remedy(place: usize, has: &Present) -> &'static str {
     }
 }
 
-/// The note on a constant that keeps its prior.
-pub fn unseen(place: usize, has: &Present, options: &Options) -> String {
-    format!(
-        "The data of {} cannot tell {}: it keeps its prior; {} to see it.",
-        options.name,
-        NAMES[place].0,
-        remedy(place, has)
-    )
+/// The notes on the constants that keep their prior: one for each remedy.
+pub fn unseen(places: &[usize], has: &Present, options: &Options) -> Vec<String> {
+    let mut by_remedy: Vec<(&str, Vec<&str>)> = Vec::new();
+    for place in places {
+        let (remedy, name) = (remedy(*place, has), NAMES[*place].0);
+        match by_remedy.iter_mut().find(|(of, _)| *of == remedy) {
+            Some((_, names)) => names.push(name),
+            None => by_remedy.push((remedy, vec![name])),
+        }
+    }
+    let note = |(remedy, names): (&str, Vec<&str>)| {
+        let (they, keep, them) = match names.len() {
+            1 => ("it", "keeps its prior", "it"),
+            _ => ("they", "keep their priors", "them"),
+        };
+        format!(
+            "The data of {} cannot tell {}: {they} {keep}; {remedy} to see {them}.",
+            options.name,
+            names.join(", ")
+        )
+    };
+    by_remedy.into_iter().map(note).collect()
 }

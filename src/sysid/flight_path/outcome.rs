@@ -282,12 +282,13 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
             }
         ));
     }
-    for place in (0..COUNT).filter(|p| nuisance::concerned(*p, has)) {
-        let stated = log.sensors.known(nuisance::NAMES[place].0).is_some();
-        if !stated && smoothed.deviations[place] > UNSEEN * problem.widths[place] {
-            notes.push(nuisance::unseen(place, has, options));
-        }
-    }
+    let unseen = |place: &usize| {
+        let stated = log.sensors.known(nuisance::NAMES[*place].0).is_some();
+        !stated && smoothed.deviations[*place] > UNSEEN * problem.widths[*place]
+    };
+    let places: Vec<usize> =
+        (0..COUNT).filter(|p| nuisance::concerned(*p, has)).filter(unseen).collect();
+    notes.extend(nuisance::unseen(&places, has, options));
     for n in found.iter().filter(|n| n.moved().abs() > FAR) {
         notes.push(format!(
             "{} is found at {:.4} {}, {:.1} standard deviations from what was known of it beforehand: check that \
