@@ -152,10 +152,12 @@ fn print_reconstruction(flight: &Reconstruction, output: &Path) {
     let rows: usize = flight.segments.iter().map(|s| s.instants.len()).sum();
     println!("{rows} reconstructed samples of {} in {}", flight.name, output.display());
     for n in &flight.nuisances {
-        let moved = n.prior.map(|p| {
-            format!("prior {} ± {:.5}, moved by {:.1} sd of it", p.value, p.sd, n.moved())
-        });
-        let found = format!("{:<22} {:>11.5} ± {:.5} {}", n.name, n.value, n.sd, n.unit);
+        let moved = n
+            .prior
+            .map(|p| format!("prior {} ± {}, moved by {:.1} sd of it", p.value, p.sd, n.moved()));
+        let decimals = if n.sd > 0.0 { (1.0 - n.sd.log10()).clamp(5.0, 9.0) as usize } else { 5 };
+        let found =
+            format!("{:<22} {:>11.decimals$} ± {:.decimals$} {}", n.name, n.value, n.sd, n.unit);
         println!("{found:<50} {}", moved.unwrap_or_default());
     }
     flight.notes.iter().for_each(|note| println!("{note}"));

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 /// The constants of sensors and wind that a flight-path reconstruction estimates, with their units.
-pub const CONSTANTS: [(&str, &str); 17] = [
+pub const CONSTANTS: [(&str, &str); 20] = [
     ("alpha_bias", "rad"),
     ("beta_bias", "rad"),
     ("airspeed_scale", ""),
@@ -34,6 +34,9 @@ pub const CONSTANTS: [(&str, &str); 17] = [
     ("accelerometer_bias_y", "m/s²"),
     ("accelerometer_bias_z", "m/s²"),
     ("skew_accelerometer", "s"),
+    ("gyro_drift_p", "rad/s²"),
+    ("gyro_drift_q", "rad/s²"),
+    ("gyro_drift_r", "rad/s²"),
 ];
 
 /// Keys of the noise of sensors, standard deviations.
@@ -91,6 +94,7 @@ fn key((name, unit): (&str, &str)) -> String {
         "rad/s" => "_radps",
         "m/s" => "_mps",
         "m/s²" => "_mps2",
+        "rad/s²" => "_radps2",
         "s" => "_s",
         _ => "",
     };

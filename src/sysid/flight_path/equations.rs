@@ -5,6 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::logs::Sampling;
+use crate::num::statistics;
 use crate::num::stream::Stream;
 use crate::sysid::flight_path::band::{self, Left, Link, Node, Stretch, add_gram};
 use crate::sysid::flight_path::intake::{Log, Track};
@@ -126,6 +127,28 @@ impl Problem<'_> {
             }
         }
         left.map(|mut left| noise::level(&mut left))
+    }
+
+    /// Root mean square of what the measured roll, pitch and yaw are off the path over blocks of `block` (s), rad; zero where
+    /// they were not measured.
+    pub fn slow_disagreement(&self, found: &Found, block: f64) -> [f64; 3] {
+        let vanes_at = self.log.sensors.vanes_at();
+        let mut sums = [(0.0, 0.0); 3];
+        for (track, path) in self.log.tracks.iter().zip(&found.paths) {
+            let readings =
+                measurement::readings(track, path, &found.values, self.log.step, vanes_at);
+            for block in readings.chunks((block / self.log.step).ceil() as usize) {
+                for (channel, (sum, count)) in sums.iter_mut().enumerate() {
+                    let residuals = block.iter().map(|r| r.residual[channel]);
+                    let residuals: Vec<f64> = residuals.filter(|x| x.is_finite()).collect();
+                    if !residuals.is_empty() {
+                        *sum += statistics::mean(&residuals).powi(2);
+                        *count += 1.0;
+                    }
+                }
+            }
+        }
+        sums.map(|(sum, count): (f64, f64)| (sum / count.max(1.0)).sqrt())
     }
 
     /// −2 ln L of the levels, up to what does not change with the gusts' level, with the constants held.

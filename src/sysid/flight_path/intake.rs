@@ -28,6 +28,8 @@ pub struct Log {
     pub step: f64,
     /// The stretches without gaps.
     pub tracks: Vec<Track>,
+    /// The extent of the flight in time.
+    pub span: Span,
     /// Which sensors the log has.
     pub has: Present,
     /// How often they measure.
@@ -70,11 +72,22 @@ pub struct Periods {
     pub velocity: f64,
 }
 
+/// The extent in time of a flight with all its stretches.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Span {
+    /// Its middle on the log's clock, s.
+    pub middle: f64,
+    /// Its length, s.
+    pub length: f64,
+}
+
 /// A stretch without gaps, as measured; a missing measurement is NaN. Units as in [`Sample`].
 #[derive(Clone, Debug, Default)]
 pub struct Track {
     /// Time of the first sample, s.
     pub start: f64,
+    /// The extent in time of the flight that it is a stretch of.
+    pub span: Span,
     /// p, q, r: never missing.
     pub rates: Vec<[f64; 3]>,
     /// Specific force: never missing if the log has it.
@@ -101,6 +114,11 @@ impl Track {
     /// The number of samples.
     pub fn len(&self) -> usize {
         self.rates.len()
+    }
+
+    /// Time of sample `k`, s; samples `step` (s) apart.
+    pub fn time(&self, k: usize, step: f64) -> f64 {
+        self.start + k as f64 * step
     }
 }
 
@@ -225,7 +243,16 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     let rudder = RudderMotion::of(&flight.samples);
     let periods = channels.periods();
     let sensors = options.sensors.overridden_by(&flight.sensors);
-    let mut log = Log { step, tracks: Vec::new(), has, periods, rudder, sensors, notes };
+    let mut log = Log {
+        step,
+        tracks: Vec::new(),
+        span: Span::default(),
+        has,
+        periods,
+        rudder,
+        sensors,
+        notes,
+    };
     let mut longest = 0.0_f64;
     for times in &stretches {
         let [start, end] = [times[0], times[times.len() - 1]];
@@ -255,6 +282,10 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
         let (flight, shortest_s) = (options.name.clone(), options.shortest_s);
         return Err(ReconstructError::TooShort { flight, longest_s: longest, shortest_s });
     }
+    let ends = log.tracks.iter().map(|t| t.time(t.len(), step));
+    let (start, end) = (log.tracks[0].start, ends.fold(f64::NEG_INFINITY, f64::max));
+    log.span = Span { middle: 0.5 * (start + end), length: end - start };
+    log.tracks.iter_mut().for_each(|track| track.span = log.span);
     Ok(log)
 }
 

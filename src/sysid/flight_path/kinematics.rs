@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::logs::Sampling;
 use crate::sysid::flight_path::band::{Block, Wide};
-use crate::sysid::flight_path::intake::Track;
-use crate::sysid::flight_path::nuisance::{EARTH, FORCE, GYRO, INERTIAL, SKEW_FORCE, Values};
+use crate::sysid::flight_path::intake::{Span, Track};
+use crate::sysid::flight_path::nuisance::{self, EARTH, FORCE, INERTIAL, SKEW_FORCE, Values};
 use crate::sysid::flight_path::path::Path;
 use crate::sysid::flight_path::rotation::{self, cross, exp, log};
 
@@ -27,6 +27,10 @@ pub struct Drive {
     force: Vec<Vector3<f64>>,
     /// Its change with the delay of the accelerometers, m/s³.
     force_by_skew: Vec<Vector3<f64>>,
+    /// Time of the first sample, s.
+    start: f64,
+    /// The flight's extent in time.
+    span: Span,
 }
 
 /// Attitude and velocity, unknowns of every instant; the gust's three may follow.
@@ -71,11 +75,14 @@ impl Drive {
         gravity: f64,
     ) -> Drive {
         let n = track.len();
-        let bias = Vector3::from_column_slice(&values[GYRO..GYRO + 3]);
-        let gyro = |k: usize| Vector3::from(track.rates[k]) - bias;
+        let gyro = |k: usize| {
+            Vector3::from(track.rates[k])
+                - Vector3::from(nuisance::gyro_bias(values, track.time(k, step), &track.span))
+        };
         let (force, slope) = shifted(&track.force, values[SKEW_FORCE] / step);
         let has_force = track.force.first().is_some_and(|f| f[0].is_finite());
-        let mut drive = Drive { rate: vec![], force: vec![], force_by_skew: vec![] };
+        let (start, span) = (track.start, track.span);
+        let mut drive = Drive { rate: vec![], force: vec![], force_by_skew: vec![], start, span };
         for k in 0..n - 1 {
             let (rate, mean): (_, [(Matrix3<f64>, usize, f64); 2]) = match sampling {
                 Sampling::Held => {
@@ -139,7 +146,12 @@ impl Drive {
             (0..3).for_each(|i| link.rest[6 + i][D - 1] = -gust[i]);
         }
         if D > 1 {
-            put(&mut link.rest, (0, GYRO - INERTIAL), &(one * step));
+            let time = self.start + (k as f64 + 0.5) * step;
+            for axis in 0..3 {
+                for (place, by) in nuisance::gyro_bias_of(axis, time, &self.span) {
+                    link.rest[axis][place - INERTIAL] = step * by;
+                }
+            }
             put(&mut link.rest, (3, FORCE - INERTIAL), &(one * step));
             for i in 0..3 {
                 link.rest[3 + i][SKEW_FORCE - INERTIAL] = self.force_by_skew[k][i] * -step;

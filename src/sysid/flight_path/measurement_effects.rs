@@ -73,8 +73,8 @@ pub const MEASUREMENT_EFFECTS: [Description; 6] = [
     },
     Description {
         id: "imu_bias",
-        description: "Gyros or accelerometers show a constant beside what they measure.",
-        formula: "ω_measured = ω + b_ω, f_measured = f + b_f",
+        description: "Gyros or accelerometers show a constant beside what they measure; that of a gyro drifts.",
+        formula: "ω_measured = ω + b_ω + d_ω (t − t_middle), f_measured = f + b_f",
         source: PATH,
         coefficients: &IMU,
         ..measured(&Entry {
@@ -101,10 +101,23 @@ pub const MEASUREMENT_EFFECTS: [Description; 6] = [
     },
 ];
 
-const IMU: [Coefficient; 6] = [
+const IMU: [Coefficient; 9] = [
     coefficient("gyro_bias_p", "of the roll gyro", "rad/s", (-0.5, 0.5)),
     coefficient("gyro_bias_q", "of the pitch gyro", "rad/s", (-0.5, 0.5)),
     coefficient("gyro_bias_r", "of the yaw gyro", "rad/s", (-0.5, 0.5)),
+    coefficient(
+        "gyro_drift_p",
+        "change of the roll gyro's bias with time",
+        "rad/s²",
+        (-1e-3, 1e-3),
+    ),
+    coefficient(
+        "gyro_drift_q",
+        "change of the pitch gyro's bias with time",
+        "rad/s²",
+        (-1e-3, 1e-3),
+    ),
+    coefficient("gyro_drift_r", "change of the yaw gyro's bias with time", "rad/s²", (-1e-3, 1e-3)),
     coefficient("accelerometer_bias_x", "of the forward accelerometer", "m/s²", (-5.0, 5.0)),
     coefficient("accelerometer_bias_y", "of the rightward accelerometer", "m/s²", (-5.0, 5.0)),
     coefficient("accelerometer_bias_z", "of the downward accelerometer", "m/s²", (-5.0, 5.0)),
@@ -147,7 +160,7 @@ mod tests {
             .flat_map(|about| about.coefficients)
             .map(|c| (c.name, c.unit))
             .collect();
-        let mut theirs: Vec<_> = nuisance::NAMES[..nuisance::EARTH].to_vec();
+        let mut theirs: Vec<_> = nuisance::NAMES[..nuisance::BEND].to_vec();
         ours.sort_unstable();
         theirs.sort_unstable();
         assert_eq!(ours, theirs);

@@ -2,10 +2,10 @@
 
 use crate::physics::sensors::CONSTANTS;
 use crate::sysid::flight_path::Options;
-use crate::sysid::flight_path::intake::{Log, Present};
+use crate::sysid::flight_path::intake::{Log, Present, Span};
 
 /// Number of constants.
-pub const COUNT: usize = 19;
+pub const COUNT: usize = 31;
 /// Place of the bias of the angle-of-attack vane.
 pub const ALPHA: usize = 0;
 /// Place of the bias of the sideslip vane.
@@ -24,19 +24,27 @@ pub const SKEW_VANES: usize = 8;
 pub const SKEW_VELOCITY: usize = 9;
 /// The first of the constants that act between instants; those before it act at instants.
 pub const INERTIAL: usize = 10;
-/// Place of the gyro biases p, q, r.
+/// Place of the gyro biases p, q, r in the middle of the flight.
 pub const GYRO: usize = 10;
 /// Place of the accelerometer biases x, y, z.
 pub const FORCE: usize = 13;
 /// Place of the delay of the accelerometers.
 pub const SKEW_FORCE: usize = 16;
+/// Place of the drifts of the gyro biases p, q, r: their change with time, rad/s². A gyro that warms up drifts
+/// by 0.05°/s a minute (so does ArduPilot's SITL): held constant, its bias turned the heading by 1.5° in four minutes.
+pub const DRIFT: usize = 17;
+/// Place of what bends the drifts, rad/s²: their changes at the inner knots of the flight, p, q, r of each. The drift of
+/// ArduPilot's SITL turns back after five minutes.
+pub const BEND: usize = 20;
+/// Number of inner knots, as far from one another as from the ends of the flight.
+const KNOTS: usize = 3;
 /// Place of the Earth's rate north and down, rad/s: a log without a latitude does not say them, and
 /// their Coriolis acceleration, 0.003 m/s² at 20 m/s, is twice what a minute's accelerometer bias is known to.
-pub const EARTH: usize = 17;
+pub const EARTH: usize = 29;
 
 /// The constants in the order in which they are handed out.
-pub const ORDER: [usize; COUNT] =
-    [10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 16, 7, 8, 9, 17, 18];
+pub const ORDER: [usize; BEND] =
+    [10, 11, 12, 17, 18, 19, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 16, 7, 8, 9];
 
 /// Prior width of a clock skew, samples: ±1.5 samples are its 95 % interval.
 pub const SKEW_SAMPLES: f64 = 0.77;
@@ -46,9 +54,10 @@ pub type Values = [f64; COUNT];
 
 /// Names and units, by place: what can be stated of sensors and wind, then the Earth's rate.
 pub const NAMES: [(&str, &str); COUNT] = {
-    let mut all = [("earth_rate_north", "rad/s"); COUNT];
-    all[COUNT - 1] = ("earth_rate_down", "rad/s");
-    assert!(CONSTANTS.len() + 2 == COUNT);
+    let mut all = [("gyro_bend", "rad/s²"); COUNT];
+    all[EARTH] = ("earth_rate_north", "rad/s");
+    all[EARTH + 1] = ("earth_rate_down", "rad/s");
+    assert!(CONSTANTS.len() == BEND && EARTH + 2 == COUNT);
     let mut place = 0;
     while place < CONSTANTS.len() {
         all[place] = CONSTANTS[place];
@@ -60,6 +69,18 @@ pub const NAMES: [(&str, &str); COUNT] = {
 /// Prior width of the delay of a sensor slower than the log's rows, in its own sample periods: it filters
 /// over about as long as it takes to measure.
 const SKEW_PERIODS: f64 = 0.5;
+
+/// Usual drift of a gyro's bias, rad/s².
+const DRIFTING: f64 = 2e-5;
+/// Time over which a drift changes by about itself, s.
+const STEADY: f64 = 3000.0;
+
+impl Span {
+    /// Time between two knots of the gyros' biases, s.
+    fn apart(&self) -> f64 {
+        self.length / (KNOTS + 1) as f64
+    }
+}
 
 /// Part of its usual width to which a constant is held that is known exactly: the equations stay regular.
 const HELD: f64 = 1e-4;
@@ -90,6 +111,8 @@ fn usual_widths(log: &Log) -> Values {
     width[WIND..WIND + 2].fill(15.0);
     // air rises and sinks, but not for the length of a flight
     width[WIND + 2] = 1.0;
+    width[DRIFT..DRIFT + 3].fill(DRIFTING);
+    width[BEND..EARTH].fill(DRIFTING * (log.span.apart() / STEADY).sqrt());
     width[EARTH..EARTH + 2].copy_from_slice(&[1.3e-5, 4.2e-5]);
     width
 }
@@ -108,6 +131,31 @@ pub fn prior_means(log: &Log) -> Values {
     mean
 }
 
+/// The constants of which the bias of the gyro on an axis (0 to 2) is made at `time`, each with its factor.
+pub fn gyro_bias_of(axis: usize, time: f64, span: &Span) -> [(usize, f64); 2 + KNOTS] {
+    let since_middle = time - span.middle;
+    std::array::from_fn(|i| match i {
+        0 => (GYRO + axis, 1.0),
+        1 => (DRIFT + axis, since_middle),
+        _ => {
+            let knot = (i - 2) as f64 - 0.5 * (KNOTS - 1) as f64;
+            // from the middle to both ends, so that the bias of the middle stays
+            let beyond = match knot {
+                ..0.0 => (since_middle - knot * span.apart()).min(0.0),
+                _ => (since_middle - knot * span.apart()).max(0.0),
+            };
+            (BEND + 3 * (i - 2) + axis, beyond)
+        }
+    })
+}
+
+/// The gyro biases p, q, r at `time`, rad/s.
+pub fn gyro_bias(values: &Values, time: f64, span: &Span) -> [f64; 3] {
+    std::array::from_fn(|axis| {
+        gyro_bias_of(axis, time, span).iter().map(|(place, by)| values[*place] * by).sum()
+    })
+}
+
 /// What is added to a constant where it is handed out: the airspeed scale is a factor there.
 pub fn offset(place: usize) -> f64 {
     if place == SCALE { 1.0 } else { 0.0 }
@@ -121,7 +169,7 @@ pub fn concerned(place: usize, has: &Present) -> bool {
         SKEW_VANES => has.alpha || has.beta,
         FORCE..=SKEW_FORCE => has.force,
         SKEW_VELOCITY => has.velocity,
-        EARTH.. => false,
+        BEND.. => false,
         _ => true,
     }
 }

@@ -11,7 +11,9 @@ use crate::sysid::flight_path::channel::wrap;
 use crate::sysid::flight_path::equations::{Found, Problem, no_path};
 use crate::sysid::flight_path::intake::{Log, Track};
 use crate::sysid::flight_path::kinematics::shifted;
-use crate::sysid::flight_path::nuisance::{self, COUNT, FORCE, GYRO, SKEW_FORCE, Values, WIND};
+use crate::sysid::flight_path::nuisance::{
+    self, BEND, COUNT, DRIFT, FORCE, SKEW_FORCE, Values, WIND,
+};
 use crate::sysid::flight_path::path::{Path, flow_angles};
 use crate::sysid::flight_path::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
 use crate::sysid::flight_path::rotation::to_euler;
@@ -26,6 +28,9 @@ const ROUGH: f64 = 0.1;
 /// Smallest delay of the actuators that is put right, samples: less is within what the regression that
 /// finds it leaves out.
 const CORRECTED: f64 = 0.25;
+
+/// Time over which a disagreement of path and measured attitude is no noise, s.
+const DISAGREEING: f64 = 4.0;
 
 /// Draws of the path's errors: their rms over a flight is then known to a few percent.
 const DRAWS: usize = 3;
@@ -53,7 +58,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     }
     let erring = draws(problem, found)?;
     let left = left(&segments, &erring, &found.levels.gyro);
-    nuisances.extend(unmeasured_angles(log, found, &segments, &left));
+    nuisances.extend(unmeasured_angles(problem, found, &segments, &left));
     let gusts = found.levels.gusts;
     let skew = actuator_skew::estimate(&segments, &erring, log.step, problem.sampling, gusts);
     let late = late_beyond_doubt(&skew, log.step);
@@ -157,7 +162,8 @@ fn segment(
         let air = path.air_velocity(k);
         let [alpha, beta] = flow_angles(&air);
         let noise = gyro.map_or([0.0; 3], |g| g[k]);
-        let [p, q, r] = std::array::from_fn(|i| track.rates[k][i] - values[GYRO + i] + noise[i]);
+        let bias = nuisance::gyro_bias(values, track.time(k, log.step), &log.span);
+        let [p, q, r] = std::array::from_fn(|i| track.rates[k][i] - bias[i] + noise[i]);
         Instant {
             time_s: track.start + k as f64 * log.step,
             state: State { roll, pitch, airspeed: air.norm(), p, q, r, alpha, beta },
@@ -233,21 +239,27 @@ fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
         .collect()
 }
 
-/// How well α and β are known where no vane measures them: by the wind and by the path. Their values are zero.
+/// How well α and β are known where no vane measures them: by the wind, by the path, and by how far its pitch and heading
+/// are from the measured ones for long. Their values are zero.
+///
+/// A heading of which gyros and compass disagree by a degree for half a minute is known to no better than that,
+/// whatever the noise of either; β errs with it.
 fn unmeasured_angles(
-    log: &Log,
+    problem: &Problem,
     smoothed: &Found,
     segments: &[Segment],
     left: &[f64; 8],
 ) -> Vec<Nuisance> {
+    let log = problem.log;
+    let slow = problem.slow_disagreement(smoothed, DISAGREEING);
     let speeds: Vec<f64> =
         segments.iter().flat_map(|s| s.instants.iter().map(|i| i.state.airspeed)).collect();
     let airspeed = mean(&speeds).max(1.0);
     let [north, east, down] = std::array::from_fn(|i| smoothed.deviations[WIND + i]);
     let across = north.hypot(east) / std::f64::consts::SQRT_2;
     let angles = [
-        ("alpha_path", log.has.alpha, down, left[6]),
-        ("beta_path", log.has.beta, across, left[7]),
+        ("alpha_path", log.has.alpha, down, left[6].hypot(slow[1])),
+        ("beta_path", log.has.beta, across, left[7].hypot(slow[2])),
     ];
     let unmeasured = angles.into_iter().filter(|(_, measured, ..)| !measured);
     unmeasured
@@ -284,7 +296,10 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
     }
     let unseen = |place: &usize| {
         let stated = log.sensors.known(nuisance::NAMES[*place].0).is_some();
-        !stated && smoothed.deviations[*place] > UNSEEN * problem.widths[*place]
+        // a drift that a flight is too short to show does it no harm
+        !stated
+            && !(DRIFT..BEND).contains(place)
+            && smoothed.deviations[*place] > UNSEEN * problem.widths[*place]
     };
     let places: Vec<usize> =
         (0..COUNT).filter(|p| nuisance::concerned(*p, has)).filter(unseen).collect();

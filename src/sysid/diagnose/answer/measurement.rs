@@ -4,8 +4,9 @@ use crate::sysid::diagnose::answer::result::Measurement;
 use crate::sysid::flight_path::reconstruction::{Nuisance, Reconstruction};
 
 /// A constant's prefix, its id in the catalogue, its nominal value, what its kind allows.
-const KINDS: [(&str, &str, f64, f64); 8] = [
+const KINDS: [(&str, &str, f64, f64); 9] = [
     ("gyro_bias", "imu_bias", 0.0, 0.02),
+    ("gyro_drift", "imu_bias", 0.0, 5e-5),
     ("accelerometer_bias", "imu_bias", 0.0, 0.3),
     ("alpha_bias", "alpha_bias", 0.0, 0.026),
     ("beta_bias", "beta_bias", 0.0, 0.026),
