@@ -129,6 +129,27 @@ fn sensors_of_the_air_that_meet_no_other_sensor_are_believed() {
 }
 
 #[test]
+fn a_gyro_that_drifts_turns_no_heading() {
+    let drift = [1.5e-5, -1.0e-5, 1.5e-5];
+    let (_, log) = planted_flight(
+        |s| {
+            (s.alpha_rad, s.beta_rad) = (f64::NAN, f64::NAN);
+            (0..3).for_each(|i| s.rates_radps[i] += drift[i] * s.time_s);
+        },
+        180.0,
+    );
+    let found = reconstruct(&log, &options()).unwrap();
+    print(&found);
+    for (axis, drift) in ["p", "q", "r"].iter().zip(drift) {
+        let name = format!("gyro_drift_{axis}");
+        let n = found.nuisances.iter().find(|n| n.name == name).unwrap();
+        assert!((n.value - drift).abs() < 4e-6, "{n:?}");
+    }
+    let beta = found.nuisances.iter().find(|n| n.name == "beta_path").unwrap();
+    assert!(beta.sd < 0.01, "{beta:?}");
+}
+
+#[test]
 fn little_is_enough_for_a_path() {
     type Strip = fn(&mut Sample);
     let strip: [(&str, Strip); 3] = [

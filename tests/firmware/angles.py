@@ -1,9 +1,12 @@
 """How well angle of attack and sideslip were known in a flight of acceptance.py, judged by the simulator's truth.
 
     python3 tests/firmware/angles.py DIR/arduplane-surfaces/recording-1
+    greylag logs reconstruct DIR/arduplane-surfaces/logs/00000001.BIN path.csv --model params/x8/jsbsim.toml
+    python3 tests/firmware/angles.py path.csv --truth DIR/arduplane-surfaces/truth.csv
 
-Prints the error of the companion's estimate (flight.csv) and of ArduPilot's own (AOA_SSA in flight.tlog, where there is one) while
+The first the error of the companion's estimate (flight.csv) and of ArduPilot's own (AOA_SSA in flight.tlog, where there is one) while
 Greylag steered: mean, standard deviation, largest, in degrees. The truth is truth.csv beside the recording: JSBSim's own angles.
+The second judges a reconstructed flight path, with roll, pitch and heading too.
 """
 
 import bisect
@@ -46,20 +49,42 @@ def offset(truth, flown):
         gaps = [abs(a - b) for a, b in pairs if a is not None]
         return statistics.fmean(gaps) if len(gaps) > 20 else math.inf
 
-    return min((error(0.02 * k), 0.02 * k) for k in range(-1000, 1001))[1]
+    # greylag-sitl begins PX4's clock at 1000 s
+    bases = [0.0, -1000.0]
+    return min((error(base + 0.02 * k), base + 0.02 * k) for base in bases for k in range(-1000, 1001))[1]
 
 
-def show(name, truth, rows, shift):
+def show(name, truth, rows, shift, angles=((1, "angle of attack"), (2, "sideslip"))):
     """A line for each angle."""
-    for column, angle in ((1, "angle of attack"), (2, "sideslip")):
+    for column, angle in angles:
         pairs = ((row[column], at(truth, row[0] + shift, column)) for row in rows)
-        errors = [math.degrees(a - b) for a, b in pairs if b is not None]
+        errors = [a - b for a, b in pairs if b is not None]
+        errors = [math.degrees((e + math.pi) % (2 * math.pi) - math.pi) for e in errors]
         mean, sd, most = statistics.fmean(errors), statistics.pstdev(errors), max(map(abs, errors))
         print(f"{name:24} {angle:16} mean {mean:+.2f}  sd {sd:.2f}  largest {most:.2f} deg  ({len(errors)} samples)")
 
 
+def unwrapped(rows, column):
+    """The same rows with an angle that does not jump."""
+    for before, row in zip(rows, rows[1:]):
+        row[column] += 2 * math.pi * round((before[column] - row[column]) / (2 * math.pi))
+    return rows
+
+
+def judge_path(path, truth):
+    """A reconstructed path from 30 s after its first sample: a launch is no flight."""
+    columns = ["time_s", "alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "yaw_rad"]
+    truth, path = unwrapped(table(truth, columns), 5), table(path, columns)
+    path = [row for row in path if row[0] > path[0][0] + 30.0]
+    angles = [(1, "angle of attack"), (2, "sideslip"), (3, "roll"), (4, "pitch"), (5, "heading")]
+    show("reconstructed path", truth, path, offset(truth, path), angles)
+
+
 def main():
     """Prints."""
+    if "--truth" in sys.argv:
+        judge_path(sys.argv[1], sys.argv[3])
+        return
     folder = pathlib.Path(sys.argv[1])
     truth = table(folder.parent / "truth.csv", ["time_s", "alpha_rad", "beta_rad", "roll_rad"])
     # armed is 1 while Greylag steers or may

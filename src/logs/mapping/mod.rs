@@ -32,6 +32,7 @@ use super::format::Format;
 use super::topics::Topics;
 use crate::physics::Sensors;
 use crate::physics::mixer::Mixer;
+use crate::physics::sensors::CONSTANTS;
 use rule::Rule;
 
 /// The topic name by which a mapping means the columns of a CSV file.
@@ -160,9 +161,8 @@ impl Mapping {
         let mut sensors = written.sensors;
         if body_rates_over_s.is_some() {
             // what is made from the attitude has no bias against it
-            ["gyro_bias_p", "gyro_bias_q", "gyro_bias_r"]
-                .into_iter()
-                .for_each(|name| sensors.hold(name, 0.0));
+            let gyros = CONSTANTS.iter().filter(|(name, _)| name.starts_with("gyro_"));
+            gyros.for_each(|(name, _)| sensors.hold(name, 0.0));
         }
         Ok(Mapping { entries, body_rates_over_s, sensors, mixer: None })
     }

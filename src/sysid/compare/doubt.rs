@@ -6,7 +6,7 @@
 
 use crate::model::GreyBox;
 use crate::num::statistics::mean;
-use crate::physics::State;
+use crate::physics::{Controls, State};
 use crate::sysid::flight_path::reconstruction::{Instant, Nuisance};
 use crate::sysid::weak_form::channels::ChannelId;
 use crate::sysid::weak_form::prepared::Prepared;
@@ -15,25 +15,31 @@ use crate::sysid::weak_form::windows;
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 pub const NORMAL_95: f64 = 1.96;
 
-/// What an error of so many units does to an instant.
-type Move = fn(&mut Instant, f64);
+/// What an error of so many units does to an instant; the change of the controls with time comes along, 1/s.
+type Move = fn(&mut Instant, &Controls, f64);
 
 /// The constants that move a residual.
 const CONSTANTS: [(&str, Move); COUNT] = [
-    ("gyro_bias_p", |i, by| i.state.p += by),
-    ("gyro_bias_q", |i, by| i.state.q += by),
-    ("gyro_bias_r", |i, by| i.state.r += by),
-    ("accelerometer_bias_x", |i, by| i.specific_force[0] += by),
-    ("accelerometer_bias_y", |i, by| i.specific_force[1] += by),
-    ("accelerometer_bias_z", |i, by| i.specific_force[2] += by),
-    ("alpha_bias", |i, by| i.state.alpha += by),
-    ("beta_bias", |i, by| i.state.beta += by),
-    ("airspeed_scale", |i, by| i.state.airspeed *= 1.0 + by),
-    ("alpha_path", |i, by| i.state.alpha += by),
-    ("beta_path", |i, by| i.state.beta += by),
+    ("gyro_bias_p", |i, _, by| i.state.p += by),
+    ("gyro_bias_q", |i, _, by| i.state.q += by),
+    ("gyro_bias_r", |i, _, by| i.state.r += by),
+    ("accelerometer_bias_x", |i, _, by| i.specific_force[0] += by),
+    ("accelerometer_bias_y", |i, _, by| i.specific_force[1] += by),
+    ("accelerometer_bias_z", |i, _, by| i.specific_force[2] += by),
+    ("alpha_bias", |i, _, by| i.state.alpha += by),
+    ("beta_bias", |i, _, by| i.state.beta += by),
+    ("airspeed_scale", |i, _, by| i.state.airspeed *= 1.0 + by),
+    ("alpha_path", |i, _, by| i.state.alpha += by),
+    ("beta_path", |i, _, by| i.state.beta += by),
+    ("skew_actuators", |i, rate, by| {
+        i.controls.aileron += rate.aileron * by;
+        i.controls.elevator += rate.elevator * by;
+        i.controls.throttle += rate.throttle * by;
+        i.controls.rudder += rate.rudder * by;
+    }),
 ];
 /// How many constants there are.
-pub const COUNT: usize = 11;
+pub const COUNT: usize = 12;
 
 /// How far one standard deviation of each constant moves a residual, in the channel's unit.
 pub type Shift = [f64; COUNT];
@@ -53,12 +59,13 @@ pub fn shifts(
         if found.is_finite() { found } else { 0.0 }
     });
     let of_window = |samples: &[Instant]| {
-        let at = &samples[samples.len() / 2];
+        let middle = samples.len() / 2;
+        let (at, rate) = (&samples[middle], controls_rate(samples, middle));
         let mut shifts = [[0.0; COUNT]; ChannelId::ALL.len()];
         for (k, (_, change)) in CONSTANTS.iter().enumerate().filter(|(k, _)| sd[*k] > 0.0) {
             let moved = |by: f64| {
                 let mut moved = Instant { state: State { ..at.state }, ..*at };
-                change(&mut moved, by);
+                change(&mut moved, &rate, by);
                 windows::residual(model, &moved)
             };
             let (up, down) = (moved(sd[k]), moved(-sd[k]));
@@ -69,6 +76,19 @@ pub fn shifts(
         shifts
     };
     flight.windows.iter().map(|window| of_window(flight.samples(window))).collect()
+}
+
+/// How fast the controls change at sample `k`, 1/s: the central difference.
+fn controls_rate(samples: &[Instant], k: usize) -> Controls {
+    let (a, b) = (&samples[k.saturating_sub(1)], &samples[(k + 1).min(samples.len() - 1)]);
+    let time = b.time_s - a.time_s;
+    let rate = |a: f64, b: f64| if time > 0.0 { (b - a) / time } else { 0.0 };
+    Controls {
+        aileron: rate(a.controls.aileron, b.controls.aileron),
+        elevator: rate(a.controls.elevator, b.controls.elevator),
+        throttle: rate(a.controls.throttle, b.controls.throttle),
+        rudder: rate(a.controls.rudder, b.controls.rudder),
+    }
 }
 
 /// Standard deviation that the constants bring into a mean of residuals, given their shifts with

@@ -112,7 +112,11 @@ fn usual_widths(log: &Log) -> Values {
     // air rises and sinks, but not for the length of a flight
     width[WIND + 2] = 1.0;
     width[DRIFT..DRIFT + 3].fill(DRIFTING);
-    width[BEND..EARTH].fill(DRIFTING * (log.span.apart() / STEADY).sqrt());
+    for place in BEND..EARTH {
+        let drift = log.sensors.known(NAMES[DRIFT + (place - BEND) % 3].0);
+        let sd = drift.map_or(DRIFTING, |known| known.sd.max(HELD * DRIFTING));
+        width[place] = sd * (log.span.apart() / STEADY).sqrt();
+    }
     width[EARTH..EARTH + 2].copy_from_slice(&[1.3e-5, 4.2e-5]);
     width
 }
