@@ -90,6 +90,47 @@ fn a_prior_that_cannot_fly_becomes_a_controller_that_does() {
 
     let other = greylag(&[&line[..], &["--seed", "2"]].concat());
     assert!(!other.status.success() && said(&other).contains("another --out"), "{}", said(&other));
+
+    goes_on_with_recent_flights(folder.path(), &out);
+    assert!(files(&out) == before, "the earlier learning was changed");
+}
+
+/// The aircraft changes, its flights show it, and what was learned before is learned on.
+fn goes_on_with_recent_flights(folder: &Path, earlier: &Path) {
+    let (flights, out) = (folder.join("changed"), folder.join("again"));
+    let (flights, out) = (flights.to_str().unwrap(), out.to_str().unwrap());
+    let effect = ["mystery", "--seed", "41", "--effect", "aeroelastic_loss", "--out", flights];
+    assert!(greylag(&effect).status.success());
+    let logs: Vec<String> = (1..4).map(|k| format!("{flights}/train-{k}.csv")).collect();
+    let line =
+        ["learn", "--continue", earlier.to_str().unwrap(), "--budget", "quick", "--out", out];
+    let line: Vec<&str> =
+        line.into_iter().chain(["--log"]).chain(logs.iter().map(String::as_str)).collect();
+    let learned = greylag(&line);
+    assert!(learned.status.success(), "{}", said(&learned));
+    for word in ["--recent-share 0.5", "--collect", "--start", "samples of recent flights count"] {
+        assert!(said(&learned).contains(word), "no {word} in {}", said(&learned));
+    }
+    let json = std::fs::read(Path::new(out).join("model/training.json")).unwrap();
+    let scores: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    // a second ahead, on the ends of the recent flights, which were held out
+    let rms = |which: &str| scores[which][2]["rms"].as_f64().unwrap();
+    println!("100 steps ahead: {} before, {} after", rms("prior"), rms("learned"));
+    assert!(rms("learned") < 0.8 * rms("prior"), "{} of {}", rms("learned"), rms("prior"));
+    let model = GreyBox::load(&Path::new(out).join("controller/model.toml")).unwrap();
+    let agent = Agent::load(&Path::new(out).join("controller/policy"), &model.airframe).unwrap();
+    assert_eq!(agent.origin.model_sha256, model.sha256);
+    let again = greylag(&line);
+    assert_eq!(said(&again).matches("done before").count(), 2, "{}", said(&again));
+    let nothing = greylag(
+        &[&["learn", "--continue", flights, "--out", out, "--log"], &[logs[0].as_str()][..]]
+            .concat(),
+    );
+    assert!(
+        !nothing.status.success() && said(&nothing).contains("greylag learn"),
+        "{}",
+        said(&nothing)
+    );
 }
 
 #[test]

@@ -21,7 +21,7 @@ use crate::model::GreyBox;
 use crate::model::residual::hash;
 use budget::{Algorithm, Budget};
 use imagined::Reached;
-use plan::{Source, Stage, Wish};
+use plan::{Recent, Source, Stage, Wish};
 use record::Record;
 
 /// Options of `greylag learn`.
@@ -36,8 +36,16 @@ use record::Record;
 )]
 pub struct Arguments {
     /// The prior: a model file that may be wrong.
-    #[arg(long, value_name = "FILE")]
-    prior: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "earlier")]
+    prior: Option<PathBuf>,
+    /// Go on from what was learned before, with recent flights (--log): the folder of a learning, or of a model with its
+    /// policy, such as params/x8/learned. Its flights are learned from again if they are there, and its policy is trained
+    /// further; nothing in it is changed.
+    #[arg(long = "continue", value_name = "DIR", requires = "logs", conflicts_with_all = ["prior", "collect", "algorithm"])]
+    earlier: Option<PathBuf>,
+    /// With --continue: part of all samples that the recent flights make up; 1 forgets the earlier ones.
+    #[arg(long, value_name = "PART", default_value_t = 0.5, requires = "earlier")]
+    recent_share: f64,
     /// Fly the flights to learn from in JSBSim.
     #[arg(long, conflicts_with = "logs", required_unless_present = "logs")]
     collect: bool,
@@ -76,7 +84,7 @@ pub struct Arguments {
 /// Learns; what is done already is not done again.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let stop = Interruption::watch()?;
-    let prior = GreyBox::load(&shipped(&arguments.prior))?;
+    let prior = GreyBox::load(&shipped(&arguments.prior_file()?))?;
     let stages = arguments.stages(&prior)?;
     // what is wrong with an option is found before the first flight
     stages.iter().try_for_each(|stage| super::check_line(&stage.line))?;
@@ -108,13 +116,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 impl Arguments {
     fn stages(&self, prior: &GreyBox) -> Result<Vec<Stage>> {
         let trainable = self.trained(prior)?;
-        let source = if self.collect {
-            Source::Simulator(self.aircraft_options(prior))
-        } else {
-            Source::Logs(self.logs.clone())
+        let source = match &self.earlier {
+            Some(folder) => Source::Recent(self.recent(folder)?),
+            None if self.collect => Source::Simulator(self.aircraft_options(prior)),
+            None => Source::Logs(self.logs.clone()),
         };
+        let file = self.prior_file()?;
         let wish = Wish {
-            prior: &self.prior,
+            prior: &file,
             out: &self.out,
             source,
             rounds: self.rounds.unwrap_or(self.budget.sizes().rounds),
@@ -124,6 +133,35 @@ impl Arguments {
             seed: self.seed,
         };
         Ok(wish.stages())
+    }
+
+    /// The file of the prior, or of the model of the earlier learning.
+    fn prior_file(&self) -> Result<PathBuf> {
+        match (&self.prior, &self.earlier) {
+            (Some(prior), _) => Ok(prior.clone()),
+            (None, Some(folder)) => Ok(flying(folder)?.join("model.toml")),
+            (None, None) => bail!("give --prior, or --continue with the folder of a learning"),
+        }
+    }
+
+    /// What the learning in `folder` goes on with.
+    fn recent(&self, folder: &Path) -> Result<Recent> {
+        let policy = shipped(&flying(folder)?.join(plan::POLICY));
+        if !policy.exists() {
+            bail!(
+                "cannot go on from {}: it has a model and no policy; give the folder of `greylag learn`",
+                folder.display()
+            );
+        }
+        let flights = folder.join(plan::FLIGHTS);
+        let flights = flights.exists().then_some(flights);
+        if flights.is_none() {
+            eprintln!(
+                "{} holds no flights: the model is learned anew from the recent ones alone",
+                folder.display()
+            );
+        }
+        Ok(Recent { flights, policy, logs: self.logs.clone(), share: self.recent_share })
     }
 
     /// Hashes of the files that a learning begins with: prior, airframe, logs.
@@ -205,6 +243,18 @@ impl Arguments {
         );
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// The folder of model and policy of a learning: `folder` itself, or its controller.
+fn flying(folder: &Path) -> Result<PathBuf> {
+    let places = [folder.join(controller::CONTROLLER), folder.to_owned()];
+    let place = places.into_iter().find(|place| shipped(&place.join("model.toml")).exists());
+    place.with_context(|| {
+        format!(
+            "cannot go on from {}: it has no model.toml; give the --out of `greylag learn` that ended",
+            folder.display()
+        )
+    })
 }
 
 /// The options with which a command flies the controller in `folder`.

@@ -19,6 +19,21 @@ pub enum Source {
     Simulator(Vec<OsString>),
     /// Recorded logs.
     Logs(Vec<PathBuf>),
+    /// Recent logs that an earlier learning goes on with.
+    Recent(Recent),
+}
+
+/// What an earlier learning goes on with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recent {
+    /// Its folder of flights, if there is one.
+    pub flights: Option<PathBuf>,
+    /// The folder of its policy.
+    pub policy: PathBuf,
+    /// The logs.
+    pub logs: Vec<PathBuf>,
+    /// Part of all samples that they make up.
+    pub share: f64,
 }
 
 /// What decides the stages.
@@ -131,6 +146,14 @@ impl Wish<'_> {
                 line = line.and(["--log".into()]);
                 line = line.and(logs.iter().map(OsString::from));
             }
+            Source::Recent(recent) => {
+                if let Some(flights) = &recent.flights {
+                    line = line.with("--collect", flights);
+                }
+                line = line.and(["--recent".into()]);
+                line = line.and(recent.logs.iter().map(OsString::from));
+                line = line.with("--recent-share", recent.share.to_string());
+            }
         }
         if !self.trainable.is_empty() {
             line = line.with("--trainable", self.trainable.join(","));
@@ -149,7 +172,11 @@ impl Wish<'_> {
         };
         let mut environment = OsString::from("model:");
         environment.push(self.folder(None));
-        let line = Line::of(&["train", "policy"])
+        let mut line = Line::of(&["train", "policy"]);
+        if let Source::Recent(recent) = &self.source {
+            line = line.with("--start", &recent.policy);
+        }
+        let line = line
             .with("--env", environment)
             .with("--algorithm", algorithm)
             .and(self.budget.policy(self.algorithm).iter().map(OsString::from))

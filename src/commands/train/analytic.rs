@@ -19,7 +19,7 @@ const LINE: u64 = 50;
 /// Updates of the critics between two lines.
 const CRITICS: u64 = 1000;
 
-/// Climbs the reward's slope in `model`; the curve of what `judge` says goes into `folder`. Gives the last
+/// Climbs the reward's slope in `model`, from the actor `from` where one is given; the curve of what `judge` says goes into `folder`. Gives the last
 /// actor, the learning rate having fallen to nothing, or `None` if interrupted: what takes minutes begins
 /// anew.
 ///
@@ -27,6 +27,7 @@ const CRITICS: u64 = 1000;
 /// If a parameter is no longer finite or the curve cannot be written.
 pub fn climb(
     recipe: &AnalyticRecipe,
+    from: Option<&Actor>,
     model: &GreyBox,
     folder: &Path,
     judge: &dyn Fn(Arc<Actor>) -> Result<Evaluated>,
@@ -36,6 +37,9 @@ pub fn climb(
     let context = || format!("cannot write {}", path.display());
     let mut curve = CurveFile::open(&path, 0).with_context(context)?;
     let mut trainer = AnalyticTrainer::new(recipe.clone(), model.clone())?;
+    if let Some(actor) = from {
+        trainer = trainer.starting_from(actor)?;
+    }
     let (start, mut reward) = (Instant::now(), 0.0);
     for update in 1..=recipe.updates {
         let progress = trainer

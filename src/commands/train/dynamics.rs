@@ -131,10 +131,10 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     }
     let truth = arguments.truth.as_ref().map(|t| GreyBox::load(&shipped(t))).transpose()?;
     let recipe = arguments.recipe(&prior);
-    let Flights { learn, judge, notes } = arguments.flights.read(&prior)?;
+    let Flights { learn, judge, samples, notes } = arguments.flights.read(&prior)?;
+    notes.iter().for_each(|note| eprintln!("{note}"));
     std::fs::create_dir_all(&arguments.out)
         .with_context(|| format!("cannot make {}", arguments.out.display()))?;
-    let samples: usize = learn.iter().map(|t| t.states.len()).sum();
     eprintln!(
         "learning from {} flights, {samples} samples; judging by {}",
         learn.len(),

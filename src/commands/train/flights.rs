@@ -9,11 +9,16 @@ use crate::learn::dynamics::resample::{SLOWEST_S, resampled};
 use crate::learn::dynamics::windows::Track;
 use crate::logs::csv::{self, Tolerance};
 use crate::model::{GreyBox, STEP};
+use crate::physics::{Controls, State};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
 /// One track in so many is held out, where there are that many.
 const HELD_OUT: usize = 10;
+/// Part of each recent flight, its end, that is held out.
+const HELD_OUT_PART: f64 = 0.2;
+/// Most copies of a recent flight.
+const MOST_COPIES: f64 = 50.0;
 
 /// Where flights come from.
 #[derive(clap::Args)]
@@ -26,6 +31,12 @@ pub struct FlightArguments {
     /// Folders that `greylag collect` wrote; every round below them is read, its states as they are.
     #[arg(long = "collect", num_args = 1..)]
     folders: Vec<PathBuf>,
+    /// Logs of recent flights, which outweigh the others; the last fifth of each judges and is not learned from.
+    #[arg(long = "recent", value_name = "LOG", num_args = 1..)]
+    recent: Vec<PathBuf>,
+    /// Part of all samples that recent flights make up, by being repeated; 1 leaves the others out.
+    #[arg(long, value_name = "PART", default_value_t = 0.5, requires = "recent")]
+    recent_share: f64,
 }
 
 /// What there is to learn from.
@@ -34,6 +45,8 @@ pub struct Flights {
     pub learn: Vec<Track>,
     /// Tracks to judge by; some of the others where there are few.
     pub judge: Vec<Track>,
+    /// Samples to learn from, each counted once.
+    pub samples: usize,
     /// What the reader must know.
     pub notes: Vec<String>,
 }
@@ -49,34 +62,94 @@ impl FlightArguments {
         for folder in &self.folders {
             tracks.extend(collected(folder, model)?);
         }
-        if !self.logs.is_empty() {
-            let intake = self.reading.take_in(&self.logs, model, ActuatorClock::Estimated)?;
-            notes.extend(intake.notes);
-            for flight in &intake.flights {
-                notes.extend(slow(flight)?);
-                tracks.extend(flight.segments.iter().map(|segment| {
-                    let rows = segment.instants.iter().map(|i| (i.state, i.controls, i.altitude));
-                    let rows = resampled(&rows.collect::<Vec<_>>(), flight.step_s);
-                    Track::new(model, rows.into_iter())
-                }));
-            }
+        let logged = self.logged(&self.logs, model, &mut notes)?;
+        tracks.extend(logged.into_iter().map(|rows| Track::new(model, rows.into_iter())));
+        if !self.recent.is_empty() {
+            return self.with_recent(tracks, model, notes);
         }
         if tracks.is_empty() {
             bail!("there is nothing to learn from: give --log or --collect");
         }
+        let samples = |learn: &[Track]| learn.iter().map(|t| t.states.len()).sum();
         if tracks.len() < HELD_OUT {
             notes.push(
                 "Too few flights to hold any out: the scores are of flights learned from.".into(),
             );
-            return Ok(Flights { judge: tracks.clone(), learn: tracks, notes });
+            let samples = samples(&tracks);
+            return Ok(Flights { judge: tracks.clone(), learn: tracks, samples, notes });
         }
         let (mut learn, mut judge) = (Vec::new(), Vec::new());
         for (k, track) in tracks.into_iter().enumerate() {
             if k % HELD_OUT == HELD_OUT - 1 { judge.push(track) } else { learn.push(track) }
         }
-        Ok(Flights { learn, judge, notes })
+        Ok(Flights { samples: samples(&learn), learn, judge, notes })
+    }
+
+    /// The rows (state, controls, altitude) of each stretch of `logs`.
+    fn logged(
+        &self,
+        logs: &[PathBuf],
+        model: &GreyBox,
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Vec<Row>>> {
+        if logs.is_empty() {
+            return Ok(Vec::new());
+        }
+        let intake = self.reading.take_in(logs, model, ActuatorClock::Estimated)?;
+        notes.extend(intake.notes);
+        let mut all = Vec::new();
+        for flight in &intake.flights {
+            notes.extend(slow(flight)?);
+            all.extend(flight.segments.iter().map(|segment| {
+                let rows = segment.instants.iter().map(|i| (i.state, i.controls, i.altitude));
+                resampled(&rows.collect::<Vec<_>>(), flight.step_s)
+            }));
+        }
+        Ok(all)
+    }
+
+    /// The tracks `others` and the recent flights, which are repeated until they are their share of all samples.
+    fn with_recent(
+        &self,
+        others: Vec<Track>,
+        model: &GreyBox,
+        mut notes: Vec<String>,
+    ) -> Result<Flights> {
+        let share = self.recent_share;
+        if !(share > 0.0 && share <= 1.0) {
+            bail!("--recent-share {share}: give a number above 0, at most 1");
+        }
+        let (mut recent, mut judge) = (Vec::new(), Vec::new());
+        for rows in self.logged(&self.recent, model, &mut notes)? {
+            let end = rows.len() - (HELD_OUT_PART * rows.len() as f64) as usize;
+            recent.push(Track::new(model, rows[..end].iter().copied()));
+            judge.push(Track::new(model, rows[end..].iter().copied()));
+        }
+        let count = |tracks: &[Track]| tracks.iter().map(|t| t.states.len()).sum::<usize>();
+        let (old, new) = (count(&others), count(&recent));
+        if new == 0 {
+            bail!("the recent logs hold no flight to learn from");
+        }
+        notes.push(
+            "The scores are of the last fifth of each recent flight, which was held out.".into(),
+        );
+        if share == 1.0 || old == 0 {
+            return Ok(Flights { learn: recent, judge, samples: new, notes });
+        }
+        let wanted = share / (1.0 - share) * old as f64 / new as f64;
+        let copies = wanted.round().clamp(1.0, MOST_COPIES) as usize;
+        notes.push(format!(
+            "{new} samples of recent flights count {copies} times beside {old} of others: {:.0} % of what is learned from.",
+            100.0 * (copies * new) as f64 / (copies * new + old) as f64
+        ));
+        let mut learn = others;
+        (0..copies).for_each(|_| learn.extend(recent.iter().cloned()));
+        Ok(Flights { learn, judge, samples: old + new, notes })
     }
 }
+
+/// A sample: state, measured controls, altitude (m).
+type Row = (State, Controls, f64);
 
 /// What must be known of a flight that was sampled more slowly than the model steps.
 ///

@@ -83,6 +83,10 @@ pub struct Arguments {
     /// Transitions remembered.
     #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     replay: u64,
+    /// Folder of a policy whose actor is trained further by the analytic policy gradient; its layers stand in for
+    /// --actor.
+    #[arg(long, value_name = "DIR")]
+    start: Option<PathBuf>,
     /// Units of the actor's hidden layers.
     #[arg(long, value_delimiter = ',', default_values_t = [300, 300])]
     actor: Vec<usize>,
@@ -173,6 +177,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// As [`run`], until `stop` is set.
 pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let ground = arguments.ground()?;
+    if arguments.start.is_some() && !arguments.is_analytic() {
+        bail!("--start trains an actor further by --algorithm analytic; TD3 begins with its own");
+    }
     println!("{:>8} {COLUMNS}", "seed");
     let one = |seed: u64| arguments.train(&ground, seed, stop);
     let seeds = arguments.seed..arguments.seed + arguments.seeds;
@@ -318,6 +325,16 @@ impl Arguments {
         Ok(Ground { model: Some(Arc::new(model)), origin, airframe })
     }
 
+    /// The actor that is trained further, if any.
+    fn started(&self, airframe: &Airframe) -> Result<Option<Arc<Actor>>> {
+        let load = |folder: &PathBuf| -> Result<Arc<Actor>> {
+            let agent = Agent::load(folder, airframe)
+                .with_context(|| format!("cannot go on from the policy in {}", folder.display()))?;
+            Ok(agent.actor)
+        };
+        self.start.as_ref().map(load).transpose()
+    }
+
     /// Trains the policy of one seed; `false` if interrupted.
     fn train(&self, ground: &Ground, seed: u64, stop: &Interruption) -> Result<bool> {
         let folder = match self.seeds {
@@ -332,7 +349,13 @@ impl Arguments {
         match &ground.model {
             Some(model) if self.is_analytic() => {
                 let world = Imagination::new(model.clone(), self.instances as usize, targets);
-                run.climb(&self.analytic(seed), self.valuation(seed), model, world)
+                let mut recipe = self.analytic(seed);
+                let from = self.started(&ground.airframe)?;
+                if let Some(actor) = &from {
+                    let sizes = actor.network().sizes();
+                    recipe.actor = sizes[1..sizes.len() - 1].to_vec();
+                }
+                run.climb(&recipe, from.as_deref(), self.valuation(seed), model, world)
             }
             Some(model) => {
                 run.train(recipe, Imagination::new(model.clone(), self.instances as usize, targets))
@@ -362,12 +385,14 @@ impl Run<'_> {
     fn climb(
         &self,
         recipe: &AnalyticRecipe,
+        from: Option<&Actor>,
         valuation: ValuationRecipe,
         model: &GreyBox,
         world: Imagination,
     ) -> Result<bool> {
         let judge = |actor| self.ground.evaluate(actor);
-        let Some(actor) = analytic::climb(recipe, model, &self.folder, &judge, self.stop)? else {
+        let Some(actor) = analytic::climb(recipe, from, model, &self.folder, &judge, self.stop)?
+        else {
             return Ok(false);
         };
         let method = Method::Analytic { climb: recipe, valuation: &valuation.clone() };

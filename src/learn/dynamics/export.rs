@@ -76,7 +76,9 @@ pub fn save(
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         own.push((name, bytes));
     }
-    let name: String = format!("{}-learned", model.name).chars().take(64).collect();
+    // one that is learned on keeps its name
+    let base = model.name.strip_suffix("-learned").unwrap_or(&model.name);
+    let name: String = format!("{base}-learned").chars().take(64).collect();
     let mut set = |key: &str, value: &str| table.insert(key.into(), value.into());
     set("name", &name);
     set("description", said.about);

@@ -247,6 +247,20 @@ impl AnalyticTrainer {
         })
     }
 
+    /// The same training from the weights of `actor`, whose layers must be those of the recipe.
+    ///
+    /// # Errors
+    /// If they are not.
+    pub fn starting_from(mut self, actor: &Actor) -> Result<Self, DenseError> {
+        let sizes = actor.network().sizes();
+        if sizes != self.actor.sizes() {
+            return Err(DenseError::Sizes(sizes.to_vec()));
+        }
+        self.actor = Mlp::new(actor.network(), &self.device);
+        self.optimiser = Optimiser::new(&self.actor, self.recipe.rate);
+        Ok(self)
+    }
+
     /// The actor as it is now.
     ///
     /// # Errors
