@@ -103,6 +103,7 @@ def arguments():
     p.add_argument("--quantised", action="store_true", help="whole counts of each sensor")
     p.add_argument("--held", default="", help="slower sensors, held in between: airspeed=25,velocity=10")
     p.add_argument("--missing", default="", help="sensor groups that are not logged: vanes,actuators")
+    p.add_argument("--drift", type=float, default=0.0, help="drift of the gyros' biases, rad/s²; warm: 1.5e-5")
     p.add_argument("--duration", type=float, default=manoeuvres.FLIGHT, help="length of each flight, s")
     p.add_argument("--out", type=Path, required=True, help="folder of the cases; each must be new")
     return p.parse_args()
@@ -112,7 +113,7 @@ def main():
     """Makes the cases of the command line."""
     a = arguments()
     missing = [x for x in a.missing.split(",") if x]
-    options = sensors.Options(a.rate, a.noise, a.skew, a.quantised, pairs(a.held), missing)
+    options = sensors.Options(a.rate, a.noise, a.skew, a.quantised, pairs(a.held), missing, a.drift)
     unknown = [x for x in (*missing, *options.held) if x not in sensors.GROUPS]
     if unknown:
         sys.exit(f"no sensor group {', '.join(unknown)}; there are {', '.join(sensors.GROUPS)}")

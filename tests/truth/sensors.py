@@ -32,7 +32,7 @@ STEPS = {
 
 @dataclass
 class Options:
-    """What the sensors are like. `noise` multiplies noise and biases."""
+    """What the sensors are like. `noise` multiplies noise and biases; `drift` is the gyros' (rad/s²), of either sign."""
 
     rate: float = 100.0
     noise: float = 1.0
@@ -40,6 +40,7 @@ class Options:
     quantised: bool = False
     held: dict = field(default_factory=dict)
     missing: list = field(default_factory=list)
+    drift: float = 0.0
 
 
 @dataclass
@@ -97,6 +98,8 @@ def log(truth, step, commands, begin, options, random):
             when = np.floor(when * options.held[group]) / options.held[group]
         out[:, columns] = sampled(smooth[:, columns], step, when)
     out[:, 3:6] += errors.gyros
+    if options.drift:
+        out[:, 3:6] += options.drift * random.choice([-1.0, 1.0], 3) * (times - times.mean())[:, None]
     out[:, 6] *= errors.airspeed_scale
     out[:, 7:9] += errors.vanes
     out[:, 9:12] += errors.accelerometers
