@@ -122,6 +122,8 @@ fn goes_on_with_recent_flights(folder: &Path, earlier: &Path) {
     assert_eq!(agent.origin.model_sha256, model.sha256);
     let again = greylag(&line);
     assert_eq!(said(&again).matches("done before").count(), 2, "{}", said(&again));
+    let none = greylag(&[&line[..], &["--recent-share", "0"]].concat());
+    assert!(!none.status.success() && said(&none).contains("above 0"), "{}", said(&none));
     let nothing = greylag(
         &[&["learn", "--continue", flights, "--out", out, "--log"], &[logs[0].as_str()][..]]
             .concat(),
@@ -146,6 +148,7 @@ fn what_cannot_be_learned_is_said_before_anything_is_flown() {
     refused(&[], "--collect");
     refused(&["--collect", "--log", "a.csv"], "cannot be used with");
     refused(&["--log", "a.csv", "--rounds", "2"], "cannot be used with");
+    refused(&["--log", "a.csv", "--recent-share", "0.5"], "cannot be used with");
     refused(&["--collect", "--hide", "nothing=1"], "nothing");
     refused(&["--collect", "--trainable", "roll_linear.Clx"], "roll_linear.Clda");
     assert!(!Path::new(&out).exists());

@@ -148,16 +148,21 @@ fn csv_file(flight: &Flight, output: &Path, force: bool) -> Result<()> {
     files::write(output, &text, force.into())
 }
 
+/// Decimals that show two digits of a standard deviation, at least five.
+fn decimals(sd: f64) -> usize {
+    if sd > 0.0 { (1.0 - sd.log10()).clamp(5.0, 9.0) as usize } else { 5 }
+}
+
 fn print_reconstruction(flight: &Reconstruction, output: &Path) {
     let rows: usize = flight.segments.iter().map(|s| s.instants.len()).sum();
     println!("{rows} reconstructed samples of {} in {}", flight.name, output.display());
     for n in &flight.nuisances {
-        let moved = n
-            .prior
-            .map(|p| format!("prior {} ± {}, moved by {:.1} sd of it", p.value, p.sd, n.moved()));
-        let decimals = if n.sd > 0.0 { (1.0 - n.sd.log10()).clamp(5.0, 9.0) as usize } else { 5 };
-        let found =
-            format!("{:<22} {:>11.decimals$} ± {:.decimals$} {}", n.name, n.value, n.sd, n.unit);
+        let moved = n.prior.map(|p| {
+            let d = decimals(p.sd);
+            format!("prior {} ± {:.d$}, moved by {:.1} sd of it", p.value, p.sd, n.moved())
+        });
+        let d = decimals(n.sd);
+        let found = format!("{:<22} {:>11.d$} ± {:.d$} {}", n.name, n.value, n.sd, n.unit);
         println!("{found:<50} {}", moved.unwrap_or_default());
     }
     flight.notes.iter().for_each(|note| println!("{note}"));

@@ -4,7 +4,7 @@
     greylag logs reconstruct DIR/arduplane-surfaces/logs/00000001.BIN path.csv --model params/x8/jsbsim.toml
     python3 tests/firmware/angles.py path.csv --truth DIR/arduplane-surfaces/truth.csv
 
-The first the error of the companion's estimate (flight.csv) and of ArduPilot's own (AOA_SSA in flight.tlog, where there is one) while
+The first prints the error of the companion's estimate (flight.csv) and of ArduPilot's own (AOA_SSA in flight.tlog, where there is one) while
 Greylag steered: mean, standard deviation, largest, in degrees. The truth is truth.csv beside the recording: JSBSim's own angles.
 The second judges a reconstructed flight path, with roll, pitch and heading too.
 """

@@ -68,7 +68,7 @@ def wrong(r):
 def table(records):
     """The counts by truth, as Markdown."""
     rows = [
-        "| truth | rate, Hz | effects | truth first | asserted right | cases with a wrong assertion | nulls | nulls with an assertion | nulls called adequate | failed |",
+        "| truth | rate, Hz | effects | true effect ranked first | true effect asserted | cases with a false assertion | cases without a hidden effect | false alarms in them | model judged adequate in them | failed |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for kind, rate in sorted({(r["truth"], r["sensors"]["rate"]) for r in records}):

@@ -16,6 +16,7 @@ use comfy_table::Table;
 
 use crate::commands::files::{command_line, shipped};
 use crate::commands::interruption::{Ended, Interruption};
+use crate::commands::train::share;
 use crate::learn::trainable;
 use crate::model::GreyBox;
 use crate::model::residual::hash;
@@ -44,7 +45,7 @@ pub struct Arguments {
     #[arg(long = "continue", value_name = "DIR", requires = "logs", conflicts_with_all = ["prior", "collect", "algorithm"])]
     earlier: Option<PathBuf>,
     /// With --continue: part of all samples that the recent flights make up; 1 forgets the earlier ones.
-    #[arg(long, value_name = "PART", default_value_t = 0.5, requires = "earlier")]
+    #[arg(long, value_name = "PART", default_value_t = 0.5, conflicts_with = "prior", value_parser = share)]
     recent_share: f64,
     /// Fly the flights to learn from in JSBSim.
     #[arg(long, conflicts_with = "logs", required_unless_present = "logs")]
@@ -164,12 +165,16 @@ impl Arguments {
         Ok(Recent { flights, policy, logs: self.logs.clone(), share: self.recent_share })
     }
 
-    /// Hashes of the files that a learning begins with: prior, airframe, logs.
+    /// Hashes of the files that a learning begins with: prior, airframe, logs, the policy that it goes on with.
     fn inputs(&self, prior: &GreyBox) -> Result<Vec<String>> {
         let mut hashes = vec![prior.sha256.clone(), format!("{:?}", prior.airframe)];
-        for log in &self.logs {
+        let mut files = self.logs.clone();
+        if let Some(folder) = &self.earlier {
+            files.push(shipped(&flying(folder)?.join(plan::POLICY)).join("actor.safetensors"));
+        }
+        for file in &files {
             let bytes =
-                std::fs::read(log).with_context(|| format!("cannot read {}", log.display()))?;
+                std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
             hashes.push(hash(&bytes));
         }
         Ok(hashes)

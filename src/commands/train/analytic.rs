@@ -19,9 +19,9 @@ const LINE: u64 = 50;
 /// Updates of the critics between two lines.
 const CRITICS: u64 = 1000;
 
-/// Climbs the reward's slope in `model`, from the actor `from` where one is given; the curve of what `judge` says goes into `folder`. Gives the last
-/// actor, the learning rate having fallen to nothing, or `None` if interrupted: what takes minutes begins
-/// anew.
+/// Climbs the reward's slope in `model`, from the actor `from` where one is given; the curve of what `judge`
+/// says goes into `folder`. Gives the last actor, the learning rate having fallen to nothing, or `None` if
+/// interrupted: what takes minutes begins anew.
 ///
 /// # Errors
 /// If a parameter is no longer finite or the curve cannot be written.

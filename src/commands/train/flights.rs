@@ -35,7 +35,7 @@ pub struct FlightArguments {
     #[arg(long = "recent", value_name = "LOG", num_args = 1..)]
     recent: Vec<PathBuf>,
     /// Part of all samples that recent flights make up, by being repeated; 1 leaves the others out.
-    #[arg(long, value_name = "PART", default_value_t = 0.5, requires = "recent")]
+    #[arg(long, value_name = "PART", default_value_t = 0.5, requires = "recent", value_parser = share)]
     recent_share: f64,
 }
 
@@ -116,9 +116,6 @@ impl FlightArguments {
         mut notes: Vec<String>,
     ) -> Result<Flights> {
         let share = self.recent_share;
-        if !(share > 0.0 && share <= 1.0) {
-            bail!("--recent-share {share}: give a number above 0, at most 1");
-        }
         let (mut recent, mut judge) = (Vec::new(), Vec::new());
         for rows in self.logged(&self.recent, model, &mut notes)? {
             let end = rows.len() - (HELD_OUT_PART * rows.len() as f64) as usize;
@@ -146,6 +143,15 @@ impl FlightArguments {
         (0..copies).for_each(|_| learn.extend(recent.iter().cloned()));
         Ok(Flights { learn, judge, samples: old + new, notes })
     }
+}
+
+/// A part of all samples, as an option has it.
+///
+/// # Errors
+/// If it is no number above 0 and at most 1.
+pub fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|share| *share > 0.0 && *share <= 1.0);
+    share.ok_or_else(|| "give a number above 0, at most 1".into())
 }
 
 /// A sample: state, measured controls, altitude (m).

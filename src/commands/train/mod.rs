@@ -6,6 +6,8 @@ mod dynamics;
 mod flights;
 mod policy;
 
+pub use flights::share;
+
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};

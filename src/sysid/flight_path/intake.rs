@@ -28,8 +28,6 @@ pub struct Log {
     pub step: f64,
     /// The stretches without gaps.
     pub tracks: Vec<Track>,
-    /// The extent of the flight in time.
-    pub span: Span,
     /// Which sensors the log has.
     pub has: Present,
     /// How often they measure.
@@ -243,16 +241,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     let rudder = RudderMotion::of(&flight.samples);
     let periods = channels.periods();
     let sensors = options.sensors.overridden_by(&flight.sensors);
-    let mut log = Log {
-        step,
-        tracks: Vec::new(),
-        span: Span::default(),
-        has,
-        periods,
-        rudder,
-        sensors,
-        notes,
-    };
+    let mut log = Log { step, tracks: Vec::new(), has, periods, rudder, sensors, notes };
     let mut longest = 0.0_f64;
     for times in &stretches {
         let [start, end] = [times[0], times[times.len() - 1]];
@@ -284,8 +273,8 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     }
     let ends = log.tracks.iter().map(|t| t.time(t.len(), step));
     let (start, end) = (log.tracks[0].start, ends.fold(f64::NEG_INFINITY, f64::max));
-    log.span = Span { middle: 0.5 * (start + end), length: end - start };
-    log.tracks.iter_mut().for_each(|track| track.span = log.span);
+    let span = Span { middle: 0.5 * (start + end), length: end - start };
+    log.tracks.iter_mut().for_each(|track| track.span = span);
     Ok(log)
 }
 

@@ -162,7 +162,7 @@ fn segment(
         let air = path.air_velocity(k);
         let [alpha, beta] = flow_angles(&air);
         let noise = gyro.map_or([0.0; 3], |g| g[k]);
-        let bias = nuisance::gyro_bias(values, track.time(k, log.step), &log.span);
+        let bias = nuisance::gyro_bias(values, track.time(k, log.step), &track.span);
         let [p, q, r] = std::array::from_fn(|i| track.rates[k][i] - bias[i] + noise[i]);
         Instant {
             time_s: track.start + k as f64 * log.step,
