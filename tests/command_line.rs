@@ -182,6 +182,32 @@ fn evaluate_flies_another_aircraft() {
 }
 
 #[test]
+fn targets_beyond_the_envelope_are_named_and_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let targets = folder.path().join("targets.csv");
+    let line = [
+        "evaluate",
+        "--controller",
+        "lqi",
+        "--model",
+        "params/aerosonde/jsbsim.toml",
+        "--aircraft",
+        "aerosonde",
+        "--targets",
+        targets.to_str().unwrap(),
+    ];
+    fs::write(&targets, "group,roll_deg,pitch_deg\neasy,20,5\nhard_corners,55,28\n").unwrap();
+    let output = greylag(&line);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && error.contains("1 of 2 targets lie beyond"), "{error}");
+    let output = greylag(&[&line[..], &["--beyond-envelope"]].concat());
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && !error.contains("lie beyond"), "{error}");
+    fs::write(&targets, "group,roll_deg,pitch_deg\nhard_corners,55,28\n").unwrap();
+    refuses(&line, &["all targets", "--beyond-envelope"]);
+}
+
+#[test]
 fn the_version_says_what_was_built() {
     let said = String::from_utf8(greylag(&["-V"]).stdout).unwrap();
     assert!(said.starts_with("greylag 0.") && said.contains("features: sitl"), "{said}");

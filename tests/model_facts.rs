@@ -43,6 +43,46 @@ fn level_trim_at_three_airspeeds() {
 }
 
 #[test]
+fn what_cannot_fly_level_descends_at_idle_throttle() {
+    let mut glider = model("jsbsim");
+    assert!(glider.set_coefficient("thrust_linear.Cp_n", 0.0));
+    assert!(Trim::level(&glider, 18.0, ALTITUDE).is_err());
+    let trim = Trim::straight(&glider, 18.0, ALTITUDE).unwrap();
+    let rate = glider.rate(&trim.state, &trim.controls, ALTITUDE);
+    assert!(rate.to_array().into_iter().all(|x| x.abs() < 1e-9), "{rate:?}");
+    let path = trim.path().to_degrees();
+    println!("descends by {path:.2} deg");
+    assert!((-8.0..-2.0).contains(&path) && trim.controls.throttle == 0.0);
+    let powered = model("jsbsim");
+    let [level, straight] =
+        [Trim::level, Trim::straight].map(|of| of(&powered, 18.0, ALTITUDE).unwrap());
+    assert_eq!(level, straight);
+}
+
+/// The least thrust of a polynomial with a square in throttle may lie above what a steep descent asks for.
+#[test]
+fn a_thrust_that_no_throttle_gives_is_left_at_idle() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/aerosonde");
+    let mut model = GreyBox::load(&folder.join("jsbsim.toml")).unwrap();
+    for (name, value) in [
+        ("T0_n", 1.0),
+        ("Tt_n", -2.0),
+        ("Ttt_n", 40.0),
+        ("TV_nspm", 0.0),
+        ("TtV_nspm", 0.0),
+        ("TVV_ns2pm2", 0.0),
+    ] {
+        assert!(model.set_coefficient(&format!("propeller.{name}"), value));
+    }
+    let trim = Trim::attitude(&model, 0.3, -0.4, 25.0, ALTITUDE).unwrap();
+    let mut rate = model.rate(&trim.state, &trim.controls, ALTITUDE).to_array();
+    assert_eq!(trim.controls.throttle, 0.0);
+    assert!(trim.acceleration > 0.5 && rate[2] == trim.acceleration);
+    rate[2] = 0.0;
+    assert!(rate.into_iter().all(|x| x.abs() < 1e-9), "{rate:?}");
+}
+
+#[test]
 fn trimmed_turns_are_steady() {
     let model = model("jsbsim");
     for (roll, pitch) in [(60.0_f64, 20.0_f64), (-45.0, -10.0), (20.0, 5.0)] {

@@ -165,7 +165,7 @@ impl Plant {
     }
 
     fn start_engines(&mut self) -> Result<(), PlantError> {
-        let started = self.nodes.start_engines(&mut self.fdm);
+        let started = self.nodes.start_engines(&mut self.fdm, self.options.step_s);
         match started.map_err(jsbsim("starting the engines"))? {
             None => Ok(()),
             Some(engine) => {

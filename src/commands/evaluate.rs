@@ -18,6 +18,8 @@ use crate::commands::{choices, fly};
 use crate::control::cem::Change;
 use crate::control::{Controller, Kind, Needs, Target};
 use crate::model::GreyBox;
+use crate::physics::Airframe;
+use crate::physics::airframe::Envelope;
 use crate::report::EvaluationReport;
 use crate::sim::episode::STEPS;
 use crate::sim::evaluation::{Evaluation, evaluate};
@@ -46,6 +48,9 @@ pub struct Arguments {
     /// Only these groups of targets.
     #[arg(long = "group", num_args = 1.., value_parser = choices::group())]
     groups: Vec<Group>,
+    /// Fly targets beyond the bank and pitch of the airframe's envelope too.
+    #[arg(long)]
+    beyond_envelope: bool,
     /// Seed of the controllers' own randomness, with the air's.
     #[arg(long, default_value_t = 1)]
     seed: u32,
@@ -83,11 +88,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::writable(path, overwrite)?;
     }
     fly::check_changes(&arguments.controllers, &arguments.changes)?;
-    let targets = targets(arguments)?;
+    let mut targets = targets(arguments)?;
     let mut plant = arguments.plant.options(arguments.seed);
     // everything that can be wrong is found before the first flight
     let load = |path: &PathBuf| GreyBox::load(&shipped(path));
     let models = arguments.models.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    if !arguments.beyond_envelope {
+        within_envelope(&mut targets, &models[0].airframe)?;
+    }
     start::describe(&mut plant, &models)?;
     plant.start = arguments.start.start(&plant.aircraft, &models)?;
     let entrants = entrants(arguments, &models)?;
@@ -168,6 +176,25 @@ fn targets(arguments: &Arguments) -> Result<TargetFile> {
         bail!("{} has no targets of that group; leave --group out", arguments.targets.display());
     }
     Ok(targets)
+}
+
+/// Leaves the targets that the airframe's envelope allows, and says how many it does not.
+fn within_envelope(targets: &mut TargetFile, airframe: &Airframe) -> Result<()> {
+    let Envelope { bank_max_deg: bank, pitch_min_deg: low, pitch_max_deg: high, .. } =
+        airframe.envelope;
+    let all = targets.rows.len();
+    targets.rows.retain(|row| row.roll_deg.abs() <= bank && (low..=high).contains(&row.pitch_deg));
+    let limits =
+        format!("the envelope of {} (bank {bank}°, pitch {low} to {high}°)", airframe.name);
+    match targets.rows.len() {
+        0 => bail!("all targets lie beyond {limits}: give others, or --beyond-envelope"),
+        left if left < all => eprintln!(
+            "{} of {all} targets lie beyond {limits} and are not flown; --beyond-envelope flies them",
+            all - left
+        ),
+        _ => {}
+    }
+    Ok(())
 }
 
 /// A controller ready to fly, with the name of its model, or the folder of its policy.

@@ -14,7 +14,7 @@ const USUAL_DELAY: f64 = 0.04;
 /// Roll rate at full aileron below which an aircraft is slow to roll, rad/s (20°/s).
 const SLOW_ROLL: f64 = 0.35;
 
-/// Level flight at one airspeed.
+/// Straight flight at one airspeed: level, or the descent at idle throttle of an aircraft that cannot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
     /// True airspeed, m/s.
@@ -25,6 +25,8 @@ pub struct Level {
     pub elevator: f64,
     /// Throttle, which may lie beyond its stops.
     pub throttle: f64,
+    /// Angle of the flight path above the horizon, rad: zero, or below in a descent.
+    pub path: f64,
 }
 
 /// What the surfaces do at full travel in level flight at the cruise airspeed.
@@ -41,7 +43,7 @@ pub struct Authority {
 /// What was found.
 #[derive(Clone, Debug)]
 pub struct AircraftCheck {
-    /// Level flight over the envelope's airspeeds, where there is any.
+    /// Straight flight over the envelope's airspeeds, where there is any.
     pub levels: Vec<Level>,
     /// The modes at the cruise airspeed.
     pub modes: Vec<Mode>,
@@ -72,7 +74,7 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
     let envelope = model.airframe.envelope;
     let altitude = model.airframe.reference.altitude;
     let cruise = envelope.airspeed_cruise_mps;
-    let trim = Trim::level(model, cruise, altitude)?;
+    let trim = Trim::straight(model, cruise, altitude)?;
     let span = envelope.airspeed_max_mps - envelope.airspeed_min_mps;
     let speeds =
         (0..SPEEDS).map(|i| envelope.airspeed_min_mps + span * i as f64 / (SPEEDS - 1) as f64);
@@ -88,10 +90,10 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
 }
 
 fn level(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Level> {
-    let trim = Trim::level(model, airspeed, altitude).ok()?;
+    let trim = Trim::straight(model, airspeed, altitude).ok()?;
     let elevator = model.airframe.actuators.elevator.travel.part(trim.controls.elevator);
     let (alpha, throttle) = (trim.state.alpha, trim.controls.throttle);
-    Some(Level { airspeed, alpha, elevator, throttle })
+    Some(Level { airspeed, alpha, elevator, throttle, path: trim.path() })
 }
 
 fn authority(model: &GreyBox, trim: &Trim, altitude: f64) -> Authority {
@@ -120,7 +122,7 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
     let missing = speeds - check.levels.len();
     if missing > 0 {
         out.push(format!(
-            "no level flight at {missing} of {speeds} airspeeds of the envelope: correct \
+            "no straight flight at {missing} of {speeds} airspeeds of the envelope: correct \
              airspeed_min_mps and airspeed_max_mps"
         ));
     }
@@ -128,7 +130,7 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
         let Level { airspeed, elevator, throttle, .. } = *level;
         if elevator.abs() > MUCH_TRAVEL {
             out.push(format!(
-                "level flight at {airspeed:.1} m/s takes {:.0} % of the elevator's travel: move the \
+                "straight flight at {airspeed:.1} m/s takes {:.0} % of the elevator's travel: move the \
                  centre of gravity or correct Cm0, Cmalpha and Cmde",
                 100.0 * elevator.abs()
             ));

@@ -92,7 +92,7 @@ const THRUST: &[(&str, &[&str])] = &[
 pub fn export(model: &GreyBox, name: &str) -> Exported {
     let mut known: Vec<&str> =
         FACTORS.iter().map(|f| f.0).chain(THRUST.iter().map(|t| t.0)).collect();
-    known.extend(["lift_table.k", "drag_table.k"]);
+    known.extend(["lift_table.k", "drag_table.k", "pitch_table.k"]);
     let effect = |full: &str| full.split('.').next().unwrap_or_default().to_owned();
     // what changes mass and inertia has changed the body
     let of_body = |name: &str| name.starts_with("mass_error.") || name.starts_with("inertia_xz.");
@@ -274,7 +274,8 @@ fn aerodynamics(model: &GreyBox) -> String {
         let table: String = model
             .tables()
             .filter(|(id, _)| {
-                (axis, *id) == ("LIFT", "lift_table") || (axis, *id) == ("DRAG", "drag_table")
+                [("LIFT", "lift_table"), ("DRAG", "drag_table"), ("PITCH", "pitch_table")]
+                    .contains(&(axis, id))
             })
             .map(|(id, table)| tabulated(table, coefficient(model, &format!("{id}.k"))))
             .collect();

@@ -65,12 +65,12 @@ pub fn rates(model: &GreyBox, trim: &Trim, altitude: f64) -> Rates {
     }
 }
 
-/// The modes of level flight at `airspeed` (m/s) and `altitude` (m): longitudinal, then lateral.
+/// The modes of straight flight at `airspeed` (m/s) and `altitude` (m): longitudinal, then lateral.
 ///
 /// # Errors
-/// If the model cannot fly level there.
+/// If the model cannot fly straight there.
 pub fn modes(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Vec<Mode>, TrimError> {
-    let trim = Trim::level(model, airspeed, altitude)?;
+    let trim = Trim::straight(model, airspeed, altitude)?;
     let a = rates(model, &trim, altitude).a;
     // the search for eigenvalues does not end on what is no number
     if !a.iter().all(|x| x.is_finite()) {

@@ -58,6 +58,21 @@ impl Trim {
         within_stops(from, 0.2).ok_or_else(|| failure(model, 0.0, 0.0, airspeed))
     }
 
+    /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m): level, or the descent at idle
+    /// throttle where no throttle holds level flight, as a glider's.
+    ///
+    /// # Errors
+    /// If no elevator holds either.
+    pub fn straight(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Trim, TrimError> {
+        Trim::level(model, airspeed, altitude)
+            .or_else(|why| glide(model, airspeed, altitude).ok_or(why))
+    }
+
+    /// Angle of the flight path above the horizon with level wings and no sideslip, rad.
+    pub fn path(&self) -> f64 {
+        self.state.pitch - self.state.alpha
+    }
+
     /// A steady turn that holds roll and pitch (rad) at `airspeed` (m/s) and `altitude` (m).
     ///
     /// Where the throttle that would hold the airspeed lies beyond its stops it is left at the
@@ -73,17 +88,21 @@ impl Trim {
         altitude: f64,
     ) -> Result<Trim, TrimError> {
         let fail = || failure(model, roll, pitch, airspeed);
-        let from =
-            |start| solve_attitude(model, roll, pitch, [airspeed, altitude], Thrust::From(start));
-        let free = within_stops(from, 0.3).ok_or_else(fail)?;
-        if (0.0..=1.0).contains(&free.controls.throttle) {
-            return Ok(free);
+        let solve = |thrust| solve_attitude(model, roll, pitch, [airspeed, altitude], thrust);
+        let held = |stop: f64| {
+            let mut held = solve(Thrust::Held(stop))?;
+            held.acceleration = model.rate(&held.state, &held.controls, altitude).airspeed;
+            Some(held)
+        };
+        match within_stops(|start| solve(Thrust::From(start)), 0.3) {
+            Some(free) if (0.0..=1.0).contains(&free.controls.throttle) => Ok(free),
+            Some(free) => held(free.controls.throttle.clamp(0.0, 1.0)).ok_or_else(fail),
+            // a thrust that is no line in throttle may miss the one that is wanted at any throttle
+            None => held(0.0)
+                .filter(|idle| idle.acceleration >= 0.0)
+                .or_else(|| held(1.0).filter(|full| full.acceleration <= 0.0))
+                .ok_or_else(fail),
         }
-        let stop = free.controls.throttle.clamp(0.0, 1.0);
-        let mut held = solve_attitude(model, roll, pitch, [airspeed, altitude], Thrust::Held(stop))
-            .ok_or_else(fail)?;
-        held.acceleration = model.rate(&held.state, &held.controls, altitude).airspeed;
-        Ok(held)
     }
 }
 
@@ -97,6 +116,23 @@ fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> 
         return first;
     }
     from(1.0).filter(holds).or(first)
+}
+
+/// The descent at idle throttle at `airspeed`, m/s. Unknowns: α, δe, θ.
+fn glide(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Trim> {
+    let condition = |[alpha, elevator, pitch]: [Dual<3>; 3]| {
+        let (mut state, controls) = level_condition([alpha, elevator, Dual::zero()], airspeed);
+        state.pitch = pitch;
+        (state, controls)
+    };
+    let x = newton::solve([0.03, 0.0, 0.0], [0.1, 0.2, 0.1], |x| {
+        let (state, controls) = condition(x);
+        let rate = model.rate(&state, &controls, altitude);
+        [rate.airspeed, rate.q, rate.alpha]
+    })?;
+    let (mut state, controls) = level_condition([x[0], x[1], 0.0], airspeed);
+    state.pitch = x[2];
+    Some(Trim { state, controls, acceleration: 0.0 })
 }
 
 /// The throttle of an attitude's trim.

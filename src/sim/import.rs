@@ -10,12 +10,10 @@ use crate::num::least_squares;
 use crate::physics::atmosphere::SEA_LEVEL_DENSITY;
 use crate::physics::catalogue::describe;
 use files::{airframe, model_file};
-use fits::{LINE_DEG, first_order, line, second_order};
+use fits::{first_order, line, second_order};
 
 /// Metres per foot.
 const FT: f64 = 0.3048;
-/// Newtons per pound of force.
-const LBF: f64 = 4.448_221_615_260_5;
 /// Incidence at which derivatives are taken, rad: 3°.
 const ALPHA: f64 = 0.052;
 /// Half the interval of angles, rad: 2°.
@@ -94,6 +92,7 @@ struct Subject<'a> {
     area: f64,
     span: f64,
     chord: f64,
+    mass: MassProperties,
 }
 
 /// D, Y, L and l, m, n as coefficients.
@@ -127,23 +126,23 @@ pub fn import(
     let area = plant.property("metrics/Sw-sqft")? * FT * FT;
     let span = plant.property("metrics/bw-ft")? * FT;
     let chord = plant.property("metrics/cbarw-ft")? * FT;
-    let mut subject = Subject { plant, start, area, span, chord };
+    let mut subject = Subject { plant, start, area, span, chord, mass };
     let mut left_out = Vec::new();
     let (polar, lift_max) = subject.polar()?;
     if lift_max <= 0.0 {
         return Err(ImportError::Lift { airspeed: cruise });
     }
     let effects = effects(&polar, &subject.slopes(&travel)?, &mut left_out);
-    let thrust = subject.thrust(&mass, &mut left_out)?;
+    let thrust = subject.thrust(&mut left_out)?;
     let lags = subject.lags(&travel)?;
     Ok(Imported {
-        airframe: airframe(&subject, name, &travel, &lags, lift_max, &mass, &polar),
-        model: model_file(name, &mass, &polar, &effects, &thrust, travel.rudder.is_some()),
+        airframe: airframe(&subject, name, &travel, &lags, lift_max, &polar, &thrust),
+        model: model_file(name, &subject.mass, &polar, &effects, &thrust, travel.rudder.is_some()),
         left_out,
     })
 }
 
-/// Lift and drag over incidence.
+/// Lift, drag and pitching moment over incidence.
 struct Polar {
     alpha: Vec<f64>,
     lift: Vec<f64>,
@@ -159,6 +158,15 @@ impl Polar {
             let share = (lift - self.lift[k]) / (self.lift[k + 1] - self.lift[k]);
             self.alpha[k] + share * (self.alpha[k + 1] - self.alpha[k])
         })
+    }
+}
+
+impl Polar {
+    /// The drag coefficient at `alpha` (rad), linear between the table's points.
+    fn drag_at(&self, alpha: f64) -> f64 {
+        let above = self.alpha.partition_point(|a| *a < alpha).clamp(1, self.alpha.len() - 1);
+        let [x, y] = [&self.alpha, &self.drag].map(|of| [of[above - 1], of[above]]);
+        y[0] + (alpha - x[0]) / (x[1] - x[0]) * (y[1] - y[0])
     }
 }
 
@@ -263,29 +271,18 @@ impl Subject<'_> {
         })
     }
 
-    /// The thrust's polynomial over throttle and airspeed.
-    fn thrust(
-        &mut self,
-        mass: &MassProperties,
-        left_out: &mut Vec<String>,
-    ) -> Result<Vec<Estimate>, PlantError> {
+    /// The polynomial of the settled thrust over throttle and airspeed.
+    fn thrust(&mut self, left_out: &mut Vec<String>) -> Result<Vec<Estimate>, PlantError> {
         let (mut rows, mut thrusts) = (Vec::new(), Vec::new());
         for speed in [0.8, 1.0, 1.25] {
             for throttle in [0.0, 0.25, 0.5, 0.75, 1.0] {
                 let airspeed_mps = speed * self.start.airspeed_mps;
-                self.plant.reset(&Start { airspeed_mps, alpha_rad: ALPHA, ..self.start })?;
-                for step in 0..300 {
-                    let truth = self.plant.step(Inputs { throttle, ..Inputs::default() })?;
-                    // an engine takes its time
-                    if step < 200 || step % 10 != 0 {
-                        continue;
-                    }
-                    let ahead = self.plant.property("forces/fbx-aero-lbs")? * LBF;
-                    let (d, v) = (truth.throttle, truth.airspeed_mps);
-                    let share = truth.air_density_kgpm3 / SEA_LEVEL_DENSITY;
-                    rows.push([1.0, d, d * d, v, d * v, v * v].map(|x| x * share));
-                    thrusts.push(mass.mass_kg * truth.specific_force_mps2[0] - ahead);
-                }
+                let start = Start { airspeed_mps, alpha_rad: ALPHA, ..self.start };
+                let (thrust, truth) = self.plant.settled_thrust(&start, throttle)?;
+                let (d, v) = (truth.throttle, truth.airspeed_mps);
+                let share = truth.air_density_kgpm3 / SEA_LEVEL_DENSITY;
+                rows.push([1.0, d, d * d, v, d * v, v * v].map(|x| x * share));
+                thrusts.push(thrust);
             }
         }
         let fit = least_squares(&rows, &thrusts).unwrap_or_default();
@@ -345,18 +342,9 @@ fn bounded(effect: &str, estimates: &mut [Estimate], left_out: &mut Vec<String>)
     }
 }
 
-/// The effects of the model with their coefficients; what is left of the pitching moment is said.
+/// The effects of the model with their coefficients.
 fn effects(polar: &Polar, slopes: &Slopes, left_out: &mut Vec<String>) -> Vec<Effect> {
-    let [zero, slope, bent] = line(polar);
-    if bent > WORTH_SAYING {
-        left_out.push(format!(
-            "the pitching moment over incidence is a line in the model; {:.0} % of its variation from {} \
-             to {} deg is left out",
-            100.0 * bent,
-            LINE_DEG[0],
-            LINE_DEG[1]
-        ));
-    }
+    let [zero, slope, _] = line(polar);
     let Slopes { base, beta, p, q, r, aileron: a, elevator: e, .. } = slopes;
     let exact = |name, value| -> Estimate { (name, value, 0.02, SOURCE) };
     let lateral = |names: [&'static str; 5], k: usize| -> Vec<Estimate> {

@@ -133,7 +133,7 @@ pub fn signature(
     } else {
         models[1].join(about.id, values)?;
     }
-    let trim = Trim::level(&models[0], model.airframe.envelope.airspeed_cruise_mps, ALTITUDE)?;
+    let trim = Trim::straight(&models[0], model.airframe.envelope.airspeed_cruise_mps, ALTITUDE)?;
     Ok(Signature { sweeps: sweeps(&models, &trim), manoeuvre: manoeuvre(&models, &trim) })
 }
 

@@ -33,7 +33,63 @@ pub struct MassProperties {
     pub inertia_kgm2: [f64; 4],
 }
 
+/// JSBSim's integrators, by which it can be held in its state while engines and filters go on.
+const INTEGRATORS: [&str; 4] = [
+    "simulation/integrator/rate/rotational",
+    "simulation/integrator/rate/translational",
+    "simulation/integrator/position/rotational",
+    "simulation/integrator/position/translational",
+];
+/// Longest time that engines are given to settle, s.
+const SETTLING_S: f64 = 60.0;
+/// Change of thrust within a second that counts as settled, in parts of it.
+const SETTLED: f64 = 1e-4;
+
 impl Plant {
+    /// Thrust along body x in N, and the truth there, once the engines have settled at `throttle` (0..1) with
+    /// the aircraft held in `start`; after 60 s as it is then. Reset it before it is stepped.
+    ///
+    /// # Errors
+    /// [`PlantError`] when the aircraft cannot be evaluated there.
+    pub fn settled_thrust(
+        &mut self,
+        start: &Start,
+        throttle: f64,
+    ) -> Result<(f64, Truth), PlantError> {
+        self.reset(start)?;
+        let mut schemes = [0.0; 4];
+        for (scheme, name) in schemes.iter_mut().zip(INTEGRATORS) {
+            *scheme = self.property(name)?;
+            self.set_property(name, 0.0)?;
+        }
+        let settled = self.settle_engines(throttle);
+        for (scheme, name) in schemes.into_iter().zip(INTEGRATORS) {
+            self.set_property(name, scheme)?;
+        }
+        settled
+    }
+
+    fn settle_engines(&mut self, throttle: f64) -> Result<(f64, Truth), PlantError> {
+        let second = (1.0 / self.options.step_s).round() as usize;
+        let inputs = Inputs { throttle, ..Inputs::default() };
+        let mass = self.mass_properties()?.mass_kg;
+        let (mut last, mut seconds) = (f64::INFINITY, 0.0);
+        loop {
+            for _ in 0..second {
+                self.step(inputs)?;
+            }
+            seconds += 1.0;
+            let aero = self.property("forces/fbx-aero-lbs")? * LBF;
+            let thrust = mass * self.truth.specific_force_mps2[0] - aero;
+            // a starting engine's thrust may stand at zero for longer than a second
+            let still = (thrust - last).abs() <= SETTLED * thrust.abs().max(1.0);
+            if seconds >= SETTLING_S || (still && seconds >= 5.0) {
+                return Ok((thrust, self.truth));
+            }
+            last = thrust;
+        }
+    }
+
     /// The loads in `start` with the surfaces at rest where `inputs` command them. Reset
     /// it before it is stepped.
     ///

@@ -95,12 +95,31 @@ impl Nodes {
 
     /// Starts every engine that can stand still; the number of the first that does not run then.
     /// JSBSim starts them at full power, from where they follow the throttle.
-    pub(super) fn start_engines(&self, fdm: &mut Fdm) -> Result<Option<usize>, Error> {
+    pub(super) fn start_engines(&self, fdm: &mut Fdm, step_s: f64) -> Result<Option<usize>, Error> {
         if self.running.is_empty() {
             return Ok(None);
         }
+        // Without a pilot at the lever a constant-speed propeller stays at its coarsest, and may stop its engine.
+        for engine in 0..self.running.len() {
+            let lever = format!("fcs/advance-cmd-norm[{engine}]");
+            if look(fdm, &lever).is_some() {
+                fdm.set_property(&lever, 1.0)?;
+            }
+        }
         const ALL: f64 = -1.0;
         fdm.set_property("propulsion/set-running", ALL)?;
+        let stands = self.stands(fdm)?;
+        if stands.is_none() {
+            return Ok(None);
+        }
+        // Fuel systems that the aircraft's XML computes feed an engine only after a frame.
+        settle(fdm, step_s)?;
+        fdm.set_property("propulsion/set-running", ALL)?;
+        self.stands(fdm)
+    }
+
+    /// The first engine that does not run.
+    fn stands(&self, fdm: &mut Fdm) -> Result<Option<usize>, Error> {
         for (engine, running) in self.running.iter().enumerate() {
             if fdm.read_node(*running)? == 0.0 {
                 return Ok(Some(engine));

@@ -1,5 +1,6 @@
 //! How far an aircraft's surfaces deflect at full command.
 
+use super::lookup::look;
 use super::{FULL_DEFLECTION_RAD, Inputs, Plant, PlantError, jsbsim};
 
 /// Steps without flight that an actuator is given to reach its stop: 20 s in steps of 10 ms.
@@ -80,10 +81,19 @@ impl Plant {
         };
         let rudder = stops(2);
         Ok(Travel {
-            aileron: self.checked(stops(0), &self.options.properties.aileron_position)?,
+            aileron: self.checked(stops(0), self.aileron_position())?,
             elevator: self.checked(stops(1), &self.options.properties.elevator_position)?,
             rudder: (rudder.largest_rad() > LEAST_RAD).then_some(rudder),
         })
+    }
+
+    /// The property that is read as the aileron's position.
+    fn aileron_position(&self) -> &str {
+        let named = &self.options.properties;
+        match look(&self.fdm, &named.aileron_position) {
+            Some(_) => &named.aileron_position,
+            None => named.aileron_fallback(),
+        }
     }
 
     fn checked(&self, stops: Stops, property: &str) -> Result<Stops, PlantError> {

@@ -73,9 +73,19 @@ fn levels(found: &AircraftCheck) -> Table {
             format!("{:.1}", l.alpha.to_degrees()),
             format!("{:.0}", 100.0 * l.elevator),
             format!("{:.0}", 100.0 * l.throttle),
+            format!("{:.1}", l.path.to_degrees()),
         ]
     });
-    table(&["level flight, m/s", "incidence, deg", "elevator, %", "throttle, %"], rows)
+    table(
+        &[
+            "straight flight, m/s",
+            "incidence, deg",
+            "elevator, %",
+            "throttle, %",
+            "flight path, deg",
+        ],
+        rows,
+    )
 }
 
 fn modes(found: &AircraftCheck) -> Table {

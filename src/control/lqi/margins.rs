@@ -46,17 +46,17 @@ pub enum MarginsError {
     },
 }
 
-/// The margins of the LQI of `model` in level flight at `airspeed` (m/s): aileron, elevator, rudder.
+/// The margins of the LQI of `model` in straight flight at `airspeed` (m/s): aileron, elevator, rudder.
 ///
 /// # Errors
-/// If the model cannot fly level there, or not be stabilised.
+/// If the model cannot fly straight there, or not be stabilised.
 pub fn margins(
     model: &GreyBox,
     airspeed: f64,
     weights: &Weights,
 ) -> Result<Vec<LoopMargins>, MarginsError> {
     let altitude = model.airframe.reference.altitude;
-    let trim = Trim::level(model, airspeed, altitude)?;
+    let trim = Trim::straight(model, airspeed, altitude)?;
     let unstable = || MarginsError::Unstable { model: model.name.clone(), airspeed_mps: airspeed };
     Ok(match loops(model, &trim, altitude, weights).ok_or_else(unstable)? {
         Loops::Two(a, b, k) => each::<STATES, 2>(&a, &b, &k),

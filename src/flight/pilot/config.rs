@@ -96,7 +96,7 @@ impl Config {
 
 fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
     // trim depends on equivalent airspeed, which differs by 5 % from true airspeed a thousand metres away
-    let trim = Trim::level(model, airspeed, model.airframe.reference.altitude)?;
+    let trim = Trim::straight(model, airspeed, model.airframe.reference.altitude)?;
     let command = model.airframe.actuators.command(&trim.controls);
     Ok(TrimPoint {
         airspeed_mps: airspeed,

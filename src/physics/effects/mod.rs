@@ -267,6 +267,7 @@ effects! {
     propeller::Propeller,
     lift_table::LiftTable,
     drag_table::DragTable,
+    pitch_table::PitchTable,
     lift_curve::LiftCurve,
     drag_curve::DragCurve,
     drag_alpha2::DragAlpha2,

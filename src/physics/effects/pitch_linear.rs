@@ -15,9 +15,9 @@ impl Effect for PitchLinear {
     const SOURCE: &'static str = "GSFM26 eq. (45)";
     const COEFFICIENTS: &'static [Coefficient] = &[
         coefficient("Cm0", "pitching moment coefficient at zero incidence", "", (-0.5, 0.5)),
-        coefficient("Cmalpha", "longitudinal stiffness", "1/rad", (-5.0, 1.0)),
-        coefficient("Cmq", "pitch damping", "", (-50.0, 0.0)),
-        coefficient("Cmde", "elevator power", "1/rad", (-3.0, 0.0)),
+        coefficient("Cmalpha", "longitudinal stiffness", "1/rad", (-5.0, 3.0)),
+        coefficient("Cmq", "pitch damping", "", (-100.0, 0.0)),
+        coefficient("Cmde", "elevator power", "1/rad", (-8.0, 0.0)),
     ];
 
     #[inline(always)]

@@ -22,7 +22,7 @@ impl Effect for RollLinear {
         ),
         coefficient("Clbeta", "dihedral effect", "1/rad", (-1.0, 0.5)),
         coefficient("Clp", "roll damping", "", (-2.0, 0.0)),
-        coefficient("Clr", "rolling moment due to yaw rate", "", (-1.0, 1.0)),
+        coefficient("Clr", "rolling moment due to yaw rate", "", (-3.0, 3.0)),
         coefficient("Clda", "aileron power", "1/rad", (0.0, 1.0)),
     ];
 

@@ -17,7 +17,7 @@ impl Effect for SideForceLinear {
         coefficient("CY0", "side force coefficient of the symmetric condition", "", (-0.1, 0.1)),
         coefficient("CYbeta", "side force due to sideslip", "1/rad", (-2.0, 0.5)),
         coefficient("CYp", "side force due to roll rate", "", (-2.0, 2.0)),
-        coefficient("CYr", "side force due to yaw rate", "", (-2.0, 2.0)),
+        coefficient("CYr", "side force due to yaw rate", "", (-10.0, 10.0)),
         coefficient("CYda", "side force due to aileron", "1/rad", (-1.0, 1.0)),
     ];
 

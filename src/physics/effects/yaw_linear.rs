@@ -20,9 +20,9 @@ impl Effect for YawLinear {
             "",
             (-0.05, 0.05),
         ),
-        coefficient("Cnbeta", "weathercock stability", "1/rad", (-0.5, 1.0)),
+        coefficient("Cnbeta", "weathercock stability", "1/rad", (-0.5, 2.0)),
         coefficient("Cnp", "yawing moment due to roll rate", "", (-1.0, 1.0)),
-        coefficient("Cnr", "yaw damping", "", (-1.0, 0.5)),
+        coefficient("Cnr", "yaw damping", "", (-6.0, 0.5)),
         coefficient("Cnda", "adverse yaw", "1/rad", (-0.5, 0.5)),
     ];
 

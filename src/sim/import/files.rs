@@ -2,9 +2,13 @@
 
 use greylag_sitl::plant::{MassProperties, Stops, Travel};
 
+use super::fits::line;
 use super::{Effect, Polar, Subject};
 use crate::model::textbook::{Estimate, incidence_limits, numbers};
-use crate::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
+use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY, standard_density};
+
+/// Share of the pitching moment's variation below which it is a line over incidence.
+const STRAIGHT: f64 = 1e-3;
 
 /// The airframe file.
 pub(super) fn airframe(
@@ -13,13 +17,14 @@ pub(super) fn airframe(
     travel: &Travel,
     (surfaces, lag): &([[f64; 2]; 3], f64),
     lift_max: f64,
-    mass: &MassProperties,
     polar: &Polar,
+    thrust: &[Estimate],
 ) -> String {
     let cruise = subject.start.airspeed_mps;
     let density = standard_density(subject.start.altitude_m);
-    let stall =
-        (2.0 * mass.mass_kg * STANDARD_GRAVITY / (density * subject.area * lift_max)).sqrt();
+    let stall = (2.0 * subject.mass.mass_kg * STANDARD_GRAVITY
+        / (density * subject.area * lift_max))
+        .sqrt();
     let slowest = (1.25 * stall).min(0.9 * cruise);
     let mut out = format!(
         "# Written by `greylag aircraft import jsbsim`.\nschema = 2\nname = {name:?}\n\n[geometry]\n\
@@ -41,17 +46,36 @@ pub(super) fn airframe(
             );
         }
     }
-    let lift = 2.0 * mass.mass_kg * STANDARD_GRAVITY / (density * subject.area * cruise * cruise);
-    let limits = incidence_limits(polar.incidence(lift), polar.incidence(lift_max));
+    let lift =
+        2.0 * subject.mass.mass_kg * STANDARD_GRAVITY / (density * subject.area * cruise * cruise);
+    let incidence = polar.incidence(lift);
+    let limits = incidence_limits(incidence, polar.incidence(lift_max));
+    let descent = descent(subject, polar, thrust, [incidence, lift]);
+    // a glider's pitch angles lie about those of its descent
+    let lowest = (5.0 * ((incidence - descent).to_degrees() / 5.0 - 2.0).floor()).min(-15.0);
     out += &format!(
         "[controls.throttle]\nlag_s = {{ value = {lag:.4}, source = \"step of the command\" }}\n\n{limits}\
          # The lift table's largest coefficient stalls at {stall:.1} m/s. Correct the rest to your mission.\n\
-         [envelope]\nbank_max_deg = 45.0\npitch_max_deg = 15.0\npitch_min_deg = -15.0\nload_factor_max = 2.0\n\
+         [envelope]\nbank_max_deg = 45.0\npitch_max_deg = 15.0\npitch_min_deg = {lowest:.1}\nload_factor_max = 2.0\n\
          airspeed_min_mps = {slowest:.2}\nairspeed_max_mps = {:.2}\nairspeed_cruise_mps = {cruise:?}\n\
          surface_slew_per_s = 20.0\n",
         1.4 * cruise
     );
     out
+}
+
+/// Angle below the horizon, rad, at which the aircraft descends at the reference airspeed with idle throttle if
+/// full throttle does not hold it level; else zero.
+fn descent(subject: &Subject, polar: &Polar, thrust: &[Estimate], [alpha, lift]: [f64; 2]) -> f64 {
+    let v = subject.start.airspeed_mps;
+    let density = standard_density(subject.start.altitude_m);
+    let at = |d: f64| {
+        let terms = [1.0, d, d * d, v, d * v, v * v];
+        let sum: f64 = terms.iter().zip(thrust).map(|(x, (_, value, ..))| x * value).sum();
+        sum * density / SEA_LEVEL_DENSITY / (0.5 * density * v * v * subject.area)
+    };
+    let drag = polar.drag_at(alpha);
+    if at(1.0) >= drag { 0.0 } else { ((drag - at(0.0)) / lift).atan().max(0.0) }
 }
 
 /// The model file.
@@ -90,9 +114,16 @@ pub(super) fn model_file(
     }
     out += "\n[effects.propeller]\n";
     numbers(&mut out, thrust);
-    for (effect, ordinate, values) in
-        [("lift_table", "CL", &polar.lift), ("drag_table", "CD", &polar.drag)]
-    {
+    let [zero, slope, bent] = line(polar);
+    let beside: Vec<f64> =
+        polar.alpha.iter().zip(&polar.pitch).map(|(a, m)| m - zero - slope * a).collect();
+    let tables = [
+        ("lift_table", "CL", &polar.lift),
+        ("drag_table", "CD", &polar.drag),
+        ("pitch_table", "Cm", &beside),
+    ];
+    let count = if bent > STRAIGHT { 3 } else { 2 };
+    for (effect, ordinate, values) in tables.into_iter().take(count) {
         let list = |values: &[f64]| {
             values.iter().map(|x| format!("{x:.6}")).collect::<Vec<_>>().join(", ")
         };

@@ -8,7 +8,7 @@ use crate::num::statistics::mean;
 use crate::physics::servos::{Surface, Travel};
 
 /// Incidences over which the pitching moment is taken as a line, degrees.
-pub(super) const LINE_DEG: [f64; 2] = [-4.0, 10.0];
+const LINE_DEG: [f64; 2] = [-4.0, 10.0];
 
 /// Intercept and slope of the pitching moment over incidence, and the share of its variation beside.
 pub(super) fn line(polar: &Polar) -> [f64; 3] {

@@ -18,14 +18,14 @@ pub struct Answers {
 }
 
 impl Answers {
-    /// The answers of `model` in level flight at `airspeed` (m/s).
+    /// The answers of `model` in straight flight at `airspeed` (m/s).
     ///
     /// # Errors
-    /// If the model cannot fly level there.
+    /// If the model cannot fly straight there.
     pub fn of(model: &GreyBox, airspeed: f64) -> Result<Answers, TrimError> {
         // a thousand metres change an answer by a tenth
         let altitude = model.airframe.reference.altitude;
-        let trim = Trim::level(model, airspeed, altitude)?;
+        let trim = Trim::straight(model, airspeed, altitude)?;
         let command = model.airframe.actuators.command(&trim.controls);
         let rates = |command: Command| {
             let mut twin = Twin::at_rest(trim.state, &trim.controls, altitude);
