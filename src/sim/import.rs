@@ -161,15 +161,6 @@ impl Polar {
     }
 }
 
-impl Polar {
-    /// The drag coefficient at `alpha` (rad), linear between the table's points.
-    fn drag_at(&self, alpha: f64) -> f64 {
-        let above = self.alpha.partition_point(|a| *a < alpha).clamp(1, self.alpha.len() - 1);
-        let [x, y] = [&self.alpha, &self.drag].map(|of| [of[above - 1], of[above]]);
-        y[0] + (alpha - x[0]) / (x[1] - x[0]) * (y[1] - y[0])
-    }
-}
-
 /// Slopes of the coefficients by what they depend on, at the incidence [`ALPHA`].
 struct Slopes {
     base: Coefficients,

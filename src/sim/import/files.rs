@@ -5,6 +5,7 @@ use greylag_sitl::plant::{MassProperties, Stops, Travel};
 use super::fits::line;
 use super::{Effect, Polar, Subject};
 use crate::model::textbook::{Estimate, incidence_limits, numbers};
+use crate::num::Table;
 use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY, standard_density};
 
 /// Share of the pitching moment's variation below which it is a line over incidence.
@@ -74,7 +75,7 @@ fn descent(subject: &Subject, polar: &Polar, thrust: &[Estimate], [alpha, lift]:
         let sum: f64 = terms.iter().zip(thrust).map(|(x, (_, value, ..))| x * value).sum();
         sum * density / SEA_LEVEL_DENSITY / (0.5 * density * v * v * subject.area)
     };
-    let drag = polar.drag_at(alpha);
+    let drag = Table::new(&polar.alpha, &polar.drag).map_or(0.0, |table| table.at(alpha));
     if at(1.0) >= drag { 0.0 } else { ((drag - at(0.0)) / lift).atan().max(0.0) }
 }
 
