@@ -15,6 +15,7 @@ use anyhow::{Context, Result, bail};
 use greylag::control::{Kind, Target, build};
 use greylag::model::{GreyBox, Memory, STEP, Trim};
 use greylag::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
+use greylag::physics::inputs::InputMemory;
 use greylag::physics::{Command, State};
 use greylag::sim::import::import;
 use greylag::sim::{Environment, Simulator};
@@ -58,11 +59,11 @@ fn main() -> Result<()> {
                 let flight =
                     if flights { fly(&model, &plant) } else { Ok("not asked to fly".into()) };
                 flown += usize::from(flights && flight.is_ok());
-                let flight = flight.unwrap_or_else(|why| format!("not flown: {why:#}"));
+                let flight = flight.unwrap_or_else(|why| format!("not flown: {why}"));
                 println!("{name:18} imported at {:.0} m/s; {flight}", plant.start.airspeed_mps);
                 left_out.iter().for_each(|what| println!("{:18}   left out: {what}", ""));
             }
-            Err(why) => println!("{name:18} no: {why:#}"),
+            Err(why) => println!("{name:18} no: {why}"),
         }
     }
     println!("{imported} of {} import, {flown} are flown by the LQI", names.len());
@@ -102,6 +103,7 @@ fn fly(model: &GreyBox, plant: &PlantOptions) -> Result<String> {
     lqi.reset(1);
     let mut target = Target { roll: 0.0, pitch, airspeed };
     let (mut memory, mut apart) = (Memory::default(), [0.0; 8]);
+    let mut inputs = InputMemory::at_rest(&seen.actuators.controls());
     for step in 0..STEPS {
         target.roll = if step < STEPS / 2 { 0.0 } else { 20f64.to_radians() };
         let own = lqi.command(&seen, &target);
@@ -115,7 +117,8 @@ fn fly(model: &GreyBox, plant: &PlantOptions) -> Result<String> {
             rudder: own.rudder + wave(0.07),
         };
         let controls = seen.actuators.controls();
-        let expected = model.step(&seen.state, &controls, seen.altitude, &mut memory);
+        let acting = model.act(&controls, &mut inputs);
+        let expected = model.step(&seen.state, &acting, seen.altitude, &mut memory);
         seen = simulator.step(command.clamped())?;
         let pairs = seen.state.to_array().into_iter().zip(expected.to_array());
         for ((sum, (flown, own)), scale) in apart.iter_mut().zip(pairs).zip(model.scale()) {

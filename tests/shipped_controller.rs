@@ -66,6 +66,19 @@ fn the_policy_holds_the_airspeed_that_is_asked_for() {
     }
 }
 
+/// Behind five steps the critics' error outweighs what a search finds: `hybrid` is worse than its policy on easy targets.
+/// Behind forty steps of the policy it is not.
+#[test]
+fn the_hybrid_whose_policy_flies_on_is_better_than_its_policy() {
+    let mean = |kind: Kind| {
+        let targets = [[20.0, 5.0], [-30.0, 12.0], [57.0, 28.0], [-55.0, -25.0]];
+        let errors = targets.map(|target| flown(kind, "learned/model.toml", target, 16.67)[0]);
+        errors.iter().sum::<f64>() / 4.0
+    };
+    let (alone, planned) = (mean(Kind::Policy), mean(Kind::HybridPolicy));
+    assert!(planned < 0.7 * alone, "{planned}°, the policy alone {alone}°");
+}
+
 /// An inertia of the wrong sign: plans through it are twice as far off as the LQI that was designed on it.
 #[test]
 fn a_model_that_does_not_predict_is_left_to_the_lqi() {

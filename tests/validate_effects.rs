@@ -53,8 +53,11 @@ fn square(model: &GreyBox, ours: [f64; 8], theirs: [f64; 8]) -> f64 {
 }
 
 /// The largest difference (rad) between the deflections that act in JSBSim, behind its hidden
-/// component, and in the model.
+/// component, and in the model; zero where it has none on the deflections.
 fn apart(plant: &mut Plant, acting: &Controls) -> f64 {
+    if plant.property("hidden/aileron-1").is_err() {
+        return 0.0;
+    }
     let mut theirs = |surface| plant.property(&format!("hidden/{surface}-1")).unwrap();
     (acting.aileron - theirs("aileron")).abs().max((acting.elevator - theirs("elevator")).abs())
 }

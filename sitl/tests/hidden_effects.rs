@@ -40,6 +40,29 @@ fn actuator_lag_follows_its_recurrence_and_rate_limit_its_limit() {
     assert!((fastest - 1.5).abs() < 1e-9, "the limit was not met: {fastest}");
 }
 
+#[test]
+fn the_thrust_lag_follows_its_recurrence() {
+    let lag = 0.3;
+    let (mut hidden, mut plain) = (plant_with(&["thrust_lag=0.3"]), plant());
+    let (gain, keep) = (DT_S / (2.0 * lag + DT_S), (2.0 * lag - DT_S) / (2.0 * lag + DT_S));
+    let thrust = |plant: &mut Plant| plant.property("propulsion/engine/thrust-lbs").unwrap();
+    let mut lagged = thrust(&mut hidden);
+    let mut before = lagged;
+    let mut most = 0.0_f64;
+    for k in 0..200 {
+        let throttle = if (k / 50) % 2 == 0 { 1.0 } else { 0.2 };
+        hidden.step(Inputs { throttle, ..IDLE }).unwrap();
+        plain.step(Inputs { throttle, ..IDLE }).unwrap();
+        let own = thrust(&mut hidden);
+        lagged = gain * (own + before) + keep * lagged;
+        before = own;
+        let acts = own + hidden.property("hidden/thrust-lbs").unwrap();
+        assert!((acts - lagged).abs() < 1e-12, "step {k}: {acts} for {lagged}");
+        most = most.max((acts - own).abs());
+    }
+    assert!(most > 1.0, "the lag was not met: {most} lbf");
+}
+
 /// An amplitude within the bounds that a flight of 3 s survives.
 fn mild(id: &str) -> f64 {
     match id {

@@ -184,6 +184,7 @@ controllers! {
     CemPolicy "cem-policy" Planned Both "CEM-MPC with the policy's proposals." => |from| from.planner("cem-policy", cem::Settings::POLICY)?,
     CemCritic "cem-critic" Planned Both "CEM-MPC with the critics' value of the end." => |from| from.planner("cem-critic", cem::Settings::CRITICS)?,
     Hybrid "hybrid" Planned Both "The hybrid controller: proposals and critics, eq. (26)." => |from| from.planner("hybrid", cem::Settings::HYBRID)?,
+    HybridPolicy "hybrid-policy" Planned Both "The hybrid whose policy flies on behind each plan." => |from| from.planner("hybrid-policy", cem::Settings::OVER_POLICY)?,
     HybridLqi "hybrid-lqi" Planned Both "The hybrid over the model's LQI, which flies on behind each plan: offset-free." => |from| from.planner_over_lqi("hybrid-lqi", cem::Settings::OVER_LQI)?,
     Policy "policy" Immediate Policy "A trained policy alone." => |from| Policy::new(from.agent()?),
 }

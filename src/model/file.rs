@@ -16,6 +16,7 @@ use crate::physics::atmosphere::{Atmosphere, Density};
 use crate::physics::effects::{Description, Kind};
 use crate::physics::formula::{Written, register};
 use crate::physics::rigid_body::{ForceAxes, RigidBody};
+use crate::physics::size::Size;
 use crate::physics::{catalogue, inputs};
 
 #[derive(Deserialize)]
@@ -133,17 +134,19 @@ fn inertia(field: &str, number: &Sourced) -> Result<f64, String> {
 
 impl File {
     fn into_model(self, airframe: Airframe) -> Result<GreyBox, String> {
+        let body = self.rigid_body.checked()?;
+        let size = Size::new(&body, &airframe.geometry);
         let mut terms = Vec::new();
         let (mut coefficients, mut acting) = (Vec::new(), Vec::new());
         for (id, content) in &self.effects {
             let first = coefficients.len();
             if let Some(kind) = inputs::Kind::from_id(id) {
-                coefficients.extend(effect(&kind.describe(), None, content)?.0);
+                coefficients.extend(effect(&kind.describe(), None, content, &size)?.0);
                 acting.push((kind, first));
                 continue;
             }
             let kind = Kind::from_id(id).ok_or_else(|| unknown_effect(id))?;
-            let (named, table) = effect(&kind.describe(), kind.written(), content)?;
+            let (named, table) = effect(&kind.describe(), kind.written(), content, &size)?;
             coefficients.extend(named);
             terms.push(Term::new(kind, first, table));
         }
@@ -159,7 +162,6 @@ impl File {
                 inputs::MOST
             ));
         }
-        let body = self.rigid_body.checked()?;
         let mut model = GreyBox {
             rudder_is_left: false,
             name: named(self.name)?,
@@ -229,6 +231,7 @@ fn effect(
     about: &Description,
     written: Option<&Written>,
     content: &toml::Value,
+    size: &Size,
 ) -> Result<(Vec<Named>, Option<Table>), String> {
     let id = about.id;
     let entries = content
@@ -253,7 +256,7 @@ fn effect(
                 format!("effects.{id}.{}: {why}", c.name)
             })?,
         };
-        let (low, high) = c.bounds;
+        let (low, high) = size.bounds(c);
         if !(low..=high).contains(&number.value) {
             return Err(format!(
                 "effects.{id}.{} = {} is not physical: {} lies in {low}..{high} {}",

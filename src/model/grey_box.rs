@@ -7,6 +7,7 @@ use crate::physics::effects::{Description, Kind, Needs};
 use crate::physics::formula::{Status, Written};
 use crate::physics::inputs::{self, InputMemory};
 use crate::physics::rigid_body::{ForceAxes, RigidBody};
+use crate::physics::size::Size;
 use crate::physics::{AirData, Airframe, Controls, State};
 
 /// A coefficient of a model with its full name.
@@ -222,6 +223,11 @@ impl GreyBox {
     /// Whether the surfaces act as they are measured.
     pub fn acts_at_once(&self) -> bool {
         self.inputs.is_empty()
+    }
+
+    /// What the physical bounds of its coefficients go by.
+    pub fn size(&self) -> Size {
+        Size::new(&self.bare_body, &self.airframe.geometry)
     }
 
     /// The reference scale x_c, eq. (21): \[1, 1, V0, 2V0/b, 2V0/c, 2V0/b, 1, 1\], V0 in m/s.

@@ -143,7 +143,11 @@ impl GreyBox {
         if let Some(table) = about.table {
             return Err(JoinError::Table { id, table });
         }
-        let possible = |(c, v): (&Coefficient, &f64)| (c.bounds.0..=c.bounds.1).contains(v);
+        let size = self.size();
+        let possible = |(c, v): (&Coefficient, &f64)| {
+            let (least, most) = size.bounds(c);
+            (least..=most).contains(v)
+        };
         let fits = values.len() == about.coefficients.len()
             && about.coefficients.iter().zip(values).all(possible);
         if fits {
@@ -152,7 +156,10 @@ impl GreyBox {
         let expected: Vec<_> = about
             .coefficients
             .iter()
-            .map(|c| format!("{} in {}..{} {}", c.name, c.bounds.0, c.bounds.1, c.unit))
+            .map(|c| {
+                let (least, most) = size.bounds(c);
+                format!("{} in {least}..{most} {}", c.name, c.unit)
+            })
             .map(|words| words.trim_end().to_owned())
             .collect();
         Err(JoinError::Values { id, expected: expected.join(", "), values: values.into() })

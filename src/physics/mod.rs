@@ -14,6 +14,7 @@ pub mod point;
 pub mod rigid_body;
 pub mod sensors;
 pub mod servos;
+pub mod size;
 mod state;
 mod time;
 mod wrench;

@@ -10,7 +10,7 @@ use crate::num::least_squares;
 use crate::physics::atmosphere::SEA_LEVEL_DENSITY;
 use crate::physics::catalogue::describe;
 use files::{airframe, model_file};
-use fits::{first_order, line, second_order};
+use fits::{first_order, line, second_order, thrust_lag};
 
 /// Metres per foot.
 const FT: f64 = 0.3048;
@@ -31,6 +31,12 @@ const TABLE_DEG: [f64; 24] = [
 ];
 /// Share of a channel's variation that is worth a word when it is left.
 const WORTH_SAYING: f64 = 0.02;
+/// Throttle before and after the step that shows the engine's lag.
+const THRUST_STEP: [f64; 2] = [0.4, 0.7];
+/// Part of that step beyond which it is said that the engine's answer is no first-order lag.
+const LAG_WORTH_SAYING: f64 = 0.1;
+/// Part of it beyond which no lag is written.
+const NO_LAG: f64 = 0.5;
 
 /// What was made of an aircraft.
 #[derive(Clone, Debug)]
@@ -134,10 +140,18 @@ pub fn import(
     }
     let effects = effects(&polar, &subject.slopes(&travel)?, &mut left_out);
     let thrust = subject.thrust(&mut left_out)?;
+    let thrust_lag = subject.thrust_lag(&thrust, &mut left_out)?;
     let lags = subject.lags(&travel)?;
     Ok(Imported {
         airframe: airframe(&subject, name, &travel, &lags, lift_max, &polar, &thrust),
-        model: model_file(name, &subject.mass, &polar, &effects, &thrust, travel.rudder.is_some()),
+        model: model_file(
+            name,
+            &subject.mass,
+            &polar,
+            &effects,
+            (&thrust, thrust_lag),
+            travel.rudder.is_some(),
+        ),
         left_out,
     })
 }
@@ -289,6 +303,32 @@ impl Subject<'_> {
         let names = ["T0_n", "Tt_n", "Ttt_n", "TV_nspm", "TtV_nspm", "TVV_ns2pm2"];
         let source = "least squares over JSBSim's thrust, 0.8 to 1.25 of the cruise airspeed";
         Ok(names.into_iter().zip(fit.iter()).map(|(n, x)| (n, *x, 0.02, source)).collect())
+    }
+
+    /// Time constant (s) of the thrust behind the throttle's position, if it has one; `thrust` is the settled thrust.
+    fn thrust_lag(
+        &mut self,
+        thrust: &[Estimate],
+        left_out: &mut Vec<String>,
+    ) -> Result<Option<f64>, PlantError> {
+        let start = Start { alpha_rad: ALPHA, ..self.start };
+        let response = self.plant.thrust_response(&start, THRUST_STEP)?;
+        let of = |name: &str| thrust.iter().find(|e| e.0 == name).map_or(0.0, |e| e.1);
+        let slope = of("Tt_n") + of("TtV_nspm") * self.start.airspeed_mps;
+        let found = thrust_lag(&response, self.plant.step_s(), [slope, of("Ttt_n")]);
+        let Some((lag, left)) = found else { return Ok(None) };
+        if left > NO_LAG {
+            left_out.push("how the thrust follows the throttle: no lag describes it".into());
+            return Ok(None);
+        }
+        if left > LAG_WORTH_SAYING {
+            left_out.push(format!(
+                "the thrust lags by {lag:.2} s in the model; its answer to a step of the throttle is off by {:.0} % of the \
+                 step (rms)",
+                100.0 * left
+            ));
+        }
+        Ok(Some(lag))
     }
 
     /// Frequency (rad/s) and damping of aileron, elevator and rudder, then the throttle's lag (s).

@@ -153,7 +153,7 @@ const OF_THE_MODEL: [Kind; 2] =
     [kind("rudder_linear", "", [1.0, 1.0]), kind("propeller", "", [1.0, 1.0])];
 
 /// Every effect that can be missing from any aircraft, with amplitudes for one of the size of the X8.
-pub const KINDS: [Kind; 25] = [
+pub const KINDS: [Kind; 26] = [
     kind("drag_alpha2", "1/rad²", [0.6, 1.2]),
     kind("drag_beta2", "1/rad²", [0.5, 1.2]),
     kind("drag_elevator_abs", "1/rad", [0.08, 0.16]),
@@ -180,6 +180,7 @@ pub const KINDS: [Kind; 25] = [
     both("dihedral_alpha", "1/rad²", [0.3, 0.6]),
     both("roll_control_alpha", "1/rad²", [0.3, 0.5]),
     kind("effectiveness_saturation", "1/rad²", [-2.0, -1.0]),
+    kind("thrust_lag", "s", [0.2, 0.6]),
 ];
 
 impl Kind {

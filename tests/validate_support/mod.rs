@@ -156,7 +156,7 @@ pub fn rate_on_turning_earth(model: &GreyBox, truth: &Truth, acting: &Controls) 
 
 /// Amplitudes several times what two minutes of flight show, so that an error of the formula cannot
 /// hide in the tolerance.
-pub const AMPLITUDES: [(&str, f64); 24] = [
+pub const AMPLITUDES: [(&str, f64); 25] = [
     ("drag_alpha2", 1.5),
     ("drag_beta2", 0.7),
     ("drag_elevator_abs", 0.3),
@@ -165,6 +165,7 @@ pub const AMPLITUDES: [(&str, f64); 24] = [
     ("unsteady_lift", 3.0),
     ("thrust_decay", 0.6),
     ("thrust_scale", -5.0),
+    ("thrust_lag", 0.4),
     ("thrust_line_offset", 0.03),
     ("motor_torque", 0.5),
     ("propeller_gyro", 0.05),

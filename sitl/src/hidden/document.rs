@@ -7,6 +7,10 @@ use crate::plant::Properties;
 /// Property with the thrust that hidden effects add, lbf.
 pub(crate) const THRUST_PROPERTY: &str = "hidden/thrust-lbs";
 
+/// Properties of the engine's thrust in the frame before, and of the lagged thrust there, lbf.
+const THRUST_BEFORE: &str = "hidden/thrust-before-lbs";
+const THRUST_LAGGED: &str = "hidden/thrust-lagged-lbs";
+
 /// An axis of JSBSim's aerodynamics.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Axis {
@@ -185,6 +189,27 @@ impl<'a> Document<'a> {
         self.thrust.push(expression);
     }
 
+    /// Lets the thrust act through a first-order lag of `constant`, s.
+    pub(super) fn lag_thrust(&mut self, constant: f64) {
+        let thrust = property("propulsion/engine/thrust-lbs");
+        // flight controls are evaluated before the engines: both components hold the frame before
+        for (component, name, settings) in [
+            ("pure_gain", THRUST_BEFORE, "<gain>1</gain>".to_owned()),
+            ("lag_filter", THRUST_LAGGED, format!("<c1>{}</c1>", 1.0 / constant)),
+        ] {
+            self.components += &format!(
+                "<{component} name=\"{name}\"><input>propulsion/engine/thrust-lbs</input>{settings}</{component}>\n"
+            );
+        }
+        let (step, double) = (self.step_s, 2.0 * constant);
+        let gain = value(step / (double + step));
+        let keep = value((double - step) / (double + step));
+        self.add_thrust(product(&[gain.clone(), thrust.clone()]));
+        self.add_thrust(product(&[gain, property(THRUST_BEFORE)]));
+        self.add_thrust(product(&[keep, property(THRUST_LAGGED)]));
+        self.add_thrust(product(&[value(-1.0), thrust]));
+    }
+
     /// Lets the whole thrust act `arm_ft` below the centre of gravity.
     pub(super) fn offset_thrust(&mut self, arm_ft: f64) {
         self.thrust_offset_ft = Some(arm_ft);
@@ -242,7 +267,7 @@ impl<'a> Document<'a> {
     /// The document with everything written into it.
     pub(super) fn finish(mut self) -> Result<String, HiddenError> {
         self.write_thrust()?;
-        if self.passed > 0 {
+        if !self.components.is_empty() {
             let channel = format!("<channel name=\"hidden\">\n{}</channel>\n", self.components);
             self.insert_before("</flight_control>", &channel)?;
         }

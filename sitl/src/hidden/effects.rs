@@ -18,7 +18,7 @@ const LBF_FT: f64 = LBF * FT;
 const ANY: f64 = 1e3;
 
 /// Every effect that can be hidden.
-pub static EFFECTS: [Effect; 24] = [
+pub static EFFECTS: [Effect; 25] = [
     Effect {
         id: "drag_alpha2",
         formula: "drag Q a α², beside the drag table",
@@ -87,6 +87,16 @@ pub static EFFECTS: [Effect; 24] = [
         write: |d, a| {
             let throttle = d.throttle();
             d.add_thrust(product(&[value(a / LBF), throttle]));
+            Ok(())
+        },
+    },
+    Effect {
+        id: "thrust_lag",
+        formula: "the thrust acts through a first-order lag of time constant a",
+        unit: "s",
+        bounds: (0.0, 100.0),
+        write: |d, a| {
+            d.lag_thrust(a);
             Ok(())
         },
     },

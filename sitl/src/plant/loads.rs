@@ -56,21 +56,77 @@ impl Plant {
         start: &Start,
         throttle: f64,
     ) -> Result<(f64, Truth), PlantError> {
+        self.held_in(start, |plant| plant.settle_engines(throttle))
+    }
+
+    /// Thrust along body x (N) and throttle position (0..1) after each step, once the throttle is commanded
+    /// `to` where the engines had settled at `from`, with the aircraft held in `start`. It ends when the thrust has
+    /// settled, after 60 s at the latest. Reset the plant before it is stepped.
+    ///
+    /// # Errors
+    /// [`PlantError`] when the aircraft cannot be evaluated there.
+    pub fn thrust_response(
+        &mut self,
+        start: &Start,
+        [from, to]: [f64; 2],
+    ) -> Result<Vec<[f64; 2]>, PlantError> {
+        self.held_in(start, |plant| {
+            let (thrust, truth) = plant.settle_engines(from)?;
+            let second = plant.steps_of_a_second();
+            let mass = plant.mass_properties()?.mass_kg;
+            let mut response = vec![[thrust, truth.throttle]];
+            while response.len() <= SETTLING_S as usize * second {
+                let before = response[response.len() - 1][0];
+                for _ in 0..second {
+                    plant.step(Inputs { throttle: to, ..Inputs::default() })?;
+                    response.push([plant.thrust(mass)?, plant.truth.throttle]);
+                }
+                let now = response[response.len() - 1][0];
+                let still = (now - before).abs() <= SETTLED * now.abs().max(1.0);
+                if still && response.len() > 5 * second {
+                    break;
+                }
+            }
+            Ok(response)
+        })
+    }
+
+    /// What `work` finds while the aircraft is held in `start` and only its systems and engines move.
+    fn held_in<T>(
+        &mut self,
+        start: &Start,
+        work: impl FnOnce(&mut Plant) -> Result<T, PlantError>,
+    ) -> Result<T, PlantError> {
         self.reset(start)?;
         let mut schemes = [0.0; 4];
         for (scheme, name) in schemes.iter_mut().zip(INTEGRATORS) {
             *scheme = self.property(name)?;
             self.set_property(name, 0.0)?;
         }
-        let settled = self.settle_engines(throttle);
+        let found = work(self);
         for (scheme, name) in schemes.into_iter().zip(INTEGRATORS) {
             self.set_property(name, scheme)?;
         }
-        settled
+        found
+    }
+
+    /// Length of a step, s.
+    pub fn step_s(&self) -> f64 {
+        self.options.step_s
+    }
+
+    fn steps_of_a_second(&self) -> usize {
+        (1.0 / self.options.step_s).round() as usize
+    }
+
+    /// Thrust along body x, N, of an aircraft of `mass`, kg.
+    fn thrust(&mut self, mass: f64) -> Result<f64, PlantError> {
+        let aero = self.property("forces/fbx-aero-lbs")? * LBF;
+        Ok(mass * self.truth.specific_force_mps2[0] - aero)
     }
 
     fn settle_engines(&mut self, throttle: f64) -> Result<(f64, Truth), PlantError> {
-        let second = (1.0 / self.options.step_s).round() as usize;
+        let second = self.steps_of_a_second();
         let inputs = Inputs { throttle, ..Inputs::default() };
         let mass = self.mass_properties()?.mass_kg;
         let (mut last, mut seconds) = (f64::INFINITY, 0.0);
@@ -79,8 +135,7 @@ impl Plant {
                 self.step(inputs)?;
             }
             seconds += 1.0;
-            let aero = self.property("forces/fbx-aero-lbs")? * LBF;
-            let thrust = mass * self.truth.specific_force_mps2[0] - aero;
+            let thrust = self.thrust(mass)?;
             // a starting engine's thrust may stand at zero for longer than a second
             let still = (thrust - last).abs() <= SETTLED * thrust.abs().max(1.0);
             if seconds >= SETTLING_S || (still && seconds >= 5.0) {

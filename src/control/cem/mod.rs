@@ -210,6 +210,7 @@ impl Cem {
             memory: self.disturbance.as_ref().map(Disturbance::memory).unwrap_or_default(),
             disturbance: self.disturbance.as_ref().map_or(disturbance::NONE, Disturbance::rate),
             ahead: self.base.as_ref().map(|base| &base.ahead),
+            steps: self.settings.steps.max(HORIZON),
         };
         let (blocks, worth) = (&mut self.blocks[first..end], &mut self.worth[first..end]);
         // blocks that fly together stay together: the numbers are those of one core

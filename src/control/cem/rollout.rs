@@ -42,6 +42,8 @@ pub(super) struct Scene<'a> {
     pub disturbance: State,
     /// The base that flies on behind a plan, and its throttle all along.
     pub ahead: Option<&'a Ahead>,
+    /// Without a base: steps in all, the policy flying on behind the plan; five without a policy.
+    pub steps: usize,
 }
 
 /// Who chooses the actions of a block.
@@ -277,6 +279,7 @@ fn rollout<R: Packed>(
     }
     let steps = match scene.ahead {
         Some(ahead) => ahead.steps(),
+        None if scene.agent.is_some() => scene.steps,
         None => HORIZON,
     };
     // plain loops, and one place where the model is: an iterator that is not inlined leaves the vector
@@ -289,7 +292,9 @@ fn rollout<R: Packed>(
         } else if step == HORIZON && actions != Actions::Base {
             reference = [flight.state.roll, flight.state.pitch];
         }
-        if let (true, Actions::Policy, Some(agent)) = (step < HORIZON, actions, scene.agent) {
+        let behind = step >= HORIZON && scene.ahead.is_none();
+        let proposed = step < HORIZON && actions == Actions::Policy;
+        if let (true, Some(agent)) = (behind || proposed, scene.agent) {
             let view = observe(&flight.state, &flight.observed(scene), &flight.target);
             let advised = agent.actor.act(units, &view);
             let mut i = 0;
@@ -417,6 +422,7 @@ mod tests {
             memory: Memory::default(),
             disturbance: disturbance::NONE,
             ahead: None,
+            steps: HORIZON,
         };
         let wave = |k: usize| std::array::from_fn(|i| ((k * 16 + i) as f32 * 0.37).sin());
         // an odd number: the last has no other beside it

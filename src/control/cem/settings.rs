@@ -72,8 +72,8 @@ pub struct Settings {
     pub alpha: Option<f64>,
     /// Who says that value.
     pub value: Value,
-    /// Steps in all that a plan is flown in the model, the base flying from the sixth on; without a
-    /// base there are five.
+    /// Steps in all that a plan is flown in the model: the base flies from the sixth on, without a base the
+    /// policy; without either there are five.
     pub steps: usize,
     /// Ticks that a plan is flown before the next one is made, up to 5; with a base every tick is planned.
     pub chunk: usize,
@@ -132,6 +132,16 @@ impl Settings {
         spread: 0.02,
         noise: [0.02, 0.06],
         ..Settings::POLICY
+    };
+    /// The hybrid controller whose policy flies on behind each plan: what a plan is worth is found in the model, and
+    /// the critics' error counts by γ⁴⁰ of what it counts behind five steps.
+    pub const OVER_POLICY: Settings = Settings {
+        population: 128,
+        update: Update::Elites(12),
+        iterations: 3,
+        proposals: 16,
+        steps: 40,
+        ..Settings::HYBRID
     };
     /// MPPI over the same rollouts.
     pub const MPPI: Settings = Settings { update: Update::Weighted(0.01), ..Settings::PAPER };

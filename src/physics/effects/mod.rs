@@ -21,6 +21,9 @@ pub struct Coefficient {
     pub unit: &'static str,
     /// The physically possible values.
     pub bounds: (f64, f64),
+    /// Whether `bounds` are those of an aircraft of up to 25 kg and grow with a larger one; see
+    /// [`Size`](crate::physics::size::Size).
+    pub grows: bool,
 }
 
 /// Shorthand for the coefficient lists.
@@ -30,7 +33,7 @@ pub(crate) const fn coefficient(
     unit: &'static str,
     bounds: (f64, f64),
 ) -> Coefficient {
-    Coefficient { name, meaning, unit, bounds }
+    Coefficient { name, meaning, unit, bounds, grows: true }
 }
 
 /// Channels of the forces and moments that the air makes: all but thrust.

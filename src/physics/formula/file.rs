@@ -308,6 +308,7 @@ fn description(
             meaning: leaked(&p.meaning),
             unit: leaked(&p.unit),
             bounds: (p.bounds[0], p.bounds[1]),
+            grows: false,
         })
         .collect();
     let mut channels: Vec<Channel> = Vec::new();

@@ -5,7 +5,7 @@
 //! there.
 //!
 //! They take part wherever a model is stepped: free runs, imagined flights, the planner (which takes the
-//! surfaces to have been at rest, as it does not observe what acted before). Trim needs none of them but
+//! surfaces and the throttle to have been at rest, as it does not observe what acted before). Trim needs none of them but
 //! for the dead zone, which it leaves out; the linear model, and so the design of the
 //! LQI, leaves out all. The LQI's integrators take up what is constant in them; what a lag or delay costs
 //! is shown in `tests/effects_lqi.rs`.
@@ -23,13 +23,22 @@ pub const PAST: usize = 24;
 /// Effects that one model may have.
 pub const MOST: usize = 3;
 
-/// An effect on what the surfaces do, with one constant.
+/// What an input effect acts on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Acts {
+    /// On aileron and elevator, rad.
+    OnSurfaces,
+    /// On the throttle, 0 to 1.
+    OnThrottle,
+}
+
+/// An effect on what the surfaces or the throttle do, with one constant.
 pub trait InputEffect {
     /// The id of parameter files, JSON and the command line.
     const ID: &'static str;
     /// What it is, in one sentence.
     const DESCRIPTION: &'static str;
-    /// What it does to a deflection u, in textbook letters.
+    /// What it does to a deflection or throttle u, in textbook letters.
     const FORMULA: &'static str;
     /// Where the formula comes from.
     const SOURCE: &'static str;
@@ -37,26 +46,28 @@ pub trait InputEffect {
     const COEFFICIENTS: &'static [Coefficient; 1];
     /// Its entry in the catalogue of effects.
     const ENTRY: Entry;
+    /// What it acts on.
+    const ACTS: Acts = Acts::OnSurfaces;
 
-    /// The surface's deflection (rad) that acts now, `input` being its measured position, `constant`
+    /// The deflection (rad) or throttle (0 to 1) that acts now, `input` being its measured position, `constant`
     /// the effect's. Called once every [`STEP`].
     fn act<R: Real>(constant: f64, memory: &mut Past<R>, input: R) -> R;
 }
 
-/// What an effect remembers of one surface, rad.
+/// What an effect remembers of one surface (rad) or of the throttle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Past<R = f64> {
-    /// The deflection that acted last.
+    /// The value that acted last.
     pub output: R,
     /// Earlier inputs, newest first.
     pub inputs: [R; PAST],
 }
 
 impl<R: Real> Past<R> {
-    /// A surface that has been at `deflection` for long.
+    /// A surface or throttle that has been at `position` for long.
     #[inline(always)]
-    pub fn at_rest(deflection: R) -> Self {
-        Past { output: deflection, inputs: [deflection; PAST] }
+    pub fn at_rest(position: R) -> Self {
+        Past { output: position, inputs: [position; PAST] }
     }
 
     /// Puts `input` at the front of the inputs.
@@ -67,15 +78,16 @@ impl<R: Real> Past<R> {
     }
 }
 
-/// What the input effects of a model remember of aileron and elevator; on a rudder they do not act.
+/// What the input effects of a model remember of aileron, elevator and throttle; on a rudder they do not act.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InputMemory<R = f64>([[Past<R>; 2]; MOST]);
+pub struct InputMemory<R = f64>([[Past<R>; 3]; MOST]);
 
 impl<R: Real> InputMemory<R> {
-    /// Surfaces that have been at `controls` for long.
+    /// Surfaces and throttle that have been at `controls` for long.
     #[inline(always)]
     pub fn at_rest(controls: &Controls<R>) -> Self {
-        InputMemory([[Past::at_rest(controls.aileron), Past::at_rest(controls.elevator)]; MOST])
+        let Controls { aileron, elevator, throttle, .. } = *controls;
+        InputMemory([[aileron, elevator, throttle].map(Past::at_rest); MOST])
     }
 
     /// What `then` remembers where `chosen` is above zero, else this.
@@ -86,19 +98,23 @@ impl<R: Real> InputMemory<R> {
             inputs: std::array::from_fn(|k| one(old.inputs[k], new.inputs[k])),
         };
         InputMemory(std::array::from_fn(|k| {
-            std::array::from_fn(|side| past(&self.0[k][side], &then.0[k][side]))
+            std::array::from_fn(|control| past(&self.0[k][control], &then.0[k][control]))
         }))
     }
 
     /// What acts now through the effect in `place` (below [`MOST`]) of a model's list.
     #[inline(always)]
     pub fn act(&mut self, place: usize, kind: Kind, constant: f64, z: &Controls<R>) -> Controls<R> {
-        let [aileron, elevator] = &mut self.0[place];
-        Controls {
-            aileron: kind.act(constant, aileron, z.aileron),
-            elevator: kind.act(constant, elevator, z.elevator),
-            throttle: z.throttle,
-            rudder: z.rudder,
+        let [aileron, elevator, throttle] = &mut self.0[place];
+        match kind.acts() {
+            Acts::OnSurfaces => Controls {
+                aileron: kind.act(constant, aileron, z.aileron),
+                elevator: kind.act(constant, elevator, z.elevator),
+                ..*z
+            },
+            Acts::OnThrottle => {
+                Controls { throttle: kind.act(constant, throttle, z.throttle), ..*z }
+            }
         }
     }
 }
@@ -133,6 +149,11 @@ macro_rules! inputs {
                 },)* }
             }
 
+            /// What the effect acts on.
+            pub const fn acts(self) -> Acts {
+                match self { $(Kind::$type => $type::ACTS,)* }
+            }
+
             /// [`InputEffect::act`] of this effect.
             #[inline(always)]
             pub fn act<R: Real>(self, constant: f64, memory: &mut Past<R>, input: R) -> R {
@@ -155,4 +176,5 @@ inputs! {
     dead_zone::DeadZone,
     backlash::Backlash,
     rate_limit::RateLimit,
+    thrust_lag::ThrustLag,
 }

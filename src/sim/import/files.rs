@@ -85,7 +85,7 @@ pub(super) fn model_file(
     mass: &MassProperties,
     polar: &Polar,
     effects: &[Effect],
-    thrust: &[Estimate],
+    (thrust, thrust_lag): (&[Estimate], Option<f64>),
     has_rudder: bool,
 ) -> String {
     let mut out = format!(
@@ -115,6 +115,11 @@ pub(super) fn model_file(
     }
     out += "\n[effects.propeller]\n";
     numbers(&mut out, thrust);
+    if let Some(lag) = thrust_lag {
+        let source = "JSBSim's answer to a step of the throttle from 0.4 to 0.7";
+        out += "\n[effects.thrust_lag]\n";
+        numbers(&mut out, &[("tau_s", lag, 0.2, source)]);
+    }
     let [zero, slope, bent] = line(polar);
     let beside: Vec<f64> =
         polar.alpha.iter().zip(&polar.pitch).map(|(a, m)| m - zero - slope * a).collect();

@@ -66,7 +66,7 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
             let (about, input) = describe(id)?;
             let coefficient = about.coefficients.iter().find(|k| k.name == short)?;
             let added = added.contains(&id);
-            let (low, high) = coefficient.bounds;
+            let (low, high) = model.size().bounds(coefficient);
             let share = if SLIGHT.contains(&id) { SLIGHT_SHARE } else { 1.0 };
             let width = if added { share * (high - low) } else { c.width() };
             let taken_over = taken_over(model).any(|(of, _)| of == id);
@@ -89,7 +89,7 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
                 meaning: coefficient.meaning,
                 prior: c.value,
                 width,
-                bounds: coefficient.bounds,
+                bounds: (low, high),
                 step: step.max(1e-9),
                 stride: stride.max(1e-9),
                 linear,
@@ -109,7 +109,8 @@ pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
         let place = names.iter().position(|name| *name == c.name)?;
         let (id, short) = c.name.split_once('.').filter(|_| linear[place])?;
         let (about, _) = describe(id)?;
-        let (low, high) = about.coefficients.iter().find(|k| k.name == short)?.bounds;
+        let coefficient = about.coefficients.iter().find(|k| k.name == short)?;
+        let (low, high) = model.size().bounds(coefficient);
         Some(high - low)
     };
     model.clone().with_widths(range)

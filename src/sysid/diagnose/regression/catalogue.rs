@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::model::GreyBox;
 use crate::physics::effects::{Description, Kind};
 use crate::physics::inputs;
+use crate::physics::size::Size;
 use crate::sysid::diagnose::regression::columns::{Ready, combine};
 use crate::sysid::diagnose::regression::gather::Column;
 use crate::sysid::diagnose::regression::local::CHANNELS;
@@ -96,7 +97,7 @@ pub fn columns(
             Trial { id: e.about.id, points: Vec::new(), support: 0.0, channels: [false; 6] };
         for ((of, values), made) in places.iter().zip(&made) {
             if let (true, Some(made)) = (of.about.id == e.about.id, made) {
-                all.add_point(&mut trial, e, values, made);
+                all.add_point(&mut trial, e, &model.size(), values, made);
             }
         }
         all.finish(trial, flights);
@@ -165,7 +166,7 @@ impl Columns {
         let mut next = 0;
         for (e, values) in joined {
             let free = e.about.coefficients.iter().enumerate().map(|(k, c)| {
-                let (low, high) = c.bounds;
+                let (low, high) = model.size().bounds(c);
                 (k, next + k, [low, high])
             });
             let free = free.collect();
@@ -184,6 +185,7 @@ impl Columns {
         &mut self,
         trial: &mut Trial,
         entry: &Entry,
+        size: &Size,
         values: &[f64],
         made: &[Vec<Column>],
     ) {
@@ -192,7 +194,7 @@ impl Columns {
             list.extend(own.iter().cloned());
         }
         let reach = |k: usize| {
-            let (low, high) = entry.about.coefficients[k].bounds;
+            let (low, high) = size.bounds(&entry.about.coefficients[k]);
             if entry.written() && k < entry.about.coefficients.len() - entry.about.shape {
                 return [low, high];
             }
@@ -258,7 +260,7 @@ fn curved_columns(
     let here = joined(values)?;
     let mut moved = Vec::new();
     for k in free(entry) {
-        let (low, high) = entry.about.coefficients[k].bounds;
+        let (low, high) = model.size().bounds(&entry.about.coefficients[k]);
         let by = (MOVED * values[k].abs()).max(1e-6);
         let (mut a, mut b) = (values.to_vec(), values.to_vec());
         a[k] = (a[k] - by).max(low);

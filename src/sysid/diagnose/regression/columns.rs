@@ -176,17 +176,16 @@ impl Ready {
         columns.pop().unwrap_or_default()
     }
 
-    /// What `model`, the flight's with one more effect on the deflections or another constant of one,
-    /// predicts beyond the flight's, to first order in the deflections.
+    /// What `model`, the flight's with one more effect on the inputs or another constant of one,
+    /// predicts beyond the flight's, to first order in deflections and throttle.
     pub fn operator(&self, model: &GreyBox) -> Column {
         let other = self.measured.acting(model);
         let mut columns = gather(&self.acting, model.integrator, 1, |place, add| {
             let (k, i) = (place.segment, place.index);
             let (a, b) = (&self.acting.segments[k][i].controls, &other.segments[k][i].controls);
-            let moved = [b.aileron - a.aileron, b.elevator - a.elevator];
-            let slopes = &self.controls[k][i];
-            for (c, (aileron, elevator)) in slopes[0].iter().zip(slopes[1]).enumerate() {
-                add(0, c, moved[0] * aileron + moved[1] * elevator);
+            let moved = [b.aileron - a.aileron, b.elevator - a.elevator, b.throttle - a.throttle];
+            for (slopes, moved) in self.controls[k][i].iter().zip(moved) {
+                slopes.iter().enumerate().for_each(|(c, slope)| add(0, c, moved * slope));
             }
         });
         columns.pop().unwrap_or_default()

@@ -225,7 +225,7 @@ impl Round {
             return false;
         };
         trial.points[score.point].free.iter().any(|(index, _, _)| {
-            let (low, high) = entry.about.coefficients[*index].bounds;
+            let (low, high) = self.model.size().bounds(&entry.about.coefficients[*index]);
             let near = 1e-6 * (high - low);
             let value = score.values[*index];
             value <= low + near || value >= high - near
@@ -524,7 +524,7 @@ fn curved(problem: &Problem, known: &mut [Known], projected: &Projected) {
 fn bounds(model: &GreyBox, index: usize) -> Option<(f64, f64)> {
     let (id, own) = model.coefficients()[index].name.split_once('.')?;
     let about = model.effects().find(|about| about.id == id)?;
-    about.coefficients.iter().find(|c| c.name == own).map(|c| c.bounds)
+    about.coefficients.iter().find(|c| c.name == own).map(|c| model.size().bounds(c))
 }
 
 /// Whether a search leaves the coefficient free: gains of nominally one are held.

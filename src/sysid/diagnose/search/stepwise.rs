@@ -1,7 +1,7 @@
 //! Forward selection: the effect with the best evidence joins the model, and again, until none passes.
 
 use crate::model::{GreyBox, RUDDER};
-use crate::physics::inputs::Kind;
+use crate::physics::inputs::{Acts, Kind};
 use crate::sysid::compare::ChannelId;
 use crate::sysid::diagnose::error::DiagnoseError;
 use crate::sysid::diagnose::options::Options;
@@ -467,7 +467,9 @@ impl Found {
                 ));
             }
             let bends = shape.bends_beside(effect.score.fall);
-            if Kind::from_id(effect.id).is_some() && bends > BENT {
+            let on_surfaces =
+                Kind::from_id(effect.id).is_some_and(|k| k.acts() == Acts::OnSurfaces);
+            if on_surfaces && bends > BENT {
                 effect.refused.push(format!(
                     "lack of fit: with it, second derivatives of the surfaces still explain {:.1} % of what is \
                      missing, so what acts on them takes another course in time",
