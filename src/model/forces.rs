@@ -27,9 +27,22 @@ struct Place<'a, R> {
     air: &'a AirData<R>,
 }
 
+/// The coefficients by which terms are multiplied.
+pub(crate) trait Weights<R>: Copy {
+    /// `amount` times the coefficient that has this place in the model's list.
+    fn weigh(self, place: usize, amount: R) -> R;
+}
+
+impl<R: Real> Weights<R> for &[Named] {
+    #[inline(always)]
+    fn weigh(self, place: usize, amount: R) -> R {
+        amount.scale(self[place].value)
+    }
+}
+
 /// The sum of terms times their coefficients.
-struct Sum<'a, R> {
-    coefficients: &'a [Named],
+struct Sum<W, R> {
+    weights: W,
     /// Place of the reporting effect's first coefficient.
     first: usize,
     wrench: Wrench<R>,
@@ -47,11 +60,10 @@ pub(crate) trait Starting<R>: Terms<R> {
     fn start_at(&mut self, first: usize);
 }
 
-impl<R: Real> Terms<R> for Sum<'_, R> {
+impl<R: Real, W: Weights<R>> Terms<R> for Sum<W, R> {
     #[inline(always)]
     fn add(&mut self, index: usize, channel: Channel, amount: R) {
-        let coefficient = self.coefficients[self.first + index].value;
-        self.wrench.add(channel, amount.scale(coefficient));
+        self.wrench.add(channel, self.weights.weigh(self.first + index, amount));
     }
 }
 
@@ -62,7 +74,7 @@ impl<R: Real, F: FnMut(usize, Channel, R)> Terms<R> for Each<'_, F> {
     }
 }
 
-impl<R: Real> Starting<R> for Sum<'_, R> {
+impl<R: Real, W: Weights<R>> Starting<R> for Sum<W, R> {
     #[inline(always)]
     fn start_at(&mut self, first: usize) {
         self.first = first;
@@ -74,6 +86,20 @@ impl<R: Real, F: FnMut(usize, Channel, R)> Starting<R> for Each<'_, F> {
     fn start_at(&mut self, first: usize) {
         self.first = first;
     }
+}
+
+/// State, controls and airflow with the surfaces centred, then also without body rates.
+#[inline(always)]
+pub(crate) fn parted<R: Real>(
+    state: &State<R>,
+    controls: &Controls<R>,
+    air: &AirData<R>,
+) -> [(State<R>, Controls<R>, AirData<R>); 2] {
+    let zero = R::zero();
+    let controls = Controls { aileron: zero, elevator: zero, rudder: zero, ..*controls };
+    let still = State { p: zero, q: zero, r: zero, ..*state };
+    let without = AirData { p_hat: zero, q_hat: zero, r_hat: zero, ..*air };
+    [(*state, controls, *air), (still, controls, without)]
 }
 
 impl GreyBox {
@@ -168,8 +194,8 @@ impl GreyBox {
     }
 
     #[inline(always)]
-    fn sum_from<R>(&self, wrench: Wrench<R>) -> Sum<'_, R> {
-        Sum { coefficients: &self.coefficients, first: 0, wrench }
+    fn sum_from<R>(&self, wrench: Wrench<R>) -> Sum<&[Named], R> {
+        Sum { weights: &self.coefficients, first: 0, wrench }
     }
 
     /// What the other effects get as input, where `independent` is the sum of those that need only the
@@ -180,18 +206,30 @@ impl GreyBox {
         place: &Place<R>,
         independent: Wrench<R>,
     ) -> (Base<R>, Wrench<R>) {
-        let needs = self.terms.last().map_or(Needs::Point, |term| term.kind.needs());
+        let parts = (self.needs() >= Needs::Parts).then(|| self.parts(place));
+        self.completed(place, independent, parts, self.coefficients.as_slice())
+    }
+
+    /// [`with_dependent`](GreyBox::with_dependent) from `independent` and, where an effect needs them, its
+    /// [`parts`](GreyBox::parts), with the coefficients of the other effects from `weights`.
+    #[inline(always)]
+    fn completed<R: Real>(
+        &self,
+        place: &Place<R>,
+        independent: Wrench<R>,
+        parts: Option<[Wrench<R>; 2]>,
+        weights: impl Weights<R>,
+    ) -> (Base<R>, Wrench<R>) {
         let mut base = Base::zero();
         base.wrench = independent;
         base.force = rigid_body::body_force(&base.wrench, place.air, self.axes);
-        if needs >= Needs::Parts {
-            let [centred, still] = self.parts(place);
+        if let Some([centred, still]) = parts {
             base.deflected = base.wrench.minus(&centred);
             base.still = still;
         }
-        let mut passes = if needs >= Needs::Rate { RATE_PASSES } else { 0 };
+        let mut passes = if self.needs() >= Needs::Rate { RATE_PASSES } else { 0 };
         loop {
-            let mut sum = self.sum_from(base.wrench);
+            let mut sum = Sum { weights, first: 0, wrench: base.wrench };
             self.dependent_terms(place, &base, &mut sum);
             if passes == 0 {
                 return (base, sum.wrench);
@@ -207,14 +245,11 @@ impl GreyBox {
     /// body rates.
     #[inline(always)]
     fn parts<R: Real>(&self, place: &Place<R>) -> [Wrench<R>; 2] {
-        let zero = R::zero();
-        let controls = Controls { aileron: zero, elevator: zero, rudder: zero, ..*place.controls };
-        let (mut state, mut air) = (*place.state, *place.air);
         let mut sums = [Wrench::zero(); 2];
-        for sum in &mut sums {
+        for (sum, (state, controls, air)) in
+            sums.iter_mut().zip(parted(place.state, place.controls, place.air))
+        {
             *sum = self.independent_sum(&Place { state: &state, controls: &controls, air: &air });
-            (state.p, state.q, state.r) = (zero, zero, zero);
-            (air.p_hat, air.q_hat, air.r_hat) = (zero, zero, zero);
         }
         sums
     }
@@ -233,7 +268,7 @@ impl GreyBox {
     }
 
     /// [`accelerations`](GreyBox::accelerations) of the effects that need only the point, as part of
-    /// its caller: all of them where [`needs`](GreyBox::needs) says so.
+    /// its caller: all of them where [`needs`](GreyBox::needs) says [`Needs::Point`].
     #[cfg(feature = "learn")]
     #[inline(always)]
     pub(crate) fn independent_accelerations<R: Real>(
@@ -244,6 +279,63 @@ impl GreyBox {
     ) -> (Vector<R>, Vector<R>) {
         let wrench = self.independent_sum(&Place { state, controls, air });
         self.accelerations_under(&wrench, state, air)
+    }
+
+    /// [`accelerations`](GreyBox::accelerations) of all effects as part of its caller.
+    #[cfg(feature = "learn")]
+    #[inline(always)]
+    pub(crate) fn whole_accelerations<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+    ) -> (Vector<R>, Vector<R>) {
+        self.accelerations_inlined(state, controls, air)
+    }
+
+    /// Sums of the effects that need only the point: as they are, with the surfaces centred, and also without body
+    /// rates; the last two are zero where no effect needs them.
+    #[cfg(feature = "learn")]
+    #[inline(always)]
+    pub(crate) fn independent_sums<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+    ) -> [Wrench<R>; 3] {
+        let place = Place { state, controls, air };
+        let mut sums = [self.independent_sum(&place), Wrench::zero(), Wrench::zero()];
+        if self.needs() >= Needs::Parts {
+            [sums[1], sums[2]] = self.parts(&place);
+        }
+        sums
+    }
+
+    /// Forces and moments of all effects, made from [`independent_sums`](GreyBox::independent_sums), the other
+    /// effects having the coefficients `weights`.
+    #[cfg(feature = "learn")]
+    #[inline(always)]
+    pub(crate) fn whole_wrench<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        air: &AirData<R>,
+        [independent, centred, still]: [Wrench<R>; 3],
+        weights: impl Weights<R>,
+    ) -> Wrench<R> {
+        let place = Place { state, controls, air };
+        let parts = (self.needs() >= Needs::Parts).then_some([centred, still]);
+        self.completed(&place, independent, parts, weights).1
+    }
+
+    /// Places in the list of coefficients of those of the effects that need more than the point; shape constants are
+    /// not among them.
+    #[cfg(feature = "learn")]
+    pub(crate) fn dependent_coefficients(&self) -> impl Iterator<Item = usize> + '_ {
+        self.terms[self.independent..].iter().flat_map(|term| {
+            let about = term.kind.describe();
+            term.first..term.first + about.coefficients.len() - about.shape
+        })
     }
 
     /// Linear acceleration (specific force plus gravity, body axes, m/s²) and angular acceleration

@@ -18,7 +18,7 @@ mod trim;
 pub mod weights;
 
 #[cfg(feature = "learn")]
-pub(crate) use forces::Starting;
+pub(crate) use forces::{Starting, Weights, parted};
 pub use grey_box::{GreyBox, Named, RUDDER};
 #[cfg(feature = "learn")]
 pub(crate) use integrator::advance_jsbsim;

@@ -6,7 +6,7 @@ use crate::learn::dynamics::windows::Track;
 use crate::model::GreyBox;
 use crate::num::{Dual, Real};
 use crate::physics::effects::Kind;
-use crate::physics::effects::Needs;
+use crate::physics::formula::Variable;
 use crate::physics::point::AirData;
 use crate::physics::rigid_body::{self, RigidBody};
 use crate::physics::{Channel, State, Wrench};
@@ -53,9 +53,9 @@ pub enum TrainableError {
         /// What it has.
         known: String,
     },
-    /// An effect acts on what others make, or near the ground.
+    /// An effect goes with the altitude.
     #[error(
-        "model {model} has the effect {effect}, which acts on what other effects make or near the ground: learning through it is not built; leave it out of the prior"
+        "model {model} has the effect {effect}, which goes with the altitude, and the rollouts that are learned from do not know it: leave it out of the prior"
     )]
     Effect {
         /// The model.
@@ -68,12 +68,13 @@ pub enum TrainableError {
 /// Whether a model can be learned through at all.
 ///
 /// # Errors
-/// If one of its effects acts on what others make, or near the ground only.
+/// If one of its effects goes with the altitude.
 pub fn check(model: &GreyBox) -> Result<(), TrainableError> {
-    let bars = |id: &str| {
-        // rollouts do not know the height above ground
-        id == "ground_effect" || Kind::from_id(id).is_some_and(|k| k.needs() != Needs::Point)
+    let written = |id: &str| {
+        let effect = Kind::from_id(id).and_then(Kind::written);
+        effect.is_some_and(|effect| effect.variables().contains(&Variable::Altitude))
     };
+    let bars = |id: &str| id == "ground_effect" || written(id);
     match model.effects().find(|e| bars(e.id)) {
         None => Ok(()),
         Some(e) => Err(TrainableError::Effect { model: model.name.clone(), effect: e.id }),

@@ -18,16 +18,16 @@ pub trait InstructionSet: Copy + Send + Sync {
     /// What a pass computes in.
     type Number: Packet;
     /// [`At::ask`].
-    fn ask(self, model: &GreyBox, at: &At<Self::Number>) -> Said<Self::Number>;
+    fn ask<const WHOLE: bool>(self, model: &GreyBox, at: &At<Self::Number>) -> Said<Self::Number>;
     /// [`At::slope`].
-    fn slope(
+    fn slope<const WHOLE: bool>(
         self,
         model: &GreyBox,
         at: &At<Self::Number>,
         slopes: &Slopes<Self::Number>,
     ) -> [Self::Number; 8];
     /// [`At::coefficients`].
-    fn coefficients(
+    fn coefficients<const WHOLE: bool>(
         self,
         model: &GreyBox,
         at: &At<Self::Number>,
@@ -89,17 +89,24 @@ macro_rules! compiled {
             type Number = $number;
 
             #[inline(always)]
-            fn ask(self, model: &GreyBox, at: &At<$number>) -> Said<$number> {
+            fn ask<const WHOLE: bool>(
+                self,
+                model: &GreyBox,
+                at: &At<$number>,
+            ) -> Said<$number> {
                 $(#[target_feature(enable = $features)])?
                 #[inline(never)]
-                fn compiled(model: &GreyBox, at: &At<$number>) -> Said<$number> {
-                    at.ask(model)
+                fn compiled<const WHOLE: bool>(
+                    model: &GreyBox,
+                    at: &At<$number>,
+                ) -> Said<$number> {
+                    at.ask::<WHOLE>(model)
                 }
-                compiled!(call compiled(model, at) $($features)?)
+                compiled!(call compiled::<WHOLE>(model, at) $($features)?)
             }
 
             #[inline(always)]
-            fn slope(
+            fn slope<const WHOLE: bool>(
                 self,
                 model: &GreyBox,
                 at: &At<$number>,
@@ -107,18 +114,18 @@ macro_rules! compiled {
             ) -> [$number; 8] {
                 $(#[target_feature(enable = $features)])?
                 #[inline(never)]
-                fn compiled(
+                fn compiled<const WHOLE: bool>(
                     model: &GreyBox,
                     at: &At<$number>,
                     slopes: &Slopes<$number>,
                 ) -> [$number; 8] {
-                    at.slope(model, slopes)
+                    at.slope::<WHOLE>(model, slopes)
                 }
-                compiled!(call compiled(model, at, slopes) $($features)?)
+                compiled!(call compiled::<WHOLE>(model, at, slopes) $($features)?)
             }
 
             #[inline(always)]
-            fn coefficients(
+            fn coefficients<const WHOLE: bool>(
                 self,
                 model: &GreyBox,
                 at: &At<$number>,
@@ -127,15 +134,15 @@ macro_rules! compiled {
             ) {
                 $(#[target_feature(enable = $features)])?
                 #[inline(never)]
-                fn compiled(
+                fn compiled<const WHOLE: bool>(
                     model: &GreyBox,
                     at: &At<$number>,
                     slopes: &Slopes<$number>,
                     sums: &mut [$number],
                 ) {
-                    at.coefficients(model, slopes, sums);
+                    at.coefficients::<WHOLE>(model, slopes, sums);
                 }
-                compiled!(call compiled(model, at, slopes, sums) $($features)?)
+                compiled!(call compiled::<WHOLE>(model, at, slopes, sums) $($features)?)
             }
 
             fn forward(self, pass: &Pass<$set>, trace: &mut Trace<$number>) -> (Sums, $number) {
@@ -165,6 +172,13 @@ macro_rules! compiled {
                 compiled!(call compiled(pass, trace, of, gradient) $($features)?)
             }
         }
+    };
+    (call $function:ident::<$generic:ident>($($argument:expr),*) $features:literal) => {
+        // SAFETY: a value of the set is made only where the processor has its features
+        unsafe { $function::<$generic>($($argument),*) }
+    };
+    (call $function:ident::<$generic:ident>($($argument:expr),*)) => {
+        $function::<$generic>($($argument),*)
     };
     (call $function:ident($($argument:expr),*) $features:literal) => {
         // SAFETY: a value of the set is made only where the processor has its features

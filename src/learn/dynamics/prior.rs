@@ -1,9 +1,9 @@
 //! The prior at a point: its rates, and the slopes through it to state and coefficients.
 
 use crate::learn::dynamics::packet::Packet;
-use crate::model::{GreyBox, Starting};
+use crate::model::{GreyBox, Starting, Weights, parted};
 use crate::num::{Dual, Real, each};
-use crate::physics::effects::Terms;
+use crate::physics::effects::{Needs, Terms};
 use crate::physics::rigid_body::{self, Vector};
 use crate::physics::{AirData, Channel, Controls, State, Wrench};
 
@@ -50,31 +50,35 @@ impl<R: Real> At<R> {
         AirData::new(&self.state, self.density, ALOFT, &model.airframe.geometry)
     }
 
-    /// What the prior of `model` says.
+    /// What the prior of `model` says: with `WHOLE` all of its effects, else those that need only the point, in code
+    /// that holds nothing else.
     #[inline(always)]
-    pub fn ask(&self, model: &GreyBox) -> Said<R> {
+    pub fn ask<const WHOLE: bool>(&self, model: &GreyBox) -> Said<R> {
         let air = self.air(model);
-        let (acceleration, spin) =
-            model.independent_accelerations(&self.state, &self.controls, &air);
+        let (acceleration, spin) = if WHOLE {
+            model.whole_accelerations(&self.state, &self.controls, &air)
+        } else {
+            model.independent_accelerations(&self.state, &self.controls, &air)
+        };
         let rate = rigid_body::state_rate(&self.state, &air, acceleration, spin);
         Said { acceleration, spin, rate }
     }
 
     /// The slope with respect to the state.
     #[inline(always)]
-    pub fn slope(&self, model: &GreyBox, slopes: &Slopes<R>) -> [R; 8] {
-        transposed(&self.state.to_array(), &Asked { model, at: self, slopes })
+    pub fn slope<const WHOLE: bool>(&self, model: &GreyBox, slopes: &Slopes<R>) -> [R; 8] {
+        transposed(&self.state.to_array(), &Asked::<R, WHOLE> { model, at: self, slopes })
     }
 }
 
 /// The prior as a function of the state, with the slopes with respect to what it says.
-struct Asked<'a, R> {
+struct Asked<'a, R, const WHOLE: bool> {
     model: &'a GreyBox,
     at: &'a At<R>,
     slopes: &'a Slopes<R>,
 }
 
-impl<R: Real> Sloped<R, 8> for Asked<'_, R> {
+impl<R: Real, const WHOLE: bool> Sloped<R, 8> for Asked<'_, R, WHOLE> {
     #[inline(always)]
     fn part(&self, x: [Dual<2, R>; 8]) -> [R; 2] {
         let Controls { aileron, elevator, throttle, rudder } = self.at.controls;
@@ -85,7 +89,7 @@ impl<R: Real> Sloped<R, 8> for Asked<'_, R> {
             rudder: fixed(rudder),
         };
         let at = At { state: State::from_array(x), controls, density: fixed(self.at.density) };
-        let said = at.ask(self.model);
+        let said = at.ask::<WHOLE>(self.model);
         let slopes = self.slopes;
         let mut sum = [R::zero(); 2];
         for i in 0..3 {
@@ -156,9 +160,15 @@ pub fn add<R: Real>(sum: &mut [R; 2], out: &Dual<2, R>, slope: R) {
 impl<R: Packet> At<R> {
     /// Adds the slopes with respect to the coefficients, then to Jxz, the last of `sums`.
     ///
-    /// Exact for effects that need only the point and are linear in the coefficients asked for.
+    /// Exact for effects that are linear in the coefficients asked for; without `WHOLE` they must need only the
+    /// point.
     #[inline(always)]
-    pub fn coefficients(&self, model: &GreyBox, slopes: &Slopes<R>, sums: &mut [R]) {
+    pub fn coefficients<const WHOLE: bool>(
+        &self,
+        model: &GreyBox,
+        slopes: &Slopes<R>,
+        sums: &mut [R],
+    ) {
         let air = self.air(model);
         let body = model.body.map(R::from_f64);
         let (push, turn) = rigid_body::state_rate_transposed(&self.state, &air, &slopes.rate);
@@ -168,10 +178,14 @@ impl<R: Packet> At<R> {
             turn[i] += slopes.spin[i];
         }
         let wrench = rigid_body::accelerations_transposed(&body, &air, model.axes, push, turn);
-        let mut tally =
-            Tally { model, first: 0, wrench: &wrench, sums: &mut *sums, moment: [R::zero(); 3] };
-        model.report_independent(&self.state, &self.controls, &air, &mut tally);
-        let moment = tally.moment;
+        let moment = if WHOLE {
+            self.whole(model, &air, &wrench, sums)
+        } else {
+            let moment = [R::zero(); 3];
+            let mut tally = Tally { model, first: 0, wrench: &wrench, sums: &mut *sums, moment };
+            model.report_independent(&self.state, &self.controls, &air, &mut tally);
+            tally.moment
+        };
         let mut dual = body.map(fixed);
         dual.jxz = Dual::variable(body.jxz, 0);
         let (state, moment) = (self.state.map(fixed), each(moment, fixed));
@@ -181,6 +195,124 @@ impl<R: Packet> At<R> {
                 *last = spin.gradient[0].mul_add(turn, *last);
             }
         }
+    }
+}
+
+impl<R: Packet> At<R> {
+    /// Adds the slopes with respect to the coefficients of all effects, `wrench` being those with respect to the forces
+    /// and moments; the moments.
+    ///
+    /// The sums over the effects that need only the point, as they are, with centred surfaces and at rest, are what the
+    /// other effects are made of: the slopes with respect to these sums go on to the coefficients of the former.
+    #[inline(always)]
+    fn whole(
+        &self,
+        model: &GreyBox,
+        air: &AirData<R>,
+        wrench: &Wrench<R>,
+        sums: &mut [R],
+    ) -> Vector<R> {
+        let made = model.independent_sums(&self.state, &self.controls, air);
+        let mut back = [Wrench::zero(); 3];
+        // the sums' channels, then the other effects' coefficients, two at a time
+        let mut own = model.dependent_coefficients();
+        let (mut first, mut more) = (0, true);
+        while more {
+            let mut moves = Moves { channels: [None; 2], places: [None; 2] };
+            for k in 0..2 {
+                match first + k {
+                    n if n < CHANNELS_OF_SUMS => moves.channels[k] = Some(n),
+                    _ => moves.places[k] = own.next(),
+                }
+            }
+            let slopes = self.moved(model, &made, wrench, &moves);
+            for (k, slope) in slopes.into_iter().enumerate() {
+                if let Some(n) = moves.channels[k] {
+                    back[n / 7].add(Channel::ALL[n % 7], slope);
+                }
+                if let Some(sum) = moves.places[k].and_then(|place| sums.get_mut(place)) {
+                    *sum += slope;
+                }
+            }
+            first += 2;
+            more = first < CHANNELS_OF_SUMS || moves.places[1].is_some();
+        }
+        let parts = parted(&self.state, &self.controls, air);
+        let places = [(self.state, self.controls, *air), parts[0], parts[1]];
+        let count = if model.needs() >= Needs::Parts { 3 } else { 1 };
+        for ((state, controls, air), slope) in places.iter().zip(&back).take(count) {
+            let moment = [R::zero(); 3];
+            let mut tally = Tally { model, first: 0, wrench: slope, sums: &mut *sums, moment };
+            model.report_independent(state, controls, air, &mut tally);
+        }
+        let made = model.whole_wrench(&self.state, &self.controls, air, made, model.coefficients());
+        [Channel::Roll, Channel::Pitch, Channel::Yaw].map(|c| made.get(c))
+    }
+
+    /// Σ of the slopes `wrench` times the derivatives of the forces and moments of all effects, in two directions.
+    #[inline(always)]
+    fn moved(
+        &self,
+        model: &GreyBox,
+        made: &[Wrench<R>; 3],
+        wrench: &Wrench<R>,
+        moves: &Moves,
+    ) -> [R; 2] {
+        let one = R::from_f64(1.0);
+        let mut sums = [Wrench::zero(); 3];
+        for (n, sum) in sums.iter_mut().enumerate() {
+            for (c, channel) in Channel::ALL.into_iter().enumerate() {
+                let mut x = fixed(made[n].get(channel));
+                for (gradient, moved) in x.gradient.iter_mut().zip(moves.channels) {
+                    if moved == Some(7 * n + c) {
+                        *gradient = one;
+                    }
+                }
+                sum.add(channel, x);
+            }
+        }
+        let Controls { aileron, elevator, throttle, rudder } = self.controls;
+        let controls = Controls {
+            aileron: fixed(aileron),
+            elevator: fixed(elevator),
+            throttle: fixed(throttle),
+            rudder: fixed(rudder),
+        };
+        let place = At { state: self.state.map(fixed), controls, density: fixed(self.density) };
+        let (air, weights) = (place.air(model), Marked { model, places: moves.places });
+        let made = model.whole_wrench(&place.state, &place.controls, &air, sums, weights);
+        let mut sum = [R::zero(); 2];
+        Channel::ALL.iter().for_each(|c| add(&mut sum, &made.get(*c), wrench.get(*c)));
+        sum
+    }
+}
+
+/// Channels of the three sums of [`GreyBox::independent_sums`].
+const CHANNELS_OF_SUMS: usize = 21;
+
+/// What moves in each of two directions: a channel of the three sums, counted on, or the coefficient of a place.
+struct Moves {
+    channels: [Option<usize>; 2],
+    places: [Option<usize>; 2],
+}
+
+/// Coefficients of which two move, one in each direction.
+#[derive(Clone, Copy)]
+struct Marked<'a> {
+    model: &'a GreyBox,
+    places: [Option<usize>; 2],
+}
+
+impl<R: Real> Weights<Dual<2, R>> for Marked<'_> {
+    #[inline(always)]
+    fn weigh(self, place: usize, amount: Dual<2, R>) -> Dual<2, R> {
+        let mut product = amount.scale(self.model.coefficients()[place].value);
+        for (gradient, moved) in product.gradient.iter_mut().zip(self.places) {
+            if moved == Some(place) {
+                *gradient += amount.value;
+            }
+        }
+        product
     }
 }
 

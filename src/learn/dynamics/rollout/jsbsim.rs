@@ -21,7 +21,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
             // this scheme knows accelerations only
             let zero = R::zero();
             let learned = State { roll: zero, pitch: zero, ..self.learned(&at, step, trace) };
-            let said = self.set.ask(&self.subject.prior, &at);
+            let said = self.ask(&at);
             let air = at.air(&self.subject.prior);
             let (acceleration, spin) = pushed(&said, &learned, &at.state, &air);
             trace.rates[step] = [said.rate, learned];

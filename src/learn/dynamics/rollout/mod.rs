@@ -6,10 +6,11 @@ mod rk4;
 use crate::learn::dynamics::kernel::InstructionSet;
 use crate::learn::dynamics::network::Passes;
 use crate::learn::dynamics::packet::Packet;
-use crate::learn::dynamics::prior::{At, Slopes};
+use crate::learn::dynamics::prior::{At, Said, Slopes};
 use crate::model::residual::Scales;
 use crate::model::{GreyBox, Integrator};
 use crate::num::Real;
+use crate::physics::effects::Needs;
 use crate::physics::rigid_body::Vector;
 use crate::physics::{Controls, State};
 
@@ -177,6 +178,16 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         At { state, controls, density: self.recorded.density[step] }
     }
 
+    /// What the prior says at a point.
+    #[inline(always)]
+    fn ask(&self, at: &At<R>) -> Said<R> {
+        let model = &self.subject.prior;
+        match model.needs() {
+            Needs::Point => self.set.ask::<false>(model, at),
+            _ => self.set.ask::<true>(model, at),
+        }
+    }
+
     /// F_a at a point.
     #[inline(always)]
     fn learned(&self, at: &At<R>, point: usize, trace: &mut Trace<R>) -> State<R> {
@@ -253,10 +264,19 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         let Place { step, point, first } = place;
         let Subject { network, scales, .. } = self.subject;
         let at = self.at(step, trace.states[point]);
-        let mut slope = self.set.slope(&self.subject.prior, &at, prior);
-        if self.subject.prior_slopes == PriorSlopes::All {
-            self.set.coefficients(&self.subject.prior, &at, prior, &mut trace.coefficients);
-        }
+        let model = &self.subject.prior;
+        let learned_too = self.subject.prior_slopes == PriorSlopes::All;
+        let mut slope = if model.needs() == Needs::Point {
+            if learned_too {
+                self.set.coefficients::<false>(model, &at, prior, &mut trace.coefficients);
+            }
+            self.set.slope::<false>(model, &at, prior)
+        } else {
+            if learned_too {
+                self.set.coefficients::<true>(model, &at, prior, &mut trace.coefficients);
+            }
+            self.set.slope::<true>(model, &at, prior)
+        };
         let (width, wide) = (network.trace(), network.slopes());
         let slot = (point - first) % CHUNK;
         let mut output = learned.to_array();

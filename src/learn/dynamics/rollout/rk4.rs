@@ -23,7 +23,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
             for stage in 0..4 {
                 let at = self.at(step, start.advance(&rate, AHEAD[stage]));
                 let learned = self.learned(&at, 4 * step + stage, trace);
-                let prior = self.set.ask(&self.subject.prior, &at).rate;
+                let prior = self.ask(&at).rate;
                 if stage == 0 {
                     trace.rates[step] = [prior, learned];
                 }
