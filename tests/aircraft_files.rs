@@ -103,6 +103,21 @@ fn a_pitching_moment_that_bends_over_incidence_is_imported_as_a_table_and_export
 }
 
 #[test]
+fn thrust_that_lags_is_imported_with_its_time_constant() {
+    let hidden = vec![Hidden::new("thrust_lag", 0.5).unwrap()];
+    let lagging = PlantOptions { hidden, ..options("x8") };
+    let mut plant = Plant::new(&lagging).unwrap();
+    let found = import(&mut plant, "late", 18.0, 600.0).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("airframe.toml"), &found.airframe).unwrap();
+    std::fs::write(folder.path().join("model.toml"), &found.model).unwrap();
+    let model = GreyBox::load(&folder.path().join("model.toml")).unwrap();
+    let lag = model.coefficients().iter().find(|c| c.name == "thrust_lag.tau_s").unwrap();
+    // between throttle and thrust lies a frame of the simulator
+    assert!((lag.value - 0.5).abs() < 0.03, "{lag:?}");
+}
+
+#[test]
 fn an_export_flies_as_its_model_says() {
     for (path, own) in
         [("params/aerosonde/jsbsim.toml", "gander"), ("params/x8/jsbsim.toml", "wing")]

@@ -7,7 +7,7 @@ use greylag_sitl::plant::{Inputs, Loads, MassProperties, Plant, PlantError, Star
 
 use crate::model::textbook::Estimate;
 use crate::num::least_squares;
-use crate::physics::atmosphere::SEA_LEVEL_DENSITY;
+use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 use crate::physics::catalogue::describe;
 use files::{airframe, model_file};
 use fits::{first_order, line, second_order, thrust_lag};
@@ -35,6 +35,12 @@ const WORTH_SAYING: f64 = 0.02;
 const THRUST_STEP: [f64; 2] = [0.4, 0.7];
 /// Part of that step beyond which it is said that the engine's answer is no first-order lag.
 const LAG_WORTH_SAYING: f64 = 0.1;
+/// Propeller torque that is none, in parts of weight times span.
+const NO_MOMENT: f64 = 1e-5;
+/// Distance of the thrust from the centre of gravity that is none, in chords.
+const NO_ARM: f64 = 1e-3;
+/// Newton metres per pound foot.
+const LBF_FT: f64 = 1.355_817_948_331_4;
 /// Part of it beyond which no lag is written.
 const NO_LAG: f64 = 0.5;
 
@@ -139,17 +145,16 @@ pub fn import(
         return Err(ImportError::Lift { airspeed: cruise });
     }
     let effects = effects(&polar, &subject.slopes(&travel)?, &mut left_out);
-    let thrust = subject.thrust(&mut left_out)?;
-    let thrust_lag = subject.thrust_lag(&thrust, &mut left_out)?;
+    let propulsion = subject.propulsion(&mut left_out)?;
     let lags = subject.lags(&travel)?;
     Ok(Imported {
-        airframe: airframe(&subject, name, &travel, &lags, lift_max, &polar, &thrust),
+        airframe: airframe(&subject, name, &travel, &lags, lift_max, &polar, &propulsion.thrust),
         model: model_file(
             name,
             &subject.mass,
             &polar,
             &effects,
-            (&thrust, thrust_lag),
+            &propulsion,
             travel.rudder.is_some(),
         ),
         left_out,
@@ -188,6 +193,18 @@ struct Slopes {
     /// Drag by the size of sideslip and its square, and by the size of the elevator.
     drag_beta: [f64; 2],
     drag_elevator: f64,
+}
+
+/// What the engines do.
+struct Propulsion {
+    /// The polynomial of the settled thrust over throttle and airspeed.
+    thrust: Vec<Estimate>,
+    /// Time constant of the thrust behind the throttle's position, s.
+    lag: Option<f64>,
+    /// Rolling moment at full throttle, to the left, N m.
+    torque: Option<f64>,
+    /// How far below the centre of gravity the thrust acts, m.
+    arm: Option<f64>,
 }
 
 /// An effect of the model file with its numbers.
@@ -276,9 +293,11 @@ impl Subject<'_> {
         })
     }
 
-    /// The polynomial of the settled thrust over throttle and airspeed.
-    fn thrust(&mut self, left_out: &mut Vec<String>) -> Result<Vec<Estimate>, PlantError> {
+    /// What the engines do, settled and after a step of the throttle.
+    fn propulsion(&mut self, left_out: &mut Vec<String>) -> Result<Propulsion, PlantError> {
         let (mut rows, mut thrusts) = (Vec::new(), Vec::new());
+        // Σ l δ, Σ δ², Σ m T, Σ T²
+        let mut moments = [0.0; 4];
         for speed in [0.8, 1.0, 1.25] {
             for throttle in [0.0, 0.25, 0.5, 0.75, 1.0] {
                 let airspeed_mps = speed * self.start.airspeed_mps;
@@ -288,6 +307,13 @@ impl Subject<'_> {
                 let share = truth.air_density_kgpm3 / SEA_LEVEL_DENSITY;
                 rows.push([1.0, d, d * d, v, d * v, v * v].map(|x| x * share));
                 thrusts.push(thrust);
+                let roll = LBF_FT * self.plant.property("moments/l-prop-lbsft")?;
+                let pitch = LBF_FT * self.plant.property("moments/m-prop-lbsft")?;
+                for (sum, x) in
+                    moments.iter_mut().zip([roll * d, d * d, pitch * thrust, thrust * thrust])
+                {
+                    *sum += x;
+                }
             }
         }
         let fit = least_squares(&rows, &thrusts).unwrap_or_default();
@@ -302,7 +328,18 @@ impl Subject<'_> {
         }
         let names = ["T0_n", "Tt_n", "Ttt_n", "TV_nspm", "TtV_nspm", "TVV_ns2pm2"];
         let source = "least squares over JSBSim's thrust, 0.8 to 1.25 of the cruise airspeed";
-        Ok(names.into_iter().zip(fit.iter()).map(|(n, x)| (n, *x, 0.02, source)).collect())
+        let thrust: Vec<Estimate> =
+            names.into_iter().zip(fit.iter()).map(|(n, x)| (n, *x, 0.02, source)).collect();
+        let lag = self.thrust_lag(&thrust, left_out)?;
+        let [roll, throttle, pitch, squared] = moments;
+        let (torque, arm) = (-roll / throttle.max(1e-9), pitch / squared.max(1e-9));
+        let weight = self.mass.mass_kg * STANDARD_GRAVITY;
+        Ok(Propulsion {
+            thrust,
+            lag,
+            torque: (torque.abs() > NO_MOMENT * weight * self.span).then_some(torque),
+            arm: (arm.abs() > NO_ARM * self.chord).then_some(arm),
+        })
     }
 
     /// Time constant (s) of the thrust behind the throttle's position, if it has one; `thrust` is the settled thrust.

@@ -238,7 +238,8 @@ def integrate(x, wanted, e, kind, amount, matrix, truth, commands):
     throttle_keep = math.exp(-h / LAG)
     past_a, past_e = np.zeros(HISTORY), np.zeros(HISTORY)
     surface_a, surface_e, throttle = (0.0, 0.0), (0.0, 0.0), 0.15
-    acting_a, acting_e, now = 0.0, 0.0, HISTORY
+    acting_a, acting_e, acting_t, now = 0.0, 0.0, throttle, HISTORY
+    thrust_keep = math.exp(-h / amount) if kind == 6 else 0.0
     memory = (0.0, 0.0, 0.0)
     row = 0
     for k in range(wanted.shape[0]):
@@ -250,26 +251,32 @@ def integrate(x, wanted, e, kind, amount, matrix, truth, commands):
         )
         commands[k, 0], commands[k, 1], commands[k, 2] = given
         for _ in range(PER_COMMAND):
-            begin = (acting_a, acting_e, throttle)
-            note(truth, row, x, begin, clipped(surface_a[0]), clipped(surface_e[0]), e)
+            begin = (acting_a, acting_e, acting_t)
+            note(truth, row, x, begin, clipped(surface_a[0]), clipped(surface_e[0]), throttle, e)
             middle = begin
             for half in range(2):
                 surface_a = follow(surface_a, given[0] * LIMIT, matrix)
                 surface_e = follow(surface_e, given[1] * LIMIT, matrix)
+                old = throttle
                 throttle = given[2] + (throttle - given[2]) * throttle_keep
+                if kind == 6:  # a lag, exact for a throttle linear between half steps
+                    slope = (throttle - old) / h
+                    acting_t = throttle - slope * amount + (acting_t - old + slope * amount) * thrust_keep
+                else:
+                    acting_t = throttle
                 now += 1
                 past_a[now % HISTORY], past_e[now % HISTORY] = clipped(surface_a[0]), clipped(surface_e[0])
                 acting_a = act(kind, amount, past_a, now, acting_a, h)
                 acting_e = act(kind, amount, past_e, now, acting_e, h)
                 if half == 0:
-                    middle = (acting_a, acting_e, throttle)
-            x = rk4(x, begin, middle, (acting_a, acting_e, throttle), e, STEP)
+                    middle = (acting_a, acting_e, acting_t)
+            x = rk4(x, begin, middle, (acting_a, acting_e, acting_t), e, STEP)
             row += 1
     return x
 
 
 @compiled
-def note(truth, row, x, z, aileron, elevator, e):
+def note(truth, row, x, z, aileron, elevator, throttle, e):
     """One row of the truth: the columns of `sensors.TRUTH`, velocity relative to the air."""
     fx, fy, fz, _, _, _, airspeed, alpha, beta = wrench(x, z, e)
     mass = MASS * (1.0 + e[17])
@@ -281,7 +288,7 @@ def note(truth, row, x, z, aileron, elevator, e):
     t[12] = (a * a + b * b - c * c - d * d) * u + 2.0 * (b * c - a * d) * v + 2.0 * (b * d + a * c) * w
     t[13] = 2.0 * (b * c + a * d) * u + (a * a - b * b + c * c - d * d) * v + 2.0 * (c * d - a * b) * w
     t[14] = 2.0 * (b * d - a * c) * u + 2.0 * (c * d + a * b) * v + (a * a - b * b - c * c + d * d) * w
-    t[15], t[16], t[17], t[18] = x[10], aileron, elevator, z[2]
+    t[15], t[16], t[17], t[18] = x[10], aileron, elevator, throttle
 
 
 def filter_matrix(h):

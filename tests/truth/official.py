@@ -126,6 +126,15 @@ def decay(d, a):
     d.push(product(over, THRUST))
 
 
+def spool(d, a):
+    """Thrust that follows a lag; what the filter reads is a frame old."""
+    channel = ET.SubElement(d.root.find("flight_control"), "channel", name="truth")
+    element = ET.SubElement(channel, "lag_filter", name="truth/thrust")
+    ET.SubElement(element, "input").text = THRUST
+    ET.SubElement(element, "c1").text = repr(1.0 / a)
+    d.push(operation("sum", "truth/thrust", product(-1.0, THRUST)))
+
+
 def wash(d, a):
     """Deflections that act more with throttle."""
     factor = operation("sum", 1.0 - a * x8.REFERENCE_THROTTLE, product(a, THROTTLE))
@@ -171,6 +180,7 @@ WRITE = {
     "cg_shift": lambda d, a: d.set("mass_balance/location[@name='CG']/x", lambda x: x + a),
     "unsteady_lift": lift_lag,
     "thrust_decay": decay,
+    "thrust_lag": spool,
     "thrust_scale": lambda d, a: d.push(product(a / POUND, THROTTLE)),
     "thrust_line_offset": lambda d, a: d.add("PITCH", "pitch", product(a / FOOT, THRUST)),
     "motor_torque": lambda d, a: d.add("ROLL", "roll", product(-a / TORQUE, THROTTLE)),

@@ -133,11 +133,11 @@ impl Settings {
         noise: [0.02, 0.06],
         ..Settings::POLICY
     };
-    /// The hybrid controller whose policy flies on behind each plan: what a plan is worth is found in the model, and
-    /// the critics' error counts by γ⁴⁰ of what it counts behind five steps.
+    /// The hybrid controller whose policy flies on behind each plan. After forty steps plans have come together
+    /// again: they differ by rewards that were flown in the model, not by what the critics err by.
     pub const OVER_POLICY: Settings = Settings {
-        population: 128,
-        update: Update::Elites(12),
+        population: 64,
+        update: Update::Elites(8),
         iterations: 3,
         proposals: 16,
         steps: 40,

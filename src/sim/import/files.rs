@@ -3,7 +3,7 @@
 use greylag_sitl::plant::{MassProperties, Stops, Travel};
 
 use super::fits::line;
-use super::{Effect, Polar, Subject};
+use super::{Effect, Polar, Propulsion, Subject};
 use crate::model::textbook::{Estimate, incidence_limits, numbers};
 use crate::num::Table;
 use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY, standard_density};
@@ -85,7 +85,7 @@ pub(super) fn model_file(
     mass: &MassProperties,
     polar: &Polar,
     effects: &[Effect],
-    (thrust, thrust_lag): (&[Estimate], Option<f64>),
+    propulsion: &Propulsion,
     has_rudder: bool,
 ) -> String {
     let mut out = format!(
@@ -114,11 +114,18 @@ pub(super) fn model_file(
         numbers(&mut out, estimates);
     }
     out += "\n[effects.propeller]\n";
-    numbers(&mut out, thrust);
-    if let Some(lag) = thrust_lag {
-        let source = "JSBSim's answer to a step of the throttle from 0.4 to 0.7";
-        out += "\n[effects.thrust_lag]\n";
-        numbers(&mut out, &[("tau_s", lag, 0.2, source)]);
+    numbers(&mut out, &propulsion.thrust);
+    let settled = "least squares over JSBSim's moment of the engines";
+    let one_each = [
+        ("thrust_lag", "tau_s", propulsion.lag, 0.2, "JSBSim's answer to a step of the throttle"),
+        ("motor_torque", "k_nm", propulsion.torque, 0.1, settled),
+        ("thrust_line_offset", "z_m", propulsion.arm, 0.1, settled),
+    ];
+    for (effect, name, value, width, source) in one_each {
+        if let Some(value) = value {
+            out += &format!("\n[effects.{effect}]\n");
+            numbers(&mut out, &[(name, value, width, source)]);
+        }
     }
     let [zero, slope, bent] = line(polar);
     let beside: Vec<f64> =
