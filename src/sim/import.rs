@@ -10,7 +10,7 @@ use crate::num::least_squares;
 use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 use crate::physics::catalogue::describe;
 use files::{airframe, model_file};
-use fits::{first_order, line, second_order, thrust_lag};
+use fits::{ThrustLag, first_order, line, second_order, thrust_lag};
 
 /// Metres per foot.
 const FT: f64 = 0.3048;
@@ -41,8 +41,11 @@ const NO_MOMENT: f64 = 1e-5;
 const NO_ARM: f64 = 1e-3;
 /// Newton metres per pound foot.
 const LBF_FT: f64 = 1.355_817_948_331_4;
-/// Part of it beyond which no lag is written.
-const NO_LAG: f64 = 0.5;
+/// How long its answer is watched, s.
+const STEP_S: f64 = 20.0;
+/// Mean, amplitude and frequency (rad/s) of the throttle's wave that judges the lag, and how long it lasts, s.
+const WAVE: [f64; 3] = [0.5, 0.1, 3.0];
+const WAVE_S: f64 = 10.0;
 
 /// What was made of an aircraft.
 #[derive(Clone, Debug)]
@@ -307,8 +310,10 @@ impl Subject<'_> {
                 let share = truth.air_density_kgpm3 / SEA_LEVEL_DENSITY;
                 rows.push([1.0, d, d * d, v, d * v, v * v].map(|x| x * share));
                 thrusts.push(thrust);
-                let roll = LBF_FT * self.plant.property("moments/l-prop-lbsft")?;
-                let pitch = LBF_FT * self.plant.property("moments/m-prop-lbsft")?;
+                // an aircraft without engines has no such property
+                let mut moment = |name: &str| LBF_FT * self.plant.property(name).unwrap_or(0.0);
+                let (roll, pitch) =
+                    (moment("moments/l-prop-lbsft"), moment("moments/m-prop-lbsft"));
                 for (sum, x) in
                     moments.iter_mut().zip([roll * d, d * d, pitch * thrust, thrust * thrust])
                 {
@@ -349,13 +354,26 @@ impl Subject<'_> {
         left_out: &mut Vec<String>,
     ) -> Result<Option<f64>, PlantError> {
         let start = Start { alpha_rad: ALPHA, ..self.start };
-        let response = self.plant.thrust_response(&start, THRUST_STEP)?;
+        let step = self.plant.step_s();
+        let steps = |seconds: f64| (seconds / step) as usize;
+        let [from, to] = THRUST_STEP;
+        let raised: Vec<f64> =
+            std::iter::once(from).chain(std::iter::repeat_n(to, steps(STEP_S))).collect();
+        let wave = |k: usize| WAVE[0] + WAVE[1] * (WAVE[2] * step * k as f64).sin();
+        let waved: Vec<f64> = (0..steps(WAVE_S)).map(wave).collect();
+        let raised = self.plant.thrust_response(&start, &raised)?;
+        let waved = self.plant.thrust_response(&start, &waved)?;
         let of = |name: &str| thrust.iter().find(|e| e.0 == name).map_or(0.0, |e| e.1);
         let slope = of("Tt_n") + of("TtV_nspm") * self.start.airspeed_mps;
-        let found = thrust_lag(&response, self.plant.step_s(), [slope, of("Ttt_n")]);
-        let Some((lag, left)) = found else { return Ok(None) };
-        if left > NO_LAG {
-            left_out.push("how the thrust follows the throttle: no lag describes it".into());
+        let Some(found) = thrust_lag([&raised, &waved], step, [slope, of("Ttt_n")]) else {
+            return Ok(None);
+        };
+        let ThrustLag { lag, left, better } = found;
+        if !better {
+            left_out.push(format!(
+                "how late the thrust follows the throttle: a lag of {lag:.2} s describes a step best, and small movements no \
+                 better than none"
+            ));
             return Ok(None);
         }
         if left > LAG_WORTH_SAYING {

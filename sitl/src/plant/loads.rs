@@ -59,33 +59,25 @@ impl Plant {
         self.held_in(start, |plant| plant.settle_engines(throttle))
     }
 
-    /// Thrust along body x (N) and throttle position (0..1) after each step, once the throttle is commanded
-    /// `to` where the engines had settled at `from`, with the aircraft held in `start`. It ends when the thrust has
-    /// settled, after 60 s at the latest. Reset the plant before it is stepped.
+    /// Thrust along body x (N) and throttle position (0..1) once the engines have settled at the first of the
+    /// `throttles` (0..1), and after each step of one of the others, with the aircraft held in `start`. Reset the plant
+    /// before it is stepped.
     ///
     /// # Errors
     /// [`PlantError`] when the aircraft cannot be evaluated there.
     pub fn thrust_response(
         &mut self,
         start: &Start,
-        [from, to]: [f64; 2],
+        throttles: &[f64],
     ) -> Result<Vec<[f64; 2]>, PlantError> {
         self.held_in(start, |plant| {
-            let (thrust, truth) = plant.settle_engines(from)?;
-            let second = plant.steps_of_a_second();
+            let Some((first, rest)) = throttles.split_first() else { return Ok(Vec::new()) };
+            let (thrust, truth) = plant.settle_engines(*first)?;
             let mass = plant.mass_properties()?.mass_kg;
             let mut response = vec![[thrust, truth.throttle]];
-            while response.len() <= SETTLING_S as usize * second {
-                let before = response[response.len() - 1][0];
-                for _ in 0..second {
-                    plant.step(Inputs { throttle: to, ..Inputs::default() })?;
-                    response.push([plant.thrust(mass)?, plant.truth.throttle]);
-                }
-                let now = response[response.len() - 1][0];
-                let still = (now - before).abs() <= SETTLED * now.abs().max(1.0);
-                if still && response.len() > 5 * second {
-                    break;
-                }
+            for throttle in rest {
+                plant.step(Inputs { throttle: *throttle, ..Inputs::default() })?;
+                response.push([plant.thrust(mass)?, plant.truth.throttle]);
             }
             Ok(response)
         })

@@ -30,7 +30,8 @@ impl Effect for GroundEffect {
             "altitude of the ground above mean sea level",
             "m",
             (-500.0, 9000.0),
-        ),
+        )
+        .of_any_size(),
     ];
     const SHAPE: usize = 1;
     const ENTRY: Option<Entry> = Some(Entry {

@@ -36,6 +36,13 @@ pub(crate) const fn coefficient(
     Coefficient { name, meaning, unit, bounds, grows: true }
 }
 
+impl Coefficient {
+    /// The same with bounds that do not grow with the aircraft.
+    pub(crate) const fn of_any_size(self) -> Coefficient {
+        Coefficient { grows: false, ..self }
+    }
+}
+
 /// Channels of the forces and moments that the air makes: all but thrust.
 const AERODYNAMIC: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];

@@ -64,38 +64,55 @@ pub(super) fn first_order(observed: &[f64]) -> f64 {
 
 /// Time constants that are tried for the thrust, s: from one step to what the effect takes.
 const THRUST_LAGS_S: [f64; 2] = [0.01, 10.0];
+/// Part of the answer to a step beyond which what a lag leaves shows that it is none.
+const NO_LAG: f64 = 0.5;
+/// What a lag must leave at most of what none leaves.
+const MUCH_BETTER: f64 = 0.8;
 /// Number of them, in equal ratios.
 const THRUST_LAGS: usize = 400;
 
-/// Time constant (s) of the lag between throttle position and thrust that follows `response` best, steps of
-/// `step` (s), and the rms of what it leaves as a share of the thrust's change. The settled thrust is `slope` δ + `curve` δ²
-/// and a constant. `None` where the thrust does not change, or follows at once as well as with a lag.
+/// The lag between throttle position and thrust.
+pub(super) struct ThrustLag {
+    /// Time constant, s.
+    pub lag: f64,
+    /// What it leaves of the answer to a step: rms as a share of the thrust's change.
+    pub left: f64,
+    /// Whether it describes the answer to a step at all, and small movements better than none does.
+    pub better: bool,
+}
+
+/// The lag that follows the answer to a step of the throttle best, judged by the answer to a wave; `answers` are thrust
+/// and throttle position after each `step` (s). The settled thrust is `slope` δ + `curve` δ² and a constant. `None` where the
+/// thrust does not change, or follows at once as well as with a lag.
 pub(super) fn thrust_lag(
-    response: &[[f64; 2]],
+    [raised, waved]: [&[[f64; 2]]; 2],
     step: f64,
     [slope, curve]: [f64; 2],
-) -> Option<(f64, f64)> {
-    let [first, last] = [response.first()?, response.last()?];
+) -> Option<ThrustLag> {
+    let [first, last] = [raised.first()?, raised.last()?];
     let settled = |throttle: f64| (slope + curve * throttle) * throttle;
     let (rise, expected) = (last[0] - first[0], settled(last[1]) - settled(first[1]));
     let largest = last[0].abs().max(first[0].abs()).max(1.0);
     if (last[1] - first[1]).abs() < NO_ANSWER || rise.abs().min(expected.abs()) < 1e-3 * largest {
         return None;
     }
-    let misfit = |lag: f64| {
+    // rms of what a lag leaves of an answer, in parts of the step's rise
+    let misfit = |answer: &[[f64; 2]], lag: f64| {
+        let [thrust, throttle] = answer.first().copied().unwrap_or_default();
         let (gain, keep) = (step / (2.0 * lag + step), (2.0 * lag - step) / (2.0 * lag + step));
-        let (mut before, mut acts) = (first[1], first[1]);
-        let squares = response.iter().map(|[thrust, throttle]| {
-            acts = gain * (throttle + before) + keep * acts;
-            before = *throttle;
-            let share = (settled(acts) - settled(first[1])) / expected;
-            ((thrust - first[0]) / rise - share).powi(2)
+        let (mut before, mut acts) = (throttle, throttle);
+        let squares = answer.iter().map(|[now, position]| {
+            acts = gain * (position + before) + keep * acts;
+            before = *position;
+            ((now - thrust) / rise - (settled(acts) - settled(throttle)) / expected).powi(2)
         });
-        (squares.sum::<f64>() / response.len() as f64).sqrt()
+        (squares.sum::<f64>() / answer.len().max(1) as f64).sqrt()
     };
     let [least, most] = THRUST_LAGS_S;
     let ratio = (most / least).powf(1.0 / (THRUST_LAGS - 1) as f64);
     let lags = (0..THRUST_LAGS).map(|k| least * ratio.powi(k as i32));
-    let (lag, left) = lags.map(|lag| (lag, misfit(lag))).min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (lag > 2.0 * step).then_some((lag, left))
+    let (lag, left) =
+        lags.map(|lag| (lag, misfit(raised, lag))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let better = left < NO_LAG && misfit(waved, lag) < MUCH_BETTER * misfit(waved, 0.0);
+    (lag > 2.0 * step).then_some(ThrustLag { lag, left, better })
 }
