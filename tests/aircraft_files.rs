@@ -8,7 +8,7 @@ use greylag::model::jsbsim::export;
 use greylag::model::textbook::{Measures, Tail};
 use greylag::model::{GreyBox, Memory, STEP};
 use greylag::physics::Command;
-use greylag::sim::import::import;
+use greylag::sim::import::{Imported, import};
 use greylag::sim::{Environment, Simulator};
 use greylag_sitl::hidden::Hidden;
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
@@ -20,6 +20,14 @@ fn shipped(path: &str) -> GreyBox {
 fn options(aircraft: &str) -> PlantOptions {
     let start = Start { airspeed_mps: 25.0, ..Start::NEUTRAL };
     PlantOptions { aircraft: aircraft.into(), start, ..PlantOptions::default() }
+}
+
+/// The model that an import wrote.
+fn loaded(found: &Imported) -> GreyBox {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("airframe.toml"), &found.airframe).unwrap();
+    std::fs::write(folder.path().join("model.toml"), &found.model).unwrap();
+    GreyBox::load(&folder.path().join("model.toml")).unwrap()
 }
 
 /// The rms of each state's rate beside that of `model` over 10 s, in x_c a second.
@@ -59,10 +67,7 @@ fn an_import_has_the_coefficients_of_the_aircraft() {
     let mut plant = Plant::new(&options("aerosonde")).unwrap();
     let found = import(&mut plant, "aerosonde", 25.0, 600.0).unwrap();
     println!("{:#?}", found.left_out);
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("airframe.toml"), &found.airframe).unwrap();
-    std::fs::write(folder.path().join("model.toml"), &found.model).unwrap();
-    let model = GreyBox::load(&folder.path().join("model.toml")).unwrap();
+    let model = loaded(&found);
     let truth = shipped("params/aerosonde/jsbsim.toml");
     for c in truth.coefficients().iter().filter(|c| !c.name.starts_with("propeller")) {
         let ours = model.coefficients().iter().find(|x| x.name == c.name);
@@ -83,10 +88,7 @@ fn a_pitching_moment_that_bends_over_incidence_is_imported_as_a_table_and_export
     let bent = PlantOptions { hidden, ..options("aerosonde") };
     let mut plant = Plant::new(&bent).unwrap();
     let found = import(&mut plant, "bent", 25.0, 600.0).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("airframe.toml"), &found.airframe).unwrap();
-    std::fs::write(folder.path().join("model.toml"), &found.model).unwrap();
-    let model = GreyBox::load(&folder.path().join("model.toml")).unwrap();
+    let model = loaded(&found);
     assert!(model.has("pitch_table"));
     let with = apart(&model, &mut Simulator::new(&bent).unwrap());
     assert!(largest(with) < 0.01);
@@ -108,10 +110,7 @@ fn thrust_that_lags_is_imported_with_its_time_constant() {
     let lagging = PlantOptions { hidden, ..options("x8") };
     let mut plant = Plant::new(&lagging).unwrap();
     let found = import(&mut plant, "late", 18.0, 600.0).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("airframe.toml"), &found.airframe).unwrap();
-    std::fs::write(folder.path().join("model.toml"), &found.model).unwrap();
-    let model = GreyBox::load(&folder.path().join("model.toml")).unwrap();
+    let model = loaded(&found);
     let lag = model.coefficients().iter().find(|c| c.name == "thrust_lag.tau_s").unwrap();
     // between throttle and thrust lies a frame of the simulator
     assert!((lag.value - 0.5).abs() < 0.03, "{lag:?}");

@@ -20,7 +20,7 @@ const STEPS: usize = 7;
 type Effects<'a> = &'a [(&'a str, &'a [f64])];
 
 /// Effects that act on what others make, in every way there is: on their forces, on what deflections and rates make
-/// of them, on the state's rate; and one on the inputs.
+/// of them, on the state's rate; and one that changes the mass.
 const ON_OTHERS: Effects = &[
     ("propwash", &[0.5]),
     ("cg_shift", &[0.01]),

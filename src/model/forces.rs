@@ -281,18 +281,6 @@ impl GreyBox {
         self.accelerations_under(&wrench, state, air)
     }
 
-    /// [`accelerations`](GreyBox::accelerations) of all effects as part of its caller.
-    #[cfg(feature = "learn")]
-    #[inline(always)]
-    pub(crate) fn whole_accelerations<R: Real>(
-        &self,
-        state: &State<R>,
-        controls: &Controls<R>,
-        air: &AirData<R>,
-    ) -> (Vector<R>, Vector<R>) {
-        self.accelerations_inlined(state, controls, air)
-    }
-
     /// Sums of the effects that need only the point: as they are, with the surfaces centred, and also without body
     /// rates; the last two are zero where no effect needs them.
     #[cfg(feature = "learn")]
@@ -351,7 +339,7 @@ impl GreyBox {
 
     /// [`accelerations`](GreyBox::accelerations) as part of its caller.
     #[inline(always)]
-    pub(super) fn accelerations_inlined<R: Real>(
+    pub(crate) fn accelerations_inlined<R: Real>(
         &self,
         state: &State<R>,
         controls: &Controls<R>,

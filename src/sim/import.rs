@@ -35,17 +35,17 @@ const WORTH_SAYING: f64 = 0.02;
 const THRUST_STEP: [f64; 2] = [0.4, 0.7];
 /// Part of that step beyond which it is said that the engine's answer is no first-order lag.
 const LAG_WORTH_SAYING: f64 = 0.1;
+/// How long the answer to the step is watched, s.
+const STEP_S: f64 = 20.0;
+/// Mean, amplitude and frequency (rad/s) of the throttle's wave that judges the lag, and how long it lasts, s.
+const WAVE: [f64; 3] = [0.5, 0.1, 3.0];
+const WAVE_S: f64 = 10.0;
 /// Propeller torque that is none, in parts of weight times span.
 const NO_MOMENT: f64 = 1e-5;
 /// Distance of the thrust from the centre of gravity that is none, in chords.
 const NO_ARM: f64 = 1e-3;
 /// Newton metres per pound foot.
 const LBF_FT: f64 = 1.355_817_948_331_4;
-/// How long its answer is watched, s.
-const STEP_S: f64 = 20.0;
-/// Mean, amplitude and frequency (rad/s) of the throttle's wave that judges the lag, and how long it lasts, s.
-const WAVE: [f64; 3] = [0.5, 0.1, 3.0];
-const WAVE_S: f64 = 10.0;
 
 /// What was made of an aircraft.
 #[derive(Clone, Debug)]

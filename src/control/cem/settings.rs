@@ -133,8 +133,8 @@ impl Settings {
         noise: [0.02, 0.06],
         ..Settings::POLICY
     };
-    /// The hybrid controller whose policy flies on behind each plan. After forty steps plans have come together
-    /// again: they differ by rewards that were flown in the model, not by what the critics err by.
+    /// The hybrid controller whose policy flies on behind each plan up to step 40 in the model, before the critics
+    /// value the state. It is as good without critics.
     pub const OVER_POLICY: Settings = Settings {
         population: 64,
         update: Update::Elites(8),

@@ -56,7 +56,7 @@ impl<R: Real> At<R> {
     pub fn ask<const WHOLE: bool>(&self, model: &GreyBox) -> Said<R> {
         let air = self.air(model);
         let (acceleration, spin) = if WHOLE {
-            model.whole_accelerations(&self.state, &self.controls, &air)
+            model.accelerations_inlined(&self.state, &self.controls, &air)
         } else {
             model.independent_accelerations(&self.state, &self.controls, &air)
         };
