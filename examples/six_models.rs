@@ -25,7 +25,7 @@ use greylag::learn::dynamics::export;
 use greylag::learn::dynamics::residual_map::residual_map;
 use greylag::learn::dynamics::score::{Horizon, free_run};
 use greylag::learn::dynamics::windows::Track;
-use greylag::learn::{Criterion, JXZ, Learned, Recipe, Start, Trainer};
+use greylag::learn::{Criterion, JXZ, Joint, Learned, Recipe, Start, Trainer};
 use greylag::logs::{Flight, Sample};
 use greylag::model::{GreyBox, Integrator};
 use greylag::physics::State;
@@ -95,6 +95,8 @@ struct Way {
     criterion: Criterion,
     /// Where the trained coefficients start.
     start: Start,
+    /// How they are learned along, if they start as given.
+    joint: Joint,
     /// Whether the residual learns alone, on a prior without forces.
     alone: bool,
     /// Whether all rollouts count alike, as in the papers.
@@ -108,12 +110,18 @@ const fn way(name: &'static str, prior: &'static str, trainable: bool) -> Way {
         trainable,
         criterion: Criterion::Scaled,
         start: Start::EquationError,
+        joint: Joint::Gradient,
         alone: false,
         alike: false,
     }
 }
 
-const WAYS: [Way; 13] = [
+/// Trained along with the residual from the severe prior as given.
+const fn along(name: &'static str, joint: Joint, alike: bool) -> Way {
+    Way { start: Start::AsGiven, joint, alike, ..way(name, "prior-severe", true) }
+}
+
+const WAYS: [Way; 16] = [
     way("true-frozen", "prior", false),
     way("true-trainable", "prior", true),
     way("mild-frozen", "prior-mild", false),
@@ -121,9 +129,12 @@ const WAYS: [Way; 13] = [
     way("severe-frozen", "prior-severe", false),
     way("severe-trainable", "prior-severe", true),
     way("as-printed-trainable", "prior-as-printed", true),
-    Way { start: Start::AsGiven, ..way("severe-joint", "prior-severe", true) },
+    along("severe-joint", Joint::Gradient, false),
+    along("severe-projected", Joint::Projection, false),
+    along("severe-least-squares", Joint::LeastSquares, false),
     Way { alike: true, ..way("true-paper", "prior", false) },
-    Way { alike: true, start: Start::AsGiven, ..way("severe-paper", "prior-severe", true) },
+    along("severe-paper", Joint::Gradient, true),
+    along("severe-paper-projected", Joint::Projection, true),
     Way { alike: true, criterion: Criterion::Plain, ..way("severe-phihp", "prior-severe", false) },
     Way {
         alike: true,
@@ -326,7 +337,11 @@ fn trained(
         trainable,
         criterion: way.criterion,
         start: way.start,
-        prior_rate: if way.start == Start::AsGiven { 3e-3 } else { 0.0 },
+        joint: way.joint,
+        prior_rate: match (way.start, way.joint) {
+            (Start::AsGiven, Joint::Gradient) => 3e-3,
+            _ => 0.0,
+        },
         seed: arguments.seed,
         ..Recipe::default()
     };

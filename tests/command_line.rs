@@ -223,6 +223,64 @@ fn completions_know_the_commands() {
 }
 
 #[test]
+fn manual_pages_are_there_for_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().join("man1");
+    let written = greylag(&["man", place.to_str().unwrap()]);
+    assert!(written.status.success());
+    let page = std::fs::read_to_string(place.join("greylag-aircraft-check.1")).unwrap();
+    assert!(page.contains("Model of the aircraft"), "{page}");
+    assert!(place.join("greylag.1").exists() && place.join("greylag-workbench.1").exists());
+}
+
+/// What a command found, as JSON on standard output with nothing else there.
+fn json(arguments: &[&str], schema: &str) -> serde_json::Value {
+    let output = greylag(&[arguments, &["--json", "-"]].concat());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{arguments:?}: {e}; {said}"));
+    assert_eq!(value["schema"], schema, "{arguments:?}");
+    value
+}
+
+#[test]
+fn commands_say_what_they_found_as_json() {
+    let x8 = ["--model", "params/x8/jsbsim.toml"];
+    let check = json(&[&["aircraft", "check"], &x8[..]].concat(), "greylag.aircraft-check/1");
+    assert!(check["modes"].as_array().unwrap().len() >= 5 && check["loops"][0]["delay"].is_f64());
+    let list = json(&["effects", "list"], "greylag.effects/1");
+    assert!(list["effects"].as_array().unwrap().iter().any(|e| e["id"] == "lift_stall"));
+    let one = json(&["effects", "show", "propwash"], "greylag.effects/1");
+    assert_eq!(one["effects"][0]["parameters"][0]["name"], "k");
+    let between = ["design", "--between", "drag_beta2", "drag_alpha2"];
+    let prior = ["--model", "params/x8/prior.toml"];
+    let design = json(&[&between[..], &prior[..]].concat(), "greylag.design/1");
+    assert!(design["chosen"].is_string() && !design["manoeuvres"].as_array().unwrap().is_empty());
+    let flown = ["faults", "--flights", "1", "--counterpart", "sitl"];
+    let faults = json(&[&flown[..], &x8[..]].concat(), "greylag.faults/1");
+    assert_eq!(faults["flights"][0]["counterpart"], "sitl");
+}
+
+/// Monte Carlo over the widths of a model: the controller is that of the model, what flies is drawn.
+#[test]
+fn evaluate_flies_models_drawn_from_widths() {
+    let folder = tempfile::tempdir().unwrap();
+    let targets = folder.path().join("targets.csv");
+    std::fs::write(&targets, "group,roll_deg,pitch_deg\neasy,20,5\nhard_corners,50,-26\n").unwrap();
+    let line =
+        ["evaluate", "--controller", "lqi", "--model", "params/x8/prior.toml", "--draws", "3"];
+    let with = [&line[..], &["--targets", targets.to_str().unwrap()]].concat();
+    let found = json(&with, "greylag.robustness/1");
+    let [lqi] = &found["controllers"].as_array().unwrap()[..] else { panic!("{found}") };
+    let draws = lqi["draws"].as_array().unwrap();
+    assert_eq!(draws.len(), 3);
+    // an LQI has integrals: it settles whatever the coefficients are, at other moments in each draw
+    assert!(draws.iter().all(|d| d[0].as_f64().unwrap() < 0.5 && d[1] == 0), "{found}");
+    assert!(draws[0] != draws[1] && draws[1] != draws[2], "{found}");
+    assert_eq!(lqi["all"]["groups"][0]["count"], 3);
+}
+
+#[test]
 fn a_reader_that_leaves_is_no_fault() {
     for arguments in [["effects", "list"], ["completions", "bash"]] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_greylag"))

@@ -150,6 +150,29 @@ fn a_flight_is_announced_told_summed_up_and_recorded_until_ctrl_c() {
     assert!(
         std::fs::metadata(folder.path().join("flights/0001/flight.tlog")).unwrap().len() > 10_000
     );
+    is_replayed_and_drawn_without_options(folder.path());
+}
+
+/// The recording says what flew: the LQI, not the controller that flies by default.
+fn is_replayed_and_drawn_without_options(folder: &Path) {
+    let greylag = |arguments: &[&str]| -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_greylag"));
+        command.args(arguments).arg("flights/0001").current_dir(folder).output().unwrap()
+    };
+    let replayed = greylag(&["replay", "--json", "-"]);
+    let said = String::from_utf8_lossy(&replayed.stderr);
+    assert!(replayed.status.success(), "{said}");
+    let outcome: serde_json::Value = serde_json::from_slice(&replayed.stdout).unwrap();
+    assert_eq!(outcome["schema"], "greylag.replay/1");
+    assert!(outcome["ticks"].as_u64().unwrap() > 50 && outcome["different"] == 0, "{outcome}");
+    // another controller gives other commands
+    assert!(!greylag(&["replay", "--controller", "pid"]).status.success());
+    let drawn = greylag(&["report"]);
+    assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
+    let page = std::fs::read_to_string(folder.join("flights/0001/report.html")).unwrap();
+    assert!(page.contains("lqi") && page.contains("prior-severe-learned"));
+    let again = greylag(&["report"]);
+    assert!(String::from_utf8_lossy(&again.stderr).contains("--force"));
 }
 
 #[test]

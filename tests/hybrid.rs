@@ -2,16 +2,18 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use greylag::control::cem::{Aids, Cem, Settings, Update, Value};
 use greylag::control::ilqr::Ilqr;
 use greylag::control::lqi::Lqi;
 use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Origin, Policy};
 use greylag::control::{self, Controller, Kind, Observation, SetupError, Source, Target};
-use greylag::model::{GreyBox, Memory};
+use greylag::model::{GreyBox, Memory, Residual};
 use greylag::num::{Dense, stream};
 use greylag::physics::actuators::Actuators;
-use greylag::physics::{ActuatorState, Command, State, Time};
+use greylag::physics::{ActuatorState, Command, Controls, State, Time};
+use rand::RngExt;
 
 fn model() -> GreyBox {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
@@ -421,5 +423,83 @@ fn what_the_planner_saw_can_be_told() {
             ends.clone().fold(f64::MIN, f64::max) - ends.fold(f64::MAX, f64::min)
         };
         assert!(spread(0) > 1e-4 && spread(1) > 1e-4);
+    }
+}
+
+/// What flies where the planner does not plan: the LQI, or the policy.
+fn unsearched(kind: Kind, model: &GreyBox, agent: &Agent, all: &[Observation]) -> Command {
+    let mut controller: Box<dyn Controller> = match kind {
+        Kind::HybridLqi => control::build(Kind::Lqi, model).unwrap(),
+        _ => Box::new(Policy::new(agent)),
+    };
+    controller.reset(1);
+    all.iter().map(|seen| controller.command(seen, &TARGET)).last().unwrap()
+}
+
+/// What a planner commands with a change of its settings.
+fn planned(
+    kind: Kind,
+    model: &GreyBox,
+    agent: &Agent,
+    change: &str,
+    all: &[Observation],
+) -> Command {
+    let changes = [change.parse().unwrap()];
+    let source = Source { model, agent: Some(agent), changes: &changes };
+    let mut planner = control::build(kind, source).unwrap();
+    planner.reset(1);
+    all.iter().map(|seen| planner.command(seen, &TARGET)).last().unwrap()
+}
+
+/// Beyond the data that the model was learned from nothing is planned.
+#[test]
+fn beyond_the_data_of_the_model_nothing_is_planned() {
+    let mut model = model();
+    let agent = agent(&model, 1.0);
+    let mut rng = stream::stream(8, &[]);
+    let mut network = Dense::uniform(&[9, 16, 8], &mut rng).unwrap();
+    network.parameters_mut().iter_mut().skip(160).for_each(|p| *p *= 1e-3);
+    let residual = Residual::new(network, &model.airframe, model.scale()).unwrap();
+    let mut draw = |most: f64| rng.random_range(-most..most);
+    let samples: Vec<_> = (0..500)
+        .map(|_| {
+            let state = State { alpha: 0.04 + draw(0.05), q: draw(0.3), ..State::NEUTRAL };
+            let controls = Controls { elevator: draw(0.1), throttle: 0.3, ..Controls::default() };
+            (state, controls)
+        })
+        .collect();
+    model.residual = Some(residual.trained_on(samples.iter().map(|(x, u)| (x, u))));
+    let stalled = State { alpha: 0.5, ..seen().state };
+    for kind in [Kind::HybridLqi, Kind::HybridPolicy, Kind::Hybrid] {
+        let far = [Observation { state: stalled, ..seen() }];
+        let alone = unsearched(kind, &model, &agent, &far);
+        let beyond = planned(kind, &model, &agent, "known=1", &far);
+        assert!(near(&beyond, &alone, 1e-5), "{kind}: {beyond:?} {alone:?}");
+        let within = [Observation { state: State::NEUTRAL, ..seen() }];
+        let [one, other] =
+            ["known=1", "known=none"].map(|c| planned(kind, &model, &agent, c, &within));
+        assert_eq!(one, other, "{kind}");
+    }
+}
+
+/// A model that does not predict is not planned with.
+#[test]
+fn a_model_that_does_not_predict_is_not_planned_with() {
+    let model = model();
+    let agent = agent(&model, 1.0);
+    // pitch rates that come and go as no aircraft's do
+    let jumping: Vec<Observation> = (0..60)
+        .map(|k| {
+            let q = if k % 2 == 0 { 1.0 } else { -1.0 };
+            let time = Time::default().plus(Duration::from_secs_f64(0.01 * f64::from(k)));
+            Observation { time, state: State { q, ..seen().state }, ..seen() }
+        })
+        .collect();
+    for kind in [Kind::HybridPolicy, Kind::Hybrid] {
+        let alone = unsearched(kind, &model, &agent, &jumping);
+        let [guarded, unguarded] = ["trust=0.5", "trust=none"]
+            .map(|change| planned(kind, &model, &agent, change, &jumping));
+        assert!(near(&guarded, &alone, 1e-5), "{kind}: {guarded:?} {alone:?}");
+        assert!(!near(&unguarded, &alone, 1e-5), "{kind}: {unguarded:?} {alone:?}");
     }
 }

@@ -87,6 +87,32 @@ fn exploring_then_learning_leaves_a_model_that_follows_better() {
     assert!(said(&other).contains("another --out"), "{}", said(&other));
 }
 
+/// A log as people have it: real PX4, 23 samples a second, no vanes, an aircraft described by its geometry.
+#[test]
+fn a_real_log_of_few_samples_a_second_is_learned_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let geometry = ["--mass-kg", "9.5", "--span-m", "4", "--area-m2", "1.499"];
+    let motor = ["--static-thrust-n", "35", "--pitch-speed-mps", "20"];
+    let new = ["aircraft", "new", &at("dawn"), "--name", "Dawn One"];
+    let made = greylag(&[&new[..], &geometry, &motor].concat());
+    assert!(made.status.success(), "{}", said(&made));
+    let (prior, out) = (at("dawn/model.toml"), at("learned"));
+    let log = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/dawn_one/fit.csv");
+    let log = log.display().to_string();
+    let train = ["train", "dynamics", "--prior", &prior, "--log", &log, "--trainable", "all"];
+    let small = ["--hidden", "8", "--batch", "16", "--updates", "40", "--out", &out];
+    let learned = greylag(&[&train[..], &small].concat());
+    assert!(learned.status.success(), "{}", said(&learned));
+    let words = said(&learned);
+    assert!(words.contains("23 samples a second") && words.contains("n 200"), "{words}");
+    let json = std::fs::read_to_string(Path::new(&out).join("training.json")).unwrap();
+    assert!(json.contains("last fifth of each flight"), "{json}");
+    // a flight that does not show the damping in roll leaves it an aircraft's, or the model could not be read again
+    let model = Path::new(&out).join("model.toml").display().to_string();
+    greylag::model::GreyBox::load(Path::new(&model)).unwrap();
+}
+
 #[test]
 fn what_is_missing_is_said() {
     let folder = tempfile::tempdir().unwrap();

@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, Once};
 use std::time::Duration;
 
@@ -21,6 +21,18 @@ const TICK: Duration = Duration::from_millis(200);
 /// Times that Ctrl-C was pressed.
 static PRESSED: AtomicUsize = AtomicUsize::new(0);
 static LISTENING: Once = Once::new();
+/// Whether `--quiet` was given.
+static SILENT: AtomicBool = AtomicBool::new(false);
+
+/// Shows no progress from now on, if `quiet`.
+pub fn silence(quiet: bool) {
+    SILENT.store(quiet, Ordering::Relaxed);
+}
+
+/// Whether progress is shown.
+pub fn is_silent() -> bool {
+    SILENT.load(Ordering::Relaxed)
+}
 
 /// A bar on a terminal, a line a stage elsewhere.
 pub struct Bar {
@@ -41,7 +53,7 @@ impl Bar {
                 tracing::warn!("Ctrl-C ends the program at once: {error}");
             }
         });
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let bar = (std::io::stderr().is_terminal() && !is_silent()).then(|| {
             let style = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} %, {eta} left");
             let bar = ProgressBar::new(STEPS);
             if let Ok(style) = style {
@@ -84,7 +96,7 @@ impl Bar {
     /// Writes a stage that differs from the one before.
     fn line(&self, doing: &str) {
         let Ok(mut last) = self.last.lock() else { return };
-        if *last != doing {
+        if *last != doing && !is_silent() {
             eprintln!("{doing}");
             doing.clone_into(&mut last);
         }

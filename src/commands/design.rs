@@ -5,10 +5,11 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use comfy_table::{CellAlignment, Table};
+use serde::Serialize;
 
 use crate::commands::bar::Bar;
 use crate::commands::effect_files::named_effects;
-use crate::commands::files::{self, shipped};
+use crate::commands::files::{self, JsonArgument, shipped};
 use crate::control::{Kind, build};
 use crate::model::GreyBox;
 use crate::sim::design::{ENOUGH, LONGEST_S, Plan, Prospect, Suspect, plan, prospects};
@@ -28,9 +29,52 @@ pub struct Arguments {
     /// Write the schedule, for `greylag fly --schedule`.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace the schedule if it exists.
+    /// Replace the files if they exist.
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    json: JsonArgument,
+}
+
+/// What each manoeuvre is expected to tell, as JSON; no value where the aircraft would leave its bounds.
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'static str,
+    program: &'static str,
+    between: [&'a str; 2],
+    manoeuvres: Vec<Manoeuvre<'a>>,
+    chosen: Option<&'a str>,
+    /// How many seconds of the chosen one tell the two apart.
+    chosen_s: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct Manoeuvre<'a> {
+    name: &'a str,
+    duration_s: f64,
+    separation: Option<f64>,
+    needed_s: Option<f64>,
+}
+
+fn document<'a>(
+    suspects: &'a [Suspect; 2],
+    all: &'a [Prospect],
+    plan: Option<&'a Plan>,
+) -> Document<'a> {
+    let row = |p: &'a Prospect| Manoeuvre {
+        name: p.name,
+        duration_s: p.duration_s,
+        separation: p.apart(),
+        needed_s: p.seconds().filter(|s| s.is_finite()),
+    };
+    Document {
+        schema: "greylag.design/1",
+        program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+        between: [&suspects[0].id, &suspects[1].id],
+        manoeuvres: all.iter().map(row).collect(),
+        chosen: plan.map(|p| p.manoeuvre.name),
+        chosen_s: plan.map(|p| p.seconds),
+    }
 }
 
 /// Flies the menu in both imagined aircraft, prints what each manoeuvre would tell, writes the best.
@@ -42,6 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.out {
         files::writable(path, overwrite)?;
     }
+    arguments.json.writable(overwrite)?;
     let model = GreyBox::load(&shipped(&arguments.model))?;
     let suspects = suspects(arguments)?;
     let lqi = build(Kind::Lqi, &model)?;
@@ -49,17 +94,22 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let all = prospects(&model, lqi.as_ref(), &suspects, &|stage| bar.hear(stage))?;
     bar.go_on()?;
     drop(bar);
-    println!("{}", table(&all));
+    let quiet = arguments.json.takes_stdout();
+    if !quiet {
+        println!("{}", table(&all));
+    }
     let [a, b] = &suspects;
     let cruise = model.airframe.envelope.airspeed_cruise_mps;
-    let Some(Plan { manoeuvre, seconds, times, schedule }) = plan(&all, cruise) else {
+    let plan = plan(&all, cruise);
+    arguments.json.write(&document(&suspects, &all, plan.as_ref()), overwrite)?;
+    let Some(Plan { manoeuvre, seconds, times, schedule }) = plan else {
         bail!(
             "no manoeuvre of the menu tells {} from {} within {LONGEST_S} s; name larger --values, or take both as one",
             a.id,
             b.id
         );
     };
-    println!(
+    let words = format!(
         "{}: {}\n{seconds:.1} s of it tell {} from {} (evidence {ENOUGH}); one pass takes {:.0} s",
         manoeuvre.name,
         manoeuvre.description,
@@ -67,9 +117,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         b.id,
         manoeuvre.schedule().duration()
     );
+    if !quiet {
+        println!("{words}");
+    }
     if let Some(path) = &arguments.out {
         files::write(path, &schedule.to_toml(), overwrite)?;
-        println!(
+        eprintln!(
             "written to {} ({times} times, on opposite headings); fly it with `greylag demo --schedule {}`",
             path.display(),
             path.display()

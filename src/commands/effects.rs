@@ -6,12 +6,13 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use comfy_table::Table;
+use serde::Serialize;
 
 use crate::commands::effect_files::is_file;
-use crate::commands::files::{self, shipped};
+use crate::commands::files::{self, JsonArgument, Overwrite, shipped};
 use crate::model::GreyBox;
 use crate::physics::Channel;
-use crate::physics::effects::{self, Description};
+use crate::physics::effects::{self, Coefficient, Description};
 use crate::physics::formula::expression::Function;
 use crate::physics::formula::{Variable, Written, register};
 use crate::physics::inputs;
@@ -29,7 +30,7 @@ pub struct Arguments {
 #[derive(clap::Subcommand)]
 enum What {
     /// Every effect in a line.
-    List,
+    List(JsonArgument),
     /// All that is known of one effect, of the catalogue or of a file; with --report, its signature drawn.
     Show(Show),
     /// The variables and functions of formulas in effect files.
@@ -47,9 +48,63 @@ struct Show {
     /// The model that the signature is drawn on.
     #[arg(long, default_value = "params/x8/jsbsim.toml")]
     model: PathBuf,
-    /// Replace the page if it exists.
+    /// Replace the files if they exist.
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    json: JsonArgument,
+}
+
+/// An effect as JSON.
+#[derive(Serialize)]
+struct Document {
+    id: &'static str,
+    description: &'static str,
+    acts_on: &'static str,
+    channels: String,
+    parameters: Vec<Parameter>,
+}
+
+/// A parameter of an effect.
+#[derive(Serialize)]
+struct Parameter {
+    name: &'static str,
+    meaning: &'static str,
+    unit: &'static str,
+    bounds: (f64, f64),
+}
+
+impl Document {
+    fn new(place: Place, about: &Description) -> Document {
+        let parameter = |c: &Coefficient| Parameter {
+            name: c.name,
+            meaning: c.meaning,
+            unit: c.unit,
+            bounds: c.bounds,
+        };
+        Document {
+            id: about.id,
+            description: about.description,
+            acts_on: place.words(),
+            channels: channels(place, about),
+            parameters: about.coefficients.iter().map(parameter).collect(),
+        }
+    }
+}
+
+/// The catalogue as JSON.
+#[derive(Serialize)]
+struct Listed {
+    schema: &'static str,
+    program: &'static str,
+    effects: Vec<Document>,
+}
+
+impl Listed {
+    fn new(effects: Vec<Document>) -> Listed {
+        let program = concat!("greylag ", env!("CARGO_PKG_VERSION"));
+        Listed { schema: "greylag.effects/1", program, effects }
+    }
 }
 
 /// Where effects act, in the order of the list.
@@ -117,7 +172,15 @@ impl TypedValueParser for NamedParser {
 /// Prints the list or one entry; writes its page.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
-        What::List => print!("{}", list()),
+        What::List(json) => {
+            json.writable(Overwrite::Never)?;
+            if !json.takes_stdout() {
+                print!("{}", list());
+            }
+            let all = catalogue();
+            let effects = all.iter().map(|(place, about)| Document::new(*place, about)).collect();
+            json.write(&Listed::new(effects), Overwrite::Never)?;
+        }
         What::Show(show) => self::show(show)?,
         What::Variables => print!("{}", variables()),
     }
@@ -203,25 +266,13 @@ fn written(effect: &Written) {
 
 fn show(show: &Show) -> Result<()> {
     let (place, about) = named(&show.id)?;
+    let overwrite = show.force.into();
+    show.json.write(&Listed::new(vec![Document::new(place, &about)]), overwrite)?;
     let channels = channels(place, &about);
-    println!("{}", about.id);
-    for [name, text] in effect_facts(&about, place.words(), &channels) {
-        println!("  {name:20} {text}");
-    }
-    println!("  parameters");
-    for c in about.coefficients {
-        let (low, high) = c.bounds;
-        let line = format!("    {:18} {}; {low} to {high} {}", c.name, c.meaning, c.unit);
-        println!("{}", line.trim_end());
-    }
-    if let Some(table) = about.table {
-        println!("    {table:18} table over alpha_rad, which only a model file can give");
-    }
-    if let Some(effect) = register::find(about.id) {
-        written(effect);
+    if !show.json.takes_stdout() {
+        print(place, &about, &channels);
     }
     let Some(path) = &show.report else { return Ok(()) };
-    let overwrite = show.force.into();
     files::writable(path, overwrite)?;
     let model = GreyBox::load(&shipped(&show.model))?;
     let values = example(&model, &about);
@@ -241,6 +292,26 @@ fn show(show: &Show) -> Result<()> {
         values,
     };
     files::write(path, &report.page().render(), overwrite)
+}
+
+/// Prints all that is known of an effect.
+fn print(place: Place, about: &Description, channels: &str) {
+    println!("{}", about.id);
+    for [name, text] in effect_facts(about, place.words(), channels) {
+        println!("  {name:20} {text}");
+    }
+    println!("  parameters");
+    for c in about.coefficients {
+        let (low, high) = c.bounds;
+        let line = format!("    {:18} {}; {low} to {high} {}", c.name, c.meaning, c.unit);
+        println!("{}", line.trim_end());
+    }
+    if let Some(table) = about.table {
+        println!("    {table:18} table over alpha_rad, which only a model file can give");
+    }
+    if let Some(effect) = register::find(about.id) {
+        written(effect);
+    }
 }
 
 /// The catalogue's example; for part of a prior, the values that the model has.

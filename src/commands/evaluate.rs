@@ -14,15 +14,16 @@ use greylag_sitl::plant_arguments::PlantArgs;
 
 use crate::commands::files::{self, shipped};
 use crate::commands::start::{self, StartArguments};
-use crate::commands::{choices, fly};
+use crate::commands::{bar, choices, fly};
 use crate::control::cem::Change;
 use crate::control::{Controller, Kind, Needs, Target};
 use crate::model::GreyBox;
+use crate::num::statistics::quantile;
 use crate::physics::Airframe;
 use crate::physics::airframe::Envelope;
 use crate::report::EvaluationReport;
 use crate::sim::episode::STEPS;
-use crate::sim::evaluation::{Evaluation, evaluate};
+use crate::sim::evaluation::{Evaluation, Robustness, evaluate};
 use crate::sim::published::published;
 use crate::sim::tracking::{Tracking, track};
 use crate::sim::{Group, Simulator, TargetFile};
@@ -51,14 +52,18 @@ pub struct Arguments {
     /// Fly targets beyond the bank and pitch of the airframe's envelope too.
     #[arg(long)]
     beyond_envelope: bool,
-    /// Seed of the controllers' own randomness, with the air's.
+    /// Fly models drawn from the widths of the first --model's coefficients, so many, in place of JSBSim: Monte Carlo over
+    /// what is not known of the aircraft. The controllers keep the --model that they are built from.
+    #[arg(long, value_name = "N", conflicts_with = "report", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    draws: Option<u32>,
+    /// Seed of the controllers' own randomness, with the air's and the draws'.
     #[arg(long, default_value_t = 1)]
     seed: u32,
     #[command(flatten)]
     plant: PlantArgs,
     #[command(flatten)]
     start: StartArguments,
-    /// Write the scores as JSON.
+    /// Write the scores as JSON; `-` for standard output, with nothing else there.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Write the scores beside the paper's, single flights and what the planners saw as an HTML page.
@@ -96,6 +101,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if !arguments.beyond_envelope {
         within_envelope(&mut targets, &models[0].airframe)?;
     }
+    if let Some(draws) = arguments.draws {
+        return over_draws(arguments, draws, &models, &targets);
+    }
     start::describe(&mut plant, &models)?;
     plant.start = arguments.start.start(&plant.aircraft, &models)?;
     let entrants = entrants(arguments, &models)?;
@@ -105,10 +113,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .iter()
         .map(|e| one(arguments.seed, e, &targets, &plant))
         .collect::<Result<Vec<_>>>()?;
-    println!("{}", table(&evaluations));
-    println!("all: easy with hard_corners, the targets of the paper's Table II");
-    println!("paper's mean: Table XI, true frozen prior, ten policies");
-    println!("to 1°: median time after which roll and pitch stay within 1° of the target");
+    if !files::is_stdout(arguments.json.as_deref()) {
+        println!("{}", table(&evaluations));
+        println!("all: easy with hard_corners, the targets of the paper's Table II");
+        println!("paper's mean: Table XI, true frozen prior, ten policies");
+        println!("to 1°: median time after which roll and pitch stay within 1° of the target");
+    }
     if let Some(path) = &arguments.json {
         let document = Document {
             schema: "greylag.evaluation/1",
@@ -126,6 +136,82 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::write(path, &page(arguments, &evaluations, &flights), overwrite)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The JSON document of flights in drawn models.
+#[derive(Serialize)]
+struct DrawsDocument<'a> {
+    schema: &'static str,
+    program: &'static str,
+    command_line: String,
+    seed: u32,
+    targets: String,
+    model: &'a str,
+    controllers: &'a [Robustness],
+}
+
+/// Flies draws of the first model, prints the tables, writes the JSON.
+fn over_draws(
+    arguments: &Arguments,
+    draws: u32,
+    models: &[GreyBox],
+    targets: &TargetFile,
+) -> Result<ExitCode> {
+    let fly = |e: &Entrant| {
+        let progress = progress(draws.into(), "draws", &format!("{}, model {}", e.kind, e.model));
+        let make = || e.controller.boxed_clone();
+        let names = [e.kind.name(), e.model.as_str()];
+        let seeds = [arguments.seed, draws];
+        let flown =
+            Robustness::of(names, &make, &models[0], &targets.rows, seeds, &|| progress.inc(1))?;
+        progress.finish_and_clear();
+        Ok(flown)
+    };
+    let flown = entrants(arguments, models)?.iter().map(fly).collect::<Result<Vec<_>>>()?;
+    let all: Vec<Evaluation> = flown.iter().map(|r| r.all.clone()).collect();
+    if !files::is_stdout(arguments.json.as_deref()) {
+        println!("{}", table(&all));
+        println!("{}", draws_table(&flown));
+        println!("flown in draws of model {} from the widths of its coefficients", models[0].name);
+    }
+    if let Some(path) = &arguments.json {
+        let document = DrawsDocument {
+            schema: "greylag.robustness/1",
+            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+            command_line: files::command_line(),
+            seed: arguments.seed,
+            targets: arguments.targets.display().to_string(),
+            model: &models[0].name,
+            controllers: &flown,
+        };
+        let text = serde_json::to_string_pretty(&document)? + "\n";
+        files::write(path, &text, arguments.force.into())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// How each controller fared from draw to draw.
+fn draws_table(flown: &[Robustness]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header([
+        "controller",
+        "model",
+        "draws",
+        "with a loss",
+        "mean ° of a draw: median",
+        "95 %",
+        "worst",
+    ]);
+    for Robustness { all, draws } in flown {
+        let means: Vec<f64> = draws.iter().map(|(mean, _)| *mean).collect();
+        let mut row = vec![all.controller.clone(), all.model.clone(), draws.len().to_string()];
+        let lost = draws.iter().filter(|(_, lost)| *lost > 0).count();
+        row.push(lost.to_string());
+        row.extend([0.5, 0.95, 1.0].map(|q| format!("{:.3}", quantile(&means, q))));
+        table.add_row(row);
+    }
+    table
 }
 
 /// Roll and pitch, degrees, of the paper's Figures 7 to 9.
@@ -241,7 +327,8 @@ fn one(
     plant: &PlantOptions,
 ) -> Result<Evaluation> {
     let Entrant { kind, model, controller } = entrant;
-    let progress = progress(targets.rows.len() as u64, &format!("{kind}, model {model}"));
+    let what = format!("{kind}, model {model}");
+    let progress = progress(targets.rows.len() as u64, "targets", &what);
     let make = || controller.boxed_clone();
     let outcomes = evaluate(plant, &make, &targets.rows, seed, &|| progress.inc(1))
         .with_context(|| format!("cannot fly aircraft {}", plant.aircraft))?;
@@ -250,9 +337,12 @@ fn one(
 }
 
 /// A bar on a terminal, one plain line elsewhere.
-fn progress(length: u64, what: &str) -> ProgressBar {
+fn progress(length: u64, of: &str, what: &str) -> ProgressBar {
+    if bar::is_silent() {
+        return ProgressBar::hidden();
+    }
     if !std::io::stderr().is_terminal() {
-        eprintln!("flying {length} targets with {what}");
+        eprintln!("flying {length} {of} with {what}");
         return ProgressBar::hidden();
     }
     let bar = ProgressBar::new(length).with_message(what.to_owned());

@@ -13,7 +13,9 @@ use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use greylag_sitl::plant::PlantOptions;
 use rayon::prelude::*;
+use serde::Serialize;
 
+use crate::commands::files::{JsonArgument, Overwrite};
 use crate::commands::fly::{self, POLICY, companion_with};
 use crate::commands::{choices, start};
 use crate::control::Kind as ControllerKind;
@@ -54,6 +56,16 @@ pub struct Arguments {
     /// Note each flight in this file, and do not fly again those that are there (of the same program).
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
+}
+
+/// The flights as JSON.
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'static str,
+    program: &'static str,
+    flights: &'a [Entry],
 }
 
 impl ValueEnum for Counterpart {
@@ -78,6 +90,8 @@ impl ValueEnum for Counterpart {
 /// # Errors
 /// If an aircraft or a controller cannot be made, or the file of `--resume` cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    arguments.json.writable(Overwrite::Never)?;
+    let quiet = arguments.json.takes_stdout();
     let model = fly::model(&arguments.model, None)?;
     let models = std::slice::from_ref(&model);
     let mut plant =
@@ -98,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                     return Ok(known);
                 }
                 let report = factory.fly(case)?;
-                if arguments.show && !report.findings.is_empty() {
+                if arguments.show && !quiet && !report.findings.is_empty() {
                     show(&report);
                 }
                 let entry = Entry::from(&report);
@@ -110,9 +124,19 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             let flown: Result<Vec<Entry>> = seeds.into_par_iter().map(fly).collect();
             entries.extend(flown?);
         }
-        print_faults(controller, &arguments.counterpart, &entries[before..]);
+        if !quiet {
+            print_faults(controller, &arguments.counterpart, &entries[before..]);
+        }
     }
-    print_findings(&entries);
+    if !quiet {
+        print_findings(&entries);
+    }
+    let document = Document {
+        schema: "greylag.faults/1",
+        program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+        flights: &entries,
+    };
+    arguments.json.write(&document, Overwrite::Never)?;
     let failed = entries.iter().any(|entry| entry.findings.iter().any(|f| f.is_failure()));
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

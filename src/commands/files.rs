@@ -1,9 +1,10 @@
 //! The files a user names on the command line.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
+use serde::Serialize;
 
 pub use super::shipped::shipped;
 use crate::report;
@@ -26,6 +27,32 @@ impl From<bool> for Overwrite {
 /// Whether a path stands for standard output: `-`.
 pub fn is_stdout(path: Option<&Path>) -> bool {
     path == Some(Path::new("-"))
+}
+
+/// `--json` of a command.
+#[derive(clap::Args, Clone, Debug)]
+pub struct JsonArgument {
+    /// Write what was found as JSON; `-` for standard output, with nothing else there.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+impl JsonArgument {
+    /// Fails at once if it cannot be written later.
+    pub fn writable(&self, overwrite: Overwrite) -> Result<()> {
+        self.json.as_ref().map_or(Ok(()), |path| writable(path, overwrite))
+    }
+
+    /// Whether standard output is the JSON's alone.
+    pub fn takes_stdout(&self) -> bool {
+        is_stdout(self.json.as_deref())
+    }
+
+    /// Writes `document` where it was asked for, if it was.
+    pub fn write(&self, document: &impl Serialize, overwrite: Overwrite) -> Result<()> {
+        let Some(path) = &self.json else { return Ok(()) };
+        write(path, &(serde_json::to_string_pretty(document)? + "\n"), overwrite)
+    }
 }
 
 /// Fails at once if `path` may not be written later, so that no long task is lost to it.

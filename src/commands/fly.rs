@@ -9,9 +9,11 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use crossbeam_channel::RecvTimeoutError;
+use serde::{Deserialize, Serialize};
 
 use crate::commands::choices;
 use crate::commands::files::shipped;
+use crate::commands::flown_with::{Chosen, FlownWith};
 use crate::control::cem::Change;
 use crate::control::policy::{Agent, Origin};
 use crate::control::{self, Controller, Kind, Needs, Source, build};
@@ -97,7 +99,8 @@ pub struct Arguments {
 }
 
 /// The vehicle's profile by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum ProfileName {
     /// The simulator's shim.
     Sitl,
@@ -108,7 +111,8 @@ pub enum ProfileName {
 }
 
 /// What is commanded, by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum CommandName {
     /// Aileron, elevator, throttle.
     Surfaces,
@@ -148,6 +152,20 @@ impl Arguments {
         self.sign.clone().map(|key| Signing { key, vehicle, local: self.local.clone() })
     }
 
+    /// What is noted beside the recording.
+    fn chosen(&self) -> Chosen<'_> {
+        Chosen {
+            controller: self.controller,
+            model: &self.model,
+            policy: &self.policy,
+            changes: &self.changes,
+            airframe: self.airframe.as_deref(),
+            schedule: self.schedule.as_deref(),
+            profile: self.profile,
+            commanded: self.command,
+        }
+    }
+
     fn controller_profile(&self, model: &GreyBox) -> Option<Profile> {
         // no message of a real controller's link commands a rudder
         let actuators = ActuatorFigures { rudder: None, ..model.airframe.actuators };
@@ -185,6 +203,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
         .context("setting the handler of Ctrl-C")?;
     let flight = Flight::start(&options, companion, stop)?;
+    if let Some(folder) = &flight.recording {
+        // the flight goes on: the recording is whole without it
+        if let Err(why) = FlownWith::write(folder, &arguments.chosen(), &model) {
+            eprintln!("greylag: `replay` will need this flight's options: {why:#}");
+        }
+    }
     announce(arguments, &model, &flight);
     show_events(&flight, &arguments.vehicle);
     let summary =

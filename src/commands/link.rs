@@ -1,5 +1,6 @@
 //! `greylag link`: what a link to a flight controller carries, and what it lacks.
 
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -9,7 +10,9 @@ use clap::{Args, Subcommand};
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use crossbeam_channel::{Receiver, bounded};
+use serde::Serialize;
 
+use crate::commands::files::{JsonArgument, Overwrite};
 use crate::commands::fly::{self, CommandName, ProfileName};
 use crate::link::address::Address;
 use crate::link::peer::LinkId;
@@ -17,6 +20,13 @@ use crate::link::transport::{Arrival, Link, Network};
 use crate::link::vehicle::real::parameters::Standing;
 use crate::link::vehicle::{Profile, Real, Stack};
 use crate::physics::airframe::ActuatorFigures;
+
+/// Writes a line; a reader that is gone is no error.
+macro_rules! say {
+    ($out:expr, $($words:tt)*) => {{
+        let _ = writeln!($out, $($words)*);
+    }};
+}
 
 /// How long a controller has to be heard.
 const PATIENCE: Duration = Duration::from_secs(4);
@@ -56,6 +66,8 @@ struct Check {
     /// How long to measure.
     #[arg(long, value_name = "S", default_value_t = 8, value_parser = clap::value_parser!(u64).range(4..=3600))]
     seconds: u64,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 /// Runs `greylag link …`.
@@ -64,6 +76,9 @@ struct Check {
 /// If the link cannot be opened, or nobody answers on it.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Command::Check(check) = &arguments.command;
+    check.json.writable(Overwrite::Never)?;
+    let mut out: Box<dyn Write> =
+        if check.json.takes_stdout() { Box::new(io::sink()) } else { Box::new(io::stdout()) };
     let model = fly::model(&check.model, None)?;
     let mut ear = Ear::open(&check.vehicle)?;
     let actuators = model.airframe.actuators;
@@ -73,9 +88,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         None => ear.find(check.command, actuators)?,
     };
     let profile = Profile { stack, authority: check.command.authority(), actuators };
-    println!("measuring {} for {} s …", check.vehicle, check.seconds);
+    say!(out, "measuring {} for {} s …", check.vehicle, check.seconds);
     let real = ear.listen(Real::new(profile), Duration::from_secs(check.seconds));
-    report(check, &real)
+    report(check, &real, &mut out)
 }
 
 /// The open link.
@@ -144,20 +159,73 @@ impl Ear {
     }
 }
 
+/// What was found, as JSON.
+#[derive(Serialize)]
+struct Document {
+    schema: &'static str,
+    program: &'static str,
+    stack: String,
+    system: Option<u8>,
+    armed: Option<bool>,
+    loss: f64,
+    /// TIMESYNC there and back, the median.
+    round_trip_ms: Option<f64>,
+    streams: Vec<StreamRow>,
+    parameters: Vec<String>,
+    warning: Option<String>,
+    /// What keeps the profile from being flown; nothing if it can be.
+    missing: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct StreamRow {
+    message: &'static str,
+    wanted_hz: f64,
+    received_hz: f64,
+    jitter_ms: f64,
+    needed: bool,
+}
+
+impl Document {
+    fn new(real: &Real, missing: &[String]) -> Document {
+        let survey = real.survey();
+        let trips = survey.round_trips();
+        let stream = |s: &crate::link::vehicle::real::profile::Stream| {
+            let traffic = survey.messages().find(|(id, _)| *id == s.id);
+            let (received_hz, jitter_ms) =
+                traffic.map_or((0.0, 0.0), |(_, t)| (t.hz, t.jitter_ms()));
+            StreamRow { message: s.name, wanted_hz: s.hz, received_hz, jitter_ms, needed: s.needed }
+        };
+        Document {
+            schema: "greylag.link-check/1",
+            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+            stack: real.profile().stack.to_string(),
+            system: real.system(),
+            armed: real.controller().map(|(_, armed)| armed),
+            loss: survey.loss(),
+            round_trip_ms: trips.get(trips.len() / 2).map(|t| t.as_secs_f64() * 1e3),
+            streams: real.profile().stack.streams().iter().map(stream).collect(),
+            parameters: real.parameter_report().into_iter().map(|(_, _, words)| words).collect(),
+            warning: real.radio_warning(),
+            missing: missing.to_vec(),
+        }
+    }
+}
+
 /// Prints what was found; fails when the profile cannot be flown.
-fn report(check: &Check, real: &Real) -> Result<ExitCode> {
+fn report(check: &Check, real: &Real, out: &mut dyn Write) -> Result<ExitCode> {
     let Some((autopilot, armed)) = real.controller() else {
         bail!("the controller fell silent while it was measured: check cable and power");
     };
     let who = Stack::of(autopilot).map_or("unknown autopilot".into(), |stack| stack.to_string());
     let state = if armed { "armed" } else { "disarmed" };
-    println!("controller  {who}, system {}, {state}", real.system().unwrap_or(0));
+    say!(out, "controller  {who}, system {}, {state}", real.system().unwrap_or(0));
     let mut missing = Vec::new();
     if Stack::of(autopilot) != Some(real.profile().stack) {
         missing.push(format!("the controller is {who}, not {}", real.profile().stack));
     }
-    traffic(check, real, &mut missing);
-    latency(real);
+    traffic(check, real, &mut missing, out);
+    latency(real, out);
     if real.is_shut_out() {
         missing.push(
             "the controller signs its frames and ignores this command's, which are not signed: fly \
@@ -165,33 +233,39 @@ fn report(check: &Check, real: &Real) -> Result<ExitCode> {
                 .into(),
         );
     } else {
-        streams(real, &mut missing);
-        parameters(real, &mut missing);
-        real.radio_warning().iter().for_each(|words| println!("\nwarning: {words}"));
+        streams(real, &mut missing, out);
+        parameters(real, &mut missing, out);
+        if let Some(words) = real.radio_warning() {
+            say!(out, "\nwarning: {words}");
+        }
     }
+    check.json.write(&Document::new(real, &missing), Overwrite::Never)?;
     if missing.is_empty() {
-        println!("\n{} can be flown by {:?}", real.profile().stack, real.profile().authority);
+        say!(out, "\n{} can be flown by {:?}", real.profile().stack, real.profile().authority);
         return Ok(ExitCode::SUCCESS);
     }
-    println!("\nmissing for {} by {:?}:", real.profile().stack, real.profile().authority);
-    missing.iter().for_each(|line| println!("  {line}"));
+    say!(out, "\nmissing for {} by {:?}:", real.profile().stack, real.profile().authority);
+    for line in &missing {
+        say!(out, "  {line}");
+    }
     Ok(ExitCode::FAILURE)
 }
 
-fn traffic(check: &Check, real: &Real, missing: &mut Vec<String>) {
+fn traffic(check: &Check, real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
     let survey = real.survey();
     let rate: f64 = survey
         .messages()
         .map(|(_, t)| survey.mean_hz(t) * t.bytes as f64 / t.frames.max(1) as f64)
         .sum();
     let kilobits = |bytes: f64| bytes * 10.0 * 1e-3;
-    print!("received    {:.0} kbit/s (ten bits a byte on a wire)", kilobits(rate));
+    let _ = write!(out, "received    {:.0} kbit/s (ten bits a byte on a wire)", kilobits(rate));
     let wanted: f64 =
         real.profile().stack.streams().iter().map(|s| s.hz * f64::from(s.bytes)).sum();
     match check.vehicle {
         Address::Serial { baud, .. } => {
             let share = wanted * 10.0 / f64::from(baud);
-            println!(
+            say!(
+                out,
                 "; the streams need {:.0} of {:.0} kbit/s, {:.0} %",
                 kilobits(wanted),
                 f64::from(baud) * 1e-3,
@@ -204,27 +278,28 @@ fn traffic(check: &Check, real: &Real, missing: &mut Vec<String>) {
                 ));
             }
         }
-        _ => println!("; the streams need {:.0}", kilobits(wanted)),
+        _ => say!(out, "; the streams need {:.0}", kilobits(wanted)),
     }
-    println!("loss        {:.2} % by sequence numbers", 100.0 * survey.loss());
+    say!(out, "loss        {:.2} % by sequence numbers", 100.0 * survey.loss());
     let counts = real.counts().frames;
     if counts.bad() > 0 {
-        println!("bad frames  {} ({} with a wrong CRC)", counts.bad(), counts.bad_crc);
+        say!(out, "bad frames  {} ({} with a wrong CRC)", counts.bad(), counts.bad_crc);
     }
     if survey.loss() > 0.02 {
         missing.push("more than 2 % of the frames are lost: check cable and flow control".into());
     }
 }
 
-fn latency(real: &Real) {
+fn latency(real: &Real, out: &mut dyn Write) {
     let trips = real.survey().round_trips();
     let at = |share: f64| {
         let index = ((trips.len() - 1) as f64 * share).round() as usize;
         trips[index].as_secs_f64() * 1e3
     };
     match trips.is_empty() {
-        true => println!("latency     TIMESYNC is not answered"),
-        false => println!(
+        true => say!(out, "latency     TIMESYNC is not answered"),
+        false => say!(
+            out,
             "latency     TIMESYNC there and back: median {:.1}, 95 % {:.1}, longest {:.1} ms ({} trips)",
             at(0.5),
             at(0.95),
@@ -234,7 +309,7 @@ fn latency(real: &Real) {
     }
 }
 
-fn streams(real: &Real, missing: &mut Vec<String>) {
+fn streams(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
     let mut table = Table::new();
     table.load_style(NOTHING).set_header(["message", "wanted", "received", "jitter", ""]);
     for stream in real.profile().stack.streams() {
@@ -268,7 +343,7 @@ fn streams(real: &Real, missing: &mut Vec<String>) {
             verdict.to_owned(),
         ]);
     }
-    println!("\n{table}");
+    say!(out, "\n{table}");
     let named: Vec<u32> = real.profile().stack.streams().iter().map(|stream| stream.id).collect();
     let others: Vec<String> = real
         .survey()
@@ -277,7 +352,7 @@ fn streams(real: &Real, missing: &mut Vec<String>) {
         .map(|(id, traffic)| format!("{id} ({:.1} Hz)", real.survey().mean_hz(traffic)))
         .collect();
     if !others.is_empty() {
-        println!("others by number: {}", others.join(", "));
+        say!(out, "others by number: {}", others.join(", "));
     }
 }
 
@@ -289,10 +364,10 @@ fn remedy(stack: Stack) -> &'static str {
     }
 }
 
-fn parameters(real: &Real, missing: &mut Vec<String>) {
-    println!("\nparameters");
+fn parameters(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
+    say!(out, "\nparameters");
     for (_, standing, words) in real.parameter_report() {
-        println!("  {words}");
+        say!(out, "  {words}");
         if !matches!(standing, Standing::Good(_) | Standing::Absent) {
             missing.push(words);
         }

@@ -22,6 +22,7 @@ mod evaluate;
 #[cfg(feature = "sitl")]
 mod faults;
 mod files;
+mod flown_with;
 pub mod fly;
 mod intake;
 mod interruption;
@@ -30,10 +31,15 @@ mod learn;
 mod link;
 mod log_once;
 mod logs;
+mod man;
 #[cfg(feature = "sitl")]
 mod mystery;
 mod propose;
+#[cfg(feature = "sitl")]
+mod recording_report;
 mod replay;
+#[cfg(feature = "sitl")]
+mod report;
 mod said_once;
 pub mod shipped;
 mod status;
@@ -74,6 +80,12 @@ use interruption::{Ended, Interruption};
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Say more of what happens; twice, all of it.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
+    verbose: u8,
+    /// Show no progress and no warnings, only results and errors.
+    #[arg(short, long, global = true)]
+    quiet: bool,
 }
 
 #[derive(Subcommand)]
@@ -121,8 +133,13 @@ enum Command {
     Mystery(mystery::Arguments),
     /// Propose a formula for what no effect of the catalogue explains.
     Propose(propose::Arguments),
+    /// Write the manual pages of every subcommand into a folder.
+    Man(man::Arguments),
     /// Replay a recorded flight, and compare the pilot's commands bit by bit.
     Replay(replay::Arguments),
+    /// Draw a recorded flight as a page: attitude, commands, timing, the model's error.
+    #[cfg(feature = "sitl")]
+    Report(report::Arguments),
     /// Write a target file.
     #[cfg(feature = "sitl")]
     Targets(targets::Arguments),
@@ -147,14 +164,21 @@ fn end_with_the_reader() {
 
 /// Runs the subcommand of the command line; what goes wrong is said in one line.
 pub fn main() -> ExitCode {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    let Arguments { command, verbose, quiet } = Arguments::parse();
+    bar::silence(quiet);
+    let level = match (quiet, verbose) {
+        (true, _) => "error",
+        (_, 0) => "warn",
+        (_, 1) => "info",
+        (_, 2..) => "debug",
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .without_time()
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(|| log_once::LogOnce)
         .init();
-    let command = Arguments::parse().command;
     // what flies goes on without a reader
     if !matches!(command, Command::Fly(_)) {
         end_with_the_reader();
@@ -187,7 +211,12 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "sitl")]
         Command::Mystery(arguments) => mystery::run(&arguments),
         Command::Propose(arguments) => propose::run(&arguments),
+        Command::Man(arguments) => {
+            man::run(&arguments, <Arguments as clap::CommandFactory>::command())
+        }
         Command::Replay(arguments) => replay::run(&arguments),
+        #[cfg(feature = "sitl")]
+        Command::Report(arguments) => report::run(&arguments),
         #[cfg(feature = "sitl")]
         Command::Targets(arguments) => targets::run(&arguments),
         #[cfg(feature = "learn")]

@@ -33,7 +33,7 @@ pub struct Arguments {
     /// Write the effect file, which `greylag amend --effect` takes.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write everything that was found as JSON.
+    /// Write everything that was found as JSON; `-` for standard output, with nothing else there.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Effect files (TOML) or folders of them, tried as candidates beside the catalogue.
@@ -85,7 +85,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     drop(bar);
     notes.append(&mut proposal.notes);
     proposal.notes = notes;
-    print(&proposal);
+    let quiet = files::is_stdout(arguments.json.as_deref());
+    if !quiet {
+        print(&proposal);
+    }
     if let Some(path) = &arguments.json {
         files::write(path, &(serde_json::to_string_pretty(&proposal)? + "\n"), overwrite)?;
     }
@@ -93,8 +96,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.out {
         Some(path) => {
             files::write(path, effect, overwrite)?;
-            println!("wrote {}; try it with `greylag amend --effect {0}`", path.display());
+            eprintln!("wrote {}; try it with `greylag amend --effect {0}`", path.display());
         }
+        None if quiet => {}
         None => println!("\n{effect}"),
     }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })

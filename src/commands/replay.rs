@@ -1,51 +1,168 @@
 //! `greylag replay`: the pilot on a recorded flight, its commands compared bit by bit.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Args;
+use serde::Serialize;
 
 use crate::commands::choices;
+use crate::commands::files::{JsonArgument, Overwrite};
+use crate::commands::flown_with::FlownWith;
 use crate::commands::fly::{self, CommandName, ProfileName};
 use crate::control::Kind;
 use crate::control::cem::Change;
-use crate::flight::replay::{Outcome, replay};
+use crate::flight::replay::{Difference, Outcome, replay};
+use crate::flight::runtime::Companion;
 use crate::link::vehicle::{Profile, Real, Sitl, Vehicle};
 use crate::manoeuvres::Schedule;
 use crate::model::GreyBox;
+use crate::physics::Command;
 use crate::physics::airframe::ActuatorFigures;
 
-/// The arguments of `greylag replay`: those that the flight was flown with.
+/// The arguments of `greylag replay`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder that `greylag fly` has recorded.
+    /// Folder that `greylag fly` or `demo` has recorded.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Controller that flew.
-    #[arg(long, value_name = "NAME", default_value = fly::CONTROLLER, value_parser = choices::controller())]
-    controller: Kind,
-    /// Model that it was designed from.
-    #[arg(long, value_name = "FILE", default_value = fly::MODEL)]
-    model: PathBuf,
-    /// Folder of the trained policy, for controllers that need one.
-    #[arg(long, value_name = "DIR", default_value = fly::POLICY)]
-    policy: PathBuf,
-    /// Settings of the planner that were not of their usual size.
+    #[command(flatten)]
+    flown: FlownArguments,
+    #[command(flatten)]
+    json: JsonArgument,
+}
+
+/// What flew, where it is not what the recording says.
+#[derive(Args, Debug)]
+pub struct FlownArguments {
+    /// Controller that flew [default: what the recording says, else hybrid-lqi].
+    #[arg(long, value_name = "NAME", value_parser = choices::controller())]
+    controller: Option<Kind>,
+    /// Model that it was designed from [default: what the recording says].
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Folder of the trained policy, for controllers that need one [default: what the recording says].
+    #[arg(long, value_name = "DIR")]
+    policy: Option<PathBuf>,
+    /// Settings of the planner that were not of their usual size [default: what the recording says].
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
-    /// Airframe file in place of the one that the model names.
+    /// Airframe file in place of the one that the model names [default: what the recording says].
     #[arg(long, value_name = "FILE")]
     airframe: Option<PathBuf>,
-    /// Schedule that was flown.
+    /// Schedule that was flown [default: what the recording says].
     #[arg(long, value_name = "FILE")]
     schedule: Option<PathBuf>,
-    /// What was at the other end of the vehicle's link.
-    #[arg(long, value_name = "NAME", default_value = "sitl", value_enum)]
-    profile: ProfileName,
-    /// What a real flight controller was commanded.
-    #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
-    command: CommandName,
+    /// What was at the other end of the vehicle's link [default: what the recording says, else sitl].
+    #[arg(long, value_name = "NAME", value_enum)]
+    profile: Option<ProfileName>,
+    /// What a real flight controller was commanded [default: what the recording says, else surfaces].
+    #[arg(long, value_name = "WHAT", value_enum)]
+    command: Option<CommandName>,
+}
+
+/// What flew a recording, ready to fly it again.
+#[cfg_attr(
+    not(feature = "sitl"),
+    expect(dead_code, reason = "pages are drawn with the simulator built in")
+)]
+pub struct Again {
+    /// The controller.
+    pub controller: Kind,
+    /// The model.
+    pub model: GreyBox,
+    /// Pilot and controllers.
+    pub companion: Companion,
+    /// The other end of the vehicle's link.
+    pub vehicle: Vehicle,
+}
+
+impl FlownArguments {
+    /// What flew the recording in `folder`: as the options say, else as the recording does.
+    ///
+    /// # Errors
+    /// If a file cannot be used.
+    pub fn again(&self, folder: &Path) -> Result<Again> {
+        let said = FlownWith::read(folder)?;
+        let said = said.as_ref();
+        let path = |given: &Option<PathBuf>, said: Option<&PathBuf>, usual: &str| {
+            given.as_ref().or(said).cloned().unwrap_or_else(|| usual.into())
+        };
+        let file = path(&self.model, said.map(|s| &s.model), fly::MODEL);
+        let airframe = self.airframe.as_ref().or(said.and_then(|s| s.airframe.as_ref()));
+        let mut model = fly::model(&file, airframe.map(PathBuf::as_path))?;
+        if self.model.is_none()
+            && let Some(note) = said.and_then(|s| s.changed_model(&model))
+        {
+            eprintln!("{note}");
+        }
+        let profile = self.profile.or(said.map(|s| s.profile)).unwrap_or(ProfileName::Sitl);
+        if profile.stack().is_some() {
+            model = model.leaving_rudder();
+        }
+        let controller = match (self.controller, said) {
+            (Some(kind), _) => kind,
+            (None, Some(said)) => said.kind()?,
+            (None, None) => fly::CONTROLLER.parse()?,
+        };
+        let changes = match said {
+            // another controller may have no such settings
+            Some(said) if self.changes.is_empty() && self.controller.is_none() => said.changes()?,
+            _ => self.changes.clone(),
+        };
+        let policy = path(&self.policy, said.map(|s| &s.policy), fly::POLICY);
+        let mut companion = fly::companion_with_planner(controller, &model, &policy, &changes)?;
+        let schedule = self.schedule.as_ref().or(said.and_then(|s| s.schedule.as_ref()));
+        if let Some(path) = schedule {
+            companion.pilot.follow(Schedule::load(path)?);
+        }
+        let command = self.command.or(said.map(|s| s.commanded)).unwrap_or(CommandName::Surfaces);
+        let vehicle = vehicle(profile, command, &model);
+        Ok(Again { controller, model, companion, vehicle })
+    }
+}
+
+/// The result as JSON.
+#[derive(Serialize)]
+struct Document {
+    schema: &'static str,
+    program: &'static str,
+    ticks: u64,
+    different: u64,
+    plans_different: u64,
+    without_state: u64,
+    cut_short: bool,
+    differences: Vec<Differing>,
+}
+
+/// A command that did not come out as recorded: aileron, elevator, throttle.
+#[derive(Serialize)]
+struct Differing {
+    time_s: f64,
+    recorded: [f64; 3],
+    replayed: [f64; 3],
+}
+
+impl From<&Outcome> for Document {
+    fn from(of: &Outcome) -> Document {
+        let three = |c: &Command| [c.aileron, c.elevator, c.throttle];
+        let differing = |d: &Difference| Differing {
+            time_s: d.time.as_secs_f64(),
+            recorded: three(&d.recorded),
+            replayed: three(&d.replayed),
+        };
+        Document {
+            schema: "greylag.replay/1",
+            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+            ticks: of.ticks,
+            different: of.different,
+            plans_different: of.plans_different,
+            without_state: of.without_state,
+            cut_short: of.cut_short,
+            differences: of.differences.iter().map(differing).collect(),
+        }
+    }
 }
 
 /// Replays; the exit status tells whether every command came out as it was recorded.
@@ -53,28 +170,24 @@ pub struct Arguments {
 /// # Errors
 /// If a file cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let mut model = fly::model(&arguments.model, arguments.airframe.as_deref())?;
-    if arguments.profile.stack().is_some() {
-        model = model.leaving_rudder();
+    arguments.json.writable(Overwrite::Never)?;
+    let Again { companion, vehicle, .. } = arguments.flown.again(&arguments.folder)?;
+    let outcome = replay(&arguments.folder, companion, vehicle)?;
+    if !arguments.json.takes_stdout() {
+        print(&outcome);
     }
-    let Arguments { controller, policy, changes, .. } = arguments;
-    let mut companion = fly::companion_with_planner(*controller, &model, policy, changes)?;
-    if let Some(path) = &arguments.schedule {
-        companion.pilot.follow(Schedule::load(path)?);
-    }
-    let outcome = replay(&arguments.folder, companion, vehicle(arguments, &model))?;
-    print(&outcome);
+    arguments.json.write(&Document::from(&outcome), Overwrite::Never)?;
     let exact = outcome.different == 0 && outcome.without_state <= u64::from(outcome.cut_short);
     Ok(if exact && outcome.ticks > 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn vehicle(arguments: &Arguments, model: &GreyBox) -> Vehicle {
+fn vehicle(profile: ProfileName, command: CommandName, model: &GreyBox) -> Vehicle {
     let figures = model.airframe.actuators;
-    match arguments.profile.stack() {
+    match profile.stack() {
         None => Vehicle::Sitl(Sitl::new(1, figures.travels())),
         Some(stack) => {
             let actuators = ActuatorFigures { rudder: None, ..figures };
-            let authority = arguments.command.authority();
+            let authority = command.authority();
             Vehicle::Real(Box::new(Real::new(Profile { stack, authority, actuators })))
         }
     }
@@ -89,9 +202,7 @@ fn print(outcome: &Outcome) {
         println!("{} ticks have no state in flight.tlog", outcome.without_state);
     }
     for d in &outcome.differences {
-        let words = |c: &crate::physics::Command| {
-            format!("{:+.6} {:+.6} {:.6}", c.aileron, c.elevator, c.throttle)
-        };
+        let words = |c: &Command| format!("{:+.6} {:+.6} {:.6}", c.aileron, c.elevator, c.throttle);
         println!(
             "  {:10.3} s: recorded {}, replayed {}",
             d.time.as_secs_f64(),

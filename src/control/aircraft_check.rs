@@ -1,5 +1,7 @@
 //! What a model says of its aircraft before anybody flies it: trim, modes, authority, loops.
 
+use serde::Serialize;
+
 use crate::control::lqi::{self, LoopMargins, MarginsError, Weights};
 use crate::control::{Kind, build};
 use crate::model::modes::{Mode, modes, rates};
@@ -15,7 +17,7 @@ const USUAL_DELAY: f64 = 0.04;
 const SLOW_ROLL: f64 = 0.35;
 
 /// Straight flight at one airspeed: level, or the descent at idle throttle of an aircraft that cannot.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Level {
     /// True airspeed, m/s.
     pub airspeed: f64,
@@ -30,7 +32,7 @@ pub struct Level {
 }
 
 /// What the surfaces do at full travel in level flight at the cruise airspeed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Authority {
     /// Steady roll rate, rad/s.
     pub roll_rate: f64,
@@ -41,7 +43,7 @@ pub struct Authority {
 }
 
 /// What was found.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct AircraftCheck {
     /// Straight flight over the envelope's airspeeds, where there is any.
     pub levels: Vec<Level>,

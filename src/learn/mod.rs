@@ -12,7 +12,7 @@ pub use dynamics::basis::{JXZ, TrainableError, trainable};
 pub use dynamics::engine::{Arithmetic, Engine};
 pub use dynamics::loss::{Loss, Objective, Penalty};
 pub use dynamics::network::Passes;
-pub use dynamics::recipe::{Criterion, Recipe, Start};
+pub use dynamics::recipe::{Criterion, Joint, Recipe, Start};
 pub use dynamics::rollout::{Gradient, PriorSlopes, Subject};
 pub use dynamics::trainer::{Learned, Moment, Progress, TrainError, Trainer};
 pub use policy::analytic::{AnalyticProgress, AnalyticRecipe, AnalyticTrainer};

@@ -2,6 +2,8 @@
 
 pub mod avl;
 pub mod block;
+pub mod data_envelope;
+mod draw;
 pub mod edit;
 mod file;
 mod forces;

@@ -1,6 +1,7 @@
 //! Modes of steady level flight: what the aircraft does by itself, with names and time constants.
 
 use nalgebra::{Complex, Matrix4, SMatrix};
+use serde::Serialize;
 
 use super::{GreyBox, Trim, TrimError};
 use crate::num::Dual;
@@ -20,12 +21,18 @@ pub struct Rates {
 }
 
 /// A mode of motion: an oscillation, or one that grows or decays without.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mode {
     /// Its name.
     pub name: &'static str,
     /// Its eigenvalue, 1/s; the one with the positive imaginary part of a pair.
+    #[serde(serialize_with = "parts")]
     pub eigenvalue: Complex<f64>,
+}
+
+/// Real and imaginary part.
+fn parts<S: serde::Serializer>(x: &Complex<f64>, to: S) -> Result<S::Ok, S::Error> {
+    [x.re, x.im].serialize(to)
 }
 
 impl Mode {

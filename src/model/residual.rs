@@ -7,7 +7,8 @@ use safetensors::SafeTensorError;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::model::weights;
+use crate::model::data_envelope::DataEnvelope;
+use crate::model::weights::{self, Square};
 use crate::num::dense::{DenseError, ON_STACK};
 use crate::num::{Dense, Real};
 use crate::physics::airframe::{ActuatorFigures, Geometry, Reference};
@@ -22,11 +23,15 @@ pub const INPUTS: usize = 9;
 /// Outputs of the network: the rates of the state, in units of x_c a second.
 pub const OUTPUTS: usize = 8;
 
+/// The tensor of a file that says where the training data lies.
+const ENVELOPE: &str = "data_envelope";
+
 /// A learned addition to the rates of a model's state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residual {
     network: Arc<Dense>,
     scales: Scales,
+    envelope: Option<Arc<DataEnvelope>>,
 }
 
 /// Fixed scales of the network's inputs and outputs, from the airframe and not from data: inputs of
@@ -195,7 +200,24 @@ impl Residual {
         if sizes.iter().any(|n| *n > ON_STACK) {
             return Err(ResidualError::Wide(sizes.into()));
         }
-        Ok(Residual { network: Arc::new(network), scales: Scales::new(airframe, x_c) })
+        let scales = Scales::new(airframe, x_c);
+        Ok(Residual { network: Arc::new(network), scales, envelope: None })
+    }
+
+    /// The residual, knowing that it was trained on these samples.
+    pub fn trained_on<'a>(
+        mut self,
+        samples: impl Iterator<Item = (&'a State, &'a Controls)>,
+    ) -> Residual {
+        let inputs: Vec<_> = samples.map(|(x, u)| self.scales.inputs(x, u)).collect();
+        self.envelope = DataEnvelope::of(&self.network, &inputs).map(Arc::new);
+        self
+    }
+
+    /// How far a point lies from the training data: 0.999 of that lies within 1. Zero where the file does not say.
+    pub fn distance(&self, state: &State, controls: &Controls) -> f64 {
+        let inputs = self.scales.inputs(state, controls);
+        self.envelope.as_ref().map_or(0.0, |e| e.distance(&self.network, &inputs))
     }
 
     /// The network.
@@ -214,7 +236,12 @@ impl Residual {
     /// # Errors
     /// What the writer of the format says.
     pub fn to_bytes(&self, origin: &Origin) -> Result<Vec<u8>, SafeTensorError> {
-        weights::to_bytes(&self.network, origin)
+        let envelope = self.envelope.as_ref().map(|e| Square {
+            name: ENVELOPE,
+            size: e.features(),
+            entries: e.whitening(),
+        });
+        weights::to_bytes(&self.network, envelope, origin)
     }
 
     /// Reads the file of a residual for `airframe`, whose reference scale is `x_c`.
@@ -235,7 +262,12 @@ impl Residual {
             let airframe = airframe.name.clone();
             return Err(ResidualError::Airframe { path: path.into(), airframe });
         }
-        Ok((Residual::new(network, airframe, x_c)?, origin))
+        let whitening = weights::matrix(&bytes, ENVELOPE).map_err(content)?;
+        // a network of another shape is refused before it is asked for its features
+        let residual = Residual::new(network, airframe, x_c)?;
+        let envelope = whitening.map(|w| DataEnvelope::new(w, &residual.network)).transpose();
+        let envelope = envelope.map_err(content)?.map(Arc::new);
+        Ok((Residual { envelope, ..residual }, origin))
     }
 }
 
@@ -309,7 +341,9 @@ mod tests {
     #[test]
     fn files_give_the_same_residual_back_and_equal_ones_are_equal() {
         let model = model();
-        let (residual, origin) = (residual(&model), origin_of(&model));
+        let samples = [(State::NEUTRAL, Controls::default())];
+        let trained = residual(&model).trained_on(samples.iter().map(|(x, u)| (x, u)));
+        let (residual, origin) = (trained, origin_of(&model));
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("residual.safetensors");
         let bytes = residual.to_bytes(&origin).unwrap();

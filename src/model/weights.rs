@@ -12,17 +12,35 @@ use crate::num::Dense;
 /// The entry of a file's metadata that holds what it says of itself, as JSON.
 const METADATA: &str = "greylag";
 
-/// A file's content: the layers of `network`, and `said` of it.
+/// A square matrix beside a network's layers, row-major.
+#[derive(Clone, Copy, Debug)]
+pub struct Square<'a> {
+    /// The tensor's name.
+    pub name: &'static str,
+    /// Rows and columns.
+    pub size: usize,
+    /// The entries.
+    pub entries: &'a [f32],
+}
+
+/// A file's content: the layers of `network`, a matrix where there is one, and `said` of it.
 ///
 /// # Errors
 /// What the writer of the format says.
-pub fn to_bytes(network: &Dense, said: &impl Serialize) -> Result<Vec<u8>, SafeTensorError> {
+pub fn to_bytes(
+    network: &Dense,
+    matrix: Option<Square>,
+    said: &impl Serialize,
+) -> Result<Vec<u8>, SafeTensorError> {
     let little = |list: &[f32]| list.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
     let mut tensors = Vec::new();
     for (k, layer) in network.layers().enumerate() {
         let shape = [network.sizes()[k], network.sizes()[k + 1]];
         tensors.push((format!("layers.{k}.weight"), shape.to_vec(), little(layer.weights)));
         tensors.push((format!("layers.{k}.bias"), vec![shape[1]], little(layer.bias)));
+    }
+    if let Some(Square { name, size, entries }) = matrix {
+        tensors.push((name.to_owned(), vec![size, size], little(entries)));
     }
     let views = tensors
         .iter()
@@ -53,7 +71,7 @@ pub fn said<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
 pub fn network(bytes: &[u8]) -> Result<Dense, String> {
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let (mut sizes, mut parameters) = (Vec::new(), Vec::new());
-    let layers = tensors.len() / 2;
+    let layers = tensors.names().iter().filter(|name| name.ends_with(".weight")).count();
     for k in 0..layers {
         for part in ["weight", "bias"] {
             let name = format!("layers.{k}.{part}");
@@ -74,9 +92,25 @@ pub fn network(bytes: &[u8]) -> Result<Dense, String> {
             if part == "weight" {
                 sizes.push(outputs);
             }
-            let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-            parameters.extend(tensor.data().chunks_exact(4).map(number));
+            parameters.extend(numbers(tensor.data()));
         }
     }
     Dense::new(&sizes, parameters).map_err(|e| e.to_string())
+}
+
+/// The entries of the matrix `name` of a file, row-major, if it has one.
+///
+/// # Errors
+/// What is wrong with it, in words.
+pub fn matrix(bytes: &[u8], name: &str) -> Result<Option<Vec<f32>>, String> {
+    let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
+    let Ok(tensor) = tensors.tensor(name) else { return Ok(None) };
+    match tensor.dtype() {
+        Dtype::F32 => Ok(Some(numbers(tensor.data()).collect())),
+        other => Err(format!("tensor {name} is {other:?}, not F32")),
+    }
+}
+
+fn numbers(data: &[u8]) -> impl Iterator<Item = f32> + '_ {
+    data.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
 }

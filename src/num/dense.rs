@@ -200,6 +200,23 @@ impl Dense {
         answer
     }
 
+    /// The units of the last hidden layer, into `units`; how many they are: none of a single affine layer.
+    ///
+    /// # Panics
+    /// If `input` has another length than the network's first layer, or a layer is wider than [`ON_STACK`].
+    pub fn last_hidden(&self, input: &[f64], units: &mut [f64; ON_STACK]) -> usize {
+        let hidden = self.sizes.len() - 2;
+        let mut from = [0.0; ON_STACK];
+        from[..self.sizes[0]].copy_from_slice(input);
+        for (k, layer) in self.layers().take(hidden).enumerate() {
+            let (inputs, outputs) = (self.sizes[k], self.sizes[k + 1]);
+            layer.apply(&from[..inputs], &mut units[..outputs]);
+            rectify(&mut units[..outputs]);
+            from[..outputs].copy_from_slice(&units[..outputs]);
+        }
+        if hidden == 0 { 0 } else { self.sizes[hidden] }
+    }
+
     /// The network's answer, whatever its width, in `units`.
     ///
     /// # Panics

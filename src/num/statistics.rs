@@ -27,6 +27,21 @@ pub fn interquartile_mean(samples: &[f64]) -> f64 {
     mean(&sorted[cut..sorted.len() - cut])
 }
 
+/// How many samples of `series` hang together: the sum of its autocorrelation, both ways, up to where that first falls
+/// below 0.05. 1 of white noise.
+pub fn correlation_length(series: &[f64]) -> f64 {
+    let mean_product = |lag: usize| {
+        let pairs = series.iter().zip(series.iter().skip(lag));
+        pairs.map(|(a, b)| a * b).sum::<f64>() / (series.len() - lag) as f64
+    };
+    if series.is_empty() {
+        return 1.0;
+    }
+    let own = mean_product(0);
+    let correlations = (1..series.len()).map(|lag| mean_product(lag) / own);
+    1.0 + 2.0 * correlations.take_while(|c| *c > 0.05).sum::<f64>()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -41,5 +56,16 @@ mod tests {
         assert_eq!(interquartile_mean(&samples), 2.5);
         assert_eq!(interquartile_mean(&[0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 900.0]), 1.0);
         assert!(quantile(&[], 0.5).is_nan());
+    }
+
+    #[test]
+    fn correlation_length_of_a_held_series_is_its_hold() {
+        use rand::RngExt;
+        let mut rng = crate::num::stream::stream(9, &[]);
+        let white: Vec<f64> = (0..5000).map(|_| rng.random_range(-1.0..1.0)).collect();
+        assert!((super::correlation_length(&white) - 1.0).abs() < 0.3);
+        let held: Vec<f64> = white.iter().flat_map(|x| [*x; 8]).collect();
+        let found = super::correlation_length(&held);
+        assert!((6.0..10.0).contains(&found), "{found}");
     }
 }

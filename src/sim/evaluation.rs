@@ -120,6 +120,44 @@ pub fn imagine(
     )
 }
 
+/// What a controller reached in models drawn from one.
+#[derive(Clone, Debug, Serialize)]
+pub struct Robustness {
+    /// The score over all draws together.
+    pub all: Evaluation,
+    /// Of each draw: mean settled error in degrees, and the targets lost.
+    pub draws: Vec<(f64, usize)>,
+}
+
+impl Robustness {
+    /// Flies `rows` in draws 0 to `draws` − 1 of `model` with the seed `seed`, see [`GreyBox::drawn`]: Monte Carlo over
+    /// what is not known of the model. `done` is called after each draw.
+    ///
+    /// # Errors
+    /// As for [`imagine`].
+    pub fn of(
+        [controller, name]: [&str; 2],
+        make: Make,
+        model: &GreyBox,
+        rows: &[Row],
+        [seed, draws]: [u32; 2],
+        done: &dyn Fn(),
+    ) -> Result<Robustness, Trouble> {
+        let (mut outcomes, mut each) = (Vec::new(), Vec::new());
+        for k in 0..draws {
+            let flown = imagine(&model.drawn(seed.into(), k.into()), make, rows, seed)?;
+            let settled: Vec<f64> = flown.iter().map(|o| o.settled_deg).collect();
+            let lost = settled.iter().filter(|deg| **deg > DIVERGED_DEG).count();
+            each.push((mean(&settled), lost));
+            outcomes.extend(flown);
+            done();
+        }
+        let repeated: Vec<Row> = (0..draws).flat_map(|_| rows.iter().copied()).collect();
+        let all = Evaluation::new(controller, name, &repeated, &outcomes);
+        Ok(Robustness { all, draws: each })
+    }
+}
+
 /// What all flights have in common: the airspeed wanted (m/s) and the seed.
 #[derive(Clone, Copy)]
 struct Conditions {

@@ -332,7 +332,7 @@ fn models(inputs: u64, mut rng: ChaCha8Rng) -> u64 {
 fn networks(inputs: u64, mut rng: ChaCha8Rng) -> u64 {
     let network = Dense::uniform(&[9, 8, 6], &mut stream(3, &[])).unwrap();
     let said: Vec<u64> = vec![7; 4];
-    let file = weights::to_bytes(&network, &said).unwrap();
+    let file = weights::to_bytes(&network, None, &said).unwrap();
     let mut taken = 0;
     for _ in 0..inputs {
         let mut bytes = file.clone();

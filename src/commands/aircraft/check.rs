@@ -6,8 +6,10 @@ use std::process::ExitCode;
 use anyhow::Result;
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
+use serde::Serialize;
 
-use crate::commands::{files, status};
+use crate::commands::files::{self, JsonArgument, Overwrite};
+use crate::commands::status;
 use crate::control::aircraft_check::{self, AircraftCheck};
 use crate::model::GreyBox;
 use crate::model::modes::Mode;
@@ -18,20 +20,44 @@ pub struct Arguments {
     /// Model of the aircraft.
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
+    #[command(flatten)]
+    json: JsonArgument,
+}
+
+/// What was found, as JSON: SI units, angles in rad.
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'static str,
+    program: &'static str,
+    model: &'a str,
+    airframe: &'a str,
+    #[serde(flatten)]
+    found: &'a AircraftCheck,
 }
 
 /// Checks and prints; the exit status is 3 if something should be mended before a flight.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    arguments.json.writable(Overwrite::Never)?;
     let model = GreyBox::load(&files::shipped(&arguments.model))?;
-    println!(
-        "{} ({}) at {:.1} m/s and {:.0} m",
-        model.name,
-        model.airframe.name,
-        model.airframe.envelope.airspeed_cruise_mps,
-        model.airframe.reference.altitude
-    );
     let found = aircraft_check::check(&model)?;
-    print(&found);
+    if !arguments.json.takes_stdout() {
+        println!(
+            "{} ({}) at {:.1} m/s and {:.0} m",
+            model.name,
+            model.airframe.name,
+            model.airframe.envelope.airspeed_cruise_mps,
+            model.airframe.reference.altitude
+        );
+        print(&found);
+    }
+    let document = Document {
+        schema: "greylag.aircraft-check/1",
+        program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+        model: &model.name,
+        airframe: &model.airframe.name,
+        found: &found,
+    };
+    arguments.json.write(&document, Overwrite::Never)?;
     Ok(if found.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(status::IN_DOUBT) })
 }
 

@@ -2,7 +2,6 @@
 
 mod client;
 mod schedule;
-mod summary;
 
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
@@ -20,6 +19,9 @@ use greylag_sitl::shim::{self, ShimOptions};
 
 use crate::commands::choices;
 use crate::commands::files::Overwrite;
+use crate::commands::flown_with::{Chosen, FlownWith};
+use crate::commands::fly::{CommandName, ProfileName};
+use crate::commands::recording_report::{self, Reporter, TOLERANCE_DEG};
 use crate::commands::start::{self, StartArguments};
 use crate::commands::{files, fly};
 use crate::control::cem::Change;
@@ -33,7 +35,6 @@ use crate::model::GreyBox;
 use crate::report::FlightReport;
 use client::{Client, View};
 use schedule::Legs;
-use summary::{Reporter, TOLERANCE_DEG};
 
 /// Options of `greylag demo`.
 #[derive(clap::Args)]
@@ -93,6 +94,17 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let stop = Arc::new(AtomicBool::new(false));
     let flight = Flight::start(&options(arguments, &model)?, flying, stop.clone())?;
     let folder = flight.recording.clone().context("the demonstration records")?;
+    let chosen = Chosen {
+        controller: *controller,
+        model: &arguments.model,
+        policy,
+        changes,
+        airframe: None,
+        schedule: arguments.schedule.as_deref(),
+        profile: ProfileName::Sitl,
+        commanded: CommandName::Surfaces,
+    };
+    FlownWith::write(&folder, &chosen, &model)?;
     let companion = flight.clients.first().copied().flatten().context("no client link")?;
     let vehicle = flight.vehicle.context("no vehicle link")?;
     println!(
@@ -119,21 +131,24 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         schedule.iter().for_each(|schedule| again.pilot.follow(schedule.clone()));
         let vehicle = Vehicle::Sitl(Sitl::new(1, model.airframe.actuators.travels()));
         // the flight is reported even if the planner's sight cannot be
-        sights = summary::sights(&folder, again, vehicle).unwrap_or_else(|why| {
+        sights = recording_report::sights(&folder, again, vehicle).unwrap_or_else(|why| {
             eprintln!("the report does not show what the planner saw: {why:#}");
             Vec::new()
         });
     }
+    let recorded = recording_report::read(&folder)?;
+    let segment = |leg: &schedule::Leg| {
+        recording_report::segment([leg.roll_deg, leg.pitch_deg], leg.difficulty, &recorded)
+    };
     let reporter = Reporter {
+        title: format!("Greylag demo: {controller} on aircraft {} in JSBSim", plant.aircraft),
         controller: arguments.controller.name(),
-        seed: arguments.seed.into(),
+        seed: Some(arguments.seed.into()),
         model: &model,
-        aircraft: &plant.aircraft,
-        legs: tracked,
+        segments: tracked.iter().map(segment).collect(),
         texts: flown?,
         sights,
     };
-    let recorded = summary::read(&folder)?;
     let report = reporter.report(&folder, &recorded)?;
     let page = folder.join("report.html");
     files::write(&page, &report.page().render(), Overwrite::Never)?;

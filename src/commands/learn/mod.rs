@@ -68,6 +68,9 @@ pub struct Arguments {
     /// Coefficients of the prior that are learned with the residual: full names, `all`, or `none`.
     #[arg(long, num_args = 1.., value_delimiter = ',', default_value = "all", value_name = "NAME")]
     trainable: Vec<String>,
+    /// With --log: take nothing from the widths of the prior's coefficients, for a prior whose numbers are guesses.
+    #[arg(long, conflicts_with = "collect")]
+    from_scratch: bool,
     /// Seed of everything.
     #[arg(long, default_value_t = 1)]
     seed: u32,
@@ -129,6 +132,7 @@ impl Arguments {
             source,
             rounds: self.rounds.unwrap_or(self.budget.sizes().rounds),
             trainable: &trainable,
+            from_scratch: self.from_scratch,
             algorithm: self.algorithm,
             budget: self.budget,
             seed: self.seed,

@@ -49,6 +49,8 @@ pub struct Wish<'a> {
     pub rounds: u32,
     /// Coefficients of the prior that are learned; none leaves it frozen.
     pub trainable: &'a [String],
+    /// Whether nothing is taken from their widths.
+    pub from_scratch: bool,
     /// How the policy is found.
     pub algorithm: Algorithm,
     /// How much work.
@@ -155,6 +157,9 @@ impl Wish<'_> {
                 line = line.with("--recent-share", recent.share.to_string());
             }
         }
+        if self.from_scratch {
+            line = line.and(["--from-scratch".into()]);
+        }
         if !self.trainable.is_empty() {
             line = line.with("--trainable", self.trainable.join(","));
         }
@@ -210,6 +215,7 @@ mod tests {
             source,
             rounds: 2,
             trainable,
+            from_scratch: false,
             algorithm: Algorithm::Analytic,
             budget: Budget::Quick,
             seed: 7,

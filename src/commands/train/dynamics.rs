@@ -15,9 +15,9 @@ use crate::learn::dynamics::export;
 use crate::learn::dynamics::residual_map::{ResidualMap, residual_map};
 use crate::learn::dynamics::score::{Horizon, free_run};
 use crate::learn::{
-    Checkpoint, Criterion, Learned, Moment, Progress, Recipe, Start, Trainer, trainable,
+    self, Checkpoint, Criterion, Learned, Moment, Progress, Recipe, Start, Trainer, trainable,
 };
-use crate::model::{GreyBox, Integrator};
+use crate::model::{GreyBox, Integrator, STEP};
 use crate::report::TrainingReport;
 
 /// Updates between two progress lines.
@@ -26,6 +26,9 @@ const LINE: u64 = 500;
 const KEEP: u64 = 4;
 /// Horizons of the score, steps.
 const HORIZONS: [usize; 4] = [1, 10, 100, 500];
+/// Steps of a rollout on logs of fewer samples than the model has steps: between its samples such a log is interpolated,
+/// and what is learned within a few of them is the interpolation.
+const SLOW_STEPS: usize = 200;
 /// The file that a training goes on from.
 const CHECKPOINT: &str = "checkpoint.safetensors";
 
@@ -67,8 +70,9 @@ pub struct Arguments {
     /// Units of the residual's hidden layers.
     #[arg(long, value_delimiter = ',', default_values_t = [64, 64])]
     hidden: Vec<usize>,
-    /// Steps of a rollout; several share the updates in turn (a curriculum).
-    #[arg(long, value_delimiter = ',', default_values_t = [20])]
+    /// Steps of a rollout; several share the updates in turn (a curriculum) [default: 20; 200 where a log has fewer than 100
+    /// samples a second].
+    #[arg(long, value_delimiter = ',')]
     steps: Vec<usize>,
     /// Rollouts in a minibatch.
     #[arg(long, default_value_t = 64)]
@@ -87,6 +91,16 @@ pub struct Arguments {
     /// paper.
     #[arg(long, default_value = "equation-error", value_parser = ["as-given", "equation-error"])]
     start: String,
+    /// With --start as-given, how the coefficients are learned along with the residual: by the gradient of the
+    /// rollouts (the paper's), by projection (every 500 updates what of the residual the prior can say moves into its
+    /// coefficients, stalls not counting), or least-squares (likewise, stalls counting).
+    #[arg(long, default_value = "gradient", value_enum)]
+    joint: Joint,
+    /// With --log: take nothing from the widths of the prior's coefficients, for a prior whose numbers are guesses. Else a
+    /// coefficient stays near its value as far as its width (15 % where none is stated) and the flights say, and one of
+    /// zero without a width is held.
+    #[arg(long)]
+    from_scratch: bool,
     /// λ0 of the penalty's weight 1/λ.
     #[arg(long, default_value_t = 1.0)]
     lambda: f64,
@@ -99,6 +113,24 @@ pub struct Arguments {
     /// Folder for model, checkpoint and scores; a training found there goes on.
     #[arg(long)]
     out: PathBuf,
+}
+
+/// How coefficients are learned along, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Joint {
+    Gradient,
+    Projection,
+    LeastSquares,
+}
+
+impl From<Joint> for learn::Joint {
+    fn from(joint: Joint) -> learn::Joint {
+        match joint {
+            Joint::Gradient => learn::Joint::Gradient,
+            Joint::Projection => learn::Joint::Projection,
+            Joint::LeastSquares => learn::Joint::LeastSquares,
+        }
+    }
 }
 
 /// The scores as JSON.
@@ -130,8 +162,12 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
         prior.integrator = if scheme == "rk4" { Integrator::Rk4 } else { Integrator::Jsbsim };
     }
     let truth = arguments.truth.as_ref().map(|t| GreyBox::load(&shipped(t))).transpose()?;
-    let recipe = arguments.recipe(&prior);
-    let Flights { learn, judge, samples, notes } = arguments.flights.read(&prior)?;
+    let Flights { learn, judge, samples, slowest_s, notes } = arguments.flights.read(&prior)?;
+    if arguments.flights.is_logs_alone() && !arguments.from_scratch {
+        // as `amend` has it: a flight that was not flown to be learned from shows part of the coefficients
+        prior = prior.with_widths(|c| Some(c.width()).filter(|width| *width > 0.0));
+    }
+    let recipe = arguments.recipe(&prior, slowest_s);
     notes.iter().for_each(|note| eprintln!("{note}"));
     std::fs::create_dir_all(&arguments.out)
         .with_context(|| format!("cannot make {}", arguments.out.display()))?;
@@ -177,6 +213,17 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
         println!("{}", shares(residual_map));
     }
     let [before, after] = scores;
+    let worse = before.iter().zip(&after).rfind(|(_, learned)| learned.runs > 0);
+    let mut notes = notes;
+    if let Some((before, _)) = worse.filter(|(b, a)| a.rms > b.rms || a.lost > b.lost) {
+        let seconds = before.steps as f64 * STEP;
+        let note = format!(
+            "What was learned is worse than the prior {seconds:.0} s ahead on flights that it has not seen: learn from more \
+             flights, with longer rollouts (--steps), or fit the prior first (greylag amend --tune-only)."
+        );
+        eprintln!("{note}");
+        notes.push(note);
+    }
     let document = Document {
         schema: "greylag.training/1",
         program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
@@ -218,9 +265,16 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
 }
 
 impl Arguments {
-    fn recipe(&self, prior: &GreyBox) -> Recipe {
+    fn recipe(&self, prior: &GreyBox, slowest_s: f64) -> Recipe {
+        let wide = |name: &String| {
+            let found = prior.coefficients().iter().find(|c| c.name == *name);
+            found.is_none_or(|c| c.width() > 0.0)
+        };
+        let narrow = self.flights.is_logs_alone() && !self.from_scratch;
         let names = match self.trainable.as_slice() {
-            [all] if all == "all" => trainable(prior),
+            [all] if all == "all" => {
+                trainable(prior).into_iter().filter(|name| !narrow || wide(name)).collect()
+            }
             names => names.to_vec(),
         };
         let start = match self.start.as_str() {
@@ -229,15 +283,20 @@ impl Arguments {
         };
         Recipe {
             hidden: self.hidden.clone(),
-            steps: self.steps.clone(),
+            steps: match self.steps.as_slice() {
+                [] if slowest_s > 1.001 * STEP => vec![SLOW_STEPS],
+                [] => Recipe::default().steps,
+                steps => steps.to_vec(),
+            },
             batch: self.batch,
             updates: self.updates,
             rate: self.rate,
-            prior_rate: self.prior_rate.unwrap_or(match start {
-                Start::AsGiven => 3e-3,
-                Start::EquationError => 0.0,
+            prior_rate: self.prior_rate.unwrap_or(match (start, self.joint) {
+                (Start::AsGiven, Joint::Gradient) => 3e-3,
+                _ => 0.0,
             }),
             start,
+            joint: self.joint.into(),
             lambda: self.lambda,
             tau: self.tau,
             criterion: if self.loss == "plain" { Criterion::Plain } else { Criterion::Scaled },

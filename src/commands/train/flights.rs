@@ -43,12 +43,19 @@ pub struct FlightArguments {
 pub struct Flights {
     /// Tracks to learn from.
     pub learn: Vec<Track>,
-    /// Tracks to judge by; some of the others where there are few.
+    /// Tracks to judge by, which are not learned from.
     pub judge: Vec<Track>,
     /// Samples to learn from, each counted once.
     pub samples: usize,
+    /// Time between samples of the slowest log, s.
+    pub slowest_s: f64,
     /// What the reader must know.
     pub notes: Vec<String>,
+}
+
+/// How many of `samples` are held out of a flight, its end.
+fn held_out(samples: usize) -> usize {
+    (HELD_OUT_PART * samples as f64) as usize
 }
 
 impl FlightArguments {
@@ -62,10 +69,11 @@ impl FlightArguments {
         for folder in &self.folders {
             tracks.extend(collected(folder, model)?);
         }
-        let logged = self.logged(&self.logs, model, &mut notes)?;
+        let mut slowest_s = STEP;
+        let logged = self.logged(&self.logs, model, &mut notes, &mut slowest_s)?;
         tracks.extend(logged.into_iter().map(|rows| Track::new(model, rows.into_iter())));
         if !self.recent.is_empty() {
-            return self.with_recent(tracks, model, notes);
+            return self.with_recent(tracks, model, notes, slowest_s);
         }
         if tracks.is_empty() {
             bail!("there is nothing to learn from: give --log or --collect");
@@ -73,16 +81,23 @@ impl FlightArguments {
         let samples = |learn: &[Track]| learn.iter().map(|t| t.states.len()).sum();
         if tracks.len() < HELD_OUT {
             notes.push(
-                "Too few flights to hold any out: the scores are of flights learned from.".into(),
+                "The scores are of the last fifth of each flight, which was held out.".into(),
             );
-            let samples = samples(&tracks);
-            return Ok(Flights { judge: tracks.clone(), learn: tracks, samples, notes });
+            let ended = |t: &Track| t.split(t.states.len() - held_out(t.states.len()));
+            let (learn, judge): (Vec<Track>, Vec<Track>) =
+                tracks.iter().map(ended).map(|[a, b]| (a, b)).unzip();
+            return Ok(Flights { samples: samples(&learn), learn, judge, slowest_s, notes });
         }
         let (mut learn, mut judge) = (Vec::new(), Vec::new());
         for (k, track) in tracks.into_iter().enumerate() {
             if k % HELD_OUT == HELD_OUT - 1 { judge.push(track) } else { learn.push(track) }
         }
-        Ok(Flights { samples: samples(&learn), learn, judge, notes })
+        Ok(Flights { samples: samples(&learn), learn, judge, slowest_s, notes })
+    }
+
+    /// Whether all flights are logs of flights that were not flown to be learned from.
+    pub fn is_logs_alone(&self) -> bool {
+        self.folders.is_empty() && self.recent.is_empty()
     }
 
     /// The rows (state, controls, altitude) of each stretch of `logs`.
@@ -91,6 +106,7 @@ impl FlightArguments {
         logs: &[PathBuf],
         model: &GreyBox,
         notes: &mut Vec<String>,
+        slowest_s: &mut f64,
     ) -> Result<Vec<Vec<Row>>> {
         if logs.is_empty() {
             return Ok(Vec::new());
@@ -100,6 +116,7 @@ impl FlightArguments {
         let mut all = Vec::new();
         for flight in &intake.flights {
             notes.extend(slow(flight)?);
+            *slowest_s = slowest_s.max(flight.step_s);
             all.extend(flight.segments.iter().map(|segment| {
                 let rows = segment.instants.iter().map(|i| (i.state, i.controls, i.altitude));
                 resampled(&rows.collect::<Vec<_>>(), flight.step_s)
@@ -114,11 +131,12 @@ impl FlightArguments {
         others: Vec<Track>,
         model: &GreyBox,
         mut notes: Vec<String>,
+        mut slowest_s: f64,
     ) -> Result<Flights> {
         let share = self.recent_share;
         let (mut recent, mut judge) = (Vec::new(), Vec::new());
-        for rows in self.logged(&self.recent, model, &mut notes)? {
-            let end = rows.len() - (HELD_OUT_PART * rows.len() as f64) as usize;
+        for rows in self.logged(&self.recent, model, &mut notes, &mut slowest_s)? {
+            let end = rows.len() - held_out(rows.len());
             recent.push(Track::new(model, rows[..end].iter().copied()));
             judge.push(Track::new(model, rows[end..].iter().copied()));
         }
@@ -131,7 +149,7 @@ impl FlightArguments {
             "The scores are of the last fifth of each recent flight, which was held out.".into(),
         );
         if share == 1.0 || old == 0 {
-            return Ok(Flights { learn: recent, judge, samples: new, notes });
+            return Ok(Flights { learn: recent, judge, samples: new, slowest_s, notes });
         }
         let wanted = share / (1.0 - share) * old as f64 / new as f64;
         let copies = wanted.round().clamp(1.0, MOST_COPIES) as usize;
@@ -141,7 +159,7 @@ impl FlightArguments {
         ));
         let mut learn = others;
         (0..copies).for_each(|_| learn.extend(recent.iter().cloned()));
-        Ok(Flights { learn, judge, samples: old + new, notes })
+        Ok(Flights { learn, judge, samples: old + new, slowest_s, notes })
     }
 }
 

@@ -114,6 +114,10 @@ pub struct Arguments {
     /// Part of the targets that lie in the hard corners, 0 to 1; 0 is the paper's.
     #[arg(long, default_value_t = 0.0)]
     corners: f64,
+    /// Models, drawn from the widths of the coefficients of --env, in which the analytic policy gradient flies (domain
+    /// randomisation); 0: the model itself. The critics are those of the model itself.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4096))]
+    draws: u64,
     /// Steps between two evaluations, flown in what it is trained in.
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
     evaluate: u64,
@@ -177,6 +181,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// As [`run`], until `stop` is set.
 pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let ground = arguments.ground()?;
+    if arguments.draws > 0 && !arguments.is_analytic() {
+        bail!("--draws spreads the aircraft of --algorithm analytic over models; TD3 flies one");
+    }
     if arguments.start.is_some() && !arguments.is_analytic() {
         bail!("--start trains an actor further by --algorithm analytic; TD3 begins with its own");
     }
@@ -254,6 +261,7 @@ impl Arguments {
             effort: self.effort,
             rounding: self.rounding,
             corners: self.corners,
+            draws: self.draws,
             seed,
             ..AnalyticRecipe::default()
         }

@@ -35,8 +35,8 @@ impl Cem {
         let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);
         let mut state = seen.state;
         let mut previous = seen.previous;
-        let mut memory = self.disturbance.as_ref().map(|d| d.memory()).unwrap_or_default();
-        let rate = self.disturbance.as_ref().map(|d| d.rate());
+        let mut memory = self.disturbance().map(|d| d.memory()).unwrap_or_default();
+        let rate = self.disturbance().map(|d| d.rate());
         let mut inputs = InputMemory::at_rest(&actuators.controls());
         let mut reference = ahead.map_or([0.0; 2], |ahead| ahead.reference());
         let steps = ahead.map_or(HORIZON, |ahead| ahead.steps());

@@ -2,6 +2,9 @@
 //! it the hybrid controller of section IV-C.
 
 mod candidates;
+mod changes;
+mod guard;
+mod population;
 mod rollout;
 mod settings;
 mod surrogate;
@@ -24,8 +27,9 @@ use crate::num::stream;
 use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
 use crate::physics::{Command, Time};
+pub use changes::{Change, ChangeError};
 use rollout::{Actions, Block, HORIZON, Machine, Scene, WIDTH, Worth};
-pub use settings::{Change, ChangeError, Instructions, Settings, Start, Update, Value};
+pub use settings::{Instructions, Settings, Start, Update, Value};
 use surrogate::Surrogate;
 
 /// Candidates whose ends the critics value before a plane takes their place.
@@ -68,7 +72,8 @@ pub struct Cem {
     agent: Option<Agent>,
     base: Option<Base>,
     ilqr: Option<Ilqr>,
-    disturbance: Option<Disturbance>,
+    /// What compares the model's predictions with what happened.
+    predictions: Option<Disturbance>,
     machine: Machine,
     /// That of the second core.
     second: Option<Machine>,
@@ -134,7 +139,7 @@ impl Cem {
             agent: aids.agent,
             base: aids.base.map(|lqi| Base { lqi, ahead: Ahead::new(steps, &model.airframe) }),
             ilqr: aids.ilqr,
-            disturbance: settings.disturbance.map(Disturbance::new),
+            predictions: guard::predictions(&settings),
             second: (settings.cores > 1).then(|| machine.clone()),
             machine,
             blocks: vec![[[[0.0; WIDTH]; 3]; HORIZON]; count],
@@ -150,149 +155,6 @@ impl Cem {
             seed: 0,
             tick: 0,
         }
-    }
-
-    /// Draws the candidates of an iteration into the blocks from `first` on.
-    fn sample(&mut self, rng: &mut impl Rng, first: usize, mean: &Plan, spread: &Plan) {
-        let begun = Instant::now();
-        let old = self.settings.persistence;
-        let new = (1.0 - old * old).sqrt();
-        for block in &mut self.blocks[first..] {
-            let mut noise = [[0.0; WIDTH]; 3];
-            for h in 0..HORIZON {
-                for c in 0..3 {
-                    for i in 0..WIDTH {
-                        let normal: f64 = StandardNormal.sample(rng);
-                        let part = if h == 0 { [0.0, 1.0] } else { [old, new] };
-                        noise[c][i] = part[0] * noise[c][i] + part[1] * normal;
-                        let x = mean[h][c] + spread[h][c] * noise[c][i];
-                        block[h][c][i] = x.clamp(-1.0, 1.0) as f32;
-                    }
-                }
-            }
-        }
-        self.spent.draw += begun.elapsed();
-    }
-
-    /// Draws the noise on the proposals of the blocks from `first` up to `end`; the first lane has none.
-    fn sample_noise(&mut self, rng: &mut impl Rng, [first, end]: [usize; 2]) {
-        let begun = Instant::now();
-        let [deviation, most] = self.settings.noise;
-        for (b, block) in self.blocks[first..end].iter_mut().enumerate() {
-            for lanes in block.iter_mut().flatten() {
-                for (i, x) in lanes.iter_mut().enumerate() {
-                    let normal: f64 = StandardNormal.sample(rng);
-                    let noise = (deviation * normal).clamp(-most, most);
-                    *x = if b + i == 0 { 0.0 } else { noise as f32 };
-                }
-            }
-        }
-        self.spent.draw += begun.elapsed();
-    }
-
-    /// Flies the blocks from `first` up to `end`.
-    fn fly(
-        &mut self,
-        seen: &Observation,
-        target: &Target,
-        actions: Actions,
-        [first, end]: [usize; 2],
-    ) {
-        let begun = Instant::now();
-        let scene = Scene {
-            model: &self.model,
-            task: &Task::PAPER,
-            seen,
-            target,
-            agent: self.agent.as_ref(),
-            alpha: self.settings.alpha,
-            surrogate: self.surrogate,
-            memory: self.disturbance.as_ref().map(Disturbance::memory).unwrap_or_default(),
-            disturbance: self.disturbance.as_ref().map_or(disturbance::NONE, Disturbance::rate),
-            ahead: self.base.as_ref().map(|base| &base.ahead),
-            steps: self.settings.steps.max(HORIZON),
-        };
-        let (blocks, worth) = (&mut self.blocks[first..end], &mut self.worth[first..end]);
-        // blocks that fly together stay together: the numbers are those of one core
-        let half = blocks.len().div_ceil(4) * 2;
-        match &mut self.second {
-            Some(second) if half < blocks.len() => {
-                let (head, tail) = blocks.split_at_mut(half);
-                let (worth_head, worth_tail) = worth.split_at_mut(half);
-                let machine = &mut self.machine;
-                rayon::join(
-                    || machine.fly(&scene, actions, head, worth_head),
-                    || second.fly(&scene, actions, tail, worth_tail),
-                );
-            }
-            _ => self.machine.fly(&scene, actions, blocks, worth),
-        }
-        self.spent.fly += begun.elapsed();
-    }
-
-    /// A candidate with its worth.
-    fn candidate(&self, index: usize) -> Valued {
-        let (block, lane) = (index / WIDTH, index % WIDTH);
-        let actions = &self.blocks[block];
-        let plan = std::array::from_fn(|h| std::array::from_fn(|c| actions[h][c][lane].into()));
-        let Worth { returns, doubt, .. } = self.worth[block];
-        Valued { plan, worth: returns[lane], doubt: doubt[lane] }
-    }
-
-    /// Mean and standard deviation of the actions of the candidates in the blocks up to `end`, as the update
-    /// weighs them, with the best of them; `None` if too few stay finite.
-    fn refit(&mut self, end: usize) -> Option<(Plan, Plan, Valued)> {
-        let begun = Instant::now();
-        let refitted = self.refitted(end);
-        self.spent.refit += begun.elapsed();
-        refitted
-    }
-
-    fn refitted(&mut self, end: usize) -> Option<(Plan, Plan, Valued)> {
-        self.order.clear();
-        for (b, worth) in self.worth[..end].iter().enumerate() {
-            for (i, &value) in worth.returns.iter().enumerate() {
-                // a candidate that leaves the numbers is the worst there is
-                let value = if value.is_finite() { value } else { f32::NEG_INFINITY };
-                self.order.push((value, (b * WIDTH + i) as u32));
-            }
-        }
-        let &best = self.order.iter().min_by(|a, b| better(a, b))?;
-        let count = match self.settings.update {
-            Update::Elites(count) => count.clamp(1, self.order.len()),
-            Update::Weighted(_) => self.order.len(),
-        };
-        self.order.select_nth_unstable_by(count - 1, better);
-        let weighted = matches!(self.settings.update, Update::Weighted(_));
-        let chosen = &mut self.order[..count];
-        let lost = |(value, _): &(f32, u32)| *value == f32::NEG_INFINITY;
-        if lost(&best) || !weighted && chosen.iter().any(lost) {
-            return None;
-        }
-        chosen.sort_unstable_by_key(|&(_, index)| index);
-        let mut all = 0.0;
-        let mut mean = [[0.0; 3]; HORIZON];
-        let mut square = [[0.0; 3]; HORIZON];
-        for &(value, index) in chosen.iter() {
-            let weight = match self.settings.update {
-                Update::Elites(_) => 1.0,
-                Update::Weighted(scale) => (f64::from(value - best.0) / scale).exp(),
-            };
-            all += weight;
-            let (block, lane) = (index as usize / WIDTH, index as usize % WIDTH);
-            for h in 0..HORIZON {
-                for c in 0..3 {
-                    let a = f64::from(self.blocks[block][h][c][lane]);
-                    mean[h][c] += weight * a;
-                    square[h][c] += weight * a * a;
-                }
-            }
-        }
-        mean.iter_mut().chain(&mut square).flatten().for_each(|x| *x /= all);
-        let deviation =
-            |h: usize, c: usize| (square[h][c] - mean[h][c] * mean[h][c]).max(0.0).sqrt();
-        let spread = std::array::from_fn(|h| std::array::from_fn(|c| deviation(h, c)));
-        Some((mean, spread, self.candidate(best.1 as usize)))
     }
 
     /// The plan that the search ends with.
@@ -342,20 +204,6 @@ impl Cem {
         Some(mean)
     }
 
-    /// Keeps the best candidates of an iteration.
-    fn keep(&mut self, count: usize) {
-        let count = count.min(self.order.len());
-        self.kept.clear();
-        if count == 0 {
-            return;
-        }
-        self.order.select_nth_unstable_by(count - 1, better);
-        for k in 0..count {
-            let plan = self.candidate(self.order[k].1 as usize).plan;
-            self.kept.push(plan);
-        }
-    }
-
     /// The best plan around the base's, if it is worth more than the base's by the margin and by what
     /// the critics doubt of either.
     fn search_around_base(
@@ -402,13 +250,6 @@ impl Cem {
         (chosen.worth - base.worth > doubt).then_some(chosen.plan)
     }
 
-    /// Puts a plan into the place of a candidate.
-    fn put(&mut self, block: usize, lane: usize, plan: &Plan) {
-        for (actions, given) in self.blocks[block].iter_mut().zip(plan) {
-            actions.iter_mut().zip(given).for_each(|(lanes, x)| lanes[lane] = *x as f32);
-        }
-    }
-
     /// The command planned a tick ago, or a new one if there is none for this moment.
     fn planned_before(&mut self, seen: &Observation, target: &Target) -> Command {
         let off = |time: Time| (time.as_secs_f64() - seen.time.as_secs_f64()).abs();
@@ -427,8 +268,8 @@ impl Cem {
         let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);
         let mut inputs = InputMemory::at_rest(&actuators.controls());
         let controls = self.model.act(&actuators.controls(), &mut inputs);
-        let mut memory = self.disturbance.as_ref().map(Disturbance::memory).unwrap_or_default();
-        let rate = self.disturbance.as_ref().map_or(disturbance::NONE, Disturbance::rate);
+        let mut memory = self.disturbance().map(Disturbance::memory).unwrap_or_default();
+        let rate = self.disturbance().map_or(disturbance::NONE, Disturbance::rate);
         let state = self.model.step(&seen.state, &controls, seen.altitude, &mut memory);
         actuators.step(&command, figures);
         Observation {
@@ -438,14 +279,6 @@ impl Cem {
             previous: [command, seen.previous[0]],
             ..*seen
         }
-    }
-
-    /// Whether the model has predicted the last half second well enough to plan with.
-    fn is_trusted(&self) -> bool {
-        let (Some(most), Some(disturbance)) = (self.settings.trust, &self.disturbance) else {
-            return true;
-        };
-        disturbance.missed_part() <= most
     }
 
     /// The base's command, or that of a plan that is surely better.
@@ -458,7 +291,7 @@ impl Cem {
         self.base = Some(base);
         // the base's throttle takes the place of what stands here
         let action = |[aileron, elevator]: [f64; 2]| [aileron, elevator, 0.0];
-        if !self.is_trusted() {
+        if !self.is_trusted(seen) {
             self.last = None;
             return alone;
         }
@@ -472,11 +305,6 @@ impl Cem {
             _ => alone,
         }
     }
-}
-
-/// The better of two candidates first; ties go to the lower index, so the order is the same everywhere.
-fn better(a: &(f32, u32), b: &(f32, u32)) -> Ordering {
-    b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
 }
 
 /// A plan a tick later, its last action held.
@@ -507,7 +335,7 @@ impl Controller for Cem {
         (self.seed, self.tick) = (seed, 0);
         (self.last, self.age) = (None, 0);
         (self.next, self.planned_for) = (None, None);
-        self.disturbance = self.settings.disturbance.map(Disturbance::new);
+        self.predictions = guard::predictions(&self.settings);
         if let Some(base) = &mut self.base {
             base.lqi.reset(seed);
         }
@@ -534,12 +362,15 @@ impl Controller for Cem {
             self.spent = Spent::default();
         }
         let begun = Instant::now();
-        if let Some(disturbance) = &mut self.disturbance {
-            disturbance.update(&self.model, seen);
+        if let Some(predictions) = &mut self.predictions {
+            predictions.update(&self.model, seen);
         }
         self.spent.prepare = begun.elapsed();
         if let Some(base) = self.base.take() {
             return self.over_base(base, seen, target);
+        }
+        if self.agent.is_some() && !self.is_trusted(seen) {
+            return self.unsearched(seen, target);
         }
         if self.settings.delay {
             return self.planned_before(seen, target);
@@ -548,7 +379,7 @@ impl Controller for Cem {
         if self.last.is_none() || self.age >= self.settings.chunk {
             (self.last, self.age) = (self.search(seen, target), 0);
         }
-        // said by a command that is no number: whoever flies has a fallback
+        // NaN signals failure; the pilot then flies its fallback
         self.last.map_or(LOST, |plan| flown(&plan[self.age]))
     }
 }

@@ -1,8 +1,7 @@
 //! Size and shape of the search.
 
-use std::str::FromStr;
-
-use super::rollout::{HORIZON, WIDTH};
+use super::changes::Change;
+use super::rollout::HORIZON;
 
 /// How the candidates of an iteration make the next distribution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,8 +86,11 @@ pub struct Settings {
     /// Time constant (s) with which what the model leaves unexplained is estimated; `None`: it is not.
     pub disturbance: Option<f64>,
     /// Largest part of the motion that the model's one-step predictions may have missed in the last half second
-    /// for plans to be made; above it the base flies alone. It needs a base and the estimate of the disturbance.
+    /// for plans to be made; above it the base flies alone, or without one the policy. It needs either of them.
     pub trust: Option<f64>,
+    /// Largest distance from the data that the model's residual was trained on, see
+    /// [`Residual::distance`](crate::model::Residual::distance), at which plans are made; beyond it, as with `trust`.
+    pub known: Option<f64>,
     /// What flies the candidates.
     pub instructions: Instructions,
     /// Cores that fly them, one or two; the commands are the same.
@@ -116,6 +118,7 @@ impl Settings {
         ilqr: false,
         disturbance: None,
         trust: None,
+        known: None,
         instructions: Instructions::Widest,
         cores: 1,
     };
@@ -131,6 +134,7 @@ impl Settings {
         start: Start::Policy,
         spread: 0.02,
         noise: [0.02, 0.06],
+        trust: Some(0.5),
         ..Settings::POLICY
     };
     /// The hybrid controller whose policy flies on behind each plan up to step 40 in the model, before the critics
@@ -173,191 +177,5 @@ impl Settings {
     /// These settings with `changes`, the later ones over the earlier.
     pub fn with(self, changes: &[Change]) -> Settings {
         changes.iter().fold(self, |settings, change| change.made(settings))
-    }
-}
-
-/// One setting in other than its usual size, as `KEY=VALUE`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Change {
-    /// [`Settings::population`].
-    Population(usize),
-    /// [`Update::Elites`].
-    Elites(usize),
-    /// [`Update::Weighted`].
-    Temperature(f64),
-    /// [`Settings::iterations`].
-    Iterations(usize),
-    /// [`Settings::start`].
-    Start(Start),
-    /// [`Settings::spread`].
-    Spread(f64),
-    /// [`Settings::persistence`].
-    Persistence(f64),
-    /// [`Settings::kept`].
-    Kept(usize),
-    /// [`Settings::proposals`].
-    Proposals(usize),
-    /// [`Settings::noise`], the deviation; it is cut off at three of them.
-    Noise(f64),
-    /// [`Settings::alpha`].
-    Alpha(Option<f64>),
-    /// [`Settings::value`].
-    Value(Value),
-    /// [`Settings::steps`].
-    Steps(usize),
-    /// [`Settings::chunk`].
-    Chunk(usize),
-    /// [`Settings::delay`].
-    Delay(bool),
-    /// [`Settings::margin`].
-    Margin(f64),
-    /// [`Settings::ilqr`].
-    Ilqr(bool),
-    /// [`Settings::disturbance`].
-    Disturbance(Option<f64>),
-    /// [`Settings::trust`].
-    Trust(Option<f64>),
-    /// [`Settings::instructions`].
-    Instructions(Instructions),
-    /// [`Settings::cores`].
-    Cores(usize),
-}
-
-impl Change {
-    fn made(self, s: Settings) -> Settings {
-        match self {
-            Change::Population(population) => Settings { population, ..s },
-            Change::Elites(count) => Settings { update: Update::Elites(count), ..s },
-            Change::Temperature(scale) => Settings { update: Update::Weighted(scale), ..s },
-            Change::Iterations(iterations) => Settings { iterations, ..s },
-            Change::Start(start) => Settings { start, ..s },
-            Change::Spread(spread) => Settings { spread, ..s },
-            Change::Persistence(persistence) => Settings { persistence, ..s },
-            Change::Kept(kept) => Settings { kept, ..s },
-            Change::Proposals(proposals) => Settings { proposals, ..s },
-            Change::Noise(deviation) => Settings { noise: [deviation, 3.0 * deviation], ..s },
-            Change::Alpha(alpha) => Settings { alpha, ..s },
-            Change::Value(value) => Settings { value, ..s },
-            Change::Steps(steps) => Settings { steps, ..s },
-            Change::Chunk(chunk) => Settings { chunk, ..s },
-            Change::Delay(delay) => Settings { delay, ..s },
-            Change::Margin(margin) => Settings { margin, ..s },
-            Change::Ilqr(ilqr) => Settings { ilqr, ..s },
-            Change::Disturbance(disturbance) => Settings { disturbance, ..s },
-            Change::Trust(trust) => Settings { trust, ..s },
-            Change::Instructions(instructions) => Settings { instructions, ..s },
-            Change::Cores(cores) => Settings { cores, ..s },
-        }
-    }
-}
-
-/// Why a text is no [`Change`].
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "{text:?} changes no setting of the planner: {why}; give KEY=VALUE with population, elites, \
-     temperature, iterations, start (neutral, policy, last), spread, persistence, kept, proposals, noise, \
-     alpha (or none), value (critics, fitted), steps, chunk, delay (yes, no), margin, \
-     ilqr (yes, no), disturbance (s, or none), trust (or none), instructions (widest, portable), cores (1, 2)"
-)]
-pub struct ChangeError {
-    text: String,
-    why: String,
-}
-
-impl FromStr for Change {
-    type Err = ChangeError;
-
-    fn from_str(text: &str) -> Result<Change, ChangeError> {
-        parse(text).map_err(|why| ChangeError { text: text.into(), why })
-    }
-}
-
-fn parse(text: &str) -> Result<Change, String> {
-    let (key, value) = text.split_once('=').ok_or("there is no '='")?;
-    let count = |[low, high]: [usize; 2]| match value.parse::<usize>() {
-        Ok(x) if (low..=high).contains(&x) => Ok(x),
-        _ => Err(format!("{value:?} is not a whole number from {low} to {high}")),
-    };
-    let lanes = |[low, high]: [usize; 2]| match count([low, high])? {
-        x if x % WIDTH == 0 => Ok(x),
-        x => Err(format!("{x} is not a multiple of {WIDTH}")),
-    };
-    let number = |[low, high]: [f64; 2]| match value.parse::<f64>() {
-        Ok(x) if (low..=high).contains(&x) => Ok(x),
-        _ => Err(format!("{value:?} is not a number from {low} to {high}")),
-    };
-    let switch = || match value {
-        "yes" => Ok(true),
-        "no" => Ok(false),
-        _ => Err(format!("{value:?} is neither yes nor no")),
-    };
-    let unless_none = |range| if value == "none" { Ok(None) } else { number(range).map(Some) };
-    Ok(match key {
-        "population" => Change::Population(lanes([WIDTH, 16384])?),
-        "elites" => Change::Elites(count([1, 16384])?),
-        "temperature" => Change::Temperature(number([1e-6, 1e3])?),
-        "iterations" => Change::Iterations(count([1, 50])?),
-        "start" => Change::Start(match value {
-            "neutral" => Start::Neutral,
-            "policy" => Start::Policy,
-            "last" => Start::Last,
-            _ => return Err(format!("there is no start {value:?}")),
-        }),
-        "spread" => Change::Spread(number([0.0, 2.0])?),
-        "persistence" => Change::Persistence(number([0.0, 1.0])?),
-        "kept" => Change::Kept(count([0, WIDTH - 1])?),
-        "proposals" => Change::Proposals(lanes([0, 16384])?),
-        "noise" => Change::Noise(number([0.0, 2.0])?),
-        "alpha" => Change::Alpha(unless_none([0.0, 1e3])?),
-        "value" => Change::Value(match value {
-            "critics" => Value::Critics,
-            "fitted" => Value::Fitted,
-            _ => return Err(format!("there is no value {value:?}")),
-        }),
-        "steps" => Change::Steps(count([HORIZON, 500])?),
-        "chunk" => Change::Chunk(count([1, HORIZON])?),
-        "margin" => Change::Margin(number([0.0, 1e3])?),
-        "ilqr" => Change::Ilqr(switch()?),
-        "delay" => Change::Delay(switch()?),
-        "cores" => Change::Cores(count([1, 2])?),
-        "instructions" => Change::Instructions(match value {
-            "widest" => Instructions::Widest,
-            "portable" => Instructions::Portable,
-            _ => return Err(format!("there are no instructions {value:?}")),
-        }),
-        "trust" => Change::Trust(unless_none([0.0, 1e3])?),
-        "disturbance" => Change::Disturbance(unless_none([0.01, 60.0])?),
-        _ => return Err(format!("there is no setting {key:?}")),
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn changes_are_read_and_made() {
-        let read = |text: &str| text.parse::<Change>().map_err(|e| e.to_string());
-        let changes = [read("spread=0.1"), read("alpha=none"), read("start=policy")];
-        let changes: Vec<Change> = changes.into_iter().map(Result::unwrap).collect();
-        let changed = Settings::HYBRID.with(&changes);
-        let expected =
-            Settings { spread: 0.1, alpha: None, start: Start::Policy, ..Settings::HYBRID };
-        assert_eq!(changed, expected);
-        assert_eq!(Settings::HYBRID.with(&[]), Settings::HYBRID);
-        for (text, why) in [
-            ("spread", "there is no '='"),
-            ("spread=x", "not a number from 0 to 2"),
-            ("alpha=NaN", "not a number"),
-            ("population=100", "not a multiple of 16"),
-            ("population=0", "not a whole number from 16"),
-            ("start=there", "no start"),
-            ("delay=1", "neither yes nor no"),
-            ("cores=3", "not a whole number from 1 to 2"),
-            ("speed=1", "no setting \"speed\""),
-        ] {
-            let error = read(text).unwrap_err();
-            assert!(error.contains(why) && error.contains("give KEY=VALUE"), "{error}");
-        }
     }
 }

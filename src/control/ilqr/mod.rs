@@ -23,6 +23,9 @@ const STEPS: usize = 50;
 /// Time constant (s) of the estimate of what the model leaves unexplained.
 const DISTURBANCE_S: f64 = 0.3;
 
+/// Part of the motion of the last half second that the model's one-step predictions may have missed for plans to be made.
+const TRUST: f64 = 0.5;
+
 /// Aileron and elevator in units of the largest deflection.
 type Surfaces = [f64; 2];
 
@@ -119,6 +122,11 @@ impl Controller for Ilqr {
         self.lqi.look_ahead(seen, target, &mut self.ahead);
         let before = self.lqi.clone();
         let alone = self.lqi.command(seen, target);
+        // a model that does not predict is no model to plan with
+        if self.disturbance.missed_part() > TRUST {
+            self.desk.plan = None;
+            return alone;
+        }
         let problem = Problem {
             model: &self.model,
             seen,

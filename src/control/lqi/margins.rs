@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Complex, DMatrix, DVector, SMatrix};
+use serde::Serialize;
 
 use super::Weights;
 use super::design::{ALL, Loops, STATES, loops};
@@ -14,7 +15,7 @@ const FREQUENCIES: usize = 1500;
 const LOWEST: f64 = 0.05;
 
 /// What one loop bears.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LoopMargins {
     /// The surface whose command is the loop's.
     pub surface: &'static str,

@@ -108,7 +108,7 @@ impl Agent {
         FILES[first..]
             .iter()
             .zip(networks)
-            .map(|(name, network)| Ok((*name, weights::to_bytes(network, &self.origin)?)))
+            .map(|(name, network)| Ok((*name, weights::to_bytes(network, None, &self.origin)?)))
             .collect()
     }
 

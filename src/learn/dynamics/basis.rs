@@ -34,6 +34,10 @@ pub struct Basis {
     pub places: Vec<usize>,
     /// θ_p0.
     start: DVector<f64>,
+    /// What is physically possible, where there are bounds.
+    bounds: Vec<Option<(f64, f64)>>,
+    /// 1/σ² of θ_p0 as a prior where the model's file states σ, else zero.
+    information: DVector<f64>,
     /// T.
     turn: DMatrix<f64>,
     /// Names of the coefficients that the data does not see, or not apart from others.
@@ -149,7 +153,13 @@ impl Basis {
         let name = |k: usize| {
             model.coefficients().get(places[k]).map_or(JXZ.to_owned(), |c| c.name.clone())
         };
-        Ok(Basis { start, turn, unseen: unseen.into_iter().map(name).collect(), places })
+        let bounds = (0..places.len()).map(|k| model.bounds_of(&name(k))).collect();
+        let stated = |p: &usize| model.coefficients().get(*p).and_then(|c| c.sd);
+        let inverse = |sd: f64| if sd > 0.0 { 1.0 / (sd * sd) } else { 0.0 };
+        let information = places.iter().map(|p| stated(p).map_or(0.0, inverse));
+        let information = DVector::from_iterator(places.len(), information);
+        let unseen = unseen.into_iter().map(name).collect();
+        Ok(Basis { start, bounds, information, turn, unseen, places })
     }
 
     /// Number of coordinates.
@@ -175,14 +185,20 @@ impl Basis {
         (0..self.len()).map(|k| of(k).sum()).collect()
     }
 
+    /// What the stated widths of the coefficients say of the coordinates: Tᵀ Σ⁻¹ T, zero where none is stated.
+    pub fn prior_information(&self) -> DMatrix<f64> {
+        let weighed = DMatrix::from_diagonal(&self.information) * &self.turn;
+        self.turn.transpose() * weighed
+    }
+
     /// Gives `model` the coefficients at `coordinates`, kept where an aircraft can have them.
     pub fn apply(&self, model: &mut GreyBox, coordinates: &[f64]) {
         let theta = &self.start + &self.turn * DVector::from_column_slice(coordinates);
         let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
         let mut body = *model.bare_body();
-        for (place, theta) in self.places.iter().zip(theta.iter()) {
+        for ((place, theta), bounds) in self.places.iter().zip(theta.iter()).zip(&self.bounds) {
             match values.get_mut(*place) {
-                Some(value) => *value = *theta,
+                Some(value) => *value = bounds.map_or(*theta, |(low, high)| theta.clamp(low, high)),
                 None => {
                     // jx jz must exceed its square
                     let most = 0.99 * (body.jx * body.jz).sqrt();

@@ -5,8 +5,13 @@
 //! through rollouts finds slowly: a fast mode (the roll damping) settles within a rollout, after which
 //! only ratios of coefficients show. The paper starts from the prior as given.
 //!
+//! Coefficients whose file states a standard deviation have it as a prior: what a flight hardly shows stays near it. Others
+//! are as the flights say, and all stay within what is physically possible.
+//!
 //! What forces that are not trained lack over the flow angles, which the residual is to learn, is fitted along
 //! and dropped: else a drag that is too small is taken for a lack of thrust.
+
+use std::ops::{AddAssign, SubAssign};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -14,6 +19,7 @@ use rayon::prelude::*;
 use crate::learn::dynamics::basis::{Basis, columns, rate_of};
 use crate::learn::dynamics::windows::{Track, Window, windows};
 use crate::model::{GreyBox, Integrator, STEP};
+use crate::num::statistics::correlation_length;
 use crate::physics::{Channel, Controls, State, Wrench};
 
 /// Steps of a window: noise of the states is divided by it, slow effects are still seen.
@@ -32,7 +38,7 @@ const REACH: f64 = 4.685;
 const FLOOR: f64 = 1e-3;
 
 /// The rates that forces and moments make: airspeed, p, q, r, alpha, beta.
-const CHANNELS: [usize; 6] = [2, 3, 4, 5, 6, 7];
+pub(super) const CHANNELS: [usize; 6] = [2, 3, 4, 5, 6, 7];
 
 /// Channels in which the prior may lack something over the flow angles.
 const FORCES: [Channel; 3] = [Channel::Drag, Channel::Lift, Channel::Side];
@@ -40,16 +46,34 @@ const FORCES: [Channel; 3] = [Channel::Drag, Channel::Lift, Channel::Side];
 /// Terms of what it may lack: 1, α, α², α³, β².
 const TERMS: usize = 5;
 
-/// A window: for each channel its error in units of x_c, and the slopes of the prediction.
-struct Row {
-    error: [f64; 6],
+/// How the errors are weighed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Weighting {
+    /// Tukey's biweight: what is far off does not count.
+    Tukey,
+    /// All alike: least squares.
+    Alike,
+}
+
+/// A window or a sample: for each channel its error in units of x_c, and the slopes of the prediction.
+pub(super) struct Row {
+    pub error: [f64; 6],
     /// With respect to the coordinates, then to what the prior may lack.
-    slopes: Vec<[f64; 6]>,
+    pub slopes: Vec<[f64; 6]>,
+}
+
+impl Row {
+    /// The row after a step of what is fitted.
+    pub fn advance(&mut self, step: &DVector<f64>) {
+        for (slopes, step) in self.slopes.iter().zip(step.iter()) {
+            self.error.iter_mut().zip(slopes).for_each(|(error, slope)| *error -= slope * step);
+        }
+    }
 }
 
 /// What is fitted.
-struct Fit<'a> {
-    basis: &'a Basis,
+pub(super) struct Fit<'a> {
+    pub basis: &'a Basis,
     /// The forces that are fitted along: those on which no trained coefficient acts.
     along: Vec<Channel>,
     /// What they come to, [`TERMS`] coefficients a force.
@@ -63,17 +87,17 @@ pub fn coordinates(prior: &GreyBox, basis: &Basis, tracks: &[Track]) -> Vec<f64>
         return Vec::new();
     }
     let mut eta = vec![0.0; basis.len()];
-    let along = forces_along(prior, basis);
-    let lacking = vec![0.0; TERMS * along.len()];
-    let mut fit = Fit { basis, along, lacking };
+    let mut fit = Fit::new(prior, basis);
     let all = windows(tracks, STEPS);
     let every = all.len().div_ceil(WINDOWS).max(1);
     let chosen: Vec<Window> = all.into_iter().step_by(every).collect();
+    let information = basis.prior_information();
     let mut model = prior.clone();
     for _ in 0..PASSES {
         basis.apply(&mut model, &eta);
         let rows: Vec<Row> = chosen.par_iter().map(|w| fit.row(&model, tracks, w)).collect();
-        let Some(step) = solve(&rows, eta.len() + fit.lacking.len()) else { break };
+        let known = Some((&information, eta.as_slice()));
+        let Some(step) = solve(&rows, fit.count(), Weighting::Tukey, known) else { break };
         if !step.iter().all(|x| x.is_finite()) {
             break;
         }
@@ -96,7 +120,19 @@ fn forces_along(prior: &GreyBox, basis: &Basis) -> Vec<Channel> {
     FORCES.into_iter().filter(|c| taken.get(*c) == 0.0).collect()
 }
 
-impl Fit<'_> {
+impl<'a> Fit<'a> {
+    /// The coordinates of `basis`, and what the forces of `prior` that are not trained may lack, at zero.
+    pub fn new(prior: &GreyBox, basis: &'a Basis) -> Fit<'a> {
+        let along = forces_along(prior, basis);
+        let lacking = vec![0.0; TERMS * along.len()];
+        Fit { basis, along, lacking }
+    }
+
+    /// How many numbers are fitted.
+    pub fn count(&self) -> usize {
+        self.basis.len() + self.lacking.len()
+    }
+
     /// One window at the coefficients of `model`.
     fn row(&self, model: &GreyBox, tracks: &[Track], window: &Window) -> Row {
         let basis = self.basis;
@@ -105,8 +141,7 @@ impl Fit<'_> {
         let scale = model.scale();
         let (before, after) =
             (track.states[start].to_array(), track.states[start + STEPS].to_array());
-        let mut row =
-            Row { error: [0.0; 6], slopes: vec![[0.0; 6]; basis.len() + self.lacking.len()] };
+        let mut row = Row { error: [0.0; 6], slopes: vec![[0.0; 6]; self.count()] };
         for (e, c) in row.error.iter_mut().zip(CHANNELS) {
             *e = (after[c] - before[c]) / scale[c];
         }
@@ -135,7 +170,7 @@ impl Fit<'_> {
     }
 
     /// The rates that each term of each force that is fitted along makes.
-    fn rates_along(&self, model: &GreyBox, state: &State, altitude: f64) -> Vec<[f64; 8]> {
+    pub fn rates_along(&self, model: &GreyBox, state: &State, altitude: f64) -> Vec<[f64; 8]> {
         let air = model.air(state, altitude);
         let State { alpha, beta, .. } = *state;
         let terms: [f64; TERMS] = [1.0, alpha, alpha * alpha, alpha.powi(3), beta * beta];
@@ -163,8 +198,14 @@ fn quadrature(integrator: Integrator, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// The step of the coordinates that a weighted least-squares fit asks for.
-fn solve(rows: &[Row], count: usize) -> Option<DVector<f64>> {
+/// The step of what is fitted that a weighted least-squares fit asks for; `known` is the information of a prior on the first
+/// of these numbers, and how far they are from it.
+pub(super) fn solve(
+    rows: &[Row],
+    count: usize,
+    weighting: Weighting,
+    known: Option<(&DMatrix<f64>, &[f64])>,
+) -> Option<DVector<f64>> {
     let mut normal = DMatrix::zeros(count, count);
     let mut right = DVector::zeros(count);
     for i in 0..CHANNELS.len() {
@@ -174,15 +215,32 @@ fn solve(rows: &[Row], count: usize) -> Option<DVector<f64>> {
         let moved = rows.iter().map(|r| r.slopes.iter().map(|s| s[i] * s[i]).sum::<f64>());
         let size = (moved.sum::<f64>() / rows.len() as f64).sqrt();
         let deviation = (1.4826 * *median).max(FLOOR * size).max(f64::MIN_POSITIVE);
+        // beside a prior, windows that say the same count once
+        let said_by = match known {
+            Some((information, _)) if information.iter().any(|x| *x != 0.0) => {
+                let errors = rows.iter().map(|r| r.error[i].clamp(-deviation, deviation));
+                correlation_length(&errors.collect::<Vec<_>>())
+            }
+            _ => 1.0,
+        };
         for row in rows {
-            let far = row.error[i] / (REACH * deviation);
+            let far = match weighting {
+                Weighting::Tukey => row.error[i] / (REACH * deviation),
+                Weighting::Alike => 0.0,
+            };
             if far.abs() < 1.0 {
-                let weight = (1.0 - far * far).powi(2) / (deviation * deviation);
+                let weight = (1.0 - far * far).powi(2) / (deviation * deviation) / said_by;
                 let slopes = DVector::from_iterator(count, row.slopes.iter().map(|s| s[i]));
                 right.axpy(weight * row.error[i], &slopes, 1.0);
                 normal.ger(weight, &slopes, &slopes, 1.0);
             }
         }
+    }
+    if let Some((information, from)) = known {
+        let own = information.nrows();
+        let pull = information * DVector::from_column_slice(from);
+        normal.view_mut((0, 0), (own, own)).add_assign(information);
+        right.rows_mut(0, own).sub_assign(&pull);
     }
     let size: f64 = normal.diagonal().iter().copied().fold(0.0, f64::max);
     for k in 0..count {

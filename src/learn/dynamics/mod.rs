@@ -9,6 +9,7 @@ pub(super) mod loss;
 pub(super) mod network;
 pub(super) mod packet;
 pub(super) mod prior;
+pub(super) mod projection;
 pub(super) mod recipe;
 pub mod resample;
 pub mod residual_map;

@@ -43,6 +43,25 @@ pub enum Start {
     EquationError,
 }
 
+/// How the prior's coefficients are learned along with the residual.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Joint {
+    /// By the gradient of the rollouts, at [`Recipe::prior_rate`]: the paper's.
+    #[default]
+    Gradient,
+    /// By variable projection, robust: what of the residual the prior can say moves into its coefficients.
+    Projection,
+    /// Likewise by least squares: where the gradient would end.
+    LeastSquares,
+}
+
+impl Joint {
+    fn is_gradient(&self) -> bool {
+        *self == Joint::Gradient
+    }
+}
+
 /// Everything that decides what a training gives, but for data and prior.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -65,6 +84,9 @@ pub struct Recipe {
     pub prior_rate: f64,
     /// Where the trained coefficients start.
     pub start: Start,
+    /// How they are learned along.
+    #[serde(default, skip_serializing_if = "Joint::is_gradient")]
+    pub joint: Joint,
     /// λ0 of eq. (24).
     pub lambda: f64,
     /// τ of eq. (24), by which λ grows an update.
@@ -92,6 +114,7 @@ impl Default for Recipe {
             rate_end: 0.01,
             prior_rate: 0.0,
             start: Start::EquationError,
+            joint: Joint::Gradient,
             lambda: 1.0,
             tau: 0.02,
             criterion: Criterion::Scaled,
@@ -117,6 +140,9 @@ impl Recipe {
         }
         if !(self.prior_rate.is_finite() && self.prior_rate >= 0.0) {
             return Some("the prior's learning rate must not be negative");
+        }
+        if self.prior_rate > 0.0 && !self.joint.is_gradient() {
+            return Some("with a projection the prior's learning rate must be zero");
         }
         if !self.floor.is_none_or(positive) {
             return Some("the floor of a rollout's error must be positive");

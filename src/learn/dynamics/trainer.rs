@@ -8,13 +8,14 @@ use crate::learn::adam::Adam;
 use crate::learn::checkpoint::{Checkpoint, CheckpointError};
 use crate::learn::dynamics::basis::{self, Basis, TrainableError};
 use crate::learn::dynamics::engine::{Arithmetic, Engine};
-use crate::learn::dynamics::equation_error;
+use crate::learn::dynamics::equation_error::{self, Weighting};
 use crate::learn::dynamics::loss::{Loss, Objective};
 use crate::learn::dynamics::network::Passes;
-use crate::learn::dynamics::recipe::{Criterion, Recipe, Start};
+use crate::learn::dynamics::projection;
+use crate::learn::dynamics::recipe::{Criterion, Joint, Recipe, Start};
 use crate::learn::dynamics::rollout::{PriorSlopes, Subject};
 use crate::learn::dynamics::score::off_after;
-use crate::learn::dynamics::windows::{Track, Window, windows};
+use crate::learn::dynamics::windows::{Track, Window, regular, windows};
 use crate::model::residual::{INPUTS, OUTPUTS, ResidualError, Scales, fingerprint, hash};
 use crate::model::{GreyBox, Residual};
 use crate::num::dense::DenseError;
@@ -23,8 +24,16 @@ use crate::num::{Dense, stream};
 /// Windows over which the bare prior's error is taken, L_prior of eq. (23).
 const PRIOR_WINDOWS: usize = 4096;
 
+/// Samples that the envelope of the data is made from, at most.
+const ENVELOPE_SAMPLES: usize = 40_000;
+
 /// Updates in a row that may come to nothing before the training is given up.
 const PATIENCE: u64 = 20;
+
+/// Updates between two projections, and the part of all updates after which there are no more: the residual then
+/// learns to leave out what has moved.
+const PROJECT_EVERY: u64 = 500;
+const PROJECT_UNTIL: f64 = 0.75;
 
 /// Purposes of the random streams.
 const START: u64 = 1;
@@ -291,7 +300,12 @@ impl Trainer {
     pub fn model(&self) -> Result<GreyBox, TrainError> {
         let mut model = self.subject.prior.clone();
         let network = self.subject.network.network().clone();
-        model.residual = Some(Residual::new(network, &model.airframe, model.scale())?);
+        let residual = Residual::new(network, &model.airframe, model.scale())?;
+        let samples = self.tracks.iter().flat_map(|t| t.states.iter().zip(&t.controls));
+        let flown = samples.filter(|(state, _)| regular(state));
+        let total: usize = self.tracks.iter().map(|t| t.states.len()).sum();
+        let every = total.div_ceil(ENVELOPE_SAMPLES).max(1);
+        model.residual = Some(residual.trained_on(flown.step_by(every)));
         Ok(model)
     }
 
@@ -337,6 +351,29 @@ impl Trainer {
         })
     }
 
+    /// Moves what of the residual the prior can say into its coefficients, where it is time for that.
+    fn project(&mut self) -> Result<(), TrainError> {
+        let weighting = match self.recipe.joint {
+            Joint::Gradient => return Ok(()),
+            Joint::Projection => Weighting::Tukey,
+            Joint::LeastSquares => Weighting::Alike,
+        };
+        let until = PROJECT_UNTIL * self.recipe.updates as f64;
+        let due = self.update.is_multiple_of(PROJECT_EVERY) && self.update as f64 <= until;
+        if !due || self.basis.is_empty() {
+            return Ok(());
+        }
+        let prior = &self.subject.prior;
+        let network = self.subject.network.network().clone();
+        let residual = Residual::new(network, &prior.airframe, prior.scale())?;
+        if let Some(step) = projection::step(prior, &residual, &self.basis, &self.tracks, weighting)
+        {
+            self.coordinates.iter_mut().zip(step).for_each(|(x, step)| *x += step);
+            self.basis.apply(&mut self.subject.prior, &self.coordinates);
+        }
+        Ok(())
+    }
+
     /// One update; `None` if it came to nothing, its gradient being no number.
     fn one(&mut self) -> Result<Option<(Loss, f64)>, TrainError> {
         let steps = self.recipe.steps_at(self.update);
@@ -378,6 +415,7 @@ impl Trainer {
         if !slopes.is_empty() {
             self.basis.apply(&mut self.subject.prior, &self.coordinates);
         }
+        self.project()?;
         let normalised = loss.prediction / unit;
         self.lambda += self.recipe.tau * normalised;
         Ok(Some((loss, normalised)))

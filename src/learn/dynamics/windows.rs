@@ -53,6 +53,17 @@ impl Track {
         Track::new(model, rows)
     }
 
+    /// The samples before `at`, and those from it on.
+    pub fn split(&self, at: usize) -> [Track; 2] {
+        let part = |range: std::ops::Range<usize>| Track {
+            states: self.states[range.clone()].to_vec(),
+            controls: self.controls[range.clone()].to_vec(),
+            altitude: self.altitude[range.clone()].to_vec(),
+            density: self.density[range].to_vec(),
+        };
+        [part(0..at), part(at..self.states.len())]
+    }
+
     /// Where rollouts of `steps` steps can start: one sample is kept before, `steps` after.
     pub fn starts(&self, steps: usize) -> std::ops::Range<usize> {
         1..self.states.len().saturating_sub(steps).max(1)

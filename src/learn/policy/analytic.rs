@@ -47,8 +47,16 @@ pub struct AnalyticRecipe {
     pub effort: f64,
     /// Part of the targets that lie in the hard corners.
     pub corners: f64,
+    /// Models, drawn from the widths of the coefficients, over which the aircraft are spread (domain randomisation);
+    /// none: the model itself.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub draws: u64,
     /// Seed of everything random.
     pub seed: u64,
+}
+
+fn is_none(draws: &u64) -> bool {
+    *draws == 0
 }
 
 impl Default for AnalyticRecipe {
@@ -63,6 +71,7 @@ impl Default for AnalyticRecipe {
             rounding: 0.005,
             effort: 0.0,
             corners: 0.3,
+            draws: 0,
             seed: 1,
         }
     }
@@ -132,7 +141,8 @@ pub struct AnalyticProgress {
 /// A training under way.
 pub struct AnalyticTrainer {
     recipe: AnalyticRecipe,
-    model: GreyBox,
+    /// The model of each aircraft, in turn.
+    models: Vec<GreyBox>,
     device: Device,
     actor: Mlp,
     optimiser: Optimiser,
@@ -233,10 +243,14 @@ impl AnalyticTrainer {
                 Instance { aircraft: neutral, target: targets.next_target(), left }
             })
             .collect();
+        let models = match recipe.draws {
+            0 => vec![model],
+            draws => (0..draws).map(|k| model.drawn(recipe.seed, k)).collect(),
+        };
         Ok(AnalyticTrainer {
             optimiser: Optimiser::new(&actor, recipe.rate),
             recipe,
-            model,
+            models,
             device,
             actor,
             targets,
@@ -283,14 +297,17 @@ impl AnalyticTrainer {
         // forward: step after step; the instances of a step are shared by the cores
         let mut flown = Vec::with_capacity(count);
         for t in 0..window {
-            let flyer = Flyer { model: &self.model, recipe: &self.recipe };
-            let fly = |units: &mut Units<f32>, Instance { aircraft, target, .. }: &Instance| {
+            let fly = |units: &mut Units<f32>, (k, instance): (usize, &Instance)| {
+                let Instance { aircraft, target, .. } = instance;
+                let model = &self.models[k % self.models.len()];
+                let flyer = Flyer { model, recipe: &self.recipe };
                 let observed = aircraft.observe(target).map(|x| x as f32);
                 let action = actor.act_one(units, &observed);
                 (observed, flyer.slopes(aircraft, target, action.map(f64::from)))
             };
             self.instances
                 .par_iter()
+                .enumerate()
                 .with_min_len(8)
                 .map_init(|| Units::new(0.0), fly)
                 .collect_into_vec(&mut flown);
@@ -421,9 +438,11 @@ impl Flyer<'_> {
         let (before, all) = (at.to_array(), after.to_array());
         for row in (0..8).chain(18..21) {
             for (k, (place, _)) in MOVED.iter().enumerate() {
-                // by what it really moved in single precision
+                // by what it really moved in single precision; a memory that the scheme does not have does not
                 let distance = before[*place].0[k + 1] - before[*place].0[0];
-                next[row][*place] = (all[row].0[k + 1] - all[row].0[0]) / distance;
+                if distance != 0.0 {
+                    next[row][*place] = (all[row].0[k + 1] - all[row].0[0]) / distance;
+                }
             }
         }
         after.map(|_, x| x.0[0].into())

@@ -71,8 +71,9 @@ struct Residuals {
 
 fn residuals(model: &GreyBox, flights: &[Flight]) -> Residuals {
     let mut all = Residuals { values: Vec::new(), channel: Vec::new() };
-    for flight in flights {
-        let series = windows::channels(model, &flight.prepared);
+    let series: Vec<Vec<Series>> =
+        flights.par_iter().map(|flight| windows::channels(model, &flight.prepared)).collect();
+    for (flight, series) in flights.iter().zip(series) {
         for (k, id) in CHANNELS.iter().enumerate() {
             let windows = flight.prepared.windows.len();
             match series.iter().find(|s| s.channel == *id) {
@@ -141,7 +142,7 @@ fn step(
     weights: &[f64; 6],
 ) -> Option<DVector<f64>> {
     let columns: Vec<windows::Columns> =
-        flights.iter().map(|f| windows::columns(present, &f.prepared)).collect();
+        flights.par_iter().map(|f| windows::columns(present, &f.prepared)).collect();
     let column = |(k, f): (usize, &Free)| {
         let known = columns.iter().flat_map(|c| c.values[f.index].iter().flatten().copied());
         let known: Vec<f64> = known.collect();

@@ -1,5 +1,7 @@
 //! What is known of an effect at once, before free runs have fitted it.
 
+use rayon::prelude::*;
+
 use super::amendment::{Added, Options, joined};
 use super::equation_error;
 use super::error::AmendError;
@@ -60,5 +62,5 @@ pub fn estimate(
 /// The flights as a fit takes them.
 fn ready(model: &GreyBox, flights: &[Reconstruction]) -> Result<Vec<Flight>, AmendError> {
     let slowest = model.airframe.envelope.flying_from_mps();
-    Ok(flights.iter().map(|f| Flight::new(f, slowest)).collect::<Result<_, _>>()?)
+    Ok(flights.par_iter().map(|f| Flight::new(f, slowest)).collect::<Result<_, _>>()?)
 }

@@ -1,10 +1,9 @@
-//! The recording of the demonstration, read back and drawn as a report.
+//! A recording, read back and drawn as a report.
 
 use std::path::Path;
 
 use anyhow::{Context, Result};
 
-use super::schedule::Leg;
 use crate::commands::files;
 use crate::control::Target;
 use crate::flight::replay::replay_watched;
@@ -14,7 +13,7 @@ use crate::logs::csv::{self, Tolerance};
 use crate::logs::{Flight, Sample};
 use crate::model::GreyBox;
 use crate::report::{
-    Cycle, Event, EventKind, FlightReport, LoopTiming, Segment, Sight, SurfaceTravel,
+    Cycle, Difficulty, Event, EventKind, FlightReport, LoopTiming, Segment, Sight, SurfaceTravel,
 };
 use crate::sim::episode::{attitude_error_deg, settled_error_deg};
 use crate::sysid::compare::{self, Comparison};
@@ -26,16 +25,16 @@ pub const TOLERANCE_DEG: f64 = 0.5;
 
 /// What the report needs besides the recording.
 pub struct Reporter<'a> {
+    /// The page's title.
+    pub title: String,
     /// Name of the controller.
     pub controller: &'a str,
     /// The model that the controller is designed from.
     pub model: &'a GreyBox,
-    /// Name of the aircraft.
-    pub aircraft: &'a str,
-    /// Seed of everything random.
-    pub seed: u64,
-    /// The attitudes to be tracked; none in a flight test.
-    pub legs: &'a [Leg],
+    /// Seed of everything random, where it is known.
+    pub seed: Option<u64>,
+    /// The attitudes that were to be tracked.
+    pub segments: Vec<Segment>,
     /// What the companion said, with its time, s.
     pub texts: Vec<(f64, String)>,
     /// What the planner saw.
@@ -47,17 +46,14 @@ impl Reporter<'_> {
     pub fn report<'f>(&self, folder: &Path, flight: &'f Flight) -> Result<FlightReport<'f>> {
         let travels = self.model.airframe.actuators.travels();
         Ok(FlightReport {
-            title: format!(
-                "Greylag demo: {} on aircraft {} in JSBSim",
-                self.controller, self.aircraft
-            ),
+            title: self.title.clone(),
             flight,
             controller: self.controller.into(),
             model: self.model.name.clone(),
-            seed: Some(self.seed),
+            seed: self.seed,
             command_line: files::command_line(),
             versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
-            segments: self.legs.iter().map(|leg| segment(leg, flight)).collect(),
+            segments: self.segments.clone(),
             tolerance_rad: TOLERANCE_DEG.to_radians(),
             travel: SurfaceTravel {
                 aileron_rad: travels.aileron.largest(),
@@ -122,13 +118,44 @@ pub fn read(folder: &Path) -> Result<Flight> {
     Ok(csv::load(&folder.join("flight.csv"), Tolerance::Strict)?.flight)
 }
 
-/// The part of the flight in which a leg's target was in force, with its settled error.
-fn segment(leg: &Leg, flight: &Flight) -> Segment {
-    let (roll, pitch) = (leg.roll_deg.to_radians(), leg.pitch_deg.to_radians());
-    // the target passes through a single-precision quaternion, good to 1e-7
-    let is =
-        |s: &&Sample| (s.roll_target_rad - roll).abs() + (s.pitch_target_rad - pitch).abs() < 1e-5;
-    let samples: Vec<&Sample> = flight.samples.iter().filter(is).collect();
+/// The part of the flight in which the target at roll and pitch (degrees) was in force, with its settled error.
+pub fn segment(
+    [roll_deg, pitch_deg]: [f64; 2],
+    difficulty: Difficulty,
+    flight: &Flight,
+) -> Segment {
+    let target = [roll_deg.to_radians(), pitch_deg.to_radians()];
+    let samples: Vec<&Sample> = flight.samples.iter().filter(|s| wants(s, target)).collect();
+    scored(&samples, target, difficulty)
+}
+
+/// Shortest time for which a target must be in force to be scored, s.
+const SHORTEST_S: f64 = 3.0;
+
+/// The parts of the flight in which a target stayed for some seconds, in time order.
+pub fn segments(flight: &Flight) -> Vec<Segment> {
+    let same = |a: &Sample, b: &Sample| wants(b, [a.roll_target_rad, a.pitch_target_rad]);
+    let runs = flight.samples.chunk_by(same).filter(|run| {
+        let ends = run.first().zip(run.last());
+        let lasting = ends.is_some_and(|(a, b)| b.time_s - a.time_s >= SHORTEST_S);
+        lasting && run[0].roll_target_rad.is_finite() && run[0].pitch_target_rad.is_finite()
+    });
+    let score = |run: &[Sample]| {
+        let target = [run[0].roll_target_rad, run[0].pitch_target_rad];
+        let [roll, pitch] = target.map(|x| x.to_degrees().abs());
+        let easy = roll < 45.0 && pitch < 25.0;
+        let difficulty = if easy { Difficulty::Easy } else { Difficulty::Hard };
+        scored(&run.iter().collect::<Vec<_>>(), target, difficulty)
+    };
+    runs.map(score).collect()
+}
+
+/// Whether a sample was flown towards `target`, rad: it passes through a single-precision quaternion, good to 1e-7.
+fn wants(s: &Sample, [roll, pitch]: [f64; 2]) -> bool {
+    (s.roll_target_rad - roll).abs() + (s.pitch_target_rad - pitch).abs() < 1e-5
+}
+
+fn scored(samples: &[&Sample], [roll, pitch]: [f64; 2], difficulty: Difficulty) -> Segment {
     let settled = &samples[samples.len() - samples.len() / 5..];
     let target = Target { roll, pitch, airspeed: f64::NAN };
     let errors: Vec<[f64; 2]> = settled
@@ -141,7 +168,7 @@ fn segment(leg: &Leg, flight: &Flight) -> Segment {
         end_s: ends(samples.last()),
         roll_target_rad: roll,
         pitch_target_rad: pitch,
-        difficulty: leg.difficulty,
+        difficulty,
         settled_error_rad: settled_error_deg(&errors).to_radians(),
     }
 }

@@ -1,0 +1,147 @@
+//! What flew a recorded flight: written beside the recording, so that `replay` and `report` need no options.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use serde::{Deserialize, Serialize};
+
+use crate::commands::files::{self, Overwrite, shipped};
+use crate::commands::fly::{CommandName, ProfileName};
+use crate::control::Kind;
+use crate::control::cem::Change;
+use crate::model::GreyBox;
+
+/// The file's name in a recording.
+pub const FILE: &str = "flown-with.toml";
+/// The layout that this program reads and writes.
+const SCHEMA: u32 = 1;
+
+/// Controller, model and link of a flight.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlownWith {
+    schema: u32,
+    /// The program with its version.
+    program: String,
+    /// The command line.
+    command: String,
+    /// The controller.
+    pub controller: String,
+    /// The model file.
+    pub model: PathBuf,
+    /// SHA-256 of the model's files.
+    model_sha256: String,
+    /// The folder of the policy.
+    pub policy: PathBuf,
+    /// Settings of the planner, as KEY=VALUE.
+    #[serde(default)]
+    planner: Vec<String>,
+    /// Airframe file in place of the model's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub airframe: Option<PathBuf>,
+    /// Flight-test schedule.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub schedule: Option<PathBuf>,
+    /// What was at the other end of the vehicle's link, and what it was commanded.
+    pub profile: ProfileName,
+    /// See `profile`.
+    pub commanded: CommandName,
+}
+
+/// The options that `fly` and `demo` have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Chosen<'a> {
+    /// The controller.
+    pub controller: Kind,
+    /// The model file.
+    pub model: &'a Path,
+    /// The folder of the policy.
+    pub policy: &'a Path,
+    /// Settings of the planner.
+    pub changes: &'a [Change],
+    /// Airframe file in place of the model's.
+    pub airframe: Option<&'a Path>,
+    /// Flight-test schedule.
+    pub schedule: Option<&'a Path>,
+    /// The other end of the vehicle's link.
+    pub profile: ProfileName,
+    /// What it is commanded.
+    pub commanded: CommandName,
+}
+
+/// A file as it is found from any folder; one that the program carries keeps its name.
+fn lasting(path: &Path) -> PathBuf {
+    std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+}
+
+impl FlownWith {
+    /// Says in the recording `folder` what flies.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(folder: &Path, chosen: &Chosen<'_>, model: &GreyBox) -> Result<()> {
+        let said = FlownWith {
+            schema: SCHEMA,
+            program: concat!("greylag ", env!("CARGO_PKG_VERSION")).into(),
+            command: files::command_line(),
+            controller: chosen.controller.name().into(),
+            model: lasting(chosen.model),
+            model_sha256: model.sha256.clone(),
+            policy: lasting(chosen.policy),
+            planner: chosen.changes.iter().map(Change::to_string).collect(),
+            airframe: chosen.airframe.map(lasting),
+            schedule: chosen.schedule.map(lasting),
+            profile: chosen.profile,
+            commanded: chosen.commanded,
+        };
+        let text = "# What flew this flight; `greylag replay` and `greylag report` read it.\n"
+            .to_owned()
+            + &toml::to_string(&said)?;
+        files::write(&folder.join(FILE), &text, Overwrite::Never)
+    }
+
+    /// Reads it from a recording; `None` from one that was made before November 2026.
+    ///
+    /// # Errors
+    /// If the file cannot be used.
+    pub fn read(folder: &Path) -> Result<Option<FlownWith>> {
+        let path = folder.join(FILE);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let context =
+            || format!("cannot use {}; name the flight's options instead", path.display());
+        let text = std::fs::read_to_string(&path).with_context(context)?;
+        let said: FlownWith = toml::from_str(&text).with_context(context)?;
+        if said.schema != SCHEMA {
+            bail!("{} has schema {}, this program reads {SCHEMA}", path.display(), said.schema);
+        }
+        Ok(Some(said))
+    }
+
+    /// The settings of the planner.
+    ///
+    /// # Errors
+    /// If one cannot be read.
+    pub fn changes(&self) -> Result<Vec<Change>> {
+        Ok(self.planner.iter().map(|text| text.parse()).collect::<Result<_, _>>()?)
+    }
+
+    /// The controller.
+    ///
+    /// # Errors
+    /// If this program has none of that name.
+    pub fn kind(&self) -> Result<Kind> {
+        Ok(self.controller.parse()?)
+    }
+
+    /// What is to be said if the model is no longer the one that flew.
+    pub fn changed_model(&self, model: &GreyBox) -> Option<String> {
+        (model.sha256 != self.model_sha256).then(|| {
+            format!(
+                "note: the files of {} have changed since the flight; what follows is of the model as it is now",
+                shipped(&self.model).display()
+            )
+        })
+    }
+}

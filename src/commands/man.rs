@@ -1,0 +1,30 @@
+//! `greylag man`: the manual pages.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+
+/// Options of `greylag man`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "For one user: greylag man ~/.local/share/man/man1; then: man greylag-compare"
+)]
+pub struct Arguments {
+    /// Folder for greylag.1 and a page for every subcommand; made if there is none. Pages there are replaced.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+}
+
+/// Writes the pages of `command`.
+///
+/// # Errors
+/// If the folder cannot be written.
+pub fn run(arguments: &Arguments, command: clap::Command) -> Result<ExitCode> {
+    let folder = &arguments.folder;
+    let context = || format!("cannot write manual pages into {}", folder.display());
+    std::fs::create_dir_all(folder).with_context(context)?;
+    clap_mangen::generate_to(command, folder).with_context(context)?;
+    println!("manual pages in {}", folder.display());
+    Ok(ExitCode::SUCCESS)
+}

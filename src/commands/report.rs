@@ -1,0 +1,61 @@
+//! `greylag report`: a recorded flight as a page.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Args;
+
+use crate::commands::files;
+use crate::commands::recording_report::{Reporter, read, segments, sights};
+use crate::commands::replay::{Again, FlownArguments};
+use crate::control::Pace;
+
+/// The arguments of `greylag report`.
+#[derive(Args)]
+pub struct Arguments {
+    /// Folder that `greylag fly` or `demo` has recorded.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// The page [default: report.html in DIR].
+    #[arg(long, value_name = "OUT.html")]
+    out: Option<PathBuf>,
+    /// Replace the page if it exists.
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    flown: FlownArguments,
+}
+
+/// Draws attitude, commands, timing, the model's error, and what a planner saw.
+///
+/// # Errors
+/// If a file cannot be used or written.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let folder = &arguments.folder;
+    let page = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
+    let overwrite = arguments.force.into();
+    files::writable(&page, overwrite)?;
+    let flight = read(folder)?;
+    let Again { controller, model, companion, vehicle } = arguments.flown.again(folder)?;
+    let sights = match controller.pace() {
+        Pace::Planned => sights(folder, companion, vehicle).unwrap_or_else(|why| {
+            eprintln!("the report does not show what the planner saw: {why:#}");
+            Vec::new()
+        }),
+        Pace::Immediate => Vec::new(),
+    };
+    let reporter = Reporter {
+        title: format!("Flight {}: {controller}, model {}", folder.display(), model.name),
+        controller: controller.name(),
+        model: &model,
+        seed: None,
+        segments: segments(&flight),
+        texts: Vec::new(),
+        sights,
+    };
+    let report = reporter.report(folder, &flight)?;
+    files::write(&page, &report.page().render(), overwrite)?;
+    println!("report: {}", page.display());
+    Ok(ExitCode::SUCCESS)
+}

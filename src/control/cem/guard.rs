@@ -1,0 +1,47 @@
+//! When the planner does not plan: a model that has not predicted, or is asked beyond what it was trained on.
+
+use super::rollout::{Actions, HORIZON, WIDTH};
+use super::{Cem, Settings, flown};
+use crate::control::disturbance::Disturbance;
+use crate::control::{Observation, Target};
+use crate::physics::Command;
+
+/// Time constant of the estimated disturbance where only the predictions are watched, s.
+const WATCHED_S: f64 = 0.3;
+
+/// What compares the model's predictions with what happened, if the settings ask for it.
+pub(super) fn predictions(settings: &Settings) -> Option<Disturbance> {
+    settings.disturbance.or(settings.trust.map(|_| WATCHED_S)).map(Disturbance::new)
+}
+
+impl Cem {
+    /// The estimated disturbance, where plans take it into account.
+    pub(super) fn disturbance(&self) -> Option<&Disturbance> {
+        self.predictions.as_ref().filter(|_| self.settings.disturbance.is_some())
+    }
+
+    /// Whether the model is one to plan with here: it has predicted the last half second well enough, and its residual
+    /// has seen data like this.
+    pub(super) fn is_trusted(&self, seen: &Observation) -> bool {
+        let predicted = match (self.settings.trust, &self.predictions) {
+            (Some(most), Some(predictions)) => predictions.missed_part() <= most,
+            _ => true,
+        };
+        let known = match (self.settings.known, &self.model.residual) {
+            (Some(most), Some(residual)) => {
+                residual.distance(&seen.state, &seen.actuators.controls()) <= most
+            }
+            _ => true,
+        };
+        predicted && known
+    }
+
+    /// The policy's own command.
+    pub(super) fn unsearched(&mut self, seen: &Observation, target: &Target) -> Command {
+        (self.last, self.planned_for) = (None, None);
+        // without noise the first lane is what the policy does
+        self.blocks[0] = [[[0.0; WIDTH]; 3]; HORIZON];
+        self.fly(seen, target, Actions::Policy, [0, 1]);
+        flown(&self.candidate(0).plan[0])
+    }
+}

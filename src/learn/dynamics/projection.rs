@@ -1,0 +1,69 @@
+//! Joint training by variable projection (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973).
+//!
+//! Prior and residual are learned together, and the prior is linear in its coefficients. For a given residual
+//! the best coefficients are those that leave no part of it in the span of ∂F_p/∂θ: a linear regression of the
+//! residual on these slopes, over the samples of the flights. The gradient of the rollouts approaches the same
+//! condition in the mean square, where a stall that the prior lacks is most of the residual and bends the
+//! coefficients; Tukey's weights take it out.
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use crate::learn::dynamics::basis::{Basis, columns};
+use crate::learn::dynamics::equation_error::{CHANNELS, Fit, Row, Weighting, solve};
+use crate::learn::dynamics::windows::{Track, regular};
+use crate::model::{GreyBox, Residual};
+
+/// Samples that take part, at most.
+const SAMPLES: usize = 8192;
+
+/// Passes of the weights.
+const PASSES: usize = 8;
+
+/// The step of the coordinates of `basis` at which `prior` says what of `residual` it can say.
+pub(super) fn step(
+    prior: &GreyBox,
+    residual: &Residual,
+    basis: &Basis,
+    tracks: &[Track],
+    weighting: Weighting,
+) -> Option<Vec<f64>> {
+    let fit = Fit::new(prior, basis);
+    let count = fit.count();
+    let places = tracks.iter().flat_map(|t| (0..t.states.len()).map(move |k| (t, k)));
+    let places: Vec<(&Track, usize)> = places.filter(|(t, k)| regular(&t.states[*k])).collect();
+    let every = places.len().div_ceil(SAMPLES).max(1);
+    let mut rows: Vec<Row> = places
+        .par_iter()
+        .step_by(every)
+        .map(|(track, k)| fit.sample(prior, residual, track, *k))
+        .collect();
+    let mut sum = DVector::zeros(count);
+    for _ in 0..PASSES {
+        let step = solve(&rows, count, weighting, None)?;
+        sum += &step;
+        rows.iter_mut().for_each(|row| row.advance(&step));
+    }
+    let own: Vec<f64> = sum.iter().take(basis.len()).copied().collect();
+    own.iter().all(|x| x.is_finite()).then_some(own)
+}
+
+impl Fit<'_> {
+    /// What the residual adds at a sample, and the slopes of what the prior could say in its place.
+    fn sample(&self, prior: &GreyBox, residual: &Residual, track: &Track, k: usize) -> Row {
+        let (state, controls) = (&track.states[k], &track.controls[k]);
+        let scale = prior.scale();
+        let added = residual.rate(state, controls).to_array();
+        let of_theta = columns(prior, track, k);
+        let lacking = self.rates_along(prior, state, track.altitude[k]);
+        let unit = |rate: &[f64; 8]| CHANNELS.map(|c| rate[c] / scale[c]);
+        let own = (0..self.basis.len()).map(|j| {
+            let mut rate = [0.0; 8];
+            for (place, turn) in self.basis.places.iter().zip(self.basis.column(j)) {
+                rate.iter_mut().zip(of_theta[*place]).for_each(|(sum, x)| *sum += turn * x);
+            }
+            unit(&rate)
+        });
+        Row { error: unit(&added), slopes: own.chain(lacking.iter().map(unit)).collect() }
+    }
+}

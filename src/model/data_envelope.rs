@@ -1,0 +1,145 @@
+//! The envelope of the data that a residual was trained on: how far from it a point lies.
+//!
+//! The distance is a leverage: that of a linear regression on 1, the network's inputs and the units of its last
+//! hidden layer, x̂ᵀ (X̂ᵀX̂)⁻¹ x̂ over the training samples. It grows where inputs leave the data and where units act
+//! that hardly acted on it; the variance of a Bayesian last layer is proportional to it.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::model::residual::INPUTS;
+use crate::num::Dense;
+use crate::num::dense::ON_STACK;
+
+/// Features at most: 1, the inputs, the widest hidden layer.
+const MOST: usize = 1 + INPUTS + ON_STACK;
+
+/// Ridge on the features' second moments, as a part of their mean: a unit that never acted has no moment.
+const RIDGE: f64 = 1e-4;
+
+/// The part of the training samples that lies within a distance of 1.
+const WITHIN: f64 = 0.999;
+
+/// The envelope of training data in the space of a network's features.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DataEnvelope {
+    /// W, row-major and square: the distance of features x̂ is ‖W x̂‖.
+    whitening: Vec<f32>,
+    features: usize,
+}
+
+impl DataEnvelope {
+    /// The envelope of `inputs`, the scaled inputs of `network` at the training samples; `None` if there are none, or
+    /// one is no number.
+    pub fn of(network: &Dense, inputs: &[[f64; INPUTS]]) -> Option<DataEnvelope> {
+        let all: Vec<DVector<f64>> = inputs
+            .iter()
+            .map(|x| {
+                let (features, count) = features(network, x);
+                DVector::from_column_slice(&features[..count])
+            })
+            .collect();
+        let count = all.first()?.len();
+        let mut moments = DMatrix::<f64>::zeros(count, count);
+        all.iter().for_each(|x| moments.ger(1.0 / all.len() as f64, x, x, 1.0));
+        let ridge = RIDGE * moments.trace() / count as f64;
+        for k in 0..count {
+            moments[(k, k)] += ridge;
+        }
+        let whitening = moments.cholesky()?.l().try_inverse()?;
+        let mut distances: Vec<f64> = all.iter().map(|x| (&whitening * x).norm()).collect();
+        let place = (WITHIN * (distances.len() - 1) as f64) as usize;
+        let (_, unit, _) = distances.select_nth_unstable_by(place, f64::total_cmp);
+        let scaled = whitening.transpose() / *unit;
+        DataEnvelope::new(scaled.iter().map(|w| *w as f32).collect(), network).ok()
+    }
+
+    /// The envelope with the matrix W, row-major, for `network`.
+    ///
+    /// # Errors
+    /// If its size is not that of the network's features, or an entry is no finite number.
+    pub fn new(whitening: Vec<f32>, network: &Dense) -> Result<DataEnvelope, String> {
+        let features = features(network, &[0.0; INPUTS]).1;
+        if whitening.len() != features * features {
+            let found = whitening.len();
+            return Err(format!("its data envelope has {found} numbers, not {features}²"));
+        }
+        if !whitening.iter().all(|w| w.is_finite()) {
+            return Err("its data envelope has an entry that is not a finite number".into());
+        }
+        Ok(DataEnvelope { whitening, features })
+    }
+
+    /// W, row-major.
+    pub fn whitening(&self) -> &[f32] {
+        &self.whitening
+    }
+
+    /// Number of features: rows and columns of W.
+    pub fn features(&self) -> usize {
+        self.features
+    }
+
+    /// The distance of the scaled `inputs` of `network`: 0.999 of the training samples lie within 1.
+    pub fn distance(&self, network: &Dense, inputs: &[f64; INPUTS]) -> f64 {
+        let (features, count) = features(network, inputs);
+        let rows = self.whitening.chunks_exact(count);
+        let product = |row: &[f32]| -> f64 {
+            row.iter().zip(&features).map(|(w, x)| f64::from(*w) * x).sum()
+        };
+        rows.map(|row| product(row).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+/// 1, the inputs, the units of the last hidden layer, and how many that are.
+fn features(network: &Dense, inputs: &[f64; INPUTS]) -> ([f64; MOST], usize) {
+    let mut features = [0.0; MOST];
+    features[0] = 1.0;
+    features[1..=INPUTS].copy_from_slice(inputs);
+    let mut units = [0.0; ON_STACK];
+    let count = network.last_hidden(inputs, &mut units);
+    features[1 + INPUTS..][..count].copy_from_slice(&units[..count]);
+    (features, 1 + INPUTS + count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::residual::OUTPUTS;
+    use crate::num::stream;
+    use rand::RngExt;
+
+    #[test]
+    fn the_distance_is_one_at_the_edge_of_the_data_and_grows_beyond() {
+        let mut rng = stream::stream(4, &[]);
+        let network = Dense::uniform(&[INPUTS, 16, 16, OUTPUTS], &mut rng).unwrap();
+        let mut draw = |reach: f64| -> [f64; INPUTS] {
+            std::array::from_fn(|_| reach * rng.random_range(-1.0..1.0))
+        };
+        let data: Vec<_> = (0..5000).map(|_| draw(1.0)).collect();
+        let envelope = DataEnvelope::of(&network, &data).unwrap();
+        let beyond = |points: &[[f64; INPUTS]]| {
+            let out = points.iter().filter(|x| envelope.distance(&network, x) > 1.0).count();
+            out as f64 / points.len() as f64
+        };
+        assert!((beyond(&data) - 0.001).abs() < 5e-4, "{}", beyond(&data));
+        let fresh: Vec<_> = (0..5000).map(|_| draw(1.0)).collect();
+        assert!(beyond(&fresh) < 0.01, "{}", beyond(&fresh));
+        // each single input beyond the data is seen
+        for k in 0..INPUTS {
+            let mut point = [0.0; INPUTS];
+            point[k] = 8.0;
+            let distance = envelope.distance(&network, &point);
+            assert!(distance > 1.0, "input {k}: {distance}");
+        }
+    }
+
+    #[test]
+    fn a_matrix_of_another_size_or_with_lost_numbers_is_refused() {
+        let network = Dense::silent(&[INPUTS, 4, OUTPUTS], &mut stream::stream(1, &[])).unwrap();
+        let count = 1 + INPUTS + 4;
+        assert!(DataEnvelope::new(vec![0.0; count * count], &network).is_ok());
+        assert!(DataEnvelope::new(vec![0.0; count], &network).is_err());
+        assert!(DataEnvelope::new(vec![f32::NAN; count * count], &network).is_err());
+        assert!(DataEnvelope::of(&network, &[]).is_none());
+    }
+}

@@ -1,0 +1,58 @@
+//! Models drawn from what is not known of one: Monte Carlo over its coefficients.
+
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::model::{GreyBox, Named};
+use crate::num::stream;
+use crate::physics::effects::Kind;
+
+/// Purpose of the random stream.
+const DRAWS: u64 = 40;
+
+impl GreyBox {
+    /// The physical bounds of the coefficient of that full name, for an aircraft of this size.
+    pub fn bounds_of(&self, name: &str) -> Option<(f64, f64)> {
+        let (effect, coefficient) = name.split_once('.')?;
+        let about = Kind::from_id(effect)?.describe();
+        let found = about.coefficients.iter().find(|c| c.name == coefficient)?;
+        Some(self.size().bounds(found))
+    }
+
+    /// Draw `k` of `seed`: every coefficient is normal about its value, with its [width](Named::width) as
+    /// standard deviation, held within its physical bounds. Mass, inertia, actuators and the residual stay.
+    pub fn drawn(&self, seed: u64, k: u64) -> GreyBox {
+        let mut rng = stream::stream(seed, &[DRAWS, k]);
+        let draw = |c: &Named| {
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            let value = c.value + c.width() * normal;
+            self.bounds_of(&c.name).map_or(value, |(least, most)| value.clamp(least, most))
+        };
+        let values: Vec<f64> = self.coefficients().iter().map(draw).collect();
+        let mut drawn = self.clone();
+        drawn.name = format!("{}, draw {k}", self.name);
+        drawn.set_coefficients(&values);
+        drawn
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn draws_spread_by_the_widths_and_repeat() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let draws: Vec<GreyBox> = (0..400).map(|k| model.drawn(7, k)).collect();
+        for (i, c) in model.coefficients().iter().enumerate() {
+            let values = draws.iter().map(|d| d.coefficients()[i].value - c.value);
+            let square = values.map(|x| x * x).sum::<f64>() / draws.len() as f64;
+            assert!(square.sqrt() <= 1.15 * c.width(), "{}", c.name);
+            // a bound may cut one side off
+            assert!(square.sqrt() >= 0.5 * c.width(), "{}", c.name);
+        }
+        assert_eq!(model.drawn(7, 3).coefficients(), draws[3].coefficients());
+        assert_ne!(model.drawn(8, 3).coefficients(), draws[3].coefficients());
+    }
+}

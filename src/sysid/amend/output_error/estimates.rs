@@ -1,0 +1,206 @@
+//! What a fit that has ended says: estimates with their intervals, by flight, and what the reader must know.
+
+use super::*;
+
+/// Two-sided 95 % point of the normal distribution.
+const NORMAL_95: f64 = 1.96;
+/// A prior's width must shrink by this factor for a coefficient to count as learned.
+const LEARNED: f64 = 0.7;
+/// Coefficients whose errors go together more closely than this say the same.
+const SAME: f64 = 0.9;
+/// Not settled if the last change exceeds this many standard deviations,
+const UNSETTLED: f64 = 0.5;
+/// and lost, so that nothing can be said of any coefficient, if it exceeds this many and was made.
+const LOST: f64 = 5.0;
+
+impl Search<'_> {
+    /// The fit as it stands, with intervals.
+    pub(super) fn finish(self) -> Result<Fit, AmendError> {
+        let model_name = || self.base.name.clone();
+        if self.change.0.is_nan() || (self.change.0 > LOST && !self.stuck) {
+            return Err(AmendError::NotConverged {
+                model: model_name(),
+                iterations: self.iterations,
+                change: self.change.0,
+                parameter: self.free[self.change.1].name.clone(),
+            });
+        }
+        let system = self.system();
+        let singular = || AmendError::Singular { model: model_name() };
+        let scores: Vec<DVector<f64>> = (self.shots.iter().zip(&system.shots))
+            .map(|(shot, normal)| {
+                let mut score = DVector::zeros(system.gradient.len());
+                for (a, p) in self.places(shot.flight).iter().enumerate() {
+                    score[*p] = normal.gradient[a];
+                }
+                score
+            })
+            .collect();
+        let covariance = interval::covariance(&system.information, &system.prior, &scores)
+            .ok_or_else(singular)?;
+        let sd = &covariance.sd;
+        let learned = |(k, f): (usize, &Free)| sd[k] < LEARNED * f.width;
+        if !self.free.iter().enumerate().any(learned) {
+            return Err(AmendError::NoExcitation { model: model_name() });
+        }
+        let by_flight = self.by_flight(&system);
+        let unsettled = self.unsettled();
+        let astray = if unsettled.is_some() { self.change.0 } else { 0.0 };
+        let wider = self.disagreement(sd, &by_flight).hypot(astray);
+        let sd: Vec<f64> = sd.iter().map(|x| x * wider).collect();
+        let mut by_flight = by_flight;
+        by_flight.iter_mut().flatten().for_each(|e| e.sd *= wider);
+        let parameters = self.parameters(&sd, &by_flight, &covariance);
+        let flights = self.flights.iter().zip(&self.place.sensors).enumerate();
+        let weakened = self.shots.iter().filter(|s| s.weight < 0.5).count() + self.short;
+        Ok(Fit {
+            model: parameters::with(self.base, &self.free, &self.place.theta),
+            parameters,
+            flights: flights
+                .map(|(k, (f, s))| {
+                    let at = self.free.len() + k * SENSORS;
+                    FittedFlight::new(&f.prepared.name, f.seconds(), s, &sd[at..at + SENSORS])
+                })
+                .collect(),
+            residual_sd: self.residual_sd(),
+            shots: self.shots.len(),
+            weakened,
+            left: self.left(),
+            weights: self.weights,
+            iterations: self.iterations,
+            notes: self.notes(weakened, &unsettled),
+            unsettled,
+        })
+    }
+
+    fn parameters(
+        &self,
+        sd: &[f64],
+        by_flight: &[Vec<FlightEstimate>],
+        covariance: &Covariance,
+    ) -> Vec<Parameter> {
+        let same = |k: usize| {
+            let own = self.free.iter().enumerate().filter(|(_, f)| !f.added);
+            let all = own.map(|(j, f)| (covariance.correlation(k, j).abs(), &f.name));
+            let closest = all.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(c, _)| *c > SAME);
+            closest.map(|(_, name)| name.clone())
+        };
+        let one = |(k, f): (usize, &Free)| {
+            let value = self.place.theta[k];
+            let half = NORMAL_95 * sd[k];
+            let at = |bound: f64| (value - bound).abs() <= 1e-6 * (f.bounds.1 - f.bounds.0);
+            Parameter {
+                name: f.name.clone(),
+                meaning: f.meaning,
+                added: f.added,
+                prior: f.prior,
+                prior_sd: f.width,
+                value,
+                sd: sd[k],
+                ci95: [value - half, value + half],
+                at_bound: at(f.bounds.0) || at(f.bounds.1),
+                by_flight: by_flight[k].clone(),
+                same_as: if f.added { same(k) } else { None },
+            }
+        };
+        self.free.iter().enumerate().map(one).collect()
+    }
+
+    /// What each flight alone would say, to first order: a step from the common optimum with that
+    /// flight's equations and the prior.
+    fn by_flight(&self, system: &System) -> Vec<Vec<FlightEstimate>> {
+        let count = self.free.len();
+        let mut all = vec![Vec::new(); count];
+        for (number, flight) in self.flights.iter().enumerate() {
+            let size = count + SENSORS;
+            let (mut information, mut gradient) =
+                (DMatrix::zeros(size, size), DVector::zeros(size));
+            let places = self.places(number);
+            let unknowns = self.unknowns(&self.place);
+            for (a, p) in places.iter().enumerate() {
+                information[(a, a)] = system.prior[*p];
+                gradient[a] = system.prior[*p] * unknowns[*p];
+            }
+            let own = self.shots.iter().zip(&system.shots).filter(|(s, _)| s.flight == number);
+            for (_, normal) in own {
+                information += &normal.information;
+                gradient += &normal.gradient;
+            }
+            let Some(cholesky) = information.cholesky() else { continue };
+            let inverse = cholesky.inverse();
+            let step = -(&inverse * gradient);
+            for (k, list) in all.iter_mut().enumerate() {
+                list.push(FlightEstimate {
+                    flight: flight.prepared.name.clone(),
+                    value: self.place.theta[k] + step[k],
+                    sd: inverse[(k, k)].sqrt(),
+                });
+            }
+        }
+        all
+    }
+
+    /// By how much intervals must widen for the flights to agree as well as they say: the root mean
+    /// square of their own estimates less the common one, in standard deviations of the difference (Birge
+    /// ratio), at least 1. What is wrong in the same way throughout a flight, as a clock is, shows here.
+    fn disagreement(&self, sd: &[f64], by_flight: &[Vec<FlightEstimate>]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (k, f) in self.free.iter().enumerate() {
+            for own in by_flight[k].iter().filter(|e| e.sd < LEARNED * f.width) {
+                let variance = own.sd.powi(2) - sd[k].powi(2);
+                if variance > 0.1 * own.sd.powi(2) {
+                    sum += (own.value - self.place.theta[k]).powi(2) / variance;
+                    count += 1.0;
+                }
+            }
+        }
+        if count > 0.0 { f64::max(1.0, (sum / count).sqrt()) } else { 1.0 }
+    }
+
+    fn left(&self) -> Vec<Left> {
+        let residuals = self.residuals();
+        let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
+        let shots = self.shots.iter().zip(&residuals).zip(&self.place.starts);
+        let one = |((shot, r), from): ((&Shot, &Vec<[f64; 8]>), &[f64; 8])| Left {
+            shot: [shot.flight, shot.segment, shot.start],
+            output: std::array::from_fn(|k| square(r, k)),
+            start: from.map(|x| x * x),
+        };
+        shots.map(one).collect()
+    }
+
+    fn residual_sd(&self) -> [f64; 8] {
+        let residuals = self.residuals();
+        let count = residuals.iter().map(Vec::len).sum::<usize>() as f64;
+        let square = |k: usize| residuals.iter().flatten().map(|r| r[k] * r[k]).sum::<f64>();
+        std::array::from_fn(|k| (square(k) / count).sqrt())
+    }
+
+    /// What had not settled, if anything.
+    fn unsettled(&self) -> Option<String> {
+        let (change, parameter) = (self.change.0, &self.free[self.change.1].name);
+        (change > UNSETTLED).then(|| {
+            format!(
+                "the search had not settled after {} iterations: {parameter} still moved by {change:.2} \
+                 standard deviations; leave out flights in which the aircraft spins or hits something, or \
+                 fly more of what moves {parameter}",
+                self.iterations
+            )
+        })
+    }
+
+    fn notes(&self, weakened: usize, unsettled: &Option<String>) -> Vec<String> {
+        let mut notes: Vec<String> = unsettled
+            .iter()
+            .map(|why| format!("{why}; all intervals are widened by that"))
+            .collect();
+        if weakened > 0 {
+            notes.push(format!(
+                "{weakened} of {} shots stray far from the flight (stall, spin, gusts) and were cut \
+                 short or count less",
+                self.shots.len()
+            ));
+        }
+        notes
+    }
+}
