@@ -39,8 +39,6 @@ pub struct Arguments {
 /// What each manoeuvre is expected to tell, as JSON; no value where the aircraft would leave its bounds.
 #[derive(Serialize)]
 struct Document<'a> {
-    schema: &'static str,
-    program: &'static str,
     between: [&'a str; 2],
     manoeuvres: Vec<Manoeuvre<'a>>,
     chosen: Option<&'a str>,
@@ -68,8 +66,6 @@ fn document<'a>(
         needed_s: p.seconds().filter(|s| s.is_finite()),
     };
     Document {
-        schema: "greylag.design/1",
-        program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
         between: [&suspects[0].id, &suspects[1].id],
         manoeuvres: all.iter().map(row).collect(),
         chosen: plan.map(|p| p.manoeuvre.name),
@@ -101,7 +97,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let [a, b] = &suspects;
     let cruise = model.airframe.envelope.airspeed_cruise_mps;
     let plan = plan(&all, cruise);
-    arguments.json.write(&document(&suspects, &all, plan.as_ref()), overwrite)?;
+    let found = document(&suspects, &all, plan.as_ref());
+    arguments.json.write("greylag.design/1", &found, overwrite)?;
     let Some(Plan { manoeuvre, seconds, times, schedule }) = plan else {
         bail!(
             "no manoeuvre of the menu tells {} from {} within {LONGEST_S} s; name larger --values, or take both as one",

@@ -92,19 +92,13 @@ impl Document {
     }
 }
 
+/// The layout of what is written as JSON.
+const SCHEMA: &str = "greylag.effects/1";
+
 /// The catalogue as JSON.
 #[derive(Serialize)]
 struct Listed {
-    schema: &'static str,
-    program: &'static str,
     effects: Vec<Document>,
-}
-
-impl Listed {
-    fn new(effects: Vec<Document>) -> Listed {
-        let program = concat!("greylag ", env!("CARGO_PKG_VERSION"));
-        Listed { schema: "greylag.effects/1", program, effects }
-    }
 }
 
 /// Where effects act, in the order of the list.
@@ -179,7 +173,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             }
             let all = catalogue();
             let effects = all.iter().map(|(place, about)| Document::new(*place, about)).collect();
-            json.write(&Listed::new(effects), Overwrite::Never)?;
+            json.write(SCHEMA, &Listed { effects }, Overwrite::Never)?;
         }
         What::Show(show) => self::show(show)?,
         What::Variables => print!("{}", variables()),
@@ -267,7 +261,8 @@ fn written(effect: &Written) {
 fn show(show: &Show) -> Result<()> {
     let (place, about) = named(&show.id)?;
     let overwrite = show.force.into();
-    show.json.write(&Listed::new(vec![Document::new(place, &about)]), overwrite)?;
+    let listed = Listed { effects: vec![Document::new(place, &about)] };
+    show.json.write(SCHEMA, &listed, overwrite)?;
     let channels = channels(place, &about);
     if !show.json.takes_stdout() {
         print(place, &about, &channels);

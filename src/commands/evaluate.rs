@@ -28,6 +28,21 @@ use crate::sim::published::published;
 use crate::sim::tracking::{Tracking, track};
 use crate::sim::{Group, Simulator, TargetFile};
 
+/// Options that a flight in a drawn model has no use for.
+const IN_JSBSIM: [&str; 11] = [
+    "report",
+    "aircraft",
+    "aircraft_dir",
+    "property",
+    "set",
+    "hide",
+    "wind_ned_mps",
+    "turbulence_severity",
+    "gust",
+    "start_airspeed_mps",
+    "start_altitude_m",
+];
+
 /// Options of `greylag evaluate`.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -54,7 +69,7 @@ pub struct Arguments {
     beyond_envelope: bool,
     /// Fly models drawn from the widths of the first --model's coefficients, so many, in place of JSBSim: Monte Carlo over
     /// what is not known of the aircraft. The controllers keep the --model that they are built from.
-    #[arg(long, value_name = "N", conflicts_with = "report", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", conflicts_with_all = IN_JSBSIM, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     draws: Option<u32>,
     /// Seed of the controllers' own randomness, with the air's and the draws'.
     #[arg(long, default_value_t = 1)]
@@ -173,6 +188,9 @@ fn over_draws(
         println!("{}", table(&all));
         println!("{}", draws_table(&flown));
         println!("flown in draws of model {} from the widths of its coefficients", models[0].name);
+        println!(
+            "intervals take all flights for independent; how draws differ is in the second table"
+        );
     }
     if let Some(path) = &arguments.json {
         let document = DrawsDocument {

@@ -63,8 +63,6 @@ pub struct Arguments {
 /// The flights as JSON.
 #[derive(Serialize)]
 struct Document<'a> {
-    schema: &'static str,
-    program: &'static str,
     flights: &'a [Entry],
 }
 
@@ -131,12 +129,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if !quiet {
         print_findings(&entries);
     }
-    let document = Document {
-        schema: "greylag.faults/1",
-        program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
-        flights: &entries,
-    };
-    arguments.json.write(&document, Overwrite::Never)?;
+    let document = Document { flights: &entries };
+    arguments.json.write("greylag.faults/1", &document, Overwrite::Never)?;
     let failed = entries.iter().any(|entry| entry.findings.iter().any(|f| f.is_failure()));
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

@@ -37,6 +37,15 @@ pub struct JsonArgument {
     json: Option<PathBuf>,
 }
 
+/// What a command found, with the name of its layout and the program.
+#[derive(Serialize)]
+struct Document<'a, T> {
+    schema: &'static str,
+    program: &'static str,
+    #[serde(flatten)]
+    content: &'a T,
+}
+
 impl JsonArgument {
     /// Fails at once if it cannot be written later.
     pub fn writable(&self, overwrite: Overwrite) -> Result<()> {
@@ -48,10 +57,17 @@ impl JsonArgument {
         is_stdout(self.json.as_deref())
     }
 
-    /// Writes `document` where it was asked for, if it was.
-    pub fn write(&self, document: &impl Serialize, overwrite: Overwrite) -> Result<()> {
+    /// Writes `content` under the name of its layout where it was asked for, if it was.
+    pub fn write(
+        &self,
+        schema: &'static str,
+        content: &impl Serialize,
+        overwrite: Overwrite,
+    ) -> Result<()> {
         let Some(path) = &self.json else { return Ok(()) };
-        write(path, &(serde_json::to_string_pretty(document)? + "\n"), overwrite)
+        let program = concat!("greylag ", env!("CARGO_PKG_VERSION"));
+        let document = Document { schema, program, content };
+        write(path, &(serde_json::to_string_pretty(&document)? + "\n"), overwrite)
     }
 }
 

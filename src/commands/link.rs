@@ -162,8 +162,6 @@ impl Ear {
 /// What was found, as JSON.
 #[derive(Serialize)]
 struct Document {
-    schema: &'static str,
-    program: &'static str,
     stack: String,
     system: Option<u8>,
     armed: Option<bool>,
@@ -197,8 +195,6 @@ impl Document {
             StreamRow { message: s.name, wanted_hz: s.hz, received_hz, jitter_ms, needed: s.needed }
         };
         Document {
-            schema: "greylag.link-check/1",
-            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
             stack: real.profile().stack.to_string(),
             system: real.system(),
             armed: real.controller().map(|(_, armed)| armed),
@@ -239,7 +235,7 @@ fn report(check: &Check, real: &Real, out: &mut dyn Write) -> Result<ExitCode> {
             say!(out, "\nwarning: {words}");
         }
     }
-    check.json.write(&Document::new(real, &missing), Overwrite::Never)?;
+    check.json.write("greylag.link-check/1", &Document::new(real, &missing), Overwrite::Never)?;
     if missing.is_empty() {
         say!(out, "\n{} can be flown by {:?}", real.profile().stack, real.profile().authority);
         return Ok(ExitCode::SUCCESS);

@@ -15,6 +15,7 @@ use crate::model::GreyBox;
 use crate::report::{
     Cycle, Difficulty, Event, EventKind, FlightReport, LoopTiming, Segment, Sight, SurfaceTravel,
 };
+use crate::sim::Group;
 use crate::sim::episode::{attitude_error_deg, settled_error_deg};
 use crate::sysid::compare::{self, Comparison};
 use crate::sysid::flight_path;
@@ -142,8 +143,8 @@ pub fn segments(flight: &Flight) -> Vec<Segment> {
     });
     let score = |run: &[Sample]| {
         let target = [run[0].roll_target_rad, run[0].pitch_target_rad];
-        let [roll, pitch] = target.map(|x| x.to_degrees().abs());
-        let easy = roll < 45.0 && pitch < 25.0;
+        let [roll, pitch] = target.map(f64::to_degrees);
+        let easy = Group::Easy.contains(roll, pitch);
         let difficulty = if easy { Difficulty::Easy } else { Difficulty::Hard };
         scored(&run.iter().collect::<Vec<_>>(), target, difficulty)
     };

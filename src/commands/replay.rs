@@ -126,8 +126,6 @@ impl FlownArguments {
 /// The result as JSON.
 #[derive(Serialize)]
 struct Document {
-    schema: &'static str,
-    program: &'static str,
     ticks: u64,
     different: u64,
     plans_different: u64,
@@ -153,8 +151,6 @@ impl From<&Outcome> for Document {
             replayed: three(&d.replayed),
         };
         Document {
-            schema: "greylag.replay/1",
-            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
             ticks: of.ticks,
             different: of.different,
             plans_different: of.plans_different,
@@ -176,7 +172,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if !arguments.json.takes_stdout() {
         print(&outcome);
     }
-    arguments.json.write(&Document::from(&outcome), Overwrite::Never)?;
+    arguments.json.write("greylag.replay/1", &Document::from(&outcome), Overwrite::Never)?;
     let exact = outcome.different == 0 && outcome.without_state <= u64::from(outcome.cut_short);
     Ok(if exact && outcome.ticks > 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -13,6 +13,11 @@ use crate::physics::actuators::Actuators;
 pub(crate) const NONE: State =
     State { roll: 0.0, pitch: 0.0, airspeed: 0.0, p: 0.0, q: 0.0, r: 0.0, alpha: 0.0, beta: 0.0 };
 
+/// Time constant of the estimate where nothing else is asked for, s: faster follows the noise, slower the manoeuvre.
+pub(crate) const TIME_CONSTANT_S: f64 = 0.3;
+/// Part of the motion that predictions may miss for the model to be planned with, where nothing else is asked for. On
+/// `params/x8/learned` they never miss so much, on `prior-as-printed` almost always (`docs/validation/learned-models.md`).
+pub(crate) const TRUST: f64 = 0.5;
 /// Time over which predictions are compared with what happened, s: a few responses of the short period.
 const MEMORY_S: f64 = 0.5;
 /// Accelerations below which nothing is compared, in x_c a second: calm flight shows no model to be wrong.

@@ -24,7 +24,6 @@ const WITHIN: f64 = 0.999;
 pub struct DataEnvelope {
     /// W, row-major and square: the distance of features x̂ is ‖W x̂‖.
     whitening: Vec<f32>,
-    features: usize,
 }
 
 impl DataEnvelope {
@@ -66,7 +65,7 @@ impl DataEnvelope {
         if !whitening.iter().all(|w| w.is_finite()) {
             return Err("its data envelope has an entry that is not a finite number".into());
         }
-        Ok(DataEnvelope { whitening, features })
+        Ok(DataEnvelope { whitening })
     }
 
     /// W, row-major.
@@ -76,7 +75,7 @@ impl DataEnvelope {
 
     /// Number of features: rows and columns of W.
     pub fn features(&self) -> usize {
-        self.features
+        self.whitening.len().isqrt()
     }
 
     /// The distance of the scaled `inputs` of `network`: 0.999 of the training samples lie within 1.

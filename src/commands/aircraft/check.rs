@@ -27,8 +27,6 @@ pub struct Arguments {
 /// What was found, as JSON: SI units, angles in rad.
 #[derive(Serialize)]
 struct Document<'a> {
-    schema: &'static str,
-    program: &'static str,
     model: &'a str,
     airframe: &'a str,
     #[serde(flatten)]
@@ -50,14 +48,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         );
         print(&found);
     }
-    let document = Document {
-        schema: "greylag.aircraft-check/1",
-        program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
-        model: &model.name,
-        airframe: &model.airframe.name,
-        found: &found,
-    };
-    arguments.json.write(&document, Overwrite::Never)?;
+    let document = Document { model: &model.name, airframe: &model.airframe.name, found: &found };
+    arguments.json.write("greylag.aircraft-check/1", &document, Overwrite::Never)?;
     Ok(if found.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(status::IN_DOUBT) })
 }
 

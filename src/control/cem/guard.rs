@@ -2,16 +2,13 @@
 
 use super::rollout::{Actions, HORIZON, WIDTH};
 use super::{Cem, Settings, flown};
-use crate::control::disturbance::Disturbance;
+use crate::control::disturbance::{Disturbance, TIME_CONSTANT_S};
 use crate::control::{Observation, Target};
 use crate::physics::Command;
 
-/// Time constant of the estimated disturbance where only the predictions are watched, s.
-const WATCHED_S: f64 = 0.3;
-
 /// What compares the model's predictions with what happened, if the settings ask for it.
 pub(super) fn predictions(settings: &Settings) -> Option<Disturbance> {
-    settings.disturbance.or(settings.trust.map(|_| WATCHED_S)).map(Disturbance::new)
+    settings.disturbance.or(settings.trust.map(|_| TIME_CONSTANT_S)).map(Disturbance::new)
 }
 
 impl Cem {

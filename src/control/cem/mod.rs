@@ -9,18 +9,13 @@ mod rollout;
 mod settings;
 mod surrogate;
 
-use std::cmp::Ordering;
 use std::time::{Duration, Instant};
-
-use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 use crate::control::disturbance::{self, Disturbance};
 use crate::control::ilqr::Ilqr;
 use crate::control::insight::Insight;
 use crate::control::lqi::{Ahead, Lqi};
 use crate::control::policy::Agent;
-use crate::control::task::Task;
 use crate::control::{Controller, Observation, Target};
 use crate::model::{GreyBox, STEP};
 use crate::num::stream;
@@ -28,7 +23,7 @@ use crate::physics::actuators::Actuators;
 use crate::physics::inputs::InputMemory;
 use crate::physics::{Command, Time};
 pub use changes::{Change, ChangeError};
-use rollout::{Actions, Block, HORIZON, Machine, Scene, WIDTH, Worth};
+use rollout::{Actions, Block, HORIZON, Machine, WIDTH, Worth};
 pub use settings::{Instructions, Settings, Start, Update, Value};
 use surrogate::Surrogate;
 

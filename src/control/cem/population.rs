@@ -1,6 +1,16 @@
 //! The candidates of an iteration: drawn, flown, weighed.
 
-use super::*;
+use std::cmp::Ordering;
+use std::time::Instant;
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::rollout::{Actions, HORIZON, Scene, WIDTH, Worth};
+use super::{Cem, Plan, Update, Valued};
+use crate::control::disturbance::{self, Disturbance};
+use crate::control::task::Task;
+use crate::control::{Observation, Target};
 
 impl Cem {
     /// Draws the candidates of an iteration into the blocks from `first` on.

@@ -2,6 +2,7 @@
 
 use super::changes::Change;
 use super::rollout::HORIZON;
+use crate::control::disturbance::{TIME_CONSTANT_S, TRUST};
 
 /// How the candidates of an iteration make the next distribution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,7 +135,7 @@ impl Settings {
         start: Start::Policy,
         spread: 0.02,
         noise: [0.02, 0.06],
-        trust: Some(0.5),
+        trust: Some(TRUST),
         ..Settings::POLICY
     };
     /// The hybrid controller whose policy flies on behind each plan up to step 40 in the model, before the critics
@@ -164,8 +165,8 @@ impl Settings {
         noise: [0.1, 0.3],
         steps: 80,
         margin: 5e-2,
-        disturbance: Some(0.3),
-        trust: Some(0.5),
+        disturbance: Some(TIME_CONSTANT_S),
+        trust: Some(TRUST),
         ..Settings::PAPER
     };
 

@@ -8,7 +8,7 @@
 mod problem;
 mod solve;
 
-use crate::control::disturbance::Disturbance;
+use crate::control::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
 use crate::control::insight::{Insight, Path};
 use crate::control::lqi::{Ahead, Lqi};
 use crate::control::{Controller, Observation, Target};
@@ -19,12 +19,6 @@ use solve::Solver;
 
 /// Steps planned ahead.
 const STEPS: usize = 50;
-
-/// Time constant (s) of the estimate of what the model leaves unexplained.
-const DISTURBANCE_S: f64 = 0.3;
-
-/// Part of the motion of the last half second that the model's one-step predictions may have missed for plans to be made.
-const TRUST: f64 = 0.5;
 
 /// Aileron and elevator in units of the largest deflection.
 type Surfaces = [f64; 2];
@@ -46,7 +40,7 @@ impl Ilqr {
             model: model.clone(),
             lqi,
             ahead: Ahead::new(STEPS, &model.airframe),
-            disturbance: Disturbance::new(DISTURBANCE_S),
+            disturbance: Disturbance::new(TIME_CONSTANT_S),
             desk: Desk { solver: Solver::new(), plan: None, flown: Trajectory::new() },
         }
     }
@@ -103,7 +97,7 @@ impl Controller for Ilqr {
 
     fn reset(&mut self, seed: u64) {
         self.lqi.reset(seed);
-        self.disturbance = Disturbance::new(DISTURBANCE_S);
+        self.disturbance = Disturbance::new(TIME_CONSTANT_S);
         self.desk.plan = None;
     }
 

@@ -219,7 +219,7 @@ pub(super) fn solve(
         let said_by = match known {
             Some((information, _)) if information.iter().any(|x| *x != 0.0) => {
                 let errors = rows.iter().map(|r| r.error[i].clamp(-deviation, deviation));
-                correlation_length(&errors.collect::<Vec<_>>())
+                correlation_length(&[errors.collect()])
             }
             _ => 1.0,
         };

@@ -13,13 +13,12 @@ use rayon::prelude::*;
 use super::equation_error;
 use super::error::AmendError;
 use super::flight::{Flight, SENSORS, SKEW, SKEW_LEAST};
-use super::interval::{self, Covariance};
 use super::normal::{self, Neighbourhood, Normal, Place, Weights};
 use super::parameters::{self, Free};
-use super::result::{FittedFlight, FlightEstimate, Parameter};
+use super::result::{FittedFlight, Parameter};
 use super::shooting::{self, Shot};
 use crate::model::GreyBox;
-use crate::num::statistics::quantile;
+use crate::num::statistics::{correlation_length, quantile};
 use crate::sysid::diagnose::search::clocks::{self, Clocks};
 use crate::sysid::progress::{Cancelled, Progress, say};
 
@@ -325,7 +324,8 @@ impl<'a> Search<'a> {
                 count += shot.weight * r.len() as f64;
             }
             let variance = (sum / count).max(floor.powi(2));
-            let together = together(&residuals, k);
+            let of_state = |r: &Vec<[f64; 8]>| r.iter().map(|x| x[k]).collect();
+            let together = correlation_length(&residuals.iter().map(of_state).collect::<Vec<_>>());
             self.weights.output[k] = 1.0 / (variance * together);
         }
         let mean = |r: &Vec<[f64; 8]>| {
@@ -502,25 +502,4 @@ impl<'a> Search<'a> {
         let all = (0..self.free.len()).map(|k| (change(k), k));
         all.fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a })
     }
-}
-
-/// How many samples of state `k`'s residual hang together: the sum of its autocorrelation up to where
-/// that first falls below 0.05.
-fn together(residuals: &[Vec<[f64; 8]>], k: usize) -> f64 {
-    let product = |lag: usize| {
-        let pairs = residuals.iter().flat_map(|r| r.iter().zip(r.iter().skip(lag)));
-        pairs.fold((0.0, 0.0), |(sum, n), (a, b)| (sum + a[k] * b[k], n + 1.0))
-    };
-    let mean = |(sum, n): (f64, f64)| if n > 0.0 { sum / n } else { 0.0 };
-    let own = mean(product(0));
-    let longest = residuals.iter().map(Vec::len).max().unwrap_or(0);
-    let mut together = 1.0;
-    for lag in 1..longest {
-        let correlation = mean(product(lag)) / own;
-        if correlation.is_nan() || correlation <= 0.05 {
-            break;
-        }
-        together += 2.0 * correlation;
-    }
-    together
 }

@@ -1,6 +1,14 @@
 //! What a fit that has ended says: estimates with their intervals, by flight, and what the reader must know.
 
-use super::*;
+use nalgebra::{DMatrix, DVector};
+
+use super::{Fit, Left, Search, System};
+use crate::sysid::amend::error::AmendError;
+use crate::sysid::amend::flight::SENSORS;
+use crate::sysid::amend::interval::{self, Covariance};
+use crate::sysid::amend::parameters::{self, Free};
+use crate::sysid::amend::result::{FittedFlight, FlightEstimate, Parameter};
+use crate::sysid::amend::shooting::Shot;
 
 /// Two-sided 95 % point of the normal distribution.
 const NORMAL_95: f64 = 1.96;
