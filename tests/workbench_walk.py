@@ -65,8 +65,17 @@ def took(step, seconds, aim):
 def drop(browser, files):
     """Drops files on the page as a hand does."""
     data = {"items": [], "files": [str(f) for f in files], "dragOperationsMask": 1}
-    for kind in ("dragEnter", "dragOver", "drop"):
-        browser.call("Input.dispatchDragEvent", type=kind, x=120, y=100, data=data)
+    browser.value("window.dropped = 0; addEventListener('drop', () => dropped++, {capture: true, once: true})")
+    # Chromium leaves out a drop that comes before the page has answered the dragover, as on a busy machine.
+    for patience in (0, 0.1, 0.3, 1, 3):
+        for kind in ("dragEnter", "dragOver"):
+            browser.call("Input.dispatchDragEvent", type=kind, x=120, y=100, data=data)
+        time.sleep(patience)
+        browser.call("Input.dispatchDragEvent", type="drop", x=120, y=100, data=data)
+        time.sleep(patience)
+        if browser.value("dropped"):
+            return
+    sys.exit("Chromium did not deliver the dropped files to the page")
 
 
 def click(browser, selector):
