@@ -15,7 +15,6 @@ use anyhow::{Context, Result, bail};
 use greylag::control::{Kind, Target, build};
 use greylag::model::{GreyBox, Memory, STEP, Trim};
 use greylag::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
-use greylag::physics::inputs::InputMemory;
 use greylag::physics::{Command, State};
 use greylag::sim::import::import;
 use greylag::sim::{Environment, Simulator};
@@ -103,7 +102,7 @@ fn fly(model: &GreyBox, plant: &PlantOptions) -> Result<String> {
     lqi.reset(1);
     let mut target = Target { roll: 0.0, pitch, airspeed };
     let (mut memory, mut apart) = (Memory::default(), [0.0; 8]);
-    let mut inputs = InputMemory::at_rest(&seen.actuators.controls());
+    let mut inputs = model.at_rest(&seen.actuators.controls());
     for step in 0..STEPS {
         target.roll = if step < STEPS / 2 { 0.0 } else { 20f64.to_radians() };
         let own = lqi.command(&seen, &target);

@@ -51,6 +51,7 @@ fn time<R: Real>(kind: Kind) -> f64 {
         elevator: number(controls.elevator),
         throttle: number(0.3),
         rudder: number(0.0),
+        lagged: None,
     };
     let air = AirData::new(&state, number(1.2), 600.0, &geometry);
     let base = Base::zero();

@@ -51,8 +51,13 @@ fn given<R: Real>(kind: Kind, shape: &[f64], alpha: R, throttle: R) -> Vec<(usiz
     let number = R::from_f64;
     let geometry = Geometry { area: 0.75, span: 2.1, chord: 0.3571 };
     let state = State { alpha, beta: number(-0.07), p: number(0.4), ..State::NEUTRAL.map(number) };
-    let controls =
-        Controls { aileron: number(0.1), elevator: number(-0.05), throttle, rudder: number(0.02) };
+    let controls = Controls {
+        aileron: number(0.1),
+        elevator: number(-0.05),
+        throttle,
+        rudder: number(0.02),
+        lagged: None,
+    };
     let air = AirData::new(&state, number(1.2), 600.0, &geometry);
     let base = Base::zero();
     let at = Point {
@@ -64,8 +69,8 @@ fn given<R: Real>(kind: Kind, shape: &[f64], alpha: R, throttle: R) -> Vec<(usiz
         base: &base,
     };
     let mut all = All(Vec::new());
-    kind.independent_basis(&at, Own { table: None, shape }, &mut all);
-    kind.dependent_basis(&at, Own { table: None, shape }, &mut all);
+    kind.independent_basis(&at, Own { shape, ..Own::default() }, &mut all);
+    kind.dependent_basis(&at, Own { shape, ..Own::default() }, &mut all);
     all.0
 }
 

@@ -26,7 +26,8 @@ fn refused(model: &mut GreyBox, id: &str, values: &[f64]) -> JoinError {
 }
 
 fn whole(model: &GreyBox) -> State {
-    let controls = Controls { aileron: 0.1, elevator: 0.05, throttle: 0.4, rudder: 0.0 };
+    let controls =
+        Controls { aileron: 0.1, elevator: 0.05, throttle: 0.4, rudder: 0.0, lagged: None };
     model.rate(&State { alpha: 0.1, q: 0.3, ..State::NEUTRAL }, &controls, 600.0)
 }
 

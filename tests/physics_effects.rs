@@ -34,7 +34,8 @@ const STATE: State = State {
     alpha: 0.12,
     beta: -0.08,
 };
-const CONTROLS: Controls = Controls { aileron: 0.2, elevator: -0.1, throttle: 0.6, rudder: 0.1 };
+const CONTROLS: Controls =
+    Controls { aileron: 0.2, elevator: -0.1, throttle: 0.6, rudder: 0.1, lagged: None };
 
 fn catalogue() -> Vec<Description> {
     let effects = Kind::ALL.iter().map(|k| k.describe()).filter(|about| about.entry.is_some());
@@ -48,7 +49,7 @@ fn made(kind: Kind, shape: &[f64], base: &Base) -> Vec<(usize, Channel, f64)> {
     let axes = ForceAxes::Wind;
     let at =
         Point { state: &STATE, controls: &CONTROLS, air: &air, geometry: &GEOMETRY, axes, base };
-    let own = Own { table: None, shape };
+    let own = Own { shape, ..Own::default() };
     let mut reported = Reported(Vec::new());
     kind.independent_basis(&at, own, &mut reported);
     kind.dependent_basis(&at, own, &mut reported);
@@ -175,6 +176,7 @@ fn stalled<R: Real>(alpha: f64, shape: &[f64], linear: f64) -> (R, AirData<R>) {
         elevator: R::zero(),
         throttle: R::zero(),
         rudder: R::zero(),
+        lagged: None,
     };
     let air = AirData::new(&state, R::from_f64(1.156), 600.0, &GEOMETRY);
     let mut base = Base::zero();
@@ -188,7 +190,7 @@ fn stalled<R: Real>(alpha: f64, shape: &[f64], linear: f64) -> (R, AirData<R>) {
         base: &base,
     };
     let mut reported = Reported(Vec::new());
-    Kind::LiftStall.dependent_basis(&at, Own { table: None, shape }, &mut reported);
+    Kind::LiftStall.dependent_basis(&at, Own { shape, ..Own::default() }, &mut reported);
     let [(0, Channel::Lift, lift)] = reported.0[..] else { panic!("one term of lift") };
     (lift, air)
 }
@@ -328,7 +330,7 @@ fn the_order_of_joining_changes_nothing() {
         ];
         let mut model = model("prior");
         order.iter().for_each(|i| model.join(effects[*i].0, effects[*i].1).unwrap());
-        let mut memory = inputs::InputMemory::at_rest(&Controls::default());
+        let mut memory = inputs::InputMemory::at_rest(&Controls::default(), [0.0; 2]);
         let acting = model.act(&CONTROLS, &mut memory);
         model.rate(&STATE, &acting, 600.0)
     };

@@ -36,6 +36,7 @@ fn conditions(count: usize) -> Vec<(State, Controls)> {
                 elevator: within(0.5),
                 throttle: 0.5 + within(0.5),
                 rudder: 0.0,
+                lagged: None,
             };
             (state, controls)
         })
@@ -89,6 +90,7 @@ fn lanes_follow_double_precision() {
                 elevator: lane(controls.elevator),
                 throttle: lane(controls.throttle),
                 rudder: lane(controls.rudder),
+                lagged: None,
             };
             let fast = model.rate(&state.map(lane), &lanes, 600.0).to_array();
             for i in 0..8 {
@@ -108,7 +110,7 @@ fn linearisation_agrees_with_differences() {
         let linear = linearise(&model, &trim, 600.0);
         let step = |x: [f64; 11]| {
             let [s @ .., aileron, elevator, throttle] = x;
-            let controls = Controls { aileron, elevator, throttle, rudder: 0.0 };
+            let controls = Controls { aileron, elevator, throttle, rudder: 0.0, lagged: None };
             model.step(&State::from_array(s), &controls, 600.0, &mut Memory::default()).to_array()
         };
         let mut at = [0.0; 11];

@@ -4,7 +4,6 @@
 mod validate_support;
 
 use greylag::model::GreyBox;
-use greylag::physics::inputs::InputMemory;
 use greylag::physics::rigid_body;
 use greylag::physics::{Channel, Command, Controls};
 use greylag_sitl::hidden::{EFFECTS, Hidden};
@@ -65,7 +64,7 @@ fn apart(plant: &mut Plant, acting: &Controls) -> f64 {
 /// Flies `commands` in JSBSim with `hidden` in it, the models beside it.
 fn fly(models: [&GreyBox; 2], hidden: &[Hidden], commands: &[Command], gaps: &mut [Gap; 2]) {
     let mut plant = plant(hidden);
-    let mut memory = InputMemory::at_rest(&Controls::default());
+    let mut memory = models[1].at_rest(&Controls::default());
     for command in commands {
         let truth = plant.step(sent(command)).unwrap();
         let seen = controls(&truth);

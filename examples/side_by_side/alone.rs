@@ -110,7 +110,8 @@ fn act(width: usize) -> Result<()> {
 /// RK4 of the bare prior in lanes, beside what the processor can do at most.
 fn share_of_peak(prior: &GreyBox) {
     let state = State { roll: 0.2, pitch: 0.1, alpha: 0.05, beta: 0.01, ..State::NEUTRAL };
-    let controls = Controls { aileron: 0.02, elevator: -0.03, throttle: 0.4, rudder: 0.0 };
+    let controls =
+        Controls { aileron: 0.02, elevator: -0.03, throttle: 0.4, rudder: 0.0, lagged: None };
     let operations = Operations::of_step(prior, &state, &controls);
     let rounds = 9;
     let all = operations.all() as f64;

@@ -99,6 +99,7 @@ impl Operations {
             elevator: Counted(controls.elevator),
             throttle: Counted(controls.throttle),
             rudder: Counted(controls.rudder),
+            lagged: None,
         };
         COUNTS.set(Operations::NONE);
         std::hint::black_box(model.step(&state, &controls, 600.0, &mut Memory::default()));
@@ -216,6 +217,7 @@ fn steps<R: Packed>(model: &GreyBox, state: &State, controls: &Controls) -> f64 
         elevator: lane(controls.elevator),
         throttle: lane(controls.throttle),
         rudder: lane(controls.rudder),
+        lagged: None,
     };
     let mut memory = Memory::default();
     let start = Instant::now();

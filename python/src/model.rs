@@ -7,7 +7,6 @@ use greylag::model::block::Block;
 use greylag::model::residual::fingerprint;
 use greylag::model::{GreyBox, Memory};
 use greylag::num::{ROW, Real};
-use greylag::physics::inputs::InputMemory;
 use greylag::physics::{Controls, State};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
@@ -28,7 +27,7 @@ pub struct Model {
 }
 
 fn controls<R: Copy>([aileron, elevator, throttle, rudder]: [R; CONTROLS]) -> Controls<R> {
-    Controls { aileron, elevator, throttle, rudder }
+    Controls { aileron, elevator, throttle, rudder, lagged: None }
 }
 
 /// Refuses tables of another shape than `rows` rows of `columns`.
@@ -43,7 +42,7 @@ fn check(what: &str, shape: &[usize], expected: &[usize]) -> PyResult<()> {
 fn acting<R: Real>(model: &GreyBox, measured: Controls<R>) -> Controls<R> {
     match model.acts_at_once() {
         true => measured,
-        false => model.act(&measured, &mut InputMemory::at_rest(&measured)),
+        false => model.act(&measured, &mut model.at_rest(&measured)),
     }
 }
 
@@ -190,7 +189,7 @@ impl Model {
             for step in 0..steps {
                 let now = &held[step * rows * CONTROLS..(step + 1) * rows * CONTROLS];
                 let measured = controls(gather::<CONTROLS>(now, first));
-                let past = inputs.get_or_insert_with(|| InputMemory::at_rest(&measured));
+                let past = inputs.get_or_insert_with(|| self.model.at_rest(&measured));
                 let acting = match self.model.acts_at_once() {
                     true => measured,
                     false => self.model.act(&measured, past),

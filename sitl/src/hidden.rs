@@ -57,6 +57,35 @@ pub struct Hidden {
     amplitude: f64,
     /// What an effect that is not of the list adds.
     functions: &'static [(Place, String)],
+    /// Filters whose outputs those functions read.
+    filters: &'static [Filter],
+}
+
+/// A filter of the flight controls that an effect reads.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Filter {
+    /// Its input, an expression of JSBSim's functions.
+    pub input: String,
+    /// What it does.
+    pub kind: FilterKind,
+    /// Its time constant or delay, s.
+    pub time_s: f64,
+}
+
+/// What a filter does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FilterKind {
+    /// A first-order lag, bilinear at the step.
+    Lag,
+    /// A pure delay of a whole number of steps.
+    Delay,
+}
+
+impl Filter {
+    /// What stands in an expression for the property with the output of the filter at `place` of the effect's list.
+    pub fn placeholder(place: usize) -> String {
+        format!("{{filter-{place}}}")
+    }
 }
 
 /// Where a function of its own acts.
@@ -93,13 +122,13 @@ impl Hidden {
             let Effect { id, unit, .. } = *effect;
             return Err(HiddenError::Amplitude { id, amplitude, min, max, unit });
         }
-        Ok(Hidden { effect, amplitude, functions: &[] })
+        Ok(Hidden { effect, amplitude, functions: &[], filters: &[] })
     }
 
     /// An effect called `id` that is not of the list: expressions of JSBSim's functions, each with where it acts.
-    /// `{aileron}`, `{elevator}`, `{rudder}` (rad) and `{throttle}` in them stand for the properties with the positions. It
-    /// lives as long as the process.
-    pub fn written(id: &str, functions: Vec<(Place, String)>) -> Self {
+    /// `{aileron}`, `{elevator}`, `{rudder}` (rad) and `{throttle}` in them stand for the properties with the positions,
+    /// [`Filter::placeholder`] for the output of one of `filters`. It lives as long as the process.
+    pub fn written(id: &str, functions: Vec<(Place, String)>, filters: Vec<Filter>) -> Self {
         let effect = Effect {
             id: id.to_owned().leak(),
             formula: "",
@@ -107,12 +136,25 @@ impl Hidden {
             bounds: (0.0, 1.0),
             write: |_, _| Ok(()),
         };
-        Hidden { effect: Box::leak(Box::new(effect)), amplitude: 1.0, functions: functions.leak() }
+        Hidden {
+            effect: Box::leak(Box::new(effect)),
+            amplitude: 1.0,
+            functions: functions.leak(),
+            filters: filters.leak(),
+        }
     }
 
     fn write(&self, document: &mut Document) -> Result<(), HiddenError> {
+        let output = |k: usize| format!("hidden/{}-filter-{k}", self.effect.id);
+        for (k, Filter { input, kind, time_s }) in self.filters.iter().enumerate() {
+            let input = document.with_positions(input);
+            document.filter(&output(k), &input, *kind, *time_s)?;
+        }
         for (k, (place, expression)) in self.functions.iter().enumerate() {
-            let expression = document.with_positions(expression);
+            let mut expression = document.with_positions(expression);
+            for k in 0..self.filters.len() {
+                expression = expression.replace(&Filter::placeholder(k), &output(k));
+            }
             let name = format!("{}-{k}", self.effect.id);
             match place.axis() {
                 Some(axis) => document.function(axis, &name, &expression)?,

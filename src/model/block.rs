@@ -65,13 +65,7 @@ fn step<R: Packed>(
 ) -> State<Block> {
     let lanes = |x: Block| R::pack(|_| x.0);
     let block = |x: R| Lanes(x.unpack(0));
-    let Controls { aileron, elevator, throttle, rudder } = *controls;
-    let controls = Controls {
-        aileron: lanes(aileron),
-        elevator: lanes(elevator),
-        throttle: lanes(throttle),
-        rudder: lanes(rudder),
-    };
+    let controls = controls.map(lanes);
     let mut remembered = memory.map(lanes);
     let next = model.step_inlined(&state.map(lanes), &controls, altitude, &mut remembered);
     *memory = remembered.map(block);

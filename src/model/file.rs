@@ -9,6 +9,7 @@ use super::residual::hash;
 use super::{GreyBox, Integrator, Named, Residual};
 use crate::num::Table;
 use crate::physics::Airframe;
+use crate::physics::actuators::LAGS;
 use crate::physics::airframe::{
     FileError, Sourced, check_schema, named, positive, toml_error, within,
 };
@@ -162,7 +163,15 @@ impl File {
                 inputs::MOST
             ));
         }
+        let lags: usize =
+            terms.iter().filter_map(|t| t.kind.written()).map(|e| e.memories().len()).sum();
+        if lags > LAGS {
+            return Err(format!(
+                "the formulas of its effects have {lags} lags and delays; {LAGS} is the most"
+            ));
+        }
         let mut model = GreyBox {
+            lags,
             rudder_is_left: false,
             name: named(self.name)?,
             description: self.description,

@@ -2,9 +2,10 @@
 
 use crate::model::{Integrator, Residual};
 use crate::num::{Real, Table};
+use crate::physics::actuators::LAGS;
 use crate::physics::atmosphere::Atmosphere;
 use crate::physics::effects::{Description, Kind, Needs};
-use crate::physics::formula::{Status, Written};
+use crate::physics::formula::{Memory, Status, Written};
 use crate::physics::inputs::{self, InputMemory};
 use crate::physics::rigid_body::{ForceAxes, RigidBody};
 use crate::physics::size::Size;
@@ -44,12 +45,14 @@ pub(super) struct Term {
     pub(super) table: Option<Table>,
     /// The values of its shape constants, kept beside it for speed.
     pub(super) shape: Vec<f64>,
+    /// Place of its first lag among those of the model.
+    pub(super) first_lag: usize,
 }
 
 impl Term {
     /// An effect whose coefficients start at `first`.
     pub(super) fn new(kind: Kind, first: usize, table: Option<Table>) -> Term {
-        Term { kind, first, table, shape: vec![0.0; kind.describe().shape] }
+        Term { kind, first, table, shape: vec![0.0; kind.describe().shape], first_lag: 0 }
     }
 }
 
@@ -84,6 +87,8 @@ pub struct GreyBox {
     /// Input effects with the place of their constant, in the order of [`inputs::Kind::ALL`].
     pub(super) inputs: Vec<(inputs::Kind, usize)>,
     pub(super) coefficients: Vec<Named>,
+    /// How many lags and delays its formulas have, at most [`LAGS`].
+    pub(super) lags: usize,
     /// Whether the link that it is flown through carries no command for a rudder.
     pub(super) rudder_is_left: bool,
 }
@@ -195,6 +200,11 @@ impl GreyBox {
         self.terms.sort_by_key(|term| (term.kind.needs(), term.kind.describe().id));
         self.independent = self.terms.partition_point(|term| term.kind.needs() == Needs::Point);
         self.inputs.sort_by_key(|(kind, _)| *kind as usize);
+        self.lags = 0;
+        for term in &mut self.terms {
+            term.first_lag = self.lags;
+            self.lags += term.kind.written().map_or(0, |effect| effect.memories().len());
+        }
         self.renew();
     }
 
@@ -217,12 +227,43 @@ impl GreyBox {
         for (place, (kind, index)) in self.inputs.iter().enumerate() {
             acting = memory.act(place, *kind, self.coefficients[*index].value, &acting);
         }
+        if self.lags > 0 {
+            let mut lagged = [R::zero(); LAGS];
+            self.each_lag(|place, lag, shape| {
+                lagged[place] = lag.act(&acting, shape, &mut memory.formulas[place]);
+            });
+            acting.lagged = Some(lagged);
+        }
         acting
     }
 
-    /// Whether the surfaces act as they are measured.
+    /// What the model remembers of controls that have been at `controls` for long.
+    #[inline(always)]
+    pub fn at_rest<R: Real>(&self, controls: &Controls<R>) -> InputMemory<R> {
+        let mut lagged = [R::zero(); LAGS];
+        self.each_lag(|place, lag, shape| lagged[place] = lag.settled(controls, shape));
+        InputMemory::at_rest(controls, lagged)
+    }
+
+    /// Calls `of` for each lag and delay of its formulas: its place, itself, the shape constants of its effect.
+    #[inline(always)]
+    fn each_lag(&self, mut of: impl FnMut(usize, &Memory, &[f64])) {
+        for Term { kind, shape, first_lag, .. } in &self.terms {
+            let Some(effect) = kind.written() else { continue };
+            for (k, lag) in effect.memories().iter().enumerate() {
+                of(first_lag + k, lag, shape);
+            }
+        }
+    }
+
+    /// Whether the controls act as they are measured, and their past does not matter.
     pub fn acts_at_once(&self) -> bool {
-        self.inputs.is_empty()
+        self.inputs.is_empty() && self.lags == 0
+    }
+
+    /// Lags and delays of its formulas.
+    pub fn lags(&self) -> usize {
+        self.lags
     }
 
     /// What the physical bounds of its coefficients go by.

@@ -215,7 +215,8 @@ pub struct Twin {
     /// Altitude above mean sea level, m.
     pub altitude: f64,
     memory: Memory,
-    inputs: InputMemory,
+    /// `None` before the first step, up to which all was at rest.
+    inputs: Option<InputMemory>,
 }
 
 impl Twin {
@@ -226,8 +227,8 @@ impl Twin {
 
     /// An aircraft at `state` and `altitude` (m), actuators and what acts through them long at `controls`.
     pub fn at_rest(state: State, controls: &Controls, altitude: f64) -> Twin {
-        let (actuators, inputs) = (Actuators::at_rest(controls), InputMemory::at_rest(controls));
-        Twin { state, actuators, altitude, memory: Memory::default(), inputs }
+        let actuators = Actuators::at_rest(controls);
+        Twin { state, actuators, altitude, memory: Memory::default(), inputs: None }
     }
 
     /// Advances by [`STEP`] in the order of the simulator: the state moves under the actuators as
@@ -236,7 +237,9 @@ impl Twin {
         let air = model.air(&self.state, self.altitude);
         let velocity = rigid_body::air_velocity(&self.state, &air);
         let climb = -rigid_body::body_to_horizon(&self.state, velocity)[2];
-        let controls = model.act(&self.actuators.controls(), &mut self.inputs);
+        let measured = self.actuators.controls();
+        let inputs = self.inputs.get_or_insert_with(|| model.at_rest(&measured));
+        let controls = model.act(&measured, inputs);
         self.state = model.step(&self.state, &controls, self.altitude, &mut self.memory);
         self.altitude += climb * STEP;
         self.actuators.step(command, &model.airframe.actuators);

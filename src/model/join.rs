@@ -2,6 +2,7 @@
 
 use super::grey_box::Term;
 use super::{GreyBox, Named};
+use crate::physics::actuators::LAGS;
 use crate::physics::effects::{Coefficient, Description, Kind};
 use crate::physics::inputs;
 
@@ -52,6 +53,16 @@ pub enum JoinError {
         /// The most.
         most: usize,
     },
+    /// More lags and delays in formulas than a model can have.
+    #[error(
+        "model {model} would have more than {most} lags and delays in its formulas, which is the most"
+    )]
+    Lags {
+        /// The model.
+        model: String,
+        /// The most.
+        most: usize,
+    },
     /// No body has the mass or the inertia that it would leave.
     #[error(
         "effect {id} with {values:?} would leave model {model} without a positive mass, or with jx·jz not above jxz²; join it with less"
@@ -82,6 +93,10 @@ impl GreyBox {
         let first = self.coefficients.len();
         match kind {
             Ok(kind) => {
+                let lags = kind.written().map_or(0, |effect| effect.memories().len());
+                if self.lags + lags > LAGS {
+                    return Err(JoinError::Lags { model: self.name.clone(), most: LAGS });
+                }
                 self.stays_physical(kind, values)?;
                 self.terms.push(Term::new(kind, first, None));
             }

@@ -36,7 +36,7 @@ pub fn linearise_step(
     let state = State::from_array(std::array::from_fn(|i| Dual::<12>::variable(x[i], i)));
     let [aileron, elevator, throttle, rudder] =
         std::array::from_fn(|i| Dual::variable(z[i], 8 + i));
-    let controls = Controls { aileron, elevator, throttle, rudder };
+    let controls = Controls { aileron, elevator, throttle, rudder, lagged: None };
     let next = model.step(&state, &controls, altitude, &mut Memory::default()).to_array();
     Linear {
         a: SMatrix::from_fn(|i, j| next[i].gradient[j]),

@@ -64,7 +64,7 @@ pub fn rates(model: &GreyBox, trim: &Trim, altitude: f64) -> Rates {
     let z = [z.aileron, z.elevator, z.throttle, z.rudder];
     let [aileron, elevator, throttle, rudder] =
         std::array::from_fn(|i| Dual::variable(z[i], 8 + i));
-    let controls = Controls { aileron, elevator, throttle, rudder };
+    let controls = Controls { aileron, elevator, throttle, rudder, lagged: None };
     let rate = model.rate(&state, &controls, altitude).to_array();
     Rates {
         a: SMatrix::from_fn(|i, j| rate[i].gradient[j]),

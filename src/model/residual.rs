@@ -329,7 +329,8 @@ mod tests {
         let model = model();
         let scales = Scales::new(&model.airframe, model.scale());
         let stop = model.airframe.actuators.aileron.travel.most;
-        let controls = Controls { aileron: stop, elevator: -stop, throttle: 1.0, rudder: 0.0 };
+        let controls =
+            Controls { aileron: stop, elevator: -stop, throttle: 1.0, rudder: 0.0, lagged: None };
         let stall = State { airspeed: 1.25 * 16.67, alpha: 0.2, beta: -0.2, ..State::NEUTRAL };
         let there = scales.inputs(&stall, &controls);
         for (x, expected) in there.iter().zip([1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0]) {

@@ -159,7 +159,7 @@ fn level_condition<R: Real>(
         alpha,
         beta: zero,
     };
-    (state, Controls { aileron: zero, elevator, throttle, rudder: zero })
+    (state, Controls { aileron: zero, elevator, throttle, rudder: zero, lagged: None })
 }
 
 /// Unknowns: α, the sideways unknown, p, q, r, δa, δe, δt. The sideways unknown is δr at β = 0 where the
@@ -231,7 +231,7 @@ fn attitude_condition<R: Real>(
     let [roll, pitch, airspeed] = [roll, pitch, airspeed].map(R::from_f64);
     (
         State { roll, pitch, airspeed, p, q, r, alpha, beta },
-        Controls { aileron, elevator, throttle, rudder },
+        Controls { aileron, elevator, throttle, rudder, lagged: None },
     )
 }
 

@@ -3,7 +3,7 @@
 //! JSBSim discretises each filter with the bilinear (Tustin) rule at the simulation step, so a
 //! recurrence with the same coefficients reproduces it to rounding.
 
-use crate::num::Real;
+use crate::num::{Real, each};
 use crate::physics::servos::{ActuatorFigures, Surface};
 
 /// A command, the action of eq. (29) of \[GSFM26\] with throttle = (a_thr + 1)/2.
@@ -39,6 +39,9 @@ impl Command {
     }
 }
 
+/// Lags and delays that the formulas of one model may have, `lag(…)` and `delay(…)` of effect files.
+pub const LAGS: usize = 2;
+
 /// What acts on the airframe at an instant: deflections and throttle position.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Controls<R = f64> {
@@ -50,6 +53,30 @@ pub struct Controls<R = f64> {
     pub throttle: R,
     /// Rudder deflection δr, rad; positive trailing edge left. Zero on an aircraft without one.
     pub rudder: R,
+    /// Values of the lags and delays of the model's formulas at this instant; `None` where the controls' past is not
+    /// known: they have then settled.
+    pub lagged: Option<[R; LAGS]>,
+}
+
+impl<R: Copy> Controls<R> {
+    /// The controls with every number read as another kind.
+    #[inline(always)]
+    #[expect(
+        clippy::manual_map,
+        reason = "a closure may leave the vector instructions of the caller"
+    )]
+    pub fn map<S: Copy>(&self, mut f: impl FnMut(R) -> S) -> Controls<S> {
+        Controls {
+            aileron: f(self.aileron),
+            elevator: f(self.elevator),
+            throttle: f(self.throttle),
+            rudder: f(self.rudder),
+            lagged: match self.lagged {
+                Some(lagged) => Some(each(lagged, f)),
+                None => None,
+            },
+        }
+    }
 }
 
 impl Controls {
@@ -61,6 +88,10 @@ impl Controls {
             elevator: mix(self.elevator, next.elevator),
             throttle: mix(self.throttle, next.throttle),
             rudder: mix(self.rudder, next.rudder),
+            lagged: self
+                .lagged
+                .zip(next.lagged)
+                .map(|(a, b)| std::array::from_fn(|k| mix(a[k], b[k]))),
         }
     }
 }
@@ -93,6 +124,7 @@ impl<R: Copy> ActuatorState<R> {
             elevator: self.elevator,
             throttle: self.throttle,
             rudder: self.rudder,
+            lagged: None,
         }
     }
 }
@@ -273,6 +305,7 @@ impl<R: Real> Actuators<R> {
                 Some(rudder) => rudder.clipped[0],
                 None => R::zero(),
             },
+            lagged: None,
         }
     }
 

@@ -168,6 +168,7 @@ impl ActuatorFigures {
             elevator: self.elevator.travel.deflection(command.elevator),
             throttle: command.throttle,
             rudder: self.rudder.map_or(0.0, |rudder| rudder.travel.deflection(command.rudder)),
+            lagged: None,
         }
     }
 }

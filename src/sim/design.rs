@@ -227,7 +227,7 @@ fn imagine(
     let Ok(mut seen) = world.reset() else { return Ok(None) };
     let nobody = Target { roll: 0.0, pitch: 0.0, airspeed: f64::NAN };
     let mut instants = Vec::new();
-    let mut memory = InputMemory::at_rest(&Controls::default());
+    let mut memory = truth.at_rest(&Controls::default());
     for _ in 0..(schedule.duration() / STEP_S).round() as usize {
         let State { roll, pitch, .. } = seen.state;
         if roll.to_degrees().abs() > ROLL_MAX_DEG || pitch.to_degrees().abs() > PITCH_MAX_DEG {

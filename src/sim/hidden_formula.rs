@@ -2,7 +2,7 @@
 //!
 //! It shares the tree with the effect, but none of its evaluation: JSBSim works the functions out itself.
 
-use greylag_sitl::hidden::{Hidden, Place};
+use greylag_sitl::hidden::{Filter, FilterKind, Hidden, Place};
 
 use crate::physics::Channel;
 use crate::physics::formula::expression::{Expression, Function, Node};
@@ -20,12 +20,14 @@ const FT: f64 = 0.3048;
 /// # Errors
 /// What JSBSim has not.
 pub fn hidden(effect: &Written, values: &[f64]) -> Result<Hidden, String> {
-    let functions = effect.lines.iter().map(|line| {
+    let mut writer = Writer { values, filters: Vec::new() };
+    let mut functions = Vec::new();
+    for line in &effect.lines {
         let (place, unit) = place(line.channel);
-        let all = [number(1.0 / unit), xml(&line.factor, values)?, xml(&line.shape, values)?];
-        Ok((place, element("product", &all)))
-    });
-    Ok(Hidden::written(effect.about.id, functions.collect::<Result<_, String>>()?))
+        let (factor, shape) = (writer.xml(&line.factor)?, writer.xml(&line.shape)?);
+        functions.push((place, element("product", &[number(1.0 / unit), factor, shape])));
+    }
+    Ok(Hidden::written(effect.about.id, functions, writer.filters))
 }
 
 /// Where a channel is in JSBSim, and how much of ours its unit is.
@@ -101,24 +103,55 @@ fn hat(rate: &str, per: &str) -> String {
     element("product", &[property(rate), property(per)])
 }
 
-fn xml(of: &Expression, values: &[f64]) -> Result<String, String> {
-    match &of.node {
-        Node::Number(x) => Ok(number(*x)),
-        Node::Variable(v) => variable(*v),
-        Node::Parameter(k) => Ok(number(values.get(*k).copied().unwrap_or(0.0))),
-        Node::Power(base, n) => Ok(element("pow", &[xml(base, values)?, number(f64::from(*n))])),
-        Node::Table(x, points) => Ok(table(&xml(x, values)?, points)),
-        Node::Call(function, all) => {
-            let all = all.iter().map(|e| xml(e, values)).collect::<Result<Vec<_>, _>>()?;
-            let written = call(*function, &all);
-            match written.len() > LONGEST {
-                true => Err(format!(
-                    "the formula takes more than {LONGEST} characters as a function of JSBSim, which repeats what \
-                     stands inside smoothstep, tanh, sign and deadband; nest them less"
-                )),
-                false => Ok(written),
+/// Writes formulas, and notes the filters that they read.
+struct Writer<'a> {
+    /// Values of the effect's parameters.
+    values: &'a [f64],
+    filters: Vec<Filter>,
+}
+
+impl Writer<'_> {
+    fn xml(&mut self, of: &Expression) -> Result<String, String> {
+        match &of.node {
+            Node::Number(x) => Ok(number(*x)),
+            Node::Variable(v) => variable(*v),
+            Node::Parameter(k) => Ok(number(self.value(*k))),
+            Node::Power(base, n) => Ok(element("pow", &[self.xml(base)?, number(f64::from(*n))])),
+            Node::Table(x, points) => Ok(table(&self.xml(x)?, points)),
+            Node::Call(function, all) if function.has_memory() => self.filter(*function, all),
+            Node::Call(function, all) => {
+                let all = all.iter().map(|e| self.xml(e)).collect::<Result<Vec<_>, _>>()?;
+                let written = call(*function, &all);
+                match written.len() > LONGEST {
+                    true => Err(format!(
+                        "the formula takes more than {LONGEST} characters as a function of JSBSim, which repeats what \
+                         stands inside smoothstep, tanh, sign and deadband; nest them less"
+                    )),
+                    false => Ok(written),
+                }
             }
         }
+    }
+
+    fn value(&self, parameter: usize) -> f64 {
+        self.values.get(parameter).copied().unwrap_or(0.0)
+    }
+
+    /// The output of a filter of the flight controls.
+    fn filter(&mut self, function: Function, all: &[Expression]) -> Result<String, String> {
+        let time_s = match all.get(1).map(|e| &e.node) {
+            Some(Node::Parameter(k)) => self.value(*k),
+            _ => return Err(format!("the time of {} is no parameter", function.name())),
+        };
+        let input = self.xml(&all[0])?;
+        let kind = if function == Function::Delay { FilterKind::Delay } else { FilterKind::Lag };
+        let filter = Filter { input, kind, time_s };
+        let known = self.filters.iter().position(|f| *f == filter);
+        let place = known.unwrap_or(self.filters.len());
+        if known.is_none() {
+            self.filters.push(filter);
+        }
+        Ok(property(&Filter::placeholder(place)))
     }
 }
 
@@ -165,6 +198,8 @@ fn call(function: Function, all: &[String]) -> String {
             let low = element("product", &[number(-1.0), width]);
             element("difference", &[all[0].clone(), element("max", &[held, low])])
         }
+        // filters of their own, which have their input settled
+        Function::Lag | Function::Delay => all[0].clone(),
     }
 }
 

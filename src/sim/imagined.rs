@@ -90,12 +90,13 @@ impl Imagination {
         // what the scheme remembers at the start is the acceleration there
         model.step(&state, &rest, model.airframe.reference.altitude, &mut memory);
         let zero = lane(0.0);
-        let rest = Controls { aileron: zero, elevator: zero, throttle: zero, rudder: zero };
+        let rest =
+            Controls { aileron: zero, elevator: zero, throttle: zero, rudder: zero, lagged: None };
         let neutral = Batch {
             state: state.map(lane),
             actuators: Actuators::at_rest(&rest).fitted(&model.airframe.actuators),
             memory: memory.map(lane),
-            inputs: (!model.acts_at_once()).then(|| InputMemory::at_rest(&rest)),
+            inputs: (!model.acts_at_once()).then(|| model.at_rest(&rest)),
             target: Target { roll: 0.0, pitch: 0.0, airspeed: state.airspeed }.map(lane),
             step: [0; WIDTH],
         };

@@ -228,7 +228,10 @@ impl Bench {
     pub(super) fn comparison(&self) -> Result<Arc<Comparison>, WorkbenchError> {
         let (key, models, flights) = {
             let inner = self.lock();
-            let key = inner.key("comparison", &inner.session.effects) + &inner.shown();
+            let shown = inner.shown();
+            // an effect that has no model yet changes nothing
+            let effects = if shown == "given" { &[] } else { &inner.session.effects[..] };
+            let key = inner.key("comparison", effects) + &shown;
             if let Some((_, known)) = inner.comparison.as_ref().filter(|(k, _)| *k == key) {
                 return Ok(known.clone());
             }

@@ -155,6 +155,7 @@ pub fn as_measured(name: &str, flight: &Flight, noise: Noise) -> Reconstruction 
             elevator: s.elevator_rad,
             throttle: s.throttle,
             rudder: 0.0,
+            lagged: None,
         },
         command: None,
         specific_force: s.specific_force_mps2,

@@ -43,6 +43,7 @@ pub fn controls(truth: &Truth) -> Controls {
         elevator: truth.elevator_rad,
         throttle: truth.throttle,
         rudder: 0.0,
+        lagged: None,
     }
 }
 

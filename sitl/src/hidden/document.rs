@@ -1,7 +1,7 @@
 //! The XML of an aircraft while hidden effects are written into it.
 
-use super::HiddenError;
 use super::expression::{product, property, sum, value};
+use super::{FilterKind, HiddenError};
 use crate::plant::Properties;
 
 /// Property with the thrust that hidden effects add, lbf.
@@ -164,6 +164,39 @@ impl<'a> Document<'a> {
             );
         }
         self.passed += 1;
+    }
+
+    /// Adds a filter of `input` (an expression), its output being the property `output`.
+    pub(super) fn filter(
+        &mut self,
+        output: &str,
+        input: &str,
+        kind: FilterKind,
+        time_s: f64,
+    ) -> Done {
+        self.components += &format!(
+            "<fcs_function name=\"{output}-input\"><function>{input}</function></fcs_function>\n"
+        );
+        let (component, settings) = match kind {
+            // without a lag, a gain of one
+            FilterKind::Lag if time_s <= 0.0 => ("pure_gain", "<gain>1</gain>".to_owned()),
+            FilterKind::Lag => ("lag_filter", format!("<c1>{}</c1>", 1.0 / time_s)),
+            FilterKind::Delay => ("actuator", self.delay(time_s)?),
+        };
+        self.components += &format!(
+            "<{component} name=\"{output}\"><input>{output}-input</input>{settings}</{component}>\n"
+        );
+        Ok(())
+    }
+
+    /// The settings of an actuator that delays by `time_s`, a whole number of steps.
+    pub(super) fn delay(&self, time_s: f64) -> Result<String, HiddenError> {
+        let frames = (time_s / self.step_s).round();
+        if frames < 1.0 || (time_s - frames * self.step_s).abs() > 1e-9 {
+            return Err(HiddenError::Delay { amplitude: time_s, step_s: self.step_s });
+        }
+        // JSBSim's actuator delays by one frame less than is asked.
+        Ok(format!("<delay type=\"frames\">{}</delay>", frames + 1.0))
     }
 
     /// The property of a deflection behind `passed` components.

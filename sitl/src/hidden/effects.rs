@@ -1,8 +1,8 @@
 //! The list of effects that can be hidden in an aircraft.
 
+use super::Effect;
 use super::document::{Axis, Surface};
 use super::expression::{abs, product, property, sum, value};
-use super::{Effect, HiddenError};
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
@@ -172,12 +172,7 @@ pub static EFFECTS: [Effect; 25] = [
         unit: "s",
         bounds: (0.0, 2.0),
         write: |d, a| {
-            let frames = (a / d.step_s).round();
-            if frames < 1.0 || (a - frames * d.step_s).abs() > 1e-9 {
-                return Err(HiddenError::Delay { amplitude: a, step_s: d.step_s });
-            }
-            // JSBSim's actuator delays by one frame less than is asked.
-            let delay = format!("<delay type=\"frames\">{}</delay>", frames + 1.0);
+            let delay = d.delay(a)?;
             d.pass_deflections("actuator", &delay);
             Ok(())
         },

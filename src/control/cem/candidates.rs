@@ -7,7 +7,6 @@ use crate::control::insight::{Insight, Path};
 use crate::model::STEP;
 use crate::physics::Command;
 use crate::physics::actuators::Actuators;
-use crate::physics::inputs::InputMemory;
 
 /// Candidates kept for the report, spread over all.
 const SHOWN: usize = 48;
@@ -37,7 +36,7 @@ impl Cem {
         let mut previous = seen.previous;
         let mut memory = self.disturbance().map(|d| d.memory()).unwrap_or_default();
         let rate = self.disturbance().map(|d| d.rate());
-        let mut inputs = InputMemory::at_rest(&actuators.controls());
+        let mut inputs = model.at_rest(&actuators.controls());
         let mut reference = ahead.map_or([0.0; 2], |ahead| ahead.reference());
         let steps = ahead.map_or(HORIZON, |ahead| ahead.steps());
         let mut path = vec![[state.roll, state.pitch]];

@@ -20,7 +20,6 @@ use crate::control::{Controller, Observation, Target};
 use crate::model::{GreyBox, STEP};
 use crate::num::stream;
 use crate::physics::actuators::Actuators;
-use crate::physics::inputs::InputMemory;
 use crate::physics::{Command, Time};
 pub use changes::{Change, ChangeError};
 use rollout::{Actions, Block, HORIZON, Machine, WIDTH, Worth};
@@ -261,7 +260,7 @@ impl Cem {
     fn after(&self, seen: &Observation, command: Command) -> Observation {
         let figures = &self.model.airframe.actuators;
         let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);
-        let mut inputs = InputMemory::at_rest(&actuators.controls());
+        let mut inputs = self.model.at_rest(&actuators.controls());
         let controls = self.model.act(&actuators.controls(), &mut inputs);
         let mut memory = self.disturbance().map(Disturbance::memory).unwrap_or_default();
         let rate = self.disturbance().map_or(disturbance::NONE, Disturbance::rate);

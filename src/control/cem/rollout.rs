@@ -223,7 +223,7 @@ impl<R: Packed> Flight<R> {
             previous,
             memory: scene.memory.map(lane),
             // what acted before the tick is not observed
-            inputs: (!model.acts_at_once()).then(|| InputMemory::at_rest(&controls)),
+            inputs: (!model.acts_at_once()).then(|| model.at_rest(&controls)),
             target: target.map(lane),
             disturbance: scene.disturbance.map(lane),
             sum: R::zero(),

@@ -106,7 +106,7 @@ impl Problem<'_> {
         let figures = &self.model.airframe.actuators;
         let Observation { state, actuators, previous, .. } = *self.seen;
         let actuators = Actuators::from_observed(&actuators, &previous, figures);
-        let inputs = InputMemory::at_rest(&actuators.controls());
+        let inputs = self.model.at_rest(&actuators.controls());
         Flight { state, actuators, memory: self.memory, inputs, previous }
     }
 

@@ -188,7 +188,7 @@ mod tests {
             let (linear, _) = truth.accelerations(&state, &controls, &air);
             let gravity =
                 crate::physics::rigid_body::gravity_in_body(&state, truth.atmosphere.gravity);
-            let Controls { aileron, elevator, throttle, rudder } = reported;
+            let Controls { aileron, elevator, throttle, rudder, .. } = reported;
             let frame = Telemetry {
                 time: Time::default().plus(Duration::from_millis(10 * i)),
                 order: Order::Next { lost: 0 },

@@ -110,7 +110,8 @@ pub fn coordinates(prior: &GreyBox, basis: &Basis, tracks: &[Track]) -> Vec<f64>
 /// The forces on which none of the trained coefficients of `prior` acts.
 fn forces_along(prior: &GreyBox, basis: &Basis) -> Vec<Channel> {
     let state = State { p: 0.1, q: 0.1, r: 0.1, alpha: 0.1, beta: 0.1, ..State::NEUTRAL };
-    let controls = Controls { aileron: 0.1, elevator: 0.1, throttle: 0.5, rudder: 0.0 };
+    let controls =
+        Controls { aileron: 0.1, elevator: 0.1, throttle: 0.5, rudder: 0.0, lagged: None };
     let mut taken = Wrench::zero();
     prior.contributions(&state, &controls, &prior.air(&state, 0.0), |i, channel, x: f64| {
         if basis.places.contains(&i) {

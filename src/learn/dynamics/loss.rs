@@ -119,6 +119,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
         let work = Work {
             windows: Vec::with_capacity(R::WIDTH),
             recorded: Recorded {
+                lagged: Vec::new(),
                 states: Vec::new(),
                 controls: Vec::new(),
                 density: Vec::new(),

@@ -81,13 +81,7 @@ struct Asked<'a, R, const WHOLE: bool> {
 impl<R: Real, const WHOLE: bool> Sloped<R, 8> for Asked<'_, R, WHOLE> {
     #[inline(always)]
     fn part(&self, x: [Dual<2, R>; 8]) -> [R; 2] {
-        let Controls { aileron, elevator, throttle, rudder } = self.at.controls;
-        let controls = Controls {
-            aileron: fixed(aileron),
-            elevator: fixed(elevator),
-            throttle: fixed(throttle),
-            rudder: fixed(rudder),
-        };
+        let controls = self.at.controls.map(fixed);
         let at = At { state: State::from_array(x), controls, density: fixed(self.at.density) };
         let said = at.ask::<WHOLE>(self.model);
         let slopes = self.slopes;
@@ -271,13 +265,7 @@ impl<R: Packet> At<R> {
                 sum.add(channel, x);
             }
         }
-        let Controls { aileron, elevator, throttle, rudder } = self.controls;
-        let controls = Controls {
-            aileron: fixed(aileron),
-            elevator: fixed(elevator),
-            throttle: fixed(throttle),
-            rudder: fixed(rudder),
-        };
+        let controls = self.controls.map(fixed);
         let place = At { state: self.state.map(fixed), controls, density: fixed(self.density) };
         let (air, weights) = (place.air(model), Marked { model, places: moves.places });
         let made = model.whole_wrench(&place.state, &place.controls, &air, sums, weights);

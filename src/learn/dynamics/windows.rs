@@ -29,7 +29,7 @@ impl Track {
         let mut track = Track::default();
         let mut memory: Option<InputMemory> = None;
         for (state, controls, altitude) in samples {
-            let memory = memory.get_or_insert_with(|| InputMemory::at_rest(&controls));
+            let memory = memory.get_or_insert_with(|| model.at_rest(&controls));
             track.states.push(state);
             track.controls.push(model.act(&controls, memory));
             track.altitude.push(altitude);
@@ -47,7 +47,8 @@ impl Track {
             let state = State { roll, pitch, airspeed, p, q, r, alpha, beta };
             let (aileron, elevator) = (s.aileron_rad, s.elevator_rad);
             let rudder = if s.rudder_rad.is_finite() { s.rudder_rad } else { 0.0 };
-            let controls = Controls { aileron, elevator, throttle: s.throttle, rudder };
+            let controls =
+                Controls { aileron, elevator, throttle: s.throttle, rudder, lagged: None };
             (state, controls, s.altitude_m)
         });
         Track::new(model, rows)
@@ -123,7 +124,7 @@ pub fn hash(tracks: &[Track]) -> String {
     for track in tracks {
         hash.update((track.states.len() as u64).to_le_bytes());
         for k in 0..track.states.len() {
-            let Controls { aileron, elevator, throttle, rudder } = track.controls[k];
+            let Controls { aileron, elevator, throttle, rudder, .. } = track.controls[k];
             let rest = [aileron, elevator, throttle, track.altitude[k]];
             // tracks without a rudder keep the hash that they had before there was one
             let rudder = Some(&rudder).filter(|x| **x != 0.0);
@@ -153,6 +154,7 @@ impl<R: Packet> Recorded<R> {
         self.states.clear();
         self.controls.clear();
         self.density.clear();
+        self.lagged.clear();
         for k in 0..steps + 2 {
             self.states.push(std::array::from_fn(|i| pick(k, &|t, s| t.states[s].to_array()[i])));
         }
@@ -164,6 +166,12 @@ impl<R: Packet> Recorded<R> {
                 pick(k, &|t, s| t.controls[s].rudder),
             ]);
             self.density.push(pick(k, &|t, s| t.density[s]));
+            if tracks[windows[0].track as usize].controls[0].lagged.is_some() {
+                let lag = |i: usize| {
+                    pick(k, &|t, s| t.controls[s].lagged.map_or(f64::NAN, |lagged| lagged[i]))
+                };
+                self.lagged.push(std::array::from_fn(lag));
+            }
         }
         let counts = |lane: usize| windows.get(lane).map_or(0.0, |w| w.weight);
         self.weight = Some(R::gather(counts));

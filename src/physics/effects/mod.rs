@@ -70,6 +70,8 @@ pub struct Own<'a> {
     pub table: Option<&'a Table>,
     /// The values of its shape constants: the last [`Effect::SHAPE`] coefficients.
     pub shape: &'a [f64],
+    /// Place of its first lag among those of the model, [`Controls::lagged`](crate::physics::Controls::lagged).
+    pub first_lag: usize,
 }
 
 /// What the search for missing effects knows of one.
@@ -228,7 +230,7 @@ macro_rules! effects {
                     $(Kind::$type => if !matches!($type::NEEDS, Needs::Point) {
                         $type::basis(at, own, terms)
                     },)*
-                    Kind::Written(effect) => effect.basis(at, own.shape, terms),
+                    Kind::Written(effect) => effect.basis(at, own, terms),
                 }
             }
 

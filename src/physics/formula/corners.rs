@@ -3,7 +3,7 @@
 use super::variable::Variable;
 use super::written::Written;
 use crate::physics::airframe::Geometry;
-use crate::physics::effects::Terms;
+use crate::physics::effects::{Own, Terms};
 use crate::physics::point::Base;
 use crate::physics::rigid_body::ForceAxes;
 use crate::physics::{AirData, Channel, Controls, Point, State};
@@ -65,7 +65,7 @@ fn try_at(
         place.set(*variable, value(k, *variable));
     }
     let mut finite = Finite(true);
-    place.visit(|at| effect.basis(at, shape, &mut finite));
+    place.visit(|at| effect.basis(at, Own { shape, ..Own::default() }, &mut finite));
     if finite.0 {
         return Ok(());
     }

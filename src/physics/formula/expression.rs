@@ -72,6 +72,8 @@ functions! {
     Sqrt "sqrt" 1 "square root";
     Smoothstep "smoothstep" 3 "smoothstep(low, high, x): 0 below low, 1 above high, 3t² − 2t³ between";
     Deadband "deadband" 2 "deadband(x, w): 0 within ±w, x ∓ w beyond";
+    Lag "lag" 2 "lag(x, tau): x through a first-order lag of time constant tau, s; x of controls alone";
+    Delay "delay" 2 "delay(x, t): x as it was t seconds before; x of controls alone";
 }
 
 impl Function {
@@ -84,6 +86,11 @@ impl Function {
     pub fn is_operator(self) -> bool {
         use Function::{Add, Divide, Multiply, Negate, Subtract};
         matches!(self, Add | Subtract | Multiply | Divide | Negate)
+    }
+
+    /// Whether it remembers what its argument was.
+    pub fn has_memory(self) -> bool {
+        matches!(self, Function::Lag | Function::Delay)
     }
 
     /// Whether it has a kink or a jump.

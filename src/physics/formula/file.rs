@@ -7,6 +7,7 @@ use toml::Spanned;
 
 use super::dimension::Dimension;
 use super::expression::{Expression, Node};
+use super::memory;
 use super::parser::{self, Fault};
 use super::split;
 use super::tape::Tape;
@@ -14,6 +15,7 @@ use super::units;
 use super::written::{Line, Status, Written};
 use super::{corners, variable::Variable};
 use crate::physics::Channel;
+use crate::physics::actuators::LAGS;
 use crate::physics::airframe::{check_schema, toml_error};
 use crate::physics::effects::{Coefficient, Description, Entry, Kind, Needs};
 use crate::physics::inputs;
@@ -202,8 +204,11 @@ fn built(
     for (k, parameter) in order[count..].iter().enumerate() {
         shape_places[*parameter] = Some(k as u16);
     }
+    let bounds: Vec<[f64; 2]> = file.parameters.values().map(|p| p.bounds).collect();
     for Placed { line, shape_at } in &lines {
         let said = |fault: Fault| place.said(*shape_at, &fault);
+        memory::check(&line.shape, &bounds).map_err(said)?;
+        memory::check(&line.factor, &[]).map_err(|f| format!("factor: {}", f.why))?;
         let parts = split::parts(&line.shape, linear).map_err(said)?;
         let factor =
             units::dimension(&line.factor, &[]).map_err(|f| format!("factor: {}", f.why))?;
@@ -223,6 +228,12 @@ fn built(
         for variable in line.factor.variables().into_iter().chain(line.shape.variables()) {
             needs = needs.max(variable.needs());
         }
+    }
+    let lags = tape.memories().len();
+    if lags > LAGS {
+        return Err(format!(
+            "the formulas have {lags} different lags and delays, {LAGS} are the most; leave some out"
+        ));
     }
     let values: Vec<f64> = coefficients.iter().map(|p| p.value).collect();
     let widths: Vec<f64> = coefficients

@@ -10,6 +10,7 @@ pub mod dimension;
 pub mod expression;
 pub mod file;
 pub mod fuzz;
+mod memory;
 pub mod parser;
 pub mod register;
 pub mod split;
@@ -18,5 +19,6 @@ pub mod units;
 pub mod variable;
 mod written;
 
+pub use memory::Memory;
 pub use variable::Variable;
 pub use written::{Line, Status, Written};

@@ -291,13 +291,6 @@ impl Parser<'_> {
             ("table", _) => self.table(at)?,
             ("clamp", _) => self.clamp(at)?,
             (_, Some(function)) => self.arguments(function, at)?,
-            ("lag" | "delay", _) => {
-                let why = format!(
-                    "{name}(…) needs memory, which a formula has not; deflections lag by the effect actuator_lag, \
-                     airflow by alpha_dot and beta_dot"
-                );
-                return Err(Fault { at, why });
-            }
             _ => return Err(Fault { at, why: no_function(name) }),
         };
         self.depth -= 1;
@@ -446,7 +439,7 @@ mod tests {
             ("table(alpha; 0:1)", 0, "two points"),
             ("table(alpha; 0:1, 0:2)", 17, "increase"),
             ("k(alpha)", 0, "*"),
-            ("lag(alpha, 0.1)", 0, "actuator_lag"),
+            ("lag(elevator)", 0, "2 arguments"),
             ("1e999", 0, "number"),
             ("k*alpha $", 8, "operator"),
             ("", 0, "term"),

@@ -4,6 +4,7 @@
 //! [`Dual`](crate::num::Dual) numbers: of eight states and three controls at once.
 
 use super::expression::{Expression, Function, Node};
+use super::memory::Memory;
 use super::variable::Variable;
 use crate::num::{Real, Table};
 use crate::physics::{Channel, Point};
@@ -36,6 +37,8 @@ enum Operation {
     Sqrt,
     Smoothstep,
     Deadband,
+    /// The lag or delay of that place, where the past is known; else what it settles to, the top.
+    Remembered(u16),
     Square,
     Power(i16),
     Table(u16),
@@ -60,6 +63,7 @@ pub struct Tape {
     tables: Vec<Table>,
     /// Variables that are multiplied in runs.
     variables: Vec<Variable>,
+    memories: Vec<Memory>,
     depth: usize,
     deepest: usize,
 }
@@ -213,6 +217,9 @@ impl Tape {
         places: &Places,
     ) -> Result<(), String> {
         use Function as F;
+        if function.has_memory() {
+            return self.remembered(function, all, places);
+        }
         // a leaf to the right, or to the left of what may change its side, needs no place on the stack
         if let ([left, right], F::Add) = (all, function) {
             for (leaf, other) in [(right, left), (left, right)] {
@@ -243,17 +250,52 @@ impl Tape {
             F::Sqrt => Operation::Sqrt,
             F::Smoothstep => Operation::Smoothstep,
             F::Deadband => Operation::Deadband,
+            F::Lag | F::Delay => return Ok(()),
         });
         self.depth -= all.len().saturating_sub(1);
         Ok(())
     }
 
-    /// Runs at `at` with shape constants `shape`, and reports each part's value.
+    /// A lag or delay: the same one for all who name it.
+    fn remembered(
+        &mut self,
+        function: Function,
+        all: &[Expression],
+        places: &Places,
+    ) -> Result<(), String> {
+        let (Some(argument), Some(Node::Parameter(k))) = (all.first(), all.get(1).map(|e| &e.node))
+        else {
+            return Err(format!("the time of {} must be a parameter", function.name()));
+        };
+        let Some(time) = places.get(*k).copied().flatten() else {
+            return Err(format!("the time of {} must be a shape constant", function.name()));
+        };
+        let mut alone = Tape::default();
+        alone.report(argument, Some(&Expression::number(1.0)), 0, Channel::Drag, places)?;
+        let memory = Memory { function, argument: alone, time };
+        let known = self.memories.iter().position(|m| *m == memory);
+        let place = known.unwrap_or(self.memories.len());
+        if known.is_none() {
+            self.memories.push(memory);
+        }
+        self.push(argument, places)?;
+        self.operations.push(Operation::Remembered(place as u16));
+        Ok(())
+    }
+
+    /// Its lags and delays, in the order of their places.
+    pub fn memories(&self) -> &[Memory] {
+        &self.memories
+    }
+
+    /// Runs at `at` with shape constants `shape`, its lags being those of the model from `first_lag` on, and reports
+    /// each part's value.
     #[inline(always)]
     pub fn run<R: Real>(
         &self,
         at: &Point<R>,
         shape: &[f64],
+        first_lag: usize,
         mut report: impl FnMut(usize, Channel, R),
     ) {
         let one = R::from_f64(1.0);
@@ -300,6 +342,11 @@ impl Tape {
                     let width = top.abs();
                     let x = take(&below, &mut depth);
                     top = x - x.max(-width).min(width);
+                }
+                Operation::Remembered(place) => {
+                    if let Some(lagged) = &at.controls.lagged {
+                        top = lagged.get(first_lag + place as usize).copied().unwrap_or(top);
+                    }
                 }
                 Operation::Square => top = top * top,
                 Operation::Power(n) => top = power(top, n),

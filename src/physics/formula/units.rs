@@ -67,6 +67,22 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
             Function::Exp | Function::Sin | Function::Cos | Function::Tanh => {
                 plain(part(&all[0])?, &all[0], function.name())?
             }
+            Function::Lag | Function::Delay => {
+                let time = Dimension::new(0, 0, 1);
+                match part(&all[1])? {
+                    Of(found) if found != time => {
+                        return Err(Fault {
+                            at: all[1].at,
+                            why: format!(
+                                "the units do not balance: the time of {} is in s, here it is in {found}; give its \
+                                 parameter the unit s",
+                                function.name()
+                            ),
+                        });
+                    }
+                    _ => part(&all[0])?,
+                }
+            }
             Function::Smoothstep => {
                 let x = part(&all[2])?;
                 same(part(&all[0])?, x, &all[2], "smoothstep")?;

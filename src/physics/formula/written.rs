@@ -1,11 +1,12 @@
 //! An effect as its file has it, ready to be evaluated.
 
 use super::expression::{Expression, Node};
+use super::memory::Memory;
 use super::tape::Tape;
 use super::variable::Variable;
 use crate::num::Real;
 use crate::physics::airframe::Sourced;
-use crate::physics::effects::{Description, Needs, Terms};
+use crate::physics::effects::{Description, Needs, Own, Terms};
 use crate::physics::{Channel, Point};
 
 /// Whether an effect may fly.
@@ -57,8 +58,16 @@ impl Written {
 
     /// What one unit of each coefficient contributes.
     #[inline(always)]
-    pub fn basis<R: Real>(&self, at: &Point<R>, shape: &[f64], terms: &mut impl Terms<R>) {
-        self.tape.run(at, shape, |index, channel, amount| terms.add(index, channel, amount));
+    pub fn basis<R: Real>(&self, at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
+        let Own { shape, first_lag, .. } = own;
+        self.tape.run(at, shape, first_lag, |index, channel, amount| {
+            terms.add(index, channel, amount);
+        });
+    }
+
+    /// Its lags and delays; at most [`LAGS`](crate::physics::actuators::LAGS).
+    pub fn memories(&self) -> &[Memory] {
+        self.tape.memories()
     }
 
     /// The value of a coefficient as the file gives it.

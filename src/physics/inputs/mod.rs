@@ -12,6 +12,7 @@
 
 use crate::num::Real;
 use crate::physics::Controls;
+use crate::physics::actuators::LAGS;
 use crate::physics::effects::{Coefficient, Description, Entry};
 
 /// Time between two calls of [`InputEffect::act`], s.
@@ -78,16 +79,24 @@ impl<R: Real> Past<R> {
     }
 }
 
-/// What the input effects of a model remember of aileron, elevator and throttle; on a rudder they do not act.
+/// What a model remembers of its controls' past; [`GreyBox::at_rest`](crate::model::GreyBox::at_rest) makes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InputMemory<R = f64>([[Past<R>; 3]; MOST]);
+pub struct InputMemory<R = f64> {
+    /// What its input effects remember of aileron, elevator and throttle; on a rudder they do not act.
+    inputs: [[Past<R>; 3]; MOST],
+    /// What its formulas remember of what they lag or delay.
+    pub(crate) formulas: [Past<R>; LAGS],
+}
 
 impl<R: Real> InputMemory<R> {
-    /// Surfaces and throttle that have been at `controls` for long.
+    /// Surfaces and throttle that have been at `controls` for long, and what formulas lag, which has been at `lagged`.
     #[inline(always)]
-    pub fn at_rest(controls: &Controls<R>) -> Self {
+    pub fn at_rest(controls: &Controls<R>, lagged: [R; LAGS]) -> Self {
         let Controls { aileron, elevator, throttle, .. } = *controls;
-        InputMemory([[aileron, elevator, throttle].map(Past::at_rest); MOST])
+        InputMemory {
+            inputs: [[aileron, elevator, throttle].map(Past::at_rest); MOST],
+            formulas: lagged.map(Past::at_rest),
+        }
     }
 
     /// What `then` remembers where `chosen` is above zero, else this.
@@ -97,15 +106,20 @@ impl<R: Real> InputMemory<R> {
             output: one(old.output, new.output),
             inputs: std::array::from_fn(|k| one(old.inputs[k], new.inputs[k])),
         };
-        InputMemory(std::array::from_fn(|k| {
-            std::array::from_fn(|control| past(&self.0[k][control], &then.0[k][control]))
-        }))
+        InputMemory {
+            inputs: std::array::from_fn(|k| {
+                std::array::from_fn(|control| {
+                    past(&self.inputs[k][control], &then.inputs[k][control])
+                })
+            }),
+            formulas: std::array::from_fn(|k| past(&self.formulas[k], &then.formulas[k])),
+        }
     }
 
     /// What acts now through the effect in `place` (below [`MOST`]) of a model's list.
     #[inline(always)]
     pub fn act(&mut self, place: usize, kind: Kind, constant: f64, z: &Controls<R>) -> Controls<R> {
-        let [aileron, elevator, throttle] = &mut self.0[place];
+        let [aileron, elevator, throttle] = &mut self.inputs[place];
         match kind.acts() {
             Acts::OnSurfaces => Controls {
                 aileron: kind.act(constant, aileron, z.aileron),

@@ -6,22 +6,16 @@ use rayon::prelude::*;
 use super::flight::Flight;
 use super::parameters::{self, Free};
 use crate::model::GreyBox;
-use crate::sysid::compare::ChannelId;
-use crate::sysid::weak_form::windows::{self, Series};
+use crate::sysid::weak_form::windows;
 
-/// Channels that tell of coefficients: the forces, where measured, and the moments.
-const CHANNELS: [ChannelId; 6] = [
-    ChannelId::Drag,
-    ChannelId::Lift,
-    ChannelId::Side,
-    ChannelId::Roll,
-    ChannelId::Pitch,
-    ChannelId::Yaw,
-];
+/// Channels that tell of coefficients: three forces, NaN where they are not measured, and three moments.
+const CHANNELS: usize = 6;
 /// Iterations of one search.
 const ITERATIONS: usize = 5;
 /// Iterations before starts are compared.
 const TRIAL: usize = 2;
+/// Fall of the weighted sum of squares below which a search has settled: a tenth of a standard deviation.
+const SETTLED: f64 = 0.01;
 /// Neighbouring windows overlap by half.
 const INDEPENDENT: f64 = 0.5;
 
@@ -70,19 +64,15 @@ struct Residuals {
 }
 
 fn residuals(model: &GreyBox, flights: &[Flight]) -> Residuals {
+    let windows: Vec<Vec<[f64; 6]>> = flights
+        .par_iter()
+        .map(|flight| windows::force_and_moment_residuals(model, &flight.prepared))
+        .collect();
     let mut all = Residuals { values: Vec::new(), channel: Vec::new() };
-    let series: Vec<Vec<Series>> =
-        flights.par_iter().map(|flight| windows::channels(model, &flight.prepared)).collect();
-    for (flight, series) in flights.iter().zip(series) {
-        for (k, id) in CHANNELS.iter().enumerate() {
-            let windows = flight.prepared.windows.len();
-            match series.iter().find(|s| s.channel == *id) {
-                Some(Series { measured, predicted, .. }) => {
-                    all.values.extend(measured.iter().zip(predicted).map(|(m, p)| m - p));
-                }
-                None => all.values.extend(std::iter::repeat_n(f64::NAN, windows)),
-            }
-            all.channel.extend(std::iter::repeat_n(k, windows));
+    for flight in windows {
+        for channel in 0..CHANNELS {
+            all.values.extend(flight.iter().map(|w| w[channel]));
+            all.channel.extend(std::iter::repeat_n(channel, flight.len()));
         }
     }
     all
@@ -108,9 +98,10 @@ fn search(
         if iteration == iterations {
             break;
         }
-        let Some(step) = step(&present, free, flights, &theta, &r, &weights) else { break };
+        let next = step(&present, free, flights, &theta, &r, &weights);
+        let Some(Step { change, .. }) = next.filter(|step| step.gain > SETTLED) else { break };
         for (k, f) in free.iter().enumerate() {
-            let change = step[k].clamp(-f.stride, f.stride);
+            let change = change[k].clamp(-f.stride, f.stride);
             theta[k] = (theta[k] + change).clamp(f.bounds.0, f.bounds.1);
         }
     }
@@ -118,7 +109,7 @@ fn search(
 }
 
 /// Inverse variances of the channels' residuals.
-fn weights(r: &Residuals) -> [f64; 6] {
+fn weights(r: &Residuals) -> [f64; CHANNELS] {
     std::array::from_fn(|k| 1.0 / mean_square(r, k))
 }
 
@@ -130,7 +121,15 @@ fn mean_square(r: &Residuals, channel: usize) -> f64 {
 
 /// The concentrated likelihood: Σ ln of the channels' mean squares.
 fn misfit(r: &Residuals) -> f64 {
-    (0..6).map(|k| mean_square(r, k).max(1e-12).ln()).sum()
+    (0..CHANNELS).map(|k| mean_square(r, k).max(1e-12).ln()).sum()
+}
+
+/// A step of Gauss–Newton.
+struct Step {
+    /// What it changes each free coefficient by.
+    change: DVector<f64>,
+    /// How much lower the weighted sum of squares is behind it, as the linear model has it.
+    gain: f64,
 }
 
 fn step(
@@ -139,8 +138,8 @@ fn step(
     flights: &[Flight],
     theta: &[f64],
     r: &Residuals,
-    weights: &[f64; 6],
-) -> Option<DVector<f64>> {
+    weights: &[f64; CHANNELS],
+) -> Option<Step> {
     let columns: Vec<windows::Columns> =
         flights.par_iter().map(|f| windows::columns(present, &f.prepared)).collect();
     let column = |(k, f): (usize, &Free)| {
@@ -171,7 +170,8 @@ fn step(
     let scale = information.diagonal().map(|d| d.sqrt().recip());
     let scaled =
         DMatrix::from_fn(free.len(), free.len(), |a, b| information[(a, b)] * scale[a] * scale[b]);
-    let mut step = scaled.cholesky()?.solve(&right.component_mul(&scale));
-    step.component_mul_assign(&scale);
-    Some(step)
+    let mut change = scaled.cholesky()?.solve(&right.component_mul(&scale));
+    change.component_mul_assign(&scale);
+    let gain = change.dot(&right);
+    Some(Step { change, gain })
 }

@@ -87,7 +87,7 @@ impl Neighbourhood {
         let variant = |k: usize| {
             let (low, high, between) = parameters::beside(base, free, &place.theta, k);
             let side = |model: GreyBox| {
-                let acting = free[k].input.then(|| acting(&model, flights, place));
+                let acting = free[k].acting.then(|| acting(&model, flights, place));
                 Side { model, acting }
             };
             Variant { low: low.map(side), high: side(high), between }

@@ -3,6 +3,7 @@
 use crate::model::{GreyBox, Named};
 use crate::physics::catalogue;
 use crate::physics::effects::Description;
+use crate::physics::formula::register;
 use crate::physics::inputs;
 
 /// Coefficients of added effects that stay where they start: shares of a whole, which cannot be determined
@@ -42,8 +43,10 @@ pub(super) struct Free {
     pub stride: f64,
     /// Whether the model is linear in it.
     pub linear: bool,
-    /// Whether it changes what acts for given measured deflections.
+    /// Whether it belongs to an effect between measured deflections and what acts.
     pub input: bool,
+    /// Whether it changes what acts for given measured deflections, or what a formula remembers of them.
+    pub acting: bool,
     /// Whether it belongs to an effect that is being added.
     pub added: bool,
 }
@@ -51,6 +54,11 @@ pub(super) struct Free {
 /// What is known of the effect `id`, and whether it acts on inputs.
 pub(super) fn describe(id: &str) -> Option<(Description, bool)> {
     catalogue::describe(id).map(|about| (about, inputs::Kind::from_id(id).is_some()))
+}
+
+/// Whether `id` is an effect of a file with a lag or delay.
+fn remembers(id: &str) -> bool {
+    register::find(id).is_some_and(|effect| !effect.memories().is_empty())
 }
 
 /// The coefficients of `model` that may change when `added` are the ids of new effects.
@@ -94,6 +102,7 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
                 stride: stride.max(1e-9),
                 linear,
                 input,
+                acting: input || (!linear && remembers(id)),
                 added,
             })
         })

@@ -5,7 +5,6 @@ use std::f64::consts::{PI, TAU};
 use super::flight::{AIRSPEED, BLUR, Flight, OFFSETS, SENSORS, SKEW};
 use crate::logs::Sampling;
 use crate::model::{GreyBox, Memory};
-use crate::physics::inputs::InputMemory;
 use crate::physics::{Controls, State};
 use crate::sysid::flight_path::reconstruction::Instant;
 use crate::sysid::weak_form::prepared::Prepared;
@@ -69,7 +68,7 @@ fn act(
     [late, blur]: [f64; 2],
 ) -> Vec<Controls> {
     let at = |place: f64| between(segment, place + late, blur);
-    let mut memory = InputMemory::at_rest(&at(0.0));
+    let mut memory = model.at_rest(&at(0.0));
     let one = |step: usize| {
         let (k, j) = (step / flight.substeps, step % flight.substeps);
         let recorded = at(match flight.sampling {
@@ -100,6 +99,7 @@ fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
         elevator: mix(|z| z.elevator),
         throttle: mix(|z| z.throttle),
         rudder: mix(|z| z.rudder),
+        lagged: None,
     }
 }
 
@@ -202,7 +202,8 @@ mod tests {
         let true_value = |k: usize| (0.19 * k as f64).sin();
         let instant = |k: usize| {
             let aileron = 0.5 * (true_value(k) + true_value(k.saturating_sub(1)));
-            let controls = Controls { aileron, elevator: 0.0, throttle: 0.0, rudder: 0.0 };
+            let controls =
+                Controls { aileron, elevator: 0.0, throttle: 0.0, rudder: 0.0, lagged: None };
             Instant {
                 time_s: 0.01 * k as f64,
                 state: State::from_array([0.0; 8]),

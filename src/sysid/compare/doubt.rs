@@ -88,6 +88,7 @@ fn controls_rate(samples: &[Instant], k: usize) -> Controls {
         elevator: rate(a.controls.elevator, b.controls.elevator),
         throttle: rate(a.controls.throttle, b.controls.throttle),
         rudder: rate(a.controls.rudder, b.controls.rudder),
+        lagged: None,
     }
 }
 

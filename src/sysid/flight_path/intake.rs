@@ -500,6 +500,7 @@ fn controls(channels: &Channels, times: &[f64], options: &Options) -> Vec<Contro
             elevator: logged(1, simulated.elevator),
             throttle: logged(2, simulated.throttle),
             rudder: logged(3, if f.rudder.is_some() { simulated.rudder } else { 0.0 }),
+            lagged: None,
         });
     }
     all

@@ -214,6 +214,7 @@ fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
                 elevator: mix(a.elevator, b.elevator),
                 throttle: mix(a.throttle, b.throttle),
                 rudder: mix(a.rudder, b.rudder),
+                lagged: None,
             };
         }
     }

@@ -6,7 +6,6 @@ use std::f64::consts::{PI, TAU};
 use crate::logs::Sampling;
 use crate::model::{GreyBox, Integrator, Memory, STEP};
 use crate::physics::State;
-use crate::physics::inputs::InputMemory;
 use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction};
 use crate::sysid::weak_form::channels::RegimeVariable;
 use crate::sysid::weak_form::kernel::{Kernel, weigh};
@@ -109,7 +108,7 @@ impl Prepared {
         let mut acting = self.clone();
         for instants in &mut acting.segments {
             let Some(first) = instants.first() else { continue };
-            let mut memory = InputMemory::at_rest(&first.controls);
+            let mut memory = model.at_rest(&first.controls);
             let mut before = first.controls;
             for instant in instants {
                 let measured = instant.controls;

@@ -10,6 +10,7 @@ use crate::learn::dynamics::prior::{At, Said, Slopes};
 use crate::model::residual::Scales;
 use crate::model::{GreyBox, Integrator};
 use crate::num::Real;
+use crate::physics::actuators::LAGS;
 use crate::physics::effects::Needs;
 use crate::physics::rigid_body::Vector;
 use crate::physics::{Controls, State};
@@ -44,8 +45,10 @@ pub enum PriorSlopes {
 pub struct Recorded<R> {
     /// States before the start, at the start, and after each step; roll in −π..π.
     pub states: Vec<[R; 8]>,
-    /// Aileron, elevator, throttle that act, from the step before the start on.
+    /// Aileron, elevator, throttle, rudder that act, from the step before the start on.
     pub controls: Vec<[R; 4]>,
+    /// What the formulas lag or delay, likewise; empty for a model without lags.
+    pub lagged: Vec<[R; LAGS]>,
     /// Air density from the step before the start on, kg/m³.
     pub density: Vec<R>,
     /// What each rollout counts; 0 for one that fills the block up.
@@ -174,7 +177,13 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
     #[inline(always)]
     fn at(&self, step: usize, state: State<R>) -> At<R> {
         let [aileron, elevator, throttle, rudder] = self.recorded.controls[step];
-        let controls = Controls { aileron, elevator, throttle, rudder };
+        let controls = Controls {
+            aileron,
+            elevator,
+            throttle,
+            rudder,
+            lagged: self.recorded.lagged.get(step).copied(),
+        };
         At { state, controls, density: self.recorded.density[step] }
     }
 

@@ -117,7 +117,10 @@ impl Ready {
     /// What one unit of each of the coefficients `wanted` of `model`, a model that has the effects of
     /// the flight's, predicts; shape constants and those of input effects have empty columns.
     pub fn linear(&self, model: &GreyBox, wanted: Range<usize>) -> Vec<Column> {
-        let mut columns = gather(&self.acting, model.integrator, wanted.len(), |place, add| {
+        // a formula with a lag needs the past of the deflections, which the flight's own model may not remember
+        let remembered = (model.lags() > 0).then(|| self.measured.acting(model));
+        let acting = remembered.as_deref().unwrap_or(&self.acting);
+        let mut columns = gather(acting, model.integrator, wanted.len(), |place, add| {
             let at = place.at;
             let air = model.air(&at.state, at.altitude);
             model.contributions(&at.state, place.controls, &air, |index, channel, amount: f64| {

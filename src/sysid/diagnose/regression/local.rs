@@ -47,6 +47,7 @@ pub fn local(model: &GreyBox, at: &Instant, controls: &Controls) -> Local {
         elevator: D::variable(controls.elevator, CONTROLS + 1),
         throttle: D::variable(controls.throttle, CONTROLS + 2),
         rudder: D::variable(controls.rudder, CONTROLS + 3),
+        lagged: None,
     };
     let all = residual(model, &state, &controls, at);
     Local {

@@ -1,0 +1,119 @@
+//! What formulas remember: what stands in `lag(…)` and `delay(…)`, as it was.
+
+use super::expression::{Expression, Function, Node};
+use super::parser::Fault;
+use super::tape::Tape;
+use super::variable::Variable;
+use crate::num::Real;
+use crate::physics::airframe::Geometry;
+use crate::physics::inputs::{ActuatorLag, InputEffect, PAST, Past, STEP, TimeDelay};
+use crate::physics::point::Base;
+use crate::physics::rigid_body::ForceAxes;
+use crate::physics::{AirData, Controls, Point, State};
+
+/// Longest delay, s: so many samples are remembered.
+pub const LONGEST_DELAY_S: f64 = (PAST - 2) as f64 * STEP;
+
+/// A lag or a delay of a formula.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Memory {
+    pub(super) function: Function,
+    /// What is lagged or delayed.
+    pub(super) argument: Tape,
+    /// Place of its time among the effect's shape constants.
+    pub(super) time: u16,
+}
+
+impl Memory {
+    /// What the argument is under `controls`, to which the lag or delay settles.
+    ///
+    /// Not in line: a copy of the tape in each planner's kernel would take minutes to compile, for few models.
+    #[inline(never)]
+    pub fn settled<R: Real>(&self, controls: &Controls<R>, shape: &[f64]) -> R {
+        let zero = R::zero();
+        let state = State::from_array([zero; 8]);
+        let air = AirData {
+            q_s: zero,
+            density: zero,
+            sin_alpha: zero,
+            cos_alpha: zero,
+            sin_beta: zero,
+            cos_beta: zero,
+            p_hat: zero,
+            q_hat: zero,
+            r_hat: zero,
+            altitude: 0.0,
+        };
+        let at = Point {
+            state: &state,
+            controls,
+            air: &air,
+            geometry: &Geometry { area: 0.0, span: 0.0, chord: 0.0 },
+            axes: ForceAxes::Wind,
+            base: &Base::zero(),
+        };
+        let mut value = zero;
+        self.argument.run(&at, shape, 0, |_, _, x| value = x);
+        value
+    }
+
+    /// The lagged or delayed value under `controls`; called once every [`STEP`].
+    #[inline(always)]
+    pub fn act<R: Real>(&self, controls: &Controls<R>, shape: &[f64], past: &mut Past<R>) -> R {
+        let now = self.settled(controls, shape);
+        let time = shape.get(self.time as usize).copied().unwrap_or(0.0).max(0.0);
+        match self.function {
+            Function::Delay => TimeDelay::act(time, past, now),
+            _ => ActuatorLag::act(time, past, now),
+        }
+    }
+}
+
+/// Refuses a lag or delay in `of` that cannot be worked out; `bounds` are those of the effect's parameters.
+///
+/// # Errors
+/// Where it stands, and what to do.
+pub fn check(of: &Expression, bounds: &[[f64; 2]]) -> Result<(), Fault> {
+    let mut fault = None;
+    of.visit(&mut |e| {
+        if let Node::Call(function, all) = &e.node
+            && function.has_memory()
+            && fault.is_none()
+        {
+            fault = refusal(*function, all, bounds).map(|why| Fault { at: e.at, why });
+        }
+    });
+    fault.map_or(Ok(()), Err)
+}
+
+fn refusal(function: Function, all: &[Expression], bounds: &[[f64; 2]]) -> Option<String> {
+    let name = function.name();
+    let [argument, time] = all else { return None };
+    if argument.any(&|node| matches!(node, Node::Call(inner, _) if inner.has_memory())) {
+        return Some(format!("{name} stands around another lag or delay; write one of them"));
+    }
+    use Variable::{Aileron, Elevator, Rudder, Throttle};
+    let other = argument
+        .variables()
+        .into_iter()
+        .find(|v| !matches!(v, Aileron | Elevator | Rudder | Throttle));
+    if let Some(other) = other {
+        return Some(format!(
+            "{name} remembers aileron, elevator, rudder and throttle alone, not {}; airflow lags by alpha_dot and beta_dot",
+            other.name()
+        ));
+    }
+    let Node::Parameter(k) = time.node else {
+        return Some(format!(
+            "the time of {name} is a number; make it a parameter in s, so that it has bounds"
+        ));
+    };
+    let [low, high] = bounds.get(k).copied().unwrap_or([0.0; 2]);
+    let most = if function == Function::Delay { LONGEST_DELAY_S } else { f64::INFINITY };
+    (low < 0.0 || high > most).then(|| match function {
+        Function::Delay => {
+            format!("a delay lies between 0 and {LONGEST_DELAY_S} s; set its bounds so")
+        }
+        _ => "the time constant of a lag is not below 0 s; set its bounds so".to_owned(),
+    })
+}
