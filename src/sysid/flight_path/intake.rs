@@ -78,7 +78,7 @@ pub struct Span {
     pub length: f64,
 }
 
-/// A stretch without gaps, as measured; a missing measurement is NaN. Units as in [`Sample`].
+/// A stretch without gaps, as measured; a missing measurement is NaN. Units as in [`Sample`](crate::logs::Sample).
 #[derive(Clone, Debug, Default)]
 pub struct Track {
     /// Time of the first sample, s.

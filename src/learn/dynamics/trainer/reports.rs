@@ -72,7 +72,7 @@ pub struct Moment {
     pub ratio: f64,
     /// λ.
     pub lambda: f64,
-    /// The trained coefficients, in the order of [`Trainer::coefficients`].
+    /// The trained coefficients, in the order of [`Trainer::coefficients`](super::Trainer::coefficients).
     pub coefficients: Vec<f64>,
 }
 
