@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use flight_support::*;
 use greylag::commands::fly::companion_with;
-use greylag::control::Kind;
+use greylag::control::ControllerKind;
 use greylag::flight::recorder::Place;
 use greylag::flight::runtime::Pace;
 use greylag::logs::csv::{self, Tolerance};
@@ -83,8 +83,10 @@ fn flown(folder: &Path, model: &GreyBox, plant: PlantOptions, start: Start) -> L
     let mut options = options(Pace::Lockstep);
     options.travels = model.airframe.actuators.travels();
     options.record = Some(Place::Exactly(folder.join("flight")));
-    let companion =
-        Companion::with(&options, companion_with(Kind::Lqi, model, Path::new("")).unwrap());
+    let companion = Companion::with(
+        &options,
+        companion_with(ControllerKind::Lqi, model, Path::new("")).unwrap(),
+    );
     let truth = folder.join("truth.csv");
     let link = format!("udpout:{}", companion.vehicle());
     let shim = Shim::start(&link, shim::Pace::Lockstep, 10.0, |shim| {

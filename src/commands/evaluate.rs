@@ -17,7 +17,7 @@ use crate::commands::files::{self, shipped};
 use crate::commands::start::{self, StartArguments};
 use crate::commands::{bar, choices, fly};
 use crate::control::cem::Change;
-use crate::control::{Controller, Kind, Needs, Target};
+use crate::control::{Controller, ControllerKind, Needs, Target};
 use crate::model::GreyBox;
 use crate::physics::Airframe;
 use crate::physics::airframe::Envelope;
@@ -49,7 +49,7 @@ const IN_JSBSIM: [&str; 11] = [
 pub struct Arguments {
     /// Controllers to score.
     #[arg(long = "controller", value_name = "NAME", num_args = 1.., required = true, value_parser = choices::controller())]
-    controllers: Vec<Kind>,
+    controllers: Vec<ControllerKind>,
     /// Models that the controllers are designed from or plan with.
     #[arg(long = "model", num_args = 1.., default_values_os_t = [PathBuf::from(fly::MODEL)])]
     models: Vec<PathBuf>,
@@ -225,7 +225,7 @@ fn within_envelope(targets: &mut TargetFile, airframe: &Airframe) -> Result<()> 
 
 /// A controller ready to fly, with the name of its model, or the folder of its policy.
 struct Entrant {
-    kind: Kind,
+    kind: ControllerKind,
     model: String,
     controller: Box<dyn Controller>,
 }

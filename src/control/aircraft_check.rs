@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::control::lqi::{self, LoopMargins, MarginsError, Weights};
-use crate::control::{Kind, build};
+use crate::control::{ControllerKind, build};
 use crate::model::modes::{Mode, modes, rates};
 use crate::model::{GreyBox, Trim, TrimError};
 
@@ -158,7 +158,7 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
             check.authority.roll_rate.to_degrees().abs()
         ));
     }
-    if let Err(why) = build(Kind::Lqi, model) {
+    if let Err(why) = build(ControllerKind::Lqi, model) {
         out.push(format!("{why}; give the envelope less bank or a pitch_min_deg nearer to 0"));
     }
     for LoopMargins { surface, delay, .. } in &check.loops {

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::columns::COLUMNS;
 use super::finding::{Finding, Severity};
-use super::phases::{self, Kind, Phase};
+use super::phases::{self, Phase, PhaseKind};
 use super::rudder::RudderMotion;
 use super::{Channel, Format, Log, Sample};
 
@@ -63,7 +63,8 @@ impl Info {
         let split = phases::split_s(samples);
         let gaps = times.windows(2).filter(|w| w[1] - w[0] > split).map(|w| (w[0], w[1] - w[0]));
         let phases = phases::phases(samples, &log.flies);
-        let flown = phases.iter().filter(|p| p.kind == Kind::Flight).map(|p| p.to_s - p.from_s);
+        let flown =
+            phases.iter().filter(|p| p.kind == PhaseKind::Flight).map(|p| p.to_s - p.from_s);
         Info {
             schema: "greylag.log-info/1",
             name: log.flight.name.clone(),

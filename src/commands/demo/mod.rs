@@ -27,9 +27,9 @@ use crate::commands::recording_report::{self, Reporter, TOLERANCE_DEG};
 use crate::commands::start::{self, StartArguments};
 use crate::commands::{files, fly};
 use crate::control::cem::Change;
-use crate::control::{self, Kind};
+use crate::control::{self, ControllerKind};
 use crate::flight::recorder::Place;
-use crate::flight::runtime::{Companion, Flight, Options, Pace};
+use crate::flight::runtime::{Companion, Flight, FlightOptions, Pace};
 use crate::link::address::Address;
 use crate::link::vehicle::{Sitl, Vehicle};
 use crate::manoeuvres::Schedule;
@@ -38,12 +38,12 @@ use crate::report::FlightReport;
 use client::{Client, View};
 use schedule::Legs;
 
-/// Options of `greylag demo`.
+/// FlightOptions of `greylag demo`.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Controller that flies.
     #[arg(long, value_name = "NAME", default_value = fly::CONTROLLER, value_parser = choices::controller())]
-    controller: Kind,
+    controller: ControllerKind,
     /// Model that the controller is designed from or plans with.
     #[arg(long, value_name = "FILE", default_value = fly::MODEL)]
     model: PathBuf,
@@ -188,9 +188,9 @@ fn input_ends() -> Arc<AtomicBool> {
     ended
 }
 
-fn options(arguments: &Arguments, model: &GreyBox) -> Result<Options> {
+fn options(arguments: &Arguments, model: &GreyBox) -> Result<FlightOptions> {
     let free_port: Address = "udpin:127.0.0.1:0".parse()?;
-    Ok(Options {
+    Ok(FlightOptions {
         vehicle: free_port.clone(),
         clients: vec![free_port],
         record: Some(
@@ -198,7 +198,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Result<Options> {
         ),
         pace: Pace::RealTime,
         duration: None,
-        plan_deadline: Options::PLAN_DEADLINE,
+        plan_deadline: FlightOptions::PLAN_DEADLINE,
         travels: model.airframe.actuators.travels(),
         mixer: model.airframe.mixer.clone(),
         controller: None,

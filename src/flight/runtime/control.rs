@@ -14,7 +14,7 @@ use super::recording_autopilot::RecordingAutopilot;
 use super::stamps::{Stamps, unix_us};
 use super::summary::Summary;
 use super::timing::Timing;
-use super::{Event, Options};
+use super::{Event, FlightOptions};
 use crate::flight::pilot::{Decision, Pilot, Plan};
 use crate::flight::recorder::call::Planned;
 use crate::flight::recorder::{Call, Recorder, Row};
@@ -61,7 +61,7 @@ pub(super) struct Control {
 
 impl Control {
     pub(super) fn new(
-        options: &Options,
+        options: &FlightOptions,
         mut pilot: Pilot,
         planner: Planner,
         ports: Ports,

@@ -13,9 +13,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::counterpart::{Aircraft, Counterpart, vehicle};
 use super::judge::{Cause, Finding, Found, Judge};
-use super::mix::{Fault, Kind, draw};
+use super::mix::{Fault, FaultKind, draw};
 use super::wire::Wire;
-use crate::control::{Controller, Kind as ControllerKind, SetupError, build};
+use crate::control::{Controller, ControllerKind, SetupError, build};
 use crate::flight::desk::Desk;
 use crate::flight::pilot::{ConfigError, Pilot};
 use crate::flight::recorder::Recorder;
@@ -153,7 +153,7 @@ impl CompanionFactory {
 
     fn fly_under(&self, case: Case, faults: Vec<Fault>) -> Result<Report, FaultsError> {
         let mut desk = self.desk(case.counterpart)?;
-        let disk = faults.iter().any(|f| f.kind == Kind::Disk).then(Disk::default);
+        let disk = faults.iter().any(|f| f.kind == FaultKind::Disk).then(Disk::default);
         if let Some(disk) = &disk {
             let folder = std::path::PathBuf::new();
             desk.record(Recorder::over(folder, disk.clone(), disk.clone(), disk.clone())?);
@@ -233,7 +233,7 @@ impl Flight {
         let acting: Vec<Fault> = self.faults.iter().filter(|f| f.acts(now_s)).copied().collect();
         let distortion = self.distortion(&acting, step);
         let bytes = self.aircraft.show(distortion);
-        let rebooting = acting.iter().any(|fault| fault.kind == Kind::Reboot);
+        let rebooting = acting.iter().any(|fault| fault.kind == FaultKind::Reboot);
         if !rebooting && !bytes.is_empty() {
             self.down.send(step, bytes, &acting);
         }
@@ -275,7 +275,7 @@ impl Flight {
 
     /// The client: arms when it can, then sends its legs.
     fn client(&mut self, step: u64, now_s: f64, host: Duration, acting: &[Fault]) {
-        if acting.iter().any(|fault| fault.kind == Kind::Client)
+        if acting.iter().any(|fault| fault.kind == FaultKind::Client)
             || !step.is_multiple_of(SETPOINT_EVERY)
         {
             return;

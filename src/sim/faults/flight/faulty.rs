@@ -10,12 +10,12 @@ use rand::RngExt;
 use super::Flight;
 use crate::sim::faults::counterpart::Aircraft;
 use crate::sim::faults::judge::{Exposure, Finding};
-use crate::sim::faults::mix::{Fault, Kind};
+use crate::sim::faults::mix::{Fault, FaultKind};
 
 impl Flight {
     /// Steps until the companion has the processor again.
     pub(super) fn nap(&mut self, acting: &[Fault]) -> u64 {
-        let starved = acting.iter().find(|fault| fault.kind == Kind::Starvation);
+        let starved = acting.iter().find(|fault| fault.kind == FaultKind::Starvation);
         let Some(Fault { strength, .. }) = starved else { return 0 };
         match self.random.random::<f64>() < 0.05 + 0.3 * strength {
             // 20 ms to 300 ms without a single instruction.
@@ -28,7 +28,7 @@ impl Flight {
     pub(super) fn exposure(&mut self, acting: &[Fault]) -> Exposure {
         let inputs = self.aircraft.inputs();
         let same = std::mem::replace(&mut self.flown, inputs) == inputs;
-        let lied_to = |fault: &Fault| matches!(fault.kind, Kind::Airspeed | Kind::Alpha);
+        let lied_to = |fault: &Fault| matches!(fault.kind, FaultKind::Airspeed | FaultKind::Alpha);
         Exposure {
             unsteered: same && self.aircraft.is_steered(),
             blind: matches!(self.aircraft, Aircraft::Sitl(_)) && self.judge.is_blind(),
@@ -42,19 +42,19 @@ impl Flight {
         for fault in acting {
             let s = fault.strength;
             match fault.kind {
-                Kind::Frozen => distortion.frozen = true,
+                FaultKind::Frozen => distortion.frozen = true,
                 // What a tube that has iced up shows: the speed of that moment, or less and less.
-                Kind::Airspeed => {
+                FaultKind::Airspeed => {
                     distortion.airspeed_mps = Some(0.4 * self.cruise + self.cruise * s)
                 }
-                Kind::Alpha => distortion.alpha_rad = 0.5 * (s - 0.5),
-                Kind::NotANumber => distortion.rate_not_a_number = true,
-                Kind::Clock => self.clock_us = (1e7 * s) as i64,
-                Kind::Disk => {
+                FaultKind::Alpha => distortion.alpha_rad = 0.5 * (s - 0.5),
+                FaultKind::NotANumber => distortion.rate_not_a_number = true,
+                FaultKind::Clock => self.clock_us = (1e7 * s) as i64,
+                FaultKind::Disk => {
                     self.disk.iter().for_each(|disk| disk.full.store(true, Ordering::Relaxed));
                 }
                 // Time begins anew.
-                Kind::Reboot => self.clock_us = -(10_000 * step as i64),
+                FaultKind::Reboot => self.clock_us = -(10_000 * step as i64),
                 _ => {}
             }
         }

@@ -3,7 +3,7 @@
 use super::{Periods, Present};
 use crate::logs::{Flight, FlowAngles, Sample};
 use crate::sysid::flight_path::ReconstructError;
-use crate::sysid::flight_path::channel::{Channel, Kind};
+use crate::sysid::flight_path::channel::{Channel, Interpolation};
 
 /// The channels of a log.
 pub(super) struct Channels {
@@ -28,21 +28,21 @@ impl Channels {
             std::array::from_fn(|i| channel(kind, &|s| get(s, i)))
         };
         let four = |get: &dyn Fn(&Sample) -> [f64; 4]| {
-            std::array::from_fn(|i| channel(Kind::Kept, &|s| get(s)[i]))
+            std::array::from_fn(|i| channel(Interpolation::Kept, &|s| get(s)[i]))
         };
         let vane = |get: &dyn Fn(&Sample) -> f64| match flight.flow_angles {
-            FlowAngles::Measured => channel(Kind::Linear, get),
-            FlowAngles::Estimated => channel(Kind::Linear, &|_| f64::NAN),
+            FlowAngles::Measured => channel(Interpolation::Linear, get),
+            FlowAngles::Estimated => channel(Interpolation::Linear, &|_| f64::NAN),
         };
         Channels {
-            rates: three(Kind::Linear, &|s, i| s.rates_radps[i]),
-            force: three(Kind::Linear, &|s, i| s.specific_force_mps2[i]),
-            attitude: three(Kind::Angle, &|s, i| s.attitude_rad[i]),
-            airspeed: channel(Kind::Linear, &|s| s.airspeed_mps),
+            rates: three(Interpolation::Linear, &|s, i| s.rates_radps[i]),
+            force: three(Interpolation::Linear, &|s, i| s.specific_force_mps2[i]),
+            attitude: three(Interpolation::Angle, &|s, i| s.attitude_rad[i]),
+            airspeed: channel(Interpolation::Linear, &|s| s.airspeed_mps),
             vanes: [vane(&|s| s.alpha_rad), vane(&|s| s.beta_rad)],
-            velocity: three(Kind::Linear, &|s, i| s.velocity_ned_mps[i]),
-            altitude: channel(Kind::Kept, &|s| s.altitude_m),
-            density: channel(Kind::Kept, &|s| s.air_density_kgpm3),
+            velocity: three(Interpolation::Linear, &|s, i| s.velocity_ned_mps[i]),
+            altitude: channel(Interpolation::Kept, &|s| s.altitude_m),
+            density: channel(Interpolation::Kept, &|s| s.air_density_kgpm3),
             positions: four(&|s| [s.aileron_rad, s.elevator_rad, s.throttle, s.rudder_rad]),
             commands: four(&|s| [s.aileron_cmd, s.elevator_cmd, s.throttle_cmd, s.rudder_cmd]),
         }
