@@ -12,7 +12,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use greylag::control::{Kind, Target, build};
+use greylag::control::{ControllerKind, Target, build};
 use greylag::model::{GreyBox, Memory, STEP, Trim};
 use greylag::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
 use greylag::physics::{Command, State};
@@ -94,7 +94,7 @@ fn taken(folder: &Path, name: &str) -> Result<(GreyBox, PlantOptions, Vec<String
 fn fly(model: &GreyBox, plant: &PlantOptions) -> Result<String> {
     let airspeed = plant.start.airspeed_mps;
     let trim = Trim::straight(model, airspeed, ALTITUDE_M)?;
-    let mut lqi = build(Kind::Lqi, model)?;
+    let mut lqi = build(ControllerKind::Lqi, model)?;
     let State { alpha, pitch, .. } = trim.state;
     let start = Start { alpha_rad: alpha, pitch_rad: pitch, ..plant.start };
     let mut simulator = Simulator::new(&PlantOptions { start, ..plant.clone() })?;

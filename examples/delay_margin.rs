@@ -16,7 +16,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use greylag::control::lqi::{Lqi, Weights};
-use greylag::control::{Controller, Kind, Observation, Target, build};
+use greylag::control::{Controller, ControllerKind, Observation, Target, build};
 use greylag::model::GreyBox;
 use greylag::physics::actuators::Actuators;
 use greylag::physics::airframe::ActuatorFigures;
@@ -53,7 +53,12 @@ fn main() -> Result<()> {
     let model = GreyBox::load(&folder.join("jsbsim.toml"))?;
     let figures = model.airframe.actuators;
     let mut controllers: Vec<(String, Box<dyn Controller>)> = Vec::new();
-    for kind in [Kind::Lqi, Kind::LqiDamped, Kind::Pid, Kind::PidRetuned] {
+    for kind in [
+        ControllerKind::Lqi,
+        ControllerKind::LqiDamped,
+        ControllerKind::Pid,
+        ControllerKind::PidRetuned,
+    ] {
         controllers.push((kind.name().into(), build(kind, &model)?));
     }
     for figures in std::env::args().skip(1) {

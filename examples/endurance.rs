@@ -18,10 +18,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use greylag::commands::fly::{self, POLICY, companion_with};
-use greylag::control::{Kind, build};
+use greylag::control::{ControllerKind, build};
 use greylag::flight::desk::Desk;
 use greylag::flight::pilot::{Config, Pilot};
-use greylag::flight::runtime::{Companion, Flight, Options, Pace, Placement};
+use greylag::flight::runtime::{Companion, Flight, FlightOptions, Pace, Placement};
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 use greylag::link::framing::{FrameCounts, Frames};
 use greylag::link::offboard::{Heard, OffboardClient};
@@ -135,7 +135,8 @@ fn in_process(model: &GreyBox, hours: f64, opposite: &str) -> Result<()> {
         }
         other => bail!("{other}: known are sitl, px4, ardupilot"),
     };
-    let mut desk = Desk::new(companion_with(Kind::Lqi, model, Path::new(POLICY))?, vehicle);
+    let mut desk =
+        Desk::new(companion_with(ControllerKind::Lqi, model, Path::new(POLICY))?, vehicle);
     let steps = (hours * 360_000.0) as u64;
     let begun = Instant::now();
     let (mut down, mut up) = (Vec::new(), Vec::new());
@@ -219,13 +220,13 @@ fn leg(number: u64, altitude_m: f64) -> (f64, f64) {
 fn through_sockets(model: &GreyBox, hours: f64) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     let free_port: greylag::link::address::Address = "udpin:127.0.0.1:0".parse()?;
-    let options = Options {
+    let options = FlightOptions {
         vehicle: free_port.clone(),
         clients: vec![free_port],
         record: None,
         pace: Pace::Lockstep,
         duration: None,
-        plan_deadline: Options::PLAN_DEADLINE,
+        plan_deadline: FlightOptions::PLAN_DEADLINE,
         controller: None,
         travels: model.airframe.actuators.travels(),
         mixer: model.airframe.mixer.clone(),
@@ -233,7 +234,7 @@ fn through_sockets(model: &GreyBox, hours: f64) -> Result<()> {
     };
     // The aircraft's minute is half a second of the client's.
     let config = Config { offboard_loss_s: 60.0, ..Config::for_model(model)? };
-    let controller = build(Kind::Lqi, model)?;
+    let controller = build(ControllerKind::Lqi, model)?;
     let pilot = Pilot::new(config, controller.boxed_clone())?;
     let flight = Flight::start(
         &options,

@@ -21,10 +21,10 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::Parser;
 use greylag::commands::fly;
 use greylag::control::cem::Change;
-use greylag::control::{self, Kind, Target, build};
+use greylag::control::{self, ControllerKind, Target, build};
 use greylag::flight::pilot::{Config, Pilot};
 use greylag::flight::recorder::Place;
-use greylag::flight::runtime::{Companion, Flight, Options, Pace, Placement, Summary};
+use greylag::flight::runtime::{Companion, Flight, FlightOptions, Pace, Placement, Summary};
 use greylag::link::autopilot::Mode;
 use greylag::link::offboard::{Heard, OffboardClient};
 use greylag::logs::Sample;
@@ -67,7 +67,7 @@ struct Flown {
 struct Arguments {
     /// Controller that flies.
     #[arg(long, default_value = "lqi")]
-    controller: Kind,
+    controller: ControllerKind,
     /// Settings of a planner in other than their usual size.
     #[arg(long, num_args = 1.., value_name = "KEY=VALUE")]
     planner: Vec<Change>,
@@ -116,7 +116,7 @@ fn told([early, late]: [f64; 2]) -> String {
 /// What is wanted of the flight in real time, and whether it was reached.
 fn real_time(
     real: &Flown,
-    kind: Kind,
+    kind: ControllerKind,
     load: usize,
     in_process: f64,
 ) -> Result<Vec<(bool, String)>> {
@@ -185,7 +185,7 @@ impl Drop for Busy {
 }
 
 /// The settled error of the same target flown from neutral in process, degrees.
-fn settled_in_process(kind: Kind, model: &GreyBox, changes: &[Change]) -> Result<f64> {
+fn settled_in_process(kind: ControllerKind, model: &GreyBox, changes: &[Change]) -> Result<f64> {
     let mut simulator = Simulator::new(&PlantOptions::default())?;
     let mut controller = fly::controller(kind, model, Path::new(fly::POLICY), changes)?;
     let target =
@@ -230,7 +230,7 @@ fn error_at_end(samples: &[Sample]) -> f64 {
 
 /// Flies the target in OFFBOARD until the shim has flown `seconds`.
 fn flight(
-    kind: Kind,
+    kind: ControllerKind,
     model: &GreyBox,
     changes: &[Change],
     pace: Pace,
@@ -255,15 +255,15 @@ fn flight(
     Ok(Flown { samples: recorded.flight.samples, companion, shim })
 }
 
-fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<Options> {
+fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<FlightOptions> {
     let free_port: greylag::link::address::Address = "udpin:127.0.0.1:0".parse()?;
-    Ok(Options {
+    Ok(FlightOptions {
         vehicle: free_port.clone(),
         clients: vec![free_port],
         record: Some(Place::Exactly(folder.to_owned())),
         pace,
         duration: None,
-        plan_deadline: Options::PLAN_DEADLINE,
+        plan_deadline: FlightOptions::PLAN_DEADLINE,
         controller: None,
         signing: None,
         travels: model.airframe.actuators.travels(),
@@ -274,7 +274,7 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<Options> {
 /// The controller with an LQI as its fallback. In lockstep the aircraft's seconds are milliseconds of the
 /// client's, so that it may be silent for longer of them.
 fn companion_with(
-    kind: Kind,
+    kind: ControllerKind,
     model: &GreyBox,
     changes: &[Change],
     pace: Pace,
@@ -284,7 +284,7 @@ fn companion_with(
         config.offboard_loss_s = 60.0;
     }
     let controller = fly::controller(kind, model, Path::new(fly::POLICY), changes)?;
-    let pilot = Pilot::new(config, build(Kind::Lqi, model)?)?;
+    let pilot = Pilot::new(config, build(ControllerKind::Lqi, model)?)?;
     let placement = match kind.pace() {
         control::Pace::Planned => Placement::Thread,
         control::Pace::Immediate => Placement::Loop,

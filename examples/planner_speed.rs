@@ -17,7 +17,7 @@ use anyhow::Result;
 
 use greylag::control::cem::{Change, Value};
 use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Origin};
-use greylag::control::{self, Kind, Observation, Source, Target};
+use greylag::control::{self, ControllerKind, Observation, Source, Target};
 use greylag::model::residual::{INPUTS, OUTPUTS};
 use greylag::model::{GreyBox, Residual};
 use greylag::num::{Dense, stream};
@@ -64,16 +64,16 @@ fn main() -> Result<()> {
     let fitted = [Change::Value(Value::Fitted)];
     let cores = [Change::Cores(2)];
     for (kind, changes) in [
-        (Kind::Policy, &[][..]),
-        (Kind::Lqi, &[]),
-        (Kind::Cem, &[]),
-        (Kind::CemPolicy, &[]),
-        (Kind::CemCritic, &[]),
-        (Kind::Hybrid, &[]),
-        (Kind::Hybrid, &fitted),
-        (Kind::Hybrid, &cores),
-        (Kind::HybridLqi, &[]),
-        (Kind::HybridLqi, &cores),
+        (ControllerKind::Policy, &[][..]),
+        (ControllerKind::Lqi, &[]),
+        (ControllerKind::Cem, &[]),
+        (ControllerKind::CemPolicy, &[]),
+        (ControllerKind::CemCritic, &[]),
+        (ControllerKind::Hybrid, &[]),
+        (ControllerKind::Hybrid, &fitted),
+        (ControllerKind::Hybrid, &cores),
+        (ControllerKind::HybridLqi, &[]),
+        (ControllerKind::HybridLqi, &cores),
     ] {
         let mut controller =
             control::build(kind, Source { model: &model, agent: Some(&agent), changes })?;

@@ -6,7 +6,7 @@
 
 use std::error::Error;
 
-use greylag::control::{Kind, build};
+use greylag::control::{ControllerKind, build};
 use greylag::logs::Flight;
 use greylag::model::GreyBox;
 use greylag::num::stream::{Stream, stream};
@@ -109,7 +109,7 @@ fn proposal(seed: u64, missing: Vec<Missing>) -> Result<Proposal, Box<dyn Error>
     let text = starting_model(&reference, &format!("hidden-{seed}"), seed, &missing)?;
     let model = GreyBox::parse(&text, &folder.join("hidden.toml"))?;
     let logs = Trial { seed, missing, turbulence: None, ..Trial::default() }
-        .fly(build(Kind::Lqi, &exact)?.as_ref())?;
+        .fly(build(ControllerKind::Lqi, &exact)?.as_ref())?;
     let (search, test) = (flights(&model, &logs.training)?, flights(&model, &logs.testing)?);
     Ok(propose(
         &model,

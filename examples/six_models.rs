@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use greylag::control::lqi::Lqi;
-use greylag::control::{self, Controller, Kind, Target};
+use greylag::control::{self, Controller, ControllerKind, Target};
 use greylag::learn::dynamics::export;
 use greylag::learn::dynamics::residual_map::residual_map;
 use greylag::learn::dynamics::score::{Horizon, free_run};
@@ -286,7 +286,7 @@ fn explored(arguments: &Arguments, prior: &GreyBox) -> Result<Vec<Flight>> {
     let mut flights = round(arguments, 0, arguments.episodes, None)?;
     for k in 1..=arguments.rounds {
         let trainer = trained(arguments, &way("explorer", "prior-severe", true), prior, &flights)?;
-        let planner = control::build(Kind::Cem, &trainer.model()?)?;
+        let planner = control::build(ControllerKind::Cem, &trainer.model()?)?;
         flights.extend(round(arguments, k, 25, Some(planner.as_ref()))?);
         eprintln!("round {k}: {} flights", flights.len());
     }

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use greylag::control::{self, Kind, Target};
+use greylag::control::{self, ControllerKind, Target};
 use greylag::logs::{Flight, Sample};
 use greylag::model::{GreyBox, Memory, STEP, Trim};
 use greylag::num::stream::{Stream, stream};
@@ -63,7 +63,7 @@ fn leg(random: &mut Stream) -> (Target, Command) {
 /// Flies `seconds` of the LQI with random steps on all four controls, through noisy sensors.
 fn flown(seed: u64, seconds: f64) -> Flight {
     let mut simulator = simulator();
-    let mut lqi = control::build(Kind::Lqi, &model()).unwrap();
+    let mut lqi = control::build(ControllerKind::Lqi, &model()).unwrap();
     let mut random = stream(seed, &[3]);
     let mut seen = simulator.reset().unwrap();
     lqi.reset(seed);
@@ -139,7 +139,7 @@ fn validate_a_step_of_the_model_with_rudder_and_propeller() {
     let mut seen = simulator.reset().unwrap();
     let mut memory = Memory::default();
     let (mut squares, mut count) = ([0.0; 8], 0.0_f64);
-    let mut lqi = control::build(Kind::Lqi, &model).unwrap();
+    let mut lqi = control::build(ControllerKind::Lqi, &model).unwrap();
     let target = Target { roll: 0.3, pitch: 0.05, airspeed: 25.0 };
     for k in 0..2000 {
         let wave = |f: f64| 0.15 * (f * f64::from(k)).sin();
@@ -167,7 +167,7 @@ fn validate_a_step_of_the_model_with_rudder_and_propeller() {
 #[test]
 fn turns_are_coordinated_by_the_rudder() {
     let mut simulator = simulator();
-    let mut lqi = control::build(Kind::Lqi, &model()).unwrap();
+    let mut lqi = control::build(ControllerKind::Lqi, &model()).unwrap();
     for (roll, pitch) in [(40.0_f64, 0.0_f64), (-40.0, 3.0), (20.0, 8.0), (-30.0, -8.0)] {
         let target = Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 25.0 };
         let mut seen = simulator.reset().unwrap();

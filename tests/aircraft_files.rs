@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use greylag::control::{self, Kind, Target};
+use greylag::control::{self, ControllerKind, Target};
 use greylag::model::jsbsim::export;
 use greylag::model::textbook::{Measures, Tail};
 use greylag::model::{GreyBox, Memory, STEP};
@@ -33,7 +33,7 @@ fn loaded(found: &Imported) -> GreyBox {
 /// The rms of each state's rate beside that of `model` over 10 s, in x_c a second.
 fn apart(model: &GreyBox, simulator: &mut Simulator) -> [f64; 8] {
     let scale = model.scale();
-    let mut lqi = control::build(Kind::Lqi, model).unwrap();
+    let mut lqi = control::build(ControllerKind::Lqi, model).unwrap();
     let target = Target { roll: 0.3, pitch: 0.05, airspeed: 25.0 };
     let mut seen = simulator.reset().unwrap();
     let (mut memory, mut squares) = (Memory::default(), [0.0; 8]);
@@ -179,6 +179,7 @@ fn an_aircraft_from_its_measures_has_an_lqi_over_its_whole_envelope() {
         std::fs::write(folder.path().join("airframe.toml"), measures.airframe()).unwrap();
         std::fs::write(folder.path().join("model.toml"), measures.model()).unwrap();
         let model = GreyBox::load(&folder.path().join("model.toml")).unwrap();
-        control::build(Kind::Lqi, &model).unwrap_or_else(|why| panic!("{measures:?}: {why}"));
+        control::build(ControllerKind::Lqi, &model)
+            .unwrap_or_else(|why| panic!("{measures:?}: {why}"));
     }
 }

@@ -58,6 +58,59 @@ const PILOT_BANNED: &[&str] = &[
     "panic!",
 ];
 
+/// Lines of a source file at most.
+const FILE_LINES: usize = 400;
+/// Files that are longer, each with why it reads better whole.
+const LONG_FILES: &[(&str, &str)] = &[
+    (
+        "physics/formula/parser.rs",
+        "one recursive descent: each function is one line of the grammar",
+    ),
+    (
+        "physics/formula/file.rs",
+        "one file format: its fields, their checks, the errors that name them",
+    ),
+    ("physics/formula/tape.rs", "one machine: its instructions and the loops that run them"),
+];
+
+/// Lines of a function at most.
+const FUNCTION_LINES: usize = 60;
+/// Functions that are longer, each with why it reads better whole.
+const LONG_FUNCTIONS: &[(&str, &str, &str)] = &[
+    ("link/wire/logged.rs", "read", "a table: one arm a message, its fields by name"),
+    (
+        "control/cem/rollout.rs",
+        "rollout",
+        "one loop, inlined whole into each instruction set; a second copy of the model takes minutes to compile",
+    ),
+    (
+        "physics/formula/tape.rs",
+        "run",
+        "a table: one arm an instruction, inlined for the registers",
+    ),
+    (
+        "physics/formula/file.rs",
+        "built",
+        "the checks of a file in the order in which its reader needs them",
+    ),
+    (
+        "sysid/diagnose/regression/columns.rs",
+        "new",
+        "one pass over a flight: its columns share what is computed at an instant",
+    ),
+    (
+        "sysid/diagnose/proposal/propose.rs",
+        "propose",
+        "the stages of a proposal, one after the other",
+    ),
+    ("sysid/diagnose/proposal/forward.rs", "climb", "one loop over terms that share their sums"),
+    (
+        "sysid/diagnose/proposal/sentences.rs",
+        "sentences",
+        "a page of text, in the order in which it is read",
+    ),
+];
+
 /// Every source file below `src`, with its path below `src`.
 fn sources() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
@@ -175,5 +228,74 @@ fn every_file_says_what_it_is_in_its_first_line() {
     for (file, text) in sources() {
         let first = text.lines().next().unwrap_or_default();
         assert!(first.starts_with("//! "), "src/{file} does not say what it is in its first line");
+    }
+}
+
+#[test]
+fn files_have_at_most_400_lines() {
+    for (file, text) in sources() {
+        let lines = text.lines().count();
+        let excepted = LONG_FILES.iter().any(|(long, _)| *long == file);
+        assert!(
+            excepted || lines <= FILE_LINES,
+            "src/{file} has {lines} lines: cut it where it has a joint, or say in LONG_FILES why it has none"
+        );
+    }
+}
+
+/// Names and lengths of the functions of rustfmt's `code`, signature and braces included.
+fn functions(code: &str) -> Vec<(&str, usize)> {
+    let lines: Vec<&str> = code.lines().collect();
+    let mut found = Vec::new();
+    for (first, line) in lines.iter().enumerate() {
+        let code = line.trim_start();
+        let Some((before, after)) = code.split_once("fn ") else { continue };
+        let is_item = before.split_whitespace().all(|word| {
+            word.starts_with("pub") || ["const", "async", "unsafe", "extern", "in"].contains(&word)
+        });
+        if !is_item || !after.starts_with(|c: char| c.is_alphabetic() || c == '_') {
+            continue;
+        }
+        let has_body = lines[first..].iter().find_map(|l| match l.trim_end() {
+            l if l.ends_with('{') => Some(true),
+            l if l.ends_with(';') || l.ends_with('}') => Some(false),
+            _ => None,
+        });
+        let end = format!("{}}}", &line[..line.len() - code.len()]);
+        let length = lines[first..].iter().position(|l| *l == end).map_or(0, |last| last + 1);
+        if has_body == Some(true) {
+            let name = after.split(|c: char| !c.is_alphanumeric() && c != '_').next();
+            found.push((name.unwrap_or_default(), length));
+        }
+    }
+    found
+}
+
+#[test]
+fn functions_have_at_most_60_lines() {
+    for (file, text) in sources().into_iter().filter(|(name, _)| !name.ends_with("tests.rs")) {
+        let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or(&text);
+        for (name, lines) in functions(text) {
+            let excepted = LONG_FUNCTIONS.iter().any(|long| (long.0, long.1) == (&*file, name));
+            assert!(
+                excepted || lines <= FUNCTION_LINES,
+                "{name} in src/{file} has {lines} lines: cut it, or say in LONG_FUNCTIONS why it is whole"
+            );
+        }
+    }
+}
+
+#[test]
+fn exceptions_are_needed() {
+    let sources = sources();
+    let text = |file: &str| sources.iter().find(|(name, _)| name == file).map(|(_, text)| text);
+    for (file, why) in LONG_FILES {
+        let lines = text(file).map_or(0, |text| text.lines().count());
+        assert!(lines > FILE_LINES && !why.is_empty(), "src/{file} needs no exception any more");
+    }
+    for (file, name, why) in LONG_FUNCTIONS {
+        let all = text(file).map(|text| functions(text)).unwrap_or_default();
+        let long = all.iter().any(|(other, lines)| other == name && *lines > FUNCTION_LINES);
+        assert!(long && !why.is_empty(), "{name} in src/{file} needs no exception any more");
     }
 }

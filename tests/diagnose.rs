@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use greylag::control::{self, Kind};
+use greylag::control::{self, ControllerKind};
 use greylag::logs::Flight;
 use greylag::manoeuvres::flights;
 use greylag::model::GreyBox;
@@ -50,7 +50,7 @@ fn flown_with(
     hidden: &[(&str, f64)],
     change: impl Fn(&mut Flight),
 ) -> Vec<Reconstruction> {
-    let lqi = control::build(Kind::Lqi, &exact()).unwrap();
+    let lqi = control::build(ControllerKind::Lqi, &exact()).unwrap();
     let hidden: Vec<Hidden> =
         hidden.iter().map(|(id, amount)| Hidden::new(id, *amount).unwrap()).collect();
     let one = |(k, schedule): (usize, &greylag::manoeuvres::Schedule)| {
@@ -133,7 +133,8 @@ fn a_rudder_that_moves_is_said_first_and_nothing_is_asserted_where_it_acts() {
 /// The three training flights of a trial.
 fn trained(seed: u64, missing: Vec<Missing>) -> Vec<Reconstruction> {
     let trial = Trial { seed, missing, turbulence: None, ..Trial::default() };
-    let logs = trial.training(control::build(Kind::Lqi, &exact()).unwrap().as_ref()).unwrap();
+    let logs =
+        trial.training(control::build(ControllerKind::Lqi, &exact()).unwrap().as_ref()).unwrap();
     logs.iter().map(rebuilt).collect()
 }
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use greylag::control::{Kind as ControllerKind, SetupError, build};
+use greylag::control::{ControllerKind, SetupError, build};
 use greylag::model::{GreyBox, Trim, linearise};
 use greylag::physics::Channel;
 use greylag::physics::formula::register;

@@ -3,7 +3,7 @@
 
 mod validate_support;
 
-use greylag::control::{self, Kind, Target};
+use greylag::control::{self, ControllerKind, Target};
 use greylag::model::GreyBox;
 use greylag::sim::{Episode, Simulator};
 use greylag_sitl::plant::PlantOptions;
@@ -14,7 +14,7 @@ const TARGETS: [[f64; 2]; 3] = [[30.0, 5.0], [-40.0, -15.0], [55.0, 20.0]];
 
 /// The mean settled error over the targets, degrees, of the LQI designed on `design`.
 fn settled(design: &GreyBox, id: &str, amplitude: f64) -> f64 {
-    let mut lqi = control::build(Kind::Lqi, design).unwrap();
+    let mut lqi = control::build(ControllerKind::Lqi, design).unwrap();
     let options = PlantOptions { hidden: hidden(id, amplitude), ..PlantOptions::default() };
     let mut simulator = Simulator::new(&options).unwrap();
     let mut sum = 0.0;

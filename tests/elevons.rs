@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use greylag::control::{self, Kind, Target};
+use greylag::control::{self, ControllerKind, Target};
 use greylag::logs::mapping::Mapping;
 use greylag::logs::{Options, load};
 use greylag::model::GreyBox;
@@ -84,7 +84,7 @@ fn elevons_fly_as_the_x8_until_they_stop() {
 #[test]
 fn the_lqi_reaches_its_targets_by_the_elevons() {
     let mut simulator = Simulator::new(&plant()).unwrap();
-    let mut lqi = control::build(Kind::Lqi, &model()).unwrap();
+    let mut lqi = control::build(ControllerKind::Lqi, &model()).unwrap();
     for (roll, pitch) in [(40.0_f64, 0.0_f64), (-30.0, 10.0)] {
         let target = Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 16.67 };
         let mut seen = simulator.reset().unwrap();

@@ -8,7 +8,7 @@ use std::net::TcpStream;
 use std::time::Duration;
 
 use flight_support::*;
-use greylag::control::{Controller, Kind, Observation, Target};
+use greylag::control::{Controller, ControllerKind, Observation, Target};
 use greylag::flight::recorder::Place;
 use greylag::flight::runtime::{Pace, Placement};
 use greylag::logs::csv::{self, Tolerance};
@@ -194,7 +194,7 @@ fn a_client_over_tcp_is_served_like_any_other() {
 }
 
 /// Flies 2000 steps in lockstep from the same start, armed from the first.
-fn lockstep_flight(kind: Kind) -> Vec<Answer> {
+fn lockstep_flight(kind: ControllerKind) -> Vec<Answer> {
     let options = options(Pace::Lockstep);
     let companion = Companion::with(
         &options,
@@ -214,7 +214,7 @@ fn lockstep_flight(kind: Kind) -> Vec<Answer> {
 
 #[test]
 fn lockstep_flights_are_the_same_to_the_bit() {
-    for kind in [Kind::Lqi, Kind::PidRetuned, Kind::Cem] {
+    for kind in [ControllerKind::Lqi, ControllerKind::PidRetuned, ControllerKind::Cem] {
         assert_eq!(lockstep_flight(kind), lockstep_flight(kind), "{kind}");
     }
 }
@@ -243,7 +243,8 @@ fn a_planner_that_is_always_late_leaves_the_fallback_flying_and_is_recorded() {
     let mut options = options(Pace::RealTime);
     options.record = Some(Place::Exactly(root.path().join("flight")));
     let mut companion =
-        greylag::commands::fly::companion_with(Kind::Lqi, x8(), std::path::Path::new("")).unwrap();
+        greylag::commands::fly::companion_with(ControllerKind::Lqi, x8(), std::path::Path::new(""))
+            .unwrap();
     (companion.controller, companion.placement) = (Box::new(Slow), Placement::Thread);
     let companion = Companion::with(&options, companion);
     let vehicle = Vehicle::new(companion.vehicle()).on_the_wall();

@@ -8,7 +8,7 @@ mod shim_support;
 use std::time::Duration;
 
 use flight_support::*;
-use greylag::control::{Kind, Target, build};
+use greylag::control::{ControllerKind, Target, build};
 use greylag::flight::recorder::Place;
 use greylag::flight::runtime::{Pace, Summary};
 use greylag::logs::Sample;
@@ -27,7 +27,7 @@ const AGREEMENT_DEG: f64 = 0.05;
 /// The settled error of an episode of the paper's protocol in process, LQI, degrees.
 fn settled_in_process(roll: f64, pitch: f64) -> f64 {
     let mut simulator = Simulator::new(&PlantOptions::default()).unwrap();
-    let mut controller = build(Kind::Lqi, x8()).unwrap();
+    let mut controller = build(ControllerKind::Lqi, x8()).unwrap();
     simulator.reset().unwrap();
     let target = Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 20.0 };
     let episode = Episode { environment: &mut simulator, controller: controller.as_mut(), seed: 0 };

@@ -8,7 +8,7 @@ use greylag::control::cem::{Aids, Cem, Settings, Update, Value};
 use greylag::control::ilqr::Ilqr;
 use greylag::control::lqi::Lqi;
 use greylag::control::policy::{ACTIONS, Actor, Agent, Critic, OBSERVATIONS, Origin, Policy};
-use greylag::control::{self, Controller, Kind, Observation, SetupError, Source, Target};
+use greylag::control::{self, Controller, ControllerKind, Observation, SetupError, Source, Target};
 use greylag::model::{GreyBox, Memory, Residual};
 use greylag::num::{Dense, stream};
 use greylag::physics::actuators::Actuators;
@@ -128,7 +128,7 @@ fn fitted_values_lead_where_the_critics_do() {
 fn two_cores_command_what_one_does() {
     let model = model();
     let agent = agent(&model, 1.0);
-    for kind in [Kind::Hybrid, Kind::HybridLqi] {
+    for kind in [ControllerKind::Hybrid, ControllerKind::HybridLqi] {
         // five blocks do not come out even
         let [one, two] = ["cores=1", "cores=2"].map(|cores| {
             let changes = [cores.parse().unwrap(), "population=80".parse().unwrap()];
@@ -187,7 +187,7 @@ fn flights_repeat_to_the_bit() {
     let model = model();
     let agent = agent(&model, 1.0);
     let source = Source { model: &model, agent: Some(&agent), changes: &[] };
-    let mut planner = control::build(Kind::HybridLqi, source).unwrap();
+    let mut planner = control::build(ControllerKind::HybridLqi, source).unwrap();
     let fly = |planner: &mut dyn Controller, seed| {
         planner.reset(seed);
         [0, 1, 2].map(|_| planner.command(&seen(), &TARGET))
@@ -207,9 +207,9 @@ fn flights_replay_to_the_bit_under_each_set_of_instructions() {
     let agent = agent(&model, 1.0);
     let plant = greylag_sitl::plant::PlantOptions::default();
     let kinds = [
-        (Kind::Hybrid, "value=critics"),
-        (Kind::Hybrid, "value=fitted"),
-        (Kind::HybridLqi, "value=critics"),
+        (ControllerKind::Hybrid, "value=critics"),
+        (ControllerKind::Hybrid, "value=fitted"),
+        (ControllerKind::HybridLqi, "value=critics"),
     ];
     for (kind, value) in kinds {
         for text in ["instructions=widest", "instructions=portable"] {
@@ -253,7 +253,11 @@ fn weights_that_leave_one_candidate_are_one_elite() {
 }
 
 #[cfg(feature = "sitl")]
-fn flown(kind: Kind, model: &str, [roll_deg, pitch_deg]: [f64; 2]) -> greylag::sim::Outcome {
+fn flown(
+    kind: ControllerKind,
+    model: &str,
+    [roll_deg, pitch_deg]: [f64; 2],
+) -> greylag::sim::Outcome {
     use greylag::sim::{Episode, Simulator};
     let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
     let model = GreyBox::load(&params.join(model)).unwrap();
@@ -275,9 +279,9 @@ fn flown(kind: Kind, model: &str, [roll_deg, pitch_deg]: [f64; 2]) -> greylag::s
 fn the_hybrid_over_the_lqi_is_sooner_there_and_as_exact() {
     let [mut ours, mut theirs] = [0.0; 2];
     for target in [[25.0, -5.0], [10.0, 8.0]] {
-        let hybrid = flown(Kind::HybridLqi, "jsbsim.toml", target);
+        let hybrid = flown(ControllerKind::HybridLqi, "jsbsim.toml", target);
         ours += hybrid.settling_s;
-        theirs += flown(Kind::Lqi, "jsbsim.toml", target).settling_s;
+        theirs += flown(ControllerKind::Lqi, "jsbsim.toml", target).settling_s;
         // a hundredth of a degree: the search's own noise would be more
         assert!(hybrid.settled_deg < 0.01, "{target:?}: {} °", hybrid.settled_deg);
     }
@@ -290,7 +294,7 @@ fn the_hybrid_over_the_lqi_is_sooner_there_and_as_exact() {
 #[test]
 fn a_wrong_model_leaves_no_steady_error() {
     for target in [[50.0, 27.0], [-50.0, -27.0]] {
-        let error = flown(Kind::HybridLqi, "prior-mild.toml", target).settled_deg;
+        let error = flown(ControllerKind::HybridLqi, "prior-mild.toml", target).settled_deg;
         assert!(error < 0.05, "{target:?}: {error} °");
     }
 }
@@ -353,7 +357,7 @@ fn a_plan_keeps_to_the_slew_limit() {
 #[test]
 fn a_planner_without_its_policy_is_refused() {
     let model = model();
-    let refused = control::build(Kind::Hybrid, &model);
+    let refused = control::build(ControllerKind::Hybrid, &model);
     assert!(matches!(refused, Err(SetupError::Untrained)));
 }
 
@@ -362,9 +366,12 @@ fn a_policy_without_critics_flies_alone_and_proposes_but_does_not_value() {
     let model = model();
     let alone = Agent { critics: None, ..agent(&model, 1.0) };
     let build = |kind| control::build(kind, Source { agent: Some(&alone), ..(&model).into() });
-    assert!(build(Kind::Policy).is_ok() && build(Kind::CemPolicy).is_ok());
-    assert!(build(Kind::HybridLqi).is_ok());
-    assert!(matches!(build(Kind::Hybrid), Err(SetupError::Criticless { name: "hybrid" })));
+    assert!(build(ControllerKind::Policy).is_ok() && build(ControllerKind::CemPolicy).is_ok());
+    assert!(build(ControllerKind::HybridLqi).is_ok());
+    assert!(matches!(
+        build(ControllerKind::Hybrid),
+        Err(SetupError::Criticless { name: "hybrid" })
+    ));
 }
 
 /// iLQR leaves no steady error either.
@@ -374,7 +381,7 @@ fn ilqr_is_exact_on_a_model_that_is_and_on_one_that_is_not() {
     for (model, target, most) in
         [("jsbsim.toml", [25.0, -5.0], 0.01), ("prior-mild.toml", [-50.0, -27.0], 0.05)]
     {
-        let flight = flown(Kind::Ilqr, model, target);
+        let flight = flown(ControllerKind::Ilqr, model, target);
         assert!(flight.settled_deg < most, "{model} {target:?}: {} °", flight.settled_deg);
     }
 }
@@ -383,7 +390,7 @@ fn ilqr_is_exact_on_a_model_that_is_and_on_one_that_is_not() {
 #[test]
 fn ilqr_repeats_to_the_bit_and_hands_over_to_the_lqi() {
     let model = model();
-    let mut planner = control::build(Kind::Ilqr, &model).unwrap();
+    let mut planner = control::build(ControllerKind::Ilqr, &model).unwrap();
     let fly = |planner: &mut dyn Controller| {
         planner.reset(1);
         [0, 1, 2].map(|_| planner.command(&seen(), &TARGET))
@@ -407,7 +414,7 @@ fn ilqr_repeats_to_the_bit_and_hands_over_to_the_lqi() {
 fn what_the_planner_saw_can_be_told() {
     let model = model();
     let agent = agent(&model, 1.0);
-    for (kind, steps) in [(Kind::Hybrid, 5), (Kind::HybridLqi, 80)] {
+    for (kind, steps) in [(ControllerKind::Hybrid, 5), (ControllerKind::HybridLqi, 80)] {
         let source = Source { model: &model, agent: Some(&agent), changes: &[] };
         let mut planner = control::build(kind, source).unwrap();
         planner.reset(1);
@@ -427,9 +434,14 @@ fn what_the_planner_saw_can_be_told() {
 }
 
 /// What flies where the planner does not plan: the LQI, or the policy.
-fn unsearched(kind: Kind, model: &GreyBox, agent: &Agent, all: &[Observation]) -> Command {
+fn unsearched(
+    kind: ControllerKind,
+    model: &GreyBox,
+    agent: &Agent,
+    all: &[Observation],
+) -> Command {
     let mut controller: Box<dyn Controller> = match kind {
-        Kind::HybridLqi => control::build(Kind::Lqi, model).unwrap(),
+        ControllerKind::HybridLqi => control::build(ControllerKind::Lqi, model).unwrap(),
         _ => Box::new(Policy::new(agent)),
     };
     controller.reset(1);
@@ -438,7 +450,7 @@ fn unsearched(kind: Kind, model: &GreyBox, agent: &Agent, all: &[Observation]) -
 
 /// What a planner commands with a change of its settings.
 fn planned(
-    kind: Kind,
+    kind: ControllerKind,
     model: &GreyBox,
     agent: &Agent,
     change: &str,
@@ -470,7 +482,7 @@ fn beyond_the_data_of_the_model_nothing_is_planned() {
         .collect();
     model.residual = Some(residual.trained_on(samples.iter().map(|(x, u)| (x, u))));
     let stalled = State { alpha: 0.5, ..seen().state };
-    for kind in [Kind::HybridLqi, Kind::HybridPolicy, Kind::Hybrid] {
+    for kind in [ControllerKind::HybridLqi, ControllerKind::HybridPolicy, ControllerKind::Hybrid] {
         let far = [Observation { state: stalled, ..seen() }];
         let alone = unsearched(kind, &model, &agent, &far);
         let beyond = planned(kind, &model, &agent, "known=1", &far);
@@ -495,7 +507,7 @@ fn a_model_that_does_not_predict_is_not_planned_with() {
             Observation { time, state: State { q, ..seen().state }, ..seen() }
         })
         .collect();
-    for kind in [Kind::HybridPolicy, Kind::Hybrid] {
+    for kind in [ControllerKind::HybridPolicy, ControllerKind::Hybrid] {
         let alone = unsearched(kind, &model, &agent, &jumping);
         let [guarded, unguarded] = ["trust=0.5", "trust=none"]
             .map(|change| planned(kind, &model, &agent, change, &jumping));

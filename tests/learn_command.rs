@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use greylag::control::policy::Agent;
-use greylag::control::{self, Kind, Source, Target};
+use greylag::control::{self, ControllerKind, Source, Target};
 use greylag::model::GreyBox;
 use greylag::sim::{Episode, Simulator};
 use greylag_sitl::plant::PlantOptions;
@@ -28,7 +28,12 @@ fn severe() -> PathBuf {
 }
 
 /// Settled error in JSBSim, degrees; 180 if the aircraft is lost or there is no such controller.
-fn settled_deg(kind: Kind, model: &GreyBox, agent: Option<&Agent>, target: [f64; 2]) -> f64 {
+fn settled_deg(
+    kind: ControllerKind,
+    model: &GreyBox,
+    agent: Option<&Agent>,
+    target: [f64; 2],
+) -> f64 {
     let Ok(mut controller) = control::build(kind, Source { model, agent, changes: &[] }) else {
         return 180.0;
     };
@@ -65,12 +70,12 @@ fn a_prior_that_cannot_fly_becomes_a_controller_that_does() {
     let bare = GreyBox::load(&severe()).unwrap();
     for target in [[25.0, -5.0], [-30.0, 12.0]] {
         // an aircraft that settles more than 10° off counts as lost
-        assert!(settled_deg(Kind::Lqi, &bare, None, target) > 10.0);
-        let error = settled_deg(Kind::Lqi, &model, None, target);
+        assert!(settled_deg(ControllerKind::Lqi, &bare, None, target) > 10.0);
+        let error = settled_deg(ControllerKind::Lqi, &model, None, target);
         println!("LQI on the learned model, {target:?}: {error:.4}°");
         // measured: 0.001°, as on the exact model
         assert!(error < 0.1, "{target:?}: {error}°");
-        let error = settled_deg(Kind::Policy, &model, Some(&agent), target);
+        let error = settled_deg(ControllerKind::Policy, &model, Some(&agent), target);
         println!("policy of some seconds, {target:?}: {error:.2}°"); // 3° measured
         assert!(error < 10.0, "{target:?}: {error}°");
     }

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use greylag::control::{Controller, Kind, build};
+use greylag::control::{Controller, ControllerKind, build};
 use greylag::flight::monitor::Monitor;
 use greylag::flight::pilot::{Config, Pilot, Plan};
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
@@ -42,7 +42,7 @@ impl Flight {
     /// What is said in `seconds` of flight, with the time of each line.
     fn said(&self, seconds: f64) -> Vec<(f64, String)> {
         let model = GreyBox::load(Path::new(self.model)).unwrap();
-        let mut lqi = build(Kind::Lqi, &model).unwrap();
+        let mut lqi = build(ControllerKind::Lqi, &model).unwrap();
         let mut pilot = Pilot::new(Config::for_model(&model).unwrap(), lqi.boxed_clone()).unwrap();
         pilot.monitor_with(Monitor::new(model.clone()));
         let figures = model.airframe.actuators;

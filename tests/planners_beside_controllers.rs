@@ -9,7 +9,7 @@ use std::path::Path;
 use controller_support::{Bench, profile};
 use flight_support::x8;
 use greylag::commands::fly::{POLICY, companion_with};
-use greylag::control::Kind;
+use greylag::control::ControllerKind;
 use greylag::flight::desk::Desk;
 use greylag::link::vehicle::{Authority, Real, Vehicle};
 use greylag_sitl::shim::{Noise, Personality};
@@ -20,7 +20,7 @@ use Personality::{Ardupilot, Px4};
 const LEGS: [(f64, f64); 5] = [(35.0, 5.0), (-40.0, 3.0), (10.0, 12.0), (30.0, -3.0), (0.0, 3.0)];
 
 /// The largest error over the last three seconds of each leg: rms of roll and of pitch, degrees.
-fn flown(kind: Kind, personality: Personality, seed: u64) -> [f64; LEGS.len()] {
+fn flown(kind: ControllerKind, personality: Personality, seed: u64) -> [f64; LEGS.len()] {
     let mut bench = Bench::new(personality, Authority::Surfaces, |options| {
         options.seed = seed;
         options.noise = Noise::REALISTIC;
@@ -55,10 +55,10 @@ fn flown(kind: Kind, personality: Personality, seed: u64) -> [f64; LEGS.len()] {
 fn attitudes_are_held_through_channels() {
     let seeds = std::env::var("SEEDS").ok().and_then(|n| n.parse().ok()).unwrap_or(2u64);
     for (kind, personality) in [
-        (Kind::Lqi, Ardupilot),
-        (Kind::Ilqr, Ardupilot),
-        (Kind::HybridLqi, Px4),
-        (Kind::HybridLqi, Ardupilot),
+        (ControllerKind::Lqi, Ardupilot),
+        (ControllerKind::Ilqr, Ardupilot),
+        (ControllerKind::HybridLqi, Px4),
+        (ControllerKind::HybridLqi, Ardupilot),
     ] {
         for seed in 0..seeds {
             let errors = flown(kind, personality, seed);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use greylag::control::{Kind, build};
+use greylag::control::{ControllerKind, build};
 use greylag::logs::Flight;
 use greylag::model::GreyBox;
 use greylag::physics::formula::{Status, file, register};
@@ -39,7 +39,7 @@ fn a_thrust_line_to_the_left_is_named_and_tested() {
     let model = GreyBox::parse(&text, &params.join("x8/lacks.toml")).unwrap();
     let exact = GreyBox::load(&params.join("x8/jsbsim.toml")).unwrap();
     let trial = Trial { seed: SEED, missing, turbulence: None, ..Trial::default() };
-    let logs = trial.fly(build(Kind::Lqi, &exact).unwrap().as_ref()).unwrap();
+    let logs = trial.fly(build(ControllerKind::Lqi, &exact).unwrap().as_ref()).unwrap();
     let search = reconstructed(&model, &logs.training);
     let test = reconstructed(&model, &logs.testing);
     let found =

@@ -15,10 +15,10 @@ use std::time::{Duration, Instant};
 use controller_support::profile;
 use flight_support::*;
 use greylag::commands::fly::{POLICY, companion_with};
-use greylag::control::{Controller, Kind, Observation, Target};
+use greylag::control::{Controller, ControllerKind, Observation, Target};
 use greylag::flight::recorder::Place;
 use greylag::flight::replay::{Outcome, replay};
-use greylag::flight::runtime::{Options, Pace, Placement};
+use greylag::flight::runtime::{FlightOptions, Pace, Placement};
 use greylag::link::vehicle::{Authority, Real, Sitl, Vehicle};
 use greylag::logs::csv::{self, Tolerance};
 use greylag_sitl::shim::{self, Noise, Personality};
@@ -29,7 +29,8 @@ use shim_support::Shim;
 
 /// Replays with a fresh LQI.
 fn again(folder: &Path, vehicle: Vehicle) -> Outcome {
-    replay(folder, companion_with(Kind::Lqi, x8(), Path::new(POLICY)).unwrap(), vehicle).unwrap()
+    replay(folder, companion_with(ControllerKind::Lqi, x8(), Path::new(POLICY)).unwrap(), vehicle)
+        .unwrap()
 }
 
 fn sitl() -> Vehicle {
@@ -40,7 +41,7 @@ fn a_flight_with_everything_in_it_replays_to_the_bit() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("flight");
     let record = Some(Place::Exactly(folder.clone()));
-    let companion = Companion::start(&Options { record, ..options(Pace::RealTime) });
+    let companion = Companion::start(&FlightOptions { record, ..options(Pace::RealTime) });
     let link = format!("udpout:{}", companion.vehicle());
     let shim = Shim::start(&link, shim::Pace::RealTime, 600.0, |options| {
         options.noise = Noise::REALISTIC;
@@ -67,9 +68,12 @@ fn a_flight_with_everything_in_it_replays_to_the_bit() {
     assert!(outcome.ticks > 500 && !outcome.cut_short, "{outcome:?}");
     assert_eq!((outcome.different, outcome.plans_different, outcome.without_state), (0, 0, 0));
     // Another controller gives other commands: the comparison can fail.
-    let other =
-        replay(&folder, companion_with(Kind::PidRetuned, x8(), Path::new(POLICY)).unwrap(), sitl())
-            .unwrap();
+    let other = replay(
+        &folder,
+        companion_with(ControllerKind::PidRetuned, x8(), Path::new(POLICY)).unwrap(),
+        sitl(),
+    )
+    .unwrap();
     assert!(other.different > 300, "{other:?}");
 }
 
@@ -83,7 +87,7 @@ struct Sluggish {
 impl Sluggish {
     fn new(slow: bool) -> Sluggish {
         Sluggish {
-            lqi: companion_with(Kind::Lqi, x8(), Path::new(POLICY)).unwrap().controller,
+            lqi: companion_with(ControllerKind::Lqi, x8(), Path::new(POLICY)).unwrap().controller,
             asked: 0,
             slow,
         }
@@ -118,12 +122,12 @@ fn a_flight_whose_planner_is_busy_at_times_replays_to_the_bit() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("flight");
     let staffed = |slow: bool, placement: Placement| {
-        let mut companion = companion_with(Kind::Lqi, x8(), Path::new(POLICY)).unwrap();
+        let mut companion = companion_with(ControllerKind::Lqi, x8(), Path::new(POLICY)).unwrap();
         (companion.controller, companion.placement) = (Box::new(Sluggish::new(slow)), placement);
         companion
     };
     let record = Some(Place::Exactly(folder.clone()));
-    let options = Options { record, ..options(Pace::RealTime) };
+    let options = FlightOptions { record, ..options(Pace::RealTime) };
     let companion = Companion::with(&options, staffed(true, Placement::Thread));
     let link = format!("udpout:{}", companion.vehicle());
     let shim = Shim::start(&link, shim::Pace::RealTime, 600.0, |_| ());
@@ -146,7 +150,7 @@ fn real(personality: Personality, authority: Authority) -> Vehicle {
 
 /// Flies beside a played controller from its check of signs on, recorded in `folder`; gives what was said.
 fn flown_beside(personality: Personality, folder: &Path) -> String {
-    let companion = Companion::start(&Options {
+    let companion = Companion::start(&FlightOptions {
         record: Some(Place::Exactly(folder.to_owned())),
         controller: Some(profile(personality, Authority::Surfaces)),
         ..options(Pace::RealTime)

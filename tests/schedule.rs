@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use greylag::control::{self, Controller, Kind};
+use greylag::control::{self, Controller, ControllerKind};
 use greylag::manoeuvres::{Axis, Excitation, Schedule, Shape, Step, flights, menu};
 use greylag::model::GreyBox;
 use greylag::physics::Command;
@@ -65,7 +65,7 @@ width_s = 2.0
 
 fn lqi() -> Box<dyn Controller> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
-    control::build(Kind::Lqi, &GreyBox::load(&path).unwrap()).unwrap()
+    control::build(ControllerKind::Lqi, &GreyBox::load(&path).unwrap()).unwrap()
 }
 
 fn range(flown: &Flown, of: fn(&Truth) -> f64) -> [f64; 2] {

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use controller_support::profile;
 use flight_support::*;
 use greylag::flight::recorder::Place;
-use greylag::flight::runtime::{Options, Pace};
+use greylag::flight::runtime::{FlightOptions, Pace};
 use greylag::link::vehicle::Authority;
 use greylag::logs::csv::{self, Tolerance};
 use greylag_sitl::shim::{self, Personality};
@@ -49,7 +49,7 @@ impl Wired {
     ) -> Self {
         let cable = Cable::new(BAUD);
         let folder = tempfile::tempdir().unwrap();
-        let companion = Companion::start(&Options {
+        let companion = Companion::start(&FlightOptions {
             vehicle: cable.companion().parse().unwrap(),
             record: Some(Place::Exactly(folder.path().join("flight"))),
             controller: Some(profile(personality, authority)),

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use flight_support::*;
 use greylag::flight::recorder::Place;
-use greylag::flight::runtime::{Event, Options, Pace};
+use greylag::flight::runtime::{Event, FlightOptions, Pace};
 use greylag::logs::Sample;
 use greylag::logs::csv::{self, Tolerance};
 use greylag_sitl::shim;
@@ -34,7 +34,8 @@ impl Wired {
         let folder = tempfile::tempdir().unwrap();
         let record = Some(Place::Exactly(folder.path().join("flight")));
         let vehicle = cable.companion().parse().unwrap();
-        let companion = Companion::start(&Options { vehicle, record, ..options(Pace::RealTime) });
+        let companion =
+            Companion::start(&FlightOptions { vehicle, record, ..options(Pace::RealTime) });
         let shim = Shim::start(&cable.controller(), shim::Pace::RealTime, 600.0, |_| {});
         let client = Client::new(companion.client(0));
         Wired { cable, companion, shim, client, folder }
@@ -97,7 +98,7 @@ fn a_plug_that_is_pulled_in_a_turn_levels_the_aircraft_and_comes_back() {
 fn a_wrong_baud_rate_is_recognised_and_said() {
     let cable = Cable::new(BAUD);
     let vehicle = cable.companion_at(115_200).parse().unwrap();
-    let companion = Companion::start(&Options { vehicle, ..options(Pace::RealTime) });
+    let companion = Companion::start(&FlightOptions { vehicle, ..options(Pace::RealTime) });
     let shim = Shim::start(&cable.controller(), shim::Pace::RealTime, 600.0, |_| {});
     let events = &companion.flight.as_ref().unwrap().events;
     let end = Instant::now() + Duration::from_secs(6);

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use greylag::control::policy::Agent;
-use greylag::control::{self, Kind, Source, Target};
+use greylag::control::{self, ControllerKind, Source, Target};
 use greylag::model::GreyBox;
 use greylag::model::residual::hash;
 use greylag::sim::{Episode, Simulator};
@@ -15,7 +15,7 @@ fn params(name: &str) -> PathBuf {
 }
 
 /// Settled error (degrees) and last airspeed (m/s) of a flight from 16.67 m/s.
-fn flown(kind: Kind, model: &str, [roll, pitch]: [f64; 2], airspeed: f64) -> [f64; 2] {
+fn flown(kind: ControllerKind, model: &str, [roll, pitch]: [f64; 2], airspeed: f64) -> [f64; 2] {
     let model = GreyBox::load(&params(model)).unwrap();
     let agent = Agent::load(&params("learned/policy"), &model.airframe).unwrap();
     let source = Source { model: &model, agent: Some(&agent), changes: &[] };
@@ -52,7 +52,7 @@ fn the_files_are_those_that_were_learned_and_belong_together() {
 /// A corner of the envelope to 0.05°: a tenth of what the demonstration needs.
 #[test]
 fn the_default_controller_reaches_a_hard_attitude() {
-    let [error, _] = flown(Kind::HybridLqi, "learned/model.toml", [57.0, 28.0], 16.67);
+    let [error, _] = flown(ControllerKind::HybridLqi, "learned/model.toml", [57.0, 28.0], 16.67);
     assert!(error < 0.05, "{error}°");
 }
 
@@ -60,7 +60,7 @@ fn the_default_controller_reaches_a_hard_attitude() {
 #[test]
 fn the_policy_holds_the_airspeed_that_is_asked_for() {
     for target in [[20.0, 5.0], [-30.0, 12.0]] {
-        let [error, airspeed] = flown(Kind::Policy, "learned/model.toml", target, 20.0);
+        let [error, airspeed] = flown(ControllerKind::Policy, "learned/model.toml", target, 20.0);
         assert!((airspeed - 20.0).abs() < 0.5, "{target:?}: {airspeed} m/s");
         assert!(error < 1.0, "{target:?}: {error}°");
     }
@@ -70,12 +70,12 @@ fn the_policy_holds_the_airspeed_that_is_asked_for() {
 /// Behind forty steps of the policy it is not.
 #[test]
 fn the_hybrid_whose_policy_flies_on_is_better_than_its_policy() {
-    let mean = |kind: Kind| {
+    let mean = |kind: ControllerKind| {
         let targets = [[20.0, 5.0], [-30.0, 12.0], [57.0, 28.0], [-55.0, -25.0]];
         let errors = targets.map(|target| flown(kind, "learned/model.toml", target, 16.67)[0]);
         errors.iter().sum::<f64>() / 4.0
     };
-    let (alone, planned) = (mean(Kind::Policy), mean(Kind::HybridPolicy));
+    let (alone, planned) = (mean(ControllerKind::Policy), mean(ControllerKind::HybridPolicy));
     assert!(planned < 0.7 * alone, "{planned}°, the policy alone {alone}°");
 }
 
@@ -83,7 +83,7 @@ fn the_hybrid_whose_policy_flies_on_is_better_than_its_policy() {
 #[test]
 fn a_model_that_does_not_predict_is_left_to_the_lqi() {
     let target = [50.0, 27.0];
-    let [alone, _] = flown(Kind::Lqi, "prior-as-printed.toml", target, 16.67);
-    let [planned, _] = flown(Kind::HybridLqi, "prior-as-printed.toml", target, 16.67);
+    let [alone, _] = flown(ControllerKind::Lqi, "prior-as-printed.toml", target, 16.67);
+    let [planned, _] = flown(ControllerKind::HybridLqi, "prior-as-printed.toml", target, 16.67);
     assert!(planned < 1.01 * alone, "{planned}°, the LQI alone {alone}°");
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use greylag::num::statistics::quantile;
 use greylag::num::stream::stream;
-use greylag::sim::missing::{Craft, Kind, Missing};
+use greylag::sim::missing::{Craft, Missing, MissingKind};
 use rand::RngExt;
 
 use crate::record::Record;
@@ -69,7 +69,7 @@ impl Seen {
 
     /// The amplitude of `factor` times the minimum detectable one, as far as it can be flown, and what
     /// multiple that is; its sign drawn where it may have either.
-    fn amplitude(&self, kind: &Kind, factor: f64, seed: u64) -> (f64, f64) {
+    fn amplitude(&self, kind: &MissingKind, factor: f64, seed: u64) -> (f64, f64) {
         let [low, high] = kind.clear;
         let (largest, sign) = (low.abs().max(high.abs()), (low + high).signum());
         let least = self.0.get(kind.id).copied().filter(|x| x.is_finite() && *x > 0.0);
@@ -93,7 +93,7 @@ impl Seen {
     }
 
     /// The effect with the multiple of its minimum detectable amplitude that it has.
-    fn missing(&self, kind: &Kind, factor: f64, seed: u64) -> Option<(Missing, f64)> {
+    fn missing(&self, kind: &MissingKind, factor: f64, seed: u64) -> Option<(Missing, f64)> {
         let (amplitude, reached) = self.amplitude(kind, factor, seed);
         Some((Missing::new(&self.1, kind.id, amplitude).ok()?, reached))
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow};
-use greylag::control::{Controller, Kind, build};
+use greylag::control::{Controller, ControllerKind, build};
 use greylag::logs::Flight as Log;
 use greylag::model::GreyBox;
 use greylag::sim::design::{Suspect, alternatives};
@@ -65,7 +65,7 @@ impl Bench {
             reference: std::fs::read_to_string(path)?,
             craft: Craft::of(&model),
             subject: Subject::new(plant, &model.airframe).map_err(|why| anyhow!("{why}"))?,
-            controller: build(Kind::Lqi, &model)?,
+            controller: build(ControllerKind::Lqi, &model)?,
             nulls,
         })
     }

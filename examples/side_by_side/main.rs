@@ -22,7 +22,7 @@ use std::cell::RefCell;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
-use greylag::control::{self, Kind, Source};
+use greylag::control::{self, ControllerKind, Source};
 use greylag::learn::{Arithmetic, Engine, Passes, PriorSlopes, Subject};
 use greylag::model::Integrator;
 
@@ -118,7 +118,7 @@ fn train(problem: &Rollouts) -> impl FnMut(usize) -> Result<Timed> + '_ {
 /// A tick of our planner: sampling and refitting included, its rollouts in four turns.
 fn plan(problem: &Scoring) -> Result<impl FnMut(usize) -> Result<Timed> + '_> {
     let source = Source { model: &problem.model, agent: Some(&problem.agent), changes: &[] };
-    let mut controller = control::build(Kind::Hybrid, source)?;
+    let mut controller = control::build(ControllerKind::Hybrid, source)?;
     controller.reset(1);
     Ok(move |calls| {
         let mut timed = Timed::default();

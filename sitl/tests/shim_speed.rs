@@ -1,5 +1,7 @@
 //! How fast lockstep goes through the sockets with a companion that only echoes.
 
+#[path = "../../tests/real_time/mod.rs"]
+mod real_time;
 mod shim_companion;
 
 use std::net::TcpListener;
@@ -19,7 +21,6 @@ fn frames_per_second(mut companion: Companion, shim: Shim) -> f64 {
     rate
 }
 
-#[test]
 fn lockstep_is_at_least_twenty_times_real_time() {
     let (companion, link) = listening();
     let udp = frames_per_second(companion, Shim::start(lockstep(&link)));
@@ -31,3 +32,5 @@ fn lockstep_is_at_least_twenty_times_real_time() {
     // The requirement: 20 times real time, for the shim's part over UDP.
     assert!(udp >= 2000.0, "{udp:.0} frames/s over UDP");
 }
+
+real_time::tests!(lockstep_is_at_least_twenty_times_real_time);

@@ -2,12 +2,12 @@
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use crate::control::Kind;
+use crate::control::ControllerKind;
 
 /// The controllers of [`crate::control`].
-pub fn controller() -> impl TypedValueParser<Value = Kind> {
-    PossibleValuesParser::new(Kind::ALL.iter().map(|kind| kind.name()))
-        .try_map(|name| name.parse::<Kind>())
+pub fn controller() -> impl TypedValueParser<Value = ControllerKind> {
+    PossibleValuesParser::new(ControllerKind::ALL.iter().map(|kind| kind.name()))
+        .try_map(|name| name.parse::<ControllerKind>())
 }
 
 /// The groups of targets.

@@ -12,7 +12,7 @@ use greylag_sitl::plant_arguments::PlantArgs;
 use crate::commands::files::shipped;
 use crate::commands::interruption::{Ended, Interruption};
 use crate::commands::start::{self, StartArguments};
-use crate::control::{self, Kind};
+use crate::control::{self, ControllerKind};
 use crate::logs::csv;
 use crate::model::GreyBox;
 use crate::sim::Simulator;
@@ -54,7 +54,7 @@ pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let models: Vec<GreyBox> = arguments.model.iter().map(load).collect::<Result<_, _>>()?;
     let planner = match (models.first(), arguments.round) {
         (None, 0) => None,
-        (Some(model), 1..) => Some(control::build(Kind::Cem, model)?),
+        (Some(model), 1..) => Some(control::build(ControllerKind::Cem, model)?),
         (None, _) => {
             bail!("round {} is planned: give the model to plan with, --model", arguments.round)
         }

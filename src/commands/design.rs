@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::commands::bar::Bar;
 use crate::commands::effect_files::named_effects;
 use crate::commands::files::{self, JsonArgument, shipped};
-use crate::control::{Kind, build};
+use crate::control::{ControllerKind, build};
 use crate::model::GreyBox;
 use crate::sim::design::{ENOUGH, LONGEST_S, Plan, Prospect, Suspect, plan, prospects};
 
@@ -85,7 +85,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     arguments.json.writable(overwrite)?;
     let model = GreyBox::load(&shipped(&arguments.model))?;
     let suspects = suspects(arguments)?;
-    let lqi = build(Kind::Lqi, &model)?;
+    let lqi = build(ControllerKind::Lqi, &model)?;
     let bar = Bar::new();
     let all = prospects(&model, lqi.as_ref(), &suspects, &|stage| bar.hear(stage))?;
     bar.go_on()?;

@@ -1,32 +1,33 @@
 //! `greylag evaluate`: score controllers on the target file.
 
+mod draws;
+
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use comfy_table::Table;
-use indicatif::{ProgressBar, ProgressStyle};
-use serde::Serialize;
-
 use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::plant_arguments::PlantArgs;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
 
 use crate::commands::files::{self, shipped};
 use crate::commands::start::{self, StartArguments};
 use crate::commands::{bar, choices, fly};
 use crate::control::cem::Change;
-use crate::control::{Controller, Kind, Needs, Target};
+use crate::control::{Controller, ControllerKind, Needs, Target};
 use crate::model::GreyBox;
-use crate::num::statistics::quantile;
 use crate::physics::Airframe;
 use crate::physics::airframe::Envelope;
 use crate::report::EvaluationReport;
 use crate::sim::episode::STEPS;
-use crate::sim::evaluation::{Evaluation, Robustness, evaluate};
+use crate::sim::evaluation::{Evaluation, evaluate};
 use crate::sim::published::published;
 use crate::sim::tracking::{Tracking, track};
 use crate::sim::{Group, Simulator, TargetFile};
+use draws::over_draws;
 
 /// Options that a flight in a drawn model has no use for.
 const IN_JSBSIM: [&str; 11] = [
@@ -48,7 +49,7 @@ const IN_JSBSIM: [&str; 11] = [
 pub struct Arguments {
     /// Controllers to score.
     #[arg(long = "controller", value_name = "NAME", num_args = 1.., required = true, value_parser = choices::controller())]
-    controllers: Vec<Kind>,
+    controllers: Vec<ControllerKind>,
     /// Models that the controllers are designed from or plan with.
     #[arg(long = "model", num_args = 1.., default_values_os_t = [PathBuf::from(fly::MODEL)])]
     models: Vec<PathBuf>,
@@ -153,85 +154,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The JSON document of flights in drawn models.
-#[derive(Serialize)]
-struct DrawsDocument<'a> {
-    schema: &'static str,
-    program: &'static str,
-    command_line: String,
-    seed: u32,
-    targets: String,
-    model: &'a str,
-    controllers: &'a [Robustness],
-}
-
-/// Flies draws of the first model, prints the tables, writes the JSON.
-fn over_draws(
-    arguments: &Arguments,
-    draws: u32,
-    models: &[GreyBox],
-    targets: &TargetFile,
-) -> Result<ExitCode> {
-    let fly = |e: &Entrant| {
-        let progress = progress(draws.into(), "draws", &format!("{}, model {}", e.kind, e.model));
-        let make = || e.controller.boxed_clone();
-        let names = [e.kind.name(), e.model.as_str()];
-        let seeds = [arguments.seed, draws];
-        let flown =
-            Robustness::of(names, &make, &models[0], &targets.rows, seeds, &|| progress.inc(1))?;
-        progress.finish_and_clear();
-        Ok(flown)
-    };
-    let flown = entrants(arguments, models)?.iter().map(fly).collect::<Result<Vec<_>>>()?;
-    let all: Vec<Evaluation> = flown.iter().map(|r| r.all.clone()).collect();
-    if !files::is_stdout(arguments.json.as_deref()) {
-        println!("{}", table(&all));
-        println!("{}", draws_table(&flown));
-        println!("flown in draws of model {} from the widths of its coefficients", models[0].name);
-        println!(
-            "intervals take all flights for independent; how draws differ is in the second table"
-        );
-    }
-    if let Some(path) = &arguments.json {
-        let document = DrawsDocument {
-            schema: "greylag.robustness/1",
-            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
-            command_line: files::command_line(),
-            seed: arguments.seed,
-            targets: arguments.targets.display().to_string(),
-            model: &models[0].name,
-            controllers: &flown,
-        };
-        let text = serde_json::to_string_pretty(&document)? + "\n";
-        files::write(path, &text, arguments.force.into())?;
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-/// How each controller fared from draw to draw.
-fn draws_table(flown: &[Robustness]) -> Table {
-    let mut table = Table::new();
-    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header([
-        "controller",
-        "model",
-        "draws",
-        "with a loss",
-        "mean ° of a draw: median",
-        "95 %",
-        "worst",
-    ]);
-    for Robustness { all, draws } in flown {
-        let means: Vec<f64> = draws.iter().map(|(mean, _)| *mean).collect();
-        let mut row = vec![all.controller.clone(), all.model.clone(), draws.len().to_string()];
-        let lost = draws.iter().filter(|(_, lost)| *lost > 0).count();
-        row.push(lost.to_string());
-        row.extend([0.5, 0.95, 1.0].map(|q| format!("{:.3}", quantile(&means, q))));
-        table.add_row(row);
-    }
-    table
-}
-
 /// Roll and pitch, degrees, of the paper's Figures 7 to 9.
 const SHOWN: [[f64; 2]; 3] = [[-58.0, -21.0], [55.0, 28.0], [20.0, 10.0]];
 
@@ -303,7 +225,7 @@ fn within_envelope(targets: &mut TargetFile, airframe: &Airframe) -> Result<()> 
 
 /// A controller ready to fly, with the name of its model, or the folder of its policy.
 struct Entrant {
-    kind: Kind,
+    kind: ControllerKind,
     model: String,
     controller: Box<dyn Controller>,
 }

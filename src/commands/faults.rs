@@ -18,8 +18,8 @@ use serde::Serialize;
 use crate::commands::files::{JsonArgument, Overwrite};
 use crate::commands::fly::{self, POLICY, companion_with};
 use crate::commands::{choices, start};
-use crate::control::Kind as ControllerKind;
-use crate::sim::faults::{Case, Cause, CompanionFactory, Counterpart, Kind, Report};
+use crate::control::ControllerKind;
+use crate::sim::faults::{Case, Cause, CompanionFactory, Counterpart, FaultKind, Report};
 use ledger::{Entry, Ledger};
 
 /// The arguments of `greylag faults`.
@@ -141,7 +141,7 @@ fn print_faults(controller: ControllerKind, counterparts: &[Counterpart], entrie
     let mut table = Table::new();
     table.load_style(NOTHING);
     table.set_header(["fault"].into_iter().chain(counterparts.iter().map(|o| o.name())));
-    for kind in Kind::ALL {
+    for kind in FaultKind::ALL {
         let cells = counterparts.iter().map(|counterpart| {
             let with = entries.iter().filter(|e| {
                 e.counterpart == counterpart.name() && e.faults().iter().any(|f| f.kind == kind)
@@ -219,7 +219,7 @@ mod tests {
         roomy(|| {
             let factory = factory();
             // Each kind of fault comes first once in so many seeds; the counterparts share them out.
-            for seed in 0..Kind::ALL.len() as u64 {
+            for seed in 0..FaultKind::ALL.len() as u64 {
                 let counterpart = Counterpart::ALL[seed as usize % Counterpart::ALL.len()];
                 let case = Case { seed, controller: ControllerKind::Lqi, counterpart };
                 let report = factory.fly(case).unwrap();
@@ -289,7 +289,8 @@ mod tests {
     fn a_full_disk_is_told_and_flown_on_with() {
         roomy(|| {
             let factory = factory();
-            let disk = Kind::ALL.iter().position(|kind| *kind == Kind::Disk).unwrap() as u64;
+            let disk =
+                FaultKind::ALL.iter().position(|kind| *kind == FaultKind::Disk).unwrap() as u64;
             let case = Case {
                 seed: disk,
                 controller: ControllerKind::Lqi,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::commands::files::{self, Overwrite, shipped};
 use crate::commands::fly::{CommandName, ProfileName};
-use crate::control::Kind;
+use crate::control::ControllerKind;
 use crate::control::cem::Change;
 use crate::model::GreyBox;
 
@@ -52,7 +52,7 @@ pub struct FlownWith {
 #[derive(Clone, Copy, Debug)]
 pub struct Chosen<'a> {
     /// The controller.
-    pub controller: Kind,
+    pub controller: ControllerKind,
     /// The model file.
     pub model: &'a Path,
     /// The folder of the policy.
@@ -131,7 +131,7 @@ impl FlownWith {
     ///
     /// # Errors
     /// If this program has none of that name.
-    pub fn kind(&self) -> Result<Kind> {
+    pub fn kind(&self) -> Result<ControllerKind> {
         Ok(self.controller.parse()?)
     }
 

@@ -16,12 +16,12 @@ use crate::commands::files::shipped;
 use crate::commands::flown_with::{Chosen, FlownWith};
 use crate::control::cem::Change;
 use crate::control::policy::{Agent, Origin};
-use crate::control::{self, Controller, Kind, Needs, Source, build};
+use crate::control::{self, Controller, ControllerKind, Needs, Source, build};
 use crate::flight::monitor::Monitor;
 use crate::flight::pilot::{Config, Pilot};
 use crate::flight::recorder::Place;
 use crate::flight::runtime::{
-    Companion, Event, Flight, Options, Pace, Placement, Signing, VehicleLink,
+    Companion, Event, Flight, FlightOptions, Pace, Placement, Signing, VehicleLink,
 };
 use crate::link::address::Address;
 use crate::link::autopilot::Severity;
@@ -65,7 +65,7 @@ pub struct Arguments {
     local: Vec<Address>,
     /// Controller.
     #[arg(long, value_name = "NAME", default_value = CONTROLLER, value_parser = choices::controller())]
-    controller: Kind,
+    controller: ControllerKind,
     /// Model that the controller is designed from or plans with.
     #[arg(long, value_name = "FILE", default_value = MODEL)]
     model: PathBuf,
@@ -91,7 +91,7 @@ pub struct Arguments {
     #[arg(long)]
     lockstep: bool,
     /// Time after a state frame at which a plan is late, in milliseconds.
-    #[arg(long, value_name = "MS", default_value_t = Options::PLAN_DEADLINE.as_millis() as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(long, value_name = "MS", default_value_t = FlightOptions::PLAN_DEADLINE.as_millis() as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
     plan_deadline_ms: u64,
     /// End after this many seconds instead of at Ctrl-C.
     #[arg(long, value_name = "S", value_parser = seconds)]
@@ -217,13 +217,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn options(arguments: &Arguments, model: &GreyBox) -> Options {
+fn options(arguments: &Arguments, model: &GreyBox) -> FlightOptions {
     let record = match (&arguments.record, arguments.no_record) {
         (_, true) => None,
         (Some(folder), _) => Some(Place::Exactly(folder.clone())),
         (None, _) => Some(Place::Numbered("flights".into())),
     };
-    Options {
+    FlightOptions {
         vehicle: arguments.vehicle.clone(),
         clients: arguments.all_clients().cloned().collect(),
         record,
@@ -254,7 +254,7 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
 /// # Errors
 /// If the policy cannot be used, or the model does not allow the controller.
 pub fn controller(
-    kind: Kind,
+    kind: ControllerKind,
     model: &GreyBox,
     folder: &Path,
     changes: &[Change],
@@ -287,12 +287,12 @@ fn foreign_policy_note(origin: &Origin, model: &GreyBox, folder: &Path) -> Optio
 ///
 /// # Errors
 /// If there are `changes` that change nothing.
-pub fn check_changes(kinds: &[Kind], changes: &[Change]) -> anyhow::Result<()> {
+pub fn check_changes(kinds: &[ControllerKind], changes: &[Change]) -> anyhow::Result<()> {
     if changes.is_empty() || kinds.iter().any(|kind| kind.searches()) {
         return Ok(());
     }
     let searching: Vec<&str> =
-        Kind::ALL.iter().filter(|k| k.searches()).map(|k| k.name()).collect();
+        ControllerKind::ALL.iter().filter(|k| k.searches()).map(|k| k.name()).collect();
     bail!(
         "--planner changes the settings of a search, and none of the controllers has one; choose one of {} \
          or leave --planner out",
@@ -305,7 +305,11 @@ pub fn check_changes(kinds: &[Kind], changes: &[Change]) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// If the policy cannot be used, the model does not allow a controller, or has no level flight.
-pub fn companion_with(kind: Kind, model: &GreyBox, folder: &Path) -> anyhow::Result<Companion> {
+pub fn companion_with(
+    kind: ControllerKind,
+    model: &GreyBox,
+    folder: &Path,
+) -> anyhow::Result<Companion> {
     companion_with_planner(kind, model, folder, &[])
 }
 
@@ -314,7 +318,7 @@ pub fn companion_with(kind: Kind, model: &GreyBox, folder: &Path) -> anyhow::Res
 /// # Errors
 /// As [`companion_with`], and if there are changes and no planner.
 pub fn companion_with_planner(
-    kind: Kind,
+    kind: ControllerKind,
     model: &GreyBox,
     folder: &Path,
     changes: &[Change],
@@ -322,7 +326,7 @@ pub fn companion_with_planner(
     check_changes(&[kind], changes)?;
     let controller = controller(kind, model, folder, changes)?;
     // The design of an LQI takes a moment; it is not made twice.
-    let fallback = if matches!(kind, Kind::Lqi | Kind::LqiDamped) {
+    let fallback = if matches!(kind, ControllerKind::Lqi | ControllerKind::LqiDamped) {
         controller.boxed_clone()
     } else {
         fallback(model)?
@@ -334,11 +338,11 @@ pub fn companion_with_planner(
 }
 
 fn fallback(model: &GreyBox) -> anyhow::Result<Box<dyn Controller>> {
-    match build(Kind::Lqi, model) {
+    match build(ControllerKind::Lqi, model) {
         Ok(lqi) => Ok(lqi),
         Err(error) => {
-            eprintln!("greylag: {error}; the fallback is {} instead", Kind::PidRetuned);
-            Ok(build(Kind::PidRetuned, model)?)
+            eprintln!("greylag: {error}; the fallback is {} instead", ControllerKind::PidRetuned);
+            Ok(build(ControllerKind::PidRetuned, model)?)
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::commands::status::IN_DOUBT;
 use crate::logs::finding::Severity;
 use crate::logs::info::Info;
 use crate::logs::mapping::Mapping;
-use crate::logs::phases::{Flying, Kind};
+use crate::logs::phases::{Flying, PhaseKind};
 use crate::logs::{Flight, Log, Options, csv};
 use crate::model::GreyBox;
 use crate::physics::Airframe;
@@ -206,7 +206,7 @@ fn print(info: &Info) {
     );
     println!("\nPhases");
     for phase in info.phases.iter().take(SHOWN) {
-        let kind = if phase.kind == Kind::Flight { "in flight" } else { "on ground" };
+        let kind = if phase.kind == PhaseKind::Flight { "in flight" } else { "on ground" };
         println!("  {:>10.2} to {:>10.2} s  {kind}  {} rows", phase.from_s, phase.to_s, phase.rows);
     }
     more(info.phases.len());

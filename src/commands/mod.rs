@@ -183,7 +183,19 @@ pub fn main() -> ExitCode {
     if !matches!(command, Command::Fly(_)) {
         end_with_the_reader();
     }
-    let result = match command {
+    run(command).unwrap_or_else(|error| {
+        if error.chain().any(|cause| cause.is::<Cancelled>()) {
+            eprintln!("greylag: stopped by Ctrl-C; nothing was written");
+            return ExitCode::from(status::INTERRUPTED);
+        }
+        eprintln!("greylag: {}", said_once::said_once(&error));
+        ExitCode::FAILURE
+    })
+}
+
+/// Runs one subcommand.
+fn run(command: Command) -> Result<ExitCode> {
+    match command {
         Command::Aircraft(arguments) => aircraft::run(&arguments),
         Command::Amend(arguments) => amend::run(&arguments),
         Command::Campaign(arguments) => campaign::run(&arguments),
@@ -222,15 +234,7 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "learn")]
         Command::Train(arguments) => train::run(&arguments),
         Command::Workbench(arguments) => workbench::run(&arguments),
-    };
-    result.unwrap_or_else(|error| {
-        if error.chain().any(|cause| cause.is::<Cancelled>()) {
-            eprintln!("greylag: stopped by Ctrl-C; nothing was written");
-            return ExitCode::from(status::INTERRUPTED);
-        }
-        eprintln!("greylag: {}", said_once::said_once(&error));
-        ExitCode::FAILURE
-    })
+    }
 }
 
 /// The subcommand of a line that does not hold the program's name.

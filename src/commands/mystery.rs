@@ -10,12 +10,12 @@ use greylag_sitl::plant::PlantOptions;
 use serde::{Deserialize, Serialize};
 
 use crate::commands::files::shipped;
-use crate::control::{Kind, build};
+use crate::control::{ControllerKind, build};
 use crate::logs::csv;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::physics::formula::register;
-use crate::sim::missing::{Craft, Kind as MissingKind, Missing};
+use crate::sim::missing::{Craft, Missing, MissingKind};
 use crate::sim::starting_model::starting_model;
 use crate::sim::trial::{Subject, Trial};
 
@@ -112,7 +112,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
     let model = starting_model(&text, &format!("mystery-{seed}"), seed, &trial.missing);
     put(&folder, "model.toml", &model.map_err(|why| anyhow!("making the model: {why}"))?)?;
     GreyBox::load(&folder.join("model.toml"))?;
-    let logs = trial.fly(build(Kind::Lqi, &reference)?.as_ref())?;
+    let logs = trial.fly(build(ControllerKind::Lqi, &reference)?.as_ref())?;
     for flight in logs.training.iter().chain(&logs.testing) {
         csv::save(flight, &folder.join(&flight.name))?;
     }

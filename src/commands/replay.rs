@@ -11,7 +11,7 @@ use crate::commands::choices;
 use crate::commands::files::{JsonArgument, Overwrite};
 use crate::commands::flown_with::FlownWith;
 use crate::commands::fly::{self, CommandName, ProfileName};
-use crate::control::Kind;
+use crate::control::ControllerKind;
 use crate::control::cem::Change;
 use crate::flight::replay::{Difference, Outcome, replay};
 use crate::flight::runtime::Companion;
@@ -38,7 +38,7 @@ pub struct Arguments {
 pub struct FlownArguments {
     /// Controller that flew [default: what the recording says, else hybrid-lqi].
     #[arg(long, value_name = "NAME", value_parser = choices::controller())]
-    controller: Option<Kind>,
+    controller: Option<ControllerKind>,
     /// Model that it was designed from [default: what the recording says].
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
@@ -69,7 +69,7 @@ pub struct FlownArguments {
 )]
 pub struct Again {
     /// The controller.
-    pub controller: Kind,
+    pub controller: ControllerKind,
     /// The model.
     pub model: GreyBox,
     /// Pilot and controllers.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::control::lqi::{self, LoopMargins, MarginsError, Weights};
-use crate::control::{Kind, build};
+use crate::control::{ControllerKind, build};
 use crate::model::modes::{Mode, modes, rates};
 use crate::model::{GreyBox, Trim, TrimError};
 
@@ -111,6 +111,29 @@ fn authority(model: &GreyBox, trim: &Trim, altitude: f64) -> Authority {
     }
 }
 
+/// What is wrong with straight flight at one airspeed.
+fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
+    let mut out = Vec::new();
+    let Level { airspeed, elevator, throttle, .. } = *level;
+    if elevator.abs() > MUCH_TRAVEL {
+        out.push(format!(
+            "straight flight at {airspeed:.1} m/s takes {:.0} % of the elevator's travel: move the \
+             centre of gravity or correct Cm0, Cmalpha and Cmde",
+            100.0 * elevator.abs()
+        ));
+    }
+    // above the cruise airspeed the envelope allows dives
+    if airspeed <= model.airframe.envelope.airspeed_cruise_mps && !(0.0..=1.0).contains(&throttle) {
+        out.push(format!(
+            "level flight at {airspeed:.1} m/s takes {:.0} % of throttle: the aircraft climbs or sinks \
+             there; correct thrust, drag or the envelope",
+            100.0 * throttle
+        ));
+    }
+    out
+}
+
+/// What is wrong with the aircraft, in sentences; empty if nothing is.
 fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String> {
     let mut out = Vec::new();
     let Authority { roll_rate, pitch_acceleration, yaw_acceleration } = check.authority;
@@ -128,33 +151,14 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
              airspeed_min_mps and airspeed_max_mps"
         ));
     }
-    for level in &check.levels {
-        let Level { airspeed, elevator, throttle, .. } = *level;
-        if elevator.abs() > MUCH_TRAVEL {
-            out.push(format!(
-                "straight flight at {airspeed:.1} m/s takes {:.0} % of the elevator's travel: move the \
-                 centre of gravity or correct Cm0, Cmalpha and Cmde",
-                100.0 * elevator.abs()
-            ));
-        }
-        // above the cruise airspeed the envelope allows dives
-        if airspeed <= model.airframe.envelope.airspeed_cruise_mps
-            && !(0.0..=1.0).contains(&throttle)
-        {
-            out.push(format!(
-                "level flight at {airspeed:.1} m/s takes {:.0} % of throttle: the aircraft climbs or sinks \
-                 there; correct thrust, drag or the envelope",
-                100.0 * throttle
-            ));
-        }
-    }
+    check.levels.iter().for_each(|level| out.extend(findings_in_level(model, level)));
     if check.authority.roll_rate.abs() < SLOW_ROLL {
         out.push(format!(
             "full aileron rolls at {:.0} deg/s only: correct Clda or Clp",
             check.authority.roll_rate.to_degrees().abs()
         ));
     }
-    if let Err(why) = build(Kind::Lqi, model) {
+    if let Err(why) = build(ControllerKind::Lqi, model) {
         out.push(format!("{why}; give the envelope less bank or a pitch_min_deg nearer to 0"));
     }
     for LoopMargins { surface, delay, .. } in &check.loops {

@@ -11,7 +11,7 @@ use crate::model::GreyBox;
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
     /// No such controller.
-    #[error("there is no controller {name:?}; there are {}", Kind::names())]
+    #[error("there is no controller {name:?}; there are {}", ControllerKind::names())]
     Unknown {
         /// What was asked for.
         name: String,
@@ -133,42 +133,42 @@ macro_rules! controllers {
     ($($kind:ident $name:literal $seat:ident $needs:ident $about:literal => |$from:ident| $build:expr),* $(,)?) => {
         /// A controller by name.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        pub enum Kind { $(#[doc = $about] $kind,)* }
+        pub enum ControllerKind { $(#[doc = $about] $kind,)* }
 
-        impl Kind {
+        impl ControllerKind {
             /// Every controller there is.
-            pub const ALL: &'static [Kind] = &[$(Kind::$kind),*];
+            pub const ALL: &'static [ControllerKind] = &[$(ControllerKind::$kind),*];
 
             /// The name that selects it.
             pub const fn name(self) -> &'static str {
-                match self { $(Kind::$kind => $name,)* }
+                match self { $(ControllerKind::$kind => $name,)* }
             }
 
             /// Where it has to run.
             pub const fn pace(self) -> Pace {
-                match self { $(Kind::$kind => Pace::$seat,)* }
+                match self { $(ControllerKind::$kind => Pace::$seat,)* }
             }
 
             /// What it is built from.
             pub const fn needs(self) -> Needs {
-                match self { $(Kind::$kind => Needs::$needs,)* }
+                match self { $(ControllerKind::$kind => Needs::$needs,)* }
             }
         }
 
-        /// Builds a controller from what [`Kind::needs`] says; a model alone will do where no policy
+        /// Builds a controller from what [`ControllerKind::needs`] says; a model alone will do where no policy
         /// is needed.
         ///
         /// # Errors
         /// If the model does not allow the design, or a policy is needed and there is none.
         pub fn build<'a>(
-            kind: Kind,
+            kind: ControllerKind,
             source: impl Into<Source<'a>>,
         ) -> Result<Box<dyn Controller>, SetupError> {
             let source = source.into();
             if let (Needs::Model | Needs::Both, Some(effect)) = (kind.needs(), source.model.proposed()) {
                 return Err(SetupError::Proposed { model: source.model.name.clone(), effect });
             }
-            match kind { $(Kind::$kind => { let $from = source; Ok(Box::new($build)) })* }
+            match kind { $(ControllerKind::$kind => { let $from = source; Ok(Box::new($build)) })* }
         }
     };
 }
@@ -189,26 +189,26 @@ controllers! {
     Policy "policy" Immediate Policy "A trained policy alone." => |from| Policy::new(from.agent()?),
 }
 
-impl Kind {
+impl ControllerKind {
     /// Whether it searches with [`cem::Settings`], so that a [`cem::Change`] tells.
     pub fn searches(self) -> bool {
-        self.pace() == Pace::Planned && self != Kind::Ilqr
+        self.pace() == Pace::Planned && self != ControllerKind::Ilqr
     }
 
     fn names() -> String {
-        Kind::ALL.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ")
+        ControllerKind::ALL.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ")
     }
 }
 
-impl FromStr for Kind {
+impl FromStr for ControllerKind {
     type Err = SetupError;
-    fn from_str(name: &str) -> Result<Kind, SetupError> {
-        let found = Kind::ALL.iter().find(|k| k.name() == name);
+    fn from_str(name: &str) -> Result<ControllerKind, SetupError> {
+        let found = ControllerKind::ALL.iter().find(|k| k.name() == name);
         found.copied().ok_or_else(|| SetupError::Unknown { name: name.into() })
     }
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for ControllerKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }

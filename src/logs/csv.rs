@@ -1,14 +1,18 @@
 //! The CSV form of a flight log: one row a sample, a header row, SI units.
 
-use std::io::{Read, Write};
+mod write;
+
+pub use super::rows::Tolerance;
+pub use write::Rows;
+pub use write::save;
+pub use write::write;
+
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::columns::{COLUMNS, EITHER, NEEDED, Place, index};
 use super::mapping::{Mapping, TEXT};
-use super::mixed;
-use super::rows;
-pub use super::rows::Tolerance;
-use super::{Flight, Sample};
+use super::{Flight, Sample, mixed, rows};
 
 /// Why a CSV flight log cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -72,78 +76,6 @@ pub struct Reading {
     pub dropped_rows: Vec<usize>,
     /// Whether the file ends in the middle of a row, which is left out.
     pub cut_short: bool,
-}
-
-/// Writes `flight` to `out`. Missing values become empty fields; numbers are written so that they
-/// read back to the bit.
-///
-/// # Errors
-/// What the writer says.
-pub fn write(flight: &Flight, out: impl Write) -> std::io::Result<()> {
-    let mut rows = Rows::new(out, &[])?;
-    flight.samples.iter().try_for_each(|sample| rows.row(sample, &[]))?;
-    rows.flush()
-}
-
-/// Writes `flight` to a new file.
-///
-/// # Errors
-/// The file exists, or cannot be written.
-pub fn save(flight: &Flight, path: &Path) -> Result<(), CsvError> {
-    let fail = |doing| move |source| CsvError::File { doing, path: path.to_owned(), source };
-    let file = std::fs::File::create_new(path).map_err(fail("create"))?;
-    write(flight, std::io::BufWriter::new(file)).map_err(fail("write"))
-}
-
-/// Writes rows as they come.
-#[derive(Debug)]
-pub struct Rows<W: Write> {
-    out: W,
-    line: String,
-}
-
-impl<W: Write> Rows<W> {
-    /// Writes the header: the columns of the format, then `extra`.
-    ///
-    /// # Errors
-    /// What the writer says.
-    pub fn new(mut out: W, extra: &[&str]) -> std::io::Result<Self> {
-        let names: Vec<&str> = COLUMNS.iter().map(|c| c.0).chain(extra.iter().copied()).collect();
-        writeln!(out, "{}", names.join(","))?;
-        Ok(Rows { out, line: String::with_capacity(512) })
-    }
-
-    /// Writes a sample, then the extra fields (free of commas and quotes) in the header's order.
-    ///
-    /// # Errors
-    /// What the writer says.
-    pub fn row(&mut self, sample: &Sample, extra: &[&str]) -> std::io::Result<()> {
-        use std::fmt::Write as _;
-        self.line.clear();
-        for (i, (_, get, _)) in COLUMNS.iter().enumerate() {
-            if i > 0 {
-                self.line.push(',');
-            }
-            let x = get(sample);
-            if x.is_finite() {
-                let _ = write!(self.line, "{x}");
-            }
-        }
-        for field in extra {
-            self.line.push(',');
-            self.line.push_str(field);
-        }
-        self.line.push('\n');
-        self.out.write_all(self.line.as_bytes())
-    }
-
-    /// Hands everything on to the file.
-    ///
-    /// # Errors
-    /// What the writer says.
-    pub fn flush(&mut self) -> std::io::Result<()> {
-        self.out.flush()
-    }
 }
 
 /// Reads a flight log from a file.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::columns::COLUMNS;
 use super::finding::{Finding, Severity};
-use super::phases::{self, Kind, Phase};
+use super::phases::{self, Phase, PhaseKind};
 use super::rudder::RudderMotion;
 use super::{Channel, Format, Log, Sample};
 
@@ -63,7 +63,8 @@ impl Info {
         let split = phases::split_s(samples);
         let gaps = times.windows(2).filter(|w| w[1] - w[0] > split).map(|w| (w[0], w[1] - w[0]));
         let phases = phases::phases(samples, &log.flies);
-        let flown = phases.iter().filter(|p| p.kind == Kind::Flight).map(|p| p.to_s - p.from_s);
+        let flown =
+            phases.iter().filter(|p| p.kind == PhaseKind::Flight).map(|p| p.to_s - p.from_s);
         Info {
             schema: "greylag.log-info/1",
             name: log.flight.name.clone(),
@@ -101,29 +102,39 @@ fn rudder(log: &Log) -> Option<Finding> {
 /// Share of the rows, or of the time by its own rate, that a column must cover to count as there.
 const PRESENT: f64 = 0.5;
 
-fn purposes(log: &Log) -> Vec<Purpose> {
+/// Whether `column` covers enough of the log to count as there.
+fn has(log: &Log, column: &str) -> bool {
     let samples = &log.flight.samples;
     let whole = samples.first().zip(samples.last()).map_or(0.0, |(a, b)| b.time_s - a.time_s);
-    let has = |column: &str| {
-        let get = COLUMNS.iter().find(|c| c.0 == column).map(|c| c.1);
-        let count = get.map_or(0, |get| samples.iter().filter(|s| get(s).is_finite()).count());
-        let channel = log.channels.iter().find(|c| c.columns.iter().any(|x| x == column));
-        let rate = channel.map_or(f64::INFINITY, |c| c.rate_hz);
-        let covered = rate > 0.0 && count as f64 >= PRESENT * rate * whole;
-        count > 0 && (count as f64 >= PRESENT * samples.len() as f64 || covered)
-    };
-    let lacking = |columns: &[&str]| -> Vec<String> {
-        columns.iter().filter(|c| !has(c)).map(|c| (*c).to_owned()).collect()
-    };
-    let mut actuators = Vec::new();
+    let get = COLUMNS.iter().find(|c| c.0 == column).map(|c| c.1);
+    let count = get.map_or(0, |get| samples.iter().filter(|s| get(s).is_finite()).count());
+    let channel = log.channels.iter().find(|c| c.columns.iter().any(|x| x == column));
+    let rate = channel.map_or(f64::INFINITY, |c| c.rate_hz);
+    let covered = rate > 0.0 && count as f64 >= PRESENT * rate * whole;
+    count > 0 && (count as f64 >= PRESENT * samples.len() as f64 || covered)
+}
+
+/// The actuators that the log does not show, and those that commands show through the actuator model.
+fn actuators(has: impl Fn(&str) -> bool) -> (Vec<String>, Vec<String>) {
+    let mut missing = Vec::new();
     let mut instead = Vec::new();
     for (command, position) in super::columns::EITHER {
         match (has(command), has(position)) {
-            (false, false) => actuators.push(format!("{command} or {position}")),
+            (false, false) => missing.push(format!("{command} or {position}")),
             (true, false) => instead.push(format!("{position} through the actuator model")),
             _ => {}
         }
     }
+    (missing, instead)
+}
+
+fn purposes(log: &Log) -> Vec<Purpose> {
+    let samples = &log.flight.samples;
+    let has = |column: &str| has(log, column);
+    let lacking = |columns: &[&str]| -> Vec<String> {
+        columns.iter().filter(|c| !has(c)).map(|c| (*c).to_owned()).collect()
+    };
+    let (actuators, instead) = actuators(has);
     let states =
         lacking(&["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"]);
     let join = |a: &[String], b: &[String]| [a, b].concat();
@@ -141,12 +152,12 @@ fn purposes(log: &Log) -> Vec<Purpose> {
         .then(|| "specific force of the reconstructed path".to_owned())
         .into_iter()
         .collect();
-    let density = if has("air_density_kgpm3") {
-        Vec::new()
-    } else if has("altitude_m") {
-        vec!["air density of the standard atmosphere at the logged altitude".to_owned()]
-    } else {
-        vec!["air density of the standard atmosphere at sea level".to_owned()]
+    let density: Vec<String> = match (has("air_density_kgpm3"), has("altitude_m")) {
+        (true, _) => Vec::new(),
+        (false, true) => {
+            vec!["air density of the standard atmosphere at the logged altitude".to_owned()]
+        }
+        (false, false) => vec!["air density of the standard atmosphere at sea level".to_owned()],
     };
     let rebuilt = if incidence.is_empty() || !velocity.is_empty() {
         Vec::new()

@@ -227,14 +227,7 @@ fn binary(
     }
     findings.extend(topics.findings);
     findings.extend(screening::screen(&table.rows, &o.flies));
-    let mut kept = rows::Rows::default();
-    let mut looked_at = rows::Rows::default();
-    for (i, sample) in table.rows.into_iter().enumerate() {
-        kept.take(i + 1, Some(sample));
-        if to == Use::Look {
-            looked_at.take_incomplete(i + 1, sample);
-        }
-    }
+    let (mut kept, looked_at) = sorted_out(table.rows, to);
     if !table.missing.is_empty() {
         kept = looked_at;
     } else if let Some(first) = kept.refused(o.tolerance) {
@@ -270,6 +263,18 @@ fn binary(
         findings,
         flies: o.flies,
     })
+}
+
+/// The rows fit to compute with, and those fit to be looked at where that is asked.
+fn sorted_out(samples: Vec<Sample>, to: Use) -> (rows::Rows, rows::Rows) {
+    let (mut kept, mut looked_at) = (rows::Rows::default(), rows::Rows::default());
+    for (i, sample) in samples.into_iter().enumerate() {
+        kept.take(i + 1, Some(sample));
+        if to == Use::Look {
+            looked_at.take_incomplete(i + 1, sample);
+        }
+    }
+    (kept, looked_at)
 }
 
 fn text(bytes: &[u8], path: &Path, options: &Options, to: Use) -> Result<Log, LogError> {

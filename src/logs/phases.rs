@@ -44,7 +44,7 @@ const GAP_S: f64 = 0.1;
 /// What an aircraft does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum PhaseKind {
     /// It stands or rolls.
     Ground,
     /// It flies.
@@ -55,7 +55,7 @@ pub enum Kind {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Phase {
     /// What it does.
-    pub kind: Kind,
+    pub kind: PhaseKind,
     /// Time of the first row, s.
     pub from_s: f64,
     /// Time of the last row, s.
@@ -73,8 +73,9 @@ pub fn split_s(rows: &[Sample]) -> f64 {
 /// The phases of a log in order.
 pub fn phases(rows: &[Sample], flies: &Flying) -> Vec<Phase> {
     let split = split_s(rows);
-    let flying =
-        |airspeed: f64| if airspeed > flies.from_mps { Kind::Flight } else { Kind::Ground };
+    let flying = |airspeed: f64| {
+        if airspeed > flies.from_mps { PhaseKind::Flight } else { PhaseKind::Ground }
+    };
     let mut raw: Vec<Phase> = Vec::new();
     // an airspeed that comes more slowly than the rows holds until the next one
     let mut airspeed = f64::NAN;
@@ -106,7 +107,7 @@ pub fn phases(rows: &[Sample], flies: &Flying) -> Vec<Phase> {
             }
             _ => {
                 if short {
-                    phase.kind = Kind::Ground;
+                    phase.kind = PhaseKind::Ground;
                 }
                 out.push(phase);
             }

@@ -14,7 +14,7 @@ use crate::physics::inputs::InputMemory;
 use crate::physics::rigid_body;
 use crate::physics::{Controls, State};
 use crate::sim::instruments::{Group, Instruments};
-use crate::sim::missing::{Craft, Kind, Missing};
+use crate::sim::missing::{Craft, Missing, MissingKind};
 use crate::sim::{Environment, Imagined};
 use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 use crate::sysid::progress::{Cancelled, Progress, say};
@@ -176,7 +176,7 @@ fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
         return Ok(model.clone().join(id, &[]).map(|()| Vec::new())?);
     };
     let craft = Craft::lacking(model);
-    let clear = craft.kind(id).map(|Kind { clear: [low, high], .. }| 0.5 * (low + high));
+    let clear = craft.kind(id).map(|MissingKind { clear: [low, high], .. }| 0.5 * (low + high));
     let clear = clear.and_then(|amplitude| Missing::new(&craft, id, amplitude).ok());
     if let Some(missing) = clear.filter(|missing| !missing.values.is_empty()) {
         return Ok(missing.values);

@@ -1,16 +1,15 @@
 //! An aircraft of JSBSim as airframe and model: central differences of its loads.
 
+mod effects;
 mod files;
 mod fits;
+mod propulsion;
 
 use greylag_sitl::plant::{Inputs, Loads, MassProperties, Plant, PlantError, Start, Stops, Travel};
 
-use crate::model::textbook::Estimate;
-use crate::num::least_squares;
-use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
-use crate::physics::catalogue::describe;
+use effects::effects;
 use files::{airframe, model_file};
-use fits::{ThrustLag, first_order, line, second_order, thrust_lag};
+use fits::{first_order, second_order};
 
 /// Metres per foot.
 const FT: f64 = 0.3048;
@@ -29,23 +28,6 @@ const TABLE_DEG: [f64; 24] = [
     -24.0, -20.0, -17.0, -14.0, -12.0, -10.0, -8.0, -6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0, 8.0,
     10.0, 12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 25.0, 30.0,
 ];
-/// Share of a channel's variation that is worth a word when it is left.
-const WORTH_SAYING: f64 = 0.02;
-/// Throttle before and after the step that shows the engine's lag.
-const THRUST_STEP: [f64; 2] = [0.4, 0.7];
-/// Part of that step beyond which it is said that the engine's answer is no first-order lag.
-const LAG_WORTH_SAYING: f64 = 0.1;
-/// How long the answer to the step is watched, s.
-const STEP_S: f64 = 20.0;
-/// Mean, amplitude and frequency (rad/s) of the throttle's wave that judges the lag, and how long it lasts, s.
-const WAVE: [f64; 3] = [0.5, 0.1, 3.0];
-const WAVE_S: f64 = 10.0;
-/// Propeller torque that is none, in parts of weight times span.
-const NO_MOMENT: f64 = 1e-5;
-/// Distance of the thrust from the centre of gravity that is none, in chords.
-const NO_ARM: f64 = 1e-3;
-/// Newton metres per pound foot.
-const LBF_FT: f64 = 1.355_817_948_331_4;
 
 /// What was made of an aircraft.
 #[derive(Clone, Debug)]
@@ -198,23 +180,6 @@ struct Slopes {
     drag_elevator: f64,
 }
 
-/// What the engines do.
-struct Propulsion {
-    /// The polynomial of the settled thrust over throttle and airspeed.
-    thrust: Vec<Estimate>,
-    /// Time constant of the thrust behind the throttle's position, s.
-    lag: Option<f64>,
-    /// Rolling moment at full throttle, to the left, N m.
-    torque: Option<f64>,
-    /// How far below the centre of gravity the thrust acts, m.
-    arm: Option<f64>,
-}
-
-/// An effect of the model file with its numbers.
-type Effect = (&'static str, Vec<Estimate>);
-
-const SOURCE: &str = "central difference of JSBSim's loads";
-
 impl Subject<'_> {
     /// Coefficients in `state`, the surfaces at `inputs`.
     fn at(&mut self, state: &Start, inputs: &Inputs) -> Result<Coefficients, PlantError> {
@@ -296,96 +261,6 @@ impl Subject<'_> {
         })
     }
 
-    /// What the engines do, settled and after a step of the throttle.
-    fn propulsion(&mut self, left_out: &mut Vec<String>) -> Result<Propulsion, PlantError> {
-        let (mut rows, mut thrusts) = (Vec::new(), Vec::new());
-        // Σ l δ, Σ δ², Σ m T, Σ T²
-        let mut moments = [0.0; 4];
-        for speed in [0.8, 1.0, 1.25] {
-            for throttle in [0.0, 0.25, 0.5, 0.75, 1.0] {
-                let airspeed_mps = speed * self.start.airspeed_mps;
-                let start = Start { airspeed_mps, alpha_rad: ALPHA, ..self.start };
-                let (thrust, truth) = self.plant.settled_thrust(&start, throttle)?;
-                let (d, v) = (truth.throttle, truth.airspeed_mps);
-                let share = truth.air_density_kgpm3 / SEA_LEVEL_DENSITY;
-                rows.push([1.0, d, d * d, v, d * v, v * v].map(|x| x * share));
-                thrusts.push(thrust);
-                // an aircraft without engines has no such property
-                let mut moment = |name: &str| LBF_FT * self.plant.property(name).unwrap_or(0.0);
-                let (roll, pitch) =
-                    (moment("moments/l-prop-lbsft"), moment("moments/m-prop-lbsft"));
-                for (sum, x) in
-                    moments.iter_mut().zip([roll * d, d * d, pitch * thrust, thrust * thrust])
-                {
-                    *sum += x;
-                }
-            }
-        }
-        let fit = least_squares(&rows, &thrusts).unwrap_or_default();
-        let along = |row: &[f64; 6]| row.iter().zip(&fit).map(|(a, b)| a * b).sum::<f64>();
-        let missed = rows.iter().zip(&thrusts).map(|(row, t)| (along(row) - t).powi(2));
-        let left = (missed.sum::<f64>() / thrusts.len() as f64).sqrt();
-        let most = thrusts.iter().fold(1e-9_f64, |most, t| most.max(t.abs()));
-        if left > WORTH_SAYING * most {
-            left_out.push(format!(
-                "the thrust is a polynomial in the model; {left:.1} N (rms) of up to {most:.0} N are left out"
-            ));
-        }
-        let names = ["T0_n", "Tt_n", "Ttt_n", "TV_nspm", "TtV_nspm", "TVV_ns2pm2"];
-        let source = "least squares over JSBSim's thrust, 0.8 to 1.25 of the cruise airspeed";
-        let thrust: Vec<Estimate> =
-            names.into_iter().zip(fit.iter()).map(|(n, x)| (n, *x, 0.02, source)).collect();
-        let lag = self.thrust_lag(&thrust, left_out)?;
-        let [roll, throttle, pitch, squared] = moments;
-        let (torque, arm) = (-roll / throttle.max(1e-9), pitch / squared.max(1e-9));
-        let weight = self.mass.mass_kg * STANDARD_GRAVITY;
-        Ok(Propulsion {
-            thrust,
-            lag,
-            torque: (torque.abs() > NO_MOMENT * weight * self.span).then_some(torque),
-            arm: (arm.abs() > NO_ARM * self.chord).then_some(arm),
-        })
-    }
-
-    /// Time constant (s) of the thrust behind the throttle's position, if it has one; `thrust` is the settled thrust.
-    fn thrust_lag(
-        &mut self,
-        thrust: &[Estimate],
-        left_out: &mut Vec<String>,
-    ) -> Result<Option<f64>, PlantError> {
-        let start = Start { alpha_rad: ALPHA, ..self.start };
-        let step = self.plant.step_s();
-        let steps = |seconds: f64| (seconds / step) as usize;
-        let [from, to] = THRUST_STEP;
-        let raised: Vec<f64> =
-            std::iter::once(from).chain(std::iter::repeat_n(to, steps(STEP_S))).collect();
-        let wave = |k: usize| WAVE[0] + WAVE[1] * (WAVE[2] * step * k as f64).sin();
-        let waved: Vec<f64> = (0..steps(WAVE_S)).map(wave).collect();
-        let raised = self.plant.thrust_response(&start, &raised)?;
-        let waved = self.plant.thrust_response(&start, &waved)?;
-        let of = |name: &str| thrust.iter().find(|e| e.0 == name).map_or(0.0, |e| e.1);
-        let slope = of("Tt_n") + of("TtV_nspm") * self.start.airspeed_mps;
-        let Some(found) = thrust_lag([&raised, &waved], step, [slope, of("Ttt_n")]) else {
-            return Ok(None);
-        };
-        let ThrustLag { lag, left, better } = found;
-        if !better {
-            left_out.push(format!(
-                "how late the thrust follows the throttle: a lag of {lag:.2} s describes a step best, and small movements no \
-                 better than none"
-            ));
-            return Ok(None);
-        }
-        if left > LAG_WORTH_SAYING {
-            left_out.push(format!(
-                "the thrust lags by {lag:.2} s in the model; its answer to a step of the throttle is off by {:.0} % of the \
-                 step (rms)",
-                100.0 * left
-            ));
-        }
-        Ok(Some(lag))
-    }
-
     /// Frequency (rad/s) and damping of aileron, elevator and rudder, then the throttle's lag (s).
     fn lags(&mut self, travel: &Travel) -> Result<([[f64; 2]; 3], f64), PlantError> {
         let mut traces = [[0.0; 4]; 40];
@@ -409,67 +284,4 @@ impl Subject<'_> {
 fn size_and_square([near, far]: [f64; 2]) -> [f64; 2] {
     let square = (far / FAR - near / ANGLE) / (FAR - ANGLE);
     [near / ANGLE - square * ANGLE, square]
-}
-
-/// Keeps coefficients within what their effects take; what is cut off is said.
-fn bounded(effect: &str, estimates: &mut [Estimate], left_out: &mut Vec<String>) {
-    let coefficients = describe(effect).map_or(&[][..], |about| about.coefficients);
-    for estimate in estimates {
-        let Some(own) = coefficients.iter().find(|c| c.name == estimate.0) else { continue };
-        let (least, most) = own.bounds;
-        let within = estimate.1.clamp(least, most);
-        if within != estimate.1 {
-            left_out.push(format!(
-                "{effect}.{} = {:.4} lies outside of the model's {least} to {most}: {within} is written",
-                estimate.0, estimate.1
-            ));
-            estimate.1 = within;
-        }
-    }
-}
-
-/// The effects of the model with their coefficients.
-fn effects(polar: &Polar, slopes: &Slopes, left_out: &mut Vec<String>) -> Vec<Effect> {
-    let [zero, slope, _] = line(polar);
-    let Slopes { base, beta, p, q, r, aileron: a, elevator: e, .. } = slopes;
-    let exact = |name, value| -> Estimate { (name, value, 0.02, SOURCE) };
-    let lateral = |names: [&'static str; 5], k: usize| -> Vec<Estimate> {
-        let values = [base[k], beta[k], p[k], r[k], a[k]];
-        names.into_iter().zip(values).map(|(name, value)| exact(name, value)).collect()
-    };
-    let none = "lift_table stands in its place";
-    let mut all = vec![
-        (
-            "lift_linear",
-            vec![
-                ("CL0", 0.0, 0.0, none),
-                ("CLalpha", 0.0, 0.0, none),
-                exact("CLq", q[2]),
-                exact("CLde", e[2]),
-            ],
-        ),
-        (
-            "drag_beta2",
-            vec![exact("CDbeta", slopes.drag_beta[0]), exact("CDbeta2", slopes.drag_beta[1])],
-        ),
-        ("drag_elevator_abs", vec![exact("CDde", slopes.drag_elevator)]),
-        ("side_force_linear", lateral(["CY0", "CYbeta", "CYp", "CYr", "CYda"], 1)),
-        ("roll_linear", lateral(["Cl0", "Clbeta", "Clp", "Clr", "Clda"], 3)),
-        (
-            "pitch_linear",
-            vec![
-                exact("Cm0", zero),
-                exact("Cmalpha", slope),
-                exact("Cmq", q[4]),
-                exact("Cmde", e[4]),
-            ],
-        ),
-        ("yaw_linear", lateral(["Cn0", "Cnbeta", "Cnp", "Cnr", "Cnda"], 5)),
-    ];
-    if let Some(d) = &slopes.rudder {
-        let numbers = vec![exact("CYdr", d[1]), exact("Cldr", d[3]), exact("Cndr", d[5])];
-        all.push(("rudder_linear", numbers));
-    }
-    all.iter_mut().for_each(|(effect, estimates)| bounded(effect, estimates, left_out));
-    all
 }

@@ -74,8 +74,8 @@ impl Craft {
 
     /// Every effect that can be missing, at this aircraft's sizes. One that is hidden in place of the aircraft's own
     /// needs the model to have it.
-    pub fn kinds(&self) -> Vec<Kind> {
-        let own = |kind: &&Kind| match kind.id {
+    pub fn kinds(&self) -> Vec<MissingKind> {
+        let own = |kind: &&MissingKind| match kind.id {
             "lift_stall" => self.has("lift_table"),
             "drag_beta2" | "drag_elevator_abs" => self.has(kind.id),
             _ => true,
@@ -85,11 +85,11 @@ impl Craft {
     }
 
     /// The effect of that id at this aircraft's size.
-    pub fn kind(&self, id: &str) -> Option<Kind> {
+    pub fn kind(&self, id: &str) -> Option<MissingKind> {
         self.kinds().into_iter().find(|kind| kind.id == id)
     }
 
-    fn sized(&self, kind: &Kind) -> Kind {
+    fn sized(&self, kind: &MissingKind) -> MissingKind {
         let factor = match kind.id {
             "thrust_scale" => self.force,
             "cg_shift" | "thrust_line_offset" => self.length,
@@ -101,7 +101,7 @@ impl Craft {
             "pitch_break" => self.stiffness,
             _ => 1.0,
         };
-        Kind { clear: kind.clear.map(|x| x * factor), ..*kind }
+        MissingKind { clear: kind.clear.map(|x| x * factor), ..*kind }
     }
 }
 
@@ -129,7 +129,7 @@ const WRITTEN: Sizes = Sizes {
 
 /// One effect that can be missing.
 #[derive(Clone, Copy, Debug)]
-pub struct Kind {
+pub struct MissingKind {
     /// Its id in the catalogue.
     pub id: &'static str,
     /// Unit of its amplitude, empty without one.
@@ -140,20 +140,20 @@ pub struct Kind {
     pub either_sign: bool,
 }
 
-const fn kind(id: &'static str, unit: &'static str, clear: [f64; 2]) -> Kind {
-    Kind { id, unit, clear, either_sign: false }
+const fn kind(id: &'static str, unit: &'static str, clear: [f64; 2]) -> MissingKind {
+    MissingKind { id, unit, clear, either_sign: false }
 }
 
-const fn both(id: &'static str, unit: &'static str, clear: [f64; 2]) -> Kind {
-    Kind { id, unit, clear, either_sign: true }
+const fn both(id: &'static str, unit: &'static str, clear: [f64; 2]) -> MissingKind {
+    MissingKind { id, unit, clear, either_sign: true }
 }
 
 /// Effects of an aircraft's own that its model is robbed of where it has them; nothing is hidden.
-const OF_THE_MODEL: [Kind; 2] =
+const OF_THE_MODEL: [MissingKind; 2] =
     [kind("rudder_linear", "", [1.0, 1.0]), kind("propeller", "", [1.0, 1.0])];
 
 /// Every effect that can be missing from any aircraft, with amplitudes for one of the size of the X8.
-pub const KINDS: [Kind; 26] = [
+pub const KINDS: [MissingKind; 26] = [
     kind("drag_alpha2", "1/rad²", [0.6, 1.2]),
     kind("drag_beta2", "1/rad²", [0.5, 1.2]),
     kind("drag_elevator_abs", "1/rad", [0.08, 0.16]),
@@ -183,9 +183,9 @@ pub const KINDS: [Kind; 26] = [
     kind("thrust_lag", "s", [0.2, 0.6]),
 ];
 
-impl Kind {
+impl MissingKind {
     /// The effect of that id, with amplitudes for an aircraft of the size of the X8.
-    pub fn from_id(id: &str) -> Option<Kind> {
+    pub fn from_id(id: &str) -> Option<MissingKind> {
         KINDS.iter().chain(&OF_THE_MODEL).copied().find(|kind| kind.id == id)
     }
 
@@ -232,7 +232,7 @@ pub(super) fn rounded(x: f64) -> f64 {
 pub struct Missing {
     /// Its id in the catalogue.
     pub id: &'static str,
-    /// How much of it, in the unit of [`Kind::unit`].
+    /// How much of it, in the unit of [`MissingKind::unit`].
     pub amplitude: f64,
     /// What JSBSim is given beyond its own file; nothing where the file has the effect.
     pub hidden: Option<Hidden>,
@@ -351,7 +351,8 @@ mod tests {
         let x8 = craft("params/x8/jsbsim.toml");
         assert_eq!(x8.kinds().len(), KINDS.len());
         for effect in &EFFECTS {
-            let kind = Kind::from_id(effect.id).unwrap_or_else(|| panic!("no {}", effect.id));
+            let kind =
+                MissingKind::from_id(effect.id).unwrap_or_else(|| panic!("no {}", effect.id));
             for seed in 0..20 {
                 let missing = Missing::drawn(&x8, seed, Some(kind.id), None).unwrap();
                 assert!(missing.hidden.is_some() && missing.amplitude != 0.0, "{missing:?}");
@@ -384,7 +385,7 @@ mod tests {
         for kind in KINDS.iter().filter(|kind| kind.id != "rate_limit") {
             assert!(kind.clear.iter().all(|x| x.abs() <= kind.most()), "{}", kind.id);
         }
-        let limit = Kind::from_id("rate_limit").unwrap();
+        let limit = MissingKind::from_id("rate_limit").unwrap();
         assert!(limit.clear.iter().all(|x| *x >= limit.most()));
     }
 }

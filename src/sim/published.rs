@@ -77,12 +77,16 @@ const ALL: [Published; 15] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::Kind;
+    use crate::control::ControllerKind;
 
     #[test]
     fn published_values_lie_in_their_intervals_and_have_controllers() {
         for p in &ALL {
-            assert!(Kind::ALL.iter().any(|k| k.name() == p.controller), "{}", p.controller);
+            assert!(
+                ControllerKind::ALL.iter().any(|k| k.name() == p.controller),
+                "{}",
+                p.controller
+            );
             for v in [p.median_deg, p.iqm_deg, p.mean_deg, p.diverged_percent] {
                 assert!(v.ci95[0] <= v.value && v.value <= v.ci95[1], "{p:?}");
             }

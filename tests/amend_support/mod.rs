@@ -4,7 +4,7 @@
 #[path = "../reconstruct_support/mod.rs"]
 pub mod sensors;
 
-use greylag::control::{self, Kind, Target};
+use greylag::control::{self, ControllerKind, Target};
 use greylag::model::GreyBox;
 use greylag::num::stream::stream;
 use greylag::sim::{Environment, Simulator};
@@ -28,7 +28,7 @@ pub fn fly(hidden: &str, seconds: f64, manoeuvres: Manoeuvres, seed: u64) -> Flo
     let hide = if hidden.is_empty() { Vec::new() } else { vec![hidden.parse().unwrap()] };
     let options = PlantOptions { hidden: hide, seed: seed as u32 + 1, ..Default::default() };
     let mut simulator = Simulator::new(&options).unwrap();
-    let mut lqi = control::build(Kind::Lqi, &sensors::model()).unwrap();
+    let mut lqi = control::build(ControllerKind::Lqi, &sensors::model()).unwrap();
     let mut random = stream(seed, &[21]);
     let phases: [f64; 8] = std::array::from_fn(|_| random.random::<f64>() * std::f64::consts::TAU);
     let mut seen = simulator.reset().unwrap();

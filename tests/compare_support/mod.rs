@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use greylag::control::{self, Kind, Target};
+use greylag::control::{self, ControllerKind, Target};
 use greylag::logs::{Flight, Sample};
 use greylag::model::GreyBox;
 use greylag::num::stream::{Stream, stream};
@@ -57,7 +57,7 @@ pub fn fly(seed: u64, seconds: f64, noise: Noise) -> Flight {
 /// The same with the excitation multiplied by `excitation`; 0 is a nominal flight.
 pub fn fly_with(seed: u64, seconds: f64, noise: Noise, excitation: f64) -> Flight {
     let mut simulator = Simulator::new(&Default::default()).unwrap();
-    let mut lqi = control::build(Kind::Lqi, &model("jsbsim")).unwrap();
+    let mut lqi = control::build(ControllerKind::Lqi, &model("jsbsim")).unwrap();
     let mut random = stream(seed, &[11]);
     let mut seen = simulator.reset().unwrap();
     lqi.reset(seed);

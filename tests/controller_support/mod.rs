@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use greylag::control::{Controller, Kind, build};
+use greylag::control::{Controller, ControllerKind, build};
 use greylag::flight::desk::Desk;
 use greylag::flight::pilot::{Config, Decision, Pilot};
 use greylag::flight::runtime::{Companion, Placement};
@@ -32,8 +32,9 @@ pub fn profile(personality: Personality, authority: Authority) -> Profile {
 
 /// An LQI with an LQI to fall back on; the design, which takes most of a bench's time, is made once.
 fn lqi() -> Companion {
-    static DESIGN: LazyLock<(Config, Box<dyn Controller>)> =
-        LazyLock::new(|| (Config::for_model(x8()).unwrap(), build(Kind::Lqi, x8()).unwrap()));
+    static DESIGN: LazyLock<(Config, Box<dyn Controller>)> = LazyLock::new(|| {
+        (Config::for_model(x8()).unwrap(), build(ControllerKind::Lqi, x8()).unwrap())
+    });
     let (config, design) = &*DESIGN;
     let [controller, fallback] = [(), ()].map(|()| design.boxed_clone());
     let pilot = Pilot::new(config.clone(), fallback).unwrap();

@@ -11,8 +11,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use greylag::commands::fly::companion_with;
-use greylag::control::Kind;
-use greylag::flight::runtime::{self, Flight, Options, Pace, Summary};
+use greylag::control::ControllerKind;
+use greylag::flight::runtime::{self, Flight, FlightOptions, Pace, Summary};
 use greylag::model::{GreyBox, Twin};
 use greylag::physics::{Command, State};
 use mavlink::dialects::ardupilotmega::*;
@@ -30,15 +30,15 @@ pub fn x8() -> &'static GreyBox {
     MODEL.get_or_init(|| GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap())
 }
 
-/// Options that listen on loopback, at ports that the system chooses.
-pub fn options(pace: Pace) -> Options {
-    Options {
+/// FlightOptions that listen on loopback, at ports that the system chooses.
+pub fn options(pace: Pace) -> FlightOptions {
+    FlightOptions {
         vehicle: "udpin:127.0.0.1:0".parse().unwrap(),
         clients: vec!["udpin:127.0.0.1:0".parse().unwrap(), "tcpin:127.0.0.1:0".parse().unwrap()],
         record: None,
         pace,
         duration: None,
-        plan_deadline: Options::PLAN_DEADLINE,
+        plan_deadline: FlightOptions::PLAN_DEADLINE,
         travels: x8().airframe.actuators.travels(),
         mixer: None,
         controller: None,
@@ -53,11 +53,11 @@ pub struct Companion {
 }
 
 impl Companion {
-    pub fn start(options: &Options) -> Self {
-        Companion::with(options, companion_with(Kind::Lqi, x8(), Path::new("")).unwrap())
+    pub fn start(options: &FlightOptions) -> Self {
+        Companion::with(options, companion_with(ControllerKind::Lqi, x8(), Path::new("")).unwrap())
     }
 
-    pub fn with(options: &Options, companion: runtime::Companion) -> Self {
+    pub fn with(options: &FlightOptions, companion: runtime::Companion) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         Companion { flight: Some(Flight::start(options, companion, stop.clone()).unwrap()), stop }
     }

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use greylag::control::{self, Kind, Target};
+use greylag::control::{self, ControllerKind, Target};
 use greylag::logs::{Flight, Sample};
 use greylag::model::GreyBox;
 use greylag::num::stream::{Stream, stream};
@@ -43,7 +43,7 @@ pub struct Flown {
 
 /// Flies `seconds` through several headings with doublets and multisines on top of the LQI.
 pub fn fly(seconds: f64, air: Air, seed: u64) -> Flown {
-    let mut lqi = control::build(Kind::Lqi, &model()).unwrap();
+    let mut lqi = control::build(ControllerKind::Lqi, &model()).unwrap();
     let options = PlantOptions { air, seed: seed as u32 + 1, ..Default::default() };
     let mut simulator = Simulator::new(&options).unwrap();
     let mut random = stream(seed, &[1]);

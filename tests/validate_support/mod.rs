@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use greylag::control::{self, Kind, Target};
+use greylag::control::{self, ControllerKind, Target};
 use greylag::model::GreyBox;
 use greylag::num::stream;
 use greylag::physics::{Channel, Command, Controls, State, rigid_body};
@@ -85,7 +85,7 @@ pub fn noise(seed: u64, memory: f64, hold: usize) -> Vec<Command> {
 
 pub fn pid(roll: f64, pitch: f64) -> Vec<Command> {
     let mut plant = plant(&[]);
-    let mut pid = control::build(Kind::Pid, &model("prior")).unwrap();
+    let mut pid = control::build(ControllerKind::Pid, &model("prior")).unwrap();
     let target = Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 20.0 };
     (0..1000)
         .map(|_| {

@@ -90,38 +90,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let places = Places::new(&path, &arguments.out, overwrite)?;
     distinct(&arguments.logs.paths, &arguments.hold_out)?;
     let effects = named_effects(&arguments.effects)?;
-    for id in &effects {
-        if catalogue::describe(id).is_none() {
-            bail!(
-                "effect {id:?} is unknown to this program; `greylag effects list` names those it knows"
-            );
-        }
-        if model.has(id) {
-            bail!(
-                "model {} has the effect {id} already; --tune-only refits its coefficients",
-                model.name
-            );
-        }
-    }
+    check_new(&effects, &model)?;
     let (paths, held) = divided(&arguments.logs.paths, &arguments.hold_out);
     let (logs, hold_out) = (hashed(&paths)?, hashed(&held)?);
-    let clock = ActuatorClock::AsRecorded;
-    let Intake { mut flights, mut notes, mut in_doubt } =
-        arguments.logs.of(paths).take_in(&model, clock)?;
-    let tests = if held.is_empty() {
-        notes.push(format!(
-            "{}: fitted to its first two thirds, judged by the last",
-            flights[0].name
-        ));
-        let [first, last] = amend::split(&flights[0]);
-        flights = vec![first];
-        vec![last]
-    } else {
-        let more = arguments.logs.of(held).take_in(&model, clock)?;
-        notes.extend(more.notes);
-        in_doubt |= more.in_doubt;
-        more.flights
-    };
+    let mut taken = arguments.logs.of(paths).take_in(&model, ActuatorClock::AsRecorded)?;
+    let tests = tests(arguments, held, &model, &mut taken)?;
+    let Intake { flights, notes, mut in_doubt } = taken;
     let options = amend::Options {
         effects: wanted(arguments, &effects, &model, &flights)?,
         conventions: arguments.conventions,
@@ -139,11 +113,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     in_doubt |= !amend::contradictions(&story.parameters).is_empty();
     let all_refused = story.all_refused();
     // drawn before anything is written, so that Ctrl-C leaves nothing behind
-    let drawn = arguments.report.as_ref().filter(|_| !all_refused).map(|path| {
-        let page = page(arguments, &model, &amended, &tests, &places, &part(&hear, drawing))?;
-        Ok::<_, anyhow::Error>((path, page))
-    });
-    let drawn = drawn.transpose()?;
+    let draw = || page(arguments, &model, &amended, &tests, &places, &part(&hear, drawing));
+    let drawn = match &arguments.report {
+        Some(path) if !all_refused => Some((path, draw()?)),
+        _ => None,
+    };
     bar.go_on()?;
     drop(bar);
     print(&amended.amendment);
@@ -158,6 +132,46 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::write(path, &page, overwrite)?;
     }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+/// Refuses effects that the program does not know or the model has already.
+fn check_new(effects: &[String], model: &GreyBox) -> Result<()> {
+    for id in effects {
+        if catalogue::describe(id).is_none() {
+            bail!(
+                "effect {id:?} is unknown to this program; `greylag effects list` names those it knows"
+            );
+        }
+        if model.has(id) {
+            bail!(
+                "model {} has the effect {id} already; --tune-only refits its coefficients",
+                model.name
+            );
+        }
+    }
+    Ok(())
+}
+
+/// The flights that judge: those held out, else the last third of the one in `taken`, which then keeps the rest.
+fn tests(
+    arguments: &Arguments,
+    held: Vec<PathBuf>,
+    model: &GreyBox,
+    taken: &mut Intake,
+) -> Result<Vec<Reconstruction>> {
+    if held.is_empty() {
+        taken.notes.push(format!(
+            "{}: fitted to its first two thirds, judged by the last",
+            taken.flights[0].name
+        ));
+        let [first, last] = amend::split(&taken.flights[0]);
+        taken.flights = vec![first];
+        return Ok(vec![last]);
+    }
+    let more = arguments.logs.of(held).take_in(model, ActuatorClock::AsRecorded)?;
+    taken.notes.extend(more.notes);
+    taken.in_doubt |= more.in_doubt;
+    Ok(more.flights)
 }
 
 /// The report as HTML, with how the errors grow on the flights that the fit did not see.

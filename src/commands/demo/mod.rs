@@ -3,8 +3,10 @@
 mod client;
 mod schedule;
 
+use crate::report::Sight;
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,9 +27,9 @@ use crate::commands::recording_report::{self, Reporter, TOLERANCE_DEG};
 use crate::commands::start::{self, StartArguments};
 use crate::commands::{files, fly};
 use crate::control::cem::Change;
-use crate::control::{self, Kind};
+use crate::control::{self, ControllerKind};
 use crate::flight::recorder::Place;
-use crate::flight::runtime::{Flight, Options, Pace};
+use crate::flight::runtime::{Companion, Flight, FlightOptions, Pace};
 use crate::link::address::Address;
 use crate::link::vehicle::{Sitl, Vehicle};
 use crate::manoeuvres::Schedule;
@@ -36,12 +38,12 @@ use crate::report::FlightReport;
 use client::{Client, View};
 use schedule::Legs;
 
-/// Options of `greylag demo`.
+/// FlightOptions of `greylag demo`.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Controller that flies.
     #[arg(long, value_name = "NAME", default_value = fly::CONTROLLER, value_parser = choices::controller())]
-    controller: Kind,
+    controller: ControllerKind,
     /// Model that the controller is designed from or plans with.
     #[arg(long, value_name = "FILE", default_value = fly::MODEL)]
     model: PathBuf,
@@ -94,17 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let stop = Arc::new(AtomicBool::new(false));
     let flight = Flight::start(&options(arguments, &model)?, flying, stop.clone())?;
     let folder = flight.recording.clone().context("the demonstration records")?;
-    let chosen = Chosen {
-        controller: *controller,
-        model: &arguments.model,
-        policy,
-        changes,
-        airframe: None,
-        schedule: arguments.schedule.as_deref(),
-        profile: ProfileName::Sitl,
-        commanded: CommandName::Surfaces,
-    };
-    FlownWith::write(&folder, &chosen, &model)?;
+    FlownWith::write(&folder, &chosen(arguments), &model)?;
     let companion = flight.clients.first().copied().flatten().context("no client link")?;
     let vehicle = flight.vehicle.context("no vehicle link")?;
     println!(
@@ -114,28 +106,17 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     println!("model: {}", model.description);
     println!("shim: aircraft {} in JSBSim, real time, towards udp {vehicle}", plant.aircraft);
     let simulator = simulate(arguments, plant.clone(), &format!("udpout:{vehicle}"), stop.clone())?;
-    let mut table = Live::begin(&legs);
-    let ended = arguments.attached.then(input_ends).unwrap_or_default();
-    let flown = Client::connect(companion)
-        .and_then(|mut c| c.fly(&legs, &ended, |leg, s, view| table.show(leg, s, view)));
-    table.end();
+    let flown = as_client(arguments, companion, &legs);
     stop.store(true, Ordering::Relaxed);
     let summary =
         flight.join().context("the control thread has died; the recording holds all up to then")?;
     let simulated = simulator.join().map_err(|_| anyhow!("the shim's thread has died"))?;
     println!("{summary}");
     println!("{}", simulated?);
-    let mut sights = Vec::new();
-    if arguments.controller.pace() == control::Pace::Planned {
-        let mut again = set_up()?;
-        schedule.iter().for_each(|schedule| again.pilot.follow(schedule.clone()));
-        let vehicle = Vehicle::Sitl(Sitl::new(1, model.airframe.actuators.travels()));
-        // the flight is reported even if the planner's sight cannot be
-        sights = recording_report::sights(&folder, again, vehicle).unwrap_or_else(|why| {
-            eprintln!("the report does not show what the planner saw: {why:#}");
-            Vec::new()
-        });
-    }
+    let sights = match controller.pace() {
+        control::Pace::Planned => sights(&folder, set_up()?, schedule, &model),
+        _ => Vec::new(),
+    };
     let recorded = recording_report::read(&folder)?;
     let segment = |leg: &schedule::Leg| {
         recording_report::segment([leg.roll_deg, leg.pitch_deg], leg.difficulty, &recorded)
@@ -156,6 +137,45 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(verdict(&report))
 }
 
+/// What was chosen, as the recording keeps it.
+fn chosen(arguments: &Arguments) -> Chosen<'_> {
+    Chosen {
+        controller: arguments.controller,
+        model: &arguments.model,
+        policy: &arguments.policy,
+        changes: &arguments.changes,
+        airframe: None,
+        schedule: arguments.schedule.as_deref(),
+        profile: ProfileName::Sitl,
+        commanded: CommandName::Surfaces,
+    }
+}
+
+/// Flies the legs as a client of the companion at `to`; the texts that it heard.
+fn as_client(arguments: &Arguments, to: SocketAddr, legs: &Legs) -> Result<Vec<(f64, String)>> {
+    let mut table = Live::begin(legs);
+    let ended = arguments.attached.then(input_ends).unwrap_or_default();
+    let flown = Client::connect(to)
+        .and_then(|mut c| c.fly(legs, &ended, |leg, s, view| table.show(leg, s, view)));
+    table.end();
+    flown
+}
+
+/// What the planner saw, flown `again` from the recording; the flight is reported even if that cannot be shown.
+fn sights(
+    folder: &Path,
+    mut again: Companion,
+    schedule: Option<Schedule>,
+    model: &GreyBox,
+) -> Vec<Sight> {
+    schedule.into_iter().for_each(|schedule| again.pilot.follow(schedule));
+    let vehicle = Vehicle::Sitl(Sitl::new(1, model.airframe.actuators.travels()));
+    recording_report::sights(folder, again, vehicle).unwrap_or_else(|why| {
+        eprintln!("the report does not show what the planner saw: {why:#}");
+        Vec::new()
+    })
+}
+
 /// Becomes true when standard input ends.
 fn input_ends() -> Arc<AtomicBool> {
     let ended = Arc::new(AtomicBool::new(false));
@@ -168,9 +188,9 @@ fn input_ends() -> Arc<AtomicBool> {
     ended
 }
 
-fn options(arguments: &Arguments, model: &GreyBox) -> Result<Options> {
+fn options(arguments: &Arguments, model: &GreyBox) -> Result<FlightOptions> {
     let free_port: Address = "udpin:127.0.0.1:0".parse()?;
-    Ok(Options {
+    Ok(FlightOptions {
         vehicle: free_port.clone(),
         clients: vec![free_port],
         record: Some(
@@ -178,7 +198,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Result<Options> {
         ),
         pace: Pace::RealTime,
         duration: None,
-        plan_deadline: Options::PLAN_DEADLINE,
+        plan_deadline: FlightOptions::PLAN_DEADLINE,
         travels: model.airframe.actuators.travels(),
         mixer: model.airframe.mixer.clone(),
         controller: None,

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::budget::Budget;
 use crate::commands::fly;
 use crate::commands::interruption::Interruption;
-use crate::control::Kind;
+use crate::control::ControllerKind;
 use crate::model::GreyBox;
 use crate::sim::evaluation::{Evaluation, imagine};
 use crate::sim::{Group, TargetFile};
@@ -16,7 +16,8 @@ use crate::sim::{Group, TargetFile};
 /// Seed of the targets: neither those that controllers are scored on nor those that trainings are judged by.
 const TARGETS: u64 = 3;
 /// One target in so many is flown: a planner takes milliseconds a step, and the LQI needs few to be judged.
-const EVERY: [(Kind, u32); 3] = [(Kind::Policy, 1), (Kind::Lqi, 4), (Kind::HybridLqi, 24)];
+const EVERY: [(ControllerKind, u32); 3] =
+    [(ControllerKind::Policy, 1), (ControllerKind::Lqi, 4), (ControllerKind::HybridLqi, 24)];
 
 /// What a controller reached in the model.
 #[derive(Clone, Debug, Serialize)]
@@ -46,14 +47,14 @@ pub fn reached(
 ) -> Result<Option<Vec<Reached>>> {
     let model = GreyBox::load(&folder.join("model.toml"))?;
     let mut all = Vec::new();
-    let flown = |kind: &Kind| budget.flies_planners() || !kind.searches();
+    let flown = |kind: &ControllerKind| budget.flies_planners() || !kind.searches();
     for (kind, every) in EVERY.into_iter().filter(|(kind, _)| flown(kind)) {
         if stop.is_set() {
             return Ok(None);
         }
         let controller = match fly::controller(kind, &model, policy, &[]) {
             Ok(controller) => controller,
-            Err(error) if kind == Kind::Policy => return Err(error),
+            Err(error) if kind == ControllerKind::Policy => return Err(error),
             Err(error) => {
                 eprintln!("{kind} is not flown in the model: {error:#}");
                 continue;

@@ -1,11 +1,13 @@
 //! `greylag train dynamics`: learn a dynamics model.
 
+mod recipe;
+mod tables;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use comfy_table::Table;
 use serde::Serialize;
 
 use super::flights::{FlightArguments, Flights};
@@ -14,11 +16,10 @@ use crate::commands::interruption::{Ended, Interruption};
 use crate::learn::dynamics::export;
 use crate::learn::dynamics::residual_map::{ResidualMap, residual_map};
 use crate::learn::dynamics::score::{Horizon, free_run};
-use crate::learn::{
-    self, Checkpoint, Criterion, Learned, Moment, Progress, Recipe, Start, Trainer, trainable,
-};
+use crate::learn::{self, Checkpoint, Learned, Moment, Recipe, Trainer};
 use crate::model::{GreyBox, Integrator, STEP};
 use crate::report::TrainingReport;
+use tables::{coefficients, horizons, line, shares};
 
 /// Updates between two progress lines.
 const LINE: u64 = 500;
@@ -26,9 +27,6 @@ const LINE: u64 = 500;
 const KEEP: u64 = 4;
 /// Horizons of the score, steps.
 const HORIZONS: [usize; 4] = [1, 10, 100, 500];
-/// Steps of a rollout on logs of fewer samples than the model has steps: between its samples such a log is interpolated,
-/// and what is learned within a few of them is the interpolation.
-const SLOW_STEPS: usize = 200;
 /// The file that a training goes on from.
 const CHECKPOINT: &str = "checkpoint.safetensors";
 
@@ -157,16 +155,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// As [`run`], until `stop` is set.
 pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let path = shipped(&arguments.prior);
-    let mut prior = GreyBox::load(&path)?;
-    if let Some(scheme) = &arguments.integrator {
-        prior.integrator = if scheme == "rk4" { Integrator::Rk4 } else { Integrator::Jsbsim };
-    }
+    let prior = arguments.prior(&path)?;
     let truth = arguments.truth.as_ref().map(|t| GreyBox::load(&shipped(t))).transpose()?;
     let Flights { learn, judge, samples, slowest_s, notes } = arguments.flights.read(&prior)?;
-    if arguments.flights.is_logs_alone() && !arguments.from_scratch {
-        // as `amend` has it: a flight that was not flown to be learned from shows part of the coefficients
-        prior = prior.with_widths(|c| Some(c.width()).filter(|width| *width > 0.0));
-    }
+    let prior = arguments.narrowed(prior);
     let recipe = arguments.recipe(&prior, slowest_s);
     notes.iter().for_each(|note| eprintln!("{note}"));
     std::fs::create_dir_all(&arguments.out)
@@ -176,17 +168,8 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
         learn.len(),
         judge.len()
     );
-    let mut trainer = Trainer::new(recipe, &prior, learn)?;
-    for name in trainer.unseen() {
-        eprintln!("the flights do not show {name} apart from others: it stays near its prior");
-    }
     let kept = arguments.out.join(CHECKPOINT);
-    if kept.exists() {
-        trainer
-            .resume(Checkpoint::load(&kept)?)
-            .with_context(|| format!("cannot go on from {}", kept.display()))?;
-        eprintln!("going on after {} updates", trainer.update());
-    }
+    let mut trainer = begun(Trainer::new(recipe, &prior, learn)?, &kept)?;
     let past = arguments.out.join(HISTORY);
     let mut history = history(&past, trainer.update());
     if !train(&mut trainer, &kept, &past, &mut history, stop)? {
@@ -198,32 +181,18 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let names: Vec<String> = learned.iter().map(|c| c.name.clone()).collect();
     let origin = export::origin(&model, trainer.data(), trainer.recipe().seed);
     let about = format!("Learned from {samples} samples of flight, prior {}.", prior.name);
-    export::save(
-        &model,
-        &path,
-        export::Text { about: &about, trained: &names },
-        &origin,
-        &arguments.out,
-    )?;
+    let text = export::Text { about: &about, trained: &names };
+    export::save(&model, &path, text, &origin, &arguments.out)?;
     let scores = [&prior, &model].map(|m| free_run(m, &judge, &HORIZONS));
-    println!("{}", coefficients(&learned));
-    println!("{}", horizons(&scores));
     let residual = residual_map(&model, &judge);
-    if let Some(residual_map) = &residual {
-        println!("{}", shares(residual_map));
-    }
-    let [before, after] = scores;
-    let worse = before.iter().zip(&after).rfind(|(_, learned)| learned.runs > 0);
+    let tables = [coefficients(&learned), horizons(&scores)];
+    tables.into_iter().chain(residual.as_ref().map(shares)).for_each(|table| println!("{table}"));
     let mut notes = notes;
-    if let Some((before, _)) = worse.filter(|(b, a)| a.rms > b.rms || a.lost > b.lost) {
-        let seconds = before.steps as f64 * STEP;
-        let note = format!(
-            "What was learned is worse than the prior {seconds:.0} s ahead on flights that it has not seen: learn from more \
-             flights, with longer rollouts (--steps), or fit the prior first (greylag amend --tune-only)."
-        );
+    if let Some(note) = worse(&scores) {
         eprintln!("{note}");
         notes.push(note);
     }
+    let [before, after] = scores;
     let document = Document {
         schema: "greylag.training/1",
         program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
@@ -237,79 +206,86 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
         residual,
         notes,
     };
-    let json = arguments.out.join("training.json");
-    files::write(&json, &(serde_json::to_string_pretty(&document)? + "\n"), Overwrite::Force)?;
-    let report = TrainingReport {
-        title: format!("{} learned from flights", prior.name),
-        subtitle: format!("{} updates over {samples} samples.", trainer.update()),
-        history: &history,
-        coefficients: &learned,
-        prior: &document.prior,
-        learned: &document.learned,
-        residual: document.residual.as_ref(),
-        notes: &document.notes,
-        provenance: vec![
-            ("Program".into(), document.program.into()),
-            ("Prior".into(), path.display().to_string()),
-            ("Data".into(), format!("SHA-256 {}", trainer.data())),
-            ("Recipe".into(), serde_json::to_string(trainer.recipe())?),
-            ("Command line".into(), files::command_line()),
-            ("Plots".into(), "uPlot 1.6.32 (MIT)".into()),
-        ],
-    };
-    let page = arguments.out.join(REPORT);
-    files::write(&page, &report.page().render(), Overwrite::Force)?;
-    println!("report in {}", page.display());
+    let title = format!("{} learned from flights", prior.name);
+    let subtitle = format!("{} updates over {samples} samples.", trainer.update());
+    document.save(&arguments.out, [title, subtitle], &path)?;
     println!("model in {}", arguments.out.join(export::MODEL).display());
     Ok(Ended::Done)
 }
 
-impl Arguments {
-    fn recipe(&self, prior: &GreyBox, slowest_s: f64) -> Recipe {
-        let wide = |name: &String| {
-            let found = prior.coefficients().iter().find(|c| c.name == *name);
-            found.is_none_or(|c| c.width() > 0.0)
+impl Document<'_> {
+    /// Writes the scores into `folder`, and the report with its title and subtitle; `prior` is that model's file.
+    fn save(&self, folder: &Path, [title, subtitle]: [String; 2], prior: &Path) -> Result<()> {
+        let json = folder.join("training.json");
+        files::write(&json, &(serde_json::to_string_pretty(self)? + "\n"), Overwrite::Force)?;
+        let report = TrainingReport {
+            title,
+            subtitle,
+            history: self.history,
+            coefficients: self.coefficients,
+            prior: &self.prior,
+            learned: &self.learned,
+            residual: self.residual.as_ref(),
+            notes: &self.notes,
+            provenance: vec![
+                ("Program".into(), self.program.into()),
+                ("Prior".into(), prior.display().to_string()),
+                ("Data".into(), format!("SHA-256 {}", self.data_sha256)),
+                ("Recipe".into(), serde_json::to_string(self.recipe)?),
+                ("Command line".into(), files::command_line()),
+                ("Plots".into(), "uPlot 1.6.32 (MIT)".into()),
+            ],
         };
-        let narrow = self.flights.is_logs_alone() && !self.from_scratch;
-        let names = match self.trainable.as_slice() {
-            [all] if all == "all" => {
-                trainable(prior).into_iter().filter(|name| !narrow || wide(name)).collect()
-            }
-            names => names.to_vec(),
-        };
-        let start = match self.start.as_str() {
-            "as-given" => Start::AsGiven,
-            _ => Start::EquationError,
-        };
-        Recipe {
-            hidden: self.hidden.clone(),
-            steps: match self.steps.as_slice() {
-                [] if slowest_s > 1.001 * STEP => vec![SLOW_STEPS],
-                [] => Recipe::default().steps,
-                steps => steps.to_vec(),
-            },
-            batch: self.batch,
-            updates: self.updates,
-            rate: self.rate,
-            prior_rate: self.prior_rate.unwrap_or(match (start, self.joint) {
-                (Start::AsGiven, Joint::Gradient) => 3e-3,
-                _ => 0.0,
-            }),
-            start,
-            joint: self.joint.into(),
-            lambda: self.lambda,
-            tau: self.tau,
-            criterion: if self.loss == "plain" { Criterion::Plain } else { Criterion::Scaled },
-            floor: match self.floor {
-                None if self.loss == "plain" => None,
-                None => Recipe::default().floor,
-                Some(floor) => Some(floor).filter(|f| *f != f64::INFINITY),
-            },
-            trainable: names,
-            seed: self.seed,
-            ..Recipe::default()
-        }
+        let page = folder.join(REPORT);
+        files::write(&page, &report.page().render(), Overwrite::Force)?;
+        println!("report in {}", page.display());
+        Ok(())
     }
+}
+
+impl Arguments {
+    /// The prior in `path`, with the scheme that was asked for.
+    fn prior(&self, path: &Path) -> Result<GreyBox> {
+        let mut prior = GreyBox::load(path)?;
+        if let Some(scheme) = &self.integrator {
+            prior.integrator = if scheme == "rk4" { Integrator::Rk4 } else { Integrator::Jsbsim };
+        }
+        Ok(prior)
+    }
+
+    /// `prior` with the widths that its coefficients keep where logs alone are learned from.
+    fn narrowed(&self, prior: GreyBox) -> GreyBox {
+        if !self.flights.is_logs_alone() || self.from_scratch {
+            return prior;
+        }
+        // as `amend` has it: a flight that was not flown to be learned from shows part of the coefficients
+        prior.with_widths(|c| Some(c.width()).filter(|width| *width > 0.0))
+    }
+}
+
+/// `trainer`, gone on from the checkpoint if there is one.
+fn begun(mut trainer: Trainer, kept: &Path) -> Result<Trainer> {
+    for name in trainer.unseen() {
+        eprintln!("the flights do not show {name} apart from others: it stays near its prior");
+    }
+    if kept.exists() {
+        trainer
+            .resume(Checkpoint::load(kept)?)
+            .with_context(|| format!("cannot go on from {}", kept.display()))?;
+        eprintln!("going on after {} updates", trainer.update());
+    }
+    Ok(trainer)
+}
+
+/// Says so if what was learned is worse than the prior, the farthest ahead that both go.
+fn worse([before, after]: &[Vec<Horizon>; 2]) -> Option<String> {
+    let farthest = before.iter().zip(after).rfind(|(_, learned)| learned.runs > 0);
+    let (before, _) = farthest.filter(|(b, a)| a.rms > b.rms || a.lost > b.lost)?;
+    let seconds = before.steps as f64 * STEP;
+    Some(format!(
+        "What was learned is worse than the prior {seconds:.0} s ahead on flights that it has not seen: learn from more \
+         flights, with longer rollouts (--steps), or fit the prior first (greylag amend --tune-only)."
+    ))
 }
 
 /// Trains to the end; `false` if interrupted. The last good state is in the checkpoint either way.
@@ -351,80 +327,4 @@ fn history(path: &Path, update: u64) -> Vec<Moment> {
     let mut history: Vec<Moment> = serde_json::from_str(&text).unwrap_or_default();
     history.retain(|m| m.update <= update);
     history
-}
-
-fn line(p: &Progress, trainer: &Trainer, ms: f64) -> String {
-    let ratio = p.loss.learned / p.loss.prior;
-    let mut text = format!(
-        "{:>7} n {:>3}  L/L_prior {:.5}  |Fa|/|Fp| {:.4}  lambda {:.1}  {ms:.1} ms",
-        p.update, p.steps, p.normalised, ratio, p.lambda
-    );
-    if p.loss.lost > 0 {
-        text += &format!("  {} rollouts lost", p.loss.lost);
-    }
-    for Learned { name, value, .. } in trainer.coefficients(None).iter().take(12) {
-        text += &format!("  {} {value:.4}", name.rsplit('.').next().unwrap_or(name));
-    }
-    text
-}
-
-/// What the residual adds, channel by channel.
-fn shares(residual_map: &ResidualMap) -> Table {
-    let mut table = Table::new();
-    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(["rate of", "prior, x_c/s", "residual, x_c/s", "strongest at"]);
-    for share in &residual_map.channels {
-        let place = share
-            .strongest
-            .as_ref()
-            .map_or(String::new(), |(over, [low, high])| format!("{over} {low:.0} to {high:.0}"));
-        table.add_row([
-            share.channel.to_owned(),
-            format!("{:.4}", share.prior),
-            format!("{:.4}", share.learned),
-            place,
-        ]);
-    }
-    table
-}
-
-fn coefficients(learned: &[Learned]) -> Table {
-    let mut table = Table::new();
-    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(["coefficient", "prior", "learned", "true"]);
-    for Learned { name, start, value, truth } in learned {
-        let truth = truth.map_or("-".into(), |t| format!("{t:.5}"));
-        table.add_row([name.clone(), format!("{start:.5}"), format!("{value:.5}"), truth]);
-    }
-    table
-}
-
-fn horizons([prior, learned]: &[Vec<Horizon>; 2]) -> Table {
-    let mut table = Table::new();
-    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header([
-        "steps",
-        "runs",
-        "prior rms",
-        "learned rms",
-        "ratio",
-        "prior median",
-        "learned median",
-        "ratio",
-        "lost",
-    ]);
-    for (p, l) in prior.iter().zip(learned) {
-        table.add_row([
-            p.steps.to_string(),
-            p.runs.to_string(),
-            format!("{:.2e}", p.rms),
-            format!("{:.2e}", l.rms),
-            format!("{:.4}", l.rms / p.rms),
-            format!("{:.2e}", p.median),
-            format!("{:.2e}", l.median),
-            format!("{:.4}", l.median / p.median),
-            format!("{:.1} % {:.1} %", 100.0 * p.lost, 100.0 * l.lost),
-        ]);
-    }
-    table
 }

@@ -1,39 +1,34 @@
 //! `greylag train policy`: train a policy in a model or in JSBSim.
 
+mod ground;
+mod recipe;
+mod run;
+
+pub use run::reached;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::Instant;
 
-use anyhow::{Context, Result, anyhow, bail};
-use serde::Serialize;
+use anyhow::{Context, Result, bail};
 
-use super::{analytic, curves};
-use crate::commands::files::{self, Overwrite, shipped};
+use super::curves;
+use crate::commands::files::shipped;
 use crate::commands::interruption::{Ended, Interruption};
-use crate::control::Controller;
-use crate::control::policy::{Actor, Agent, Critic, Evaluated, Origin, Policy};
-use crate::learn::policy::learning_curve::{COLUMNS, CURVE, CurveFile, CurvePoint};
-use crate::learn::{
-    AnalyticRecipe, Hyperparameters, PolicyProgress, PolicyRecipe, PolicyStanding, PolicyTrainer,
-    ValuationRecipe, write_whole,
-};
+use crate::control::policy::{Actor, Agent, Origin};
+use crate::learn::policy::learning_curve::COLUMNS;
+use crate::learn::{AnalyticRecipe, ValuationRecipe};
 use crate::model::GreyBox;
-use crate::model::residual::{fingerprint, hash};
+use crate::model::residual::fingerprint;
 use crate::physics::Airframe;
-use crate::sim::evaluation::{Evaluation, Make, imagine};
 use crate::sim::imagined::Imagination;
-use crate::sim::targets::{Row, Stratified};
-use crate::sim::world::World;
-use crate::sim::{Group, Outcome, TargetFile};
+use crate::sim::targets::Stratified;
+use ground::Ground;
+use run::Run;
 
-/// The file that a training goes on from.
-const CHECKPOINT: &str = "checkpoint.safetensors";
 /// The page of the learning curves.
 const REPORT: &str = "policy.html";
-/// Part of the imagined episodes that may be lost before it is said to be too many.
-const MANY: f64 = 0.2;
 
 /// Options of `greylag train policy`.
 #[derive(clap::Args)]
@@ -148,31 +143,6 @@ impl FromStr for Place {
     }
 }
 
-/// What a run says of itself beside its curve.
-#[derive(Serialize)]
-struct Document<'a> {
-    schema: &'static str,
-    program: &'static str,
-    command_line: String,
-    method: &'a Method<'a>,
-    best: &'a Origin,
-}
-
-/// How a policy was found.
-#[derive(Serialize)]
-#[serde(rename_all = "snake_case")]
-enum Method<'a> {
-    Td3(&'a PolicyRecipe),
-    Analytic { climb: &'a AnalyticRecipe, valuation: &'a ValuationRecipe },
-}
-
-/// Where a policy is trained, found to be whole.
-struct Ground {
-    model: Option<Arc<GreyBox>>,
-    origin: Origin,
-    airframe: Airframe,
-}
-
 /// Trains, prints the curve, writes the best policy.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(learn(arguments, &Interruption::watch()?)?.into())
@@ -211,34 +181,6 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
 }
 
 impl Arguments {
-    fn recipe(&self, seed: u64) -> PolicyRecipe {
-        PolicyRecipe {
-            td3: Hyperparameters {
-                actor: self.actor.clone(),
-                critic: self.critic.clone(),
-                discount: self.discount,
-                tau: self.tau,
-                actor_rate: self.rate,
-                critic_rate: self.rate,
-                smoothing: self.smoothing,
-                exploration: self.exploration,
-                batch: self.batch as usize,
-                ..Hyperparameters::default()
-            },
-            steps: self.steps,
-            warmup: self.warmup,
-            replay: self.replay as usize,
-            instances: if matches!(self.environment, Place::Simulator) {
-                1
-            } else {
-                self.instances as usize
-            },
-            corners: self.corners,
-            checkpoint: self.checkpoint,
-            seed,
-        }
-    }
-
     /// What the same command does after an interruption.
     fn next_time(&self) -> &'static str {
         match self.is_analytic() {
@@ -249,33 +191,6 @@ impl Arguments {
 
     fn is_analytic(&self) -> bool {
         self.algorithm == "analytic"
-    }
-
-    fn analytic(&self, seed: u64) -> AnalyticRecipe {
-        AnalyticRecipe {
-            actor: self.actor.clone(),
-            instances: self.gradient_batch as usize,
-            window: self.window as usize,
-            updates: self.updates,
-            rate: self.climb,
-            effort: self.effort,
-            rounding: self.rounding,
-            corners: self.corners,
-            draws: self.draws,
-            seed,
-            ..AnalyticRecipe::default()
-        }
-    }
-
-    fn valuation(&self, seed: u64) -> ValuationRecipe {
-        ValuationRecipe {
-            critic: self.critic.clone(),
-            updates: self.valuation,
-            instances: self.instances as usize,
-            discount: self.discount,
-            seed,
-            ..ValuationRecipe::default()
-        }
     }
 
     fn ground(&self) -> Result<Ground> {
@@ -377,183 +292,4 @@ impl Arguments {
             None => Err(anyhow!("this program was built without JSBSim")),
         }
     }
-}
-
-/// The training of one policy.
-struct Run<'a> {
-    folder: PathBuf,
-    seed: u64,
-    evaluate: u64,
-    ground: &'a Ground,
-    stop: &'a Interruption,
-}
-
-impl Run<'_> {
-    /// An actor up the reward's slope, then its critics.
-    fn climb(
-        &self,
-        recipe: &AnalyticRecipe,
-        from: Option<&Actor>,
-        valuation: ValuationRecipe,
-        model: &GreyBox,
-        world: Imagination,
-    ) -> Result<bool> {
-        let judge = |actor| self.ground.evaluate(actor);
-        let Some(actor) = analytic::climb(recipe, from, model, &self.folder, &judge, self.stop)?
-        else {
-            return Ok(false);
-        };
-        let method = Method::Analytic { climb: recipe, valuation: &valuation.clone() };
-        let Some(critics) = analytic::value(valuation, &actor, world, self.stop)? else {
-            return Ok(false);
-        };
-        let steps = recipe.updates * (recipe.window * recipe.instances) as u64;
-        let evaluated = self.ground.evaluate(actor.clone())?;
-        self.save(&method, actor, critics.into(), steps, evaluated)?;
-        println!("{:>8} policy in {}", self.seed, self.folder.display());
-        Ok(true)
-    }
-
-    fn train<W: World>(&self, recipe: PolicyRecipe, world: W) -> Result<bool> {
-        // more steps of the same training are the same training
-        let of = PolicyRecipe { steps: 0, ..recipe.clone() };
-        let of = (of, &self.ground.origin.model_sha256);
-        let what = serde_json::to_string(&of)?;
-        let mut trainer = PolicyTrainer::new(recipe, world, hash(what.as_bytes()))?;
-        let kept = self.folder.join(CHECKPOINT);
-        if kept.exists() {
-            let standing = PolicyStanding::load(&kept)?;
-            trainer
-                .resume(standing)
-                .with_context(|| format!("going on from {}", kept.display()))?;
-            eprintln!("seed {}: going on after {} steps", self.seed, trainer.steps());
-        }
-        let path = self.folder.join(CURVE);
-        let context = || format!("cannot write {}", path.display());
-        let mut curve = CurveFile::open(&path, trainer.steps()).with_context(context)?;
-        let (mut best, before) = (curve.best(), curve.seconds());
-        let start = Instant::now();
-        let (first, goal) = (trainer.steps(), trainer.recipe().steps);
-        while trainer.steps() < goal {
-            let progress = trainer.run(self.evaluate).with_context(|| match kept.exists() {
-                true => format!("seed {}: the last good state is in {}", self.seed, kept.display()),
-                false => format!("seed {}: no checkpoint was written yet", self.seed),
-            })?;
-            let seconds = start.elapsed().as_secs_f64();
-            let evaluated = self.ground.evaluate(trainer.actor())?;
-            let made = (progress.steps - first) as f64;
-            let left = seconds / made * goal.saturating_sub(progress.steps) as f64;
-            let point = CurvePoint {
-                steps: progress.steps,
-                updates: progress.updates,
-                seconds: before + seconds,
-                loss: progress.loss,
-                reward: progress.reward,
-                episodes: progress.episodes,
-                lost: progress.lost,
-                ..reached(evaluated)
-            };
-            curve.add(point).with_context(context)?;
-            println!("{:>8} {}  {:.0} min left", self.seed, point.line(), left / 60.0);
-            warn(self.seed, &progress);
-            if point.badness() <= best {
-                best = point.badness();
-                let method = Method::Td3(trainer.recipe());
-                let (actor, critics) = (trainer.actor(), trainer.critics()?);
-                self.save(&method, actor, critics, progress.steps, evaluated)?;
-            }
-            if trainer.at_checkpoint() {
-                trainer.standing().save(&kept)?;
-            }
-            if self.stop.is_set() && trainer.steps() < goal {
-                return Ok(false);
-            }
-        }
-        println!("{:>8} policy in {}", self.seed, self.folder.display());
-        Ok(true)
-    }
-
-    /// Writes the policy as it is now, the best so far.
-    fn save(
-        &self,
-        method: &Method,
-        actor: Arc<Actor>,
-        critics: Arc<[Critic; 2]>,
-        steps: u64,
-        evaluated: Evaluated,
-    ) -> Result<()> {
-        let evaluation = Some(evaluated);
-        let origin = Origin { seed: self.seed, steps, evaluation, ..self.ground.origin.clone() };
-        let agent = Agent { actor, critics: Some(critics), origin };
-        for (name, bytes) in agent.to_files().map_err(|e| anyhow!("the policy's files: {e}"))? {
-            let path = self.folder.join(name);
-            write_whole(&path, &bytes)
-                .with_context(|| format!("cannot write {}", path.display()))?;
-        }
-        let document = Document {
-            schema: "greylag.policy-training/1",
-            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
-            command_line: files::command_line(),
-            method,
-            best: &agent.origin,
-        };
-        let json = self.folder.join("training.json");
-        files::write(&json, &(serde_json::to_string_pretty(&document)? + "\n"), Overwrite::Force)
-    }
-}
-
-/// Says so if many episodes end outside the envelope.
-fn warn(seed: u64, progress: &PolicyProgress) {
-    let part = progress.lost as f64 / progress.episodes.max(1) as f64;
-    if progress.updates > 0 && part > MANY {
-        eprintln!(
-            "seed {seed}: {:.0} % of the episodes so far left the envelope of a state that can be \
-             believed (attitude, incidence, rates, airspeed); if that goes on, the model lacks flights \
-             near there: collect some and learn it again",
-            100.0 * part
-        );
-    }
-}
-
-/// A point of the curve that says what was reached, and nothing else.
-pub fn reached(e: Evaluated) -> CurvePoint {
-    let Evaluated { easy_deg, hard_deg, divergence_rate, .. } = e;
-    CurvePoint { easy_deg, hard_deg, divergence_rate, ..CurvePoint::default() }
-}
-
-/// Seed of the targets that a training is judged by: none of those that policies are scored on.
-const OTHER: u64 = 2;
-
-impl Ground {
-    /// What `actor` reaches in what it is trained in, on a tenth of a target file: a policy that is trained
-    /// in a model is chosen without a flight in any simulator.
-    fn evaluate(&self, actor: Arc<Actor>) -> Result<Evaluated> {
-        let mut rows = TargetFile::generate(OTHER).rows;
-        rows.retain(|r| r.group != Group::HardOutside && r.number % 10 == r.number / 10 % 10);
-        let make = || -> Box<dyn Controller> { Box::new(Policy::of(actor.clone())) };
-        let outcomes = match &self.model {
-            Some(model) => imagine(model, &make, &rows, 1)?,
-            None => flown(&make, &rows)?,
-        };
-        let scores = Evaluation::new("policy", &self.origin.model, &rows, &outcomes);
-        let mean = |group: &str| scores.score(group).map_or(f64::NAN, |s| s.mean_deg);
-        Ok(Evaluated {
-            targets: rows.len(),
-            easy_deg: mean("easy"),
-            hard_deg: mean("hard_corners"),
-            divergence_rate: scores.score("all").map_or(f64::NAN, |s| s.divergence_rate),
-        })
-    }
-}
-
-/// What came of flights in JSBSim, where the policy was trained there.
-#[cfg(feature = "sitl")]
-fn flown(make: Make, rows: &[Row]) -> Result<Vec<Outcome>> {
-    let plant = greylag_sitl::plant::PlantOptions::default();
-    Ok(crate::sim::evaluation::evaluate(&plant, make, rows, 1, &|| ())?)
-}
-
-#[cfg(not(feature = "sitl"))]
-fn flown(_: Make, _: &[Row]) -> Result<Vec<Outcome>> {
-    bail!("this program was built without JSBSim")
 }

@@ -9,21 +9,22 @@
 //!    late, or not finite         no usable state         still none
 //! ```
 
+mod command;
 mod config;
 mod decision;
-
 mod estimate;
 mod failsafe;
-mod polarity_hold;
 mod limits;
 mod model_watch;
 mod modes;
 mod oscillation;
 mod parameters;
-mod programme;
 mod polarity;
+mod polarity_hold;
+mod programme;
 mod telemetry;
 mod texts;
+mod wish;
 
 pub use config::{Config, ConfigError, ThrustSource, TrimPoint};
 pub use decision::{Decision, Plan, Request, Source};
@@ -335,104 +336,6 @@ impl Pilot {
             },
             throttle,
         }
-    }
-
-    /// The target of the schedule, if one is flown at `now`.
-    fn scheduled_wish(&mut self, now: Time) -> Option<(Target, Option<f64>)> {
-        let programme = self.programme.as_mut()?;
-        if self.mode == Mode::Offboard && self.setpoint.is_some() {
-            return Some((programme.wish(now, &mut self.texts), None));
-        }
-        programme.stop();
-        None
-    }
-
-    /// The target of the mode, before the envelope, with the throttle if the mode sets it itself.
-    fn wish(&self) -> (Target, Option<f64>) {
-        let airspeed = self.config.envelope.airspeed_cruise_mps;
-        match (self.mode, self.setpoint, self.sticks) {
-            (Mode::Offboard, Some((_, s)), _) => {
-                let throttle =
-                    s.thrust.filter(|_| self.config.thrust_source == ThrustSource::Setpoint);
-                (Target { roll: s.roll, pitch: s.pitch, airspeed }, throttle)
-            }
-            (Mode::Stabilized, _, Some((_, s))) => {
-                // A stick forward is nose down; each half of its travel reaches its own limit.
-                let pitch = if s.pitch > 0.0 {
-                    s.pitch * self.limits.pitch_min
-                } else {
-                    -s.pitch * self.limits.pitch_max
-                };
-                (Target { roll: s.roll * self.limits.bank_max, pitch, airspeed }, Some(s.throttle))
-            }
-            _ => (self.level_target(), None),
-        }
-    }
-
-    fn level_target(&self) -> Target {
-        let airspeed = self.config.envelope.airspeed_cruise_mps;
-        Target { roll: 0.0, pitch: self.config.trim_at(airspeed).pitch_deg.to_radians(), airspeed }
-    }
-
-    fn with_state(
-        &mut self,
-        plan: Plan,
-        seen: &Observation,
-        throttle: Option<f64>,
-    ) -> (Command, Source) {
-        let (mut command, source) = match plan {
-            Plan::Ready(command) if command.is_finite() => {
-                self.fallback_engaged = false;
-                (command, Source::Planned)
-            }
-            Plan::Ready(_) => {
-                self.planner_engaged = false;
-                if due(&mut self.complaints.plan, self.clock) {
-                    self.texts
-                        .say(Severity::Error, "controller gave no finite command: fallback flies");
-                }
-                self.fall_back(seen, Source::Fallback)
-            }
-            Plan::Late | Plan::Busy => self.fall_back(seen, Source::Late),
-            Plan::None => self.fall_back(seen, Source::Fallback),
-        };
-        if let Some(programme) = &mut self.programme {
-            command = programme.excite(command);
-        }
-        command.throttle =
-            self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
-        (command, source)
-    }
-
-    fn fall_back(&mut self, seen: &Observation, source: Source) -> (Command, Source) {
-        if !self.fallback_engaged {
-            self.fallback.reset(0);
-            self.fallback_engaged = true;
-        }
-        let command = self.fallback.command(seen, &self.target);
-        if command.is_finite() {
-            return (command, source);
-        }
-        self.fallback_engaged = false;
-        if due(&mut self.complaints.fallback, self.clock) {
-            self.texts.say(Severity::Critical, "fallback gave no finite command: level at trim");
-        }
-        (self.level_command(), Source::Level)
-    }
-
-    /// The command while the state cannot be used.
-    fn without_state(&self) -> (Command, Source) {
-        let short = self.estimate.usable_within(self.clock, self.config.state_hold_s);
-        if short && !self.vehicle_lost {
-            (self.in_force, Source::Held)
-        } else {
-            (self.level_command(), Source::Level)
-        }
-    }
-
-    fn level_command(&self) -> Command {
-        let trim = self.config.trim_at(self.config.envelope.airspeed_cruise_mps);
-        Command { elevator: trim.elevator, throttle: trim.throttle, ..Command::IDLE }
     }
 
     fn complain_of_state(&mut self, reason: &'static str) {

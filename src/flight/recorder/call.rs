@@ -115,6 +115,15 @@ impl FromStr for Call {
     }
 }
 
+/// The value in a line about a parameter.
+fn parameter(words: &[&str]) -> Option<ParameterValue> {
+    match *words.get(2)? {
+        "real" => Some(ParameterValue::Real(words.get(3)?.parse().ok()?)),
+        "int" => Some(ParameterValue::Int(words.get(3)?.parse().ok()?)),
+        _ => None,
+    }
+}
+
 fn read(line: &str) -> Option<Call> {
     let words: Vec<&str> = line.split(' ').collect();
     let number = |at: usize| words.get(at)?.parse::<f64>().ok();
@@ -165,15 +174,7 @@ fn read(line: &str) -> Option<Call> {
             let sticks = Sticks { roll: number(2)?, pitch: number(3)?, throttle: number(4)? };
             Call::Sticks(time(1)?, sticks)
         }
-        "parameter" => {
-            let index = words.get(1)?.parse().ok()?;
-            let value = match *words.get(2)? {
-                "real" => ParameterValue::Real(words.get(3)?.parse().ok()?),
-                "int" => ParameterValue::Int(words.get(3)?.parse().ok()?),
-                _ => return None,
-            };
-            Call::Parameter(index, value)
-        }
+        "parameter" => Call::Parameter(words.get(1)?.parse().ok()?, parameter(&words)?),
         _ => return None,
     })
 }

@@ -1,5 +1,7 @@
 //! The control thread: one loop that answers state frames, then serves clients.
 
+mod clients;
+
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -12,7 +14,7 @@ use super::recording_autopilot::RecordingAutopilot;
 use super::stamps::{Stamps, unix_us};
 use super::summary::Summary;
 use super::timing::Timing;
-use super::{Event, Options};
+use super::{Event, FlightOptions};
 use crate::flight::pilot::{Decision, Pilot, Plan};
 use crate::flight::recorder::call::Planned;
 use crate::flight::recorder::{Call, Recorder, Row};
@@ -59,7 +61,7 @@ pub(super) struct Control {
 
 impl Control {
     pub(super) fn new(
-        options: &Options,
+        options: &FlightOptions,
         mut pilot: Pilot,
         planner: Planner,
         ports: Ports,
@@ -258,55 +260,6 @@ impl Control {
         }
     }
 
-    /// Passes on to the controller what a client has sent it.
-    fn route(&mut self, host: Duration, packet: &Packet) {
-        let Some(router) = &mut self.router else { return };
-        router.learn(host, packet.peer, &packet.bytes);
-        let engaged = self.outputs != Outputs::Disarmed;
-        let frames = router.to_controller(&packet.bytes, self.clients.identity(), engaged);
-        if let Some(peer) = self.vehicle.peer().filter(|_| !frames.is_empty()) {
-            self.ports.send_to_vehicle(unix_us(), peer, frames);
-        }
-    }
-
-    fn take_client(&mut self, arrival: Arrival) {
-        let host = Instant::now();
-        let now = self.now(host);
-        match arrival {
-            Arrival::Packet(mut packet) => {
-                self.ports.sift(unix_us(), &mut packet);
-                self.tell_of_refusals();
-                self.route(now.host, &packet);
-                let mut pilot = RecordingAutopilot {
-                    pilot: &mut self.pilot,
-                    vehicle: &self.vehicle,
-                    recorder: self.recorder.as_ref(),
-                    hear: |event| drop(self.events.try_send(event)),
-                };
-                self.clients.handle(now, packet.peer, &packet.bytes, &mut pilot);
-                self.record(packet.arrived, &packet.bytes);
-            }
-            Arrival::Opened(peer) => self.clients.welcome(now, peer),
-            Arrival::Closed(peer) => {
-                self.clients.forget(peer);
-                self.router.iter_mut().for_each(|router| router.forget(peer));
-            }
-            Arrival::Remark(remark) => self.remark(&remark),
-        }
-        self.send_to_clients();
-    }
-
-    /// Says once that somebody does not sign, or not with our key.
-    fn tell_of_refusals(&mut self) {
-        let refused = self.ports.signing().map_or(0, |counts| counts.refused());
-        if refused > 0 && !self.told_refusals {
-            self.told_refusals = true;
-            let words =
-                "frames without a right signature are refused: sign them with the key of --sign";
-            self.pilot.tell(Severity::Warning, words);
-        }
-    }
-
     /// Says something about a link to the ground stations, and to whoever shows events.
     fn remark(&mut self, remark: &Remark) {
         self.pilot.tell(Severity::Warning, &remark.to_string());
@@ -346,24 +299,6 @@ impl Control {
         if let Some(frame) = self.vehicle.due(host, self.outputs) {
             self.record(Instant::now(), &frame);
             self.ports.send_to_vehicle(unix_us(), peer, frame);
-        }
-    }
-
-    fn welcome_targets(&mut self) {
-        let now = self.now(self.started);
-        let targets = self.ports.clients.iter().filter_map(|link| link.target());
-        for peer in targets.collect::<Vec<_>>() {
-            self.clients.welcome(now, peer);
-        }
-    }
-
-    fn send_to_clients(&mut self) {
-        let unix_us = unix_us();
-        for (peer, frame) in self.clients.drain() {
-            if let Some(recorder) = &self.recorder {
-                recorder.bytes(self.stamps.of(Instant::now()), &frame);
-            }
-            self.ports.send_to_client(unix_us, peer, frame);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::Options;
+use super::FlightOptions;
 use crate::link::address::Address;
 use crate::link::peer::LinkId;
 use crate::link::signing::{Key, KeyError, Signer, SigningCounts, StampError, StampFile};
@@ -47,7 +47,7 @@ pub(super) struct Guard {
 
 impl Guard {
     /// Reads key and timestamp. Link 0 is the vehicle's, the clients' follow.
-    pub(super) fn open(signing: &Signing, options: &Options) -> Result<Self, SigningError> {
+    pub(super) fn open(signing: &Signing, options: &FlightOptions) -> Result<Self, SigningError> {
         let key = Key::load(&signing.key)?;
         let (file, stamp) = StampFile::open(&signing.key)?;
         let clients = options.clients.iter().enumerate();

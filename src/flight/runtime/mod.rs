@@ -50,7 +50,7 @@ const EVENTS: usize = 1024;
 
 /// How to fly.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct FlightOptions {
     /// The vehicle's link.
     pub vehicle: Address,
     /// The clients' links.
@@ -73,7 +73,7 @@ pub struct Options {
     pub signing: Option<Signing>,
 }
 
-impl Options {
+impl FlightOptions {
     /// The time that a planner has by default: a cycle of 10 ms less what the rest of the loop
     /// and the link need.
     pub const PLAN_DEADLINE: Duration = Duration::from_millis(8);
@@ -146,7 +146,7 @@ impl Flight {
     /// # Errors
     /// The first thing that cannot be opened.
     pub fn start(
-        options: &Options,
+        options: &FlightOptions,
         companion: Companion,
         stop: Arc<AtomicBool>,
     ) -> Result<Self, FlightError> {

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use crossbeam_channel::{Receiver, bounded};
 
 use super::guard::Guard;
-use super::{FlightError, Options};
+use super::{FlightError, FlightOptions};
 use crate::link::peer::{LinkId, PeerId};
 use crate::link::signing::SigningCounts;
 use crate::link::transport::{Arrival, Link, Network, Packet};
@@ -28,7 +28,7 @@ pub(super) struct Ports {
 
 impl Ports {
     /// Opens all links, or none.
-    pub(super) fn open(options: &Options) -> Result<Self, FlightError> {
+    pub(super) fn open(options: &FlightOptions) -> Result<Self, FlightError> {
         let guard = options.signing.as_ref().map(|s| Guard::open(s, options)).transpose()?;
         let network = Network::start()?;
         let (to_vehicle, from_vehicle) = bounded(VEHICLE_QUEUE);

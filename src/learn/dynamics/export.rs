@@ -83,34 +83,19 @@ pub fn save(
     set("name", &name);
     set("description", said.about);
     set("airframe", AIRFRAME);
-    set(
-        "integrator",
-        match model.integrator {
-            Integrator::Rk4 => "rk4",
-            Integrator::Jsbsim => "jsbsim",
-        },
-    );
+    let scheme = match model.integrator {
+        Integrator::Rk4 => "rk4",
+        Integrator::Jsbsim => "jsbsim",
+    };
+    set("integrator", scheme);
     set("residual", RESIDUAL);
     if !own.is_empty() {
         let names = own.iter().map(|(name, _)| toml::Value::from(name.as_str())).collect();
         table.insert("effect_files".into(), toml::Value::Array(names));
     }
     for name in said.trained {
-        let value = model.coefficients().iter().find(|c| c.name == *name).map(|c| c.value);
-        let path: Vec<&str> = match name.as_str() {
-            JXZ => name.split('.').collect(),
-            _ => ["effects"].into_iter().chain(name.split('.')).collect(),
-        };
-        let value = value.unwrap_or(model.bare_body().jxz);
-        let entry = path.iter().try_fold(&mut table, |t, key| t.get_mut(*key)?.as_table_mut());
-        let entry = entry.ok_or_else(|| wrong(format!("it has no {name}")))?;
-        let before = entry.get("value").map(ToString::to_string).unwrap_or_default();
-        entry.insert("value".into(), value.into());
-        let source = format!(
-            "learned from flights (data {}), from {before}",
-            &origin.data[..12.min(origin.data.len())]
-        );
-        entry.insert("source".into(), source.into());
+        write_trained(&mut table, model, name, origin)
+            .ok_or_else(|| wrong(format!("it has no {name}")))?;
     }
     let text = toml::to_string(&table).map_err(|e| wrong(e.to_string()))?;
     let residual = match &model.residual {
@@ -125,6 +110,30 @@ pub fn save(
     own.iter().try_for_each(|(name, bytes)| write(name, bytes))?;
     write(RESIDUAL, &residual)?;
     write(MODEL, text.as_bytes())
+}
+
+/// Puts the coefficient `name` of `model` into the model file's `table`; `None` if that has no such entry.
+fn write_trained(
+    table: &mut toml::Table,
+    model: &GreyBox,
+    name: &str,
+    origin: &Origin,
+) -> Option<()> {
+    let value = model.coefficients().iter().find(|c| c.name == name).map(|c| c.value);
+    let path: Vec<&str> = match name {
+        JXZ => name.split('.').collect(),
+        _ => ["effects"].into_iter().chain(name.split('.')).collect(),
+    };
+    let value = value.unwrap_or(model.bare_body().jxz);
+    let entry = path.iter().try_fold(table, |t, key| t.get_mut(*key)?.as_table_mut())?;
+    let before = entry.get("value").map(ToString::to_string).unwrap_or_default();
+    entry.insert("value".into(), value.into());
+    let source = format!(
+        "learned from flights (data {}), from {before}",
+        &origin.data[..12.min(origin.data.len())]
+    );
+    entry.insert("source".into(), source.into());
+    Some(())
 }
 
 /// What a residual's file says of a training of `model` on `data` (SHA-256, hexadecimal).

@@ -1,28 +1,28 @@
 //! Training of the dynamics model, section IV-A of \[GSFM26\].
 
-use rand::seq::SliceRandom;
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+mod reports;
+mod stage;
+
+pub use reports::Learned;
+pub use reports::Moment;
+pub use reports::Progress;
+pub use reports::TrainError;
 
 use crate::learn::adam::Adam;
-use crate::learn::checkpoint::{Checkpoint, CheckpointError};
-use crate::learn::dynamics::basis::{self, Basis, TrainableError};
+use crate::learn::checkpoint::Checkpoint;
+use crate::learn::dynamics::basis::{self, Basis};
 use crate::learn::dynamics::engine::{Arithmetic, Engine};
 use crate::learn::dynamics::equation_error::{self, Weighting};
 use crate::learn::dynamics::loss::{Loss, Objective};
 use crate::learn::dynamics::network::Passes;
 use crate::learn::dynamics::projection;
-use crate::learn::dynamics::recipe::{Criterion, Joint, Recipe, Start};
+use crate::learn::dynamics::recipe::{Joint, Recipe, Start};
 use crate::learn::dynamics::rollout::{PriorSlopes, Subject};
-use crate::learn::dynamics::score::off_after;
-use crate::learn::dynamics::windows::{Track, Window, regular, windows};
-use crate::model::residual::{INPUTS, OUTPUTS, ResidualError, Scales, fingerprint, hash};
+use crate::learn::dynamics::windows::{Track, regular};
+use crate::model::residual::{INPUTS, OUTPUTS, Scales, fingerprint, hash};
 use crate::model::{GreyBox, Residual};
-use crate::num::dense::DenseError;
 use crate::num::{Dense, stream};
-
-/// Windows over which the bare prior's error is taken, L_prior of eq. (23).
-const PRIOR_WINDOWS: usize = 4096;
+use stage::Stage;
 
 /// Samples that the envelope of the data is made from, at most.
 const ENVELOPE_SAMPLES: usize = 40_000;
@@ -37,88 +37,6 @@ const PROJECT_UNTIL: f64 = 0.75;
 
 /// Purposes of the random streams.
 const START: u64 = 1;
-const SHUFFLE: u64 = 2;
-
-/// Why a training cannot begin or go on.
-#[derive(Debug, thiserror::Error)]
-pub enum TrainError {
-    /// The recipe makes no sense.
-    #[error("the training's options: {0}")]
-    Recipe(&'static str),
-    /// A coefficient cannot be trained.
-    #[error(transparent)]
-    Trainable(#[from] TrainableError),
-    /// The network cannot be made.
-    #[error(transparent)]
-    Network(#[from] DenseError),
-    /// Prior and network do not fit.
-    #[error(transparent)]
-    Residual(#[from] ResidualError),
-    /// There is too little data.
-    #[error(
-        "the flights have no stretch of {0} samples without a gap, which one rollout takes; give longer logs, or shorter rollouts"
-    )]
-    Data(usize),
-    /// The bare prior cannot follow the flights at all.
-    #[error(
-        "model {0} leaves the numbers on most rollouts before anything is learned: it is no model of this aircraft, or the logs are of another"
-    )]
-    Prior(String),
-    /// The loss has left the numbers.
-    #[error(
-        "the loss left the numbers at update {update}; what was learned before is kept in the last checkpoint: go on from it with a smaller learning rate"
-    )]
-    Diverged {
-        /// The update.
-        update: u64,
-    },
-    /// A checkpoint does not fit.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-}
-
-/// How an update, or several, went.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Progress {
-    /// Updates made.
-    pub update: u64,
-    /// Rollouts' length.
-    pub steps: usize,
-    /// Mean over the updates since the last report.
-    pub loss: Loss,
-    /// L_pred/L_prior, eq. (23), likewise.
-    pub normalised: f64,
-    /// λ.
-    pub lambda: f64,
-}
-
-/// How a training stood at a moment, as its report shows it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Moment {
-    /// Updates made.
-    pub update: u64,
-    /// L_pred/L_prior, eq. (23).
-    pub normalised: f64,
-    /// ‖F_a‖/‖F_p‖.
-    pub ratio: f64,
-    /// λ.
-    pub lambda: f64,
-    /// The trained coefficients, in the order of [`Trainer::coefficients`].
-    pub coefficients: Vec<f64>,
-}
-
-/// A coefficient of the prior that was trained.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Learned {
-    /// Full name.
-    pub name: String,
-    /// Value at the start.
-    pub start: f64,
-    /// Value now.
-    pub value: f64,
-    /// The true value, where it is known.
-    pub truth: Option<f64>,
-}
 
 /// A training in progress.
 pub struct Trainer {
@@ -138,17 +56,6 @@ pub struct Trainer {
     update: u64,
     /// Rollouts of the present length, in the order of the present pass over the data.
     stage: Stage,
-}
-
-/// What holds while the rollouts have one length.
-struct Stage {
-    steps: usize,
-    /// L_prior.
-    prior_error: f64,
-    all: Vec<Window>,
-    /// The pass over the data for which `order` was shuffled.
-    pass: u64,
-    order: Vec<Window>,
 }
 
 impl Trainer {
@@ -420,68 +327,4 @@ impl Trainer {
         self.lambda += self.recipe.tau * normalised;
         Ok(Some((loss, normalised)))
     }
-}
-
-impl Stage {
-    /// The rollouts of `steps` steps, and how far `bare`, the prior alone, is off on them.
-    fn new(
-        bare: &Subject,
-        recipe: &Recipe,
-        tracks: &[Track],
-        steps: usize,
-    ) -> Result<Stage, TrainError> {
-        let mut all = windows(tracks, steps);
-        if all.is_empty() {
-            return Err(TrainError::Data(steps + 2));
-        }
-        if let Some(floor) = recipe.floor {
-            weigh(&mut all, &bare.prior, tracks, steps, floor);
-        }
-        let some: Vec<Window> =
-            all.iter().step_by(all.len().div_ceil(PRIOR_WINDOWS)).copied().collect();
-        let arithmetic = Arithmetic::Lanes;
-        let mut engine = Engine::new(bare, some.len(), steps, arithmetic);
-        let objective = Objective {
-            scale: recipe.criterion.scale(&bare.prior),
-            penalty: recipe.criterion.penalty(),
-            unit: 1.0,
-            lambda: 1.0,
-        };
-        let loss = engine.loss(bare, &objective, tracks, &some, steps);
-        if loss.lost * 2 > some.len() {
-            return Err(TrainError::Prior(bare.prior.name.clone()));
-        }
-        let prior_error = match recipe.criterion {
-            // a prior without any error has nothing to be measured by
-            Criterion::Scaled => loss.prediction.max(1e-12),
-            Criterion::Plain => 1.0,
-        };
-        Ok(Stage { steps, prior_error, all, pass: u64::MAX, order: Vec::new() })
-    }
-
-    /// The rollouts of an update: each pass over the data shuffles it anew.
-    fn minibatch(&mut self, recipe: &Recipe, update: u64) -> &[Window] {
-        let batch = recipe.batch.min(self.all.len());
-        let passes = (self.all.len() / batch) as u64;
-        let (pass, place) = (update / passes, (update % passes) as usize);
-        if pass != self.pass {
-            self.pass = pass;
-            self.order.clone_from(&self.all);
-            let mut rng = stream::stream(recipe.seed, &[SHUFFLE, self.steps as u64, pass]);
-            self.order.shuffle(&mut rng);
-        }
-        &self.order[place * batch..][..batch]
-    }
-}
-
-/// Weighs `all` as [`Recipe::floor`] says; the mean of the weights is 1.
-fn weigh(all: &mut [Window], model: &GreyBox, tracks: &[Track], steps: usize, floor: f64) {
-    let mut weights: Vec<f64> =
-        all.par_iter().map(|w| off_after(model, tracks, w, steps).powi(2)).collect();
-    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    // a prior without any error has nothing to be measured by
-    let unit = mean(&weights).max(f64::MIN_POSITIVE);
-    weights.iter_mut().for_each(|w| *w = 1.0 / (*w / unit + floor * floor));
-    let unit = mean(&weights);
-    all.iter_mut().zip(weights).for_each(|(window, w)| window.weight = w / unit);
 }

@@ -15,7 +15,7 @@ mod surfaces;
 
 use super::Sample;
 use super::finding::{Cure, Finding};
-use super::phases::{self, Flying, Kind};
+use super::phases::{self, Flying, PhaseKind};
 
 /// Rows below which nothing is said about units.
 const ENOUGH: usize = 50;
@@ -46,7 +46,7 @@ pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
 /// Whether there is a flight, and one that is long enough.
 fn flight(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let flights: Vec<_> =
-        phases::phases(rows, flies).into_iter().filter(|p| p.kind == Kind::Flight).collect();
+        phases::phases(rows, flies).into_iter().filter(|p| p.kind == PhaseKind::Flight).collect();
     if flights.is_empty() {
         let fastest = relation::values(rows, |s| s.airspeed_mps).into_iter().fold(0.0, f64::max);
         return Some(Finding::problem(format!(

@@ -1,21 +1,21 @@
 //! One flight of 60 s under faults, in lockstep in this process.
 
-use std::io::{Error, ErrorKind, Write};
+mod disk;
+mod faulty;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use greylag_sitl::plant::{Inputs, PlantOptions};
-use greylag_sitl::shim::{Distortion, ShimError};
-use rand::{RngExt, SeedableRng};
+use greylag_sitl::shim::ShimError;
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::counterpart::{Aircraft, Counterpart, vehicle};
-use super::judge::{Cause, Exposure, Finding, Found, Judge};
-use super::mix::{Fault, Kind, draw};
+use super::judge::{Cause, Finding, Found, Judge};
+use super::mix::{Fault, FaultKind, draw};
 use super::wire::Wire;
-use crate::control::{Controller, Kind as ControllerKind, SetupError, build};
+use crate::control::{Controller, ControllerKind, SetupError, build};
 use crate::flight::desk::Desk;
 use crate::flight::pilot::{ConfigError, Pilot};
 use crate::flight::recorder::Recorder;
@@ -23,6 +23,7 @@ use crate::flight::runtime::Companion;
 use crate::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 use crate::link::vehicle::Vehicle;
 use crate::model::GreyBox;
+use disk::Disk;
 
 /// Steps of a flight: 60 s.
 const STEPS: u64 = 6000;
@@ -152,7 +153,7 @@ impl CompanionFactory {
 
     fn fly_under(&self, case: Case, faults: Vec<Fault>) -> Result<Report, FaultsError> {
         let mut desk = self.desk(case.counterpart)?;
-        let disk = faults.iter().any(|f| f.kind == Kind::Disk).then(Disk::default);
+        let disk = faults.iter().any(|f| f.kind == FaultKind::Disk).then(Disk::default);
         if let Some(disk) = &disk {
             let folder = std::path::PathBuf::new();
             desk.record(Recorder::over(folder, disk.clone(), disk.clone(), disk.clone())?);
@@ -182,25 +183,6 @@ impl CompanionFactory {
             flight.judge.note(0.0, Finding::Panic);
         }
         Ok(Report { case, faults, findings: flight.judge.findings(), texts: flight.texts })
-    }
-}
-
-/// A disk that is full from some moment on.
-#[derive(Clone, Debug, Default)]
-struct Disk {
-    full: Arc<AtomicBool>,
-}
-
-impl Write for Disk {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        match self.full.load(Ordering::Relaxed) {
-            true => Err(Error::from(ErrorKind::StorageFull)),
-            false => Ok(bytes.len()),
-        }
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
     }
 }
 
@@ -251,7 +233,7 @@ impl Flight {
         let acting: Vec<Fault> = self.faults.iter().filter(|f| f.acts(now_s)).copied().collect();
         let distortion = self.distortion(&acting, step);
         let bytes = self.aircraft.show(distortion);
-        let rebooting = acting.iter().any(|fault| fault.kind == Kind::Reboot);
+        let rebooting = acting.iter().any(|fault| fault.kind == FaultKind::Reboot);
         if !rebooting && !bytes.is_empty() {
             self.down.send(step, bytes, &acting);
         }
@@ -287,52 +269,13 @@ impl Flight {
         }
     }
 
-    /// Steps until the companion has the processor again.
-    fn nap(&mut self, acting: &[Fault]) -> u64 {
-        let starved = acting.iter().find(|fault| fault.kind == Kind::Starvation);
-        let Some(Fault { strength, .. }) = starved else { return 0 };
-        match self.random.random::<f64>() < 0.05 + 0.3 * strength {
-            // 20 ms to 300 ms without a single instruction.
-            true => self.random.random_range(2..=5 + (25.0 * strength) as u64),
-            false => 0,
-        }
-    }
-
-    /// What the aircraft is exposed to at this step, through no fault of who steers it.
-    fn exposure(&mut self, acting: &[Fault]) -> Exposure {
-        let inputs = self.aircraft.inputs();
-        let same = std::mem::replace(&mut self.flown, inputs) == inputs;
-        let lied_to = |fault: &Fault| matches!(fault.kind, Kind::Airspeed | Kind::Alpha);
-        Exposure {
-            unsteered: same && self.aircraft.is_steered(),
-            blind: matches!(self.aircraft, Aircraft::Sitl(_)) && self.judge.is_blind(),
-            misled: acting.iter().any(lied_to),
-        }
-    }
-
     fn hear_texts(&mut self, now_s: f64) {
         self.texts.extend(self.desk.texts.drain(..).map(|text| (now_s, text.words)));
     }
 
-    /// Waits until the recorder's thread has met the full disk, which has to be reported.
-    fn hear_of_the_disk(&mut self, now_s: f64) {
-        if self.disk.as_ref().is_none_or(|disk| !disk.full.load(Ordering::Relaxed)) {
-            return;
-        }
-        for _ in 0..300 {
-            self.desk.poll(Duration::from_secs(61), &mut Vec::new());
-            self.hear_texts(now_s);
-            if self.texts.iter().any(|(_, words)| words.contains("recording of flight")) {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        self.judge.note(now_s, Finding::Unreported);
-    }
-
     /// The client: arms when it can, then sends its legs.
     fn client(&mut self, step: u64, now_s: f64, host: Duration, acting: &[Fault]) {
-        if acting.iter().any(|fault| fault.kind == Kind::Client)
+        if acting.iter().any(|fault| fault.kind == FaultKind::Client)
             || !step.is_multiple_of(SETPOINT_EVERY)
         {
             return;
@@ -351,32 +294,6 @@ impl Flight {
             }
         }
         self.desk.pilot().attitude_setpoint(now, setpoint);
-    }
-
-    /// What the faults do to the sensors and the clock.
-    fn distortion(&mut self, acting: &[Fault], step: u64) -> Distortion {
-        let mut distortion = Distortion::default();
-        for fault in acting {
-            let s = fault.strength;
-            match fault.kind {
-                Kind::Frozen => distortion.frozen = true,
-                // What a tube that has iced up shows: the speed of that moment, or less and less.
-                Kind::Airspeed => {
-                    distortion.airspeed_mps = Some(0.4 * self.cruise + self.cruise * s)
-                }
-                Kind::Alpha => distortion.alpha_rad = 0.5 * (s - 0.5),
-                Kind::NotANumber => distortion.rate_not_a_number = true,
-                Kind::Clock => self.clock_us = (1e7 * s) as i64,
-                Kind::Disk => {
-                    self.disk.iter().for_each(|disk| disk.full.store(true, Ordering::Relaxed));
-                }
-                // Time begins anew.
-                Kind::Reboot => self.clock_us = -(10_000 * step as i64),
-                _ => {}
-            }
-        }
-        distortion.clock_us = self.clock_us;
-        distortion
     }
 
     /// A link that is dead hands the aircraft back within half a second.

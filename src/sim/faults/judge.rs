@@ -2,7 +2,7 @@
 
 use greylag_sitl::plant::Truth;
 
-use super::mix::Kind;
+use super::mix::FaultKind;
 use crate::flight::pilot::{Decision, Source};
 use crate::physics::Command;
 use crate::physics::airframe::Envelope;
@@ -97,11 +97,13 @@ impl Cause {
     }
 
     /// Whether it is the doing of faults of `kind`.
-    pub fn is_of(self, kind: Kind) -> bool {
-        let lie = matches!(kind, Kind::Airspeed | Kind::Alpha);
+    pub fn is_of(self, kind: FaultKind) -> bool {
+        let lie = matches!(kind, FaultKind::Airspeed | FaultKind::Alpha);
         match self {
             Cause::Misled => lie,
-            Cause::Unsteered | Cause::Blind => !lie && !matches!(kind, Kind::Client | Kind::Disk),
+            Cause::Unsteered | Cause::Blind => {
+                !lie && !matches!(kind, FaultKind::Client | FaultKind::Disk)
+            }
             Cause::Itself => false,
         }
     }

@@ -10,7 +10,7 @@ pub const LAST_S: f64 = 42.0;
 
 /// Something that can go wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Kind {
+pub enum FaultKind {
     /// Datagrams, or stretches of the stream, are lost.
     Loss,
     /// They come twice.
@@ -47,48 +47,48 @@ pub enum Kind {
     Disk,
 }
 
-impl Kind {
+impl FaultKind {
     /// All of them.
-    pub const ALL: [Kind; 17] = [
-        Kind::Loss,
-        Kind::Duplication,
-        Kind::Reordering,
-        Kind::Delay,
-        Kind::Corruption,
-        Kind::Truncation,
-        Kind::Flood,
-        Kind::Unplug,
-        Kind::Frozen,
-        Kind::Airspeed,
-        Kind::Alpha,
-        Kind::NotANumber,
-        Kind::Clock,
-        Kind::Reboot,
-        Kind::Client,
-        Kind::Starvation,
-        Kind::Disk,
+    pub const ALL: [FaultKind; 17] = [
+        FaultKind::Loss,
+        FaultKind::Duplication,
+        FaultKind::Reordering,
+        FaultKind::Delay,
+        FaultKind::Corruption,
+        FaultKind::Truncation,
+        FaultKind::Flood,
+        FaultKind::Unplug,
+        FaultKind::Frozen,
+        FaultKind::Airspeed,
+        FaultKind::Alpha,
+        FaultKind::NotANumber,
+        FaultKind::Clock,
+        FaultKind::Reboot,
+        FaultKind::Client,
+        FaultKind::Starvation,
+        FaultKind::Disk,
     ];
 
     /// Its name in tables.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Loss => "loss",
-            Kind::Duplication => "duplication",
-            Kind::Reordering => "reordering",
-            Kind::Delay => "delay spikes",
-            Kind::Corruption => "corruption",
-            Kind::Truncation => "truncation",
-            Kind::Flood => "flood",
-            Kind::Unplug => "unplug",
-            Kind::Frozen => "frozen sensors",
-            Kind::Airspeed => "airspeed blocked",
-            Kind::Alpha => "alpha jump",
-            Kind::NotANumber => "NaN rate",
-            Kind::Clock => "clock jump",
-            Kind::Reboot => "reboot",
-            Kind::Client => "client death",
-            Kind::Starvation => "CPU starvation",
-            Kind::Disk => "disk full",
+            FaultKind::Loss => "loss",
+            FaultKind::Duplication => "duplication",
+            FaultKind::Reordering => "reordering",
+            FaultKind::Delay => "delay spikes",
+            FaultKind::Corruption => "corruption",
+            FaultKind::Truncation => "truncation",
+            FaultKind::Flood => "flood",
+            FaultKind::Unplug => "unplug",
+            FaultKind::Frozen => "frozen sensors",
+            FaultKind::Airspeed => "airspeed blocked",
+            FaultKind::Alpha => "alpha jump",
+            FaultKind::NotANumber => "NaN rate",
+            FaultKind::Clock => "clock jump",
+            FaultKind::Reboot => "reboot",
+            FaultKind::Client => "client death",
+            FaultKind::Starvation => "CPU starvation",
+            FaultKind::Disk => "disk full",
         }
     }
 }
@@ -97,7 +97,7 @@ impl Kind {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
     /// What.
-    pub kind: Kind,
+    pub kind: FaultKind,
     /// From when, s.
     pub from_s: f64,
     /// Until when, s.
@@ -118,25 +118,25 @@ impl Fault {
 pub fn draw(seed: u64) -> Vec<Fault> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let count = random.random_range(1..=3);
-    let first = Kind::ALL[seed as usize % Kind::ALL.len()];
+    let first = FaultKind::ALL[seed as usize % FaultKind::ALL.len()];
     (0..count)
         .map(|i| {
             let kind = match i {
                 0 => first,
-                _ => Kind::ALL[random.random_range(0..Kind::ALL.len())],
+                _ => FaultKind::ALL[random.random_range(0..FaultKind::ALL.len())],
             };
             one(kind, &mut random)
         })
         .collect()
 }
 
-fn one(kind: Kind, random: &mut impl Rng) -> Fault {
+fn one(kind: FaultKind, random: &mut impl Rng) -> Fault {
     let from_s = random.random_range(FIRST_S..LAST_S - 8.0);
     let length = match kind {
-        Kind::Unplug => random.random_range(0.1..4.0),
-        Kind::Reboot => random.random_range(0.5..2.0),
-        Kind::Clock => 0.01,
-        Kind::NotANumber | Kind::Frozen => random.random_range(0.02..4.0),
+        FaultKind::Unplug => random.random_range(0.1..4.0),
+        FaultKind::Reboot => random.random_range(0.5..2.0),
+        FaultKind::Clock => 0.01,
+        FaultKind::NotANumber | FaultKind::Frozen => random.random_range(0.02..4.0),
         _ => random.random_range(1.0..8.0),
     };
     Fault { kind, from_s, to_s: from_s + length, strength: random.random() }

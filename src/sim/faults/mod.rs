@@ -12,4 +12,4 @@ mod wire;
 pub use counterpart::Counterpart;
 pub use flight::{Case, CompanionFactory, FaultsError, Report};
 pub use judge::{Cause, Finding, Found};
-pub use mix::{Fault, Kind, draw};
+pub use mix::{Fault, FaultKind, draw};

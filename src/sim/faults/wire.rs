@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::mix::{Fault, Kind};
+use super::mix::{Fault, FaultKind};
 
 /// One direction of a link, step by step.
 pub struct Wire {
@@ -27,21 +27,21 @@ impl Wire {
         for fault in faults {
             let s = fault.strength;
             match fault.kind {
-                Kind::Unplug => return,
-                Kind::Loss if self.chance(0.05 + 0.6 * s) => return,
-                Kind::Duplication if self.chance(0.1 + 0.8 * s) => copies = 2,
-                Kind::Reordering if self.chance(0.1 + 0.4 * s) => {
+                FaultKind::Unplug => return,
+                FaultKind::Loss if self.chance(0.05 + 0.6 * s) => return,
+                FaultKind::Duplication if self.chance(0.1 + 0.8 * s) => copies = 2,
+                FaultKind::Reordering if self.chance(0.1 + 0.4 * s) => {
                     arrives += self.random.random_range(1..=1 + (4.0 * s) as u64);
                 }
-                Kind::Delay if self.chance(0.02 + 0.1 * s) => {
+                FaultKind::Delay if self.chance(0.02 + 0.1 * s) => {
                     arrives += self.random.random_range(2..=5 + (30.0 * s) as u64);
                 }
-                Kind::Corruption if self.chance(0.1 + 0.8 * s) => self.flip(&mut bytes, s),
-                Kind::Truncation if self.chance(0.1 + 0.6 * s) => {
+                FaultKind::Corruption if self.chance(0.1 + 0.8 * s) => self.flip(&mut bytes, s),
+                FaultKind::Truncation if self.chance(0.1 + 0.6 * s) => {
                     let length = self.random.random_range(0..=bytes.len());
                     bytes.truncate(length);
                 }
-                Kind::Flood => {
+                FaultKind::Flood => {
                     for _ in 0..10 {
                         let garbage = self.garbage(&bytes);
                         self.under_way.push((step, garbage));

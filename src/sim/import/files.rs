@@ -2,8 +2,10 @@
 
 use greylag_sitl::plant::{MassProperties, Stops, Travel};
 
+use super::effects::Effect;
 use super::fits::line;
-use super::{Effect, Polar, Propulsion, Subject};
+use super::propulsion::Propulsion;
+use super::{Polar, Subject};
 use crate::model::textbook::{Estimate, incidence_limits, numbers};
 use crate::num::Table;
 use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY, standard_density};
@@ -127,6 +129,12 @@ pub(super) fn model_file(
             numbers(&mut out, &[(name, value, width, source)]);
         }
     }
+    out + &tables(polar)
+}
+
+/// The tables of lift and drag over incidence, and of what the pitching moment departs from a line if it does.
+fn tables(polar: &Polar) -> String {
+    let mut out = String::new();
     let [zero, slope, bent] = line(polar);
     let beside: Vec<f64> =
         polar.alpha.iter().zip(&polar.pitch).map(|(a, m)| m - zero - slope * a).collect();

@@ -9,7 +9,7 @@ const LONGEST_PERIODS: f64 = 2.5;
 
 /// What a channel is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum Interpolation {
     /// A number.
     Linear,
     /// An angle that wraps at ±π, rad.
@@ -32,21 +32,24 @@ impl Channel {
     /// if they are many, for then the log holds a slower sensor's value. Of a value that stays longer than
     /// that sensor's period, as a coarsely quantised one does, some repeats are kept, the last one always.
     /// Angles are unwrapped.
-    pub fn new(samples: impl Iterator<Item = (f64, f64)>, kind: Kind) -> Channel {
+    pub fn new(samples: impl Iterator<Item = (f64, f64)>, kind: Interpolation) -> Channel {
         let (mut time, mut value): (Vec<f64>, Vec<f64>) =
             samples.filter(|(_, x)| x.is_finite()).unzip();
         let fresh: Vec<bool> =
             (0..value.len()).map(|i| i == 0 || value[i] != value[i - 1]).collect();
         let repeated = fresh.iter().filter(|f| !**f).count();
-        let stuck = kind != Kind::Kept && value.len() > 20 && repeated + 1 == value.len();
-        if kind != Kind::Kept && repeated as f64 > HELD_SHARE * value.len() as f64 && !stuck {
+        let stuck = kind != Interpolation::Kept && value.len() > 20 && repeated + 1 == value.len();
+        if kind != Interpolation::Kept
+            && repeated as f64 > HELD_SHARE * value.len() as f64
+            && !stuck
+        {
             let keep = kept(&time, &fresh);
             let mut kept = keep.iter();
             time.retain(|_| *kept.next().unwrap_or(&true));
             let mut kept = keep.iter();
             value.retain(|_| *kept.next().unwrap_or(&true));
         }
-        if kind == Kind::Angle {
+        if kind == Interpolation::Angle {
             unwrap(&mut value);
         }
         Channel { time, value, stuck }
@@ -146,7 +149,7 @@ mod tests {
     /// 100 Hz samples of a slow sine as `value` makes them.
     fn channel(value: impl Fn(f64) -> f64) -> Channel {
         let times = (0..1000).map(|k| k as f64 * 0.01);
-        Channel::new(times.map(|t| (t, value(t))), Kind::Linear)
+        Channel::new(times.map(|t| (t, value(t))), Interpolation::Linear)
     }
 
     #[test]

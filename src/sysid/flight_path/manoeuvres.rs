@@ -24,7 +24,7 @@ const SHORTEST: f64 = 0.5;
 
 /// What was flown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum ManoeuvreKind {
     /// Nothing moves.
     Steady,
     /// Banked, nothing else moves.
@@ -47,7 +47,7 @@ pub struct Manoeuvre {
     /// End, s.
     pub end_s: f64,
     /// What was flown.
-    pub kind: Kind,
+    pub kind: ManoeuvreKind,
 }
 
 /// The manoeuvres of a flight in order of time, without gaps inside its segments.
@@ -81,7 +81,7 @@ fn of_segment(segment: &Segment, step: f64) -> Vec<Manoeuvre> {
     merged
 }
 
-fn kinds(instants: &[Instant], step: f64) -> Vec<Kind> {
+fn kinds(instants: &[Instant], step: f64) -> Vec<ManoeuvreKind> {
     let half = (WINDOW / step / 2.0).round() as usize;
     let level = |get: &dyn Fn(&Instant) -> f64| root_mean_square(instants, half, 0.0, get);
     let about_mean = |get: &dyn Fn(&Instant) -> f64| root_mean_square(instants, half, 1.0, get);
@@ -95,12 +95,12 @@ fn kinds(instants: &[Instant], step: f64) -> Vec<Kind> {
             let rolls = roll[k] > ROLL_RATE || aileron[k] > DEFLECTION;
             let pitches = pitch[k] > PITCH_RATE || elevator[k] > DEFLECTION;
             match (rolls, pitches) {
-                (true, true) => Kind::RollAndPitch,
-                (true, false) => Kind::Roll,
-                (false, true) => Kind::Pitch,
-                _ if throttle[k] > THROTTLE => Kind::Thrust,
-                _ if instants[k].state.roll.abs() > BANK => Kind::Turn,
-                _ => Kind::Steady,
+                (true, true) => ManoeuvreKind::RollAndPitch,
+                (true, false) => ManoeuvreKind::Roll,
+                (false, true) => ManoeuvreKind::Pitch,
+                _ if throttle[k] > THROTTLE => ManoeuvreKind::Thrust,
+                _ if instants[k].state.roll.abs() > BANK => ManoeuvreKind::Turn,
+                _ => ManoeuvreKind::Steady,
             }
         })
         .collect()

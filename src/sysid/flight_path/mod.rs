@@ -25,7 +25,7 @@ mod rotation;
 mod sampling;
 mod smoother;
 
-pub use manoeuvres::{Kind as ManoeuvreKind, Manoeuvre, manoeuvres};
+pub use manoeuvres::{Manoeuvre, ManoeuvreKind, manoeuvres};
 
 use equations::Problem;
 use sampling::Chosen;

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Fit, Left, Search, System};
+use super::gauss_newton::System;
+use super::{Fit, Left, Search};
 use crate::sysid::amend::error::AmendError;
 use crate::sysid::amend::flight::SENSORS;
 use crate::sysid::amend::interval::{self, Covariance};

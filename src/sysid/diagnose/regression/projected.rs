@@ -66,22 +66,7 @@ impl Projected {
             .par_iter()
             .map(|c| c.matrix(&placed[c.flight], &noise.whiteners[c.channel]))
             .collect();
-        let mut aa = DMatrix::zeros(na, na);
-        let mut ay = DMatrix::zeros(na, ny);
-        for (places, z) in &whitened {
-            let split = places.iter().take_while(|p| **p < na).count();
-            let a = z.columns(0, split);
-            let products = a.tr_mul(z);
-            for (i, pi) in places[..split].iter().enumerate() {
-                for (j, pj) in places.iter().enumerate() {
-                    if *pj < na {
-                        aa[(*pi, *pj)] += products[(i, j)];
-                    } else {
-                        ay[(*pi, *pj - na)] += products[(i, j)];
-                    }
-                }
-            }
-        }
+        let (mut aa, mut ay) = products_of_known(&whitened, na, ny);
         let shared_of = |place: usize| shared.get(place).copied().unwrap_or(0.0);
         for (k, known) in known.iter().enumerate() {
             ay[(k, ny - 1)] -= shared_of(k);
@@ -108,11 +93,7 @@ impl Projected {
             }
         }
         let by_channel = by_channel(cells, &rows, ny);
-        let mut root = -taken.clone();
-        for (k, known) in known.iter().enumerate() {
-            root[(k, ny - 1)] += known.offset;
-            root.row_mut(k).scale_mut(known.weight().sqrt());
-        }
+        let root = root_of_prior(known, &taken);
         let prior = root.tr_mul(&root);
         let total = blocks.iter().fold(prior.clone(), |sum, b| sum + b);
         let noise = noise_products(cells, &rows, &noise.residuals, ny);
@@ -190,6 +171,42 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }
     let inverse = scaled.cholesky()?.inverse();
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// Rows whose squares are what the prior of the known unknowns weighs, the residual in the last column.
+fn root_of_prior(known: &[Known], taken: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut root = -taken.clone();
+    let last = root.ncols() - 1;
+    for (k, known) in known.iter().enumerate() {
+        root[(k, last)] += known.offset;
+        root.row_mut(k).scale_mut(known.weight().sqrt());
+    }
+    root
+}
+
+/// Products of the whitened columns of the `na` known unknowns with one another, and with the `ny` columns
+/// behind them.
+fn products_of_known(
+    whitened: &[(Vec<usize>, DMatrix<f64>)],
+    na: usize,
+    ny: usize,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (mut aa, mut ay) = (DMatrix::zeros(na, na), DMatrix::zeros(na, ny));
+    for (places, z) in whitened {
+        let split = places.iter().take_while(|p| **p < na).count();
+        let a = z.columns(0, split);
+        let products = a.tr_mul(z);
+        for (i, pi) in places[..split].iter().enumerate() {
+            for (j, pj) in places.iter().enumerate() {
+                if *pj < na {
+                    aa[(*pi, *pj)] += products[(i, j)];
+                } else {
+                    ay[(*pi, *pj - na)] += products[(i, j)];
+                }
+            }
+        }
+    }
+    (aa, ay)
 }
 
 /// Rows of the candidates and the residual less what the known unknowns take.

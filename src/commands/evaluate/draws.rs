@@ -1,0 +1,93 @@
+//! Evaluation in models drawn from the widths of the coefficients.
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use comfy_table::Table;
+use serde::Serialize;
+
+use super::{Arguments, Entrant, entrants, progress, table};
+use crate::commands::files::{self};
+use crate::model::GreyBox;
+use crate::num::statistics::quantile;
+use crate::sim::TargetFile;
+use crate::sim::evaluation::{Evaluation, Robustness};
+
+/// The JSON document of flights in drawn models.
+#[derive(Serialize)]
+struct DrawsDocument<'a> {
+    schema: &'static str,
+    program: &'static str,
+    command_line: String,
+    seed: u32,
+    targets: String,
+    model: &'a str,
+    controllers: &'a [Robustness],
+}
+
+/// Flies draws of the first model, prints the tables, writes the JSON.
+pub(super) fn over_draws(
+    arguments: &Arguments,
+    draws: u32,
+    models: &[GreyBox],
+    targets: &TargetFile,
+) -> Result<ExitCode> {
+    let fly = |e: &Entrant| {
+        let progress = progress(draws.into(), "draws", &format!("{}, model {}", e.kind, e.model));
+        let make = || e.controller.boxed_clone();
+        let names = [e.kind.name(), e.model.as_str()];
+        let seeds = [arguments.seed, draws];
+        let flown =
+            Robustness::of(names, &make, &models[0], &targets.rows, seeds, &|| progress.inc(1))?;
+        progress.finish_and_clear();
+        Ok(flown)
+    };
+    let flown = entrants(arguments, models)?.iter().map(fly).collect::<Result<Vec<_>>>()?;
+    let all: Vec<Evaluation> = flown.iter().map(|r| r.all.clone()).collect();
+    if !files::is_stdout(arguments.json.as_deref()) {
+        println!("{}", table(&all));
+        println!("{}", draws_table(&flown));
+        println!("flown in draws of model {} from the widths of its coefficients", models[0].name);
+        println!(
+            "intervals take all flights for independent; how draws differ is in the second table"
+        );
+    }
+    if let Some(path) = &arguments.json {
+        let document = DrawsDocument {
+            schema: "greylag.robustness/1",
+            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+            command_line: files::command_line(),
+            seed: arguments.seed,
+            targets: arguments.targets.display().to_string(),
+            model: &models[0].name,
+            controllers: &flown,
+        };
+        let text = serde_json::to_string_pretty(&document)? + "\n";
+        files::write(path, &text, arguments.force.into())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// How each controller fared from draw to draw.
+fn draws_table(flown: &[Robustness]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header([
+        "controller",
+        "model",
+        "draws",
+        "with a loss",
+        "mean ° of a draw: median",
+        "95 %",
+        "worst",
+    ]);
+    for Robustness { all, draws } in flown {
+        let means: Vec<f64> = draws.iter().map(|(mean, _)| *mean).collect();
+        let mut row = vec![all.controller.clone(), all.model.clone(), draws.len().to_string()];
+        let lost = draws.iter().filter(|(_, lost)| *lost > 0).count();
+        row.push(lost.to_string());
+        row.extend([0.5, 0.95, 1.0].map(|q| format!("{:.3}", quantile(&means, q))));
+        table.add_row(row);
+    }
+    table
+}

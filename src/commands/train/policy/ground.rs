@@ -1,0 +1,57 @@
+//! Where a policy is trained and judged: the model or the simulator.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+
+use crate::control::Controller;
+use crate::control::policy::{Actor, Evaluated, Origin, Policy};
+use crate::model::GreyBox;
+use crate::physics::Airframe;
+use crate::sim::evaluation::{Evaluation, Make, imagine};
+use crate::sim::targets::Row;
+use crate::sim::{Group, Outcome, TargetFile};
+
+/// Where a policy is trained, found to be whole.
+pub(super) struct Ground {
+    pub(super) model: Option<Arc<GreyBox>>,
+    pub(super) origin: Origin,
+    pub(super) airframe: Airframe,
+}
+
+impl Ground {
+    /// What `actor` reaches in what it is trained in, on a tenth of a target file: a policy that is trained
+    /// in a model is chosen without a flight in any simulator.
+    pub(super) fn evaluate(&self, actor: Arc<Actor>) -> Result<Evaluated> {
+        let mut rows = TargetFile::generate(OTHER).rows;
+        rows.retain(|r| r.group != Group::HardOutside && r.number % 10 == r.number / 10 % 10);
+        let make = || -> Box<dyn Controller> { Box::new(Policy::of(actor.clone())) };
+        let outcomes = match &self.model {
+            Some(model) => imagine(model, &make, &rows, 1)?,
+            None => flown(&make, &rows)?,
+        };
+        let scores = Evaluation::new("policy", &self.origin.model, &rows, &outcomes);
+        let mean = |group: &str| scores.score(group).map_or(f64::NAN, |s| s.mean_deg);
+        Ok(Evaluated {
+            targets: rows.len(),
+            easy_deg: mean("easy"),
+            hard_deg: mean("hard_corners"),
+            divergence_rate: scores.score("all").map_or(f64::NAN, |s| s.divergence_rate),
+        })
+    }
+}
+
+/// Seed of the targets that a training is judged by: none of those that policies are scored on.
+const OTHER: u64 = 2;
+
+/// What came of flights in JSBSim, where the policy was trained there.
+#[cfg(feature = "sitl")]
+pub(super) fn flown(make: Make, rows: &[Row]) -> Result<Vec<Outcome>> {
+    let plant = greylag_sitl::plant::PlantOptions::default();
+    Ok(crate::sim::evaluation::evaluate(&plant, make, rows, 1, &|| ())?)
+}
+
+#[cfg(not(feature = "sitl"))]
+pub(super) fn flown(_: Make, _: &[Row]) -> Result<Vec<Outcome>> {
+    bail!("this program was built without JSBSim")
+}

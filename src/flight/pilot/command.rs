@@ -1,0 +1,69 @@
+//! Which command flies: planned, of the fallback, held, or level at trim.
+
+use super::{Pilot, Plan, Source, due};
+use crate::control::Observation;
+use crate::link::autopilot::Severity;
+use crate::physics::Command;
+
+impl Pilot {
+    pub(super) fn with_state(
+        &mut self,
+        plan: Plan,
+        seen: &Observation,
+        throttle: Option<f64>,
+    ) -> (Command, Source) {
+        let (mut command, source) = match plan {
+            Plan::Ready(command) if command.is_finite() => {
+                self.fallback_engaged = false;
+                (command, Source::Planned)
+            }
+            Plan::Ready(_) => {
+                self.planner_engaged = false;
+                if due(&mut self.complaints.plan, self.clock) {
+                    self.texts
+                        .say(Severity::Error, "controller gave no finite command: fallback flies");
+                }
+                self.fall_back(seen, Source::Fallback)
+            }
+            Plan::Late | Plan::Busy => self.fall_back(seen, Source::Late),
+            Plan::None => self.fall_back(seen, Source::Fallback),
+        };
+        if let Some(programme) = &mut self.programme {
+            command = programme.excite(command);
+        }
+        command.throttle =
+            self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
+        (command, source)
+    }
+
+    fn fall_back(&mut self, seen: &Observation, source: Source) -> (Command, Source) {
+        if !self.fallback_engaged {
+            self.fallback.reset(0);
+            self.fallback_engaged = true;
+        }
+        let command = self.fallback.command(seen, &self.target);
+        if command.is_finite() {
+            return (command, source);
+        }
+        self.fallback_engaged = false;
+        if due(&mut self.complaints.fallback, self.clock) {
+            self.texts.say(Severity::Critical, "fallback gave no finite command: level at trim");
+        }
+        (self.level_command(), Source::Level)
+    }
+
+    /// The command while the state cannot be used.
+    pub(super) fn without_state(&self) -> (Command, Source) {
+        let short = self.estimate.usable_within(self.clock, self.config.state_hold_s);
+        if short && !self.vehicle_lost {
+            (self.in_force, Source::Held)
+        } else {
+            (self.level_command(), Source::Level)
+        }
+    }
+
+    fn level_command(&self) -> Command {
+        let trim = self.config.trim_at(self.config.envelope.airspeed_cruise_mps);
+        Command { elevator: trim.elevator, throttle: trim.throttle, ..Command::IDLE }
+    }
+}

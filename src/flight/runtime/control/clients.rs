@@ -1,0 +1,79 @@
+//! The side of the clients: what they send, what is sent to them, what of it goes on to the vehicle.
+
+use std::time::{Duration, Instant};
+
+use super::Control;
+use crate::flight::runtime::recording_autopilot::RecordingAutopilot;
+use crate::flight::runtime::stamps::unix_us;
+use crate::link::autopilot::Severity;
+use crate::link::transport::{Arrival, Packet};
+use crate::link::vehicle::Outputs;
+
+impl Control {
+    /// Passes on to the controller what a client has sent it.
+    fn route(&mut self, host: Duration, packet: &Packet) {
+        let Some(router) = &mut self.router else { return };
+        router.learn(host, packet.peer, &packet.bytes);
+        let engaged = self.outputs != Outputs::Disarmed;
+        let frames = router.to_controller(&packet.bytes, self.clients.identity(), engaged);
+        if let Some(peer) = self.vehicle.peer().filter(|_| !frames.is_empty()) {
+            self.ports.send_to_vehicle(unix_us(), peer, frames);
+        }
+    }
+
+    pub(super) fn take_client(&mut self, arrival: Arrival) {
+        let host = Instant::now();
+        let now = self.now(host);
+        match arrival {
+            Arrival::Packet(mut packet) => {
+                self.ports.sift(unix_us(), &mut packet);
+                self.tell_of_refusals();
+                self.route(now.host, &packet);
+                let mut pilot = RecordingAutopilot {
+                    pilot: &mut self.pilot,
+                    vehicle: &self.vehicle,
+                    recorder: self.recorder.as_ref(),
+                    hear: |event| drop(self.events.try_send(event)),
+                };
+                self.clients.handle(now, packet.peer, &packet.bytes, &mut pilot);
+                self.record(packet.arrived, &packet.bytes);
+            }
+            Arrival::Opened(peer) => self.clients.welcome(now, peer),
+            Arrival::Closed(peer) => {
+                self.clients.forget(peer);
+                self.router.iter_mut().for_each(|router| router.forget(peer));
+            }
+            Arrival::Remark(remark) => self.remark(&remark),
+        }
+        self.send_to_clients();
+    }
+
+    /// Says once that somebody does not sign, or not with our key.
+    fn tell_of_refusals(&mut self) {
+        let refused = self.ports.signing().map_or(0, |counts| counts.refused());
+        if refused > 0 && !self.told_refusals {
+            self.told_refusals = true;
+            let words =
+                "frames without a right signature are refused: sign them with the key of --sign";
+            self.pilot.tell(Severity::Warning, words);
+        }
+    }
+
+    pub(super) fn welcome_targets(&mut self) {
+        let now = self.now(self.started);
+        let targets = self.ports.clients.iter().filter_map(|link| link.target());
+        for peer in targets.collect::<Vec<_>>() {
+            self.clients.welcome(now, peer);
+        }
+    }
+
+    pub(super) fn send_to_clients(&mut self) {
+        let unix_us = unix_us();
+        for (peer, frame) in self.clients.drain() {
+            if let Some(recorder) = &self.recorder {
+                recorder.bytes(self.stamps.of(Instant::now()), &frame);
+            }
+            self.ports.send_to_client(unix_us, peer, frame);
+        }
+    }
+}

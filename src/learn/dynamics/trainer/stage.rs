@@ -1,0 +1,93 @@
+//! What holds while the rollouts have one length: the windows, their weights and order, the prior's error.
+
+use rand::seq::SliceRandom;
+use rayon::prelude::*;
+
+use super::reports::TrainError;
+use crate::learn::dynamics::engine::{Arithmetic, Engine};
+use crate::learn::dynamics::loss::Objective;
+use crate::learn::dynamics::recipe::{Criterion, Recipe};
+use crate::learn::dynamics::rollout::Subject;
+use crate::learn::dynamics::score::off_after;
+use crate::learn::dynamics::windows::{Track, Window, windows};
+use crate::model::GreyBox;
+use crate::num::stream;
+
+/// Windows over which the bare prior's error is taken, L_prior of eq. (23).
+const PRIOR_WINDOWS: usize = 4096;
+const SHUFFLE: u64 = 2;
+
+/// What holds while the rollouts have one length.
+pub(super) struct Stage {
+    pub(super) steps: usize,
+    /// L_prior.
+    pub(super) prior_error: f64,
+    pub(super) all: Vec<Window>,
+    /// The pass over the data for which `order` was shuffled.
+    pass: u64,
+    order: Vec<Window>,
+}
+
+impl Stage {
+    /// The rollouts of `steps` steps, and how far `bare`, the prior alone, is off on them.
+    pub(super) fn new(
+        bare: &Subject,
+        recipe: &Recipe,
+        tracks: &[Track],
+        steps: usize,
+    ) -> Result<Stage, TrainError> {
+        let mut all = windows(tracks, steps);
+        if all.is_empty() {
+            return Err(TrainError::Data(steps + 2));
+        }
+        if let Some(floor) = recipe.floor {
+            weigh(&mut all, &bare.prior, tracks, steps, floor);
+        }
+        let some: Vec<Window> =
+            all.iter().step_by(all.len().div_ceil(PRIOR_WINDOWS)).copied().collect();
+        let arithmetic = Arithmetic::Lanes;
+        let mut engine = Engine::new(bare, some.len(), steps, arithmetic);
+        let objective = Objective {
+            scale: recipe.criterion.scale(&bare.prior),
+            penalty: recipe.criterion.penalty(),
+            unit: 1.0,
+            lambda: 1.0,
+        };
+        let loss = engine.loss(bare, &objective, tracks, &some, steps);
+        if loss.lost * 2 > some.len() {
+            return Err(TrainError::Prior(bare.prior.name.clone()));
+        }
+        let prior_error = match recipe.criterion {
+            // a prior without any error has nothing to be measured by
+            Criterion::Scaled => loss.prediction.max(1e-12),
+            Criterion::Plain => 1.0,
+        };
+        Ok(Stage { steps, prior_error, all, pass: u64::MAX, order: Vec::new() })
+    }
+
+    /// The rollouts of an update: each pass over the data shuffles it anew.
+    pub(super) fn minibatch(&mut self, recipe: &Recipe, update: u64) -> &[Window] {
+        let batch = recipe.batch.min(self.all.len());
+        let passes = (self.all.len() / batch) as u64;
+        let (pass, place) = (update / passes, (update % passes) as usize);
+        if pass != self.pass {
+            self.pass = pass;
+            self.order.clone_from(&self.all);
+            let mut rng = stream::stream(recipe.seed, &[SHUFFLE, self.steps as u64, pass]);
+            self.order.shuffle(&mut rng);
+        }
+        &self.order[place * batch..][..batch]
+    }
+}
+
+/// Weighs `all` as [`Recipe::floor`] says; the mean of the weights is 1.
+fn weigh(all: &mut [Window], model: &GreyBox, tracks: &[Track], steps: usize, floor: f64) {
+    let mut weights: Vec<f64> =
+        all.par_iter().map(|w| off_after(model, tracks, w, steps).powi(2)).collect();
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+    // a prior without any error has nothing to be measured by
+    let unit = mean(&weights).max(f64::MIN_POSITIVE);
+    weights.iter_mut().for_each(|w| *w = 1.0 / (*w / unit + floor * floor));
+    let unit = mean(&weights);
+    all.iter_mut().zip(weights).for_each(|(window, w)| window.weight = w / unit);
+}

@@ -1,0 +1,113 @@
+//! What is due besides answers: heartbeat, watchdog, requests of streams and parameters, changes of mode.
+
+use std::time::Duration;
+
+use super::profile::{Authority, Stack};
+use super::{ENOUGH, GONE, Real};
+use crate::link::autopilot::Severity;
+use crate::link::framing::Source;
+use crate::link::wire::controller as wire;
+
+const HEARTBEAT: Duration = Duration::from_secs(1);
+/// Between two measurements of the latency.
+const TIME_SYNC: Duration = Duration::from_millis(200);
+/// Without a new state for this long the aircraft is handed back.
+const BLIND: Duration = Duration::from_millis(300);
+
+impl Real {
+    /// What is due at `host` besides answers: heartbeat, requests, the hand-back.
+    pub fn due(&mut self, host: Duration) -> Option<Vec<u8>> {
+        let mut bytes = Vec::new();
+        if host >= self.next_heartbeat {
+            self.next_heartbeat = host + HEARTBEAT;
+            let message = wire::heartbeat(self.engagement.steers());
+            bytes.extend(self.write(&message));
+        }
+        if let Some(to) = self.target() {
+            self.watch(host);
+            self.ask(host, to, &mut bytes);
+            self.request_mode(host, to, &mut bytes);
+        }
+        (!bytes.is_empty()).then_some(bytes)
+    }
+
+    /// The watchdog.
+    fn watch(&mut self, host: Duration) {
+        if !self.engagement.steers() {
+            self.pulse.rest();
+            return self.remind(host);
+        }
+        // A controller that tracks an attitude does not mind a slow companion.
+        let surfaces = self.profile.authority == Authority::Surfaces;
+        let scarce = self.pulse.cycle(host).filter(|_| surfaces);
+        let age = |at: Duration| host.saturating_sub(at);
+        let silent = self.controller.is_none_or(|c| age(c.heard) > GONE);
+        let blind = self.last_state.is_none_or(|at| age(at) > BLIND);
+        let steered = self.profile.stack.steered(self.profile.authority).name;
+        if silent {
+            self.hand_back("no heartbeat of the controller for 3 s".into());
+        } else if blind {
+            self.hand_back("no state of the vehicle for 0.3 s".into());
+        } else if let Some(words) = scarce {
+            self.hand_back(words);
+        } else if let Some(why) =
+            self.engagement.overdue(host, self.profile.stack, self.profile.authority)
+        {
+            self.hand_back(format!("the controller did not go to {steered}: {why}"));
+        }
+    }
+
+    /// Says that a hand-back is not confirmed.
+    fn remind(&mut self, host: Duration) {
+        if self.engagement.unconfirmed(host) {
+            let (steered, hold) =
+                (self.profile.stack.steered(self.profile.authority), self.profile.stack.hold());
+            let words = format!(
+                "hand-back not confirmed: the controller may still be in {}; take over by radio or \
+                 set {}",
+                steered.name, hold.name
+            );
+            self.say(Severity::Critical, words);
+        }
+    }
+
+    /// Streams, parameters, latency.
+    fn ask(&mut self, host: Duration, to: Source, bytes: &mut Vec<u8>) {
+        let first = self.survey.windows() == 0 && self.survey.messages().count() <= 1;
+        if self.survey.turn(host) || first {
+            self.requests.turn();
+            if let Some(words) = self.requests.complaint(self.profile.stack) {
+                self.say(Severity::Error, words);
+            }
+            for stream in self.profile.stack.streams() {
+                let thin = self.survey.hz(stream.id) < ENOUGH * stream.hz;
+                if thin && self.requests.ask(stream.id) {
+                    let message = wire::message_interval(to, stream.id, (1e6 / stream.hz) as f32);
+                    bytes.extend(self.write(&message));
+                }
+            }
+        }
+        for name in self.parameters.due(host) {
+            let message = wire::parameter_request(to, name);
+            bytes.extend(self.write(&message));
+        }
+        if host >= self.next_sync {
+            self.next_sync = host + TIME_SYNC;
+            let message = wire::time_sync(host.as_nanos() as i64, to);
+            bytes.extend(self.write(&message));
+        }
+    }
+
+    fn request_mode(&mut self, host: Duration, to: Source, bytes: &mut Vec<u8>) {
+        let Some(steer) = self.engagement.request(host) else { return };
+        let stack = self.profile.stack;
+        let mode = if steer { stack.steered(self.profile.authority) } else { stack.hold() };
+        let message = wire::set_mode(to, mode.main, mode.sub);
+        bytes.extend(self.write(&message));
+        if !steer && (stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces) {
+            // The channels go back to the radio.
+            let message = wire::channels_override(to, [0; 3]);
+            bytes.extend(self.write(&message));
+        }
+    }
+}

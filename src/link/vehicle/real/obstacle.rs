@@ -1,0 +1,90 @@
+//! Why the aircraft cannot be engaged now, in words with the remedy.
+
+use super::profile::{Authority, Stack};
+use super::{ENOUGH, Real};
+use crate::link::framing::Source;
+
+/// What a controller that signs means for a companion that does not.
+const SHUT_OUT: &str = "the controller signs its frames and ignores ours, which carry no right \
+                        signature: give its key with --sign and add --sign-vehicle";
+
+impl Real {
+    /// What a radio means for a flight by surfaces. ArduPlane goes on with the radio's sticks when
+    /// our overrides end, and stays in MANUAL: no failsafe of its own acts.
+    pub fn radio_warning(&self) -> Option<String> {
+        let by_channels =
+            (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);
+        (by_channels && self.radio == Some(true)).then(|| {
+            "a radio is bound: if this computer dies, ArduPilot stays in MANUAL on the radio's \
+             sticks. Put its throttle at cruise and be ready to fly"
+                .to_owned()
+        })
+    }
+
+    /// Whether the controller signs what it sends and has answered nothing that we asked.
+    pub fn is_shut_out(&self) -> bool {
+        self.signs && self.parameters.is_silent()
+    }
+
+    /// Why a stream that was denied does not come, with the remedy.
+    pub fn denial(&self, id: u32) -> Option<String> {
+        self.requests.words(self.profile.stack).filter(|_| self.requests.is_denied(id))
+    }
+
+    /// Why the aircraft cannot be engaged now, with the remedy.
+    pub fn obstacle(&self) -> Option<String> {
+        let Some(controller) = self.controller else {
+            return Some(
+                "no flight controller heard: check port, baud rate and its MAVLink".into(),
+            );
+        };
+        if Stack::of(controller.autopilot) != Some(self.profile.stack) {
+            return Some(self.wrong_stack(controller.autopilot));
+        }
+        if let Some(Source { system, component }) = self.intruder {
+            return Some(format!(
+                "system {system}, component {component} is on the vehicle's link too: \
+                 disconnect it, then start again"
+            ));
+        }
+        if !controller.armed {
+            return Some("the controller is not armed: arm and launch it first".into());
+        }
+        if self.is_shut_out() {
+            return Some(SHUT_OUT.into());
+        }
+        self.parameters.obstacle(controller.system).or_else(|| self.thin_stream())
+    }
+
+    /// A stream that comes too seldom.
+    fn thin_stream(&self) -> Option<String> {
+        let thin = self
+            .profile
+            .stack
+            .streams()
+            .iter()
+            .find(|stream| stream.needed && self.survey.hz(stream.id) < ENOUGH * stream.hz)?;
+        if let Some(words) = self.denial(thin.id) {
+            return Some(words);
+        }
+        Some(format!(
+            "{} comes at {:.0} Hz, {:.0} are needed: wait a second, then see `greylag link check`",
+            thin.name,
+            self.survey.hz(thin.id),
+            thin.hz
+        ))
+    }
+
+    pub(super) fn wrong_stack(&self, autopilot: u8) -> String {
+        match Stack::of(autopilot) {
+            Some(Stack::Px4) => "the controller is PX4: fly it with --profile px4".into(),
+            Some(Stack::Ardupilot) => {
+                "the controller is ArduPilot: fly it with --profile ardupilot".into()
+            }
+            None => format!(
+                "the controller is neither PX4 nor ArduPilot (MAV_AUTOPILOT {autopilot}): \
+                 connect one of these"
+            ),
+        }
+    }
+}

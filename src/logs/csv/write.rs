@@ -1,0 +1,80 @@
+//! Writing a flight as CSV.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::CsvError;
+use crate::logs::columns::COLUMNS;
+use crate::logs::{Flight, Sample};
+
+/// Writes `flight` to `out`. Missing values become empty fields; numbers are written so that they
+/// read back to the bit.
+///
+/// # Errors
+/// What the writer says.
+pub fn write(flight: &Flight, out: impl Write) -> std::io::Result<()> {
+    let mut rows = Rows::new(out, &[])?;
+    flight.samples.iter().try_for_each(|sample| rows.row(sample, &[]))?;
+    rows.flush()
+}
+
+/// Writes `flight` to a new file.
+///
+/// # Errors
+/// The file exists, or cannot be written.
+pub fn save(flight: &Flight, path: &Path) -> Result<(), CsvError> {
+    let fail = |doing| move |source| CsvError::File { doing, path: path.to_owned(), source };
+    let file = std::fs::File::create_new(path).map_err(fail("create"))?;
+    write(flight, std::io::BufWriter::new(file)).map_err(fail("write"))
+}
+
+/// Writes rows as they come.
+#[derive(Debug)]
+pub struct Rows<W: Write> {
+    out: W,
+    line: String,
+}
+
+impl<W: Write> Rows<W> {
+    /// Writes the header: the columns of the format, then `extra`.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn new(mut out: W, extra: &[&str]) -> std::io::Result<Self> {
+        let names: Vec<&str> = COLUMNS.iter().map(|c| c.0).chain(extra.iter().copied()).collect();
+        writeln!(out, "{}", names.join(","))?;
+        Ok(Rows { out, line: String::with_capacity(512) })
+    }
+
+    /// Writes a sample, then the extra fields (free of commas and quotes) in the header's order.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn row(&mut self, sample: &Sample, extra: &[&str]) -> std::io::Result<()> {
+        use std::fmt::Write as _;
+        self.line.clear();
+        for (i, (_, get, _)) in COLUMNS.iter().enumerate() {
+            if i > 0 {
+                self.line.push(',');
+            }
+            let x = get(sample);
+            if x.is_finite() {
+                let _ = write!(self.line, "{x}");
+            }
+        }
+        for field in extra {
+            self.line.push(',');
+            self.line.push_str(field);
+        }
+        self.line.push('\n');
+        self.out.write_all(self.line.as_bytes())
+    }
+
+    /// Hands everything on to the file.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn flush(&mut self) -> std::io::Result<()> {
+        self.out.flush()
+    }
+}

@@ -1,0 +1,153 @@
+//! The coefficients of each effect, by the formulas of textbooks.
+
+use super::{Estimate, Figures, Measures, Tail, helmbold};
+
+/// Tailplane's volume, distance in chords, efficiency and share of its chord that moves, as lift.
+const TAIL: [f64; 4] = [0.5, 2.8, 0.95, 0.5];
+/// Fin's volume, distance in spans, lift slope, and share of its chord that moves, as lift.
+const FIN: [f64; 4] = [0.04, 0.4, 3.0, 0.55];
+/// Span efficiency.
+const EFFICIENCY: f64 = 0.85;
+
+impl Measures {
+    /// Lift slope of wing and tailplane, 1/rad.
+    pub(super) fn slope(&self, f: &Figures) -> f64 {
+        match self.tail {
+            Tail::FlyingWing => f.wing,
+            Tail::Conventional => f.wing + tailplane() * TAIL[0] / TAIL[1] * (1.0 - downwash(f)),
+        }
+    }
+
+    /// Lift and pitching moment (about a chord) of the elevator, 1/rad.
+    fn elevator(&self, f: &Figures) -> [f64; 2] {
+        match self.tail {
+            Tail::Conventional => {
+                let lift = tailplane() * TAIL[3] * TAIL[0] / TAIL[1];
+                [lift, -lift * TAIL[1]]
+            }
+            Tail::FlyingWing => [0.07 * f.wing, -0.8 * 0.07 * f.wing],
+        }
+    }
+
+    pub(super) fn zero_lift(&self) -> f64 {
+        if self.tail == Tail::Conventional { 0.25 } else { 0.08 }
+    }
+
+    pub(super) fn lift(&self, f: &Figures) -> Vec<Estimate> {
+        let rate = match self.tail {
+            Tail::Conventional => 2.0 * tailplane() * TAIL[0],
+            Tail::FlyingWing => 0.9 * f.wing,
+        };
+        vec![
+            ("CL0", self.zero_lift(), 0.5, "estimate: camber and incidence of the wing"),
+            ("CLalpha", self.slope(f), 0.1, "Helmbold, with the tailplane behind its downwash"),
+            ("CLq", rate, 0.5, "Etkin and Reid 5.4"),
+            ("CLde", self.elevator(f)[0], 0.5, "tail volume 0.5, half of it by the elevator"),
+        ]
+    }
+
+    pub(super) fn drag(&self, f: &Figures) -> Vec<Estimate> {
+        let (base, zero) = (0.03, self.zero_lift());
+        let k = 1.0 / induced(f);
+        vec![
+            ("CD0", base + k * zero * zero, 0.5, "estimate: a small clean aircraft"),
+            ("CDalpha", 2.0 * k * zero * self.slope(f), 0.5, "lift squared over pi e AR, e = 0.85"),
+            ("CDq", 0.0, 0.0, "none"),
+            ("CDde", 0.0, 0.0, "none"),
+        ]
+    }
+
+    pub(super) fn induced_drag(&self, f: &Figures) -> Estimate {
+        let value = self.slope(f).powi(2) / induced(f);
+        ("CDalpha2", value, 0.25, "lift squared over pi e AR, e = 0.85")
+    }
+
+    pub(super) fn side(&self, _: &Figures) -> Vec<Estimate> {
+        let fin = if self.tail == Tail::Conventional { FIN[2] * FIN[0] / FIN[1] } else { 0.15 };
+        vec![
+            ("CY0", 0.0, 0.0, "symmetric"),
+            ("CYbeta", -fin - 0.05, 0.5, "fin volume 0.04, and the fuselage"),
+            ("CYp", 0.0, 0.0, "small"),
+            ("CYr", 2.0 * fin * FIN[1], 0.5, "Etkin and Reid 5.8"),
+            ("CYda", 0.0, 0.0, "small"),
+        ]
+    }
+
+    pub(super) fn roll(&self, f: &Figures) -> Vec<Estimate> {
+        vec![
+            ("Cl0", 0.0, 0.0, "symmetric"),
+            ("Clbeta", -0.08, 0.5, "estimate: some dihedral"),
+            ("Clp", -0.1 * f.wing, 0.25, "strip theory at the ratio of published small aircraft"),
+            ("Clr", f.lift / 4.0, 0.5, "Etkin and Reid 5.8"),
+            ("Clda", 0.032 * f.wing, 0.5, "at the ratio of published small aircraft"),
+        ]
+    }
+
+    pub(super) fn pitch(&self, f: &Figures) -> Vec<Estimate> {
+        let (margin, damping) = match self.tail {
+            Tail::Conventional => (0.12, -2.2 * tailplane() * TAIL[0] * TAIL[1]),
+            Tail::FlyingWing => (0.08, -0.35 * f.wing),
+        };
+        let slope = -margin * self.slope(f);
+        let alpha = (f.lift - self.zero_lift()) / self.slope(f);
+        vec![
+            ("Cm0", -slope * alpha, 0.5, "trimmed at the cruise airspeed without elevator"),
+            ("Cmalpha", slope, 0.5, "estimate: static margin"),
+            ("Cmq", damping, 0.3, "Etkin and Reid 5.4"),
+            ("Cmde", self.elevator(f)[1], 0.5, "tail volume 0.5, half of it by the elevator"),
+        ]
+    }
+
+    pub(super) fn yaw(&self, f: &Figures) -> Vec<Estimate> {
+        let conventional = self.tail == Tail::Conventional;
+        let fin = FIN[0] * FIN[2];
+        let (stiffness, damping) =
+            if conventional { (fin - 0.05, -2.0 * FIN[1] * fin) } else { (0.03, -0.04) };
+        vec![
+            ("Cn0", 0.0, 0.0, "symmetric"),
+            ("Cnbeta", stiffness, 0.5, "fin volume 0.04 less the fuselage"),
+            ("Cnp", -f.lift / 8.0, 0.5, "Etkin and Reid 5.8"),
+            ("Cnr", damping, 0.5, "fin volume 0.04"),
+            ("Cnda", -0.005, 1.0, "adverse yaw of published small aircraft"),
+        ]
+    }
+
+    /// T = Ts (δ² − δ V/Vp): thrust of a fixed pitch, voltage in proportion to the throttle.
+    pub(super) fn thrust(&self) -> Vec<Estimate> {
+        let (rest, source) = (self.static_thrust, "static thrust and pitch speed");
+        vec![
+            ("T0_n", 0.0, 0.0, source),
+            ("Tt_n", 0.0, 0.0, source),
+            ("Ttt_n", rest, 0.2, source),
+            ("TV_nspm", 0.0, 0.0, source),
+            ("TtV_nspm", -rest / self.pitch_speed, 0.3, source),
+            ("TVV_ns2pm2", 0.0, 0.0, source),
+        ]
+    }
+}
+
+/// Side force, rolling and yawing moment of a rudder on the fin.
+pub(super) fn rudder() -> Vec<Estimate> {
+    let force = FIN[2] * FIN[3] * FIN[0] / FIN[1];
+    let source = "fin volume 0.04, half of it by the rudder";
+    vec![
+        ("CYdr", force, 0.5, source),
+        ("Cldr", 0.05 * force, 1.0, source),
+        ("Cndr", -force * FIN[1], 0.5, source),
+    ]
+}
+
+/// Lift slope of the tailplane with its efficiency, 1/rad.
+fn tailplane() -> f64 {
+    TAIL[2] * helmbold(4.5)
+}
+
+/// Change of the downwash at the tailplane with incidence.
+fn downwash(f: &Figures) -> f64 {
+    2.0 * f.wing / (std::f64::consts::PI * f.aspect)
+}
+
+/// π e AR.
+pub(super) fn induced(f: &Figures) -> f64 {
+    std::f64::consts::PI * EFFICIENCY * f.aspect
+}

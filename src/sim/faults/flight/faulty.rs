@@ -1,0 +1,80 @@
+//! What the faults do to companion, sensors, clock and disk while the flight goes on.
+
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use greylag_sitl::shim::Distortion;
+
+use rand::RngExt;
+
+use super::Flight;
+use crate::sim::faults::counterpart::Aircraft;
+use crate::sim::faults::judge::{Exposure, Finding};
+use crate::sim::faults::mix::{Fault, FaultKind};
+
+impl Flight {
+    /// Steps until the companion has the processor again.
+    pub(super) fn nap(&mut self, acting: &[Fault]) -> u64 {
+        let starved = acting.iter().find(|fault| fault.kind == FaultKind::Starvation);
+        let Some(Fault { strength, .. }) = starved else { return 0 };
+        match self.random.random::<f64>() < 0.05 + 0.3 * strength {
+            // 20 ms to 300 ms without a single instruction.
+            true => self.random.random_range(2..=5 + (25.0 * strength) as u64),
+            false => 0,
+        }
+    }
+
+    /// What the aircraft is exposed to at this step, through no fault of who steers it.
+    pub(super) fn exposure(&mut self, acting: &[Fault]) -> Exposure {
+        let inputs = self.aircraft.inputs();
+        let same = std::mem::replace(&mut self.flown, inputs) == inputs;
+        let lied_to = |fault: &Fault| matches!(fault.kind, FaultKind::Airspeed | FaultKind::Alpha);
+        Exposure {
+            unsteered: same && self.aircraft.is_steered(),
+            blind: matches!(self.aircraft, Aircraft::Sitl(_)) && self.judge.is_blind(),
+            misled: acting.iter().any(lied_to),
+        }
+    }
+
+    /// What the faults do to the sensors and the clock.
+    pub(super) fn distortion(&mut self, acting: &[Fault], step: u64) -> Distortion {
+        let mut distortion = Distortion::default();
+        for fault in acting {
+            let s = fault.strength;
+            match fault.kind {
+                FaultKind::Frozen => distortion.frozen = true,
+                // What a tube that has iced up shows: the speed of that moment, or less and less.
+                FaultKind::Airspeed => {
+                    distortion.airspeed_mps = Some(0.4 * self.cruise + self.cruise * s)
+                }
+                FaultKind::Alpha => distortion.alpha_rad = 0.5 * (s - 0.5),
+                FaultKind::NotANumber => distortion.rate_not_a_number = true,
+                FaultKind::Clock => self.clock_us = (1e7 * s) as i64,
+                FaultKind::Disk => {
+                    self.disk.iter().for_each(|disk| disk.full.store(true, Ordering::Relaxed));
+                }
+                // Time begins anew.
+                FaultKind::Reboot => self.clock_us = -(10_000 * step as i64),
+                _ => {}
+            }
+        }
+        distortion.clock_us = self.clock_us;
+        distortion
+    }
+
+    /// Waits until the recorder's thread has met the full disk, which has to be reported.
+    pub(super) fn hear_of_the_disk(&mut self, now_s: f64) {
+        if self.disk.as_ref().is_none_or(|disk| !disk.full.load(Ordering::Relaxed)) {
+            return;
+        }
+        for _ in 0..300 {
+            self.desk.poll(Duration::from_secs(61), &mut Vec::new());
+            self.hear_texts(now_s);
+            if self.texts.iter().any(|(_, words)| words.contains("recording of flight")) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        self.judge.note(now_s, Finding::Unreported);
+    }
+}

@@ -1,0 +1,134 @@
+//! What the engines of an aircraft do: settled thrust, its lag, the moments it makes.
+
+use greylag_sitl::plant::{PlantError, Start};
+
+use super::fits::{ThrustLag, thrust_lag};
+use super::{ALPHA, Subject};
+use crate::model::textbook::Estimate;
+use crate::num::least_squares;
+use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
+
+/// Share of a channel's variation that is worth a word when it is left.
+const WORTH_SAYING: f64 = 0.02;
+/// Throttle before and after the step that shows the engine's lag.
+const THRUST_STEP: [f64; 2] = [0.4, 0.7];
+/// Part of that step beyond which it is said that the engine's answer is no first-order lag.
+const LAG_WORTH_SAYING: f64 = 0.1;
+/// How long the answer to the step is watched, s.
+const STEP_S: f64 = 20.0;
+/// Mean, amplitude and frequency (rad/s) of the throttle's wave that judges the lag, and how long it lasts, s.
+const WAVE: [f64; 3] = [0.5, 0.1, 3.0];
+const WAVE_S: f64 = 10.0;
+/// Propeller torque that is none, in parts of weight times span.
+const NO_MOMENT: f64 = 1e-5;
+/// Distance of the thrust from the centre of gravity that is none, in chords.
+const NO_ARM: f64 = 1e-3;
+/// Newton metres per pound foot.
+const LBF_FT: f64 = 1.355_817_948_331_4;
+
+/// What the engines do.
+pub(super) struct Propulsion {
+    /// The polynomial of the settled thrust over throttle and airspeed.
+    pub(super) thrust: Vec<Estimate>,
+    /// Time constant of the thrust behind the throttle's position, s.
+    pub(super) lag: Option<f64>,
+    /// Rolling moment at full throttle, to the left, N m.
+    pub(super) torque: Option<f64>,
+    /// How far below the centre of gravity the thrust acts, m.
+    pub(super) arm: Option<f64>,
+}
+
+impl Subject<'_> {
+    /// What the engines do, settled and after a step of the throttle.
+    pub(super) fn propulsion(
+        &mut self,
+        left_out: &mut Vec<String>,
+    ) -> Result<Propulsion, PlantError> {
+        let (mut rows, mut thrusts) = (Vec::new(), Vec::new());
+        // Σ l δ, Σ δ², Σ m T, Σ T²
+        let mut moments = [0.0; 4];
+        for speed in [0.8, 1.0, 1.25] {
+            for throttle in [0.0, 0.25, 0.5, 0.75, 1.0] {
+                let airspeed_mps = speed * self.start.airspeed_mps;
+                let start = Start { airspeed_mps, alpha_rad: ALPHA, ..self.start };
+                let (thrust, truth) = self.plant.settled_thrust(&start, throttle)?;
+                let (d, v) = (truth.throttle, truth.airspeed_mps);
+                let share = truth.air_density_kgpm3 / SEA_LEVEL_DENSITY;
+                rows.push([1.0, d, d * d, v, d * v, v * v].map(|x| x * share));
+                thrusts.push(thrust);
+                // an aircraft without engines has no such property
+                let mut moment = |name: &str| LBF_FT * self.plant.property(name).unwrap_or(0.0);
+                let (roll, pitch) =
+                    (moment("moments/l-prop-lbsft"), moment("moments/m-prop-lbsft"));
+                for (sum, x) in
+                    moments.iter_mut().zip([roll * d, d * d, pitch * thrust, thrust * thrust])
+                {
+                    *sum += x;
+                }
+            }
+        }
+        let fit = least_squares(&rows, &thrusts).unwrap_or_default();
+        let along = |row: &[f64; 6]| row.iter().zip(&fit).map(|(a, b)| a * b).sum::<f64>();
+        let missed = rows.iter().zip(&thrusts).map(|(row, t)| (along(row) - t).powi(2));
+        let left = (missed.sum::<f64>() / thrusts.len() as f64).sqrt();
+        let most = thrusts.iter().fold(1e-9_f64, |most, t| most.max(t.abs()));
+        if left > WORTH_SAYING * most {
+            left_out.push(format!(
+                "the thrust is a polynomial in the model; {left:.1} N (rms) of up to {most:.0} N are left out"
+            ));
+        }
+        let names = ["T0_n", "Tt_n", "Ttt_n", "TV_nspm", "TtV_nspm", "TVV_ns2pm2"];
+        let source = "least squares over JSBSim's thrust, 0.8 to 1.25 of the cruise airspeed";
+        let thrust: Vec<Estimate> =
+            names.into_iter().zip(fit.iter()).map(|(n, x)| (n, *x, 0.02, source)).collect();
+        let lag = self.thrust_lag(&thrust, left_out)?;
+        let [roll, throttle, pitch, squared] = moments;
+        let (torque, arm) = (-roll / throttle.max(1e-9), pitch / squared.max(1e-9));
+        let weight = self.mass.mass_kg * STANDARD_GRAVITY;
+        Ok(Propulsion {
+            thrust,
+            lag,
+            torque: (torque.abs() > NO_MOMENT * weight * self.span).then_some(torque),
+            arm: (arm.abs() > NO_ARM * self.chord).then_some(arm),
+        })
+    }
+
+    /// Time constant (s) of the thrust behind the throttle's position, if it has one; `thrust` is the settled thrust.
+    fn thrust_lag(
+        &mut self,
+        thrust: &[Estimate],
+        left_out: &mut Vec<String>,
+    ) -> Result<Option<f64>, PlantError> {
+        let start = Start { alpha_rad: ALPHA, ..self.start };
+        let step = self.plant.step_s();
+        let steps = |seconds: f64| (seconds / step) as usize;
+        let [from, to] = THRUST_STEP;
+        let raised: Vec<f64> =
+            std::iter::once(from).chain(std::iter::repeat_n(to, steps(STEP_S))).collect();
+        let wave = |k: usize| WAVE[0] + WAVE[1] * (WAVE[2] * step * k as f64).sin();
+        let waved: Vec<f64> = (0..steps(WAVE_S)).map(wave).collect();
+        let raised = self.plant.thrust_response(&start, &raised)?;
+        let waved = self.plant.thrust_response(&start, &waved)?;
+        let of = |name: &str| thrust.iter().find(|e| e.0 == name).map_or(0.0, |e| e.1);
+        let slope = of("Tt_n") + of("TtV_nspm") * self.start.airspeed_mps;
+        let Some(found) = thrust_lag([&raised, &waved], step, [slope, of("Ttt_n")]) else {
+            return Ok(None);
+        };
+        let ThrustLag { lag, left, better } = found;
+        if !better {
+            left_out.push(format!(
+                "how late the thrust follows the throttle: a lag of {lag:.2} s describes a step best, and small movements no \
+                 better than none"
+            ));
+            return Ok(None);
+        }
+        if left > LAG_WORTH_SAYING {
+            left_out.push(format!(
+                "the thrust lags by {lag:.2} s in the model; its answer to a step of the throttle is off by {:.0} % of the \
+                 step (rms)",
+                100.0 * left
+            ));
+        }
+        Ok(Some(lag))
+    }
+}

@@ -1,0 +1,146 @@
+//! One damped Gauss–Newton step within bounds and strides, and how far it moves the coefficients.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::Search;
+use crate::sysid::amend::error::AmendError;
+use crate::sysid::amend::flight::SENSORS;
+use crate::sysid::amend::normal::{self, Normal, Place};
+use crate::sysid::amend::parameters::Free;
+
+/// The equations of all shots together.
+pub(super) struct System {
+    pub(super) shots: Vec<Normal>,
+    pub(super) information: DMatrix<f64>,
+    pub(super) gradient: DVector<f64>,
+    pub(super) prior: DVector<f64>,
+}
+
+impl Search<'_> {
+    /// Where the unknowns of a shot's own equations stand among all.
+    pub(super) fn places(&self, flight: usize) -> Vec<usize> {
+        let count = self.free.len();
+        let own = count + flight * SENSORS;
+        (0..count).chain(own..own + SENSORS).collect()
+    }
+
+    pub(super) fn system(&self) -> System {
+        let residuals = self.residuals();
+        let one = |index: usize| {
+            let (shot, from) = (&self.shots[index], &self.place.starts[index]);
+            normal::normal(&self.jacobians[index], &residuals[index], shot, from, &self.weights)
+        };
+        let shots: Vec<Normal> = (0..self.shots.len()).into_par_iter().map(one).collect();
+        let prior = self.prior();
+        let mut information = DMatrix::from_diagonal(&prior);
+        let mut gradient = prior.component_mul(&self.unknowns(&self.place));
+        for (shot, normal) in self.shots.iter().zip(&shots) {
+            let places = self.places(shot.flight);
+            for (a, p) in places.iter().enumerate() {
+                gradient[*p] += normal.gradient[a];
+                for (b, q) in places.iter().enumerate() {
+                    information[(*p, *q)] += normal.information[(a, b)];
+                }
+            }
+        }
+        System { shots, information, gradient, prior }
+    }
+
+    /// One damped step; whether it moved.
+    pub(super) fn step(&mut self, system: &System, damping: &mut f64) -> Result<bool, AmendError> {
+        let before = self.cost(&self.place);
+        for _ in 0..8 {
+            let step = self.solve(system, *damping)?;
+            let next = self.moved(system, &step);
+            if self.cost(&next) < before {
+                self.change = self.in_deviations(system, &step);
+                self.place = next;
+                *damping = (*damping / 10.0).max(1e-9);
+                return Ok(true);
+            }
+            *damping = (*damping * 10.0).max(1e-3);
+        }
+        self.change = self.in_deviations(system, &self.solve(system, 1e-9)?);
+        Ok(false)
+    }
+
+    /// The step that stays within bounds and strides.
+    fn solve(&self, system: &System, damping: f64) -> Result<DVector<f64>, AmendError> {
+        let singular = || AmendError::Singular { model: self.base.name.clone() };
+        let mut held: Vec<Option<f64>> = vec![None; system.gradient.len()];
+        let scale = system.information.diagonal().map(|d| d.sqrt().recip());
+        for _ in 0..=self.free.len() {
+            let mut matrix = system.information.clone();
+            let mut right = -&system.gradient;
+            for (k, known) in held.iter().enumerate().filter_map(|(k, h)| h.map(|h| (k, h))) {
+                right -= system.information.column(k) * known;
+                matrix.row_mut(k).fill(0.0);
+                matrix.column_mut(k).fill(0.0);
+                matrix[(k, k)] = system.information[(k, k)];
+            }
+            for (k, known) in held.iter().enumerate().filter_map(|(k, h)| h.map(|h| (k, h))) {
+                right[k] = system.information[(k, k)] * known;
+            }
+            // scaled to a unit diagonal, so that units do not matter
+            for (a, b) in (0..scale.len()).flat_map(|a| (0..scale.len()).map(move |b| (a, b))) {
+                matrix[(a, b)] *= scale[a] * scale[b];
+            }
+            right.component_mul_assign(&scale);
+            for k in 0..scale.len() {
+                matrix[(k, k)] += damping * f64::from(u8::from(held[k].is_none()));
+            }
+            let mut step = matrix.cholesky().ok_or_else(singular)?.solve(&right);
+            step.component_mul_assign(&scale);
+            let beyond = self.free.iter().enumerate().find_map(|(k, f)| {
+                let (low, high) = self.room(k, f);
+                let outside = step[k] < low - 1e-12 || step[k] > high + 1e-12;
+                (held[k].is_none() && outside).then(|| (k, step[k].clamp(low, high)))
+            });
+            match beyond {
+                Some((k, limit)) => held[k] = Some(limit),
+                None => return Ok(step),
+            }
+        }
+        Err(singular())
+    }
+
+    /// How far a coefficient may move.
+    fn room(&self, k: usize, f: &Free) -> (f64, f64) {
+        let here = self.place.theta[k];
+        ((f.bounds.0 - here).max(-f.stride), (f.bounds.1 - here).min(f.stride))
+    }
+
+    fn moved(&self, system: &System, step: &DVector<f64>) -> Place {
+        let mut next = self.place.clone();
+        let count = self.free.len();
+        for (k, f) in self.free.iter().enumerate() {
+            next.theta[k] = (next.theta[k] + step[k]).clamp(f.bounds.0, f.bounds.1);
+        }
+        for (flight, sensors) in next.sensors.iter_mut().enumerate() {
+            for (k, x) in sensors.iter_mut().enumerate() {
+                *x += step[count + flight * SENSORS + k];
+            }
+        }
+        for ((shot, normal), from) in
+            self.shots.iter().zip(&system.shots).zip(next.starts.iter_mut())
+        {
+            let places = self.places(shot.flight);
+            let own = DVector::from_iterator(places.len(), places.iter().map(|p| step[*p]));
+            let change = normal.start_step(&own);
+            from.iter_mut().zip(change).for_each(|(x, d)| *x += d);
+        }
+        next
+    }
+
+    /// The largest change of a coefficient in its standard deviations, and which.
+    fn in_deviations(&self, system: &System, step: &DVector<f64>) -> (f64, usize) {
+        let Some(cholesky) = system.information.clone().cholesky() else {
+            return (f64::INFINITY, 0);
+        };
+        let inverse = cholesky.inverse();
+        let change = |k: usize| step[k].abs() / inverse[(k, k)].sqrt();
+        let all = (0..self.free.len()).map(|k| (change(k), k));
+        all.fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a })
+    }
+}

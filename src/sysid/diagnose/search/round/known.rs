@@ -1,0 +1,110 @@
+//! What is unknown in every round: the free coefficients and the errors of the sensors, with their columns.
+
+use super::Problem;
+use crate::model::GreyBox;
+use crate::sysid::diagnose::regression::catalogue::{self, Entry};
+use crate::sysid::diagnose::regression::cells::Placed;
+use crate::sysid::diagnose::regression::columns::{Ready, SENSORS, combine};
+use crate::sysid::diagnose::regression::gather::Column;
+use crate::sysid::diagnose::regression::projected::{Known, Projected};
+use crate::sysid::diagnose::regression::sensors;
+
+type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
+
+/// The known unknowns and their columns: free coefficients, whose columns `linear_columns` has where the model is linear in
+/// them, then the sensors of each flight.
+pub(super) fn known(
+    problem: &Problem,
+    model: &GreyBox,
+    flights: &[Ready],
+    linear_columns: Vec<Vec<Column>>,
+) -> KnownColumns {
+    let (mut known, mut coefficients) = (Vec::new(), Vec::new());
+    let mut placed: Vec<Placed> = vec![Vec::new(); flights.len()];
+    let linear = model.linear();
+    for (index, named) in model.coefficients().iter().enumerate() {
+        // a shape constant that has joined is not moved farther than its linearisation reaches
+        let joined =
+            if linear[index] { f64::INFINITY } else { catalogue::REACH * named.value.abs() };
+        let (value, width) = problem.prior.get(index).copied().unwrap_or((named.value, joined));
+        let held = width <= 0.0 || model.replaced(&named.name).is_some();
+        if held || !searched(model, index) {
+            continue;
+        }
+        for ((list, flight), columns) in placed.iter_mut().zip(flights).zip(&linear_columns) {
+            let column = match linear[index] {
+                true => columns[index].clone(),
+                false => tangent(model, flight, index),
+            };
+            list.push((known.len(), column));
+        }
+        coefficients.push(index);
+        known.push(Known { name: named.name.clone(), width, offset: value - named.value });
+    }
+    for (k, (list, flight)) in placed.iter_mut().zip(flights).enumerate() {
+        for (i, column) in flight.sensors.iter().enumerate() {
+            list.push((known.len(), column.clone()));
+            known.push(Known {
+                name: format!("{} of flight {}", sensors::NAMES[i], k + 1),
+                width: problem.sensors[k][i],
+                offset: sensors::mean(i),
+            });
+        }
+    }
+    (known, coefficients, placed)
+}
+
+/// Expects of every flight's blur what its clock adds to it: a record of u that is late by λ samples is
+/// u − λu' + ½λ²u'', and the clock's column holds the first order alone. Without the second, a delay of a
+/// sample that the clock takes for its own leaves a curvature that only a lag explains.
+pub(super) fn curved(problem: &Problem, known: &mut [Known], projected: &Projected) {
+    let first = known.len().saturating_sub(problem.flights.len() * SENSORS);
+    for (k, flight) in problem.flights.iter().enumerate() {
+        let own = first + k * SENSORS;
+        let (late, blur) = (own + sensors::LATE_PLACE, own + sensors::BLUR_PLACE);
+        let samples = projected.tuned[late] / flight.dt;
+        let unsure = projected.covariance[(late, late)].max(0.0).sqrt() / flight.dt;
+        let [mean, sd] = sensors::BLURRED;
+        known[blur].offset = mean - 0.5 * samples * samples;
+        known[blur].width = sd.hypot(samples * unsure);
+    }
+}
+
+/// Whether a search leaves the coefficient free: gains of nominally one are held.
+fn searched(model: &GreyBox, index: usize) -> bool {
+    let name = &model.coefficients()[index].name;
+    let Some((id, own)) = name.split_once('.') else { return true };
+    let Some(about) = model.effects().find(|about| about.id == id) else { return true };
+    let entry = Entry { about, operator: false };
+    let starts = about.entry.map_or(0, |e| e.starts.len());
+    starts == 0 || catalogue::free(&entry).iter().any(|k| about.coefficients[*k].name == own)
+}
+
+/// The derivative of the prediction by a coefficient that the model is not linear in.
+fn tangent(model: &GreyBox, flight: &Ready, index: usize) -> Column {
+    let named = &model.coefficients()[index];
+    let by = (0.02 * named.value.abs()).max(1e-4);
+    let moved = |by: f64| {
+        let mut moved = model.clone();
+        moved.set_coefficient(&named.name, named.value + by);
+        moved
+    };
+    let id = named.name.split('.').next().unwrap_or_default();
+    let own: Vec<usize> = (0..model.coefficients().len())
+        .filter(|k| model.coefficients()[*k].name.split('.').next() == Some(id))
+        .collect();
+    let linear = model.linear();
+    let of = |model: &GreyBox| {
+        if own.iter().all(|k| !linear[*k]) {
+            return flight.operator(model);
+        }
+        let (first, last) = (own[0], own[own.len() - 1] + 1);
+        let values: Vec<f64> = (first..last)
+            .map(|k| if linear[k] { model.coefficients()[k].value } else { 0.0 })
+            .collect();
+        combine(&flight.linear(model, first..last), &values)
+    };
+    // lags, delays and dead zones are not negative
+    let down = by.min(named.value.max(0.0));
+    combine(&[of(&moved(by)), of(&moved(-down))], &[1.0 / (by + down), -1.0 / (by + down)])
+}

@@ -1,0 +1,132 @@
+//! The models and the columns that a round fits.
+
+use super::Round;
+use crate::model::GreyBox;
+use crate::sysid::diagnose::regression::catalogue::{self};
+use crate::sysid::diagnose::regression::cells::Placed;
+use crate::sysid::diagnose::regression::columns::{combine, of_body};
+use crate::sysid::diagnose::regression::gather::Column;
+use crate::sysid::diagnose::regression::rank::Score;
+
+impl Round {
+    /// The model with its coefficients where they go once `score`'s effect has joined.
+    pub fn with(&self, score: &Score) -> GreyBox {
+        let p = &self.projected;
+        let mut model = self.model.clone();
+        let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
+        for (k, place) in self.coefficients.iter().enumerate() {
+            let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
+            values[*place] += p.tuned[k] - given;
+        }
+        model.set_coefficients(&values);
+        model
+    }
+
+    /// Measured less the tuned model, sensors' errors taken out, flight by flight.
+    pub fn tuned_residual(&self) -> Vec<Column> {
+        let na = self.known.len();
+        let of = |placed: &Placed| {
+            let (mut columns, mut weights) = (Vec::new(), Vec::new());
+            for (place, column) in placed {
+                if *place < na {
+                    weights.push(-self.projected.tuned[*place]);
+                    columns.push(column.clone());
+                } else if *place == self.last {
+                    weights.push(1.0);
+                    columns.push(column.clone());
+                }
+            }
+            combine(&columns, &weights)
+        };
+        self.placed.iter().map(of).collect()
+    }
+
+    /// What `score` adds to the residual, flight by flight.
+    pub fn contribution(&self, score: &Score) -> Vec<Column> {
+        let na = self.known.len();
+        let of = |placed: &Placed| {
+            let columns: Vec<Column> = score
+                .weights
+                .iter()
+                .filter_map(|(c, _)| {
+                    placed.iter().find(|(p, _)| *p == na + c).map(|(_, column)| column.clone())
+                })
+                .collect();
+            let weights: Vec<f64> = score.weights.iter().map(|(_, w)| *w).collect();
+            combine(&columns, &weights)
+        };
+        self.placed.iter().map(of).collect()
+    }
+
+    /// What `score` takes of the squared whitened error, channel by channel.
+    pub fn taken_by(&self, score: &Score) -> [f64; 6] {
+        let mut taken = [0.0; 6];
+        let last = self.projected.width();
+        for (cell, rows) in self.cells.list.iter().zip(&self.projected.rows) {
+            for row in rows.row_iter() {
+                let x: f64 = score.weights.iter().map(|(c, w)| w * row[*c]).sum();
+                taken[cell.channel] += x * (2.0 * row[last] - x);
+            }
+        }
+        taken
+    }
+
+    /// Channels in which `score` takes at least a tenth of what it takes in the best, the best first.
+    pub fn channels_of(&self, score: &Score) -> Vec<usize> {
+        let taken = self.taken_by(score);
+        let most = taken.iter().fold(0.0_f64, |a, b| a.max(*b));
+        let mut channels: Vec<usize> =
+            (0..6).filter(|c| taken[*c] > 0.1 * most && taken[*c] > 0.0).collect();
+        channels.sort_by(|a, b| taken[*b].total_cmp(&taken[*a]));
+        channels
+    }
+
+    /// The model with its coefficients where the data and their prior put them, asserted effects' within
+    /// their bounds.
+    pub fn tuned(&self) -> GreyBox {
+        let mut model = self.model.clone();
+        let linear = model.linear();
+        let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
+        for (k, place) in self.coefficients.iter().enumerate() {
+            let mut step = self.projected.tuned[k];
+            if !linear[*place] {
+                let reach = catalogue::REACH * values[*place].abs();
+                step = step.clamp(-reach, reach);
+            }
+            values[*place] += step;
+            if *place >= self.given
+                && let Some((low, high)) = bounds(&model, *place)
+            {
+                values[*place] = values[*place].clamp(low, high);
+            }
+        }
+        model.set_coefficients(&values);
+        if self.model.body.may_become(&model.body) {
+            return model;
+        }
+        let of_body: Vec<usize> =
+            self.coefficients.iter().copied().filter(|k| of_body(&self.model, *k)).collect();
+        let given: Vec<f64> = self.model.coefficients().iter().map(|c| c.value).collect();
+        let less = (0..100).rev().map(|percent| {
+            let mut less = values.clone();
+            for k in &of_body {
+                less[*k] = given[*k] + 0.01 * f64::from(percent) * (values[*k] - given[*k]);
+            }
+            less
+        });
+        for values in less {
+            model.set_coefficients(&values);
+            if self.model.body.may_become(&model.body) {
+                break;
+            }
+        }
+        model
+    }
+}
+
+/// The physical bounds of a coefficient.
+fn bounds(model: &GreyBox, index: usize) -> Option<(f64, f64)> {
+    let (id, own) = model.coefficients()[index].name.split_once('.')?;
+    let about = model.effects().find(|about| about.id == id)?;
+    about.coefficients.iter().find(|c| c.name == own).map(|c| model.size().bounds(c))
+}

@@ -1,0 +1,92 @@
+//! Refusals of selected effects by what is left beside them.
+
+use super::found::{Found, Selected};
+use crate::physics::inputs::{Acts, Kind};
+use crate::sysid::compare::ChannelId;
+
+/// Part of what is to be removed from its channels that an effect may leave there.
+const LEFT: f64 = 0.3;
+/// The same of what products of the states take beside it: right ones leave less than 0.02, but for
+/// `unsteady_lift`, whose formula is not what the simulator has.
+const SHAPELESS: f64 = 0.1;
+/// The same of what second derivatives of the surfaces take beside an effect on the inputs.
+const BENT: f64 = 0.02;
+
+impl Found {
+    /// Refuses effects that leave in their own channels much of what there is to remove: of what they take
+    /// themselves and what a flexible model could remove besides, or of what is more than noise.
+    pub(super) fn judge_remainder(&mut self) {
+        let (before, after) = (&self.first_remainder, &self.remainder);
+        let real = |s: &&Selected| s.refused.is_empty() && !s.relieves;
+        let taken: Vec<(&'static str, [f64; 6])> =
+            self.selected.iter().filter(real).map(|s| (s.id, s.taken)).collect();
+        let assertable = self.selected.iter_mut().filter(|s| s.refused.is_empty() && !s.relieves);
+        for effect in assertable {
+            let own = |of: &[f64; 6]| effect.channels.iter().map(|c| of[*c]).sum::<f64>();
+            let significant =
+                effect.channels.iter().any(|c| after.removable[*c] > after.threshold[*c]);
+            let least = own(&after.removable);
+            let share = least / own(&before.removable).max(least + effect.score.fall).max(1.0);
+            if significant && share > LEFT {
+                effect.refused.push(format!(
+                    "with it, a flexible model could still remove {:.0} % of what it could without",
+                    100.0 * share
+                ));
+            }
+            let beyond = self.beyond.as_ref();
+            let left = beyond.and_then(|b| b.share(&effect.channels, effect.score.fall));
+            if let Some(share) = left.filter(|share| *share > LEFT) {
+                effect.refused.push(format!(
+                    "with it, {:.0} % of what its channels have beyond noise is still there",
+                    100.0 * share
+                ));
+            }
+            let Some(shape) = &self.shape else { continue };
+            // several effects of a channel leave what they leave together
+            let others = taken.iter().filter(|(id, _)| *id != effect.id);
+            let others: f64 =
+                others.map(|(_, of)| effect.channels.iter().map(|c| of[*c]).sum::<f64>()).sum();
+            let beside = shape.beside(&effect.channels, effect.score.fall + others.max(0.0));
+            if let Some((share, term)) = beside.filter(|(share, _)| *share > SHAPELESS) {
+                effect.refused.push(format!(
+                    "with it, products of the states, {term} above all, still explain {:.0} % of what is \
+                     missing: its formula has another shape",
+                    100.0 * share
+                ));
+            }
+            let bends = shape.bends_beside(effect.score.fall);
+            let on_surfaces =
+                Kind::from_id(effect.id).is_some_and(|k| k.acts() == Acts::OnSurfaces);
+            if on_surfaces && bends > BENT {
+                effect.refused.push(format!(
+                    "lack of fit: with it, second derivatives of the surfaces still explain {:.1} % of what is \
+                     missing, so what acts on them takes another course in time",
+                    100.0 * bends
+                ));
+            }
+        }
+        self.refuse_companions();
+    }
+
+    /// Refuses every effect that acts in one of `channels`, for `reason`.
+    pub fn refuse_in(&mut self, channels: &[ChannelId], except: &str, reason: &str) {
+        let touched = |c: &usize| channels.contains(&ChannelId::ALL[*c]);
+        let spared = |s: &&mut Selected| s.id != except && s.channels.iter().any(touched);
+        for effect in self.selected.iter_mut().filter(spared) {
+            effect.refused.push(reason.to_owned());
+        }
+        self.refuse_companions();
+    }
+
+    /// Refuses what was found beside an effect that is refused: it is no more sure than that.
+    fn refuse_companions(&mut self) {
+        let refused = |s: &Selected| !s.refused.is_empty() && s.trace.is_none();
+        let Some(first) = self.selected.iter().position(refused) else { return };
+        let (refused, later) = self.selected.split_at_mut(first + 1);
+        for effect in later.iter_mut().filter(|s| s.refused.is_empty()) {
+            effect
+                .refused
+                .push(format!("it was found beside {}, which is refused", refused[first].id));
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! How the reconstructed path errs: draws of the noise of every sensor, and shifts by other residuals.
+
+use nalgebra::{SVector, Vector3};
+use rand_distr::{Distribution, StandardNormal};
+
+use super::{BETWEEN, Found, Problem, WIDTH, start, step_deviations, weigh};
+use crate::logs::Sampling;
+use crate::num::stream::Stream;
+use crate::sysid::flight_path::band::{self, Node};
+use crate::sysid::flight_path::intake::Track;
+use crate::sysid::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST};
+use crate::sysid::flight_path::levels::CALM;
+use crate::sysid::flight_path::measurement::{self, AT, OTHERS, Others, Reading};
+use crate::sysid::flight_path::nuisance::{self, COUNT, Values};
+use crate::sysid::flight_path::path::{CHANNELS, Path};
+
+/// A path with an error like that of the one found.
+#[derive(Clone, Debug)]
+pub struct Erring {
+    /// The path of each track.
+    pub paths: Vec<Path>,
+    /// The noise of the gyros of each track, rad/s.
+    pub gyro: Vec<Vec<[f64; 3]>>,
+}
+
+impl Problem<'_> {
+    /// What the constants of [`calm`](Self::calm) would be moved by if the sensors of the air had the
+    /// residuals `others`, by stretch, then instant.
+    pub fn moved_by(
+        &self,
+        found: &Found,
+        bound: f64,
+        others: &[Vec<[Others; 3]>],
+    ) -> Option<[Values; OTHERS]> {
+        const W: usize = WIDTH + OTHERS;
+        const M: usize = AT + OTHERS;
+        let eliminated = self.eliminate::<MOTION, W, M, BETWEEN>(found, bound, Some(others));
+        let (_, _, left) = eliminated?;
+        let factor = self.information(&left)?.cholesky()?;
+        Some(std::array::from_fn(|r| {
+            let seen = |i: usize| !nuisance::unseeable(i, &self.log.has);
+            let right = SVector::<f64, COUNT>::from_fn(|i, _| {
+                if seen(i) { left.corner[OTHERS + i][r] } else { 0.0 }
+            });
+            factor.solve(&right).into()
+        }))
+    }
+
+    /// How the path errs that was found, in one draw of the noise of every sensor, the constants held.
+    pub fn erring(&self, found: &Found, random: &mut Stream) -> Option<Erring> {
+        let mut erring = Erring { paths: found.paths.clone(), gyro: Vec::new() };
+        for (track, path) in self.log.tracks.iter().zip(&mut erring.paths) {
+            let gyro = if found.levels.gusts > CALM {
+                self.err::<MOTION_AND_GUST>(track, path, found, random)?
+            } else {
+                self.err::<MOTION>(track, path, found, random)?
+            };
+            erring.gyro.push(gyro);
+        }
+        Some(erring)
+    }
+
+    /// Moves `path` by its error in one draw; returns the gyros' noise in it, rad/s.
+    fn err<const N: usize>(
+        &self,
+        track: &Track,
+        path: &mut Path,
+        found: &Found,
+        random: &mut Stream,
+    ) -> Option<Vec<[f64; 3]>> {
+        let (step, gravity) = (self.log.step, self.options.gravity);
+        let (values, l) = (&found.values, &found.levels);
+        let mut unit = || -> f64 { StandardNormal.sample(random) };
+        let noise: Vec<[f64; N]> =
+            (0..path.len()).map(|_| std::array::from_fn(|_| unit())).collect();
+        let measured =
+            measurement::readings(track, path, values, step, self.log.sensors.vanes_at());
+        // as the path was found: what is coloured counts as white that is so much wider
+        let spread: [f64; CHANNELS] = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
+        let readings: Vec<Reading> = measured
+            .into_iter()
+            .map(|r| r.with(std::array::from_fn(|i| spread[i] * unit())))
+            .collect();
+        let drive = Drive::new(track, values, step, self.sampling, gravity);
+        let sd = step_deviations::<N>(l, step);
+        let along: &Path = path;
+        let instant = |k: usize, node: &mut Node<N, 1>, corner: &mut band::Corner<1>| {
+            if k == 0 {
+                start::<N, 1>(&Vector3::zeros(), l.gusts, node, corner);
+            }
+            let reading = &readings[k];
+            measurement::add::<N, 1, 1>(
+                along,
+                values,
+                k,
+                reading,
+                &spread,
+                f64::INFINITY,
+                None,
+                node,
+                corner,
+            );
+        };
+        let link = |k: usize, corner: &mut band::Corner<1>| {
+            let mut step = drive.step::<N, 1>(along, values, k, step, gravity);
+            for i in 0..N {
+                let unit = match (i, self.sampling) {
+                    (0..3, Sampling::Instants) => 0.5 * (noise[k][i] + noise[k + 1][i]),
+                    _ => noise[k][i],
+                };
+                step.rest[i][0] = sd[i] * unit;
+            }
+            weigh(step, &sd, f64::INFINITY, corner)
+        };
+        let (stretch, _) = band::eliminate(along.len(), instant, link)?;
+        for (k, x) in stretch.substitute(&[1.0]).iter().enumerate() {
+            path.shift(k, x);
+        }
+        Some(noise.iter().map(|unit| std::array::from_fn(|i| l.gyro[i] * unit[i])).collect())
+    }
+}

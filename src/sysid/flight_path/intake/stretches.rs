@@ -1,0 +1,80 @@
+//! The stretches of a log that were flown without a gap, and the time between their samples.
+
+use super::Present;
+use crate::logs::{Flight, Sample};
+use crate::num::statistics::quantile;
+use crate::sysid::flight_path::{Options, ReconstructError};
+
+/// Median row periods that a pause must exceed to be a gap,
+const GAP_PERIODS: f64 = 2.5;
+/// up to this period, s: at less than 5 Hz nothing is known between the rows.
+const SLOWEST_PERIOD: f64 = 0.2;
+/// Time around a row over which its airspeed is averaged to tell flight from ground, s.
+const AIRBORNE_WINDOW: f64 = 1.0;
+
+/// The times of the rows of each stretch in flight without a gap.
+pub(super) fn stretches(
+    flight: &Flight,
+    has: &Present,
+    options: &Options,
+) -> Result<Vec<Vec<f64>>, ReconstructError> {
+    let usable = |s: &&Sample| {
+        s.time_s.is_finite()
+            && s.rates_radps.iter().all(|x| x.is_finite())
+            && (!has.force || s.specific_force_mps2.iter().all(|x| x.is_finite()))
+    };
+    let airborne = airborne(flight, options)?;
+    let gap = gap(flight, options);
+    let mut stretches: Vec<Vec<f64>> = Vec::new();
+    for s in flight.samples.iter().filter(usable).filter(|s| airborne(s.time_s)) {
+        match stretches.last_mut() {
+            Some(times) if times.last().is_some_and(|t| s.time_s <= *t) => {}
+            Some(times) if times.last().is_some_and(|t| s.time_s - t <= gap) => {
+                times.push(s.time_s);
+            }
+            _ => stretches.push(vec![s.time_s]),
+        }
+    }
+    Ok(stretches)
+}
+
+/// Longest time between rows that is no gap, s: longer for a log that is slow throughout.
+pub(super) fn gap(flight: &Flight, options: &Options) -> f64 {
+    let times: Vec<f64> = flight.samples.iter().map(|s| s.time_s).collect();
+    let periods: Vec<f64> =
+        times.windows(2).map(|w| w[1] - w[0]).filter(|period| *period > 0.0).collect();
+    let period = if periods.is_empty() { 0.0 } else { quantile(&periods, 0.5) };
+    1.000_001 * options.gap_s.max(GAP_PERIODS * period.min(SLOWEST_PERIOD))
+}
+
+/// Tells flight from ground by the mean airspeed around a time.
+fn airborne(flight: &Flight, options: &Options) -> Result<impl Fn(f64) -> bool, ReconstructError> {
+    let rows = flight.samples.iter().map(|s| (s.time_s, s.airspeed_mps));
+    let (times, speeds): (Vec<f64>, Vec<f64>) =
+        rows.filter(|(t, v)| t.is_finite() && v.is_finite()).unzip();
+    let fastest = speeds.iter().copied().fold(0.0, f64::max);
+    let slowest = options.airspeed_min_mps;
+    if fastest < slowest {
+        return Err(ReconstructError::NoFlight {
+            flight: options.name.clone(),
+            fastest_mps: fastest,
+        });
+    }
+    let mut sums = vec![0.0];
+    for v in &speeds {
+        sums.push(sums[sums.len() - 1] + v);
+    }
+    Ok(move |t: f64| {
+        let a = times.partition_point(|x| *x < t - AIRBORNE_WINDOW / 2.0);
+        let b = times.partition_point(|x| *x <= t + AIRBORNE_WINDOW / 2.0);
+        b > a && sums[b] - sums[a] >= slowest * (b - a) as f64
+    })
+}
+
+pub(super) fn step(stretches: &[Vec<f64>], options: &Options) -> f64 {
+    let periods: Vec<f64> =
+        stretches.iter().flat_map(|t| t.windows(2).map(|w| w[1] - w[0])).collect();
+    let median = quantile(&periods, 0.5);
+    // a clock written with few digits must not make a step of 0.010001 s
+    if median.is_finite() && median > 1.02 * options.step_s { median } else { options.step_s }
+}

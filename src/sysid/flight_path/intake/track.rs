@@ -1,0 +1,138 @@
+//! One stretch on a uniform clock: measurements where there are any, commands held, deflections always.
+
+use super::channels::Channels;
+use super::{Present, Track};
+use crate::physics::actuators::Actuators;
+use crate::physics::atmosphere::{Atmosphere, Density};
+use crate::physics::{Command, Controls};
+use crate::sysid::flight_path::Options;
+use crate::sysid::flight_path::channel::{Channel, wrap};
+
+/// Time over which a climb is taken from the altitude, s.
+const CLIMB_WINDOW: f64 = 1.0;
+
+pub(super) fn track(
+    channels: &Channels,
+    has: &Present,
+    [start, end]: [f64; 2],
+    [step, gap]: [f64; 2],
+    options: &Options,
+) -> Track {
+    let n = ((end - start) / step + 1e-6).floor() as usize + 1;
+    let nan = f64::NAN;
+    let times: Vec<f64> = (0..n).map(|k| (start + k as f64 * step).min(end)).collect();
+    let reach = gap;
+    let near = 0.5 * step;
+    let measured = |c: &Channel, t: f64| c.measured(t, reach, near);
+    let keep = |use_it: bool, x: f64| if use_it { x } else { nan };
+    let mut track = Track { start, ..Track::default() };
+    for &t in &times {
+        track.rates.push(std::array::from_fn(|i| channels.rates[i].between(t, 2.0 * reach)));
+        let force = std::array::from_fn(|i| channels.force[i].between(t, 2.0 * reach));
+        track.force.push(if has.force { force } else { [nan; 3] });
+        let angle = |i: usize| wrap(measured(&channels.attitude[i], t));
+        track.attitude.push([angle(0), angle(1), keep(has.yaw, angle(2))]);
+        track.airspeed.push(measured(&channels.airspeed, t));
+        track.vanes.push([
+            keep(has.alpha, measured(&channels.vanes[0], t)),
+            keep(has.beta, measured(&channels.vanes[1], t)),
+        ]);
+        let velocity = std::array::from_fn(|i| measured(&channels.velocity[i], t));
+        track.velocity.push(if has.velocity { velocity } else { [nan; 3] });
+        let altitude = channels.altitude.between(t, f64::INFINITY);
+        let held = channels.altitude.held(t);
+        track.altitude.push(if altitude.is_nan() { held } else { altitude });
+        track.commands.push(command(channels, t));
+    }
+    if has.altitude && !has.velocity {
+        climb(&mut track, step);
+    }
+    if !has.yaw && !has.velocity {
+        heading(&mut track, step);
+    }
+    let air = Atmosphere { density: Density::Standard, gravity: options.gravity };
+    let logged = |t: f64| {
+        let density = channels.density.between(t, f64::INFINITY);
+        if density.is_nan() { channels.density.held(t) } else { density }
+    };
+    let standard = |h: f64| air.density_at(if h.is_finite() { h } else { 0.0 });
+    track.density = times
+        .iter()
+        .zip(&track.altitude)
+        .map(|(t, h)| Some(logged(*t)).filter(|d| *d > 0.0).unwrap_or_else(|| standard(*h)))
+        .collect();
+    track.controls = controls(channels, &times, options);
+    track
+}
+
+/// Takes the vertical velocity from the altitude, once every [`CLIMB_WINDOW`], so that the errors of
+/// the altitude enter once each.
+fn climb(track: &mut Track, step: f64) {
+    let half = (CLIMB_WINDOW / step / 2.0).round().max(1.0) as usize;
+    let mut k = half;
+    while k + half < track.len() {
+        let rise = track.altitude[k + half] - track.altitude[k - half];
+        track.velocity[k][2] = -rise / (2 * half) as f64 / step;
+        k += 2 * half;
+    }
+}
+
+/// Integrates the heading from the gyros, ψ̇ = (q sin φ + r cos φ) / cos θ, and hands it out once every
+/// [`CLIMB_WINDOW`]: where nothing else shows the heading, the path could turn as it likes.
+fn heading(track: &mut Track, step: f64) {
+    let every = (CLIMB_WINDOW / step).round().max(1.0) as usize;
+    let (mut yaw, mut last) = (0.0, [0.0; 2]);
+    for k in 0..track.len() {
+        let [roll, pitch, _] = track.attitude[k];
+        if roll.is_finite() && pitch.is_finite() {
+            last = [roll, pitch];
+        }
+        let ([roll, pitch], [_, q, r]) = (last, track.rates[k]);
+        track.attitude[k][2] = if k % every == 0 { wrap(yaw) } else { f64::NAN };
+        yaw += step * (q * roll.sin() + r * roll.cos()) / pitch.cos();
+    }
+}
+
+/// The command in force at `t`; where only some are logged, the others are NaN.
+fn command(channels: &Channels, t: f64) -> Option<Command> {
+    let [aileron, elevator, throttle, rudder] =
+        std::array::from_fn(|i| channels.commands[i].held(t));
+    let rudder = if rudder.is_finite() { rudder } else { 0.0 };
+    let command = Command { aileron, elevator, throttle, rudder };
+    command.is_finite().then_some(command)
+}
+
+/// The deflections at `times`: as logged, else from the commands through the actuators.
+pub(super) fn controls(channels: &Channels, times: &[f64], options: &Options) -> Vec<Controls> {
+    let f = &options.actuators;
+    let sent = |t: f64| {
+        let [aileron, elevator, throttle, rudder] = std::array::from_fn(|i| {
+            let command = channels.commands[i].held(t);
+            if command.is_finite() { command.clamp(-1.0, 1.0) } else { 0.0 }
+        });
+        Command { aileron, elevator, throttle, rudder }
+    };
+    let mut clock = times.first().copied().unwrap_or(0.0);
+    let mut actuators = Actuators::at_rest(&f.controls(&sent(clock)));
+    let mut all = Vec::with_capacity(times.len());
+    for &t in times {
+        while clock + 0.5 * f.step < t {
+            actuators.step(&sent(clock + 1e-9), f);
+            clock += f.step;
+        }
+        let simulated = actuators.controls();
+        let logged = |i: usize, simulated: f64| {
+            let x = channels.positions[i].between(t, f64::INFINITY);
+            let x = if x.is_nan() { channels.positions[i].held(t) } else { x };
+            if x.is_finite() { x } else { simulated }
+        };
+        all.push(Controls {
+            aileron: logged(0, simulated.aileron),
+            elevator: logged(1, simulated.elevator),
+            throttle: logged(2, simulated.throttle),
+            rudder: logged(3, if f.rudder.is_some() { simulated.rudder } else { 0.0 }),
+            lagged: None,
+        });
+    }
+    all
+}
