@@ -1,5 +1,6 @@
 //! What no effect of the catalogue holds: a formula is proposed, tested on other flights, and mends the model.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use greylag::control::{ControllerKind, build};
@@ -9,9 +10,10 @@ use greylag::physics::formula::{Status, file, register};
 use greylag::sim::missing::Missing;
 use greylag::sim::starting_model::starting_model;
 use greylag::sim::trial::Trial;
-use greylag::sysid::diagnose::{Options, Verdict, propose};
+use greylag::sysid::diagnose::{DiagnoseError, Options, Proposal, Verdict, propose, trend};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
+use greylag::sysid::progress::{Stage, unheard};
 
 /// Seed of the flights; none of those that thresholds were set with.
 const SEED: u64 = 3101;
@@ -28,12 +30,10 @@ fn reconstructed(model: &GreyBox, flights: &[Flight]) -> Vec<Reconstruction> {
     flights.iter().map(one).collect()
 }
 
-/// A thrust line 40 mm to the left: n = 1.16 N m δt, which no effect of the catalogue is.
-#[test]
-fn a_thrust_line_to_the_left_is_named_and_tested() {
+/// A model that lacks `missing`, flights to search and flights to test on.
+fn flown(missing: Missing) -> (GreyBox, Vec<Reconstruction>, Vec<Reconstruction>) {
     let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params");
-    let effect = register::load(&params.join("effects/yaw_by_throttle.toml")).unwrap()[0];
-    let missing = vec![Missing::written(effect, &[1.16]).unwrap()];
+    let missing = vec![missing];
     let reference = std::fs::read_to_string(params.join("x8/jsbsim.toml")).unwrap();
     let text = starting_model(&reference, "lacks", SEED, &missing).unwrap();
     let model = GreyBox::parse(&text, &params.join("x8/lacks.toml")).unwrap();
@@ -42,12 +42,20 @@ fn a_thrust_line_to_the_left_is_named_and_tested() {
     let logs = trial.fly(build(ControllerKind::Lqi, &exact).unwrap().as_ref()).unwrap();
     let search = reconstructed(&model, &logs.training);
     let test = reconstructed(&model, &logs.testing);
-    let found =
-        propose(&model, &search, &test, &Options::default(), &greylag::sysid::progress::unheard)
-            .unwrap();
+    (model, search, test)
+}
+
+/// A thrust line 40 mm to the left: n = 1.16 N m δt, which no effect of the catalogue is.
+#[test]
+fn a_thrust_line_to_the_left_is_named_and_tested() {
+    let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params");
+    let effect = register::load(&params.join("effects/yaw_by_throttle.toml")).unwrap()[0];
+    let (model, search, test) = flown(Missing::written(effect, &[1.16]).unwrap());
+    let found = propose(&model, &search, &test, &Options::default(), &unheard).unwrap();
     assert_eq!(found.verdict, Verdict::Unexplained);
     let chosen = found.front.iter().find(|r| r.chosen).unwrap();
     assert_eq!(chosen.formula, "yaw = k*throttle", "{:?}", found.sentences);
+    assert!(found.free.is_none(), "nothing is left for free forms: {:?}", found.free);
     let grades = found.grades.unwrap();
     assert!(grades.channel && grades.variables && grades.trend, "{:?}", found.sentences);
     assert!(found.sentences[0].contains("grows linearly with throttle, not with airspeed"));
@@ -58,4 +66,67 @@ fn a_thrust_line_to_the_left_is_named_and_tested() {
     assert_eq!(own.status, Status::Proposed);
     // the interval of the amendment with the true effect is ±0.002; a search tunes less
     assert!((own.values[0] - 1.16).abs() < 0.05, "{:?}", own.values);
+}
+
+/// A side force that saturates with sideslip.
+const SATURATING: &str = r#"
+schema = 1
+id = "side_saturates"
+description = "The side force saturates."
+source = "made up"
+status = "accepted"
+[parameters.k]
+value = -0.05
+bounds = [-1.0, 1.0]
+unit = ""
+meaning = "amount"
+[[channels]]
+channel = "side"
+factor = "qbar*S"
+shape = "k*tanh(beta/0.02)"
+"#;
+
+#[test]
+fn a_form_that_the_library_lacks_is_found_among_free_ones() {
+    let effect = register::read(SATURATING).unwrap();
+    let (model, search, test) = flown(Missing::written(effect, &effect.values).unwrap());
+    let with = |free_forms: bool| {
+        let options = Options { free_forms, ..Options::default() };
+        propose(&model, &search, &test, &options, &unheard).unwrap()
+    };
+    let found = with(true);
+    assert_eq!(found.verdict, Verdict::Unexplained);
+    let free = found.free.as_ref().unwrap();
+    assert!(free.chosen && free.tried > 5000, "{free:?}");
+    for pair in free.front.windows(2) {
+        assert!(pair[0].complexity < pair[1].complexity && pair[0].removed < pair[1].removed);
+    }
+    let grades = found.grades.unwrap();
+    assert!(grades.channel && grades.variables && grades.trend, "{:?}", found.sentences);
+    let first = &found.front[0];
+    assert!(first.chosen && trend(shape(&first.formula)) == trend("tanh(beta/0.02)"), "{first:?}");
+    // all forms at once and the round of the library have the same statistic
+    let same = free.front.iter().find(|r| r.formula == first.formula).unwrap();
+    assert!((same.evidence / first.evidence - 1.0).abs() < 0.1, "{same:?} {first:?}");
+    let held_out = found.held_out.as_ref().unwrap();
+    assert!(held_out.removed > 0.95 && held_out.fall > held_out.threshold, "{held_out:?}");
+    let own = file::parse(found.effect.as_ref().unwrap()).unwrap();
+    assert_eq!((own.status, own.about.shape), (Status::Proposed, 1));
+    let library = with(false);
+    let left = |p: &Proposal| 1.0 - p.held_out.as_ref().unwrap().removed;
+    assert!(library.free.is_none() && left(&library) > 2.0 * left(&found), "{:?}", library.front);
+    // the same seed, the same answer
+    let again = with(true);
+    assert_eq!(serde_json::to_string(&again).unwrap(), serde_json::to_string(&found).unwrap());
+    let stop = |stage: Stage<'_>| match stage.doing.contains("free forms") {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
+    };
+    let ended = propose(&model, &search, &test, &Options::default(), &stop);
+    assert!(matches!(ended, Err(DiagnoseError::Cancelled(_))), "{:?}", ended.map(|p| p.sentences));
+}
+
+/// What follows the coefficient and the factor of a side force.
+fn shape(formula: &str) -> &str {
+    formula.split_once("k*qbar*S*").unwrap().1
 }

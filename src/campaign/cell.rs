@@ -27,7 +27,9 @@ pub struct Cell {
     pub inputs: BTreeMap<String, String>,
     /// Numbers of the cells whose folders it reads.
     pub after: Vec<usize>,
-    /// SHA-256 of program version, command, inputs and the cells before: the same means the same result.
+    /// SHA-256 over the program's version (not its commit), [`words`](Cell::words) and [`inputs`](Cell::inputs). The
+    /// cells before count by their folders in `words`, whose names hold their identities; the cell's own folder does
+    /// not count. The same identity means the same result.
     pub identity: String,
 }
 
@@ -76,7 +78,7 @@ pub struct Record {
     pub levels: BTreeMap<String, String>,
     /// Its seed.
     pub seed: Option<u64>,
-    /// What decided it.
+    /// The cell's [`identity`](Cell::identity).
     pub identity: String,
     /// The program and its build.
     pub program: String,

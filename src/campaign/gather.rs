@@ -12,7 +12,8 @@ use super::store::{Failure, Standing, Store, Times, whole};
 pub struct Gathered {
     /// The results, in the order of the cells.
     pub records: Vec<Record>,
-    /// What they took, in the same order, where it is known.
+    /// What they took, in the order of the cells, without those whose times are not known: [`Times::cell`] says which
+    /// record each belongs to.
     pub times: Vec<Times>,
     /// Cells that failed, and why.
     pub failed: Vec<(String, Failure)>,

@@ -29,7 +29,7 @@ pub fn silence(quiet: bool) {
     SILENT.store(quiet, Ordering::Relaxed);
 }
 
-/// Whether progress is shown.
+/// Whether no progress is shown (`--quiet`).
 pub fn is_silent() -> bool {
     SILENT.load(Ordering::Relaxed)
 }

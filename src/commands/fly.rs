@@ -132,7 +132,7 @@ impl ProfileName {
 }
 
 impl CommandName {
-    /// The authority it means.
+    /// What the companion commands of a real controller.
     pub fn authority(self) -> Authority {
         match self {
             CommandName::Surfaces => Authority::Surfaces,
@@ -301,10 +301,11 @@ pub fn check_changes(kinds: &[ControllerKind], changes: &[Change]) -> anyhow::Re
 }
 
 /// A pilot with its controllers: `kind` flies, with the policy in `folder` if it needs one; an LQI of
-/// the same model is the fallback.
+/// the same model is the fallback, or `pid-retuned`, with a line on standard error, where none can be designed.
 ///
 /// # Errors
-/// If the policy cannot be used, the model does not allow a controller, or has no level flight.
+/// If the policy cannot be used, the model does not allow `kind`, or flies straight at its cruise airspeed neither level
+/// nor in a glide. An LQI that cannot be designed as the fallback is no error.
 pub fn companion_with(
     kind: ControllerKind,
     model: &GreyBox,
@@ -337,6 +338,10 @@ pub fn companion_with_planner(
     Ok(Companion { pilot, controller, placement })
 }
 
+/// The fallback of `model`: an LQI, or `pid-retuned`, with a line on standard error, where no LQI can be designed.
+///
+/// # Errors
+/// If `pid-retuned` cannot be built either.
 fn fallback(model: &GreyBox) -> anyhow::Result<Box<dyn Controller>> {
     match build(ControllerKind::Lqi, model) {
         Ok(lqi) => Ok(lqi),

@@ -6,6 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 
+use crate::commands::status;
+
 /// A flag that Ctrl-C sets.
 #[derive(Clone, Debug, Default)]
 pub struct Interruption(Arc<AtomicBool>);
@@ -43,7 +45,7 @@ impl From<Ended> for ExitCode {
     fn from(ended: Ended) -> ExitCode {
         match ended {
             Ended::Done => ExitCode::SUCCESS,
-            Ended::Interrupted => ExitCode::from(130),
+            Ended::Interrupted => ExitCode::from(status::INTERRUPTED),
         }
     }
 }

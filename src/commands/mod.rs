@@ -63,6 +63,7 @@ use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
 use crate::sysid::progress::Cancelled;
+use interruption::{Ended, Interruption};
 
 /// What `-V` says: version, commit where the build was given one (`GREYLAG_COMMIT`), features.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
@@ -72,7 +73,6 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
     let commit = option_env!("GREYLAG_COMMIT").unwrap_or("unknown");
     format!("{} (commit {commit}; features: {})", env!("CARGO_PKG_VERSION"), built.join(", "))
 });
-use interruption::{Ended, Interruption};
 
 /// A MAVLink offboard autopilot companion for fixed-wing aircraft.
 #[derive(Parser)]

@@ -13,7 +13,7 @@ use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
-use crate::sysid::diagnose::{Options, Proposal, propose};
+use crate::sysid::diagnose::{Options, Proposal, Rung, propose};
 use crate::sysid::flight_path::ActuatorClock;
 
 /// Options of `greylag propose`.
@@ -42,6 +42,9 @@ pub struct Arguments {
     /// Ids to be left out of the catalogue.
     #[arg(long, num_args = 1..)]
     without: Vec<String>,
+    /// Try the shapes of the library only, no free forms.
+    #[arg(long)]
+    library_only: bool,
     /// Bootstrap draws under the null hypothesis (no effect missing) that set the thresholds.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
@@ -76,6 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         nulls: arguments.nulls.into(),
         with,
         without: arguments.without.clone(),
+        free_forms: !arguments.library_only,
         ..Options::default()
     };
     let bar = Bar::new();
@@ -123,18 +127,21 @@ fn print(proposal: &Proposal) {
     println!("{}", proposal.model);
     proposal.sentences.iter().for_each(|sentence| println!("  {sentence}"));
     if !proposal.front.is_empty() {
-        println!("\n{}", front(proposal));
+        println!("\n{}", front(&proposal.front, "evidence of last term"));
+    }
+    if let Some(free) = proposal.free.as_ref().filter(|f| !f.front.is_empty()) {
+        println!("\nfree forms, the best of each size\n{}", front(&free.front, "evidence"));
     }
     proposal.notes.iter().for_each(|note| println!("note: {note}"));
 }
 
 /// Formulas by size.
-fn front(proposal: &Proposal) -> Table {
+fn front(rungs: &[Rung], evidence: &str) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(["formula", "size", "error removed", "evidence of last term", "by chance"]);
+    table.set_header(["formula", "size", "error removed", evidence, "by chance"]);
     table.column_iter_mut().skip(1).for_each(|c| c.set_cell_alignment(CellAlignment::Right));
-    for rung in &proposal.front {
+    for rung in rungs {
         let mark = if rung.chosen { " (chosen)" } else { "" };
         table.add_row([
             format!("{}{mark}", rung.formula),

@@ -12,7 +12,7 @@ pub struct Insight {
     pub candidates: Vec<Path>,
     /// What was chosen.
     pub chosen: Path,
-    /// Whether the search found it; else the controller flies that the search leans on.
+    /// Whether the search found it; if not, the base controller (or the policy) flies.
     pub searched: bool,
     /// Time that the parts of the tick took, in their order.
     pub phases: Vec<(&'static str, Duration)>,

@@ -53,8 +53,8 @@ impl<R: Copy> Target<R> {
     }
 }
 
-/// A control law, called every 10 ms of vehicle time. It never allocates, blocks or fails:
-/// a controller that cannot be built says so in [`build`].
+/// A control law, called every 10 ms of vehicle time. A controller that cannot be built says so in [`build`]; one that
+/// is built returns no errors: a command that is not finite says that it has none, see [`Controller::command`].
 pub trait Controller: Send + Sync {
     /// The name that selects it on the command line.
     fn name(&self) -> &'static str;
@@ -63,7 +63,10 @@ pub trait Controller: Send + Sync {
     /// The first command afterwards may differ from the one in force: whoever hands over limits
     /// how fast the surfaces move.
     fn reset(&mut self, seed: u64);
-    /// The command for this tick.
+    /// The command for this tick; it need not be in range. A call neither allocates nor waits for the outside.
+    ///
+    /// A controller that has no command, as a planner without a plan, returns NaN: the caller must check
+    /// [`Command::is_finite`] and fly something else, as the pilot does with its fallback.
     fn command(&mut self, seen: &Observation, target: &Target) -> Command;
     /// Computes what it can before the next tick is seen: whoever has time between two commands calls this. The
     /// commands are the same if nobody does.

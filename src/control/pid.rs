@@ -12,7 +12,7 @@ pub struct Gains {
     pub kp: f64,
     /// On its integral, per second.
     pub ki: f64,
-    /// On the measured rate, times seconds.
+    /// On the measured body rate, output per rad/s; it is subtracted. The airspeed loop has none.
     pub kd: f64,
 }
 

@@ -40,8 +40,8 @@ impl Task {
         -(self.roll_cap + self.pitch_cap + self.airspeed_cap)
     }
 
-    /// The reward of the step that loses the aircraft: the worst for ever, discounted. Without it, whoever
-    /// ends an episode early would escape what the rest of it costs.
+    /// The reward of the step that loses the aircraft (no loss function): the worst for ever, discounted. Without it,
+    /// whoever ends an episode early would escape what the rest of it costs.
     pub fn of_loss(&self) -> f64 {
         self.worst() / (1.0 - self.discount)
     }

@@ -1,4 +1,5 @@
-//! Learning: the grey box from flights, prior and residual together, section IV-A of \[GSFM26\].
+//! Learning: a grey-box model from flights, prior and residual together (section IV-A of \[GSFM26\]), and policies in
+//! a model or in JSBSim (section IV-B).
 
 mod adam;
 mod checkpoint;

@@ -123,8 +123,8 @@ pub struct Status {
     pub actuators: ActuatorState,
     /// Share of the 10 ms cycle the control task needed lately, 0..1.
     pub load: f64,
-    /// What is measured less what the model predicts, by its band, in the order of [`RESIDUALS`]; beyond
-    /// −1..1 is outside.
+    /// What is measured less what the model predicts, divided by the half width of its band (two standard deviations,
+    /// see `flight::monitor`), in the order of [`RESIDUALS`]; no unit, beyond −1..1 is outside.
     pub residuals: [f64; 6],
 }
 

@@ -3,7 +3,7 @@
 //! A datagram is cut by [`Frames`], a byte stream by [`StreamCutter`]. Both take MAVLink 1 and 2,
 //! check the CRC, and look for the next start marker after anything that is not a frame. Signed
 //! frames (incompatibility flag 0x01) count as frames, their signature unchecked: whether to
-//! trust them is decided elsewhere, once signing exists. Any other incompatibility flag is
+//! believe them is decided by `signing::Signer::believed`. Any other incompatibility flag is
 //! refused, as the MAVLink guide asks.
 
 use mavlink::calculate_crc;
@@ -59,7 +59,7 @@ pub struct Frame<'a> {
     pub id: u32,
     /// The payload as sent: MAVLink 2 has cut its trailing zeros.
     pub payload: &'a [u8],
-    /// Whether it carries a signature (which nobody has checked).
+    /// Whether it carries a signature; it is not checked here.
     pub signed: bool,
     /// The frame from its start marker to its last byte, for logs and routing.
     pub bytes: &'a [u8],

@@ -35,7 +35,7 @@ pub struct Telemetry {
     pub faults: Faults,
     /// The eight variables of flight.
     pub state: State,
-    /// Standard deviation of angle of attack and sideslip in `state`, rad.
+    /// Standard deviation of the flow angles in `state`, rad: of the angle of attack and of the sideslip alike.
     pub incidence_sd: f64,
     /// Yaw, rad.
     pub yaw: f64,

@@ -15,9 +15,9 @@ pub struct Sample {
     pub rates_radps: [f64; 3],
     /// True airspeed, m/s.
     pub airspeed_mps: f64,
-    /// Angle of attack, rad.
+    /// Angle of attack, rad; positive with the air from below.
     pub alpha_rad: f64,
-    /// Sideslip, rad.
+    /// Sideslip, rad; positive with the air from the right.
     pub beta_rad: f64,
     /// Specific force at the centre of gravity, m/s² (about −9.81 on z in level flight).
     pub specific_force_mps2: [f64; 3],
@@ -27,17 +27,17 @@ pub struct Sample {
     pub altitude_m: f64,
     /// Air density, kg/m³.
     pub air_density_kgpm3: f64,
-    /// Aileron deflection that acts, rad.
+    /// Recorded aileron deflection, rad; positive rolls right.
     pub aileron_rad: f64,
-    /// Elevator deflection that acts, rad.
+    /// Recorded elevator deflection, rad; positive trailing edge down (nose down).
     pub elevator_rad: f64,
-    /// Rudder deflection that acts, rad; positive trailing edge left.
+    /// Recorded rudder deflection, rad; positive trailing edge left (nose left).
     pub rudder_rad: f64,
-    /// Throttle position that acts, 0..1.
+    /// Recorded throttle position, 0..1.
     pub throttle: f64,
-    /// Commanded aileron, −1..1.
+    /// Commanded aileron, −1..1; positive rolls right.
     pub aileron_cmd: f64,
-    /// Commanded elevator, −1..1.
+    /// Commanded elevator, −1..1; positive pitches down.
     pub elevator_cmd: f64,
     /// Commanded rudder, −1..1; positive yaws left.
     pub rudder_cmd: f64,

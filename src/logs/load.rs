@@ -346,7 +346,8 @@ fn name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// What wrong units may have made rows unusable, for an error.
+/// What wrong units may have made rows unusable, for an error: the findings of `screening` whose text says "look"
+/// ("looks like degrees"), so such a text must keep that word.
 fn hint(findings: &[Finding]) -> String {
     findings.iter().filter(|f| f.text.contains("look")).map(|f| format!("; {}", f.text)).collect()
 }

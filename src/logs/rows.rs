@@ -7,9 +7,9 @@ use super::columns::{COLUMNS, NEEDED, index};
 const REFUSED_SHARE: f64 = 0.05;
 /// The least that a pitot at rest shows, m/s: noise about zero, as true airspeed.
 const PITOT_AT_REST: f64 = -5.0;
-/// Share of rows that a column fills below which it is a slower sensor's,
+/// Share of the rows that a column fills, below which it is taken for a slower sensor's.
 const FILLED_SHARE: f64 = 0.95;
-/// if it fills so many: a sensor that failed fills few.
+/// Fewest rows that a column must fill to be taken for a slower sensor's: one that failed fills few.
 const ENOUGH: usize = 50;
 /// Row numbers kept in the report of unusable rows.
 const ROWS_NAMED: usize = 20;

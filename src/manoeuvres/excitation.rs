@@ -113,7 +113,8 @@ pub struct Excitation {
     /// How it goes.
     pub shape: Shape,
     /// Share (0..=1) of the controller's reaction on this axis that is let through meanwhile: a good
-    /// controller undoes an excitation before the aircraft has moved.
+    /// controller undoes an excitation before the aircraft has moved. It has nothing to do with the authority over
+    /// surfaces or attitude of a real vehicle.
     pub authority: f64,
 }
 

@@ -129,7 +129,7 @@ pub const MENU: &[Manoeuvre] = &[
     },
     Manoeuvre {
         name: "skid",
-        description: "Aileron doublets at the yaw mode's pace with wings near level: sideslip without a rudder.",
+        description: "Aileron sines at the yaw mode's pace (0.5 to 1.1 Hz), wings near level: sideslip without a rudder.",
         steps: || {
             let sway =
                 |v: f64| Step::hold(8.0, 0.0, 3.0, v).with(sines(Aileron, 0.35, 0.5, 1.1, 5));
@@ -203,8 +203,8 @@ pub const MENU: &[Manoeuvre] = &[
     },
 ];
 
-/// Slow with the nose up and the throttle closed to beyond the stall, then the nose down; `depth`
-/// 0..1 is how long the nose is held up.
+/// Slow with the nose up and the throttle closed to beyond the stall, then the nose down. The nose is
+/// held up for 3.2 s + 0.8 s · `depth`: the menu takes 1, the drawn flights 1.7 to 2.3.
 pub(super) fn stall(depth: f64) -> Step {
     let up = 3.2 + 0.8 * depth;
     let step = Step::hold(up + 2.8, 0.0, 14.0, 12.0).with(pulse(Throttle, -1.0, 0.0, up));
@@ -250,7 +250,7 @@ fn doublets(amplitude: f64) -> Vec<Step> {
 /// Share of the controller's reaction during pulses of a surface.
 const LOOSE: f64 = 0.25;
 
-/// `shape` on `axis`, against a controller held off where the axis is a surface.
+/// `shape` on `axis`; on a surface with the controller held off, to the share [`LOOSE`] of its reaction.
 pub(super) fn loose(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Excitation {
     let authority = if matches!(axis, Aileron | Elevator) { LOOSE } else { 1.0 };
     Excitation::new(axis, amplitude, start, shape).against(authority)

@@ -333,7 +333,7 @@ fn value(sections: &[Section], effect: &str, name: &str) -> f64 {
     own.and_then(|(_, all)| all.iter().find(|e| e.0 == name)).map_or(0.0, |e| e.1)
 }
 
-/// Slope of the lift (1/rad) and lift at no incidence.
+/// Slope of the lift (1/rad) and lift at α = 0.
 fn slope_and_zero(sections: &[Section]) -> [f64; 2] {
     [value(sections, "lift_linear", "CLalpha"), value(sections, "lift_linear", "CL0")]
 }

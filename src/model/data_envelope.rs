@@ -1,7 +1,8 @@
 //! The envelope of the data that a residual was trained on: how far from it a point lies.
 //!
-//! The distance is a leverage: that of a linear regression on 1, the network's inputs and the units of its last
-//! hidden layer, x̂ᵀ (X̂ᵀX̂)⁻¹ x̂ over the training samples. It grows where inputs leave the data and where units act
+//! The distance is the square root of a leverage, scaled so that 99.9 % of the training samples lie within 1. The
+//! leverage is that of a linear regression on 1, the network's inputs and the units of its last hidden layer,
+//! x̂ᵀ (X̂ᵀX̂)⁻¹ x̂ over the training samples. It grows where inputs leave the data and where units act
 //! that hardly acted on it; the variance of a Bayesian last layer is proportional to it.
 
 use nalgebra::{DMatrix, DVector};

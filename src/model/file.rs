@@ -156,22 +156,9 @@ impl File {
                 "it names no effect, so nothing would hold the aircraft up; add [effects.…]".into(),
             );
         }
-        if acting.len() > inputs::MOST {
-            return Err(format!(
-                "it names {} effects between actuators and surfaces; {} is the most",
-                acting.len(),
-                inputs::MOST
-            ));
-        }
-        let lags: usize =
-            terms.iter().filter_map(|t| t.kind.written()).map(|e| e.memories().len()).sum();
-        if lags > LAGS {
-            return Err(format!(
-                "the formulas of its effects have {lags} lags and delays; {LAGS} is the most"
-            ));
-        }
+        can_be_remembered(acting.len(), &terms)?;
         let mut model = GreyBox {
-            lags,
+            lags: 0,
             rudder_is_left: false,
             name: named(self.name)?,
             description: self.description,
@@ -194,6 +181,24 @@ impl File {
         }
         Err("its effects leave no positive mass, or jx·jz not above jxz²; give them smaller values"
             .into())
+    }
+}
+
+/// Refuses more effects with memory than a model has room for.
+fn can_be_remembered(inputs: usize, terms: &[Term]) -> Result<(), String> {
+    if inputs > inputs::MOST {
+        return Err(format!(
+            "it names {inputs} effects between actuators and surfaces; {} is the most",
+            inputs::MOST
+        ));
+    }
+    let lags: usize =
+        terms.iter().filter_map(|t| t.kind.written()).map(|e| e.memories().len()).sum();
+    match lags > LAGS {
+        true => Err(format!(
+            "the formulas of its effects have {lags} lags and delays; {LAGS} is the most"
+        )),
+        false => Ok(()),
     }
 }
 

@@ -11,7 +11,7 @@ use crate::physics::rigid_body::{ForceAxes, RigidBody};
 use crate::physics::size::Size;
 use crate::physics::{AirData, Airframe, Controls, State};
 
-/// A coefficient of a model with its full name.
+/// A coefficient of a model: full name, value, standard deviation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named {
     /// `effect.coefficient`, as in the model file.

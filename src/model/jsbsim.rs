@@ -10,10 +10,13 @@ use crate::physics::airframe::ActuatorFigures;
 use crate::physics::rigid_body::ForceAxes;
 use crate::physics::servos::Surface;
 
-/// Newtons per pound of force, metres per foot, kilograms per pound, kg m² per slug ft².
+/// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
+/// Metres per foot.
 const FT: f64 = 0.3048;
+/// Kilograms per pound.
 const LB: f64 = 0.453_592_37;
+/// kg m² per slug ft².
 const SLUG_FT2: f64 = 1.355_817_948_331_4;
 
 /// The files of an aircraft, by their path below the folder of the aircraft's name.

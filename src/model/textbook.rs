@@ -98,7 +98,7 @@ impl Measures {
         self.airframe_with_chord(f.chord, [self.slope(&f), self.zero_lift()])
     }
 
-    /// The same with the mean chord (m), the slope of the lift (1/rad) and the lift at no incidence of another source.
+    /// The same with the mean chord (m), the slope of the lift (1/rad) and the lift at α = 0 of another source.
     pub(crate) fn airframe_with_chord(&self, chord: f64, [slope, zero_lift]: [f64; 2]) -> String {
         let f = self.figures();
         let mut out = format!(

@@ -5,10 +5,12 @@ use rand::RngExt;
 
 use super::Real;
 
-/// The widest layer that a network may have.
+/// The widest layer that a network may have. [`Units`] has room for it on the heap, taken once:
+/// [`Dense::evaluate_in`] and [`Dense::evaluate_one`] take any network and allocate nothing.
 pub const WIDEST: usize = 512;
 
-/// The widest layer that [`Dense::evaluate`] has room for on the stack.
+/// The widest layer that [`Dense::evaluate`] and [`Dense::last_hidden`] have room for on the stack: they need no
+/// [`Units`] and allocate nothing, but panic for a wider network. A residual with a wider layer is refused.
 pub const ON_STACK: usize = 128;
 
 /// A dense network: affine layers with max(0, ·) between them, none after the last.
@@ -30,7 +32,7 @@ pub struct Layer<'a> {
     pub bias: &'a [f32],
 }
 
-/// Room for the units of two layers: with it, evaluating a wide network takes no memory.
+/// Room for the units of two layers of up to [`WIDEST`], on the heap: with it, evaluating a network allocates nothing.
 #[derive(Clone, Debug)]
 pub struct Units<R> {
     from: Vec<R>,

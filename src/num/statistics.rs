@@ -27,8 +27,8 @@ pub fn interquartile_mean(samples: &[f64]) -> f64 {
     mean(&sorted[cut..sorted.len() - cut])
 }
 
-/// How many samples hang together in `parts`, series with gaps between them: the sum of the autocorrelation, both ways, up
-/// to where that first falls below 0.05. 1 of white noise.
+/// Integral correlation length, in samples, of `parts`, series of zero mean with gaps between them (the mean is not
+/// removed): the autocorrelation summed both ways up to where it first falls below 0.05. 1 for white noise.
 pub fn correlation_length(parts: &[Vec<f64>]) -> f64 {
     let mean_product = |lag: usize| {
         let pairs = parts.iter().flat_map(|part| part.iter().zip(part.iter().skip(lag)));

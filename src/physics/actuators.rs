@@ -45,7 +45,7 @@ pub const LAGS: usize = 2;
 /// What acts on the airframe at an instant: deflections and throttle position.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Controls<R = f64> {
-    /// Aileron deflection δa, rad.
+    /// Aileron deflection δa, rad; positive rolls right.
     pub aileron: R,
     /// Elevator deflection δe, rad; positive trailing edge down.
     pub elevator: R,
@@ -99,17 +99,17 @@ impl Controls {
 /// The observed actuator state z, eq. (27) of \[GSFM26\].
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ActuatorState<R = f64> {
-    /// Aileron position, rad.
+    /// Aileron position, rad; positive rolls right.
     pub aileron: R,
     /// Aileron rate, rad/s.
     pub aileron_rate: R,
-    /// Elevator position, rad.
+    /// Elevator position, rad; positive trailing edge down.
     pub elevator: R,
     /// Elevator rate, rad/s.
     pub elevator_rate: R,
     /// Throttle position, 0..1.
     pub throttle: R,
-    /// Rudder position, rad; zero on an aircraft without one.
+    /// Rudder position, rad; positive trailing edge left. Zero on an aircraft without one.
     pub rudder: R,
     /// Rudder rate, rad/s.
     pub rudder_rate: R,

@@ -72,20 +72,20 @@ impl Reference {
     pub const OF_SCHEMA_1: Reference = Reference { airspeed: 16.67, altitude: 600.0 };
 }
 
-/// Incidence that a controller keeps to, rad.
+/// Incidence (angle of attack) that a controller keeps to.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Incidence {
-    /// That steady flight should not exceed.
+    /// Largest angle of attack of steady flight, rad.
     #[serde(rename = "comfortable_rad")]
     pub comfortable: f64,
-    /// That no commanded attitude may need: the rest is for the transient.
+    /// Largest angle of attack that a commanded attitude may need, rad; what is above it is for transients.
     #[serde(rename = "tolerable_rad")]
     pub tolerable: f64,
-    /// Beyond which the nose is pushed down.
+    /// Angle of attack beyond which the nose is pushed down, rad.
     #[serde(rename = "push_from_rad")]
     pub push_from: f64,
-    /// Elevator (rad) a rad beyond it.
+    /// Elevator deflection, nose down, added per rad of angle of attack beyond `push_from`, rad/rad.
     pub push_gain: f64,
 }
 

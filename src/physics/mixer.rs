@@ -20,7 +20,7 @@ const TRAVEL: f64 = 1e-3;
 pub enum Does {
     /// A surface: its deflections at −1 and 1, rad.
     Deflects(Travel),
-    /// A motor, 0..1.
+    /// A motor, tractor or pusher; its command is 0..1.
     Pulls,
 }
 

@@ -81,7 +81,7 @@ pub struct Base<R = f64> {
     pub deflected: Wrench<R>,
     /// What `wrench` would be without deflections and body rates.
     pub still: Wrench<R>,
-    /// The state's rate, 1/s, of the model with all its effects.
+    /// The rate of the state of the model with all its effects, in each state's unit per second.
     pub rate: State<R>,
 }
 

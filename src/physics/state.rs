@@ -36,7 +36,7 @@ impl State {
         "beta_rad",
     ];
 
-    /// The start of an episode: wings level, no incidence, 16.67 m/s (section V-A of \[GSFM26\]).
+    /// The start of an episode: wings level, α = β = 0, 16.67 m/s (section V-A of \[GSFM26\]).
     pub const NEUTRAL: State = State {
         roll: 0.0,
         pitch: 0.0,

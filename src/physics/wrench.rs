@@ -5,7 +5,8 @@ use crate::num::Real;
 /// A direction in which an effect may act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
-    /// Drag, N, along the airflow.
+    /// Drag alone, N, along the airflow, positive backwards; thrust is in `BodyX`. `ChannelId::Drag` of the weak form
+    /// is drag less thrust.
     Drag,
     /// Lift, N, upward across the airflow.
     Lift,

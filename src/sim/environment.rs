@@ -41,7 +41,8 @@ pub trait Environment {
     fn reseed(&mut self, _seed: u32) {}
 }
 
-/// A model with the exact actuator filters as its state.
+/// One aircraft imagined by a model, with the exact actuator filters as its state. Many at once, for training, are
+/// [`Imagination`](crate::sim::imagined::Imagination).
 #[derive(Clone, Debug)]
 pub struct Imagined {
     model: GreyBox,

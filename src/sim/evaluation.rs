@@ -125,7 +125,8 @@ pub fn imagine(
 pub struct Robustness {
     /// The score over all draws together.
     pub all: Evaluation,
-    /// Of each draw: mean settled error in degrees, and the targets lost.
+    /// Of each draw: mean settled error, degrees, and the number of targets that diverged (settled error over
+    /// [`DIVERGED_DEG`]).
     pub draws: Vec<(f64, usize)>,
 }
 

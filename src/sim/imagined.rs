@@ -54,7 +54,8 @@ pub struct Stepped {
     pub ended: [Ended; WIDTH],
 }
 
-/// Aircraft imagined by a model, each with its own target, filters and episode.
+/// Aircraft imagined by a model, each with its own target, filters and episode: many at once, for training. One
+/// aircraft to fly a controller in is [`Imagined`](crate::sim::environment::Imagined).
 ///
 /// The actuators' exact filters are part of the state. The air density is that of the start: over an
 /// episode it would change by less than 1 %.

@@ -23,7 +23,7 @@ pub struct Published {
     pub iqm_deg: Value,
     /// Mean.
     pub mean_deg: Value,
-    /// Share of the targets lost, percent; over all six models.
+    /// Share of the targets that diverged (settled error over 10°), percent; over all six models.
     pub diverged_percent: Value,
     /// Time for a step, ms.
     pub ms_per_step: f64,

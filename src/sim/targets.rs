@@ -208,7 +208,8 @@ impl TargetFile {
     /// Reads a file with the columns `group,roll_deg,pitch_deg`.
     ///
     /// # Errors
-    /// If it cannot be read, is no such table, is empty, or commands more than ±89°.
+    /// If it cannot be read, is no such table, is empty, or has a row whose roll and pitch are outside its group's
+    /// bounds (see [`Group`]).
     pub fn load(path: &Path) -> Result<TargetFile, TargetError> {
         let fail = |why: String| TargetError { path: path.display().to_string(), why };
         let mut reader = csv::ReaderBuilder::new()

@@ -25,9 +25,9 @@ impl<'a> Stage<'a> {
 pub struct FirstLook {
     /// Its id.
     pub id: &'static str,
-    /// Its evidence.
+    /// Evidence for it: the smaller of the penalised gain in likelihood and the Wald statistic, no unit.
     pub evidence: f64,
-    /// What chance reaches.
+    /// Evidence that the best candidate reaches by chance where nothing is missing.
     pub threshold: f64,
 }
 

@@ -1,4 +1,6 @@
 //! The session's logs by what they serve for, and what the commands of this program would call them.
+//!
+//! Which role a log takes when it comes is said in `session.rs`, `Session::usual_role`.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,8 +16,11 @@ use crate::sysid::flight_path::reconstruction::Reconstruction;
 
 /// The flights that a fit sees and those that it is judged by, with what is odd about their logs.
 pub struct Divided {
+    /// Flights that the fit sees.
     pub fit: Vec<Reconstruction>,
+    /// Flights that judge it.
     pub held_out: Vec<Reconstruction>,
+    /// What is odd about their logs.
     pub notes: Vec<String>,
 }
 

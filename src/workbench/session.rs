@@ -155,7 +155,7 @@ pub struct Flown {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Session {
-    /// 1.
+    /// Version of the file's layout: 1.
     pub schema: u32,
     /// Goes up by one with each change.
     pub revision: u64,

@@ -21,7 +21,7 @@ const LOOK: Duration = Duration::from_millis(50);
 const PAUSE: Duration = Duration::from_secs(2);
 /// Time that a process has to come to its checkpoint after Ctrl-C.
 const GRACE: Duration = Duration::from_secs(20);
-/// Sessions of a cell that ends without a word, as one that is killed for memory does.
+/// Most times in all that a cell is started whose process a signal ended, as for want of memory.
 const KILLS: u32 = 3;
 /// Where what the cells print goes, below the campaign's folder.
 const LOGS: &str = "logs";

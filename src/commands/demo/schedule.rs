@@ -18,8 +18,9 @@ pub struct Leg {
 /// Length of a leg, s: six of them with start-up stay under a minute.
 pub const LEG_S: f64 = 8.0;
 
-/// Largest bank and pitch for which the legs are written, degrees: the paper's hard targets.
+/// Largest bank for which the legs are written, degrees: that of the paper's hard targets.
 const BANK_DEG: f64 = 60.0;
+/// Largest pitch for which the legs are written, degrees, up and down.
 const PITCH_DEG: f64 = 30.0;
 
 /// Easy targets, then hard ones; climbs and dives alternate, so that the altitude comes back.

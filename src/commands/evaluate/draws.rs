@@ -76,7 +76,7 @@ fn draws_table(flown: &[Robustness]) -> Table {
         "controller",
         "model",
         "draws",
-        "with a loss",
+        "with a divergence",
         "mean ° of a draw: median",
         "95 %",
         "worst",

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use super::budget::{Algorithm, Budget};
 
-/// Folders below that of a learning.
+/// Folder of the flights, below that of a learning.
 pub const FLIGHTS: &str = "flights";
-/// The last model.
+/// Folder of the last model, likewise.
 pub const MODEL: &str = "model";
-/// The policy.
+/// Folder of the policy, likewise.
 pub const POLICY: &str = "policy";
 
 /// Where the flights come from.

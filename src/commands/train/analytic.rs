@@ -45,7 +45,7 @@ pub fn climb(
         let progress = trainer
             .update()
             .with_context(|| format!("the actor was lost after {update} updates; lower --climb"))?;
-        reward += progress.reward / LINE as f64;
+        reward += progress.reward;
         if !update.is_multiple_of(LINE) && update != recipe.updates {
             continue;
         }
@@ -57,7 +57,7 @@ pub fn climb(
             updates: update,
             seconds,
             loss: f64::NAN,
-            reward,
+            reward: reward / ((update - 1) % LINE + 1) as f64,
             episodes: steps / recipe.episode as u64,
             lost: progress.lost,
             ..reached(judge(actor)?)

@@ -50,7 +50,7 @@ pub enum Instructions {
 pub struct Settings {
     /// Candidates per iteration N, a multiple of 16.
     pub population: usize,
-    /// What becomes of them.
+    /// How the next distribution is made of the candidates.
     pub update: Update,
     /// Iterations I.
     pub iterations: usize,
@@ -61,7 +61,7 @@ pub struct Settings {
     /// Correlation of a candidate's noise from one step to the next, 0..1 (iCEM's coloured noise, of first
     /// order).
     pub persistence: f64,
-    /// Best candidates that stay in the next iteration (iCEM), fewer than 16.
+    /// Best candidates carried over to the next iteration (the kept elites of iCEM), fewer than 16.
     pub kept: usize,
     /// Candidates of the first iteration that the policy proposes, a multiple of 16; the first of them
     /// without noise.
@@ -70,7 +70,7 @@ pub struct Settings {
     pub noise: [f64; 2],
     /// Weight α of the critics' value of the end, eq. (26).
     pub alpha: Option<f64>,
-    /// Who says that value.
+    /// What gives the value of a plan's end.
     pub value: Value,
     /// Steps in all that a plan is flown in the model: the base flies from the sixth on, without a base the
     /// policy; without either there are five.
@@ -90,7 +90,8 @@ pub struct Settings {
     /// for plans to be made; above it the base flies alone, or without one the policy. It needs either of them.
     pub trust: Option<f64>,
     /// Largest distance from the data that the model's residual was trained on, see
-    /// [`Residual::distance`](crate::model::Residual::distance), at which plans are made; beyond it, as with `trust`.
+    /// [`Residual::distance`](crate::model::Residual::distance), at which plans are made
+    /// (1 holds 99.9 % of the training samples); beyond it, as with `trust`.
     pub known: Option<f64>,
     /// What flies the candidates.
     pub instructions: Instructions,

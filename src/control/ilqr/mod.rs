@@ -58,7 +58,7 @@ impl Ilqr {
     }
 }
 
-/// What is kept from tick to tick.
+/// The warm start: solver, last plan and its trajectory, kept from tick to tick.
 #[derive(Clone, Debug)]
 struct Desk {
     solver: Solver,

@@ -59,7 +59,8 @@ impl Gain {
 /// Places of φ θ p q r α β in the state of eq. (4): airspeed is scheduled on, not fed back.
 const ATTITUDE_STATES: [usize; 7] = [0, 1, 3, 4, 5, 6, 7];
 
-/// What an error costs: one over the square of the size that is as bad as the others' (Bryson).
+/// Sizes of the errors that are as bad as one another (Bryson's rule): the cost of each is one over the square of its
+/// field here, so a larger number is a softer loop.
 ///
 /// Found on the `jsbsim` model by settled error over the target file; the figures are forgiving.
 #[derive(Clone, Copy, Debug, PartialEq)]

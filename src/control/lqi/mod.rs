@@ -18,14 +18,16 @@ pub use design::Weights;
 use gain_schedule::Schedule;
 pub use margins::{LoopMargins, MarginsError, margins};
 
-/// Largest rates of the reference, rad/s: commanded steps become ramps that the surfaces can
+/// Largest rate of the roll reference, rad/s: commanded steps become ramps that the surfaces can
 /// follow, so the integrators never see a large error.
 const ROLL_RATE: f64 = 0.8;
+/// Largest rate of the pitch reference, rad/s.
 const PITCH_RATE: f64 = 0.5;
 /// Time constant that rounds the ramps' ends, s.
 const ROUNDING: f64 = 0.35;
-/// Airspeed loop: per m/s, and per m.
+/// Throttle per m/s of airspeed error.
 const AIRSPEED_KP: f64 = 0.3;
+/// Throttle per second and m/s of airspeed error, so per metre.
 const AIRSPEED_KI: f64 = 0.05;
 
 /// Where an LQI flies to.

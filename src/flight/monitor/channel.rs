@@ -49,7 +49,7 @@ impl fmt::Display for Channel {
 pub struct Warning {
     /// Which.
     pub channel: Channel,
-    /// Its residual by its band, signed; beyond −1..1 is outside.
+    /// Its residual divided by the half width of its band, signed; no unit, beyond −1..1 is outside.
     pub share: f64,
     /// Whether the residual follows the deflection of the channel's surface.
     pub follows_surface: bool,

@@ -99,7 +99,8 @@ impl Monitor {
         self.watches = [Watch::default(); 6];
     }
 
-    /// Residuals by their bands, in the order of [`Channel::ALL`]; beyond −1..1 is outside, NaN when not known.
+    /// Residuals divided by the half widths of their bands (two standard deviations), in the order of
+    /// [`Channel::ALL`]; no unit, beyond −1..1 is outside, NaN when not known.
     pub fn shares(&self) -> Six {
         std::array::from_fn(|k| if self.compared[k] { self.watches[k].share() } else { f64::NAN })
     }

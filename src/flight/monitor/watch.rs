@@ -54,7 +54,8 @@ impl Watch {
         self.departed &= self.quiet_s < QUIET_S;
     }
 
-    /// The residual by its band, with its sign; beyond −1..1 is outside, NaN before the first.
+    /// The residual divided by the half width of its band, signed; no unit, beyond −1..1 is outside, NaN before the
+    /// first.
     pub fn share(&self) -> f64 {
         (self.power.sqrt() / self.band()).copysign(self.residual)
     }

@@ -1,4 +1,7 @@
-//! The numbers a pilot flies by: the airframe's envelope, times, slew limits, level trim.
+//! The numbers a pilot flies by: the airframe's envelope, times, slew limits, trim of straight flight.
+//!
+//! "Level trim" is short for [`Trim::straight`] with level wings: level flight, or the descent at idle throttle where
+//! no throttle holds level flight.
 
 use super::polarity::Answers;
 use crate::model::{GreyBox, Trim, TrimError};
@@ -26,7 +29,8 @@ pub struct Config {
     pub arm_tilt_max_deg: f64,
     /// Airspeed above which disarming needs force, m/s.
     pub disarm_airspeed_max_mps: f64,
-    /// Level trim, by rising airspeed.
+    /// Trim of straight flight with level wings ([`Trim::straight`]): level, or a glide at idle throttle; by rising
+    /// airspeed.
     pub trim: Vec<TrimPoint>,
     /// What the model answers to the surfaces, to check their signs by.
     pub answers: Option<Answers>,
@@ -41,12 +45,12 @@ pub enum ThrustSource {
     Setpoint,
 }
 
-/// One row of the level trim table.
+/// One row of the trim table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrimPoint {
     /// True airspeed, m/s.
     pub airspeed_mps: f64,
-    /// Pitch, which is the angle of attack in level flight, degrees.
+    /// Pitch, degrees: the angle of attack in level flight, less than it in a glide.
     pub pitch_deg: f64,
     /// Elevator command, −1..1.
     pub elevator: f64,
@@ -55,17 +59,17 @@ pub struct TrimPoint {
 }
 
 impl Config {
-    /// Settings for the aircraft that `model` describes: its envelope, its level trim.
+    /// Settings for the aircraft that `model` describes: its envelope, its trim of straight flight.
     ///
     /// # Errors
-    /// If the model cannot fly level at the cruise airspeed, or what [`Config::check`] finds.
+    /// If the model flies straight at the cruise airspeed neither level nor in a glide, or what [`Config::check`] finds.
     pub fn for_model(model: &GreyBox) -> Result<Self, ConfigError> {
         let envelope = model.airframe.envelope;
         let row = |airspeed: f64| trim_row(model, airspeed);
         row(envelope.airspeed_cruise_mps)?;
         let count =
             ((envelope.airspeed_max_mps - envelope.airspeed_min_mps) / TRIM_SPACING) as usize;
-        // Airspeeds at which the model has no level trim are left to their neighbours.
+        // Airspeeds at which the model has neither trim are left to their neighbours.
         let speeds = (0..=count).map(|i| envelope.airspeed_min_mps + i as f64 * TRIM_SPACING);
         let mut config = Config::new(envelope, speeds.filter_map(|v| row(v).ok()).collect());
         config.answers = Some(Answers::of(model, envelope.airspeed_cruise_mps)?);
@@ -134,7 +138,7 @@ pub enum ConfigError {
         "pilot table `trim` needs at least one row, finite numbers, and rising airspeeds: correct the rows"
     )]
     Trim,
-    /// The model has no level flight at the cruise airspeed.
+    /// The model flies straight at the cruise airspeed neither level nor in a glide.
     #[error("the pilot needs level trim at the cruise airspeed: {0}")]
     NoTrim(#[from] TrimError),
 }
@@ -199,7 +203,7 @@ impl Config {
         ]
     }
 
-    /// Level trim at an airspeed (m/s): linear between the rows, constant beyond the ends.
+    /// Trim of straight flight at an airspeed (m/s): linear between the rows, constant beyond the ends.
     pub fn trim_at(&self, airspeed_mps: f64) -> TrimPoint {
         let (first, last) = (self.trim[0], self.trim[self.trim.len() - 1]);
         if airspeed_mps <= first.airspeed_mps {

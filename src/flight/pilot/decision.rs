@@ -71,7 +71,8 @@ impl Source {
 pub struct Decision {
     /// Time of the state frame that is answered, vehicle clock.
     pub time: Time,
-    /// What the actuators shall do: finite, in range, within the slew limit of the last one.
+    /// What the actuators shall do: finite and in range. Armed, it is within the slew limit of the last one; disarmed,
+    /// it is [`Command::IDLE`] at once.
     pub command: Command,
     /// Who decided it.
     pub source: Source,
@@ -83,7 +84,7 @@ pub struct Decision {
     pub target: Target,
     /// Whether a failsafe is in force.
     pub failsafe: bool,
-    /// What the check of signs has found wrong, until the aircraft has gone back.
+    /// What the sign check or the oscillation guard has found wrong since the aircraft was armed.
     pub refused: Option<Fault>,
 }
 

@@ -55,7 +55,9 @@ pub struct Pilot {
     fallback: Box<dyn Controller>,
     estimate: Estimate,
     texts: Texts,
+    /// The vehicle's time now, also while no states come.
     clock: Time,
+    /// Time of the state that is being answered.
     answering: Time,
     armed: bool,
     mode: Mode,
@@ -63,7 +65,9 @@ pub struct Pilot {
     sticks: Option<(Time, Sticks)>,
     setpoint_lost: bool,
     vehicle_lost: bool,
+    /// The command in force.
     in_force: Command,
+    /// The command that was in force before it; repeated states do not count.
     before: Command,
     /// The command in force when the state last changed.
     last_moved: Command,
@@ -79,7 +83,7 @@ pub struct Pilot {
     check: Option<Check>,
     /// The guard against oscillations, where there is a controller to give the aircraft to.
     oscillation: Option<Oscillation>,
-    /// What the check, or the guard, has found wrong.
+    /// What the sign check or the oscillation guard has found wrong since the aircraft was armed.
     refused: Option<Fault>,
     /// The model that says what it has not predicted, where there is one.
     monitor: Option<Monitor>,

@@ -53,7 +53,7 @@ pub struct Written {
     pub rows: u64,
     /// Frames of `flight.tlog`.
     pub frames: u64,
-    /// Rows or datagrams that did not fit the queue, or came after the disk had failed.
+    /// Entries that did not fit the queue, and rows, frames and calls that came after the disk had failed.
     pub dropped: u64,
 }
 

@@ -17,7 +17,7 @@ pub struct Row {
     pub decision: Decision,
     /// From the arrival of the state frame to the sending of the command, µs.
     pub latency_us: f64,
-    /// Residuals of the model by their bands; NaN when not known.
+    /// Residuals of the model divided by the half widths of their bands, as in `Status::residuals`; NaN when not known.
     pub residuals: [f64; 6],
 }
 

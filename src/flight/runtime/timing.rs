@@ -63,7 +63,7 @@ pub struct Timing {
     /// Cycles without their answer: in real time those whose answer took longer than 10 ms; in lockstep,
     /// where the vehicle's time stands until it is there, those whose state had to be sent again.
     pub missed: u64,
-    /// Plans that came after their deadline.
+    /// Ticks without a plan in time: it came after its deadline, or the planner was still at an earlier request.
     pub late_plans: u64,
 }
 

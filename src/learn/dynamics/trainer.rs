@@ -27,12 +27,13 @@ use stage::Stage;
 /// Samples that the envelope of the data is made from, at most.
 const ENVELOPE_SAMPLES: usize = 40_000;
 
-/// Updates in a row that may come to nothing before the training is given up.
+/// Most updates in a row without a usable step before the training is given up ([`TrainError::Diverged`]).
 const PATIENCE: u64 = 20;
 
-/// Updates between two projections, and the part of all updates after which there are no more: the residual then
-/// learns to leave out what has moved.
+/// Updates between two projections.
 const PROJECT_EVERY: u64 = 500;
+/// Share of all updates after which there are no more projections: the residual then learns to leave out what has
+/// moved.
 const PROJECT_UNTIL: f64 = 0.75;
 
 /// Purposes of the random streams.

@@ -38,7 +38,8 @@ pub struct AnalyticRecipe {
     pub rate: f64,
     /// Error of roll and pitch (rad) below which the reward is rounded off: its corner has no slope.
     pub rounding: f64,
-    /// Reward of a change of the command from step to step, in units of the action, negative.
+    /// Price (≥ 0) of a change of the command from step to step: this times the square of the change, in units of the
+    /// action, counts against the reward in the slope.
     pub effort: f64,
     /// Part of the targets that lie in the hard corners.
     pub corners: f64,

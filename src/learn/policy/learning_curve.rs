@@ -29,11 +29,11 @@ pub struct CurvePoint {
     pub easy_deg: f64,
     /// Mean settled error on hard ones, degrees.
     pub hard_deg: f64,
-    /// Share of the targets that were lost.
+    /// Share of the targets that diverged (settled error over 10°).
     pub divergence_rate: f64,
     /// Mean loss of the critics.
     pub loss: f64,
-    /// Mean reward of a step of the training.
+    /// Mean reward of a step of the training; with TD3 as in `PolicyProgress::reward`.
     pub reward: f64,
     /// Episodes begun so far.
     pub episodes: u64,

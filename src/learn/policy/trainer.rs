@@ -107,7 +107,8 @@ pub struct PolicyProgress {
     pub updates: u64,
     /// Mean loss of the critics; NaN before the first update.
     pub loss: f64,
-    /// Mean reward of a step.
+    /// Mean reward of a step. A step that loses the aircraft counts as the worst of a single step here (−1.1, see
+    /// `Task::worst`), while the critics learn from what it costs for ever (−110, `Task::of_loss`).
     pub reward: f64,
     /// Episodes begun so far.
     pub episodes: u64,

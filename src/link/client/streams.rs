@@ -1,4 +1,5 @@
-//! How often a client gets each message by itself.
+//! How often a client gets each message by itself, and how it changes that. The list of messages with their default
+//! rates is [`STREAMS`] in `link/wire/telemetry.rs`.
 
 use std::time::Duration;
 

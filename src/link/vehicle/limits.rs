@@ -18,7 +18,7 @@ impl Faults {
     pub const RATES: Faults = Faults(2);
     /// The airspeed or the altitude.
     pub const AIR: Faults = Faults(4);
-    /// The angle of attack or the sideslip.
+    /// A flow angle: the angle of attack or the sideslip.
     pub const INCIDENCE: Faults = Faults(8);
     /// The specific force.
     pub const SPECIFIC_FORCE: Faults = Faults(16);
@@ -61,23 +61,23 @@ impl fmt::Display for Faults {
     }
 }
 
-/// rad/s: 2000 °/s, the full scale of common gyroscopes, is 35.
+/// Plausible body rates, rad/s: 2000 °/s, the full scale of common gyroscopes, is 35.
 const RATE: RangeInclusive<f64> = -40.0..=40.0;
-/// m/s: an aircraft of this kind never reaches 150; a little below zero is sensor noise.
+/// Plausible airspeed, m/s: an aircraft of this kind never reaches 150; a little below zero is sensor noise.
 const AIRSPEED: RangeInclusive<f64> = -5.0..=150.0;
-/// m AMSL.
+/// Plausible altitude above mean sea level, m.
 const ALTITUDE: RangeInclusive<f64> = -1000.0..=20_000.0;
-/// rad: half a turn with room for rounding.
+/// Plausible angle of attack and sideslip, rad: half a turn with room for rounding.
 const INCIDENCE: RangeInclusive<f64> = -3.15..=3.15;
-/// m/s²: 50 g.
+/// Plausible specific force along each body axis, m/s²: 50 g.
 const FORCE: RangeInclusive<f64> = -500.0..=500.0;
-/// Normalised deflection, with room for noise.
+/// Plausible normalised deflection, with room for noise.
 const DEFLECTION: RangeInclusive<f64> = -1.5..=1.5;
-/// rad: a surface that moves, by a right angle at most.
+/// Plausible travel of a surface to each side, rad: it moves, by a right angle at most.
 const TRAVEL: RangeInclusive<f64> = 0.001..=1.6;
-/// Throttle position, with room for noise.
+/// Plausible throttle position, with room for noise.
 const THROTTLE: RangeInclusive<f64> = -0.25..=1.25;
-/// Normalised deflection rate, 1/s: the actuator's own limit is far below.
+/// Plausible rate of the normalised deflection, 1/s: the actuator's own limit is far below.
 const DEFLECTION_RATE: RangeInclusive<f64> = -1000.0..=1000.0;
 
 // A range contains no NaN, so each of these is false for one.

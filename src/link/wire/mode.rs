@@ -18,7 +18,7 @@ const ARMED: u8 = 128;
 pub enum ModeRequest {
     /// One of ours.
     Known(Mode),
-    /// None of ours, in words for a STATUSTEXT.
+    /// A mode that this autopilot does not have.
     Unknown,
 }
 

@@ -33,7 +33,7 @@ pub const TOPICS: [&str; 15] = [
 const EQUIVALENT: [f64; 2] = [3.0, 12.0];
 /// Milli-g, m/s².
 const MILLI_G: f64 = STANDARD_GRAVITY / 1000.0;
-/// Deflection at normalised 1 of the shim's aircraft, rad.
+/// Deflection of the simulator's X8 at a normalised position of 1, rad.
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 const DEFLECTION: f64 = 0.5235;
 

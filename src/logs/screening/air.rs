@@ -10,6 +10,7 @@ use crate::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
 
 /// Units of speed other than m/s: name, m/s in one.
 const SPEEDS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("knots", 0.514_444), ("ft/s", 0.3048)];
+/// Metres in a foot.
 const FOOT: f64 = 0.3048;
 /// Window over which a climb is compared, s.
 const CLIMB_S: f64 = 2.0;

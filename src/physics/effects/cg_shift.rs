@@ -4,7 +4,8 @@ use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use crate::num::Real;
 use crate::physics::{Channel, Point};
 
-/// Moments of the forces about a centre of gravity that lies aft of, or below, the model's.
+/// Moments of the forces about a centre of gravity that lies aft of the model's (along x only; a negative distance is
+/// forward of it).
 pub struct CgShift;
 
 impl Effect for CgShift {

@@ -9,9 +9,9 @@ use crate::physics::Channel;
 
 /// The first place of the grid, °.
 const FIRST_DEG: f64 = -8.0;
-/// Distance between places, °,
+/// Distance between places of the grid, °.
 const SPACING_DEG: f64 = 2.0;
-/// and half that between these angles, °, where lift breaks.
+/// Angles of attack between which the places lie half as far apart, °: there lift breaks.
 const FINE_DEG: (f64, f64) = (10.0, 20.0);
 /// Places: from −8° to 30°.
 const PLACES: usize = 25;

@@ -4,7 +4,7 @@
 //! [`Dual`](crate::num::Dual) numbers: of eight states and three controls at once.
 
 use super::expression::{Expression, Function, Node};
-use super::memory::Memory;
+use super::memory::{Memory, Time};
 use super::variable::Variable;
 use crate::num::{Real, Table};
 use crate::physics::{Channel, Point};
@@ -263,12 +263,16 @@ impl Tape {
         all: &[Expression],
         places: &Places,
     ) -> Result<(), String> {
-        let (Some(argument), Some(Node::Parameter(k))) = (all.first(), all.get(1).map(|e| &e.node))
-        else {
-            return Err(format!("the time of {} must be a parameter", function.name()));
+        let time = match all.get(1).map(|e| &e.node) {
+            Some(Node::Number(seconds)) => Some(Time::Fixed(*seconds)),
+            Some(Node::Parameter(k)) => places.get(*k).copied().flatten().map(Time::Constant),
+            _ => None,
         };
-        let Some(time) = places.get(*k).copied().flatten() else {
-            return Err(format!("the time of {} must be a shape constant", function.name()));
+        let (Some(argument), Some(time)) = (all.first(), time) else {
+            return Err(format!(
+                "the time of {} must be a number or a shape constant",
+                function.name()
+            ));
         };
         let mut alone = Tape::default();
         alone.report(argument, Some(&Expression::number(1.0)), 0, Channel::Drag, places)?;

@@ -69,7 +69,12 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
             }
             Function::Lag | Function::Delay => {
                 let time = Dimension::new(0, 0, 1);
-                match part(&all[1])? {
+                // a number is in s
+                let given = match all[1].node {
+                    Node::Number(_) => Any,
+                    _ => part(&all[1])?,
+                };
+                match given {
                     Of(found) if found != time => {
                         return Err(Fault {
                             at: all[1].at,

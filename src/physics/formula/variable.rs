@@ -2,10 +2,8 @@
 
 use super::dimension::Dimension;
 use crate::num::Real;
-use crate::physics::{Channel, Point};
-
-/// What evaluates a variable must know of the model.
 use crate::physics::effects::Needs;
+use crate::physics::{Channel, Point};
 
 const ANGLE: Dimension = Dimension::NONE;
 const RATE: Dimension = Dimension::new(0, 0, -1);

@@ -20,9 +20,10 @@ pub const SETTLED_OR_NOT: f64 = 0.5;
 const CLEAR: f64 = 1.96;
 /// The same for effects with more coefficients than three, one of which exceeds that by chance.
 const CLEAR_OF_MANY: f64 = 3.0;
-/// Flights disagree if a flight's own estimate is this many standard deviations away…
+/// Least distance of a flight's own estimate from that of all, in standard deviations, at which flights disagree; it
+/// must exceed [`DISAGREE_SHARE`] too.
 const DISAGREE: f64 = 4.0;
-/// …and by this share of the value.
+/// Least such distance as a share of the value.
 const DISAGREE_SHARE: f64 = 0.3;
 
 impl AddedEffect {

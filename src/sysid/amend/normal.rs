@@ -143,7 +143,7 @@ pub(super) fn run(
     let flight = &flights[shot.flight].prepared;
     let start = shooting::start(shot, flight, sensors, from);
     let path = shooting::fly(model, flight, shot, &controls[shot.flight][shot.segment], start);
-    shooting::residuals(flight, shot, sensors, &path)
+    shooting::residuals(flight, shot, sensors, &model.scale(), &path)
 }
 
 /// Derivatives of the residuals of shot number `index`: columns for the free coefficients, its flight's

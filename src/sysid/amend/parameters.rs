@@ -9,9 +9,9 @@ use crate::physics::inputs;
 /// Coefficients of added effects that stay where they start: shares of a whole, which cannot be determined
 /// from the shape beside them.
 const HELD: &[&str] = &["lift_stall.k"];
-/// Effects that correct others by what no formula says: heights where little was flown stay small,
+/// Effects without a formula of their own (curves): their heights stay small where little was flown.
 pub(super) const SLIGHT: &[&str] = &["lift_curve", "drag_curve"];
-/// for their prior is this share of what is possible.
+/// Prior width of a height of those effects, as a share of the range that is possible.
 const SLIGHT_SHARE: f64 = 0.1;
 /// Such an effect with the one whose shape it takes over: the constants of that formula stay as they are, since
 /// the curve can take up whatever they could.

@@ -162,7 +162,7 @@ pub(super) fn fly(
     path
 }
 
-/// Predicted − measured; roll the short way round.
+/// Predicted − measured; roll the short way round. Weak form and report take the opposite sign.
 pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
@@ -170,15 +170,17 @@ pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
 }
 
 /// Predicted − measured after each sample of a shot, sensors' constants included; where a run has left
-/// the flight, its last error stays.
+/// the flight, its last error stays. `scale` is x_c.
 pub(super) fn residuals(
     flight: &Prepared,
     shot: &Shot,
     sensors: &[f64; SENSORS],
+    scale: &[f64; 8],
     path: &[[f64; 8]],
 ) -> Vec<[f64; 8]> {
     let segment = &flight.segments[shot.segment];
-    let mut last = [LEFT; 8];
+    // a run that leaves at its first step has the error at which it counts as left
+    let mut last = scale.map(|x| LEFT * x);
     (0..shot.steps)
         .map(|k| {
             if let Some(predicted) = path.get(k) {

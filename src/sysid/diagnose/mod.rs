@@ -20,4 +20,7 @@ pub use answer::result::{
 pub use answer::run::{diagnose, searched};
 pub use error::DiagnoseError;
 pub use options::{Detail, Options};
-pub use proposal::{Alternative, Form, Grades, HeldOut, Proposal, Rung, Shape, propose};
+pub use proposal::{
+    Alternative, Form, Free, FreeForms, Grades, HeldOut, Proposal, Rung, Shape, propose, signals,
+    trend,
+};

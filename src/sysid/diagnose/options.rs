@@ -26,6 +26,8 @@ pub struct Options {
     pub without: Vec<String>,
     /// What is worked out besides.
     pub detail: Detail,
+    /// Whether the search for a formula tries free forms where the shapes of its library are not all.
+    pub free_forms: bool,
 }
 
 impl Default for Options {
@@ -38,6 +40,7 @@ impl Default for Options {
             with: Vec::new(),
             without: Vec::new(),
             detail: Detail::Full,
+            free_forms: true,
         }
     }
 }

@@ -14,7 +14,7 @@ pub struct Instant {
     pub state: State,
     /// Heading ψ, rad; NaN if the log has none.
     pub yaw: f64,
-    /// The deflections that act.
+    /// The recorded deflections and throttle position, resampled, before the model's own effects on inputs.
     pub controls: Controls,
     /// The command, where the log has one.
     pub command: Option<Command>,

@@ -162,7 +162,8 @@ fn predicted_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
     to_force_axes(rigid_body::body_force(&wrench, &air, model.axes), &air, model.axes)
 }
 
-/// The inverse of [`rigid_body::body_force`]: D less thrust, L, Y.
+/// D less thrust, L and Y, N, of a force in body axes: in the order of [`ChannelId::ALL`], not in that of
+/// [`rigid_body::aerodynamic_force`], which is D, Y, L.
 pub(in crate::sysid) fn to_force_axes<R: Real>(
     force: Vector<R>,
     air: &AirData<R>,

@@ -43,7 +43,7 @@ pub struct Watched {
     pub predicted: [Column; 6],
     /// Half width of the monitor's band, two standard deviations.
     pub band: [Column; 6],
-    /// The monitor's residual by its band; beyond −1..1 is outside.
+    /// The monitor's residual divided by the half width of its band; no unit, beyond −1..1 is outside.
     pub share: [Column; 6],
 }
 

@@ -47,7 +47,7 @@ pub struct Flying {
     pub on: bool,
     /// What was seen of it.
     pub live: Live,
-    /// Points that were let go.
+    /// Points dropped from the start of `live`, so that it stays short.
     pub gone: usize,
     stop: Stop,
 }

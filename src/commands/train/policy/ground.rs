@@ -23,7 +23,7 @@ impl Ground {
     /// What `actor` reaches in what it is trained in, on a tenth of a target file: a policy that is trained
     /// in a model is chosen without a flight in any simulator.
     pub(super) fn evaluate(&self, actor: Arc<Actor>) -> Result<Evaluated> {
-        let mut rows = TargetFile::generate(OTHER).rows;
+        let mut rows = TargetFile::generate(JUDGE_SEED).rows;
         rows.retain(|r| r.group != Group::HardOutside && r.number % 10 == r.number / 10 % 10);
         let make = || -> Box<dyn Controller> { Box::new(Policy::of(actor.clone())) };
         let outcomes = match &self.model {
@@ -42,7 +42,7 @@ impl Ground {
 }
 
 /// Seed of the targets that a training is judged by: none of those that policies are scored on.
-const OTHER: u64 = 2;
+const JUDGE_SEED: u64 = 2;
 
 /// What came of flights in JSBSim, where the policy was trained there.
 #[cfg(feature = "sitl")]
@@ -53,5 +53,5 @@ pub(super) fn flown(make: Make, rows: &[Row]) -> Result<Vec<Outcome>> {
 
 #[cfg(not(feature = "sitl"))]
 pub(super) fn flown(_: Make, _: &[Row]) -> Result<Vec<Outcome>> {
-    bail!("this program was built without JSBSim")
+    anyhow::bail!("this program was built without JSBSim")
 }

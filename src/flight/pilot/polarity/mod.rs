@@ -33,6 +33,7 @@ const CERTAIN: f64 = 7.0;
 /// A sign is not judged before its surface has gone the other way and been answered: one edge may
 /// meet one gust.
 const SEEN: [usize; 2] = [LENGTH + ANSWERED, OFFSET + LENGTH + ANSWERED];
+/// States after the edge of a pulse by which the aircraft has answered it.
 const ANSWERED: usize = 7;
 /// An answer is at least this share of the model's: a model may be wrong by much, but not so.
 const ANSWER: f64 = 0.1;

@@ -81,7 +81,7 @@ pub struct Moment {
 pub struct Learned {
     /// Full name.
     pub name: String,
-    /// Value at the start.
+    /// Value in the prior's file.
     pub start: f64,
     /// Value now.
     pub value: f64,

@@ -1,4 +1,6 @@
 //! The controller's parameters: read one by one, checked against what the profile needs.
+//!
+//! The rules themselves, which parameter must be what, are in `profile.rs`.
 
 use std::time::Duration;
 

@@ -9,7 +9,7 @@ const RATE: f64 = 100.0;
 /// Below this share of them the controller flies better by itself.
 const LEAST: f64 = 0.4;
 
-/// What has come and gone in the window that is open.
+/// The watchdog of steering by surfaces: states and cycles counted in the window that is open.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pulse {
     since: Option<Duration>,

@@ -17,9 +17,9 @@ const NORMAL_95: f64 = 1.96;
 const LEARNED: f64 = 0.7;
 /// Coefficients whose errors go together more closely than this say the same.
 const SAME: f64 = 0.9;
-/// Not settled if the last change exceeds this many standard deviations,
+/// Last change of a coefficient, in standard deviations, above which a fit has not settled.
 const UNSETTLED: f64 = 0.5;
-/// and lost, so that nothing can be said of any coefficient, if it exceeds this many and was made.
+/// Last change, in standard deviations, above which nothing can be said of any coefficient, if it was made.
 const LOST: f64 = 5.0;
 
 impl Search<'_> {

@@ -18,9 +18,9 @@ use crate::sysid::diagnose::search::round::Round;
 const TRIED: usize = 8;
 /// Largest factor between one amount and the next.
 const STRIDE: f64 = 8.0;
-/// Power of the amount with which what an effect shows is taken to grow while nothing is known,
+/// Power of the amount with which an effect's evidence is taken to grow until two amounts have been tried.
 const POWER: f64 = 2.0;
-/// and between which powers two amounts may say it does.
+/// Least and largest power that two amounts may give.
 const POWERS: [f64; 2] = [0.5, 4.0];
 /// An amount whose evidence is within this share of the one sought is close enough.
 const CLOSE: f64 = 0.1;

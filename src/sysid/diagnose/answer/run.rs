@@ -130,6 +130,7 @@ pub fn problem<'a>(
     Ok((problem, used, notes))
 }
 
+/// The verdict on what the search found: an effect, something unexplained, or an adequate model.
 pub fn verdict(found: &Found) -> Verdict {
     let significant =
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;

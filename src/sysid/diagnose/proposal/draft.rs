@@ -1,7 +1,7 @@
 //! The effect file of a formula that was found.
 
 use super::grades;
-use super::library::Form;
+use super::library::{Form, Shape};
 use crate::physics::formula::file::channel_name;
 
 /// A term with its coefficient.
@@ -45,6 +45,13 @@ pub fn formula(terms: &[Term]) -> String {
     terms.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
+/// The names of the constants of a term, the one in place `k`.
+fn names(k: usize, term: &Term) -> Vec<String> {
+    let count = term.form.shape.constants().len();
+    let letter = |i: usize| if count > 1 { ["a", "b", "c", "d"][i.min(3)] } else { "" };
+    (0..count).map(|i| format!("w{}{}", k + 1, letter(i))).collect()
+}
+
 /// The effect file of `terms`, thresholds free; `from` says of which flights.
 pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> String {
     let quoted = |text: &str| toml::Value::from(text).to_string();
@@ -68,22 +75,29 @@ pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> 
             quoted(&term.form.unit()),
             quoted(&format!("how much {}", grades::words(&term.form, 1.0)))
         );
-        if let Some(c) = term.form.shape.constant() {
+        for (name, c) in names(k, term).iter().zip(term.form.shape.constants()) {
+            // a threshold may be zero; what divides may not
+            let (ends, unit, meaning) = match term.form.shape {
+                Shape::Free(_) => ([0.2 * c, 5.0 * c], "", "constant of its shape"),
+                Shape::Lagged(..) => ([0.0, 5.0 * c], "s", "time constant of the lag"),
+                _ => ([0.0, 3.0 * c], "", "where it begins"),
+            };
             text += &format!(
-                "\n[parameters.w{}]\nvalue = {c}\nwidth = {}\nbounds = [0.0, {}]\nunit = \"\"\nmeaning = \"where it begins\"\n",
-                k + 1,
-                rounded(0.3 * c),
-                rounded(3.0 * c)
+                "\n[parameters.{name}]\nvalue = {c}\nwidth = {}\nbounds = [{}, {}]\nunit = {}\nmeaning = {}\n",
+                rounded(0.3 * c.abs()),
+                rounded(ends[0].min(ends[1])),
+                rounded(ends[0].max(ends[1])),
+                quoted(unit),
+                quoted(meaning)
             );
         }
     }
     for (k, term) in terms.iter().enumerate() {
-        let constant = format!("w{}", k + 1);
         text += &format!(
             "\n[[channels]]\nchannel = {}\nfactor = {}\nshape = {}\n",
             quoted(channel_name(term.form.channel)),
             quoted(term.form.factor()),
-            quoted(&format!("k{}*{}", k + 1, term.form.shape.text(Some(&constant))))
+            quoted(&format!("k{}*{}", k + 1, term.form.shape.text(Some(&names(k, term)))))
         );
     }
     text
@@ -91,10 +105,10 @@ pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::library::Shape;
+    use super::super::free::Free;
     use super::*;
     use crate::physics::Channel;
-    use crate::physics::formula::{Status, Variable, file as reader};
+    use crate::physics::formula::{Status, Variable, file as reader, parser};
 
     #[test]
     fn a_draft_is_an_effect_file_that_nothing_flies() {
@@ -114,5 +128,20 @@ mod tests {
         assert_eq!(effect.status, Status::Proposed);
         assert_eq!(effect.about.id, "proposed_yaw_by_throttle_beta");
         assert_eq!((effect.values, effect.about.shape), (vec![0.53, -0.01, 0.07], 1));
+    }
+
+    #[test]
+    fn the_constants_of_a_free_form_are_parameters() {
+        let text = "exp(alpha/w0)*beta/(1 + abs(throttle)/w1)";
+        let expression = parser::parse(text, &["w0", "w1"]).unwrap();
+        let free = Box::leak(Box::new(Free { expression, constants: vec![-0.08, 0.5] }));
+        let form = Form { channel: Channel::Pitch, of_air: true, shape: Shape::Free(free) };
+        let terms = [Term { form, value: 0.3, sd: 0.02 }];
+        let effect = reader::parse(&file(&terms, "It bends.", &[], "a flight")).unwrap();
+        assert_eq!((effect.values, effect.about.shape), (vec![0.3, -0.08, 0.5], 2));
+        assert_eq!(
+            formula(&terms),
+            "pitch = k*qbar*S*c*exp(alpha/-0.08)*beta/(1 + abs(throttle)/0.5)"
+        );
     }
 }

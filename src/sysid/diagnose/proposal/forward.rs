@@ -4,7 +4,7 @@ use super::draft::{self, Term};
 use super::grades;
 use super::held_out;
 use super::library::{self, Form};
-use super::result::{Alternative, Proposal, Rung};
+use super::result::{Alternative, Grades, Rung};
 use crate::model::GreyBox;
 use crate::num::statistics::quantile;
 use crate::physics::Channel;
@@ -54,12 +54,16 @@ pub(super) fn failing(found: &Found) -> Vec<Channel> {
 /// The forms to be tried, each as a candidate.
 pub(super) fn forms(problem: &Problem, channels: &[Channel]) -> Vec<(Form, Entry)> {
     let threshold = |v: Variable, q: f64| rounded(magnitude(problem, v, q));
-    let all = channels.iter().flat_map(|c| library::forms(*c, &threshold));
+    candidates(channels.iter().flat_map(|c| library::forms(*c, &threshold)))
+}
+
+/// `forms`, each as a candidate.
+pub(super) fn candidates(forms: impl Iterator<Item = Form>) -> Vec<(Form, Entry)> {
     let entry = |form: Form| {
         let effect = form.effect().ok()?;
         Some((form, Entry { about: effect.about, operator: false }))
     };
-    all.filter_map(entry).collect()
+    forms.filter_map(entry).collect()
 }
 
 /// Two significant figures, so that thresholds can be read.
@@ -92,94 +96,169 @@ pub(super) struct Ask<'a> {
     pub problem: &'a Problem,
     pub options: &'a Options,
     pub forms: &'a [(Form, Entry)],
+    /// Channels whose error counts, in the order of the regression.
+    pub channels: [bool; 6],
+    /// Evidence that the first term needs whatever chance reaches among `forms`: where these were picked from more.
+    pub least: f64,
+    /// Share of what the best form takes by which a simpler one may be behind.
+    pub behind: f64,
 }
 
-/// The first term with all of them.
-pub(super) type Climbed = Option<(Term, Vec<Term>)>;
+/// What a search says beside its terms.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Said {
+    pub front: Vec<Rung>,
+    pub alike: Vec<Alternative>,
+    pub grades: Option<Grades>,
+    pub refused: Vec<String>,
+    pub nulls: Vec<f64>,
+}
+
+/// Where a search arrives.
+pub(super) struct Climbed {
+    pub said: Said,
+    /// The first term as it was found; `None` if none was.
+    pub first: Option<Term>,
+    /// All of them as tuning leaves them.
+    pub terms: Vec<Term>,
+    /// The forms that the flights cannot tell from the first one.
+    pub class: Vec<Form>,
+    /// The model with the terms.
+    pub model: GreyBox,
+    /// The squared error beyond noise of the model given.
+    pub excess: f64,
+    /// The first round; `None` if there was nothing to try.
+    pub round: Option<Round>,
+    first_fall: f64,
+}
+
+impl Climbed {
+    /// Share of the error beyond noise that the terms remove.
+    pub(super) fn removed(&self) -> f64 {
+        self.said.front.iter().find(|r| r.chosen).map_or(0.0, |r| r.removed)
+    }
+
+    /// Nodes of the formula.
+    pub(super) fn complexity(&self) -> usize {
+        self.terms.iter().map(|t| 1 + t.form.shape.complexity()).sum()
+    }
+}
+
+/// A round with its winner.
+struct Stage<'a> {
+    round: &'a Round,
+    scores: &'a [(usize, Score)],
+    place: usize,
+    threshold: f64,
+}
 
 impl Ask<'_> {
     /// One term after the other joins `model` while it is more than chance and worth it. `None` if the flights do
     /// not hold the model.
-    pub(super) fn climb(&self, mut model: GreyBox, proposal: &mut Proposal) -> Option<Climbed> {
-        proposal.tried = self.forms.len();
-        let mut terms: Vec<Term> = Vec::new();
-        let channels = self.channels();
+    pub(super) fn climb(&self, model: GreyBox) -> Option<Climbed> {
         let given = model.clone();
-        let excess = self.excess(&model, &channels)?.max(1.0);
-        let mut first_fall = 0.0;
-        while terms.len() < MOST {
+        let excess = self.excess(&model)?.max(1.0);
+        let mut c = Climbed {
+            said: Said::default(),
+            first: None,
+            terms: Vec::new(),
+            class: Vec::new(),
+            model,
+            excess,
+            round: None,
+            first_fall: 0.0,
+        };
+        while c.terms.len() < MOST {
             let open: Vec<Entry> =
-                self.forms.iter().map(|(_, e)| *e).filter(|e| !model.has(e.about.id)).collect();
-            let round = Round::new(self.problem, model.clone(), &open)?;
+                self.forms.iter().map(|(_, e)| *e).filter(|e| !c.model.has(e.about.id)).collect();
+            let round = Round::new(self.problem, c.model.clone(), &open)?;
             let Ranked { round, scores, nulls, threshold } =
                 ranked(self.problem, round, self.options);
-            let Some(place) = self.winner(&round, &scores) else { break };
-            let (trial, score) = &scores[place];
-            let form = self.form(round.trials[*trial].id)?;
-            let passes = score.evidence > threshold && score.fall > WORTH * first_fall;
-            if terms.is_empty() {
-                proposal.nulls = nulls;
-                first_fall = score.fall;
-            }
-            let term = Term { form, value: score.values[0], sd: score.deviations[0] };
-            terms.push(term);
-            let before = proposal.front.last().map_or(0.0, |r| r.removed);
-            proposal.front.push(Rung {
-                formula: draft::formula(&terms),
-                complexity: terms.iter().map(|t| 1 + t.form.shape.complexity()).sum(),
-                removed: before + score.fall / excess,
-                evidence: score.evidence,
-                threshold,
-                chosen: false,
-            });
-            if !passes {
-                terms.pop();
-                break;
-            }
-            if terms.len() == 1 {
-                let alike = self.alike(&round, &scores, place);
-                proposal.refused.extend(contradicted(&round, *trial, score));
-                let steady = self.selected(&round, &scores, place) >= SELECTED;
-                proposal.grades =
-                    Some(grades::grades(&form, &alike.iter().map(|a| a.0).collect::<Vec<_>>()));
-                if let Some(grades) = &mut proposal.grades {
-                    grades.form &= steady;
+            let on = self.winner(&round, &scores).is_some_and(|place| {
+                if c.terms.is_empty() {
+                    c.said.nulls = nulls;
                 }
-                proposal.alike = alike
-                    .iter()
-                    .map(|(form, evidence)| Alternative {
-                        formula: draft::formula(&[Term { form: *form, value: 0.0, sd: 0.0 }]),
-                        evidence: *evidence,
-                    })
-                    .collect();
-            }
-            let Some(tuned) = self.tuned(&round, *trial, score)? else { break };
-            let removed = held_out::removed(self.problem, &given, &tuned, &channels)?;
-            // a term that pulls the others far off, or makes things worse, is one of them again
-            if terms.iter().any(|t| moved(t, &tuned)) || removed <= before {
-                terms.pop();
+                let stage = Stage { round: &round, scores: &scores, place, threshold };
+                self.joins(&mut c, &given, &stage) == Some(true)
+            });
+            c.round.get_or_insert(round);
+            if !on {
                 break;
             }
-            if let Some(rung) = proposal.front.last_mut() {
-                rung.removed = removed;
-            }
-            model = tuned;
         }
-        if let Some(rung) = terms.len().checked_sub(1).and_then(|k| proposal.front.get_mut(k)) {
+        if let Some(rung) = c.terms.len().checked_sub(1).and_then(|k| c.said.front.get_mut(k)) {
             rung.chosen = true;
         }
-        let Some(first) = terms.first().copied() else { return Some(None) };
-        Some(Some((first, self.joint(&model, terms))))
+        c.first = c.terms.first().copied();
+        c.terms = self.joint(&c.model, std::mem::take(&mut c.terms));
+        Some(c)
     }
 
-    /// The channels of the forms, in the order of the regression.
-    fn channels(&self) -> [bool; 6] {
-        std::array::from_fn(|c| self.forms.iter().any(|(f, _)| f.channel == ORDER[c]))
+    /// Notes the winner of a round in the front and, if it passes, in the terms and the model; whether it joined.
+    /// `None` if the flights do not hold the model with it.
+    fn joins(&self, c: &mut Climbed, given: &GreyBox, stage: &Stage) -> Option<bool> {
+        let &Stage { round, scores, place, threshold } = stage;
+        let (trial, score) = &scores[place];
+        let form = self.form(round.trials[*trial].id)?;
+        let first = c.terms.is_empty();
+        let threshold = if first { threshold.max(self.least) } else { threshold };
+        let before = c.said.front.last().map_or(0.0, |r| r.removed);
+        let worth = score.fall > WORTH * c.first_fall;
+        c.terms.push(Term { form, value: score.values[0], sd: score.deviations[0] });
+        c.said.front.push(Rung {
+            formula: draft::formula(&c.terms),
+            complexity: c.complexity(),
+            removed: before + score.fall / c.excess,
+            evidence: score.evidence,
+            threshold,
+            chosen: false,
+        });
+        if score.evidence <= threshold || !worth {
+            c.terms.pop();
+            return Some(false);
+        }
+        if first {
+            c.first_fall = score.fall;
+            self.grade(c, stage, &form);
+        }
+        let Some(tuned) = self.tuned(round, *trial, score)? else {
+            c.terms.pop();
+            return Some(false);
+        };
+        let removed = held_out::removed(self.problem, given, &tuned, &self.channels)?;
+        // a term that pulls the others far off, or makes things worse, is one of them again
+        if c.terms.iter().any(|t| moved(t, &tuned)) || removed <= before {
+            c.terms.pop();
+            return Some(false);
+        }
+        if let Some(rung) = c.said.front.last_mut() {
+            rung.removed = removed;
+        }
+        c.model = tuned;
+        Some(true)
     }
 
-    /// What `model` leaves beyond noise in `channels`.
-    fn excess(&self, model: &GreyBox, channels: &[bool; 6]) -> Option<f64> {
-        Some(checks::excess(&Round::new(self.problem, model.clone(), &[])?, channels))
+    /// What is sure of the first term.
+    fn grade(&self, c: &mut Climbed, stage: &Stage, form: &Form) {
+        let &Stage { round, scores, place, .. } = stage;
+        let (trial, score) = &scores[place];
+        let alike = self.alike(round, scores, place);
+        c.said.refused.extend(contradicted(round, *trial, score));
+        let steady = self.selected(round, scores, place) >= SELECTED;
+        c.class = alike.iter().map(|a| a.0).collect();
+        let mut grades = grades::grades(form, &c.class);
+        grades.form &= steady;
+        c.said.grades = Some(grades);
+        let alternative = |(form, evidence): &(Form, f64)| Alternative {
+            formula: draft::formula(&[Term { form: *form, value: 0.0, sd: 0.0 }]),
+            evidence: *evidence,
+        };
+        c.said.alike = alike.iter().map(alternative).collect();
+    }
+
+    /// What `model` leaves beyond noise.
+    fn excess(&self, model: &GreyBox) -> Option<f64> {
+        Some(checks::excess(&Round::new(self.problem, model.clone(), &[])?, &self.channels))
     }
 
     /// The model of `round` with a trial in it, all coefficients tuned together; `Some(None)` if it cannot join.
@@ -215,20 +294,36 @@ impl Ask<'_> {
         let best = (0..scores.len()).find(fits)?;
         let size =
             |k: usize| self.form(round.trials[scores[k].0].id).map_or(99, |f| f.shape.complexity());
-        let alike = checks::class(round, scores, best).into_iter().filter(fits);
-        // a simpler one in its place must be as likely
-        let likely = alike
-            .filter(|k| scores[*k].1.fall > scores[best].1.fall - LIKELY && size(*k) < size(best));
-        likely.min_by_key(|k| (size(*k), *k)).or(Some(best))
+        let own = &scores[best].1;
+        let pool: Vec<usize> = match self.behind > 0.0 {
+            true => (0..scores.len())
+                .filter(|k| checks::likeness(round, own, &scores[*k].1).abs() > checks::ALIKE)
+                .collect(),
+            false => checks::class(round, scores, best),
+        };
+        // a simpler one in its place must be as likely, or as good in practice
+        let likely = |k: &usize| {
+            let slack =
+                (LIKELY + NODE * (size(best) as f64 - size(*k) as f64)).max(self.behind * own.fall);
+            let slack = if self.behind > 0.0 { slack } else { LIKELY };
+            scores[*k].1.fall > own.fall - slack && size(*k) < size(best)
+        };
+        let simpler = pool.into_iter().filter(fits).filter(likely);
+        simpler.min_by_key(|k| (size(*k), *k)).or(Some(best))
     }
 
-    /// The forms that these flights cannot tell from the one in `place`, with their evidence.
+    /// The forms that these flights cannot tell from the one in `place`, with their evidence: of those that were
+    /// picked from more, no larger ones, of which there is always one.
     fn alike(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> Vec<(Form, f64)> {
+        let own = self.form(round.trials[scores[place].0].id).map_or(0, |f| f.shape.complexity());
         checks::class(round, scores, place)
             .into_iter()
             .filter_map(|k| {
                 let (trial, score) = &scores[k];
-                Some((self.form(round.trials[*trial].id)?, score.evidence))
+                let form = self.form(round.trials[*trial].id)?;
+                let same = checks::likeness(round, &scores[place].1, score).abs() > 1.0 - SAME;
+                let larger = self.behind > 0.0 && form.shape.complexity() > own;
+                (!same && !larger).then_some((form, score.evidence))
             })
             .collect()
     }
@@ -267,3 +362,7 @@ fn moved(term: &Term, model: &GreyBox) -> bool {
 
 /// Fall of the squared error by which a simpler form may be behind: its likelihood is then e⁻² of the other's.
 const LIKELY: f64 = 4.0;
+/// The same for each node that it has less: with a node more there are about e times as many forms.
+const NODE: f64 = 2.0;
+/// Forms whose contributions are as alike as this are one, written in two ways.
+const SAME: f64 = 1e-9;

@@ -1,33 +1,14 @@
 //! What may be said of a form beside those that the flights cannot tell from it, in words.
 
+use super::free::{self, trend::plain};
 use super::library::{Form, Shape};
 use super::result::Grades;
 use crate::physics::Channel;
 use crate::physics::formula::Variable;
 
-/// How a shape runs with the sign of its variables.
-fn trend(form: &Form) -> String {
-    let positive = |v: &Variable| matches!(v, Variable::Throttle | Variable::Airspeed);
-    match form.shape {
-        // a positive variable: linear, square and threshold all grow with it
-        Shape::Linear(v) | Shape::Square(v) | Shape::Above(v, _) if positive(&v) => {
-            format!("grows {}", plain(v))
-        }
-        Shape::Linear(v) | Shape::SignedSquare(v) | Shape::Beyond(v, _) => {
-            format!("odd {}", plain(v))
-        }
-        Shape::Magnitude(v) | Shape::Square(v) => format!("even {}", plain(v)),
-        Shape::Above(v, _) => format!("one-sided {}", plain(v)),
-        Shape::Product(v, w) => {
-            let one = |v: Variable| {
-                format!("{} {}", if positive(&v) { "grows" } else { "odd" }, plain(v))
-            };
-            let mut both = [one(v), one(w)];
-            both.sort();
-            both.join(" ")
-        }
-        Shape::ByMagnitude(v, w) => format!("odd {} even {}", plain(v), plain(w)),
-    }
+/// How a form runs with each of its variables.
+fn trend(form: &Form) -> Option<String> {
+    free::trend::trend(&form.shape.text(None))
 }
 
 /// What `best` and all of `alike`, which these flights cannot tell from it, have in common.
@@ -39,16 +20,6 @@ pub fn grades(best: &Form, alike: &[Form]) -> Grades {
         variables: same(&|f| sorted(f) == variables),
         trend: same(&|f| trend(f) == trend(best)),
         form: alike.is_empty(),
-    }
-}
-
-/// The name of a variable: a rate is the same one whether it is divided by the airspeed or not.
-fn plain(v: Variable) -> &'static str {
-    match v {
-        Variable::RollRateHat => "p",
-        Variable::PitchRateHat => "q",
-        Variable::YawRateHat => "r",
-        v => v.name(),
     }
 }
 
@@ -95,6 +66,8 @@ pub fn words(form: &Form, value: f64) -> String {
         Shape::ByMagnitude(v, w) => format!("with {} times the magnitude of {}", long(v), long(w)),
         Shape::Above(v, c) => format!("with {} above {c}", long(v)),
         Shape::Beyond(v, c) => format!("with {} beyond ±{c}", long(v)),
+        Shape::Lagged(v, tau) => format!("linearly with {} through a lag of {tau} s", long(v)),
+        Shape::Free(free) => format!("with {}", free.text(None)),
     };
     let pressure = match form.of_air {
         true => ", in proportion to dynamic pressure",

@@ -1,11 +1,13 @@
 //! The shapes that are tried: each one variable or two in a known factor of a channel.
 
+use super::free::Free;
 use crate::physics::Channel;
+use crate::physics::formula::dimension::Dimension;
 use crate::physics::formula::file::channel_name;
 use crate::physics::formula::{Variable, Written, register};
 
 /// Variables of shapes that grow with dynamic pressure: all are numbers without a unit.
-const OF_AIR: [Variable; 9] = [
+pub(super) const OF_AIR: [Variable; 9] = [
     Variable::Alpha,
     Variable::Beta,
     Variable::RollRateHat,
@@ -17,7 +19,7 @@ const OF_AIR: [Variable; 9] = [
     Variable::Throttle,
 ];
 /// Variables of shapes that do not: thrust, gyroscopic and inertial moments.
-const BESIDE_AIR: [Variable; 7] = [
+pub(super) const BESIDE_AIR: [Variable; 7] = [
     Variable::Throttle,
     Variable::Airspeed,
     Variable::RollRate,
@@ -29,6 +31,16 @@ const BESIDE_AIR: [Variable; 7] = [
 /// Variables that may have a dead band or a threshold.
 const BANDED: [Variable; 5] =
     [Variable::Alpha, Variable::Beta, Variable::Aileron, Variable::Elevator, Variable::Throttle];
+/// Time constants of lags, s: some four times apart, between which a lag is nearly the mean of its neighbours.
+const LAGS_S: [f64; 3] = [0.1, 0.3, 1.0];
+
+/// Controls that a term may follow with a lag, and whether it then grows with dynamic pressure.
+const LAGGED: [(bool, Variable); 4] = [
+    (true, Variable::Aileron),
+    (true, Variable::Elevator),
+    (true, Variable::Throttle),
+    (false, Variable::Throttle),
+];
 /// Where thresholds lie, as quantiles of the magnitude of what was flown.
 pub(super) const QUANTILES: [f64; 2] = [0.5, 0.75];
 
@@ -51,6 +63,10 @@ pub enum Shape {
     Above(Variable, f64),
     /// What v exceeds a dead band by, with its sign.
     Beyond(Variable, f64),
+    /// v through a first-order lag of so many seconds.
+    Lagged(Variable, f64),
+    /// Any expression.
+    Free(&'static Free),
 }
 
 /// A shape in a factor of a channel.
@@ -74,14 +90,19 @@ impl Shape {
             | Shape::Square(v)
             | Shape::SignedSquare(v)
             | Shape::Above(v, _)
-            | Shape::Beyond(v, _) => vec![v],
+            | Shape::Beyond(v, _)
+            | Shape::Lagged(v, _) => vec![v],
+            Shape::Free(free) => free.expression.variables(),
         }
     }
 
-    /// The formula, with its constant as `constant` if that is given.
-    pub fn text(&self, constant: Option<&str>) -> String {
+    /// The formula, its constants by `names` if these are given.
+    pub fn text(&self, names: Option<&[String]>) -> String {
         let name = Variable::name;
-        let number = |c: f64| constant.map_or(format!("{c}"), str::to_owned);
+        let number = |c: f64| match names {
+            Some([name, ..]) => name.clone(),
+            _ => format!("{c}"),
+        };
         match *self {
             Shape::Linear(v) => name(v).into(),
             Shape::Magnitude(v) => format!("abs({})", name(v)),
@@ -91,14 +112,17 @@ impl Shape {
             Shape::ByMagnitude(v, w) => format!("{}*abs({})", name(v), name(w)),
             Shape::Above(v, c) => format!("max({} - {}, 0)", name(v), number(c)),
             Shape::Beyond(v, c) => format!("deadband({}, {})", name(v), number(c)),
+            Shape::Lagged(v, tau) => format!("lag({}, {})", name(v), number(tau)),
+            Shape::Free(free) => free.text(names),
         }
     }
 
-    /// Its threshold, if it has one.
-    pub fn constant(&self) -> Option<f64> {
-        match *self {
-            Shape::Above(_, c) | Shape::Beyond(_, c) => Some(c),
-            _ => None,
+    /// Its constants beside the coefficient.
+    pub fn constants(&self) -> Vec<f64> {
+        match self {
+            Shape::Above(_, c) | Shape::Beyond(_, c) | Shape::Lagged(_, c) => vec![*c],
+            Shape::Free(free) => free.constants.clone(),
+            _ => Vec::new(),
         }
     }
 
@@ -110,6 +134,8 @@ impl Shape {
             Shape::Product(..) => 3,
             Shape::SignedSquare(_) | Shape::ByMagnitude(..) | Shape::Beyond(..) => 4,
             Shape::Above(..) => 5,
+            Shape::Lagged(..) => 3,
+            Shape::Free(free) => free.expression.size(),
         }
     }
 }
@@ -135,6 +161,11 @@ impl Form {
         if self.of_air {
             return String::new();
         }
+        if let Shape::Free(free) = self.shape {
+            let whole = if force == "N" { Dimension::FORCE } else { Dimension::MOMENT };
+            let unit = whole.per(free.dimension().unwrap_or_default());
+            return if unit == Dimension::NONE { String::new() } else { unit.to_string() };
+        }
         let per = |v: &Variable| match v {
             Variable::Airspeed => " m^-1 s",
             Variable::RollRate | Variable::PitchRate | Variable::YawRate => " s",
@@ -148,7 +179,11 @@ impl Form {
 
     /// Its id among the candidates.
     pub fn id(&self) -> String {
-        let text = self.shape.text(None);
+        let text = match self.shape {
+            // too long for an id
+            Shape::Free(free) => format!("free_{:x}", number_of(&free.text(None))),
+            shape => shape.text(None),
+        };
         let plain: String =
             text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         format!(
@@ -175,6 +210,13 @@ impl Form {
         );
         register::read(&text)
     }
+}
+
+/// A number that goes with `text` (FNV-1a).
+fn number_of(text: &str) -> u64 {
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 /// All forms in `channel`; `threshold` gives the quantile of the magnitude of a variable.
@@ -210,6 +252,9 @@ pub fn forms(channel: Channel, threshold: &dyn Fn(Variable, f64) -> f64) -> Vec<
                 }
             }
         }
+    }
+    for (of_air, v) in LAGGED {
+        shapes.extend(LAGS_S.map(|tau| (of_air, Shape::Lagged(v, tau))));
     }
     shapes.into_iter().map(|(of_air, shape)| Form { channel, of_air, shape }).collect()
 }

@@ -1,14 +1,19 @@
 //! A formula for what no effect of the catalogue holds: shapes searched, tested on other flights, put into words.
 
+mod beyond;
 mod draft;
 mod forward;
+mod free;
 mod grades;
 mod held_out;
 mod library;
 mod propose;
 mod result;
 mod sentences;
+mod signals;
 
+pub use free::{Free, trend::trend};
 pub use library::{Form, Shape};
 pub use propose::propose;
-pub use result::{Alternative, Grades, HeldOut, Proposal, Rung};
+pub use result::{Alternative, FreeForms, Grades, HeldOut, Proposal, Rung};
+pub use signals::signals;

@@ -1,10 +1,12 @@
 //! The search for a formula: one term after the other on some flights, the whole tested on others.
 
-use super::draft;
-use super::forward::{Ask, failing, forms};
+use super::beyond::{better, beyond, doubt};
+use super::draft::{self, Term};
+use super::forward::{Ask, Climbed, ORDER, failing, forms};
+use super::free::grammar::MOST_NODES;
 use super::grades;
 use super::held_out::{objection, tested};
-use super::result::{Proposal, Settings};
+use super::result::{HeldOut, Proposal, Settings};
 use super::sentences::{capital, sentences};
 use crate::model::{GreyBox, RUDDER};
 use crate::physics::Channel;
@@ -17,8 +19,9 @@ use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::progress::{Progress, part, say};
 use crate::sysid::rudder;
 
-/// Shares of the work after the diagnosis, and before the test.
+/// Shares of the work after the diagnosis, of the free forms, and before the test.
 const SEARCHED: f64 = 0.3;
+const FREE: [f64; 2] = [0.6, 0.9];
 const TESTED: f64 = 0.9;
 
 /// Proposes a formula for what `model` lacks according to `flights`, if a diagnosis leaves it unexplained, and tests
@@ -47,42 +50,31 @@ pub fn propose(
     if let Some(motion) = rudder {
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
     }
-    let mut proposal = Proposal {
-        schema: "greylag.proposal/1",
-        version: env!("CARGO_PKG_VERSION"),
-        model: model.name.clone(),
-        verdict: verdict(&found),
-        sentences: rudder.map(rudder::warning).into_iter().collect(),
-        front: Vec::new(),
-        alike: Vec::new(),
-        grades: None,
-        held_out: None,
-        tried: 0,
-        refused: Vec::new(),
-        settings: Settings {
-            seed: options.seed,
-            nulls: options.nulls,
-            without: options.without.clone(),
-        },
-        nulls: Vec::new(),
-        effect: None,
-        notes,
-    };
+    let said = rudder.map(rudder::warning).into_iter().collect();
+    let mut proposal = empty(model, verdict(&found), options, said, notes);
     if let Some(why) = settled(&found, proposal.verdict) {
         proposal.sentences.push(why);
         return Ok(proposal);
     }
     let tuned = Round::new(&problem, model.clone(), &[]).ok_or_else(unusable)?.tuned();
-    let mut channels = failing(&found);
-    if rudder.is_some() {
-        let moved = [Channel::Drag, Channel::Side, Channel::Roll, Channel::Yaw];
-        channels.retain(|c| !moved.contains(c));
-    }
+    let channels = searched(&found, rudder.is_some());
     let forms = forms(&problem, &channels);
+    proposal.tried = forms.len();
     say(progress, &format!("trying {} shapes", forms.len()), SEARCHED)?;
-    let ask = Ask { problem: &problem, options, forms: &forms };
-    let climbed = ask.climb(tuned.clone(), &mut proposal).ok_or_else(unusable)?;
-    let Some((first, terms)) = climbed else {
+    let ask = Ask {
+        problem: &problem,
+        options,
+        forms: &forms,
+        channels: std::array::from_fn(|c| channels.contains(&ORDER[c])),
+        least: 0.0,
+        behind: 0.0,
+    };
+    let library = ask.climb(tuned.clone()).ok_or_else(unusable)?;
+    let climbed = beyond_library(&ask, library, &tuned, &mut proposal, progress)?;
+    let Climbed { said, first, terms, .. } = climbed;
+    (proposal.front, proposal.alike, proposal.grades) = (said.front, said.alike, said.grades);
+    (proposal.refused, proposal.nulls) = (said.refused, said.nulls);
+    let Some(first) = first else {
         proposal.sentences.push(nothing(&proposal));
         return Ok(proposal);
     };
@@ -93,16 +85,86 @@ pub fn propose(
     say(progress, "testing the formula on flights that the search has not seen", TESTED)?;
     let names: Vec<String> = used.iter().map(|f| f.name.clone()).collect();
     let tested = tested(&test, &tuned, &terms, options, names).ok_or_else(unusable)?;
+    let from = flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
+    conclude(&mut proposal, &first, &terms, tested, &from);
+    Ok(proposal)
+}
+
+/// The channels in which a formula is searched for; none of those that a rudder moves if the model lacks one.
+fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
+    let moved = [Channel::Drag, Channel::Side, Channel::Roll, Channel::Yaw];
+    let mut channels = failing(found);
+    channels.retain(|c| !(rudder && moved.contains(c)));
+    channels
+}
+
+/// A proposal before anything was searched.
+fn empty(
+    model: &GreyBox,
+    verdict: Verdict,
+    options: &Options,
+    sentences: Vec<String>,
+    notes: Vec<String>,
+) -> Proposal {
+    Proposal {
+        schema: "greylag.proposal/1",
+        version: env!("CARGO_PKG_VERSION"),
+        model: model.name.clone(),
+        verdict,
+        sentences,
+        front: Vec::new(),
+        free: None,
+        alike: Vec::new(),
+        grades: None,
+        held_out: None,
+        tried: 0,
+        refused: Vec::new(),
+        settings: Settings {
+            seed: options.seed,
+            nulls: options.nulls,
+            without: options.without.clone(),
+            free_forms: options.free_forms,
+        },
+        nulls: Vec::new(),
+        effect: None,
+        notes,
+    }
+}
+
+/// Says what was found, and writes the effect file if nothing speaks against it; `from` names the flights searched.
+fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldOut, from: &str) {
     proposal.refused.extend(objection(&tested));
-    proposal.sentences.extend(sentences(&proposal, &first, &terms, &tested));
+    proposal.sentences.extend(sentences(proposal, first, terms, &tested));
     if proposal.refused.is_empty() {
         let words = grades::words(&first.form, first.value);
         let alike: Vec<String> = proposal.alike.iter().map(|a| a.formula.clone()).collect();
-        let from = flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
-        proposal.effect = Some(draft::file(&terms, &capital(&words), &alike, &from));
+        proposal.effect = Some(draft::file(terms, &capital(&words), &alike, from));
     }
     proposal.held_out = Some(tested);
-    Ok(proposal)
+}
+
+/// The library's formula, or the one with free forms if that is better.
+fn beyond_library(
+    ask: &Ask,
+    library: Climbed,
+    tuned: &GreyBox,
+    proposal: &mut Proposal,
+    progress: &Progress,
+) -> Result<Climbed, DiagnoseError> {
+    if !ask.options.free_forms {
+        return Ok(library);
+    }
+    let Some(doubt) = doubt(ask, &library) else { return Ok(library) };
+    say(progress, "trying free forms", FREE[0])?;
+    let Some((mut record, free)) = beyond(ask, &library, tuned, doubt, &part(progress, FREE))?
+    else {
+        return Ok(library);
+    };
+    let taken = better(&free, &library);
+    record.chosen &= taken;
+    record.front.iter_mut().for_each(|rung| rung.chosen &= taken);
+    proposal.free = Some(record);
+    Ok(if taken { free } else { library })
 }
 
 /// Why there is nothing to propose, where the catalogue or chance explains what is left.
@@ -129,5 +191,8 @@ fn nothing(proposal: &Proposal) -> String {
             r.formula, r.evidence, r.threshold
         )
     });
-    format!("Something is missing, and none of {} shapes is it{best}.", proposal.tried)
+    let free = proposal.free.as_ref().map_or(String::new(), |f| {
+        format!(" and {} free forms of at most {MOST_NODES} nodes", f.tried)
+    });
+    format!("Something is missing, and none of {} shapes{free} is it{best}.", proposal.tried)
 }

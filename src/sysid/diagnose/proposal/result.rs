@@ -56,6 +56,19 @@ pub struct HeldOut {
     pub threshold: f64,
 }
 
+/// What the search of free forms gave, which follows where the library's shapes are not all.
+#[derive(Clone, Debug, Serialize)]
+pub struct FreeForms {
+    /// Why it was made.
+    pub why: String,
+    /// Forms that were tried, over all channels.
+    pub tried: usize,
+    /// The best form of each size that takes more than all smaller ones, channel by channel, its constants fitted.
+    pub front: Vec<Rung>,
+    /// Whether one of them is in the formula that was found.
+    pub chosen: bool,
+}
+
 /// What a search was asked for.
 #[derive(Clone, Debug, Serialize)]
 pub struct Settings {
@@ -65,6 +78,8 @@ pub struct Settings {
     pub nulls: usize,
     /// Ids that were left out of the catalogue.
     pub without: Vec<String>,
+    /// Whether free forms may be tried.
+    pub free_forms: bool,
 }
 
 /// What was found.
@@ -82,13 +97,15 @@ pub struct Proposal {
     pub sentences: Vec<String>,
     /// The formulas of the search, each with one term more than the one before.
     pub front: Vec<Rung>,
+    /// The search of free forms, if one was made.
+    pub free: Option<FreeForms>,
     /// Forms of the first term that these flights cannot tell from it.
     pub alike: Vec<Alternative>,
     /// What is sure of the first term.
     pub grades: Option<Grades>,
     /// The test on other flights.
     pub held_out: Option<HeldOut>,
-    /// Forms that were tried.
+    /// Shapes of the library that were tried.
     pub tried: usize,
     /// Why the formula that was found is not proposed; empty if it is.
     pub refused: Vec<String>,

@@ -1,6 +1,7 @@
 //! What was found, in sentences.
 
 use super::draft::Term;
+use super::free::grammar::MOST_NODES;
 use super::grades;
 use super::library;
 use super::result::{HeldOut, Proposal};
@@ -68,6 +69,19 @@ pub(super) fn sentences(
                 }
             }
         });
+    }
+    if let Some(free) = &proposal.free {
+        let found = match free.chosen {
+            true => "one of them is in the formula above",
+            false => {
+                "none of them is better than the library's by more than a hundredth, or simpler"
+            }
+        };
+        said.push(format!(
+            "{}, so {} free forms of at most {MOST_NODES} nodes were tried: {found}.",
+            capital(&free.why).trim_end_matches('.'),
+            free.tried
+        ));
     }
     let verdict = match proposal.refused.is_empty() {
         true => "it is proposed".to_owned(),

@@ -1,4 +1,7 @@
 //! What an effect must pass besides its evidence: held-out segments, bootstraps, the flights' agreement.
+//!
+//! Here they are computed; the thresholds that they are held against are in `stepwise/examine.rs` and
+//! `stepwise/judge.rs`.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -26,10 +29,10 @@ const UNSURE: f64 = 0.1;
 const DOUBT: f64 = 4.0;
 /// Least share of a flight's information on an amount that its excitation gives, and not the noise of its columns.
 const LEAST_SIGNAL: f64 = 0.5;
-/// Prior standard deviations by which the model's own figures are wrong, if a candidate in their place is more
-/// than an error of the prior,
+/// Strain, in prior standard deviations, of the model's own coefficients: a candidate that takes more of it may be
+/// these coefficients by another name.
 const STRAIN: f64 = 5.0;
-/// and the least share of what it takes that this strain is.
+/// Least share of what such a candidate takes in all that is this strain.
 const RELIEF: f64 = 0.9;
 /// Candidates that a bootstrap lets compete.
 const COMPETING: usize = 8;

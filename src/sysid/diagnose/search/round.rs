@@ -22,9 +22,9 @@ use shared_noise::{Setting, shared, sum};
 const REFINEMENTS: usize = 3;
 /// Times that the clocks' second order is taken anew.
 const CURVATURES: usize = 2;
-/// A nonlinear candidate is worth it if it takes this part of what the best one takes,
+/// A nonlinear candidate is linearised anew if it takes more than this share of the squared error that the best takes.
 const WORTH: f64 = 0.2;
-/// or if its evidence is this close to the best.
+/// It is linearised anew, too, if its evidence is within this of the best one's.
 const CLOSE: f64 = 40.0;
 
 /// What all rounds share.

@@ -31,9 +31,10 @@ const TERMS: usize = PRODUCTS + BENT.len();
 const RIDGE: f64 = 1e-4;
 /// Standard deviations beyond which what the terms take is no chance.
 const DOUBT: f64 = 4.0;
-/// Squared error per row that the terms may take of what sensors and path have left unsaid,
+/// Squared error per row that the terms may take of what sensors and path have left unsaid.
 const UNSURE: f64 = 0.1;
-/// and before it says by itself that something is missing: without anything missing, 0.13 at most.
+/// Squared error per row above which the terms by themselves say that something is missing: without anything missing,
+/// they take 0.13 at most.
 const ALARM: f64 = 0.15;
 /// Squared whitened error that second derivatives take of right models: up to 25.
 const BENDING: f64 = 30.0;

@@ -130,7 +130,8 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
 
 impl Found {
     /// Joins the effect selected last to the model and ranks what is left.
-    /// An earlier one that is nothing beside it goes.
+    /// An earlier one that is nothing beside it goes. `false` if it cannot join, or the model with it cannot be
+    /// linearised: the search ends.
     fn join(
         &mut self,
         problem: &Problem,

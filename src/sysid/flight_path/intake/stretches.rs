@@ -5,9 +5,9 @@ use crate::logs::{Flight, Sample};
 use crate::num::statistics::quantile;
 use crate::sysid::flight_path::{Options, ReconstructError};
 
-/// Median row periods that a pause must exceed to be a gap,
+/// A pause is a gap if it exceeds this many median periods of the rows, and `Options::gap_s`.
 const GAP_PERIODS: f64 = 2.5;
-/// up to this period, s: at less than 5 Hz nothing is known between the rows.
+/// Longest median period of the rows that counts in that, s: at less than 5 Hz nothing is known between the rows.
 const SLOWEST_PERIOD: f64 = 0.2;
 /// Time around a row over which its airspeed is averaged to tell flight from ground, s.
 const AIRBORNE_WINDOW: f64 = 1.0;

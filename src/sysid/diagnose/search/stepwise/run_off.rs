@@ -5,11 +5,11 @@ use crate::sysid::diagnose::search::checks;
 use crate::sysid::diagnose::search::round::Problem;
 use crate::sysid::diagnose::search::settling::{SETTLING, settled};
 
-/// Candidates of this part of the best one's order contend with it,
+/// Share of the best candidate's order (see `Score::order`) above which another contends with it.
 const CONTENDING: f64 = 0.2;
-/// if their contribution is this much like its own;
+/// Least likeness (correlation) of its contribution to the best one's.
 const CONTENDING_LIKENESS: f64 = 0.6;
-/// so many at most.
+/// Most contenders, the best one among them.
 const CONTENDERS: usize = 4;
 
 /// Puts the best of several close contenders first, each joined to the model and settled under one noise, and

@@ -1,0 +1,131 @@
+//! Effects drawn from a grammar, hidden in JSBSim, and what `propose` makes of the flights; and nulls.
+//!
+//! `cargo run --release --ignore-rust-version --no-default-features --features sitl --example propose_hidden --
+//! inside 9000 10 >> results/propose-hidden.jsonl`; `outside` draws shapes that the library lacks, `nulls` hides
+//! nothing. With the name of a folder behind it writes the signals of each case there, for
+//! `tests/formulas_by_others.py`. One line of JSON a seed; seeds must not be those of earlier runs.
+
+mod draw;
+mod judge;
+
+use std::error::Error;
+use std::path::Path;
+use std::time::Instant;
+
+use draw::Drawn;
+use greylag::control::{Kind, build};
+use greylag::logs::Flight;
+use greylag::model::GreyBox;
+use greylag::sim::missing::Missing;
+use greylag::sim::starting_model::starting_model;
+use greylag::sim::trial::Trial;
+use greylag::sysid::diagnose::{Options, Proposal, propose, signals};
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
+use greylag::sysid::progress::unheard;
+
+/// A model with the flights of an aircraft that has more to it.
+struct Case {
+    seed: u64,
+    model: GreyBox,
+    search: Vec<Reconstruction>,
+    test: Vec<Reconstruction>,
+}
+
+fn flights(model: &GreyBox, all: &[Flight]) -> Result<Vec<Reconstruction>, Box<dyn Error>> {
+    let one = |f: &Flight| {
+        let options = flight_path::Options {
+            gravity: model.atmosphere.gravity,
+            actuators_clock: ActuatorClock::AsRecorded,
+            ..flight_path::Options::new(&f.name, model.airframe.actuators)
+        };
+        Ok(reconstruct(f, &options)?)
+    };
+    all.iter().map(one).collect()
+}
+
+fn flown(seed: u64, missing: Vec<Missing>) -> Result<Case, Box<dyn Error>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+    let reference = std::fs::read_to_string(folder.join("jsbsim.toml"))?;
+    let exact = GreyBox::load(&folder.join("jsbsim.toml"))?;
+    let text = starting_model(&reference, &format!("hidden-{seed}"), seed, &missing)?;
+    let model = GreyBox::parse(&text, &folder.join("hidden.toml"))?;
+    let logs = Trial { seed, missing, turbulence: None, ..Trial::default() }
+        .fly(build(Kind::Lqi, &exact)?.as_ref())?;
+    let (search, test) = (flights(&model, &logs.training)?, flights(&model, &logs.testing)?);
+    Ok(Case { seed, model, search, test })
+}
+
+impl Case {
+    /// The proposal with or without free forms, and how long it took, s.
+    fn proposal(&self, free_forms: bool) -> Result<(Proposal, f64), Box<dyn Error>> {
+        let options = Options { seed: self.seed, free_forms, ..Options::default() };
+        let start = Instant::now();
+        let found = propose(&self.model, &self.search, &self.test, &options, &unheard)?;
+        Ok((found, start.elapsed().as_secs_f64()))
+    }
+
+    fn export(&self, folder: &Path, hidden: Option<&Drawn>) -> Result<(), Box<dyn Error>> {
+        let options = Options { seed: self.seed, ..Options::default() };
+        let truth = hidden.map_or(String::new(), |h| {
+            format!("{};{};{}", h.channel, h.variables.join(" "), h.shape)
+        });
+        let text = format!("# truth: {truth}\n{}", signals(&self.model, &self.search, &options)?);
+        let kind = if hidden.is_some() { "case" } else { "null" };
+        std::fs::create_dir_all(folder)?;
+        Ok(std::fs::write(folder.join(format!("{kind}-{}.csv", self.seed)), text)?)
+    }
+}
+
+/// Flies a seed and judges what is found with the library alone and with free forms.
+fn line(what: &str, seed: u64, export: Option<&Path>) -> Result<serde_json::Value, Box<dyn Error>> {
+    let hidden = match what {
+        "inside" => Some(draw::inside(seed)?),
+        "outside" => Some(draw::outside(seed)?),
+        "nulls" => None,
+        other => return Err(format!("{other:?}: write inside, outside or nulls").into()),
+    };
+    let named =
+        hidden.as_ref().map(|h| format!("{} {} k={:.4}", h.channel, h.shape, h.effect.values[0]));
+    let mut line = serde_json::json!({ "seed": seed, "grammar": what, "hidden": named });
+    let missing: Result<Vec<Missing>, _> =
+        hidden.iter().map(|h| Missing::written(h.effect, &h.effect.values)).collect();
+    let case = match missing.map_err(Into::into).and_then(|m| flown(seed, m)) {
+        Ok(case) => case,
+        Err(why) => {
+            line["failed"] = why.to_string().into();
+            return Ok(line);
+        }
+    };
+    if let Some(folder) = export {
+        case.export(folder, hidden.as_ref())?;
+    }
+    let (free, seconds) = case.proposal(true)?;
+    line["free"] = judge::judged(&free, hidden.as_ref());
+    line["seconds"] = ((10.0 * seconds).round() / 10.0).into();
+    // without a search of free forms both are the same
+    if free.free.is_some() {
+        let (library, seconds) = case.proposal(false)?;
+        line["library"] = judge::judged(&library, hidden.as_ref());
+        line["seconds_library"] = ((10.0 * seconds).round() / 10.0).into();
+    }
+    Ok(line)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().collect();
+    let (what, first, count, export) = match &arguments[..] {
+        [_, what, first, count] => (what, first, count, None),
+        [_, what, first, count, folder] => (what, first, count, Some(Path::new(folder))),
+        _ => {
+            return Err(
+                "write: propose_hidden inside|outside|nulls FIRST_SEED COUNT [FOLDER]".into()
+            );
+        }
+    };
+    let (first, count): (u64, u64) = (first.parse()?, count.parse()?);
+    for seed in first..first + count {
+        println!("{}", line(what, seed, export)?);
+    }
+    Ok(())
+}

@@ -1,0 +1,125 @@
+//! Free forms, where the library found nothing or leaves more than it should.
+
+use super::forward::{Ask, Climbed, ORDER, candidates};
+use super::free::search::{Fitted, Searched, searched};
+use super::library::{self, Form, Shape};
+use super::result::{FreeForms, Rung};
+use crate::model::GreyBox;
+use crate::physics::Channel;
+use crate::sysid::diagnose::DiagnoseError;
+use crate::sysid::diagnose::proposal::draft::{self, Term};
+use crate::sysid::diagnose::search::remainder::remainder;
+use crate::sysid::diagnose::search::round::Round;
+use crate::sysid::progress::{Progress, part, say};
+
+/// Share of what a formula took that a flexible model must still remove for the formula to be in doubt.
+const MATERIAL: f64 = 0.02;
+/// Share of what the best form takes by which a simpler one may be behind: what an exact formula leaves of strong
+/// effects, by the errors of reconstructed paths, is of that order.
+const BEHIND: f64 = 0.01;
+/// Fall of the squared error that a larger formula must take more than a smaller one.
+const WORTH: f64 = 10.0;
+
+/// Why free forms are tried, and in which channels; `None` if the library's formula leaves nothing that a flexible model
+/// could remove.
+pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel>)> {
+    let counted = |c: &usize| ask.channels[*c];
+    if library.terms.is_empty() {
+        let all: Vec<Channel> = (0..6).filter(counted).map(|c| ORDER[c]).collect();
+        let why = "no shape of the library is what is missing";
+        return (!all.is_empty()).then(|| (why.into(), all));
+    }
+    let round = Round::new(ask.problem, library.model.clone(), &[])?;
+    let left = remainder(&round, ask.options.nulls, ask.options.level);
+    let taken = library.removed() * library.excess;
+    let material = |c: &usize| {
+        left.removable[*c] > left.threshold[*c] && left.removable[*c] > MATERIAL * taken
+    };
+    let all: Vec<usize> = (0..6).filter(counted).filter(material).collect();
+    if !all.is_empty() {
+        let more: f64 = all.iter().map(|c| left.removable[*c]).sum();
+        let why = format!(
+            "a flexible model could remove {:.0} % more than the best shapes of the library",
+            100.0 * more / taken.max(1.0)
+        );
+        return Some((why, all.into_iter().map(|c| ORDER[c]).collect()));
+    }
+    let own = |t: &&Term| t.form.channel == library.terms[0].form.channel;
+    let several = library.terms.iter().filter(own).count() > 1;
+    several.then(|| {
+        let why = "the library needs several shapes for one channel";
+        (why.into(), vec![library.terms[0].form.channel])
+    })
+}
+
+/// Tries free forms in `channels` of what `tuned` leaves, the library's best beside them. `None` if the flights do not
+/// hold the model.
+///
+/// # Errors
+/// If `progress` ends it.
+pub(super) fn beyond(
+    ask: &Ask,
+    library: &Climbed,
+    tuned: &GreyBox,
+    (why, channels): (String, Vec<Channel>),
+    progress: &Progress,
+) -> Result<Option<(FreeForms, Climbed)>, DiagnoseError> {
+    let Some(round) = &library.round else { return Ok(None) };
+    let mut all: Vec<(Channel, Searched)> = Vec::new();
+    for (k, channel) in channels.iter().enumerate() {
+        let share = |k: usize| 0.8 * k as f64 / channels.len() as f64;
+        let own = part(progress, [share(k), share(k + 1)]);
+        if let Some(found) = searched(round, *channel, ask.options, &own)? {
+            all.push((*channel, found));
+        }
+    }
+    say(progress, "judging the best free forms beside the library's", 0.8)?;
+    let mut forms: Vec<Form> =
+        library.terms.iter().map(|t| t.form).chain(library.class.clone()).collect();
+    for finalist in all.iter().flat_map(|(_, s)| &s.finalists) {
+        let form = as_of_library(finalist.form);
+        if !forms.contains(&form) {
+            forms.push(form);
+        }
+    }
+    let forms = candidates(forms.into_iter());
+    let ask = Ask {
+        forms: &forms,
+        least: all.iter().map(|(_, s)| s.threshold).fold(0.0, f64::max),
+        behind: BEHIND,
+        ..*ask
+    };
+    let Some(climbed) = ask.climb(tuned.clone()) else { return Ok(None) };
+    let rung = |f: &Fitted, threshold: f64| Rung {
+        formula: draft::formula(&[Term { form: f.form, value: 0.0, sd: 0.0 }]),
+        complexity: 1 + f.size,
+        removed: f.fall / library.excess,
+        evidence: f.evidence,
+        threshold,
+        chosen: climbed.terms.iter().any(|t| t.form == as_of_library(f.form)),
+    };
+    let front = all.iter().flat_map(|(_, s)| s.front.iter().map(|f| rung(f, s.threshold)));
+    let front: Vec<Rung> = front.collect();
+    let tried = all.iter().map(|(_, s)| s.tried).sum();
+    let chosen = climbed.terms.iter().any(|t| matches!(t.form.shape, Shape::Free(_)));
+    Ok(Some((FreeForms { why, tried, front, chosen }, climbed)))
+}
+
+/// The form of the library that is written as `form` is, or `form` itself.
+fn as_of_library(form: Form) -> Form {
+    let text = form.shape.text(None);
+    let of = library::forms(form.channel, &|_, _| 0.0);
+    let same = |f: &Form| f.of_air == form.of_air && f.shape.text(None) == text;
+    of.into_iter().find(same).unwrap_or(form)
+}
+
+/// Whether the formula with free forms takes the place of the library's: it takes more, or no less and is simpler.
+pub(super) fn better(free: &Climbed, library: &Climbed) -> bool {
+    let taken = |c: &Climbed| c.removed() * library.excess;
+    let more = taken(free) - taken(library);
+    let least = WORTH.max(BEHIND * taken(library));
+    match free.complexity() < library.complexity() {
+        true => more > -least,
+        false => more > least,
+    }
+}

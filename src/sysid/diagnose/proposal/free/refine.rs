@@ -1,0 +1,104 @@
+//! The constants of a form where they fit best, its coefficient eliminated (variable projection).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::grammar::Free;
+use super::samples::Samples;
+use super::screen::Screen;
+use crate::sysid::diagnose::regression::projected::scaled_inverse;
+
+/// Gauss–Newton steps.
+const STEPS: usize = 6;
+/// Times that a step is halved before it is given up.
+const HALVINGS: usize = 4;
+/// Share of a constant by which its derivative is taken.
+const MOVED: f64 = 0.01;
+/// Largest change of a constant in one step, as a share.
+const REACH: f64 = 0.5;
+/// A fall that grows by less than this share has settled.
+const SETTLED: f64 = 1e-4;
+
+/// A channel with the factor of the form.
+pub struct Place<'a> {
+    /// The channel.
+    pub screen: &'a Screen<'a>,
+    /// The samples.
+    pub samples: &'a Samples,
+    /// What the form is multiplied by, a value a sample.
+    pub factor: &'a [f64],
+}
+
+impl Place<'_> {
+    /// The whitened column of `free`, projected.
+    pub fn column(&self, free: &Free, constants: &[f64]) -> DVector<f64> {
+        let mut values = self.samples.of(&free.expression, constants);
+        values.iter_mut().zip(self.factor).for_each(|(x, f)| *x *= f);
+        self.screen.projected(&DVector::from_vec(self.screen.column(values)))
+    }
+
+    /// `free` with its constants where they take most of `target`, and what it takes.
+    pub fn refined(&self, free: &Free, target: &DVector<f64>) -> (Free, f64) {
+        let mut best = free.constants.clone();
+        let mut column = self.column(free, &best);
+        let mut fall = taken(&column, target);
+        for _ in 0..STEPS {
+            let Some(step) = self.step(free, &best, &column, target) else { break };
+            let before = fall;
+            for halving in 0..HALVINGS {
+                let share = 0.5_f64.powi(halving as i32);
+                let moved: Vec<f64> = best
+                    .iter()
+                    .zip(step.iter())
+                    .map(|(c, d)| c + (share * d).clamp(-REACH * c.abs(), REACH * c.abs()))
+                    .collect();
+                let other = self.column(free, &moved);
+                let reached = taken(&other, target);
+                if reached > fall {
+                    (best, column, fall) = (moved, other, reached);
+                    break;
+                }
+            }
+            if fall - before <= SETTLED * before {
+                break;
+            }
+        }
+        (Free { expression: free.expression.clone(), constants: best }, fall)
+    }
+
+    /// The step of the constants by Kaufman's approximation: derivatives of the contribution with what the column
+    /// itself takes projected out.
+    fn step(
+        &self,
+        free: &Free,
+        constants: &[f64],
+        column: &DVector<f64>,
+        target: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let square = column.norm_squared();
+        let amount = column.dot(target) / square;
+        if constants.is_empty() || !amount.is_finite() {
+            return None;
+        }
+        let mut slopes = DMatrix::zeros(target.len(), constants.len());
+        for k in 0..constants.len() {
+            let by = MOVED * constants[k].abs();
+            let at = |sign: f64| {
+                let mut moved = constants.to_vec();
+                moved[k] += sign * by;
+                self.column(free, &moved)
+            };
+            let mut slope = (at(1.0) - at(-1.0)) * (amount / (2.0 * by));
+            slope -= column * (column.dot(&slope) / square);
+            slopes.set_column(k, &slope);
+        }
+        let left = target - column * amount;
+        let step = scaled_inverse(&slopes.tr_mul(&slopes))? * slopes.tr_mul(&left);
+        step.iter().all(|x| x.is_finite()).then_some(step)
+    }
+}
+
+/// What a projected column takes of `target`'s square.
+fn taken(column: &DVector<f64>, target: &DVector<f64>) -> f64 {
+    let fall = column.dot(target).powi(2) / column.norm_squared();
+    if fall.is_finite() { fall } else { 0.0 }
+}

@@ -1,0 +1,250 @@
+//! All forms on the whitened residual of one channel, and on that of flights that lack nothing.
+//!
+//! The statistics are those of the library's round ([`Score`](crate::sysid::diagnose::regression::rank::Score)) with
+//! what the model's own coefficients take projected out, but for the noise that columns share with the residual,
+//! which the round corrects when the best forms come to it.
+
+use nalgebra::{DMatrix, DVector};
+use rand::RngExt;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::num::stream::stream;
+use crate::physics::Channel;
+use crate::sysid::diagnose::proposal::forward::ORDER;
+use crate::sysid::diagnose::regression::cells::Placed;
+use crate::sysid::diagnose::regression::projected::Known;
+use crate::sysid::diagnose::search::round::Round;
+
+use super::samples::{Average, Samples};
+
+/// Random stream of the null flights.
+const NULLS: u64 = 84;
+
+/// One channel of all flights, ready for whatever column is tried.
+pub struct Screen<'a> {
+    round: &'a Round,
+    samples: &'a Samples,
+    /// The cells of the channel.
+    cells: Vec<usize>,
+    windows: Vec<Vec<Average<'a>>>,
+    /// Whitened columns of the known unknowns.
+    known: DMatrix<f64>,
+    /// Square roots of their weights as a prior.
+    roots: DVector<f64>,
+    /// Covariance of the known unknowns times `known`'.
+    taken: DMatrix<f64>,
+    /// What the tuned model leaves, and the noise.
+    residual: DVector<f64>,
+    noise: DVector<f64>,
+    /// First row and one past the last of each block, with the block's number.
+    blocks: Vec<(usize, usize, usize)>,
+    block_count: usize,
+    /// Independent rows.
+    support: f64,
+}
+
+/// What is kept of a column.
+#[derive(Clone, Debug)]
+pub struct Kept {
+    /// Its square once projected.
+    square: f64,
+    /// Its product with the residual.
+    linear: f64,
+    /// The square of what it takes from the prior.
+    prior: f64,
+    /// Products with residual, noise and itself, block by block.
+    blocks: Vec<[f64; 3]>,
+    /// What it takes from each known unknown, in widths of the prior.
+    strain: Vec<f64>,
+}
+
+/// What a form reaches.
+#[derive(Clone, Copy, Debug)]
+pub struct Reached {
+    /// Fall of the squared whitened error.
+    pub fall: f64,
+    /// The smaller of the fall less (1 + its constants) ln n and the block-robust Wald statistic.
+    pub evidence: f64,
+}
+
+/// A flight that lacks nothing: the sign of each block's noise and the prior's error in its widths.
+pub struct Null {
+    signs: Vec<f64>,
+    prior: DVector<f64>,
+}
+
+impl<'a> Screen<'a> {
+    /// `channel` of `round`; `None` if no flight measures it.
+    pub fn new(round: &'a Round, samples: &'a Samples, channel: Channel) -> Option<Screen<'a>> {
+        let place = ORDER.iter().position(|c| *c == channel)?;
+        let all = &round.cells.list;
+        let cells: Vec<usize> = (0..all.len()).filter(|k| all[*k].channel == place).collect();
+        let rows: usize = cells.iter().map(|k| all[*k].windows.len()).sum();
+        if rows == 0 {
+            return None;
+        }
+        let na = round.known.len();
+        let mut known = DMatrix::zeros(rows, na);
+        let (mut residual, mut noise) = (Vec::new(), Vec::new());
+        let mut blocks = Vec::new();
+        let whitener = &round.noise.whiteners[place];
+        for k in &cells {
+            let first = residual.len();
+            let own: Placed =
+                round.placed[all[*k].flight].iter().take_while(|(p, _)| *p < na).cloned().collect();
+            let (places, z) = all[*k].matrix(&own, whitener);
+            for (i, p) in places.iter().enumerate() {
+                known.view_mut((first, *p), (z.nrows(), 1)).copy_from(&z.column(i));
+            }
+            let projected = &round.projected.rows[*k];
+            residual.extend(projected.column(projected.ncols() - 1).iter());
+            noise.extend(&round.noise.residuals[*k]);
+            let own = all[*k].rows_of_blocks();
+            blocks.extend(own.into_iter().map(|(b, from, to)| (first + from, first + to, b)));
+        }
+        let root = |k: &Known| {
+            if k.width.is_finite() && k.width > 0.0 { 1.0 / k.width } else { 0.0 }
+        };
+        Some(Screen {
+            windows: cells.iter().map(|k| samples.windows(round, *k)).collect(),
+            taken: &round.projected.covariance * known.transpose(),
+            roots: DVector::from_iterator(na, round.known.iter().map(root)),
+            residual: DVector::from_vec(residual),
+            noise: DVector::from_vec(noise),
+            // neighbouring windows overlap by half
+            support: 0.5 * rows as f64,
+            block_count: round.cells.blocks(),
+            round,
+            samples,
+            cells,
+            known,
+            blocks,
+        })
+    }
+
+    /// The whitened column of `values`, a value a sample.
+    pub fn column(&self, values: Vec<f64>) -> Vec<f64> {
+        let values = self.samples.merged(values);
+        let mut rows = Vec::with_capacity(self.residual.len());
+        for (cell, windows) in self.cells.iter().zip(&self.windows) {
+            let cell = &self.round.cells.list[*cell];
+            let whitener = &self.round.noise.whiteners[cell.channel];
+            let raw: Vec<f64> = windows.iter().map(|w| w.of(&values)).collect();
+            let mut from = 0;
+            for &to in &cell.runs {
+                rows.extend(whitener.apply(&raw[from..to]));
+                from = to;
+            }
+        }
+        rows
+    }
+
+    /// What is kept of `columns`, one after the other.
+    pub fn keep(&self, columns: &DMatrix<f64>) -> Vec<Kept> {
+        let taken = &self.taken * columns;
+        let left = columns - &self.known * &taken;
+        let one = |k: usize| {
+            let (x, own) = (columns.column(k), left.column(k));
+            let strain: Vec<f64> =
+                taken.column(k).iter().zip(self.roots.iter()).map(|(t, w)| t * w).collect();
+            let mut blocks = vec![[0.0; 3]; self.block_count];
+            for &(from, to, b) in &self.blocks {
+                let part = own.rows(from, to - from);
+                blocks[b][0] += part.dot(&self.residual.rows(from, to - from));
+                blocks[b][1] += part.dot(&self.noise.rows(from, to - from));
+                blocks[b][2] += part.norm_squared();
+            }
+            Kept {
+                square: x.dot(&own),
+                linear: x.dot(&self.residual),
+                prior: strain.iter().map(|t| t * t).sum(),
+                blocks,
+                strain,
+            }
+        };
+        (0..columns.ncols()).map(one).collect()
+    }
+
+    /// `column` less what the known unknowns take of it, the prior's rows behind.
+    pub fn projected(&self, column: &DVector<f64>) -> DVector<f64> {
+        let taken = &self.taken * column;
+        stacked(column - &self.known * &taken, -self.roots.component_mul(&taken))
+    }
+
+    /// What the tuned model leaves, and of the prior.
+    pub fn residual(&self) -> DVector<f64> {
+        let tuned = self.round.known.iter().zip(self.round.projected.tuned.iter());
+        let off = DVector::from_iterator(self.roots.len(), tuned.map(|(k, t)| k.offset - t));
+        stacked(self.residual.clone(), self.roots.component_mul(&off))
+    }
+
+    /// Null flight number `k`.
+    pub fn null(&self, seed: u64, k: usize) -> Null {
+        let mut random = stream(seed, &[NULLS, k as u64]);
+        let mut sign = || if random.random::<bool>() { 1.0 } else { -1.0 };
+        let signs = (0..self.block_count).map(|_| sign()).collect();
+        let prior = DVector::from_fn(self.roots.len(), |_, _| StandardNormal.sample(&mut random));
+        Null { signs, prior }
+    }
+
+    /// What the tuned model leaves of that null flight, and of the prior.
+    pub fn residual_of(&self, null: &Null) -> DVector<f64> {
+        let mut noise = self.noise.clone();
+        for &(from, to, b) in &self.blocks {
+            noise.rows_mut(from, to - from).scale_mut(null.signs[b]);
+        }
+        let wrong = &self.round.projected.covariance * self.roots.component_mul(&null.prior);
+        let taken = &self.taken * &noise + wrong;
+        let prior = &null.prior - self.roots.component_mul(&taken);
+        stacked(noise - &self.known * taken, prior)
+    }
+
+    /// What a form with so many constants reaches in the flights.
+    pub fn measured(&self, kept: &Kept, constants: usize) -> Reached {
+        let product = |b: usize| kept.blocks[b][0];
+        self.reached(kept, kept.linear, product, constants)
+    }
+
+    /// The same in a null flight.
+    pub fn by_chance(&self, kept: &Kept, null: &Null, constants: usize) -> Reached {
+        let product = |b: usize| null.signs[b] * kept.blocks[b][1];
+        let noise: f64 = (0..self.block_count).map(product).sum();
+        let prior: f64 = kept.strain.iter().zip(null.prior.iter()).map(|(t, g)| t * g).sum();
+        self.reached(kept, noise - prior, product, constants)
+    }
+
+    fn reached(
+        &self,
+        kept: &Kept,
+        linear: f64,
+        product: impl Fn(usize) -> f64,
+        constants: usize,
+    ) -> Reached {
+        let amount = linear / kept.square;
+        let fall = linear * amount;
+        let count = self.block_count as f64;
+        let scatter: f64 =
+            (0..self.block_count).map(|b| (product(b) - kept.blocks[b][2] * amount).powi(2)).sum();
+        let meat = kept.prior + count / (count - 1.0).max(1.0) * scatter;
+        let wald = if meat > 0.0 { linear * linear / meat } else { 0.0 };
+        let gain = fall - self.price(constants);
+        let evidence = gain.min(wald);
+        match evidence.is_finite() {
+            true => Reached { fall, evidence },
+            // a column that is zero, infinite or the model's own
+            false => Reached { fall: 0.0, evidence: f64::NEG_INFINITY },
+        }
+    }
+
+    /// What the fall must exceed for a coefficient and `constants`.
+    pub fn price(&self, constants: usize) -> f64 {
+        (1 + constants) as f64 * self.support.max(2.0).ln()
+    }
+}
+
+fn stacked(rows: DVector<f64>, prior: DVector<f64>) -> DVector<f64> {
+    let count = rows.len();
+    let mut all = rows.resize_vertically(count + prior.len(), 0.0);
+    all.rows_mut(count, prior.len()).copy_from(&prior);
+    all
+}

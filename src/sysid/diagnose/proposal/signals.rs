@@ -1,0 +1,52 @@
+//! What a search for a formula works on, as a table for other programs.
+
+use std::fmt::Write;
+
+use super::forward::ORDER;
+use super::free::samples::{Samples, VARIABLES};
+use crate::model::GreyBox;
+use crate::physics::formula::file::channel_name;
+use crate::sysid::diagnose::answer::run::problem;
+use crate::sysid::diagnose::search::round::Round;
+use crate::sysid::diagnose::{DiagnoseError, Options};
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+
+/// The residual of `model`, tuned to `flights` and their sensors' errors taken out, as CSV: a row a window of the weak
+/// form (0.37 s, half overlapping), with the flight, the mean of each variable over the window (SI units), dynamic
+/// pressure times wing area (`qbar_S`, N), and `left_` and a channel: what is left there (N or N m; empty where it is
+/// not measured).
+///
+/// # Errors
+/// As of [`diagnose`](crate::sysid::diagnose::diagnose).
+pub fn signals(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    options: &Options,
+) -> Result<String, DiagnoseError> {
+    let unusable = || DiagnoseError::Unusable { model: model.name.clone() };
+    let (problem, _, _) = problem(model, flights, options)?;
+    let tuned = Round::new(&problem, model.clone(), &[]).ok_or_else(unusable)?.tuned();
+    let round = Round::new(&problem, tuned, &[]).ok_or_else(unusable)?;
+    let left = round.tuned_residual();
+    let samples = Samples::new(&round, ORDER[0]);
+    let names: Vec<&str> = VARIABLES.iter().map(|v| v.name()).collect();
+    let mut text = format!("flight,{},qbar_S", names.join(","));
+    ORDER.iter().for_each(|c| text += &format!(",left_{}", channel_name(*c)));
+    text += "\n";
+    for (k, own) in left.iter().enumerate() {
+        for (w, row) in samples.means(&round, k).iter().enumerate() {
+            let _ = write!(text, "{k}");
+            for x in row {
+                let _ = write!(text, ",{x:.6e}");
+            }
+            for channel in own {
+                let _ = match channel.get(w).filter(|x| x.is_finite()) {
+                    Some(x) => write!(text, ",{x:.6e}"),
+                    None => write!(text, ","),
+                };
+            }
+            text += "\n";
+        }
+    }
+    Ok(text)
+}
