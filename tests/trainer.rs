@@ -12,6 +12,7 @@ use greylag::physics::Command;
 use greylag::sim::described::describe;
 use greylag::sim::import::import;
 use greylag::sim::one_step::{Flight, errors};
+use greylag::sim::starting_model::starting_model;
 use greylag::sim::{Environment, Simulator};
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
 use study_support::Aircraft;
@@ -147,6 +148,23 @@ fn a_hidden_effect_is_found_and_added_with_flaps_up() {
 #[test]
 fn a_hidden_effect_is_found_and_added_with_flaps_down() {
     DOWN.effect_is_found_and_added("rudder_linear", "52");
+}
+
+/// A study starts from coefficients that are wrong by 15 %: a width of 2 % in the reference is not theirs.
+#[test]
+fn the_starting_model_of_a_study_states_no_width_that_its_errors_exceed() {
+    let text = std::fs::read_to_string(root().join(UP.file("jsbsim.toml"))).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let airframe = root().join(UP.file("airframe.toml"));
+    std::fs::copy(airframe, folder.path().join("airframe.toml")).unwrap();
+    let start = starting_model(&text, "start", 5, &[]).unwrap();
+    std::fs::write(folder.path().join("model.toml"), start).unwrap();
+    let wrong = GreyBox::load(&folder.path().join("model.toml")).unwrap();
+    for (ours, truth) in wrong.coefficients().iter().zip(model(UP).coefficients()) {
+        assert_eq!(ours.name, truth.name);
+        // none is off by more than two of the 15 %, and 15 % of 0.7 of the value is a width
+        assert!((ours.value - truth.value).abs() <= 2.9 * ours.width(), "{ours:?} for {truth:?}");
+    }
 }
 
 /// It is at rest in its condition when the flight begins, wherever it starts.
