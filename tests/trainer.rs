@@ -11,6 +11,7 @@ use greylag::model::jsbsim::{ConditionsError, export_in_conditions};
 use greylag::physics::Command;
 use greylag::sim::described::describe;
 use greylag::sim::import::import;
+use greylag::sim::missing::{Craft, Missing};
 use greylag::sim::one_step::{Flight, errors};
 use greylag::sim::starting_model::starting_model;
 use greylag::sim::{Environment, Simulator};
@@ -164,6 +165,17 @@ fn the_starting_model_of_a_study_states_no_width_that_its_errors_exceed() {
         assert_eq!(ours.name, truth.name);
         // none is off by more than two of the 15 %, and 15 % of 0.7 of the value is a width
         assert!((ours.value - truth.value).abs() <= 2.9 * ours.width(), "{ours:?} for {truth:?}");
+    }
+}
+
+/// Amplitudes go by the size of the aircraft: what can be drawn of it can be hidden in it.
+#[test]
+fn every_effect_that_is_drawn_can_be_hidden() {
+    let craft = Craft::of(&model(UP));
+    for kind in craft.kinds() {
+        for amplitude in kind.clear {
+            Missing::new(&craft, kind.id, amplitude).unwrap_or_else(|why| panic!("{why}"));
+        }
     }
 }
 
