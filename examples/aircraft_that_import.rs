@@ -12,22 +12,25 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use greylag::control::{ControllerKind, Target, build};
-use greylag::model::{GreyBox, Memory, STEP, Trim};
+use greylag::control::Target;
+use greylag::model::{GreyBox, Trim};
 use greylag::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
 use greylag::physics::{Command, State};
+use greylag::sim::Simulator;
 use greylag::sim::import::import;
-use greylag::sim::{Environment, Simulator};
+use greylag::sim::one_step::{Flight, errors};
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
 
 /// Where the aircraft are imported and flown, m.
 const ALTITUDE_M: f64 = 1000.0;
 /// Lift coefficient there.
 const LIFT: f64 = 0.4;
-/// Length of a flight, steps of 0.01 s.
-const STEPS: usize = 2000;
-/// Steps with moving surfaces.
-const MOVED: usize = 1500;
+/// 20 s in which surfaces and throttle move for the first 15: for as long as the attitude is not judged.
+const FLIGHT: Flight = Flight {
+    steps: 2000,
+    moved: 1500,
+    amplitude: Command { aileron: 0.1, elevator: 0.1, throttle: 0.1, rudder: 0.1 },
+};
 /// Names of the states.
 const STATES: [&str; 8] = ["roll", "pitch", "airspeed", "p", "q", "r", "alpha", "beta"];
 /// Attitude error at its end that counts as flown, degrees.
@@ -94,41 +97,20 @@ fn taken(folder: &Path, name: &str) -> Result<(GreyBox, PlantOptions, Vec<String
 fn fly(model: &GreyBox, plant: &PlantOptions) -> Result<String> {
     let airspeed = plant.start.airspeed_mps;
     let trim = Trim::straight(model, airspeed, ALTITUDE_M)?;
-    let mut lqi = build(ControllerKind::Lqi, model)?;
     let State { alpha, pitch, .. } = trim.state;
     let start = Start { alpha_rad: alpha, pitch_rad: pitch, ..plant.start };
     let mut simulator = Simulator::new(&PlantOptions { start, ..plant.clone() })?;
-    let mut seen = simulator.reset()?;
-    lqi.reset(1);
-    let mut target = Target { roll: 0.0, pitch, airspeed };
-    let (mut memory, mut apart) = (Memory::default(), [0.0; 8]);
-    let mut inputs = model.at_rest(&seen.actuators.controls());
-    for step in 0..STEPS {
-        target.roll = if step < STEPS / 2 { 0.0 } else { 20f64.to_radians() };
-        let own = lqi.command(&seen, &target);
-        // the surfaces move for as long as the attitude is not judged
-        let size = if step < MOVED { 0.1 } else { 0.0 };
-        let wave = |frequency: f64| size * (frequency * step as f64).sin();
-        let command = Command {
-            aileron: own.aileron + wave(0.11),
-            elevator: own.elevator + wave(0.13),
-            throttle: own.throttle + wave(0.05),
-            rudder: own.rudder + wave(0.07),
-        };
-        let controls = seen.actuators.controls();
-        let acting = model.act(&controls, &mut inputs);
-        let expected = model.step(&seen.state, &acting, seen.altitude, &mut memory);
-        seen = simulator.step(command.clamped())?;
-        let pairs = seen.state.to_array().into_iter().zip(expected.to_array());
-        for ((sum, (flown, own)), scale) in apart.iter_mut().zip(pairs).zip(model.scale()) {
-            *sum += ((flown - own) / STEP / scale).powi(2) / STEPS as f64;
-        }
-    }
-    let error = (seen.state.roll - target.roll).abs().max((seen.state.pitch - target.pitch).abs());
+    let bank = 20f64.to_radians();
+    let target = |step| {
+        let roll = if step < FLIGHT.steps / 2 { 0.0 } else { bank };
+        Target { roll, pitch, airspeed }
+    };
+    let found = errors(model, &mut simulator, &FLIGHT, target)?;
+    let last = found.last.state;
+    let error = (last.roll - bank).abs().max((last.pitch - pitch).abs());
     let degrees = error.to_degrees();
-    let rms = apart.map(f64::sqrt);
-    let worst = (0..8).max_by(|a, b| rms[*a].total_cmp(&rms[*b])).unwrap_or(0);
-    let rates = format!("rates {:.2} % of x_c a second ({})", 100.0 * rms[worst], STATES[worst]);
+    let (worst, rms) = found.worst();
+    let rates = format!("rates {:.2} % of x_c a second ({})", 100.0 * rms, STATES[worst]);
     if degrees.is_nan() || degrees >= ENOUGH_DEG {
         bail!("{degrees:.1} deg from its target after 20 s; {rates}");
     }

@@ -6,9 +6,10 @@ use std::sync::LazyLock;
 
 use greylag::control::{self, ControllerKind, Target};
 use greylag::logs::{Flight, Sample};
-use greylag::model::{GreyBox, Memory, STEP, Trim};
+use greylag::model::{GreyBox, STEP, Trim};
 use greylag::num::stream::{Stream, stream};
 use greylag::physics::Command;
+use greylag::sim::one_step::{Flight as Excited, errors};
 use greylag::sim::{Environment, Simulator};
 use greylag::sysid::diagnose::{Diagnosis, Options, Verdict, diagnose};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
@@ -134,31 +135,10 @@ fn asked(model: &GreyBox) -> Diagnosis {
 
 #[test]
 fn validate_a_step_of_the_model_with_rudder_and_propeller() {
-    let (model, mut simulator) = (model(), simulator());
-    let scale = model.scale();
-    let mut seen = simulator.reset().unwrap();
-    let mut memory = Memory::default();
-    let (mut squares, mut count) = ([0.0; 8], 0.0_f64);
-    let mut lqi = control::build(ControllerKind::Lqi, &model).unwrap();
     let target = Target { roll: 0.3, pitch: 0.05, airspeed: 25.0 };
-    for k in 0..2000 {
-        let wave = |f: f64| 0.15 * (f * f64::from(k)).sin();
-        let own = lqi.command(&seen, &target);
-        let command = Command {
-            aileron: own.aileron + wave(0.11),
-            elevator: own.elevator + wave(0.13),
-            throttle: own.throttle + wave(0.05),
-            rudder: own.rudder + 2.0 * wave(0.07),
-        };
-        let expected =
-            model.step(&seen.state, &seen.actuators.controls(), seen.altitude, &mut memory);
-        seen = simulator.step(command.clamped()).unwrap();
-        for (i, (a, b)) in seen.state.to_array().iter().zip(expected.to_array()).enumerate() {
-            squares[i] += ((a - b) / STEP / scale[i]).powi(2);
-        }
-        count += 1.0;
-    }
-    let rms = squares.map(|s| (s / count).sqrt());
+    let amplitude = Command { aileron: 0.15, elevator: 0.15, throttle: 0.15, rudder: 0.3 };
+    let flight = Excited { steps: 2000, moved: 2000, amplitude };
+    let rms = errors(&model(), &mut simulator(), &flight, |_| target).unwrap().rms;
     println!("{rms:?}");
     // 1 % of x_c a second is asked for; the polynomial leaves 0.2 N of thrust, which is 0.07 %
     assert!(rms.iter().all(|x| *x < 0.003), "{rms:?}");

@@ -4,12 +4,13 @@
 use std::path::Path;
 
 use greylag::control::{self, ControllerKind, Target};
+use greylag::model::GreyBox;
 use greylag::model::jsbsim::export;
 use greylag::model::textbook::{Measures, Tail};
-use greylag::model::{GreyBox, Memory, STEP};
 use greylag::physics::Command;
+use greylag::sim::Simulator;
 use greylag::sim::import::{Imported, import};
-use greylag::sim::{Environment, Simulator};
+use greylag::sim::one_step::{Flight, errors};
 use greylag_sitl::hidden::Hidden;
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
 
@@ -32,28 +33,10 @@ fn loaded(found: &Imported) -> GreyBox {
 
 /// The rms of each state's rate beside that of `model` over 10 s, in x_c a second.
 fn apart(model: &GreyBox, simulator: &mut Simulator) -> [f64; 8] {
-    let scale = model.scale();
-    let mut lqi = control::build(ControllerKind::Lqi, model).unwrap();
     let target = Target { roll: 0.3, pitch: 0.05, airspeed: 25.0 };
-    let mut seen = simulator.reset().unwrap();
-    let (mut memory, mut squares) = (Memory::default(), [0.0; 8]);
-    for k in 0..1000 {
-        let wave = |f: f64| 0.1 * (f * f64::from(k)).sin();
-        let own = lqi.command(&seen, &target);
-        let command = Command {
-            aileron: own.aileron + wave(0.11),
-            elevator: own.elevator + wave(0.13),
-            throttle: own.throttle + wave(0.05),
-            rudder: own.rudder + wave(0.07),
-        };
-        let controls = seen.actuators.controls();
-        let expected = model.step(&seen.state, &controls, seen.altitude, &mut memory);
-        seen = simulator.step(command.clamped()).unwrap();
-        for (i, (a, b)) in seen.state.to_array().iter().zip(expected.to_array()).enumerate() {
-            squares[i] += ((a - b) / STEP / scale[i]).powi(2) / 1000.0;
-        }
-    }
-    let rms = squares.map(f64::sqrt);
+    let amplitude = Command { aileron: 0.1, elevator: 0.1, throttle: 0.1, rudder: 0.1 };
+    let flight = Flight { steps: 1000, moved: 1000, amplitude };
+    let rms = errors(model, simulator, &flight, |_| target).unwrap().rms;
     println!("{rms:?}");
     rms
 }

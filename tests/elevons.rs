@@ -1,6 +1,8 @@
 //! The X8 with its elevons described one by one: flown, recorded, read from a log and diagnosed as any aircraft is.
 #![cfg(feature = "sitl")]
 
+mod study_support;
+
 use std::path::{Path, PathBuf};
 
 use greylag::control::{self, ControllerKind, Target};
@@ -12,6 +14,9 @@ use greylag::physics::Command;
 use greylag::sim::described::describe;
 use greylag::sim::{Environment, Simulator};
 use greylag_sitl::plant::{FULL_DEFLECTION_RAD as TRAVEL, Plant, PlantOptions};
+use study_support::Aircraft;
+
+const X8: Aircraft = Aircraft { name: "x8-elevons", folder: "x8-elevons", airspeed_mps: 18.0 };
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -136,4 +141,16 @@ fn a_log_of_elevons_is_one_of_the_controls() {
         assert!((row.elevator_rad - TRAVEL * wanted.elevator).abs() < 1e-9);
         assert!((row.aileron_cmd - wanted.aileron).abs() < 1e-9 && row.throttle == 0.4);
     }
+}
+
+#[test]
+fn the_demonstration_and_the_evaluation_fly_it() {
+    X8.is_flown_by_demo([25.0, 4.0]);
+    let error = X8.settled_error_deg("jsbsim.toml", "easy,30,10\nhard_corners,-55,-27\n");
+    assert!(error < 0.05, "{error} deg");
+}
+
+#[test]
+fn a_hidden_effect_is_found_and_added() {
+    X8.effect_is_found_and_added("pitch_break", "41");
 }

@@ -8,7 +8,7 @@ use crate::hidden::{self, Hidden, HiddenError};
 use crate::plant::Properties;
 
 /// The files of the aircraft built into the program, by their path in a JSBSim tree.
-const BUILT_IN: [(&str, &str); 9] = [
+const BUILT_IN: [(&str, &str); 12] = [
     ("x8/x8.xml", include_str!("../aircraft/x8/x8.xml")),
     ("x8/Engines/x8_motor.xml", include_str!("../aircraft/x8/Engines/x8_motor.xml")),
     ("x8/Engines/x8_direct.xml", include_str!("../aircraft/x8/Engines/x8_direct.xml")),
@@ -30,12 +30,15 @@ const BUILT_IN: [(&str, &str); 9] = [
         "x8-elevons/Engines/x8-elevons_direct.xml",
         include_str!("../aircraft/x8-elevons/Engines/x8-elevons_direct.xml"),
     ),
+    ("c172p/c172p.xml", include_str!("../aircraft/c172p/c172p.xml")),
+    ("c172p/Engines/c172p_motor.xml", include_str!("../aircraft/c172p/Engines/c172p_motor.xml")),
+    ("c172p/Engines/c172p_direct.xml", include_str!("../aircraft/c172p/Engines/c172p_direct.xml")),
 ];
 
 /// Name of the aircraft that flies unless another is named.
 pub(crate) const BUILT_IN_NAME: &str = "x8";
 /// Names of all that are built in.
-const BUILT_IN_NAMES: &str = "x8, aerosonde, x8-elevons";
+const BUILT_IN_NAMES: &str = "x8, aerosonde, x8-elevons, c172p";
 
 /// Why an aircraft could not be loaded.
 #[derive(Debug, thiserror::Error)]

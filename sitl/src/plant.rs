@@ -5,6 +5,7 @@ mod lookup;
 mod mixing;
 mod nodes;
 mod options;
+mod settling;
 mod state;
 mod steering;
 mod travel;

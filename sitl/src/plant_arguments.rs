@@ -22,7 +22,8 @@ pub struct PlantArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Aircraft")]
 struct AircraftArgs {
-    /// Folder that holds NAME/NAME.xml; without it one built into the program flies: x8, aerosonde, x8-elevons.
+    /// Folder that holds NAME/NAME.xml; without it one built into the program flies: x8, aerosonde, x8-elevons,
+    /// c172p.
     #[arg(long, value_name = "DIR", requires = "aircraft")]
     aircraft_dir: Option<PathBuf>,
     /// Name of the aircraft.

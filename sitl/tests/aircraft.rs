@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use flights::{assert_same, differ, fly, plant};
-use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Properties, Travel};
+use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Properties, Start, Travel};
 
 fn shipped() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("aircraft")
@@ -244,4 +244,29 @@ fn a_surface_that_does_not_follow_its_command_has_no_travel() {
     let mut plant = Plant::new(&options(fixed.path(), "twin")).unwrap();
     let message = plant.travel().unwrap_err().to_string();
     assert!(message.contains("fcs/effective-aileron-pos"), "{message}");
+}
+
+/// Flaps that take 3 s to come down are down when a flight begins: a condition is a setting, not a movement.
+#[test]
+fn what_is_held_has_reached_its_position_at_the_start() {
+    const FLAPS: &str = "<channel name=\"flaps\"><kinematic name=\"fcs/flaps\"><input>fcs/flap-cmd-norm</input>\
+        <traverse><setting><position>0</position><time>0</time></setting>\
+        <setting><position>1</position><time>3</time></setting></traverse>\
+        <output>fcs/flap-pos-norm</output></kinematic></channel></flight_control>";
+    const LIFT: &str = "<axis name=\"LIFT\"><function name=\"aero/flaps\"><product><property>aero/qbar-psf</property>\
+        <property>metrics/Sw-sqft</property><value>0.3</value><property>fcs/flap-pos-norm</property></product></function>";
+    let flapped =
+        twin(|xml| xml.replace("</flight_control>", FLAPS).replace("<axis name=\"LIFT\">", LIFT));
+    let held = |setting: f64| PlantOptions {
+        held: vec![("fcs/flap-cmd-norm".to_owned(), setting)],
+        ..options(flapped.path(), "twin")
+    };
+    let [up, down] = [0.0, 1.0].map(|setting| {
+        let mut plant = Plant::new(&held(setting)).unwrap();
+        assert_eq!(plant.property("fcs/flap-pos-norm").unwrap(), setting);
+        assert_eq!(plant.truth().time_s, 0.0);
+        plant.loads(&Start::NEUTRAL, &Inputs::default()).unwrap().force_n[2]
+    });
+    // 0.3 of q S: 0.5 · 1.156 kg/m³ · (16.67 m/s)² · 0.75 m²
+    assert!((up - down - 0.3 * 120.5).abs() < 1.0, "{up} {down} N");
 }

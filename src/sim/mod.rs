@@ -24,6 +24,7 @@ pub mod import;
 pub mod instruments;
 #[cfg(feature = "sitl")]
 pub mod missing;
+pub mod one_step;
 #[cfg(feature = "sitl")]
 mod simulator;
 #[cfg(feature = "sitl")]

@@ -101,6 +101,14 @@ fn make_wrong(effects: &mut toml::Table, seed: u64) {
             let mut random = stream(seed, &[[DRAW].as_slice(), &path].concat());
             let unit: f64 = StandardNormal.sample(&mut random);
             let wrong = value * (1.0 + WRONG * unit.clamp(-2.0, 2.0));
+            // a width that is narrower than the error would hold the fit to the error; without one it is 15 %
+            if number
+                .get("sd")
+                .and_then(toml::Value::as_float)
+                .is_some_and(|sd| sd < WRONG * wrong.abs())
+            {
+                number.remove("sd");
+            }
             number.insert("value".into(), rounded(wrong).into());
             number.insert("source".into(), "a guess, good to some 15 %".into());
         }

@@ -16,6 +16,8 @@ const THROTTLE0: f64 = 0.118;
 const LBF_FT: f64 = LBF * FT;
 /// Bound of coefficients: beyond it, an amplitude is taken for a slip.
 const ANY: f64 = 1e3;
+/// Bound of what goes with the size of the aircraft: N, N m, N m s, kg m².
+const LARGE: f64 = 1e7;
 
 /// Every effect that can be hidden.
 pub static EFFECTS: [Effect; 25] = [
@@ -83,7 +85,7 @@ pub static EFFECTS: [Effect; 25] = [
         id: "thrust_scale",
         formula: "thrust a δt",
         unit: "N",
-        bounds: (-ANY, ANY),
+        bounds: (-LARGE, LARGE),
         write: |d, a| {
             let throttle = d.throttle();
             d.add_thrust(product(&[value(a / LBF), throttle]));
@@ -114,7 +116,7 @@ pub static EFFECTS: [Effect; 25] = [
         id: "motor_torque",
         formula: "rolling moment −a δt",
         unit: "N m",
-        bounds: (-ANY, ANY),
+        bounds: (-LARGE, LARGE),
         write: |d, a| {
             let terms = [value(-a / LBF_FT), d.throttle()];
             d.function(Axis::Roll, "motor-torque", &product(&terms))
@@ -124,7 +126,7 @@ pub static EFFECTS: [Effect; 25] = [
         id: "propeller_gyro",
         formula: "pitching moment a r, yawing moment −a q",
         unit: "N m s",
-        bounds: (-10.0, 10.0),
+        bounds: (-LARGE, LARGE),
         write: |d, a| {
             let pitch = product(&[value(a / LBF_FT), property("velocities/r-rad_sec")]);
             let yaw = product(&[value(-a / LBF_FT), property("velocities/q-rad_sec")]);
@@ -218,7 +220,7 @@ pub static EFFECTS: [Effect; 25] = [
         id: "inertia_xz",
         formula: "product of inertia Jxz + a, with −Jxz in the inertia matrix",
         unit: "kg m²",
-        bounds: (-10.0, 10.0),
+        bounds: (-LARGE, LARGE),
         write: |d, a| {
             // JSBSim's ixz is −Jxz, unless the element turns its sign rule off.
             let sign = if d.has("negated_crossproduct_inertia=\"false\"") { 1.0 } else { -1.0 };

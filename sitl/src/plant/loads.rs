@@ -1,6 +1,6 @@
 //! Loads: the forces and moments of the air on an aircraft that is held in a state.
 
-use super::nodes::STILL_S;
+use super::settling::STILL_S;
 use super::{Inputs, Plant, PlantError, Start, Truth, jsbsim};
 
 /// Newtons per pound of force, and newton metres per foot pound.

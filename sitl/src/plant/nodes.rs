@@ -3,6 +3,7 @@
 use jsbsim::{Error, Fdm, NodeId};
 
 use super::lookup::{look, needed};
+use super::settling::{self, settle};
 use super::steering::Steering;
 use super::{Inputs, PlantError, PlantOptions, Start, Truth};
 use crate::air::Gust;
@@ -15,9 +16,6 @@ const LBF: f64 = 4.448_221_615_260_5;
 const SLUG: f64 = LBF / FT;
 /// Pascals per pound per square foot.
 const PSF: f64 = LBF / (FT * FT);
-
-/// A step too short to move anything, s, with which derivatives are evaluated anew.
-pub(super) const STILL_S: f64 = 1e-12;
 
 /// Nodes of everything that is read or written in a step.
 pub(super) struct Nodes {
@@ -82,9 +80,7 @@ impl Nodes {
 
     /// Writes the commands.
     pub(super) fn command(&self, fdm: &mut Fdm, inputs: &Inputs) -> Result<(), Error> {
-        for (node, value) in &self.held {
-            fdm.write_node(*node, *value)?;
-        }
+        settling::hold(fdm, &self.held)?;
         self.steering.command(fdm, inputs)
     }
 
@@ -175,6 +171,7 @@ impl Nodes {
             fdm.set_property(&format!("ic/{name}"), value)?;
         }
         fdm.run_ic()?;
+        settling::settle_conditions(fdm, &self.held, options.step_s)?;
         self.blow(fdm, options)
     }
 
@@ -283,19 +280,6 @@ fn scattered(seed: u32) -> f64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((z ^ (z >> 31)) % 0x7fff_ffff) as f64
-}
-
-/// Evaluates derivatives in the air as it now is, and fills the integrators' histories with them.
-///
-/// JSBSim's initial condition takes no vertical wind, so the wind is set after it; five frames
-/// fill the longest history (Adams-Bashforth 3 needs three of them).
-fn settle(fdm: &mut Fdm, step_s: f64) -> Result<(), Error> {
-    fdm.set_dt(STILL_S);
-    for _ in 0..5 {
-        fdm.run()?;
-    }
-    fdm.set_dt(step_s);
-    Ok(())
 }
 
 fn read3(fdm: &mut Fdm, nodes: &[NodeId; 3], scale: f64) -> Result<[f64; 3], Error> {

@@ -125,7 +125,7 @@ impl Plant {
     /// Aileron, elevator and rudder where they come to rest at `inputs`, rad.
     fn rest(&mut self, inputs: &Inputs) -> Result<[f64; 3], PlantError> {
         // Filters keep the step for which they were laid out; nothing else moves in so short a one.
-        self.fdm.set_dt(super::nodes::STILL_S);
+        self.fdm.set_dt(super::settling::STILL_S);
         let (mut last, mut at_rest) = ([f64::INFINITY; 3], 0);
         for _ in 0..STEPS {
             self.nodes.command(&mut self.fdm, inputs).map_err(jsbsim("writing the commands"))?;

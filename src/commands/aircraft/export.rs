@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 
 use crate::commands::files::{self, Overwrite};
 use crate::model::GreyBox;
-use crate::model::jsbsim::export;
+use crate::model::jsbsim::export_in_conditions;
 
 /// The arguments of `greylag aircraft export`.
 #[derive(Args)]
@@ -26,9 +26,10 @@ enum To {
 /// The arguments of `greylag aircraft export jsbsim`.
 #[derive(Args)]
 struct Jsbsim {
-    /// The model.
-    #[arg(long, value_name = "FILE")]
-    model: PathBuf,
+    /// The model. Repeat it for models of one aircraft in several conditions, flap settings say: the aircraft then
+    /// reads the property in which their airframes differ.
+    #[arg(long, value_name = "FILE", required = true)]
+    model: Vec<PathBuf>,
     /// Folder in which the aircraft's folder is made.
     dir: PathBuf,
     /// The aircraft's name there: letters, digits, `_` and `-`.
@@ -43,8 +44,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if name.is_empty() || !name.chars().all(plain) {
         bail!("cannot name an aircraft '{name}': use letters, digits, _ and -");
     }
-    let model = GreyBox::load(&files::shipped(&jsbsim.model))?;
-    let exported = export(&model, name);
+    let load = |path: &PathBuf| GreyBox::load(&files::shipped(path));
+    let models = jsbsim.model.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let exported = export_in_conditions(&models, name)?;
     let folder = dir.join(name);
     let engines = folder.join("Engines");
     std::fs::create_dir_all(&engines)

@@ -16,7 +16,7 @@ pub const ATTITUDES: &str = "attitudes";
 /// The folder of schedules, below the session's.
 pub const SCHEDULES: &str = "schedules";
 /// Aircraft that the simulator holds.
-pub const AIRCRAFT: [&str; 2] = ["x8", "aerosonde"];
+pub const AIRCRAFT: [&str; 4] = ["x8", "aerosonde", "x8-elevons", "c172p"];
 
 /// A simulator flight that is asked for.
 #[derive(Clone, Debug, Deserialize)]

@@ -1,0 +1,78 @@
+//! Frames in which the aircraft stands still while its systems come to rest.
+
+use jsbsim::{Error, Fdm, NodeId};
+
+/// A step too short to move the aircraft, s. Filters and kinematics keep the step for which they were laid out.
+pub(super) const STILL_S: f64 = 1e-12;
+
+/// Longest time that flaps and gear are given to reach the position that is held, s.
+const TRANSIT_S: f64 = 60.0;
+/// Time without a change of the air's loads after which they have reached it, s.
+const AT_REST_S: f64 = 0.5;
+/// Change of a load in one frame that is none, in parts of it.
+const UNCHANGED: f64 = 1e-9;
+/// Forces (lbf) and moments (lbf ft) of the air, body axes.
+const LOADS: [&str; 6] = [
+    "forces/fbx-aero-lbs",
+    "forces/fby-aero-lbs",
+    "forces/fbz-aero-lbs",
+    "moments/l-aero-lbsft",
+    "moments/m-aero-lbsft",
+    "moments/n-aero-lbsft",
+];
+
+/// Writes the properties that are held.
+pub(super) fn hold(fdm: &mut Fdm, held: &[(NodeId, f64)]) -> Result<(), Error> {
+    for (node, value) in held {
+        fdm.write_node(*node, *value)?;
+    }
+    Ok(())
+}
+
+/// Evaluates derivatives in the air as it now is, and fills the integrators' histories with them.
+///
+/// JSBSim's initial condition takes no vertical wind, so the wind is set after it; five frames
+/// fill the longest history (Adams-Bashforth 3 needs three of them).
+pub(super) fn settle(fdm: &mut Fdm, step_s: f64) -> Result<(), Error> {
+    fdm.set_dt(STILL_S);
+    for _ in 0..5 {
+        fdm.run()?;
+    }
+    fdm.set_dt(step_s);
+    Ok(())
+}
+
+/// Lets flaps, gear and whatever else `held` commands reach its position before the flight begins, 60 s at most.
+pub(super) fn settle_conditions(
+    fdm: &mut Fdm,
+    held: &[(NodeId, f64)],
+    step_s: f64,
+) -> Result<(), Error> {
+    if held.is_empty() {
+        return Ok(());
+    }
+    fdm.set_dt(STILL_S);
+    let came = come_to_rest(fdm, held, step_s);
+    fdm.set_dt(step_s);
+    came
+}
+
+fn come_to_rest(fdm: &mut Fdm, held: &[(NodeId, f64)], step_s: f64) -> Result<(), Error> {
+    let frames = |seconds: f64| (seconds / step_s).ceil() as usize;
+    let (mut last, mut at_rest) = ([f64::INFINITY; 6], 0);
+    for _ in 0..frames(TRANSIT_S) {
+        hold(fdm, held)?;
+        fdm.run()?;
+        let mut now = [0.0; 6];
+        for (load, name) in now.iter_mut().zip(LOADS) {
+            *load = fdm.get_property(name)?;
+        }
+        let still = |(a, b): (&f64, &f64)| (a - b).abs() <= UNCHANGED * a.abs();
+        at_rest = if now.iter().zip(&last).all(still) { at_rest + 1 } else { 0 };
+        if at_rest >= frames(AT_REST_S) {
+            break;
+        }
+        last = now;
+    }
+    Ok(())
+}

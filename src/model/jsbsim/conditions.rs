@@ -1,0 +1,225 @@
+//! Models of one aircraft in several conditions, as one aircraft that reads in which it is.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use super::aerodynamics;
+use crate::model::GreyBox;
+
+/// Settings that every aircraft of JSBSim has.
+const OF_JSBSIM: [&str; 4] =
+    ["fcs/flap-cmd-norm", "fcs/speedbrake-cmd-norm", "fcs/spoiler-cmd-norm", "gear/gear-cmd-norm"];
+
+/// Why models are not those of one aircraft in several conditions.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ConditionsError {
+    /// No model was given.
+    #[error("no model to export: name one with --model")]
+    Nothing,
+    /// The airframes differ in no property, or in several.
+    #[error(
+        "cannot export the models {models} as one aircraft: the [conditions] of their airframes must differ in exactly one \
+         property and differ in {}; give each airframe.toml its setting of the same property, such as \"fcs/flap-cmd-norm\"",
+        if properties.is_empty() { "none".to_owned() } else { properties.join(", ") }
+    )]
+    Properties {
+        /// Names of the models.
+        models: String,
+        /// The properties in which they differ.
+        properties: Vec<String>,
+    },
+    /// Two models are of the same setting.
+    #[error(
+        "cannot export the models {first} and {second} as one aircraft: both are of {property} = {setting}; leave one of \
+         them out"
+    )]
+    Twice {
+        /// Name of a model.
+        first: String,
+        /// Name of the other.
+        second: String,
+        /// The property that tells the conditions apart.
+        property: String,
+        /// Its value in both.
+        setting: f64,
+    },
+    /// Something that no condition changes is not the same in all.
+    #[error(
+        "cannot export the models {first} and {second} as one aircraft: their {what} differ; a condition changes only \
+         aerodynamic coefficients, so give both models the same {what}"
+    )]
+    Differ {
+        /// Name of a model.
+        first: String,
+        /// Name of the other.
+        second: String,
+        /// In what they differ.
+        what: String,
+    },
+}
+
+/// Models of one aircraft, one for each setting of a property.
+pub(super) struct Conditions<'a> {
+    /// The property; empty if there is one model.
+    property: String,
+    /// Settings, ascending, with the model of each.
+    settings: Vec<(f64, &'a GreyBox)>,
+}
+
+impl<'a> Conditions<'a> {
+    /// One model: the aircraft is always in its condition.
+    pub(super) fn one(model: &'a GreyBox) -> Self {
+        Conditions { property: String::new(), settings: vec![(0.0, model)] }
+    }
+
+    /// Several, told apart by the one property in which their airframes' conditions differ.
+    pub(super) fn of(models: &'a [GreyBox]) -> Result<Self, ConditionsError> {
+        let Some((first, rest)) = models.split_first() else {
+            return Err(ConditionsError::Nothing);
+        };
+        if rest.is_empty() {
+            return Ok(Conditions::one(first));
+        }
+        for other in rest {
+            same(first, other)?;
+        }
+        let property = property(models)?;
+        let mut settings: Vec<(f64, &GreyBox)> =
+            models.iter().map(|m| (m.airframe.conditions[&property], m)).collect();
+        settings.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some([(setting, one), (_, other)]) =
+            settings.array_windows().find(|[(a, _), (b, _)]| a == b)
+        {
+            let (first, second) = (one.name.clone(), other.name.clone());
+            return Err(ConditionsError::Twice { first, second, property, setting: *setting });
+        }
+        Ok(Conditions { property, settings })
+    }
+
+    /// The models, by their settings.
+    pub(super) fn models(&self) -> impl Iterator<Item = &'a GreyBox> + '_ {
+        self.settings.iter().map(|(_, model)| *model)
+    }
+
+    /// The model of the lowest setting: what no condition changes is that of all.
+    pub(super) fn first(&self) -> &'a GreyBox {
+        self.settings[0].1
+    }
+
+    /// The models' names, in a list.
+    pub(super) fn names(&self) -> String {
+        let names: Vec<&str> = self.models().map(|m| m.name.as_str()).collect();
+        names.join(", ")
+    }
+
+    /// Makes the property known, at the lowest setting, where JSBSim does not by itself.
+    pub(super) fn declaration(&self) -> String {
+        match &self.settings[..] {
+            [_] => String::new(),
+            _ if OF_JSBSIM.contains(&self.property.as_str()) => String::new(),
+            settings => {
+                format!(
+                    "    <property value=\"{:?}\"> {} </property>\n",
+                    settings[0].0, self.property
+                )
+            }
+        }
+    }
+
+    /// The channel that weighs the conditions: each is one at its own setting and zero at the others.
+    pub(super) fn weights(&self) -> String {
+        if self.settings.len() == 1 {
+            return String::new();
+        }
+        let mut out = "    <channel name=\"conditions\">\n".to_owned();
+        for (i, _) in self.settings.iter().enumerate() {
+            let rows: String = self
+                .settings
+                .iter()
+                .enumerate()
+                .map(|(j, (setting, _))| format!("          {setting:?} {}\n", u8::from(i == j)))
+                .collect();
+            let _ = write!(
+                out,
+                "      <fcs_function name=\"{}\">\n        <function> <table>\n          <independentVar \
+                 lookup=\"row\">{}</independentVar>\n          <tableData>\n{rows}          </tableData>\n        </table> \
+                 </function>\n      </fcs_function>\n",
+                weight(i),
+                self.property
+            );
+        }
+        out.push_str("    </channel>\n");
+        out
+    }
+
+    /// What is to be summed for all conditions, `terms` being that of one.
+    pub(super) fn weighted(&self, terms: impl Fn(&GreyBox) -> String) -> String {
+        if let [(_, model)] = &self.settings[..] {
+            return terms(model);
+        }
+        self.models()
+            .enumerate()
+            .map(|(i, model)| {
+                format!(
+                    "            <product> <property>{}</property> <sum>\n            <value>0.0</value>\n{}            </sum> \
+                     </product>\n",
+                    weight(i),
+                    terms(model)
+                )
+            })
+            .collect()
+    }
+}
+
+/// The property that holds the weight of the condition of that number.
+fn weight(number: usize) -> String {
+    format!("fcs/condition-{number}")
+}
+
+/// The property that tells `models` apart.
+fn property(models: &[GreyBox]) -> Result<String, ConditionsError> {
+    let names: BTreeSet<&String> =
+        models.iter().flat_map(|m| m.airframe.conditions.keys()).collect();
+    let setting = |model: &GreyBox, name: &str| model.airframe.conditions.get(name).copied();
+    let differ =
+        |name: &&&String| models.iter().any(|m| setting(m, name) != setting(&models[0], name));
+    let properties: Vec<String> = names.iter().filter(differ).map(|name| (*name).clone()).collect();
+    match &properties[..] {
+        [one] if models.iter().all(|m| setting(m, one).is_some()) => Ok(one.clone()),
+        _ => {
+            let models: Vec<&str> = models.iter().map(|m| m.name.as_str()).collect();
+            Err(ConditionsError::Properties { models: models.join(", "), properties })
+        }
+    }
+}
+
+/// That two models have in common what no condition changes.
+fn same(first: &GreyBox, second: &GreyBox) -> Result<(), ConditionsError> {
+    let differ = |what: &str| ConditionsError::Differ {
+        first: first.name.clone(),
+        second: second.name.clone(),
+        what: what.to_owned(),
+    };
+    let (one, other) = (&first.airframe, &second.airframe);
+    for (what, same) in [
+        ("geometry", one.geometry == other.geometry),
+        ("controls", one.actuators == other.actuators),
+        ("surfaces and motors", one.mixer == other.mixer),
+        ("mass and inertia", first.body == second.body),
+        ("force axes", first.axes == second.axes),
+    ] {
+        if !same {
+            return Err(differ(what));
+        }
+    }
+    let fixed = |model: &GreyBox| -> Vec<(String, u64)> {
+        let of_engine = model.coefficients().iter().filter(|c| !aerodynamics::knows(&c.name));
+        of_engine.map(|c| (c.name.clone(), c.value.to_bits())).collect()
+    };
+    let (ours, theirs) = (fixed(first), fixed(second));
+    let lacking = ours.iter().find(|c| !theirs.contains(c));
+    match lacking.or_else(|| theirs.iter().find(|c| !ours.contains(c))) {
+        Some((name, _)) => Err(differ(&format!("values of {name}"))),
+        None => Ok(()),
+    }
+}

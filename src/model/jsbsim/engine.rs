@@ -1,0 +1,79 @@
+//! The engine of an exported aircraft: thrust as an external force, its lag, its arm and its torque.
+
+use super::{FT, LBF, THROTTLE, coefficient, product};
+use crate::model::GreyBox;
+
+const SPEED: &str = "velocities/vt-fps";
+/// The throttle that acts on the engine where its thrust lags.
+const LATE_THROTTLE: &str = "fcs/engine-throttle-norm";
+const LAG: &str = "thrust_lag.tau_s";
+const ARM: &str = "thrust_line_offset.z_m";
+const TORQUE: &str = "motor_torque.k_nm";
+
+/// The thrust's terms: coefficient, factors; airspeed is in ft/s there.
+const THRUST: &[(&str, &[&str])] = &[
+    ("thrust_linear.Cp_n", &[THROTTLE]),
+    ("propeller.T0_n", &["fcs/density-ratio"]),
+    ("propeller.Tt_n", &["fcs/density-ratio", THROTTLE]),
+    ("propeller.Ttt_n", &["fcs/density-ratio", THROTTLE, THROTTLE]),
+    ("propeller.TV_nspm", &["fcs/density-ratio", SPEED]),
+    ("propeller.TtV_nspm", &["fcs/density-ratio", THROTTLE, SPEED]),
+    ("propeller.TVV_ns2pm2", &["fcs/density-ratio", SPEED, SPEED]),
+];
+
+/// Whether the files have the coefficient of that full name, as part of the engine.
+pub(super) fn knows(name: &str) -> bool {
+    THRUST.iter().any(|(term, _)| *term == name) || [LAG, ARM, TORQUE].contains(&name)
+}
+
+/// The throttle that acts on the engine.
+fn throttle(model: &GreyBox) -> &'static str {
+    if coefficient(model, LAG) > 0.0 { LATE_THROTTLE } else { THROTTLE }
+}
+
+/// The filter behind the throttle's, of a thrust that lags.
+pub(super) fn lag(model: &GreyBox) -> String {
+    let lag = coefficient(model, LAG);
+    if lag <= 0.0 {
+        return String::new();
+    }
+    format!(
+        "      <lag_filter name=\"fcs/engine-lag\">\n        <input> {THROTTLE} </input>\n        <c1> {:?} </c1>\n        \
+         <output> {LATE_THROTTLE} </output>\n      </lag_filter>\n",
+        1.0 / lag
+    )
+}
+
+/// The section of external reactions: the thrust along body x.
+pub(super) fn force(model: &GreyBox) -> String {
+    let throttle = throttle(model);
+    let terms: String = THRUST
+        .iter()
+        .map(|(name, factors)| {
+            let speeds = factors.iter().filter(|f| **f == SPEED).count();
+            let value = coefficient(model, name) / LBF * FT.powi(speeds as i32);
+            let acting: Vec<&str> =
+                factors.iter().map(|f| if *f == THROTTLE { throttle } else { *f }).collect();
+            product(value, &acting, "          ")
+        })
+        .collect();
+    // JSBSim's structural frame has z up
+    let below = coefficient(model, ARM);
+    let z = if below == 0.0 { "0".to_owned() } else { format!("{:?}", -below) };
+    format!(
+        "  <external_reactions>\n    <force name=\"thrust\" frame=\"BODY\">\n      <location unit=\"M\"> <x> 0 </x> <y> 0 </y> \
+         <z> {z} </z> </location>\n      <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>\n      <function \
+         name=\"external_reactions/thrust/magnitude\">\n        <sum>\n{terms}        </sum>\n      </function>\n    </force>\n  \
+         </external_reactions>\n\n"
+    )
+}
+
+/// A function of the rolling moment: the engine's torque, to the left.
+pub(super) fn torque(model: &GreyBox) -> String {
+    let torque = coefficient(model, TORQUE);
+    if torque == 0.0 {
+        return String::new();
+    }
+    let moment = product(-torque / (LBF * FT), &[throttle(model)], "        ");
+    format!("      <function name=\"aero/engine-torque\">\n{moment}      </function>\n")
+}

@@ -1,0 +1,92 @@
+//! One step of a model beside one step of what is flown, over a flight in which every control moves.
+
+use super::{Environment, Trouble};
+use crate::control::{Kind, Observation, SetupError, Target, build};
+use crate::model::{GreyBox, Memory, STEP};
+use crate::physics::Command;
+use crate::physics::inputs::InputMemory;
+
+/// Angular frequencies of the waves on aileron, elevator, throttle and rudder, rad a step.
+const WAVES: [f64; 4] = [0.11, 0.13, 0.05, 0.07];
+
+/// A flight in which the LQI of the model holds attitudes, with a wave on top of each of its commands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flight {
+    /// Its length, steps of 0.01 s.
+    pub steps: usize,
+    /// Steps with waves; none follow.
+    pub moved: usize,
+    /// Amplitude of the wave on each control, in units of its command.
+    pub amplitude: Command,
+}
+
+/// How far the model's steps are from those flown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Errors {
+    /// Root mean square over the flight, in parts of the state's scale x_c a second, in the order of `State::to_array`.
+    pub rms: [f64; 8],
+    /// What was seen after the last step.
+    pub last: Observation,
+}
+
+impl Errors {
+    /// The largest of [`Errors::rms`] and its place in the state.
+    pub fn worst(&self) -> (usize, f64) {
+        let largest = self.rms.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+        largest.unwrap_or_default()
+    }
+}
+
+/// Why the flight was not flown.
+#[derive(Debug, thiserror::Error)]
+pub enum FlightError {
+    /// The model allows no LQI.
+    #[error(transparent)]
+    Controller(#[from] SetupError),
+    /// What is flown cannot go on.
+    #[error(transparent)]
+    Trouble(#[from] Trouble),
+}
+
+/// Flies `flight` in `environment` towards the `target` of each step, `model` predicting each step from the state
+/// and the deflections before it.
+///
+/// # Errors
+/// [`FlightError`], if the model allows no LQI, or the aircraft cannot be flown.
+pub fn errors(
+    model: &GreyBox,
+    environment: &mut impl Environment,
+    flight: &Flight,
+    target: impl Fn(usize) -> Target,
+) -> Result<Errors, FlightError> {
+    let scale = model.scale();
+    let mut lqi = build(Kind::Lqi, model)?;
+    lqi.reset(1);
+    let mut seen = environment.reset()?;
+    let (mut memory, mut squares) = (Memory::default(), [0.0; 8]);
+    let mut inputs = InputMemory::at_rest(&seen.actuators.controls());
+    for step in 0..flight.steps {
+        let own = lqi.command(&seen, &target(step));
+        let command = if step < flight.moved { moved(own, flight.amplitude, step) } else { own };
+        let acting = model.act(&seen.actuators.controls(), &mut inputs);
+        let expected = model.step(&seen.state, &acting, seen.altitude, &mut memory);
+        seen = environment.step(command.clamped())?;
+        let pairs = seen.state.to_array().into_iter().zip(expected.to_array());
+        for ((sum, (flown, own)), scale) in squares.iter_mut().zip(pairs).zip(scale) {
+            *sum += ((flown - own) / STEP / scale).powi(2);
+        }
+    }
+    Ok(Errors { rms: squares.map(|sum| (sum / flight.steps as f64).sqrt()), last: seen })
+}
+
+/// `own` with the waves of that step on top.
+fn moved(own: Command, amplitude: Command, step: usize) -> Command {
+    let [aileron, elevator, throttle, rudder] =
+        WAVES.map(|frequency| (frequency * step as f64).sin());
+    Command {
+        aileron: own.aileron + amplitude.aileron * aileron,
+        elevator: own.elevator + amplitude.elevator * elevator,
+        throttle: own.throttle + amplitude.throttle * throttle,
+        rudder: own.rudder + amplitude.rudder * rudder,
+    }
+}
