@@ -1,10 +1,9 @@
 //! One step of a model beside one step of what is flown, over a flight in which every control moves.
 
 use super::{Environment, Trouble};
-use crate::control::{Kind, Observation, SetupError, Target, build};
+use crate::control::{ControllerKind, Observation, SetupError, Target, build};
 use crate::model::{GreyBox, Memory, STEP};
 use crate::physics::Command;
-use crate::physics::inputs::InputMemory;
 
 /// Angular frequencies of the waves on aileron, elevator, throttle and rudder, rad a step.
 const WAVES: [f64; 4] = [0.11, 0.13, 0.05, 0.07];
@@ -60,11 +59,11 @@ pub fn errors(
     target: impl Fn(usize) -> Target,
 ) -> Result<Errors, FlightError> {
     let scale = model.scale();
-    let mut lqi = build(Kind::Lqi, model)?;
+    let mut lqi = build(ControllerKind::Lqi, model)?;
     lqi.reset(1);
     let mut seen = environment.reset()?;
     let (mut memory, mut squares) = (Memory::default(), [0.0; 8]);
-    let mut inputs = InputMemory::at_rest(&seen.actuators.controls());
+    let mut inputs = model.at_rest(&seen.actuators.controls());
     for step in 0..flight.steps {
         let own = lqi.command(&seen, &target(step));
         let command = if step < flight.moved { moved(own, flight.amplitude, step) } else { own };
