@@ -5,7 +5,7 @@ mod validate_support;
 
 use std::path::Path;
 
-use greylag::control::{Kind, build};
+use greylag::control::{ControllerKind, build};
 use greylag::logs::Flight;
 use greylag::model::block::Block;
 use greylag::model::{GreyBox, Memory};
@@ -161,7 +161,7 @@ fn a_fit_finds_the_time_constant() {
     let model = GreyBox::parse(&lacking, &params.join("x8/lacks.toml")).unwrap();
     let exact = GreyBox::load(&params.join("x8/jsbsim.toml")).unwrap();
     let trial = Trial { seed: SEED, missing, turbulence: None, ..Trial::default() };
-    let logs = trial.fly(build(Kind::Lqi, &exact).unwrap().as_ref()).unwrap();
+    let logs = trial.fly(build(ControllerKind::Lqi, &exact).unwrap().as_ref()).unwrap();
     let fit = reconstructed(&model, &logs.training);
     let test = reconstructed(&model, &logs.testing);
     let effects = vec![Added { id: "yaw_by_spool".into(), start: None }];

@@ -223,8 +223,9 @@ def write(browser, folder):
     return found
 
 
-def search(browser):
-    """A search for a formula is started and cancelled."""
+def search(browser, folder):
+    """A search for a formula is started and cancelled, then runs to its end; a schedule is made between look-alikes."""
+    found = []
     click(browser, "#propose")
     wait(browser, "document.querySelector('#job progress')", 60, "the search for a formula")
     time.sleep(1)
@@ -232,6 +233,23 @@ def search(browser):
     click(browser, "#job button")
     wait(browser, "!document.querySelector('#job progress')", 60, "the search is cancelled")
     took("cancel a search", time.monotonic() - begun, "0.1 s")
+    begun = time.monotonic()
+    click(browser, "#propose")
+    wait(browser, "document.querySelector('#job progress')", 60, "the search for a formula, again")
+    wait(browser, "!document.querySelector('#job progress') && document.querySelector('#proposal .verdict, #proposal > .bad')", 300, "what the search says")
+    took("search for a formula", time.monotonic() - begun, "60 s")
+    if failed := browser.value("document.querySelector('#proposal > .bad')?.textContent"):
+        found.append(f"the search failed: {failed}")
+    if not browser.value("document.querySelector('[data-between]')"):
+        found.append("no schedule is offered between look-alikes")
+        return found
+    begun = time.monotonic()
+    click(browser, "[data-between]")
+    wait(browser, "[...document.querySelectorAll('#suspects button')].some(b => b.textContent == 'Fly it')", 300, "the schedule")
+    took("schedule between look-alikes", time.monotonic() - begun, "–")
+    browser.value("[...document.querySelectorAll('#suspects button')].find(b => b.textContent == 'Fly it').scrollIntoView()")
+    found += shoot(browser, folder, "6b-schedule")
+    return found
 
 
 def fly(browser, folder):
@@ -326,7 +344,7 @@ def walk(browser, bench, greylag, flights, folder, session):
     found += accessible(browser, "a fitted model")
     found += by_keyboard(browser)
     found += write(browser, folder)
-    search(browser)
+    found += search(browser, folder)
     found += fly(browser, folder)
     found += foreign_sockets(bench.process.pid)
     if not refused(bench.origin, "/api/state"):

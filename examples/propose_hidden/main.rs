@@ -13,7 +13,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use draw::Drawn;
-use greylag::control::{Kind, build};
+use greylag::control::{ControllerKind, build};
 use greylag::logs::Flight;
 use greylag::model::GreyBox;
 use greylag::sim::missing::Missing;
@@ -51,7 +51,7 @@ fn flown(seed: u64, missing: Vec<Missing>) -> Result<Case, Box<dyn Error>> {
     let text = starting_model(&reference, &format!("hidden-{seed}"), seed, &missing)?;
     let model = GreyBox::parse(&text, &folder.join("hidden.toml"))?;
     let logs = Trial { seed, missing, turbulence: None, ..Trial::default() }
-        .fly(build(Kind::Lqi, &exact)?.as_ref())?;
+        .fly(build(ControllerKind::Lqi, &exact)?.as_ref())?;
     let (search, test) = (flights(&model, &logs.training)?, flights(&model, &logs.testing)?);
     Ok(Case { seed, model, search, test })
 }

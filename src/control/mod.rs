@@ -11,7 +11,6 @@ pub mod policy;
 pub mod task;
 mod registry;
 
-pub use registry::ControllerKind as Kind;
 pub use registry::{ControllerKind, Needs, Pace, SetupError, Source, build};
 
 use insight::Insight;

@@ -82,7 +82,7 @@ impl Bench {
     pub(super) fn design(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         use super::commands::quoted;
         use super::error::io;
-        use crate::control::{Kind, build};
+        use crate::control::{ControllerKind, build};
         use crate::sim::design::{Suspect, plan, prospects};
 
         let (model, path, between, words) = {
@@ -92,7 +92,8 @@ impl Bench {
             (inner.model.clone(), inner.session.model.clone(), between, words)
         };
         let suspects = between.each_ref().map(|id| Suspect { id: id.clone(), values: Vec::new() });
-        let all = prospects(&model, build(Kind::Lqi, &model)?.as_ref(), &suspects, progress)?;
+        let all =
+            prospects(&model, build(ControllerKind::Lqi, &model)?.as_ref(), &suspects, progress)?;
         let [a, b] = &between;
         let plan = plan(&all, model.airframe.envelope.airspeed_cruise_mps)
             .ok_or_else(|| WorkbenchError::NotApart([a.clone(), b.clone()]))?;

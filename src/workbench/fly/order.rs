@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::super::bench::Inner;
 use super::super::commands::quoted;
 use super::super::error::WorkbenchError;
-use crate::control::{Kind, Needs};
+use crate::control::{ControllerKind, Needs};
 use crate::manoeuvres::menu::{self, MENU};
 
 /// The schedule of `greylag demo` where no other is named.
@@ -84,7 +84,8 @@ impl Inner {
 
 /// Controllers that need a model alone.
 pub fn controllers() -> impl Iterator<Item = &'static str> {
-    let alone = Kind::ALL.iter().filter(|k| !matches!(k.needs(), Needs::Policy | Needs::Both));
+    let alone =
+        ControllerKind::ALL.iter().filter(|k| !matches!(k.needs(), Needs::Policy | Needs::Both));
     alone.map(|k| k.name())
 }
 
@@ -100,7 +101,8 @@ impl Order {
         model: &Path,
         record: &Path,
     ) -> Result<Vec<String>, WorkbenchError> {
-        Kind::from_str(&self.controller).map_err(|e| WorkbenchError::Order(format!("{e}")))?;
+        ControllerKind::from_str(&self.controller)
+            .map_err(|e| WorkbenchError::Order(format!("{e}")))?;
         if !AIRCRAFT.contains(&self.aircraft.as_str()) {
             return Err(WorkbenchError::Order(format!("there is no aircraft {:?}", self.aircraft)));
         }
