@@ -299,13 +299,15 @@ def main():
         truth, flights, x, left = read(path)
         for name, method in methods.items():
             found = found_by(method, flights, x, left)
+            row = None
             if truth is None:
                 nulls[name].append(found is not None)
-                continue
-            row = judged(found, truth, {**{v: np.zeros(len(flights)) for v in VARIABLES}, **x}) if found else [False] * 4
-            rows[name].append(row)
-            print(json.dumps({"file": path.name, "method": name, "truth": truth, "found": str(found and (
-                found[0], found[1][2] if isinstance(found[1], tuple) else found[1])), "right": [bool(r) for r in row]}))
+            else:
+                all = {**{v: np.zeros(len(flights)) for v in VARIABLES}, **x}
+                row = [bool(r) for r in judged(found, truth, all)] if found else [False] * 4
+                rows[name].append(row)
+            named = found and [found[0], found[1][2] if isinstance(found[1], tuple) else found[1]]
+            print(json.dumps({"file": path.name, "method": name, "truth": truth, "found": named, "right": row}), flush=True)
     rows["greylag propose"], nulls["greylag propose"] = ours(sys.argv[2], {int(f.stem.split("-")[1]) for f in files})
     print(f"{'':24}{'channel':>10}{'variables':>10}{'trend':>10}{'form':>10}{'names in a null':>18}")
     for name in rows:

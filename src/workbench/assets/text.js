@@ -137,10 +137,11 @@ function proposal() {
   const said = state.proposal.error && el("p", { class: "bad" }, state.proposal.error);
   const list = [el("div", { class: "row" }, ask), said];
   if (found) {
-    const { effect, refused, sentences, front } = found;
+    const { effect, refused, sentences, front, free } = found;
     // the sentences say how far it may be trusted, and what the test found
     list.push(el("div", { class: `verdict ${effect ? "effect" : "unexplained"}` }, sentences.map((s) => el("p", {}, s)), refused.filter((s) => !sentences.includes(s)).map((s) => el("p", { class: "bad" }, s))));
     if (front.length) list.push(el("details", {}, el("summary", {}, "Formulas by size"), el("ul", {}, front.map((r) => el("li", {}, `${r.formula}: removes ${show(100 * r.removed)} %, evidence of its last term ${show(r.evidence)}, chance reaches ${show(r.threshold)}${r.chosen ? " (chosen)" : ""}`)))));
+    if (free && free.front.length) list.push(el("details", {}, el("summary", {}, `Free forms, the best of each size (${free.tried} were tried)`), el("ul", {}, free.front.map((r) => el("li", {}, `${r.formula}: removes ${show(100 * r.removed)} %, evidence ${show(r.evidence)}, chance reaches ${show(r.threshold)}${r.chosen ? " (chosen)" : ""}`)))));
     if (effect) list.push(el("div", { class: "row" }, el("button", { type: "button", id: "proposal-edit", onclick: () => put(effect) }, "Open it as text")));
     // as it comes, unless something is being written
     if (effect && taken !== state.proposal.key && bench.waited_for === "proposal") { taken = state.proposal.key; put(effect); }

@@ -247,7 +247,7 @@ impl Ask<'_> {
         let steady = self.selected(round, scores, place) >= SELECTED;
         c.class = alike.iter().map(|a| a.0).collect();
         let mut grades = grades::grades(form, &c.class);
-        grades.form &= steady;
+        grades.form &= steady && !self.surpassed(stage);
         c.said.grades = Some(grades);
         let alternative = |(form, evidence): &(Form, f64)| Alternative {
             formula: draft::formula(&[Term { form: *form, value: 0.0, sd: 0.0 }]),
@@ -326,6 +326,24 @@ impl Ask<'_> {
                 (!same && !larger).then_some((form, score.evidence))
             })
             .collect()
+    }
+
+    /// Whether a form much like the winner takes more than it by more than its size is worth: the simpler one is as good in
+    /// practice, and its form is not the truth.
+    fn surpassed(&self, stage: &Stage) -> bool {
+        let &Stage { round, scores, place, .. } = stage;
+        let size = |k: usize| {
+            let form = self.form(round.trials[scores[k].0].id);
+            form.map_or(0.0, |f| f.shape.complexity() as f64)
+        };
+        let own = &scores[place].1;
+        self.behind > 0.0
+            && (0..scores.len()).any(|k| {
+                let slack = LIKELY + NODE * (size(k) - size(place)).max(0.0);
+                let other = &scores[k].1;
+                other.fall > own.fall + slack
+                    && checks::likeness(round, own, other).abs() > checks::ALIKE
+            })
     }
 
     fn form(&self, id: &str) -> Option<Form> {
