@@ -98,7 +98,6 @@ const LONG_FUNCTIONS: &[(&str, &str, &str)] = &[
         "new",
         "one pass over a flight: its columns share what is computed at an instant",
     ),
-    ("sysid/diagnose/proposal/forward.rs", "climb", "one loop over terms that share their sums"),
     (
         "sysid/diagnose/proposal/sentences.rs",
         "sentences",

@@ -67,27 +67,7 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
             Function::Exp | Function::Sin | Function::Cos | Function::Tanh => {
                 plain(part(&all[0])?, &all[0], function.name())?
             }
-            Function::Lag | Function::Delay => {
-                let time = Dimension::new(0, 0, 1);
-                // a number is in s
-                let given = match all[1].node {
-                    Node::Number(_) => Any,
-                    _ => part(&all[1])?,
-                };
-                match given {
-                    Of(found) if found != time => {
-                        return Err(Fault {
-                            at: all[1].at,
-                            why: format!(
-                                "the units do not balance: the time of {} is in s, here it is in {found}; give its \
-                                 parameter the unit s",
-                                function.name()
-                            ),
-                        });
-                    }
-                    _ => part(&all[0])?,
-                }
-            }
+            Function::Lag | Function::Delay => timed(*function, all, dimensions)?,
             Function::Smoothstep => {
                 let x = part(&all[2])?;
                 same(part(&all[0])?, x, &all[2], "smoothstep")?;
@@ -96,6 +76,30 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
             }
         },
     })
+}
+
+/// A lag or delay: what it holds, its time being in s; a number is.
+fn timed(
+    function: Function,
+    all: &[Expression],
+    dimensions: &[Dimension],
+) -> Result<Measure, Fault> {
+    let time = Dimension::new(0, 0, 1);
+    let given = match all[1].node {
+        Node::Number(_) => Measure::Any,
+        _ => measure(&all[1], dimensions)?,
+    };
+    match given {
+        Measure::Of(found) if found != time => Err(Fault {
+            at: all[1].at,
+            why: format!(
+                "the units do not balance: the time of {} is in s, here it is in {found}; give its \
+                 parameter the unit s",
+                function.name()
+            ),
+        }),
+        _ => measure(&all[0], dimensions),
+    }
 }
 
 fn both(a: Measure, b: Measure, of: impl Fn(Dimension, Dimension) -> Dimension) -> Measure {
