@@ -90,10 +90,13 @@ pub(super) fn beyond(
         ..*ask
     };
     let Some(climbed) = ask.climb(tuned.clone()) else { return Ok(None) };
+    // a form also frees the coefficients that stood in for it, which are counted in its fall
+    let falls = all.iter().flat_map(|(_, s)| s.front.iter().map(|f| f.fall));
+    let whole = falls.fold(library.excess, f64::max);
     let rung = |f: &Fitted, threshold: f64| Rung {
         formula: draft::formula(&[Term { form: f.form, value: 0.0, sd: 0.0 }]),
         complexity: 1 + f.size,
-        removed: f.fall / library.excess,
+        removed: f.fall / whole,
         evidence: f.evidence,
         threshold,
         chosen: climbed.terms.iter().any(|t| t.form == as_of_library(f.form)),

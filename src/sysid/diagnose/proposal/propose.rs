@@ -6,7 +6,7 @@ use super::forward::{Ask, Climbed, ORDER, failing, forms};
 use super::free::grammar::MOST_NODES;
 use super::grades;
 use super::held_out::{objection, tested};
-use super::result::{HeldOut, Proposal, Settings};
+use super::result::{HeldOut, Proposal, Rung, Settings};
 use super::sentences::{capital, sentences};
 use crate::model::{GreyBox, RUDDER};
 use crate::physics::Channel;
@@ -78,10 +78,9 @@ pub fn propose(
         proposal.sentences.push(nothing(&proposal));
         return Ok(proposal);
     };
-    if let Some(grades) = proposal.grades.as_mut() {
-        // further terms say that the first one's form is not the whole
-        grades.form &= terms.len() == 1;
-    }
+    // further terms say that the first one's form is not the whole
+    let whole = terms.len() == 1 && !outdone(&proposal);
+    proposal.grades.iter_mut().for_each(|grades| grades.form &= whole);
     say(progress, "testing the formula on flights that the search has not seen", TESTED)?;
     let names: Vec<String> = used.iter().map(|f| f.name.clone()).collect();
     let tested = tested(&test, &tuned, &terms, options, names).ok_or_else(unusable)?;
@@ -96,6 +95,14 @@ fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     let mut channels = failing(found);
     channels.retain(|c| !(rudder && moved.contains(c)));
     channels
+}
+
+/// Whether a free form fits better than the formula of the library that was taken, as it is simpler and hardly behind
+/// in the error removed: its form is then not sure.
+fn outdone(proposal: &Proposal) -> bool {
+    let best = |rungs: &[Rung]| rungs.iter().map(|r| r.evidence).fold(0.0, f64::max);
+    let free = proposal.free.as_ref().filter(|free| !free.chosen);
+    free.is_some_and(|free| best(&free.front) > best(&proposal.front))
 }
 
 /// A proposal before anything was searched.
