@@ -1,5 +1,5 @@
 //! Lags and delays in formulas: what JSBSim's own filters make of the same effect, what settles, what is refused, and
-//! that a fit finds the time constant.
+//! that fit and diagnosis find the time constant.
 
 mod validate_support;
 
@@ -16,6 +16,7 @@ use greylag::sim::missing::Missing;
 use greylag::sim::starting_model::starting_model;
 use greylag::sim::trial::Trial;
 use greylag::sysid::amend::{Added, Options, amend};
+use greylag::sysid::diagnose;
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag::sysid::progress::unheard;
@@ -151,7 +152,7 @@ fn reconstructed(model: &GreyBox, flights: &[Flight]) -> Vec<Reconstruction> {
 
 /// A thrust line 40 mm to the left behind an engine of 0.5 s; the file believes 0.3 s.
 #[test]
-fn a_fit_finds_the_time_constant() {
+fn fit_and_diagnosis_find_the_time_constant() {
     const SEED: u64 = 8823;
     let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params");
     let effect = register::load(&params.join("effects/yaw_by_spool.toml")).unwrap()[0];
@@ -173,4 +174,12 @@ fn a_fit_finds_the_time_constant() {
     };
     assert!((value("k") - 1.16).abs() < 0.02, "{}", value("k"));
     assert!((value("tau") - 0.5).abs() < 0.02, "{}", value("tau"));
+
+    // the diagnosis names it; 10 ms are the doubt of the actuators' clock
+    let options = diagnose::Options { with: vec!["yaw_by_spool".into()], ..Default::default() };
+    let found = diagnose::diagnose(&model, &fit, &options, &unheard).unwrap();
+    let first = &found.effects[0];
+    assert!(first.asserted && first.id == "yaw_by_spool", "{:?}", found.sentences);
+    let tau = first.parameters.iter().find(|p| p.name == "tau").unwrap().value;
+    assert!((tau - 0.5).abs() < 0.02, "{tau}");
 }

@@ -77,17 +77,15 @@ pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> 
         );
         for (name, c) in names(k, term).iter().zip(term.form.shape.constants()) {
             // a threshold may be zero; what divides may not
-            let (ends, unit, meaning) = match term.form.shape {
-                Shape::Free(_) => ([0.2 * c, 5.0 * c], "", "constant of its shape"),
-                Shape::Lagged(..) => ([0.0, 5.0 * c], "s", "time constant of the lag"),
-                _ => ([0.0, 3.0 * c], "", "where it begins"),
+            let (ends, meaning) = match term.form.shape {
+                Shape::Free(_) => ([0.2 * c, 5.0 * c], "constant of its shape"),
+                _ => ([0.0, 3.0 * c], "where it begins"),
             };
             text += &format!(
-                "\n[parameters.{name}]\nvalue = {c}\nwidth = {}\nbounds = [{}, {}]\nunit = {}\nmeaning = {}\n",
+                "\n[parameters.{name}]\nvalue = {c}\nwidth = {}\nbounds = [{}, {}]\nunit = \"\"\nmeaning = {}\n",
                 rounded(0.3 * c.abs()),
                 rounded(ends[0].min(ends[1])),
                 rounded(ends[0].max(ends[1])),
-                quoted(unit),
                 quoted(meaning)
             );
         }

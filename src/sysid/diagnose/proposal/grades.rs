@@ -66,7 +66,6 @@ pub fn words(form: &Form, value: f64) -> String {
         Shape::ByMagnitude(v, w) => format!("with {} times the magnitude of {}", long(v), long(w)),
         Shape::Above(v, c) => format!("with {} above {c}", long(v)),
         Shape::Beyond(v, c) => format!("with {} beyond ±{c}", long(v)),
-        Shape::Lagged(v, tau) => format!("linearly with {} through a lag of {tau} s", long(v)),
         Shape::Free(free) => format!("with {}", free.text(None)),
     };
     let pressure = match form.of_air {

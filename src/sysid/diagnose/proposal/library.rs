@@ -31,16 +31,6 @@ pub(super) const BESIDE_AIR: [Variable; 7] = [
 /// Variables that may have a dead band or a threshold.
 const BANDED: [Variable; 5] =
     [Variable::Alpha, Variable::Beta, Variable::Aileron, Variable::Elevator, Variable::Throttle];
-/// Time constants of lags, s: some four times apart, between which a lag is nearly the mean of its neighbours.
-const LAGS_S: [f64; 3] = [0.1, 0.3, 1.0];
-
-/// Controls that a term may follow with a lag, and whether it then grows with dynamic pressure.
-const LAGGED: [(bool, Variable); 4] = [
-    (true, Variable::Aileron),
-    (true, Variable::Elevator),
-    (true, Variable::Throttle),
-    (false, Variable::Throttle),
-];
 /// Where thresholds lie, as quantiles of the magnitude of what was flown.
 pub(super) const QUANTILES: [f64; 2] = [0.5, 0.75];
 
@@ -63,8 +53,6 @@ pub enum Shape {
     Above(Variable, f64),
     /// What v exceeds a dead band by, with its sign.
     Beyond(Variable, f64),
-    /// v through a first-order lag of so many seconds.
-    Lagged(Variable, f64),
     /// Any expression.
     Free(&'static Free),
 }
@@ -90,8 +78,7 @@ impl Shape {
             | Shape::Square(v)
             | Shape::SignedSquare(v)
             | Shape::Above(v, _)
-            | Shape::Beyond(v, _)
-            | Shape::Lagged(v, _) => vec![v],
+            | Shape::Beyond(v, _) => vec![v],
             Shape::Free(free) => free.expression.variables(),
         }
     }
@@ -112,7 +99,6 @@ impl Shape {
             Shape::ByMagnitude(v, w) => format!("{}*abs({})", name(v), name(w)),
             Shape::Above(v, c) => format!("max({} - {}, 0)", name(v), number(c)),
             Shape::Beyond(v, c) => format!("deadband({}, {})", name(v), number(c)),
-            Shape::Lagged(v, tau) => format!("lag({}, {})", name(v), number(tau)),
             Shape::Free(free) => free.text(names),
         }
     }
@@ -120,7 +106,7 @@ impl Shape {
     /// Its constants beside the coefficient.
     pub fn constants(&self) -> Vec<f64> {
         match self {
-            Shape::Above(_, c) | Shape::Beyond(_, c) | Shape::Lagged(_, c) => vec![*c],
+            Shape::Above(_, c) | Shape::Beyond(_, c) => vec![*c],
             Shape::Free(free) => free.constants.clone(),
             _ => Vec::new(),
         }
@@ -134,7 +120,6 @@ impl Shape {
             Shape::Product(..) => 3,
             Shape::SignedSquare(_) | Shape::ByMagnitude(..) | Shape::Beyond(..) => 4,
             Shape::Above(..) => 5,
-            Shape::Lagged(..) => 3,
             Shape::Free(free) => free.expression.size(),
         }
     }
@@ -252,9 +237,6 @@ pub fn forms(channel: Channel, threshold: &dyn Fn(Variable, f64) -> f64) -> Vec<
                 }
             }
         }
-    }
-    for (of_air, v) in LAGGED {
-        shapes.extend(LAGS_S.map(|tau| (of_air, Shape::Lagged(v, tau))));
     }
     shapes.into_iter().map(|(of_air, shape)| Form { channel, of_air, shape }).collect()
 }

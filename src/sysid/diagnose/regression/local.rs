@@ -47,7 +47,7 @@ pub fn local(model: &GreyBox, at: &Instant, controls: &Controls) -> Local {
         elevator: D::variable(controls.elevator, CONTROLS + 1),
         throttle: D::variable(controls.throttle, CONTROLS + 2),
         rudder: D::variable(controls.rudder, CONTROLS + 3),
-        lagged: None,
+        lagged: controls.lagged.map(|lagged| lagged.map(D::from_f64)),
     };
     let all = residual(model, &state, &controls, at);
     Local {
