@@ -1,25 +1,21 @@
 //! Lags and delays in formulas: what JSBSim's own filters make of the same effect, what settles, what is refused, and
 //! that fit and diagnosis find the time constant.
 
+mod lacking_support;
 mod validate_support;
 
 use std::path::Path;
 
-use greylag::control::{ControllerKind, build};
-use greylag::logs::Flight;
 use greylag::model::block::Block;
 use greylag::model::{GreyBox, Memory};
 use greylag::num::Real;
 use greylag::physics::formula::{Written, file, register};
 use greylag::physics::{Channel, Controls, State};
 use greylag::sim::missing::Missing;
-use greylag::sim::starting_model::starting_model;
-use greylag::sim::trial::Trial;
 use greylag::sysid::amend::{Added, Options, amend};
 use greylag::sysid::diagnose;
-use greylag::sysid::flight_path::reconstruction::Reconstruction;
-use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag::sysid::progress::unheard;
+use lacking_support::flown;
 use validate_support::{controls, histories, inputs as sent, model, plant};
 
 /// An effect file with one channel, the parameters being k (N m) and `time` with its `bounds`.
@@ -138,33 +134,13 @@ fn a_model_has_no_more_lags_than_it_can_remember() {
     }
 }
 
-fn reconstructed(model: &GreyBox, flights: &[Flight]) -> Vec<Reconstruction> {
-    let one = |f: &Flight| {
-        let options = flight_path::Options {
-            gravity: model.atmosphere.gravity,
-            actuators_clock: ActuatorClock::AsRecorded,
-            ..flight_path::Options::new(&f.name, model.airframe.actuators)
-        };
-        reconstruct(f, &options).unwrap()
-    };
-    flights.iter().map(one).collect()
-}
-
 /// A thrust line 40 mm to the left behind an engine of 0.5 s; the file believes 0.3 s.
 #[test]
 fn fit_and_diagnosis_find_the_time_constant() {
     const SEED: u64 = 8823;
     let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params");
     let effect = register::load(&params.join("effects/yaw_by_spool.toml")).unwrap()[0];
-    let missing = vec![Missing::written(effect, &[1.16, 0.5]).unwrap()];
-    let reference = std::fs::read_to_string(params.join("x8/jsbsim.toml")).unwrap();
-    let lacking = starting_model(&reference, "lacks", SEED, &missing).unwrap();
-    let model = GreyBox::parse(&lacking, &params.join("x8/lacks.toml")).unwrap();
-    let exact = GreyBox::load(&params.join("x8/jsbsim.toml")).unwrap();
-    let trial = Trial { seed: SEED, missing, turbulence: None, ..Trial::default() };
-    let logs = trial.fly(build(ControllerKind::Lqi, &exact).unwrap().as_ref()).unwrap();
-    let fit = reconstructed(&model, &logs.training);
-    let test = reconstructed(&model, &logs.testing);
+    let (model, fit, test) = flown(Missing::written(effect, &[1.16, 0.5]).unwrap(), SEED);
     let effects = vec![Added { id: "yaw_by_spool".into(), start: None }];
     let options = Options { effects, ..Options::default() };
     let amended = amend(&model, &fit, &test, &options, &unheard).unwrap();

@@ -1,56 +1,25 @@
 //! What no effect of the catalogue holds: a formula is proposed, tested on other flights, and mends the model.
 
+mod lacking_support;
+
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use greylag::control::{ControllerKind, build};
-use greylag::logs::Flight;
-use greylag::model::GreyBox;
 use greylag::physics::formula::{Status, file, register};
 use greylag::sim::missing::Missing;
-use greylag::sim::starting_model::starting_model;
-use greylag::sim::trial::Trial;
 use greylag::sysid::diagnose::{DiagnoseError, Options, Proposal, Verdict, propose, trend};
-use greylag::sysid::flight_path::reconstruction::Reconstruction;
-use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag::sysid::progress::{Stage, unheard};
+use lacking_support::flown;
 
 /// Seed of the flights; none of those that thresholds were set with.
 const SEED: u64 = 3101;
-
-fn reconstructed(model: &GreyBox, flights: &[Flight]) -> Vec<Reconstruction> {
-    let one = |f: &Flight| {
-        let options = flight_path::Options {
-            gravity: model.atmosphere.gravity,
-            actuators_clock: ActuatorClock::AsRecorded,
-            ..flight_path::Options::new(&f.name, model.airframe.actuators)
-        };
-        reconstruct(f, &options).unwrap()
-    };
-    flights.iter().map(one).collect()
-}
-
-/// A model that lacks `missing`, flights to search and flights to test on.
-fn flown(missing: Missing) -> (GreyBox, Vec<Reconstruction>, Vec<Reconstruction>) {
-    let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params");
-    let missing = vec![missing];
-    let reference = std::fs::read_to_string(params.join("x8/jsbsim.toml")).unwrap();
-    let text = starting_model(&reference, "lacks", SEED, &missing).unwrap();
-    let model = GreyBox::parse(&text, &params.join("x8/lacks.toml")).unwrap();
-    let exact = GreyBox::load(&params.join("x8/jsbsim.toml")).unwrap();
-    let trial = Trial { seed: SEED, missing, turbulence: None, ..Trial::default() };
-    let logs = trial.fly(build(ControllerKind::Lqi, &exact).unwrap().as_ref()).unwrap();
-    let search = reconstructed(&model, &logs.training);
-    let test = reconstructed(&model, &logs.testing);
-    (model, search, test)
-}
 
 /// A thrust line 40 mm to the left: n = 1.16 N m δt, which no effect of the catalogue is.
 #[test]
 fn a_thrust_line_to_the_left_is_named_and_tested() {
     let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params");
     let effect = register::load(&params.join("effects/yaw_by_throttle.toml")).unwrap()[0];
-    let (model, search, test) = flown(Missing::written(effect, &[1.16]).unwrap());
+    let (model, search, test) = flown(Missing::written(effect, &[1.16]).unwrap(), SEED);
     let found = propose(&model, &search, &test, &Options::default(), &unheard).unwrap();
     assert_eq!(found.verdict, Verdict::Unexplained);
     let chosen = found.front.iter().find(|r| r.chosen).unwrap();
@@ -89,7 +58,7 @@ shape = "k*max(q_hat - 0.004, 0)"
 #[test]
 fn a_form_that_the_library_lacks_is_found_among_free_ones() {
     let effect = register::read(THRESHOLD).unwrap();
-    let (model, search, test) = flown(Missing::written(effect, &effect.values).unwrap());
+    let (model, search, test) = flown(Missing::written(effect, &effect.values).unwrap(), SEED);
     let with = |free_forms: bool| {
         let options = Options { free_forms, ..Options::default() };
         propose(&model, &search, &test, &options, &unheard).unwrap()
