@@ -141,7 +141,6 @@ impl Writer<'_> {
     fn filter(&mut self, function: Function, all: &[Expression]) -> Result<String, String> {
         let time_s = match all.get(1).map(|e| &e.node) {
             Some(Node::Parameter(k)) => self.value(*k),
-            Some(Node::Number(seconds)) => *seconds,
             _ => return Err(format!("the time of {} is no parameter", function.name())),
         };
         let input = self.xml(&all[0])?;

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use greylag::logs::csv::{self, Tolerance};
+use greylag::model::jsbsim::Exported;
 use serde_json::Value;
 
 /// An aircraft of the simulator with a model that flies as it does.
@@ -17,6 +18,21 @@ pub struct Aircraft {
     pub folder: &'static str,
     /// An airspeed at which it flies, m/s.
     pub airspeed_mps: f64,
+}
+
+/// The simulator's files of the aircraft `name` are what `aircraft export jsbsim` makes of its models.
+pub fn shipped_as_exported(exported: &Exported, name: &str) {
+    assert_eq!(exported.left_out, Vec::<String>::new());
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("sitl/aircraft").join(name);
+    for (path, text) in &exported.files {
+        let shipped = folder.join(path);
+        if std::env::var_os("GREYLAG_WRITE_DOCS").is_some() {
+            fs::create_dir_all(shipped.parent().unwrap()).unwrap();
+            fs::write(&shipped, text).unwrap();
+        }
+        let shipped = fs::read_to_string(shipped).unwrap();
+        assert!(shipped == *text, "{path}: write it anew with GREYLAG_WRITE_DOCS=1");
+    }
 }
 
 /// The program with `arguments` and those that name the aircraft and its model.

@@ -20,16 +20,8 @@ pub struct Memory {
     pub(super) function: Function,
     /// What is lagged or delayed.
     pub(super) argument: Tape,
-    pub(super) time: Time,
-}
-
-/// The time of a lag or delay.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Time {
-    /// A number, s.
-    Fixed(f64),
-    /// The shape constant of that place.
-    Constant(u16),
+    /// Place of its time among the effect's shape constants.
+    pub(super) time: u16,
 }
 
 impl Memory {
@@ -69,11 +61,7 @@ impl Memory {
     #[inline(always)]
     pub fn act<R: Real>(&self, controls: &Controls<R>, shape: &[f64], past: &mut Past<R>) -> R {
         let now = self.settled(controls, shape);
-        let time = match self.time {
-            Time::Fixed(seconds) => seconds,
-            Time::Constant(k) => shape.get(k as usize).copied().unwrap_or(0.0),
-        };
-        let time = time.max(0.0);
+        let time = shape.get(self.time as usize).copied().unwrap_or(0.0).max(0.0);
         match self.function {
             Function::Delay => TimeDelay::act(time, past, now),
             _ => ActuatorLag::act(time, past, now),
@@ -115,11 +103,11 @@ fn refusal(function: Function, all: &[Expression], bounds: &[[f64; 2]]) -> Optio
             other.name()
         ));
     }
-    let [low, high] = match time.node {
-        Node::Number(seconds) => [seconds; 2],
-        Node::Parameter(k) => bounds.get(k).copied().unwrap_or([0.0; 2]),
-        _ => return Some(format!("the time of {name} is a number of seconds or a parameter in s")),
+    // a number would have no bounds, and a search tries effects without shape constants all in one model
+    let Node::Parameter(k) = time.node else {
+        return Some(format!("the time of {name} must be a parameter in s, so that it has bounds"));
     };
+    let [low, high] = bounds.get(k).copied().unwrap_or([0.0; 2]);
     let most = if function == Function::Delay { LONGEST_DELAY_S } else { f64::INFINITY };
     (low < 0.0 || high > most).then(|| match function {
         Function::Delay => {

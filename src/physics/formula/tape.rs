@@ -4,7 +4,7 @@
 //! [`Dual`](crate::num::Dual) numbers: of eight states and three controls at once.
 
 use super::expression::{Expression, Function, Node};
-use super::memory::{Memory, Time};
+use super::memory::Memory;
 use super::variable::Variable;
 use crate::num::{Real, Table};
 use crate::physics::{Channel, Point};
@@ -264,15 +264,11 @@ impl Tape {
         places: &Places,
     ) -> Result<(), String> {
         let time = match all.get(1).map(|e| &e.node) {
-            Some(Node::Number(seconds)) => Some(Time::Fixed(*seconds)),
-            Some(Node::Parameter(k)) => places.get(*k).copied().flatten().map(Time::Constant),
+            Some(Node::Parameter(k)) => places.get(*k).copied().flatten(),
             _ => None,
         };
         let (Some(argument), Some(time)) = (all.first(), time) else {
-            return Err(format!(
-                "the time of {} must be a number or a shape constant",
-                function.name()
-            ));
+            return Err(format!("the time of {} must be a shape constant", function.name()));
         };
         let mut alone = Tape::default();
         alone.report(argument, Some(&Expression::number(1.0)), 0, Channel::Drag, places)?;

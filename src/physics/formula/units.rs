@@ -78,18 +78,14 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
     })
 }
 
-/// A lag or delay: what it holds, its time being in s; a number is.
+/// A lag or delay: what it holds, its time being in s.
 fn timed(
     function: Function,
     all: &[Expression],
     dimensions: &[Dimension],
 ) -> Result<Measure, Fault> {
     let time = Dimension::new(0, 0, 1);
-    let given = match all[1].node {
-        Node::Number(_) => Measure::Any,
-        _ => measure(&all[1], dimensions)?,
-    };
-    match given {
+    match measure(&all[1], dimensions)? {
         Measure::Of(found) if found != time => Err(Fault {
             at: all[1].at,
             why: format!(

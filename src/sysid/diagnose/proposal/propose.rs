@@ -98,7 +98,8 @@ fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
 }
 
 /// Whether a free form fits better than the formula of the library that was taken, as it is simpler and hardly behind
-/// in the error removed: its form is then not sure.
+/// in the error removed: its form is then not sure. Their evidences are of two rounds of tuning, so this only withholds a
+/// grade.
 fn outdone(proposal: &Proposal) -> bool {
     let best = |rungs: &[Rung]| rungs.iter().map(|r| r.evidence).fold(0.0, f64::max);
     let free = proposal.free.as_ref().filter(|free| !free.chosen);
