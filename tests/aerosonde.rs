@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use greylag::control::{self, ControllerKind, Target};
+use greylag::control::{self, Controller, ControllerKind, Target};
 use greylag::logs::{Flight, Sample};
 use greylag::model::{GreyBox, STEP, Trim};
 use greylag::num::stream::{Stream, stream};
@@ -144,27 +144,43 @@ fn validate_a_step_of_the_model_with_rudder_and_propeller() {
     assert!(rms.iter().all(|x| *x < 0.003), "{rms:?}");
 }
 
+/// The planner searches around the LQI's plan: there is no policy of this aircraft.
 #[test]
 fn turns_are_coordinated_by_the_rudder() {
-    let mut simulator = simulator();
-    let mut lqi = control::build(ControllerKind::Lqi, &model()).unwrap();
-    for (roll, pitch) in [(40.0_f64, 0.0_f64), (-40.0, 3.0), (20.0, 8.0), (-30.0, -8.0)] {
-        let target = Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 25.0 };
-        let mut seen = simulator.reset().unwrap();
-        lqi.reset(1);
-        let (mut sideslip, mut error) = (0.0_f64, 0.0_f64);
-        for step in 0..1000 {
-            seen = simulator.step(lqi.command(&seen, &target)).unwrap();
-            let s = seen.state;
-            sideslip = sideslip.max(s.beta.abs().to_degrees());
-            if step >= 800 {
-                error = error.max((s.roll - target.roll).abs().to_degrees());
-                error = error.max((s.pitch - target.pitch).abs().to_degrees());
-            }
+    for kind in [ControllerKind::Lqi, ControllerKind::HybridLqi] {
+        let mut simulator = simulator();
+        let mut controller = control::build(kind, &model()).unwrap();
+        for (roll, pitch) in [(40.0_f64, 0.0_f64), (-40.0, 3.0), (20.0, 8.0), (-30.0, -8.0)] {
+            let target =
+                Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 25.0 };
+            let [error, sideslip] = settled(&mut simulator, controller.as_mut(), &target);
+            println!(
+                "{kind} {roll} {pitch}: sideslip up to {sideslip:.3} deg, settled within {error:.4} deg"
+            );
+            assert!(error < 0.05 && sideslip < 0.5);
         }
-        println!("{roll} {pitch}: sideslip up to {sideslip:.3} deg, settled within {error:.4} deg");
-        assert!(error < 0.05 && sideslip < 0.5);
     }
+}
+
+/// Largest error of the attitude in the last 2 s of 10 s, and largest sideslip of all, degrees.
+fn settled(
+    simulator: &mut Simulator,
+    controller: &mut dyn Controller,
+    target: &Target,
+) -> [f64; 2] {
+    let mut seen = simulator.reset().unwrap();
+    controller.reset(1);
+    let (mut sideslip, mut error) = (0.0_f64, 0.0_f64);
+    for step in 0..1000 {
+        seen = simulator.step(controller.command(&seen, target)).unwrap();
+        let s = seen.state;
+        sideslip = sideslip.max(s.beta.abs().to_degrees());
+        if step >= 800 {
+            error = error.max((s.roll - target.roll).abs().to_degrees());
+            error = error.max((s.pitch - target.pitch).abs().to_degrees());
+        }
+    }
+    [error, sideslip]
 }
 
 #[test]

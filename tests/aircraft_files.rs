@@ -8,8 +8,10 @@ use greylag::model::GreyBox;
 use greylag::model::jsbsim::export;
 use greylag::model::textbook::{Measures, Tail};
 use greylag::physics::Command;
+use greylag::physics::formula::register;
 use greylag::sim::Simulator;
 use greylag::sim::import::{Imported, import};
+use greylag::sim::missing::Missing;
 use greylag::sim::one_step::{Flight, errors};
 use greylag_sitl::hidden::Hidden;
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
@@ -97,6 +99,52 @@ fn thrust_that_lags_is_imported_with_its_time_constant() {
     let lag = model.coefficients().iter().find(|c| c.name == "thrust_lag.tau_s").unwrap();
     // between throttle and thrust lies a frame of the simulator
     assert!((lag.value - 0.5).abs() < 0.03, "{lag:?}");
+}
+
+/// The coefficient `name` of an aerosonde with `hidden`, as an import has it, with that import.
+fn imported(hidden: Hidden, name: &str) -> (f64, GreyBox) {
+    let mut plant =
+        Plant::new(&PlantOptions { hidden: vec![hidden], ..options("aerosonde") }).unwrap();
+    let model = loaded(&import(&mut plant, "aerosonde", 25.0, 600.0).unwrap());
+    let found = model.coefficients().iter().find(|c| c.name == name);
+    println!("{found:?}");
+    (found.unwrap_or_else(|| panic!("no {name}")).value, model)
+}
+
+#[test]
+fn what_goes_with_the_rate_of_incidence_is_imported_apart_from_the_pitch_rate() {
+    let truth = shipped("params/aerosonde/jsbsim.toml");
+    let of = |model: &GreyBox, name: &str| {
+        model.coefficients().iter().find(|c| c.name == name).unwrap().value
+    };
+    let hidden = Hidden::new("unsteady_lift", 3.0).unwrap();
+    let (lift, model) = imported(hidden, "unsteady_lift.CLalphadot");
+    assert!((lift - 3.0).abs() < 0.03);
+    // the hidden effect pitches by half of what it lifts, against it
+    assert!((of(&model, "unsteady_lift.Cmalphadot") + 1.5).abs() < 0.015);
+    for name in ["pitch_linear.Cmq", "pitch_linear.Cmalpha", "lift_linear.CLq"] {
+        let (ours, theirs) = (of(&model, name), of(&truth, name));
+        assert!((ours - theirs).abs() < 0.005 * theirs.abs() + 1e-3, "{name}: {ours} for {theirs}");
+    }
+}
+
+/// The slipstream is hidden as a function of JSBSim's own thrust, which the import does not read.
+#[test]
+fn an_elevator_in_the_slipstream_is_imported_with_its_share_of_the_thrust() {
+    let effect = register::find("tail_slipstream").unwrap();
+    let hidden = Missing::written(effect, &[-3.0, -0.2]).unwrap().hidden.unwrap();
+    let (by_thrust, model) = imported(hidden, "tail_slipstream.Cmde_T");
+    assert!((by_thrust + 3.0).abs() < 0.06);
+    let truth = shipped("params/aerosonde/jsbsim.toml");
+    let of = |model: &GreyBox, name: &str| {
+        model.coefficients().iter().find(|c| c.name == name).unwrap().value
+    };
+    assert!((of(&model, "tail_slipstream.Cndr_T") + 0.2).abs() < 0.004);
+    for name in ["pitch_linear.Cmde", "rudder_linear.Cndr"] {
+        let (ours, theirs) = (of(&model, name), of(&truth, name));
+        assert!((ours - theirs).abs() < 0.005 * theirs.abs(), "{name}: {ours} for {theirs}");
+    }
+    assert!(!model.has("unsteady_lift") && !model.has("p_factor"));
 }
 
 #[test]

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use greylag::model::GreyBox;
-use greylag::physics::{effects, inputs};
+use greylag::physics::catalogue::on_air;
+use greylag::physics::inputs;
 use greylag::sim::design::{Suspect, alternatives};
 use greylag::sysid::weak_form::prepared::Prepared;
 use greylag::sysid::weak_form::windows::{Series, channels, columns};
@@ -55,7 +56,7 @@ fn candidates<'a>(
     model: &'a GreyBox,
     without: &'a [String],
 ) -> impl Iterator<Item = &'static str> + 'a {
-    let forces = effects::Kind::ALL.iter().map(|kind| kind.describe());
+    let forces = on_air();
     let inputs = inputs::Kind::ALL.iter().map(|kind| kind.describe());
     let all = forces.chain(inputs).filter(|about| about.entry.is_some()).map(|about| about.id);
     all.filter(|id| !model.has(id) && !without.iter().any(|w| w == id))

@@ -12,7 +12,8 @@ use crate::commands::effect_files::is_file;
 use crate::commands::files::{self, JsonArgument, Overwrite, shipped};
 use crate::model::GreyBox;
 use crate::physics::Channel;
-use crate::physics::effects::{self, Coefficient, Description};
+use crate::physics::catalogue::on_air;
+use crate::physics::effects::{Coefficient, Description};
 use crate::physics::formula::expression::Function;
 use crate::physics::formula::{Variable, Written, register};
 use crate::physics::inputs;
@@ -123,10 +124,7 @@ impl Place {
 
 /// Every effect that the program knows.
 fn catalogue() -> Vec<(Place, Description)> {
-    let (missing, prior): (Vec<_>, Vec<_>) = effects::Kind::ALL
-        .iter()
-        .map(|kind| kind.describe())
-        .partition(|about| about.entry.is_some());
+    let (missing, prior): (Vec<_>, Vec<_>) = on_air().partition(|about| about.entry.is_some());
     let inputs = inputs::Kind::ALL.iter().map(|kind| kind.describe());
     let at = |place| move |about| (place, about);
     missing

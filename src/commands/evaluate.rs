@@ -17,7 +17,7 @@ use crate::commands::files::{self, shipped};
 use crate::commands::start::{self, StartArguments};
 use crate::commands::{bar, choices, fly};
 use crate::control::cem::Change;
-use crate::control::{Controller, ControllerKind, Needs, Target};
+use crate::control::{Controller, ControllerKind, Needs, Source, Target, build};
 use crate::model::GreyBox;
 use crate::physics::Airframe;
 use crate::physics::airframe::Envelope;
@@ -240,20 +240,24 @@ fn entrants(arguments: &Arguments, models: &[GreyBox]) -> Result<Vec<Entrant>> {
         let sources: Vec<(&GreyBox, String, &PathBuf)> = match kind.needs() {
             Needs::Model => models.clone().map(|m| (m, m.name.clone(), &none)).collect(),
             Needs::Gains => models.clone().take(1).map(|m| (m, "-".into(), &none)).collect(),
-            Needs::Both => models
+            Needs::Both | Needs::ModelAndAnyPolicy => models
                 .clone()
-                .flat_map(|m| {
-                    policies().map(move |p| (m, format!("{}, {}", m.name, p.display()), p))
-                })
+                .flat_map(|m| policies().map(move |p| (m, m.name.clone(), p)))
                 .collect(),
             Needs::Policy => models
                 .clone()
                 .take(1)
-                .flat_map(|m| policies().map(move |p| (m, p.display().to_string(), p)))
+                .flat_map(|m| policies().map(move |p| (m, String::new(), p)))
                 .collect(),
         };
-        for (model, name, folder) in sources {
-            let controller = fly::controller(*kind, model, folder, &arguments.changes)?;
+        for (model, mut name, folder) in sources {
+            let agent = fly::policy(*kind, model, folder)?;
+            let changes = &arguments.changes;
+            let controller = build(*kind, Source { model, agent: agent.as_ref(), changes })?;
+            if agent.is_some() {
+                let separator = if name.is_empty() { "" } else { ", " };
+                name += &format!("{separator}{}", folder.display());
+            }
             entrants.push(Entrant { kind: *kind, model: name, controller });
         }
     }

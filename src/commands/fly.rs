@@ -15,7 +15,7 @@ use crate::commands::choices;
 use crate::commands::files::shipped;
 use crate::commands::flown_with::{Chosen, FlownWith};
 use crate::control::cem::Change;
-use crate::control::policy::{Agent, Origin};
+use crate::control::policy::{Agent, AgentError, Origin};
 use crate::control::{self, Controller, ControllerKind, Needs, Source, build};
 use crate::flight::monitor::Monitor;
 use crate::flight::pilot::{Config, Pilot};
@@ -69,7 +69,7 @@ pub struct Arguments {
     /// Model that the controller is designed from or plans with.
     #[arg(long, value_name = "FILE", default_value = MODEL)]
     model: PathBuf,
-    /// Folder of the trained policy, for controllers that need one.
+    /// Folder of the trained policy, for controllers that use one.
     #[arg(long, value_name = "DIR", default_value = POLICY)]
     policy: PathBuf,
     /// Settings of the planner in other than their usual size, as KEY=VALUE.
@@ -249,7 +249,7 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
     Ok(model)
 }
 
-/// The controller `kind` of `model`, with the policy in `folder` if it needs one.
+/// The controller `kind` of `model`, with the policy in `folder` as [`policy`] finds it.
 ///
 /// # Errors
 /// If the policy cannot be used, or the model does not allow the controller.
@@ -259,14 +259,39 @@ pub fn controller(
     folder: &Path,
     changes: &[Change],
 ) -> anyhow::Result<Box<dyn Controller>> {
-    if !matches!(kind.needs(), Needs::Policy | Needs::Both) {
-        return Ok(build(kind, Source { model, agent: None, changes })?);
+    let agent = policy(kind, model, folder)?;
+    Ok(build(kind, Source { model, agent: agent.as_ref(), changes })?)
+}
+
+/// The policy in `folder` for the controller `kind` of `model`; `None` where the controller uses none, or can do without
+/// one and `folder` is the default's, of another airframe. What is to be known of it goes to standard error.
+///
+/// # Errors
+/// If the policy cannot be used.
+pub fn policy(
+    kind: ControllerKind,
+    model: &GreyBox,
+    folder: &Path,
+) -> anyhow::Result<Option<Agent>> {
+    if matches!(kind.needs(), Needs::Gains | Needs::Model) {
+        return Ok(None);
     }
-    let agent = Agent::load(&shipped(folder), &model.airframe)?;
+    let agent = match Agent::load(&shipped(folder), &model.airframe) {
+        Err(AgentError::Airframe { airframe, .. })
+            if !kind.needs().policy() && folder == Path::new(POLICY) =>
+        {
+            eprintln!(
+                "note: there is no policy for airframe {airframe}; {kind} searches around the LQI's plan alone: \
+                 train one with `greylag train policy --env model:FILE` and name its folder with --policy"
+            );
+            return Ok(None);
+        }
+        agent => agent?,
+    };
     if let Some(note) = foreign_policy_note(&agent.origin, model, folder) {
         eprintln!("{note}");
     }
-    Ok(build(kind, Source { model, agent: Some(&agent), changes })?)
+    Ok(Some(agent))
 }
 
 /// What is to be said of a policy that was trained in another model than the one that flies with it.
@@ -300,7 +325,7 @@ pub fn check_changes(kinds: &[ControllerKind], changes: &[Change]) -> anyhow::Re
     )
 }
 
-/// A pilot with its controllers: `kind` flies, with the policy in `folder` if it needs one; an LQI of
+/// A pilot with its controllers: `kind` flies, with the policy in `folder` as [`policy`] finds it; an LQI of
 /// the same model is the fallback, or `pid-retuned`, with a line on standard error, where none can be designed.
 ///
 /// # Errors

@@ -81,11 +81,14 @@ impl<'a> Source<'a> {
         self.planner_over(None, name, settings)
     }
 
+    /// The same over the model's LQI. Without a policy the search starts from the LQI's plan alone.
     fn planner_over_lqi(
         &self,
         name: &'static str,
         settings: cem::Settings,
     ) -> Result<cem::Cem, SetupError> {
+        let proposals = if self.agent.is_some() { settings.proposals } else { 0 };
+        let settings = cem::Settings { proposals, ..settings };
         self.planner_over(Some(lqi::Lqi::new(self.model)?), name, settings)
     }
 
@@ -127,6 +130,15 @@ pub enum Needs {
     Policy,
     /// A model and a policy.
     Both,
+    /// A model; a policy's plans are tried beside the controller's own where there is one.
+    ModelAndAnyPolicy,
+}
+
+impl Needs {
+    /// Whether nothing flies without a policy.
+    pub fn policy(self) -> bool {
+        matches!(self, Needs::Policy | Needs::Both)
+    }
 }
 
 macro_rules! controllers {
@@ -165,7 +177,7 @@ macro_rules! controllers {
             source: impl Into<Source<'a>>,
         ) -> Result<Box<dyn Controller>, SetupError> {
             let source = source.into();
-            if let (Needs::Model | Needs::Both, Some(effect)) = (kind.needs(), source.model.proposed()) {
+            if let (Needs::Model | Needs::Both | Needs::ModelAndAnyPolicy, Some(effect)) = (kind.needs(), source.model.proposed()) {
                 return Err(SetupError::Proposed { model: source.model.name.clone(), effect });
             }
             match kind { $(ControllerKind::$kind => { let $from = source; Ok(Box::new($build)) })* }
@@ -185,7 +197,7 @@ controllers! {
     CemCritic "cem-critic" Planned Both "CEM-MPC with the critics' value of the end." => |from| from.planner("cem-critic", cem::Settings::CRITICS)?,
     Hybrid "hybrid" Planned Both "The hybrid controller: proposals and critics, eq. (26)." => |from| from.planner("hybrid", cem::Settings::HYBRID)?,
     HybridPolicy "hybrid-policy" Planned Both "The hybrid whose policy flies on behind each plan." => |from| from.planner("hybrid-policy", cem::Settings::OVER_POLICY)?,
-    HybridLqi "hybrid-lqi" Planned Both "The hybrid over the model's LQI, which flies on behind each plan: offset-free." => |from| from.planner_over_lqi("hybrid-lqi", cem::Settings::OVER_LQI)?,
+    HybridLqi "hybrid-lqi" Planned ModelAndAnyPolicy "The hybrid over the model's LQI, which flies on behind each plan: offset-free." => |from| from.planner_over_lqi("hybrid-lqi", cem::Settings::OVER_LQI)?,
     Policy "policy" Immediate Policy "A trained policy alone." => |from| Policy::new(from.agent()?),
 }
 

@@ -27,15 +27,26 @@ impl Size {
         if !coefficient.grows {
             return coefficient.bounds;
         }
-        let factor = match coefficient.unit {
-            "N" => self.mass,
-            "m" => self.length,
-            "N m" => self.mass * self.length,
-            "N m s" | "kg m²" => self.mass * self.length * self.length,
-            _ => 1.0,
-        };
+        let factor = self.factor(coefficient.unit).unwrap_or(1.0);
         let (least, most) = coefficient.bounds;
         (factor * least, factor * most)
+    }
+}
+
+impl Size {
+    fn factor(&self, unit: &str) -> Option<f64> {
+        match unit {
+            "N" => Some(self.mass),
+            "m" => Some(self.length),
+            "N m" => Some(self.mass * self.length),
+            "N m s" | "kg m²" => Some(self.mass * self.length * self.length),
+            _ => None,
+        }
+    }
+
+    /// Whether bounds in `unit` grow with an aircraft.
+    pub fn scales(unit: &str) -> bool {
+        Size { mass: 1.0, length: 1.0 }.factor(unit).is_some()
     }
 }
 

@@ -3,13 +3,20 @@
 mod effects;
 mod files;
 mod fits;
+mod lateral;
+mod propeller;
 mod propulsion;
 
 use greylag_sitl::plant::{Inputs, Loads, MassProperties, Plant, PlantError, Start, Stops, Travel};
 
+use crate::physics::airframe::Geometry;
+use crate::physics::rigid_body::RigidBody;
+use crate::physics::size::Size;
 use effects::effects;
 use files::{airframe, model_file};
 use fits::{first_order, second_order};
+use lateral::{AileronOverIncidence, WithLift};
+use propeller::Propeller;
 
 /// Metres per foot.
 const FT: f64 = 0.3048;
@@ -21,6 +28,8 @@ const ANGLE: f64 = 0.035;
 const FAR: f64 = 4.0 * ANGLE;
 /// Half the interval of dimensionless rates.
 const RATE: f64 = 0.005;
+/// Pitch angle at which gravity turns the path otherwise than in level flight, rad: 60°.
+const ATTITUDE: f64 = 1.05;
 /// Half the interval of commands.
 const COMMAND: f64 = 0.2;
 /// Incidences of the tables, degrees.
@@ -90,6 +99,8 @@ struct Subject<'a> {
     span: f64,
     chord: f64,
     mass: MassProperties,
+    /// Coefficients by the rate of incidence as α̇c/2V, which every evaluation is freed of.
+    alpha_rate: Coefficients,
 }
 
 /// D, Y, L and l, m, n as coefficients.
@@ -123,13 +134,21 @@ pub fn import(
     let area = plant.property("metrics/Sw-sqft")? * FT * FT;
     let span = plant.property("metrics/bw-ft")? * FT;
     let chord = plant.property("metrics/cbarw-ft")? * FT;
-    let mut subject = Subject { plant, start, area, span, chord, mass };
+    let mut subject = Subject { plant, start, area, span, chord, mass, alpha_rate: [0.0; 6] };
+    subject.alpha_rate = subject.alpha_rate()?;
     let mut left_out = Vec::new();
     let (polar, lift_max) = subject.polar()?;
     if lift_max <= 0.0 {
         return Err(ImportError::Lift { airspeed: cruise });
     }
-    let effects = effects(&polar, &subject.slopes(&travel)?, &mut left_out);
+    let beside = Beside {
+        alpha_rate: subject.alpha_rate,
+        propeller: subject.propeller(&travel)?,
+        with_lift: subject.lateral_with_lift()?,
+        aileron: subject.aileron_over_incidence(at_command(travel.aileron))?,
+    };
+    let size = subject.size();
+    let effects = effects(&polar, &subject.slopes(&travel)?, &beside, &size, &mut left_out);
     let propulsion = subject.propulsion(&mut left_out)?;
     let lags = subject.lags(&travel)?;
     Ok(Imported {
@@ -165,6 +184,14 @@ impl Polar {
     }
 }
 
+/// What the linear coefficients leave.
+struct Beside {
+    alpha_rate: Coefficients,
+    propeller: Propeller,
+    with_lift: Option<WithLift>,
+    aileron: Option<AileronOverIncidence>,
+}
+
 /// Slopes of the coefficients by what they depend on, at the incidence [`ALPHA`].
 struct Slopes {
     base: Coefficients,
@@ -184,8 +211,46 @@ impl Subject<'_> {
     /// Coefficients in `state`, the surfaces at `inputs`.
     fn at(&mut self, state: &Start, inputs: &Inputs) -> Result<Coefficients, PlantError> {
         let loads = self.plant.loads(state, inputs)?;
-        let pressure = 0.5 * loads.truth.air_density_kgpm3 * state.airspeed_mps.powi(2) * self.area;
-        Ok(self.coefficients(&loads, pressure))
+        let pressure = self.pressure(&loads);
+        self.steady(&loads, pressure)
+    }
+
+    fn size(&self) -> Size {
+        let MassProperties { mass_kg: mass, inertia_kgm2: [jx, jy, jz, jxz] } = self.mass;
+        let geometry = Geometry { area: self.area, span: self.span, chord: self.chord };
+        Size::new(&RigidBody { mass, jx, jy, jz, jxz }, &geometry)
+    }
+
+    /// Dynamic pressure times wing area, N.
+    fn pressure(&self, loads: &Loads) -> f64 {
+        0.5 * loads.truth.air_density_kgpm3 * loads.truth.airspeed_mps.powi(2) * self.area
+    }
+
+    /// Coefficients of `loads`, just evaluated, less what the rate of incidence makes.
+    fn steady(&mut self, loads: &Loads, pressure: f64) -> Result<Coefficients, PlantError> {
+        let rate = self.incidence_rate(loads.truth.airspeed_mps)?;
+        let all = self.coefficients(loads, pressure);
+        Ok(std::array::from_fn(|k| all[k] - rate * self.alpha_rate[k]))
+    }
+
+    /// α̇c/2V as JSBSim has it.
+    fn incidence_rate(&mut self, airspeed: f64) -> Result<f64, PlantError> {
+        let rate = self.plant.property("aero/alphadot-rad_sec")?;
+        Ok(rate * self.chord / (2.0 * airspeed))
+    }
+
+    /// Slopes of the coefficients by α̇c/2V: at one airflow, gravity turns the path faster in some attitudes than in others.
+    fn alpha_rate(&mut self) -> Result<Coefficients, PlantError> {
+        let mut sides = [([0.0; 6], 0.0); 2];
+        for (side, pitch_rad) in sides.iter_mut().zip([0.0, ATTITUDE]) {
+            let state = Start { alpha_rad: ALPHA, pitch_rad, ..self.start };
+            let loads = self.plant.loads(&state, &Inputs::default())?;
+            let pressure = self.pressure(&loads);
+            *side = (self.coefficients(&loads, pressure), self.incidence_rate(state.airspeed_mps)?);
+        }
+        let [(level, slow), (steep, fast)] = sides;
+        let by = fast - slow;
+        Ok(std::array::from_fn(|k| if by.abs() > 1e-9 { (steep[k] - level[k]) / by } else { 0.0 }))
     }
 
     fn coefficients(&self, loads: &Loads, pressure: f64) -> Coefficients {
@@ -238,13 +303,12 @@ impl Subject<'_> {
         let base = self.at(&Start { alpha_rad: ALPHA, ..self.start }, &Inputs::default())?;
         let v = self.start.airspeed_mps;
         let (per_span, per_chord) = (2.0 * v / self.span, 2.0 * v / self.chord);
-        let mean = |s: Stops| COMMAND * 0.5 * (s.most_rad - s.least_rad);
         let (beta, even_beta) = self.slope(ANGLE, |k, s, _| s.beta_rad = k * ANGLE)?;
         let (_, far_beta) = self.slope(FAR, |k, s, _| s.beta_rad = k * FAR)?;
         let (elevator, even_elevator) =
-            self.slope(mean(travel.elevator), |k, _, i| i.elevator = k * COMMAND)?;
+            self.slope(at_command(travel.elevator), |k, _, i| i.elevator = k * COMMAND)?;
         let rudder = match travel.rudder {
-            Some(stops) => Some(self.slope(mean(stops), |k, _, i| i.rudder = k * COMMAND)?.0),
+            Some(stops) => Some(self.slope(at_command(stops), |k, _, i| i.rudder = k * COMMAND)?.0),
             None => None,
         };
         Ok(Slopes {
@@ -253,11 +317,12 @@ impl Subject<'_> {
             p: self.slope(RATE, |k, s, _| s.p_radps = k * RATE * per_span)?.0,
             q: self.slope(RATE, |k, s, _| s.q_radps = k * RATE * per_chord)?.0,
             r: self.slope(RATE, |k, s, _| s.r_radps = k * RATE * per_span)?.0,
-            aileron: self.slope(mean(travel.aileron), |k, _, i| i.aileron = k * COMMAND)?.0,
+            aileron: self.slope(at_command(travel.aileron), |k, _, i| i.aileron = k * COMMAND)?.0,
             elevator,
             rudder,
             drag_beta: size_and_square([even_beta[0] - base[0], far_beta[0] - base[0]]),
-            drag_elevator: ((even_elevator[0] - base[0]) / mean(travel.elevator)).clamp(0.0, 0.5),
+            drag_elevator: ((even_elevator[0] - base[0]) / at_command(travel.elevator))
+                .clamp(0.0, 0.5),
         })
     }
 
@@ -278,6 +343,11 @@ impl Subject<'_> {
         let throttle: Vec<f64> = traces.iter().map(|t| t[3]).collect();
         Ok(([of(0, travel.aileron), of(1, travel.elevator), rudder], first_order(&throttle)))
     }
+}
+
+/// Deflection at [`COMMAND`], the mean of both sides, rad.
+fn at_command(stops: Stops) -> f64 {
+    COMMAND * 0.5 * (stops.most_rad - stops.least_rad)
 }
 
 /// a and b of a |β| + b β² from its values at [`ANGLE`] and [`FAR`].

@@ -5,6 +5,8 @@ use std::fmt::Write;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::num::stream::stream;
+use crate::physics::catalogue::describe;
+use crate::physics::size::Size;
 use crate::sim::missing::{Missing, rounded};
 
 /// How wrong coefficients are: standard deviation as a share of the value, none beyond twice.
@@ -100,7 +102,7 @@ fn make_wrong(effects: &mut toml::Table, seed: u64) {
             let path: Vec<u64> = format!("{id}.{name}").bytes().map(u64::from).collect();
             let mut random = stream(seed, &[[DRAW].as_slice(), &path].concat());
             let unit: f64 = StandardNormal.sample(&mut random);
-            let wrong = value * (1.0 + WRONG * unit.clamp(-2.0, 2.0));
+            let wrong = possible(id, name, value * (1.0 + WRONG * unit.clamp(-2.0, 2.0)));
             // a width that is narrower than the error would hold the fit to the error; without one it is 15 %
             if number
                 .get("sd")
@@ -112,6 +114,16 @@ fn make_wrong(effects: &mut toml::Table, seed: u64) {
             number.insert("value".into(), rounded(wrong).into());
             number.insert("source".into(), "a guess, good to some 15 %".into());
         }
+    }
+}
+
+/// The nearest value that the coefficient can have on an aircraft of any size.
+fn possible(effect: &str, name: &str, value: f64) -> f64 {
+    let about = describe(effect);
+    let own = about.and_then(|about| about.coefficients.iter().find(|c| c.name == name));
+    match own.filter(|c| !Size::scales(c.unit)) {
+        Some(c) => value.clamp(c.bounds.0, c.bounds.1),
+        None => value,
     }
 }
 

@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use greylag::physics::effects::{self, Description};
+use greylag::physics::catalogue::on_air;
+use greylag::physics::effects::Description;
 use greylag::physics::{Channel, inputs};
 use greylag::sysid::flight_path::measurement_effects::MEASUREMENT_EFFECTS;
 
@@ -20,8 +21,7 @@ Q is dynamic pressure times wing area. Angles are in radians.
 
 /// The page.
 pub fn page() -> String {
-    let all = effects::Kind::ALL.iter().map(|kind| kind.describe());
-    let (missing, prior): (Vec<_>, Vec<_>) = all.partition(|about| about.entry.is_some());
+    let (missing, prior): (Vec<_>, Vec<_>) = on_air().partition(|about| about.entry.is_some());
     let groups = [
         ("Effects that a model may lack: forces, moments, body", missing),
         (

@@ -56,7 +56,7 @@ impl Plant {
         start: &Start,
         throttle: f64,
     ) -> Result<(f64, Truth), PlantError> {
-        self.held_in(start, |plant| plant.settle_engines(throttle))
+        self.held_in(start, |plant| plant.settle_engines(&Inputs { throttle, ..Inputs::default() }))
     }
 
     /// Thrust along body x (N) and throttle position (0..1) once the engines have settled at the first of the
@@ -72,7 +72,8 @@ impl Plant {
     ) -> Result<Vec<[f64; 2]>, PlantError> {
         self.held_in(start, |plant| {
             let Some((first, rest)) = throttles.split_first() else { return Ok(Vec::new()) };
-            let (thrust, truth) = plant.settle_engines(*first)?;
+            let at_first = Inputs { throttle: *first, ..Inputs::default() };
+            let (thrust, truth) = plant.settle_engines(&at_first)?;
             let mass = plant.mass_properties()?.mass_kg;
             let mut response = vec![[thrust, truth.throttle]];
             for throttle in rest {
@@ -80,6 +81,22 @@ impl Plant {
                 response.push([plant.thrust(mass)?, plant.truth.throttle]);
             }
             Ok(response)
+        })
+    }
+
+    /// Loads and thrust along body x (N) once the engines have settled at the throttle of `inputs` and the surfaces
+    /// where it commands them, with the aircraft held in `start`. Reset the plant before it is stepped.
+    ///
+    /// # Errors
+    /// [`PlantError`] when the aircraft cannot be evaluated there.
+    pub fn powered_loads(
+        &mut self,
+        start: &Start,
+        inputs: &Inputs,
+    ) -> Result<(Loads, f64), PlantError> {
+        self.held_in(start, |plant| {
+            let (thrust, _) = plant.settle_engines(inputs)?;
+            Ok((plant.loads_now()?, thrust))
         })
     }
 
@@ -117,14 +134,13 @@ impl Plant {
         Ok(mass * self.truth.specific_force_mps2[0] - aero)
     }
 
-    fn settle_engines(&mut self, throttle: f64) -> Result<(f64, Truth), PlantError> {
+    fn settle_engines(&mut self, inputs: &Inputs) -> Result<(f64, Truth), PlantError> {
         let second = self.steps_of_a_second();
-        let inputs = Inputs { throttle, ..Inputs::default() };
         let mass = self.mass_properties()?.mass_kg;
         let (mut last, mut seconds) = (f64::INFINITY, 0.0);
         loop {
             for _ in 0..second {
-                self.step(inputs)?;
+                self.step(*inputs)?;
             }
             seconds += 1.0;
             let thrust = self.thrust(mass)?;
@@ -165,6 +181,10 @@ impl Plant {
             }
             last = now;
         }
+        self.loads_now()
+    }
+
+    fn loads_now(&mut self) -> Result<Loads, PlantError> {
         let three =
             |plant: &mut Plant, names: [&str; 3], unit: f64| -> Result<[f64; 3], PlantError> {
                 let [a, b, c] = names.map(|name| plant.property(name));

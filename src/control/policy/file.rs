@@ -74,7 +74,7 @@ pub enum AgentError {
         why: String,
     },
     /// It was trained for another aircraft.
-    #[error("policy {path} was trained for another airframe than {airframe}; fly it with the airframe of model {model}, or train one for this", path = path.display())]
+    #[error("policy {path} was trained for another airframe than {airframe}; fly it with the airframe of model {model}, train one for this with `greylag train policy --env model:FILE`, or fly hybrid-lqi or lqi, which need none", path = path.display())]
     Airframe {
         /// The folder.
         path: PathBuf,

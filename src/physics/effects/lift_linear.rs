@@ -15,7 +15,7 @@ impl Effect for LiftLinear {
     const COEFFICIENTS: &'static [Coefficient] = &[
         coefficient("CL0", "lift coefficient at zero incidence", "", (-1.0, 1.0)),
         coefficient("CLalpha", "lift slope", "1/rad", (0.0, 10.0)),
-        coefficient("CLq", "lift due to pitch rate", "", (-20.0, 20.0)),
+        coefficient("CLq", "lift due to pitch rate", "", (-40.0, 40.0)),
         coefficient("CLde", "lift due to elevator", "1/rad", (-6.0, 6.0)),
     ];
 

@@ -19,7 +19,7 @@ impl Effect for UnsteadyLift {
             "Cmalphadot",
             "pitching moment due to the rate of angle of attack",
             "",
-            (-20.0, 20.0),
+            (-60.0, 60.0),
         ),
     ];
     const NEEDS: Needs = Needs::Rate;

@@ -49,6 +49,9 @@ struct Parameter {
     value: f64,
     width: Option<f64>,
     bounds: [f64; 2],
+    /// Whether the bounds grow with an aircraft of more than 25 kg or 5 m, as those of the catalogue do.
+    #[serde(default)]
+    grows: bool,
     unit: String,
     meaning: String,
 }
@@ -319,7 +322,7 @@ fn description(
             meaning: leaked(&p.meaning),
             unit: leaked(&p.unit),
             bounds: (p.bounds[0], p.bounds[1]),
-            grows: false,
+            grows: p.grows,
         })
         .collect();
     let mut channels: Vec<Channel> = Vec::new();

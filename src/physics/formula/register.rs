@@ -1,11 +1,13 @@
-//! The effects of files that this process has read.
+//! The effects of files: those that the program ships, and those that this process has read.
 //!
 //! An effect of a file is asked for by its id, as one of the catalogue is, and both live as long as the process: a
 //! file that is read again is the same effect, one that was edited in between takes its place for whoever asks
 //! next. Models that were loaded before keep what they have.
 
 use std::path::{Path, PathBuf};
-use std::sync::{PoisonError, RwLock};
+use std::sync::{LazyLock, PoisonError, RwLock};
+
+use include_dir::{Dir, include_dir};
 
 use super::file;
 use super::written::Written;
@@ -13,10 +15,23 @@ use crate::physics::airframe::FileError;
 
 static READ: RwLock<Vec<&'static Written>> = RwLock::new(Vec::new());
 
-/// The effect of that id, if a file with it was read.
+static FOLDER: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/params/catalogue");
+
+static SHIPPED: LazyLock<Vec<Written>> = LazyLock::new(|| {
+    let texts = FOLDER.files().filter_map(|f| f.contents_utf8());
+    texts.filter_map(|text| file::parse(text).ok()).collect()
+});
+
+/// The effects of the files that belong to the catalogue, in the order of their ids.
+pub fn shipped() -> &'static [Written] {
+    &SHIPPED
+}
+
+/// The effect of that id: of a file that was read, or else of one that belongs to the catalogue.
 pub fn find(id: &str) -> Option<&'static Written> {
     let read = READ.read().unwrap_or_else(PoisonError::into_inner);
-    read.iter().rev().copied().find(|effect| effect.about.id == id)
+    let own = read.iter().rev().copied().find(|effect| effect.about.id == id);
+    own.or_else(|| shipped().iter().find(|effect| effect.about.id == id))
 }
 
 /// Reads the text of an effect file and notes the effect.

@@ -1,21 +1,22 @@
 //! The effects of the model with their coefficients, from slopes and polar.
 
 use super::fits::line;
-use super::{Polar, Slopes};
+use super::{Beside, Polar, Slopes};
 use crate::model::textbook::Estimate;
 use crate::physics::catalogue::describe;
+use crate::physics::size::Size;
 
 /// An effect of the model file with its numbers.
 pub(super) type Effect = (&'static str, Vec<Estimate>);
 
 const SOURCE: &str = "central difference of JSBSim's loads";
 
-/// Keeps coefficients within what their effects take; what is cut off is said.
-fn bounded(effect: &str, estimates: &mut [Estimate], left_out: &mut Vec<String>) {
+/// Keeps coefficients within what their effects take of an aircraft of that size; what is cut off is said.
+fn bounded(effect: &str, estimates: &mut [Estimate], size: &Size, left_out: &mut Vec<String>) {
     let coefficients = describe(effect).map_or(&[][..], |about| about.coefficients);
     for estimate in estimates {
         let Some(own) = coefficients.iter().find(|c| c.name == estimate.0) else { continue };
-        let (least, most) = own.bounds;
+        let (least, most) = size.bounds(own);
         let within = estimate.1.clamp(least, most);
         if within != estimate.1 {
             left_out.push(format!(
@@ -28,7 +29,13 @@ fn bounded(effect: &str, estimates: &mut [Estimate], left_out: &mut Vec<String>)
 }
 
 /// The effects of the model with their coefficients.
-pub(super) fn effects(polar: &Polar, slopes: &Slopes, left_out: &mut Vec<String>) -> Vec<Effect> {
+pub(super) fn effects(
+    polar: &Polar,
+    slopes: &Slopes,
+    beside: &Beside,
+    size: &Size,
+    left_out: &mut Vec<String>,
+) -> Vec<Effect> {
     let [zero, slope, _] = line(polar);
     let Slopes { base, beta, p, q, r, aileron: a, elevator: e, .. } = slopes;
     let exact = |name, value| -> Estimate { (name, value, 0.02, SOURCE) };
@@ -69,6 +76,85 @@ pub(super) fn effects(polar: &Polar, slopes: &Slopes, left_out: &mut Vec<String>
         let numbers = vec![exact("CYdr", d[1]), exact("Cldr", d[3]), exact("Cndr", d[5])];
         all.push(("rudder_linear", numbers));
     }
-    all.iter_mut().for_each(|(effect, estimates)| bounded(effect, estimates, left_out));
+    beside.put(&mut all);
+    all.iter_mut().for_each(|(effect, estimates)| bounded(effect, estimates, size, left_out));
     all
+}
+
+/// Rate derivatives of lift and pitching moment that are none.
+const NO_RATE: f64 = 1e-3;
+
+impl Beside {
+    /// Adds its effects, and takes from the linear coefficients what these now hold.
+    fn put(&self, all: &mut Vec<Effect>) {
+        let powered = "central difference of JSBSim's loads at three throttles";
+        let lift = self.alpha_rate[2];
+        let pitch = self.alpha_rate[4];
+        if lift.abs() > NO_RATE || pitch.abs() > NO_RATE {
+            let source = "difference of JSBSim's loads between two attitudes";
+            let numbers =
+                vec![("CLalphadot", lift, 0.02, source), ("Cmalphadot", pitch, 0.02, source)];
+            all.push(("unsteady_lift", numbers));
+        }
+        let surfaces = [
+            (self.propeller.elevator, "pitch_linear", "Cmde", "Cmde_T"),
+            (self.propeller.rudder, "rudder_linear", "Cndr", "Cndr_T"),
+        ];
+        let mut slipstream = Vec::new();
+        for (found, linear, own, name) in surfaces {
+            if let Some([still, _]) = found {
+                set(all, linear, own, still);
+            }
+            slipstream.push((name, found.map_or(0.0, |[_, by_thrust]| by_thrust), 0.05, powered));
+        }
+        if surfaces.iter().any(|(found, ..)| found.is_some()) {
+            all.push(("tail_slipstream", slipstream));
+        }
+        if let Some([still, full]) = self.propeller.gyro {
+            let source = "least squares over JSBSim's moments of the engines by yaw rate";
+            all.push(("propeller_gyro", vec![("h_nms", still, 0.1, source)]));
+            all.push(("propeller_gyro_throttle", vec![("h_nms", full, 0.1, source)]));
+        }
+        let source = "least squares over JSBSim's yawing moment of the engines";
+        if let Some(y) = self.propeller.sideways {
+            all.push(("thrust_line_sideways", vec![("y_m", y, 0.1, source)]));
+        }
+        if let Some(k) = self.propeller.p_factor {
+            all.push(("p_factor", vec![("k", k, 0.1, source)]));
+        }
+        if let Some(found) = self.aileron {
+            let source = "central differences of JSBSim's loads at two incidences";
+            let names = ["Clalphada", "Cnalphada"];
+            for ((effect, name), value) in
+                [("roll_linear", "Clda"), ("yaw_linear", "Cnda")].into_iter().zip(found.without)
+            {
+                set(all, effect, name, value);
+            }
+            let numbers = names.into_iter().zip(found.by_incidence);
+            let numbers = numbers.map(|(name, value)| (name, value, 0.05, source)).collect();
+            all.push(("roll_control_alpha", numbers));
+        }
+        if let Some(found) = &self.with_lift {
+            let source = "central differences of JSBSim's loads at two incidences";
+            let linear = [
+                ("roll_linear", "Clr"),
+                ("roll_linear", "Clbeta"),
+                ("yaw_linear", "Cnp"),
+                ("yaw_linear", "Cnbeta"),
+            ];
+            for ((effect, name), value) in linear.into_iter().zip(found.without) {
+                set(all, effect, name, value);
+            }
+            let names = ["Clr_CL", "Clbeta_CL", "Cnp_CL", "Cnbeta_CL"];
+            let numbers = names.into_iter().zip(found.by_lift);
+            let numbers = numbers.map(|(name, value)| (name, value, 0.05, source)).collect();
+            all.push(("lateral_with_lift", numbers));
+        }
+    }
+}
+
+/// Gives the coefficient `name` of `effect` another value.
+fn set(all: &mut [Effect], effect: &str, name: &str, value: f64) {
+    let own = all.iter_mut().filter(|(id, _)| *id == effect).flat_map(|(_, numbers)| numbers);
+    own.filter(|number| number.0 == name).for_each(|number| number.1 = value);
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::super::bench::Inner;
 use super::super::commands::quoted;
 use super::super::error::WorkbenchError;
-use crate::control::{ControllerKind, Needs};
+use crate::control::ControllerKind;
 use crate::manoeuvres::menu::{self, MENU};
 
 /// The schedule of `greylag demo` where no other is named.
@@ -84,8 +84,7 @@ impl Inner {
 
 /// Controllers that need a model alone.
 pub fn controllers() -> impl Iterator<Item = &'static str> {
-    let alone =
-        ControllerKind::ALL.iter().filter(|k| !matches!(k.needs(), Needs::Policy | Needs::Both));
+    let alone = ControllerKind::ALL.iter().filter(|k| !k.needs().policy());
     alone.map(|k| k.name())
 }
 

@@ -3,7 +3,9 @@
 use rayon::prelude::*;
 
 use crate::model::GreyBox;
+use crate::physics::catalogue::on_air;
 use crate::physics::effects::{Description, Kind};
+use crate::physics::formula::register;
 use crate::physics::inputs;
 use crate::physics::size::Size;
 use crate::sysid::diagnose::regression::columns::{Ready, combine};
@@ -39,9 +41,11 @@ impl Entry {
 /// but for those of `without`.
 pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<Entry> {
     let of = |about: Description, operator| Entry { about, operator };
-    let physical = Kind::ALL.iter().map(|k| of(k.describe(), false));
+    let physical = on_air().map(|about| of(about, false));
     let on_inputs = inputs::Kind::ALL.iter().map(|k| of(k.describe(), true));
-    let own = with.iter().filter_map(|id| Kind::from_id(id)).filter(|k| k.written().is_some());
+    let shipped = |id: &str| register::shipped().iter().any(|effect| effect.about.id == id);
+    let own = with.iter().filter(|id| !shipped(id)).filter_map(|id| Kind::from_id(id));
+    let own = own.filter(|k| k.written().is_some());
     physical
         .chain(on_inputs)
         .chain(own.map(|k| of(k.describe(), false)))
@@ -169,7 +173,8 @@ impl Columns {
                 let (low, high) = model.size().bounds(c);
                 (k, next + k, [low, high])
             });
-            let free = free.collect();
+            // what the flights do not move, as the rudder of an aircraft without one, stays at zero
+            let free = free.filter(|(_, column, _)| self.acts(*column)).collect();
             let trial = Trial {
                 id: e.about.id,
                 points: vec![Point { values, contribution: None, free }],
@@ -210,6 +215,12 @@ impl Columns {
                 .map(|(i, &k)| (k, first + 1 + i, reach(k)))
                 .collect(),
         });
+    }
+
+    /// Whether a column has anything but zeros.
+    fn acts(&self, column: usize) -> bool {
+        let moved = |x: &f64| *x != 0.0;
+        self.columns.iter().any(|list| list[column].iter().flatten().any(moved))
     }
 
     /// Notes where a trial acts, and keeps it if it acts at all.

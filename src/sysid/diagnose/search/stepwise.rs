@@ -29,6 +29,8 @@ use run_off::run_off;
 const RANKED: f64 = 0.3;
 /// Most effects that are asserted together.
 const MOST: usize = 6;
+/// Most candidates that are refused beside what has joined before the search ends.
+const MOST_ASIDE: usize = 4;
 
 /// Searches for what `model` lacks.
 ///
@@ -73,6 +75,7 @@ pub fn search(
         level: Vec::new(),
         selected: Vec::new(),
     };
+    let mut aside = Vec::new();
     while found.selected.len() < MOST {
         found.beaten.clear();
         found.level.clear();
@@ -86,12 +89,21 @@ pub fn search(
             (None, false) => "is refused",
         };
         say(progress, &format!("{}: {outcome}", winner.id), found.fraction())?;
+        // several things may be missing: what is refused beside one of them does not hide the next
+        if !passed && found.last.is_some() && aside.len() < MOST_ASIDE {
+            found.scores.remove(0);
+            aside.push(winner);
+            continue;
+        }
+        aside.retain(|s: &Selected| s.id != winner.id);
         found.selected.push(winner);
         if !passed || !found.join(problem, model, &entries, options, progress)? {
             break;
         }
     }
     found.judge_remainder();
+    aside.retain(|s| found.selected.iter().all(|other| other.id != s.id));
+    found.selected.append(&mut aside);
     Ok(found)
 }
 

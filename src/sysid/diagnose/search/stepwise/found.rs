@@ -73,7 +73,7 @@ pub struct Found {
     pub beaten: Vec<usize>,
     /// Trials of the last round that were as good as the first one once both had settled.
     pub level: Vec<usize>,
-    /// Asserted effects in the order of selection, then the one refused, if there is one.
+    /// Asserted effects in the order of selection, then those refused.
     pub selected: Vec<Selected>,
 }
 

@@ -1,0 +1,81 @@
+//! Lateral derivatives of the wing that grow with its lift.
+
+use greylag_sitl::plant::{Inputs, PlantError, Start};
+
+use super::{ALPHA, ANGLE, COMMAND, RATE, Subject};
+
+/// Change between the two incidences below which a derivative is constant, in parts of the largest of its kind.
+const CONSTANT: f64 = 0.02;
+
+/// Derivatives by lift coefficient with what is left of them without lift.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WithLift {
+    /// Clr, Clβ, Cnp, Cnβ without lift.
+    pub(super) without: [f64; 4],
+    /// What a unit of the lift coefficient adds to each.
+    pub(super) by_lift: [f64; 4],
+}
+
+/// Rolling and yawing moment of the aileron, 1/rad, without incidence, and what a radian of incidence adds, 1/rad².
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AileronOverIncidence {
+    pub(super) without: [f64; 2],
+    pub(super) by_incidence: [f64; 2],
+}
+
+impl Subject<'_> {
+    /// Clδa and Cnδa at two incidences, where the aileron is at `unit` (rad) at [`COMMAND`]; `None` where they hardly
+    /// differ.
+    pub(super) fn aileron_over_incidence(
+        &mut self,
+        unit: f64,
+    ) -> Result<Option<AileronOverIncidence>, PlantError> {
+        let mut at = [[0.0; 2]; 2];
+        for (own, sign) in at.iter_mut().zip([-1.0, 1.0]) {
+            let base = Start { alpha_rad: ALPHA + sign * ANGLE, ..self.start };
+            let [up, down] = [COMMAND, -COMMAND]
+                .map(|aileron| self.at(&base, &Inputs { aileron, ..Inputs::default() }));
+            let (up, down) = (up?, down?);
+            *own = [3, 5].map(|c| (up[c] - down[c]) / (2.0 * unit));
+        }
+        let [low, high] = at;
+        let by_incidence: [f64; 2] = std::array::from_fn(|k| (high[k] - low[k]) / (2.0 * ANGLE));
+        let without = std::array::from_fn(|k| low[k] - by_incidence[k] * (ALPHA - ANGLE));
+        let changes = (0..2).any(|k| (high[k] - low[k]).abs() > CONSTANT * high[0].abs());
+        Ok(changes.then_some(AileronOverIncidence { without, by_incidence }))
+    }
+
+    /// Clr, Clβ, Cnp and Cnβ at two incidences; `None` where they hardly differ.
+    pub(super) fn lateral_with_lift(&mut self) -> Result<Option<WithLift>, PlantError> {
+        let mut at = [[0.0; 5]; 2];
+        for (own, sign) in at.iter_mut().zip([-1.0, 1.0]) {
+            let base = Start { alpha_rad: ALPHA + sign * ANGLE, ..self.start };
+            let rate = RATE * 2.0 * self.start.airspeed_mps / self.span;
+            let mut slope = |unit: f64, set: &dyn Fn(&mut Start, f64)| {
+                let mut side = |k: f64| {
+                    let mut state = base;
+                    set(&mut state, k);
+                    self.at(&state, &Inputs::default())
+                };
+                let (up, down) = (side(1.0)?, side(-1.0)?);
+                Ok::<_, PlantError>([3, 5].map(|c| (up[c] - down[c]) / (2.0 * unit)))
+            };
+            let [by_r, _] = slope(RATE, &|s, k| s.r_radps = k * rate)?;
+            let [_, by_p] = slope(RATE, &|s, k| s.p_radps = k * rate)?;
+            let [roll, yaw] = slope(ANGLE, &|s, k| s.beta_rad = k * ANGLE)?;
+            let lift = self.at(&base, &Inputs::default())?[2];
+            *own = [by_r, roll, by_p, yaw, lift];
+        }
+        let [low, high] = at;
+        let lift = high[4] - low[4];
+        let by_lift: [f64; 4] = std::array::from_fn(|k| (high[k] - low[k]) / lift);
+        let without = std::array::from_fn(|k| low[k] - by_lift[k] * low[4]);
+        let most = |k: [usize; 2]| {
+            k.map(|k| low[k].abs().max(high[k].abs())).into_iter().fold(0.0, f64::max)
+        };
+        // roll due to yaw rate and yaw due to roll rate are of one size, as are those due to sideslip
+        let scale = [most([0, 2]), most([1, 3]), most([0, 2]), most([1, 3])];
+        let changes = (0..4).any(|k| (high[k] - low[k]).abs() > CONSTANT * scale[k]);
+        Ok((changes && lift.abs() > 1e-3).then_some(WithLift { without, by_lift }))
+    }
+}

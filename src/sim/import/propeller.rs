@@ -1,0 +1,115 @@
+//! What a running propeller does beside its thrust: slipstream over the tail, gyroscopic moments, P-factor.
+
+use greylag_sitl::plant::{Inputs, PlantError, Start, Travel};
+
+use super::{ALPHA, ANGLE, COMMAND, RATE, Subject, at_command};
+use crate::num::least_squares;
+
+/// Throttles at which the engines are settled.
+const THROTTLES: [f64; 3] = [0.2, 0.6, 1.0];
+/// Share of what full throttle adds to a surface's moment, below which there is no slipstream.
+const NO_SLIPSTREAM: f64 = 0.01;
+/// Angular momentum that is none, in parts of mass · span² per second.
+const NO_MOMENTUM: f64 = 1e-4;
+/// Distance of the thrust from the centre of gravity that is none, in chords.
+const NO_ARM: f64 = 1e-3;
+/// Distance of the thrust from the hub that is none, chords by radian.
+const NO_OFFSET: f64 = 1e-2;
+/// Newton metres per pound foot.
+const LBF_FT: f64 = 1.355_817_948_331_4;
+
+/// What of it the aircraft has.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Propeller {
+    /// Pitching moment due to elevator without thrust, 1/rad, and what thrust over dynamic pressure and area adds to it.
+    pub(super) elevator: Option<[f64; 2]>,
+    /// The same of yawing moment and rudder.
+    pub(super) rudder: Option<[f64; 2]>,
+    /// Angular momentum without throttle and what full throttle adds, N m s.
+    pub(super) gyro: Option<[f64; 2]>,
+    /// How far to the left of the centre of gravity the thrust acts, m.
+    pub(super) sideways: Option<f64>,
+    /// Distance of the thrust from the hub by incidence, chords.
+    pub(super) p_factor: Option<f64>,
+}
+
+impl Subject<'_> {
+    /// Measures it about the reference state.
+    pub(super) fn propeller(&mut self, travel: &Travel) -> Result<Propeller, PlantError> {
+        let base = Start { alpha_rad: ALPHA, ..self.start };
+        let elevator =
+            self.slipstream(&base, at_command(travel.elevator), 4, |i, x| i.elevator = x)?;
+        let rudder = match travel.rudder {
+            Some(stops) => self.slipstream(&base, at_command(stops), 5, |i, x| i.rudder = x)?,
+            None => None,
+        };
+        let rate = RATE * 2.0 * self.start.airspeed_mps / self.span;
+        let (mut momenta, mut throttles) = (Vec::new(), Vec::new());
+        let (mut arms, mut yaws) = (Vec::new(), Vec::new());
+        for throttle in THROTTLES {
+            let inputs = Inputs { throttle, ..Inputs::default() };
+            let turned = |k: f64| Start { r_radps: k * rate, ..base };
+            let [up, down] = [1.0, -1.0].map(|k| self.engine_moments(&turned(k), &inputs));
+            let ((_, [up, _]), (_, [down, _])) = (up?, down?);
+            momenta.push((up - down) / (2.0 * rate));
+            throttles.push([1.0, throttle]);
+            for sign in [1.0, -1.0] {
+                let alpha_rad = ALPHA + sign * ANGLE;
+                let (thrust, [_, yaw]) =
+                    self.engine_moments(&Start { alpha_rad, ..self.start }, &inputs)?;
+                arms.push([thrust, -self.chord * thrust * alpha_rad]);
+                yaws.push(yaw);
+            }
+        }
+        let gyro = least_squares(&throttles, &momenta).unwrap_or_default();
+        let heavy = NO_MOMENTUM * self.mass.mass_kg * self.span * self.span;
+        let [sideways, p_factor] = least_squares(&arms, &yaws).unwrap_or_default();
+        Ok(Propeller {
+            elevator,
+            rudder,
+            gyro: (gyro[0].abs() + gyro[1].abs() > heavy).then_some(gyro),
+            sideways: (sideways.abs() > NO_ARM * self.chord).then_some(sideways),
+            p_factor: (p_factor.abs() > NO_OFFSET).then_some(p_factor),
+        })
+    }
+
+    /// Thrust (N), and pitching and yawing moment of the engines (N m), settled in `state`.
+    fn engine_moments(
+        &mut self,
+        state: &Start,
+        inputs: &Inputs,
+    ) -> Result<(f64, [f64; 2]), PlantError> {
+        let (_, thrust) = self.plant.powered_loads(state, inputs)?;
+        // an aircraft without engines has no such property
+        let mut moment = |name: &str| LBF_FT * self.plant.property(name).unwrap_or(0.0);
+        Ok((thrust, [moment("moments/m-prop-lbsft"), moment("moments/n-prop-lbsft")]))
+    }
+
+    /// Slope of the moment coefficient `of` by a surface that `set` commands to ± `unit` (rad): without thrust, and by thrust
+    /// over dynamic pressure and area.
+    fn slipstream(
+        &mut self,
+        base: &Start,
+        unit: f64,
+        of: usize,
+        set: impl Fn(&mut Inputs, f64),
+    ) -> Result<Option<[f64; 2]>, PlantError> {
+        let (mut rows, mut slopes, mut full) = (Vec::new(), Vec::new(), 0.0);
+        for throttle in THROTTLES {
+            let (mut sides, mut share) = ([0.0; 2], 0.0);
+            for (side, sign) in sides.iter_mut().zip([1.0, -1.0]) {
+                let mut inputs = Inputs { throttle, ..Inputs::default() };
+                set(&mut inputs, sign * COMMAND);
+                let (loads, thrust) = self.plant.powered_loads(base, &inputs)?;
+                let pressure = self.pressure(&loads);
+                *side = self.steady(&loads, pressure)?[of];
+                share = thrust / pressure;
+            }
+            rows.push([1.0, share]);
+            slopes.push((sides[0] - sides[1]) / (2.0 * unit));
+            full = share;
+        }
+        let found = least_squares(&rows, &slopes);
+        Ok(found.filter(|[still, by]| (by * full).abs() > NO_SLIPSTREAM * still.abs()))
+    }
+}
