@@ -69,6 +69,37 @@ fn files_that_are_not_there_are_named() {
     refused(&["--airframe", "nowhere.toml"], &["nowhere.toml", "airframe"]);
 }
 
+/// The words are those of sd_notify(3); systemd is a socket of ours.
+#[cfg(unix)]
+#[test]
+fn systemds_watchdog_is_fed_while_the_control_loop_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("notify");
+    let systemd = std::os::unix::net::UnixDatagram::bind(&path).unwrap();
+    systemd.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    let links = ["--vehicle", "udpin:127.0.0.1:0", "--client", "udpin:127.0.0.1:0"];
+    let start = |watchdog: bool| {
+        let mut command = fly(folder.path(), &links);
+        command.args(["--controller", "lqi", "--no-record", "--duration-s", "2"]);
+        command.env("NOTIFY_SOCKET", &path);
+        if watchdog {
+            command.env("WATCHDOG_USEC", "200000");
+        }
+        command.output().unwrap()
+    };
+    assert!(start(true).status.success());
+    let mut word = [0; 64];
+    for _ in 0..5 {
+        let length = systemd.recv(&mut word).unwrap();
+        assert_eq!(std::str::from_utf8(&word[..length]).unwrap().trim(), "WATCHDOG=1");
+    }
+    systemd.set_nonblocking(true).unwrap();
+    while systemd.recv(&mut word).is_ok() {}
+    // where no watchdog watches, nothing is said
+    assert!(start(false).status.success());
+    assert!(systemd.recv(&mut word).is_err());
+}
+
 #[test]
 fn a_recording_is_not_overwritten() {
     let root = tempfile::tempdir().unwrap();

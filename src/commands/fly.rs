@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::commands::choices;
 use crate::commands::files::shipped;
 use crate::commands::flown_with::{Chosen, FlownWith};
+use crate::commands::watchdog;
 use crate::control::cem::Change;
 use crate::control::policy::{Agent, AgentError, Origin};
 use crate::control::{self, Controller, ControllerKind, Needs, Source, build};
@@ -209,6 +210,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             eprintln!("greylag: `replay` will need this flight's options: {why:#}");
         }
     }
+    watchdog::feed(flight.rounds.clone());
     announce(arguments, &model, &flight);
     show_events(&flight, &arguments.vehicle);
     let summary =

@@ -49,6 +49,7 @@ mod start;
 mod targets;
 #[cfg(feature = "learn")]
 mod train;
+mod watchdog;
 mod workbench;
 
 use std::ffi::OsString;

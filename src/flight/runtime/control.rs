@@ -2,7 +2,7 @@
 
 mod clients;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Sender, select_biased};
@@ -103,7 +103,7 @@ impl Control {
         }
     }
 
-    pub(super) fn run(mut self, stop: &AtomicBool) -> Summary {
+    pub(super) fn run(mut self, stop: &AtomicBool, rounds: &AtomicU64) -> Summary {
         self.welcome_targets();
         let mut next_poll = self.started;
         while !stop.load(Ordering::Relaxed) && !self.is_over() {
@@ -111,6 +111,7 @@ impl Control {
             let host = Instant::now();
             if host >= next_poll {
                 self.poll(host);
+                rounds.fetch_add(1, Ordering::Relaxed);
                 // After a stall the beats that were missed stay missed.
                 next_poll = (next_poll + POLL).max(host);
             }

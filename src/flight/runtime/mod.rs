@@ -20,7 +20,7 @@ mod recording_autopilot;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -136,6 +136,8 @@ pub struct Flight {
     pub clients: Vec<Option<SocketAddr>>,
     /// Where it is recorded.
     pub recording: Option<std::path::PathBuf>,
+    /// How many rounds the control thread has gone, one in 10 ms at least while it lives.
+    pub rounds: Arc<AtomicU64>,
     thread: JoinHandle<Summary>,
 }
 
@@ -163,12 +165,14 @@ impl Flight {
         let (say, events) = bounded(EVENTS);
         let (vehicle, clients) = (ports.vehicle_address(), ports.client_addresses());
         let recording = recorder.as_ref().map(|r| r.folder().to_owned());
+        let rounds = Arc::new(AtomicU64::new(0));
+        let counted = rounds.clone();
         let control = Control::new(options, companion.pilot, planner, ports, recorder, say);
         let thread = std::thread::Builder::new()
             .name("control".into())
-            .spawn(move || control.run(&stop))
+            .spawn(move || control.run(&stop, &counted))
             .map_err(|error| FlightError::Thread("control", error))?;
-        Ok(Flight { events, vehicle, clients, recording, thread })
+        Ok(Flight { events, vehicle, clients, recording, rounds, thread })
     }
 
     /// Whether it is still under way.
