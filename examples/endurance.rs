@@ -17,7 +17,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use greylag::commands::fly::{self, POLICY, companion_with};
+use greylag::commands::controllers::POLICY;
+use greylag::commands::fly::{self, companion_with};
 use greylag::control::{ControllerKind, build};
 use greylag::flight::desk::Desk;
 use greylag::flight::pilot::{Config, Pilot};

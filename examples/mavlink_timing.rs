@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Parser;
-use greylag::commands::fly;
+use greylag::commands::{controllers, fly};
 use greylag::control::cem::Change;
 use greylag::control::{self, ControllerKind, Target, build};
 use greylag::flight::pilot::{Config, Pilot};
@@ -187,7 +187,8 @@ impl Drop for Busy {
 /// The settled error of the same target flown from neutral in process, degrees.
 fn settled_in_process(kind: ControllerKind, model: &GreyBox, changes: &[Change]) -> Result<f64> {
     let mut simulator = Simulator::new(&PlantOptions::default())?;
-    let mut controller = fly::controller(kind, model, Path::new(fly::POLICY), changes)?;
+    let mut controller =
+        controllers::controller(kind, model, Path::new(controllers::POLICY), changes)?;
     let target =
         Target { roll: ROLL_DEG.to_radians(), pitch: PITCH_DEG.to_radians(), airspeed: 20.0 };
     let episode = Episode { environment: &mut simulator, controller: controller.as_mut(), seed: 0 };
@@ -283,7 +284,7 @@ fn companion_with(
     if pace == Pace::Lockstep {
         config.offboard_loss_s = 60.0;
     }
-    let controller = fly::controller(kind, model, Path::new(fly::POLICY), changes)?;
+    let controller = controllers::controller(kind, model, Path::new(controllers::POLICY), changes)?;
     let pilot = Pilot::new(config, build(ControllerKind::Lqi, model)?)?;
     let placement = match kind.pace() {
         control::Pace::Planned => Placement::Thread,

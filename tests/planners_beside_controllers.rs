@@ -8,7 +8,8 @@ use std::path::Path;
 
 use controller_support::{Bench, profile};
 use flight_support::x8;
-use greylag::commands::fly::{POLICY, companion_with};
+use greylag::commands::controllers::POLICY;
+use greylag::commands::fly::companion_with;
 use greylag::control::ControllerKind;
 use greylag::flight::desk::Desk;
 use greylag::link::vehicle::{Authority, Real, Vehicle};

@@ -14,7 +14,8 @@ use std::time::{Duration, Instant};
 
 use controller_support::profile;
 use flight_support::*;
-use greylag::commands::fly::{POLICY, companion_with};
+use greylag::commands::controllers::POLICY;
+use greylag::commands::fly::companion_with;
 use greylag::control::{Controller, ControllerKind, Observation, Target};
 use greylag::flight::recorder::Place;
 use greylag::flight::replay::{Outcome, replay};

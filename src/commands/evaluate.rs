@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use crate::commands::files::{self, shipped};
 use crate::commands::start::{self, StartArguments};
-use crate::commands::{bar, choices, fly};
+use crate::commands::{bar, choices, controllers, fly};
 use crate::control::cem::Change;
 use crate::control::{Controller, ControllerKind, Needs, Source, Target, build};
 use crate::model::GreyBox;
@@ -54,7 +54,7 @@ pub struct Arguments {
     #[arg(long = "model", num_args = 1.., default_values_os_t = [PathBuf::from(fly::MODEL)])]
     models: Vec<PathBuf>,
     /// Folders of trained policies, for controllers that need one.
-    #[arg(long = "policy", value_name = "DIR", num_args = 1.., default_values_os_t = [PathBuf::from(fly::POLICY)])]
+    #[arg(long = "policy", value_name = "DIR", num_args = 1.., default_values_os_t = [PathBuf::from(controllers::POLICY)])]
     policies: Vec<PathBuf>,
     /// Settings of the planners in other than their usual size, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     for path in arguments.json.iter().chain(&arguments.report) {
         files::writable(path, overwrite)?;
     }
-    fly::check_changes(&arguments.controllers, &arguments.changes)?;
+    controllers::check_changes(&arguments.controllers, &arguments.changes)?;
     let mut targets = targets(arguments)?;
     let mut plant = arguments.plant.options(arguments.seed);
     // everything that can be wrong is found before the first flight
@@ -251,7 +251,7 @@ fn entrants(arguments: &Arguments, models: &[GreyBox]) -> Result<Vec<Entrant>> {
                 .collect(),
         };
         for (model, mut name, folder) in sources {
-            let agent = fly::policy(*kind, model, folder)?;
+            let agent = controllers::policy(*kind, model, folder)?;
             let changes = &arguments.changes;
             let controller = build(*kind, Source { model, agent: agent.as_ref(), changes })?;
             if agent.is_some() {

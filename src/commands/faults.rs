@@ -15,8 +15,9 @@ use greylag_sitl::plant::PlantOptions;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::commands::controllers::POLICY;
 use crate::commands::files::{JsonArgument, Overwrite};
-use crate::commands::fly::{self, POLICY, companion_with};
+use crate::commands::fly::{self, companion_with};
 use crate::commands::{choices, start};
 use crate::control::ControllerKind;
 use crate::sim::faults::{Case, Cause, CompanionFactory, Counterpart, FaultKind, Report};

@@ -5,6 +5,7 @@ mod amend;
 mod bar;
 mod campaign;
 mod choices;
+pub mod controllers;
 #[cfg(feature = "sitl")]
 mod collect;
 mod compare;

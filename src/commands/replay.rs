@@ -8,6 +8,7 @@ use clap::Args;
 use serde::Serialize;
 
 use crate::commands::choices;
+use crate::commands::controllers;
 use crate::commands::files::{JsonArgument, Overwrite};
 use crate::commands::flown_with::FlownWith;
 use crate::commands::fly::{self, CommandName, ProfileName};
@@ -111,7 +112,7 @@ impl FlownArguments {
             Some(said) if self.changes.is_empty() && self.controller.is_none() => said.changes()?,
             _ => self.changes.clone(),
         };
-        let policy = path(&self.policy, said.map(|s| &s.policy), fly::POLICY);
+        let policy = path(&self.policy, said.map(|s| &s.policy), controllers::POLICY);
         let mut companion = fly::companion_with_planner(controller, &model, &policy, &changes)?;
         let schedule = self.schedule.as_ref().or(said.and_then(|s| s.schedule.as_ref()));
         if let Some(path) = schedule {

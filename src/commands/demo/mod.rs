@@ -25,7 +25,7 @@ use crate::commands::flown_with::{Chosen, FlownWith};
 use crate::commands::fly::{CommandName, ProfileName};
 use crate::commands::recording_report::{self, Reporter, TOLERANCE_DEG};
 use crate::commands::start::{self, StartArguments};
-use crate::commands::{files, fly};
+use crate::commands::{controllers, files, fly};
 use crate::control::cem::Change;
 use crate::control::{self, ControllerKind};
 use crate::flight::recorder::Place;
@@ -48,7 +48,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", default_value = fly::MODEL)]
     model: PathBuf,
     /// Folder of the trained policy, for controllers that need one.
-    #[arg(long, value_name = "DIR", default_value = fly::POLICY)]
+    #[arg(long, value_name = "DIR", default_value = controllers::POLICY)]
     policy: PathBuf,
     /// Settings of the planner in other than their usual size, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]

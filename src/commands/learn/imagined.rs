@@ -6,7 +6,7 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::budget::Budget;
-use crate::commands::fly;
+use crate::commands::controllers;
 use crate::commands::interruption::Interruption;
 use crate::control::ControllerKind;
 use crate::model::GreyBox;
@@ -52,7 +52,7 @@ pub fn reached(
         if stop.is_set() {
             return Ok(None);
         }
-        let controller = match fly::controller(kind, &model, policy, &[]) {
+        let controller = match controllers::controller(kind, &model, policy, &[]) {
             Ok(controller) => controller,
             Err(error) if kind == ControllerKind::Policy => return Err(error),
             Err(error) => {

@@ -1,6 +1,7 @@
 //! The effects of the model with their coefficients, from slopes and polar.
 
 use super::fits::line;
+use super::propeller::Propeller;
 use super::{Beside, Polar, Slopes};
 use crate::model::textbook::Estimate;
 use crate::physics::catalogue::describe;
@@ -87,55 +88,23 @@ const NO_RATE: f64 = 1e-3;
 impl Beside {
     /// Adds its effects, and takes from the linear coefficients what these now hold.
     fn put(&self, all: &mut Vec<Effect>) {
-        let powered = "central difference of JSBSim's loads at three throttles";
-        let lift = self.alpha_rate[2];
-        let pitch = self.alpha_rate[4];
+        let [lift, pitch] = [self.alpha_rate[2], self.alpha_rate[4]];
         if lift.abs() > NO_RATE || pitch.abs() > NO_RATE {
             let source = "difference of JSBSim's loads between two attitudes";
             let numbers =
                 vec![("CLalphadot", lift, 0.02, source), ("Cmalphadot", pitch, 0.02, source)];
             all.push(("unsteady_lift", numbers));
         }
-        let surfaces = [
-            (self.propeller.elevator, "pitch_linear", "Cmde", "Cmde_T"),
-            (self.propeller.rudder, "rudder_linear", "Cndr", "Cndr_T"),
-        ];
-        let mut slipstream = Vec::new();
-        for (found, linear, own, name) in surfaces {
-            if let Some([still, _]) = found {
-                set(all, linear, own, still);
-            }
-            slipstream.push((name, found.map_or(0.0, |[_, by_thrust]| by_thrust), 0.05, powered));
-        }
-        if surfaces.iter().any(|(found, ..)| found.is_some()) {
-            all.push(("tail_slipstream", slipstream));
-        }
-        if let Some([still, full]) = self.propeller.gyro {
-            let source = "least squares over JSBSim's moments of the engines by yaw rate";
-            all.push(("propeller_gyro", vec![("h_nms", still, 0.1, source)]));
-            all.push(("propeller_gyro_throttle", vec![("h_nms", full, 0.1, source)]));
-        }
-        let source = "least squares over JSBSim's yawing moment of the engines";
-        if let Some(y) = self.propeller.sideways {
-            all.push(("thrust_line_sideways", vec![("y_m", y, 0.1, source)]));
-        }
-        if let Some(k) = self.propeller.p_factor {
-            all.push(("p_factor", vec![("k", k, 0.1, source)]));
-        }
+        self.propeller.put(all);
+        let source = "central differences of JSBSim's loads at two incidences";
         if let Some(found) = self.aileron {
-            let source = "central differences of JSBSim's loads at two incidences";
-            let names = ["Clalphada", "Cnalphada"];
-            for ((effect, name), value) in
-                [("roll_linear", "Clda"), ("yaw_linear", "Cnda")].into_iter().zip(found.without)
-            {
-                set(all, effect, name, value);
-            }
-            let numbers = names.into_iter().zip(found.by_incidence);
-            let numbers = numbers.map(|(name, value)| (name, value, 0.05, source)).collect();
+            set(all, "roll_linear", "Clda", found.without[0]);
+            set(all, "yaw_linear", "Cnda", found.without[1]);
+            let names = ["Clalphada", "Cnalphada"].into_iter().zip(found.by_incidence);
+            let numbers = names.map(|(name, value)| (name, value, 0.05, source)).collect();
             all.push(("roll_control_alpha", numbers));
         }
         if let Some(found) = &self.with_lift {
-            let source = "central differences of JSBSim's loads at two incidences";
             let linear = [
                 ("roll_linear", "Clr"),
                 ("roll_linear", "Clbeta"),
@@ -149,6 +118,38 @@ impl Beside {
             let numbers = names.into_iter().zip(found.by_lift);
             let numbers = numbers.map(|(name, value)| (name, value, 0.05, source)).collect();
             all.push(("lateral_with_lift", numbers));
+        }
+    }
+}
+
+impl Propeller {
+    fn put(&self, all: &mut Vec<Effect>) {
+        let surfaces = [
+            (self.elevator, "pitch_linear", "Cmde", "Cmde_T"),
+            (self.rudder, "rudder_linear", "Cndr", "Cndr_T"),
+        ];
+        let powered = "central difference of JSBSim's loads at three throttles";
+        let mut slipstream = Vec::new();
+        for (found, linear, own, name) in surfaces {
+            if let Some([still, _]) = found {
+                set(all, linear, own, still);
+            }
+            slipstream.push((name, found.map_or(0.0, |[_, by_thrust]| by_thrust), 0.05, powered));
+        }
+        if surfaces.iter().any(|(found, ..)| found.is_some()) {
+            all.push(("tail_slipstream", slipstream));
+        }
+        if let Some([still, full]) = self.gyro {
+            let source = "least squares over JSBSim's moments of the engines by yaw rate";
+            all.push(("propeller_gyro", vec![("h_nms", still, 0.1, source)]));
+            all.push(("propeller_gyro_throttle", vec![("h_nms", full, 0.1, source)]));
+        }
+        let source = "least squares over JSBSim's yawing moment of the engines";
+        if let Some(y) = self.sideways {
+            all.push(("thrust_line_sideways", vec![("y_m", y, 0.1, source)]));
+        }
+        if let Some(k) = self.p_factor {
+            all.push(("p_factor", vec![("k", k, 0.1, source)]));
         }
     }
 }

@@ -1,0 +1,90 @@
+//! Controllers built from the files that a command names.
+
+use std::path::Path;
+
+use anyhow::bail;
+
+use crate::commands::files::shipped;
+use crate::control::cem::Change;
+use crate::control::policy::{Agent, AgentError, Origin};
+use crate::control::{Controller, ControllerKind, Needs, Source, build};
+use crate::model::GreyBox;
+
+/// The policy that is flown where no other is named, trained in the default model.
+pub const POLICY: &str = "params/x8/learned/policy";
+
+/// The controller `kind` of `model`, with the policy in `folder` as [`policy`] finds it.
+///
+/// # Errors
+/// If the policy cannot be used, or the model does not allow the controller.
+pub fn controller(
+    kind: ControllerKind,
+    model: &GreyBox,
+    folder: &Path,
+    changes: &[Change],
+) -> anyhow::Result<Box<dyn Controller>> {
+    let agent = policy(kind, model, folder)?;
+    Ok(build(kind, Source { model, agent: agent.as_ref(), changes })?)
+}
+
+/// The policy in `folder` for the controller `kind` of `model`; `None` where the controller uses none, or can do without
+/// one and `folder` is the default's, of another airframe. What is to be known of it goes to standard error.
+///
+/// # Errors
+/// If the policy cannot be used.
+pub fn policy(
+    kind: ControllerKind,
+    model: &GreyBox,
+    folder: &Path,
+) -> anyhow::Result<Option<Agent>> {
+    if matches!(kind.needs(), Needs::Gains | Needs::Model) {
+        return Ok(None);
+    }
+    let agent = match Agent::load(&shipped(folder), &model.airframe) {
+        Err(AgentError::Airframe { airframe, .. })
+            if !kind.needs().policy() && folder == Path::new(POLICY) =>
+        {
+            eprintln!(
+                "note: there is no policy for airframe {airframe}; {kind} searches around the LQI's plan alone: \
+                 train one with `greylag train policy --env model:FILE` and name its folder with --policy"
+            );
+            return Ok(None);
+        }
+        agent => agent?,
+    };
+    if let Some(note) = foreign_policy_note(&agent.origin, model, folder) {
+        eprintln!("{note}");
+    }
+    Ok(Some(agent))
+}
+
+/// What is to be said of a policy that was trained in another model than the one that flies with it.
+fn foreign_policy_note(origin: &Origin, model: &GreyBox, folder: &Path) -> Option<String> {
+    (origin.model_sha256 != model.sha256).then(|| {
+        format!(
+            "note: policy {} was trained in {}, not in model {} as its files are now; its proposals and \
+             values are those of another model: train one with `greylag train policy --env model:FILE`, or name \
+             the model it belongs to",
+            folder.display(),
+            origin.model,
+            model.name
+        )
+    })
+}
+
+/// Refuses settings of a planner where none of `kinds` searches.
+///
+/// # Errors
+/// If there are `changes` that change nothing.
+pub fn check_changes(kinds: &[ControllerKind], changes: &[Change]) -> anyhow::Result<()> {
+    if changes.is_empty() || kinds.iter().any(|kind| kind.searches()) {
+        return Ok(());
+    }
+    let searching: Vec<&str> =
+        ControllerKind::ALL.iter().filter(|k| k.searches()).map(|k| k.name()).collect();
+    bail!(
+        "--planner changes the settings of a search, and none of the controllers has one; choose one of {} \
+         or leave --planner out",
+        searching.join(", ")
+    )
+}
