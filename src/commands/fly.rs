@@ -249,8 +249,8 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
     Ok(model)
 }
 
-/// A pilot with its controllers: `kind` flies, with the policy in `folder` as [`controllers::policy`](crate::commands::controllers::policy) finds it; an LQI of
-/// the same model is the fallback, or `pid-retuned`, with a line on standard error, where none can be designed.
+/// A pilot with its controllers: `kind` flies, with the policy in `folder` as
+/// [`controllers::policy`](crate::commands::controllers::policy) finds it; an LQI of the same model is the fallback, or `pid-retuned`, with a line on standard error, where none can be designed.
 ///
 /// # Errors
 /// If the policy cannot be used, the model does not allow `kind`, or flies straight at its cruise airspeed neither level

@@ -1,4 +1,4 @@
-//! Systemd's watchdog: it is told that the control thread goes its rounds.
+//! Systemd's watchdog, fed while the control thread runs.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use sd_notify::NotifyState;
 
-/// Tells systemd, where its watchdog watches this process, twice in each of its periods that `rounds` has grown. A
-/// control thread that hangs is said nothing of, and the process is started anew.
+/// Feeds systemd's watchdog twice in each of its periods if `rounds` has grown since; does nothing where no watchdog
+/// watches this process. A control thread that hangs is not fed for, and systemd starts the process anew.
 pub fn feed(rounds: Arc<AtomicU64>) {
     let Some(period) = sd_notify::watchdog_enabled() else { return };
-    let told = std::thread::Builder::new().name("watchdog".into()).spawn(move || {
+    let started = std::thread::Builder::new().name("watchdog".into()).spawn(move || {
         let mut last = None;
         loop {
             let now = rounds.load(Ordering::Relaxed);
@@ -22,7 +22,7 @@ pub fn feed(rounds: Arc<AtomicU64>) {
             std::thread::sleep((period / 2).max(Duration::from_millis(10)));
         }
     });
-    if let Err(why) = told {
+    if let Err(why) = started {
         eprintln!("greylag: systemd's watchdog will not be fed: {why}");
     }
 }

@@ -31,9 +31,7 @@ impl Size {
         let (least, most) = coefficient.bounds;
         (factor * least, factor * most)
     }
-}
 
-impl Size {
     fn factor(&self, unit: &str) -> Option<f64> {
         match unit {
             "N" => Some(self.mass),
