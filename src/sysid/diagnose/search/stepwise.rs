@@ -75,13 +75,29 @@ pub fn search(
         level: Vec::new(),
         selected: Vec::new(),
     };
+    let mut aside = select(problem, model, &mut found, &entries, options, progress)?;
+    found.judge_remainder();
+    aside.retain(|s| found.selected.iter().all(|other| other.id != s.id));
+    found.selected.append(&mut aside);
+    Ok(found)
+}
+
+/// Lets the best candidates join one after the other, until none passes; returns those that were refused beside them.
+fn select(
+    problem: &Problem,
+    model: &GreyBox,
+    found: &mut Found,
+    entries: &[Entry],
+    options: &Options,
+    progress: &Progress,
+) -> Result<Vec<Selected>, DiagnoseError> {
     let mut aside = Vec::new();
     while found.selected.len() < MOST {
         found.beaten.clear();
         found.level.clear();
-        run_off(problem, &mut found);
+        run_off(problem, found);
         say(progress, "checking the best candidate", found.fraction())?;
-        let Some(winner) = examine(&found, options) else { break };
+        let Some(winner) = examine(found, options) else { break };
         let passed = winner.refused.is_empty() || winner.trace.is_some();
         let outcome = match (&winner.trace, passed) {
             (Some(_), _) => "is a trace",
@@ -97,14 +113,11 @@ pub fn search(
         }
         aside.retain(|s: &Selected| s.id != winner.id);
         found.selected.push(winner);
-        if !passed || !found.join(problem, model, &entries, options, progress)? {
+        if !passed || !found.join(problem, model, entries, options, progress)? {
             break;
         }
     }
-    found.judge_remainder();
-    aside.retain(|s| found.selected.iter().all(|other| other.id != s.id));
-    found.selected.append(&mut aside);
-    Ok(found)
+    Ok(aside)
 }
 
 /// The candidates as the first ranking has them.
