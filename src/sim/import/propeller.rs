@@ -2,6 +2,7 @@
 
 use greylag_sitl::plant::{Inputs, PlantError, Start, Travel};
 
+use super::propulsion::{LBF_FT, NO_ARM};
 use super::{ALPHA, ANGLE, COMMAND, RATE, Subject, at_command};
 use crate::num::least_squares;
 
@@ -11,12 +12,8 @@ const THROTTLES: [f64; 3] = [0.2, 0.6, 1.0];
 const NO_SLIPSTREAM: f64 = 0.01;
 /// Angular momentum that is none, in parts of mass · span² per second.
 const NO_MOMENTUM: f64 = 1e-4;
-/// Distance of the thrust from the centre of gravity that is none, in chords.
-const NO_ARM: f64 = 1e-3;
 /// Distance of the thrust from the hub that is none, chords by radian.
 const NO_OFFSET: f64 = 1e-2;
-/// Newton metres per pound foot.
-const LBF_FT: f64 = 1.355_817_948_331_4;
 
 /// What of it the aircraft has.
 #[derive(Clone, Copy, Debug, Default)]

@@ -22,9 +22,9 @@ const WAVE_S: f64 = 10.0;
 /// Propeller torque that is none, in parts of weight times span.
 const NO_MOMENT: f64 = 1e-5;
 /// Distance of the thrust from the centre of gravity that is none, in chords.
-const NO_ARM: f64 = 1e-3;
+pub(super) const NO_ARM: f64 = 1e-3;
 /// Newton metres per pound foot.
-const LBF_FT: f64 = 1.355_817_948_331_4;
+pub(super) const LBF_FT: f64 = 1.355_817_948_331_4;
 
 /// What the engines do.
 pub(super) struct Propulsion {
