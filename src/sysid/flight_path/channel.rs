@@ -1,5 +1,7 @@
 //! A channel of a log: its samples in time order, missing ones left out.
 
+use std::ops::{Add, Mul, Sub};
+
 use crate::num::statistics::quantile;
 
 /// Share of repeated values above which a channel is taken to be slower than the log's rows.
@@ -142,6 +144,24 @@ pub fn wrap(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
+/// Value and slope (per sample) at `part`, 0 to 1, of the way from the second of four samples to the third: the cubic
+/// whose slopes at these two are those of the parabolas around them.
+///
+/// From one interval to the next neither has a step. A parabola around the nearest sample has one half-way between two: a
+/// search for a delay cannot pass it where the samples are rough.
+pub fn cubic<T>([a, b, c, d]: [T; 4], part: f64) -> (T, T)
+where
+    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
+{
+    let slope = (c - a) * 0.5;
+    let bend = a - b * 2.5 + c * 2.0 - d * 0.5;
+    let twist = (b - c) * 1.5 + (d - a) * 0.5;
+    (
+        b + (slope + (bend + twist * part) * part) * part,
+        slope + (bend * 2.0 + twist * (3.0 * part)) * part,
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -164,5 +184,18 @@ mod tests {
         // about 0.6 s pass at the sine's top without a step of 0.05
         let coarse = channel(|t| (t.sin() / 0.05).round() * 0.05);
         assert!((0..1000).all(|k| coarse.between(k as f64 * 0.01, 0.2).is_finite()));
+    }
+
+    #[test]
+    fn a_cubic_goes_through_its_samples_without_steps() {
+        let samples = [0.3, -1.2, 2.0, 0.7, -0.4];
+        let four = |i: usize| std::array::from_fn(|k| samples[i + k]);
+        let ((value, slope), (next, onward)) = (cubic(four(0), 1.0), cubic(four(1), 0.0));
+        assert!((value - 2.0).abs() < 1e-12 && (next - 2.0).abs() < 1e-12);
+        assert!((slope - onward).abs() < 1e-12);
+        // the slope is that of the value
+        let by = 1e-6;
+        let rise = cubic(four(0), 0.3 + by).0 - cubic(four(0), 0.3 - by).0;
+        assert!((rise / (2.0 * by) - cubic(four(0), 0.3).1).abs() < 1e-6);
     }
 }

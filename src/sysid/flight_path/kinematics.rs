@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::logs::Sampling;
 use crate::sysid::flight_path::band::{Block, Wide};
+use crate::sysid::flight_path::channel::cubic;
 use crate::sysid::flight_path::intake::{Span, Track};
 use crate::sysid::flight_path::nuisance::{self, EARTH, FORCE, INERTIAL, SKEW_FORCE, Values};
 use crate::sysid::flight_path::path::Path;
@@ -172,19 +173,16 @@ fn weight(track: &Track, k: usize, gravity: f64) -> Vector3<f64> {
     r.transpose() * Vector3::new(0.0, 0.0, -gravity)
 }
 
-/// `samples` that came `late` samples late, put right by parabolas through three of them, with the
-/// change of each by one more sample of lateness.
+/// `samples` that came `late` samples late, put right by cubics through four of them, with the change of each by one more
+/// sample of lateness.
 pub fn shifted(samples: &[[f64; 3]], late: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
     let last = samples.len() as isize - 1;
     let at = |i: isize| Vector3::from(samples[i.clamp(0, last) as usize]);
-    let whole = late.round();
-    let part = late - whole;
+    let whole = late.floor();
     (0..=last)
         .map(|k| {
             let i = k + whole as isize;
-            let (a, b, c) = (at(i - 1), at(i), at(i + 1));
-            let (slope, bend) = ((c - a) * 0.5, a - b * 2.0 + c);
-            (b + slope * part + bend * (0.5 * part * part), slope + bend * part)
+            cubic([i - 1, i, i + 1, i + 2].map(at), late - whole)
         })
         .unzip()
 }
@@ -203,6 +201,16 @@ mod tests {
             let t = k as f64;
             assert!((shifted[k].x - f(t)).abs() < 1e-12);
             assert!((slope[k].x - (0.2 - 0.1 * t)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn lateness_of_rough_samples_has_no_step() {
+        let samples: Vec<[f64; 3]> = (0..20).map(|k| [f64::from(k * k % 7); 3]).collect();
+        for half in [-0.5, 0.5, 1.5, 2.0] {
+            let (before, after) =
+                (shifted(&samples, half - 1e-9).0, shifted(&samples, half + 1e-9).0);
+            assert!(before.iter().zip(&after).all(|(a, b)| (a - b).norm() < 1e-6), "{half}");
         }
     }
 }

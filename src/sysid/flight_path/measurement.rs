@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::sysid::flight_path::band::{Corner, Node, add_gram};
-use crate::sysid::flight_path::channel::wrap;
+use crate::sysid::flight_path::channel::{cubic, wrap};
 use crate::sysid::flight_path::intake::Track;
 use crate::sysid::flight_path::kinematics::MOTION_AND_GUST;
 use crate::sysid::flight_path::lever_arm::air_at;
@@ -120,19 +120,29 @@ pub fn readings(
             if y.is_nan() {
                 continue;
             }
-            let angle = |x: f64| if channel < 3 { wrap(x) } else { x };
-            let h = shown[j][channel];
-            let (ahead, behind) =
-                (angle(shown[j + 1][channel] - h), angle(h - shown[j - 1][channel]));
-            let (rate, bend, part) = ((ahead + behind) * 0.5, ahead - behind, whole - late);
-            let (h, gain) =
-                with_errors(channel, h + rate * part + 0.5 * bend * part * part, values);
-            reading.residual[channel] = angle(y - h);
-            reading.by_late[channel] = -gain * (rate + bend * part) / step;
+            let (h, slope) = seen_at(&shown, channel, j, whole - late);
+            let (h, gain) = with_errors(channel, h, values);
+            reading.residual[channel] = turn(channel, y - h);
+            reading.by_late[channel] = -gain * slope / step;
         }
         reading
     };
     (0..n).into_par_iter().with_min_len(1000).map(read).collect()
+}
+
+/// What a sensor without errors shows `part` of a sample behind sample `j`, with its slope (per sample).
+fn seen_at(shown: &[[f64; CHANNELS]], channel: usize, j: usize, part: f64) -> (f64, f64) {
+    let (here, last) = (shown[j][channel], shown.len() as isize - 1);
+    let beside = |i: isize| turn(channel, shown[i.clamp(0, last) as usize][channel] - here);
+    let whole = part.floor();
+    let i = j as isize + whole as isize;
+    let (beside, slope) = cubic([i - 1, i, i + 1, i + 2].map(beside), part - whole);
+    (here + beside, slope)
+}
+
+/// A difference of a channel, that of angles the short way round.
+fn turn(channel: usize, x: f64) -> f64 {
+    if channel < 3 { wrap(x) } else { x }
 }
 
 /// What a sensor with its errors shows where one without shows `h`, and the gain from one to the other.
