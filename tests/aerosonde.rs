@@ -140,15 +140,15 @@ fn validate_a_step_of_the_model_with_rudder_and_propeller() {
     let flight = Excited { steps: 2000, moved: 2000, amplitude };
     let rms = errors(&model(), &mut simulator(), &flight, |_| target).unwrap().rms;
     println!("{rms:?}");
-    // 1 % of x_c a second is asked for; the polynomial leaves 0.2 N of thrust, which is 0.07 %
-    assert!(rms.iter().all(|x| *x < 0.003), "{rms:?}");
+    // 1 % of x_c a second is asked for; what is left is the simulator's way of turning the path
+    assert!(rms.iter().all(|x| *x < 3e-4), "{rms:?}");
 }
 
-/// The planner searches around the LQI's plan: there is no policy of this aircraft. It rolls in faster than the LQI and
-/// leaves the rudder to it, so that it slips for a moment.
+/// The planner searches around the LQI's plan: there is no policy of this aircraft. It leaves the rudder to the LQI, and
+/// a plan that slips meanwhile is worth less.
 #[test]
 fn turns_are_coordinated_by_the_rudder() {
-    for (kind, most) in [(ControllerKind::Lqi, 0.5), (ControllerKind::HybridLqi, 1.0)] {
+    for kind in [ControllerKind::Lqi, ControllerKind::HybridLqi] {
         let mut simulator = simulator();
         let mut controller = control::build(kind, &model()).unwrap();
         for (roll, pitch) in [(40.0_f64, 0.0_f64), (-40.0, 3.0), (20.0, 8.0), (-30.0, -8.0)] {
@@ -159,7 +159,7 @@ fn turns_are_coordinated_by_the_rudder() {
                 "{kind} {roll} {pitch}: sideslip up to {sideslip:.3} deg, {steady:.4} in the turn, settled within \
                  {error:.4} deg"
             );
-            assert!(error < 0.05 && sideslip < most && steady < 0.05);
+            assert!(error < 0.05 && sideslip < 0.5 && steady < 0.05);
         }
     }
 }
@@ -212,7 +212,7 @@ fn a_propeller_in_place_of_a_linear_thrust_is_named() {
     let found = asked(&changed(|text| {
         let linear =
             "\n[effects.thrust_linear]\nCp_n = { value = 30.0, source = \"half throttle\" }\n";
-        without(&text, "propeller") + linear
+        without(&without(&text, "thrust_table"), "thrust_table.T_n") + linear
     }));
     assert_eq!(found.verdict, Verdict::Effect);
     let first = &found.effects[0];

@@ -54,12 +54,15 @@ fn an_import_has_the_coefficients_of_the_aircraft() {
     println!("{:#?}", found.left_out);
     let model = loaded(&found);
     let truth = shipped("params/aerosonde/jsbsim.toml");
-    for c in truth.coefficients().iter().filter(|c| !c.name.starts_with("propeller")) {
+    for c in truth.coefficients() {
         let ours = model.coefficients().iter().find(|x| x.name == c.name);
         let Some(ours) = ours else { continue };
         // five decimals are written
         assert!((ours.value - c.value).abs() < 0.002 * c.value.abs() + 2e-5, "{ours:?} for {c:?}");
     }
+    let [ours, theirs] = [&model, &truth].map(|model| model.thrust_grid().unwrap());
+    // a point of both grids, N
+    assert!((ours.at(0.5, 25.0) - theirs.at(0.5, 25.0)).abs() < 1e-3);
     let (ours, theirs) = (model.airframe.actuators.travels(), truth.airframe.actuators.travels());
     assert!((ours.elevator.least - theirs.elevator.least).abs() < 1e-5, "{ours:?}");
     assert!(ours.rudder.is_some());

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::grey_box::Term;
+use super::grey_box::{Points, Term};
 use super::residual::hash;
 use super::{GreyBox, Integrator, Named, Residual};
-use crate::num::Table;
+use crate::num::{Grid, Table};
 use crate::physics::Airframe;
 use crate::physics::actuators::LAGS;
 use crate::physics::airframe::{
@@ -80,6 +80,17 @@ struct TableFile {
     _source: String,
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GridFile {
+    throttle: Vec<f64>,
+    airspeed_mps: Vec<f64>,
+    /// A row for each throttle.
+    value: Vec<Vec<f64>>,
+    #[serde(rename = "source")]
+    _source: String,
+}
+
 impl GreyBox {
     /// Reads a model file (`schema = 1`) and the airframe file it names, relative to itself.
     ///
@@ -147,9 +158,9 @@ impl File {
                 continue;
             }
             let kind = Kind::from_id(id).ok_or_else(|| unknown_effect(id))?;
-            let (named, table) = effect(&kind.describe(), kind.written(), content, &size)?;
+            let (named, points) = effect(&kind.describe(), kind.written(), content, &size)?;
             coefficients.extend(named);
-            terms.push(Term::new(kind, first, table));
+            terms.push(Term::new(kind, first, points));
         }
         if terms.is_empty() {
             return Err(
@@ -239,22 +250,21 @@ impl AirFile {
     }
 }
 
-/// One effect's coefficients and table out of its TOML table; what that leaves out of an effect of a file is as
+/// One effect's coefficients and points out of its TOML table; what that leaves out of an effect of a file is as
 /// its own file has it.
 fn effect(
     about: &Description,
     written: Option<&Written>,
     content: &toml::Value,
     size: &Size,
-) -> Result<(Vec<Named>, Option<Table>), String> {
+) -> Result<(Vec<Named>, Points), String> {
     let id = about.id;
     let entries = content
         .as_table()
         .ok_or_else(|| format!("effects.{id} must be a table of coefficients"))?;
-    let known =
-        |key: &str| about.table == Some(key) || about.coefficients.iter().any(|c| c.name == key);
-    if let Some(key) = entries.keys().find(|key| !known(key)) {
-        let names: Vec<_> = about.coefficients.iter().map(|c| c.name).chain(about.table).collect();
+    let tables = about.table.into_iter().chain(about.grid);
+    let names: Vec<_> = about.coefficients.iter().map(|c| c.name).chain(tables).collect();
+    if let Some(key) = entries.keys().find(|key| !names.contains(&key.as_str())) {
         return Err(format!("effects.{id}.{key} is unknown; {id} has {}", names.join(", ")));
     }
     let get = |key: &str| {
@@ -282,15 +292,25 @@ fn effect(
         }
         named.push(Named { name: format!("{id}.{}", c.name), value: number.value, sd: number.sd });
     }
-    let table = about.table.map(|key| table(id, key, get(key)?)).transpose()?;
-    Ok((named, table))
+    let at = |key: &str, why: String| format!("effects.{id}.{key}: {why}");
+    let table = |key: &str| -> Result<Table, String> {
+        let points: TableFile = points(get(key)?).map_err(|why| at(key, why))?;
+        Table::new(&points.alpha_rad, &points.value).map_err(|e| at(key, e.to_string()))
+    };
+    let grid = |key: &str| -> Result<Grid, String> {
+        let GridFile { throttle, airspeed_mps, value, .. } =
+            points(get(key)?).map_err(|why| at(key, why))?;
+        Grid::new(&throttle, &airspeed_mps, &value).map_err(|e| at(key, e.to_string()))
+    };
+    let points = Points {
+        table: about.table.map(table).transpose()?,
+        grid: about.grid.map(grid).transpose()?,
+    };
+    Ok((named, points))
 }
 
-fn table(id: &str, key: &str, content: toml::Value) -> Result<Table, String> {
-    let at = |why: String| format!("effects.{id}.{key}: {why}");
-    let points: TableFile =
-        content.try_into().map_err(|e| at(e.message().lines().collect::<Vec<_>>().join("; ")))?;
-    Table::new(&points.alpha_rad, &points.value).map_err(|e| at(e.to_string()))
+fn points<T: serde::de::DeserializeOwned>(content: toml::Value) -> Result<T, String> {
+    content.try_into().map_err(|e| e.message().lines().collect::<Vec<_>>().join("; "))
 }
 
 fn unknown_effect(id: &str) -> String {

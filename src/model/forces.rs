@@ -10,7 +10,7 @@
 use super::GreyBox;
 use super::grey_box::{Named, Term};
 use crate::num::Real;
-use crate::physics::effects::{Needs, Own, Terms};
+use crate::physics::effects::{Needs, Terms};
 use crate::physics::point::Base;
 use crate::physics::rigid_body::{self, Vector};
 use crate::physics::{AirData, Channel, Controls, Point, State, Wrench};
@@ -156,8 +156,8 @@ impl GreyBox {
     fn independent_terms<R: Real>(&self, place: &Place<R>, terms: &mut impl Starting<R>) {
         let base = Base::zero();
         let at = self.point(place, &base);
-        for Term { kind, first, table, shape, .. } in &self.terms[..self.independent] {
-            let own = Own { table: table.as_ref(), shape, first_lag: 0 };
+        for Term { kind, first, points, shape, .. } in &self.terms[..self.independent] {
+            let own = points.own(shape, 0);
             terms.start_at(*first);
             kind.independent_basis(&at, own, terms);
         }
@@ -172,8 +172,8 @@ impl GreyBox {
         terms: &mut impl Starting<R>,
     ) {
         let at = self.point(place, base);
-        for Term { kind, first, table, shape, first_lag } in &self.terms[self.independent..] {
-            let own = Own { table: table.as_ref(), shape, first_lag: *first_lag };
+        for Term { kind, first, points, shape, first_lag } in &self.terms[self.independent..] {
+            let own = points.own(shape, *first_lag);
             terms.start_at(*first);
             kind.dependent_basis(&at, own, terms);
         }

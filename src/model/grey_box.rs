@@ -1,10 +1,10 @@
 //! The dynamics model: which effects act, with which coefficients, on which rigid body.
 
 use crate::model::{Integrator, Residual};
-use crate::num::{Real, Table};
+use crate::num::{Grid, Real, Table};
 use crate::physics::actuators::LAGS;
 use crate::physics::atmosphere::Atmosphere;
-use crate::physics::effects::{Description, Kind, Needs};
+use crate::physics::effects::{Description, Kind, Needs, Own};
 use crate::physics::formula::{Memory, Status, Written};
 use crate::physics::inputs::{self, InputMemory};
 use crate::physics::rigid_body::{ForceAxes, RigidBody};
@@ -36,13 +36,28 @@ impl Named {
     }
 }
 
+/// What an effect has beside its coefficients.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Points {
+    pub(super) table: Option<Table>,
+    pub(super) grid: Option<Grid>,
+}
+
+impl Points {
+    /// With the rest of what belongs to the effect.
+    #[inline(always)]
+    pub(super) fn own<'a>(&'a self, shape: &'a [f64], first_lag: usize) -> Own<'a> {
+        Own { table: self.table.as_ref(), grid: self.grid.as_ref(), shape, first_lag }
+    }
+}
+
 /// An effect as a model uses it.
 #[derive(Clone, Debug)]
 pub(super) struct Term {
     pub(super) kind: Kind,
     /// Place of its first coefficient in the model's list.
     pub(super) first: usize,
-    pub(super) table: Option<Table>,
+    pub(super) points: Points,
     /// The values of its shape constants, kept beside it for speed.
     pub(super) shape: Vec<f64>,
     /// Place of its first lag among those of the model.
@@ -51,8 +66,8 @@ pub(super) struct Term {
 
 impl Term {
     /// An effect whose coefficients start at `first`.
-    pub(super) fn new(kind: Kind, first: usize, table: Option<Table>) -> Term {
-        Term { kind, first, table, shape: vec![0.0; kind.describe().shape], first_lag: 0 }
+    pub(super) fn new(kind: Kind, first: usize, points: Points) -> Term {
+        Term { kind, first, points, shape: vec![0.0; kind.describe().shape], first_lag: 0 }
     }
 }
 
@@ -179,9 +194,14 @@ impl GreyBox {
         self.written().find(|e| e.status == Status::Proposed).map(|e| e.about.id)
     }
 
+    /// Its grid of thrust over throttle and airspeed, if it has one.
+    pub fn thrust_grid(&self) -> Option<&Grid> {
+        self.terms.iter().find_map(|t| t.points.grid.as_ref())
+    }
+
     /// The tables of its effects, with the effects' ids.
     pub fn tables(&self) -> impl Iterator<Item = (&'static str, &Table)> {
-        self.terms.iter().filter_map(|t| Some((t.kind.describe().id, t.table.as_ref()?)))
+        self.terms.iter().filter_map(|t| Some((t.kind.describe().id, t.points.table.as_ref()?)))
     }
 
     /// Whether the model is linear in each of its coefficients, in their order.

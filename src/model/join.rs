@@ -1,6 +1,6 @@
 //! How an effect joins a model, or why it cannot.
 
-use super::grey_box::Term;
+use super::grey_box::{Points, Term};
 use super::{GreyBox, Named};
 use crate::physics::actuators::LAGS;
 use crate::physics::effects::{Coefficient, Description, Kind};
@@ -26,7 +26,7 @@ pub enum JoinError {
         id: &'static str,
     },
     /// It needs a table, which only a model file can give.
-    #[error("effect {id} needs a table {table} over alpha_rad; write it into the model file")]
+    #[error("effect {id} needs a table {table}; write it into the model file")]
     Table {
         /// The effect.
         id: &'static str,
@@ -98,7 +98,7 @@ impl GreyBox {
                     return Err(JoinError::Lags { model: self.name.clone(), most: LAGS });
                 }
                 self.stays_physical(kind, values)?;
-                self.terms.push(Term::new(kind, first, None));
+                self.terms.push(Term::new(kind, first, Points::default()));
             }
             Err(_) if self.inputs.len() == inputs::MOST => {
                 return Err(JoinError::Inputs { model: self.name.clone(), most: inputs::MOST });
@@ -155,7 +155,7 @@ impl GreyBox {
         if self.has(id) {
             return Err(JoinError::Present { model: self.name.clone(), id });
         }
-        if let Some(table) = about.table {
+        if let Some(table) = about.table.or(about.grid) {
             return Err(JoinError::Table { id, table });
         }
         let size = self.size();

@@ -3,6 +3,7 @@
 pub mod bootstrap;
 pub mod dense;
 mod dual;
+mod grid;
 mod lanes;
 mod least_squares;
 mod real;
@@ -13,6 +14,7 @@ pub mod stream;
 
 pub use dense::Dense;
 pub use dual::Dual;
+pub use grid::{Grid, GridError};
 #[cfg(target_arch = "x86_64")]
 pub use lanes::{Avx2, Avx512};
 pub use lanes::{BASE_FUSED, Base, Lanes, Packed, ROW};

@@ -17,8 +17,13 @@ pub enum TableError {
     #[error("a table needs at least two points, this one has {0}")]
     TooShort(usize),
     /// Too many points.
-    #[error("a table may have {MAX_POINTS} points, this one has {0}; thin it out")]
-    TooLong(usize),
+    #[error("a table may have {most} points, this one has {points}; thin it out")]
+    TooLong {
+        /// How many it has.
+        points: usize,
+        /// How many it may have.
+        most: usize,
+    },
     /// The two lists differ in length.
     #[error("a table needs as many ordinates as abscissae, this one has {0} and {1}")]
     Uneven(usize, usize),
@@ -43,7 +48,7 @@ impl Table {
             return Err(TableError::TooShort(x.len()));
         }
         if x.len() > MAX_POINTS {
-            return Err(TableError::TooLong(x.len()));
+            return Err(TableError::TooLong { points: x.len(), most: MAX_POINTS });
         }
         if let Some(i) = (0..x.len()).find(|&i| !(x[i].is_finite() && y[i].is_finite())) {
             return Err(TableError::NotFinite(i));

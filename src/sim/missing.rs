@@ -80,7 +80,8 @@ impl Craft {
             "drag_beta2" | "drag_elevator_abs" => self.has(kind.id),
             _ => true,
         };
-        let taken = OF_THE_MODEL.iter().filter(|kind| self.has(kind.id));
+        let thrust = |id| id == "propeller" && self.has("thrust_table");
+        let taken = OF_THE_MODEL.iter().filter(|kind| self.has(kind.id) || thrust(kind.id));
         KINDS.iter().filter(own).chain(taken).map(|kind| self.sized(kind)).collect()
     }
 
@@ -284,6 +285,7 @@ impl Missing {
             "drag_elevator_abs" => (own_elevator, Some("drag_elevator_abs")),
             "lift_stall" => (0.0, Some("lift_table")),
             "rudder_linear" => (0.0, Some("rudder_linear")),
+            "propeller" if craft.has("thrust_table") => (0.0, Some("thrust_table")),
             "propeller" => (0.0, Some("propeller")),
             _ => (0.0, None),
         };

@@ -43,8 +43,9 @@ pub fn starting_model(
             set(lift, "CL0", zero).ok_or_else(|| broken("lift_linear.CL0"))?;
             set(lift, "CLalpha", slope).ok_or_else(|| broken("lift_linear.CLalpha"))?;
         }
-        if id == "propeller" {
-            let most = most_thrust(&taken).ok_or_else(|| broken("propeller"))?;
+        if ["propeller", "thrust_table"].contains(&id) {
+            let most = most_thrust(&taken).or_else(|| most_in_table(&taken));
+            let most = most.ok_or_else(|| broken(id))?;
             effects.insert("thrust_linear".into(), linear_thrust(most));
         }
     }
@@ -74,6 +75,11 @@ fn line(effect: &toml::Value) -> Option<[f64; 2]> {
 fn most_thrust(effect: &toml::Value) -> Option<f64> {
     let value = |name: &str| effect.get(name)?.get("value")?.as_float();
     Some(value("T0_n")? + value("Tt_n")? + value("Ttt_n")?)
+}
+
+/// Thrust (N) of an effect `thrust_table` at the most throttle and the least airspeed.
+fn most_in_table(effect: &toml::Value) -> Option<f64> {
+    effect.get("T_n")?.get("value")?.as_array()?.last()?.as_array()?.first()?.as_float()
 }
 
 /// The effect `thrust_linear` that somebody writes who has not thought of the airspeed: half of the thrust at rest.

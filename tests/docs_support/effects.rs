@@ -63,6 +63,10 @@ fn section(about: &Description) -> String {
     if let Some(table) = about.table {
         item("table", format!("`{table}` over `alpha_rad`, which only a model file can give"));
     }
+    if let Some(grid) = about.grid {
+        let over = "over `throttle` and `airspeed_mps`, which only a model file can give";
+        item("table", format!("`{grid}` {over}"));
+    }
     if !about.coefficients.is_empty() {
         out += "\n| parameter | meaning | range | unit |\n|---|---|---|---|\n";
     }

@@ -32,6 +32,10 @@ const SURVEYED: usize = 128;
 /// Candidates that they value again at the end.
 const RESCORED: usize = 64;
 
+/// Sideslip that costs a reward of 1 a step where the base flies a rudder, rad. The paper's task (eq. 30) does not know
+/// sideslip, and a plan that rolls faster than the rudder can follow would cost nothing.
+const SIDESLIP: f64 = 0.3;
+
 /// What a search may lean on.
 #[derive(Clone, Debug, Default)]
 pub struct Aids {
@@ -65,6 +69,8 @@ pub struct Cem {
     settings: Settings,
     agent: Option<Agent>,
     base: Option<Base>,
+    /// [`SIDESLIP`], where the base flies a rudder.
+    sideslip: Option<f64>,
     ilqr: Option<Ilqr>,
     /// What compares the model's predictions with what happened.
     predictions: Option<Disturbance>,
@@ -131,6 +137,7 @@ impl Cem {
             model: model.clone(),
             settings,
             agent: aids.agent,
+            sideslip: (aids.base.is_some() && model.has_rudder()).then_some(SIDESLIP),
             base: aids.base.map(|lqi| Base { lqi, ahead: Ahead::new(steps, &model.airframe) }),
             ilqr: aids.ilqr,
             predictions: guard::predictions(&settings),

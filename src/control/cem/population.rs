@@ -72,6 +72,7 @@ impl Cem {
             disturbance: self.disturbance().map_or(disturbance::NONE, Disturbance::rate),
             ahead: self.base.as_ref().map(|base| &base.ahead),
             steps: self.settings.steps.max(HORIZON),
+            sideslip: self.sideslip,
         };
         let (blocks, worth) = (&mut self.blocks[first..end], &mut self.worth[first..end]);
         // blocks that fly together stay together: the numbers are those of one core

@@ -44,6 +44,8 @@ pub(super) struct Scene<'a> {
     pub ahead: Option<&'a Ahead>,
     /// Without a base: steps in all, the policy flying on behind the plan; five without a policy.
     pub steps: usize,
+    /// Sideslip that costs a reward of 1 a step where a rudder is flown, rad.
+    pub sideslip: Option<f64>,
 }
 
 /// Who chooses the actions of a block.
@@ -222,7 +224,6 @@ impl<R: Packed> Flight<R> {
             actuators,
             previous,
             memory: scene.memory.map(lane),
-            // what acted before the tick is not observed
             inputs: (!model.acts_at_once()).then(|| model.at_rest(&controls)),
             target: target.map(lane),
             disturbance: scene.disturbance.map(lane),
@@ -243,7 +244,11 @@ impl<R: Packed> Flight<R> {
         self.state = self.state.advance(&self.disturbance, STEP);
         self.actuators.step(&command, &model.airframe.actuators);
         self.previous = [command, self.previous[0]];
-        self.sum += task.reward(&self.state, &self.target).scale(self.weight);
+        let mut reward = task.reward(&self.state, &self.target);
+        if let Some(scale) = scene.sideslip {
+            reward -= self.state.beta.abs().scale(1.0 / scale);
+        }
+        self.sum += reward.scale(self.weight);
         self.weight *= task.discount;
     }
 

@@ -2,28 +2,32 @@
 
 use super::{FT, LBF, THROTTLE, coefficient, product};
 use crate::model::GreyBox;
+use crate::num::Grid;
 
 const SPEED: &str = "velocities/vt-fps";
 /// The throttle that acts on the engine where its thrust lags.
 const LATE_THROTTLE: &str = "fcs/engine-throttle-norm";
 const LAG: &str = "thrust_lag.tau_s";
+const DENSITY: &str = "fcs/density-ratio";
+/// The factor on the thrust's table.
+const TABLE: &str = "thrust_table.k";
 const ARM: &str = "thrust_line_offset.z_m";
 const TORQUE: &str = "motor_torque.k_nm";
 
 /// The thrust's terms: coefficient, factors; airspeed is in ft/s there.
 const THRUST: &[(&str, &[&str])] = &[
     ("thrust_linear.Cp_n", &[THROTTLE]),
-    ("propeller.T0_n", &["fcs/density-ratio"]),
-    ("propeller.Tt_n", &["fcs/density-ratio", THROTTLE]),
-    ("propeller.Ttt_n", &["fcs/density-ratio", THROTTLE, THROTTLE]),
-    ("propeller.TV_nspm", &["fcs/density-ratio", SPEED]),
-    ("propeller.TtV_nspm", &["fcs/density-ratio", THROTTLE, SPEED]),
-    ("propeller.TVV_ns2pm2", &["fcs/density-ratio", SPEED, SPEED]),
+    ("propeller.T0_n", &[DENSITY]),
+    ("propeller.Tt_n", &[DENSITY, THROTTLE]),
+    ("propeller.Ttt_n", &[DENSITY, THROTTLE, THROTTLE]),
+    ("propeller.TV_nspm", &[DENSITY, SPEED]),
+    ("propeller.TtV_nspm", &[DENSITY, THROTTLE, SPEED]),
+    ("propeller.TVV_ns2pm2", &[DENSITY, SPEED, SPEED]),
 ];
 
 /// Whether the files have the coefficient of that full name, as part of the engine.
 pub(super) fn knows(name: &str) -> bool {
-    THRUST.iter().any(|(term, _)| *term == name) || [LAG, ARM, TORQUE].contains(&name)
+    THRUST.iter().any(|(term, _)| *term == name) || [TABLE, LAG, ARM, TORQUE].contains(&name)
 }
 
 /// The throttle that acts on the engine.
@@ -56,6 +60,7 @@ pub(super) fn force(model: &GreyBox) -> String {
                 factors.iter().map(|f| if *f == THROTTLE { throttle } else { *f }).collect();
             product(value, &acting, "          ")
         })
+        .chain(model.thrust_grid().map(|grid| tabulated(grid, coefficient(model, TABLE), throttle)))
         .collect();
     // JSBSim's structural frame has z up
     let below = coefficient(model, ARM);
@@ -65,6 +70,23 @@ pub(super) fn force(model: &GreyBox) -> String {
          <z> {z} </z> </location>\n      <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>\n      <function \
          name=\"external_reactions/thrust/magnitude\">\n        <sum>\n{terms}        </sum>\n      </function>\n    </force>\n  \
          </external_reactions>\n\n"
+    )
+}
+
+/// The thrust's table times `factor`, in lbf over throttle and airspeed in ft/s.
+fn tabulated(grid: &Grid, factor: f64, throttle: &str) -> String {
+    let [throttles, airspeeds] = grid.axes();
+    let heads: String = airspeeds.iter().map(|v| format!(" {:?}", v / FT)).collect();
+    let row = |d: &f64| -> String {
+        let thrusts = airspeeds.iter().map(|v| format!(" {:?}", factor * grid.at(*d, *v) / LBF));
+        format!("                {d:?}{}\n", thrusts.collect::<String>())
+    };
+    let rows: String = throttles.iter().map(row).collect();
+    format!(
+        "          <product>\n            <property>{DENSITY}</property>\n            <table>\n              <independentVar \
+         lookup=\"row\">{throttle}</independentVar>\n              <independentVar \
+         lookup=\"column\">{SPEED}</independentVar>\n              <tableData>\n               {heads}\n{rows}              \
+         </tableData>\n            </table>\n          </product>\n"
     )
 }
 

@@ -5,7 +5,7 @@
 //! files, the search for missing effects and the report under its id. Effects on what the surfaces
 //! do with their commands are in [`inputs`](crate::physics::inputs).
 
-use crate::num::{Real, Table};
+use crate::num::{Grid, Real, Table};
 use crate::physics::formula::{Written, register};
 use crate::physics::rigid_body::RigidBody;
 use crate::physics::{Channel, Point};
@@ -68,6 +68,8 @@ pub enum Needs {
 pub struct Own<'a> {
     /// Its table; present exactly if [`Effect::TABLE`] is.
     pub table: Option<&'a Table>,
+    /// Its grid; present exactly if [`Effect::GRID`] is.
+    pub grid: Option<&'a Grid>,
     /// The values of its shape constants: the last [`Effect::SHAPE`] coefficients.
     pub shape: &'a [f64],
     /// Place of its first lag among those of the model, [`Controls::lagged`](crate::physics::Controls::lagged).
@@ -119,6 +121,8 @@ pub trait Effect {
     const SHAPE: usize = 0;
     /// Name of the ordinate of a table over `alpha_rad` that the effect needs.
     const TABLE: Option<&'static str> = None;
+    /// Name of the ordinate of a grid over `throttle` and `airspeed_mps` that the effect needs.
+    const GRID: Option<&'static str> = None;
     /// What it needs.
     const NEEDS: Needs = Needs::Point;
     /// Full names of coefficients in whose place it stands: they are zero in a model that it joins.
@@ -150,6 +154,8 @@ pub struct Description {
     pub shape: usize,
     /// [`Effect::TABLE`].
     pub table: Option<&'static str>,
+    /// [`Effect::GRID`].
+    pub grid: Option<&'static str>,
     /// [`Effect::REPLACES`].
     pub replaces: &'static [&'static str],
     /// [`Effect::ENTRY`].
@@ -186,6 +192,7 @@ macro_rules! effects {
                     coefficients: $type::COEFFICIENTS,
                     shape: $type::SHAPE,
                     table: $type::TABLE,
+                    grid: $type::GRID,
                     replaces: $type::REPLACES,
                     entry: $type::ENTRY,
                 },)*
@@ -277,6 +284,7 @@ effects! {
     rudder_linear::RudderLinear,
     thrust_linear::ThrustLinear,
     propeller::Propeller,
+    thrust_table::ThrustTable,
     lift_table::LiftTable,
     drag_table::DragTable,
     pitch_table::PitchTable,

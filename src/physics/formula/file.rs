@@ -348,6 +348,7 @@ fn description(
         coefficients: coefficients.leak(),
         shape,
         table: None,
+        grid: None,
         replaces: &[],
         entry: Some(entry),
     }

@@ -158,6 +158,7 @@ macro_rules! inputs {
                     coefficients: $type::COEFFICIENTS,
                     shape: 1,
                     table: None,
+                    grid: None,
                     replaces: &[],
                     entry: Some($type::ENTRY),
                 },)* }

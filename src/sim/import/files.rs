@@ -7,7 +7,7 @@ use super::fits::line;
 use super::propulsion::Propulsion;
 use super::{Polar, Subject};
 use crate::model::textbook::{Estimate, incidence_limits, numbers};
-use crate::num::Table;
+use crate::num::{Grid, Table};
 use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY, standard_density};
 
 /// Share of the pitching moment's variation below which it is a line over incidence.
@@ -115,8 +115,13 @@ pub(super) fn model_file(
         out += &format!("\n[effects.{effect}]\n");
         numbers(&mut out, estimates);
     }
-    out += "\n[effects.propeller]\n";
-    numbers(&mut out, &propulsion.thrust);
+    match &propulsion.table {
+        Some(table) => out += &thrust_table(table),
+        None => {
+            out += "\n[effects.propeller]\n";
+            numbers(&mut out, &propulsion.thrust);
+        }
+    }
     let settled = "least squares over JSBSim's moment of the engines";
     let one_each = [
         ("thrust_lag", "tau_s", propulsion.lag, 0.2, "JSBSim's answer to a step of the throttle"),
@@ -130,6 +135,23 @@ pub(super) fn model_file(
         }
     }
     out + &tables(polar)
+}
+
+/// The table of thrust over throttle and airspeed.
+fn thrust_table(table: &Grid) -> String {
+    let [throttles, airspeeds] = table.axes();
+    let list = |values: &mut dyn Iterator<Item = f64>| {
+        values.map(|x| format!("{x:.5}")).collect::<Vec<_>>().join(", ")
+    };
+    let row =
+        |d: &f64| format!("    [{}],\n", list(&mut airspeeds.iter().map(|v| table.at(*d, *v))));
+    format!(
+        "\n[effects.thrust_table]\nk = {{ value = 1.0, source = \"the table as it is\" }}\n\n[effects.thrust_table.T_n]\n\
+         throttle = [{}]\nairspeed_mps = [{}]\nvalue = [\n{}]\nsource = \"JSBSim's thrust, the engines settled\"\n",
+        list(&mut throttles.iter().copied()),
+        list(&mut airspeeds.iter().copied()),
+        throttles.iter().map(row).collect::<String>()
+    )
 }
 
 /// The tables of lift and drag over incidence, and of what the pitching moment departs from a line if it does.

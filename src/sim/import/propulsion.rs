@@ -5,7 +5,7 @@ use greylag_sitl::plant::{PlantError, Start};
 use super::fits::{ThrustLag, thrust_lag};
 use super::{ALPHA, Subject};
 use crate::model::textbook::Estimate;
-use crate::num::least_squares;
+use crate::num::{Grid, least_squares};
 use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
 /// Share of a channel's variation that is worth a word when it is left.
@@ -23,6 +23,9 @@ const WAVE_S: f64 = 10.0;
 const NO_MOMENT: f64 = 1e-5;
 /// Distance of the thrust from the centre of gravity that is none, in chords.
 pub(super) const NO_ARM: f64 = 1e-3;
+/// Airspeeds of the table of thrust, in parts of the cruise's; throttles of it.
+const SPEEDS: [f64; 14] = [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7];
+const THROTTLES: [f64; 11] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 /// Newton metres per pound foot.
 pub(super) const LBF_FT: f64 = 1.355_817_948_331_4;
 
@@ -30,6 +33,8 @@ pub(super) const LBF_FT: f64 = 1.355_817_948_331_4;
 pub(super) struct Propulsion {
     /// The polynomial of the settled thrust over throttle and airspeed.
     pub(super) thrust: Vec<Estimate>,
+    /// The settled thrust itself (N, at the density of sea level), where it is a function of throttle and airspeed.
+    pub(super) table: Option<Grid>,
     /// Time constant of the thrust behind the throttle's position, s.
     pub(super) lag: Option<f64>,
     /// Rolling moment at full throttle, to the left, N m.
@@ -72,7 +77,8 @@ impl Subject<'_> {
         let missed = rows.iter().zip(&thrusts).map(|(row, t)| (along(row) - t).powi(2));
         let left = (missed.sum::<f64>() / thrusts.len() as f64).sqrt();
         let most = thrusts.iter().fold(1e-9_f64, |most, t| most.max(t.abs()));
-        if left > WORTH_SAYING * most {
+        let table = self.thrust_table()?;
+        if table.is_none() && left > WORTH_SAYING * most {
             left_out.push(format!(
                 "the thrust is a polynomial in the model; {left:.1} N (rms) of up to {most:.0} N are left out"
             ));
@@ -87,10 +93,32 @@ impl Subject<'_> {
         let weight = self.mass.mass_kg * STANDARD_GRAVITY;
         Ok(Propulsion {
             thrust,
+            table,
             lag,
             torque: (torque.abs() > NO_MOMENT * weight * self.span).then_some(torque),
             arm: (arm.abs() > NO_ARM * self.chord).then_some(arm),
         })
+    }
+
+    /// The settled thrust over throttle and airspeed, N at the density of sea level; `None` where the engines do not
+    /// leave them where they are asked to be.
+    fn thrust_table(&mut self) -> Result<Option<Grid>, PlantError> {
+        let airspeeds = SPEEDS.map(|part| part * self.start.airspeed_mps);
+        let mut rows = Vec::with_capacity(THROTTLES.len());
+        for throttle in THROTTLES {
+            let mut row = Vec::with_capacity(SPEEDS.len());
+            for airspeed_mps in airspeeds {
+                let start = Start { airspeed_mps, alpha_rad: ALPHA, ..self.start };
+                let (thrust, truth) = self.plant.settled_thrust(&start, throttle)?;
+                let moved = (truth.airspeed_mps / airspeed_mps - 1.0).abs();
+                if (truth.throttle - throttle).abs() > 1e-6 || moved > 1e-3 {
+                    return Ok(None);
+                }
+                row.push(thrust * SEA_LEVEL_DENSITY / truth.air_density_kgpm3);
+            }
+            rows.push(row);
+        }
+        Ok(Grid::new(&THROTTLES, &airspeeds, &rows).ok())
     }
 
     /// Time constant (s) of the thrust behind the throttle's position, if it has one; `thrust` is the settled thrust.

@@ -141,6 +141,7 @@ const fn measured(entry: &Entry) -> Description {
         coefficients: &[],
         shape: 0,
         table: None,
+        grid: None,
         replaces: &[],
         entry: Some(*entry),
     }

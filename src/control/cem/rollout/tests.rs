@@ -30,6 +30,7 @@ fn instruction_sets_agree() {
         disturbance: disturbance::NONE,
         ahead: None,
         steps: HORIZON,
+        sideslip: None,
     };
     let wave = |k: usize| std::array::from_fn(|i| ((k * 16 + i) as f32 * 0.37).sin());
     // an odd number: the last has no other beside it
