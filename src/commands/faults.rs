@@ -1,6 +1,7 @@
 //! `greylag faults`: a campaign of seeded flights under faults, judged automatically.
 
 mod ledger;
+mod search;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -22,6 +23,7 @@ use crate::commands::{choices, start};
 use crate::control::ControllerKind;
 use crate::sim::faults::{Case, Cause, CompanionFactory, Counterpart, FaultKind, Report};
 use ledger::{Entry, Ledger};
+use search::Search;
 
 /// The arguments of `greylag faults`.
 #[derive(Args)]
@@ -57,6 +59,13 @@ pub struct Arguments {
     /// Note each flight in this file, and do not fly again those that are there (of the same program).
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
+    /// Search so many flights for one that breaks a rule of flight, with the first of the controllers: faults, winds,
+    /// targets and requests are varied, always from the flights that came nearest. `--first` is its seed.
+    #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show"])]
+    search: Option<u64>,
+    /// Fly the scenario in this file (JSON, as `--search` prints it) and show how far each rule is from being broken.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["flights", "resume", "show", "search", "json"])]
+    scenario: Option<PathBuf>,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -102,6 +111,18 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     for &controller in &arguments.controller {
         let companion = companion_with(controller, &model, POLICY.as_ref())?;
         let factory = CompanionFactory::new(companion, &model)?.with_aircraft(plant.clone());
+        if let Some(file) = &arguments.scenario {
+            return search::fly(&factory, file);
+        }
+        if let Some(flights) = arguments.search {
+            return search::run(&Search {
+                factory: &factory,
+                counterparts: &arguments.counterpart,
+                flights,
+                seed: arguments.first,
+                json: &arguments.json,
+            });
+        }
         let before = entries.len();
         for &counterpart in &arguments.counterpart {
             let seeds = arguments.first..arguments.first + arguments.flights;

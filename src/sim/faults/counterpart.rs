@@ -5,11 +5,14 @@ use greylag_sitl::shim::bench::Bench;
 use greylag_sitl::shim::controller::{FlightController, Mode};
 use greylag_sitl::shim::{Distortion, Launch, Noise, Personality, ShimError, ShimOptions};
 
+use serde::{Deserialize, Serialize};
+
 use crate::link::vehicle::{Authority, Profile, Real, Sitl, Stack, Vehicle};
 use crate::model::GreyBox;
 
 /// What is at the other end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Counterpart {
     /// The simulator's shim.
     Sitl,
@@ -113,6 +116,17 @@ impl Aircraft {
         match self {
             Aircraft::Sitl(bench) => bench.hear(bytes),
             Aircraft::Real(controller) => controller.hear(bytes),
+        }
+    }
+
+    /// A ground station sets the flight controller's loiter mode; whether there is a flight controller.
+    pub(super) fn take_over(&mut self) -> bool {
+        match self {
+            Aircraft::Sitl(_) => false,
+            Aircraft::Real(controller) => {
+                controller.set_mode(Mode::Hold);
+                true
+            }
         }
     }
 

@@ -1,7 +1,9 @@
 //! One flight of 60 s under faults, in lockstep in this process.
 
+mod client;
 mod disk;
 mod faulty;
+mod traced;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
@@ -13,31 +15,23 @@ use rand_chacha::ChaCha8Rng;
 
 use super::counterpart::{Aircraft, Counterpart, vehicle};
 use super::judge::{Cause, Finding, Found, Judge};
-use super::mix::{Fault, FaultKind, draw};
+use super::mix::{Fault, FaultKind};
+use super::policies::Sample;
+use super::scenario::Scenario;
 use super::wire::Wire;
 use crate::control::{Controller, ControllerKind, SetupError, build};
 use crate::flight::desk::Desk;
 use crate::flight::pilot::{ConfigError, Pilot};
 use crate::flight::recorder::Recorder;
 use crate::flight::runtime::Companion;
-use crate::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 use crate::link::vehicle::Vehicle;
 use crate::model::GreyBox;
+use crate::physics::airframe::Envelope;
 use disk::Disk;
+use traced::Follower;
 
 /// Steps of a flight: 60 s.
 const STEPS: u64 = 6000;
-/// Setpoints come at 10 Hz.
-const SETPOINT_EVERY: u64 = 10;
-/// What the client asks for, s, roll, pitch in degrees: turns both ways, a climb, a descent.
-const LEGS: [(f64, f64, f64); 6] = [
-    (0.0, 0.0, 3.0),
-    (12.0, 35.0, 5.0),
-    (20.0, -40.0, 3.0),
-    (28.0, 10.0, 12.0),
-    (36.0, 30.0, -3.0),
-    (44.0, 0.0, 3.0),
-];
 /// A dead link must have handed the aircraft back after this time, s.
 const HAND_BACK_S: f64 = 0.5;
 
@@ -113,6 +107,11 @@ impl CompanionFactory {
         CompanionFactory { plant, ..self }
     }
 
+    /// The envelope of its aircraft.
+    pub fn envelope(&self) -> Envelope {
+        self.model.airframe.envelope
+    }
+
     fn desk(&self, counterpart: Counterpart) -> Result<Desk, FaultsError> {
         let config = self.companion.pilot.config().clone();
         let pilot = Pilot::new(config, self.fallback.boxed_clone())?;
@@ -128,7 +127,8 @@ impl CompanionFactory {
     /// # Errors
     /// If the aircraft cannot be loaded.
     pub fn fly(&self, case: Case) -> Result<Report, FaultsError> {
-        let mut report = self.fly_under(case, draw(case.seed))?;
+        let scenario = Scenario::of_seed(case.counterpart, case.seed);
+        let mut report = self.fly_under(case, scenario.faults)?;
         for cause in Cause::OF_FAULTS {
             if !report.findings.iter().any(|found| found.is_open_to(cause)) {
                 continue;
@@ -152,21 +152,45 @@ impl CompanionFactory {
     }
 
     fn fly_under(&self, case: Case, faults: Vec<Fault>) -> Result<Report, FaultsError> {
-        let mut desk = self.desk(case.counterpart)?;
+        let scenario = Scenario { faults, ..Scenario::of_seed(case.counterpart, case.seed) };
+        let flight = self.flown(&scenario, None)?;
+        let findings = flight.judge.findings();
+        Ok(Report { case, faults: scenario.faults, findings, texts: flight.texts })
+    }
+
+    /// Flies `scenario` for its samples, every 10 ms, and what the judge of a flight found. The samples end with a panic.
+    ///
+    /// # Errors
+    /// If the aircraft cannot be loaded.
+    pub fn trace(&self, scenario: &Scenario) -> Result<(Vec<Sample>, Vec<Found>), FaultsError> {
+        let mut flight = self.flown(scenario, Some(Vec::with_capacity(STEPS as usize)))?;
+        let samples = flight.trace.take().unwrap_or_default();
+        Ok((samples, flight.judge.findings()))
+    }
+
+    fn flown(
+        &self,
+        scenario: &Scenario,
+        trace: Option<Vec<Sample>>,
+    ) -> Result<Flight, FaultsError> {
+        let Scenario { counterpart, seed, faults, .. } = scenario;
+        let mut desk = self.desk(*counterpart)?;
         let disk = faults.iter().any(|f| f.kind == FaultKind::Disk).then(Disk::default);
         if let Some(disk) = &disk {
             let folder = std::path::PathBuf::new();
             desk.record(Recorder::over(folder, disk.clone(), disk.clone(), disk.clone())?);
         }
-        let mut random = ChaCha8Rng::seed_from_u64(case.seed);
+        let mut random = ChaCha8Rng::seed_from_u64(*seed);
         random.set_stream(STARVED);
         let mut flight = Flight {
-            aircraft: Aircraft::new(&self.plant, case.counterpart, case.seed)?,
+            aircraft: Aircraft::new(&scenario.air(&self.plant), *counterpart, *seed)?,
             desk,
-            down: Wire::new(case.seed, 0),
-            up: Wire::new(case.seed, 1),
+            down: Wire::new(*seed, 0),
+            up: Wire::new(*seed, 1),
             judge: Judge::new(self.model.airframe.envelope),
-            faults: faults.clone(),
+            scenario: scenario.clone(),
+            trace,
+            follower: Follower::default(),
             cruise: self.model.airframe.envelope.airspeed_cruise_mps,
             random,
             disk,
@@ -182,7 +206,7 @@ impl CompanionFactory {
         if catch_unwind(AssertUnwindSafe(|| flight.fly())).is_err() {
             flight.judge.note(0.0, Finding::Panic);
         }
-        Ok(Report { case, faults, findings: flight.judge.findings(), texts: flight.texts })
+        Ok(flight)
     }
 }
 
@@ -193,7 +217,10 @@ struct Flight {
     down: Wire,
     up: Wire,
     judge: Judge,
-    faults: Vec<Fault>,
+    scenario: Scenario,
+    /// The samples so far, where they are wanted.
+    trace: Option<Vec<Sample>>,
+    follower: Follower,
     /// Airspeed at which the aircraft cruises, m/s.
     cruise: f64,
     random: ChaCha8Rng,
@@ -230,7 +257,8 @@ impl Flight {
 
     /// One step of 10 ms; `false` when the aircraft is lost.
     fn step(&mut self, step: u64, now_s: f64) -> bool {
-        let acting: Vec<Fault> = self.faults.iter().filter(|f| f.acts(now_s)).copied().collect();
+        let acting: Vec<Fault> =
+            self.scenario.faults.iter().filter(|f| f.acts(now_s)).copied().collect();
         let distortion = self.distortion(&acting, step);
         let bytes = self.aircraft.show(distortion);
         let rebooting = acting.iter().any(|fault| fault.kind == FaultKind::Reboot);
@@ -239,6 +267,7 @@ impl Flight {
         }
         let arrived = self.down.receive(step);
         self.watch_link(now_s, !arrived.is_empty());
+        self.follower.heard(now_s, !arrived.is_empty());
         self.unread.extend(arrived);
         if step >= self.asleep_until {
             self.companion(step, now_s, &acting);
@@ -247,9 +276,11 @@ impl Flight {
         for batch in self.up.receive(step) {
             self.aircraft.hear(&batch);
         }
+        self.take_over(step);
         let flies = self.aircraft.fly();
         let exposure = self.exposure(&acting);
         self.judge.aircraft(now_s, &self.aircraft.truth(), exposure);
+        self.sample(now_s);
         flies
     }
 
@@ -258,8 +289,11 @@ impl Flight {
         let host = Duration::from_secs(1) + Duration::from_millis(10 * step);
         let mut up = Vec::new();
         for batch in std::mem::take(&mut self.unread) {
-            let judge = &mut self.judge;
-            self.desk.hear(host, &batch, &mut up, |_, decision| judge.decision(now_s, decision));
+            let (judge, follower) = (&mut self.judge, &mut self.follower);
+            self.desk.hear(host, &batch, &mut up, |_, decision| {
+                judge.decision(now_s, decision);
+                follower.decided(decision);
+            });
         }
         self.client(step, now_s, host, acting);
         self.desk.poll(host, &mut up);
@@ -271,29 +305,6 @@ impl Flight {
 
     fn hear_texts(&mut self, now_s: f64) {
         self.texts.extend(self.desk.texts.drain(..).map(|text| (now_s, text.words)));
-    }
-
-    /// The client: arms when it can, then sends its legs.
-    fn client(&mut self, step: u64, now_s: f64, host: Duration, acting: &[Fault]) {
-        if acting.iter().any(|fault| fault.kind == FaultKind::Client)
-            || !step.is_multiple_of(SETPOINT_EVERY)
-        {
-            return;
-        }
-        let (_, roll, pitch) =
-            LEGS.iter().rev().find(|(from, ..)| *from <= now_s).copied().unwrap_or(LEGS[0]);
-        let now = self.desk.now(host);
-        let setpoint =
-            AttitudeSetpoint { roll: roll.to_radians(), pitch: pitch.to_radians(), thrust: None };
-        if !self.armed {
-            self.armed = self.desk.arm(host) == Verdict::Accepted;
-            if self.armed {
-                self.desk.pilot().attitude_setpoint(now, setpoint);
-                // Refused at most because something is lost at this very moment: HOLD is flown.
-                let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
-            }
-        }
-        self.desk.pilot().attitude_setpoint(now, setpoint);
     }
 
     /// A link that is dead hands the aircraft back within half a second.

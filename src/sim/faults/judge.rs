@@ -210,6 +210,11 @@ impl Judge {
         self.blind
     }
 
+    /// Whether the last step exposed the aircraft to what its companion cannot help.
+    pub fn is_exposed(&self) -> bool {
+        self.causes.iter().any(|(_, at)| *at == Some(self.steps))
+    }
+
     fn suffer(&mut self, exposure: Exposure) {
         self.steps += 1;
         self.unsteered = if exposure.unsteered { self.unsteered + 1 } else { 0 };

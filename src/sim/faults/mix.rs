@@ -2,6 +2,7 @@
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 /// Flight before the first fault, s: a real controller is found and engaged meanwhile.
 pub const FIRST_S: f64 = 12.0;
@@ -9,7 +10,8 @@ pub const FIRST_S: f64 = 12.0;
 pub const LAST_S: f64 = 42.0;
 
 /// Something that can go wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
     /// Datagrams, or stretches of the stream, are lost.
     Loss,
@@ -94,7 +96,8 @@ impl FaultKind {
 }
 
 /// A fault of a flight.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fault {
     /// What.
     pub kind: FaultKind,
@@ -130,7 +133,8 @@ pub fn draw(seed: u64) -> Vec<Fault> {
         .collect()
 }
 
-fn one(kind: FaultKind, random: &mut impl Rng) -> Fault {
+/// A fault of that kind at any time.
+pub(super) fn one(kind: FaultKind, random: &mut impl Rng) -> Fault {
     let from_s = random.random_range(FIRST_S..LAST_S - 8.0);
     let length = match kind {
         FaultKind::Unplug => random.random_range(0.1..4.0),

@@ -7,9 +7,14 @@ mod counterpart;
 mod flight;
 mod judge;
 mod mix;
+pub mod policies;
+mod scenario;
+pub mod search;
+pub mod temporal;
 mod wire;
 
 pub use counterpart::Counterpart;
 pub use flight::{Case, CompanionFactory, FaultsError, Report};
 pub use judge::{Cause, Finding, Found};
 pub use mix::{Fault, FaultKind, draw};
+pub use scenario::{Asked, Asking, Leg, Scenario};

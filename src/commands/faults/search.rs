@@ -1,0 +1,119 @@
+//! `greylag faults --search`: looks for flights that break a rule of flight.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use comfy_table::Table;
+use comfy_table::presets::NOTHING;
+use serde::Serialize;
+
+use crate::commands::bar::Bar;
+use crate::commands::files::{JsonArgument, Overwrite};
+use crate::sim::faults::policies::policies;
+use crate::sim::faults::search::{Nearest, distances, search};
+use crate::sim::faults::{CompanionFactory, Counterpart, Scenario};
+use crate::sysid::progress::Stage;
+
+/// What a search is for.
+pub(super) struct Search<'a> {
+    pub(super) factory: &'a CompanionFactory,
+    pub(super) counterparts: &'a [Counterpart],
+    pub(super) flights: u64,
+    pub(super) seed: u64,
+    pub(super) json: &'a JsonArgument,
+}
+
+/// A rule as JSON.
+#[derive(Serialize)]
+struct Row<'a> {
+    policy: &'a str,
+    asks: &'a str,
+    flights: u64,
+    broken: u64,
+    distance: Option<f64>,
+    at_s: f64,
+    /// The flight that came nearest, made smaller if it breaks the rule.
+    scenario: Option<&'a Scenario>,
+}
+
+#[derive(Serialize)]
+struct Document<'a> {
+    seed: u64,
+    policies: Vec<Row<'a>>,
+}
+
+/// Searches and prints how near the flights came to breaking each rule; fails if one is broken.
+pub(super) fn run(search_for: &Search) -> Result<ExitCode> {
+    let Search { factory, counterparts, flights, seed, json } = *search_for;
+    let bar = Bar::new();
+    let found = search(factory, counterparts, flights, seed, &mut |flown, broken| {
+        let doing = format!("searching; rules broken: {broken}");
+        bar.hear(Stage { doing: &doing, fraction: flown as f64 / flights as f64, ranking: &[] })
+    })?;
+    drop(bar);
+    let rows = found.iter().map(row).collect();
+    json.write("greylag.faults.search/1", &Document { seed, policies: rows }, Overwrite::Never)?;
+    if !json.takes_stdout() {
+        print(&found);
+    }
+    let broken = found.iter().any(|nearest| nearest.broken > 0);
+    Ok(if broken { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+fn row(nearest: &Nearest) -> Row<'_> {
+    Row {
+        policy: nearest.policy,
+        asks: nearest.asks,
+        flights: nearest.flights,
+        broken: nearest.broken,
+        distance: nearest.distance.is_finite().then_some(nearest.distance),
+        at_s: nearest.at_s,
+        scenario: nearest.scenario.as_ref(),
+    }
+}
+
+fn print(found: &[Nearest]) {
+    println!("distance 1 is far from breaking a rule, below 0 it is broken");
+    let mut table = Table::new();
+    table.load_style(NOTHING);
+    table.set_header(["rule", "flights", "broken", "least distance", "at (s)", "asks"]);
+    for n in found.iter().filter(|n| n.flights > 0) {
+        table.add_row([
+            n.policy.to_owned(),
+            n.flights.to_string(),
+            n.broken.to_string(),
+            format!("{:.3}", n.distance),
+            format!("{:.2}", n.at_s),
+            n.asks.to_owned(),
+        ]);
+    }
+    println!("{table}");
+    for n in found.iter().filter(|n| n.broken > 0) {
+        let Some(scenario) = &n.scenario else { continue };
+        // numbers and names cannot fail to be written
+        let text = serde_json::to_string(scenario).unwrap_or_default();
+        println!(
+            "\n{}, the smallest flight found; `greylag faults --scenario FILE` flies it:\n{text}",
+            n.policy
+        );
+    }
+}
+
+/// Flies the scenario in `file` and prints its distance to breaking each rule; fails if one is broken.
+pub(super) fn fly(factory: &CompanionFactory, file: &Path) -> Result<ExitCode> {
+    let text = std::fs::read_to_string(file)
+        .with_context(|| format!("reading the scenario {}", file.display()))?;
+    let scenario: Scenario = serde_json::from_str(&text)
+        .with_context(|| format!("the scenario {} is not one", file.display()))?;
+    let rules = policies(&factory.envelope());
+    let judged = distances(factory, &rules, &scenario)?;
+    let mut broken = false;
+    for (rule, judged) in rules.iter().zip(judged) {
+        let Some((distance, at_s)) = judged else { continue };
+        broken |= distance < 0.0;
+        let word = if distance < 0.0 { "BROKEN" } else { "held" };
+        println!("{word:6} {distance:6.3} at {at_s:5.2} s  {}: {}", rule.id, rule.asks);
+    }
+    Ok(if broken { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}

@@ -1,0 +1,73 @@
+//! What the client and a ground station ask for while the flight goes on.
+
+use std::time::Duration;
+
+use super::Flight;
+use crate::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
+use crate::sim::faults::mix::{Fault, FaultKind};
+use crate::sim::faults::scenario::{Asking, mode_of};
+
+/// Setpoints come at 10 Hz.
+const SETPOINT_EVERY: u64 = 10;
+
+impl Flight {
+    /// The client: arms when it can, then sends its legs.
+    pub(super) fn client(&mut self, step: u64, now_s: f64, host: Duration, acting: &[Fault]) {
+        if acting.iter().any(|fault| fault.kind == FaultKind::Client) {
+            return;
+        }
+        let now = self.desk.now(host);
+        for asked in self.scenario.asked.clone().into_iter().filter(|a| at_step(a.at_s) == step) {
+            self.ask(now_s, host, asked.what);
+        }
+        if !step.is_multiple_of(SETPOINT_EVERY) {
+            return;
+        }
+        let legs = &self.scenario.legs;
+        let Some(leg) = legs.iter().rev().find(|leg| leg.from_s <= now_s).or(legs.first()).copied()
+        else {
+            return;
+        };
+        let [roll, pitch] = [leg.roll_deg, leg.pitch_deg].map(f64::to_radians);
+        let setpoint = AttitudeSetpoint { roll, pitch, thrust: None };
+        self.follower.client_heard(now_s);
+        if !self.armed {
+            self.armed = self.desk.arm(host) == Verdict::Accepted;
+            if self.armed {
+                self.follower.asked = true;
+                self.desk.pilot().attitude_setpoint(now, setpoint);
+                // Refused at most because something is lost at this very moment: HOLD is flown.
+                let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
+            }
+        }
+        self.desk.pilot().attitude_setpoint(now, setpoint);
+    }
+
+    /// What the client asks for beside its setpoints.
+    fn ask(&mut self, now_s: f64, host: Duration, what: Asking) {
+        let now = self.desk.now(host);
+        let verdict = match (what, mode_of(what)) {
+            (_, Some(mode)) => self.desk.pilot().set_mode(now, mode),
+            (Asking::Arm, _) => self.desk.arm(host),
+            (Asking::Disarm, _) => self.desk.pilot().disarm(now, false),
+            _ => return,
+        };
+        let steers = matches!(what, Asking::Arm | Asking::Offboard);
+        self.follower.asked |= steers && verdict == Verdict::Accepted;
+        self.hear_texts(now_s);
+    }
+
+    /// A ground station takes the aircraft, over a link of its own.
+    pub(super) fn take_over(&mut self, step: u64) {
+        let asked = &self.scenario.asked;
+        let taken = asked.iter().any(|a| a.what == Asking::TakeOver && at_step(a.at_s) == step);
+        if taken && self.aircraft.take_over() {
+            self.follower.asked = false;
+        }
+    }
+}
+
+/// The step of a moment, s.
+fn at_step(at_s: f64) -> u64 {
+    (100.0 * at_s) as u64
+}

@@ -1,0 +1,128 @@
+//! What the rules of flight need to know of a flight under way.
+
+use super::Flight;
+use crate::flight::pilot::{Decision, Source};
+use crate::link::autopilot::Mode;
+use crate::link::vehicle::Vehicle;
+use crate::sim::faults::policies::Sample;
+
+/// Time constants of what a surface does slowly, and of the mean square of the rest, s.
+const SLOW_S: f64 = 0.5;
+const MEAN_S: f64 = 1.0;
+/// Length of a step, s.
+const STEP_S: f64 = 0.01;
+/// Difference of targets, rad, above which another attitude is asked for.
+const SAME: f64 = 1e-3;
+
+/// Follows a flight from step to step.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Follower {
+    /// Whether somebody has asked for the companion to steer, and nobody has taken the aircraft since.
+    pub(super) asked: bool,
+    decision: Option<Decision>,
+    fresh: bool,
+    age_s: f64,
+    held_s: f64,
+    moved: f64,
+    heard_s: f64,
+    client_heard_s: f64,
+    steady_s: f64,
+    target: [f64; 2],
+    lines: usize,
+    start_m: Option<f64>,
+    surfaces: [Fast; 2],
+}
+
+/// The fast movement of a surface.
+#[derive(Clone, Copy, Debug, Default)]
+struct Fast {
+    slow: f64,
+    mean_square: f64,
+}
+
+impl Fast {
+    fn update(&mut self, x: f64) {
+        self.slow += STEP_S / SLOW_S * (x - self.slow);
+        let fast = x - self.slow;
+        self.mean_square += STEP_S / MEAN_S * (fast * fast - self.mean_square);
+    }
+}
+
+impl Follower {
+    pub(super) fn heard(&mut self, now_s: f64, something: bool) {
+        if something {
+            self.heard_s = now_s;
+        }
+    }
+
+    pub(super) fn client_heard(&mut self, now_s: f64) {
+        self.client_heard_s = now_s;
+    }
+
+    pub(super) fn decided(&mut self, decision: &Decision) {
+        if let Some(last) = self.decision.filter(|last| last.armed && decision.armed) {
+            let (c, l) = (decision.command, last.command);
+            let step = (c.aileron - l.aileron).abs().max((c.elevator - l.elevator).abs());
+            self.moved = self.moved.max(step);
+        }
+        let since = self.decision.map_or(0.0, |last| decision.time.since(last.time).as_secs_f64());
+        self.held_s = if decision.source == Source::Held { self.held_s + since } else { 0.0 };
+        (self.decision, self.fresh) = (Some(*decision), true);
+    }
+
+    /// How long the same attitude has been asked for and flown.
+    fn steady(&mut self, flown: bool) {
+        let target = self.decision.map_or([0.0; 2], |d| [d.target.roll, d.target.pitch]);
+        let same = target.iter().zip(self.target).all(|(a, b)| (a - b).abs() < SAME);
+        self.steady_s = if flown && same { self.steady_s + STEP_S } else { 0.0 };
+        self.target = target;
+    }
+}
+
+impl Flight {
+    /// Takes the sample of a step, where samples are wanted.
+    pub(super) fn sample(&mut self, now_s: f64) {
+        let Some(trace) = &mut self.trace else { return };
+        let truth = self.aircraft.truth();
+        let follower = &mut self.follower;
+        let (steered, exposed) = (self.aircraft.is_steered(), self.judge.is_exposed());
+        let engaged = match self.desk.vehicle() {
+            Vehicle::Real(session) => session.is_engaged(),
+            Vehicle::Sitl(_) => follower.decision.is_some_and(|d| d.armed),
+        };
+        let controlled = |d: &Decision| {
+            let by_attitude = matches!(d.source, Source::Planned | Source::Late | Source::Fallback);
+            d.armed && d.mode == Mode::Offboard && by_attitude
+        };
+        let controlled = follower.decision.as_ref().is_some_and(controlled);
+        follower.steady(steered && engaged && controlled && !exposed);
+        follower.age_s =
+            if std::mem::take(&mut follower.fresh) { 0.0 } else { follower.age_s + STEP_S };
+        let inputs = self.aircraft.inputs();
+        // flown by attitude, the surfaces are the controller's own
+        let ours = steered && self.desk.vehicle().flies_surfaces();
+        let [aileron, elevator] = &mut follower.surfaces;
+        aileron.update(if ours { inputs.aileron } else { aileron.slow });
+        elevator.update(if ours { inputs.elevator } else { elevator.slow });
+        let mean_square = aileron.mean_square.max(elevator.mean_square);
+        let start = *follower.start_m.get_or_insert(truth.altitude_m);
+        trace.push(Sample {
+            decision: follower.decision,
+            age_s: follower.age_s,
+            held_s: follower.held_s,
+            moved: std::mem::take(&mut follower.moved),
+            steered,
+            engaged,
+            silent_s: now_s - follower.heard_s,
+            client_silent_s: now_s - follower.client_heard_s,
+            steady_s: follower.steady_s,
+            attitude_deg: [truth.roll_rad, truth.pitch_rad].map(f64::to_degrees),
+            airspeed_mps: truth.airspeed_mps,
+            lost_m: start - truth.altitude_m,
+            swing: mean_square.sqrt(),
+            exposed,
+            spoke: self.texts.len() > std::mem::replace(&mut follower.lines, self.texts.len()),
+            asked: follower.asked,
+        });
+    }
+}

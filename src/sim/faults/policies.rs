@@ -1,0 +1,335 @@
+//! The rules of flight: what must hold in every flight, whatever befalls it, in signal temporal logic.
+
+use super::temporal::Formula;
+use crate::flight::pilot::{Decision, Source};
+use crate::link::autopilot::Mode;
+use crate::physics::airframe::Envelope;
+
+/// Overshoot of bank and pitch beyond the envelope that is still no violation, degrees: what a gust of the surfaces' full
+/// slew takes.
+const OVERSHOOT_DEG: f64 = 15.0;
+/// Angle that is one unit of distance, degrees; likewise altitude (m), time (s).
+const UNIT_DEG: f64 = 30.0;
+const UNIT_M: f64 = 100.0;
+const UNIT_S: f64 = 5.0;
+/// Altitude that a flight of turns, climbs and descents may lose, m.
+const ALTITUDE_LOSS_M: f64 = 200.0;
+/// What an aircraft was exposed to so long ago no longer explains anything, s.
+const MEMORY_S: f64 = 3.0;
+/// Root mean square of a surface's fast movement, of its travel, that is an oscillation.
+const SWING: f64 = 0.5;
+/// Longest time that a command is held, s: 50 ms, and half a step for the moments at which states come.
+const HELD_S: f64 = 0.055;
+/// Age of a decision beyond which it says nothing of now, s.
+const STALE_S: f64 = 0.05;
+/// A complaint that comes again within this time is not repeated, s.
+const COMPLAINED_S: f64 = 5.0;
+/// Rounding of a step of the surfaces, and of a limit of the envelope (rad).
+const ROUNDING: f64 = 1e-9;
+
+/// A flight at one step.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    /// The last decision of the pilot; `None` before the first.
+    pub decision: Option<Decision>,
+    /// How old it is, s.
+    pub age_s: f64,
+    /// For how long the command has been held over a gap of states, vehicle clock, s.
+    pub held_s: f64,
+    /// Largest change of a surface's command by that decision, −1..1 being the travel; 0 where it is no new one.
+    pub moved: f64,
+    /// Whether the flight controller flies what the companion sends; at the simulator's own link always.
+    pub steered: bool,
+    /// Whether the companion means to steer.
+    pub engaged: bool,
+    /// For how long nothing has come from the vehicle, s.
+    pub silent_s: f64,
+    /// For how long the client has sent no setpoint, s.
+    pub client_silent_s: f64,
+    /// For how long the same attitude has been asked for and flown, s.
+    pub steady_s: f64,
+    /// Roll and pitch, degrees.
+    pub attitude_deg: [f64; 2],
+    /// True airspeed, m/s.
+    pub airspeed_mps: f64,
+    /// Altitude lost since the start, m.
+    pub lost_m: f64,
+    /// Root mean square of the fast movement of the surface that moves most, over about a second, of its travel; of surfaces
+    /// that the companion flies.
+    pub swing: f64,
+    /// Whether the aircraft is exposed to what its companion cannot help: unsteered, blind, misled.
+    pub exposed: bool,
+    /// Whether something was said to the ground stations.
+    pub spoke: bool,
+    /// Whether somebody has asked for the companion to steer, and nobody has taken the aircraft since.
+    pub asked: bool,
+}
+
+impl Sample {
+    fn decided(&self, holds: impl Fn(&Decision) -> bool) -> bool {
+        self.decision.as_ref().is_some_and(holds)
+    }
+
+    /// Attitude error, degrees, where an attitude is flown.
+    fn error_deg(&self) -> Option<f64> {
+        let target = self.decision.as_ref()?.target;
+        let off = (self.attitude_deg[0] - target.roll.to_degrees()).abs();
+        Some(off.max((self.attitude_deg[1] - target.pitch.to_degrees()).abs()))
+    }
+}
+
+/// A rule.
+pub struct Policy {
+    /// Its name.
+    pub id: &'static str,
+    /// What it asks, in words.
+    pub asks: &'static str,
+    /// It speaks of a flight controller: not judged at the simulator's own link.
+    pub of_controllers: bool,
+    /// What must always hold.
+    pub always: Formula<Sample>,
+}
+
+type Rule = Formula<Sample>;
+
+fn is(statement: impl Fn(&Sample) -> bool + Send + Sync + 'static) -> Rule {
+    Formula::is(statement)
+}
+
+fn decided(holds: impl Fn(&Decision) -> bool + Send + Sync + 'static) -> Rule {
+    is(move |s| s.decided(&holds))
+}
+
+/// Holds unless the aircraft was exposed a moment ago.
+fn unless_exposed(rule: Rule) -> Rule {
+    is(|s| s.exposed).lately(MEMORY_S).or(rule)
+}
+
+/// How far a duration is below `most`, s.
+fn shorter(seconds: impl Fn(&Sample) -> f64 + Send + Sync + 'static, most: f64) -> Rule {
+    Formula::atom(move |s| (most - seconds(s)) / UNIT_S)
+}
+
+/// After so long on one target the attitude error is below `most` degrees.
+fn settled(after_s: f64, most: f64) -> Rule {
+    let near = Formula::atom(move |s: &Sample| s.error_deg().map_or(1.0, |e| (most - e) / most));
+    shorter(|s| s.steady_s, after_s).or(near)
+}
+
+/// Whatever begins is reported within a second, or was a moment ago.
+fn reported(event: Rule) -> Rule {
+    let spoke = || is(|s| s.spoke);
+    event.begins().implies(spoke().within(1.0).or(spoke().lately(COMPLAINED_S)))
+}
+
+/// What the pilot has decided ends within `seconds`, or it decides nothing any more.
+fn ends(state: impl Fn(&Sample) -> bool + Copy + Send + Sync + 'static, seconds: f64) -> Rule {
+    is(state).implies(is(move |s| !state(s) || s.age_s > STALE_S).within(seconds))
+}
+
+/// Every rule for an aircraft of this envelope.
+pub fn policies(envelope: &Envelope) -> Vec<Policy> {
+    let mut all = of_commands(envelope);
+    all.extend(of_the_aircraft(envelope));
+    all.extend(of_handing_over());
+    all.extend(of_reports());
+    all
+}
+
+fn policy(id: &'static str, asks: &'static str, always: Rule) -> Policy {
+    Policy { id, asks, of_controllers: false, always }
+}
+
+fn of_commands(envelope: &Envelope) -> Vec<Policy> {
+    let Envelope { bank_max_deg, pitch_max_deg, pitch_min_deg, .. } = *envelope;
+    let step = envelope.surface_slew_per_s * 0.01;
+    let inside = |x: f64, least: f64, most: f64| (most - x).min(x - least).to_degrees() / UNIT_DEG;
+    let [bank, high, low] = [bank_max_deg, pitch_max_deg, pitch_min_deg].map(f64::to_radians);
+    vec![
+        policy(
+            "finite",
+            "every command is finite",
+            decided(|d| d.command.is_finite()).or(is(|s| s.decision.is_none())),
+        ),
+        policy(
+            "range",
+            "surfaces stay within their travel, throttle within 0..1",
+            Formula::atom(|s: &Sample| {
+                s.decision.map_or(1.0, |d| {
+                    let c = d.command;
+                    1.0 + ROUNDING
+                        - c.aileron.abs().max(c.elevator.abs()).max((2.0 * c.throttle - 1.0).abs())
+                })
+            }),
+        ),
+        policy(
+            "slew",
+            "armed, no surface is commanded faster than the slew limit",
+            Formula::atom(move |s: &Sample| (step + ROUNDING - s.moved) / step),
+        ),
+        policy(
+            "idle",
+            "disarmed, the command is idle",
+            decided(|d| d.armed || d.command == crate::physics::Command::IDLE)
+                .or(is(|s| s.decision.is_none())),
+        ),
+        policy(
+            "bank-target",
+            "the bank that is flown to lies inside the envelope",
+            Formula::atom(move |s: &Sample| {
+                s.decision
+                    .filter(|d| d.target.roll.is_finite())
+                    .map_or(1.0, |d| inside(d.target.roll, -bank - ROUNDING, bank + ROUNDING))
+            }),
+        ),
+        policy(
+            "pitch-target",
+            "the pitch that is flown to lies inside the envelope",
+            Formula::atom(move |s: &Sample| {
+                s.decision
+                    .filter(|d| d.target.pitch.is_finite())
+                    .map_or(1.0, |d| inside(d.target.pitch, low - ROUNDING, high + ROUNDING))
+            }),
+        ),
+        policy(
+            "held",
+            "a command is held over a gap of states for at most 0.06 s",
+            Formula::atom(|s: &Sample| (HELD_S - s.held_s) / HELD_S),
+        ),
+    ]
+}
+
+fn of_the_aircraft(envelope: &Envelope) -> Vec<Policy> {
+    let e = *envelope;
+    let beyond = OVERSHOOT_DEG;
+    let angle = |room: fn(&Envelope, [f64; 2]) -> f64| {
+        unless_exposed(Formula::atom(move |s: &Sample| {
+            (room(&e, s.attitude_deg) + beyond) / UNIT_DEG
+        }))
+    };
+    let stall = e.airspeed_min_mps / std::f64::consts::SQRT_2;
+    vec![
+        policy(
+            "bank",
+            "bank stays within 15 degrees of the envelope",
+            angle(|e, [roll, _]| e.bank_max_deg - roll.abs()),
+        ),
+        policy(
+            "nose-up",
+            "pitch stays less than 15 degrees above the envelope",
+            angle(|e, [_, pitch]| e.pitch_max_deg - pitch),
+        ),
+        policy(
+            "nose-down",
+            "pitch stays less than 15 degrees below the envelope",
+            angle(|e, [_, pitch]| pitch - e.pitch_min_deg),
+        ),
+        policy(
+            "stall",
+            "airspeed stays above the stall",
+            unless_exposed(Formula::atom(move |s: &Sample| (s.airspeed_mps - stall) / stall)),
+        ),
+        policy(
+            "overspeed",
+            "airspeed stays below the envelope's largest",
+            unless_exposed(Formula::atom(move |s: &Sample| {
+                (e.airspeed_max_mps - s.airspeed_mps) / e.airspeed_max_mps
+            })),
+        ),
+        policy(
+            "altitude",
+            "no more than 200 m are lost",
+            unless_exposed(Formula::atom(|s: &Sample| (ALTITUDE_LOSS_M - s.lost_m) / UNIT_M)),
+        ),
+        policy(
+            "reached",
+            "an attitude asked for is reached to 5 degrees within 5 s",
+            settled(5.0, 5.0),
+        ),
+        policy("kept", "after 8 s it is kept to 3 degrees", settled(8.0, 3.0)),
+        policy(
+            "no-oscillation",
+            "no surface moves fast by more than half its travel (rms over a second)",
+            unless_exposed(Formula::atom(|s: &Sample| (SWING - s.swing) / SWING)),
+        ),
+    ]
+}
+
+fn of_handing_over() -> Vec<Policy> {
+    let of_controllers = |id, asks, always| Policy { id, asks, of_controllers: true, always };
+    fn ours(s: &Sample) -> bool {
+        s.steered && s.engaged
+    }
+    vec![
+        of_controllers(
+            "dead-link",
+            "when nothing has come for 0.3 s, the aircraft is handed back within 0.3 s",
+            is(|s| ours(s) && s.silent_s >= 0.3).implies(is(|s| !ours(s)).within(0.3)),
+        ),
+        of_controllers(
+            "refusal",
+            "what the checks refuse is handed back within 5 s",
+            ends(|s| ours(s) && s.decided(|d| d.refused.is_some()), 5.0),
+        ),
+        of_controllers(
+            "no-state",
+            "without a state to fly on the aircraft is handed back within 5 s",
+            ends(|s| ours(s) && s.decided(|d| d.source == Source::Level), 5.0),
+        ),
+        of_controllers(
+            "unasked",
+            "nobody's mode is changed to the companion's unless a client asked for it",
+            is(|s| s.steered).begins().implies(is(|s| s.asked)),
+        ),
+        of_controllers(
+            "after-disarm",
+            "disarmed, the companion lets go of the controller within 3 s",
+            ends(|s| ours(s) && s.decided(|d| !d.armed), 3.0),
+        ),
+        policy(
+            "client-lost",
+            "a client that is silent for 1 s ends OFFBOARD within 1 s",
+            ends(
+                |s| {
+                    let offboard =
+                        |d: &Decision| d.armed && d.mode == Mode::Offboard && !d.failsafe;
+                    s.client_silent_s >= 1.0 && s.decided(offboard)
+                },
+                1.0,
+            ),
+        ),
+    ]
+}
+
+fn of_reports() -> Vec<Policy> {
+    vec![
+        policy(
+            "refusal-reported",
+            "what the checks refuse is reported within 1 s",
+            reported(decided(|d| d.refused.is_some())),
+        ),
+        policy(
+            "failsafe-reported",
+            "a failsafe is reported within 1 s",
+            reported(decided(|d| d.armed && d.failsafe)),
+        ),
+        policy(
+            "level-reported",
+            "flying without a state is reported within 1 s",
+            reported(decided(|d| d.armed && d.source == Source::Level)),
+        ),
+        policy(
+            "disarm-reported",
+            "disarming is reported within 1 s",
+            reported(decided(|d| !d.armed).and(is(|s| s.decision.is_some()))),
+        ),
+        Policy {
+            of_controllers: true,
+            ..policy(
+                "hand-back-reported",
+                "the end of steering is reported within 1 s",
+                reported(is(|s| !s.steered)),
+            )
+        },
+    ]
+}

@@ -1,0 +1,215 @@
+//! A flight under faults as data: what befalls it, what is asked for, in which air.
+
+use greylag_sitl::air::Turbulence;
+use greylag_sitl::plant::PlantOptions;
+use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
+
+use super::counterpart::Counterpart;
+use super::mix::{FIRST_S, Fault, FaultKind, LAST_S, draw, one};
+use crate::link::autopilot::Mode;
+
+/// Fewest and most faults, requests and legs of a scenario that is varied.
+const MOST: usize = 4;
+/// Strongest steady wind, m/s, and turbulence (curve of MIL-F-8785C) of a scenario.
+const WIND_MPS: f64 = 8.0;
+const TURBULENCE: u8 = 4;
+
+/// An attitude that the client asks for from a moment on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Leg {
+    /// From when, s.
+    pub from_s: f64,
+    /// Roll, degrees.
+    pub roll_deg: f64,
+    /// Pitch, degrees.
+    pub pitch_deg: f64,
+}
+
+/// Something that a client or a ground station asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Asked {
+    /// When, s.
+    pub at_s: f64,
+    /// What.
+    pub what: Asking,
+}
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Asking {
+    /// The client asks the companion for OFFBOARD.
+    Offboard,
+    /// The client asks the companion for HOLD.
+    Hold,
+    /// The client asks the companion to disarm; in the air it refuses.
+    Disarm,
+    /// The client asks the companion to arm.
+    Arm,
+    /// A ground station takes the aircraft: it sets the flight controller's own loiter mode. Nothing at the simulator's link.
+    TakeOver,
+}
+
+impl Asking {
+    const ALL: [Asking; 5] =
+        [Asking::Offboard, Asking::Hold, Asking::Disarm, Asking::Arm, Asking::TakeOver];
+}
+
+/// A flight of 60 s.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// What is at the other end of the vehicle's link.
+    pub counterpart: Counterpart,
+    /// From which everything random follows that is not written here: noise, what a wire loses.
+    pub seed: u64,
+    /// Steady wind, the velocity of the air over the ground, north-east-down, m/s.
+    pub wind_ned_mps: [f64; 3],
+    /// Turbulence: a probability-of-exceedance curve of MIL-F-8785C, 1 to 7; 0 for none.
+    pub turbulence: u8,
+    /// What goes wrong.
+    pub faults: Vec<Fault>,
+    /// What the client wants flown, by time.
+    pub legs: Vec<Leg>,
+    /// What is asked for besides.
+    pub asked: Vec<Asked>,
+}
+
+/// What the client asks for unless a scenario says otherwise: turns both ways, a climb, a descent.
+const LEGS: [(f64, f64, f64); 6] = [
+    (0.0, 0.0, 3.0),
+    (12.0, 35.0, 5.0),
+    (20.0, -40.0, 3.0),
+    (28.0, 10.0, 12.0),
+    (36.0, 30.0, -3.0),
+    (44.0, 0.0, 3.0),
+];
+
+impl Scenario {
+    /// The flight of a seed in the campaign of faults: still air, six legs, nothing else asked for.
+    pub fn of_seed(counterpart: Counterpart, seed: u64) -> Scenario {
+        let leg = |(from_s, roll_deg, pitch_deg)| Leg { from_s, roll_deg, pitch_deg };
+        Scenario {
+            counterpart,
+            seed,
+            wind_ned_mps: [0.0; 3],
+            turbulence: 0,
+            faults: draw(seed),
+            legs: LEGS.map(leg).to_vec(),
+            asked: Vec::new(),
+        }
+    }
+
+    /// A flight drawn at random.
+    pub fn drawn(counterpart: Counterpart, random: &mut impl Rng) -> Scenario {
+        let mut scenario = Scenario::of_seed(counterpart, random.random_range(0..1_000_000));
+        for _ in 0..4 {
+            scenario = scenario.varied(random);
+        }
+        scenario
+    }
+
+    /// The same with one thing changed.
+    pub fn varied(&self, random: &mut impl Rng) -> Scenario {
+        let mut changed = self.clone();
+        match random.random_range(0..10) {
+            0 => changed.seed = random.random_range(0..1_000_000),
+            1 => {
+                let [north, east] = [(); 2].map(|()| random.random_range(-WIND_MPS..WIND_MPS));
+                changed.wind_ned_mps = [north, east, 0.0];
+            }
+            2 => changed.turbulence = random.random_range(0..=TURBULENCE),
+            3 | 4 if changed.faults.len() < MOST => {
+                let kind = FaultKind::ALL[random.random_range(0..FaultKind::ALL.len())];
+                changed.faults.push(one(kind, random));
+            }
+            3 | 4 => _ = changed.faults.remove(random.random_range(0..MOST)),
+            5 | 6 if !changed.faults.is_empty() => {
+                let place = random.random_range(0..changed.faults.len());
+                let fault = &mut changed.faults[place];
+                let length = (fault.to_s - fault.from_s) * random.random_range(0.5..2.0);
+                let moved = fault.from_s + random.random_range(-2.0..2.0);
+                fault.from_s = moved.clamp(FIRST_S, LAST_S - 8.0);
+                fault.to_s = fault.from_s + length.clamp(0.01, 8.0);
+                fault.strength = (fault.strength + random.random_range(-0.3..0.3)).clamp(0.0, 1.0);
+            }
+            7 if changed.legs.len() > 1 => {
+                // the last is level, which is what the end is judged by
+                let place = random.random_range(0..changed.legs.len() - 1);
+                let leg = &mut changed.legs[place];
+                leg.roll_deg = random.random_range(-60.0..60.0);
+                leg.pitch_deg = random.random_range(-20.0..20.0);
+            }
+            8 if changed.asked.len() < MOST => {
+                let what = Asking::ALL[random.random_range(0..Asking::ALL.len())];
+                changed.asked.push(Asked { at_s: random.random_range(FIRST_S..LAST_S), what });
+            }
+            _ if !changed.asked.is_empty() => {
+                let place = random.random_range(0..changed.asked.len());
+                let moved = changed.asked[place].at_s + random.random_range(-2.0..2.0);
+                changed.asked[place].at_s = moved.clamp(FIRST_S, LAST_S);
+            }
+            _ => {}
+        }
+        changed
+    }
+
+    /// Each scenario with less in it.
+    pub fn smaller(&self) -> Vec<Scenario> {
+        let mut all = Vec::new();
+        let mut with = |change: &dyn Fn(&mut Scenario)| {
+            let mut changed = self.clone();
+            change(&mut changed);
+            if changed != *self {
+                all.push(changed);
+            }
+        };
+        for k in 0..self.faults.len() {
+            with(&|s| _ = s.faults.remove(k));
+        }
+        for k in 0..self.asked.len() {
+            with(&|s| _ = s.asked.remove(k));
+        }
+        with(&|s| s.wind_ned_mps = [0.0; 3]);
+        with(&|s| s.turbulence = 0);
+        let usual = Scenario::of_seed(self.counterpart, 0).legs;
+        with(&|s| s.legs = usual.clone());
+        for k in 0..self.faults.len() {
+            with(&|s| {
+                let fault = &mut s.faults[k];
+                let half = 0.5 * (fault.to_s - fault.from_s);
+                if half >= 0.05 {
+                    fault.to_s = fault.from_s + half;
+                }
+            });
+        }
+        all
+    }
+
+    /// The aircraft `plant` in the scenario's air.
+    pub(super) fn air(&self, plant: &PlantOptions) -> PlantOptions {
+        let mut plant = plant.clone();
+        if self.wind_ned_mps != [0.0; 3] {
+            plant.air.wind_ned_mps = self.wind_ned_mps;
+        }
+        if self.turbulence > 0 {
+            // twenty feet above ground plays no part at the altitude of these flights
+            let turbulence = Turbulence { wind_20ft_mps: 7.6, severity: self.turbulence };
+            plant.air.turbulence = Some(turbulence);
+            plant.seed = self.seed as u32;
+        }
+        plant
+    }
+}
+
+/// The mode that the client asks the companion for, if it is one.
+pub(super) fn mode_of(asking: Asking) -> Option<Mode> {
+    match asking {
+        Asking::Offboard => Some(Mode::Offboard),
+        Asking::Hold => Some(Mode::Hold),
+        Asking::Disarm | Asking::Arm | Asking::TakeOver => None,
+    }
+}

@@ -1,0 +1,166 @@
+//! A search for flights that break a rule: each step varies the flight that came nearest to it (PGFuzz, Kim et al., NDSS
+//! 2021), and what breaks a rule is made smaller.
+
+use std::ops::ControlFlow;
+
+use rand::RngExt;
+use rand::seq::IndexedRandom;
+use rayon::prelude::*;
+
+use super::counterpart::Counterpart;
+use super::flight::{CompanionFactory, FaultsError};
+use super::judge::{Finding, Found};
+use super::policies::{Policy, Sample, policies};
+use super::scenario::Scenario;
+use super::temporal::SAMPLE_S;
+use crate::num::stream::stream;
+
+/// Flights that are flown side by side; the search is the same on any number of cores.
+const TOGETHER: u64 = 16;
+/// Share of the flights that are drawn afresh.
+const FRESH: f64 = 0.25;
+/// Most rounds in which a flight is made smaller.
+const ROUNDS: usize = 8;
+/// Stream of the search.
+const SEARCH: u64 = 61;
+
+/// How near a flight came to breaking a rule.
+#[derive(Clone, Debug)]
+pub struct Nearest {
+    /// The rule's name.
+    pub policy: &'static str,
+    /// What it asks.
+    pub asks: &'static str,
+    /// Flights that it was judged in.
+    pub flights: u64,
+    /// Flights that broke it.
+    pub broken: u64,
+    /// The least distance of all flights, 1 at most; below 0 the rule is broken.
+    pub distance: f64,
+    /// When, s.
+    pub at_s: f64,
+    /// That flight; made smaller if it breaks the rule.
+    pub scenario: Option<Scenario>,
+}
+
+/// How near `scenario` comes to each of `rules` that applies: distance and moment (s). A panic breaks all of them.
+///
+/// # Errors
+/// If the aircraft cannot be loaded.
+pub fn distances(
+    factory: &CompanionFactory,
+    rules: &[Policy],
+    scenario: &Scenario,
+) -> Result<Vec<Option<(f64, f64)>>, FaultsError> {
+    let (samples, found) = factory.trace(scenario)?;
+    let panicked = found.iter().any(|f: &Found| f.finding == Finding::Panic);
+    let judged = |rule: &Policy| {
+        let applies = !rule.of_controllers || scenario.counterpart != Counterpart::Sitl;
+        applies.then(|| nearest(rule, &samples, panicked))
+    };
+    Ok(rules.iter().map(judged).collect())
+}
+
+fn nearest(rule: &Policy, samples: &[Sample], panicked: bool) -> (f64, f64) {
+    let (place, distance) = rule.always.least(samples).unwrap_or((0, 1.0));
+    if panicked {
+        return (-1.0, samples.len() as f64 * SAMPLE_S);
+    }
+    (distance, place as f64 * SAMPLE_S)
+}
+
+/// Flies `flights` flights with the companions of `factory` at the `counterparts`, always nearer to breaking a rule of
+/// `rules`; `heard` hears of the flights flown and the rules broken by then, and ends the search.
+///
+/// # Errors
+/// If the aircraft cannot be loaded.
+pub fn search(
+    factory: &CompanionFactory,
+    counterparts: &[Counterpart],
+    flights: u64,
+    seed: u64,
+    heard: &mut dyn FnMut(u64, usize) -> ControlFlow<()>,
+) -> Result<Vec<Nearest>, FaultsError> {
+    let rules = policies(&factory.envelope());
+    let begin = |rule: &Policy| Nearest {
+        policy: rule.id,
+        asks: rule.asks,
+        flights: 0,
+        broken: 0,
+        distance: f64::INFINITY,
+        at_s: 0.0,
+        scenario: None,
+    };
+    let mut all: Vec<Nearest> = rules.iter().map(begin).collect();
+    let mut flown = 0;
+    while flown < flights {
+        let together = TOGETHER.min(flights - flown);
+        let next = |k: u64| {
+            let mut random = stream(seed, &[SEARCH, flown + k]);
+            let near: Vec<&Scenario> = all
+                .iter()
+                .filter_map(|n| n.scenario.as_ref().filter(|_| n.distance >= 0.0))
+                .collect();
+            match near.choose(&mut random) {
+                Some(scenario) if !random.random_bool(FRESH) => scenario.varied(&mut random),
+                _ => {
+                    let counterpart = counterparts[random.random_range(0..counterparts.len())];
+                    Scenario::drawn(counterpart, &mut random)
+                }
+            }
+        };
+        let scenarios: Vec<Scenario> = (0..together).map(next).collect();
+        let judged: Result<Vec<_>, _> =
+            scenarios.par_iter().map(|scenario| distances(factory, &rules, scenario)).collect();
+        for (scenario, judged) in scenarios.iter().zip(judged?) {
+            for (nearest, judged) in all.iter_mut().zip(judged) {
+                nearest.take(scenario, judged);
+            }
+        }
+        flown += together;
+        if heard(flown, all.iter().filter(|n| n.broken > 0).count()).is_break() {
+            break;
+        }
+    }
+    for (k, nearest) in all.iter_mut().enumerate().filter(|(_, n)| n.broken > 0) {
+        nearest.shrink(factory, &rules, k)?;
+    }
+    Ok(all)
+}
+
+impl Nearest {
+    fn take(&mut self, scenario: &Scenario, judged: Option<(f64, f64)>) {
+        let Some((distance, at_s)) = judged else { return };
+        self.flights += 1;
+        self.broken += u64::from(distance < 0.0);
+        if distance < self.distance {
+            (self.distance, self.at_s) = (distance, at_s);
+            self.scenario = Some(scenario.clone());
+        }
+    }
+
+    /// Takes out of the flight what it does not need to break the rule `k`.
+    fn shrink(
+        &mut self,
+        factory: &CompanionFactory,
+        rules: &[Policy],
+        k: usize,
+    ) -> Result<(), FaultsError> {
+        for _ in 0..ROUNDS {
+            let Some(scenario) = &self.scenario else { return Ok(()) };
+            let mut smaller = None;
+            for candidate in scenario.smaller() {
+                if let Some((distance, at_s)) = distances(factory, rules, &candidate)?[k]
+                    && distance < 0.0
+                {
+                    smaller = Some((candidate, distance, at_s));
+                    break;
+                }
+            }
+            let Some((candidate, distance, at_s)) = smaller else { return Ok(()) };
+            (self.distance, self.at_s) = (distance, at_s);
+            self.scenario = Some(candidate);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,179 @@
+//! Signal temporal logic over sampled flights: how far a formula is from being violated.
+//!
+//! Robust semantics (Donzé and Maler, Robust Satisfaction of Temporal Logic over Real-Valued Signals, FORMATS 2010): a
+//! formula is a number at each sample, positive where it holds, negative where it is violated, and the size says by how
+//! much. Windows that reach beyond the end of the flight are not held against it.
+
+use std::collections::VecDeque;
+
+/// Length of a sample, s.
+pub const SAMPLE_S: f64 = 0.01;
+
+/// A formula over samples `S`.
+pub enum Formula<S> {
+    /// A distance, −1..1: positive where the statement holds. What is not a number is −1.
+    Atom(Box<dyn Fn(&S) -> f64 + Send + Sync>),
+    /// The formula does not hold.
+    Not(Box<Formula<S>>),
+    /// All hold.
+    All(Vec<Formula<S>>),
+    /// One of them holds.
+    Any(Vec<Formula<S>>),
+    /// It holds at some sample of the next so many seconds.
+    Within(f64, Box<Formula<S>>),
+    /// It has held at some sample of the last so many seconds.
+    Lately(f64, Box<Formula<S>>),
+    /// It holds now and did not at the sample before.
+    Begins(Box<Formula<S>>),
+}
+
+impl<S> Formula<S> {
+    /// A distance in units in which 1 is as good or bad as it gets.
+    pub fn atom(distance: impl Fn(&S) -> f64 + Send + Sync + 'static) -> Self {
+        Formula::Atom(Box::new(distance))
+    }
+
+    /// A statement that holds or does not.
+    pub fn is(statement: impl Fn(&S) -> bool + Send + Sync + 'static) -> Self {
+        Formula::atom(move |sample| if statement(sample) { 1.0 } else { -1.0 })
+    }
+
+    /// `self` implies `then`.
+    pub fn implies(self, then: Self) -> Self {
+        Formula::Any(vec![Formula::Not(Box::new(self)), then])
+    }
+
+    /// Or `other` holds.
+    pub fn or(self, other: Self) -> Self {
+        Formula::Any(vec![self, other])
+    }
+
+    /// And `other` holds.
+    pub fn and(self, other: Self) -> Self {
+        Formula::All(vec![self, other])
+    }
+
+    /// It holds at some sample of the next `seconds`.
+    pub fn within(self, seconds: f64) -> Self {
+        Formula::Within(seconds, Box::new(self))
+    }
+
+    /// It has held at some sample of the last `seconds`.
+    pub fn lately(self, seconds: f64) -> Self {
+        Formula::Lately(seconds, Box::new(self))
+    }
+
+    /// It holds now and did not at the sample before.
+    pub fn begins(self) -> Self {
+        Formula::Begins(Box::new(self))
+    }
+
+    /// The distance at each sample.
+    pub fn distances(&self, samples: &[S]) -> Vec<f64> {
+        match self {
+            Formula::Atom(distance) => samples
+                .iter()
+                .map(|sample| Some(distance(sample)).filter(|d| !d.is_nan()))
+                .map(|d| d.map_or(-1.0, |d| d.clamp(-1.0, 1.0)))
+                .collect(),
+            Formula::Not(of) => of.distances(samples).into_iter().map(|d| -d).collect(),
+            Formula::All(of) => together(of, samples, 1.0, f64::min),
+            Formula::Any(of) => together(of, samples, -1.0, f64::max),
+            Formula::Within(seconds, of) => {
+                let mut ahead = of.distances(samples);
+                ahead.reverse();
+                let mut best = largest_lately(&ahead, count(*seconds), 1.0);
+                best.reverse();
+                best
+            }
+            Formula::Lately(seconds, of) => {
+                largest_lately(&of.distances(samples), count(*seconds), -1.0)
+            }
+            Formula::Begins(of) => {
+                let now = of.distances(samples);
+                let before = std::iter::once(1.0).chain(now.iter().copied());
+                now.iter().zip(before).map(|(now, before)| now.min(-before)).collect()
+            }
+        }
+    }
+
+    /// The least distance of the flight with its sample: how nearly the formula fails to hold always. `None` without
+    /// samples.
+    pub fn least(&self, samples: &[S]) -> Option<(usize, f64)> {
+        self.distances(samples).into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+fn count(seconds: f64) -> usize {
+    (seconds / SAMPLE_S).round() as usize
+}
+
+fn together<S>(
+    of: &[Formula<S>],
+    samples: &[S],
+    neutral: f64,
+    join: fn(f64, f64) -> f64,
+) -> Vec<f64> {
+    let mut sum = vec![neutral; samples.len()];
+    for formula in of {
+        sum.iter_mut().zip(formula.distances(samples)).for_each(|(x, d)| *x = join(*x, d));
+    }
+    sum
+}
+
+/// The largest of each value and the `before` ones before it; `beyond` stands for those before the first.
+fn largest_lately(values: &[f64], before: usize, beyond: f64) -> Vec<f64> {
+    // places whose values fall: the first is the largest of the window
+    let mut falling = VecDeque::<usize>::new();
+    let mut largest = Vec::with_capacity(values.len());
+    for (place, value) in values.iter().enumerate() {
+        while falling.back().is_some_and(|last| values[*last] <= *value) {
+            falling.pop_back();
+        }
+        falling.push_back(place);
+        while falling.front().is_some_and(|first| first + before < place) {
+            falling.pop_front();
+        }
+        let here = falling.front().map_or(*value, |first| values[*first]);
+        largest.push(if place < before { here.max(beyond) } else { here });
+    }
+    largest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value() -> Formula<f64> {
+        Formula::atom(|x: &f64| *x)
+    }
+
+    #[test]
+    fn windows_look_ahead_and_back() {
+        let flight = [0.1, -0.5, 0.3, -0.2, -0.4];
+        // two samples on; beyond the end nothing is held against the flight
+        assert_eq!(value().within(0.02).distances(&flight), [0.3, 0.3, 0.3, 1.0, 1.0]);
+        assert_eq!(value().lately(0.02).distances(&flight), [0.1, 0.1, 0.3, 0.3, 0.3]);
+        assert_eq!(value().lately(0.0).distances(&flight), flight);
+        assert_eq!(value().least(&flight), Some((1, -0.5)));
+    }
+
+    #[test]
+    fn an_event_is_answered_in_time_or_not() {
+        // 1: asked, 2: answered
+        let answered = Formula::is(|x: &f64| *x == 1.0)
+            .begins()
+            .implies(Formula::is(|x: &f64| *x == 2.0).within(0.02));
+        let held = |flight: &[f64]| answered.least(flight).unwrap().1;
+        assert_eq!(held(&[0.0, 1.0, 1.0, 2.0, 0.0]), 1.0);
+        assert_eq!(held(&[0.0, 1.0, 1.0, 1.0, 2.0]), -1.0);
+        assert_eq!(held(&[0.0, 0.0, 0.0]), 1.0);
+    }
+
+    #[test]
+    fn what_is_no_number_does_not_hold() {
+        assert_eq!(value().distances(&[f64::NAN, 7.0]), [-1.0, 1.0]);
+        assert_eq!(Formula::Not(Box::new(value())).distances(&[0.25]), [-0.25]);
+        assert_eq!(value().and(Formula::is(|_| true)).distances(&[0.5]), [0.5]);
+    }
+}

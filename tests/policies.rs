@@ -1,0 +1,103 @@
+//! The rules of flight in signal temporal logic: held without faults, broken by a bad controller, searched and made smaller.
+#![cfg(feature = "sitl")]
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use greylag::commands::controllers::POLICY;
+use greylag::commands::fly::companion_with;
+use greylag::control::{Controller, ControllerKind, Observation, Target};
+use greylag::flight::runtime::Companion;
+use greylag::model::GreyBox;
+use greylag::physics::Command;
+use greylag::sim::faults::policies::policies;
+use greylag::sim::faults::search::{distances, search};
+use greylag::sim::faults::{CompanionFactory, Counterpart, Scenario};
+
+fn x8() -> GreyBox {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+    GreyBox::load(&path).unwrap()
+}
+
+fn lqi() -> Companion {
+    companion_with(ControllerKind::Lqi, &x8(), Path::new(POLICY)).unwrap()
+}
+
+fn quiet(counterpart: Counterpart) -> Scenario {
+    Scenario { faults: Vec::new(), ..Scenario::of_seed(counterpart, 3) }
+}
+
+/// Names of the rules that a flight breaks.
+fn broken(factory: &CompanionFactory, scenario: &Scenario) -> Vec<&'static str> {
+    let rules = policies(&factory.envelope());
+    let judged = distances(factory, &rules, scenario).unwrap();
+    let broken = |d: &Option<(f64, f64)>| d.is_some_and(|(distance, _)| distance < 0.0);
+    rules.iter().zip(&judged).filter(|(_, d)| broken(d)).map(|(rule, _)| rule.id).collect()
+}
+
+#[test]
+fn flights_without_faults_break_no_rule() {
+    let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
+    for counterpart in Counterpart::ALL {
+        assert_eq!(broken(&factory, &quiet(counterpart)), [""; 0], "{counterpart:?}");
+    }
+}
+
+/// Rolls as far as it goes, and swings its elevator.
+#[derive(Clone)]
+struct Wild;
+
+impl Controller for Wild {
+    fn name(&self) -> &'static str {
+        "wild"
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
+    }
+
+    fn reset(&mut self, _: u64) {}
+
+    fn command(&mut self, seen: &Observation, _: &Target) -> Command {
+        let up = (seen.time.as_micros() / 200_000).is_multiple_of(2);
+        let elevator = if up { 0.9 } else { -0.9 };
+        Command { aileron: 0.2, elevator, throttle: 0.5, rudder: 0.0 }
+    }
+}
+
+#[test]
+fn a_controller_that_does_not_fly_breaks_the_rules_of_the_aircraft() {
+    let wild = Companion { controller: Box::new(Wild), ..lqi() };
+    let factory = CompanionFactory::new(wild, &x8()).unwrap();
+    let broken = broken(&factory, &quiet(Counterpart::Sitl));
+    for rule in ["bank", "reached"] {
+        assert!(broken.contains(&rule), "{broken:?}");
+    }
+    // what the companion itself answers for holds whatever the controller does
+    for rule in ["finite", "range", "slew", "idle", "bank-target", "failsafe-reported"] {
+        assert!(!broken.contains(&rule), "{broken:?}");
+    }
+}
+
+#[test]
+fn a_search_repeats_from_its_seed_and_what_it_finds_is_made_smaller() {
+    let wild = Companion { controller: Box::new(Wild), ..lqi() };
+    let factory = CompanionFactory::new(wild, &x8()).unwrap();
+    let run = || {
+        let on = &mut |_, _| ControlFlow::Continue(());
+        search(&factory, &[Counterpart::Sitl], 4, 5, on).unwrap()
+    };
+    let [one, two] = [run(), run()];
+    for (a, b) in one.iter().zip(&two) {
+        assert_eq!((a.policy, a.flights, a.broken), (b.policy, b.flights, b.broken));
+        assert_eq!((a.distance, &a.scenario), (b.distance, &b.scenario));
+    }
+    let bank = one.iter().find(|n| n.policy == "bank").unwrap();
+    let scenario = bank.scenario.as_ref().unwrap();
+    assert!(bank.broken > 0 && bank.distance < 0.0);
+    // no fault is needed for it, no wind and no request
+    assert!(scenario.faults.is_empty() && scenario.asked.is_empty(), "{scenario:?}");
+    assert!(scenario.wind_ned_mps == [0.0; 3] && scenario.turbulence == 0, "{scenario:?}");
+    let text = serde_json::to_string(scenario).unwrap();
+    assert_eq!(&serde_json::from_str::<Scenario>(&text).unwrap(), scenario);
+}
