@@ -2,15 +2,15 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, ValueEnum};
-use greylag_sitl::airframe_file::{self, AirframeError};
-use greylag_sitl::error_arguments::{FaultArgs, SensorArgs};
-use greylag_sitl::plant::Start;
-use greylag_sitl::plant_arguments::PlantArgs;
-use greylag_sitl::shim::{
+use crate::airframe_file::{self, AirframeError};
+use crate::error_arguments::{FaultArgs, SensorArgs};
+use crate::plant::Start;
+use crate::plant_arguments::PlantArgs;
+use crate::shim::{
     Address, ArdupilotOptions, ChannelRange, Existing, Launch, OutputMap, Pace, Personality,
     Px4Noise, Px4Options, ShimOptions, TruthFile,
 };
+use clap::{Args, Parser, ValueEnum};
 
 /// Flies an aircraft in JSBSim and plays its flight controller over MAVLink.
 ///

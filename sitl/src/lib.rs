@@ -2,6 +2,7 @@
 
 pub mod air;
 mod aircraft;
+pub mod arguments;
 pub mod airframe_file;
 pub mod error_arguments;
 pub mod hidden;

@@ -1,6 +1,5 @@
 //! The program `greylag-sitl`: a flight controller with an aircraft, played to a companion.
 
-mod arguments;
 mod said_once;
 
 use std::io::Write;
@@ -9,8 +8,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
-use arguments::Cli;
 use clap::Parser;
+use greylag_sitl::arguments::Cli;
 use greylag_sitl::shim::{self, Launch, Pace, ShimOptions};
 use said_once::said_once;
 

@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
     after_help = "For one user: greylag man ~/.local/share/man/man1; then: man greylag-compare"
 )]
 pub struct Arguments {
-    /// Folder for greylag.1 and a page for every subcommand; made if there is none. Pages there are replaced.
+    /// Folder for greylag.1, a page for every subcommand and greylag-sitl.1; made if there is none. Pages there are replaced.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }
@@ -25,6 +25,12 @@ pub fn run(arguments: &Arguments, command: clap::Command) -> Result<ExitCode> {
     let context = || format!("cannot write manual pages into {}", folder.display());
     std::fs::create_dir_all(folder).with_context(context)?;
     clap_mangen::generate_to(command, folder).with_context(context)?;
+    #[cfg(feature = "sitl")]
+    clap_mangen::generate_to(
+        <greylag_sitl::arguments::Cli as clap::CommandFactory>::command(),
+        folder,
+    )
+    .with_context(context)?;
     println!("manual pages in {}", folder.display());
     Ok(ExitCode::SUCCESS)
 }

@@ -289,7 +289,7 @@ impl Arguments {
                 run.train(recipe, crate::sim::flown::Flown::new(&plant, targets)?)
             }
             #[cfg(not(feature = "sitl"))]
-            None => Err(anyhow!("this program was built without JSBSim")),
+            None => Err(anyhow::anyhow!("this program was built without JSBSim")),
         }
     }
 }
