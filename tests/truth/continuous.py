@@ -11,6 +11,7 @@ import numpy as np
 import aircraft as x8
 from atmosphere import density
 from compiled import compiled
+from formulas import FORMS, THROTTLE, form_of
 from hidden import INPUTS
 from pilot import PERIOD, command
 
@@ -23,9 +24,10 @@ NAMES = (
     "drag_alpha2", "drag_beta2", "drag_elevator_abs", "stall", "stall_alpha", "stall_sharpness", "pitch_break",
     "cg_shift", "lift_alphadot", "pitch_alphadot", "thrust_decay", "thrust_scale", "thrust_line_offset",
     "motor_torque", "propeller_gyro", "propwash", "aeroelastic_loss", "mass_error", "inertia_xz", "asymmetry",
-    "dihedral_alpha", "roll_control_alpha", "effectiveness_saturation",
+    "dihedral_alpha", "roll_control_alpha", "effectiveness_saturation", "formula_channel", "formula_form",
+    "formula_first", "formula_second", "formula_constant", "formula_amount",
 )  # fmt: skip
-"""Figures of the hidden effects, in the order of the vector that the equations take."""
+"""Figures of the hidden effects and of a hidden formula, in the order of the vector that the equations take."""
 
 _C = {f"{e}.{n}": v for e, names in x8.COEFFICIENTS.items() for n, v in names.items()}
 CLQ, CLDE = _C["lift_linear.CLq"], _C["lift_linear.CLde"]
@@ -38,11 +40,12 @@ CL0, CLA = x8.LINEAR_LIFT["CL0"], x8.LINEAR_LIFT["CLalpha"]
 AREA, SPAN, CHORD, MASS, THRUST = x8.AREA, x8.SPAN, x8.CHORD, x8.MASS, x8.THRUST_MAX
 JX, JY, JZ, JXZ, GRAVITY = x8.JX, x8.JY, x8.JZ, x8.JXZ, x8.GRAVITY
 LIFT_ALPHA, LIFT, DRAG_ALPHA, DRAG = x8.LIFT_ALPHA, x8.LIFT, x8.DRAG_ALPHA, x8.DRAG
+WITHOUT_AIR = 1 + list(FORMS).index(THROTTLE)
 V0, THROTTLE0, LIMIT, LAG = x8.REFERENCE_SPEED, x8.REFERENCE_THROTTLE, x8.DEFLECTION_MAX, x8.THROTTLE_LAG
 
 
-def vector(effect=None, amount=0.0):
-    """The figures of one hidden effect, or of none."""
+def vector(effect=None, amount=0.0, formula=None):
+    """The figures of one hidden effect or of a formula (`formulas.Formula`), or of none."""
     values = dict.fromkeys(NAMES, 0.0)
     if effect == "lift_stall":
         values.update(stall=1.0, stall_alpha=amount, stall_sharpness=50.0)
@@ -54,6 +57,8 @@ def vector(effect=None, amount=0.0):
         values.update(drag_elevator_abs=amount - CDDE)
     elif effect is not None and effect not in INPUTS:
         values[effect] = amount
+    if formula is not None:
+        values.update(formula.figures())
     return tuple(values.values())
 
 
@@ -124,7 +129,27 @@ def wrench(x, z, e):
         fz -= half * e[8] * rate * ca
         m += half * CHORD * e[9] * rate
     m, n = m - e[7] * fz, n + e[7] * fy
+    if e[23] != 0.0:
+        more = of_formula((alpha, beta, ph, qh, rh, z[0], z[1], throttle), qs, e)
+        along = -more[0] * cb - more[2] * sb
+        fx += along * ca + more[1] * sa
+        fy += more[2] * cb - more[0] * sb
+        fz += along * sa - more[1] * ca
+        l, m, n = l + more[3], m + more[4], n + more[5]
     return fx, fy, fz, l, m, n, airspeed, alpha, beta
+
+
+@compiled
+def of_formula(of, qs, e):
+    """Drag, lift, side force (N), rolling, pitching, yawing moment (N m) of a hidden formula of the variables `of`."""
+    channel, form = int(e[23]), int(e[24])
+    amount = e[28] * form_of(form, of[int(e[25])], of[int(e[26])], e[27])
+    if form != WITHOUT_AIR:
+        amount *= qs * (1.0, 1.0, 1.0, SPAN, CHORD, SPAN)[channel - 1]
+    return (
+        amount if channel == 1 else 0.0, amount if channel == 2 else 0.0, amount if channel == 3 else 0.0,
+        amount if channel == 4 else 0.0, amount if channel == 5 else 0.0, amount if channel == 6 else 0.0,
+    )  # fmt: skip
 
 
 @compiled
@@ -301,8 +326,11 @@ def filter_matrix(h):
     )  # fmt: skip
 
 
-def fly(wanted, effect, amount, wind, heading):
-    """Truth (a row a millisecond) and commands of a plan, flown in a steady wind (NED, m/s)."""
+def fly(wanted, effect, amount, wind, heading, formula=None):
+    """Truth (a row a millisecond) and commands of a plan, flown in a steady wind (NED, m/s).
+
+    What is hidden is an effect with its amount, or a formula (`formulas.Formula`), or nothing.
+    """
     pitch = 0.03
     x = (
         18.0 * math.cos(pitch), 0.0, 18.0 * math.sin(pitch), 0.0, 0.0, 0.0,
@@ -311,6 +339,6 @@ def fly(wanted, effect, amount, wind, heading):
     )  # fmt: skip
     truth, commands = np.zeros((PER_COMMAND * len(wanted), 19)), np.zeros((len(wanted), 3))
     kind = INPUTS.index(effect) + 1 if effect in INPUTS else 0
-    integrate(x, wanted, vector(effect, amount), kind, amount, filter_matrix(0.5 * STEP), truth, commands)
+    integrate(x, wanted, vector(effect, amount, formula), kind, amount, filter_matrix(0.5 * STEP), truth, commands)
     truth[:, 12:15] += wind
     return truth, commands

@@ -1,9 +1,10 @@
 """Makes cases for `greylag diagnose`: flights of a truth that shares no code with it, and a model.
 
     python tests/truth/make_cases.py --truth continuous --seed 1 --effects all --nulls 20 --out cases
+    python tests/truth/make_cases.py --truth continuous --seed 1 --formulas 24 --nulls 20 --out cases
 
-Every case is a folder with model.toml, airframe.toml, train-1..3.csv, test-1..2.csv and truth.json. All of it
-follows from the seed.
+The second command hides formulas of `formulas.py` in place of effects, for `greylag propose`. Every case is a folder
+with model.toml, airframe.toml, train-1..3.csv, test-1..2.csv and truth.json. All of it follows from the seed.
 """
 
 import argparse
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+import formulas
 import hidden
 import manoeuvres
 import model_file
@@ -27,6 +29,13 @@ ROLL_MAX, PITCH_MAX = np.radians(85.0), np.radians(60.0)
 WIND_MAX = 6.0
 """Strongest steady wind, m/s."""
 GENTLER = 0.75
+FORMULA = "formula"
+DRAWS = 20
+"""Formulas drawn for a case before it is given up: some cannot be flown."""
+
+
+class Lost(RuntimeError):
+    """The aircraft leaves its bounds however gentle the flight."""
 
 
 def truth_of(name):
@@ -53,18 +62,42 @@ def fly_within_bounds(fly, case, seed, flight, effect, amount, duration):
         if np.isfinite(rows).all() and (np.abs(rows[:, :2]) < (ROLL_MAX, PITCH_MAX)).all():
             return rows, commands, {"wind_ned_mps": wind.tolist(), "scale": scale}
         scale *= GENTLER
-    raise RuntimeError(f"{case}, {flight}: the aircraft leaves its bounds; hide less of {effect}")
+    raise Lost(f"{case}, {flight}: the aircraft leaves its bounds; hide less of {effect}")
 
 
-def make_case(folder, kind, case, seed, effect, options, duration, wrong):
-    """Writes one case."""
+def flown(fly, case, seed, effect, amount, duration):
+    """Every flight of a case: truth, commands, what was drawn."""
+    return {f: fly_within_bounds(fly, case, seed, f, effect, amount, duration) for f in manoeuvres.FLIGHTS}
+
+
+def flown_with_formula(fly, case, seed, duration, strength):
+    """The first formula drawn with which all flights can be flown, the flights, and the formulas before it."""
+    lost = []
+    for k in range(DRAWS):
+        formula = formulas.drawn(hidden.random_of(seed, case, 6, k), strength)
+        try:
+            return formula, flown(partial(fly, formula=formula), case, seed, None, 0.0, duration), lost
+        except Lost:
+            lost.append(formula.text())
+    raise Lost(f"{case}: none of {DRAWS} formulas can be flown")
+
+
+def make_case(folder, kind, case, seed, effect, options, duration, wrong, strength=1.0):
+    """Writes one case; `effect` is an id, `FORMULA` for a formula that is drawn, or None."""
     (fly, step), folder = truth_of(kind), folder / case
     folder.mkdir(parents=True)
-    amount = hidden.amplitude(effect, kind.split("-")[0], hidden.random_of(seed, case, 3)) if effect else 0.0
-    told = {"case": case, "truth": kind, "seed": seed, "hidden": effect, "amount": amount, "duration_s": duration}
+    told = {"case": case, "truth": kind, "seed": seed, "hidden": effect, "amount": 0.0, "duration_s": duration}
     told.update(sensors=asdict(options), wrong=wrong, flights={})
-    for flight in manoeuvres.FLIGHTS:
-        rows, commands, drawn = fly_within_bounds(fly, case, seed, flight, effect, amount, duration)
+    if effect == FORMULA:
+        formula, flights, lost = flown_with_formula(fly, case, seed, duration, strength)
+        told.update(hidden=formula.text(), amount=formula.amount, formula=formula.told(), strength=strength)
+        told["not_flown"] = lost
+        effect = None
+    else:
+        if effect:
+            told["amount"] = hidden.amplitude(effect, kind.split("-")[0], hidden.random_of(seed, case, 3))
+        flights = flown(fly, case, seed, effect, told["amount"], duration)
+    for flight, (rows, commands, drawn) in flights.items():
         random = hidden.random_of(seed, case, *flight.encode(), 4)
         names, table, errors = sensors.log(rows, step, commands, manoeuvres.SETTLE, options, random)
         sensors.write(folder / f"{flight}.csv", names, table)
@@ -94,7 +127,9 @@ def arguments():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--truth", choices=("continuous", "official", "official-adams"), required=True)
     p.add_argument("--seed", type=int, required=True)
-    p.add_argument("--effects", default="all", help="'all', or ids with commas between; '' for none")
+    p.add_argument("--effects", help="'all', or ids with commas between; '' for none; all if no formulas are asked for")
+    p.add_argument("--formulas", type=int, default=0, help="cases that hide a formula; of the continuous truth alone")
+    p.add_argument("--strength", type=float, default=1.0, help="factor on the amounts of the formulas")
     p.add_argument("--nulls", type=int, default=0, help="cases without a hidden effect")
     p.add_argument("--rate", type=float, default=100.0, help="samples a second of the logs")
     p.add_argument("--noise", type=float, default=1.0, help="factor on the sensors' noise and biases")
@@ -117,10 +152,14 @@ def main():
     unknown = [x for x in (*missing, *options.held) if x not in sensors.GROUPS]
     if unknown:
         sys.exit(f"no sensor group {', '.join(unknown)}; there are {', '.join(sensors.GROUPS)}")
+    if a.formulas and a.truth != "continuous":
+        sys.exit("--formulas: only the continuous truth can hide formulas")
+    effects = a.effects if a.effects is not None else "" if a.formulas else "all"
     cases = [(f"{a.truth}-null-{k:02}", None) for k in range(a.nulls)]
-    cases += [(f"{a.truth}-{effect}", effect) for effect in chosen(a.effects)]
+    cases += [(f"{a.truth}-{effect}", effect) for effect in chosen(effects)]
+    cases += [(f"{a.truth}-formula-{k:02}", FORMULA) for k in range(a.formulas)]
     for case, effect in cases:
-        make_case(a.out, a.truth, case, a.seed, effect, options, a.duration, a.wrong)
+        make_case(a.out, a.truth, case, a.seed, effect, options, a.duration, a.wrong, a.strength)
         print(a.out / case, flush=True)
 
 

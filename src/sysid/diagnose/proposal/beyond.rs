@@ -46,10 +46,14 @@ pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel
     }
     let own = |t: &&Term| t.form.channel == library.terms[0].form.channel;
     let several = library.terms.iter().filter(own).count() > 1;
-    several.then(|| {
-        let why = "the library needs several shapes for one channel";
-        (why.into(), vec![library.terms[0].form.channel])
-    })
+    let why = match (several, library.strained) {
+        (true, _) => "the library needs several shapes for one channel",
+        (false, true) => {
+            "a second shape of the library says more, and cannot stand beside the first"
+        }
+        (false, false) => return None,
+    };
+    Some((why.into(), vec![library.terms[0].form.channel]))
 }
 
 /// Tries free forms in `channels` of what `tuned` leaves, the library's best beside them. `None` if the flights do not
@@ -116,13 +120,25 @@ fn as_of_library(form: Form) -> Form {
     of.into_iter().find(same).unwrap_or(form)
 }
 
-/// Whether the formula with free forms takes the place of the library's: it takes more, or no less and is simpler.
+/// Whether the formula with free forms takes the place of the library's: it takes more, or no less and is simpler, or is
+/// the same with other constants, which the library reads off the flights and does not fit.
 pub(super) fn better(free: &Climbed, library: &Climbed) -> bool {
     let taken = |c: &Climbed| c.removed() * library.excess;
     let more = taken(free) - taken(library);
     let least = WORTH.max(BEHIND * taken(library));
+    if structure(free) == structure(library) {
+        return more > WORTH;
+    }
     match free.complexity() < library.complexity() {
         true => more > -least,
         false => more > least,
     }
+}
+
+/// The shapes without their constants.
+fn structure(of: &Climbed) -> Vec<(Channel, bool, String)> {
+    let letters = |form: &Form| -> String {
+        form.shape.text(None).chars().filter(|c| !c.is_ascii_digit() && *c != '.').collect()
+    };
+    of.terms.iter().map(|t| (t.form.channel, t.form.of_air, letters(&t.form))).collect()
 }

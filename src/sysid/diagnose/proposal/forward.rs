@@ -129,6 +129,9 @@ pub(super) struct Climbed {
     pub excess: f64,
     /// The first round; `None` if there was nothing to try.
     pub round: Option<Round>,
+    /// Whether a further term was more than chance and worth it, and yet could not stand beside those there are: these
+    /// stand for something else.
+    pub strained: bool,
     first_fall: f64,
 }
 
@@ -166,6 +169,7 @@ impl Ask<'_> {
             model,
             excess,
             round: None,
+            strained: false,
             first_fall: 0.0,
         };
         while c.terms.len() < MOST {
@@ -189,6 +193,9 @@ impl Ask<'_> {
         if let Some(rung) = c.terms.len().checked_sub(1).and_then(|k| c.said.front.get_mut(k)) {
             rung.chosen = true;
         }
+        if let Some(grades) = c.said.grades.as_mut().filter(|_| c.strained) {
+            *grades = Grades { variables: false, trend: false, form: false, ..*grades };
+        }
         c.first = c.terms.first().copied();
         c.terms = self.joint(&c.model, std::mem::take(&mut c.terms));
         Some(c)
@@ -208,7 +215,8 @@ impl Ask<'_> {
         c.said.front.push(Rung {
             formula: draft::formula(&c.terms),
             complexity: c.complexity(),
-            removed: before + score.fall / c.excess,
+            // a term also frees the coefficients that stood in for it, which are counted in its fall
+            removed: (before + score.fall / c.excess).min(1.0),
             evidence: score.evidence,
             threshold,
             chosen: false,
@@ -229,6 +237,7 @@ impl Ask<'_> {
         // a term that pulls the others far off, or makes things worse, is one of them again
         if c.terms.iter().any(|t| moved(t, &tuned)) || removed <= before {
             c.terms.pop();
+            c.strained = !c.terms.is_empty();
             return Some(false);
         }
         if let Some(rung) = c.said.front.last_mut() {
