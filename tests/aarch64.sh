@@ -14,6 +14,8 @@ for tool in qemu-aarch64 aarch64-linux-gnu-gcc; do
 done
 [ -d "$(rustc --print sysroot)/lib/rustlib/$triple" ] || { echo "no $triple: rustup target add $triple"; exit 77; }
 
+# apart from the other builds, whose tests call cargo and would wait for this one
+export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-target/aarch64}
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu"
 # what is built is run once: crates are compiled quickly rather than to be fast

@@ -59,11 +59,25 @@ fn what_cannot_fly_level_descends_at_idle_throttle() {
     assert_eq!(level, straight);
 }
 
+/// Above the airspeed that full throttle holds in level flight.
+#[test]
+fn what_is_too_fast_for_its_engine_descends_at_full_throttle() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/aerosonde");
+    let model = GreyBox::load(&folder.join("jsbsim.toml")).unwrap();
+    assert!(Trim::level(&model, 35.0, ALTITUDE).is_err());
+    let trim = Trim::straight(&model, 35.0, ALTITUDE).unwrap();
+    let rate = model.rate(&trim.state, &trim.controls, ALTITUDE);
+    assert!(rate.to_array().into_iter().all(|x| x.abs() < 1e-9), "{rate:?}");
+    let path = trim.path().to_degrees();
+    println!("descends by {path:.2} deg");
+    assert!((-10.0..0.0).contains(&path) && trim.controls.throttle == 1.0);
+}
+
 /// The least thrust of a polynomial with a square in throttle may lie above what a steep descent asks for.
 #[test]
 fn a_thrust_that_no_throttle_gives_is_left_at_idle() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/aerosonde");
-    let mut model = GreyBox::load(&folder.join("jsbsim.toml")).unwrap();
+    let mut model = GreyBox::load(&folder.join("prior.toml")).unwrap();
     for (name, value) in [
         ("T0_n", 1.0),
         ("Tt_n", -2.0),

@@ -346,7 +346,7 @@ fn contributions_add_up_to_the_wrench() {
     let mut model = model("jsbsim");
     for kind in Kind::ALL {
         let about = kind.describe();
-        if about.table.is_none() && !model.has(about.id) {
+        if about.table.or(about.grid).is_none() && !model.has(about.id) {
             let middle = |c: &greylag::physics::effects::Coefficient| 0.02 * c.bounds.1;
             let mut values: Vec<f64> = about.coefficients.iter().map(middle).collect();
             if about.id == "lift_stall" {

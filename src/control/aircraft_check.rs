@@ -220,8 +220,8 @@ mod tests {
     #[test]
     fn a_reversed_surface_and_a_weak_motor_are_said() {
         let mut wrong = model("params/aerosonde/jsbsim.toml");
-        wrong.set_coefficient("roll_linear.Clda", -0.17);
-        wrong.set_coefficient("propeller.Ttt_n", 20.0);
+        assert!(wrong.set_coefficient("roll_linear.Clda", -0.17));
+        assert!(wrong.set_coefficient("thrust_table.k", 0.25));
         let said = check(&wrong).unwrap().findings.join("\n");
         assert!(said.contains("Clda") && said.contains("throttle"), "{said}");
     }

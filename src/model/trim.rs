@@ -5,6 +5,9 @@ use super::newton;
 use crate::num::{Dual, Real};
 use crate::physics::{Controls, State};
 
+/// Path angle by which a descent at full throttle must be shallower than at idle to be one with an engine, rad.
+const SHALLOWER: f64 = 1e-6;
+
 /// A steady flight condition with the controls that hold it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trim {
@@ -58,14 +61,14 @@ impl Trim {
         within_stops(from, 0.2).ok_or_else(|| failure(model, 0.0, 0.0, airspeed))
     }
 
-    /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m): level, or the descent at idle
-    /// throttle where no throttle holds level flight, as a glider's.
+    /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m): level, or where no throttle holds level
+    /// flight the descent at full throttle if that is shallower, else at idle, as a glider's.
     ///
     /// # Errors
     /// If no elevator holds either.
     pub fn straight(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Trim, TrimError> {
         Trim::level(model, airspeed, altitude)
-            .or_else(|why| glide(model, airspeed, altitude).ok_or(why))
+            .or_else(|why| descent(model, airspeed, altitude).ok_or(why))
     }
 
     /// Angle of the flight path above the horizon with level wings and no sideslip, rad.
@@ -118,10 +121,20 @@ fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> 
     from(1.0).filter(holds).or(first)
 }
 
-/// The descent at idle throttle at `airspeed`, m/s. Unknowns: α, δe, θ.
-fn glide(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Trim> {
+/// The descent at `airspeed`, m/s, at full throttle where that is shallower than at idle.
+fn descent(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Trim> {
+    let [idle, full] = [0.0, 1.0].map(|throttle| straight_at(model, airspeed, altitude, throttle));
+    let powered = |full: &Trim| {
+        full.path() < 0.0 && idle.as_ref().is_none_or(|idle| full.path() > idle.path() + SHALLOWER)
+    };
+    full.filter(powered).or(idle)
+}
+
+/// The straight flight at `airspeed` (m/s) and that throttle. Unknowns: α, δe, θ.
+fn straight_at(model: &GreyBox, airspeed: f64, altitude: f64, throttle: f64) -> Option<Trim> {
     let condition = |[alpha, elevator, pitch]: [Dual<3>; 3]| {
-        let (mut state, controls) = level_condition([alpha, elevator, Dual::zero()], airspeed);
+        let held = Dual::from_f64(throttle);
+        let (mut state, controls) = level_condition([alpha, elevator, held], airspeed);
         state.pitch = pitch;
         (state, controls)
     };
@@ -130,7 +143,7 @@ fn glide(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Trim> {
         let rate = model.rate(&state, &controls, altitude);
         [rate.airspeed, rate.q, rate.alpha]
     })?;
-    let (mut state, controls) = level_condition([x[0], x[1], 0.0], airspeed);
+    let (mut state, controls) = level_condition([x[0], x[1], throttle], airspeed);
     state.pitch = x[2];
     Some(Trim { state, controls, acceleration: 0.0 })
 }

@@ -280,7 +280,7 @@ impl Flight {
         let flies = self.aircraft.fly();
         let exposure = self.exposure(&acting);
         self.judge.aircraft(now_s, &self.aircraft.truth(), exposure);
-        self.sample(now_s);
+        self.sample(now_s, &acting);
         flies
     }
 

@@ -61,7 +61,9 @@ impl Flight {
     pub(super) fn take_over(&mut self, step: u64) {
         let asked = &self.scenario.asked;
         let taken = asked.iter().any(|a| a.what == Asking::TakeOver && at_step(a.at_s) == step);
-        if taken && self.aircraft.take_over() {
+        // in the controller's own mode already, it changes nothing that the companion could see
+        let steered = self.aircraft.is_steered();
+        if taken && self.aircraft.take_over() && steered {
             self.follower.asked = false;
         }
     }

@@ -4,6 +4,7 @@ use super::Flight;
 use crate::flight::pilot::{Decision, Source};
 use crate::link::autopilot::Mode;
 use crate::link::vehicle::Vehicle;
+use crate::sim::faults::mix::{Fault, FaultKind};
 use crate::sim::faults::policies::Sample;
 
 /// Time constants of what a surface does slowly, and of the mean square of the rest, s.
@@ -81,7 +82,7 @@ impl Follower {
 
 impl Flight {
     /// Takes the sample of a step, where samples are wanted.
-    pub(super) fn sample(&mut self, now_s: f64) {
+    pub(super) fn sample(&mut self, now_s: f64, acting: &[Fault]) {
         let Some(trace) = &mut self.trace else { return };
         let truth = self.aircraft.truth();
         let follower = &mut self.follower;
@@ -95,7 +96,10 @@ impl Flight {
             d.armed && d.mode == Mode::Offboard && by_attitude
         };
         let controlled = follower.decision.as_ref().is_some_and(controlled);
-        follower.steady(steered && engaged && controlled && !exposed);
+        let harmless = |f: &Fault| matches!(f.kind, FaultKind::Client | FaultKind::Disk);
+        let disturbed = !acting.iter().all(harmless);
+        let calm = self.scenario.turbulence == 0 && !exposed && !disturbed;
+        follower.steady(steered && engaged && controlled && calm);
         follower.age_s =
             if std::mem::take(&mut follower.fresh) { 0.0 } else { follower.age_s + STEP_S };
         let inputs = self.aircraft.inputs();
@@ -121,6 +125,7 @@ impl Flight {
             lost_m: start - truth.altitude_m,
             swing: mean_square.sqrt(),
             exposed,
+            disturbed,
             spoke: self.texts.len() > std::mem::replace(&mut follower.lines, self.texts.len()),
             asked: follower.asked,
         });

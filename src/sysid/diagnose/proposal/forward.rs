@@ -129,7 +129,7 @@ pub(super) struct Climbed {
     pub excess: f64,
     /// The first round; `None` if there was nothing to try.
     pub round: Option<Round>,
-    /// Whether a further term was more than chance and worth it, and yet could not stand beside those there are: these
+    /// Whether a further term was more than chance and took a part of the error, and yet did not join: those there are
     /// stand for something else.
     pub strained: bool,
     first_fall: f64,
@@ -221,6 +221,9 @@ impl Ask<'_> {
             threshold,
             chosen: false,
         });
+        // until it stands beside the others
+        let much = score.fall > WORTH * c.excess;
+        c.strained = !first && score.evidence > threshold && much;
         if score.evidence <= threshold || !worth {
             c.terms.pop();
             return Some(false);
@@ -237,13 +240,13 @@ impl Ask<'_> {
         // a term that pulls the others far off, or makes things worse, is one of them again
         if c.terms.iter().any(|t| moved(t, &tuned)) || removed <= before {
             c.terms.pop();
-            c.strained = !c.terms.is_empty();
             return Some(false);
         }
         if let Some(rung) = c.said.front.last_mut() {
             rung.removed = removed;
         }
         c.model = tuned;
+        c.strained = false;
         Some(true)
     }
 
