@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # The numerics of an aarch64, on which there are NEON and a multiply-add that is always fused: built for it and run by
-# qemu. Tests of the library itself, the gradient of training in lanes, and the numbers that an x86-64 computed.
+# qemu. The gradient of training in lanes, formulas, and the numbers that an x86-64 computed; with LIBRARY=1 the tests of
+# the library too, which compiles it once more.
 #
-#   tests/aarch64.sh [FEATURES]      (learn by default; none for the companion alone, some minutes faster)
+#   [LIBRARY=1] tests/aarch64.sh [FEATURES]      (learn by default; none for the companion alone, some minutes faster)
 #
 # Needs qemu-aarch64 and aarch64-linux-gnu-gcc (Debian: qemu-user, gcc-aarch64-linux-gnu, libc6-dev-arm64-cross) and the
 # target (rustup target add aarch64-unknown-linux-gnu). Exit status 77: one of them is not installed.
@@ -21,6 +22,8 @@ export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch
 # what is built is run once: crates are compiled quickly rather than to be fast
 build=(--config 'profile.dev.package."*".opt-level=1' --ignore-rust-version --target "$triple" --no-default-features --features "${1-learn}")
 
-# Not the rooms that open sockets, logs or pages: nothing there is of one processor.
-cargo test "${build[@]}" --lib -- num:: physics:: model:: control:: learn::
 cargo test "${build[@]}" --test learn_gradient --test formula --test portable_numbers -- --nocapture
+if [ -n "${LIBRARY:-}" ]; then
+  # not the rooms that open sockets, logs or pages: nothing there is of one processor
+  cargo test "${build[@]}" --lib -- num:: physics:: model:: control:: learn::
+fi

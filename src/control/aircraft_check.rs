@@ -16,7 +16,7 @@ const USUAL_DELAY: f64 = 0.04;
 /// Roll rate at full aileron below which an aircraft is slow to roll, rad/s (20°/s).
 const SLOW_ROLL: f64 = 0.35;
 
-/// Straight flight at one airspeed: level, or the descent at idle throttle of an aircraft that cannot.
+/// Straight flight at one airspeed: level, or the descent, at full or idle throttle, of an aircraft that cannot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Level {
     /// True airspeed, m/s.
@@ -114,7 +114,7 @@ fn authority(model: &GreyBox, trim: &Trim, altitude: f64) -> Authority {
 /// What is wrong with straight flight at one airspeed.
 fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
     let mut out = Vec::new();
-    let Level { airspeed, elevator, throttle, .. } = *level;
+    let Level { airspeed, elevator, throttle, path, .. } = *level;
     if elevator.abs() > MUCH_TRAVEL {
         out.push(format!(
             "straight flight at {airspeed:.1} m/s takes {:.0} % of the elevator's travel: move the \
@@ -123,7 +123,15 @@ fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
         ));
     }
     // above the cruise airspeed the envelope allows dives
-    if airspeed <= model.airframe.envelope.airspeed_cruise_mps && !(0.0..=1.0).contains(&throttle) {
+    let cruises = airspeed <= model.airframe.envelope.airspeed_cruise_mps;
+    if cruises && throttle == 1.0 && path < 0.0 {
+        out.push(format!(
+            "full throttle does not hold level flight at {airspeed:.1} m/s: it descends by {:.1} degrees; correct \
+             thrust, drag or the envelope",
+            -path.to_degrees()
+        ));
+    }
+    if cruises && !(0.0..=1.0).contains(&throttle) {
         out.push(format!(
             "level flight at {airspeed:.1} m/s takes {:.0} % of throttle: the aircraft climbs or sinks \
              there; correct thrust, drag or the envelope",
