@@ -104,8 +104,9 @@ fn print(found: &[Nearest]) {
 pub(super) fn fly(factory: &CompanionFactory, file: &Path) -> Result<ExitCode> {
     let text = std::fs::read_to_string(file)
         .with_context(|| format!("reading the scenario {}", file.display()))?;
-    let scenario: Scenario = serde_json::from_str(&text)
-        .with_context(|| format!("the scenario {} is not one", file.display()))?;
+    let scenario: Scenario = serde_json::from_str(&text).with_context(|| {
+        format!("{} holds no scenario; give a file of what --search prints", file.display())
+    })?;
     let rules = policies(&factory.envelope());
     let judged = distances(factory, &rules, &scenario)?;
     let mut broken = false;

@@ -9,10 +9,10 @@ use crate::physics::airframe::Envelope;
 
 /// Overshoot of bank and pitch beyond the envelope that is still no violation, degrees: a gust of
 /// the surfaces' full slew takes about so far.
-const OVERSHOOT_DEG: f64 = 15.0;
+pub(super) const OVERSHOOT_DEG: f64 = 15.0;
 /// The least airspeed of the envelope over that at which an airspeed is a finding: half the dynamic pressure, about the
 /// stall.
-const ABOVE_STALL: f64 = std::f64::consts::SQRT_2;
+pub(super) const ABOVE_STALL: f64 = std::f64::consts::SQRT_2;
 /// Altitude that a flight of turns, climbs and descents may lose, m, of the 600 it begins at.
 const ALTITUDE_LOSS_M: f64 = 200.0;
 /// Attitude error at the end that counts as recovered, degrees.

@@ -1,13 +1,13 @@
 //! The rules of flight: what must hold in every flight, whatever befalls it, in signal temporal logic.
 
+use super::judge::{ABOVE_STALL, OVERSHOOT_DEG};
 use super::temporal::Formula;
-use crate::flight::pilot::{Decision, Source};
+use crate::control::Target;
+use crate::flight::pilot::{Decision, Source, TICK_S};
 use crate::link::autopilot::Mode;
+use crate::physics::Command;
 use crate::physics::airframe::Envelope;
 
-/// Overshoot of bank and pitch beyond the envelope that is still no violation, degrees: what a gust of the surfaces' full
-/// slew takes.
-const OVERSHOOT_DEG: f64 = 15.0;
 /// Angle that is one unit of distance, degrees; likewise altitude (m), time (s).
 const UNIT_DEG: f64 = 30.0;
 const UNIT_M: f64 = 100.0;
@@ -22,13 +22,13 @@ const SWING: f64 = 0.5;
 const HELD_S: f64 = 0.055;
 /// Time in which an attitude must be reached, s.
 const REACHED_S: f64 = 5.0;
-/// Age of a decision beyond which it says nothing of now, s.
-const STALE_S: f64 = 0.05;
+/// Age of a decision beyond which it says nothing of now, s: longer than a starved processor sleeps.
+const STALE_S: f64 = 0.5;
 /// A complaint that comes again within this time is not repeated, s.
 const COMPLAINED_S: f64 = 5.0;
 /// Time within which an oscillation ends: the guard needs a second to see it, and hands back.
 const SWING_S: f64 = 2.5;
-/// Rounding of a step of the surfaces, and of a limit of the envelope (rad).
+/// Rounding of a step of the surfaces, and of a limit of the envelope (degrees).
 const ROUNDING: f64 = 1e-9;
 
 /// A flight at one step.
@@ -109,7 +109,7 @@ fn decided(holds: impl Fn(&Decision) -> bool + Send + Sync + 'static) -> Rule {
 
 /// Holds unless the aircraft was exposed a moment ago.
 fn unless_exposed(rule: Rule) -> Rule {
-    is(|s| s.exposed).lately(MEMORY_S).or(rule)
+    is(|s| s.exposed).once(MEMORY_S).or(rule)
 }
 
 /// The attitude error is below `most` degrees, where an attitude is flown.
@@ -125,12 +125,20 @@ fn steady_for_less(seconds: f64) -> Rule {
 /// Whatever begins is reported within a second, or was a moment ago.
 fn reported(event: Rule) -> Rule {
     let spoke = || is(|s| s.spoke);
-    event.begins().implies(spoke().within(1.0).or(spoke().lately(COMPLAINED_S)))
+    event.rises().implies(spoke().eventually(1.0).or(spoke().once(COMPLAINED_S)))
 }
 
 /// What the pilot has decided ends within `seconds`, or it decides nothing any more.
 fn ends(state: impl Fn(&Sample) -> bool + Copy + Send + Sync + 'static, seconds: f64) -> Rule {
-    is(state).implies(is(move |s| !state(s) || s.age_s > STALE_S).within(seconds))
+    is(state).implies(is(move |s| !state(s) || s.age_s > STALE_S).eventually(seconds))
+}
+
+/// The angle `of` a target lies between these two, degrees, where an attitude is flown.
+fn target_inside(of: fn(&Target) -> f64, [least, most]: [f64; 2]) -> Rule {
+    Formula::atom(move |s: &Sample| {
+        let angle = s.decision.map(|d| of(&d.target).to_degrees()).filter(|x| x.is_finite());
+        angle.map_or(1.0, |x| ((most - x).min(x - least) + ROUNDING) / UNIT_DEG)
+    })
 }
 
 /// Every rule for an aircraft of this envelope.
@@ -148,9 +156,7 @@ fn policy(id: &'static str, asks: &'static str, always: Rule) -> Policy {
 
 fn of_commands(envelope: &Envelope) -> Vec<Policy> {
     let Envelope { bank_max_deg, pitch_max_deg, pitch_min_deg, .. } = *envelope;
-    let step = envelope.surface_slew_per_s * 0.01;
-    let inside = |x: f64, least: f64, most: f64| (most - x).min(x - least).to_degrees() / UNIT_DEG;
-    let [bank, high, low] = [bank_max_deg, pitch_max_deg, pitch_min_deg].map(f64::to_radians);
+    let step = envelope.surface_slew_per_s * TICK_S;
     vec![
         policy(
             "finite",
@@ -176,26 +182,17 @@ fn of_commands(envelope: &Envelope) -> Vec<Policy> {
         policy(
             "idle",
             "disarmed, the command is idle",
-            decided(|d| d.armed || d.command == crate::physics::Command::IDLE)
-                .or(is(|s| s.decision.is_none())),
+            decided(|d| d.armed || d.command == Command::IDLE).or(is(|s| s.decision.is_none())),
         ),
         policy(
             "bank-target",
             "the bank that is flown to lies inside the envelope",
-            Formula::atom(move |s: &Sample| {
-                s.decision
-                    .filter(|d| d.target.roll.is_finite())
-                    .map_or(1.0, |d| inside(d.target.roll, -bank - ROUNDING, bank + ROUNDING))
-            }),
+            target_inside(|t| t.roll, [-bank_max_deg, bank_max_deg]),
         ),
         policy(
             "pitch-target",
             "the pitch that is flown to lies inside the envelope",
-            Formula::atom(move |s: &Sample| {
-                s.decision
-                    .filter(|d| d.target.pitch.is_finite())
-                    .map_or(1.0, |d| inside(d.target.pitch, low - ROUNDING, high + ROUNDING))
-            }),
+            target_inside(|t| t.pitch, [pitch_min_deg, pitch_max_deg]),
         ),
         policy(
             "held",
@@ -213,7 +210,7 @@ fn of_the_aircraft(envelope: &Envelope) -> Vec<Policy> {
             (room(&e, s.attitude_deg) + beyond) / UNIT_DEG
         }))
     };
-    let stall = e.airspeed_min_mps / std::f64::consts::SQRT_2;
+    let stall = e.airspeed_min_mps / ABOVE_STALL;
     vec![
         policy(
             "bank",
@@ -250,7 +247,7 @@ fn of_the_aircraft(envelope: &Envelope) -> Vec<Policy> {
         policy(
             "reached",
             "in calm air and without faults an attitude is reached to 5 degrees within 5 s",
-            steady_for_less(REACHED_S).or(near(5.0).lately(REACHED_S)),
+            steady_for_less(REACHED_S).or(near(5.0).once(REACHED_S)),
         ),
         policy(
             "kept",
@@ -260,7 +257,9 @@ fn of_the_aircraft(envelope: &Envelope) -> Vec<Policy> {
         policy(
             "no-oscillation",
             "no surface moves fast by more than half its travel (rms over a second) for 2.5 s",
-            unless_exposed(ends(|s| s.swing > SWING, SWING_S)),
+            unless_exposed(
+                is(|s| s.swing > SWING).implies(is(|s| s.swing <= SWING).eventually(SWING_S)),
+            ),
         ),
     ]
 }
@@ -274,7 +273,7 @@ fn of_handing_over() -> Vec<Policy> {
         of_controllers(
             "dead-link",
             "when nothing has come for 0.3 s, the aircraft is handed back within 0.3 s",
-            is(|s| ours(s) && s.silent_s >= 0.3).implies(is(|s| !ours(s)).within(0.3)),
+            is(|s| ours(s) && s.silent_s >= 0.3).implies(is(|s| !ours(s)).eventually(0.3)),
         ),
         of_controllers(
             "refusal",
@@ -289,7 +288,7 @@ fn of_handing_over() -> Vec<Policy> {
         of_controllers(
             "unasked",
             "nobody's mode is changed to the companion's unless a client asked for it",
-            is(|s| s.steered).begins().implies(is(|s| s.asked)),
+            is(|s| s.steered).rises().implies(is(|s| s.asked)),
         ),
         of_controllers(
             "after-disarm",
@@ -339,7 +338,7 @@ fn of_reports() -> Vec<Policy> {
                 "hand-back-reported",
                 "the end of steering is reported within 1 s, unless a fault keeps it from the companion",
                 // the companion learns of it through its link
-                is(|s| s.disturbed).lately(1.0).or(reported(is(|s| !s.steered))),
+                is(|s| s.disturbed).once(1.0).or(reported(is(|s| !s.steered))),
             )
         },
     ]

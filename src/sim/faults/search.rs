@@ -12,7 +12,7 @@ use super::flight::{CompanionFactory, FaultsError};
 use super::judge::{Finding, Found};
 use super::policies::{Policy, Sample, policies};
 use super::scenario::Scenario;
-use super::temporal::SAMPLE_S;
+use crate::flight::pilot::TICK_S;
 use crate::num::stream::stream;
 
 /// Flights that are flown side by side; the search is the same on any number of cores.
@@ -64,9 +64,9 @@ pub fn distances(
 fn nearest(rule: &Policy, samples: &[Sample], panicked: bool) -> (f64, f64) {
     let (place, distance) = rule.always.least(samples).unwrap_or((0, 1.0));
     if panicked {
-        return (-1.0, samples.len() as f64 * SAMPLE_S);
+        return (-1.0, samples.len() as f64 * TICK_S);
     }
-    (distance, place as f64 * SAMPLE_S)
+    (distance, place as f64 * TICK_S)
 }
 
 /// Flies `flights` flights with the companions of `factory` at the `counterparts`, always nearer to breaking a rule of

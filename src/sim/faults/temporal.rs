@@ -6,10 +6,9 @@
 
 use std::collections::VecDeque;
 
-/// Length of a sample, s.
-pub const SAMPLE_S: f64 = 0.01;
+use crate::flight::pilot::TICK_S;
 
-/// A formula over samples `S`.
+/// A formula over samples `S`, one every tick of 10 ms.
 pub enum Formula<S> {
     /// A distance, −1..1: positive where the statement holds. What is not a number is −1.
     Atom(Box<dyn Fn(&S) -> f64 + Send + Sync>),
@@ -20,11 +19,11 @@ pub enum Formula<S> {
     /// One of them holds.
     Any(Vec<Formula<S>>),
     /// It holds at some sample of the next so many seconds.
-    Within(f64, Box<Formula<S>>),
+    Eventually(f64, Box<Formula<S>>),
     /// It has held at some sample of the last so many seconds.
-    Lately(f64, Box<Formula<S>>),
+    Once(f64, Box<Formula<S>>),
     /// It holds now and did not at the sample before.
-    Begins(Box<Formula<S>>),
+    Rises(Box<Formula<S>>),
 }
 
 impl<S> Formula<S> {
@@ -54,18 +53,18 @@ impl<S> Formula<S> {
     }
 
     /// It holds at some sample of the next `seconds`.
-    pub fn within(self, seconds: f64) -> Self {
-        Formula::Within(seconds, Box::new(self))
+    pub fn eventually(self, seconds: f64) -> Self {
+        Formula::Eventually(seconds, Box::new(self))
     }
 
     /// It has held at some sample of the last `seconds`.
-    pub fn lately(self, seconds: f64) -> Self {
-        Formula::Lately(seconds, Box::new(self))
+    pub fn once(self, seconds: f64) -> Self {
+        Formula::Once(seconds, Box::new(self))
     }
 
     /// It holds now and did not at the sample before.
-    pub fn begins(self) -> Self {
-        Formula::Begins(Box::new(self))
+    pub fn rises(self) -> Self {
+        Formula::Rises(Box::new(self))
     }
 
     /// The distance at each sample.
@@ -79,17 +78,17 @@ impl<S> Formula<S> {
             Formula::Not(of) => of.distances(samples).into_iter().map(|d| -d).collect(),
             Formula::All(of) => together(of, samples, 1.0, f64::min),
             Formula::Any(of) => together(of, samples, -1.0, f64::max),
-            Formula::Within(seconds, of) => {
+            Formula::Eventually(seconds, of) => {
                 let mut ahead = of.distances(samples);
                 ahead.reverse();
-                let mut best = largest_lately(&ahead, count(*seconds), 1.0);
+                let mut best = largest_of_the_last(&ahead, count(*seconds), 1.0);
                 best.reverse();
                 best
             }
-            Formula::Lately(seconds, of) => {
-                largest_lately(&of.distances(samples), count(*seconds), -1.0)
+            Formula::Once(seconds, of) => {
+                largest_of_the_last(&of.distances(samples), count(*seconds), -1.0)
             }
-            Formula::Begins(of) => {
+            Formula::Rises(of) => {
                 let now = of.distances(samples);
                 let before = std::iter::once(1.0).chain(now.iter().copied());
                 now.iter().zip(before).map(|(now, before)| now.min(-before)).collect()
@@ -105,7 +104,7 @@ impl<S> Formula<S> {
 }
 
 fn count(seconds: f64) -> usize {
-    (seconds / SAMPLE_S).round() as usize
+    (seconds / TICK_S).round() as usize
 }
 
 fn together<S>(
@@ -122,7 +121,7 @@ fn together<S>(
 }
 
 /// The largest of each value and the `before` ones before it; `beyond` stands for those before the first.
-fn largest_lately(values: &[f64], before: usize, beyond: f64) -> Vec<f64> {
+fn largest_of_the_last(values: &[f64], before: usize, beyond: f64) -> Vec<f64> {
     // places whose values fall: the first is the largest of the window
     let mut falling = VecDeque::<usize>::new();
     let mut largest = Vec::with_capacity(values.len());
@@ -152,9 +151,9 @@ mod tests {
     fn windows_look_ahead_and_back() {
         let flight = [0.1, -0.5, 0.3, -0.2, -0.4];
         // two samples on; beyond the end nothing is held against the flight
-        assert_eq!(value().within(0.02).distances(&flight), [0.3, 0.3, 0.3, 1.0, 1.0]);
-        assert_eq!(value().lately(0.02).distances(&flight), [0.1, 0.1, 0.3, 0.3, 0.3]);
-        assert_eq!(value().lately(0.0).distances(&flight), flight);
+        assert_eq!(value().eventually(0.02).distances(&flight), [0.3, 0.3, 0.3, 1.0, 1.0]);
+        assert_eq!(value().once(0.02).distances(&flight), [0.1, 0.1, 0.3, 0.3, 0.3]);
+        assert_eq!(value().once(0.0).distances(&flight), flight);
         assert_eq!(value().least(&flight), Some((1, -0.5)));
     }
 
@@ -162,8 +161,8 @@ mod tests {
     fn an_event_is_answered_in_time_or_not() {
         // 1: asked, 2: answered
         let answered = Formula::is(|x: &f64| *x == 1.0)
-            .begins()
-            .implies(Formula::is(|x: &f64| *x == 2.0).within(0.02));
+            .rises()
+            .implies(Formula::is(|x: &f64| *x == 2.0).eventually(0.02));
         let held = |flight: &[f64]| answered.least(flight).unwrap().1;
         assert_eq!(held(&[0.0, 1.0, 1.0, 2.0, 0.0]), 1.0);
         assert_eq!(held(&[0.0, 1.0, 1.0, 1.0, 2.0]), -1.0);

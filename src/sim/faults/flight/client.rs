@@ -17,8 +17,9 @@ impl Flight {
             return;
         }
         let now = self.desk.now(host);
-        for asked in self.scenario.asked.clone().into_iter().filter(|a| at_step(a.at_s) == step) {
-            self.ask(now_s, host, asked.what);
+        let due = self.scenario.asked.iter().filter(|a| at_step(a.at_s) == step);
+        for what in due.map(|a| a.what).collect::<Vec<_>>() {
+            self.ask(now_s, host, what);
         }
         if !step.is_multiple_of(SETPOINT_EVERY) {
             return;

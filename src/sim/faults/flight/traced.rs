@@ -1,7 +1,7 @@
 //! What the rules of flight need to know of a flight under way.
 
 use super::Flight;
-use crate::flight::pilot::{Decision, Source};
+use crate::flight::pilot::{Decision, Source, TICK_S};
 use crate::link::autopilot::Mode;
 use crate::link::vehicle::Vehicle;
 use crate::sim::faults::mix::{Fault, FaultKind};
@@ -10,8 +10,6 @@ use crate::sim::faults::policies::Sample;
 /// Time constants of what a surface does slowly, and of the mean square of the rest, s.
 const SLOW_S: f64 = 0.5;
 const MEAN_S: f64 = 1.0;
-/// Length of a step, s.
-const STEP_S: f64 = 0.01;
 /// Difference of targets, rad, above which another attitude is asked for.
 const SAME: f64 = 1e-3;
 
@@ -43,9 +41,9 @@ struct Fast {
 
 impl Fast {
     fn update(&mut self, x: f64) {
-        self.slow += STEP_S / SLOW_S * (x - self.slow);
+        self.slow += TICK_S / SLOW_S * (x - self.slow);
         let fast = x - self.slow;
-        self.mean_square += STEP_S / MEAN_S * (fast * fast - self.mean_square);
+        self.mean_square += TICK_S / MEAN_S * (fast * fast - self.mean_square);
     }
 }
 
@@ -75,7 +73,7 @@ impl Follower {
     fn steady(&mut self, flown: bool) {
         let target = self.decision.map_or([0.0; 2], |d| [d.target.roll, d.target.pitch]);
         let same = target.iter().zip(self.target).all(|(a, b)| (a - b).abs() < SAME);
-        self.steady_s = if flown && same { self.steady_s + STEP_S } else { 0.0 };
+        self.steady_s = if flown && same { self.steady_s + TICK_S } else { 0.0 };
         self.target = target;
     }
 }
@@ -101,7 +99,7 @@ impl Flight {
         let calm = self.scenario.turbulence == 0 && !exposed && !disturbed;
         follower.steady(steered && engaged && controlled && calm);
         follower.age_s =
-            if std::mem::take(&mut follower.fresh) { 0.0 } else { follower.age_s + STEP_S };
+            if std::mem::take(&mut follower.fresh) { 0.0 } else { follower.age_s + TICK_S };
         let inputs = self.aircraft.inputs();
         // flown by attitude, the surfaces are the controller's own
         let ours = steered && self.desk.vehicle().flies_surfaces();

@@ -46,7 +46,7 @@ pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel
     }
     let own = |t: &&Term| t.form.channel == library.terms[0].form.channel;
     let several = library.terms.iter().filter(own).count() > 1;
-    let why = match (several, library.strained) {
+    let why = match (several, library.significant_left_out) {
         (true, _) => "the library needs several shapes for one channel",
         (false, true) => {
             "a second shape of the library says more, and cannot stand beside the first"

@@ -131,7 +131,7 @@ pub(super) struct Climbed {
     pub round: Option<Round>,
     /// Whether a further term was more than chance and took a part of the error, and yet did not join: those there are
     /// stand for something else.
-    pub strained: bool,
+    pub significant_left_out: bool,
     first_fall: f64,
 }
 
@@ -169,7 +169,7 @@ impl Ask<'_> {
             model,
             excess,
             round: None,
-            strained: false,
+            significant_left_out: false,
             first_fall: 0.0,
         };
         while c.terms.len() < MOST {
@@ -193,7 +193,7 @@ impl Ask<'_> {
         if let Some(rung) = c.terms.len().checked_sub(1).and_then(|k| c.said.front.get_mut(k)) {
             rung.chosen = true;
         }
-        if let Some(grades) = c.said.grades.as_mut().filter(|_| c.strained) {
+        if let Some(grades) = c.said.grades.as_mut().filter(|_| c.significant_left_out) {
             *grades = Grades { variables: false, trend: false, form: false, ..*grades };
         }
         c.first = c.terms.first().copied();
@@ -223,7 +223,7 @@ impl Ask<'_> {
         });
         // until it stands beside the others
         let much = score.fall > WORTH * c.excess;
-        c.strained = !first && score.evidence > threshold && much;
+        c.significant_left_out = !first && score.evidence > threshold && much;
         if score.evidence <= threshold || !worth {
             c.terms.pop();
             return Some(false);
@@ -246,7 +246,7 @@ impl Ask<'_> {
             rung.removed = removed;
         }
         c.model = tuned;
-        c.strained = false;
+        c.significant_left_out = false;
         Some(true)
     }
 
