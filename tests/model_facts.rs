@@ -59,6 +59,26 @@ fn what_cannot_fly_level_descends_at_idle_throttle() {
     assert_eq!(level, straight);
 }
 
+/// A thrust that is flat up to half throttle and steep beyond, as an afterburner's.
+#[test]
+fn a_thrust_with_a_kink_is_trimmed_level_and_in_turns() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/aerosonde");
+    let text = std::fs::read_to_string(folder.join("jsbsim.toml")).unwrap();
+    let start = text.find("[effects.thrust_table.T_n]").unwrap();
+    let kinked = "[effects.thrust_table.T_n]\nthrottle = [0.0, 0.5, 0.501, 1.0]\nairspeed_mps = [10.0, 40.0]\n\
+                  value = [[2.0, 1.0], [2.0, 1.0], [60.0, 50.0], [60.1, 50.1]]\nsource = \"a test\"\n";
+    let text = format!("{}{kinked}", &text[..start]);
+    let model = GreyBox::parse(&text, &folder.join("kinked.toml")).unwrap();
+    for trim in [
+        Trim::level(&model, 25.0, ALTITUDE).unwrap(),
+        Trim::attitude(&model, 0.5, 0.1, 25.0, ALTITUDE).unwrap(),
+    ] {
+        let rate = model.rate(&trim.state, &trim.controls, ALTITUDE);
+        assert!(rate.to_array().into_iter().all(|x| x.abs() < 1e-6), "{rate:?}");
+        assert!((0.5..0.501).contains(&trim.controls.throttle), "{trim:?}");
+    }
+}
+
 /// Above the airspeed that full throttle holds in level flight.
 #[test]
 fn what_is_too_fast_for_its_engine_descends_at_full_throttle() {

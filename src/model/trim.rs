@@ -7,6 +7,8 @@ use crate::physics::{Controls, State};
 
 /// Path angle by which a descent at full throttle must be shallower than at idle to be one with an engine, rad.
 const SHALLOWER: f64 = 1e-6;
+/// Bisections of the throttle: to the last digit.
+const HALVINGS: usize = 52;
 
 /// A steady flight condition with the controls that hold it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +60,9 @@ impl Trim {
             let (state, controls) = level_condition(x, airspeed);
             Some(Trim { state, controls, acceleration: 0.0 })
         };
-        within_stops(from, 0.2).ok_or_else(|| failure(model, 0.0, 0.0, airspeed))
+        within_stops(from, 0.2)
+            .or_else(|| halved(|held| straight_at(model, airspeed, altitude, held), Trim::path))
+            .ok_or_else(|| failure(model, 0.0, 0.0, airspeed))
     }
 
     /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m): level, or where no throttle holds level
@@ -104,6 +108,7 @@ impl Trim {
             None => held(0.0)
                 .filter(|idle| idle.acceleration >= 0.0)
                 .or_else(|| held(1.0).filter(|full| full.acceleration <= 0.0))
+                .or_else(|| halved(held, |trim| trim.acceleration))
                 .ok_or_else(fail),
         }
     }
@@ -119,6 +124,21 @@ fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> 
         return first;
     }
     from(1.0).filter(holds).or(first)
+}
+
+/// The trim at the throttle where what is `left` rises through zero, by bisection: Newton's steps may go to and fro about
+/// a kink of a table of thrust. `None` if it does not lie between idle and full throttle.
+fn halved(held: impl Fn(f64) -> Option<Trim>, left: impl Fn(&Trim) -> f64) -> Option<Trim> {
+    let [idle, full] = [held(0.0)?, held(1.0)?];
+    if !(left(&idle) < 0.0 && left(&full) > 0.0) {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if left(&held(middle)?) < 0.0 { low = middle } else { high = middle }
+    }
+    held(high)
 }
 
 /// The descent at `airspeed`, m/s, at full throttle where that is shallower than at idle.

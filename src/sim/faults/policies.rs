@@ -145,6 +145,7 @@ fn target_inside(of: fn(&Target) -> f64, [least, most]: [f64; 2]) -> Rule {
 pub fn policies(envelope: &Envelope) -> Vec<Policy> {
     let mut all = of_commands(envelope);
     all.extend(of_the_aircraft(envelope));
+    all.extend(of_the_loop());
     all.extend(of_handing_over());
     all.extend(of_reports());
     all
@@ -244,6 +245,11 @@ fn of_the_aircraft(envelope: &Envelope) -> Vec<Policy> {
             "no more than 400 m are lost",
             unless_exposed(Formula::atom(|s: &Sample| (ALTITUDE_LOSS_M - s.lost_m) / UNIT_M)),
         ),
+    ]
+}
+
+fn of_the_loop() -> Vec<Policy> {
+    vec![
         policy(
             "reached",
             "in calm air and without faults an attitude is reached to 5 degrees within 5 s",
