@@ -78,7 +78,7 @@ def differences(effect, amount, seed, seconds=12.0):
 
 def difference(sim, e):
     """Differences at one moment."""
-    z = tuple(sim[name] for name in (*official.POSITIONS.values(), official.THROTTLE))
+    z = (*(sim[name] for name in (*official.POSITIONS.values(), official.THROTTLE)), 0.0)
     x = state_of(sim)
     theirs = np.array([sim[name] * unit for name, unit in READ.items()])
     ours = np.array((*continuous.wrench(x, z, e)[:6], *continuous.rates(x, z, e)[:6]))

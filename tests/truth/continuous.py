@@ -11,7 +11,7 @@ import numpy as np
 import aircraft as x8
 from atmosphere import density
 from compiled import compiled
-from formulas import FORMS, THROTTLE, form_of
+from formulas import FORMS, LAGGED, THROTTLE, VARIABLES, form_of
 from hidden import INPUTS
 from pilot import PERIOD, command
 
@@ -40,7 +40,9 @@ CL0, CLA = x8.LINEAR_LIFT["CL0"], x8.LINEAR_LIFT["CLalpha"]
 AREA, SPAN, CHORD, MASS, THRUST = x8.AREA, x8.SPAN, x8.CHORD, x8.MASS, x8.THRUST_MAX
 JX, JY, JZ, JXZ, GRAVITY = x8.JX, x8.JY, x8.JZ, x8.JXZ, x8.GRAVITY
 LIFT_ALPHA, LIFT, DRAG_ALPHA, DRAG = x8.LIFT_ALPHA, x8.LIFT, x8.DRAG_ALPHA, x8.DRAG
-WITHOUT_AIR = 1 + list(FORMS).index(THROTTLE)
+WITHOUT_AIR = (1 + list(FORMS).index(THROTTLE), 1 + list(FORMS | LAGGED).index("lag without air"))
+FIRST_LAGGED = 1 + len(FORMS)
+OF_CONTROLS = list(VARIABLES).index("aileron")
 V0, THROTTLE0, LIMIT, LAG = x8.REFERENCE_SPEED, x8.REFERENCE_THROTTLE, x8.DEFLECTION_MAX, x8.THROTTLE_LAG
 
 
@@ -88,7 +90,8 @@ def lift_of_wing(alpha, e):
 def wrench(x, z, e):
     """Force other than gravity (N), moment (N m), airspeed, alpha, beta.
 
-    `z`: aileron, elevator (rad, as they act) and throttle; `e`: figures of the hidden effects.
+    `z`: aileron, elevator (rad, as they act), throttle, and the control that a hidden lag has made late; `e`: figures of
+    the hidden effects.
     """
     u, v, w, p, q, r = x[0], x[1], x[2], x[3], x[4], x[5]
     airspeed = math.sqrt(u * u + v * v + w * w)
@@ -130,7 +133,7 @@ def wrench(x, z, e):
         m += half * CHORD * e[9] * rate
     m, n = m - e[7] * fz, n + e[7] * fy
     if e[23] != 0.0:
-        more = of_formula((alpha, beta, ph, qh, rh, z[0], z[1], throttle), qs, e)
+        more = of_formula((alpha, beta, ph, qh, rh, z[0], z[1], throttle, z[3]), qs, e)
         along = -more[0] * cb - more[2] * sb
         fx += along * ca + more[1] * sa
         fy += more[2] * cb - more[0] * sb
@@ -144,7 +147,7 @@ def of_formula(of, qs, e):
     """Drag, lift, side force (N), rolling, pitching, yawing moment (N m) of a hidden formula of the variables `of`."""
     channel, form = int(e[23]), int(e[24])
     amount = e[28] * form_of(form, of[int(e[25])], of[int(e[26])], e[27])
-    if form != WITHOUT_AIR:
+    if form != WITHOUT_AIR[0] and form != WITHOUT_AIR[1]:
         amount *= qs * (1.0, 1.0, 1.0, SPAN, CHORD, SPAN)[channel - 1]
     return (
         amount if channel == 1 else 0.0, amount if channel == 2 else 0.0, amount if channel == 3 else 0.0,
@@ -265,6 +268,9 @@ def integrate(x, wanted, e, kind, amount, matrix, truth, commands):
     surface_a, surface_e, throttle = (0.0, 0.0), (0.0, 0.0), 0.15
     acting_a, acting_e, acting_t, now = 0.0, 0.0, throttle, HISTORY
     thrust_keep = math.exp(-h / amount) if kind == 6 else 0.0
+    lags, lagged_of, tau = e[24] >= FIRST_LAGGED, int(e[26]) - OF_CONTROLS, e[27]
+    late_keep = math.exp(-h / tau) if lags else 0.0
+    late = throttle if lags and lagged_of == 2 else 0.0
     memory = (0.0, 0.0, 0.0)
     row = 0
     for k in range(wanted.shape[0]):
@@ -276,7 +282,7 @@ def integrate(x, wanted, e, kind, amount, matrix, truth, commands):
         )
         commands[k, 0], commands[k, 1], commands[k, 2] = given
         for _ in range(PER_COMMAND):
-            begin = (acting_a, acting_e, acting_t)
+            begin = (acting_a, acting_e, acting_t, late)
             note(truth, row, x, begin, clipped(surface_a[0]), clipped(surface_e[0]), throttle, e)
             middle = begin
             for half in range(2):
@@ -289,13 +295,18 @@ def integrate(x, wanted, e, kind, amount, matrix, truth, commands):
                     acting_t = throttle - slope * amount + (acting_t - old + slope * amount) * thrust_keep
                 else:
                     acting_t = throttle
+                acted = (acting_a, acting_e, old)
                 now += 1
                 past_a[now % HISTORY], past_e[now % HISTORY] = clipped(surface_a[0]), clipped(surface_e[0])
                 acting_a = act(kind, amount, past_a, now, acting_a, h)
                 acting_e = act(kind, amount, past_e, now, acting_e, h)
+                if lags:  # as the lag of the thrust
+                    target = (acting_a, acting_e, throttle)[lagged_of]
+                    slope = (target - acted[lagged_of]) / h
+                    late = target - slope * tau + (late - acted[lagged_of] + slope * tau) * late_keep
                 if half == 0:
-                    middle = (acting_a, acting_e, acting_t)
-            x = rk4(x, begin, middle, (acting_a, acting_e, acting_t), e, STEP)
+                    middle = (acting_a, acting_e, acting_t, late)
+            x = rk4(x, begin, middle, (acting_a, acting_e, acting_t, late), e, STEP)
             row += 1
     return x
 

@@ -42,6 +42,14 @@ FORMS = {
 
 The throttle is never negative, so in it a form just grows.
 """
+LAGGED = {
+    "lag": ("lag({v}, {c})", ("odd",)),
+    "lag without air": ("lag({v}, {c})", ("grows",)),
+}
+"""Controls through a first-order lag of so many seconds: drawn by `drawn_lagged` alone."""
+CONTROLS = ("aileron", "elevator", "throttle")
+LAGS = (0.1, 0.6)
+"""Shortest and longest time constant, s."""
 OF_TWO = ("product", "product with a square")
 WITH_CONSTANT = ("dead band", "hinge", "tanh")
 THROTTLE = "throttle alone"
@@ -81,18 +89,18 @@ class Formula:
     @property
     def factor(self):
         """What the form is multiplied by besides."""
-        return "1" if self.form == THROTTLE else FACTORS[self.channel]
+        return "1" if self.form in (THROTTLE, "lag without air") else FACTORS[self.channel]
 
     @property
     def shape(self):
         """The form with its variables."""
         v, w = (*self.variables, "")[:2]
-        return FORMS[self.form][0].format(v=v, w=w, c=f"{self.constant:g}")
+        return (FORMS | LAGGED)[self.form][0].format(v=v, w=w, c=f"{self.constant:g}")
 
     @property
     def trend(self):
         """Parity by variable."""
-        parity = zip(self.variables, FORMS[self.form][1])
+        parity = zip(self.variables, (FORMS | LAGGED)[self.form][1])
         return {name: "grows" if name == "throttle" else of for name, of in parity}
 
     def text(self):
@@ -107,10 +115,12 @@ class Formula:
     def figures(self):
         """The numbers that the equations take: channel and form from one on, variables from zero."""
         places = [list(VARIABLES).index(v) for v in self.variables]
+        # behind the variables stands what a lag makes of the second one
+        first = len(VARIABLES) if self.form in LAGGED else places[0]
         return {
             "formula_channel": 1.0 + list(CHANNELS).index(self.channel),
-            "formula_form": 1.0 + list(FORMS).index(self.form),
-            "formula_first": float(places[0]),
+            "formula_form": 1.0 + list(FORMS | LAGGED).index(self.form),
+            "formula_first": float(first),
             "formula_second": float(places[-1]),
             "formula_constant": self.constant,
             "formula_amount": self.amount,
@@ -123,6 +133,21 @@ def drawn(random, strength=1.0):
         formula = anything(random, strength)
         if (formula.channel, formula.shape) not in HELD:
             return formula
+
+
+def drawn_lagged(random, strength=1.0):
+    """A control through a lag, where neither the catalogue nor the model holds it."""
+    while True:
+        channel, variable = str(random.choice(list(CHANNELS))), str(random.choice(CONTROLS))
+        without_air = variable == "throttle" and random.uniform() < 0.5
+        if without_air and channel == "drag":  # the thrust of an engine that takes time: thrust_lag
+            continue
+        low, high = LAGS
+        constant = float(f"{low * (high / low) ** random.uniform():.2g}")
+        times, sign = random.uniform(1.0, 2.0), random.choice((-1.0, 1.0))
+        size = WITHOUT_AIR[channel] if without_air else CHANNELS[channel]
+        amount = float(f"{sign * times * strength * size / VARIABLES[variable]:.4g}")
+        return Formula(channel, "lag without air" if without_air else "lag", [variable], constant, amount)
 
 
 def anything(random, strength=1.0):

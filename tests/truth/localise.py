@@ -72,7 +72,7 @@ def wind_axes(force, alpha, beta):
 def channels(rows, effect):
     """Measured, and what the model lacks: six channels at every row."""
     e, rate = figures(effect), rows[:, 3:6]
-    predicted = np.array([continuous.wrench(body(row), tuple(row[16:19]), e)[:6] for row in rows])
+    predicted = np.array([continuous.wrench(body(row), (*row[16:19], 0.0), e)[:6] for row in rows])
     if effect == "drag_beta2":  # the model has none of its two coefficients
         qs = 0.5 * np.array([continuous.density(h) for h in rows[:, 15]]) * rows[:, 6] ** 2 * x8.AREA
         extra = -continuous.CDB * np.abs(rows[:, 8]) * qs

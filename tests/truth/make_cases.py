@@ -29,7 +29,8 @@ ROLL_MAX, PITCH_MAX = np.radians(85.0), np.radians(60.0)
 WIND_MAX = 6.0
 """Strongest steady wind, m/s."""
 GENTLER = 0.75
-FORMULA = "formula"
+FORMULA, LAGGED = "formula", "lagged"
+DRAWN = {FORMULA: formulas.drawn, LAGGED: formulas.drawn_lagged}
 DRAWS = 20
 """Formulas drawn for a case before it is given up: some cannot be flown."""
 
@@ -70,11 +71,11 @@ def flown(fly, case, seed, effect, amount, duration):
     return {f: fly_within_bounds(fly, case, seed, f, effect, amount, duration) for f in manoeuvres.FLIGHTS}
 
 
-def flown_with_formula(fly, case, seed, duration, strength):
+def flown_with_formula(fly, draw, case, seed, duration, strength):
     """The first formula drawn with which all flights can be flown, the flights, and the formulas before it."""
     lost = []
     for k in range(DRAWS):
-        formula = formulas.drawn(hidden.random_of(seed, case, 6, k), strength)
+        formula = draw(hidden.random_of(seed, case, 6, k), strength)
         try:
             return formula, flown(partial(fly, formula=formula), case, seed, None, 0.0, duration), lost
         except Lost:
@@ -83,13 +84,13 @@ def flown_with_formula(fly, case, seed, duration, strength):
 
 
 def make_case(folder, kind, case, seed, effect, options, duration, wrong, strength=1.0):
-    """Writes one case; `effect` is an id, `FORMULA` for a formula that is drawn, or None."""
+    """Writes one case; `effect` is an id, one of `DRAWN` for a formula that is drawn, or None."""
     (fly, step), folder = truth_of(kind), folder / case
     folder.mkdir(parents=True)
     told = {"case": case, "truth": kind, "seed": seed, "hidden": effect, "amount": 0.0, "duration_s": duration}
     told.update(sensors=asdict(options), wrong=wrong, flights={})
-    if effect == FORMULA:
-        formula, flights, lost = flown_with_formula(fly, case, seed, duration, strength)
+    if effect in DRAWN:
+        formula, flights, lost = flown_with_formula(fly, DRAWN[effect], case, seed, duration, strength)
         told.update(hidden=formula.text(), amount=formula.amount, formula=formula.told(), strength=strength)
         told["not_flown"] = lost
         effect = None
@@ -129,6 +130,7 @@ def arguments():
     p.add_argument("--seed", type=int, required=True)
     p.add_argument("--effects", help="'all', or ids with commas between; '' for none; all if no formulas are asked for")
     p.add_argument("--formulas", type=int, default=0, help="cases that hide a formula; of the continuous truth alone")
+    p.add_argument("--lagged", type=int, default=0, help="cases that hide a control through a lag; of the same")
     p.add_argument("--strength", type=float, default=1.0, help="factor on the amounts of the formulas")
     p.add_argument("--nulls", type=int, default=0, help="cases without a hidden effect")
     p.add_argument("--rate", type=float, default=100.0, help="samples a second of the logs")
@@ -152,12 +154,13 @@ def main():
     unknown = [x for x in (*missing, *options.held) if x not in sensors.GROUPS]
     if unknown:
         sys.exit(f"no sensor group {', '.join(unknown)}; there are {', '.join(sensors.GROUPS)}")
-    if a.formulas and a.truth != "continuous":
-        sys.exit("--formulas: only the continuous truth can hide formulas")
-    effects = a.effects if a.effects is not None else "" if a.formulas else "all"
+    if (a.formulas or a.lagged) and a.truth != "continuous":
+        sys.exit("--formulas, --lagged: only the continuous truth can hide formulas")
+    effects = a.effects if a.effects is not None else "" if a.formulas or a.lagged else "all"
     cases = [(f"{a.truth}-null-{k:02}", None) for k in range(a.nulls)]
     cases += [(f"{a.truth}-{effect}", effect) for effect in chosen(effects)]
     cases += [(f"{a.truth}-formula-{k:02}", FORMULA) for k in range(a.formulas)]
+    cases += [(f"{a.truth}-lagged-{k:02}", LAGGED) for k in range(a.lagged)]
     for case, effect in cases:
         make_case(a.out, a.truth, case, a.seed, effect, options, a.duration, a.wrong, a.strength)
         print(a.out / case, flush=True)

@@ -31,7 +31,7 @@ def kernel(dt):
 def weak_form(rows, dt):
     """Measured and predicted moments in windows."""
     e = continuous.vector()
-    moment = np.array([continuous.wrench(localise.body(r), tuple(r[16:19]), e)[3:6] for r in rows])
+    moment = np.array([continuous.wrench(localise.body(r), (*r[16:19], 0.0), e)[3:6] for r in rows])
     inertia = np.array([[x8.JX, 0.0, -x8.JXZ], [0.0, x8.JY, 0.0], [-x8.JXZ, 0.0, x8.JZ]])
     rate = rows[:, 3:6]
     turning = np.cross(rate, rate @ inertia)

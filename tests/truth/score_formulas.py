@@ -48,9 +48,9 @@ def deadband(x, w):
 
 FUNCTIONS = {
     "abs": np.abs, "max": np.maximum, "min": np.minimum, "exp": np.exp, "sin": np.sin, "cos": np.cos, "tanh": np.tanh,
-    "sqrt": np.sqrt, "sign": np.sign, "deadband": deadband,
+    "sqrt": np.sqrt, "sign": np.sign, "deadband": deadband, "lag": lambda x, _: x,
 }  # fmt: skip
-"""The functions of the program's formulas."""
+"""The functions of the program's formulas, a lag in its steady state."""
 
 
 def divided(term):
@@ -89,7 +89,9 @@ def cloud():
 
 
 def same(factor, shape, hidden):
-    """Whether a form is the hidden one up to a number, however it is written."""
+    """Whether a form is the hidden one up to a number, however it is written; a lag says so by its form alone."""
+    if "lag(" in shape + hidden["shape"]:
+        return False
     at = cloud()
     ours, truth = pressed(factor, at) * value(shape, at), pressed(hidden["factor"], at) * value(hidden["shape"], at)
     scale = (ours @ truth) / (truth @ truth)

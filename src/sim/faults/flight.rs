@@ -17,13 +17,14 @@ use super::counterpart::{Aircraft, Counterpart, vehicle};
 use super::judge::{Cause, Finding, Found, Judge};
 use super::mix::{Fault, FaultKind};
 use super::policies::Sample;
-use super::scenario::Scenario;
+use super::scenario::{Scenario, Setting};
 use super::wire::Wire;
 use crate::control::{Controller, ControllerKind, SetupError, build};
 use crate::flight::desk::Desk;
 use crate::flight::pilot::{ConfigError, Pilot};
 use crate::flight::recorder::Recorder;
 use crate::flight::runtime::Companion;
+use crate::link::autopilot::{Autopilot, ParameterValue, Verdict};
 use crate::link::vehicle::Vehicle;
 use crate::model::GreyBox;
 use crate::physics::airframe::Envelope;
@@ -50,6 +51,16 @@ pub enum FaultsError {
     /// The pilot refuses its settings.
     #[error(transparent)]
     Pilot(#[from] ConfigError),
+    /// A scenario has a parameter that the companion refuses.
+    #[error("setting {name} to {times} times its default: {why}")]
+    Parameter {
+        /// Its name.
+        name: String,
+        /// Its value as a multiple of the default.
+        times: f64,
+        /// Why.
+        why: String,
+    },
     /// The recorder's thread cannot be started.
     #[error("starting the recorder of a flight: {0}; close other programs and try again")]
     Recorder(#[from] std::io::Error),
@@ -175,6 +186,7 @@ impl CompanionFactory {
     ) -> Result<Flight, FaultsError> {
         let Scenario { counterpart, seed, faults, .. } = scenario;
         let mut desk = self.desk(*counterpart)?;
+        scenario.parameters.iter().try_for_each(|setting| set(&mut desk, setting))?;
         let disk = faults.iter().any(|f| f.kind == FaultKind::Disk).then(Disk::default);
         if let Some(disk) = &disk {
             let folder = std::path::PathBuf::new();
@@ -207,6 +219,23 @@ impl CompanionFactory {
             flight.judge.note(0.0, Finding::Panic);
         }
         Ok(flight)
+    }
+}
+
+/// Sets a parameter of the companion of `desk`.
+fn set(desk: &mut Desk, Setting { name, times }: &Setting) -> Result<(), FaultsError> {
+    let refused = |why: String| FaultsError::Parameter { name: name.clone(), times: *times, why };
+    let pilot = desk.pilot();
+    let place = pilot.parameters().iter().position(|p| p.name == name);
+    let Some(place) = place else {
+        return Err(refused("there is no such parameter; docs/reference/parameters.md lists them".into()));
+    };
+    let ParameterValue::Real(default) = pilot.parameters()[place].value else {
+        return Err(refused("it is no real number and has no multiples".into()));
+    };
+    match pilot.set_parameter(place, ParameterValue::Real(default * *times as f32)) {
+        Verdict::Rejected(why) | Verdict::Denied(why) => Err(refused(why)),
+        _ => Ok(()),
     }
 }
 

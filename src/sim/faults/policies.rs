@@ -70,6 +70,10 @@ pub struct Sample {
     pub spoke: bool,
     /// Whether somebody has asked for the companion to steer, and nobody has taken the aircraft since.
     pub asked: bool,
+    /// The envelope as the companion's parameters have it.
+    pub envelope: Envelope,
+    /// Silence of the client after which OFFBOARD ends, s; likewise.
+    pub offboard_loss_s: f64,
 }
 
 impl Sample {
@@ -133,9 +137,10 @@ fn ends(state: impl Fn(&Sample) -> bool + Copy + Send + Sync + 'static, seconds:
     is(state).implies(is(move |s| !state(s) || s.age_s > STALE_S).eventually(seconds))
 }
 
-/// The angle `of` a target lies between these two, degrees, where an attitude is flown.
-fn target_inside(of: fn(&Target) -> f64, [least, most]: [f64; 2]) -> Rule {
+/// The angle `of` a target lies between two of the envelope, degrees, where an attitude is flown.
+fn target_inside(of: fn(&Target) -> f64, ends: fn(&Envelope) -> [f64; 2]) -> Rule {
     Formula::atom(move |s: &Sample| {
+        let [least, most] = ends(&s.envelope);
         let angle = s.decision.map(|d| of(&d.target).to_degrees()).filter(|x| x.is_finite());
         angle.map_or(1.0, |x| ((most - x).min(x - least) + ROUNDING) / UNIT_DEG)
     })
@@ -143,7 +148,7 @@ fn target_inside(of: fn(&Target) -> f64, [least, most]: [f64; 2]) -> Rule {
 
 /// Every rule for an aircraft of this envelope.
 pub fn policies(envelope: &Envelope) -> Vec<Policy> {
-    let mut all = of_commands(envelope);
+    let mut all = of_commands();
     all.extend(of_the_aircraft(envelope));
     all.extend(of_the_loop());
     all.extend(of_handing_over());
@@ -155,9 +160,7 @@ fn policy(id: &'static str, asks: &'static str, always: Rule) -> Policy {
     Policy { id, asks, of_controllers: false, always }
 }
 
-fn of_commands(envelope: &Envelope) -> Vec<Policy> {
-    let Envelope { bank_max_deg, pitch_max_deg, pitch_min_deg, .. } = *envelope;
-    let step = envelope.surface_slew_per_s * TICK_S;
+fn of_commands() -> Vec<Policy> {
     vec![
         policy(
             "finite",
@@ -178,7 +181,10 @@ fn of_commands(envelope: &Envelope) -> Vec<Policy> {
         policy(
             "slew",
             "armed, no surface is commanded faster than the slew limit",
-            Formula::atom(move |s: &Sample| (step + ROUNDING - s.moved) / step),
+            Formula::atom(|s: &Sample| {
+                let step = s.envelope.surface_slew_per_s * TICK_S;
+                (step + ROUNDING - s.moved) / step
+            }),
         ),
         policy(
             "idle",
@@ -188,12 +194,12 @@ fn of_commands(envelope: &Envelope) -> Vec<Policy> {
         policy(
             "bank-target",
             "the bank that is flown to lies inside the envelope",
-            target_inside(|t| t.roll, [-bank_max_deg, bank_max_deg]),
+            target_inside(|t| t.roll, |e| [-e.bank_max_deg, e.bank_max_deg]),
         ),
         policy(
             "pitch-target",
             "the pitch that is flown to lies inside the envelope",
-            target_inside(|t| t.pitch, [pitch_min_deg, pitch_max_deg]),
+            target_inside(|t| t.pitch, |e| [e.pitch_min_deg, e.pitch_max_deg]),
         ),
         policy(
             "held",
@@ -208,7 +214,7 @@ fn of_the_aircraft(envelope: &Envelope) -> Vec<Policy> {
     let beyond = OVERSHOOT_DEG;
     let angle = |room: fn(&Envelope, [f64; 2]) -> f64| {
         unless_exposed(Formula::atom(move |s: &Sample| {
-            (room(&e, s.attitude_deg) + beyond) / UNIT_DEG
+            (room(&s.envelope, s.attitude_deg) + beyond) / UNIT_DEG
         }))
     };
     let stall = e.airspeed_min_mps / ABOVE_STALL;
@@ -303,12 +309,12 @@ fn of_handing_over() -> Vec<Policy> {
         ),
         policy(
             "client-lost",
-            "a client that is silent for 1 s ends OFFBOARD within 1 s",
+            "a client that is silent for GL_OFFB_LOSS_S (1 s) ends OFFBOARD within 1 s",
             ends(
                 |s| {
                     let offboard =
                         |d: &Decision| d.armed && d.mode == Mode::Offboard && !d.failsafe;
-                    s.client_silent_s >= 1.0 && s.decided(offboard)
+                    s.client_silent_s >= s.offboard_loss_s && s.decided(offboard)
                 },
                 1.0,
             ),

@@ -58,6 +58,30 @@ impl Asking {
         [Asking::Offboard, Asking::Hold, Asking::Disarm, Asking::Arm, Asking::TakeOver];
 }
 
+/// A parameter of the companion with another value than its own, set before the flight.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Setting {
+    /// Its name: `GL_` and so on.
+    pub name: String,
+    /// Its value as a multiple of the default.
+    pub times: f64,
+}
+
+/// The parameters that are varied, with the least and the most multiple of the default. The envelope gets narrower, never
+/// wider: what lies outside it nobody promises.
+const SETTINGS: [(&str, [f64; 2]); 9] = [
+    ("GL_OFFB_LOSS_S", [0.3, 3.0]),
+    ("GL_VEH_LOSS_S", [0.3, 3.0]),
+    ("GL_BANK_MAX_DEG", [0.4, 1.0]),
+    ("GL_PITCH_MAX_DEG", [0.4, 1.0]),
+    ("GL_PITCH_MIN_DEG", [0.4, 1.0]),
+    ("GL_CRUISE_MPS", [0.8, 1.4]),
+    ("GL_LOAD_MAX", [0.7, 1.0]),
+    ("GL_SLEW_SURF", [0.3, 2.0]),
+    ("GL_SLEW_THR", [0.2, 4.0]),
+];
+
 /// A flight of 60 s.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -76,6 +100,9 @@ pub struct Scenario {
     pub legs: Vec<Leg>,
     /// What is asked for besides.
     pub asked: Vec<Asked>,
+    /// Parameters of the companion that are not their defaults.
+    #[serde(default)]
+    pub parameters: Vec<Setting>,
 }
 
 /// What the client asks for unless a scenario says otherwise: turns both ways, a climb, a descent.
@@ -100,6 +127,7 @@ impl Scenario {
             faults: draw(seed),
             legs: LEGS.map(leg).to_vec(),
             asked: Vec::new(),
+            parameters: Vec::new(),
         }
     }
 
@@ -115,7 +143,14 @@ impl Scenario {
     /// The same with one thing changed.
     pub fn varied(&self, random: &mut impl Rng) -> Scenario {
         let mut changed = self.clone();
-        match random.random_range(0..10) {
+        match random.random_range(0..12) {
+            10 => changed.parameters.clear(),
+            11 => {
+                let (name, [least, most]) = SETTINGS[random.random_range(0..SETTINGS.len())];
+                changed.parameters.retain(|setting| setting.name != name);
+                let times = random.random_range(least..most);
+                changed.parameters.push(Setting { name: name.into(), times });
+            }
             0 => changed.seed = random.random_range(0..1_000_000),
             1 => {
                 let [north, east] = [(); 2].map(|()| random.random_range(-WIND_MPS..WIND_MPS));
@@ -172,6 +207,9 @@ impl Scenario {
         }
         for k in 0..self.asked.len() {
             with(&|s| _ = s.asked.remove(k));
+        }
+        for k in 0..self.parameters.len() {
+            with(&|s| _ = s.parameters.remove(k));
         }
         with(&|s| s.wind_ned_mps = [0.0; 3]);
         with(&|s| s.turbulence = 0);

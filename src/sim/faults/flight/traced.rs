@@ -107,6 +107,7 @@ impl Flight {
         aileron.update(if ours { inputs.aileron } else { aileron.slow });
         elevator.update(if ours { inputs.elevator } else { elevator.slow });
         let mean_square = aileron.mean_square.max(elevator.mean_square);
+        let config = self.desk.pilot().config();
         let start = *follower.start_m.get_or_insert(truth.altitude_m);
         trace.push(Sample {
             decision: follower.decision,
@@ -126,6 +127,8 @@ impl Flight {
             disturbed,
             spoke: self.texts.len() > std::mem::replace(&mut follower.lines, self.texts.len()),
             asked: follower.asked,
+            envelope: config.envelope,
+            offboard_loss_s: config.offboard_loss_s,
         });
     }
 }

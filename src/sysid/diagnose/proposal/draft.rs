@@ -77,12 +77,13 @@ pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> 
         );
         for (name, c) in names(k, term).iter().zip(term.form.shape.constants()) {
             // a threshold may be zero; what divides may not
-            let (ends, meaning) = match term.form.shape {
-                Shape::Free(_) => ([0.2 * c, 5.0 * c], "constant of its shape"),
-                _ => ([0.0, 3.0 * c], "where it begins"),
+            let (ends, unit, meaning) = match term.form.shape {
+                Shape::Free(_) => ([0.2 * c, 5.0 * c], "", "constant of its shape"),
+                Shape::Lagged(..) => ([0.0, 5.0 * c], "s", "time constant"),
+                _ => ([0.0, 3.0 * c], "", "where it begins"),
             };
             text += &format!(
-                "\n[parameters.{name}]\nvalue = {c}\nwidth = {}\nbounds = [{}, {}]\nunit = \"\"\nmeaning = {}\n",
+                "\n[parameters.{name}]\nvalue = {c}\nwidth = {}\nbounds = [{}, {}]\nunit = \"{unit}\"\nmeaning = {}\n",
                 rounded(0.3 * c.abs()),
                 rounded(ends[0].min(ends[1])),
                 rounded(ends[0].max(ends[1])),
@@ -118,14 +119,15 @@ mod tests {
         let terms = [
             term(false, Shape::Linear(Variable::Throttle), 0.53),
             term(true, Shape::Beyond(Variable::Beta, 0.07), -0.01),
+            term(true, Shape::Lagged(Variable::Aileron, 0.12), 0.02),
         ];
         // a name as macOS writes it, which Rust and TOML escape in different ways
         let text =
             file(&terms, "It \"yaws\".", &["yaw = k*throttle^2".into()], "e\u{301}te\u{301}.csv");
         let effect = reader::parse(&text).unwrap_or_else(|why| panic!("{why}\n{text}"));
         assert_eq!(effect.status, Status::Proposed);
-        assert_eq!(effect.about.id, "proposed_yaw_by_throttle_beta");
-        assert_eq!((effect.values, effect.about.shape), (vec![0.53, -0.01, 0.07], 1));
+        assert_eq!(effect.about.id, "proposed_yaw_by_throttle_beta_aileron");
+        assert_eq!((effect.values, effect.about.shape), (vec![0.53, -0.01, 0.02, 0.07, 0.12], 2));
     }
 
     #[test]

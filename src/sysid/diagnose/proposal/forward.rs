@@ -206,7 +206,7 @@ impl Ask<'_> {
     fn joins(&self, c: &mut Climbed, given: &GreyBox, stage: &Stage) -> Option<bool> {
         let &Stage { round, scores, place, threshold } = stage;
         let (trial, score) = &scores[place];
-        let form = self.form(round.trials[*trial].id)?;
+        let form = self.form(round.trials[*trial].id)?.fitted(&score.values);
         let first = c.terms.is_empty();
         let threshold = if first { threshold.max(self.least) } else { threshold };
         let before = c.said.front.last().map_or(0.0, |r| r.removed);
@@ -332,7 +332,7 @@ impl Ask<'_> {
             .into_iter()
             .filter_map(|k| {
                 let (trial, score) = &scores[k];
-                let form = self.form(round.trials[*trial].id)?;
+                let form = self.form(round.trials[*trial].id)?.fitted(&score.values);
                 let same = checks::likeness(round, &scores[place].1, score).abs() > 1.0 - SAME;
                 let larger = self.behind > 0.0 && form.shape.complexity() > own;
                 (!same && !larger).then_some((form, score.evidence))
@@ -365,9 +365,11 @@ impl Ask<'_> {
     /// The terms with their coefficients as all of them together were tuned.
     fn joint(&self, model: &GreyBox, mut terms: Vec<Term>) -> Vec<Term> {
         for term in &mut terms {
-            let name = format!("{}.k", term.form.id());
-            let tuned = model.coefficients().iter().find(|c| c.name == name);
-            term.value = tuned.map_or(term.value, |c| c.value);
+            let prefix = format!("{}.", term.form.id());
+            let own = model.coefficients().iter().filter(|c| c.name.starts_with(&prefix));
+            let tuned: Vec<f64> = own.map(|c| c.value).collect();
+            term.value = tuned.first().copied().unwrap_or(term.value);
+            term.form = term.form.fitted(&tuned);
         }
         terms
     }

@@ -8,7 +8,12 @@ use crate::physics::formula::Variable;
 
 /// How a form runs with each of its variables.
 fn trend(form: &Form) -> Option<String> {
-    free::trend::trend(&form.shape.text(None))
+    // in the steady state a lag is no more
+    let shape = match form.shape {
+        Shape::Lagged(v, _) => Shape::Linear(v),
+        shape => shape,
+    };
+    free::trend::trend(&shape.text(None))
 }
 
 /// What `best` and all of `alike`, which these flights cannot tell from it, have in common.
@@ -66,6 +71,9 @@ pub fn words(form: &Form, value: f64) -> String {
         Shape::ByMagnitude(v, w) => format!("with {} times the magnitude of {}", long(v), long(w)),
         Shape::Above(v, c) => format!("with {} above {c}", long(v)),
         Shape::Beyond(v, c) => format!("with {} beyond ±{c}", long(v)),
+        Shape::Lagged(v, tau) => {
+            format!("linearly with {} through a lag of {tau} s", long(v))
+        }
         Shape::Free(free) => format!("with {}", free.text(None)),
     };
     let pressure = match form.of_air {

@@ -37,7 +37,7 @@ pub(super) fn tested(
     flights: Vec<String>,
 ) -> Option<HeldOut> {
     let effects: Vec<&'static Written> =
-        terms.iter().filter_map(|t| t.form.effect().ok()).collect();
+        terms.iter().filter_map(|t| t.form.fixed().ok()).collect();
     let entries: Vec<Entry> =
         effects.iter().map(|e| Entry { about: e.about, operator: false }).collect();
     let round = Round::new(problem, model.clone(), &entries)?;
@@ -55,8 +55,12 @@ pub(super) fn tested(
     chance.sort_by(f64::total_cmp);
     let channels = std::array::from_fn(|c| terms.iter().any(|t| t.form.channel == ORDER[c]));
     let mut with = model.clone();
-    for term in terms {
-        with.join_most(&term.form.id(), &[term.value]).ok()?;
+    for (term, effect) in terms.iter().zip(&effects) {
+        let mut values = vec![term.value];
+        if effect.about.shape > 0 {
+            values.extend(term.form.shape.constants());
+        }
+        with.join_most(effect.about.id, &values).ok()?;
     }
     let removed = removed(problem, model, &with, &channels)?;
     // nothing is gained by a fall below zero

@@ -31,6 +31,15 @@ pub(super) const BESIDE_AIR: [Variable; 7] = [
 /// Variables that may have a dead band or a threshold.
 const BANDED: [Variable; 5] =
     [Variable::Alpha, Variable::Beta, Variable::Aileron, Variable::Elevator, Variable::Throttle];
+/// Variables that a lag can have.
+pub(super) const CONTROLS: [Variable; 4] =
+    [Variable::Aileron, Variable::Elevator, Variable::Rudder, Variable::Throttle];
+/// Where the search for the time constant of a lag starts, s; it also starts at a quarter of it and at 1.75 of it.
+const LAG_S: f64 = 0.2;
+/// Longest time constant of a lag, s.
+const LONGEST_LAG_S: f64 = 3.0;
+/// Where the search for its amount starts: so little that the first step is one of the amount alone.
+const AMOUNT: f64 = 1e-3;
 /// Where thresholds lie, as quantiles of the magnitude of what was flown.
 pub(super) const QUANTILES: [f64; 2] = [0.5, 0.75];
 
@@ -53,6 +62,8 @@ pub enum Shape {
     Above(Variable, f64),
     /// What v exceeds a dead band by, with its sign.
     Beyond(Variable, f64),
+    /// v, a control, through a first-order lag of so many seconds. As a candidate its time constant is free.
+    Lagged(Variable, f64),
     /// Any expression.
     Free(&'static Free),
 }
@@ -78,7 +89,8 @@ impl Shape {
             | Shape::Square(v)
             | Shape::SignedSquare(v)
             | Shape::Above(v, _)
-            | Shape::Beyond(v, _) => vec![v],
+            | Shape::Beyond(v, _)
+            | Shape::Lagged(v, _) => vec![v],
             Shape::Free(free) => free.expression.variables(),
         }
     }
@@ -99,6 +111,7 @@ impl Shape {
             Shape::ByMagnitude(v, w) => format!("{}*abs({})", name(v), name(w)),
             Shape::Above(v, c) => format!("max({} - {}, 0)", name(v), number(c)),
             Shape::Beyond(v, c) => format!("deadband({}, {})", name(v), number(c)),
+            Shape::Lagged(v, tau) => format!("lag({}, {})", name(v), number(tau)),
             Shape::Free(free) => free.text(names),
         }
     }
@@ -106,7 +119,7 @@ impl Shape {
     /// Its constants beside the coefficient.
     pub fn constants(&self) -> Vec<f64> {
         match self {
-            Shape::Above(_, c) | Shape::Beyond(_, c) => vec![*c],
+            Shape::Above(_, c) | Shape::Beyond(_, c) | Shape::Lagged(_, c) => vec![*c],
             Shape::Free(free) => free.constants.clone(),
             _ => Vec::new(),
         }
@@ -117,7 +130,7 @@ impl Shape {
         match self {
             Shape::Linear(_) => 1,
             Shape::Magnitude(_) | Shape::Square(_) => 2,
-            Shape::Product(..) => 3,
+            Shape::Product(..) | Shape::Lagged(..) => 3,
             Shape::SignedSquare(_) | Shape::ByMagnitude(..) | Shape::Beyond(..) => 4,
             Shape::Above(..) => 5,
             Shape::Free(free) => free.expression.size(),
@@ -167,6 +180,8 @@ impl Form {
         let text = match self.shape {
             // too long for an id
             Shape::Free(free) => format!("free_{:x}", number_of(&free.text(None))),
+            // its time constant is free
+            Shape::Lagged(v, _) => format!("lag {}", v.name()),
             shape => shape.text(None),
         };
         let plain: String =
@@ -178,11 +193,54 @@ impl Form {
         )
     }
 
-    /// The effect of this form alone, its threshold fixed.
+    /// The form with the constants that a search left free as it found them: `values` are the coefficient, then these.
+    pub fn fitted(self, values: &[f64]) -> Form {
+        match (self.shape, values) {
+            (Shape::Lagged(v, _), [_, tau, ..]) => {
+                // three figures, so that it can be read
+                let tau = format!("{tau:.2e}").parse().unwrap_or(*tau);
+                Form { shape: Shape::Lagged(v, tau), ..self }
+            }
+            _ => self,
+        }
+    }
+
+    /// The effect of this form alone, its threshold fixed; of a lag, the time constant is free.
     ///
     /// # Errors
     /// If its file could not be read, which none of the library is.
     pub fn effect(&self) -> Result<&'static Written, String> {
+        match self.shape {
+            Shape::Lagged(v, _) => self.through_lag(v, LAG_S, &self.id()),
+            _ => self.fixed(),
+        }
+    }
+
+    /// The effect of a control through a lag; the search starts at `tau`, and a width to either side.
+    fn through_lag(&self, v: Variable, tau: f64, id: &str) -> Result<&'static Written, String> {
+        register::read(&format!(
+            "schema = 1\nid = \"{id}\"\ndescription = \"A control through a lag.\"\nsource = \"greylag propose\"\n\
+             status = \"proposed\"\n[parameters.k]\nvalue = {AMOUNT}\nbounds = [-1e6, 1e6]\nunit = \"{}\"\n\
+             meaning = \"amount\"\n[parameters.tau]\nvalue = {tau}\nwidth = {}\nbounds = [0.0, {LONGEST_LAG_S}]\n\
+             unit = \"s\"\nmeaning = \"time constant\"\n[[channels]]\nchannel = \"{}\"\nfactor = \"{}\"\n\
+             shape = \"k*lag({}, tau)\"\n",
+            self.unit(),
+            0.75 * tau,
+            channel_name(self.channel),
+            self.factor(),
+            v.name()
+        ))
+    }
+
+    /// The effect of this form alone, all its constants as they are.
+    ///
+    /// # Errors
+    /// As of [`Form::effect`].
+    pub fn fixed(&self) -> Result<&'static Written, String> {
+        if let Shape::Lagged(v, tau) = self.shape {
+            let own = format!("{}_{tau}", self.id()).replace('.', "_");
+            return self.through_lag(v, tau, &own);
+        }
         let text = format!(
             "schema = 1\nid = \"{}\"\ndescription = \"A shape that was tried.\"\nsource = \"greylag propose\"\n\
              status = \"proposed\"\n[parameters.k]\nvalue = 0.0\nbounds = [-1e6, 1e6]\nunit = \"{}\"\n\
@@ -195,6 +253,14 @@ impl Form {
         );
         register::read(&text)
     }
+}
+
+/// The controls `of` in `channel`, each through a lag.
+pub fn lags(channel: Channel, of: &[Variable]) -> Vec<Form> {
+    let form = |of_air, v| Form { channel, of_air, shape: Shape::Lagged(v, LAG_S) };
+    let with_air = of.iter().filter(|v| CONTROLS.contains(v)).map(|v| form(true, *v));
+    let thrust = of.contains(&Variable::Throttle).then(|| form(false, Variable::Throttle));
+    with_air.chain(thrust).collect()
 }
 
 /// A number that goes with `text` (FNV-1a).
@@ -244,6 +310,22 @@ pub fn forms(channel: Channel, threshold: &dyn Fn(Variable, f64) -> f64) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_lag_is_a_candidate_with_a_free_time_constant() {
+        let all = lags(Channel::Yaw, &CONTROLS);
+        assert_eq!(all.len(), 5);
+        for form in all {
+            let effect = form.effect().unwrap_or_else(|why| panic!("{form:?}: {why}"));
+            assert_eq!(effect.about.shape, 1);
+            let fitted = form.fitted(&[0.5, 0.31234]);
+            assert_eq!(fitted.shape.constants(), [0.312]);
+            assert_eq!(fitted.id(), form.id());
+            let fixed = fitted.fixed().unwrap_or_else(|why| panic!("{form:?}: {why}"));
+            assert_ne!(fixed.about.id, effect.about.id);
+            assert_eq!(fixed.values, [AMOUNT, 0.312]);
+        }
+    }
 
     #[test]
     fn every_form_is_an_effect_with_an_id_of_its_own() {

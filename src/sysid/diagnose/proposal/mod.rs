@@ -6,6 +6,7 @@ mod forward;
 mod free;
 mod grades;
 mod held_out;
+mod lags;
 mod library;
 mod propose;
 mod result;

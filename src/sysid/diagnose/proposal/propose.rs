@@ -6,6 +6,7 @@ use super::forward::{Ask, Climbed, ORDER, failing, forms};
 use super::free::grammar::MOST_NODES;
 use super::grades;
 use super::held_out::{objection, tested};
+use super::lags;
 use super::result::{HeldOut, Proposal, Rung, Settings};
 use super::sentences::{capital, sentences};
 use crate::model::{GreyBox, RUDDER};
@@ -19,8 +20,9 @@ use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::progress::{Progress, part, say};
 use crate::sysid::rudder;
 
-/// Shares of the work after the diagnosis, of the free forms, and before the test.
+/// Shares of the work after the diagnosis, before the lags, of the free forms, and before the test.
 const SEARCHED: f64 = 0.3;
+const LAGS: f64 = 0.5;
 const FREE: [f64; 2] = [0.6, 0.9];
 const TESTED: f64 = 0.9;
 
@@ -151,7 +153,7 @@ fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldO
     proposal.held_out = Some(tested);
 }
 
-/// The library's formula, or the one with free forms if that is better.
+/// The library's formula, or one with controls through a lag or with free forms if that is better.
 fn beyond_library(
     ask: &Ask,
     library: Climbed,
@@ -159,10 +161,20 @@ fn beyond_library(
     proposal: &mut Proposal,
     progress: &Progress,
 ) -> Result<Climbed, DiagnoseError> {
-    if !ask.options.free_forms {
-        return Ok(library);
+    let mut doubted = doubt(ask, &library);
+    let mut library = library;
+    let channels = doubted.as_ref().map_or(&[][..], |(_, channels)| channels);
+    let forms = lags::forms(&library, channels);
+    if !forms.is_empty() {
+        say(progress, "trying controls through a lag", LAGS)?;
+        proposal.tried += forms.len();
+        let lagged = lags::climb(ask, &library, forms, tuned);
+        if let Some(lagged) = lagged.filter(|lagged| better(lagged, &library)) {
+            library = lagged;
+            doubted = doubt(ask, &library);
+        }
     }
-    let Some(doubt) = doubt(ask, &library) else { return Ok(library) };
+    let Some(doubt) = doubted.filter(|_| ask.options.free_forms) else { return Ok(library) };
     say(progress, "trying free forms", FREE[0])?;
     let Some((mut record, free)) = beyond(ask, &library, tuned, doubt, &part(progress, FREE))?
     else {
