@@ -11,13 +11,11 @@ channel's standard deviation; it is **named** if its q-value is at most 0.05 (Be
 of the model) and its mean residual is as large. Between 1 and 4 % it counts either way.
 """
 
-import argparse
 import json
 import math
 import subprocess
 import sys
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +24,7 @@ import aircraft as x8
 import continuous
 import make_cases
 import manoeuvres
+import scoring
 
 STEP, KERNEL_S = 0.01, 0.37
 MATERIAL, DOUBTFUL = 0.02, (0.01, 0.04)
@@ -202,27 +201,13 @@ def table(records):
 
 def main():
     """Scores the cases of the command line."""
-    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument("--greylag", help="the program")
-    p.add_argument("--cases", type=Path, nargs="+", default=[], help="cases, or folders of cases")
-    p.add_argument("--jobs", type=int, default=1)
-    p.add_argument("--jsonl", type=Path, help="append a record a case to this file")
-    p.add_argument("--table", type=Path, help="only print the tables of the records in this file")
+    p = scoring.arguments(__doc__)
     a = p.parse_args()
     if a.table:
-        print(table([json.loads(text) for text in a.table.read_text().splitlines()]))
+        print(table(scoring.recorded(a.table)))
         return
-    folders = sorted(case.parent for folder in a.cases for case in folder.rglob("truth.json"))
-    if not (a.greylag and folders):
-        p.error("name the program with --greylag and cases with --cases, or a file of records with --table")
-    records = []
-    with ThreadPoolExecutor(a.jobs) as pool:
-        for record in pool.map(lambda case: score(a.greylag, case), folders):
-            records.append(record)
-            print(record["case"], record["controlled"], flush=True)
-            if a.jsonl:
-                with a.jsonl.open("a") as file:
-                    file.write(json.dumps(record) + "\n")
+    line = lambda record: f"{record['case']} {record['controlled']}"  # noqa: E731
+    records = scoring.score(scoring.folders(p, a), a, lambda case: score(a.greylag, case), line)
     print("\n" + table(records))
 
 

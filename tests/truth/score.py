@@ -4,15 +4,14 @@
     python tests/truth/score.py --table results/second-truth.jsonl
 """
 
-import argparse
 import json
 import math
 import subprocess
 import sys
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import scoring
 from hidden import PARAMETERS
 
 
@@ -126,52 +125,24 @@ def answered(path, greylag):
     """The records that an earlier run left of this program, by folder."""
     if not (path and path.exists()):
         return {}
-    records = [json.loads(text) for text in path.read_text().splitlines()]
-    return {r["folder"]: r for r in records if r["greylag"] == str(greylag)}
-
-
-def score(cases, a):
-    """The records of all cases, each printed and kept as soon as it is there."""
-    before, records = answered(a.jsonl, a.greylag) if a.resume else {}, []
-
-    def one(case):
-        return before.get(str(case)) or diagnose(a.greylag, case, a.nulls)
-
-    with ThreadPoolExecutor(a.jobs) as pool:
-        for record in pool.map(one, cases):
-            records.append(record)
-            print(line(record), flush=True)
-            if a.jsonl and record["folder"] not in before:
-                a.jsonl.parent.mkdir(parents=True, exist_ok=True)
-                with a.jsonl.open("a") as file:
-                    file.write(json.dumps(record) + "\n")
-    return records
+    return {r["folder"]: r for r in scoring.recorded(path) if r["greylag"] == str(greylag)}
 
 
 def main():
     """Scores the cases of the command line."""
-    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument("--greylag", help="the program")
-    p.add_argument("--cases", type=Path, nargs="+", default=[], help="cases, or folders of cases")
-    p.add_argument("--table", type=Path, help="only print the tables of the records in this file")
-    p.add_argument("--jobs", type=int, default=2)
+    p = scoring.arguments(__doc__, jobs=2)
     p.add_argument("--nulls", type=int, help="simulated nulls of each diagnosis; the program's default without")
-    p.add_argument("--jsonl", type=Path, help="append a record a case to this file")
     p.add_argument("--resume", action="store_true", help="keep what the JSONL file has of the same program and case")
     p.add_argument("--strict", action="store_true", help="exit with 1 if anything wrong is asserted or a case fails")
     a = p.parse_args()
     if a.table:
-        records = [json.loads(text) for text in a.table.read_text().splitlines()]
+        records = scoring.recorded(a.table)
         print(table(records) + "\n\n" + coverage(records))
         return
-    if not a.greylag:
-        p.error("name the program with --greylag, or a file of records with --table")
-    cases = [case.parent for folder in a.cases for case in folder.rglob("truth.json")]
-    # nulls first: a false alarm shows soonest
-    cases.sort(key=lambda case: ("-null-" not in case.name, case.name.removeprefix("official-adams").split("-", 1)[1], case))
-    if not cases:
-        sys.exit("no cases there; make some with make_cases.py")
-    records = score(cases, a)
+    cases = scoring.folders(p, a)
+    before = answered(a.jsonl, a.greylag) if a.resume else {}
+    judge = lambda case: before.get(str(case)) or diagnose(a.greylag, case, a.nulls)  # noqa: E731
+    records = scoring.score(cases, a, judge, line, before)
     print("\n" + table(records) + "\n\n" + coverage(records))
     if a.strict and any(wrong(r) or r["verdict"] == "failed" for r in records):
         sys.exit(1)

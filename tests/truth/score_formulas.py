@@ -7,21 +7,19 @@ The first term of the formula that was found is held against the hidden one. A f
 taken it, and *proposed* if the flights that were held out do not refuse it either.
 """
 
-import argparse
 import ast
 import json
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 import tomllib
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
 import aircraft as x8
+import scoring
 from formulas import FACTORS, VARIABLES
 from score import wilson
 
@@ -314,40 +312,16 @@ def without(nulls):
     return "\n".join([*rows, took(nulls)])
 
 
-def score(cases, a):
-    """The records of all cases, each printed and kept as soon as it is there."""
-    records = []
-    with ThreadPoolExecutor(a.jobs) as pool:
-        for record in pool.map(lambda case: propose(a.greylag, case), cases):
-            records.append(record)
-            print(line(record), flush=True)
-            if a.jsonl:
-                with a.jsonl.open("a") as file:
-                    file.write(json.dumps(record) + "\n")
-    return records
-
-
 def main():
     """Scores the cases of the command line."""
-    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument("--greylag", help="the program")
-    p.add_argument("--cases", type=Path, nargs="+", default=[], help="cases, or folders of cases")
-    p.add_argument("--table", type=Path, help="only print the tables of the records in this file")
-    p.add_argument("--jobs", type=int, default=1)
-    p.add_argument("--jsonl", type=Path, help="append a record a case to this file")
+    p = scoring.arguments(__doc__)
     a = p.parse_args()
     if a.table:
-        records = [json.loads(text) for text in a.table.read_text().splitlines()]
+        records = scoring.recorded(a.table)
         print("\n".join(line(r) for r in records) + "\n\n" + tables(records))
         return
-    if not a.greylag:
-        p.error("name the program with --greylag, or a file of records with --table")
-    cases = [case.parent for folder in a.cases for case in folder.rglob("truth.json")]
-    # nulls first: a false proposal shows soonest
-    cases.sort(key=lambda case: ("-null-" not in case.name, case))
-    if not cases:
-        sys.exit("no cases there; make some with make_cases.py")
-    print("\n" + tables(score(cases, a)))
+    records = scoring.score(scoring.folders(p, a), a, lambda case: propose(a.greylag, case), line)
+    print("\n" + tables(records))
 
 
 if __name__ == "__main__":

@@ -228,7 +228,9 @@ fn set(desk: &mut Desk, Setting { name, times }: &Setting) -> Result<(), FaultsE
     let pilot = desk.pilot();
     let place = pilot.parameters().iter().position(|p| p.name == name);
     let Some(place) = place else {
-        return Err(refused("there is no such parameter; docs/reference/parameters.md lists them".into()));
+        return Err(refused(
+            "there is no such parameter; docs/reference/parameters.md lists them".into(),
+        ));
     };
     let ParameterValue::Real(default) = pilot.parameters()[place].value else {
         return Err(refused("it is no real number and has no multiples".into()));

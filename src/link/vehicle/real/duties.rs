@@ -39,7 +39,7 @@ impl Real {
         }
         // A controller that tracks an attitude does not mind a slow companion.
         let surfaces = self.profile.authority == Authority::Surfaces;
-        let scarce = self.pulse.cycle(host).filter(|_| surfaces);
+        let scarce = self.pulse.cycle(host, self.survey.frames()).filter(|_| surfaces);
         let age = |at: Duration| host.saturating_sub(at);
         let silent = self.controller.is_none_or(|c| age(c.heard) > GONE);
         let blind = self.last_state.is_none_or(|at| age(at) > BLIND);

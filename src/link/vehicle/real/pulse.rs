@@ -1,4 +1,5 @@
-//! Whether there is enough of everything to steer by surfaces: states that arrive, cycles that run.
+//! Whether there is enough of everything to steer by surfaces: states that arrive, frames that are not lost, cycles that
+//! run.
 
 use std::time::Duration;
 
@@ -9,12 +10,20 @@ const RATE: f64 = 100.0;
 /// Below this share of them the controller flies better by itself.
 const LEAST: f64 = 0.4;
 
+/// Share of the frames whose loss in two windows one after the other is too much: what we send is then lost as often, and
+/// surfaces that follow every fourth command swing. A single gap of 0.2 s stays below it.
+const LOSSY: f64 = 0.35;
+
 /// The watchdog of steering by surfaces: states and cycles counted in the window that is open.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pulse {
     since: Option<Duration>,
     states: u32,
     cycles: u32,
+    /// Frames received and lost when the window opened.
+    before: Option<[u64; 2]>,
+    /// Whether the window before lost too many.
+    lossy: bool,
 }
 
 impl Pulse {
@@ -28,16 +37,20 @@ impl Pulse {
         *self = Pulse::default();
     }
 
-    /// A cycle at `host`; what there was too little of in the window that it closes.
-    pub(super) fn cycle(&mut self, host: Duration) -> Option<String> {
+    /// A cycle at `host`; what there was too little of in the window that it closes. `frames`: all that were received and
+    /// all that were lost so far.
+    pub(super) fn cycle(&mut self, host: Duration, frames: [u64; 2]) -> Option<String> {
         self.cycles += 1;
+        let before = *self.before.get_or_insert(frames);
         let since = *self.since.get_or_insert(host);
         let length = host.saturating_sub(since);
         if length < WINDOW {
             return None;
         }
-        let Pulse { states, cycles, .. } = std::mem::take(self);
-        self.since = Some(host);
+        let [received, lost] = [0, 1].map(|k| frames[k].saturating_sub(before[k]) as f64);
+        let lossy = lost > LOSSY * (lost + received);
+        let next = Pulse { since: Some(host), before: Some(frames), lossy, ..Pulse::default() };
+        let Pulse { states, cycles, lossy: lossy_before, .. } = std::mem::replace(self, next);
         let due = RATE * length.as_secs_f64();
         let little = |count: u32| f64::from(count) < LEAST * due;
         let counted = |count: u32, what: &str| {
@@ -47,6 +60,10 @@ impl Pulse {
         match (little(cycles), little(states)) {
             (true, _) => counted(cycles, "cycles of this computer"),
             (false, true) => counted(states, "states of the vehicle"),
+            (false, false) if lossy && lossy_before => {
+                let share = 100.0 * lost / (lost + received);
+                Some(format!("the link loses {share:.0} % of the frames"))
+            }
             (false, false) => None,
         }
     }
@@ -63,8 +80,29 @@ mod tests {
             if i.is_multiple_of(state) {
                 pulse.state();
             }
-            pulse.cycle(Duration::from_millis(cycle_ms * i))
+            pulse.cycle(Duration::from_millis(cycle_ms * i), [0, 0])
         })
+    }
+
+    /// What two seconds say in which `lost` of ten frames are lost from `from_ms` to `to_ms`.
+    fn lossy(lost: u64, from_ms: u64, to_ms: u64) -> Option<String> {
+        let mut pulse = Pulse::default();
+        let mut frames = [0, 0];
+        (0..200).find_map(|i| {
+            let at_ms = 10 * i;
+            let gone = if (from_ms..to_ms).contains(&at_ms) { lost } else { 0 };
+            frames = [frames[0] + 10 - gone, frames[1] + gone];
+            pulse.state();
+            pulse.cycle(Duration::from_millis(at_ms), frames)
+        })
+    }
+
+    #[test]
+    fn a_link_that_loses_frames_is_left_and_one_with_a_gap_is_not() {
+        assert_eq!(lossy(3, 0, 2000), None);
+        assert_eq!(lossy(10, 400, 600), None);
+        assert_eq!(lossy(10, 600, 800), None);
+        assert!(lossy(5, 300, 2000).unwrap().contains("50 % of the frames"));
     }
 
     #[test]

@@ -131,6 +131,11 @@ impl Survey {
         self.messages.iter().map(|(id, traffic)| (*id, traffic))
     }
 
+    /// Frames that came, and that never did, by the gaps in their sequence numbers.
+    pub(super) fn frames(&self) -> [u64; 2] {
+        [self.received, self.lost]
+    }
+
     /// Share of frames that never came, by the gaps in their sequence numbers.
     pub fn loss(&self) -> f64 {
         let all = self.received + self.lost;

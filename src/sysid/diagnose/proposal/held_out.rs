@@ -36,8 +36,7 @@ pub(super) fn tested(
     options: &Options,
     flights: Vec<String>,
 ) -> Option<HeldOut> {
-    let effects: Vec<&'static Written> =
-        terms.iter().filter_map(|t| t.form.fixed().ok()).collect();
+    let effects: Vec<&'static Written> = terms.iter().filter_map(|t| t.form.fixed().ok()).collect();
     let entries: Vec<Entry> =
         effects.iter().map(|e| Entry { about: e.about, operator: false }).collect();
     let round = Round::new(problem, model.clone(), &entries)?;

@@ -39,7 +39,7 @@ const LAG_S: f64 = 0.2;
 /// Longest time constant of a lag, s.
 const LONGEST_LAG_S: f64 = 3.0;
 /// Where the search for its amount starts: so little that the first step is one of the amount alone.
-const AMOUNT: f64 = 1e-3;
+const AMOUNT: f64 = 1e-6;
 /// Where thresholds lie, as quantiles of the magnitude of what was flown.
 pub(super) const QUANTILES: [f64; 2] = [0.5, 0.75];
 

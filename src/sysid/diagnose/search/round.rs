@@ -26,6 +26,8 @@ const CURVATURES: usize = 2;
 const WORTH: f64 = 0.2;
 /// It is linearised anew, too, if its evidence is within this of the best one's.
 const CLOSE: f64 = 40.0;
+/// A candidate whose amount is more than so many times the one that it was linearised with started from nothing.
+const NOTHING: f64 = 1e3;
 
 /// What all rounds share.
 pub struct Problem {
@@ -166,7 +168,7 @@ impl Round {
                 });
                 let worth = score.fall > WORTH * most || score.evidence > best - CLOSE;
                 if point.contribution.is_some() && moved && worth {
-                    wanted.push((trial.id, score.values.clone()));
+                    wanted.push((trial.id, self.next_place(trial, score)));
                 }
             }
             if wanted.is_empty() || !self.refine(wanted) {
@@ -175,6 +177,20 @@ impl Round {
             scores = self.scores();
         }
         scores
+    }
+
+    /// Where a candidate is linearised next: at its best values; where it started from next to nothing, with the shape
+    /// constants that it had, whose derivatives there said nothing.
+    fn next_place(&self, trial: &Trial, score: &Score) -> Vec<f64> {
+        let start = &trial.points[score.point].values;
+        let mut next = score.values.clone();
+        let Some(entry) = self.entries.iter().find(|e| e.about.id == trial.id) else { return next };
+        let linear = next.len() - entry.about.shape;
+        let much = |(new, old): (&f64, &f64)| new.abs() > NOTHING * old.abs();
+        if linear > 0 && next[..linear].iter().zip(&start[..linear]).all(much) {
+            next[linear..].copy_from_slice(&start[linear..]);
+        }
+        next
     }
 
     /// Adds places at which candidates are linearised; `false` if that cannot be done.
