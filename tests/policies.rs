@@ -11,9 +11,8 @@ use greylag::flight::runtime::Companion;
 use greylag::model::GreyBox;
 use greylag::physics::Command;
 use greylag::sim::faults::policies::policies;
-use greylag::sim::faults::scenario::Setting;
 use greylag::sim::faults::search::{distances, search};
-use greylag::sim::faults::{CompanionFactory, Counterpart, Scenario};
+use greylag::sim::faults::{CompanionFactory, Counterpart, Scenario, Setting};
 
 fn x8() -> GreyBox {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");

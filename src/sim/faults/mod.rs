@@ -17,4 +17,4 @@ pub use counterpart::Counterpart;
 pub use flight::{Case, CompanionFactory, FaultsError, Report};
 pub use judge::{Cause, Finding, Found};
 pub use mix::{Fault, FaultKind, draw};
-pub use scenario::{Asked, Asking, Leg, Scenario};
+pub use scenario::{Asked, Asking, Leg, Scenario, Setting};
