@@ -21,9 +21,13 @@ use crate::commands::files::{JsonArgument, Overwrite};
 use crate::commands::fly::{self, companion_with};
 use crate::commands::{choices, start};
 use crate::control::ControllerKind;
+use crate::model::GreyBox;
 use crate::sim::faults::{Case, Cause, CompanionFactory, Counterpart, FaultKind, Report};
 use ledger::{Entry, Ledger};
 use search::Search;
+
+/// The aircraft that is flown where no other is named.
+const AIRCRAFT: &str = "x8";
 
 /// The arguments of `greylag faults`.
 #[derive(Args)]
@@ -39,7 +43,7 @@ pub struct Arguments {
     controller: Vec<ControllerKind>,
     /// The simulator's aircraft; the played flight controllers have gains for the X8, so others fly with the
     /// counterpart sitl.
-    #[arg(long, value_name = "NAME", default_value = "x8", conflicts_with = "resume")]
+    #[arg(long, value_name = "NAME", default_value = AIRCRAFT, conflicts_with = "resume")]
     aircraft: String,
     /// Model that the controllers are designed from or plan with.
     /// Flights that `--resume` notes are all of the default model.
@@ -101,16 +105,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     arguments.json.writable(Overwrite::Never)?;
     let quiet = arguments.json.takes_stdout();
     let model = fly::model(&arguments.model, None)?;
-    let models = std::slice::from_ref(&model);
-    let mut plant =
-        PlantOptions { aircraft: arguments.aircraft.clone(), ..PlantOptions::default() };
-    start::describe(&mut plant, models)?;
-    plant.start = start::usual(&plant.aircraft, models)?;
+    let plant = plant(&arguments.aircraft, &model)?;
     let ledger = arguments.resume.as_deref().map(Ledger::open).transpose()?;
     let mut entries = Vec::new();
     for &controller in &arguments.controller {
-        let companion = companion_with(controller, &model, POLICY.as_ref())?;
-        let factory = CompanionFactory::new(companion, &model)?.with_aircraft(plant.clone());
+        let factory = factory(controller, &model, &plant)?;
         if let Some(file) = &arguments.scenario {
             return search::fly(&factory, file);
         }
@@ -157,13 +156,41 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
+/// The companions that fly scenarios where nothing else is named: `kind` of the default model, with the X8.
+///
+/// # Errors
+/// If the model or the policy that are shipped cannot be used.
+pub fn shipped(kind: ControllerKind) -> Result<CompanionFactory> {
+    let model = fly::model(fly::MODEL.as_ref(), None)?;
+    let plant = plant(AIRCRAFT, &model)?;
+    factory(kind, &model, &plant)
+}
+
+/// The simulator's aircraft as the airframe of `model` describes it, at its usual start.
+fn plant(aircraft: &str, model: &GreyBox) -> Result<PlantOptions> {
+    let models = std::slice::from_ref(model);
+    let mut plant = PlantOptions { aircraft: aircraft.into(), ..PlantOptions::default() };
+    start::describe(&mut plant, models)?;
+    plant.start = start::usual(&plant.aircraft, models)?;
+    Ok(plant)
+}
+
+fn factory(
+    kind: ControllerKind,
+    model: &GreyBox,
+    plant: &PlantOptions,
+) -> Result<CompanionFactory> {
+    let companion = companion_with(kind, model, POLICY.as_ref())?;
+    Ok(CompanionFactory::new(companion, model)?.with_aircraft(plant.clone()))
+}
+
 /// Fault against counterpart: flights with that fault among theirs, of these the flights with a finding.
 fn print_faults(controller: ControllerKind, counterparts: &[Counterpart], entries: &[Entry]) {
     println!("\n{}: findings of flights of 60 s with each fault", controller.name());
     let mut table = Table::new();
     table.load_style(NOTHING);
     table.set_header(["fault"].into_iter().chain(counterparts.iter().map(|o| o.name())));
-    for kind in FaultKind::ALL {
+    for kind in FaultKind::DRAWN {
         let cells = counterparts.iter().map(|counterpart| {
             let with = entries.iter().filter(|e| {
                 e.counterpart == counterpart.name() && e.faults().iter().any(|f| f.kind == kind)
@@ -241,7 +268,7 @@ mod tests {
         roomy(|| {
             let factory = factory();
             // Each kind of fault comes first once in so many seeds; the counterparts share them out.
-            for seed in 0..FaultKind::ALL.len() as u64 {
+            for seed in 0..FaultKind::DRAWN.len() as u64 {
                 let counterpart = Counterpart::ALL[seed as usize % Counterpart::ALL.len()];
                 let case = Case { seed, controller: ControllerKind::Lqi, counterpart };
                 let report = factory.fly(case).unwrap();
@@ -312,7 +339,7 @@ mod tests {
         roomy(|| {
             let factory = factory();
             let disk =
-                FaultKind::ALL.iter().position(|kind| *kind == FaultKind::Disk).unwrap() as u64;
+                FaultKind::DRAWN.iter().position(|kind| *kind == FaultKind::Disk).unwrap() as u64;
             let case = Case {
                 seed: disk,
                 controller: ControllerKind::Lqi,

@@ -2,13 +2,18 @@
 
 use greylag_sitl::plant::{Inputs, PlantOptions, Truth};
 use greylag_sitl::shim::bench::Bench;
-use greylag_sitl::shim::controller::{FlightController, Mode};
+use greylag_sitl::shim::controller::FlightController;
+pub use greylag_sitl::shim::controller::Mode as ControllerMode;
 use greylag_sitl::shim::{Distortion, Launch, Noise, Personality, ShimError, ShimOptions};
 
 use serde::{Deserialize, Serialize};
 
+use super::scenario::Scenario;
 use crate::link::vehicle::{Authority, Profile, Real, Sitl, Stack, Vehicle};
 use crate::model::GreyBox;
+
+/// ArduPilot's parameter that is 1 without a radio, 0 with one whose sticks are released.
+const NO_RADIO: &str = "SIM_RC_FAIL";
 
 /// What is at the other end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -47,6 +52,28 @@ impl Counterpart {
         }
     }
 
+    /// The stack of its flight controller as its users call it; `None` for the simulator, which has none.
+    pub fn stack(self) -> Option<&'static str> {
+        self.personality().map(|(personality, _)| match personality {
+            Personality::Px4 => "PX4",
+            Personality::Ardupilot => "ArduPilot",
+        })
+    }
+
+    /// What its flight controller calls `mode`.
+    pub fn mode_name(self, mode: ControllerMode) -> &'static str {
+        let px4 = matches!(self, Counterpart::Px4 | Counterpart::Px4Attitude);
+        match mode {
+            ControllerMode::Manual => "MANUAL",
+            ControllerMode::Guided if px4 => "OFFBOARD",
+            ControllerMode::Guided => "GUIDED",
+            ControllerMode::Hold if px4 => "HOLD",
+            ControllerMode::Hold => "LOITER",
+            ControllerMode::Return => "RTL",
+            ControllerMode::Circle => "CIRCLE",
+        }
+    }
+
     fn personality(self) -> Option<(Personality, Authority)> {
         match self {
             Counterpart::Sitl => None,
@@ -65,18 +92,18 @@ pub(super) enum Aircraft {
 }
 
 impl Aircraft {
-    pub(super) fn new(
-        plant: &PlantOptions,
-        counterpart: Counterpart,
-        seed: u64,
-    ) -> Result<Self, ShimError> {
-        let mut options = ShimOptions::new(plant.clone(), plant.start);
-        options.seed = seed;
+    /// The aircraft `plant` in the scenario's air, with its noise and its counterpart.
+    pub(super) fn new(plant: &PlantOptions, scenario: &Scenario) -> Result<Self, ShimError> {
+        let mut options = ShimOptions::new(scenario.air(plant), plant.start);
+        options.seed = scenario.seed;
         options.noise = Noise::REALISTIC;
-        Ok(match counterpart.personality() {
+        Ok(match scenario.counterpart.personality() {
             None => Aircraft::Sitl(Box::new(Bench::new(&options)?)),
             Some((personality, _)) => {
                 options.launch = Launch::Immediate;
+                if scenario.radio && personality == Personality::Ardupilot {
+                    options.parameters = vec![(NO_RADIO.into(), 0.0)];
+                }
                 Aircraft::Real(Box::new(FlightController::new(personality, &options)?))
             }
         })
@@ -124,7 +151,7 @@ impl Aircraft {
         match self {
             Aircraft::Sitl(_) => false,
             Aircraft::Real(controller) => {
-                controller.set_mode(Mode::Hold);
+                controller.set_mode(ControllerMode::Hold);
                 true
             }
         }
@@ -139,12 +166,18 @@ impl Aircraft {
         matches!(flown, Ok(None))
     }
 
+    /// The flight controller's mode, where there is one.
+    pub(super) fn mode(&self) -> Option<ControllerMode> {
+        match self {
+            Aircraft::Sitl(_) => None,
+            Aircraft::Real(controller) => Some(controller.mode()),
+        }
+    }
+
     /// Whether the companion has the surfaces, or the attitude.
     pub(super) fn is_steered(&self) -> bool {
-        match self {
-            Aircraft::Sitl(_) => true,
-            Aircraft::Real(c) => matches!(c.mode(), Mode::Manual | Mode::Guided),
-        }
+        self.mode()
+            .is_none_or(|mode| matches!(mode, ControllerMode::Manual | ControllerMode::Guided))
     }
 }
 

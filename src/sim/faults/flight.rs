@@ -17,7 +17,7 @@ use super::counterpart::{Aircraft, Counterpart, vehicle};
 use super::judge::{Cause, Finding, Found, Judge};
 use super::mix::{Fault, FaultKind};
 use super::policies::Sample;
-use super::scenario::{Scenario, Setting};
+use super::scenario::{Asking, Scenario, Setting};
 use super::wire::Wire;
 use crate::control::{Controller, ControllerKind, SetupError, build};
 use crate::flight::desk::Desk;
@@ -88,6 +88,19 @@ pub struct Report {
     pub findings: Vec<Found>,
     /// What was said to the ground stations, with nothing left out: when, s, and what.
     pub texts: Vec<(f64, String)>,
+}
+
+/// A flight with all that was seen and heard of it.
+#[derive(Clone, Debug)]
+pub struct Witnessed {
+    /// The flight, every 10 ms; it ends with a panic or on the ground.
+    pub samples: Vec<Sample>,
+    /// What the judge of a flight found.
+    pub findings: Vec<Found>,
+    /// What the companion said to the ground stations: when, s, and what.
+    pub texts: Vec<(f64, String)>,
+    /// What the client asked the companion for besides setpoints, and the answers: when, s.
+    pub answers: Vec<(f64, Asking, Verdict)>,
 }
 
 /// A companion fresh from the factory: the design of its controller is not made again.
@@ -174,9 +187,18 @@ impl CompanionFactory {
     /// # Errors
     /// If the aircraft cannot be loaded.
     pub fn trace(&self, scenario: &Scenario) -> Result<(Vec<Sample>, Vec<Found>), FaultsError> {
+        self.witness(scenario).map(|flown| (flown.samples, flown.findings))
+    }
+
+    /// The same with what was said and answered.
+    ///
+    /// # Errors
+    /// If the aircraft cannot be loaded.
+    pub fn witness(&self, scenario: &Scenario) -> Result<Witnessed, FaultsError> {
         let mut flight = self.flown(scenario, Some(Vec::with_capacity(STEPS as usize)))?;
         let samples = flight.trace.take().unwrap_or_default();
-        Ok((samples, flight.judge.findings()))
+        let Flight { judge, texts, answers, .. } = flight;
+        Ok(Witnessed { samples, findings: judge.findings(), texts, answers })
     }
 
     fn flown(
@@ -187,6 +209,8 @@ impl CompanionFactory {
         let Scenario { counterpart, seed, faults, .. } = scenario;
         let mut desk = self.desk(*counterpart)?;
         scenario.parameters.iter().try_for_each(|setting| set(&mut desk, setting))?;
+        let kills = faults.iter().filter(|f| f.kind == FaultKind::Killed).count();
+        let spares: Result<Vec<_>, _> = (0..kills).map(|_| self.desk(*counterpart)).collect();
         let disk = faults.iter().any(|f| f.kind == FaultKind::Disk).then(Disk::default);
         if let Some(disk) = &disk {
             let folder = std::path::PathBuf::new();
@@ -195,7 +219,7 @@ impl CompanionFactory {
         let mut random = ChaCha8Rng::seed_from_u64(*seed);
         random.set_stream(STARVED);
         let mut flight = Flight {
-            aircraft: Aircraft::new(&scenario.air(&self.plant), *counterpart, *seed)?,
+            aircraft: Aircraft::new(&self.plant, scenario)?,
             desk,
             down: Wire::new(*seed, 0),
             up: Wire::new(*seed, 1),
@@ -211,8 +235,11 @@ impl CompanionFactory {
             flown: Inputs::default(),
             clock_us: 0,
             armed: false,
+            killed: false,
+            spares: spares?,
             dead_since: None,
             texts: Vec::new(),
+            answers: Vec::new(),
         };
         // What a panic leaves behind is only read, to be judged.
         if catch_unwind(AssertUnwindSafe(|| flight.fly())).is_err() {
@@ -265,9 +292,13 @@ struct Flight {
     /// What jumps have added to the vehicle's clock, µs.
     clock_us: i64,
     armed: bool,
+    /// Whether the companion is killed, and the companions that start after it.
+    killed: bool,
+    spares: Vec<Desk>,
     /// Since when nothing has come, while steering through a real controller.
     dead_since: Option<f64>,
     texts: Vec<(f64, String)>,
+    answers: Vec<(f64, Asking, Verdict)>,
 }
 
 impl Flight {
@@ -300,7 +331,7 @@ impl Flight {
         self.watch_link(now_s, !arrived.is_empty());
         self.follower.heard(now_s, !arrived.is_empty());
         self.unread.extend(arrived);
-        if step >= self.asleep_until {
+        if self.is_alive(&acting) && step >= self.asleep_until {
             self.companion(step, now_s, &acting);
             self.asleep_until = step + self.nap(&acting);
         }

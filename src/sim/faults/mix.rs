@@ -47,11 +47,14 @@ pub enum FaultKind {
     Starvation,
     /// The disk is full: recording ends.
     Disk,
+    /// The companion is killed; it starts again, remembering nothing, when the fault ends.
+    Killed,
 }
 
 impl FaultKind {
-    /// All of them.
-    pub const ALL: [FaultKind; 17] = [
+    /// Those that campaigns and searches draw. A killed companion is not among them: with it every seed would draw another
+    /// flight.
+    pub const DRAWN: [FaultKind; 17] = [
         FaultKind::Loss,
         FaultKind::Duplication,
         FaultKind::Reordering,
@@ -91,7 +94,19 @@ impl FaultKind {
             FaultKind::Client => "client death",
             FaultKind::Starvation => "CPU starvation",
             FaultKind::Disk => "disk full",
+            FaultKind::Killed => "companion killed",
         }
+    }
+
+    /// Whether it can be weaker or stronger.
+    pub fn has_strength(self) -> bool {
+        use FaultKind::*;
+        !matches!(self, Flood | Unplug | Frozen | NotANumber | Reboot | Client | Disk | Killed)
+    }
+
+    /// Whether it lasts: what it does at its beginning is not undone at its end otherwise.
+    pub fn has_length(self) -> bool {
+        !matches!(self, FaultKind::Clock | FaultKind::Disk)
     }
 }
 
@@ -121,12 +136,12 @@ impl Fault {
 pub fn draw(seed: u64) -> Vec<Fault> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let count = random.random_range(1..=3);
-    let first = FaultKind::ALL[seed as usize % FaultKind::ALL.len()];
+    let first = FaultKind::DRAWN[seed as usize % FaultKind::DRAWN.len()];
     (0..count)
         .map(|i| {
             let kind = match i {
                 0 => first,
-                _ => FaultKind::ALL[random.random_range(0..FaultKind::ALL.len())],
+                _ => FaultKind::DRAWN[random.random_range(0..FaultKind::DRAWN.len())],
             };
             one(kind, &mut random)
         })

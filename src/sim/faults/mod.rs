@@ -13,8 +13,8 @@ pub mod search;
 pub mod temporal;
 mod wire;
 
-pub use counterpart::Counterpart;
-pub use flight::{Case, CompanionFactory, FaultsError, Report};
+pub use counterpart::{ControllerMode, Counterpart};
+pub use flight::{Case, CompanionFactory, FaultsError, Report, Witnessed};
 pub use judge::{Cause, Finding, Found};
 pub use mix::{Fault, FaultKind, draw};
 pub use scenario::{Asked, Asking, Leg, Scenario, Setting};

@@ -1,5 +1,6 @@
 //! The rules of flight: what must hold in every flight, whatever befalls it, in signal temporal logic.
 
+use super::counterpart::ControllerMode;
 use super::judge::{ABOVE_STALL, OVERSHOOT_DEG};
 use super::temporal::Formula;
 use crate::control::Target;
@@ -46,6 +47,8 @@ pub struct Sample {
     pub steered: bool,
     /// Whether the companion means to steer.
     pub engaged: bool,
+    /// Whether the flight controller has shown the companion that it flies what it is sent.
+    pub confirmed: bool,
     /// For how long nothing has come from the vehicle, s.
     pub silent_s: f64,
     /// For how long the client has sent no setpoint, s.
@@ -70,10 +73,27 @@ pub struct Sample {
     pub spoke: bool,
     /// Whether somebody has asked for the companion to steer, and nobody has taken the aircraft since.
     pub asked: bool,
+    /// Altitude above mean sea level, m.
+    pub altitude_m: f64,
+    /// What the companion shows to its clients; `None` while it is killed.
+    pub shown: Option<Shown>,
+    /// The flight controller's mode; `None` at the simulator's own link.
+    pub controller: Option<ControllerMode>,
     /// The envelope as the companion's parameters have it.
     pub envelope: Envelope,
     /// Silence of the client after which OFFBOARD ends, s; likewise.
     pub offboard_loss_s: f64,
+}
+
+/// What the companion shows to its clients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shown {
+    /// Its mode.
+    pub mode: Mode,
+    /// Whether its outputs are live.
+    pub armed: bool,
+    /// Whether a failsafe is in force.
+    pub failsafe: bool,
 }
 
 impl Sample {

@@ -103,6 +103,9 @@ pub struct Scenario {
     /// Parameters of the companion that are not their defaults.
     #[serde(default)]
     pub parameters: Vec<Setting>,
+    /// Whether a radio with its sticks released is bound to the flight controller; only ArduPilot is played with one.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub radio: bool,
 }
 
 /// What the client asks for unless a scenario says otherwise: turns both ways, a climb, a descent.
@@ -128,6 +131,7 @@ impl Scenario {
             legs: LEGS.map(leg).to_vec(),
             asked: Vec::new(),
             parameters: Vec::new(),
+            radio: false,
         }
     }
 
@@ -158,7 +162,7 @@ impl Scenario {
             }
             2 => changed.turbulence = random.random_range(0..=TURBULENCE),
             3 | 4 if changed.faults.len() < MOST => {
-                let kind = FaultKind::ALL[random.random_range(0..FaultKind::ALL.len())];
+                let kind = FaultKind::DRAWN[random.random_range(0..FaultKind::DRAWN.len())];
                 changed.faults.push(one(kind, random));
             }
             3 | 4 => _ = changed.faults.remove(random.random_range(0..MOST)),

@@ -53,12 +53,22 @@ pub fn distances(
     scenario: &Scenario,
 ) -> Result<Vec<Option<(f64, f64)>>, FaultsError> {
     let (samples, found) = factory.trace(scenario)?;
-    let panicked = found.iter().any(|f: &Found| f.finding == Finding::Panic);
-    let judged = |rule: &Policy| {
-        let applies = !rule.of_controllers || scenario.counterpart != Counterpart::Sitl;
-        applies.then(|| nearest(rule, &samples, panicked))
+    Ok(judged(rules, scenario.counterpart, &samples, &found))
+}
+
+/// The same of a flight that was flown with `counterpart`: its samples, and what the judge of a flight found.
+pub fn judged(
+    rules: &[Policy],
+    counterpart: Counterpart,
+    samples: &[Sample],
+    found: &[Found],
+) -> Vec<Option<(f64, f64)>> {
+    let panicked = found.iter().any(|f| f.finding == Finding::Panic);
+    let judge = |rule: &Policy| {
+        let applies = !rule.of_controllers || counterpart != Counterpart::Sitl;
+        applies.then(|| nearest(rule, samples, panicked))
     };
-    Ok(rules.iter().map(judged).collect())
+    rules.iter().map(judge).collect()
 }
 
 fn nearest(rule: &Policy, samples: &[Sample], panicked: bool) -> (f64, f64) {

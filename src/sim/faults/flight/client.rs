@@ -55,6 +55,7 @@ impl Flight {
         };
         let steers = matches!(what, Asking::Arm | Asking::Offboard);
         self.follower.asked |= steers && verdict == Verdict::Accepted;
+        self.answers.push((now_s, what, verdict));
         self.hear_texts(now_s);
     }
 

@@ -24,6 +24,25 @@ impl Flight {
         }
     }
 
+    /// Kills the companion, and starts another when the fault ends; whether one runs.
+    pub(super) fn is_alive(&mut self, acting: &[Fault]) -> bool {
+        let killed = acting.iter().any(|fault| fault.kind == FaultKind::Killed);
+        if killed && !self.killed {
+            // its recording ends with it
+            self.disk = None;
+            // there is one for each such fault
+            if let Some(next) = self.spares.pop() {
+                self.desk = next;
+            }
+            self.follower.died();
+        }
+        self.killed = killed;
+        if killed {
+            self.unread.clear();
+        }
+        !killed
+    }
+
     /// What the aircraft is exposed to at this step, through no fault of who steers it.
     pub(super) fn exposure(&mut self, acting: &[Fault]) -> Exposure {
         let inputs = self.aircraft.inputs();

@@ -2,10 +2,10 @@
 
 use super::Flight;
 use crate::flight::pilot::{Decision, Source, TICK_S};
-use crate::link::autopilot::Mode;
+use crate::link::autopilot::{Autopilot, Mode, Status};
 use crate::link::vehicle::Vehicle;
 use crate::sim::faults::mix::{Fault, FaultKind};
-use crate::sim::faults::policies::Sample;
+use crate::sim::faults::policies::{Sample, Shown};
 
 /// Time constants of what a surface does slowly, and of the mean square of the rest, s.
 const SLOW_S: f64 = 0.5;
@@ -69,6 +69,12 @@ impl Follower {
         (self.decision, self.fresh) = (Some(*decision), true);
     }
 
+    /// The companion is dead: what it had decided is of another life, and nobody has asked the next one.
+    pub(super) fn died(&mut self) {
+        (self.decision, self.fresh, self.asked) = (None, false, false);
+        (self.held_s, self.moved) = (0.0, 0.0);
+    }
+
     /// How long the same attitude has been asked for and flown.
     fn steady(&mut self, flown: bool) {
         let target = self.decision.map_or([0.0; 2], |d| [d.target.roll, d.target.pitch]);
@@ -82,12 +88,17 @@ impl Flight {
     /// Takes the sample of a step, where samples are wanted.
     pub(super) fn sample(&mut self, now_s: f64, acting: &[Fault]) {
         let Some(trace) = &mut self.trace else { return };
+        let Status { mode, armed, failsafe, .. } = self.desk.pilot().status();
+        let shown = (!self.killed).then_some(Shown { mode, armed, failsafe });
         let truth = self.aircraft.truth();
         let follower = &mut self.follower;
         let (steered, exposed) = (self.aircraft.is_steered(), self.judge.is_exposed());
-        let engaged = match self.desk.vehicle() {
-            Vehicle::Real(session) => session.is_engaged(),
-            Vehicle::Sitl(_) => follower.decision.is_some_and(|d| d.armed),
+        let (engaged, confirmed) = match self.desk.vehicle() {
+            Vehicle::Real(session) => (session.is_engaged(), session.flies()),
+            Vehicle::Sitl(_) => {
+                let armed = follower.decision.is_some_and(|d| d.armed);
+                (armed, armed)
+            }
         };
         let controlled = |d: &Decision| {
             let by_attitude = matches!(d.source, Source::Planned | Source::Late | Source::Fallback);
@@ -116,6 +127,7 @@ impl Flight {
             moved: std::mem::take(&mut follower.moved),
             steered,
             engaged,
+            confirmed,
             silent_s: now_s - follower.heard_s,
             client_silent_s: now_s - follower.client_heard_s,
             steady_s: follower.steady_s,
@@ -129,6 +141,9 @@ impl Flight {
             asked: follower.asked,
             envelope: config.envelope,
             offboard_loss_s: config.offboard_loss_s,
+            altitude_m: truth.altitude_m,
+            shown,
+            controller: self.aircraft.mode(),
         });
     }
 }
