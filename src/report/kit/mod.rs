@@ -17,6 +17,7 @@ pub(super) mod numbers;
 pub(super) mod page;
 pub(super) mod table;
 pub(super) mod time_figure;
+pub(super) mod time_line;
 pub(super) mod whiskers;
 pub(super) mod write;
 pub(super) mod xy;
