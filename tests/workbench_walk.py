@@ -290,6 +290,44 @@ def fly(browser, folder):
     return found
 
 
+def failsafes(browser, bench, folder):
+    """The page of failsafes: reached by its link, flown by each click, wrong choices said once, every control by keyboard."""
+    found = []
+    click(browser, "#to-failsafes")
+    begun = time.monotonic()
+    wait(browser, "location.pathname == '/failsafes' && document.documentElement?.dataset.ready == 'yes'", 60, "the page of failsafes")
+    took("page of failsafes with its first flight", time.monotonic() - begun, "2 s")
+    if "handed back" not in browser.value("document.querySelector('.verdict').textContent"):
+        found.append("failsafes: the first flight's verdict says no hand-back")
+    if browser.value("document.querySelector('[data-field=radio]').checkVisibility()"):
+        found.append("failsafes: PX4 is offered a radio")
+    found += shoot(browser, folder, "9-failsafes")
+    found += accessible(browser, "failsafes")
+    found += by_keyboard(browser)
+
+    set_to = "(([name, value]) => {{ const e = document.querySelector(`[name=${{name}}]`); e.value = value; e.dispatchEvent(new Event('change', {{bubbles: true}})); }})({})"
+    begun = time.monotonic()
+    browser.value(set_to.format(["fault", "client"]))
+    wait(browser, "document.querySelector('.verdict')?.textContent.startsWith('Client dies')", 60, "another fault is flown")
+    took("click to flight", time.monotonic() - begun, "1 s")
+    browser.value(set_to.format(["from_s", "soon"]))
+    wait(browser, "document.getElementById('wrong') && document.querySelector('[name=from_s]').ariaInvalid == 'true'", 60, "a wrong time is said")
+    if browser.value("document.querySelectorAll('[role=alert]:not(:empty)').length") != 1:
+        found.append("failsafes: a wrong choice is not said once")
+    found += shoot(browser, folder, "10-failsafes-wrong")
+    browser.value(set_to.format(["from_s", "15"]))
+    wait(browser, "document.querySelector('.verdict') && !document.querySelector('[aria-invalid]')", 60, "the time is mended")
+    browser.value("[...document.querySelectorAll('.examples a')].find(a => a.textContent.includes('radio')).click()")
+    wait(browser, "document.querySelector('.verdict')?.textContent.includes('stays in MANUAL')", 60, "an example is flown")
+    if not browser.value("document.querySelector('[data-field=radio]').checkVisibility()"):
+        found.append("failsafes: ArduPilot is offered no radio")
+    browser.value("history.back()")
+    wait(browser, "document.querySelector('.verdict')?.textContent.startsWith('Client dies')", 60, "the flight before it comes back")
+    browser.call("Page.navigate", url=bench.origin + "/")
+    wait(browser, "document.documentElement?.dataset.ready == 'yes' && document.getElementById('flights')", 60, "the workbench again")
+    return found
+
+
 def walk(browser, bench, greylag, flights, folder, session):
     found = []
     logs = sorted(flights.glob("train-*.csv")) + sorted(flights.glob("test-*.csv"))
@@ -360,6 +398,7 @@ def walk(browser, bench, greylag, flights, folder, session):
     found += write(browser, folder)
     found += search(browser, bench, folder)
     found += fly(browser, folder)
+    found += failsafes(browser, bench, folder)
     found += foreign_sockets(bench.process.pid)
     if not refused(bench.origin, "/api/state"):
         found.append("a wrong token is answered")

@@ -6,8 +6,12 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 
+#[cfg(feature = "sitl")]
+use crate::commands::faults;
 use crate::commands::files::shipped;
 use crate::commands::intake::Reading;
+#[cfg(feature = "sitl")]
+use crate::workbench::Failsafes;
 use crate::workbench::Given;
 use crate::workbench::server::{random_token, serve};
 use crate::workbench::session::FILE;
@@ -48,6 +52,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         model: model(arguments).as_deref().map(shipped),
         logs: arguments.logs.clone(),
         reading: arguments.reading.of_workbench(),
+        #[cfg(feature = "sitl")]
+        failsafes: Failsafes::new(|kind| faults::shipped(kind).map_err(|e| format!("{e:#}"))),
     };
     let token = random_token().context("cannot draw a token for the page")?;
     serve(given, arguments.port, &token, |address| {

@@ -33,6 +33,9 @@ pub struct Given {
     pub logs: Vec<PathBuf>,
     /// How logs are read.
     pub reading: Reading,
+    /// What flies failsafes.
+    #[cfg(feature = "sitl")]
+    pub failsafes: super::failsafe::Failsafes,
 }
 
 /// The session with what was worked out of it.
@@ -42,6 +45,8 @@ pub struct Bench {
     inner: Mutex<Inner>,
     /// Held while a log is taken: two that come at once have one name each.
     pub(super) taking: Mutex<()>,
+    #[cfg(feature = "sitl")]
+    pub(super) failsafes: super::failsafe::Failsafes,
     _claim: Claim,
 }
 
@@ -125,6 +130,8 @@ impl Bench {
             hear: Box::new(hear),
             inner: Mutex::new(inner),
             taking: Mutex::new(()),
+            #[cfg(feature = "sitl")]
+            failsafes: given.failsafes,
             _claim: claim,
         });
         for log in &given.logs {

@@ -9,6 +9,8 @@ mod bench;
 mod commands;
 mod curves;
 mod error;
+#[cfg(feature = "sitl")]
+mod failsafe;
 mod fit;
 mod flights;
 mod fly;
@@ -27,6 +29,8 @@ pub use act::{Act, Request};
 pub use bench::{Bench, Given};
 pub use curves::FlightData;
 pub use error::{Kind, WorkbenchError};
+#[cfg(feature = "sitl")]
+pub use failsafe::{Answer, Failsafes};
 pub use fly::{Order, Part};
 pub use own::{Checked, check, grammar};
 pub use reading::Reading;

@@ -89,6 +89,7 @@ function choose_lit() {
   return true;
 }
 function show_all() {
+  document.getElementById("to-failsafes").hidden = !bench.state.fly.possible;
   answer();
   job();
   flights(bench);

@@ -8,7 +8,7 @@ use super::routes;
 
 const PAGE: &str = include_str!("../assets/page.html");
 /// Files by name, with their types.
-const FILES: [(&str, &str, &str); 11] = [
+const FILES: [(&str, &str, &str); 13] = [
     ("workbench.css", CSS, include_str!("../assets/workbench.css")),
     ("uplot.css", CSS, include_str!("../../report/kit/assets/uPlot.min.css")),
     ("uplot.js", JS, include_str!("../../report/kit/assets/uPlot.iife.min.js")),
@@ -20,6 +20,8 @@ const FILES: [(&str, &str, &str); 11] = [
     ("text.js", JS, include_str!("../assets/text.js")),
     ("suspects.js", JS, include_str!("../assets/suspects.js")),
     ("model.js", JS, include_str!("../assets/model.js")),
+    ("failsafes.css", CSS, include_str!("../assets/failsafes.css")),
+    ("failsafes.js", JS, include_str!("../assets/failsafes.js")),
 ];
 const CSS: &str = "text/css; charset=utf-8";
 const JS: &str = "text/javascript; charset=utf-8";

@@ -14,7 +14,7 @@ use super::routes::failure;
 
 /// What a page may load: this program's own files, nothing from elsewhere, nothing written into the page.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
-                      img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+                      img-src 'self' data:; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
 /// Lets a request pass that has the token and comes from this program's own page.
 pub async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {

@@ -1,6 +1,7 @@
 //! The workbench served to a browser on this machine: loopback only, a token, no file from elsewhere.
 
 mod assets;
+mod failsafes;
 mod guard;
 mod routes;
 
@@ -97,6 +98,7 @@ fn router(shared: Shared) -> Router {
     Router::new()
         .route("/", get(assets::page))
         .route("/assets/{name}", get(assets::asset))
+        .route("/failsafes", get(failsafes::page))
         .route("/api/state", get(routes::state))
         .route("/api/failing", get(routes::failing))
         .route("/api/diagnosis", get(routes::diagnosis))

@@ -1,0 +1,110 @@
+//! Failsafes to click through: a flight under a fault is chosen on a page, flown by the companion's own pilot in lockstep,
+//! and shown: who flew when, what was said, which rules of flight held.
+
+mod answer;
+mod bands;
+mod choices;
+mod form;
+mod page;
+mod verdict;
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::control::ControllerKind;
+use crate::sim::faults::policies::{Policy, policies};
+use crate::sim::faults::search::judged;
+use crate::sim::faults::{CompanionFactory, FaultsError, Scenario, Witnessed};
+use form::Form;
+
+/// Makes the companions with a controller, or says why it cannot.
+type Make = Box<dyn Fn(ControllerKind) -> Result<CompanionFactory, String> + Send + Sync>;
+/// Stack of the thread that designs a controller, bytes: dual numbers are large where nothing is optimised away.
+const STACK: usize = 16 << 20;
+
+/// Flies what the page asks for.
+pub struct Failsafes {
+    make: Make,
+    /// What was made before: a design takes a moment.
+    made: Mutex<HashMap<&'static str, Arc<CompanionFactory>>>,
+}
+
+/// A flight with its rules.
+struct Flown {
+    scenario: Scenario,
+    controller: ControllerKind,
+    witnessed: Witnessed,
+    rules: Vec<Policy>,
+    /// For each rule that applies its least distance, 1 at most, below 0 broken, and when (s).
+    judged: Vec<Option<(f64, f64)>>,
+}
+
+/// What a request for the page is answered.
+#[derive(Debug)]
+pub struct Answer {
+    /// The page, as HTML.
+    pub html: String,
+    /// Whether a choice was none.
+    pub refused: bool,
+}
+
+impl Failsafes {
+    /// Flies with the companions of `make`.
+    pub fn new(
+        make: impl Fn(ControllerKind) -> Result<CompanionFactory, String> + Send + Sync + 'static,
+    ) -> Failsafes {
+        Failsafes { make: Box::new(make), made: Mutex::default() }
+    }
+
+    /// The page for the choices in `query`, names and values as they come; what is not chosen is the default. A choice that
+    /// is none, or a flight that cannot be flown, is said on the page.
+    pub fn page(&self, query: &[(String, String)]) -> Answer {
+        let (form, unknown) = Form::of(query);
+        let chosen = match unknown {
+            Some(wrong) => Err(wrong),
+            None => form.chosen(),
+        };
+        match chosen {
+            Err(wrong) => Answer {
+                html: page::render(&form, Some(&wrong), &page::refused(&wrong)),
+                refused: true,
+            },
+            Ok(chosen) => {
+                let shown = match self.fly(chosen.scenario, chosen.controller) {
+                    Ok(flown) => answer::html(&flown),
+                    Err(why) => page::failed(&why),
+                };
+                Answer { html: page::render(&form, None, &shown), refused: false }
+            }
+        }
+    }
+
+    fn fly(&self, scenario: Scenario, controller: ControllerKind) -> Result<Flown, String> {
+        let factory = self.factory(controller)?;
+        let words = |e: FaultsError| e.to_string();
+        let witnessed = factory.witness(&scenario).map_err(words)?;
+        let rules = policies(&factory.envelope());
+        let judged = judged(&rules, scenario.counterpart, &witnessed.samples, &witnessed.findings);
+        Ok(Flown { scenario, controller, witnessed, rules, judged })
+    }
+
+    fn factory(&self, controller: ControllerKind) -> Result<Arc<CompanionFactory>, String> {
+        let known = |made: &Failsafes| {
+            let made = made.made.lock().unwrap_or_else(PoisonError::into_inner);
+            made.get(controller.name()).cloned()
+        };
+        if let Some(factory) = known(self) {
+            return Ok(factory);
+        }
+        let make = &self.make;
+        let design = move || make(controller);
+        let made = std::thread::scope(|scope| {
+            let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, design);
+            let thread = thread.map_err(|e| format!("starting the design of {controller}: {e}"))?;
+            thread.join().unwrap_or_else(|_| Err(format!("the design of {controller} panicked")))
+        })?;
+        let made = Arc::new(made);
+        let mut all = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(all.entry(controller.name()).or_insert(made).clone())
+    }
+}

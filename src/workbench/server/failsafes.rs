@@ -1,0 +1,36 @@
+//! The page of failsafes.
+
+use axum::extract::{Query, State};
+use axum::response::Response;
+
+use super::Shared;
+
+/// The page for the choices of the address; one that is none is answered 422.
+#[cfg(feature = "sitl")]
+pub async fn page(
+    State(shared): State<Shared>,
+    Query(query): Query<Vec<(String, String)>>,
+) -> Response {
+    use axum::http::StatusCode;
+    use axum::response::{Html, IntoResponse};
+
+    let flown = tokio::task::spawn_blocking(move || shared.bench.failsafes.page(&query)).await;
+    match flown {
+        Ok(answer) => {
+            let refused = StatusCode::UNPROCESSABLE_ENTITY;
+            let status = if answer.refused { refused } else { StatusCode::OK };
+            (status, Html(answer.html)).into_response()
+        }
+        Err(error) => super::routes::failure(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            &format!("a fault of the program, please report it: {error}"),
+        ),
+    }
+}
+
+/// Without a simulator nothing is flown.
+#[cfg(not(feature = "sitl"))]
+pub async fn page(_: State<Shared>, _: Query<Vec<(String, String)>>) -> Response {
+    use axum::response::IntoResponse;
+    crate::workbench::WorkbenchError::NoSimulator.into_response()
+}
