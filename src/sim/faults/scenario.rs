@@ -101,7 +101,7 @@ pub struct Scenario {
     /// What is asked for besides.
     pub asked: Vec<Asked>,
     /// Parameters of the companion that are not their defaults.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Setting>,
     /// Whether a radio with its sticks released is bound to the flight controller; only ArduPilot is played with one.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
