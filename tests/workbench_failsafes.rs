@@ -120,6 +120,8 @@ fn a_killed_companion_engages_no_more_unasked_and_a_radio_keeps_ardupilot_in_man
         "{}",
         verdict(&radio)
     );
+    let end = "At the end nobody flies: ArduPilot is in MANUAL, the companion disarmed";
+    assert!(verdict(&radio).contains(end), "{}", verdict(&radio));
     let scenario: Scenario = serde_json::from_str(&text(&radio, "scenario")).unwrap();
     assert_eq!((scenario.counterpart, scenario.radio), (Counterpart::Ardupilot, true));
     assert_eq!(scenario.faults[0].kind, FaultKind::Killed);

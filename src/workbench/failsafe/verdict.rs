@@ -255,6 +255,9 @@ impl Flown {
             (Some(stack), Some(mode)) if last.engaged && last.steered => {
                 format!("At the end the companion steers, in {shown}, {stack} in {mode}.")
             }
+            (Some(stack), Some(mode)) if last.steered => {
+                format!("At the end nobody flies: {stack} is in {mode}, the companion {shown}.")
+            }
             (Some(stack), Some(mode)) => {
                 format!("At the end {stack} flies {mode}, the companion is {shown}.")
             }
@@ -265,7 +268,7 @@ impl Flown {
     /// Altitude that was lost, where that is much.
     fn lost(&self) -> String {
         let lost = self.witnessed.samples.iter().map(|s| s.lost_m).fold(0.0, f64::max);
-        if lost < MUCH_M { String::new() } else { format!(" It lost {lost:.0} m.") }
+        if lost < MUCH_M { String::new() } else { format!(" The aircraft lost {lost:.0} m.") }
     }
 
     /// How the rules stand.
