@@ -359,7 +359,6 @@ mod tests {
             ),
             ("from_s", "NaN", "from 1 to 55 s"),
             ("for_s", "-1", "from 0.02 to 40 s"),
-            ("strength", "101", "from 0 to 100 %"),
             ("seed", "1.5", "is no whole number"),
             ("seed", "1e9", "from 0 to 999999"),
             ("fault", "meteor", "choose one of `loss`"),
@@ -373,6 +372,9 @@ mod tests {
             let wrong = chosen(&[(field, value)]).unwrap_err();
             assert!(wrong.field == field && wrong.why.contains(why), "{field}: {wrong}");
         }
+        // a cut has no strength
+        let wrong = chosen(&[("fault", "loss"), ("strength", "101")]).unwrap_err();
+        assert!(wrong.why.contains("from 0 to 100 %"), "{wrong}");
         let wrong = chosen(&[("colour", "red")]).unwrap_err();
         assert!(wrong.why.contains("no choice \"colour\"") && wrong.why.contains("counterpart"));
         // nobody is there whom a station could ask
