@@ -46,6 +46,7 @@ pub use kit::findings::{Finding, Findings, Link};
 pub use kit::grid::{Grid, GridCell, GridRow};
 pub use kit::heat_map::{HeatCell, HeatMap};
 pub use kit::histogram::Histogram;
+#[cfg(feature = "sitl")]
 pub(crate) use kit::html::escape;
 pub use kit::intervals::{IntervalBins, IntervalPanel, Intervals};
 pub use kit::loop_timing::{Cycle, LoopTiming};
