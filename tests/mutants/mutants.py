@@ -420,8 +420,8 @@ def chosen(options, built):
     for mutant in mutants:
         name = f"{mutant['file']}:{mutant['line']}: {mutant['change']} in {mutant['function']}"
         record = done.get(identity(mutant))
-        again = record and options.again and record["outcome"] in ("missed", "not reached")
-        if (record is None or again) and re.search(options.only, name):
+        missed = record is not None and record["outcome"] in ("missed", "not reached")
+        if (missed if options.again else record is None) and re.search(options.only, name):
             yield mutant
 
 
@@ -501,7 +501,7 @@ def main():
     parser.add_argument("--sample", type=int, help="only so many mutants, drawn at random")
     parser.add_argument("--seed", type=int, default=1, help="of the order in which mutants are run")
     parser.add_argument("--only", default="", help="mutants whose name this regular expression finds")
-    parser.add_argument("--again", action="store_true", help="run missed mutants again")
+    parser.add_argument("--again", action="store_true", help="run the missed mutants once more, and no others")
     parser.add_argument("--tests", default="", help="tests whose name this regular expression finds")
     parser.add_argument("--longest", type=float, default=10.0, help="tests that take more processor time are left out, s")
     parser.add_argument("--until", help="stop at this time of the day, HH:MM")
