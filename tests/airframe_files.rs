@@ -125,3 +125,32 @@ fn a_command_goes_to_the_stop_of_its_side_at_the_rate_of_its_servo() {
         assert!((again.elevator - deflection).abs() < 1e-15);
     }
 }
+
+#[test]
+fn an_envelope_is_open_where_it_says_so_and_refused_beyond() {
+    let controls = [both("aileron"), both("elevator")].concat();
+    let with = |field: &str, value: f64| {
+        let line = COMMON.lines().find(|line| line.starts_with(field)).unwrap();
+        let common = COMMON.replace(line, &format!("{field} = {value:?}"));
+        Airframe::parse(&format!("schema = 2\n{common}{controls}{REST}"))
+    };
+    // The ends themselves are refused where the rule says "between", but for the largest load and rate.
+    for (field, bad, good) in [
+        ("bank_max_deg", [0.0, 90.0], [0.1, 89.9]),
+        ("pitch_min_deg", [-90.0, 0.0], [-89.9, -0.1]),
+        ("pitch_max_deg", [0.0, 90.0], [0.1, 89.9]),
+        ("load_factor_max", [1.0, 20.1], [1.1, 20.0]),
+        ("airspeed_min_mps", [0.0, 25.0], [0.1, 24.9]),
+        ("airspeed_max_mps", [25.0, 1000.0], [25.1, 999.0]),
+        ("surface_slew_per_s", [0.0, 200.1], [0.1, 200.0]),
+    ] {
+        for value in bad {
+            let refused = with(field, value).unwrap_err();
+            assert!(refused.contains(&format!("envelope.{field}")), "{value}: {refused}");
+        }
+        for value in good {
+            assert!(with(field, value).is_ok(), "{field} {value}: {:?}", with(field, value).err());
+        }
+    }
+    assert_eq!(with("airspeed_min_mps", 18.0).unwrap().envelope.flying_from_mps(), 9.0);
+}

@@ -9,7 +9,7 @@ use greylag::flight::pilot::{Answers, Config, Decision, Pilot, Plan, Source, Tri
 use greylag::link::autopilot::{
     AttitudeSetpoint, Autopilot, Mode, ParameterValue, Sticks, Verdict,
 };
-use greylag::link::vehicle::{Faults, Order, Telemetry, VANE_SD};
+use greylag::link::vehicle::{Fault, Faults, Order, Telemetry, VANE_SD};
 use greylag::manoeuvres::{Axis, Excitation, Schedule, Shape, Step};
 use greylag::model::GreyBox;
 use greylag::physics::{ActuatorState, Airframe, Command, State, Time};
@@ -195,12 +195,12 @@ fn arming_needs_a_fresh_state_unless_forced() {
 
 #[test]
 fn arming_is_refused_at_an_absurd_airspeed_or_attitude() {
-    for (airspeed, roll) in [(46.0, 0.0), (20.0, 1.2)] {
+    for (airspeed, roll, pitch) in [(46.0, 0.0, 0.0), (20.0, 1.2, 0.0), (20.0, 0.0, -1.2)] {
         let mut flight = Flight::new();
         flight.now = flight.now.plus(TICK);
         let mut seen = frame(flight.now);
         seen.state.airspeed = airspeed;
-        seen.state.roll = roll;
+        (seen.state.roll, seen.state.pitch) = (roll, pitch);
         flight.tick_with(seen);
         assert!(matches!(flight.pilot.arm(flight.now, false), Verdict::Rejected(_)));
         assert_eq!(flight.pilot.arm(flight.now, true), Verdict::Accepted);
@@ -685,4 +685,122 @@ fn a_schedule_is_flown_inside_the_limits_for_as_long_as_offboard_lasts() {
     assert_eq!(flight.pilot.set_mode(flight.now, Mode::Offboard), Verdict::Accepted);
     assert!((fly(&mut flight, 20).target.roll.to_degrees() - 60.0).abs() < 1e-9);
     assert!(flight.texts().contains("schedule steep begins"));
+}
+
+#[test]
+fn arming_at_the_limits_themselves_is_allowed() {
+    let mut flight = Flight::new();
+    flight.now = flight.now.plus(TICK);
+    let mut seen = frame(flight.now);
+    (seen.state.airspeed, seen.state.roll) = (45.0, 60f64.to_radians());
+    flight.tick_with(seen);
+    assert_eq!(flight.pilot.arm(flight.now, false), Verdict::Accepted);
+}
+
+#[test]
+fn disarming_ends_offboard() {
+    // Who arms next must not fly a setpoint that was meant for another flight.
+    let mut flight = Flight::offboard();
+    assert_eq!(flight.pilot.disarm(flight.now, true), Verdict::Accepted);
+    assert_eq!(flight.pilot.status().mode, Mode::Hold);
+}
+
+#[test]
+fn offboard_needs_a_fresh_state_of_the_vehicle() {
+    let mut flight = Flight::armed();
+    // A microsecond and the tolerance of half a one after the 0.5 s.
+    let late = flight.now.plus(Duration::from_micros(500_002));
+    flight.pilot.attitude_setpoint(late, LEVEL_SETPOINT);
+    let Verdict::Rejected(words) = flight.pilot.set_mode(late, Mode::Offboard) else { panic!() };
+    assert!(words.contains("no fresh vehicle state"), "{words}");
+}
+
+#[test]
+fn a_planner_is_shown_the_last_two_commands_in_force() {
+    let mut flight = Flight::armed();
+    let [first, second] = [(); 2].map(|()| flight.tick().command);
+    assert_ne!(first, second);
+    // A frame that is repeated moves nothing.
+    flight.tick_with(frame(flight.now));
+    flight.now = flight.now.plus(TICK);
+    let request = flight.pilot.observe(flight.now, &frame(flight.now)).unwrap();
+    assert_eq!(request.observation.previous, [second, first]);
+}
+
+#[test]
+fn a_clock_that_falls_back_by_more_than_a_second_is_a_new_start() {
+    let said = "clock went back";
+    for (back_us, restarted) in [(20_000, false), (1_000_000, false), (1_000_001, true)] {
+        // The clock of the frames alone.
+        let mut flight = Flight::armed();
+        flight.fly(300);
+        let then = Time::from_micros(flight.now.as_micros() - back_us);
+        flight.now = flight.now.plus(TICK);
+        flight.tick_with(Telemetry { time: then, ..frame(flight.now) });
+        assert_eq!(flight.texts().contains(said), restarted, "frame, {back_us} us");
+        // The clock while no frames come.
+        let mut flight = Flight::armed();
+        flight.fly(300);
+        flight.pilot.advance(Time::from_micros(flight.now.as_micros() - back_us));
+        assert_eq!(flight.texts().contains(said), restarted, "clock, {back_us} us");
+    }
+}
+
+#[test]
+fn each_half_of_the_pitch_stick_reaches_its_own_limit() {
+    for (stick, pitch_deg) in [(0.5, -10.0), (-0.5, 15.0)] {
+        let mut flight = Flight::armed();
+        let index =
+            flight.pilot.parameters().iter().position(|p| p.name == "GL_PITCH_MIN_DEG").unwrap();
+        let set = flight.pilot.set_parameter(index, ParameterValue::Real(-20.0));
+        assert_eq!(set, Verdict::Accepted);
+        let sticks = Sticks { roll: 0.0, pitch: stick, throttle: 0.5 };
+        flight.pilot.sticks(flight.now, sticks);
+        assert_eq!(flight.pilot.set_mode(flight.now, Mode::Stabilized), Verdict::Accepted);
+        // Half of 20° nose down with the stick forward, half of 30° nose up with it back.
+        let pitch = flight.fly(2).target.pitch.to_degrees();
+        assert!((pitch - pitch_deg).abs() < 1e-9, "{pitch}");
+    }
+}
+
+#[test]
+fn what_a_controller_is_given_the_aircraft_back_for() {
+    // Level at trim because nothing else is left: the controller flies better, failsafe or not.
+    let mut flight = Flight::with(Box::new(Broken));
+    flight.fly(5);
+    flight.pilot.arm(flight.now, false);
+    flight.plan = Plan::None;
+    let decision = flight.fly(2);
+    assert_eq!((decision.source, decision.failsafe), (Source::Level, false));
+    assert_eq!(decision.demand().fault, Some(Fault::State));
+    let mut flight = Flight::offboard();
+    assert_eq!(flight.fly(50).demand().fault, None);
+    let lost = flight.fly(60);
+    assert_eq!((lost.source, lost.failsafe), (Source::Planned, true));
+    assert_eq!(lost.demand().fault, Some(Fault::Lost));
+    // Nobody has an aircraft to give back.
+    flight.pilot.disarm(flight.now, true);
+    assert_eq!(flight.tick().demand().fault, None);
+}
+
+#[test]
+fn a_planner_begins_anew_after_a_state_that_could_not_be_used() {
+    let mut flight = Flight::armed();
+    flight.fly(3);
+    let mut ask = |bad: bool| {
+        flight.now = flight.now.plus(TICK);
+        let mut seen = frame(flight.now);
+        if bad {
+            seen.state.q = f64::NAN;
+        }
+        let request = flight.pilot.observe(flight.now, &seen);
+        flight.pilot.decide(request.map_or(Plan::None, |_| Plan::Ready(RIGHT)));
+        request.map(|request| request.engage)
+    };
+    assert_eq!([ask(false), ask(true), ask(false)], [Some(false), None, Some(true)]);
+}
+
+#[test]
+fn residuals_that_nobody_computes_are_not_zero() {
+    assert!(Flight::armed().pilot.status().residuals.iter().all(|share| share.is_nan()));
 }

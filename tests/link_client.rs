@@ -519,3 +519,27 @@ fn a_flood_costs_a_bounded_outbox() {
     assert!(sent(&mut clients).len() <= 4096);
     assert!(clients.counts().dropped >= 5000);
 }
+
+#[test]
+fn an_onboard_computer_answers_for_itself_only_and_streams_nothing_by_itself() {
+    let (mut clients, mut double) = (Clients::onboard(), Double::new());
+    clients.adopt(US.system);
+    let drained = |clients: &mut Clients| clients.drain().map(|(_, b)| b).collect::<Vec<_>>();
+    // The controller is component 1, and whoever names no component means it.
+    for component in [0, 1] {
+        let arm = raw_frame(76, &command_payload(400, [1.0; 7], 1, component, 0));
+        clients.handle(at_ms(0), peer(1), &arm, &mut double);
+    }
+    assert!(double.arms.is_empty() && drained(&mut clients).is_empty());
+    assert_eq!(clients.counts().for_others, 2);
+    let arm = raw_frame(76, &command_payload(400, [1.0; 7], 1, 191, 0));
+    clients.handle(at_ms(0), peer(1), &arm, &mut double);
+    assert_eq!(double.arms.len(), 1);
+    drained(&mut clients);
+    let mut ids = vec![];
+    for ms in (0..3000).step_by(10) {
+        clients.poll(at_ms(ms), &mut double);
+        ids.extend(drained(&mut clients).iter().map(|bytes| bytes[7]));
+    }
+    assert!(!ids.is_empty() && ids.iter().all(|id| *id == 0), "heartbeats only: {ids:?}");
+}

@@ -110,6 +110,20 @@ fn refusals_are_told_at_a_bounded_rate() {
 }
 
 #[test]
+fn each_refusal_of_a_setpoint_says_what_was_wrong() {
+    let unit = [1.0, 0.0, 0.0, 0.0];
+    for (data, words) in [
+        (setpoint(unit, f32::NAN, 7), "a number is NaN"),
+        (setpoint([0.0; 4], 0.5, 7), "the quaternion is zero"),
+        (setpoint(unit, 0.5, 128), "it has no attitude"),
+    ] {
+        let (mut clients, mut double) = new();
+        let told = texts(&send(&mut clients, &mut double, 0, 1, data)).concat();
+        assert!(told.contains(words), "{told}");
+    }
+}
+
+#[test]
 fn two_clients_cannot_steer_at_once() {
     let (mut clients, mut double) = new();
     for ms in (0..2000).step_by(100) {
@@ -265,6 +279,8 @@ fn a_parameter_that_does_not_exist_is_an_error() {
         let seen = ask(&mut clients, &mut double, at_ms(0), 1, &bytes);
         let MavMessage::PARAM_ERROR(m) = seen[0].message() else { panic!() };
         assert_eq!(m.error, MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST);
+        // −1: it was asked for by its name.
+        assert_eq!(m.param_index, if bytes == raw_frame(20, &by_index) { 3 } else { -1 });
     }
 }
 

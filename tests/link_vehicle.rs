@@ -244,3 +244,36 @@ fn the_heartbeat_beats_once_a_second() {
         .filter(|i| sitl.heartbeat(Duration::from_millis(10 * i), Outputs::Disarmed).is_some());
     assert_eq!(beats.count(), 5);
 }
+
+#[test]
+fn a_rudder_is_read_and_the_rates_are_held_for_a_period() {
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
+    let mut shown = Shown::at(20_000);
+    shown.actuators.active = 15;
+    // Travels as of old, deflection and rate of the rudder, then travels to each side.
+    shown.actuators.actuator[5..15]
+        .copy_from_slice(&[0.4, 0.3, 0.5, -3.0, 0.4, 0.3, 0.25, -0.4, -0.3, -0.2]);
+    let t = take(&mut sitl, &shown.bytes())[0];
+    close(t.rate_hold_s, 0.01);
+    close(t.actuators.rudder, 0.5 * 0.25);
+    close(t.actuators.rudder_rate, -3.0 * 0.25);
+    // A surface that does not move to one side has no travel.
+    let mut stuck = Shown::at(30_000);
+    stuck.actuators.active = 15;
+    stuck.actuators.actuator[5..15]
+        .copy_from_slice(&[0.4, 0.3, 0.5, -3.0, 0.4, 0.3, 0.25, 0.0, -0.3, -0.2]);
+    assert_eq!(take(&mut sitl, &stuck.bytes())[0].faults, Faults::ACTUATORS);
+}
+
+#[test]
+fn a_frame_that_comes_early_after_a_gap_tells_the_gap() {
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
+    let mut order = |us| take(&mut sitl, &Shown::at(us).bytes())[0].order;
+    assert_eq!(order(5_000_000), Order::First);
+    // 17 ms are two periods with jitter: one frame is missing. 14 ms are one.
+    assert_eq!(order(5_017_000), Order::Next { lost: 1 });
+    assert_eq!(order(5_031_000), Order::Next { lost: 0 });
+    // By a second it comes late, by more the clock has started anew.
+    assert_eq!(order(4_031_000), Order::Late);
+    assert_eq!(order(4_030_000), Order::First);
+}

@@ -292,4 +292,30 @@ mod tests {
         assert!(Config { throttle_slew_per_s: f64::NAN, ..x8() }.check().is_err());
         assert!(Config { trim: vec![], ..x8() }.check().is_err());
     }
+
+    #[test]
+    fn the_trim_table_spans_the_envelope_by_a_row_for_each_metre_a_second() {
+        let speeds: Vec<f64> = x8().trim.iter().map(|row| row.airspeed_mps).collect();
+        let wanted: Vec<f64> = (13..=45).map(f64::from).collect();
+        assert_eq!(speeds, wanted);
+    }
+
+    #[test]
+    fn rows_that_do_not_rise_or_are_no_trim_are_refused() {
+        let good = TrimPoint { airspeed_mps: 20.0, pitch_deg: 2.0, elevator: 0.1, throttle: 0.2 };
+        let check = |trim: Vec<TrimPoint>| Config { trim, ..x8() }.check();
+        assert_eq!(check(vec![good]), Ok(()));
+        assert_eq!(check(vec![good, good]), Err(ConfigError::Trim));
+        // The ends of what is allowed are good, a little more is not.
+        let edge = TrimPoint { pitch_deg: -30.0, elevator: 1.0, throttle: 1.0, ..good };
+        assert_eq!(check(vec![edge]), Ok(()));
+        for bad in [
+            TrimPoint { airspeed_mps: 0.0, ..good },
+            TrimPoint { pitch_deg: 30.1, ..good },
+            TrimPoint { elevator: -1.1, ..good },
+            TrimPoint { throttle: f64::NAN, ..good },
+        ] {
+            assert_eq!(check(vec![bad]), Err(ConfigError::Trim), "{bad:?}");
+        }
+    }
 }

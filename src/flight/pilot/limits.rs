@@ -185,4 +185,23 @@ mod tests {
         // The throttle takes 20 ticks: 0.5 after ten.
         assert!((now.throttle - 0.5).abs() < 1e-9);
     }
+
+    #[test]
+    fn protection_fades_in_linearly_over_two_metres_a_second() {
+        let e = x8();
+        let pitch =
+            |wanted: f64, airspeed: f64| e.limit(wish(0.0, wanted), airspeed).pitch.to_degrees();
+        // Between −5° and 30° halfway and at a quarter; between 5° and −30° likewise.
+        for (wanted, airspeed, limited) in [
+            (90.0, 14.0, 12.5),
+            (90.0, 13.5, 3.75),
+            (90.0, 20.0, 30.0),
+            (-90.0, 44.0, -12.5),
+            (-90.0, 44.5, -3.75),
+            (-90.0, 20.0, -30.0),
+        ] {
+            let pitch = pitch(wanted, airspeed);
+            assert!((pitch - limited).abs() < 1e-9, "{pitch} at {airspeed} m/s");
+        }
+    }
 }

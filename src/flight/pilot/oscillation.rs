@@ -159,4 +159,12 @@ mod tests {
         let q = |t: f64| 3.0 * (TAU * 0.8 * t).sin();
         assert_eq!(trips(30.0, q, |t| 10.0 * (TAU * 0.8 * t).sin()), None);
     }
+
+    #[test]
+    fn a_fast_swing_is_not_said_before_a_second_has_passed() {
+        // Six half swings of 7 Hz take 0.43 s.
+        let swing = |t: f64| (TAU * 7.0 * t).sin();
+        let at = trips(5.0, |t| 4.0 * swing(t), |t| -10.0 * swing(t + 0.02)).unwrap();
+        assert!((1.0..2.0).contains(&at), "{at}");
+    }
 }

@@ -137,6 +137,7 @@ mod tests {
         }
         assert!(changed(&config, THRUST_SOURCE, ParameterValue::Int(2)).is_err());
         assert!(changed(&config, SYSTEM_ID, ParameterValue::Int(7)).is_err());
+        assert!(changed(&config, THRUST_SOURCE, ParameterValue::Real(1.0)).is_err());
         assert!(changed(&config, 999, ParameterValue::Real(1.0)).is_err());
         // Cruise must stay above the minimum airspeed, or HOLD would fly in the protection.
         assert!(changed(&config, 5, ParameterValue::Real(12.0)).is_err());

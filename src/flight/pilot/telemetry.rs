@@ -124,4 +124,19 @@ mod tests {
         frame.state.airspeed = 0.0;
         assert_eq!(defect(&frame), None);
     }
+
+    #[test]
+    fn pitch_ends_at_the_vertical_and_roll_at_half_a_turn() {
+        use std::f64::consts::{FRAC_PI_2, PI};
+        for (roll, pitch, fault) in [
+            (PI, FRAC_PI_2, None),
+            (-PI, -FRAC_PI_2, None),
+            (0.0, 1.58, Some("attitude")),
+            (3.15, 0.0, Some("attitude")),
+        ] {
+            let mut frame = good();
+            (frame.state.roll, frame.state.pitch) = (roll, pitch);
+            assert_eq!(defect(&frame), fault, "{roll} {pitch}");
+        }
+    }
 }

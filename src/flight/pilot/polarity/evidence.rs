@@ -124,3 +124,52 @@ impl Evidence {
         (fit.gain.is_finite() && error.is_finite() && error > 0.0).then_some(fit)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{LONGEST, SEEN, Verdict, judged};
+    use super::*;
+    use crate::link::vehicle::{Axis, Fault};
+
+    /// A gain that is certain by so many standard errors.
+    fn fit(gain: f64, certainty: f64) -> Fit {
+        Fit { gain, error: gain.abs() / certainty, misfit: 0.0 }
+    }
+
+    #[test]
+    fn a_sign_is_judged_when_it_is_certain_large_enough_and_answered_both_ways() {
+        let right = fit(0.9, 8.0);
+        let reversed = |axis| Verdict::Wrong(Fault::Reversed(axis));
+        for (roll, pitch, index, verdict) in [
+            (right, right, SEEN[1], Verdict::Right([0.9; 2])),
+            (right, right, SEEN[1] - 1, Verdict::Open),
+            (fit(-0.9, 8.0), right, SEEN[0], reversed(Axis::Roll)),
+            (fit(-0.9, 8.0), right, SEEN[0] - 1, Verdict::Open),
+            (right, fit(-0.9, 8.0), SEEN[1], reversed(Axis::Pitch)),
+            // Large and not certain; certain and too small to be an answer.
+            (fit(-0.9, 6.9), right, SEEN[1], Verdict::Open),
+            (fit(-0.09, 50.0), right, SEEN[1], Verdict::Open),
+            (right, fit(0.09, 50.0), LONGEST - 1, Verdict::Open),
+        ] {
+            assert_eq!(judged(&[roll, pitch], index), verdict, "{roll:?} {pitch:?} {index}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_certain_in_the_end_is_no_answer_or_too_much_air() {
+        let right = fit(0.9, 8.0);
+        // 0.2 + 3 · 0.09 is under half an answer, 0.6 + 3 · 0.3 is not.
+        for (roll, pitch, fault) in [
+            (fit(0.2, 2.2), right, Fault::Unanswered(Axis::Roll)),
+            (right, fit(0.2, 2.2), Fault::Unanswered(Axis::Pitch)),
+            (right, fit(0.6, 2.0), Fault::SignsUnknown),
+            (fit(0.6, 2.0), right, Fault::SignsUnknown),
+        ] {
+            assert_eq!(
+                judged(&[roll, pitch], LONGEST),
+                Verdict::Wrong(fault),
+                "{roll:?} {pitch:?}"
+            );
+        }
+    }
+}

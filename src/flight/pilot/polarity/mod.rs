@@ -305,4 +305,24 @@ mod tests {
             assert!(!check.is_open());
         }
     }
+
+    #[test]
+    fn only_an_attitude_that_departs_from_the_first_ends_the_check() {
+        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        for (roll_deg, pitch_deg, open) in
+            [(35.0, 15.0, true), (14.0, 15.0, false), (56.0, 15.0, false), (35.0, -6.0, false)]
+        {
+            let mut check = Check::new(Answers::of(&model, 22.0).unwrap());
+            check.await_authority();
+            check.begin(Command::IDLE);
+            let mut see = |k: u64, roll: f64, pitch: f64| {
+                let (roll, pitch) = (roll.to_radians(), pitch.to_radians());
+                let state = State { roll, pitch, ..State::NEUTRAL };
+                check.see(Time::from_micros(10_000 * k), &state, Command::IDLE)
+            };
+            // In a turn: it is the change that counts, of more than 20°.
+            assert_eq!(see(0, 35.0, 15.0), Verdict::Open);
+            assert_eq!(see(1, roll_deg, pitch_deg) == Verdict::Open, open, "{roll_deg}");
+        }
+    }
 }

@@ -341,4 +341,45 @@ mod tests {
         let state = assembly.take(late, &attitude(30), &Command::IDLE).unwrap();
         assert!(state.faults.contains(Faults::AIR) && state.faults.contains(Faults::INCIDENCE));
     }
+
+    #[test]
+    fn an_absurd_wind_is_left_out_and_faults_are_counted() {
+        let mut assembly = assembly();
+        let host = Duration::from_secs(1);
+        let wind = |x| ControllerMessage::Wind { velocity: [x, 0.0, 0.0], sd: 0.5 };
+        assembly.take(host, &wind(1000.0), &Command::IDLE);
+        fed(&mut assembly, host);
+        let state = assembly.take(host, &attitude(20), &Command::IDLE).unwrap();
+        assert!(state.wind[0].is_nan());
+        assembly.take(host, &wind(8.0), &Command::IDLE);
+        let late = host + STALE + Duration::from_millis(1);
+        let state = assembly.take(late, &attitude(30), &Command::IDLE).unwrap();
+        assert_eq!(state.wind, [8.0, 0.0, 0.0]);
+        let counts = assembly.counts;
+        assert_eq!((counts.faulty, counts.states, counts.starts), (1, 2, 1));
+    }
+
+    #[test]
+    fn an_absurd_position_is_left_out_and_an_unknown_density_is_the_standard_one() {
+        let mut assembly = assembly();
+        let host = Duration::from_secs(1);
+        fed(&mut assembly, host);
+        let imu = ControllerMessage::Imu {
+            time: Time::default(),
+            specific_force: [0.0, 0.0, -9.81],
+            density: f64::NAN,
+        };
+        assembly.take(host, &imu, &Command::IDLE);
+        let position =
+            |at| ControllerMessage::Position { position: [at, 7.5], velocity: [20.0, 0.0, 0.0] };
+        assembly.take(host, &position(91.0), &Command::IDLE);
+        let state = assembly.take(host, &attitude(20), &Command::IDLE).unwrap();
+        assert!(state.position[0].is_nan() && state.velocity[0].is_nan());
+        // √(1.225 / 1.156), the density at 600 m of the standard atmosphere.
+        assert!((state.state.airspeed - 20.588).abs() < 0.005, "{}", state.state.airspeed);
+        assembly.take(host, &position(45.0), &Command::IDLE);
+        let state = assembly.take(host, &attitude(30), &Command::IDLE).unwrap();
+        assert_eq!((state.position, state.velocity), ([45.0, 7.5], [20.0, 0.0, 0.0]));
+        assert_eq!(standard_density(f64::NAN), standard_density(0.0));
+    }
 }

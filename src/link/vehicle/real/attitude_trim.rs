@@ -138,4 +138,11 @@ mod tests {
         let late = Time::from_micros(60_000_000);
         assert_eq!(trim.command(late, [0.1, 0.0], [0.08, 0.0]), [0.1, 0.0]);
     }
+
+    #[test]
+    fn the_trim_takes_its_time() {
+        // 1.5 s to settle, then a time of 3 s: after 4.5 s 0.69° of 1.8° are left, as e^(−1) of it is.
+        let left = flown(1.8 * DEGREE, |_| 0.8)[450].abs() / DEGREE;
+        assert!((left - 0.69).abs() < 0.05, "{left}");
+    }
 }

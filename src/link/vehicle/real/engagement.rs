@@ -266,4 +266,47 @@ mod tests {
         assert_eq!(engagement.shown(ms(60_300), false), Shown::Confirmed);
         assert_eq!(engagement.request(ms(61_000)), None);
     }
+
+    #[test]
+    fn a_mode_that_overtakes_is_borne_for_a_tenth_of_a_second_and_no_longer() {
+        for (late, shown) in [(100, Shown::Nothing), (101, Shown::Taken)] {
+            let mut engagement = Engagement::new(Duration::ZERO);
+            assert!(engagement.begin(ms(0)));
+            engagement.request(ms(0));
+            assert_eq!(engagement.shown(ms(10), true), Shown::Engaged);
+            assert_eq!(engagement.shown(ms(10 + late), false), shown);
+            // Its pilot has it: nothing is begun until the demand has ended once.
+            assert!(!engagement.begin(ms(200)));
+            assert_eq!(engagement.is_engaged(), shown == Shown::Nothing);
+            engagement.rest();
+            assert!(engagement.begin(ms(300)));
+        }
+    }
+
+    #[test]
+    fn each_refusal_is_said_in_its_own_words() {
+        for (result, stack, authority, words) in [
+            (1, Stack::Px4, Authority::Surfaces, "COM_RC_IN_MODE"),
+            (1, Stack::Px4, Authority::Attitude, "requirements of OFFBOARD"),
+            (1, Stack::Ardupilot, Authority::Surfaces, "level flight"),
+            (2, Stack::Px4, Authority::Surfaces, "a failsafe or a geofence"),
+            (3, Stack::Px4, Authority::Surfaces, "no such mode"),
+            (4, Stack::Px4, Authority::Surfaces, "failed to change over"),
+            (9, Stack::Px4, Authority::Surfaces, "MAV_RESULT 9"),
+        ] {
+            let mut engagement = Engagement::new(LEAD);
+            engagement.begin(ms(0));
+            // In progress is no refusal.
+            [result, 5].map(|result| engagement.answered(result));
+            let said = engagement.overdue(ms(3501), stack, authority).unwrap();
+            assert!(said.contains(words), "{said}");
+        }
+        let mut engagement = Engagement::new(LEAD);
+        engagement.begin(ms(0));
+        let silent = engagement.overdue(ms(3501), Stack::Px4, Authority::Surfaces).unwrap();
+        assert!(silent.contains("did not answer"), "{silent}");
+        engagement.answered(0);
+        let held = engagement.overdue(ms(3501), Stack::Px4, Authority::Surfaces).unwrap();
+        assert!(held.contains("it accepted"), "{held}");
+    }
 }

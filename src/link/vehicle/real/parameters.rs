@@ -232,4 +232,36 @@ mod tests {
         (0..100).for_each(|step| drop(parameters.due(AGAIN * step)));
         assert!(parameters.obstacle(1).unwrap().contains("COM_OF_LOSS_T is unknown"));
     }
+
+    #[test]
+    fn a_parameter_is_asked_for_again_after_its_time_and_not_for_ever() {
+        let mut parameters = Parameters::new(Stack::Px4.rules(Authority::Attitude));
+        let both = vec!["COM_OF_LOSS_T", "COM_OBL_RC_ACT"];
+        assert_eq!(parameters.due(Duration::ZERO), both);
+        assert!(parameters.due(AGAIN - Duration::from_millis(1)).is_empty());
+        assert_eq!(parameters.due(AGAIN), both);
+        // Of two names each has its five tries.
+        let mut parameters = Parameters::new(Stack::Ardupilot.rules(Authority::Surfaces));
+        let asked: Vec<_> = (0..200).flat_map(|step| parameters.due(AGAIN * step)).collect();
+        for name in ["MAV_GCS_SYSID", "SYSID_MYGCS", "RC_OPTIONS"] {
+            assert_eq!(asked.iter().filter(|n| **n == name).count(), 5, "{name}");
+        }
+    }
+
+    #[test]
+    fn the_ends_of_a_range_are_within_it() {
+        let mut parameters = Parameters::new(Stack::Px4.rules(Authority::Attitude));
+        parameters.take("COM_OBL_RC_ACT", 5.0);
+        for (value, good) in [(0.1, true), (0.5, true), (0.0999, false), (0.5001, false)] {
+            parameters.take("COM_OF_LOSS_T", value);
+            assert_eq!(parameters.obstacle(1).is_none(), good, "{value}");
+        }
+    }
+
+    #[test]
+    fn only_the_forbidden_bits_are_to_be_cleared() {
+        let parameters = answered(|name| (name == "RC_OPTIONS").then_some(42.0));
+        let words = parameters.obstacle(1).unwrap();
+        assert!(words.contains("RC_OPTIONS is 42: set it to 40"), "{words}");
+    }
 }

@@ -141,4 +141,22 @@ mod tests {
         assert_eq!(sent(1.0, 1.0, 1.0), [1000, 1100, 2000]);
         assert_eq!(sent(-1.0, -0.5, 0.25), [2000, 1700, 1250]);
     }
+
+    #[test]
+    fn full_deflection_is_full_stick_and_px4s_trims_are_taken_off() {
+        let mut parameters = Parameters::new(Stack::Px4.rules(Authority::Surfaces));
+        let sent = |parameters: &Parameters, aileron: f64, elevator: f64, throttle: f64| {
+            let command = Command { aileron, elevator, throttle, rudder: 0.0 };
+            Sticks::default().thousandths(&command, parameters)
+        };
+        assert_eq!(sent(&parameters, 1.0, 1.0, 1.0), [1000; 3]);
+        assert_eq!(sent(&parameters, -1.0, -1.0, 0.0), [-1000, -1000, 0]);
+        for (name, value) in
+            [("TRIM_ROLL", 0.1), ("TRIM_PITCH", -0.05), ("FW_MAN_R_SC", 0.5), ("FW_MAN_P_SC", 0.8)]
+        {
+            parameters.take(name, value);
+        }
+        // (0.3 − 0.1) / 0.5 and (0.25 − 0.05) / 0.8.
+        assert_eq!(sent(&parameters, 0.3, 0.25, 0.5), [250, 400, 500]);
+    }
 }

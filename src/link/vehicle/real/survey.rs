@@ -200,4 +200,31 @@ mod tests {
         assert!((2.0..5.0).contains(&traffic.jitter_ms()), "{}", traffic.jitter_ms());
         assert_eq!((survey.hz(105), survey.windows()), (0.0, 2));
     }
+
+    #[test]
+    fn a_message_is_counted_from_the_first_frame_of_the_controller() {
+        let mut survey = Survey::default();
+        survey.frame(Duration::from_secs(5), 0, 0, 21);
+        for i in 0..9 {
+            survey.frame(Duration::from_secs(8), 22, 1 + i, 37);
+        }
+        survey.frame(Duration::from_secs(13), 0, 10, 21);
+        let rate = survey.messages().find(|(id, _)| *id == 22).map(|(_, t)| survey.mean_hz(t));
+        // Nine in eight seconds, whatever the host's clock showed at first.
+        assert_eq!(rate, Some(9.0 / 8.0));
+    }
+
+    #[test]
+    fn a_rate_that_is_granted_amid_a_window_does_not_empty_it() {
+        let mut survey = Survey::default();
+        survey.turn(Duration::ZERO);
+        for i in 0..100 {
+            survey.frame(Duration::from_millis(10 * i), 31, i as u8, 60);
+            if i == 50 {
+                survey.restart(Duration::from_millis(500), 31);
+            }
+        }
+        assert!(survey.turn(Duration::from_secs(1)));
+        assert!((survey.hz(31) - 100.0).abs() < 1e-9, "{}", survey.hz(31));
+    }
 }

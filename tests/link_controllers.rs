@@ -1,0 +1,474 @@
+//! The vehicle side of real flight controllers, in bytes: what is asked of them, when, and what is believed.
+
+mod link_support;
+
+use std::path::Path;
+use std::time::Duration;
+
+use greylag::link::autopilot::Severity;
+use greylag::link::vehicle::{
+    Authority, Demand, Fault, Notice, Outputs, Profile, Real, Sitl, Stack, Vehicle,
+};
+use greylag::physics::servos::Travels;
+use greylag::physics::{Airframe, Command};
+use link_support::{Shown, frame_from, peer};
+use mavlink::MavlinkVersion::V2;
+use mavlink::dialects::ardupilotmega::*;
+
+const HEARTBEAT: u32 = 0;
+const MANUAL_CONTROL: u32 = 69;
+const CHANNELS_OVERRIDE: u32 = 70;
+const COMMAND_LONG: u32 = 76;
+const DO_SET_MODE: u16 = 176;
+const SET_MESSAGE_INTERVAL: u16 = 511;
+/// MANUAL and HOLD of PX4, MANUAL and LOITER of ArduPlane.
+const PX4_MANUAL: u32 = 1 << 16;
+const PX4_HOLD: u32 = 4 << 16 | 3 << 24;
+const ARDUPILOT_MANUAL: u32 = 0;
+const ARDUPILOT_LOITER: u32 = 12;
+
+/// A controller played by hand, with the vehicle side that hears it, in steps of 10 ms.
+struct Played {
+    real: Real,
+    stack: Stack,
+    /// Time since the start, ms.
+    ms: u64,
+    mode: u32,
+    /// Each how many steps a state comes.
+    every: u64,
+    demand: Demand,
+    /// The frames that came out, with the time, ms.
+    out: Vec<(u64, u32, Vec<u8>)>,
+    notices: Vec<Notice>,
+}
+
+/// What asks for nothing.
+const NOTHING: Demand = Demand { outputs: Outputs::Disarmed, attitude: [0.0; 2], fault: None };
+const RIGHT: Command = Command { aileron: 0.5, elevator: 0.0, throttle: 0.25, rudder: 0.0 };
+
+fn armed(command: Command) -> Demand {
+    Demand { outputs: Outputs::Armed(command), ..NOTHING }
+}
+
+impl Played {
+    fn new(stack: Stack, authority: Authority) -> Self {
+        let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
+        let profile = Profile { stack, authority, actuators: airframe.actuators };
+        Played {
+            real: Real::new(profile),
+            stack,
+            ms: 0,
+            mode: if stack == Stack::Px4 { PX4_HOLD } else { ARDUPILOT_LOITER },
+            every: 1,
+            demand: NOTHING,
+            out: vec![],
+            notices: vec![],
+        }
+    }
+
+    fn host(&self) -> Duration {
+        Duration::from_millis(self.ms)
+    }
+
+    /// A frame of the controller.
+    fn says(&mut self, message: &MavMessage) {
+        self.says_from(1, 1, message);
+    }
+
+    /// A frame of anyone on its link.
+    fn says_from(&mut self, system: u8, component: u8, message: &MavMessage) {
+        let bytes = frame_from(V2, system, component, message);
+        let (host, demand) = (self.host(), self.demand);
+        let mut states = vec![];
+        self.real.handle(host, peer(1), &bytes, |state| states.push(state.time));
+        for time in states {
+            let answer = self.real.answer(host, time, &demand);
+            self.sent(&answer);
+        }
+    }
+
+    fn sent(&mut self, mut bytes: &[u8]) {
+        while !bytes.is_empty() {
+            let (frame, rest) = bytes.split_at(12 + bytes[1] as usize);
+            let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
+            self.out.push((self.ms, id, frame[10..frame.len() - 2].to_vec()));
+            bytes = rest;
+        }
+    }
+
+    fn heartbeat(&mut self) {
+        let autopilot = match self.stack {
+            Stack::Px4 => MavAutopilot::MAV_AUTOPILOT_PX4,
+            Stack::Ardupilot => MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        };
+        self.says(&beat(autopilot, self.mode));
+    }
+
+    /// A step: a heartbeat each second, a state each `every` steps, what is due.
+    fn step(&mut self) {
+        if self.ms.is_multiple_of(1000) {
+            self.heartbeat();
+        }
+        if (self.ms / 10).is_multiple_of(self.every) {
+            // A breath of turbulence, so that nothing stands still.
+            let mut shown = Shown::at(1000 * self.ms);
+            shown.attitude.rollspeed = 1e-3 * (self.ms % 70) as f32;
+            self.says(&MavMessage::HIGHRES_IMU(shown.imu));
+            self.says(&MavMessage::VFR_HUD(shown.air));
+            self.says(&MavMessage::ATTITUDE_QUATERNION(shown.attitude));
+        }
+        let due = self.real.due(self.host()).unwrap_or_default();
+        self.sent(&due);
+        self.notices.extend(std::iter::from_fn(|| self.real.take_notice()));
+        self.ms += 10;
+    }
+
+    fn run(&mut self, ms: u64) {
+        (0..ms / 10).for_each(|_| self.step());
+    }
+
+    /// Steers: asks, and shows the steered mode.
+    fn engage(&mut self) {
+        self.demand = armed(RIGHT);
+        self.run(700);
+        self.mode = if self.stack == Stack::Px4 { PX4_MANUAL } else { ARDUPILOT_MANUAL };
+        self.heartbeat();
+        assert!(self.real.flies(), "{:?}", self.notices);
+    }
+
+    /// Frames with a number, with their times.
+    fn frames(&self, id: u32) -> Vec<(u64, Vec<u8>)> {
+        self.out.iter().filter(|o| o.1 == id).map(|o| (o.0, o.2.clone())).collect()
+    }
+
+    /// Times, ms, with parameters 1 and 2 of each command with this number.
+    fn commands(&self, number: u16) -> Vec<(u64, [f32; 2])> {
+        let float =
+            |p: &[u8], at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
+        let asked = self.frames(COMMAND_LONG).into_iter();
+        asked
+            .filter(|(_, p)| p.len() > 29 && u16::from_le_bytes([p[28], p[29]]) == number)
+            .map(|(ms, p)| (ms, [float(&p, 0), float(&p, 4)]))
+            .collect()
+    }
+
+    /// Times, ms, with the main mode of each request for a mode.
+    fn requests(&self) -> Vec<(u64, f32)> {
+        self.commands(DO_SET_MODE).into_iter().map(|(ms, [_, main])| (ms, main)).collect()
+    }
+
+    /// Whether something of this kind was said as an error.
+    fn complained(&self, words: &str) -> bool {
+        let hit = |notice: &Notice| matches!(notice, Notice::Text(Severity::Error, said) if said.contains(words));
+        self.notices.iter().any(hit)
+    }
+
+    /// The reason of the hand-back, if there was one.
+    fn released(&self) -> Option<String> {
+        self.notices.iter().find_map(|notice| match notice {
+            Notice::Released(reason) => Some(reason.clone()),
+            _ => None,
+        })
+    }
+}
+
+fn beat(autopilot: MavAutopilot, mode: u32) -> MavMessage {
+    MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        custom_mode: mode,
+        mavtype: MavType::MAV_TYPE_FIXED_WING,
+        autopilot,
+        base_mode: MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED
+            | MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+        ..Default::default()
+    })
+}
+
+/// The answer to the last request for a mode, or for a stream.
+fn ack(command: MavCmd, result: MavResult, component: u8) -> MavMessage {
+    MavMessage::COMMAND_ACK(COMMAND_ACK_DATA {
+        command,
+        result,
+        target_system: 1,
+        target_component: component,
+        ..Default::default()
+    })
+}
+
+#[test]
+fn our_heartbeat_beats_once_a_second_before_a_controller_is_heard_too() {
+    let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
+    let profile = Profile {
+        stack: Stack::Px4,
+        authority: Authority::Surfaces,
+        actuators: airframe.actuators,
+    };
+    let mut real = Real::new(profile);
+    assert_eq!((real.controller(), real.system(), real.peer()), (None, None, None));
+    let beats = (0..500).filter(|i| real.due(Duration::from_millis(10 * i)).is_some()).count();
+    assert_eq!(beats, 5);
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(3000);
+    assert_eq!(played.frames(HEARTBEAT).len(), 3);
+    assert_eq!((played.real.controller(), played.real.system()), (Some((12, true)), Some(1)));
+}
+
+#[test]
+fn px4_sees_half_a_second_of_sticks_before_it_is_asked_for_the_mode() {
+    for (stack, lead_ms, sticks) in
+        [(Stack::Px4, 500, MANUAL_CONTROL), (Stack::Ardupilot, 0, CHANNELS_OVERRIDE)]
+    {
+        let mut played = Played::new(stack, Authority::Surfaces);
+        played.run(2000);
+        assert!(played.requests().is_empty() && played.frames(sticks).is_empty());
+        played.demand = armed(RIGHT);
+        played.run(900);
+        let steered = if stack == Stack::Px4 { 1.0 } else { 0.0 };
+        // It is asked again every 250 ms.
+        let wanted: Vec<_> = (0..4).map(|i| (2000 + lead_ms + 250 * i, steered)).collect();
+        let asked = played.requests();
+        assert_eq!(asked[..], wanted[..asked.len()], "{stack}");
+        assert!(asked.len() >= 2, "{asked:?}");
+        let first = played.frames(sticks)[0].0;
+        assert!(first <= 2010, "{stack}: first sticks at {first} ms");
+    }
+}
+
+#[test]
+fn a_mode_that_is_not_shown_within_its_time_is_given_up_with_the_reason() {
+    for (result, component, words) in [
+        // An answer to another companion is none to us.
+        (MavResult::MAV_RESULT_DENIED, 190, "it did not answer"),
+        (MavResult::MAV_RESULT_DENIED, 191, "a failsafe or a geofence"),
+        (MavResult::MAV_RESULT_ACCEPTED, 191, "it accepted, but showed another mode"),
+    ] {
+        let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+        played.run(2000);
+        played.demand = armed(RIGHT);
+        played.run(600);
+        played.says(&ack(MavCmd::MAV_CMD_DO_SET_MODE, result, component));
+        played.run(2890);
+        assert_eq!(played.released(), None);
+        played.run(50);
+        let reason = played.released().unwrap();
+        assert!(reason.contains(words), "{reason}");
+        // It is asked for HOLD, and nothing is begun again while the demand lasts.
+        played.run(1000);
+        assert_eq!(played.requests().last().unwrap().1, 4.0);
+        assert!(!played.real.is_engaged());
+    }
+}
+
+#[test]
+fn a_command_that_is_not_finite_is_sent_as_the_last_that_was() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(2000);
+    played.engage();
+    played.run(100);
+    let before = played.frames(MANUAL_CONTROL).last().unwrap().1.clone();
+    played.demand = armed(Command { aileron: f64::NAN, ..RIGHT });
+    played.run(50);
+    let after = played.frames(MANUAL_CONTROL);
+    assert!(after[after.len() - 5..].iter().all(|(_, payload)| *payload == before));
+    // y, + right, in thousandths.
+    assert_eq!(i16::from_le_bytes([before[2], before[3]]), 500);
+    assert_eq!(played.real.counts().bad_commands, 5);
+}
+
+#[test]
+fn a_fault_hands_the_aircraft_back_and_the_channels_to_the_radio() {
+    let mut played = Played::new(Stack::Ardupilot, Authority::Surfaces);
+    played.run(2000);
+    played.engage();
+    played.run(500);
+    let at = played.ms;
+    played.demand.fault = Some(Fault::Lost);
+    played.run(1000);
+    assert!(played.released().is_some());
+    // LOITER, asked at once and every 250 ms, each time with channels that are released.
+    let loiter: Vec<_> = played.requests().into_iter().filter(|r| r.0 >= at).collect();
+    let wanted: Vec<_> = (0..4).map(|i| (at + 250 * i, 12.0)).collect();
+    assert_eq!(loiter, wanted);
+    let channels = played.frames(CHANNELS_OVERRIDE).into_iter().filter(|f| f.0 >= at);
+    let released: Vec<_> = channels.map(|(_, p)| p[..6].to_vec()).collect();
+    assert_eq!(released, vec![vec![0; 6]; 4]);
+}
+
+#[test]
+fn a_radio_is_believed_only_while_nothing_is_overridden() {
+    let receiver = |alive: bool| {
+        let bits = if alive {
+            MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+        } else {
+            MavSysStatusSensor::empty()
+        };
+        MavMessage::SYS_STATUS(SYS_STATUS_DATA {
+            onboard_control_sensors_present: bits,
+            onboard_control_sensors_enabled: bits,
+            onboard_control_sensors_health: bits,
+            ..Default::default()
+        })
+    };
+    let mut played = Played::new(Stack::Ardupilot, Authority::Surfaces);
+    played.run(2000);
+    assert_eq!(played.real.radio_warning(), None);
+    played.says(&receiver(true));
+    assert!(played.real.radio_warning().is_some());
+    played.says(&receiver(false));
+    played.engage();
+    // Our own overrides look like one.
+    played.says(&receiver(true));
+    assert_eq!(played.real.radio_warning(), None);
+    // By attitudes, or at PX4, a dead companion leaves nobody's sticks in force.
+    for (stack, authority) in
+        [(Stack::Ardupilot, Authority::Attitude), (Stack::Px4, Authority::Surfaces)]
+    {
+        let mut played = Played::new(stack, authority);
+        played.run(2000);
+        played.says(&receiver(true));
+        assert_eq!(played.real.radio_warning(), None);
+    }
+}
+
+#[test]
+fn a_thin_stream_is_an_obstacle_with_its_rate() {
+    for (every, thin) in [(1, false), (2, true)] {
+        let mut played = Played::new(Stack::Px4, Authority::Attitude);
+        played.every = every;
+        played.run(500);
+        for (name, value) in [("COM_OF_LOSS_T", 0.5), ("COM_OBL_RC_ACT", 5.0)] {
+            played.says(&MavMessage::PARAM_VALUE(PARAM_VALUE_DATA {
+                param_value: value,
+                param_count: 2,
+                param_id: name.into(),
+                param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+                ..Default::default()
+            }));
+        }
+        played.run(3000);
+        assert_eq!(played.real.denial(31), None, "nothing was denied");
+        let said = played.real.obstacle();
+        let words = "ATTITUDE_QUATERNION comes at 50 Hz, 100 are needed";
+        assert_eq!(said.as_ref().is_some_and(|said| said.contains(words)), thin, "{said:?}");
+        assert!(thin || said.is_none(), "{said:?}");
+    }
+}
+
+#[test]
+fn what_others_send_is_counted_and_not_believed() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(1000);
+    let states = played.real.counts().states;
+    assert_eq!((states, played.real.counts().foreign), (100, 0));
+    let stranger = frame_from(V2, 2, 1, &MavMessage::VFR_HUD(VFR_HUD_DATA::default()));
+    played.real.handle(played.host(), peer(1), &stranger, |_| panic!("a state of another"));
+    let counts = played.real.counts();
+    assert_eq!((counts.states, counts.foreign), (states, 1));
+}
+
+#[test]
+fn without_a_state_for_longer_than_0_3_s_the_aircraft_is_handed_back() {
+    for (stack, authority) in
+        [(Stack::Ardupilot, Authority::Attitude), (Stack::Px4, Authority::Surfaces)]
+    {
+        let mut played = Played::new(stack, authority);
+        played.run(2000);
+        played.demand = armed(RIGHT);
+        played.run(700);
+        played.mode = stack.steered(authority).custom(stack);
+        played.heartbeat();
+        played.run(100);
+        // The last state came 10 ms ago.
+        played.every = u64::MAX;
+        played.run(300);
+        assert_eq!(played.released(), None);
+        played.run(10);
+        let reason = played.released().unwrap();
+        assert!(reason.contains("no state of the vehicle for 0.3 s"), "{reason}");
+    }
+}
+
+#[test]
+fn ardupilot_is_sent_its_channels_at_50_hz_and_px4_its_sticks_at_100() {
+    for (stack, id, hz) in
+        [(Stack::Ardupilot, CHANNELS_OVERRIDE, 50), (Stack::Px4, MANUAL_CONTROL, 100)]
+    {
+        let mut played = Played::new(stack, Authority::Surfaces);
+        played.run(2000);
+        played.engage();
+        let before = played.frames(id).len();
+        played.run(1000);
+        assert_eq!(played.frames(id).len() - before, hz, "{stack}");
+    }
+}
+
+#[test]
+fn streams_are_asked_for_at_the_first_frame_and_then_once_a_second() {
+    let mut played = Played::new(Stack::Px4, Authority::Attitude);
+    played.heartbeat();
+    let due = played.real.due(played.host()).unwrap();
+    played.sent(&due);
+    let wanted = [(31.0, 1e4), (105.0, 1e4), (74.0, 2e4), (33.0, 1e5), (231.0, 5e5)];
+    let asked: Vec<_> = played.commands(SET_MESSAGE_INTERVAL).into_iter().map(|c| c.1).collect();
+    assert_eq!(asked, wanted.map(|(id, us)| [id, us]));
+    // Those that come at their rate are not asked for again.
+    played.run(3500);
+    let again = played.commands(SET_MESSAGE_INTERVAL);
+    assert!(again[5..].iter().all(|(ms, _)| *ms >= 1000), "{again:?}");
+    assert!(again.iter().filter(|(ms, [id, _])| *ms > 0 && *id == 31.0).count() <= 1, "{again:?}");
+    assert_eq!(again.iter().filter(|(ms, [id, _])| *ms > 0 && *id == 33.0).count(), 3, "{again:?}");
+}
+
+#[test]
+fn a_stream_that_is_denied_is_an_obstacle_with_the_remedy() {
+    let mut played = Played::new(Stack::Ardupilot, Authority::Attitude);
+    played.heartbeat();
+    let due = played.real.due(played.host()).unwrap();
+    played.sent(&due);
+    // Answers come in the order of the requests: ATTITUDE_QUATERNION was the first.
+    let interval = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL;
+    played.says(&ack(interval, MavResult::MAV_RESULT_DENIED, 190));
+    assert_eq!(played.real.denial(31), None, "an answer to another");
+    played.says(&ack(interval, MavResult::MAV_RESULT_DENIED, 191));
+    let words = played.real.denial(31).unwrap();
+    assert!(words.contains("denies ATTITUDE_QUATERNION at 100 Hz"), "{words}");
+    assert_eq!(played.real.denial(105), None);
+}
+
+#[test]
+fn only_an_autopilot_of_the_profiles_stack_is_flown() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    // A gimbal that says PX4, and an autopilot's place with no autopilot in it.
+    played.says_from(1, 154, &beat(MavAutopilot::MAV_AUTOPILOT_PX4, PX4_HOLD));
+    played.says_from(1, 1, &beat(MavAutopilot::MAV_AUTOPILOT_INVALID, PX4_HOLD));
+    assert_eq!(played.real.controller(), None);
+    played.says_from(7, 1, &beat(MavAutopilot::MAV_AUTOPILOT_PX4, PX4_HOLD));
+    assert_eq!((played.real.system(), played.real.controller()), (Some(7), Some((12, true))));
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(100);
+    assert!(!played.complained("fly it with --profile"));
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.stack = Stack::Ardupilot;
+    played.run(100);
+    assert!(played.complained("ArduPilot: fly it with --profile ardupilot"));
+    assert!(played.real.obstacle().unwrap().contains("--profile ardupilot"));
+}
+
+#[test]
+fn surfaces_are_known_to_move_only_while_a_controller_flies_them_as_commanded() {
+    let sitl = Vehicle::Sitl(Sitl::new(1, Travels::alike(0.5)));
+    assert!(sitl.moves_surfaces() && sitl.flies_surfaces() && !sitl.has_channels());
+    for (authority, surfaces) in [(Authority::Surfaces, true), (Authority::Attitude, false)] {
+        let mut played = Played::new(Stack::Ardupilot, authority);
+        let vehicle = |played: &Played| Vehicle::Real(Box::new(played.real.clone()));
+        played.run(2000);
+        let before = vehicle(&played);
+        assert!(!before.moves_surfaces());
+        assert_eq!((before.flies_surfaces(), before.has_channels()), (surfaces, surfaces));
+        played.demand = armed(RIGHT);
+        played.run(100);
+        played.mode = Stack::Ardupilot.steered(authority).custom(Stack::Ardupilot);
+        played.heartbeat();
+        assert_eq!(vehicle(&played).moves_surfaces(), surfaces);
+        assert_eq!(vehicle(&played).counts(), played.real.counts());
+    }
+}
