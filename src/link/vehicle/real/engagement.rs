@@ -297,7 +297,7 @@ mod tests {
             let mut engagement = Engagement::new(LEAD);
             engagement.begin(ms(0));
             // In progress is no refusal.
-            [result, 5].map(|result| engagement.answered(result));
+            [result, 5].into_iter().for_each(|result| engagement.answered(result));
             let said = engagement.overdue(ms(3501), stack, authority).unwrap();
             assert!(said.contains(words), "{said}");
         }
