@@ -118,8 +118,8 @@ fn each_refusal_of_a_setpoint_says_what_was_wrong() {
         (setpoint(unit, 0.5, 128), "it has no attitude"),
     ] {
         let (mut clients, mut double) = new();
-        let told = texts(&send(&mut clients, &mut double, 0, 1, data)).concat();
-        assert!(told.contains(words), "{told}");
+        let said = texts(&send(&mut clients, &mut double, 0, 1, data)).concat();
+        assert!(said.contains(words), "{said}");
     }
 }
 

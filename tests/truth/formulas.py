@@ -108,7 +108,7 @@ class Formula:
         factor = "" if self.factor == "1" else f"{self.factor}*"
         return f"{self.channel} = {self.amount:g}*{factor}{self.shape}"
 
-    def told(self):
+    def record(self):
         """What truth.json says of it."""
         return {**asdict(self), "factor": self.factor, "shape": self.shape, "trend": self.trend, "text": self.text()}
 

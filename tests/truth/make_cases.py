@@ -87,26 +87,26 @@ def make_case(folder, kind, case, seed, effect, options, duration, wrong, streng
     """Writes one case; `effect` is an id, one of `DRAWN` for a formula that is drawn, or None."""
     (fly, step), folder = truth_of(kind), folder / case
     folder.mkdir(parents=True)
-    told = {"case": case, "truth": kind, "seed": seed, "hidden": effect, "amount": 0.0, "duration_s": duration}
-    told.update(sensors=asdict(options), wrong=wrong, flights={})
+    record = {"case": case, "truth": kind, "seed": seed, "hidden": effect, "amount": 0.0, "duration_s": duration}
+    record.update(sensors=asdict(options), wrong=wrong, flights={})
     if effect in DRAWN:
         formula, flights, lost = flown_with_formula(fly, DRAWN[effect], case, seed, duration, strength)
-        told.update(hidden=formula.text(), amount=formula.amount, formula=formula.told(), strength=strength)
-        told["not_flown"] = lost
+        record.update(hidden=formula.text(), amount=formula.amount, formula=formula.record(), strength=strength)
+        record["not_flown"] = lost
         effect = None
     else:
         if effect:
-            told["amount"] = hidden.amplitude(effect, kind.split("-")[0], hidden.random_of(seed, case, 3))
-        flights = flown(fly, case, seed, effect, told["amount"], duration)
+            record["amount"] = hidden.amplitude(effect, kind.split("-")[0], hidden.random_of(seed, case, 3))
+        flights = flown(fly, case, seed, effect, record["amount"], duration)
     for flight, (rows, commands, drawn) in flights.items():
         random = hidden.random_of(seed, case, *flight.encode(), 4)
         names, table, errors = sensors.log(rows, step, commands, manoeuvres.SETTLE, options, random)
         sensors.write(folder / f"{flight}.csv", names, table)
-        told["flights"][flight] = {**drawn, "errors": errors}
+        record["flights"][flight] = {**drawn, "errors": errors}
     parts = model_file.coefficients(effect, hidden.random_of(seed, case, 5), wrong)
     (folder / "model.toml").write_text(model_file.text(case, parts))
     shutil.copyfile(AIRFRAME, folder / "airframe.toml")
-    (folder / "truth.json").write_text(json.dumps(told, indent=1) + "\n")
+    (folder / "truth.json").write_text(json.dumps(record, indent=1) + "\n")
 
 
 def chosen(text):

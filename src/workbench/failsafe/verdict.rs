@@ -17,7 +17,7 @@ const TOGETHER_S: f64 = 0.2;
 /// What has not changed after this time did not, s.
 const LATER_S: f64 = 2.0;
 
-/// A loss of altitude that is told, m.
+/// A loss of altitude that the sentence mentions, m.
 const MUCH_M: f64 = 30.0;
 
 /// Something after which something may change.

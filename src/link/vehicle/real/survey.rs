@@ -5,6 +5,8 @@ use std::time::Duration;
 
 /// Rates are taken over windows of this length.
 const WINDOW: Duration = Duration::from_secs(1);
+/// Frames by which one may come late: further back is a new start.
+const LATE: u32 = 32;
 /// Round trips that are kept.
 const TRIPS: usize = 256;
 
@@ -67,10 +69,17 @@ pub struct Survey {
 impl Survey {
     /// Notes a frame of the controller.
     pub(super) fn frame(&mut self, host: Duration, id: u32, sequence: u8, bytes: usize) {
-        if let Some(before) = self.sequence.replace(sequence) {
-            // A gap of more than half the counter is a frame that came late, or a new start.
-            let gap = sequence.wrapping_sub(before).wrapping_sub(1);
-            self.lost += if gap < 128 { u64::from(gap) } else { 0 };
+        match self.sequence.map(|before| sequence.wrapping_sub(before)) {
+            // twice the same
+            Some(0) => {}
+            // late: it was counted as lost
+            Some(back) if u32::from(back) > 256 - LATE => self.lost = self.lost.saturating_sub(1),
+            Some(ahead) => {
+                // more than half the counter is a new start
+                self.lost += if ahead <= 128 { u64::from(ahead - 1) } else { 0 };
+                self.sequence = Some(sequence);
+            }
+            None => self.sequence = Some(sequence),
         }
         self.received += 1;
         let (first, _) = *self.span.get_or_insert((host, host));
@@ -212,6 +221,21 @@ mod tests {
         let rate = survey.messages().find(|(id, _)| *id == 22).map(|(_, t)| survey.mean_hz(t));
         // Nine in eight seconds, whatever the host's clock showed at first.
         assert_eq!(rate, Some(9.0 / 8.0));
+    }
+
+    #[test]
+    fn frames_that_come_late_or_twice_are_not_lost() {
+        let mut survey = Survey::default();
+        for sequence in [250, 252, 251, 251, 255, 254, 253, 0, 2, 1, 3] {
+            survey.frame(Duration::ZERO, 0, sequence, 21);
+        }
+        assert_eq!(survey.frames()[1], 0);
+        // five are missing, then the controller starts again
+        survey.frame(Duration::ZERO, 0, 9, 21);
+        survey.frame(Duration::ZERO, 0, 150, 21);
+        assert_eq!(survey.frames()[1], 5);
+        survey.frame(Duration::ZERO, 0, 152, 21);
+        assert_eq!(survey.frames()[1], 6);
     }
 
     #[test]
