@@ -12,7 +12,7 @@ use greylag::model::GreyBox;
 use greylag::physics::Command;
 use greylag::sim::faults::policies::policies;
 use greylag::sim::faults::search::{distances, search};
-use greylag::sim::faults::{CompanionFactory, Counterpart, Scenario, Setting};
+use greylag::sim::faults::{CompanionFactory, ControllerSetting, Counterpart, Scenario, Setting};
 
 fn x8() -> GreyBox {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
@@ -50,6 +50,45 @@ fn a_link_that_loses_half_of_its_frames_is_left_in_time() {
     let scenario: Scenario = serde_json::from_str(scenario).unwrap();
     let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
     assert_eq!(broken(&factory, &scenario), [""; 0]);
+}
+
+#[test]
+fn a_bank_that_is_reversed_by_attitude_stays_inside_a_narrow_envelope() {
+    // found by a search; a step of the attitude put the nose 22 degrees above and 21 below the envelope
+    let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
+    for scenario in [
+        include_str!("data/scenarios/reversal-px4-attitude.json"),
+        include_str!("data/scenarios/reversal-ardupilot-attitude.json"),
+        include_str!("data/scenarios/unplugged-ardupilot-attitude.json"),
+    ] {
+        let scenario: Scenario = serde_json::from_str(scenario).unwrap();
+        assert_eq!(broken(&factory, &scenario), [""; 0], "{:?}", scenario.counterpart);
+    }
+}
+
+#[test]
+fn parameters_of_the_flight_controller_are_set_and_looked_at() {
+    let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
+    let with = |counterpart, name: &str, value| {
+        let controller_parameters = vec![ControllerSetting { name: name.into(), value }];
+        Scenario { controller_parameters, ..quiet(counterpart) }
+    };
+    // engaging is refused: nothing is flown, and nothing broken
+    for (counterpart, name, value) in [
+        (Counterpart::Px4, "COM_RC_IN_MODE", 0.0),
+        (Counterpart::Px4Attitude, "COM_OF_LOSS_T", 5.0),
+        (Counterpart::Ardupilot, "RC_OVERRIDE_TIME", 3.0),
+    ] {
+        let scenario = with(counterpart, name, value);
+        assert_eq!(broken(&factory, &scenario), [""; 0], "{name}");
+        let (samples, _) = factory.trace(&scenario).unwrap();
+        assert!(!samples.iter().any(|s| s.confirmed), "{name}");
+        assert!(samples.iter().any(|s| s.spoke), "{name}");
+    }
+    let rules = policies(&factory.envelope());
+    let refused = |scenario| distances(&factory, &rules, &scenario).unwrap_err().to_string();
+    assert!(refused(with(Counterpart::Px4, "NONE", 1.0)).contains("has no parameter NONE"));
+    assert!(refused(with(Counterpart::Sitl, "X", 1.0)).contains("no flight controller is played"));
 }
 
 #[test]

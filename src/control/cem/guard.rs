@@ -17,11 +17,11 @@ impl Cem {
         self.predictions.as_ref().filter(|_| self.settings.disturbance.is_some())
     }
 
-    /// Whether the model is one to plan with here: it has predicted the last half second well enough, and its residual
-    /// has seen data like this.
+    /// Whether the model is one to plan with here: it has predicted the last half second well enough, gusts aside, and its
+    /// residual has seen data like this.
     pub(super) fn is_trusted(&self, seen: &Observation) -> bool {
         let predicted = match (self.settings.trust, &self.predictions) {
-            (Some(most), Some(predictions)) => predictions.missed_part() <= most,
+            (Some(most), Some(predictions)) => !predictions.is_wrong(most),
             _ => true,
         };
         let known = match (self.settings.known, &self.model.residual) {

@@ -87,7 +87,8 @@ pub struct Settings {
     /// Time constant (s) with which what the model leaves unexplained is estimated; `None`: it is not.
     pub disturbance: Option<f64>,
     /// Largest part of the motion that the model's one-step predictions may have missed in the last half second
-    /// for plans to be made; above it the base flies alone, or without one the policy. It needs either of them.
+    /// for plans to be made; above it, unless what they missed is like gusts, the base flies alone, or without one the policy.
+    /// It needs either of them.
     pub trust: Option<f64>,
     /// Largest distance from the data that the model's residual was trained on, see
     /// [`Residual::distance`](crate::model::Residual::distance), at which plans are made

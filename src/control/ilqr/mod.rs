@@ -117,7 +117,7 @@ impl Controller for Ilqr {
         let before = self.lqi.clone();
         let alone = self.lqi.command(seen, target);
         // a model that does not predict is no model to plan with
-        if self.disturbance.missed_part() > TRUST {
+        if self.disturbance.is_wrong(TRUST) {
             self.desk.plan = None;
             return alone;
         }

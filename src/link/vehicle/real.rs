@@ -6,6 +6,7 @@
 
 pub mod air_data;
 mod assembly;
+mod attitude_ramp;
 mod attitude_trim;
 mod duties;
 mod engagement;
@@ -28,6 +29,7 @@ use crate::link::peer::PeerId;
 use crate::link::wire::{Message, controller as wire};
 use crate::physics::{Command, Time};
 use assembly::Assembly;
+use attitude_ramp::AttitudeRamp;
 use attitude_trim::AttitudeTrim;
 use engagement::Engagement;
 use parameters::{Parameters, Standing};
@@ -74,6 +76,7 @@ pub struct Real {
     assembly: Assembly,
     engagement: Engagement,
     sticks: Sticks,
+    ramp: AttitudeRamp,
     trim: AttitudeTrim,
     /// The command that the actuators got last.
     sent: Command,
@@ -104,6 +107,7 @@ impl Real {
             assembly: Assembly::new(profile.actuators),
             engagement: Engagement::new(profile.stack.lead()),
             sticks: Sticks::default(),
+            ramp: AttitudeRamp::default(),
             trim: AttitudeTrim::default(),
             sent: Command::IDLE,
             last_state: None,
@@ -136,6 +140,7 @@ impl Real {
     pub fn answer(&mut self, host: Duration, time: Time, demand: &Demand) -> Vec<u8> {
         let Outputs::Armed(command) = demand.outputs else {
             self.engagement.rest();
+            self.ramp.rest();
             self.trim.rest();
             return Vec::new();
         };
@@ -153,7 +158,7 @@ impl Real {
         }
         let every = self.profile.stack.frames_per_command(self.profile.authority);
         let attitude = match self.profile.authority {
-            Authority::Attitude => self.trimmed(time, demand.attitude),
+            Authority::Attitude => self.commanded(time, demand.attitude),
             _ => demand.attitude,
         };
         let due = self.engagement.steers() && self.states.is_multiple_of(every);
@@ -175,13 +180,17 @@ impl Real {
         self.write(&message)
     }
 
-    /// The attitude to command where `wanted` (rad) is wanted: trimmed while the controller flies it.
-    fn trimmed(&mut self, time: Time, wanted: [f64; 2]) -> [f64; 2] {
+    /// The attitude to command where `wanted` (rad) is wanted: on a ramp, and trimmed while the controller flies it.
+    fn commanded(&mut self, time: Time, wanted: [f64; 2]) -> [f64; 2] {
+        let seen = self.assembly.attitude();
         if !self.flies() {
+            // until then what is sent is the attitude that the aircraft has
+            self.ramp.rest();
             self.trim.rest();
-            return wanted;
+            return self.ramp.command(time, wanted, seen);
         }
-        self.trim.command(time, wanted, self.assembly.attitude())
+        let on_the_way = self.ramp.command(time, wanted, seen);
+        self.trim.command(time, on_the_way, seen)
     }
 
     /// The oldest notice that was not fetched.

@@ -8,7 +8,7 @@ use greylag_sitl::shim::{Distortion, Launch, Noise, Personality, ShimError, Shim
 
 use serde::{Deserialize, Serialize};
 
-use super::scenario::Scenario;
+use super::scenario::{ControllerSetting, Scenario};
 use crate::link::vehicle::{Authority, Profile, Real, Sitl, Stack, Vehicle};
 use crate::model::GreyBox;
 
@@ -97,12 +97,22 @@ impl Aircraft {
         let mut options = ShimOptions::new(scenario.air(plant), plant.start);
         options.seed = scenario.seed;
         options.noise = Noise::REALISTIC;
-        Ok(match scenario.counterpart.personality() {
-            None => Aircraft::Sitl(Box::new(Bench::new(&options)?)),
-            Some((personality, _)) => {
+        let first = scenario.controller_parameters.first();
+        Ok(match (scenario.counterpart.personality(), first) {
+            (None, Some(setting)) => {
+                return Err(ShimError::Parameter {
+                    stack: "sitl",
+                    name: setting.name.clone(),
+                    known: "none: no flight controller is played there".into(),
+                });
+            }
+            (None, None) => Aircraft::Sitl(Box::new(Bench::new(&options)?)),
+            (Some((personality, _)), _) => {
                 options.launch = Launch::Immediate;
+                let set = |s: &ControllerSetting| (s.name.clone(), s.value);
+                options.parameters = scenario.controller_parameters.iter().map(set).collect();
                 if scenario.radio && personality == Personality::Ardupilot {
-                    options.parameters = vec![(NO_RADIO.into(), 0.0)];
+                    options.parameters.push((NO_RADIO.into(), 0.0));
                 }
                 Aircraft::Real(Box::new(FlightController::new(personality, &options)?))
             }
@@ -171,6 +181,14 @@ impl Aircraft {
         match self {
             Aircraft::Sitl(_) => None,
             Aircraft::Real(controller) => Some(controller.mode()),
+        }
+    }
+
+    /// Whether the flight controller flies by itself in the companion's mode, for want of targets.
+    pub(super) fn turns_back(&self) -> bool {
+        match self {
+            Aircraft::Sitl(_) => false,
+            Aircraft::Real(controller) => controller.turns_back(),
         }
     }
 

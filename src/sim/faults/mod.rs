@@ -17,4 +17,4 @@ pub use counterpart::{ControllerMode, Counterpart};
 pub use flight::{Case, CompanionFactory, FaultsError, Report, Witnessed};
 pub use judge::{Cause, Finding, Found};
 pub use mix::{Fault, FaultKind, draw};
-pub use scenario::{Asked, Asking, Leg, Scenario, Setting};
+pub use scenario::{Asked, Asking, ControllerSetting, Leg, Scenario, Setting};

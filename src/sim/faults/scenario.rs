@@ -82,6 +82,56 @@ const SETTINGS: [(&str, [f64; 2]); 9] = [
     ("GL_SLEW_THR", [0.2, 4.0]),
 ];
 
+/// A parameter of the flight controller with another value than the played one has.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ControllerSetting {
+    /// Its name, of PX4 or ArduPilot.
+    pub name: String,
+    /// Its value, in the stack's unit.
+    pub value: f64,
+}
+
+/// Values of parameters.
+type Values = [(&'static str, &'static [f64])];
+
+/// PX4's parameters that are varied, with the values that are tried: right ones, wrong ones, and the stack's own defaults. What the
+/// companion cannot fly safely with it has to refuse.
+const PX4_SETTINGS: &Values = &[
+    ("COM_RC_IN_MODE", &[0.0, 1.0, 2.0, 3.0, 4.0]),
+    ("COM_RC_LOSS_T", &[0.1, 0.5, 1.0, 5.0]),
+    ("NAV_RCL_ACT", &[0.0, 1.0, 2.0, 3.0]),
+    ("COM_OF_LOSS_T", &[0.1, 0.5, 1.0, 5.0]),
+    ("COM_OBL_RC_ACT", &[0.0, 3.0, 5.0]),
+    ("FW_MAN_R_SC", &[0.5, 1.0]),
+    ("FW_MAN_P_SC", &[0.5, 1.0]),
+    ("TRIM_ROLL", &[-0.1, 0.0, 0.1]),
+    ("TRIM_PITCH", &[-0.1, 0.0, 0.1]),
+    ("PWM_MAIN_REV", &[0.0, 1.0, 2.0, 3.0]),
+    ("IMU_GYRO_CUTOFF", &[5.0, 20.0, 40.0, 80.0]),
+];
+
+/// ArduPilot's, likewise.
+const ARDUPILOT_SETTINGS: &Values = &[
+    ("SERVO1_REVERSED", &[0.0, 1.0]),
+    ("SERVO2_REVERSED", &[0.0, 1.0]),
+    ("MAV_GCS_SYSID", &[1.0, 255.0]),
+    ("SCHED_LOOP_RATE", &[50.0, 100.0, 200.0, 400.0]),
+    ("RC_OVERRIDE_TIME", &[0.1, 0.5, 3.0]),
+    ("GUIDED_TIMEOUT", &[0.2, 1.0, 3.0]),
+    ("THR_FAILSAFE", &[0.0, 1.0]),
+    ("FS_SHORT_ACTN", &[0.0, 1.0, 2.0, 3.0]),
+    ("FS_LONG_ACTN", &[0.0, 1.0, 2.0]),
+    ("RC_FS_TIMEOUT", &[0.5, 1.0, 5.0]),
+    ("SIM_RC_FAIL", &[0.0, 1.0]),
+    ("INS_GYRO_FILTER", &[0.0, 5.0, 20.0, 50.0]),
+    ("SIM_SERVO_DELAY", &[0.0, 20.0, 60.0]),
+    ("RC1_REVERSED", &[0.0, 1.0]),
+    ("RC2_REVERSED", &[0.0, 1.0]),
+    ("RC1_TRIM", &[1400.0, 1500.0, 1600.0]),
+    ("RC2_TRIM", &[1400.0, 1500.0, 1600.0]),
+];
+
 /// A flight of 60 s.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -103,6 +153,9 @@ pub struct Scenario {
     /// Parameters of the companion that are not their defaults.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Setting>,
+    /// Parameters of the flight controller that are not as the played one has them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub controller_parameters: Vec<ControllerSetting>,
     /// Whether a radio with its sticks released is bound to the flight controller; only ArduPilot is played with one.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub radio: bool,
@@ -131,6 +184,7 @@ impl Scenario {
             legs: LEGS.map(leg).to_vec(),
             asked: Vec::new(),
             parameters: Vec::new(),
+            controller_parameters: Vec::new(),
             radio: false,
         }
     }
@@ -147,7 +201,9 @@ impl Scenario {
     /// The same with one thing changed.
     pub fn varied(&self, random: &mut impl Rng) -> Scenario {
         let mut changed = self.clone();
-        match random.random_range(0..12) {
+        match random.random_range(0..14) {
+            12 => changed.controller_parameters.clear(),
+            13 => changed.set_one_of_the_controllers(random),
             10 => changed.parameters.clear(),
             11 => {
                 let (name, [least, most]) = SETTINGS[random.random_range(0..SETTINGS.len())];
@@ -196,6 +252,18 @@ impl Scenario {
         changed
     }
 
+    fn set_one_of_the_controllers(&mut self, random: &mut impl Rng) {
+        let settings = match self.counterpart {
+            Counterpart::Sitl => return,
+            Counterpart::Px4 | Counterpart::Px4Attitude => PX4_SETTINGS,
+            Counterpart::Ardupilot | Counterpart::ArdupilotAttitude => ARDUPILOT_SETTINGS,
+        };
+        let (name, values) = settings[random.random_range(0..settings.len())];
+        let value = values[random.random_range(0..values.len())];
+        self.controller_parameters.retain(|setting| setting.name != name);
+        self.controller_parameters.push(ControllerSetting { name: name.into(), value });
+    }
+
     /// Each scenario with less in it.
     pub fn smaller(&self) -> Vec<Scenario> {
         let mut all = Vec::new();
@@ -214,6 +282,9 @@ impl Scenario {
         }
         for k in 0..self.parameters.len() {
             with(&|s| _ = s.parameters.remove(k));
+        }
+        for k in 0..self.controller_parameters.len() {
+            with(&|s| _ = s.controller_parameters.remove(k));
         }
         with(&|s| s.wind_ned_mps = [0.0; 3]);
         with(&|s| s.turbulence = 0);

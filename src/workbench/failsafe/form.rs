@@ -287,6 +287,7 @@ mod tests {
             legs: vec![leg(0.0, 0.0, 3.0), leg(8.0, 25.0, 5.0), leg(45.0, 0.0, 3.0)],
             asked: vec![asked(25.0, Asking::Arm), asked(25.1, Asking::Offboard)],
             parameters: Vec::new(),
+            controller_parameters: Vec::new(),
             radio: false,
         };
         assert_eq!(scenario, expected);

@@ -515,6 +515,12 @@ impl FlightController {
         self.parameters.get("SIM_RC_FAIL") == 0.0
     }
 
+    /// Whether GUIDED has no target any more, so that ArduPilot turns back to where it was entered.
+    pub fn turns_back(&self) -> bool {
+        let ardupilot = self.personality == Personality::Ardupilot;
+        ardupilot && self.mode == Mode::Guided && !self.wish_alive()
+    }
+
     fn command(&mut self) -> Inputs {
         if self.mode == Mode::Manual {
             // Between two samples the channels stand as they stood.
@@ -536,10 +542,7 @@ impl FlightController {
                 let [roll, pitch] = law::left_off(roll, pitch);
                 self.law.attitude(&self.measured, roll, pitch, thrust)
             }
-            // Without targets ArduPilot goes back to the point at which GUIDED was entered.
-            None if (self.mode, self.personality) == (Mode::Guided, Personality::Ardupilot) => {
-                self.law.attitude(&self.measured, TURN_BACK, 0.0, None)
-            }
+            None if self.turns_back() => self.law.attitude(&self.measured, TURN_BACK, 0.0, None),
             None => self.law.level(&self.measured),
         }
     }

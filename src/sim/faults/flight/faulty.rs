@@ -49,7 +49,7 @@ impl Flight {
         let same = std::mem::replace(&mut self.flown, inputs) == inputs;
         let lied_to = |fault: &Fault| matches!(fault.kind, FaultKind::Airspeed | FaultKind::Alpha);
         Exposure {
-            unsteered: same && self.aircraft.is_steered(),
+            unsteered: same && self.aircraft.is_steered() || self.aircraft.turns_back(),
             blind: matches!(self.aircraft, Aircraft::Sitl(_)) && self.judge.is_blind(),
             misled: acting.iter().any(lied_to),
         }

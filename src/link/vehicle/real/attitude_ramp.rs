@@ -1,0 +1,83 @@
+//! A limit on how fast the attitude moves that a controller is commanded.
+//!
+//! A step of the bank from one side to the other drives a controller's loops to their stops, and its pitch errs by 20° meanwhile.
+//! A ramp that the loops can follow keeps the attitude where the envelope wants it.
+
+use crate::physics::Time;
+
+/// Fastest change of the commanded roll and pitch, rad/s: below the limits that controllers set themselves (PX4's default is 70°/s in
+/// roll, 60°/s in pitch; ArduPilot's autotune takes 75°/s).
+const RATE: [f64; 2] = [45.0 * DEGREE, 20.0 * DEGREE];
+/// A longer gap between two states says nothing of what was commanded meanwhile, s.
+const GAP_S: f64 = 0.1;
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// The roll and pitch that were commanded last.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct AttitudeRamp {
+    last: Option<(Time, [f64; 2])>,
+}
+
+impl AttitudeRamp {
+    /// Forgets all: the controller flies by itself.
+    pub(super) fn rest(&mut self) {
+        self.last = None;
+    }
+
+    /// The roll and pitch to command on the way to `wanted`, rad, at `now`; the way begins at `seen`.
+    pub(super) fn command(&mut self, now: Time, wanted: [f64; 2], seen: [f64; 2]) -> [f64; 2] {
+        let (before, from) = self.last.unwrap_or((now, seen));
+        let dt = now.since(before).as_secs_f64().min(GAP_S);
+        let ramped = std::array::from_fn(|axis| {
+            let most = RATE[axis] * dt;
+            // an attitude that is no number is no place to start from
+            if from[axis].is_finite() {
+                wanted[axis].clamp(from[axis] - most, from[axis] + most)
+            } else {
+                wanted[axis]
+            }
+        });
+        self.last = Some((now, ramped));
+        ramped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(ms: u64) -> Time {
+        Time::from_micros(1000 * ms)
+    }
+
+    #[test]
+    fn a_step_becomes_a_ramp_that_begins_where_the_aircraft_is() {
+        let mut ramp = AttitudeRamp::default();
+        let [roll, pitch] = [50.0 * DEGREE, -10.0 * DEGREE];
+        let mut got = [0.0; 2];
+        for tick in 0..=100 {
+            got = ramp.command(at(10 * tick), [roll, pitch], [5.0 * DEGREE, 2.0 * DEGREE]);
+            if tick == 50 {
+                assert!((got[0] / DEGREE - 27.5).abs() < 1e-9, "{}", got[0] / DEGREE);
+                assert!((got[1] / DEGREE + 8.0).abs() < 1e-9, "{}", got[1] / DEGREE);
+            }
+        }
+        assert!((got[0] - roll).abs() < 1e-9 && got[1] == pitch, "reached, and not passed");
+    }
+
+    #[test]
+    fn a_gap_is_no_licence_to_jump() {
+        let mut ramp = AttitudeRamp::default();
+        ramp.command(at(0), [0.0; 2], [0.0; 2]);
+        let [roll, _] = ramp.command(at(5000), [1.0, 0.0], [0.0; 2]);
+        assert!((roll / DEGREE - 4.5).abs() < 1e-9, "{}", roll / DEGREE);
+    }
+
+    #[test]
+    fn an_attitude_that_is_not_known_and_a_rest_begin_anew() {
+        let mut ramp = AttitudeRamp::default();
+        assert_eq!(ramp.command(at(0), [0.3, 0.1], [f64::NAN; 2]), [0.3, 0.1]);
+        ramp.rest();
+        assert_eq!(ramp.command(at(10), [0.3, 0.1], [0.0; 2]), [0.0; 2]);
+    }
+}
