@@ -8,9 +8,10 @@ use greylag::commands::controllers::POLICY;
 use greylag::commands::fly::companion_with;
 use greylag::control::{Controller, ControllerKind, Observation, Target};
 use greylag::flight::runtime::Companion;
+use greylag::link::vehicle::Fault;
 use greylag::model::GreyBox;
 use greylag::physics::Command;
-use greylag::sim::faults::policies::policies;
+use greylag::sim::faults::policies::{Sample, policies};
 use greylag::sim::faults::search::{distances, search};
 use greylag::sim::faults::{CompanionFactory, ControllerSetting, Counterpart, Scenario, Setting};
 
@@ -63,6 +64,30 @@ fn a_bank_that_is_reversed_by_attitude_stays_inside_a_narrow_envelope() {
     ] {
         let scenario: Scenario = serde_json::from_str(scenario).unwrap();
         assert_eq!(broken(&factory, &scenario), [""; 0], "{:?}", scenario.counterpart);
+    }
+}
+
+#[test]
+fn surfaces_that_answer_late_swing_for_two_seconds_at_most() {
+    // found by a search: 60 ms between command and surface; the guard saw the swing after three seconds, at 76 degrees of bank
+    let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
+    let scenario = include_str!("data/scenarios/late-surfaces-ardupilot.json");
+    let scenario: Scenario = serde_json::from_str(scenario).unwrap();
+    assert_eq!(broken(&factory, &scenario), [""; 0]);
+}
+
+#[test]
+fn turbulence_is_no_oscillation() {
+    let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
+    let swings =
+        |s: &Sample| matches!(s.decision.and_then(|d| d.refused), Some(Fault::Oscillation(_)));
+    for counterpart in [Counterpart::Px4, Counterpart::Ardupilot] {
+        for turbulence in [4, 5, 6] {
+            let scenario = Scenario { turbulence, ..quiet(counterpart) };
+            let (samples, _) = factory.trace(&scenario).unwrap();
+            assert!(samples.iter().any(|s| s.confirmed), "{counterpart:?}, {turbulence}");
+            assert!(!samples.iter().any(swings), "{counterpart:?}, {turbulence}");
+        }
     }
 }
 

@@ -181,7 +181,7 @@ mod tests {
         let mut state = State::NEUTRAL;
         let mut memory = Memory::default();
         for tick in 0..1000_u64 {
-            let side = |period: u64| if tick / period % 2 == 0 { 0.1 } else { -0.1 };
+            let side = |period: u64| if (tick / period).is_multiple_of(2) { 0.1 } else { -0.1 };
             let (aileron, elevator) = (side(50), side(35));
             let actuators = ActuatorState { aileron, elevator, ..ActuatorState::default() };
             let seen = Observation {

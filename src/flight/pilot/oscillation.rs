@@ -3,8 +3,8 @@
 //! A loop with more delay than it was designed for can fall into a limit cycle that the slew limit of its
 //! surface sustains: the X8 by ArduPlane's channels swung at 2.6 Hz, q to 228 °/s, for 50 s, with every
 //! state fresh and every command in range. What gives it away is a rate that changes its sign again
-//! and again with the command at its limit each time. A manoeuvre does so once or twice; air does not
-//! keep the command at its limit.
+//! and again with the command at its limit, or over half of its travel, each time. A manoeuvre does so once
+//! or twice; air does not make a command sweep like that.
 
 use super::limits::TICK_S;
 use crate::link::vehicle::Axis;
@@ -22,6 +22,9 @@ const PEAK: f64 = 0.4;
 const NO_SIGN: f64 = 0.05;
 /// Least share of a half swing with the command at its slew limit or its stop.
 const LIMITED: f64 = 0.2;
+/// A command that sweeps this much within a half swing swings too, limit or not: half of the travel from −1 to 1. Where a
+/// surface answers 60 ms late, one half swing in four is free of the limit.
+const SWEPT: f64 = 1.0;
 /// Half swings in a row, and how long they last together, s. A step between ±60° gives three.
 const SWINGS: u32 = 6;
 const LONG_S: f64 = 1.0;
@@ -29,7 +32,7 @@ const LONG_S: f64 = 1.0;
 const ALL: f64 = 0.999;
 
 /// One axis.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Swings {
     mean: Option<f64>,
     /// Sign of the half swing that goes on, 0 before the first.
@@ -37,9 +40,21 @@ struct Swings {
     ticks: u32,
     limited: u32,
     peak: f64,
+    /// Least and largest command of it.
+    range: [f64; 2],
     /// Half swings in a row that were swings, with their ticks.
     row: u32,
     row_ticks: u32,
+}
+
+/// The range of no command.
+const NONE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+impl Default for Swings {
+    fn default() -> Self {
+        let (mean, sign, peak, range) = (None, 0.0, 0.0, NONE);
+        Swings { mean, sign, ticks: 0, limited: 0, peak, range, row: 0, row_ticks: 0 }
+    }
 }
 
 /// The guard of roll and pitch.
@@ -59,8 +74,8 @@ impl Oscillation {
         let limited =
             |before: f64, now: f64| (now - before).abs() >= ALL * step || now.abs() >= ALL;
         let [roll, pitch] = &mut self.0;
-        let rolls = roll.see(state.p, limited(before.aileron, now.aileron));
-        let pitches = pitch.see(state.q, limited(before.elevator, now.elevator));
+        let rolls = roll.see(state.p, now.aileron, limited(before.aileron, now.aileron));
+        let pitches = pitch.see(state.q, now.elevator, limited(before.elevator, now.elevator));
         match (rolls, pitches) {
             (_, true) => Some(Axis::Pitch),
             (true, false) => Some(Axis::Roll),
@@ -70,7 +85,7 @@ impl Oscillation {
 }
 
 impl Swings {
-    fn see(&mut self, rate: f64, limited: bool) -> bool {
+    fn see(&mut self, rate: f64, command: f64, limited: bool) -> bool {
         if !rate.is_finite() {
             return false;
         }
@@ -83,6 +98,7 @@ impl Swings {
         }
         self.ticks += 1;
         self.limited += u32::from(limited);
+        self.range = [self.range[0].min(command), self.range[1].max(command)];
         self.peak = self.peak.max(swing.abs());
         self.row >= SWINGS && f64::from(self.row_ticks) * TICK_S >= LONG_S
     }
@@ -93,13 +109,13 @@ impl Swings {
         let share = f64::from(self.limited) / f64::from(self.ticks.max(1));
         let is_swing = (HALF_SWING_S[0]..=HALF_SWING_S[1]).contains(&length)
             && self.peak >= PEAK
-            && share >= LIMITED;
+            && (share >= LIMITED || self.range[1] - self.range[0] >= SWEPT);
         if is_swing {
             (self.row, self.row_ticks) = (self.row + 1, self.row_ticks + self.ticks);
         } else {
             (self.row, self.row_ticks) = (0, 0);
         }
-        (self.ticks, self.limited, self.peak) = (0, 0, 0.0);
+        (self.ticks, self.limited, self.peak, self.range) = (0, 0, 0.0, NONE);
     }
 }
 
@@ -143,6 +159,16 @@ mod tests {
         assert_eq!(trips(5.0, q, mild), None, "two ticks of twenty are no limit");
         let at = trips(5.0, q, |t| 2.0 * mild(t)).unwrap();
         assert!((1.0..2.0).contains(&at), "{at}");
+    }
+
+    #[test]
+    fn a_swing_over_half_of_the_travel_is_found_without_the_limit() {
+        // 0.15 of a change in a tick at most, where 0.2 are allowed, and 0.8 at most
+        let q = |t: f64| 2.5 * (TAU * 3.0 * t).sin();
+        let elevator = |part: f64| move |t: f64| -part * (TAU * 3.0 * t + 0.6).sin();
+        let at = trips(5.0, q, elevator(0.8)).unwrap();
+        assert!((1.0..2.0).contains(&at), "{at}");
+        assert_eq!(trips(5.0, q, elevator(0.4)), None);
     }
 
     #[test]
