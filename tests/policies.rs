@@ -68,7 +68,7 @@ fn a_bank_that_is_reversed_by_attitude_stays_inside_a_narrow_envelope() {
 }
 
 #[test]
-fn surfaces_that_answer_late_swing_for_two_seconds_at_most() {
+fn surfaces_that_answer_late_are_handed_back_before_the_rules_break() {
     // found by a search: 60 ms between command and surface; the guard saw the swing after three seconds, at 76 degrees of bank
     let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
     let scenario = include_str!("data/scenarios/late-surfaces-ardupilot.json");

@@ -33,6 +33,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 
 import greylag
 from greylag.stable_baselines3 import ImaginedVecEnv
+from judging import judge
 
 torch.set_num_threads(1)
 OTHERS = ("PPO", "SAC", "TD3")
@@ -109,17 +110,6 @@ def train_own(name: str, seed: int, folder: Path, asked: argparse.Namespace) -> 
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return {"steps": asked.td3_steps if name == "greylag TD3" else asked.analytic_updates, "cpu_s": used}
-
-
-def judge(folder: Path, asked: argparse.Namespace) -> dict[str, dict[str, float]]:
-    """Settled error and losses by group of targets, flown in JSBSim."""
-    out = folder / "evaluation.json"
-    command = [str(asked.greylag), "evaluate", "--controller", "policy", "--policy", str(folder)]
-    command += ["--targets", str(asked.targets), "--json", str(out), "--force"]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    scores = json.loads(out.read_text())["controllers"][0]["groups"]
-    kept = ("count", "mean_deg", "median_deg", "max_deg", "divergence_rate", "settling_s")
-    return {score["targets"]: {name: score[name] for name in kept} for score in scores}
 
 
 def table(rows: list[dict]) -> None:

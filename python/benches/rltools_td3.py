@@ -18,7 +18,6 @@ import json
 import os
 import re
 import statistics
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -30,6 +29,7 @@ import numpy as np
 import rltools
 
 import greylag
+from judging import judge
 
 AGENT = "RLtools TD3"
 # Compiled in; what is not here is RLtools' default. Of its three layers two are hidden. The buffer holds all steps, which is the default.
@@ -102,17 +102,6 @@ def export(state: Any, folder: Path, seed: int, steps: int) -> float:
     if apart > 1e-3:
         raise SystemExit(f"{folder}: what was exported differs from what RLtools flies by {apart}")
     return apart
-
-
-def judge(folder: Path, asked: argparse.Namespace) -> dict[str, dict[str, float]]:
-    """Settled error and losses by group of targets, flown in JSBSim: as in ``other_agents.py``."""
-    out = folder / "evaluation.json"
-    command = [str(asked.greylag), "evaluate", "--controller", "policy", "--policy", str(folder)]
-    command += ["--targets", str(asked.targets), "--json", str(out), "--force"]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    scores = json.loads(out.read_text())["controllers"][0]["groups"]
-    kept = ("count", "mean_deg", "median_deg", "max_deg", "divergence_rate", "settling_s")
-    return {score["targets"]: {name: score[name] for name in kept} for score in scores}
 
 
 def main() -> None:

@@ -23,7 +23,7 @@ const NO_SIGN: f64 = 0.05;
 /// Least share of a half swing with the command at its slew limit or its stop.
 const LIMITED: f64 = 0.2;
 /// A command that sweeps this much within a half swing swings too, limit or not: half of the travel from −1 to 1. Where a
-/// surface answers 60 ms late, one half swing in four is free of the limit.
+/// surface answers 60 ms late, a limit cycle has half swings that hardly touch the limit.
 const SWEPT: f64 = 1.0;
 /// Half swings in a row, and how long they last together, s. A step between ±60° gives three.
 const SWINGS: u32 = 6;
