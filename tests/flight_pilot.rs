@@ -538,6 +538,53 @@ impl Controller for Wild {
     }
 }
 
+/// Swings in pitch at 2.6 Hz, the elevator between its stops, for so many ticks of `step`; the largest elevator beyond
+/// trim in the last second.
+fn swing(flight: &mut Flight, ticks: usize, step: Duration) -> f64 {
+    let trim = x8().trim_at(x8().envelope.airspeed_cruise_mps).elevator;
+    let mut recent = Vec::new();
+    for _ in 0..ticks {
+        flight.now = flight.now.plus(step);
+        let phase = std::f64::consts::TAU * 2.6 * flight.now.as_secs_f64();
+        let mut seen = frame(flight.now);
+        seen.state.q = 4.0 * phase.sin();
+        let elevator = (-10.0 * (phase + 0.5).sin()).clamp(-1.0, 1.0);
+        flight.plan = Plan::Ready(Command { elevator, ..Command::IDLE });
+        recent.push((flight.tick_with(seen).command.elevator - trim).abs());
+    }
+    let second = (1.0 / step.as_secs_f64()) as usize;
+    recent.iter().rev().take(second).fold(0.0, |a, b| a.max(*b))
+}
+
+#[test]
+fn a_loop_that_swings_where_nobody_else_can_fly_gets_a_third_of_the_deflections_for_a_while() {
+    // each tick, and a starved processor's every third
+    for step in [TICK, 3 * TICK] {
+        let mut flight = Flight::armed();
+        flight.texts();
+        let seconds = |s: f64| (s / step.as_secs_f64()) as usize;
+        assert!(swing(&mut flight, seconds(0.9), step) > 0.5);
+        let eased = swing(&mut flight, seconds(3.0), step);
+        assert!(eased < 0.4, "{eased}");
+        assert!(flight.texts().contains("oscillates in pitch: a third of the deflections for 5 s"));
+        assert_eq!(flight.last.unwrap().refused, None);
+        // calm again, all of them are flown
+        flight.plan = Plan::Ready(RIGHT);
+        assert!((flight.fly(600).command.elevator - RIGHT.elevator).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_loop_that_swings_is_given_back_where_a_controller_flies() {
+    let mut flight = Flight::armed();
+    flight.pilot.check_signs();
+    assert!(swing(&mut flight, 300, TICK) > 0.8);
+    assert_eq!(
+        flight.last.unwrap().refused,
+        Some(Fault::Oscillation(greylag::link::vehicle::Axis::Pitch))
+    );
+}
+
 fn storm_frame(dice: &mut Dice, now: Time) -> Telemetry {
     let mut seen = frame(now);
     if dice.below(4) == 0 {

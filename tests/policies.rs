@@ -77,6 +77,20 @@ fn surfaces_that_answer_late_are_handed_back_before_the_rules_break() {
 }
 
 #[test]
+fn a_loop_that_a_starved_processor_makes_swing_is_calmed_where_nobody_else_can_fly() {
+    // found by searches; states that were answered late kept the surfaces swinging between their stops
+    let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
+    for scenario in [
+        include_str!("data/scenarios/starved-in-a-turn.json"),
+        include_str!("data/scenarios/starved-long.json"),
+        include_str!("data/scenarios/starved-in-a-descent.json"),
+    ] {
+        let scenario: Scenario = serde_json::from_str(scenario).unwrap();
+        assert_eq!(broken(&factory, &scenario), [""; 0], "{:?}", scenario.faults);
+    }
+}
+
+#[test]
 fn turbulence_is_no_oscillation() {
     let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
     let swings =

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::process::Command;
 
-use greylag::sim::faults::{Asking, Counterpart, FaultKind, Scenario};
+use greylag::sim::faults::{Asking, ControllerSetting, Counterpart, FaultKind, Scenario};
 use workbench_support::{Bench, MODEL};
 
 /// The page for a query, with its status.
@@ -123,7 +123,9 @@ fn a_killed_companion_engages_no_more_unasked_and_a_radio_keeps_ardupilot_in_man
     let end = "At the end nobody flies: ArduPilot is in MANUAL, the companion disarmed";
     assert!(verdict(&radio).contains(end), "{}", verdict(&radio));
     let scenario: Scenario = serde_json::from_str(&text(&radio, "scenario")).unwrap();
-    assert_eq!((scenario.counterpart, scenario.radio), (Counterpart::Ardupilot, true));
+    assert_eq!(scenario.counterpart, Counterpart::Ardupilot);
+    let bound = ControllerSetting { name: "SIM_RC_FAIL".into(), value: 0.0 };
+    assert_eq!(scenario.controller_parameters, [bound]);
     assert_eq!(scenario.faults[0].kind, FaultKind::Killed);
 }
 

@@ -91,7 +91,7 @@ pub struct StageFile {
 pub struct TableFile {
     /// Its title.
     pub title: String,
-    /// The stage whose cells it sums up.
+    /// The stage whose cells it sums up, and levels that they are to have: `stage axis=level …`.
     pub stage: String,
     /// The axes that make its rows; cells of a row that differ in others are its strata.
     pub rows: Vec<String>,
@@ -161,7 +161,11 @@ impl CampaignFile {
         self.stages.iter().try_for_each(|stage| self.check_stage(stage))?;
         self.tables.iter().try_for_each(|table| self.check_table(table))?;
         self.claims.iter().try_for_each(|claim| {
-            [&claim.less, &claim.than].into_iter().try_for_each(|of| self.choice(of).map(|_| ()))
+            let about = |why: String| format!("claim {:?}: {why}", claim.says);
+            [&claim.less, &claim.than]
+                .into_iter()
+                .try_for_each(|of| self.choice(of).map(|_| ()))
+                .map_err(about)
         })
     }
 
@@ -182,7 +186,8 @@ impl CampaignFile {
 
     fn check_table(&self, table: &TableFile) -> Result<(), String> {
         let about = |why: String| format!("table {:?}: {why}", table.title);
-        let stage = self.stage(&table.stage).map_err(about)?;
+        let (stage, _) = self.choice(&table.stage).map_err(about)?;
+        let stage = self.stage(&stage).map_err(about)?;
         if let Some(axis) = table.rows.iter().find(|axis| !stage.over.contains(axis)) {
             let over = stage.over.join(", ");
             return Err(about(format!("stage {} does not vary {axis}, only {over}", stage.name)));
@@ -220,7 +225,7 @@ impl CampaignFile {
     /// # Errors
     /// If there is no such stage, axis or level.
     pub fn choice(&self, text: &str) -> Result<(String, BTreeMap<String, String>), String> {
-        let about = |why: String| format!("claim on {text:?}: {why}");
+        let about = |why: String| format!("{text:?}: {why}");
         let mut words = text.split_whitespace();
         let stage = self.stage(words.next().unwrap_or_default()).map_err(about)?;
         let levels = levels(words).map_err(about)?;

@@ -163,6 +163,11 @@ mod tests {
         let summary = &summaries(&planned_first.file, &all.records)[0];
         assert_eq!(summary.rows[1].ours.mean.value, 12.0);
         assert_eq!(summary.rows[1].runs[2].cell, "last/y/3");
+        // one level of an axis alone
+        let mut chosen = planned_first.file.clone();
+        (chosen.tables[0].stage, chosen.tables[0].rows) = ("last kind=y".into(), Vec::new());
+        let summary = &summaries(&chosen, &all.records)[0];
+        assert_eq!((summary.rows.len(), summary.rows[0].ours.mean.value), (1, 12.0));
         let found = &findings(&planned_first.file, &all.records).unwrap()[0];
         assert_eq!(found.outcome, Outcome::Holds, "{}", found.because);
 

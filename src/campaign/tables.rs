@@ -89,9 +89,13 @@ pub fn summaries(file: &CampaignFile, records: &[Record]) -> Vec<Summary> {
 
 fn summary(file: &CampaignFile, table: &TableFile, records: &[Record]) -> Summary {
     let mut rows = Vec::new();
-    for metric in &table.metrics {
-        for levels in row_levels(file, table) {
-            rows.extend(row(table, metric, &levels, records));
+    // a file that was read has no other choices
+    if let Ok((stage, fixed)) = file.choice(&table.stage) {
+        let of_stage: Vec<&Record> = records.iter().filter(|r| r.has(&stage, &fixed)).collect();
+        for metric in &table.metrics {
+            for levels in row_levels(file, table) {
+                rows.extend(row(table, metric, &levels, &of_stage));
+            }
         }
     }
     Summary {
@@ -120,12 +124,13 @@ fn row(
     table: &TableFile,
     metric: &str,
     levels: &[(String, String)],
-    records: &[Record],
+    of_stage: &[&Record],
 ) -> Option<SummaryRow> {
     let wanted: BTreeMap<String, String> = levels.iter().cloned().collect();
     let mut strata: BTreeMap<Vec<&String>, Vec<f64>> = BTreeMap::new();
     let mut runs = Vec::new();
-    for record in records.iter().filter(|r| r.has(&table.stage, &wanted)) {
+    let has = |r: &Record| wanted.iter().all(|(axis, level)| r.levels.get(axis) == Some(level));
+    for record in of_stage.iter().filter(|r| has(r)) {
         let Some(value) = record.metrics.get(metric) else { continue };
         let others =
             record.levels.iter().filter(|(axis, _)| *axis != SEED && !wanted.contains_key(*axis));

@@ -224,7 +224,11 @@ impl Local<'_> {
 
     /// The quantities of a result that the tables ask for.
     fn reached(&self, record: &Record) -> String {
-        let tables = self.plan.file.tables.iter().filter(|t| t.stage == record.stage);
+        let file = &self.plan.file;
+        let of = |choice: &str| {
+            file.choice(choice).is_ok_and(|(stage, levels)| record.has(&stage, &levels))
+        };
+        let tables = file.tables.iter().filter(|t| of(&t.stage));
         let metrics = tables
             .flat_map(|t| &t.metrics)
             .filter_map(|metric| Some(format!("{metric} {:.4}", record.metrics.get(metric)?)));

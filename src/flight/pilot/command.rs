@@ -1,11 +1,44 @@
 //! Which command flies: planned, of the fallback, held, or level at trim.
 
-use super::{Pilot, Plan, Source, due};
+use super::{Pilot, Plan, Source, due, within};
 use crate::control::Observation;
 use crate::link::autopilot::Severity;
-use crate::physics::Command;
+use crate::link::vehicle::Axis;
+use crate::physics::{Command, Time};
+
+/// Part of a controller's deflections beyond level trim that is flown while they are eased. It divides the loop's gain, and so
+/// multiplies the delay that the loop bears by about as much.
+const EASED: f64 = 1.0 / 3.0;
+/// For how long they are eased after the loop has swung, s.
+const EASED_S: f64 = 5.0;
 
 impl Pilot {
+    /// Eases deflections from `time` on, because the loop about `axis` swings.
+    pub(super) fn ease(&mut self, axis: Axis, time: Time) {
+        self.eased = Some(time);
+        let axis = match axis {
+            Axis::Roll => "roll",
+            Axis::Pitch => "pitch",
+        };
+        let words = format!("oscillates in {axis}: a third of the deflections for {EASED_S} s");
+        self.texts.say(Severity::Error, words);
+    }
+
+    /// `command` as it is flown at `time`.
+    fn as_eased(&self, command: Command, time: Time) -> Command {
+        if !within(self.eased, time, EASED_S) {
+            return command;
+        }
+        let level = self.level_command();
+        let toward = |level: f64, wanted: f64| level + EASED * (wanted - level);
+        Command {
+            aileron: toward(level.aileron, command.aileron),
+            elevator: toward(level.elevator, command.elevator),
+            rudder: toward(level.rudder, command.rudder),
+            throttle: command.throttle,
+        }
+    }
+
     pub(super) fn with_state(
         &mut self,
         plan: Plan,
@@ -31,6 +64,7 @@ impl Pilot {
         if let Some(programme) = &mut self.programme {
             command = programme.excite(command);
         }
+        command = self.as_eased(command, seen.time);
         command.throttle =
             self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
         (command, source)

@@ -1,6 +1,7 @@
 //! What is lost, what comes back: the vehicle, the setpoints, the sticks, the vehicle's clock.
 
 use super::estimate::{Estimate, Frame};
+use super::oscillation::Oscillation;
 use super::{Complaints, Pilot};
 use crate::link::autopilot::{Mode, Severity};
 use crate::physics::Time;
@@ -85,6 +86,8 @@ impl Pilot {
         self.sticks = None;
         self.vehicle_lost = false;
         self.complaints = Complaints::default();
+        self.oscillation = Oscillation::default();
+        self.eased = None;
         self.forget_controllers();
     }
 }

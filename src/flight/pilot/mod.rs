@@ -81,8 +81,12 @@ pub struct Pilot {
     programme: Option<Programme>,
     /// The check of the surfaces' signs, where there is one.
     check: Option<Check>,
-    /// The guard against oscillations, where there is a controller to give the aircraft to.
-    oscillation: Option<Oscillation>,
+    /// The guard against oscillations.
+    oscillation: Oscillation,
+    /// Whether there is a controller to give the aircraft to.
+    hands_back: bool,
+    /// When the loop last swung where nobody else can fly: deflections are eased for a while after it.
+    eased: Option<Time>,
     /// What the sign check or the oscillation guard has found wrong since the aircraft was armed.
     refused: Option<Fault>,
     /// The model that says what it has not predicted, where there is one.
@@ -147,7 +151,9 @@ impl Pilot {
             load: 0.0,
             programme: None,
             check: None,
-            oscillation: None,
+            oscillation: Oscillation::default(),
+            hands_back: false,
+            eased: None,
             refused: None,
             monitor: None,
         })
@@ -159,18 +165,18 @@ impl Pilot {
         self.programme = Some(Programme::new(schedule));
     }
 
-    /// Checks the surfaces' signs from now on, whenever control authority is taken, and guards against
-    /// oscillations: for a vehicle whose controller moves the surfaces for us, and has the aircraft back
-    /// when either fails. Without the model's answers in the settings no signs can be checked.
+    /// Checks the surfaces' signs from now on, whenever control authority is taken, and gives the aircraft back when they are
+    /// wrong or the loop oscillates: for a vehicle whose controller moves the surfaces for us. Without the model's answers
+    /// in the settings no signs can be checked.
     pub fn check_signs(&mut self) {
-        self.oscillation = Some(Oscillation::default());
+        self.hands_back = true;
         self.check = self.config.answers.clone().map(Check::new);
     }
 
     /// The vehicle's controller has given us control authority, if it is one to give it.
     pub fn engaged(&mut self, now: Time) {
         self.advance(now);
-        self.oscillation = self.oscillation.map(|_| Oscillation::default());
+        self.oscillation = Oscillation::default();
         if let Some(check) = &mut self.check {
             check.begin(self.in_force);
         }
@@ -241,16 +247,18 @@ impl Pilot {
         self.decision()
     }
 
-    /// Looks for an oscillation in what was flown on.
+    /// Looks for an oscillation in what was flown on. Where there is a controller it gets the aircraft back; where there is
+    /// none, deflections are eased for a while.
     fn guard(&mut self) {
-        let (Pending::Fly { seen, .. }, Some(guard)) = (&self.pending, &mut self.oscillation)
-        else {
-            return;
-        };
-        let step = self.limits.surface_step;
-        if let Some(axis) = guard.see(&seen.state, &self.before, &self.in_force, step) {
-            *guard = Oscillation::default();
+        let Pending::Fly { seen, .. } = &self.pending else { return };
+        let (time, step) = (seen.time, self.limits.surface_step);
+        let found = self.oscillation.see(time, &seen.state, &self.before, &self.in_force, step);
+        let Some(axis) = found else { return };
+        self.oscillation = Oscillation::default();
+        if self.hands_back {
             self.refused = Some(Fault::Oscillation(axis));
+        } else {
+            self.ease(axis, time);
         }
     }
 

@@ -8,7 +8,7 @@
 
 use super::limits::TICK_S;
 use crate::link::vehicle::Axis;
-use crate::physics::{Command, State};
+use crate::physics::{Command, State, Time};
 
 /// A steady turn has a pitch rate: what is slower than this is taken off, s.
 const SLOW_S: f64 = 0.5;
@@ -37,14 +37,15 @@ struct Swings {
     mean: Option<f64>,
     /// Sign of the half swing that goes on, 0 before the first.
     sign: f64,
-    ticks: u32,
-    limited: u32,
+    /// How long it has lasted, and how long of that the command was at its limit, s.
+    lasts: f64,
+    limited: f64,
     peak: f64,
     /// Least and largest command of it.
     range: [f64; 2],
-    /// Half swings in a row that were swings, with their ticks.
+    /// Half swings in a row that were swings, and how long they lasted together, s.
     row: u32,
-    row_ticks: u32,
+    row_s: f64,
 }
 
 /// The range of no command.
@@ -53,19 +54,23 @@ const NONE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 impl Default for Swings {
     fn default() -> Self {
         let (mean, sign, peak, range) = (None, 0.0, 0.0, NONE);
-        Swings { mean, sign, ticks: 0, limited: 0, peak, range, row: 0, row_ticks: 0 }
+        Swings { mean, sign, lasts: 0.0, limited: 0.0, peak, range, row: 0, row_s: 0.0 }
     }
 }
 
 /// The guard of roll and pitch.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Oscillation([Swings; 2]);
+pub(super) struct Oscillation {
+    axes: [Swings; 2],
+    last: Option<Time>,
+}
 
 impl Oscillation {
-    /// Takes in a tick: the state, the commands before and after it, and the largest change of a
-    /// surface in a tick. The axis that oscillates, if one does.
+    /// Takes in a tick: its time and state, the commands before and after it, and the largest change of a
+    /// surface in a tick. The axis that oscillates, if one does. A starved processor leaves ticks out, so time counts, not ticks.
     pub(super) fn see(
         &mut self,
+        time: Time,
         state: &State,
         before: &Command,
         now: &Command,
@@ -73,9 +78,12 @@ impl Oscillation {
     ) -> Option<Axis> {
         let limited =
             |before: f64, now: f64| (now - before).abs() >= ALL * step || now.abs() >= ALL;
-        let [roll, pitch] = &mut self.0;
-        let rolls = roll.see(state.p, now.aileron, limited(before.aileron, now.aileron));
-        let pitches = pitch.see(state.q, now.elevator, limited(before.elevator, now.elevator));
+        let passed = self.last.map_or(TICK_S, |last| time.since(last).as_secs_f64()).max(TICK_S);
+        self.last = Some(time);
+        let [roll, pitch] = &mut self.axes;
+        let rolls = roll.see(passed, state.p, now.aileron, limited(before.aileron, now.aileron));
+        let pitches =
+            pitch.see(passed, state.q, now.elevator, limited(before.elevator, now.elevator));
         match (rolls, pitches) {
             (_, true) => Some(Axis::Pitch),
             (true, false) => Some(Axis::Roll),
@@ -85,37 +93,35 @@ impl Oscillation {
 }
 
 impl Swings {
-    fn see(&mut self, rate: f64, command: f64, limited: bool) -> bool {
+    fn see(&mut self, passed: f64, rate: f64, command: f64, limited: bool) -> bool {
         if !rate.is_finite() {
             return false;
         }
         let mean = self.mean.get_or_insert(rate);
-        *mean += (rate - *mean) * TICK_S / SLOW_S;
+        *mean += (rate - *mean) * (passed / SLOW_S).min(1.0);
         let swing = rate - *mean;
         if swing.abs() > NO_SIGN && swing.signum() != self.sign {
             self.close();
             self.sign = swing.signum();
         }
-        self.ticks += 1;
-        self.limited += u32::from(limited);
+        self.lasts += passed;
+        self.limited += if limited { passed } else { 0.0 };
         self.range = [self.range[0].min(command), self.range[1].max(command)];
         self.peak = self.peak.max(swing.abs());
-        self.row >= SWINGS && f64::from(self.row_ticks) * TICK_S >= LONG_S
+        self.row >= SWINGS && self.row_s >= LONG_S
     }
 
     /// A half swing has ended: whether it was one decides on the row.
     fn close(&mut self) {
-        let length = f64::from(self.ticks) * TICK_S;
-        let share = f64::from(self.limited) / f64::from(self.ticks.max(1));
-        let is_swing = (HALF_SWING_S[0]..=HALF_SWING_S[1]).contains(&length)
+        let is_swing = (HALF_SWING_S[0]..=HALF_SWING_S[1]).contains(&self.lasts)
             && self.peak >= PEAK
-            && (share >= LIMITED || self.range[1] - self.range[0] >= SWEPT);
+            && (self.limited >= LIMITED * self.lasts || self.range[1] - self.range[0] >= SWEPT);
         if is_swing {
-            (self.row, self.row_ticks) = (self.row + 1, self.row_ticks + self.ticks);
+            (self.row, self.row_s) = (self.row + 1, self.row_s + self.lasts);
         } else {
-            (self.row, self.row_ticks) = (0, 0);
+            (self.row, self.row_s) = (0, 0.0);
         }
-        (self.ticks, self.limited, self.peak, self.range) = (0, 0, 0.0, NONE);
+        (self.lasts, self.limited, self.peak, self.range) = (0.0, 0.0, 0.0, NONE);
     }
 }
 
@@ -136,7 +142,7 @@ mod tests {
             let elevator = wanted(at).clamp(before.elevator - STEP, before.elevator + STEP);
             let now = Command { elevator: elevator.clamp(-1.0, 1.0), ..before };
             let state = State { q: rate(at), ..State::NEUTRAL };
-            let axis = guard.see(&state, &before, &now, STEP);
+            let axis = guard.see(Time::from_micros((1e6 * at) as u64), &state, &before, &now, STEP);
             before = now;
             axis.map(|axis| {
                 assert_eq!(axis, Axis::Pitch);

@@ -12,9 +12,6 @@ use super::scenario::{ControllerSetting, Scenario};
 use crate::link::vehicle::{Authority, Profile, Real, Sitl, Stack, Vehicle};
 use crate::model::GreyBox;
 
-/// ArduPilot's parameter that is 1 without a radio, 0 with one whose sticks are released.
-const NO_RADIO: &str = "SIM_RC_FAIL";
-
 /// What is at the other end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -111,9 +108,6 @@ impl Aircraft {
                 options.launch = Launch::Immediate;
                 let set = |s: &ControllerSetting| (s.name.clone(), s.value);
                 options.parameters = scenario.controller_parameters.iter().map(set).collect();
-                if scenario.radio && personality == Personality::Ardupilot {
-                    options.parameters.push((NO_RADIO.into(), 0.0));
-                }
                 Aircraft::Real(Box::new(FlightController::new(personality, &options)?))
             }
         })

@@ -156,9 +156,6 @@ pub struct Scenario {
     /// Parameters of the flight controller that are not as the played one has them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub controller_parameters: Vec<ControllerSetting>,
-    /// Whether a radio with its sticks released is bound to the flight controller; only ArduPilot is played with one.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub radio: bool,
 }
 
 /// What the client asks for unless a scenario says otherwise: turns both ways, a climb, a descent.
@@ -185,7 +182,6 @@ impl Scenario {
             asked: Vec::new(),
             parameters: Vec::new(),
             controller_parameters: Vec::new(),
-            radio: false,
         }
     }
 

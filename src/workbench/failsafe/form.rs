@@ -5,7 +5,9 @@ use serde_json::Value;
 
 use super::choices::{AGAIN, NOTHING, REQUESTS, TURBULENCE, controllers};
 use crate::control::ControllerKind;
-use crate::sim::faults::{Asked, Asking, Counterpart, Fault, FaultKind, Leg, Scenario};
+use crate::sim::faults::{
+    Asked, Asking, ControllerSetting, Counterpart, Fault, FaultKind, Leg, Scenario,
+};
 
 /// Length of a flight, s.
 pub(super) const FLIGHT_S: f64 = 60.0;
@@ -121,7 +123,7 @@ impl Form {
     pub fn chosen(&self) -> Result<Chosen, Wrong> {
         let counterpart: Counterpart = self.named("counterpart", "flight controller")?;
         let controller = self.controller()?;
-        let radio = self.radio(counterpart)?;
+        let controller_parameters = self.radio(counterpart)?;
         let faults = self.fault()?.into_iter().collect();
         let asked = self.asked(counterpart)?;
         let legs = self.legs()?;
@@ -136,7 +138,7 @@ impl Form {
             faults,
             legs,
             asked,
-            radio,
+            controller_parameters,
             ..Scenario::of_seed(counterpart, seed as u64)
         };
         Ok(Chosen { scenario, controller })
@@ -153,10 +155,11 @@ impl Form {
         })
     }
 
-    fn radio(&self, counterpart: Counterpart) -> Result<bool, Wrong> {
+    /// The flight controller's parameter that binds a radio, if one is wanted.
+    fn radio(&self, counterpart: Counterpart) -> Result<Vec<ControllerSetting>, Wrong> {
         match (self.value("radio"), counterpart.stack()) {
-            ("no", _) => Ok(false),
-            ("yes", Some("ArduPilot")) => Ok(true),
+            ("no", _) => Ok(Vec::new()),
+            ("yes", Some("ArduPilot")) => Ok(vec![bound_radio()]),
             ("yes", _) => {
                 Err(self.wrong("radio", "is for ArduPilot: only that is played with a radio"))
             }
@@ -254,6 +257,11 @@ impl Form {
     }
 }
 
+/// A radio with its sticks released at ArduPilot.
+fn bound_radio() -> ControllerSetting {
+    ControllerSetting { name: "SIM_RC_FAIL".into(), value: 0.0 }
+}
+
 /// The velocity of the air over the ground, north-east-down, m/s, of a wind that comes from a direction.
 fn wind(speed_mps: f64, from_deg: f64) -> [f64; 3] {
     let (sin, cos) = from_deg.to_radians().sin_cos();
@@ -288,12 +296,9 @@ mod tests {
             asked: vec![asked(25.0, Asking::Arm), asked(25.1, Asking::Offboard)],
             parameters: Vec::new(),
             controller_parameters: Vec::new(),
-            radio: false,
         };
         assert_eq!(scenario, expected);
-        // the file of the command, which knows no radio unless there is one
         let file = serde_json::to_string(&scenario).unwrap();
-        assert!(!file.contains("radio"), "{file}");
         assert_eq!(serde_json::from_str::<Scenario>(&file).unwrap(), expected);
     }
 
@@ -323,7 +328,8 @@ mod tests {
             (controller.name(), scenario.counterpart),
             ("pid-retuned", Counterpart::Ardupilot)
         );
-        assert_eq!((scenario.radio, scenario.turbulence, scenario.seed), (true, 4, 77));
+        assert_eq!((scenario.turbulence, scenario.seed), (4, 77));
+        assert_eq!(scenario.controller_parameters, [bound_radio()]);
         // a wind from the west goes east
         assert_eq!(scenario.wind_ned_mps, [0.0, 5.0, 0.0]);
         assert_eq!((scenario.legs[1].roll_deg, scenario.legs[1].pitch_deg), (-10.0, -2.0));

@@ -29,6 +29,11 @@ use run_off::run_off;
 const RANKED: f64 = 0.3;
 /// Most effects that are asserted together.
 const MOST: usize = 6;
+/// Most passes of tuning after an effect has joined. A product of two coefficients, as of a saturation and the
+/// effectiveness that saturates, takes more of them than [`SETTLING`]: each is tuned with the other held.
+const MOST_SETTLING: usize = 12;
+/// Largest change of a coefficient, in its standard deviations, of a model that is settled.
+const SETTLED: f64 = 0.2;
 /// Most candidates that are refused beside what has joined before the search ends.
 const MOST_ASIDE: usize = 4;
 
@@ -170,21 +175,11 @@ impl Found {
         if model.join_most(winner.id, &winner.score.values).is_err() {
             return Ok(false);
         }
-        for _ in 0..SETTLING {
-            say(progress, &format!("settling the model with {}", winner.id), self.fraction())?;
-            let Some(round) = Round::new(problem, model.clone(), &[]) else { return Ok(false) };
-            model = round.tuned();
-            let newest = winner.id;
-            let idle = self.selected.iter().find(|s| {
-                s.id != newest && round.amount(s.id).is_some_and(|wald| wald < self.threshold)
-            });
-            if let Some(idle) = idle.map(|s| s.id) {
-                model = without(given, &model, idle);
-                self.selected.retain(|s| s.id != idle);
-                break;
-            }
-        }
-        let Some(settled) = Round::new(problem, model.clone(), &[]) else { return Ok(false) };
+        let doing = format!("settling the model with {}", winner.id);
+        let Some(settled) = self.settle(problem, given, model, &doing, progress)? else {
+            return Ok(false);
+        };
+        model = settled.model.clone();
         self.beyond = Some(checks::Beyond::of(&settled));
         self.shape = shape(&settled, options.nulls);
         let open: Vec<Entry> = entries.iter().filter(|e| !model.has(e.about.id)).copied().collect();
@@ -195,6 +190,36 @@ impl Found {
         self.remainder = remainder(&round, options.nulls, options.level);
         self.last = Some(round);
         Ok(true)
+    }
+
+    /// `model`, with the effect selected last, once its coefficients move no more; an earlier effect that is nothing beside it
+    /// goes, and ends that. `None` if the model cannot be linearised.
+    fn settle(
+        &mut self,
+        problem: &Problem,
+        given: &GreyBox,
+        mut model: GreyBox,
+        doing: &str,
+        progress: &Progress,
+    ) -> Result<Option<Round>, Cancelled> {
+        let newest = self.selected.last().map(|s| s.id);
+        for pass in 0..MOST_SETTLING {
+            say(progress, doing, self.fraction())?;
+            let Some(round) = Round::new(problem, model.clone(), &[]) else { return Ok(None) };
+            if pass >= SETTLING && round.stride() < SETTLED {
+                return Ok(Some(round));
+            }
+            model = round.tuned();
+            let idle = self.selected.iter().find(|s| {
+                Some(s.id) != newest && round.amount(s.id).is_some_and(|wald| wald < self.threshold)
+            });
+            if let Some(idle) = idle.map(|s| s.id) {
+                model = without(given, &model, idle);
+                self.selected.retain(|s| s.id != idle);
+                break;
+            }
+        }
+        Ok(Round::new(problem, model, &[]))
     }
 
     /// Share of the search that is done; how many effects will be selected is not known.

@@ -7,9 +7,14 @@ use crate::sysid::diagnose::regression::local::CHANNELS;
 use crate::sysid::diagnose::search::round::Round;
 use crate::sysid::weak_form::windows::{self, Series};
 
-/// Share of each channel's variance beyond noise that `residual`, a column a flight, leaves unexplained under
-/// the model of `first`; NaN where the flights do not measure the channel.
-pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
+/// Mean square of a channel, and what of it noise is.
+struct Measured {
+    variance: f64,
+    noise: f64,
+}
+
+/// Every channel as the flights of `first` measure it; `None` where they do not.
+fn measured(first: &Round) -> [Option<Measured>; CHANNELS] {
     let series: Vec<Vec<Series>> =
         first.flights.iter().map(|f| windows::channels(&first.model, &f.measured)).collect();
     std::array::from_fn(|k| {
@@ -18,13 +23,40 @@ pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
         let measured: Vec<f64> =
             own.iter().flat_map(|s| s.measured.iter().copied()).filter(|x| x.is_finite()).collect();
         if measured.is_empty() {
-            return f64::NAN;
+            return None;
         }
         let noise = mean(&own.iter().map(|s| s.noise_variance).collect::<Vec<_>>());
         let middle = mean(&measured);
         let deviations: Vec<f64> = measured.iter().map(|x| (x - middle).powi(2)).collect();
-        let left = residual.iter().flat_map(|c| c[k].iter()).filter(|x| x.is_finite());
-        let squares: Vec<f64> = left.map(|x| x * x).collect();
-        ((mean(&squares) - noise) / (mean(&deviations) - noise).max(1e-12)).max(0.0)
+        Some(Measured { variance: (mean(&deviations) - noise).max(1e-12), noise })
+    })
+}
+
+fn mean_square(residual: &[Column], channel: usize) -> f64 {
+    let finite = residual.iter().flat_map(|c| c[channel].iter()).filter(|x| x.is_finite());
+    mean(&finite.map(|x| x * x).collect::<Vec<f64>>())
+}
+
+/// Share of each channel's variance beyond noise that `residual`, a column a flight, leaves unexplained under
+/// the model of `first`; NaN where the flights do not measure the channel.
+pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
+    let measured = measured(first);
+    std::array::from_fn(|k| match &measured[k] {
+        Some(Measured { variance, noise }) => {
+            ((mean_square(residual, k) - noise) / variance).max(0.0)
+        }
+        None => f64::NAN,
+    })
+}
+
+/// Share of each channel's variance beyond noise by which `after` leaves less unexplained than `before`; negative where it
+/// leaves more, 0 where the flights do not measure the channel.
+pub fn explained(first: &Round, before: &[Column], after: &[Column]) -> [f64; CHANNELS] {
+    let measured = measured(first);
+    std::array::from_fn(|k| match &measured[k] {
+        Some(Measured { variance, .. }) => {
+            (mean_square(before, k) - mean_square(after, k)) / variance
+        }
+        None => 0.0,
     })
 }

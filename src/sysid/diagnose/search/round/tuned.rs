@@ -22,6 +22,13 @@ impl Round {
         model
     }
 
+    /// The largest change that tuning makes to a coefficient, in its standard deviations.
+    pub fn stride(&self) -> f64 {
+        let p = &self.projected;
+        let of = |k: usize| p.tuned[k].abs() / p.covariance[(k, k)].sqrt();
+        (0..self.coefficients.len()).map(of).filter(|x| x.is_finite()).fold(0.0, f64::max)
+    }
+
     /// Measured less the tuned model, sensors' errors taken out, flight by flight.
     pub fn tuned_residual(&self) -> Vec<Column> {
         let na = self.known.len();
@@ -56,6 +63,26 @@ impl Round {
             combine(&columns, &weights)
         };
         self.placed.iter().map(of).collect()
+    }
+
+    /// What of the tuned model's residual is left once `score`'s effect has joined and the known columns have
+    /// gone where they go with it, flight by flight.
+    pub fn residual_with(&self, score: &Score) -> Vec<Column> {
+        let added = self.contribution(score);
+        let given = |place: usize| -> f64 {
+            score.weights.iter().map(|(c, w)| w * self.projected.taken[(place, *c)]).sum()
+        };
+        let moved = |placed: &Placed| {
+            let known = placed.iter().filter(|(place, _)| *place < self.known.len());
+            known.map(|(place, column)| (column.clone(), given(*place))).unzip()
+        };
+        let of = |((residual, added), placed): ((Column, Column), &Placed)| {
+            let (mut columns, mut weights): (Vec<Column>, Vec<f64>) = moved(placed);
+            columns.extend([residual, added]);
+            weights.extend([1.0, -1.0]);
+            combine(&columns, &weights)
+        };
+        self.tuned_residual().into_iter().zip(added).zip(&self.placed).map(of).collect()
     }
 
     /// What `score` takes of the squared whitened error, channel by channel.

@@ -5,6 +5,7 @@ use crate::sysid::diagnose::options::Options;
 use crate::sysid::diagnose::regression::rank::Score;
 use crate::sysid::diagnose::search::checks;
 use crate::sysid::diagnose::search::round::Round;
+use crate::sysid::diagnose::search::unexplained::explained;
 
 /// Least fall of the error on held-out segments.
 pub const HELD_OUT: f64 = 0.1;
@@ -95,14 +96,16 @@ fn class(found: &Found) -> Vec<usize> {
 }
 
 /// Says so if a significant effect does not matter: in no channel does it explain [`MATERIAL`] of the variance
-/// and [`MATERIAL_BESIDE`] of what the tuned model left beyond noise.
+/// and [`MATERIAL_BESIDE`] of what the tuned model left beyond noise. What counts is by how much less is left with it in
+/// the model and the known coefficients where they go then: evidence also holds what the prior and the noise of the
+/// columns are credited with, which no channel shows.
 fn immaterial(found: &Found, round: &Round, score: &Score) -> Option<String> {
     let taken = round.taken_by(score);
+    let explained = explained(&found.first, &round.tuned_residual(), &round.residual_with(score));
     let of_channel = |c: usize| {
         let only = std::array::from_fn(|k| k == c);
         let share = (taken[c] / checks::excess(&found.first, &only).max(taken[c])).max(0.0);
-        let share = if share.is_finite() { share } else { 0.0 };
-        [share, share * found.unexplained[c]]
+        [if share.is_finite() { share } else { 0.0 }, explained[c]]
     };
     let shares: Vec<[f64; 2]> = (0..6).map(of_channel).collect();
     let matters = |[of_error, of_variance]: &[f64; 2]| {
