@@ -575,6 +575,34 @@ fn a_loop_that_swings_where_nobody_else_can_fly_gets_a_third_of_the_deflections_
 }
 
 #[test]
+fn an_aircraft_nearly_on_its_back_is_rolled_upright_before_its_nose_is_raised() {
+    let trim = x8().trim_at(x8().envelope.airspeed_cruise_mps).elevator;
+    let mut flight = Flight::armed();
+    // right aileron and up elevator
+    flight.plan = Plan::Ready(RIGHT);
+    let mut at = |bank_deg: f64| {
+        let ticks = (0..15).map(|_| {
+            flight.now = flight.now.plus(TICK);
+            let mut seen = frame(flight.now);
+            seen.state.roll = bank_deg.to_radians();
+            flight.tick_with(seen).command
+        });
+        ticks.last().unwrap()
+    };
+    let is = |c: Command, aileron: f64, elevator: f64| {
+        (c.aileron - aileron).abs() < 1e-9 && (c.elevator - elevator).abs() < 1e-9
+    };
+    assert!(is(at(85.0), 1.0, -1.0), "a steep bank is the controller's");
+    for bank in [130.0, 85.0, 65.0] {
+        assert!(is(at(bank), -1.0, trim), "{bank}");
+    }
+    assert!(is(at(55.0), 1.0, -1.0), "upright, the controller flies");
+    assert!(is(at(-100.0), 1.0, trim));
+    assert!(is(at(-55.0), 1.0, -1.0));
+    assert_eq!(flight.texts().matches("wings level first").count(), 2);
+}
+
+#[test]
 fn a_loop_that_swings_is_given_back_where_a_controller_flies() {
     let mut flight = Flight::armed();
     flight.pilot.check_signs();

@@ -91,6 +91,17 @@ fn a_loop_that_a_starved_processor_makes_swing_is_calmed_where_nobody_else_can_f
 }
 
 #[test]
+fn an_aircraft_that_rolled_onto_its_back_while_nothing_was_heard_of_it_recovers_in_time() {
+    // found by a search: up elevator, nearly inverted, had the nose 85 degrees down for four seconds
+    let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
+    let scenario = include_str!("data/scenarios/reboot-in-a-turn.json");
+    let scenario: Scenario = serde_json::from_str(scenario).unwrap();
+    let (samples, _) = factory.trace(&scenario).unwrap();
+    assert!(samples.iter().any(|s| s.attitude_deg[0].abs() > 120.0));
+    assert_eq!(broken(&factory, &scenario), [""; 0]);
+}
+
+#[test]
 fn turbulence_is_no_oscillation() {
     let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
     let swings =

@@ -1,5 +1,7 @@
 //! Which command flies: planned, of the fallback, held, or level at trim.
 
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
+
 use super::{Pilot, Plan, Source, due, within};
 use crate::control::Observation;
 use crate::link::autopilot::Severity;
@@ -11,6 +13,9 @@ use crate::physics::{Command, Time};
 const EASED: f64 = 1.0 / 3.0;
 /// For how long they are eased after the loop has swung, s.
 const EASED_S: f64 = 5.0;
+/// Bank beyond which the aircraft is upset, and below which it no longer is, rad. Nearly on its back, up elevator pulls the
+/// nose down: the wings come level first. No envelope allows such a bank.
+const UPSET: [f64; 2] = [FRAC_PI_2, FRAC_PI_3];
 
 impl Pilot {
     /// Eases deflections from `time` on, because the loop about `axis` swings.
@@ -22,6 +27,23 @@ impl Pilot {
         };
         let words = format!("oscillates in {axis}: a third of the deflections for {EASED_S} s");
         self.texts.say(Severity::Error, words);
+    }
+
+    /// `command`, or what rolls the aircraft upright where it is upset.
+    fn upright(&mut self, command: Command, roll: f64) -> Command {
+        let [begins, ends] = UPSET;
+        if self.upset {
+            self.upset = roll.abs() > ends;
+        } else if roll.abs() > begins {
+            self.upset = true;
+            let words = format!("bank {:.0} degrees: wings level first", roll.to_degrees());
+            self.texts.say(Severity::Error, words);
+        }
+        if !self.upset {
+            return command;
+        }
+        let level = self.level_command();
+        Command { aileron: -roll.signum(), throttle: command.throttle, ..level }
     }
 
     /// `command` as it is flown at `time`.
@@ -65,6 +87,7 @@ impl Pilot {
             command = programme.excite(command);
         }
         command = self.as_eased(command, seen.time);
+        command = self.upright(command, seen.state.roll);
         command.throttle =
             self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);
         (command, source)

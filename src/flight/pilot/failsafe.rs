@@ -88,6 +88,7 @@ impl Pilot {
         self.complaints = Complaints::default();
         self.oscillation = Oscillation::default();
         self.eased = None;
+        self.upset = false;
         self.forget_controllers();
     }
 }

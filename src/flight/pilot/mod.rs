@@ -87,6 +87,8 @@ pub struct Pilot {
     hands_back: bool,
     /// When the loop last swung where nobody else can fly: deflections are eased for a while after it.
     eased: Option<Time>,
+    /// Whether the aircraft is being rolled upright.
+    upset: bool,
     /// What the sign check or the oscillation guard has found wrong since the aircraft was armed.
     refused: Option<Fault>,
     /// The model that says what it has not predicted, where there is one.
@@ -154,6 +156,7 @@ impl Pilot {
             oscillation: Oscillation::default(),
             hands_back: false,
             eased: None,
+            upset: false,
             refused: None,
             monitor: None,
         })
