@@ -47,6 +47,9 @@ use texts::Texts;
 /// Least time between two lines about the same kind of trouble, s.
 const COMPLAINT_INTERVAL_S: f64 = 5.0;
 
+/// A loop that swings again within this time does not only swing for once, s.
+const SWINGS_AGAIN_S: f64 = 20.0;
+
 /// The pilot of one aircraft.
 pub struct Pilot {
     config: Config,
@@ -85,7 +88,7 @@ pub struct Pilot {
     oscillation: Oscillation,
     /// Whether there is a controller to give the aircraft to.
     hands_back: bool,
-    /// When the loop last swung where nobody else can fly: deflections are eased for a while after it.
+    /// When the loop last swung: deflections are eased for a while after it.
     eased: Option<Time>,
     /// Whether the aircraft is being rolled upright.
     upset: bool,
@@ -179,7 +182,7 @@ impl Pilot {
     /// The vehicle's controller has given us control authority, if it is one to give it.
     pub fn engaged(&mut self, now: Time) {
         self.advance(now);
-        self.oscillation = Oscillation::default();
+        (self.oscillation, self.eased) = (Oscillation::default(), None);
         if let Some(check) = &mut self.check {
             check.begin(self.in_force);
         }
@@ -250,15 +253,15 @@ impl Pilot {
         self.decision()
     }
 
-    /// Looks for an oscillation in what was flown on. Where there is a controller it gets the aircraft back; where there is
-    /// none, deflections are eased for a while.
+    /// Looks for an oscillation in what was flown on: deflections are eased for a while. If the loop swings again soon and there
+    /// is a controller, it gets the aircraft back.
     fn guard(&mut self) {
         let Pending::Fly { seen, .. } = &self.pending else { return };
         let (time, step) = (seen.time, self.limits.surface_step);
         let found = self.oscillation.see(time, &seen.state, &self.before, &self.in_force, step);
         let Some(axis) = found else { return };
         self.oscillation = Oscillation::default();
-        if self.hands_back {
+        if self.hands_back && within(self.eased, time, SWINGS_AGAIN_S) {
             self.refused = Some(Fault::Oscillation(axis));
         } else {
             self.ease(axis, time);
