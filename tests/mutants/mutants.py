@@ -402,7 +402,8 @@ def shown(mutant):
 
 
 def identity(record):
-    return (record["file"], record["line"], record["column"], record["function"], record["change"])
+    """What a mutant is known by when lines above it come or go."""
+    return (record["file"], record["function"], record["code"], record["column"], record["change"])
 
 
 def latest(path):
@@ -461,10 +462,20 @@ def wilson(part, whole, z=1.96):
     return middle - reach, middle + reach
 
 
+def of_today():
+    """The mutants of the sources as they are, built or not."""
+    schemata = Schemata(set())
+    for file, only in targets(files()):
+        schemata.rewrite(file, (ROOT / file).read_text(), only)
+    return {identity(vars(mutant)): vars(mutant) for mutant in schemata.mutants}
+
+
 def report(options):
-    """Prints the mutation score, by file and in all, then what was missed."""
+    """Prints the mutation score, by file and in all, then what was missed; code that is no more counts for nothing."""
     equivalent = {(e["file"], e["function"], e["change"], e["code"]) for e in lines(HERE / "equivalent.jsonl")}
-    records = list(latest(options.results).values())
+    today = of_today()
+    records = [r | {"line": today[i]["line"]} for i, r in latest(options.results).items() if i in today]
+    print(f"{len(records)} of {len(today)} mutants were run")
     for record in records:
         key = (record["file"], record["function"], record["change"], record["code"])
         if key in equivalent and record["outcome"] not in CAUGHT:
@@ -481,7 +492,7 @@ def report(options):
         low, high = wilson(part, whole)
         score = f"{100 * part / whole:6.1f} % ({100 * low:.1f} to {100 * high:.1f})" if whole else ""
         print(f"{file:44}" + "".join(f"{row[o]:15}" for o in outcomes) + f"  {score}")
-    for record in sorted(records, key=identity):
+    for record in sorted(records, key=lambda r: (r["file"], r["line"], r["column"])):
         if record["outcome"] in ("missed", "not reached"):
             print(f"{record['outcome']:11} {record['file']}:{record['line']}: {record['change']} in {record['function']}"
                   f"   | {record['code']}")
