@@ -804,3 +804,18 @@ fn a_planner_begins_anew_after_a_state_that_could_not_be_used() {
 fn residuals_that_nobody_computes_are_not_zero() {
     assert!(Flight::armed().pilot.status().residuals.iter().all(|share| share.is_nan()));
 }
+
+#[test]
+fn a_target_is_shown_only_while_somebody_flies_for_it() {
+    let shown = |flight: &Flight| flight.pilot.status().target;
+    let mut flight = Flight::new();
+    flight.fly(5);
+    assert!(shown(&flight).iter().all(|x| x.is_nan()), "disarmed");
+    let mut flight = Flight::offboard();
+    flight.fly(5);
+    assert_eq!(shown(&flight), [0.2, 0.1]);
+    flight.pilot.sticks(flight.now, Sticks { roll: 0.5, pitch: 0.0, throttle: 0.5 });
+    assert_eq!(flight.pilot.set_mode(flight.now, Mode::Manual), Verdict::Accepted);
+    flight.fly(5);
+    assert!(shown(&flight).iter().all(|x| x.is_nan()), "by sticks");
+}

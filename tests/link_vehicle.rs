@@ -277,3 +277,37 @@ fn a_frame_that_comes_early_after_a_gap_tells_the_gap() {
     assert_eq!(order(4_031_000), Order::Late);
     assert_eq!(order(4_030_000), Order::First);
 }
+
+#[test]
+fn a_force_that_was_never_believed_is_that_of_level_flight() {
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
+    let mut shown = Shown::at(0);
+    shown.imu.zacc = f32::NAN;
+    let t = take(&mut sitl, &shown.bytes())[0];
+    // Lift carries the weight: upwards, in axes that have z down.
+    assert_eq!((t.faults, t.specific_force), (Faults::SPECIFIC_FORCE, [0.0, 0.0, -9.81]));
+}
+
+#[test]
+fn an_absurd_wind_is_left_out_and_the_last_one_stands() {
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
+    let mut wind = |us, wind_x| {
+        let said = MavMessage::WIND_COV(WIND_COV_DATA { wind_x, ..Default::default() });
+        take(&mut sitl, &[shim(said), Shown::at(us).bytes()].concat())[0].wind
+    };
+    assert!(wind(0, 1000.0)[0].is_nan());
+    assert_eq!(wind(10_000, 8.0), [8.0, 0.0, 0.0]);
+    assert_eq!(wind(20_000, f32::NAN), [8.0, 0.0, 0.0]);
+}
+
+#[test]
+fn a_travel_that_differs_by_the_files_rounding_is_the_same_and_by_more_is_not() {
+    for (found, same) in [(0.5235, true), (0.5238, true), (0.5243, false), (0.5227, false)] {
+        let mut shown = Shown::at(20_000);
+        shown.actuators.active = 7;
+        (shown.actuators.actuator[5], shown.actuators.actuator[6]) = (found, found);
+        let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
+        take(&mut sitl, &shown.bytes());
+        assert_eq!(sitl.obstacle().is_none(), same, "{found} rad");
+    }
+}
