@@ -16,6 +16,7 @@ use greylag::physics::servos::Travels;
 use greylag::physics::{Airframe, Command, Controls, Time};
 use link_support::{Shown, frame_from, peer};
 use mavlink::MavlinkVersion::V2;
+use mavlink::Message;
 use mavlink::dialects::ardupilotmega::*;
 
 const HEARTBEAT: u32 = 0;

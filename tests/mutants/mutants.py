@@ -134,14 +134,18 @@ def targets(all_files):
                 yield file, only
 
 
-def write_tree(tree, dropped):
-    """Copies the repository to `tree` with all mutants in it; the mutants."""
-    every = files()
+def mutated(every, dropped):
+    """The mutants of the files, and the text of each file with all of them in it but the dropped ones."""
     schemata = Schemata(dropped)
-    texts = {}
-    for file, only in targets(every):
-        texts[file] = schemata.rewrite(file, (ROOT / file).read_text(), only)
-    texts["src/mutants.rs"] = RUNTIME.replace("COUNT", str(len(schemata.mutants) + 1))
+    texts = {file: schemata.rewrite(file, (ROOT / file).read_text(), only) for file, only in targets(every)}
+    return schemata.mutants, texts
+
+
+def write_tree(tree, dropped):
+    """Copies the repository to `tree` with all mutants in it."""
+    every = files()
+    mutants, texts = mutated(every, dropped)
+    texts["src/mutants.rs"] = RUNTIME.replace("COUNT", str(len(mutants) + 1))
     allowed = "#![allow(overflowing_literals, unconditional_panic, arithmetic_overflow, missing_docs, unused)]\n"
     library = (ROOT / "src/lib.rs").read_text().split("\npub mod num;", 1)
     texts["src/lib.rs"] = f"{library[0]}\n{allowed}pub mod mutants;\npub mod num;{library[1]}"
@@ -150,7 +154,6 @@ def write_tree(tree, dropped):
             put(tree / file, (ROOT / file).read_bytes())
     for file, text in texts.items():
         put(tree / file, text.encode())
-    return schemata.mutants
 
 
 # --- the build ---
@@ -199,7 +202,7 @@ def drop_what_does_not_build(cargo, options):
     dropped_file = options.work / "dropped.json"
     # Numbers of an earlier build hold for the same sources only.
     dropped = set()
-    mutants = write_tree(cargo.tree, dropped)
+    mutants, _ = mutated(files(), dropped)
     print(f"{len(mutants)} mutants", flush=True)
     key = hashlib.sha256("\n".join(m.name for m in mutants).encode()).hexdigest()
     if dropped_file.is_file() and (old := json.loads(dropped_file.read_text()))["key"] == key:
@@ -464,10 +467,7 @@ def wilson(part, whole, z=1.96):
 
 def of_today():
     """The mutants of the sources as they are, built or not."""
-    schemata = Schemata(set())
-    for file, only in targets(files()):
-        schemata.rewrite(file, (ROOT / file).read_text(), only)
-    return {identity(vars(mutant)): vars(mutant) for mutant in schemata.mutants}
+    return {identity(vars(mutant)): vars(mutant) for mutant in mutated(files(), set())[0]}
 
 
 def report(options):

@@ -76,16 +76,4 @@ mod tests {
         let pitch = answers.after(1, 4);
         assert!(pitch < -0.5 && pitch > -2.0, "{pitch}");
     }
-
-    #[test]
-    fn what_an_aircraft_does_by_itself_is_no_answer() {
-        // The torque of the C172's propeller rolls it to the left meanwhile.
-        let model = GreyBox::load(Path::new("params/c172p/jsbsim.toml")).unwrap();
-        let trim = Trim::straight(&model, 50.0, model.airframe.reference.altitude).unwrap();
-        let alone = model.rate(&trim.state, &trim.controls, model.airframe.reference.altitude).p;
-        assert!(alone.abs() > 0.01, "{alone}");
-        let answers = Answers::of(&model, 50.0).unwrap();
-        let roll = answers.after(0, 20);
-        assert!(roll > 0.2 && roll < 4.0, "{roll}");
-    }
 }
