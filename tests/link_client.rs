@@ -723,3 +723,25 @@ fn a_flood_of_bad_input_is_logged_once_in_ten_seconds() {
     assert_eq!(lines.iter().map(|(ms, _)| *ms).collect::<Vec<_>>(), [0, 10_000, 20_000]);
     assert!(lines[2].1.contains("refused_setpoints=1500"), "{}", lines[2].1);
 }
+
+#[test]
+fn to_loiter_is_to_hold_and_to_return_is_refused() {
+    let (mut clients, mut double) = new();
+    let mut asked =
+        |number| acks(&ask(&mut clients, &mut double, at_ms(0), 1, &command(number, &[])));
+    assert_eq!((asked(17), asked(20)), (vec![(17, 0)], vec![(20, 2)]));
+    assert_eq!(double.modes, [Mode::Hold]);
+}
+
+#[test]
+fn who_was_silent_for_three_seconds_makes_room() {
+    for (silent_ms, turned_away) in [(2999, 1), (3000, 0)] {
+        let (mut clients, mut double) = new();
+        for port in 0..MAX_SESSIONS as u16 {
+            clients.handle(at_ms(0), peer(100 + port), &hello(V2), &mut double);
+        }
+        clients.handle(at_ms(silent_ms), peer(1), &hello(V2), &mut double);
+        assert_eq!(clients.counts().turned_away, turned_away, "{silent_ms} ms");
+        assert_eq!(clients.session_count(), MAX_SESSIONS);
+    }
+}

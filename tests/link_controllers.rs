@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use greylag::link::autopilot::Severity;
 use greylag::link::signing::{Key, Signer};
+use greylag::link::vehicle::real::parameters::Standing;
 use greylag::link::vehicle::{
     Authority, Axis, Demand, Fault, Faults, Notice, Order, Outputs, Profile, Real, Sitl, Stack,
     Telemetry, Vehicle,
@@ -44,6 +45,8 @@ struct Played {
     skipped: u64,
     /// The number of the controller's next frame, and by how much it grows, where its frames are numbered.
     sequence: Option<(u8, u8)>,
+    /// The controller's heartbeats do not come.
+    heartless: bool,
     /// The controller signs its frames.
     signer: Option<Signer>,
     /// The states that were delivered.
@@ -74,6 +77,7 @@ impl Played {
             every: 1,
             skipped: u64::MAX,
             sequence: None,
+            heartless: false,
             signer: None,
             states: vec![],
             demand: NOTHING,
@@ -152,7 +156,7 @@ impl Played {
 
     /// A step: a heartbeat each second, a state each `every` steps, what is due.
     fn step(&mut self) {
-        if self.ms.is_multiple_of(1000) {
+        if self.ms.is_multiple_of(1000) && !self.heartless {
             self.heartbeat();
         }
         let step = self.ms / 10;
@@ -548,6 +552,7 @@ fn states_that_come_late_twice_after_a_gap_or_a_restart_are_told_apart_with_thei
         (counts.states, counts.starts, counts.late, counts.repeated, counts.lost),
         (6, 2, 2, 1, 1)
     );
+    assert_eq!((counts.faulty, counts.incomplete), (0, 0));
 }
 
 #[test]
@@ -700,6 +705,8 @@ fn only_a_controller_that_signs_and_answers_nothing_shuts_us_out() {
     {
         let mut played = Played::new(Stack::Px4, Authority::Attitude);
         played.signer = signs.then(|| Signer::new(Key::from_bytes([1; 32]), 0));
+        played.heartbeat();
+        assert!(!played.real.is_shut_out(), "nothing was asked yet");
         played.run(1000);
         if answers {
             played.parameter("COM_OF_LOSS_T", 0.5);
@@ -761,4 +768,71 @@ fn a_mode_has_the_number_of_its_heartbeat() {
     assert_eq!([Authority::Attitude, Authority::Surfaces].map(px4), [6 << 16, 1 << 16]);
     let guided = Stack::Ardupilot.steered(Authority::Attitude);
     assert_eq!(guided.custom(Stack::Ardupilot), 15);
+}
+
+#[test]
+fn a_controller_without_a_heartbeat_for_more_than_three_seconds_is_gone() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(2000);
+    played.engage();
+    assert!(played.real.is_engaged());
+    played.run(300);
+    // The last heartbeat came at 2.7 s, when it was engaged, or at 3 s.
+    assert_eq!(played.ms, 3000);
+    played.step();
+    played.heartless = true;
+    // At 6 s it is three seconds old.
+    played.run(3000);
+    assert_eq!(played.released(), None);
+    played.step();
+    assert!(played.released().unwrap().contains("no heartbeat of the controller for 3 s"));
+}
+
+#[test]
+fn a_parameter_is_unknown_or_absent_only_when_each_of_its_names_was_asked_for_in_vain() {
+    let mut played = Played::new(Stack::Ardupilot, Authority::Surfaces);
+    let standing = |played: &Played, name: &str| {
+        let report = played.real.parameter_report();
+        let found = report.into_iter().find(|(known, ..)| *known == name);
+        found.map(|(_, standing, _)| standing)
+    };
+    played.run(1000);
+    for name in ["MAV_GCS_SYSID", "RC_FS_TIMEOUT", "RC1_MIN"] {
+        assert_eq!(standing(&played, name), Some(Standing::Unread), "{name} after a second");
+    }
+    // Five requests, 0.4 s apart; ten where it has two names.
+    played.run(1500);
+    assert_eq!(standing(&played, "RC1_MIN"), Some(Standing::Unknown));
+    assert_eq!(standing(&played, "RC_FS_TIMEOUT"), Some(Standing::Absent));
+    assert_eq!(standing(&played, "MAV_GCS_SYSID"), Some(Standing::Unread));
+    played.run(2500);
+    assert_eq!(standing(&played, "MAV_GCS_SYSID"), Some(Standing::Unknown));
+}
+
+#[test]
+fn a_controller_that_is_found_is_named() {
+    for (stack, words) in [
+        (Stack::Px4, "controller found: PX4, system 1"),
+        (Stack::Ardupilot, "controller found: ArduPilot, system 1"),
+    ] {
+        let mut played = Played::new(stack, Authority::Surfaces);
+        played.run(100);
+        let said = Notice::Text(Severity::Info, words.into());
+        assert!(played.notices.contains(&said), "{:?}", played.notices);
+    }
+}
+
+#[test]
+fn the_survey_counts_bytes_and_keeps_a_rate_that_is_granted() {
+    let mut played = Played::new(Stack::Px4, Authority::Attitude);
+    played.every = 2;
+    played.run(3010);
+    let traffic = *played.real.survey().messages().find(|(id, _)| *id == HEARTBEAT).unwrap().1;
+    let frame = frame_from(V2, 1, 1, &beat(MavAutopilot::MAV_AUTOPILOT_PX4, PX4_HOLD));
+    assert_eq!((traffic.frames, traffic.bytes), (4, 4 * frame.len() as u64));
+    assert_eq!(played.real.survey().hz(31), 50.0);
+    // It was asked for once more at 3 s, first of all; its count begins anew, its rate stands.
+    played.says(&ack(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, MavResult::MAV_RESULT_ACCEPTED, 191));
+    let traffic = *played.real.survey().messages().find(|(id, _)| *id == 31).unwrap().1;
+    assert_eq!((traffic.frames, traffic.hz), (0, 50.0));
 }
