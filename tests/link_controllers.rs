@@ -612,7 +612,9 @@ fn the_way_there_and_back_is_measured_five_times_a_second() {
         played.says(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 1, ts1, ..Default::default() }));
     };
     let ms = Duration::from_millis;
-    [30, 10, 20].map(|took_ms| answer(&mut played, took_ms));
+    for took_ms in [30, 10, 20] {
+        answer(&mut played, took_ms);
+    }
     assert_eq!(played.real.survey().round_trips(), [10, 20, 30].map(ms));
     // The newest 256 are kept.
     (0..300).for_each(|_| answer(&mut played, 5));

@@ -354,7 +354,9 @@ fn surfaces_of_the_airframe_follow_the_controls() {
 #[test]
 fn a_fault_that_is_found_twice_is_still_one() {
     let mut faults = Faults::NONE;
-    [Faults::AIR, Faults::RATES, Faults::AIR].map(|fault| faults.insert(fault));
+    for fault in [Faults::AIR, Faults::RATES, Faults::AIR] {
+        faults.insert(fault);
+    }
     assert!(faults.contains(Faults::AIR) && faults.contains(Faults::RATES));
     assert!(!faults.contains(Faults::ATTITUDE) && !faults.is_empty());
 }
