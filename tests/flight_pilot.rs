@@ -886,3 +886,61 @@ fn a_planner_begins_anew_after_a_state_that_could_not_be_used() {
 fn residuals_that_nobody_computes_are_not_zero() {
     assert!(Flight::armed().pilot.status().residuals.iter().all(|share| share.is_nan()));
 }
+
+#[test]
+fn a_target_is_shown_only_while_somebody_flies_for_it() {
+    let shown = |flight: &Flight| flight.pilot.status().target;
+    let mut flight = Flight::new();
+    flight.fly(5);
+    assert!(shown(&flight).iter().all(|x| x.is_nan()), "disarmed");
+    let mut flight = Flight::offboard();
+    flight.fly(5);
+    assert_eq!(shown(&flight), [0.2, 0.1]);
+    flight.pilot.sticks(flight.now, Sticks { roll: 0.5, pitch: 0.0, throttle: 0.5 });
+    assert_eq!(flight.pilot.set_mode(flight.now, Mode::Manual), Verdict::Accepted);
+    flight.fly(5);
+    assert!(shown(&flight).iter().all(|x| x.is_nan()), "by sticks");
+    // A lockstep vehicle repeats its frame: what was wanted before the disarming is over all the same.
+    let mut flight = Flight::offboard();
+    flight.fly(5);
+    flight.pilot.disarm(flight.now, true);
+    assert_eq!(flight.tick_with(frame(flight.now)).source, Source::Disarmed);
+    assert!(shown(&flight).iter().all(|x| x.is_nan()), "disarmed in flight");
+}
+
+#[test]
+fn the_system_id_is_said_to_be_fixed() {
+    let mut flight = Flight::new();
+    let index = flight.pilot.parameters().iter().position(|p| p.name == "SYSID_THISMAV").unwrap();
+    let same = flight.pilot.set_parameter(index, ParameterValue::Int(1));
+    assert_eq!(same, Verdict::Accepted);
+    let Verdict::Denied(words) = flight.pilot.set_parameter(index, ParameterValue::Int(7)) else {
+        panic!()
+    };
+    assert!(words.contains("SYSID_THISMAV is fixed at 1"), "{words}");
+}
+
+#[test]
+fn until_the_signs_are_checked_the_aircraft_is_held_level_with_its_trim_throttle() {
+    let config = Config { answers: Some(model_answers().clone()), ..x8() };
+    let pilot = Pilot::new(config, Box::new(Proportional)).unwrap();
+    let mut flight = Flight { pilot, ..Flight::new() };
+    flight.pilot.check_signs();
+    flight.fly(5);
+    assert_eq!(flight.pilot.arm(flight.now, false), Verdict::Accepted);
+    let decision = flight.fly(20);
+    let trim = flight.pilot.config().trim_at(20.0);
+    let level =
+        Command { aileron: 0.0, elevator: trim.elevator, throttle: trim.throttle, rudder: 0.0 };
+    assert_eq!((decision.source, decision.command), (Source::Check, level));
+    assert!(flight.pilot.status().target.iter().all(|x| x.is_nan()), "nobody has a target yet");
+}
+
+#[test]
+fn a_schedule_says_once_that_it_begins() {
+    let mut flight = Flight::offboard();
+    flight.pilot.follow(Schedule::new("flat", "", vec![Step::hold(2.0, 0.0, 0.0, 20.0)]).unwrap());
+    flight.fly(50);
+    let told = flight.texts();
+    assert_eq!(told.matches("schedule flat begins").count(), 1, "{told}");
+}

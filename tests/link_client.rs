@@ -543,3 +543,205 @@ fn an_onboard_computer_answers_for_itself_only_and_streams_nothing_by_itself() {
     }
     assert!(!ids.is_empty() && ids.iter().all(|id| *id == 0), "heartbeats only: {ids:?}");
 }
+
+#[test]
+fn the_old_questions_for_versions_are_answered_and_others_denied() {
+    let (mut clients, mut double) = new();
+    let mut asked = |number, param| {
+        let seen = ask(&mut clients, &mut double, at_ms(0), 1, &command(number, &[param]));
+        (acks(&seen), seen.iter().map(|s| s.id).filter(|id| *id != 77).collect::<Vec<_>>())
+    };
+    assert_eq!(asked(519, 1.0), (vec![(519, 0)], vec![300]));
+    assert_eq!(asked(520, 1.0), (vec![(520, 0)], vec![148]));
+    // Zero asks for nothing: denied, and not unknown.
+    assert_eq!(asked(520, 0.0), (vec![(520, 2)], vec![]));
+    assert_eq!(clients.counts().unknown_commands, 0);
+}
+
+#[test]
+fn home_is_where_the_vehicle_was_first_seen_then_where_it_was_armed() {
+    let (mut clients, mut double) = new();
+    let mut home = |double: &mut Double, ms, latitude: f64, armed| {
+        double.status.position[0] = latitude;
+        double.status.armed = armed;
+        clients.poll(at_ms(ms), double);
+        let seen = ask(&mut clients, double, at_ms(ms), 1, &command(410, &[]));
+        let found = seen.iter().find(|s| s.id == 242).map(|s| s.message());
+        let Some(MavMessage::HOME_POSITION(m)) = found else { panic!("{seen:?}") };
+        f64::from(m.latitude) * 1e-7
+    };
+    let near = |got: f64, want: f64| assert!((got - want).abs() < 1e-6, "{got} for {want}");
+    near(home(&mut double, 0, 45.0, false), 45.0);
+    near(home(&mut double, 10, 45.1, false), 45.0);
+    near(home(&mut double, 20, 45.2, true), 45.2);
+    near(home(&mut double, 30, 45.3, true), 45.2);
+    near(home(&mut double, 40, 45.4, false), 45.2);
+}
+
+#[test]
+fn an_answer_is_remembered_for_three_seconds() {
+    for (later_ms, arms) in [(2999, 1), (3000, 2)] {
+        let (mut clients, mut double) = new();
+        let mut arm = |ms, confirmation| {
+            let payload = command_payload(400, [1.0; 7], 1, 1, confirmation);
+            ask(&mut clients, &mut double, at_ms(ms), 1, &raw_frame(76, &payload))
+        };
+        arm(100, 0);
+        arm(100 + later_ms, 1);
+        assert_eq!(double.arms.len(), arms, "{later_ms} ms later");
+    }
+}
+
+#[test]
+fn a_peer_may_change_its_version_after_more_than_five_seconds_of_silence() {
+    for (silent_ms, version) in [(5000, V2), (5001, V1)] {
+        let (mut clients, mut double) = new();
+        clients.handle(at_ms(100), peer(1), &hello(V2), &mut double);
+        clients.handle(at_ms(100 + silent_ms), peer(1), &hello(V1), &mut double);
+        clients.poll(at_ms(100 + silent_ms), &mut double);
+        let seen = sent(&mut clients);
+        assert!(!seen.is_empty() && seen.iter().all(|s| s.version == version), "{silent_ms} ms");
+    }
+}
+
+#[test]
+fn a_peer_is_forgotten_after_a_minute_of_silence() {
+    let (mut clients, mut double) = new();
+    clients.handle(at_ms(100), peer(1), &hello(V2), &mut double);
+    clients.poll(at_ms(60_099), &mut double);
+    assert_eq!(clients.session_count(), 1);
+    clients.poll(at_ms(60_100), &mut double);
+    assert_eq!(clients.session_count(), 0);
+}
+
+#[test]
+fn a_request_for_streams_concerns_its_group_or_all_that_come_by_default() {
+    // Group 10 has the attitude: the others keep their rates.
+    let (mut clients, mut double) = new();
+    clients.handle(at_ms(0), peer(1), &raw_frame(66, &[4, 0, 1, 1, 10, 1]), &mut double);
+    let seen = run(&mut clients, &mut double, 0, 10_000);
+    assert_eq!([30, 83, 33, 1].map(|id| count(&seen, id)), [40, 50, 50, 10]);
+    // Group 0 is no request for SYSTEM_TIME and CURRENT_MODE, which nobody gets unasked.
+    let (mut clients, mut double) = new();
+    clients.handle(at_ms(0), peer(1), &raw_frame(66, &[4, 0, 1, 1, 0, 1]), &mut double);
+    let seen = run(&mut clients, &mut double, 0, 10_000);
+    assert_eq!([30, 33, 2, 436].map(|id| count(&seen, id)), [40, 40, 0, 0]);
+}
+
+/// The program's log, in memory.
+#[derive(Clone, Default)]
+struct Log(std::sync::Arc<std::sync::Mutex<Vec<u8>>>);
+
+impl std::io::Write for Log {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.lock().unwrap().extend(bytes);
+        Ok(bytes.len())
+    }
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Log {
+    /// What is logged meanwhile, line by line.
+    fn of(during: impl FnOnce()) -> Vec<String> {
+        let log = Log::default();
+        let writer = log.clone();
+        let subscriber =
+            tracing_subscriber::fmt().with_writer(move || writer.clone()).with_ansi(false).finish();
+        tracing::subscriber::with_default(subscriber, during);
+        let bytes = log.0.lock().unwrap().clone();
+        String::from_utf8(bytes).unwrap().lines().map(str::to_owned).collect()
+    }
+}
+
+/// A frame with a wrong check sum.
+fn spoilt() -> Vec<u8> {
+    let mut bytes = hello(V2);
+    *bytes.last_mut().unwrap() ^= 0xFF;
+    bytes
+}
+
+/// An attitude with a quaternion of zeros.
+fn refused() -> Vec<u8> {
+    raw_frame(82, &[0])
+}
+
+#[test]
+fn each_kind_of_input_that_cannot_be_used_is_logged() {
+    let level = || {
+        let target = SET_ATTITUDE_TARGET_DATA { q: [1.0, 0.0, 0.0, 0.0], ..Default::default() };
+        frame(V2, &MavMessage::SET_ATTITUDE_TARGET(target))
+    };
+    type Spoil = fn(&mut Clients, &mut Double, &[u8]);
+    let cases: [(&str, Spoil); 4] = [
+        ("bad_crc=1", |clients, double, _| clients.handle(at_ms(0), peer(1), &spoilt(), double)),
+        ("refused_setpoints=1", |clients, double, _| {
+            clients.handle(at_ms(0), peer(1), &refused(), double);
+        }),
+        ("contested_setpoints=1", |clients, double, level| {
+            clients.handle(at_ms(0), peer(1), level, double);
+            clients.handle(at_ms(0), peer(2), level, double);
+        }),
+        ("turned_away=1", |clients, double, _| {
+            for port in 0..=MAX_SESSIONS as u16 {
+                clients.handle(at_ms(0), peer(port), &hello(V2), double);
+            }
+        }),
+    ];
+    for (field, spoil) in cases {
+        let (mut clients, mut double) = new();
+        let lines = Log::of(|| {
+            spoil(&mut clients, &mut double, &level());
+            clients.poll(at_ms(0), &mut double);
+        });
+        assert!(lines.len() == 1 && lines[0].contains(field), "{field}: {lines:?}");
+    }
+    let (mut clients, mut double) = new();
+    let lines = Log::of(|| {
+        clients.handle(at_ms(0), peer(1), &level(), &mut double);
+        run(&mut clients, &mut double, 0, 30_000);
+    });
+    assert!(lines.is_empty(), "nothing was wrong: {lines:?}");
+}
+
+#[test]
+fn a_flood_of_bad_input_is_logged_once_in_ten_seconds() {
+    let (mut clients, mut double) = new();
+    let mut lines = vec![];
+    for ms in (0..40_000).step_by(10) {
+        // Bad input for 15 s; the line at 20 s is of what came after the one at 10 s.
+        let said = Log::of(|| {
+            if ms < 15_000 {
+                clients.handle(at_ms(ms), peer(1), &refused(), &mut double);
+            }
+            clients.poll(at_ms(ms), &mut double);
+        });
+        sent(&mut clients);
+        lines.extend(said.into_iter().map(|line| (ms, line)));
+    }
+    assert_eq!(lines.iter().map(|(ms, _)| *ms).collect::<Vec<_>>(), [0, 10_000, 20_000]);
+    assert!(lines[2].1.contains("refused_setpoints=1500"), "{}", lines[2].1);
+}
+
+#[test]
+fn to_loiter_is_to_hold_and_to_return_is_refused() {
+    let (mut clients, mut double) = new();
+    let mut asked =
+        |number| acks(&ask(&mut clients, &mut double, at_ms(0), 1, &command(number, &[])));
+    assert_eq!((asked(17), asked(20)), (vec![(17, 0)], vec![(20, 2)]));
+    assert_eq!(double.modes, [Mode::Hold]);
+}
+
+#[test]
+fn who_was_silent_for_three_seconds_makes_room() {
+    for (silent_ms, turned_away) in [(2999, 1), (3000, 0)] {
+        let (mut clients, mut double) = new();
+        for port in 0..MAX_SESSIONS as u16 {
+            clients.handle(at_ms(0), peer(100 + port), &hello(V2), &mut double);
+        }
+        clients.handle(at_ms(silent_ms), peer(1), &hello(V2), &mut double);
+        assert_eq!(clients.counts().turned_away, turned_away, "{silent_ms} ms");
+        assert_eq!(clients.session_count(), MAX_SESSIONS);
+    }
+}

@@ -6,25 +6,30 @@ use std::path::Path;
 use std::time::Duration;
 
 use greylag::link::autopilot::Severity;
+use greylag::link::signing::{Key, Signer};
+use greylag::link::vehicle::real::parameters::Standing;
 use greylag::link::vehicle::{
-    Authority, Demand, Fault, Notice, Outputs, Profile, Real, Sitl, Stack, Vehicle,
+    Authority, Axis, Demand, Fault, Faults, Notice, Order, Outputs, Profile, Real, Sitl, Stack,
+    Telemetry, Vehicle,
 };
+use greylag::physics::actuators::Actuators;
 use greylag::physics::servos::Travels;
-use greylag::physics::{Airframe, Command};
+use greylag::physics::{Airframe, Command, Controls, Time};
 use link_support::{Shown, frame_from, peer};
 use mavlink::MavlinkVersion::V2;
+use mavlink::Message;
 use mavlink::dialects::ardupilotmega::*;
 
 const HEARTBEAT: u32 = 0;
 const MANUAL_CONTROL: u32 = 69;
 const CHANNELS_OVERRIDE: u32 = 70;
 const COMMAND_LONG: u32 = 76;
+const ATTITUDE_TARGET: u32 = 82;
+const TIME_SYNC: u32 = 111;
 const DO_SET_MODE: u16 = 176;
 const SET_MESSAGE_INTERVAL: u16 = 511;
-/// MANUAL and HOLD of PX4, MANUAL and LOITER of ArduPlane.
-const PX4_MANUAL: u32 = 1 << 16;
+/// HOLD of PX4, LOITER of ArduPlane.
 const PX4_HOLD: u32 = 4 << 16 | 3 << 24;
-const ARDUPILOT_MANUAL: u32 = 0;
 const ARDUPILOT_LOITER: u32 = 12;
 
 /// A controller played by hand, with the vehicle side that hears it, in steps of 10 ms.
@@ -36,6 +41,16 @@ struct Played {
     mode: u32,
     /// Each how many steps a state comes.
     every: u64,
+    /// Each how many steps a state is left out.
+    skipped: u64,
+    /// The number of the controller's next frame, and by how much it grows, where its frames are numbered.
+    sequence: Option<(u8, u8)>,
+    /// The controller's heartbeats do not come.
+    heartless: bool,
+    /// The controller signs its frames.
+    signer: Option<Signer>,
+    /// The states that were delivered.
+    states: Vec<Telemetry>,
     demand: Demand,
     /// The frames that came out, with the time, ms.
     out: Vec<(u64, u32, Vec<u8>)>,
@@ -60,6 +75,11 @@ impl Played {
             ms: 0,
             mode: if stack == Stack::Px4 { PX4_HOLD } else { ARDUPILOT_LOITER },
             every: 1,
+            skipped: u64::MAX,
+            sequence: None,
+            heartless: false,
+            signer: None,
+            states: vec![],
             demand: NOTHING,
             out: vec![],
             notices: vec![],
@@ -77,14 +97,44 @@ impl Played {
 
     /// A frame of anyone on its link.
     fn says_from(&mut self, system: u8, component: u8, message: &MavMessage) {
-        let bytes = frame_from(V2, system, component, message);
+        let mut bytes = frame_from(V2, system, component, message);
+        if let Some((number, by)) = &mut self.sequence {
+            bytes = numbered(&bytes, *number);
+            *number = number.wrapping_add(*by);
+        }
+        if let Some(signer) = &mut self.signer {
+            bytes = signer.sign(1000 * self.ms, 0, &bytes);
+        }
         let (host, demand) = (self.host(), self.demand);
         let mut states = vec![];
-        self.real.handle(host, peer(1), &bytes, |state| states.push(state.time));
-        for time in states {
-            let answer = self.real.answer(host, time, &demand);
+        self.real.handle(host, peer(1), &bytes, |state| states.push(state));
+        for state in &states {
+            let answer = self.real.answer(host, state.time, &demand);
             self.sent(&answer);
         }
+        self.states.extend(states);
+    }
+
+    /// The three messages that make a state of the controller's clock, ms; what came of it.
+    fn state(&mut self, boot_ms: u64) -> Telemetry {
+        let mut shown = Shown::at(1000 * boot_ms);
+        // A breath of turbulence, so that nothing stands still.
+        shown.attitude.rollspeed = 1e-3 * (boot_ms % 70) as f32;
+        self.says(&MavMessage::HIGHRES_IMU(shown.imu));
+        self.says(&MavMessage::VFR_HUD(shown.air));
+        self.says(&MavMessage::ATTITUDE_QUATERNION(shown.attitude));
+        *self.states.last().unwrap()
+    }
+
+    /// A value of a parameter, as the controller tells it.
+    fn parameter(&mut self, name: &str, value: f32) {
+        self.says(&MavMessage::PARAM_VALUE(PARAM_VALUE_DATA {
+            param_value: value,
+            param_count: 2,
+            param_id: name.into(),
+            param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+            ..Default::default()
+        }));
     }
 
     fn sent(&mut self, mut bytes: &[u8]) {
@@ -106,16 +156,12 @@ impl Played {
 
     /// A step: a heartbeat each second, a state each `every` steps, what is due.
     fn step(&mut self) {
-        if self.ms.is_multiple_of(1000) {
+        if self.ms.is_multiple_of(1000) && !self.heartless {
             self.heartbeat();
         }
-        if (self.ms / 10).is_multiple_of(self.every) {
-            // A breath of turbulence, so that nothing stands still.
-            let mut shown = Shown::at(1000 * self.ms);
-            shown.attitude.rollspeed = 1e-3 * (self.ms % 70) as f32;
-            self.says(&MavMessage::HIGHRES_IMU(shown.imu));
-            self.says(&MavMessage::VFR_HUD(shown.air));
-            self.says(&MavMessage::ATTITUDE_QUATERNION(shown.attitude));
+        let step = self.ms / 10;
+        if step.is_multiple_of(self.every) && (step + 1) % self.skipped != 0 {
+            self.state(self.ms);
         }
         let due = self.real.due(self.host()).unwrap_or_default();
         self.sent(&due);
@@ -131,7 +177,7 @@ impl Played {
     fn engage(&mut self) {
         self.demand = armed(RIGHT);
         self.run(700);
-        self.mode = if self.stack == Stack::Px4 { PX4_MANUAL } else { ARDUPILOT_MANUAL };
+        self.mode = self.stack.steered(self.real.profile().authority).custom(self.stack);
         self.heartbeat();
         assert!(self.real.flies(), "{:?}", self.notices);
     }
@@ -170,6 +216,17 @@ impl Played {
             _ => None,
         })
     }
+}
+
+/// A frame with another sequence number.
+fn numbered(frame: &[u8], sequence: u8) -> Vec<u8> {
+    let mut bytes = frame.to_vec();
+    let end = bytes.len() - 2;
+    bytes[4] = sequence;
+    let id = u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]);
+    let crc = mavlink::calculate_crc(&bytes[1..end], MavMessage::extra_crc(id));
+    bytes[end..].copy_from_slice(&crc.to_le_bytes());
+    bytes
 }
 
 fn beat(autopilot: MavAutopilot, mode: u32) -> MavMessage {
@@ -331,18 +388,13 @@ fn a_radio_is_believed_only_while_nothing_is_overridden() {
 
 #[test]
 fn a_thin_stream_is_an_obstacle_with_its_rate() {
-    for (every, thin) in [(1, false), (2, true)] {
+    // Four states of five are enough, and two of four are not.
+    for (every, skipped, thin) in [(1, u64::MAX, false), (1, 5, false), (2, u64::MAX, true)] {
         let mut played = Played::new(Stack::Px4, Authority::Attitude);
-        played.every = every;
+        (played.every, played.skipped) = (every, skipped);
         played.run(500);
         for (name, value) in [("COM_OF_LOSS_T", 0.5), ("COM_OBL_RC_ACT", 5.0)] {
-            played.says(&MavMessage::PARAM_VALUE(PARAM_VALUE_DATA {
-                param_value: value,
-                param_count: 2,
-                param_id: name.into(),
-                param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
-                ..Default::default()
-            }));
+            played.parameter(name, value);
         }
         played.run(3000);
         assert_eq!(played.real.denial(31), None, "nothing was denied");
@@ -470,5 +522,319 @@ fn surfaces_are_known_to_move_only_while_a_controller_flies_them_as_commanded() 
         played.heartbeat();
         assert_eq!(vehicle(&played).moves_surfaces(), surfaces);
         assert_eq!(vehicle(&played).counts(), played.real.counts());
+        assert_eq!((vehicle(&played).peer(), sitl.peer()), (Some(peer(1)), None));
     }
+}
+
+#[test]
+fn states_that_come_late_twice_after_a_gap_or_a_restart_are_told_apart_with_their_times() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.heartbeat();
+    let next = |lost| Order::Next { lost };
+    // Of 10 ms each, with jitter: 17 ms are two, of which one is missing, 14 ms are one.
+    for (boot_ms, order) in [
+        (50_000, Order::First),
+        (50_010, next(0)),
+        (50_027, next(1)),
+        (50_041, next(0)),
+        (50_041, Order::Repeated),
+        (50_031, Order::Late),
+        // By a second it comes late, by more the clock has started anew.
+        (49_041, Order::Late),
+        (49_040, Order::First),
+        (49_050, next(0)),
+    ] {
+        let state = played.state(boot_ms);
+        assert_eq!((state.order, state.time), (order, Time::from_micros(1000 * boot_ms)));
+    }
+    let counts = played.real.counts();
+    assert_eq!(
+        (counts.states, counts.starts, counts.late, counts.repeated, counts.lost),
+        (6, 2, 2, 1, 1)
+    );
+    assert_eq!((counts.faulty, counts.incomplete), (0, 0));
+}
+
+#[test]
+fn a_controllers_force_that_was_never_believed_is_that_of_level_flight() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.heartbeat();
+    let mut shown = Shown::at(1_000_000);
+    shown.imu.zacc = 1e30;
+    played.says(&MavMessage::HIGHRES_IMU(shown.imu));
+    played.says(&MavMessage::VFR_HUD(shown.air));
+    played.says(&MavMessage::ATTITUDE_QUATERNION(shown.attitude));
+    let state = played.states[0];
+    assert!(state.faults.contains(Faults::SPECIFIC_FORCE), "{}", state.faults);
+    assert_eq!(state.specific_force, [0.0, 0.0, -9.81]);
+}
+
+#[test]
+fn the_actuators_move_on_by_a_step_for_each_period_that_has_passed() {
+    // A controller does not report its surfaces: they are the airframe's, moved by what was commanded.
+    for (passed_ms, steps) in [(10, 1), (14, 1), (17, 2), (30, 3), (150, 15), (5000, 20)] {
+        let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+        played.heartbeat();
+        played.demand = armed(RIGHT);
+        played.state(1000);
+        let seen = played.state(1000 + passed_ms).actuators;
+        let figures = played.real.profile().actuators;
+        let mut actuators = Actuators::at_rest(&Controls::default());
+        (0..steps).for_each(|_| actuators.step(&RIGHT, &figures));
+        assert_eq!(seen, actuators.observed(&figures), "{passed_ms} ms");
+    }
+}
+
+#[test]
+fn an_attitude_is_commanded_with_the_time_of_its_state() {
+    for stack in [Stack::Px4, Stack::Ardupilot] {
+        let mut played = Played::new(stack, Authority::Attitude);
+        played.run(2000);
+        played.engage();
+        played.run(500);
+        let sent = played.frames(ATTITUDE_TARGET);
+        assert!(sent.len() > 20, "{stack}: {}", sent.len());
+        for (ms, payload) in sent {
+            let boot_ms = u32::from_le_bytes([payload[0], payload[1], payload[2], payload[3]]);
+            assert_eq!(u64::from(boot_ms), ms, "{stack}");
+        }
+    }
+}
+
+#[test]
+fn the_way_there_and_back_is_measured_five_times_a_second() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(3000);
+    assert_eq!(played.frames(TIME_SYNC).len(), 15);
+    assert!(played.real.survey().round_trips().is_empty());
+    let answer = |played: &mut Played, took_ms: u64| {
+        let ts1 = 1_000_000 * (played.ms - took_ms) as i64;
+        played.says(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 1, ts1, ..Default::default() }));
+    };
+    let ms = Duration::from_millis;
+    for took_ms in [30, 10, 20] {
+        answer(&mut played, took_ms);
+    }
+    assert_eq!(played.real.survey().round_trips(), [10, 20, 30].map(ms));
+    // The newest 256 are kept.
+    (0..300).for_each(|_| answer(&mut played, 5));
+    assert_eq!(played.real.survey().round_trips(), vec![ms(5); 256]);
+}
+
+#[test]
+fn channels_are_released_only_when_ardupilot_gets_them_back() {
+    for (stack, authority) in
+        [(Stack::Px4, Authority::Surfaces), (Stack::Ardupilot, Authority::Attitude)]
+    {
+        let mut played = Played::new(stack, authority);
+        played.run(2000);
+        played.engage();
+        played.demand.fault = Some(Fault::Lost);
+        played.run(1000);
+        assert!(played.requests().last().unwrap().0 > 2700, "{stack} was asked to hold");
+        assert_eq!(played.frames(CHANNELS_OVERRIDE), [], "{stack}");
+    }
+    let mut played = Played::new(Stack::Ardupilot, Authority::Surfaces);
+    played.run(2000);
+    played.engage();
+    played.run(500);
+    let sent = played.frames(CHANNELS_OVERRIDE);
+    assert!(!sent.is_empty() && sent.iter().all(|(_, p)| p[..6] != [0; 6]), "while we steer");
+}
+
+#[test]
+fn who_steers_by_surfaces_needs_many_states_and_few_lost_frames() {
+    for (authority, leaves) in [(Authority::Surfaces, true), (Authority::Attitude, false)] {
+        let mut played = Played::new(Stack::Px4, authority);
+        played.run(2000);
+        played.engage();
+        played.run(1000);
+        assert_eq!(played.released(), None);
+        // 33 of 100 Hz.
+        played.every = 3;
+        played.run(1200);
+        let thin = played.released().is_some_and(|why| why.contains("states of the vehicle"));
+        assert_eq!(thin, leaves, "{authority:?} {:?}", played.notices);
+
+        let mut played = Played::new(Stack::Px4, authority);
+        played.sequence = Some((0, 1));
+        played.run(2000);
+        played.engage();
+        played.run(1000);
+        assert_eq!(played.released(), None);
+        // Each second frame is lost, by their numbers.
+        played.sequence = Some((0, 2));
+        played.run(1700);
+        let lossy = played.released().is_some_and(|why| why.contains("loses 50 % of the frames"));
+        assert_eq!(lossy, leaves, "{authority:?} {:?}", played.notices);
+    }
+}
+
+#[test]
+fn a_companion_with_our_ids_and_a_second_autopilot_are_intruders_and_others_are_not() {
+    let none = beat(MavAutopilot::MAV_AUTOPILOT_INVALID, 0);
+    let complaints = |played: &mut Played, words: &str| {
+        played.step();
+        let of =
+            |n: &&Notice| matches!(n, Notice::Text(Severity::Error, said) if said.contains(words));
+        played.notices.iter().filter(of).count()
+    };
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(1000);
+    // A camera of the aircraft, and another aircraft's companion.
+    played.says_from(1, 100, &none);
+    played.says_from(2, 191, &none);
+    assert_eq!(complaints(&mut played, "on the vehicle's link"), 0);
+    assert!(!played.real.obstacle().unwrap().contains("on the vehicle's link"));
+    (0..3).for_each(|_| played.says_from(1, 191, &none));
+    assert_eq!(complaints(&mut played, "another onboard computer with our ids"), 1);
+    assert!(played.real.obstacle().unwrap().contains("system 1, component 191"));
+
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(1000);
+    let second = beat(MavAutopilot::MAV_AUTOPILOT_PX4, PX4_HOLD);
+    (0..3).for_each(|_| played.says_from(2, 1, &second));
+    assert_eq!(complaints(&mut played, "a second autopilot (system 2, component 1)"), 1);
+    (0..3).for_each(|_| played.says_from(3, 1, &second));
+    assert_eq!(complaints(&mut played, "a second autopilot (system 3, component 1)"), 1);
+    assert_eq!(played.real.system(), Some(1));
+}
+
+#[test]
+fn only_a_controller_that_signs_and_answers_nothing_shuts_us_out() {
+    for (signs, answers, out) in
+        [(true, false, true), (true, true, false), (false, false, false), (false, true, false)]
+    {
+        let mut played = Played::new(Stack::Px4, Authority::Attitude);
+        played.signer = signs.then(|| Signer::new(Key::from_bytes([1; 32]), 0));
+        played.heartbeat();
+        assert!(!played.real.is_shut_out(), "nothing was asked yet");
+        played.run(1000);
+        if answers {
+            played.parameter("COM_OF_LOSS_T", 0.5);
+        }
+        played.run(1000);
+        assert_eq!(played.real.is_shut_out(), out, "signs {signs}, answers {answers}");
+    }
+}
+
+#[test]
+fn a_stream_that_the_flight_can_do_without_may_be_denied() {
+    let mut played = Played::new(Stack::Ardupilot, Authority::Attitude);
+    played.heartbeat();
+    let due = played.real.due(played.host()).unwrap();
+    played.sent(&due);
+    let interval = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL;
+    // Attitude, forces and air come; AOA_SSA does not.
+    for result in [MavResult::MAV_RESULT_ACCEPTED; 3] {
+        played.says(&ack(interval, result, 191));
+    }
+    played.says(&ack(interval, MavResult::MAV_RESULT_UNSUPPORTED, 191));
+    assert_eq!(played.real.denial(11020), None);
+    played.run(2000);
+    assert!(!played.complained("denies"), "{:?}", played.notices);
+}
+
+#[test]
+fn each_fault_is_said_with_the_remedy_of_its_stack() {
+    for (fault, stack, part) in [
+        (Fault::Reversed(Axis::Roll), Stack::Ardupilot, "RC1_REVERSED"),
+        (Fault::Reversed(Axis::Pitch), Stack::Ardupilot, "RC2_REVERSED"),
+        (Fault::Reversed(Axis::Roll), Stack::Px4, "CA_SV_CSn_TRQ_R"),
+        (Fault::Reversed(Axis::Pitch), Stack::Px4, "CA_SV_CSn_TRQ_P"),
+        (Fault::Reversed(Axis::Roll), Stack::Px4, "rolls left when the aileron is commanded right"),
+        (
+            Fault::Reversed(Axis::Pitch),
+            Stack::Px4,
+            "pitches up when the elevator is commanded down",
+        ),
+        (Fault::Unanswered(Axis::Roll), Stack::Px4, "does not answer to the aileron"),
+        (Fault::Unanswered(Axis::Pitch), Stack::Px4, "does not answer to the elevator"),
+        (Fault::Oscillation(Axis::Roll), Stack::Px4, "oscillates in roll, the aileron"),
+        (Fault::Oscillation(Axis::Pitch), Stack::Px4, "oscillates in pitch, the elevator"),
+        (Fault::Oscillation(Axis::Pitch), Stack::Ardupilot, "raise SCHED_LOOP_RATE"),
+    ] {
+        let words = fault.words(stack);
+        assert!(words.contains(part), "{words}");
+    }
+    // PX4's loop has no rate to raise.
+    assert!(!Fault::Oscillation(Axis::Roll).words(Stack::Px4).contains("raise"));
+}
+
+#[test]
+fn a_mode_has_the_number_of_its_heartbeat() {
+    assert_eq!(Stack::Px4.hold().custom(Stack::Px4), PX4_HOLD);
+    assert_eq!(Stack::Ardupilot.hold().custom(Stack::Ardupilot), ARDUPILOT_LOITER);
+    // Main mode 6 of PX4 is OFFBOARD, 1 is MANUAL; mode 15 of ArduPlane is GUIDED.
+    let px4 = |authority| Stack::Px4.steered(authority).custom(Stack::Px4);
+    assert_eq!([Authority::Attitude, Authority::Surfaces].map(px4), [6 << 16, 1 << 16]);
+    let guided = Stack::Ardupilot.steered(Authority::Attitude);
+    assert_eq!(guided.custom(Stack::Ardupilot), 15);
+}
+
+#[test]
+fn a_controller_without_a_heartbeat_for_more_than_three_seconds_is_gone() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(2000);
+    played.engage();
+    assert!(played.real.is_engaged());
+    played.run(300);
+    // The last heartbeat came at 2.7 s, when it was engaged, or at 3 s.
+    assert_eq!(played.ms, 3000);
+    played.step();
+    played.heartless = true;
+    // At 6 s it is three seconds old.
+    played.run(3000);
+    assert_eq!(played.released(), None);
+    played.step();
+    assert!(played.released().unwrap().contains("no heartbeat of the controller for 3 s"));
+}
+
+#[test]
+fn a_parameter_is_unknown_or_absent_only_when_each_of_its_names_was_asked_for_in_vain() {
+    let mut played = Played::new(Stack::Ardupilot, Authority::Surfaces);
+    let standing = |played: &Played, name: &str| {
+        let report = played.real.parameter_report();
+        let found = report.into_iter().find(|(known, ..)| *known == name);
+        found.map(|(_, standing, _)| standing)
+    };
+    played.run(1000);
+    for name in ["MAV_GCS_SYSID", "RC_FS_TIMEOUT", "RC1_MIN"] {
+        assert_eq!(standing(&played, name), Some(Standing::Unread), "{name} after a second");
+    }
+    // Five requests, 0.4 s apart; ten where it has two names.
+    played.run(1500);
+    assert_eq!(standing(&played, "RC1_MIN"), Some(Standing::Unknown));
+    assert_eq!(standing(&played, "RC_FS_TIMEOUT"), Some(Standing::Absent));
+    assert_eq!(standing(&played, "MAV_GCS_SYSID"), Some(Standing::Unread));
+    played.run(2500);
+    assert_eq!(standing(&played, "MAV_GCS_SYSID"), Some(Standing::Unknown));
+}
+
+#[test]
+fn a_controller_that_is_found_is_named() {
+    for (stack, words) in [
+        (Stack::Px4, "controller found: PX4, system 1"),
+        (Stack::Ardupilot, "controller found: ArduPilot, system 1"),
+    ] {
+        let mut played = Played::new(stack, Authority::Surfaces);
+        played.run(100);
+        let said = Notice::Text(Severity::Info, words.into());
+        assert!(played.notices.contains(&said), "{:?}", played.notices);
+    }
+}
+
+#[test]
+fn the_survey_counts_bytes_and_keeps_a_rate_that_is_granted() {
+    let mut played = Played::new(Stack::Px4, Authority::Attitude);
+    played.every = 2;
+    played.run(3010);
+    let traffic = *played.real.survey().messages().find(|(id, _)| *id == HEARTBEAT).unwrap().1;
+    let frame = frame_from(V2, 1, 1, &beat(MavAutopilot::MAV_AUTOPILOT_PX4, PX4_HOLD));
+    assert_eq!((traffic.frames, traffic.bytes), (4, 4 * frame.len() as u64));
+    assert_eq!(played.real.survey().hz(31), 50.0);
+    // It was asked for once more at 3 s, first of all; its count begins anew, its rate stands.
+    played.says(&ack(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, MavResult::MAV_RESULT_ACCEPTED, 191));
+    let traffic = *played.real.survey().messages().find(|(id, _)| *id == 31).unwrap().1;
+    assert_eq!((traffic.frames, traffic.hz), (0, 50.0));
 }

@@ -140,6 +140,25 @@ fn two_clients_cannot_steer_at_once() {
 }
 
 #[test]
+fn a_client_that_is_forgotten_leaves_control_authority_to_the_next_and_no_other_does() {
+    let sticks = |x| {
+        let data = MANUAL_CONTROL_DATA { x, target: 1, ..Default::default() };
+        frame(V2, &MavMessage::MANUAL_CONTROL(data))
+    };
+    for (forgotten, followed) in [(3, 1), (1, 2)] {
+        let (mut clients, mut double) = new();
+        send(&mut clients, &mut double, 0, 1, setpoint(banked(), 0.5, 7));
+        ask(&mut clients, &mut double, at_ms(0), 1, &sticks(100));
+        // As when a TCP connection has closed.
+        clients.forget(peer(forgotten));
+        send(&mut clients, &mut double, 10, 2, setpoint([1.0, 0.0, 0.0, 0.0], 0.5, 7));
+        ask(&mut clients, &mut double, at_ms(10), 2, &sticks(200));
+        let got = (double.setpoints.len(), double.sticks.len());
+        assert_eq!(got, (followed, followed), "after client {forgotten} was forgotten");
+    }
+}
+
+#[test]
 fn sticks_are_scaled_limited_and_refused_when_an_axis_is_missing() {
     let (mut clients, mut double) = new();
     let mut push = |x, y, z| {

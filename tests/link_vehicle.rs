@@ -5,7 +5,8 @@ mod link_support;
 use std::time::Duration;
 
 use greylag::link::vehicle::{Faults, Order, Outputs, Sitl, Telemetry};
-use greylag::physics::servos::Travels;
+use greylag::physics::mixer::{Does, Effector, Mixer};
+use greylag::physics::servos::{Travel, Travels};
 use greylag::physics::{Command, Time};
 use link_support::{Shown, dissect, frame_from, peer, shim};
 use mavlink::MavlinkVersion::V2;
@@ -276,4 +277,86 @@ fn a_frame_that_comes_early_after_a_gap_tells_the_gap() {
     // By a second it comes late, by more the clock has started anew.
     assert_eq!(order(4_031_000), Order::Late);
     assert_eq!(order(4_030_000), Order::First);
+}
+
+#[test]
+fn a_force_that_was_never_believed_is_that_of_level_flight() {
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
+    let mut shown = Shown::at(0);
+    shown.imu.zacc = f32::NAN;
+    let t = take(&mut sitl, &shown.bytes())[0];
+    // Lift carries the weight: upwards, in axes that have z down.
+    assert_eq!((t.faults, t.specific_force), (Faults::SPECIFIC_FORCE, [0.0, 0.0, -9.81]));
+}
+
+#[test]
+fn an_absurd_wind_is_left_out_and_the_last_one_stands() {
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
+    let mut wind = |us, wind_x| {
+        let said = MavMessage::WIND_COV(WIND_COV_DATA { wind_x, ..Default::default() });
+        take(&mut sitl, &[shim(said), Shown::at(us).bytes()].concat())[0].wind
+    };
+    assert!(wind(0, 1000.0)[0].is_nan());
+    assert_eq!(wind(10_000, 8.0), [8.0, 0.0, 0.0]);
+    assert_eq!(wind(20_000, f32::NAN), [8.0, 0.0, 0.0]);
+}
+
+#[test]
+fn a_travel_that_differs_by_the_files_rounding_is_the_same_and_by_more_is_not() {
+    for (found, same) in [(0.5235, true), (0.5238, true), (0.5243, false), (0.5227, false)] {
+        let mut shown = Shown::at(20_000);
+        shown.actuators.active = 7;
+        (shown.actuators.actuator[5], shown.actuators.actuator[6]) = (found, found);
+        let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
+        take(&mut sitl, &shown.bytes());
+        assert_eq!(sitl.obstacle().is_none(), same, "{found} rad");
+    }
+}
+
+#[test]
+fn a_travel_that_differs_to_one_side_only_is_another() {
+    // A companion whose airframe has 0.4 to each side.
+    for (least, same) in [(-0.4, true), (-0.3, false)] {
+        let mut shown = Shown::at(20_000);
+        shown.actuators.active = 15;
+        shown.actuators.actuator[5..15]
+            .copy_from_slice(&[0.4, 0.4, 0.0, 0.0, 0.4, 0.4, 0.4, least, -0.4, -0.4]);
+        let mut sitl = Sitl::new(1, Travels::alike(0.4));
+        take(&mut sitl, &shown.bytes());
+        assert_eq!(sitl.obstacle().is_none(), same, "{:?}", sitl.obstacle());
+    }
+}
+
+#[test]
+fn surfaces_of_the_airframe_follow_the_controls() {
+    let surface = |name: &str, gains| Effector {
+        name: name.into(),
+        does: Does::Deflects(Travel::symmetric(0.5)),
+        gains,
+        channel: None,
+        command: None,
+        position: None,
+    };
+    let elevons = vec![
+        surface("left", [1.0, 1.0, 0.0, 0.0]),
+        surface("right", [-1.0, 1.0, 0.0, 0.0]),
+        Effector { does: Does::Pulls, ..surface("motor", [0.0, 0.0, 0.0, 1.0]) },
+    ];
+    let mixer = Mixer::new(elevons, false).unwrap();
+    let mut sitl = Sitl::new(1, Travels::alike(0.5)).with_mixer(Some(mixer));
+    let command = Command { aileron: 0.25, elevator: 0.5, throttle: 0.75, rudder: 0.0 };
+    let sent = controls(&sitl.command(Time::default(), Outputs::Armed(command))).controls;
+    assert_eq!(sent[..4], [0.25, 0.5, 0.75, 0.0]);
+    // Sum and difference on the elevons.
+    assert_eq!(sent[4..8], [0.75, 0.25, 0.75, 0.0]);
+}
+
+#[test]
+fn a_fault_that_is_found_twice_is_still_one() {
+    let mut faults = Faults::NONE;
+    for fault in [Faults::AIR, Faults::RATES, Faults::AIR] {
+        faults.insert(fault);
+    }
+    assert!(faults.contains(Faults::AIR) && faults.contains(Faults::RATES));
+    assert!(!faults.contains(Faults::ATTITUDE) && !faults.is_empty());
 }

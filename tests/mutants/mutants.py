@@ -134,14 +134,18 @@ def targets(all_files):
                 yield file, only
 
 
-def write_tree(tree, dropped):
-    """Copies the repository to `tree` with all mutants in it; the mutants."""
-    every = files()
+def mutated(every, dropped):
+    """The mutants of the files, and the text of each file with all of them in it but the dropped ones."""
     schemata = Schemata(dropped)
-    texts = {}
-    for file, only in targets(every):
-        texts[file] = schemata.rewrite(file, (ROOT / file).read_text(), only)
-    texts["src/mutants.rs"] = RUNTIME.replace("COUNT", str(len(schemata.mutants) + 1))
+    texts = {file: schemata.rewrite(file, (ROOT / file).read_text(), only) for file, only in targets(every)}
+    return schemata.mutants, texts
+
+
+def write_tree(tree, dropped):
+    """Copies the repository to `tree` with all mutants in it."""
+    every = files()
+    mutants, texts = mutated(every, dropped)
+    texts["src/mutants.rs"] = RUNTIME.replace("COUNT", str(len(mutants) + 1))
     allowed = "#![allow(overflowing_literals, unconditional_panic, arithmetic_overflow, missing_docs, unused)]\n"
     library = (ROOT / "src/lib.rs").read_text().split("\npub mod num;", 1)
     texts["src/lib.rs"] = f"{library[0]}\n{allowed}pub mod mutants;\npub mod num;{library[1]}"
@@ -150,7 +154,6 @@ def write_tree(tree, dropped):
             put(tree / file, (ROOT / file).read_bytes())
     for file, text in texts.items():
         put(tree / file, text.encode())
-    return schemata.mutants
 
 
 # --- the build ---
@@ -199,7 +202,7 @@ def drop_what_does_not_build(cargo, options):
     dropped_file = options.work / "dropped.json"
     # Numbers of an earlier build hold for the same sources only.
     dropped = set()
-    mutants = write_tree(cargo.tree, dropped)
+    mutants, _ = mutated(files(), dropped)
     print(f"{len(mutants)} mutants", flush=True)
     key = hashlib.sha256("\n".join(m.name for m in mutants).encode()).hexdigest()
     if dropped_file.is_file() and (old := json.loads(dropped_file.read_text()))["key"] == key:
@@ -402,7 +405,8 @@ def shown(mutant):
 
 
 def identity(record):
-    return (record["file"], record["line"], record["column"], record["function"], record["change"])
+    """What a mutant is known by when lines above it come or go."""
+    return (record["file"], record["function"], record["code"], record["column"], record["change"])
 
 
 def latest(path):
@@ -461,10 +465,17 @@ def wilson(part, whole, z=1.96):
     return middle - reach, middle + reach
 
 
+def of_today():
+    """The mutants of the sources as they are, built or not."""
+    return {identity(vars(mutant)): vars(mutant) for mutant in mutated(files(), set())[0]}
+
+
 def report(options):
-    """Prints the mutation score, by file and in all, then what was missed."""
+    """Prints the mutation score, by file and in all, then what was missed; code that is no more counts for nothing."""
     equivalent = {(e["file"], e["function"], e["change"], e["code"]) for e in lines(HERE / "equivalent.jsonl")}
-    records = list(latest(options.results).values())
+    today = of_today()
+    records = [r | {"line": today[i]["line"]} for i, r in latest(options.results).items() if i in today]
+    print(f"{len(records)} of {len(today)} mutants were run")
     for record in records:
         key = (record["file"], record["function"], record["change"], record["code"])
         if key in equivalent and record["outcome"] not in CAUGHT:
@@ -481,7 +492,7 @@ def report(options):
         low, high = wilson(part, whole)
         score = f"{100 * part / whole:6.1f} % ({100 * low:.1f} to {100 * high:.1f})" if whole else ""
         print(f"{file:44}" + "".join(f"{row[o]:15}" for o in outcomes) + f"  {score}")
-    for record in sorted(records, key=identity):
+    for record in sorted(records, key=lambda r: (r["file"], r["line"], r["column"])):
         if record["outcome"] in ("missed", "not reached"):
             print(f"{record['outcome']:11} {record['file']}:{record['line']}: {record['change']} in {record['function']}"
                   f"   | {record['code']}")

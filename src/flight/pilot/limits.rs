@@ -204,4 +204,10 @@ mod tests {
             assert!((pitch - limited).abs() < 1e-9, "{pitch} at {airspeed} m/s");
         }
     }
+
+    #[test]
+    fn at_the_limits_of_airspeed_themselves_the_throttle_is_free() {
+        let e = x8();
+        assert_eq!([e.protect(0.2, 13.0), e.protect(0.7, 45.0)], [0.2, 0.7]);
+    }
 }

@@ -54,3 +54,28 @@ fn instruction_sets_agree() {
         assert_eq!(run(Machine::Avx2(unsafe { room_avx2() })), widest);
     }
 }
+
+/// A surface moves by 0.2 in a step where the airframe allows 20 a second; the throttle is not a surface.
+#[test]
+fn surfaces_of_a_plan_move_no_faster_than_the_airframe_allows() {
+    for (aircraft, rudder) in [("x8/jsbsim.toml", 1.0), ("aerosonde/jsbsim.toml", 0.3)] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params").join(aircraft);
+        let mut model = GreyBox::load(&path).unwrap();
+        model.airframe.envelope.surface_slew_per_s = 20.0;
+        let last = Command { aileron: 0.1, elevator: 0.1, throttle: 0.0, rudder: 0.1 };
+        let far = Command { aileron: 1.0, elevator: -1.0, throttle: 1.0, rudder: 1.0 };
+        let got = slewed(far, &last, &model.airframe);
+        // A rudder that the airframe does not have is nobody's to limit.
+        let wanted = Command { aileron: 0.3, elevator: -0.1, throttle: 1.0, rudder };
+        for (got, wanted) in [
+            (got.aileron, wanted.aileron),
+            (got.elevator, wanted.elevator),
+            (got.throttle, wanted.throttle),
+            (got.rudder, wanted.rudder),
+        ] {
+            assert!((got - wanted).abs() < 1e-12, "{aircraft}: {got} for {wanted}");
+        }
+        let near = Command { aileron: 0.2, elevator: 0.0, throttle: 0.5, rudder: 0.2 };
+        assert_eq!(slewed(near, &last, &model.airframe), near);
+    }
+}

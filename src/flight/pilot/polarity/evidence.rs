@@ -130,6 +130,8 @@ mod tests {
     use super::super::{LONGEST, SEEN, Verdict, judged};
     use super::*;
     use crate::link::vehicle::{Axis, Fault};
+    use crate::model::GreyBox;
+    use std::path::Path;
 
     /// A gain that is certain by so many standard errors.
     fn fit(gain: f64, certainty: f64) -> Fit {
@@ -170,6 +172,52 @@ mod tests {
                 Verdict::Wrong(fault),
                 "{roll:?} {pitch:?}"
             );
+        }
+    }
+
+    /// The record of an aircraft that answers as the model does, its rates beside that changed by `leftover` from state to state.
+    fn record(answers: &Answers, states: usize, leftover: impl Fn(usize) -> f64) -> Evidence {
+        let mut evidence = Evidence::default();
+        let changes = [[(0, 0.06), (12, -0.12)], [(6, 0.06), (18, -0.12)]];
+        for (axis, changes) in changes.iter().enumerate() {
+            changes.iter().for_each(|(index, by)| evidence.change(axis, *index, *by));
+        }
+        let mut left = 0.0;
+        for index in 0..states {
+            left += leftover(index);
+            let rate = |axis: usize| -> f64 {
+                let after = |at: usize| answers.after(axis, index as isize - at as isize);
+                changes[axis].iter().map(|(at, by)| by * after(*at)).sum()
+            };
+            evidence.rates(index, [rate(0) + left, rate(1) + left]);
+        }
+        evidence
+    }
+
+    fn x8() -> Answers {
+        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        Answers::of(&model, 20.0).unwrap()
+    }
+
+    #[test]
+    fn fourteen_changes_of_the_rates_say_something_and_thirteen_nothing() {
+        let answers = x8();
+        let fit = |states| record(&answers, states, |_| 0.0).fit(&answers);
+        assert!(fit(14).is_none());
+        assert!((fit(15).unwrap()[0].gain - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn gusts_that_wander_leave_more_doubt_than_as_large_ones_that_do_not() {
+        // Changes by 0.01 rad/s: of one sign for nine states, or of the other at each.
+        let answers = x8();
+        let doubt = |states: usize| {
+            let gust = |index: usize| if (index / states).is_multiple_of(2) { 0.01 } else { -0.01 };
+            record(&answers, 60, gust).fit(&answers).unwrap().map(|fit| fit.error)
+        };
+        let (wandering, white) = (doubt(9), doubt(1));
+        for (wandering, white) in wandering.into_iter().zip(white) {
+            assert!(wandering > 1.8 * white, "{wandering} {white}");
         }
     }
 }

@@ -325,4 +325,29 @@ mod tests {
             assert_eq!(see(1, roll_deg, pitch_deg) == Verdict::Open, open, "{roll_deg}");
         }
     }
+
+    #[test]
+    fn pulses_begin_to_the_right_and_down_one_after_the_other_and_sum_to_nothing() {
+        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let level = Command { elevator: 0.1, throttle: 0.2, ..Command::IDLE };
+        let mut check = Check::new(Answers::of(&model, 22.0).unwrap());
+        check.await_authority();
+        check.begin(level);
+        check.see(Time::default(), &State::NEUTRAL, level);
+        let pulses: Vec<[f64; 2]> = (0..60)
+            .map(|k| {
+                let command = check.command(Time::from_micros(10_000 * k)).unwrap();
+                assert_eq!((command.throttle, command.rudder), (0.2, 0.0));
+                [command.aileron, command.elevator - 0.1]
+            })
+            .collect();
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{pulses:?}");
+        near(pulses[0][0], 0.06);
+        near(pulses[5][1], 0.0);
+        near(pulses[6][1], 0.06);
+        for axis in [0, 1] {
+            near(pulses.iter().map(|pulse| pulse[axis]).sum(), 0.0);
+            assert!(pulses.iter().filter(|pulse| pulse[axis] < 0.0).count() == 24);
+        }
+    }
 }

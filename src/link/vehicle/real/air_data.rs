@@ -301,4 +301,54 @@ mod tests {
             assert!((w.atan2(u) - 0.2 * pitch.signum()).abs() < 1e-12);
         }
     }
+
+    #[test]
+    fn large_angles_are_found_too_and_at_the_slowest_airspeed_they_still_are() {
+        let air = [20.0, 4.0, 6.0];
+        let mut filter = AirData::default();
+        let step = |k: u32| turning(air, [0.5, 0.3], 0.3, f64::from(k) * 0.01);
+        let last = (0..3000).filter_map(|k| filter.update(&step(k), 0.01)).last().unwrap();
+        // atan(6 / 20) and asin(4 / 21.26).
+        let [alpha, beta] = last.map(f64::to_degrees);
+        assert!((alpha - 16.699).abs() < 0.03 && (beta - 10.844).abs() < 0.03, "{alpha} {beta}");
+        let slow = Measured { airspeed: 3.0, velocity: [3.0, 0.0, 0.0], ..level() };
+        assert!(AirData::default().update(&slow, 0.01).is_some());
+    }
+
+    #[test]
+    fn a_first_airspeed_that_was_wrong_is_forgotten_within_half_a_second() {
+        // 6 m/s too fast: the path seems flatter, the angle of attack larger by 1.4°.
+        let (sin, cos) = 4f64.to_radians().sin_cos();
+        let good = turning([20.0 * cos, 0.0, 20.0 * sin], [0.0, 10f64.to_radians()], 0.0, 0.0);
+        let mut filter = AirData::default();
+        let first = filter.update(&Measured { airspeed: 26.0, ..good }, 0.01).unwrap();
+        assert!(first[0].to_degrees() > 5.0, "{first:?}");
+        let last = (0..50).filter_map(|_| filter.update(&good, 0.01)).last().unwrap();
+        assert!((last[0].to_degrees() - 4.0).abs() < 0.4, "{last:?}");
+    }
+
+    #[test]
+    fn a_wrong_beginning_is_forgotten_in_a_steep_turn_too() {
+        let air = [20.0, 0.0, 1.5];
+        let measured = |k: u32| Measured {
+            velocity: [f64::NAN; 3],
+            ..turning(air, [1.0, 0.1], 0.5, f64::from(k) * 0.01)
+        };
+        let mut filter = AirData::default();
+        let first = measured(0);
+        filter.update(&Measured { airspeed: first.airspeed + 4.0, ..first }, 0.01).unwrap();
+        let last = (1..300).filter_map(|k| filter.update(&measured(k), 0.01)).last().unwrap();
+        let truth = 1.5f64.atan2(20.0);
+        assert!((last[0] - truth).to_degrees().abs() < 1.0, "{last:?} for {truth}");
+    }
+
+    #[test]
+    fn a_glitch_moves_the_angles_by_a_tenth_of_a_degree() {
+        // 40 m/s of climb in one measurement: it counts for 1.5 m/s, of which a fiftieth is believed.
+        let mut filter = AirData::default();
+        let before = (0..400).filter_map(|_| filter.update(&level(), 0.01)).last().unwrap();
+        let after = filter.update(&Measured { climb: 40.0, ..level() }, 0.01).unwrap();
+        let moved = (after[0] - before[0]).to_degrees();
+        assert!((-0.15..-0.05).contains(&moved), "{moved}");
+    }
 }

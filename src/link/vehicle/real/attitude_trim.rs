@@ -145,4 +145,27 @@ mod tests {
         let left = flown(1.8 * DEGREE, |_| 0.8)[450].abs() / DEGREE;
         assert!((left - 0.69).abs() < 0.05, "{left}");
     }
+
+    /// A trim of 1.8° that was found in a turn to the right, 20 s long.
+    fn trimmed() -> AttitudeTrim {
+        let (mut trim, mut roll) = (AttitudeTrim::default(), 0.8);
+        for tick in 0..2000 {
+            let now = Time::from_micros(10_000 * tick);
+            let [commanded, _] = trim.command(now, [0.8, 0.0], [roll, 0.0]);
+            roll += (commanded - 1.8 * DEGREE - roll) * 0.02;
+        }
+        trim
+    }
+
+    #[test]
+    fn the_trim_of_one_turn_is_not_added_to_another() {
+        let at = Time::from_micros(20_000_000);
+        let [roll, _] = trimmed().command(at, [0.8, 0.0], [0.8, 0.0]);
+        assert!(((roll - 0.8) / DEGREE - 1.8).abs() < 0.1, "{}", roll / DEGREE);
+        assert_eq!(trimmed().command(at, [-0.8, 0.0], [0.8, 0.0]), [-0.8, 0.0]);
+        // Who engages again begins anew.
+        let mut trim = trimmed();
+        trim.rest();
+        assert_eq!(trim.command(at, [0.8, 0.0], [0.8, 0.0]), [0.8, 0.0]);
+    }
 }

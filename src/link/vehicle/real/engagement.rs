@@ -309,4 +309,14 @@ mod tests {
         let held = engagement.overdue(ms(3501), Stack::Px4, Authority::Surfaces).unwrap();
         assert!(held.contains("it accepted"), "{held}");
     }
+
+    #[test]
+    fn a_hand_back_is_said_again_once_more_than_two_seconds_have_passed() {
+        let mut engagement = Engagement::new(Duration::ZERO);
+        engagement.begin(ms(0));
+        engagement.hand_back();
+        engagement.request(ms(0));
+        let said = [1990, 2000, 2001, 2010, 9000].map(|at| engagement.unconfirmed(ms(at)));
+        assert_eq!(said, [false, false, true, false, false]);
+    }
 }

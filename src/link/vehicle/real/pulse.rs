@@ -113,4 +113,19 @@ mod tests {
         assert!(second(10, 3).unwrap().contains("of 50 states"));
         assert!(second(30, 1).unwrap().contains("cycles of this computer"));
     }
+
+    #[test]
+    fn each_window_begins_where_the_last_ended() {
+        // No state from the second window on: that is known when it is over, half a second later.
+        let mut pulse = Pulse::default();
+        let said = (0..200).find_map(|i| {
+            if i <= 50 {
+                pulse.state();
+            }
+            let words = pulse.cycle(Duration::from_millis(10 * i), [0, 0])?;
+            Some((10 * i, words))
+        });
+        let (at_ms, words) = said.unwrap();
+        assert!(at_ms == 1000 && words.contains("only 0 of 50 states"), "{at_ms} ms: {words}");
+    }
 }

@@ -159,4 +159,28 @@ mod tests {
         // (0.3 − 0.1) / 0.5 and (0.25 − 0.05) / 0.8.
         assert_eq!(sent(&parameters, 0.3, 0.25, 0.5), [250, 400, 500]);
     }
+
+    #[test]
+    fn half_of_a_deflection_is_half_of_its_own_side_of_the_channel() {
+        let mut parameters = Parameters::new(Stack::Ardupilot.rules(Authority::Surfaces));
+        for (name, value) in [
+            ("RC1_MIN", 1000.0),
+            ("RC1_TRIM", 1400.0),
+            ("RC1_MAX", 2000.0),
+            ("RC3_MIN", 1000.0),
+            ("RC3_MAX", 2000.0),
+            ("RC3_REVERSED", 1.0),
+        ] {
+            parameters.take(name, value);
+        }
+        let sent = |aileron: f64, throttle: f64| {
+            let command = Command { aileron, elevator: 0.0, throttle, rudder: 0.0 };
+            let [roll, _, throttle] = Sticks::default().pulses(&command, &parameters);
+            (roll, throttle)
+        };
+        // The throttle's channel is reversed: closed is its longest pulse.
+        assert_eq!(sent(-0.5, 0.0), (1200, 2000));
+        assert_eq!(sent(0.5, 0.25), (1700, 1750));
+        assert_eq!(sent(0.0, 1.0), (1400, 1000));
+    }
 }

@@ -251,4 +251,26 @@ mod tests {
         assert!(survey.turn(Duration::from_secs(1)));
         assert!((survey.hz(31) - 100.0).abs() < 1e-9, "{}", survey.hz(31));
     }
+
+    #[test]
+    fn the_jitter_of_two_intervals_is_their_standard_deviation() {
+        let mut survey = Survey::default();
+        for (i, ms) in [0, 10, 30].into_iter().enumerate() {
+            survey.frame(Duration::from_millis(ms), 31, i as u8, 60);
+        }
+        // 10 and 20 ms: √(2 · 5²) with one degree of freedom.
+        let jitter = survey.messages().next().unwrap().1.jitter_ms();
+        assert!((jitter - 7.071).abs() < 0.001, "{jitter}");
+    }
+
+    #[test]
+    fn a_window_that_is_closed_late_counts_for_its_length() {
+        let mut survey = Survey::default();
+        survey.turn(Duration::ZERO);
+        for i in 0..150 {
+            survey.frame(Duration::from_millis(10 * i), 31, i as u8, 60);
+        }
+        assert!(survey.turn(Duration::from_millis(1500)));
+        assert!((survey.hz(31) - 100.0).abs() < 1e-9, "{}", survey.hz(31));
+    }
 }
