@@ -21,6 +21,7 @@ use super::shooting::{self, Shot};
 use crate::model::GreyBox;
 use crate::num::statistics::{correlation_length, quantile};
 use crate::sysid::diagnose::search::clocks::{self, Clocks};
+use crate::sysid::per_flight::PerFlight;
 use crate::sysid::progress::{Cancelled, Progress, say};
 
 /// Shortest flight to fit to, s.
@@ -153,7 +154,7 @@ pub fn fit(
 fn clocks(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Option<Clocks> {
     let given = free.iter().filter(|f| f.added).map(|f| f.index).min()?;
     let flights: Vec<_> = flights.iter().map(|f| (&f.prepared, &f.forces)).collect();
-    clocks::clocks(model, given, &flights)
+    clocks::clocks(model, given, &flights, PerFlight::default())
 }
 
 /// The free coefficients as `model` has them, within their bounds.
