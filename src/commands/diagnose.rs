@@ -11,6 +11,7 @@ use crate::commands::distinct::distinct;
 use crate::commands::effect_files::named_effects;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::per_flight::PerFlightArguments;
 use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::report::DiagnosisReport;
@@ -52,6 +53,8 @@ pub struct Arguments {
     /// Ids to be left out of the catalogue.
     #[arg(long, num_args = 1..)]
     without: Vec<String>,
+    #[command(flatten)]
+    per_flight: PerFlightArguments,
     /// Replace the JSON and the report if they exist.
     #[arg(long)]
     force: bool,
@@ -72,6 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         nulls: arguments.nulls.into(),
         with: named_effects(&arguments.effects)?,
         without: arguments.without.clone(),
+        per_flight: arguments.per_flight.asked(),
         ..Options::default()
     };
     let bar = Bar::new();

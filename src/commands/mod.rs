@@ -35,6 +35,7 @@ mod logs;
 mod man;
 #[cfg(feature = "sitl")]
 mod mystery;
+mod per_flight;
 mod propose;
 #[cfg(feature = "sitl")]
 mod recording_report;

@@ -4,6 +4,7 @@ pub mod amend;
 pub mod compare;
 pub mod diagnose;
 pub mod flight_path;
+pub mod per_flight;
 pub mod progress;
 pub mod rudder;
 pub mod signature;

@@ -5,11 +5,13 @@
 pub mod sensors;
 
 use greylag::control::{self, ControllerKind, Target};
+use greylag::logs::Flight;
 use greylag::model::GreyBox;
 use greylag::num::stream::stream;
 use greylag::sim::{Environment, Simulator};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{ActuatorClock, Options, reconstruct};
+use greylag_sitl::hidden::Hidden;
 use greylag_sitl::plant::PlantOptions;
 use rand::RngExt;
 use sensors::{Errors, Flown, STEP};
@@ -26,6 +28,11 @@ pub enum Manoeuvres {
 /// Flies `seconds` with `hidden` (`id=amplitude`) in the aircraft.
 pub fn fly(hidden: &str, seconds: f64, manoeuvres: Manoeuvres, seed: u64) -> Flown {
     let hide = if hidden.is_empty() { Vec::new() } else { vec![hidden.parse().unwrap()] };
+    fly_hiding(hide, seconds, manoeuvres, seed)
+}
+
+/// The same with `hide` in the aircraft.
+pub fn fly_hiding(hide: Vec<Hidden>, seconds: f64, manoeuvres: Manoeuvres, seed: u64) -> Flown {
     let options = PlantOptions { hidden: hide, seed: seed as u32 + 1, ..Default::default() };
     let mut simulator = Simulator::new(&options).unwrap();
     let mut lqi = control::build(ControllerKind::Lqi, &sensors::model()).unwrap();
@@ -96,13 +103,17 @@ pub fn errors(seed: u64) -> Errors {
 /// A flight as its log gives it after the reconstruction, deflections as recorded.
 pub fn flight(hidden: &str, seconds: f64, manoeuvres: Manoeuvres, seed: u64) -> Reconstruction {
     let flown = fly(hidden, seconds, manoeuvres, seed);
-    let log = sensors::spoil(&flown, &errors(seed), seed);
+    rebuilt(&sensors::spoil(&flown, &errors(seed), seed), seed)
+}
+
+/// A log after the reconstruction, deflections as recorded.
+pub fn rebuilt(log: &Flight, seed: u64) -> Reconstruction {
     let options = Options {
         gravity: 9.806,
         actuators_clock: ActuatorClock::AsRecorded,
         ..Options::new(format!("flight{seed}.csv"), sensors::model().airframe.actuators)
     };
-    reconstruct(&log, &options).unwrap()
+    reconstruct(log, &options).unwrap()
 }
 
 /// The model that flies as JSBSim does, each coefficient wrong by 15 % one way or the other.

@@ -87,6 +87,7 @@ pub fn amendment() -> Amendment {
                 airspeed_scale: [0.01, 0.002],
                 alpha_bias_rad: [0.002, 0.001],
                 beta_bias_rad: [0.0, 0.001],
+                own: Vec::new(),
             })
             .into(),
         held_out: vec!["test-1.csv".into(), "test-2.csv".into()],
@@ -98,6 +99,7 @@ pub fn amendment() -> Amendment {
             lengths_s: vec![1.0, 5.0],
             horizons_s: vec![1.0, 2.0, 5.0, 10.0],
             judged_at_s: 5.0,
+            per_flight: Default::default(),
         },
     }
 }

@@ -274,6 +274,7 @@ pub fn diagnosis() -> Diagnosis {
             measured("train-1.csv", "airspeed_scale", 1.002, 0.003, "", false),
             measured("train-2.csv", "wind_north", -5.9, 0.12, "m/s", true),
         ],
+        trims: Vec::new(),
         tuned: names.iter().enumerate().map(tuned).collect(),
         advice: vec![
             Advice {
@@ -301,7 +302,13 @@ pub fn diagnosis() -> Diagnosis {
             .collect(),
         learnable_remainder: 0.08,
         notes: vec!["train-3.ulg has no vane: its α and β count for less".into()],
-        settings: Settings { seed: 1, nulls: 100, bootstraps: 50, without: vec!["ground_effect".into()] },
+        settings: Settings {
+            seed: 1,
+            nulls: 100,
+            bootstraps: 50,
+            without: vec!["ground_effect".into()],
+            per_flight: Default::default(),
+        },
     }
 }
 

@@ -17,6 +17,7 @@ use crate::commands::distinct::distinct;
 use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::per_flight::PerFlightArguments;
 use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
@@ -65,6 +66,8 @@ pub struct Arguments {
     /// zeros too. For a model whose numbers are guesses.
     #[arg(long)]
     from_scratch: bool,
+    #[command(flatten)]
+    per_flight: PerFlightArguments,
     /// Write effects into the model that the data refuse.
     #[arg(long)]
     accept_anyway: bool,
@@ -101,6 +104,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         conventions: arguments.conventions,
         prior: if arguments.from_scratch { Prior::Bounds } else { Prior::File },
         refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
+        per_flight: arguments.per_flight.asked(),
         ..amend::Options::default()
     };
     let bar = Bar::new();
@@ -219,7 +223,8 @@ fn wanted(
 ) -> Result<Vec<Added>> {
     let mut all = Vec::new();
     if arguments.accept {
-        let options = diagnose::Options { with: own_effects(effects), ..Default::default() };
+        let (with, per_flight) = (own_effects(effects), arguments.per_flight.asked());
+        let options = diagnose::Options { with, per_flight, ..Default::default() };
         let bar = Bar::new();
         let diagnosis = diagnose(model, flights, &options, &|stage| bar.hear(stage))?;
         all.extend(diagnosis.effects.iter().filter(|c| c.asserted).map(Added::of));

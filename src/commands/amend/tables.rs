@@ -2,12 +2,15 @@
 
 use comfy_table::{CellAlignment, Table};
 
-use crate::sysid::amend::{Amendment, Parameter};
+use crate::sysid::amend::{Amendment, FittedFlight, Parameter};
 use crate::sysid::compare::HorizonScore;
 
 /// Parameters, errors, sentences, notes.
 pub fn print(story: &Amendment) {
     println!("{}\n{}", parameter_table(&story.parameters), error_table(story));
+    if story.flights.iter().any(|f| !f.own.is_empty()) {
+        println!("{}", own_table(&story.flights));
+    }
     story.sentences.iter().for_each(|sentence| println!("{sentence}"));
     story.notes.iter().for_each(|note| println!("note: {note}"));
 }
@@ -37,6 +40,30 @@ fn parameter_table(parameters: &[Parameter]) -> Table {
         table.add_row(row);
     }
     table
+}
+
+/// What each flight has of its own; angles in degrees.
+fn own_table(flights: &[FittedFlight]) -> Table {
+    let mut table =
+        empty_table(["flight", "its own", "value", "sd", "beside the flights' mean", "sd"]);
+    for f in flights {
+        for c in &f.own {
+            let (factor, unit) = own_unit(c.name);
+            let show = |x: f64| format!("{}{unit}", number(factor * x));
+            let [by, of] = c.beside_mean.map_or_else(|| ["–".into(), "–".into()], |b| b.map(show));
+            table.add_row([f.flight.clone(), c.name.into(), show(c.value), show(c.sd), by, of]);
+        }
+    }
+    table
+}
+
+/// Factor to the unit in which a constant of a flight is shown, and that unit.
+fn own_unit(name: &str) -> (f64, &'static str) {
+    match name {
+        name if name.starts_with("askew") => (1f64.to_degrees(), "°"),
+        "thrust_share" => (100.0, " %"),
+        _ => (1.0, ""),
+    }
 }
 
 /// Free-run errors on the flights that the fit did not see.

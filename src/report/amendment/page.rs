@@ -162,6 +162,15 @@ fn sensors(a: &Amendment) -> Section {
             let ends = interval(value - half, value + half);
             table.push([f.flight.clone(), what.into(), number(value), ends, unit.to_string()]);
         }
+        for c in &f.own {
+            let angle = c.name.starts_with("askew");
+            let (factor, unit) = if angle { (1f64.to_degrees(), "°") } else { (1.0, "") };
+            let (value, half) = (factor * c.value, factor * NORMAL_95 * c.sd);
+            let ends = interval(value - half, value + half);
+            let what = if angle { "axes turned: " } else { "trim: " };
+            let what = format!("{what}{}", c.name);
+            table.push([f.flight.clone(), what, number(value), ends, unit.to_string()]);
+        }
     }
     if table.rows.is_empty() {
         return Section::default();

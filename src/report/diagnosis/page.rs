@@ -30,6 +30,7 @@ pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     sections.push(tables::unseen(d));
     sections.push(tables::tuned(&d.tuned));
     sections.push(tables::measurement(d));
+    sections.push(tables::trims(d));
     sections.push(tables::candidates(d));
     sections.push(tables::notes(d));
     sections.push(tables::provenance(report));

@@ -107,8 +107,45 @@ pub(in crate::report) fn measurement(d: &Diagnosis) -> Section {
             if m.asserted { "yes".into() } else { "no".to_string() },
         ]);
     }
-    let note = "Decided from kinematics alone, before any aerodynamics, and taken out.";
+    let note = match d.settings.per_flight.askew_deg {
+        Some(_) => {
+            "Decided from kinematics alone, before any aerodynamics, and taken out; axes_askew beside the aerodynamics."
+        }
+        None => "Decided from kinematics alone, before any aerodynamics, and taken out.",
+    };
     section("Sensors and wind", note, table)
+}
+
+/// The trims of each flight, where they were asked for.
+pub(in crate::report) fn trims(d: &Diagnosis) -> Section {
+    let columns = [
+        ("Flight", Left),
+        ("Trim", Left),
+        ("Value", Right),
+        ("95 % interval", Right),
+        ("Beside the flights' mean", Right),
+        ("95 % interval", Right),
+        ("Clearly its own", Left),
+    ];
+    let mut table = Table::new("Trims", &columns);
+    let ends = |value: f64, sd: f64| interval(value - NORMAL_95 * sd, value + NORMAL_95 * sd);
+    for t in &d.trims {
+        let beside = t.beside_mean.map(|[by, sd]| [number(by), ends(by, sd)]);
+        let [by, of] = beside.unwrap_or_default();
+        table.push([
+            t.flight.clone(),
+            t.name.clone(),
+            number(t.value),
+            ends(t.value, t.sd),
+            by,
+            of,
+            if t.asserted { "yes".into() } else { "no".to_string() },
+        ]);
+    }
+    let note = "Fitted beside the aerodynamics, to be added to the model's coefficients in that flight. What all \
+                flights have in common is in the model's coefficients as well, so that the difference from the \
+                flights' mean is known better.";
+    section("Trims of the flights", note, table)
 }
 
 pub(in crate::report) fn candidates(d: &Diagnosis) -> Section {

@@ -15,6 +15,7 @@ use crate::physics::catalogue;
 use crate::physics::effects::{Coefficient, Description, Kind};
 use crate::sysid::diagnose::Candidate;
 use crate::sysid::flight_path::reconstruction::{Reconstruction, Segment};
+use crate::sysid::per_flight::PerFlight;
 use crate::sysid::progress::Progress;
 use crate::sysid::rudder;
 use selection::{Ask, Selection};
@@ -75,6 +76,8 @@ pub struct Options {
     pub horizons_s: Vec<f64>,
     /// Whether the model's other conventions are tried too.
     pub conventions: bool,
+    /// What each flight has of its own beside its sensors' constants.
+    pub per_flight: PerFlight,
     /// The model tuned to the same flights without any effect ([`tune`](super::tune)), where that is known already.
     pub tuned: Option<Fit>,
 }
@@ -93,6 +96,7 @@ impl Default for Options {
             refused: Refused::Left,
             horizons_s,
             conventions: false,
+            per_flight: PerFlight::default(),
             tuned: None,
         }
     }
@@ -155,7 +159,8 @@ pub fn amend(
         false => (best, Vec::new()),
     };
     let Selection { fit, after, effects, .. } = best;
-    let notes = notes(model, &tuned.model, &fit);
+    let mut notes = notes(model, &tuned.model, &fit);
+    notes.extend(story::apart(&options.per_flight));
     let mut amendment = Amendment {
         schema: "greylag.amend/1",
         version: env!("CARGO_PKG_VERSION"),
@@ -175,6 +180,7 @@ pub fn amend(
             lengths_s: FitOptions::default().lengths_s,
             horizons_s: options.horizons_s.clone(),
             judged_at_s: JUDGED_AT_S,
+            per_flight: options.per_flight,
         },
     };
     let rudder = rudder::unmodelled(flights, model).or(rudder::unmodelled(held_out, model));

@@ -2,6 +2,8 @@
 
 use crate::sysid::diagnose::search::clocks::{BLURRED, Doubt};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::per_flight::trims::TRIMS;
+use crate::sysid::per_flight::{PerFlight, askew};
 use crate::sysid::weak_form::prepared::{ClockError, Prepared};
 
 /// Constants of a flight's sensors that are estimated along.
@@ -28,6 +30,38 @@ const DOUBT: [f64; 6] = [0.003, 2e-4, 2e-4, 2e-4, 0.002, 0.002];
 /// Names of the reconstruction's constants, in that order.
 const NAMES: [&str; 6] =
     ["airspeed_scale", "gyro_bias_p", "gyro_bias_q", "gyro_bias_r", "alpha_bias", "beta_bias"];
+
+/// What is estimated of a flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Own {
+    /// Its sensors' constants.
+    pub sensors: [f64; SENSORS],
+    /// By how much its measured axes are turned, rad; zero where that is not asked for.
+    pub askew: [f64; askew::NAMES.len()],
+    /// Its trims; zero where they are not asked for.
+    pub trims: [f64; TRIMS.len()],
+}
+
+impl Own {
+    /// Nothing but `sensors`.
+    pub fn of(sensors: [f64; SENSORS]) -> Own {
+        Own { sensors, askew: Default::default(), trims: Default::default() }
+    }
+
+    /// What `asked` makes unknown, in the order of the unknowns: sensors, angles, trims.
+    pub fn unknowns(&self, asked: &PerFlight) -> impl Iterator<Item = f64> {
+        let askew = self.askew.into_iter().take(asked.angles());
+        let trims = self.trims.into_iter().take(if asked.has_trims() { TRIMS.len() } else { 0 });
+        self.sensors.into_iter().chain(askew).chain(trims)
+    }
+
+    /// Adds `step`, in that order.
+    pub fn step(&mut self, asked: &PerFlight, step: &[f64]) {
+        let askew = self.askew.iter_mut().take(asked.angles());
+        let all = self.sensors.iter_mut().chain(askew).chain(&mut self.trims);
+        all.zip(step).for_each(|(x, by)| *x += by);
+    }
+}
 
 /// A flight as the fit takes it.
 #[derive(Clone, Debug)]

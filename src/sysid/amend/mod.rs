@@ -27,4 +27,6 @@ pub use flight::Flight;
 pub use judge::contradictions;
 pub use output_error::{Fit, FitOptions};
 pub use quick::{Estimate, estimate, tune};
-pub use result::{AddedEffect, Amendment, FittedFlight, FlightEstimate, Parameter, Settings};
+pub use result::{
+    AddedEffect, Amendment, FittedFlight, FlightEstimate, OwnConstant, Parameter, Settings,
+};

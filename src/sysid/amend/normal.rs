@@ -1,12 +1,15 @@
 //! The normal equations of a shot, the errors of its initial state eliminated.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::flight::{AIRSPEED, BLUR, Flight, OFFSETS, SENSORS, SKEW};
+use super::flight::{AIRSPEED, BLUR, Flight, OFFSETS, Own, SENSORS, SKEW};
 use super::parameters::{self, Free};
 use super::shooting::{self, Shot};
 use crate::model::GreyBox;
 use crate::physics::Controls;
+use crate::sysid::per_flight::{PerFlight, trims};
 
 /// Steps of derivatives in the initial state, in the units of the state.
 const STATE_STEP: [f64; 8] = [1e-5, 1e-5, 1e-3, 1e-4, 1e-4, 1e-4, 1e-5, 1e-5];
@@ -17,13 +20,16 @@ const SKEW_STEP: f64 = 5e-3;
 /// The same in their blur, squared samples.
 const BLUR_STEP: f64 = 0.05;
 
+/// Step of the derivative in a trim, as a share of its width.
+const TRIM_STEP: f64 = 1e-3;
+
 /// Where the search stands.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
     /// The free coefficients.
     pub theta: Vec<f64>,
-    /// Sensors' constants of each flight.
-    pub sensors: Vec<[f64; SENSORS]>,
+    /// What each flight has of its own.
+    pub own: Vec<Own>,
     /// Error of each shot's initial state.
     pub starts: Vec<[f64; 8]>,
 }
@@ -58,6 +64,8 @@ struct Side {
 /// The present model with what its derivatives need.
 pub(super) struct Neighbourhood {
     pub model: GreyBox,
+    /// What is unknown of each flight beside its sensors' constants.
+    pub asked: PerFlight,
     /// What acts under it.
     pub acting: Acting,
     variants: Vec<Variant>,
@@ -72,17 +80,23 @@ pub(super) fn acting(model: &GreyBox, flights: &[Flight], place: &Place) -> Acti
 
 /// The same with the sensors' constant `which` greater `by` so much.
 fn moved(model: &GreyBox, flights: &[Flight], place: &Place, which: usize, by: f64) -> Acting {
-    let one = |(f, s): (&Flight, &[f64; SENSORS])| {
-        let mut s = *s;
+    let one = |(f, own): (&Flight, &Own)| {
+        let mut s = own.sensors;
         s[which] += by;
         shooting::acting(model, &f.prepared, &s)
     };
-    flights.iter().zip(&place.sensors).map(one).collect()
+    flights.iter().zip(&place.own).map(one).collect()
 }
 
 impl Neighbourhood {
     /// The models around `place`.
-    pub fn new(base: &GreyBox, free: &[Free], flights: &[Flight], place: &Place) -> Neighbourhood {
+    pub fn new(
+        base: &GreyBox,
+        free: &[Free],
+        flights: &[Flight],
+        place: &Place,
+        asked: PerFlight,
+    ) -> Neighbourhood {
         let model = parameters::with(base, free, &place.theta);
         let variant = |k: usize| {
             let (low, high, between) = parameters::beside(base, free, &place.theta, k);
@@ -98,11 +112,12 @@ impl Neighbourhood {
             late: [-SKEW_STEP, SKEW_STEP].map(|by| moved(&model, flights, place, SKEW, by)),
             blurred: [-BLUR_STEP, BLUR_STEP].map(|by| moved(&model, flights, place, BLUR, by)),
             model,
+            asked,
         }
     }
 }
 
-/// A shot's normal equations in the free coefficients and its flight's sensor constants.
+/// A shot's normal equations in the free coefficients and what is its flight's own.
 pub(super) struct Normal {
     /// Information, after the initial state is eliminated.
     pub information: DMatrix<f64>,
@@ -131,23 +146,34 @@ pub(super) fn cost(shot: &Shot, residuals: &[[f64; 8]], start: &[f64; 8], w: &We
     0.5 * (shot.weight * output + square(start, &w.start))
 }
 
-/// The run of a shot at `place`, as residuals.
+/// `model` with the trims of a flight, which have joined it if there are any.
+pub(super) fn of_flight<'a>(model: &'a GreyBox, own: &Own) -> Cow<'a, GreyBox> {
+    if own.trims.iter().all(|trim| *trim == 0.0) {
+        return Cow::Borrowed(model);
+    }
+    let mut of_flight = model.clone();
+    trims::set(&mut of_flight, &own.trims);
+    Cow::Owned(of_flight)
+}
+
+/// The run of a shot whose flight has `own`, as residuals.
 pub(super) fn run(
     model: &GreyBox,
     controls: &Acting,
     flights: &[Flight],
     shot: &Shot,
-    sensors: &[f64; SENSORS],
+    own: &Own,
     from: &[f64; 8],
 ) -> Vec<[f64; 8]> {
     let flight = &flights[shot.flight].prepared;
-    let start = shooting::start(shot, flight, sensors, from);
+    let start = shooting::start(shot, flight, own, from);
+    let model = &*of_flight(model, own);
     let path = shooting::fly(model, flight, shot, &controls[shot.flight][shot.segment], start);
-    shooting::residuals(flight, shot, sensors, &model.scale(), &path)
+    shooting::residuals(flight, shot, own, &model.scale(), &path)
 }
 
-/// Derivatives of the residuals of shot number `index`: columns for the free coefficients, its flight's
-/// sensor constants and its initial state, eight rows a sample.
+/// Derivatives of the residuals of shot number `index`: columns for the free coefficients, what is unknown of its
+/// flight and its initial state, eight rows a sample.
 pub(super) fn jacobian(
     around: &Neighbourhood,
     flights: &[Flight],
@@ -155,13 +181,15 @@ pub(super) fn jacobian(
     index: usize,
     place: &Place,
 ) -> DMatrix<f64> {
-    let (sensors, from) = (&place.sensors[shot.flight], &place.starts[index]);
+    let (own, from) = (&place.own[shot.flight], &place.starts[index]);
     let fly = |model: &GreyBox, controls: &Acting, from: &[f64; 8]| {
-        run(model, controls, flights, shot, sensors, from)
+        run(model, controls, flights, shot, own, from)
     };
     let here = fly(&around.model, &around.acting, from);
     let count = around.variants.len();
-    let mut j = DMatrix::<f64>::zeros(8 * shot.steps, count + SENSORS + 8);
+    let constants = around.asked.constants();
+    let starts = count + SENSORS + constants.len();
+    let mut j = DMatrix::<f64>::zeros(8 * shot.steps, starts + 8);
     let mut fill = |column: usize, low: &[[f64; 8]], high: &[[f64; 8]], between: f64| {
         let mut column = j.column_mut(column);
         for (k, (a, b)) in low.iter().zip(high).enumerate() {
@@ -185,9 +213,19 @@ pub(super) fn jacobian(
         let mut moved = *from;
         moved[i] += step;
         let high = fly(&around.model, &around.acting, &moved);
-        fill(count + SENSORS + i, &here, &high, *step);
+        fill(starts + i, &here, &high, *step);
     }
-    sensor_columns(&mut j, count, flights, shot);
+    let angles = around.asked.angles();
+    for (i, constant) in constants[angles..].iter().enumerate() {
+        let (mut moved, step) = (*own, TRIM_STEP * constant.width);
+        moved.trims[i] += step;
+        let high = run(&around.model, &around.acting, flights, shot, &moved, from);
+        fill(count + SENSORS + angles + i, &here, &high, step);
+    }
+    sensor_columns(&mut j, [count, starts], flights, shot);
+    if angles > 0 {
+        askew_columns(&mut j, [count + SENSORS, starts], flights, shot);
+    }
     j
 }
 
@@ -209,17 +247,41 @@ pub(super) fn normal(
 }
 
 /// The offsets of the sensors: what they add, less what they take from the initial state.
-fn sensor_columns(j: &mut DMatrix<f64>, count: usize, flights: &[Flight], shot: &Shot) {
+fn sensor_columns(
+    j: &mut DMatrix<f64>,
+    [count, starts]: [usize; 2],
+    flights: &[Flight],
+    shot: &Shot,
+) {
     let segment = &flights[shot.flight].prepared.segments[shot.segment];
     for (k, state) in OFFSETS.iter().enumerate() {
         let unit = |i: usize| match *state {
             AIRSPEED => segment[shot.start + i].state.airspeed,
             _ => 1.0,
         };
-        let (column, initial) = (count + SKEW + 1 + k, count + SENSORS + state);
+        let (column, initial) = (count + SKEW + 1 + k, starts + state);
         for row in 0..j.nrows() {
             let direct = if row % 8 == *state { unit(1 + row / 8) } else { 0.0 };
             j[(row, column)] = direct - unit(0) * j[(row, initial)];
+        }
+    }
+}
+
+/// The angles of the measured axes, likewise, in the columns from `first` on.
+fn askew_columns(
+    j: &mut DMatrix<f64>,
+    [first, starts]: [usize; 2],
+    flights: &[Flight],
+    shot: &Shot,
+) {
+    let flight = &flights[shot.flight].prepared;
+    let segment = &flight.segments[shot.segment];
+    let turned = |i: usize| shooting::turned(flight, &segment[shot.start + i].state.to_array());
+    for (axis, initial) in turned(0).iter().enumerate() {
+        for row in 0..j.nrows() {
+            let direct = turned(1 + row / 8)[axis][row % 8];
+            let from: f64 = (0..8).map(|k| initial[k] * j[(row, starts + k)]).sum();
+            j[(row, first + axis)] = direct - from;
         }
     }
 }

@@ -8,12 +8,12 @@
 mod estimates;
 mod gauss_newton;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::equation_error;
 use super::error::AmendError;
-use super::flight::{Flight, SENSORS, SKEW, SKEW_LEAST};
+use super::flight::{Flight, Own, SENSORS, SKEW, SKEW_LEAST};
 use super::normal::{self, Neighbourhood, Place, Weights};
 use super::parameters::{self, Free};
 use super::result::{FittedFlight, Parameter};
@@ -21,6 +21,7 @@ use super::shooting::{self, Shot};
 use crate::model::GreyBox;
 use crate::num::statistics::{correlation_length, quantile};
 use crate::sysid::diagnose::search::clocks::{self, Clocks};
+use crate::sysid::per_flight::{PerFlight, trims};
 use crate::sysid::progress::{Cancelled, Progress, say};
 
 /// Shortest flight to fit to, s.
@@ -52,11 +53,14 @@ pub struct FitOptions {
     pub lengths_s: Vec<f64>,
     /// Times that the derivatives may be renewed for the last length.
     pub renewals: usize,
+    /// What each flight has of its own beside its sensors' constants.
+    pub per_flight: PerFlight,
 }
 
 impl Default for FitOptions {
     fn default() -> Self {
-        FitOptions { added: Vec::new(), lengths_s: vec![1.0, 5.0], renewals: 8 }
+        let per_flight = PerFlight::default();
+        FitOptions { added: Vec::new(), lengths_s: vec![1.0, 5.0], renewals: 8, per_flight }
     }
 }
 
@@ -122,14 +126,16 @@ pub fn fit(
     let doing = format!("{}: equation error over {} flight(s)", model.name, flights.len());
     say(progress, &doing, 0.0)?;
     let clocks = match free.iter().any(|f| f.input && f.added) {
-        true => clocks(model, &free, flights),
+        true => clocks(model, &free, flights, options.per_flight),
         false => None,
     };
     let theta = match &clocks {
         Some(clocks) => values(&clocks.model, &free),
         None => equation_error::start(model, &free, flights),
     };
-    let mut search = Search::new(model, flights, free, theta);
+    let asked = options.per_flight;
+    let flown = if asked.has_trims() { trims::joined(model)? } else { model.clone() };
+    let mut search = Search::new(&flown, flights, free, theta, asked);
     if let Some(clocks) = clocks {
         search.set_clocks(&clocks.late);
     }
@@ -146,14 +152,19 @@ pub fn fit(
             false => search.settle(options.renewals.min(2), NEAR, &step)?,
         }
     }
-    search.finish()
+    search.finish(model)
 }
 
 /// The actuators' clocks with an effect on the deflections in the model, which free runs cannot tell from it.
-fn clocks(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Option<Clocks> {
+fn clocks(
+    model: &GreyBox,
+    free: &[Free],
+    flights: &[Flight],
+    per_flight: PerFlight,
+) -> Option<Clocks> {
     let given = free.iter().filter(|f| f.added).map(|f| f.index).min()?;
     let flights: Vec<_> = flights.iter().map(|f| (&f.prepared, &f.forces)).collect();
-    clocks::clocks(model, given, &flights)
+    clocks::clocks(model, given, &flights, per_flight)
 }
 
 /// The free coefficients as `model` has them, within their bounds.
@@ -164,7 +175,10 @@ fn values(model: &GreyBox, free: &[Free]) -> Vec<f64> {
 
 /// A search under way.
 struct Search<'a> {
+    /// The model, with trims if they are asked for.
     base: &'a GreyBox,
+    /// What is unknown of each flight beside its sensors' constants.
+    asked: PerFlight,
     flights: &'a [Flight],
     free: Vec<Free>,
     shots: Vec<Shot>,
@@ -185,20 +199,27 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(base: &'a GreyBox, flights: &'a [Flight], free: Vec<Free>, theta: Vec<f64>) -> Self {
+    fn new(
+        base: &'a GreyBox,
+        flights: &'a [Flight],
+        free: Vec<Free>,
+        theta: Vec<f64>,
+        asked: PerFlight,
+    ) -> Self {
         let expected: Vec<_> = flights.iter().map(|f| f.doubt).collect();
-        let sensors = flights.iter().map(|f| f.doubt.map(|[mean, _]| mean)).collect();
+        let own = flights.iter().map(|f| Own::of(f.doubt.map(|[mean, _]| mean))).collect();
         let inverse = |sd: [f64; 8]| sd.map(|x| x.powi(-2));
         // samples of a coarse model's residual hang together for about a fifth of a second
         let weights = Weights { output: inverse(COARSE).map(|w| w / 20.0), start: inverse(START) };
         Search {
             base,
+            asked,
             flights,
             free,
             shots: Vec::new(),
             jacobians: Vec::new(),
             short: 0,
-            place: Place { theta, sensors, starts: Vec::new() },
+            place: Place { theta, own, starts: Vec::new() },
             expected,
             weights,
             iterations: 0,
@@ -209,10 +230,10 @@ impl<'a> Search<'a> {
 
     /// Begins with the actuators' clocks, late (s) with standard deviations, as they are known.
     fn set_clocks(&mut self, clocks: &[[f64; 2]]) {
-        let flights = self.expected.iter_mut().zip(&mut self.place.sensors);
-        for ((expected, sensors), [late, sd]) in flights.zip(clocks) {
+        let flights = self.expected.iter_mut().zip(&mut self.place.own);
+        for ((expected, own), [late, sd]) in flights.zip(clocks) {
             expected[SKEW] = [*late, sd.max(SKEW_LEAST)];
-            sensors[SKEW] = *late;
+            own.sensors[SKEW] = *late;
         }
     }
 
@@ -227,9 +248,10 @@ impl<'a> Search<'a> {
             .par_iter()
             .map(|shot| {
                 let flight = &self.flights[shot.flight].prepared;
-                let sensors = &self.place.sensors[shot.flight];
-                let start = shooting::start(shot, flight, sensors, &[0.0; 8]);
+                let own = &self.place.own[shot.flight];
+                let start = shooting::start(shot, flight, own, &[0.0; 8]);
                 let controls = &acting[shot.flight][shot.segment];
+                let model = normal::of_flight(&model, own);
                 shooting::fly(&model, flight, shot, controls, start).len()
             })
             .collect();
@@ -299,7 +321,8 @@ impl<'a> Search<'a> {
     }
 
     fn differentiate(&mut self) {
-        let around = Neighbourhood::new(self.base, &self.free, self.flights, &self.place);
+        let around =
+            Neighbourhood::new(self.base, &self.free, self.flights, &self.place, self.asked);
         let one = |(index, shot): (usize, &Shot)| {
             normal::jacobian(&around, self.flights, shot, index, &self.place)
         };
@@ -340,7 +363,7 @@ impl<'a> Search<'a> {
         let model = parameters::with(self.base, &self.free, &place.theta);
         let acting = normal::acting(&model, self.flights, place);
         let one = |(shot, from): (&Shot, &[f64; 8])| {
-            normal::run(&model, &acting, self.flights, shot, &place.sensors[shot.flight], from)
+            normal::run(&model, &acting, self.flights, shot, &place.own[shot.flight], from)
         };
         self.shots.par_iter().zip(&place.starts).map(one).collect()
     }
@@ -353,20 +376,5 @@ impl<'a> Search<'a> {
             .sum();
         let (unknowns, prior) = (self.unknowns(place), self.prior());
         data + 0.5 * unknowns.component_mul(&unknowns).dot(&prior)
-    }
-
-    /// Coefficients less their prior, then the sensors' constants flight by flight.
-    fn unknowns(&self, place: &Place) -> DVector<f64> {
-        let coefficients = self.free.iter().zip(&place.theta).map(|(f, x)| x - f.prior);
-        let off = place.sensors.iter().flatten().zip(self.expected.iter().flatten());
-        let all = coefficients.chain(off.map(|(x, [mean, _])| x - mean));
-        DVector::from_vec(all.collect())
-    }
-
-    /// Inverse prior variances of the unknowns.
-    fn prior(&self) -> DVector<f64> {
-        let coefficients = self.free.iter().map(|f| f.width);
-        let all = coefficients.chain(self.expected.iter().flatten().map(|[_, sd]| *sd));
-        DVector::from_vec(all.map(|sd| sd.powi(-2)).collect())
     }
 }

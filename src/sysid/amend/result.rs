@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::conventions::Tried;
 use super::flight::SENSORS;
 use crate::sysid::compare::HorizonScore;
+use crate::sysid::per_flight::{Constant, PerFlight};
 
 /// A fitted coefficient.
 #[derive(Clone, Debug, Serialize)]
@@ -60,6 +61,36 @@ pub struct FittedFlight {
     pub alpha_bias_rad: [f64; 2],
     /// Likewise the sideslip vane's bias, rad.
     pub beta_bias_rad: [f64; 2],
+    /// What it has of its own beside them, where that was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub own: Vec<OwnConstant>,
+}
+
+/// A trim of one flight, or an angle by which its measured axes are turned.
+#[derive(Clone, Debug, Serialize)]
+pub struct OwnConstant {
+    /// `askew_roll`, `askew_pitch`, `askew_yaw` (rad), or one of the trims `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`,
+    /// `thrust_share` (dimensionless), which are added to the model's coefficients in this flight.
+    pub name: &'static str,
+    /// Its standard deviation as a prior, about zero.
+    pub prior_sd: f64,
+    /// Its value.
+    pub value: f64,
+    /// Its standard deviation, what is not sure of the model's coefficient included.
+    pub sd: f64,
+    /// The same less the mean of all flights, with its standard deviation; `None` of a single flight.
+    pub beside_mean: Option<[f64; 2]>,
+}
+
+impl OwnConstant {
+    pub(super) fn new(
+        constant: &Constant,
+        value: f64,
+        sd: f64,
+        beside_mean: Option<[f64; 2]>,
+    ) -> OwnConstant {
+        OwnConstant { name: constant.name, prior_sd: constant.width, value, sd, beside_mean }
+    }
 }
 
 impl FittedFlight {
@@ -71,6 +102,7 @@ impl FittedFlight {
             airspeed_scale: [x[1], sd[1]],
             alpha_bias_rad: [x[5], sd[5]],
             beta_bias_rad: [x[6], sd[6]],
+            own: Vec::new(),
         }
     }
 }
@@ -99,6 +131,9 @@ pub struct Settings {
     pub horizons_s: Vec<f64>,
     /// Horizon at which improvement is judged, s.
     pub judged_at_s: f64,
+    /// What each flight had of its own.
+    #[serde(flatten)]
+    pub per_flight: PerFlight,
 }
 
 /// An amended model's story.

@@ -2,11 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::flight::{AIRSPEED, BLUR, Flight, OFFSETS, SENSORS, SKEW};
+use super::flight::{AIRSPEED, BLUR, Flight, OFFSETS, Own, SENSORS, SKEW};
 use crate::logs::Sampling;
 use crate::model::{GreyBox, Memory};
 use crate::physics::{Controls, State};
 use crate::sysid::flight_path::reconstruction::Instant;
+use crate::sysid::per_flight::askew;
 use crate::sysid::weak_form::prepared::Prepared;
 
 /// A run whose scaled error exceeds this has left the flight.
@@ -103,25 +104,37 @@ fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
     }
 }
 
-/// What a flight's sensors add to the state, their constants being `sensors`.
-pub(super) fn offset(sensors: &[f64; SENSORS], state: &[f64; 8]) -> [f64; 8] {
+/// What a unit of each angle by which the measured axes are turned adds to the state.
+pub(super) fn turned(flight: &Prepared, state: &[f64; 8]) -> [[f64; 8]; askew::NAMES.len()] {
+    let [roll, pitch, _, p, q, r, alpha, beta] = *state;
+    let attitude = askew::attitude(roll, pitch);
+    let (rates, flow) = (askew::vector([p, q, r]), flight.turning.at(alpha, beta));
+    std::array::from_fn(|axis| {
+        let ([roll, pitch], [p, q, r], [alpha, beta]) = (attitude[axis], rates[axis], flow[axis]);
+        [roll, pitch, 0.0, p, q, r, alpha, beta]
+    })
+}
+
+/// What a flight's sensors add to the state, their constants and axes being those of `own`.
+pub(super) fn offset(flight: &Prepared, own: &Own, state: &[f64; 8]) -> [f64; 8] {
+    let sensors = &own.sensors;
     let mut offset = [0.0; 8];
     for (k, place) in OFFSETS.iter().enumerate() {
         let unit = if *place == AIRSPEED { state[AIRSPEED] } else { 1.0 };
         offset[*place] = sensors[SKEW + 1 + k] * unit;
     }
+    if own.askew.iter().any(|angle| *angle != 0.0) {
+        for (angle, by) in own.askew.iter().zip(turned(flight, state)) {
+            offset.iter_mut().zip(by).for_each(|(x, by)| *x += angle * by);
+        }
+    }
     offset
 }
 
 /// The state in which a shot starts: as reconstructed, less what the sensors add, plus `from`.
-pub(super) fn start(
-    shot: &Shot,
-    flight: &Prepared,
-    sensors: &[f64; SENSORS],
-    from: &[f64; 8],
-) -> [f64; 8] {
+pub(super) fn start(shot: &Shot, flight: &Prepared, own: &Own, from: &[f64; 8]) -> [f64; 8] {
     let measured = flight.segments[shot.segment][shot.start].state.to_array();
-    let offset = offset(sensors, &measured);
+    let offset = offset(flight, own, &measured);
     std::array::from_fn(|k| measured[k] - offset[k] + from[k])
 }
 
@@ -174,7 +187,7 @@ pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
 pub(super) fn residuals(
     flight: &Prepared,
     shot: &Shot,
-    sensors: &[f64; SENSORS],
+    own: &Own,
     scale: &[f64; 8],
     path: &[[f64; 8]],
 ) -> Vec<[f64; 8]> {
@@ -185,7 +198,7 @@ pub(super) fn residuals(
         .map(|k| {
             if let Some(predicted) = path.get(k) {
                 let measured = segment[shot.start + 1 + k].state.to_array();
-                let offset = offset(sensors, &measured);
+                let offset = offset(flight, own, &measured);
                 let seen = std::array::from_fn(|i| predicted[i] + offset[i]);
                 last = error(&measured, &seen);
             }

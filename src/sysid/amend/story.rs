@@ -3,6 +3,7 @@
 use super::conventions::Tried;
 use super::judge::{judged, judged_at};
 use super::result::Amendment;
+use crate::sysid::per_flight::PerFlight;
 
 /// The amendment in words: what became of the error, of the conventions, and of every effect.
 pub fn sentences(story: &Amendment) -> Vec<String> {
@@ -54,6 +55,20 @@ pub fn sentences(story: &Amendment) -> Vec<String> {
         all.push(format!("{} is {verb}: {}.{next}", effect.id, effect.refused.join("; ")));
     }
     all
+}
+
+/// What becomes of `asked`, which each flight has of its own, outside the fit; nothing if nothing was asked for.
+pub fn apart(asked: &PerFlight) -> Option<String> {
+    let what = match (asked.has_trims(), asked.angles() > 0) {
+        (false, false) => return None,
+        (true, false) => "trims",
+        (false, true) => "axes",
+        (true, true) => "trims and axes",
+    };
+    Some(format!(
+        "Each flight was fitted with {what} of its own; the model file has what all flights have in common, and the \
+         flights held out are judged with that: nothing is taken from them."
+    ))
 }
 
 fn change(from: f64, to: f64) -> String {

@@ -14,8 +14,8 @@ pub(in crate::sysid) mod search;
 
 pub use answer::curves::over_the_best;
 pub use answer::result::{
-    Advice, Candidate, ChannelLeft, Curve, Decoy, Diagnosis, FlightEstimate, Measurement, Nulls,
-    Parameter, Settings, Tuned, Verdict,
+    Advice, Candidate, ChannelLeft, Curve, Decoy, Diagnosis, FlightEstimate, FlightTrim,
+    Measurement, Nulls, Parameter, Settings, Tuned, Verdict,
 };
 pub use answer::run::{diagnose, searched};
 pub use error::DiagnoseError;

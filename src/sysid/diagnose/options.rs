@@ -1,5 +1,7 @@
 //! What a diagnosis is asked for.
 
+use crate::sysid::per_flight::PerFlight;
+
 /// How much a diagnosis works out besides its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
@@ -28,6 +30,8 @@ pub struct Options {
     pub detail: Detail,
     /// Whether the search for a formula tries free forms where the shapes of its library are not all.
     pub free_forms: bool,
+    /// What each flight has of its own beside its sensors' errors.
+    pub per_flight: PerFlight,
 }
 
 impl Default for Options {
@@ -41,6 +45,7 @@ impl Default for Options {
             without: Vec::new(),
             detail: Detail::Full,
             free_forms: true,
+            per_flight: PerFlight::default(),
         }
     }
 }

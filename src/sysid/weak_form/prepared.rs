@@ -7,6 +7,7 @@ use crate::logs::Sampling;
 use crate::model::{GreyBox, Integrator, Memory, STEP};
 use crate::physics::State;
 use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction};
+use crate::sysid::per_flight::askew::Turning;
 use crate::sysid::weak_form::channels::RegimeVariable;
 use crate::sysid::weak_form::kernel::{Kernel, weigh};
 
@@ -43,6 +44,8 @@ pub struct Prepared {
     pub noise: [f64; 8],
     /// Noise of the accelerometers, m/s², likewise.
     pub force_noise: [f64; 3],
+    /// What axes that are turned make of its α and β.
+    pub turning: Turning,
     /// The kernel on its clock.
     pub kernel: Kernel,
     /// The windows, in time order.
@@ -86,6 +89,7 @@ impl Prepared {
             std::array::from_fn(|k| left(flight.force_noise[k], &|i| i.specific_force[k]));
         let first = flight.segments.iter().find_map(|s| s.instants.first());
         let windows = windows(&segments, &kernel, first.map_or(0.0, |i| i.time_s));
+        let turning = Turning::of(flight, &segments);
         Ok(Prepared {
             name: flight.name.clone(),
             dt,
@@ -94,6 +98,7 @@ impl Prepared {
             segments,
             noise,
             force_noise,
+            turning,
             kernel,
             windows,
         })

@@ -228,7 +228,9 @@ impl Ask<'_> {
     fn fit(&self, model: &GreyBox, options: &FitOptions) -> Result<Fit, AmendError> {
         let progress = progress::part(self.progress, self.done());
         self.begun.fetch_add(1, Ordering::Relaxed);
-        output_error::fit(model, self.train, options, &progress)
+        let per_flight = self.options.per_flight;
+        let options = FitOptions { per_flight, ..options.clone() };
+        output_error::fit(model, self.train, &options, &progress)
     }
 
     /// Shares of the work that are done before and after the next fit. Some effects are asked for twice, so the

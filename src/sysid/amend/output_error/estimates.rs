@@ -4,11 +4,12 @@ use nalgebra::{DMatrix, DVector};
 
 use super::gauss_newton::System;
 use super::{Fit, Left, Search};
+use crate::model::GreyBox;
 use crate::sysid::amend::error::AmendError;
-use crate::sysid::amend::flight::SENSORS;
+use crate::sysid::amend::flight::{Flight, SENSORS};
 use crate::sysid::amend::interval::{self, Covariance};
 use crate::sysid::amend::parameters::{self, Free};
-use crate::sysid::amend::result::{FittedFlight, FlightEstimate, Parameter};
+use crate::sysid::amend::result::{FittedFlight, FlightEstimate, OwnConstant, Parameter};
 use crate::sysid::amend::shooting::Shot;
 
 /// Two-sided 95 % point of the normal distribution.
@@ -24,7 +25,8 @@ const LOST: f64 = 5.0;
 
 impl Search<'_> {
     /// The fit as it stands, with intervals.
-    pub(super) fn finish(self) -> Result<Fit, AmendError> {
+    /// Its model is `given`, without trims of flights.
+    pub(super) fn finish(self, given: &GreyBox) -> Result<Fit, AmendError> {
         let model_name = || self.base.name.clone();
         if self.change.0.is_nan() || (self.change.0 > LOST && !self.stuck) {
             return Err(AmendError::NotConverged {
@@ -60,17 +62,12 @@ impl Search<'_> {
         let mut by_flight = by_flight;
         by_flight.iter_mut().flatten().for_each(|e| e.sd *= wider);
         let parameters = self.parameters(&sd, &by_flight, &covariance);
-        let flights = self.flights.iter().zip(&self.place.sensors).enumerate();
+        let flights = self.fitted_flights(&sd, &covariance);
         let weakened = self.shots.iter().filter(|s| s.weight < 0.5).count() + self.short;
         Ok(Fit {
-            model: parameters::with(self.base, &self.free, &self.place.theta),
+            model: parameters::with(given, &self.free, &self.place.theta),
             parameters,
-            flights: flights
-                .map(|(k, (f, s))| {
-                    let at = self.free.len() + k * SENSORS;
-                    FittedFlight::new(&f.prepared.name, f.seconds(), s, &sd[at..at + SENSORS])
-                })
-                .collect(),
+            flights,
             residual_sd: self.residual_sd(),
             shots: self.shots.len(),
             weakened,
@@ -80,6 +77,40 @@ impl Search<'_> {
             notes: self.notes(weakened, &unsettled),
             unsettled,
         })
+    }
+
+    fn fitted_flights(&self, sd: &[f64], covariance: &Covariance) -> Vec<FittedFlight> {
+        let (size, constants) = (self.of_flight(), self.asked.constants());
+        let count = self.flights.len();
+        let place = |flight: usize, which: usize| self.free.len() + flight * size + which;
+        // less the mean of the flights, which is as well in the model's coefficient
+        let beside_mean = |flight: usize, which: usize| {
+            let value =
+                |k: usize| self.place.own[k].unknowns(&self.asked).nth(which).unwrap_or(0.0);
+            let weight = |k: usize| f64::from(u8::from(k == flight)) - 1.0 / count as f64;
+            let pairs = (0..count).flat_map(|a| (0..count).map(move |b| (a, b)));
+            let variance: f64 = pairs
+                .map(|(a, b)| {
+                    let (i, j) = (place(a, which), place(b, which));
+                    weight(a) * weight(b) * sd[i] * sd[j] * covariance.correlation(i, j)
+                })
+                .sum();
+            let by: f64 = (0..count).map(|k| weight(k) * value(k)).sum();
+            [by, variance.max(0.0).sqrt()]
+        };
+        let one = |(k, flight): (usize, &Flight)| {
+            let sd = &sd[place(k, 0)..place(k + 1, 0)];
+            let own = &self.place.own[k];
+            let mut fitted =
+                FittedFlight::new(&flight.prepared.name, flight.seconds(), &own.sensors, sd);
+            let values = own.unknowns(&self.asked).zip(sd).enumerate().skip(SENSORS);
+            for ((which, (value, sd)), constant) in values.zip(&constants) {
+                let beside_mean = (count > 1).then(|| beside_mean(k, which));
+                fitted.own.push(OwnConstant::new(constant, value, *sd, beside_mean));
+            }
+            fitted
+        };
+        self.flights.iter().enumerate().map(one).collect()
     }
 
     fn parameters(
@@ -121,7 +152,7 @@ impl Search<'_> {
         let count = self.free.len();
         let mut all = vec![Vec::new(); count];
         for (number, flight) in self.flights.iter().enumerate() {
-            let size = count + SENSORS;
+            let size = count + self.of_flight();
             let (mut information, mut gradient) =
                 (DMatrix::zeros(size, size), DVector::zeros(size));
             let places = self.places(number);

@@ -18,11 +18,39 @@ pub(super) struct System {
 }
 
 impl Search<'_> {
+    /// Coefficients less their prior, then the unknowns of each flight.
+    pub(super) fn unknowns(&self, place: &Place) -> DVector<f64> {
+        let coefficients = self.free.iter().zip(&place.theta).map(|(f, x)| x - f.prior);
+        let mut all: Vec<f64> = coefficients.collect();
+        for (own, expected) in place.own.iter().zip(&self.expected) {
+            let mean = expected.iter().map(|[mean, _]| *mean).chain(std::iter::repeat(0.0));
+            all.extend(own.unknowns(&self.asked).zip(mean).map(|(x, mean)| x - mean));
+        }
+        DVector::from_vec(all)
+    }
+
+    /// How many unknowns a flight has.
+    pub(super) fn of_flight(&self) -> usize {
+        SENSORS + self.asked.constants().len()
+    }
+
+    /// Inverse prior variances of the unknowns.
+    pub(super) fn prior(&self) -> DVector<f64> {
+        let constants = self.asked.constants();
+        let mut all: Vec<f64> = self.free.iter().map(|f| f.width).collect();
+        for expected in &self.expected {
+            all.extend(expected.iter().map(|[_, sd]| *sd));
+            all.extend(constants.iter().map(|c| c.width));
+        }
+        DVector::from_vec(all.iter().map(|sd| sd.powi(-2)).collect())
+    }
+
     /// Where the unknowns of a shot's own equations stand among all.
     pub(super) fn places(&self, flight: usize) -> Vec<usize> {
         let count = self.free.len();
-        let own = count + flight * SENSORS;
-        (0..count).chain(own..own + SENSORS).collect()
+        let size = self.of_flight();
+        let own = count + flight * size;
+        (0..count).chain(own..own + size).collect()
     }
 
     pub(super) fn system(&self) -> System {
@@ -117,10 +145,9 @@ impl Search<'_> {
         for (k, f) in self.free.iter().enumerate() {
             next.theta[k] = (next.theta[k] + step[k]).clamp(f.bounds.0, f.bounds.1);
         }
-        for (flight, sensors) in next.sensors.iter_mut().enumerate() {
-            for (k, x) in sensors.iter_mut().enumerate() {
-                *x += step[count + flight * SENSORS + k];
-            }
+        let step_of = step.as_slice()[count..].chunks(self.of_flight());
+        for (own, step) in next.own.iter_mut().zip(step_of) {
+            own.step(&self.asked, step);
         }
         for ((shot, normal), from) in
             self.shots.iter().zip(&system.shots).zip(next.starts.iter_mut())

@@ -5,6 +5,7 @@ pub(super) mod curves;
 pub(super) mod decoys;
 pub(super) mod detectable;
 pub(super) mod measurement;
+pub(super) mod per_flight;
 pub(super) mod ranking;
 pub(super) mod result;
 pub(super) mod run;

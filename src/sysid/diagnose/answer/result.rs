@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::sysid::per_flight::PerFlight;
+
 /// The answer in one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -31,8 +33,12 @@ pub struct Diagnosis {
     pub effects: Vec<Candidate>,
     /// What the tuned model with the asserted effects leaves unexplained, by channel.
     pub channels: Vec<ChannelLeft>,
-    /// Sensor errors and wind of each flight, decided before any aerodynamics.
+    /// Sensor errors and wind of each flight, decided before any aerodynamics; axes that stand askew
+    /// (`axes_askew`), decided beside them, where they were asked for.
     pub measurement: Vec<Measurement>,
+    /// The trims of each flight, where they were asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub trims: Vec<FlightTrim>,
     /// The prior's coefficients as tuned, with the asserted effects in the model.
     pub tuned: Vec<Tuned>,
     /// What to fly next, the most useful first.
@@ -162,6 +168,25 @@ pub struct Measurement {
     pub asserted: bool,
 }
 
+/// A trim of one flight, beside what all flights have in common.
+#[derive(Clone, Debug, Serialize)]
+pub struct FlightTrim {
+    /// The flight.
+    pub flight: String,
+    /// Its name: `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`, or `thrust_share`, a share of the model's thrust.
+    pub name: String,
+    /// Its standard deviation as a prior, about zero.
+    pub prior_sd: f64,
+    /// Its value, dimensionless, to be added to the model's coefficient.
+    pub value: f64,
+    /// Its standard deviation, what is not sure of the model's coefficient included.
+    pub sd: f64,
+    /// The same less the mean of all flights, with its standard deviation; `None` of a single flight.
+    pub beside_mean: Option<[f64; 2]>,
+    /// Whether it is clearly not the mean, and by no more than is believed.
+    pub asserted: bool,
+}
+
 /// A tuned coefficient.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tuned {
@@ -220,4 +245,7 @@ pub struct Settings {
     pub bootstraps: usize,
     /// Ids left out of the catalogue.
     pub without: Vec<String>,
+    /// What each flight had of its own.
+    #[serde(flatten)]
+    pub per_flight: PerFlight,
 }

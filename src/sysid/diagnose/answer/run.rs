@@ -5,6 +5,7 @@ use crate::physics;
 use crate::sysid::diagnose::answer::advice;
 use crate::sysid::diagnose::answer::decoys;
 use crate::sysid::diagnose::answer::measurement;
+use crate::sysid::diagnose::answer::per_flight;
 use crate::sysid::diagnose::answer::ranking;
 use crate::sysid::diagnose::answer::result::{Diagnosis, Nulls, Settings, Verdict};
 use crate::sysid::diagnose::answer::sentences;
@@ -50,7 +51,9 @@ pub fn diagnose(
     }
     let effects = ranking::candidates(&found, options);
     let channels = shares::channels(&found);
-    let measurement = measurement::measurement(&used);
+    let mut measurement = measurement::measurement(&used);
+    measurement.extend(per_flight::askew(found.round()));
+    let trims = per_flight::trims(found.round());
     let verdict = verdict(&found);
     notes.extend(sentences::notes(&found, model, options));
     let decoys = match options.detail {
@@ -66,11 +69,13 @@ pub fn diagnose(
             .map(rudder::warning)
             .into_iter()
             .chain(sentences::sentences(&found, verdict, &effects, &channels, &measurement))
+            .chain(per_flight::sentences(&measurement, &trims))
             .collect(),
         advice: advice::advice(&found, verdict, &effects, &channels),
         effects,
         channels,
         measurement,
+        trims,
         tuned: shares::tuned(&found, model),
         nulls: Nulls { count: options.nulls, best: found.nulls.clone(), level: options.level },
         decoys,
@@ -81,6 +86,7 @@ pub fn diagnose(
             nulls: options.nulls,
             bootstraps: options.bootstraps,
             without: options.without.clone(),
+            per_flight: options.per_flight,
         },
     })
 }
@@ -126,7 +132,8 @@ pub fn problem<'a>(
     let sensors = used.iter().zip(&prepared).map(|(f, p)| sensors::widths(f, p.dt)).collect();
     let prior = model.coefficients().iter().map(|c| (c.value, c.width())).collect();
     let path = used.iter().zip(&prepared).map(|(f, p)| shared::path_error(f, p.dt)).collect();
-    let problem = Problem { flights: prepared, prior, path, sensors, seed: options.seed };
+    let (seed, per_flight) = (options.seed, options.per_flight);
+    let problem = Problem { flights: prepared, prior, path, sensors, per_flight, seed };
     Ok((problem, used, notes))
 }
 

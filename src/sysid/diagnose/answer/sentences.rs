@@ -5,7 +5,7 @@ use crate::physics::catalogue::describe;
 use crate::sysid::diagnose::answer::result::{
     Candidate, ChannelLeft, Measurement, Parameter, Verdict,
 };
-use crate::sysid::diagnose::answer::shares;
+use crate::sysid::diagnose::answer::{per_flight, shares};
 use crate::sysid::diagnose::options::Options;
 use crate::sysid::diagnose::search::stepwise::Found;
 
@@ -64,7 +64,8 @@ pub fn sentences(
             Some(format!("Most is left in {}: {regime}.", c.channel))
         }));
     }
-    said.extend(measurement.iter().filter(|m| m.asserted).map(|m| {
+    let before = |m: &&Measurement| m.asserted && m.id != per_flight::ASKEW;
+    said.extend(measurement.iter().filter(before).map(|m| {
         format!(
             "{}: {} is {:.4} ± {:.4} {} ({}), taken out before any aerodynamics.",
             m.flight, m.name, m.value, m.sd, m.unit, m.id
@@ -154,7 +155,8 @@ pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
         found.remainder.total, found.remainder.total_threshold, found.remainder.removable
     ));
     let round = found.round();
-    for (k, known) in round.known.iter().enumerate().skip(round.coefficients.len()) {
+    let own = round.per_flight.constants().len() * round.flights.len();
+    for (k, known) in round.known.iter().enumerate().skip(round.coefficients.len() + own) {
         let off = round.projected.tuned[k] / known.width;
         if off.abs() > FAR + 1.0 {
             notes.push(format!(
@@ -164,6 +166,7 @@ pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
             ));
         }
     }
+    notes.extend(per_flight::notes(round));
     if !options.without.is_empty() {
         notes.push(format!("Left out of the catalogue: {}.", options.without.join(", ")));
     }

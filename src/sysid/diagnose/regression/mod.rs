@@ -7,6 +7,7 @@ pub(super) mod features;
 pub(super) mod gather;
 pub(super) mod local;
 pub(super) mod noise;
+pub(super) mod per_flight;
 pub(super) mod projected;
 pub(super) mod rank;
 pub(super) mod sensors;

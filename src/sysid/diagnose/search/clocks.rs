@@ -11,6 +11,7 @@ pub use crate::sysid::diagnose::regression::sensors::BLURRED;
 use crate::sysid::diagnose::regression::shared::{self, PathError};
 use crate::sysid::diagnose::search::round::{Problem, Round};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::per_flight::PerFlight;
 use crate::sysid::weak_form::prepared::Prepared;
 
 /// Times that everything is fitted again around the last values.
@@ -40,14 +41,20 @@ pub struct Clocks {
     pub late: Vec<[f64; 2]>,
 }
 
-/// Fits `model`, whose first `given` coefficients have their prior widths and whose others have none, together
+/// Fits `model`, each flight with what it has of its own by `per_flight`, whose first `given` coefficients have their prior widths and whose others have none, together
 /// with the clocks of `flights`; `None` if they do not hold the model at all.
-pub fn clocks(model: &GreyBox, given: usize, flights: &[(&Prepared, &Doubt)]) -> Option<Clocks> {
+pub fn clocks(
+    model: &GreyBox,
+    given: usize,
+    flights: &[(&Prepared, &Doubt)],
+    per_flight: PerFlight,
+) -> Option<Clocks> {
     let problem = Problem {
         flights: flights.iter().map(|(flight, _)| (*flight).clone()).collect(),
         prior: model.coefficients().iter().take(given).map(|c| (c.value, c.width())).collect(),
         path: flights.iter().map(|(_, doubt)| doubt.path).collect(),
         sensors: flights.iter().map(|(_, doubt)| doubt.sensors).collect(),
+        per_flight,
         seed: SEED,
     };
     let mut round = Round::new(&problem, model.clone(), &[])?;

@@ -14,6 +14,7 @@ use crate::sysid::diagnose::regression::noise::Noise;
 use crate::sysid::diagnose::regression::projected::{Known, Projected, scaled_inverse};
 use crate::sysid::diagnose::regression::rank::{Draw, Score, Trial};
 use crate::sysid::diagnose::regression::{features, shared};
+use crate::sysid::per_flight::PerFlight;
 use crate::sysid::weak_form::prepared::Prepared;
 use known::{curved, known};
 use shared_noise::{Setting, shared, sum};
@@ -39,6 +40,8 @@ pub struct Problem {
     pub path: Vec<shared::PathError>,
     /// Prior widths of the sensors' errors, flight by flight.
     pub sensors: Vec<[f64; SENSORS]>,
+    /// What each flight has of its own beside them.
+    pub per_flight: PerFlight,
     /// Seed of everything random.
     pub seed: u64,
 }
@@ -60,10 +63,12 @@ pub struct Round {
     pub flights: Vec<Ready>,
     /// Their cells.
     pub cells: Cells,
-    /// Coefficients and sensor errors fitted along.
+    /// Coefficients, what each flight has of its own, and sensor errors fitted along.
     pub known: Vec<Known>,
     /// Place of each known coefficient in the model's list.
     pub coefficients: Vec<usize>,
+    /// What each flight has of its own, which stands behind the coefficients, flight by flight.
+    pub per_flight: PerFlight,
     /// The candidates.
     pub trials: Vec<Trial>,
     /// Everything projected.
@@ -137,6 +142,7 @@ impl Round {
             cells,
             known,
             coefficients,
+            per_flight: problem.per_flight,
             trials: made.trials,
             projected,
             placed,

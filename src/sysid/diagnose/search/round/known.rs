@@ -7,12 +7,12 @@ use crate::sysid::diagnose::regression::cells::Placed;
 use crate::sysid::diagnose::regression::columns::{Ready, SENSORS, combine};
 use crate::sysid::diagnose::regression::gather::Column;
 use crate::sysid::diagnose::regression::projected::{Known, Projected};
-use crate::sysid::diagnose::regression::sensors;
+use crate::sysid::diagnose::regression::{per_flight, sensors};
 
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
 
 /// The known unknowns and their columns: free coefficients, whose columns `linear_columns` has where the model is linear in
-/// them, then the sensors of each flight.
+/// them, then what each flight has of its own, then the sensors of each flight.
 pub(super) fn known(
     problem: &Problem,
     model: &GreyBox,
@@ -40,6 +40,15 @@ pub(super) fn known(
         }
         coefficients.push(index);
         known.push(Known { name: named.name.clone(), width, offset: value - named.value });
+    }
+    let constants = problem.per_flight.constants();
+    for (k, (list, flight)) in placed.iter_mut().zip(flights).enumerate() {
+        let columns = per_flight::columns(&problem.per_flight, model, flight);
+        for (constant, column) in constants.iter().zip(columns) {
+            list.push((known.len(), column));
+            let name = format!("{} of flight {}", constant.name, k + 1);
+            known.push(Known { name, width: constant.width, offset: 0.0 });
+        }
     }
     for (k, (list, flight)) in placed.iter_mut().zip(flights).enumerate() {
         for (i, column) in flight.sensors.iter().enumerate() {

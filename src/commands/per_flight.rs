@@ -1,0 +1,42 @@
+//! Options for what may differ from flight to flight.
+
+use crate::sysid::per_flight::PerFlight;
+
+/// Largest standard deviation of an angle, °: beyond it a turn is no small one.
+const MOST_DEG: f64 = 10.0;
+/// Largest factor on the trims' widths.
+const MOST_TIMES: f64 = 100.0;
+
+/// What may differ from flight to flight.
+#[derive(clap::Args, Clone, Copy, Debug)]
+pub struct PerFlightArguments {
+    /// Give each flight trims of its own (CD0, CL0, CY0, Cl0, Cm0, Cn0, a share of the thrust) beside what all flights
+    /// have in common; FACTOR times their usual standard deviations.
+    #[arg(long, value_name = "FACTOR", num_args = 0..=1, require_equals = true, default_missing_value = "1",
+          value_parser = factor)]
+    flight_trims: Option<f64>,
+    /// Take each flight's measured axes (the autopilot's board, the markers of motion capture) to be turned against the
+    /// body by three small constant angles of this standard deviation, in degrees.
+    #[arg(long, value_name = "DEG", value_parser = degrees)]
+    axes_askew: Option<f64>,
+}
+
+impl PerFlightArguments {
+    /// What is asked for.
+    pub fn asked(&self) -> PerFlight {
+        PerFlight { trims: self.flight_trims, askew_deg: self.axes_askew }
+    }
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    within(text, MOST_TIMES, "a factor on the trims' standard deviations, such as 2")
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    within(text, MOST_DEG, "a standard deviation in degrees, such as 3")
+}
+
+fn within(text: &str, most: f64, what: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|x| *x > 0.0 && *x <= most);
+    value.ok_or_else(|| format!("give {what}, above 0 and up to {most}"))
+}

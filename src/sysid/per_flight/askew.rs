@@ -1,0 +1,99 @@
+//! Measured axes that stand askew: turned against the body by a small constant rotation.
+//!
+//! ε (rad, body axes) is the rotation that takes the body's axes to those of the board or the markers. The coordinates
+//! of a vector x in the turned axes are x − ε × x = x + x × ε to first order (Stevens, Lewis and Johnson, Aircraft Control
+//! and Simulation, section 1.3): so it is with body rates, specific force and the velocity through the air. The path is
+//! smoothed in the axes of gyros and attitude, so α and β are of these axes too. Vanes keep the body's: what the turn makes of α
+//! and β on the average the reconstruction takes for their bias, and the rest the path has from the vanes.
+
+use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction};
+
+/// Names of the angles: about body x, y and z.
+pub const NAMES: [&str; 3] = ["askew_roll", "askew_pitch", "askew_yaw"];
+
+/// What a unit of each angle adds to the coordinates `x` of a vector: x × e.
+pub fn vector(x: [f64; 3]) -> [[f64; 3]; 3] {
+    let [x, y, z] = x;
+    [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+}
+
+/// What a unit of each angle adds to α and β (rad): those of the velocity V (cos α cos β, sin β, sin α cos β), turned
+/// like any vector.
+pub fn flow(alpha: f64, beta: f64) -> [[f64; 2]; 3] {
+    let ((sin, cos), tan_beta) = (alpha.sin_cos(), beta.tan());
+    [[-cos * tan_beta, sin], [1.0, 0.0], [-sin * tan_beta, -cos]]
+}
+
+/// What a unit of each angle adds to roll and pitch (rad), away from vertical flight: a turn about body axes, as body
+/// rates turn them.
+pub fn attitude(roll: f64, pitch: f64) -> [[f64; 2]; 3] {
+    let ((sin, cos), tan_pitch) = (roll.sin_cos(), pitch.tan());
+    [[1.0, 0.0], [tan_pitch * sin, cos], [tan_pitch * cos, -sin]]
+}
+
+/// What a unit of each angle adds to α and β of a flight's path.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Turning {
+    /// Of α where a vane measures it: the mean over the flight.
+    alpha: Option<[f64; 3]>,
+    /// Of β likewise.
+    beta: Option<[f64; 3]>,
+}
+
+impl Turning {
+    /// That of `flight`, of which `segments` are used.
+    pub fn of(flight: &Reconstruction, segments: &[Vec<Instant>]) -> Turning {
+        let vane = |name: &str| flight.nuisances.iter().any(|n| n.name == name);
+        let mut sums = [[0.0; 3]; 2];
+        for at in segments.iter().flatten() {
+            for (axis, turned) in flow(at.state.alpha, at.state.beta).iter().enumerate() {
+                (0..2).for_each(|k| sums[k][axis] += turned[k]);
+            }
+        }
+        let count = segments.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+        let [alpha, beta] = sums.map(|of| of.map(|x| x / count));
+        Turning {
+            alpha: vane("alpha_bias").then_some(alpha),
+            beta: vane("beta_bias").then_some(beta),
+        }
+    }
+
+    /// At `alpha` and `beta` (rad), as [`flow`] has it where no vane measures.
+    pub fn at(&self, alpha: f64, beta: f64) -> [[f64; 2]; 3] {
+        let turned = flow(alpha, beta);
+        std::array::from_fn(|axis| {
+            let [alpha, beta] = turned[axis];
+            [self.alpha.map_or(alpha, |of| of[axis]), self.beta.map_or(beta, |of| of[axis])]
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Rotation3, Vector3};
+
+    /// Against rotation matrices.
+    #[test]
+    fn a_small_turn_moves_vectors_angles_and_attitude() {
+        const STEP: f64 = 1e-6;
+        let (alpha, beta, roll, pitch) = (0.2_f64, -0.1_f64, 0.6, 0.3);
+        let air = Vector3::new(alpha.cos() * beta.cos(), beta.sin(), alpha.sin() * beta.cos());
+        let body = Rotation3::from_euler_angles(roll, pitch, 1.0);
+        for axis in 0..3 {
+            let mut turn = Vector3::zeros();
+            turn[axis] = STEP;
+            let turn = Rotation3::from_scaled_axis(turn);
+            let seen = turn.inverse() * air;
+            let close = |a: f64, b: f64| assert!((a / STEP - b).abs() < 1e-5, "{axis} {a} {b}");
+            (0..3).for_each(|k| close(seen[k] - air[k], vector(air.into())[axis][k]));
+            let [of_alpha, of_beta] = flow(alpha, beta)[axis];
+            close(seen.z.atan2(seen.x) - alpha, of_alpha);
+            close(seen.y.asin() - beta, of_beta);
+            let (r, p, _) = (body * turn).euler_angles();
+            let [of_roll, of_pitch] = attitude(roll, pitch)[axis];
+            close(r - roll, of_roll);
+            close(p - pitch, of_pitch);
+        }
+    }
+}

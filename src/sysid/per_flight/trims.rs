@@ -1,0 +1,89 @@
+//! Trims that each flight has of its own: constant coefficients beside the model's, and a share of its thrust.
+//!
+//! They join a model as an effect that the catalogue does not have, so that a model needs no coefficient of such a name.
+
+use crate::model::{GreyBox, JoinError};
+use crate::physics::formula::register;
+
+/// A trim with its width.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trim {
+    /// Its name; those of coefficients are as in the catalogue.
+    pub name: &'static str,
+    /// Standard deviation from flight to flight, dimensionless.
+    pub width: f64,
+}
+
+const fn trim(name: &'static str, width: f64) -> Trim {
+    Trim { name, width }
+}
+
+/// The trims in the order of the effect's coefficients, with how far flights of one aircraft usually differ.
+///
+/// Lift: half a degree of a wing that is put on anew, at a slope of 4 to 5 per rad. Pitch: a centre of gravity that is
+/// off by 1 to 2 % of the chord at a lift coefficient of 0.5, or half a degree of elevator. Roll and yaw: a degree of
+/// one surface. Side force: two degrees of a fin. Drag: a hatch, tape, a dirty wing. Thrust: the voltage of a battery
+/// between full and half empty squared, or another propeller.
+pub const TRIMS: [Trim; 7] = [
+    trim("CD0", 0.005),
+    trim("CL0", 0.03),
+    trim("CY0", 0.01),
+    trim("Cl0", 0.003),
+    trim("Cm0", 0.01),
+    trim("Cn0", 0.003),
+    trim("thrust_share", 0.1),
+];
+
+const ID: &str = "flight_trims";
+
+/// `model` with the trims, all zero, as its last coefficients.
+///
+/// # Errors
+/// The model has an effect of that id.
+pub fn joined(model: &GreyBox) -> Result<GreyBox, JoinError> {
+    // the text is part of the program; unread, its id is unknown
+    let _ = register::read(include_str!("flight_trims.toml"));
+    let mut with = model.clone();
+    with.join(ID, &[0.0; TRIMS.len()])?;
+    Ok(with)
+}
+
+/// Puts the trims of a model that they have [joined] at `values`.
+pub fn set(model: &mut GreyBox, values: &[f64]) {
+    let mut all: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
+    let first = all.len().saturating_sub(values.len());
+    all[first..].copy_from_slice(values);
+    model.set_coefficients(&all);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::{Channel, Controls, State};
+
+    #[test]
+    fn trims_stand_behind_the_models_coefficients_in_their_order() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let mut with = joined(&model).unwrap();
+        let count = model.coefficients().len();
+        let names: Vec<&str> =
+            with.coefficients()[count..].iter().map(|c| c.name.as_str()).collect();
+        let expected: Vec<String> = TRIMS.iter().map(|t| format!("{ID}.{}", t.name)).collect();
+        assert_eq!(names, expected);
+        let state = State::from_array([0.1, 0.1, 18.0, 0.1, 0.1, 0.1, 0.05, 0.02]);
+        let controls =
+            Controls { aileron: 0.0, elevator: 0.02, throttle: 0.5, rudder: 0.0, lagged: None };
+        let air = model.air(&state, 100.0);
+        let before = model.wrench(&state, &controls, &air);
+        assert_eq!(with.wrench(&state, &controls, &air), before);
+        set(&mut with, &[0.0, 0.03, 0.0, 0.0, 0.01, 0.0, -0.1]);
+        let after = with.wrench(&state, &controls, &air);
+        let added = |c: Channel| after.get(c) - before.get(c);
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(close(added(Channel::Lift), 0.03 * air.q_s));
+        assert!(close(added(Channel::Pitch), 0.01 * air.q_s * model.airframe.geometry.chord));
+        assert!(close(added(Channel::BodyX), -0.1 * before.get(Channel::BodyX)));
+        assert!(close(added(Channel::Roll), 0.0));
+    }
+}
