@@ -17,14 +17,20 @@ fn root() -> PathBuf {
 
 /// The shipped prior with a moment of the thrust about the vertical, its effect file beside it.
 fn folder(status: &str) -> tempfile::TempDir {
+    folder_of("yaw_by_throttle", status)
+}
+
+/// The same with the effect under the name `id`: a process knows each name once.
+fn folder_of(id: &str, status: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let effect = fs::read_to_string(root().join("effects/yaw_by_throttle.toml")).unwrap();
     let effect = effect.replace("\"accepted\"", &format!("\"{status}\""));
+    let effect = effect.replace("yaw_by_throttle", id);
     fs::write(folder.path().join("own.toml"), effect).unwrap();
     fs::copy(root().join("x8/airframe.toml"), folder.path().join("airframe.toml")).unwrap();
     let model = fs::read_to_string(root().join("x8/prior.toml")).unwrap();
     let model = model.replace("schema = 1\n", "schema = 1\neffect_files = [\"own.toml\"]\n")
-        + "\n[effects.yaw_by_throttle]\nk = { value = 1.16, source = \"40 mm of 29 N\" }\n";
+        + &format!("\n[effects.{id}]\nk = {{ value = 1.16, source = \"40 mm of 29 N\" }}\n");
     fs::write(folder.path().join("model.toml"), model).unwrap();
     folder
 }
@@ -56,14 +62,13 @@ fn a_model_takes_part_of_what_its_effect_file_says() {
 
 #[test]
 fn what_a_search_proposed_does_not_fly() {
-    let folder = folder("proposed");
+    const ID: &str = "yaw_of_a_search";
+    let folder = folder_of(ID, "proposed");
     let model = GreyBox::load(&folder.path().join("model.toml")).unwrap();
     let refused = build(ControllerKind::Lqi, &model).err().unwrap();
-    assert!(
-        matches!(&refused, SetupError::Proposed { effect, .. } if *effect == "yaw_by_throttle")
-    );
+    assert!(matches!(&refused, SetupError::Proposed { effect, .. } if *effect == ID));
     assert!(refused.to_string().contains("status = \"accepted\""));
-    let accepted = self::folder("accepted");
+    let accepted = folder_of(ID, "accepted");
     let model = GreyBox::load(&accepted.path().join("model.toml")).unwrap();
     assert!(build(ControllerKind::Lqi, &model).is_ok());
 }
