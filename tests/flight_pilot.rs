@@ -941,6 +941,6 @@ fn a_schedule_says_once_that_it_begins() {
     let mut flight = Flight::offboard();
     flight.pilot.follow(Schedule::new("flat", "", vec![Step::hold(2.0, 0.0, 0.0, 20.0)]).unwrap());
     flight.fly(50);
-    let told = flight.texts();
-    assert_eq!(told.matches("schedule flat begins").count(), 1, "{told}");
+    let texts = flight.texts();
+    assert_eq!(texts.matches("schedule flat begins").count(), 1, "{texts}");
 }

@@ -9,7 +9,7 @@ use crate::sysid::per_flight::Constant;
 pub const ASKEW: &str = "axes_askew";
 /// Standard deviations beyond which a constant is clearly not zero.
 const CLEARLY: f64 = 4.0;
-/// Standard deviations beforehand beyond which a constant is not believed: something that acts like it is missing.
+/// Prior standard deviations beyond which a constant is not believed: something that acts like it is missing.
 const BELIEVED: f64 = 3.0;
 /// Angle under which axes are mounted as well as can be, rad.
 const MOUNTED: f64 = 0.5 * std::f64::consts::PI / 180.0;
@@ -156,7 +156,7 @@ pub fn notes(round: &Round) -> Vec<String> {
     let far = fitted(round).into_iter().filter(|f| f.value.abs() > BELIEVED * f.constant.width);
     far.map(|f| {
         format!(
-            "{} of {} is {:+.1} times its standard deviation beforehand: that is too narrow, or something that acts \
+            "{} of {} lies {:+.1} prior standard deviations from zero: the prior is too narrow, or something that acts \
              like it is missing.",
             f.constant.name,
             f.flight,

@@ -7,7 +7,7 @@ use crate::sysid::diagnose::regression::local::CHANNELS;
 use crate::sysid::diagnose::search::round::Round;
 use crate::sysid::weak_form::windows::{self, Series};
 
-/// Mean square of a channel, and what of it noise is.
+/// Variance of a channel beyond its noise, and the variance of that noise, both in squared units of the channel.
 struct Measured {
     variance: f64,
     noise: f64,
