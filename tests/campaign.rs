@@ -152,6 +152,26 @@ fn what_is_missing_failed_or_stale_is_named_and_not_mixed_in() {
 }
 
 #[test]
+fn two_cells_of_one_command_are_two_results_in_a_report() {
+    let named = r#"[{ name = "one", words = "pid" }, { name = "two", words = "pid" }]"#;
+    let text = FLOWN.replace(r#"["pid", "policy"]"#, named);
+    let text = text.replace("controller=policy", "controller=one");
+    let campaign = Campaign::new(&text.replace("controller=pid", "controller=two"));
+    let mut results = String::new();
+    for cell in ["scores/one/1", "scores/two/1"] {
+        let run = campaign.run("run", "out", &["--cell", cell]);
+        assert!(run.status.success(), "{}", said(&run));
+        let folder = folder_of(&campaign.path("out"), &cell.replace('/', "-"));
+        results += &fs::read_to_string(folder.join("result.json")).unwrap();
+    }
+    let path = campaign.path("results.jsonl");
+    fs::write(&path, results).unwrap();
+    let report = campaign.run("report", "out", &["--results", path.to_str().unwrap()]);
+    assert!(said(&report).contains("4 of 6 cells are missing"), "{}", said(&report));
+    assert!(!said(&report).contains("stale"), "{}", said(&report));
+}
+
+#[test]
 fn the_status_of_a_cell_says_whether_to_try_again() {
     let reads = "[[stage]]\nname = \"reads\"\nover = [\"seed\"]\n\
                  command = \"evaluate --controller policy --policy {flights} --json {out}/e.json\"\n";

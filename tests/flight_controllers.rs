@@ -27,18 +27,19 @@ fn ready(personality: Personality, authority: Authority) -> Bench {
 #[test]
 fn an_attitude_is_held_through_every_stack() {
     // The bounds of issue 8: 0.3° through PX4's sticks at 100 Hz, 0.6° through ArduPilot's channels
-    // at 50 Hz. When a controller of its own tracks the attitude, its loops stay off by up to 1.1° here, as
-    // real ones do: 0.3° with the companion's slow trim (issue 30). The hard corner is shown only.
-    for (personality, authority, bound) in [
-        (Px4, Surfaces, 0.3),
-        (Ardupilot, Surfaces, 0.6),
-        (Px4, Attitude, 0.3),
-        (Ardupilot, Attitude, 0.3),
+    // at 50 Hz. When a controller of its own tracks the attitude, its loops stay off, as real ones do: 0.3° with
+    // the companion's slow trim (issue 30). ArduPlane's begin anew at each change of mode and take longer; the real
+    // one was off by 0.55° after 12 s. The hard corner is shown only.
+    for (personality, authority, seconds, bound) in [
+        (Px4, Surfaces, 14.0, 0.3),
+        (Ardupilot, Surfaces, 14.0, 0.6),
+        (Px4, Attitude, 14.0, 0.3),
+        (Ardupilot, Attitude, 20.0, 0.3),
     ] {
         for (i, (roll, pitch)) in TARGETS.into_iter().enumerate() {
             let mut bench = ready(personality, authority);
             bench.engage(roll, pitch);
-            bench.steer(roll, pitch, 14.0);
+            bench.steer(roll, pitch, seconds);
             let settled = bench.settled_deg(roll, pitch);
             println!("{personality} {authority:?} {roll}, {pitch}: settled error {settled:.4} deg");
             assert!(bench.said("engaged"), "{:?}", bench.texts());
@@ -173,7 +174,9 @@ fn a_wire_that_is_cut_hands_the_aircraft_back_and_only_a_request_takes_it_again(
         // It goes on when asked.
         bench.engage(10.0, 3.0);
         bench.steer(10.0, 3.0, 8.0);
-        assert!(bench.settled_deg(10.0, 3.0) < 0.6, "{:?}", bench.texts());
+        let settled = bench.settled_deg(10.0, 3.0);
+        println!("{personality} {authority:?}: settled {settled:.3} after 8 s");
+        assert!(settled < 0.6, "{:?}", bench.texts());
     }
 }
 

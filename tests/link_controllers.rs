@@ -160,7 +160,7 @@ impl Played {
             self.heartbeat();
         }
         let step = self.ms / 10;
-        if step.is_multiple_of(self.every) && (step + 1) % self.skipped != 0 {
+        if step.is_multiple_of(self.every) && !(step + 1).is_multiple_of(self.skipped) {
             self.state(self.ms);
         }
         let due = self.real.due(self.host()).unwrap_or_default();

@@ -19,6 +19,7 @@ use crate::sysid::compare::{self, compare};
 use crate::sysid::diagnose::{Candidate, Diagnosis, Options, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::per_flight::askew;
 use crate::sysid::progress::{Progress, Stage, part};
 
 /// Candidates in the table.
@@ -134,6 +135,9 @@ fn print(diagnosis: &Diagnosis) {
     println!("{}", diagnosis.model);
     diagnosis.sentences.iter().for_each(|sentence| println!("  {sentence}"));
     println!("\n{}\n{}", effects(diagnosis), channels(diagnosis));
+    if let Some(own) = own(diagnosis) {
+        println!("{own}");
+    }
     for advice in &diagnosis.advice {
         println!("fly {}: {}", advice.manoeuvre, advice.why);
     }
@@ -196,6 +200,30 @@ fn channels(diagnosis: &Diagnosis) -> Table {
         ]);
     }
     table
+}
+
+/// What each flight has of its own; `None` if nothing of it was asked for.
+fn own(diagnosis: &Diagnosis) -> Option<Table> {
+    let angles = diagnosis.measurement.iter().filter(|m| m.id == askew::ID).map(|m| {
+        let [value, sd] = [m.value, m.sd].map(f64::to_degrees);
+        let estimate = format!("{} ± {} °", number(value), number(sd));
+        [m.flight.clone(), m.name.clone(), estimate, "–".into(), clear(m.asserted)]
+    });
+    let trims = diagnosis.trims.iter().map(|t| {
+        let estimate = |[value, sd]: [f64; 2]| format!("{} ± {}", number(value), number(sd));
+        let beside = t.beside_mean.map_or("–".into(), estimate);
+        let own = estimate([t.value, t.sd]);
+        [t.flight.clone(), t.name.clone(), own, beside, clear(t.asserted)]
+    });
+    let rows: Vec<_> = angles.chain(trims).collect();
+    let mut table =
+        table(["flight", "constant", "estimate ± sd", "less the flights' mean", "asserted"]);
+    table.add_rows(&rows);
+    (!rows.is_empty()).then_some(table)
+}
+
+fn clear(asserted: bool) -> String {
+    if asserted { "yes" } else { "" }.into()
 }
 
 /// Three significant figures; a dash for what is not known.

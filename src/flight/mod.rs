@@ -7,3 +7,4 @@ pub mod pilot;
 pub mod recorder;
 pub mod replay;
 pub mod runtime;
+mod threads;

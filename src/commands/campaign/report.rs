@@ -86,7 +86,10 @@ impl Arguments {
         };
         let mut records = read_lines(path)?;
         let all = records.len();
-        records.retain(|r| plan.cells.iter().any(|cell| cell.identity == r.identity));
+        // two cells may have one command, and with it one identity
+        let planned: HashSet<(&str, &str)> =
+            plan.cells.iter().map(|c| (c.id.as_str(), c.identity.as_str())).collect();
+        records.retain(|r| planned.contains(&(r.cell.as_str(), r.identity.as_str())));
         if records.len() < all {
             println!(
                 "{} of the {all} results in {} are stale (another command or input) and left out",
@@ -95,7 +98,7 @@ impl Arguments {
             );
         }
         let mut known = HashSet::new();
-        records.retain(|r| known.insert(r.identity.clone()));
+        records.retain(|r| known.insert(r.cell.clone()));
         let missing = plan.cells.len() - records.len();
         if missing > 0 {
             println!("{missing} of {} cells are missing in {}", plan.cells.len(), path.display());

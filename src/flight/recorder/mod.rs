@@ -5,23 +5,21 @@
 
 pub mod call;
 mod folder;
+mod queue;
 mod row;
 
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 pub use call::Call;
 pub use folder::{Place, RecordError};
 pub use row::Row;
 
+use crate::flight::threads::{Receiver, RecvTimeoutError, Sender, bounded};
 use crate::link::framing::{FrameCounts, Frames};
 use crate::logs::csv::Rows;
+use queue::Queue;
 
 /// Entries that may wait: four seconds of a 100 Hz loop with its traffic.
 const QUEUE: usize = 4096;
@@ -39,10 +37,8 @@ enum Entry {
 /// The handle that control holds.
 #[derive(Debug)]
 pub struct Recorder {
-    queue: Option<Sender<Entry>>,
-    dropped: Arc<AtomicU64>,
+    queue: Queue<Entry, Written>,
     troubles: Receiver<String>,
-    thread: Option<JoinHandle<Written>>,
     folder: PathBuf,
 }
 
@@ -81,13 +77,10 @@ impl Recorder {
         tlog: impl Write + Send + 'static,
         calls: impl Write + Send + 'static,
     ) -> std::io::Result<Self> {
-        let (queue, entries) = bounded(QUEUE);
         let (trouble, troubles) = bounded(3);
-        let dropped = Arc::new(AtomicU64::new(0));
         let mut files = Files::new(csv, tlog, calls, trouble);
-        let work = move || files.run(&entries);
-        let thread = std::thread::Builder::new().name("recorder".into()).spawn(work)?;
-        Ok(Recorder { queue: Some(queue), dropped, troubles, thread: Some(thread), folder })
+        let queue = Queue::start("recorder", QUEUE, move |entries| files.run(&entries))?;
+        Ok(Recorder { queue, troubles, folder })
     }
 
     /// Where the files lie.
@@ -97,17 +90,17 @@ impl Recorder {
 
     /// Records a tick.
     pub fn row(&self, row: Row) {
-        self.hand_over(Entry::Row(Box::new(row)));
+        self.queue.hand_over(Entry::Row(Box::new(row)));
     }
 
     /// Records a datagram, or whole frames of a stream, sent or received at `unix_us` (µs since 1970).
     pub fn bytes(&self, unix_us: u64, bytes: &[u8]) {
-        self.hand_over(Entry::Bytes { unix_us, bytes: bytes.into() });
+        self.queue.hand_over(Entry::Bytes { unix_us, bytes: bytes.into() });
     }
 
     /// Records a call of the pilot.
     pub fn call(&self, call: Call) {
-        self.hand_over(Entry::Call(call));
+        self.queue.hand_over(Entry::Call(call));
     }
 
     /// What has gone wrong since the last call; each file fails at most once.
@@ -117,7 +110,7 @@ impl Recorder {
 
     /// Entries dropped so far because the queue was full.
     pub fn dropped(&self) -> u64 {
-        self.dropped.load(Ordering::Relaxed)
+        self.queue.dropped()
     }
 
     /// Writes what is waiting, closes the files, says what they came to.
@@ -125,16 +118,8 @@ impl Recorder {
         self.close()
     }
 
-    fn hand_over(&self, entry: Entry) {
-        let full = self.queue.as_ref().is_none_or(|queue| queue.try_send(entry).is_err());
-        if full {
-            self.dropped.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-
     fn close(&mut self) -> Written {
-        self.queue = None;
-        let written = self.thread.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        let written = self.queue.close();
         Written { dropped: written.dropped + self.dropped(), ..written }
     }
 }

@@ -8,6 +8,8 @@
 
 use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction};
 
+/// Id of the angles among the errors of the measurement.
+pub const ID: &str = "axes_askew";
 /// Names of the angles: about body x, y and z.
 pub const NAMES: [&str; 3] = ["askew_roll", "askew_pitch", "askew_yaw"];
 

@@ -154,7 +154,7 @@ impl FlightController {
             encoder: Encoder::new(SYSTEM, COMPONENT),
             streams: Streams::new(Equipment { travel, receiver }),
             parameters,
-            law: Law::new(travel),
+            law: Law::new(personality, travel),
             lag: Lag::default(),
             distorter: Distorter::default(),
             sticks: Sticks::default(),
@@ -259,8 +259,9 @@ impl FlightController {
     /// Changes the mode by the pilot's hand.
     pub fn set_mode(&mut self, mode: Mode) {
         if self.mode != mode {
+            let manual = self.mode == Mode::Manual;
+            self.law.begin(manual || self.personality == Personality::Ardupilot);
             (self.mode, self.entered_us) = (mode, self.now_us);
-            self.law = Law::new(self.flight.travel());
             let heartbeat = self.heartbeat();
             self.encoder.encode(&heartbeat, &mut self.waiting);
         }
@@ -539,7 +540,6 @@ impl FlightController {
         let wish = self.wish.filter(|_| self.mode == Mode::Guided && self.wish_alive());
         match wish {
             Some(Wish { roll, pitch, thrust, .. }) => {
-                let [roll, pitch] = law::left_off(roll, pitch);
                 self.law.attitude(&self.measured, roll, pitch, thrust)
             }
             None if self.turns_back() => self.law.attitude(&self.measured, TURN_BACK, 0.0, None),

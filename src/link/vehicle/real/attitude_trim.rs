@@ -1,20 +1,23 @@
-//! A slow trim on the attitude that a controller is commanded: its own loops leave 0.3° to 1.8°.
+//! A slow trim on the attitude that a controller is commanded: its own loops leave 0.3° to 1.8°, and in steep turns up
+//! to 9° of pitch for half a minute, where the elevator that they feed forward to the turn does not fit the aircraft.
 //!
 //! The error that stays is integrated over seconds, within narrow bounds, and only while the wanted attitude has stood
 //! still and is nearly reached. So it takes away what is constant and leaves every transient to the controller.
 
 use crate::physics::Time;
 
-/// An error is taken away within about this time, s: ten times slower than a controller's attitude loop.
-const TIME_S: f64 = 3.0;
-/// The most that is added, rad: twice what real controllers left, 1.8° at 45° of bank.
-const MOST: f64 = 3.0 * DEGREE;
+/// An error is taken away within about this time, s: five times slower than a controller's attitude loop.
+const TIME_S: f64 = 2.5;
+/// The most that is added, rad: what PX4's and ArduPlane's loops leave at 55° of bank and 20° nose down.
+const MOST: f64 = 10.0 * DEGREE;
 /// A wanted attitude that moves by more begins anew to settle, rad.
 const STILL: f64 = 0.5 * DEGREE;
 /// How long the wanted attitude has stood before the error counts, s: the transient of a step.
 const SETTLING_S: f64 = 1.5;
 /// An error beyond this is no error that stays, rad.
-const NEAR: f64 = 4.0 * DEGREE;
+const NEAR: f64 = 12.0 * DEGREE;
+/// A wanted attitude that is farther from where the trim was found needs another one, rad.
+const ANOTHER: f64 = 4.0 * DEGREE;
 /// A longer gap between two states says nothing of what came between, s.
 const GAP_S: f64 = 0.1;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
@@ -46,7 +49,7 @@ impl AttitudeTrim {
         for axis in 0..2 {
             let added = &mut self.added[axis];
             // what was found in a turn to the right is wrong in one to the left
-            if (self.found_at[axis] - wanted[axis]).abs() > NEAR {
+            if (self.found_at[axis] - wanted[axis]).abs() > ANOTHER {
                 *added = 0.0;
             }
             // what the controller leaves of what it is commanded, the trim included
@@ -94,10 +97,10 @@ mod tests {
 
     #[test]
     fn the_trim_is_bounded_and_leaves_manoeuvres_alone() {
-        let errors = flown(3.9 * DEGREE, |_| 0.8);
-        // 3° of 3.9° at the most.
-        assert!((errors[1999].abs() / DEGREE - 0.9).abs() < 0.01, "{}", errors[1999] / DEGREE);
-        assert!(flown(6.0 * DEGREE, |_| 0.8)[1999].abs() > 5.9 * DEGREE, "no error that stays");
+        let errors = flown(11.0 * DEGREE, |_| 0.8);
+        // 10° of 11° at the most.
+        assert!((errors[1999].abs() / DEGREE - 1.0).abs() < 0.01, "{}", errors[1999] / DEGREE);
+        assert!(flown(13.0 * DEGREE, |_| 0.8)[1999].abs() > 12.9 * DEGREE, "no error that stays");
         // Half a hertz: nothing stands still, so nothing is added to what the controller does by itself.
         let sine = |t: f64| 0.3 * (3.1 * t).sin();
         let mut plain = 0.0;
@@ -141,9 +144,9 @@ mod tests {
 
     #[test]
     fn the_trim_takes_its_time() {
-        // 1.5 s to settle, then a time of 3 s: after 4.5 s 0.69° of 1.8° are left, as e^(−1) of it is.
+        // 1.5 s to settle, then a time of 2.5 s: after 4.5 s 0.54° of 1.8° are left, e^(−1.2) of it.
         let left = flown(1.8 * DEGREE, |_| 0.8)[450].abs() / DEGREE;
-        assert!((left - 0.69).abs() < 0.05, "{left}");
+        assert!((left - 0.54).abs() < 0.05, "{left}");
     }
 
     /// A trim of 1.8° that was found in a turn to the right, 20 s long.

@@ -1,12 +1,12 @@
 //! What each flight has of its own, as fitted beside the aerodynamics: its trims, how its measured axes stand.
 
+use std::collections::HashSet;
+
 use crate::sysid::diagnose::answer::result::{FlightTrim, Measurement};
 use crate::sysid::diagnose::answer::sentences::figures;
 use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::per_flight::Constant;
+use crate::sysid::per_flight::{Constant, askew};
 
-/// Id of the angles among the errors of the measurement.
-pub const ASKEW: &str = "axes_askew";
 /// Standard deviations beyond which a constant is clearly not zero.
 const CLEARLY: f64 = 4.0;
 /// Prior standard deviations beyond which a constant is not believed: something that acts like it is missing.
@@ -20,20 +20,23 @@ const LEAST: f64 = 0.15 * std::f64::consts::PI / 180.0;
 const MATTERS: f64 = 0.2;
 
 /// The angles of each flight's axes in `round`; empty if they were not asked for.
-pub fn askew(round: &Round) -> Vec<Measurement> {
+pub fn angles(round: &Round) -> Vec<Measurement> {
     let angles = round.per_flight.angles();
-    let fitted = fitted(round).into_iter().filter(|f| f.which < angles);
+    let all = fitted(round);
+    let astray = astray(&all);
+    let fitted = all.into_iter().filter(|f| f.which < angles);
     fitted
         .map(|f| {
             let (size, sd) = (f.value.abs(), f.sd.hypot(LEAST));
+            let believed = !astray.contains(&f.flight);
             Measurement {
                 flight: f.flight,
-                id: ASKEW.into(),
+                id: askew::ID.into(),
                 name: f.constant.name.into(),
                 value: f.value,
                 sd,
                 unit: "rad".into(),
-                asserted: size > MOUNTED.max(CLEARLY * sd) && size < BELIEVED * f.constant.width,
+                asserted: believed && size > MOUNTED.max(CLEARLY * sd),
             }
         })
         .collect()
@@ -42,19 +45,22 @@ pub fn askew(round: &Round) -> Vec<Measurement> {
 /// The trims of each flight in `round`; empty if they were not asked for.
 pub fn trims(round: &Round) -> Vec<FlightTrim> {
     let angles = round.per_flight.angles();
-    let fitted = fitted(round).into_iter().filter(|f| f.which >= angles);
+    let all = fitted(round);
+    let astray = astray(&all);
+    let fitted = all.into_iter().filter(|f| f.which >= angles);
     let clear = |[by, sd]: [f64; 2], width: f64| {
         (CLEARLY * sd).max(MATTERS * width) < by.abs() && by.abs() < BELIEVED * width
     };
     fitted
         .map(|f| FlightTrim {
+            asserted: !astray.contains(&f.flight)
+                && f.beside_mean.is_some_and(|beside| clear(beside, f.constant.width)),
             flight: f.flight,
             name: f.constant.name.into(),
             prior_sd: f.constant.width,
             value: f.value,
             sd: f.sd,
             beside_mean: f.beside_mean,
-            asserted: f.beside_mean.is_some_and(|beside| clear(beside, f.constant.width)),
         })
         .collect()
 }
@@ -68,6 +74,19 @@ struct Fitted {
     value: f64,
     sd: f64,
     beside_mean: Option<[f64; 2]>,
+}
+
+impl Fitted {
+    /// Whether it is farther from zero than is believed.
+    fn strains(&self) -> bool {
+        self.value.abs() > BELIEVED * self.constant.width
+    }
+}
+
+/// Flights of which nothing is asserted: where one constant takes up what something else causes, its neighbours, which
+/// correlate with it, are not believed either.
+fn astray(fitted: &[Fitted]) -> HashSet<String> {
+    fitted.iter().filter(|f| f.strains()).map(|f| f.flight.clone()).collect()
 }
 
 fn fitted(round: &Round) -> Vec<Fitted> {
@@ -115,13 +134,16 @@ fn misfit(round: &Round, flight: usize) -> f64 {
 /// What is clearly so, a sentence for each flight.
 pub fn sentences(measurement: &[Measurement], trims: &[FlightTrim]) -> Vec<String> {
     let mut said: Vec<String> = Vec::new();
-    let askew = measurement.iter().filter(|m| m.id == ASKEW && m.asserted).map(|m| {
+    let turned = measurement.iter().filter(|m| m.id == askew::ID && m.asserted).map(|m| {
         let about = m.name.trim_start_matches("askew_");
         let [value, sd] = [m.value, m.sd].map(f64::to_degrees);
         (m.flight.as_str(), format!("{about} {value:.1} ± {sd:.1}°"))
     });
-    for (flight, all) in by_flight(askew) {
-        said.push(format!("{flight}: the measured axes stand askew, {all} ({ASKEW}), fitted beside the aerodynamics."));
+    for (flight, all) in by_flight(turned) {
+        said.push(format!(
+            "{flight}: the measured axes stand askew, {all} ({}), fitted beside the aerodynamics.",
+            askew::ID
+        ));
     }
     let trims = trims.iter().filter(|t| t.asserted).filter_map(|t| {
         let [by, sd] = t.beside_mean?;
@@ -153,15 +175,34 @@ fn by_flight<'a>(all: impl Iterator<Item = (&'a str, String)>) -> Vec<(&'a str, 
 
 /// Constants that strain their prior, in words.
 pub fn notes(round: &Round) -> Vec<String> {
-    let far = fitted(round).into_iter().filter(|f| f.value.abs() > BELIEVED * f.constant.width);
+    let far = fitted(round).into_iter().filter(Fitted::strains);
     far.map(|f| {
         format!(
             "{} of {} lies {:+.1} prior standard deviations from zero: the prior is too narrow, or something that acts \
-             like it is missing.",
+             like it is missing. Nothing is asserted of this flight's trims and axes.",
             f.constant.name,
             f.flight,
             f.value / f.constant.width
         )
     })
     .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_constant_astray_withdraws_the_others_of_its_flight() {
+        let of = |flight: &str, value: f64| Fitted {
+            flight: flight.into(),
+            which: 0,
+            constant: Constant { name: "CL0", width: 0.03 },
+            value,
+            sd: 0.001,
+            beside_mean: None,
+        };
+        let all = [of("a", 0.08), of("b", 0.02), of("a", 0.02), of("b", -0.1), of("c", 0.0)];
+        assert_eq!(astray(&all), HashSet::from(["b".to_owned()]));
+    }
 }

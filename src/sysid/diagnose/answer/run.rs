@@ -52,7 +52,7 @@ pub fn diagnose(
     let effects = ranking::candidates(&found, options);
     let channels = shares::channels(&found);
     let mut measurement = measurement::measurement(&used);
-    measurement.extend(per_flight::askew(found.round()));
+    measurement.extend(per_flight::angles(found.round()));
     let trims = per_flight::trims(found.round());
     let verdict = verdict(&found);
     notes.extend(sentences::notes(&found, model, options));

@@ -8,6 +8,7 @@ use crate::sysid::diagnose::answer::result::{
 use crate::sysid::diagnose::answer::{per_flight, shares};
 use crate::sysid::diagnose::options::Options;
 use crate::sysid::diagnose::search::stepwise::Found;
+use crate::sysid::per_flight::askew;
 
 /// Prior standard deviations beyond which a tuned coefficient is worth a note.
 const FAR: f64 = 3.0;
@@ -64,7 +65,7 @@ pub fn sentences(
             Some(format!("Most is left in {}: {regime}.", c.channel))
         }));
     }
-    let before = |m: &&Measurement| m.asserted && m.id != per_flight::ASKEW;
+    let before = |m: &&Measurement| m.asserted && m.id != askew::ID;
     said.extend(measurement.iter().filter(before).map(|m| {
         format!(
             "{}: {} is {:.4} ± {:.4} {} ({}), taken out before any aerodynamics.",

@@ -1,0 +1,108 @@
+//! A controller on a thread of its own: its plan is used at its tick or not at all.
+
+use std::time::{Duration, Instant};
+
+use crate::control::Controller;
+use crate::flight::pilot::{Plan, Request};
+use crate::flight::runtime::Pace;
+use crate::flight::threads::{Builder, JoinHandle, Receiver, RecvTimeoutError, Sender, bounded};
+use crate::physics::Command;
+
+/// Seed of a controller's random numbers, the same at every engagement.
+const SEED: u64 = 0;
+
+/// The command of `controller` for `request`.
+pub(super) fn run(controller: &mut dyn Controller, request: &Request) -> Command {
+    if request.engage {
+        controller.reset(SEED);
+    }
+    controller.command(&request.observation, &request.target)
+}
+
+/// A controller on its own thread.
+pub struct Threaded {
+    requests: Option<Sender<(u64, Request)>>,
+    pub(super) plans: Receiver<(u64, Command)>,
+    thread: Option<JoinHandle<()>>,
+    tick: u64,
+    /// An engagement that the planner has not heard of, because it was busy.
+    owed: bool,
+    pub(super) deadline: Duration,
+    pace: Pace,
+}
+
+impl Threaded {
+    /// Starts the thread. A plan must be there `deadline` after its state frame; in lockstep it
+    /// is waited for.
+    pub fn start(
+        mut controller: Box<dyn Controller>,
+        deadline: Duration,
+        pace: Pace,
+    ) -> std::io::Result<Self> {
+        let (requests, orders) = bounded::<(u64, Request)>(1);
+        let (answers, plans) = bounded(2);
+        let work = move || {
+            for (tick, request) in orders {
+                if answers.send((tick, run(controller.as_mut(), &request))).is_err() {
+                    return;
+                }
+                controller.prepare();
+            }
+        };
+        let thread = Builder::new().name("planner".into()).spawn(work)?;
+        Ok(Threaded {
+            requests: Some(requests),
+            plans,
+            thread: Some(thread),
+            tick: 0,
+            owed: false,
+            deadline,
+            pace,
+        })
+    }
+
+    /// The plan for `request`, which `arrived` then.
+    pub fn plan(&mut self, request: &Request, arrived: Instant) -> Plan {
+        self.tick += 1;
+        // Plans of earlier ticks are of no use any more.
+        while self.plans.try_recv().is_ok() {}
+        let engage = request.engage || self.owed;
+        let Some(requests) = &self.requests else {
+            return Plan::None;
+        };
+        if requests.try_send((self.tick, Request { engage, ..*request })).is_err() {
+            self.owed = engage;
+            return Plan::Busy;
+        }
+        self.owed = false;
+        self.wait(arrived)
+    }
+
+    fn wait(&self, arrived: Instant) -> Plan {
+        loop {
+            let answer = match self.pace {
+                Pace::RealTime => self.plans.recv_deadline(arrived + self.deadline),
+                Pace::Lockstep => self.plans.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            };
+            match answer {
+                Ok((tick, command)) if tick == self.tick => return Plan::Ready(command),
+                Ok(_) => {}
+                Err(RecvTimeoutError::Timeout) => return Plan::Late,
+                // The controller has died; the fallback flies.
+                Err(RecvTimeoutError::Disconnected) => return Plan::None,
+            }
+        }
+    }
+}
+
+impl Drop for Threaded {
+    fn drop(&mut self) {
+        self.requests = None;
+        // The thread may be at its last plan, with nobody to take it.
+        while self.plans.recv().is_ok() {}
+        if let Some(thread) = self.thread.take() {
+            // A panic there has been reported by its own thread.
+            let _ = thread.join();
+        }
+    }
+}
