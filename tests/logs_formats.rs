@@ -85,6 +85,16 @@ fn targets_of_px4_come_from_its_quaternion() {
 }
 
 #[test]
+fn a_motor_that_px4_stops_has_no_throttle() {
+    let mut truth = samples(400);
+    truth[150..250].iter_mut().for_each(|sample| sample.throttle_cmd = 0.0);
+    let read = read(&ulog(&truth)).flight.samples;
+    for (a, b) in truth.iter().zip(&read) {
+        assert!((a.throttle_cmd - b.throttle_cmd).abs() < 1e-6, "{} {}", a.time_s, b.throttle_cmd);
+    }
+}
+
+#[test]
 fn a_file_cut_anywhere_is_read_up_to_there_with_a_warning() {
     let truth = samples(60);
     for bytes in [ulog(&truth), dataflash(&truth), tlog(&truth)] {

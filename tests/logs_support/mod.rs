@@ -96,7 +96,9 @@ pub fn ulog(samples: &[Sample]) -> Vec<u8> {
         let (a, e) = (s.aileron_cmd, s.elevator_cmd);
         let mut servos = vec![e - a, e + a];
         servos.resize(8, f64::NAN);
-        let mut motors = vec![s.throttle_cmd];
+        // PX4 stops a motor below 0.02, by NaN.
+        let motor = if s.throttle_cmd < 0.02 { f64::NAN } else { s.throttle_cmd };
+        let mut motors = vec![motor];
         motors.resize(12, f64::NAN);
         let all: [Vec<f64>; 11] = [
             quaternion(s.attitude_rad).to_vec(),

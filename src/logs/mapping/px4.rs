@@ -76,7 +76,7 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
 
 fn commands(topics: &Topics) -> Vec<Rule> {
     let mut out = allocated(topics);
-    out.push(Rule::linear("throttle_cmd", "actuator_motors", "control[0]", 1.0));
+    out.extend(motor(topics));
     // The three torques, then thrust, of the controller that flies the wings.
     let vtol = topics.first("vtol_vehicle_status").is_some();
     let fixed_wing = if vtol { Some(1) } else { None };
@@ -99,6 +99,14 @@ fn commands(topics: &Topics) -> Vec<Rule> {
         out.push(rule.noting(format!("commands are {group}'s, before the mixer")));
     }
     out
+}
+
+/// The first motor, where one runs at any time of the log.
+fn motor(topics: &Topics) -> Option<Rule> {
+    let (topic, field) = ("actuator_motors", "control[0]");
+    let runs = topics.first(topic)?.field(field)?.iter().any(|x| x.is_finite());
+    let term = Term { field: field.into(), gain: 1.0, shape: Shape::Motor };
+    runs.then(|| Rule::sum("throttle_cmd", topic, vec![term]))
 }
 
 /// Commands from the servos' outputs by the torque that each is said to make (CA_SV_CSn_TRQ_*).

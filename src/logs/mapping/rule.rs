@@ -16,6 +16,8 @@ pub enum Shape {
         /// Pulse at 1, µs.
         max: f64,
     },
+    /// A motor of PX4: NaN stops it.
+    Motor,
     /// A pulse to 0..1.
     Range {
         /// Pulse at 0, µs.
@@ -29,6 +31,13 @@ impl Shape {
     fn of(self, x: f64) -> f64 {
         match self {
             Shape::Linear => x,
+            Shape::Motor => {
+                if x.is_nan() {
+                    0.0
+                } else {
+                    x
+                }
+            }
             Shape::Surface { min, trim, max } => {
                 let side = if x > trim { max - trim } else { trim - min };
                 if side > 0.0 { (x - trim) / side } else { 0.0 }
