@@ -9,7 +9,9 @@ use greylag::flight::pilot::{Answers, Config, Decision, Pilot, Plan, Source, Tri
 use greylag::link::autopilot::{
     AttitudeSetpoint, Autopilot, Mode, ParameterValue, Sticks, Verdict,
 };
-use greylag::link::vehicle::{Fault, Faults, Order, Telemetry, VANE_SD};
+use greylag::link::vehicle::{
+    Authority, Fault, Faults, Order, Profile, Real, Stack, Telemetry, VANE_SD, Vehicle,
+};
 use greylag::manoeuvres::{Axis, Excitation, Schedule, Shape, Step};
 use greylag::model::GreyBox;
 use greylag::physics::{ActuatorState, Airframe, Command, State, Time};
@@ -618,6 +620,22 @@ fn a_loop_that_swings_again_is_given_back_where_a_controller_flies() {
         let expected = given_back.filter(|_| hands_back);
         assert_eq!(flight.last.unwrap().refused, expected, "{hands_back}");
     }
+}
+
+#[test]
+fn where_a_controller_flies_attitudes_nothing_is_said_of_our_surfaces() {
+    let mut flight = Flight::armed();
+    let actuators = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap().actuators;
+    let profile = Profile { stack: Stack::Px4, authority: Authority::Attitude, actuators };
+    flight.pilot.take_on(&Vehicle::Real(Box::new(Real::new(profile))));
+    swing(&mut flight, 300, TICK);
+    let mut seen = frame(flight.now.plus(TICK));
+    seen.state.roll = 2.0;
+    flight.now = seen.time;
+    flight.tick_with(seen);
+    assert_eq!(flight.last.unwrap().refused, None);
+    let texts = flight.texts();
+    assert!(!texts.contains("oscillates") && !texts.contains("wings level"), "{texts}");
 }
 
 fn storm_frame(dice: &mut Dice, now: Time) -> Telemetry {

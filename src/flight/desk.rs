@@ -37,9 +37,7 @@ impl Desk {
     /// wherever it would sit otherwise.
     pub fn new(companion: Companion, vehicle: Vehicle) -> Self {
         let mut pilot = companion.pilot;
-        if vehicle.has_channels() {
-            pilot.check_signs();
-        }
+        pilot.take_on(&vehicle);
         Desk {
             pilot,
             controller: companion.controller,

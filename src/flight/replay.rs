@@ -170,9 +170,7 @@ pub fn replay_watched(
     let bytes = std::fs::read(&tlog).map_err(failed(tlog.clone()))?;
     let states = States { vehicle, bytes, at: 0, ready: VecDeque::new() };
     let mut companion = companion;
-    if states.vehicle.has_channels() {
-        companion.pilot.check_signs();
-    }
+    companion.pilot.take_on(&states.vehicle);
     let outcome = Outcome::default();
     let mut replayed = Replayed { companion, states, watch, outcome, owed: false };
     let mut lines = text.split_inclusive('\n').enumerate().peekable();

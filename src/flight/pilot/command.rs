@@ -2,15 +2,17 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 
-use super::{Pilot, Plan, Source, due, within};
+use super::{Pilot, Plan, Source, TICK_S, due, within};
 use crate::control::Observation;
 use crate::link::autopilot::Severity;
 use crate::link::vehicle::Axis;
 use crate::physics::{Command, Time};
 
-/// Part of a controller's deflections beyond level trim that is flown while they are eased. It divides the loop's gain, and so
-/// multiplies the delay that the loop bears by about as much.
+/// Part of a controller's deflections beyond their mean that is flown while they are eased. It divides the loop's gain at the
+/// frequency at which it swings, and so multiplies the delay that the loop bears by about as much.
 const EASED: f64 = 1.0 / 3.0;
+/// Time constant of that mean, s: a limit cycle of 1 to 8 Hz averages out, what a turn needs is in it.
+const MEAN_S: f64 = 0.5;
 /// For how long they are eased after the loop has swung, s.
 const EASED_S: f64 = 5.0;
 /// Bank beyond which the aircraft is upset, and below which it no longer is, rad. Nearly on its back, up elevator pulls the
@@ -31,6 +33,9 @@ impl Pilot {
 
     /// `command`, or what rolls the aircraft upright where it is upset.
     fn upright(&mut self, command: Command, roll: f64) -> Command {
+        if self.by_attitude {
+            return command;
+        }
         let [begins, ends] = UPSET;
         if self.upset {
             self.upset = roll.abs() > ends;
@@ -47,16 +52,23 @@ impl Pilot {
     }
 
     /// `command` as it is flown at `time`.
-    fn as_eased(&self, command: Command, time: Time) -> Command {
+    fn as_eased(&mut self, command: Command, time: Time) -> Command {
+        let mean = self.mean.get_or_insert(command);
+        for (mean, wanted) in [
+            (&mut mean.aileron, command.aileron),
+            (&mut mean.elevator, command.elevator),
+            (&mut mean.rudder, command.rudder),
+        ] {
+            *mean += (wanted - *mean) * TICK_S / MEAN_S;
+        }
         if !within(self.eased, time, EASED_S) {
             return command;
         }
-        let level = self.level_command();
-        let toward = |level: f64, wanted: f64| level + EASED * (wanted - level);
+        let toward = |mean: f64, wanted: f64| mean + EASED * (wanted - mean);
         Command {
-            aileron: toward(level.aileron, command.aileron),
-            elevator: toward(level.elevator, command.elevator),
-            rudder: toward(level.rudder, command.rudder),
+            aileron: toward(mean.aileron, command.aileron),
+            elevator: toward(mean.elevator, command.elevator),
+            rudder: toward(mean.rudder, command.rudder),
             throttle: command.throttle,
         }
     }

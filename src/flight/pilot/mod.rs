@@ -35,7 +35,7 @@ pub use polarity::Answers;
 use crate::control::{Controller, Observation, Target};
 use crate::flight::monitor::Monitor;
 use crate::link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
-use crate::link::vehicle::{Fault, Telemetry};
+use crate::link::vehicle::{Fault, Telemetry, Vehicle};
 use crate::manoeuvres::Schedule;
 use crate::physics::{Command, Time};
 use estimate::{Estimate, Frame, RESTART, within};
@@ -88,8 +88,12 @@ pub struct Pilot {
     oscillation: Oscillation,
     /// Whether there is a controller to give the aircraft to.
     hands_back: bool,
+    /// Whether a controller flies attitudes by itself, so that our surfaces are not those that fly.
+    by_attitude: bool,
     /// When the loop last swung: deflections are eased for a while after it.
     eased: Option<Time>,
+    /// What the controller's deflections are on the average of the last half second.
+    mean: Option<Command>,
     /// Whether the aircraft is being rolled upright.
     upset: bool,
     /// What the sign check or the oscillation guard has found wrong since the aircraft was armed.
@@ -158,6 +162,8 @@ impl Pilot {
             check: None,
             oscillation: Oscillation::default(),
             hands_back: false,
+            by_attitude: false,
+            mean: None,
             eased: None,
             upset: false,
             refused: None,
@@ -171,6 +177,15 @@ impl Pilot {
         self.programme = Some(Programme::new(schedule));
     }
 
+    /// Prepares for `vehicle`: where a controller moves the surfaces for us, their signs are checked; where it flies attitudes by
+    /// itself, our surfaces do not fly, and nothing is said of them.
+    pub fn take_on(&mut self, vehicle: &Vehicle) {
+        self.by_attitude = !vehicle.flies_surfaces();
+        if vehicle.has_channels() {
+            self.check_signs();
+        }
+    }
+
     /// Checks the surfaces' signs from now on, whenever control authority is taken, and gives the aircraft back when they are
     /// wrong or the loop oscillates: for a vehicle whose controller moves the surfaces for us. Without the model's answers
     /// in the settings no signs can be checked.
@@ -182,7 +197,7 @@ impl Pilot {
     /// The vehicle's controller has given us control authority, if it is one to give it.
     pub fn engaged(&mut self, now: Time) {
         self.advance(now);
-        (self.oscillation, self.eased) = (Oscillation::default(), None);
+        (self.oscillation, self.eased, self.mean) = (Oscillation::default(), None, None);
         if let Some(check) = &mut self.check {
             check.begin(self.in_force);
         }
@@ -257,6 +272,9 @@ impl Pilot {
     /// is a controller, it gets the aircraft back.
     fn guard(&mut self) {
         let Pending::Fly { seen, .. } = &self.pending else { return };
+        if self.by_attitude {
+            return;
+        }
         let (time, step) = (seen.time, self.limits.surface_step);
         let found = self.oscillation.see(time, &seen.state, &self.before, &self.in_force, step);
         let Some(axis) = found else { return };

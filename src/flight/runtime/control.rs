@@ -74,9 +74,7 @@ impl Control {
             ),
             Some(profile) => Vehicle::Real(Box::new(Real::new(profile))),
         };
-        if vehicle.has_channels() {
-            pilot.check_signs();
-        }
+        pilot.take_on(&vehicle);
         let started = Instant::now();
         Control {
             pilot,
