@@ -567,7 +567,8 @@ fn a_loop_that_swings_gets_a_third_of_the_deflections_for_a_while() {
         let seconds = |s: f64| (s / step.as_secs_f64()) as usize;
         assert!(swing(&mut flight, seconds(0.6), step) > 0.5);
         let eased = swing(&mut flight, seconds(3.0), step);
-        assert!(eased < 0.4, "{eased}");
+        // 1.1 beside level trim is asked: a third about the mean, which moves by 0.19 itself, and 0.13 of trim
+        assert!(eased < 0.6, "{eased}");
         assert!(flight.texts().contains("oscillates in pitch: a third of the deflections for 5 s"));
         assert_eq!(flight.last.unwrap().refused, None);
         // calm again, all of them are flown

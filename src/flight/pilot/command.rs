@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 
-use super::{Pilot, Plan, Source, TICK_S, due, within};
+use super::{Pilot, Plan, Source, due, within};
 use crate::control::Observation;
 use crate::link::autopilot::Severity;
 use crate::link::vehicle::Axis;
@@ -53,13 +53,15 @@ impl Pilot {
 
     /// `command` as it is flown at `time`.
     fn as_eased(&mut self, command: Command, time: Time) -> Command {
-        let mean = self.mean.get_or_insert(command);
+        let (last, mean) = self.mean.get_or_insert((time, command));
+        let passed = time.since(*last).as_secs_f64();
+        *last = time;
         for (mean, wanted) in [
             (&mut mean.aileron, command.aileron),
             (&mut mean.elevator, command.elevator),
             (&mut mean.rudder, command.rudder),
         ] {
-            *mean += (wanted - *mean) * TICK_S / MEAN_S;
+            *mean += (wanted - *mean) * (passed / MEAN_S).min(1.0);
         }
         if !within(self.eased, time, EASED_S) {
             return command;

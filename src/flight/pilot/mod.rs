@@ -92,8 +92,8 @@ pub struct Pilot {
     by_attitude: bool,
     /// When the loop last swung: deflections are eased for a while after it.
     eased: Option<Time>,
-    /// What the controller's deflections are on the average of the last half second.
-    mean: Option<Command>,
+    /// What the controller's deflections are on the average of the last half second, and until when.
+    mean: Option<(Time, Command)>,
     /// Whether the aircraft is being rolled upright.
     upset: bool,
     /// What the sign check or the oscillation guard has found wrong since the aircraft was armed.

@@ -18,6 +18,8 @@ const THROTTLE: f64 = 0.2;
 const ALTITUDE: [f64; 3] = [0.01, 0.02, 0.15];
 /// The X8's elevator in level flight at that speed, rad: the loops have flown for minutes when something begins.
 const LEVEL_RAD: f64 = 0.0685;
+/// Travel of the X8's surfaces, rad.
+const X8_TRAVEL: f64 = 30.0 * std::f64::consts::PI / 180.0;
 /// Bank up to which a turn is coordinated, rad.
 const COORDINATED: f64 = 80.0 * std::f64::consts::PI / 180.0;
 /// PX4 takes less of larger rate errors into the integral, and none of this one, rad/s.
@@ -54,7 +56,7 @@ struct Stack {
 const PX4: Stack = Stack {
     roll: Gains { time_constant_s: 0.45, most: 1.22, p: 0.085, i: 0.132, bound: 0.2, forward: 0.4 },
     pitch: Gains { time_constant_s: 0.4, most: 1.05, p: 0.05, i: 0.05, bound: 0.4, forward: 0.4 },
-    full_rad: 0.5235,
+    full_rad: X8_TRAVEL,
     cutoff_hz: f64::INFINITY,
     scaled_at_mps: 18.0,
     least_mps: 11.0,
@@ -80,7 +82,7 @@ const ARDUPILOT: Stack = Stack {
         bound: 0.666,
         forward: 0.35,
     },
-    full_rad: 0.5235 / 0.785,
+    full_rad: X8_TRAVEL / std::f64::consts::FRAC_PI_4,
     cutoff_hz: 3.0,
     scaled_at_mps: 15.0,
     least_mps: 7.5,
