@@ -3,7 +3,8 @@
 //! Kinematics do not know the actuators; the angular accelerations do. Roll and pitch accelerations
 //! are regressed, averaged over a short kernel so that nothing is differentiated, on rates, flow
 //! angles, inertial coupling, deflection and rate of deflection: the last coefficient over the one
-//! before it is the delay. A lag of the surfaces that the record does not show looks the same.
+//! before it is the delay. A lag of the surfaces that the record does not show looks the same. What is slower than half a
+//! second is taken off both sides: there the errors of unmeasured flow angles are, up to 0.2° beside PX4, and a clock is not.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,6 +16,8 @@ use crate::sysid::flight_path::reconstruction::{Instant, Segment};
 const KERNEL: f64 = 0.15;
 /// Windows whose residuals are taken to hang together: about 1 s.
 const BLOCK: usize = 14;
+/// Windows over which the mean is taken off: about 0.5 s.
+const SLOW: usize = 7;
 /// What the regression itself leaves out of the delay, s: the most seen on 16 axes of noise-free flights
 /// of the X8 in calm air.
 const SYSTEMATIC: f64 = 2e-5;
@@ -120,13 +123,16 @@ fn from_axis(
     for segment in segments {
         let terms: Vec<Vec<f64>> = held(segment.instants.iter().map(terms).collect(), sampling);
         let rates: Vec<f64> = segment.instants.iter().map(rate).collect();
+        let (mut of_terms, mut of_rates) = (Vec::new(), Vec::new());
         let mut middle = half + 1;
         while middle + half + 1 < rates.len() {
             let (row, value) = window(&kernel, &terms, &rates, middle - half, step);
-            rows.push(row);
-            values.push(value);
+            of_terms.push(row);
+            of_rates.push(vec![value]);
             middle += half;
         }
+        rows.extend(fast(&of_terms));
+        values.extend(fast(&of_rates).into_iter().flatten());
     }
     regress(&rows, &values)
 }
@@ -142,6 +148,17 @@ fn held(terms: Vec<Vec<f64>>, sampling: Sampling) -> Vec<Vec<f64>> {
             })
             .collect(),
     }
+}
+
+/// Each row less the mean of the rows about it.
+fn fast(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let about = |i: usize| &rows[i.saturating_sub(SLOW / 2)..(i + SLOW / 2 + 1).min(rows.len())];
+    let less_mean = |(i, row): (usize, &Vec<f64>)| {
+        let about = about(i);
+        let mean = |j: usize| about.iter().map(|r| r[j]).sum::<f64>() / about.len() as f64;
+        row.iter().enumerate().map(|(j, x)| x - mean(j)).collect()
+    };
+    rows.iter().enumerate().map(less_mean).collect()
 }
 
 /// Kernel averages from sample `start`: the terms with the last one's rate of change, the acceleration.
