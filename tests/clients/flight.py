@@ -14,6 +14,9 @@ import time
 
 # The attitude that every client flies, degrees, and how near it has to come.
 ROLL_DEG, PITCH_DEG, NEAR_DEG = 20.0, 5.0, 0.5
+# What a controller's own loops leave by themselves: the companion routes, and trims nothing. PX4's, played as the real
+# ones fly, leave 3 to 4 degrees of pitch for half a minute at half thrust.
+OWN_ERROR_DEG = 5.0
 # Largest step of a surface between two cycles: 20 a second at 100 Hz (GL_SLEW_SURF), rounded.
 SURFACE_STEP = 0.2 + 1e-6
 

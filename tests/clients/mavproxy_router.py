@@ -3,13 +3,11 @@
 import re
 
 import flight
-from flight import PITCH_DEG, ROLL_DEG, check, quaternion, say
+from flight import OWN_ERROR_DEG, PITCH_DEG, ROLL_DEG, check, quaternion, say
 from mavproxy_console import MavProxy, Watcher
 
 # PX4's HOLD and OFFBOARD.
 HOLD, OFFBOARD = 4 << 16 | 3 << 24, 6 << 16
-# What the loops of a controller leave by themselves, as real ones do: the companion routes, and trims nothing.
-OWN_ERROR_DEG = 1.0
 
 
 def patient(proxy, watcher):

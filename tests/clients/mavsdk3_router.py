@@ -4,7 +4,7 @@ import asyncio
 import json
 
 import flight
-from flight import NEAR_DEG, PITCH_DEG, ROLL_DEG, check, quaternion, roll_pitch, say
+from flight import NEAR_DEG, OWN_ERROR_DEG, PITCH_DEG, ROLL_DEG, check, quaternion, roll_pitch, say
 from mavsdk import System
 from mavsdk.mavlink_direct import MavlinkMessage
 from mavsdk.offboard import Attitude, OffboardError
@@ -65,8 +65,7 @@ async def fly_controller(drone):
     await drone.offboard.set_attitude(Attitude(ROLL_DEG, PITCH_DEG, 0.0, 0.5))
     await drone.offboard.start()
     await until(modes(), lambda m: m == FlightMode.OFFBOARD, "offboard in telemetry")
-    # The loops that the shim plays are not as fine as Greylag's.
-    await settle(drone, 1.0)
+    await settle(drone, OWN_ERROR_DEG)
     say("offboard.stop, which asks for HOLD")
     await drone.offboard.stop()
     await until(modes(), lambda m: m == FlightMode.HOLD, "hold in telemetry")

@@ -4,7 +4,7 @@ import asyncio
 import json
 
 import flight
-from flight import NEAR_DEG, PITCH_DEG, ROLL_DEG, check, quaternion, roll_pitch, say
+from flight import NEAR_DEG, OWN_ERROR_DEG, PITCH_DEG, ROLL_DEG, check, quaternion, roll_pitch, say
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
@@ -66,8 +66,7 @@ async def fly_controller(system, telemetry):
     await offboard.set_attitude(Attitude(ROLL_DEG, PITCH_DEG, 0.0, 0.5))
     await offboard.start()
     await until(modes(), lambda m: m == FlightMode.OFFBOARD, "offboard in telemetry")
-    # The loops that the shim plays are not as fine as Greylag's.
-    await settle(telemetry, 1.0)
+    await settle(telemetry, OWN_ERROR_DEG)
     say("offboard.stop, which asks for HOLD")
     await offboard.stop()
     await until(modes(), lambda m: m == FlightMode.HOLD, "hold in telemetry")
