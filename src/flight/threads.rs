@@ -3,7 +3,6 @@
 //! Nothing else is imported there, so that `tests/interleavings.rs` can compile the same sources with those of shuttle, which
 //! tries other orders of their steps in each run.
 
-pub use std::sync::Arc;
 pub use std::sync::atomic::{AtomicU64, Ordering};
 pub use std::thread::{Builder, JoinHandle};
 

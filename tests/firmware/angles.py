@@ -6,7 +6,7 @@
 
 The first prints the error of the companion's estimate (flight.csv) and of ArduPilot's own (AOA_SSA in flight.tlog, where there is one) while
 Greylag steered: mean, standard deviation, largest, in degrees. The truth is truth.csv beside the recording: JSBSim's own angles.
-The second judges a reconstructed flight path, with roll, pitch and heading too.
+The second judges a reconstructed flight path, with roll, pitch and heading too, and how late surfaces and rates are in it.
 """
 
 import bisect
@@ -71,13 +71,27 @@ def unwrapped(rows, column):
     return rows
 
 
+def late_ms(truth, rows, shift, column):
+    """By how much a column comes late beside the truth: where it fits best, to a millisecond."""
+
+    def error(ms):
+        pairs = ((at(truth, row[0] + shift - 0.001 * ms, column), row[column]) for row in rows[::7])
+        return statistics.fmean((a - b) ** 2 for a, b in pairs if a is not None)
+
+    return min(range(-50, 51), key=error)
+
+
 def judge_path(path, truth):
     """A reconstructed path from 30 s after its first sample: a launch is no flight."""
-    columns = ["time_s", "alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "yaw_rad"]
+    columns = ["time_s", "alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "yaw_rad", "p_radps", "q_radps", "aileron_rad", "elevator_rad"]
     truth, path = unwrapped(table(truth, columns), 5), table(path, columns)
     path = [row for row in path if row[0] > path[0][0] + 30.0]
     angles = [(1, "angle of attack"), (2, "sideslip"), (3, "roll"), (4, "pitch"), (5, "heading")]
-    show("reconstructed path", truth, path, offset(truth, path), angles)
+    shift = offset(truth, path)
+    show("reconstructed path", truth, path, shift, angles)
+    for name, surface, rate in (("aileron", 8, 6), ("elevator", 9, 7)):
+        of_surface, of_rate = (late_ms(truth, path, shift, column) for column in (surface, rate))
+        print(f"{'reconstructed path':24} {name:16} {of_surface:+d} ms late, its rate {of_rate:+d} ms")
 
 
 def main():

@@ -1,14 +1,12 @@
 //! A queue into a thread that never holds up whoever fills it: what does not fit is dropped and counted.
 
-use crate::flight::threads::{
-    Arc, AtomicU64, Builder, JoinHandle, Ordering, Receiver, Sender, bounded,
-};
+use crate::flight::threads::{AtomicU64, Builder, JoinHandle, Ordering, Receiver, Sender, bounded};
 
 /// The filling end of a queue of `E` into a thread that comes to a `W`.
 #[derive(Debug)]
 pub struct Queue<E, W> {
     entries: Option<Sender<E>>,
-    dropped: Arc<AtomicU64>,
+    dropped: AtomicU64,
     thread: Option<JoinHandle<W>>,
 }
 
@@ -24,8 +22,7 @@ impl<E: Send + 'static, W: Default + Send + 'static> Queue<E, W> {
     ) -> std::io::Result<Self> {
         let (entries, to_do) = bounded(size);
         let thread = Builder::new().name(name.into()).spawn(move || work(to_do))?;
-        let dropped = Arc::new(AtomicU64::new(0));
-        Ok(Queue { entries: Some(entries), dropped, thread: Some(thread) })
+        Ok(Queue { entries: Some(entries), dropped: AtomicU64::new(0), thread: Some(thread) })
     }
 
     /// Hands `entry` over, or drops it if the queue is full or its thread has died. Never waits.

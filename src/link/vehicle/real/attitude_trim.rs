@@ -1,5 +1,5 @@
-//! A slow trim on the attitude that a controller is commanded: its own loops leave 0.3° to 1.8°, and in steep turns up
-//! to 9° of pitch for half a minute, where the elevator that they feed forward to the turn does not fit the aircraft.
+//! A slow trim on the attitude that a controller is commanded: its own loops leave 0.3° to 1.8°, and in steep turns, as
+//! played, up to 9° of pitch for half a minute, where the elevator that they feed forward to the turn does not fit the aircraft.
 //!
 //! The error that stays is integrated over seconds, within narrow bounds, and only while the wanted attitude has stood
 //! still and is nearly reached. So it takes away what is constant and leaves every transient to the controller.
@@ -8,7 +8,7 @@ use crate::physics::Time;
 
 /// An error is taken away within about this time, s: five times slower than a controller's attitude loop.
 const TIME_S: f64 = 2.5;
-/// The most that is added, rad: what PX4's and ArduPlane's loops leave at 55° of bank and 20° nose down.
+/// The most that is added, rad: what PX4's and ArduPlane's loops, as played, leave at 55° of bank and 20° nose down.
 const MOST: f64 = 10.0 * DEGREE;
 /// A wanted attitude that moves by more begins anew to settle, rad.
 const STILL: f64 = 0.5 * DEGREE;
