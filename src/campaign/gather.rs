@@ -25,6 +25,19 @@ pub struct Gathered {
     pub missing: Vec<String>,
 }
 
+/// What became of results from elsewhere.
+#[derive(Clone, Debug, Default)]
+pub struct Joined {
+    /// Results that were taken.
+    pub taken: usize,
+    /// Results of cells that are done here too, with the same measurements.
+    pub twice: usize,
+    /// Cells that are done here too, with other measurements.
+    pub differing: Vec<String>,
+    /// Results of no cell of the plan, or of another command or input.
+    pub foreign: usize,
+}
+
 /// Looks at every cell.
 ///
 /// # Errors
@@ -51,6 +64,35 @@ impl Gathered {
             Standing::Missing => self.missing.push(id),
         }
         Ok(())
+    }
+
+    /// Takes the results of `others`, say of another machine, for the cells of `plan` that are not done here, and says what became of them.
+    ///
+    /// A result of another command or input than the plan's is left out. Where a cell was run in both places, the result from here stays.
+    pub fn join(&mut self, plan: &Plan, others: Vec<Record>) -> Joined {
+        let mut joined = Joined::default();
+        for other in others {
+            let of_it = |cell: &Cell| cell.id == other.cell && cell.identity == other.identity;
+            if !plan.cells.iter().any(of_it) {
+                joined.foreign += 1;
+                continue;
+            }
+            match self.records.iter().find(|own| own.cell == other.cell) {
+                Some(own) if own.metrics == other.metrics => joined.twice += 1,
+                Some(_) => joined.differing.push(other.cell),
+                None => {
+                    joined.taken += 1;
+                    for rest in [&mut self.begun, &mut self.stale, &mut self.missing] {
+                        rest.retain(|id| *id != other.cell);
+                    }
+                    self.failed.retain(|(id, _)| *id != other.cell);
+                    self.records.push(other);
+                }
+            }
+        }
+        let place = |record: &Record| plan.cells.iter().position(|cell| cell.id == record.cell);
+        self.records.sort_by_cached_key(place);
+        joined
     }
 
     /// Whether every cell is done.
@@ -170,6 +212,18 @@ mod tests {
         assert_eq!((summary.rows.len(), summary.rows[0].ours.mean.value), (1, 12.0));
         let found = &findings(&planned_first.file, &all.records).unwrap()[0];
         assert_eq!(found.outcome, Outcome::Holds, "{}", found.because);
+
+        // what another machine has of cells that are not done here
+        let (mut partly, mut elsewhere) = (all.clone(), all.records.clone());
+        elsewhere[0].metrics.insert("easy.mean_deg".to_owned(), 7.0);
+        elsewhere[8].identity = "of another input".into();
+        let absent = partly.records.split_off(2);
+        partly.missing = absent.iter().map(|r| r.cell.clone()).collect();
+        let joined = partly.join(&planned_first, elsewhere);
+        assert_eq!((joined.taken, joined.twice, joined.foreign), (6, 1, 1));
+        assert_eq!(joined.differing, ["first/1"]);
+        assert_eq!(partly.missing, [absent[6].cell.as_str()]);
+        assert_eq!(partly.records, all.records[..8]);
 
         // another input makes other cells: nothing of the old ones is mixed in
         std::fs::write(&input, "2").unwrap();

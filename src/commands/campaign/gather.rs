@@ -1,12 +1,12 @@
 //! `greylag campaign gather`: join the results, say which cells are missing.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Result;
 
 use super::Which;
-use crate::campaign::gather::{Gathered, gather, write_lines};
+use crate::campaign::gather::{Gathered, Joined, gather, read_lines, write_lines};
 use crate::commands::files::{self, Overwrite};
 use crate::commands::status::IN_DOUBT;
 
@@ -24,6 +24,9 @@ pub struct Arguments {
     /// Write what each cell took, when, and on which processor.
     #[arg(long, value_name = "FILE.jsonl")]
     times: Option<PathBuf>,
+    /// Take the results of other machines for the cells that are not done here: files that `--results` wrote there.
+    #[arg(long, value_name = "FILE.jsonl", num_args = 1..)]
+    join: Vec<PathBuf>,
     /// Replace the files if they exist.
     #[arg(long)]
     force: bool,
@@ -36,13 +39,16 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::writable(path, overwrite)?;
     }
     let (plan, store) = arguments.which.open()?;
-    let all = gather(&plan, &store)?;
+    let mut all = gather(&plan, &store)?;
     println!(
         "{} of {} cells are done in {}",
         all.records.len(),
         plan.cells.len(),
         store.folder().display()
     );
+    for path in &arguments.join {
+        say_joined(path, &all.join(&plan, read_lines(path)?));
+    }
     say(&all);
     if let Some(path) = &arguments.results {
         write_lines(path, &all.records)?;
@@ -53,6 +59,26 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         println!("times in {}", path.display());
     }
     Ok(if all.is_whole() { ExitCode::SUCCESS } else { ExitCode::from(IN_DOUBT) })
+}
+
+/// Says what became of the results in a file.
+fn say_joined(path: &Path, joined: &Joined) {
+    let path = path.display();
+    println!("{} results taken from {path}", joined.taken);
+    if joined.twice > 0 {
+        println!("{} cells were run here as well, with the same measurements", joined.twice);
+    }
+    for cell in &joined.differing {
+        println!(
+            "{cell} was run here as well and measured something else: the result from here stays"
+        );
+    }
+    if joined.foreign > 0 {
+        println!(
+            "{} results in {path} belong to no cell of this campaign, or to another command or input: left out",
+            joined.foreign
+        );
+    }
 }
 
 /// Names the cells that are not done.

@@ -84,8 +84,7 @@ impl Flight {
         let mut doubt = [[0.0, SKEW_SD]; SENSORS];
         doubt[BLUR] = BLURRED;
         for (k, (name, default)) in NAMES.iter().zip(DOUBT).enumerate() {
-            let stated = flight.nuisances.iter().find(|n| n.name == *name).map(|n| n.sd);
-            let stated = stated.filter(|sd| sd.is_finite() && *sd > 0.0);
+            let stated = flight.deviation(name).filter(|sd| *sd > 0.0);
             doubt[k + 1][1] = stated.unwrap_or(default).clamp(0.1 * default, 20.0 * default);
         }
         let prepared = Prepared::new(flight, slowest)?;

@@ -97,7 +97,9 @@ fn directions(channel: ChannelId) -> (&'static str, &'static str) {
 
 /// "8.2 ± 0.3 N too low" or "28 ± 4 % too high".
 fn error(subject: &Subject, regime: &Regime) -> String {
-    let half = 0.5 * (regime.interval[1] - regime.interval[0]);
+    let [least, most] = regime.interval;
+    // what counts is the side of zero: an interval that does not hold it must not read as if it did
+    let half = if regime.mean > 0.0 { regime.mean - least } else { most - regime.mean };
     let (low, high) = directions(subject.channel);
     if subject.channel == ChannelId::Lift && regime.relative_percent.is_finite() {
         let half = half * (regime.relative_percent / regime.mean).abs();

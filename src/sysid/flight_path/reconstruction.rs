@@ -88,6 +88,18 @@ pub struct Reconstruction {
 }
 
 impl Reconstruction {
+    /// The standard deviation of a constant by its name, in its unit; without a vane that of `alpha_bias` is how well α is known, and likewise
+    /// β. `None` if it was not estimated.
+    pub fn deviation(&self, name: &str) -> Option<f64> {
+        let angle = match name {
+            "alpha_bias" => "alpha_path",
+            "beta_bias" => "beta_path",
+            _ => name,
+        };
+        let found = self.nuisances.iter().find(|n| n.name == name || n.name == angle)?;
+        Some(found.sd).filter(|sd| sd.is_finite())
+    }
+
     /// The flight as a log: reconstructed states and what was measured beside them.
     pub fn to_flight(&self) -> Flight {
         let rate_hold_s = if self.sampling == Sampling::Held { self.step_s } else { 0.0 };

@@ -104,6 +104,22 @@ impl Prepared {
         })
     }
 
+    /// The flight with every other sample.
+    pub fn every_other(&self) -> Prepared {
+        let thin = |s: &Vec<Instant>| s.iter().step_by(2).copied().collect::<Vec<_>>();
+        let segments: Vec<_> = self.segments.iter().map(thin).filter(|s| s.len() > 1).collect();
+        let kernel = Kernel::hann(2.0 * self.dt);
+        let origin = segments.first().map_or(0.0, |s| s[0].time_s);
+        Prepared {
+            dt: 2.0 * self.dt,
+            substeps: 2 * self.substeps,
+            windows: windows(&segments, &kernel, origin),
+            segments,
+            kernel,
+            ..self.clone()
+        }
+    }
+
     /// The flight with the deflections that act under `model`'s input effects in place of the measured
     /// ones.
     pub fn acting(&self, model: &GreyBox) -> Cow<'_, Prepared> {

@@ -76,9 +76,10 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     let about = describe(s.id)?;
     let round = found.round();
     let parameters = about.coefficients.iter().enumerate().map(|(k, c)| {
-        let (value, sd) = fitted(round, s.id, c.name).unwrap_or((s.score.values[k], 0.0));
+        let [value, sd, sums] =
+            fitted(found, s.id, c.name).unwrap_or([s.score.values[k], 0.0, 0.0]);
         // the blocks' scatter stands in the deviation of the round that selected it
-        parameter(&about, k, value, sd.max(s.score.deviations[k]))
+        parameter(&about, k, value, sd.max(s.score.deviations[k]).hypot(sums))
     });
     let parameters = parameters.collect();
     let curve = match options.detail {
@@ -109,17 +110,19 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     })
 }
 
-/// Value and standard deviation of a coefficient that has joined the model.
-fn fitted(round: &Round, id: &str, name: &str) -> Option<(f64, f64)> {
+/// Value of a coefficient that has joined the model, its standard deviation by the noise and that by the sums over samples.
+fn fitted(found: &Found, id: &str, name: &str) -> Option<[f64; 3]> {
+    let round = found.round();
     let full = format!("{id}.{name}");
     let place = round.model.coefficients().iter().position(|c| c.name == full)?;
     let tuned = round.tuned();
     let value = tuned.coefficients()[place].value;
+    let sums = found.sums.get(place).copied().unwrap_or(0.0);
     match round.coefficients.iter().position(|k| *k == place) {
-        None => Some((value, 0.0)),
+        None => Some([value, 0.0, 0.0]),
         Some(k) => {
             let p = &round.projected;
-            Some((value, p.covariance[(k, k)].max(0.0).sqrt()))
+            Some([value, p.covariance[(k, k)].max(0.0).sqrt(), sums])
         }
     }
 }

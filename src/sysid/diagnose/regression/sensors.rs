@@ -56,8 +56,7 @@ pub fn widths(flight: &Reconstruction, dt: f64) -> [f64; SENSORS] {
     let stated = |name: &str| {
         // the vanes share a clock
         let name = if matches!(name, "skew_alpha" | "skew_beta") { "skew_vanes" } else { name };
-        let of = flight.nuisances.iter().find(|n| n.name == name).map(|n| n.sd);
-        of.filter(|sd| sd.is_finite()).unwrap_or(0.0)
+        flight.deviation(name).unwrap_or(0.0)
     };
     std::array::from_fn(|k| match FLOOR.get(k) {
         Some(floor) => stated(NAMES[k]).max(*floor),

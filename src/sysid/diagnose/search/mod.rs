@@ -2,6 +2,7 @@
 
 pub(super) mod checks;
 pub(in crate::sysid) mod clocks;
+pub(super) mod coarser;
 pub(super) mod excitation;
 pub(super) mod nulls;
 pub(super) mod remainder;

@@ -15,6 +15,7 @@ use crate::sysid::diagnose::error::DiagnoseError;
 use crate::sysid::diagnose::options::Options;
 use crate::sysid::diagnose::regression::catalogue::{self, Entry};
 use crate::sysid::diagnose::regression::rank::Score;
+use crate::sysid::diagnose::search::coarser::left_by_sums;
 use crate::sysid::diagnose::search::remainder::remainder;
 use crate::sysid::diagnose::search::round::{Problem, Round};
 use crate::sysid::diagnose::search::settling::{Ranked, SETTLING, ranked};
@@ -79,11 +80,15 @@ pub fn search(
         beaten: Vec::new(),
         level: Vec::new(),
         selected: Vec::new(),
+        sums: Vec::new(),
     };
     let mut aside = select(problem, model, &mut found, &entries, options, progress)?;
     found.judge_remainder();
     aside.retain(|s| found.selected.iter().all(|other| other.id != s.id));
     found.selected.append(&mut aside);
+    if found.last.is_some() {
+        found.sums = left_by_sums(problem, found.round());
+    }
     Ok(found)
 }
 

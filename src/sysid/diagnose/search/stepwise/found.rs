@@ -75,6 +75,8 @@ pub struct Found {
     pub level: Vec<usize>,
     /// Asserted effects in the order of selection, then those refused.
     pub selected: Vec<Selected>,
+    /// Standard deviation that the sums over samples leave in each coefficient of the last round's model; empty if nothing was selected.
+    pub sums: Vec<f64>,
 }
 
 impl Found {
