@@ -166,7 +166,8 @@ impl Local<'_> {
             .arg(self.file)
             .arg("--out")
             .arg(self.store.folder())
-            .args(["--cell", &cell.number.to_string()])
+            // by its id: a file that is edited meanwhile numbers its cells anew
+            .args(["--cell", &cell.id])
             .env("RAYON_NUM_THREADS", (cores / self.jobs).max(1).to_string())
             .stdin(Stdio::null())
             .stdout(log.try_clone().context("opening the log twice")?)
