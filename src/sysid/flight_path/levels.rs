@@ -143,6 +143,12 @@ impl Levels {
         turn.max(pull).ln()
     }
 
+    /// What slow errors make of a channel's colour at least, where a sample has the noise `level`.
+    fn least_colour(&self, channel: usize, level: f64) -> f64 {
+        let least = if channel == AIRSPEED { self.slow_airspeed } else { 0.0 };
+        1.0_f64.hypot(least / level)
+    }
+
     /// Takes the levels anew from the residuals of every stretch; returns the largest relative change.
     pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
         let mut change = 0.0_f64;
@@ -150,14 +156,18 @@ impl Levels {
             let all = readings.iter().flatten().map(|r| r.residual[channel]);
             let mut residuals: Vec<f64> = all.filter(|x| !x.is_nan()).collect();
             let over = |block: f64| noise::colour(&residuals, (block / step).round() as usize);
-            let least = if channel == AIRSPEED { self.slow_airspeed } else { 0.0 };
             let colour = COLOUR_BLOCKS.map(over).into_iter().fold(1.0, f64::max);
             let level = noise::level(&mut residuals);
-            if level.is_nan() || self.stated[channel] {
+            if level.is_nan() {
+                continue;
+            }
+            if self.stated[channel] {
+                // the noise of a sample is stated, not how slowly the sensor errs
+                self.colour[channel] = self.least_colour(channel, self.measured[channel]);
                 continue;
             }
             let level = level.max(self.white[channel]).min(widest);
-            let colour = colour.max(1.0_f64.hypot(least / level)).min(widest / level);
+            let colour = colour.max(self.least_colour(channel, level)).min(widest / level);
             change = change.max((level / self.measured[channel]).ln().abs());
             (self.measured[channel], self.colour[channel]) = (level, colour);
         }
