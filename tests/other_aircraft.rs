@@ -146,9 +146,10 @@ fn check_rows(recorded: &[Sample], truth: &[Sample], surfaces: &[Deflection]) {
 fn an_aircraft_of_another_travel_than_the_airframe_is_refused() {
     let (_folder, plant) = other_aircraft();
     let companion = Companion::start(&options(Pace::Lockstep));
+    // before the vehicle, which is refused at once: nobody says it again to who comes later
+    let mut client = Client::new(companion.client(0));
     let link = format!("udpout:{}", companion.vehicle());
     let shim = Shim::start(&link, shim::Pace::Lockstep, 10.0, |shim| shim.plant = plant);
-    let mut client = Client::new(companion.client(0));
     client.wait_for_text("travel is 0.4363");
     assert_ne!(client.arm(), MavResult::MAV_RESULT_ACCEPTED);
     client.wait_for_text("arming refused");
