@@ -146,7 +146,7 @@ fn check_rows(recorded: &[Sample], truth: &[Sample], surfaces: &[Deflection]) {
 fn an_aircraft_of_another_travel_than_the_airframe_is_refused() {
     let (_folder, plant) = other_aircraft();
     let companion = Companion::start(&options(Pace::Lockstep));
-    // before the vehicle, which is refused at once: nobody says it again to who comes later
+    // connected before the vehicle: the refusal is sent once, to the clients of that moment
     let mut client = Client::new(companion.client(0));
     let link = format!("udpout:{}", companion.vehicle());
     let shim = Shim::start(&link, shim::Pace::Lockstep, 10.0, |shim| shim.plant = plant);

@@ -215,6 +215,11 @@ mod tests {
 
         // what another machine has of cells that are not done here
         let (mut partly, mut elsewhere) = (all.clone(), all.records.clone());
+        // one whose last bit a quick reader of decimals would change
+        elsewhere[1].metrics.insert("easy.mean_deg".to_owned(), 0.001_848_630_997_957_734_2);
+        write_lines(&path, &elsewhere).unwrap();
+        assert_eq!(read_lines(&path).unwrap(), elsewhere);
+        elsewhere[1] = all.records[1].clone();
         elsewhere[0].metrics.insert("easy.mean_deg".to_owned(), 7.0);
         elsewhere[8].identity = "of another input".into();
         let absent = partly.records.split_off(2);

@@ -1,6 +1,6 @@
 """Scores where `greylag compare` says that a model fails: channels and regime cells, against the truth.
 
-    python tests/truth/make_cases.py --truth continuous --wrong 0 --seed 52721 --effects all --nulls 10 --out cases
+    python tests/truth/make_cases.py --truth continuous --wrong 0 --seed 52751 --effects all --nulls 10 --out cases
     python tests/truth/localise.py --greylag target/release/greylag --cases cases --jsonl results/localisation.jsonl
     python tests/truth/localise.py --table results/localisation.jsonl
 
@@ -181,7 +181,7 @@ def table(records):
     for kind in sorted({r["truth"] for r in records}):
         for title, of in (
             ("effects", [r for r in records if r["truth"] == kind and r["hidden"]]),
-            ("nulls", [r for r in records if r["truth"] == kind and not r["hidden"]]),
+            ("without a hidden effect", [r for r in records if r["truth"] == kind and not r["hidden"]]),
         ):
             for which, how in (("controlled", "q-value"), ("alone", "its own interval")) if of else ():
                 wrong, named, precision, recall, f1, rate = measures(of, which)

@@ -31,7 +31,7 @@ const AIRSPEED: usize = 3;
 /// Blocks over which residuals are averaged to see their colour, s.
 const COLOUR_BLOCKS: [f64; 2] = [1.0, 4.0];
 /// Slow error of an airspeed's dynamic pressure, Pa, and the time over which it lasts, s: the zero of the pressure sensor drifts, and the
-/// static port errs with attitude. Usual small sensors state 1 Pa to 0.1 % of a range of several kPa.
+/// static port errs with attitude. A guess, 0.3 % of the airspeed at 17 m/s; no sensor was measured.
 const PITOT: (f64, f64) = (1.0, 30.0);
 /// Density by which that is turned into a speed, kg/m³: the error is known to no better than its order.
 const NEAR_THE_GROUND: f64 = 1.2;

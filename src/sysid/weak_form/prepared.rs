@@ -111,12 +111,16 @@ impl Prepared {
         let kernel = Kernel::hann(2.0 * self.dt);
         let origin = segments.first().map_or(0.0, |s| s[0].time_s);
         Prepared {
+            name: self.name.clone(),
             dt: 2.0 * self.dt,
             substeps: 2 * self.substeps,
+            sampling: self.sampling,
+            noise: self.noise,
+            force_noise: self.force_noise,
+            turning: self.turning,
             windows: windows(&segments, &kernel, origin),
             segments,
             kernel,
-            ..self.clone()
         }
     }
 
