@@ -19,7 +19,8 @@ use greylag::physics::{Command, State};
 use greylag::sim::Simulator;
 use greylag::sim::import::import;
 use greylag::sim::one_step::{Flight, errors};
-use greylag_sitl::plant::{Plant, PlantOptions, Start};
+use greylag_sitl::plant::discovery::steered;
+use greylag_sitl::plant::{PlantOptions, Start};
 
 /// Where the aircraft are imported and flown, m.
 const ALTITUDE_M: f64 = 1000.0;
@@ -79,7 +80,10 @@ fn taken(folder: &Path, name: &str) -> Result<(GreyBox, PlantOptions, Vec<String
         aircraft: name.to_owned(),
         ..PlantOptions::default()
     };
-    let mut plant = Plant::new(&options)?;
+    let (mut plant, found) = steered(&options)?;
+    if let Some(found) = found {
+        options.properties = found.properties;
+    }
     let mass = plant.mass_properties()?.mass_kg;
     let area = plant.property("metrics/Sw-sqft")? * 0.3048 * 0.3048;
     let pressure = mass * STANDARD_GRAVITY / (LIFT * area);

@@ -103,8 +103,9 @@ pub(crate) fn load(
     name: &str,
     properties: &Properties,
     effects: &[Hidden],
+    held: &[(String, f64)],
 ) -> Result<(), AircraftError> {
-    let plain = read(dir, name)?;
+    let plain = declared(&read(dir, name)?, held);
     let properties = properties.in_document(&plain);
     let document = hidden::write_into(&plain, &properties, effects, fdm.dt())?;
     let mut tree = Tree { disk: dir.map(FileResolver::new), memory: MemoryResolver::new() };
@@ -119,6 +120,30 @@ pub(crate) fn load(
     tree.memory.insert(path.clone(), document);
     fdm.load_model_file(&tree, &path)
         .map_err(|source| AircraftError::Load { name: name.to_owned(), source })
+}
+
+/// The document with a system that declares what is held: an aircraft may read what only another program defines.
+fn declared(document: &str, held: &[(String, f64)]) -> String {
+    let end = document.rfind("</fdm_config>").filter(|_| !held.is_empty());
+    let Some(end) = end else { return document.to_owned() };
+    let plain = |name: &str| {
+        !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "/-_[].".contains(c))
+    };
+    let lines: String = held
+        .iter()
+        // what JSBSim itself has, and what a file writes, is not declared twice
+        .filter(|(name, _)| {
+            plain(name)
+                && !document.contains(&format!("<output>{name}<"))
+                && !name.starts_with("fcs/")
+        })
+        .map(|(name, value)| format!("<property value=\"{value}\">{name}</property>"))
+        .collect();
+    if lines.is_empty() {
+        return document.to_owned();
+    }
+    let system = format!("<system name=\"held\">{lines}</system>");
+    [&document[..end], &system, &document[end..]].concat()
 }
 
 /// The text of the aircraft's main document.

@@ -1,5 +1,7 @@
 //! The plant: one aircraft flown by JSBSim in this process, step by step in its own time.
 
+pub mod discovery;
+mod linked;
 mod loads;
 mod lookup;
 mod mixing;
@@ -68,6 +70,32 @@ pub enum PlantError {
         /// The property that stays where it is.
         property: String,
     },
+    /// Nothing steers the aircraft about an axis.
+    #[error(
+        "no command of the aircraft '{aircraft}' {does} it: {tried}; it is none that ailerons and an elevator steer, or its own names must be \
+         given with --property (as KEY=NAME, KEY=-NAME*SCALE or KEY=NAME,-NAME)"
+    )]
+    Unmoved {
+        /// The aircraft's name.
+        aircraft: String,
+        /// What nothing does.
+        does: &'static str,
+        /// What was tried.
+        tried: String,
+    },
+    /// A file of the aircraft reads a property that nothing defines.
+    #[error(
+        "the aircraft '{aircraft}' reads {property} ({place}), which no file of it defines; the program that it was written for does: \
+         give its value with --set {property}=0"
+    )]
+    Undefined {
+        /// The aircraft's name.
+        aircraft: String,
+        /// What is not defined.
+        property: String,
+        /// Where it is read.
+        place: String,
+    },
     /// The start of an episode is not one that can be flown from.
     #[error(
         "cannot start at {0:?}: give finite angles and rates, an airspeed from 0.1 to 1000 m/s and an altitude from -400 to 80000 m"
@@ -135,8 +163,8 @@ impl Plant {
         }
         let mut fdm = Fdm::new().map_err(jsbsim("starting"))?;
         fdm.set_dt(options.step_s);
-        let PlantOptions { aircraft_dir, aircraft, properties, hidden, .. } = &options;
-        aircraft::load(&mut fdm, aircraft_dir.as_deref(), aircraft, properties, hidden)?;
+        let PlantOptions { aircraft_dir, aircraft, properties, hidden, held, .. } = &options;
+        aircraft::load(&mut fdm, aircraft_dir.as_deref(), aircraft, properties, hidden, held)?;
         let nodes = Nodes::find(&fdm, &options)?;
         let mut loaded = jsbsim::Snapshot::new();
         fdm.snapshot_into(&mut loaded).map_err(jsbsim("saving the loaded aircraft"))?;
@@ -158,7 +186,7 @@ impl Plant {
         self.fdm.restore(&self.loaded).map_err(jsbsim("going back to the loaded aircraft"))?;
         self.nodes
             .start(&mut self.fdm, start, &self.options)
-            .map_err(jsbsim("setting the start"))?;
+            .map_err(starting(&self.options.aircraft))?;
         self.start_engines()?;
         (self.steps, self.next_gust) = (0, 0);
         let truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the start"))?;
@@ -290,4 +318,23 @@ impl Plant {
 /// Turns what JSBSim says while `doing` into a [`PlantError`].
 fn jsbsim(doing: &'static str) -> impl Fn(jsbsim::Error) -> PlantError {
     move |source| PlantError::Jsbsim { doing, source }
+}
+
+/// Turns what JSBSim says at a start into a [`PlantError`]: a property that is missing has a name.
+fn starting(aircraft: &str) -> impl Fn(jsbsim::Error) -> PlantError {
+    let aircraft = aircraft.to_owned();
+    move |source| {
+        let said = source.to_string();
+        let place = said.split(": Property ").next().unwrap_or_default().to_owned();
+        let missing =
+            said.split("Property ").nth(1).and_then(|rest| rest.split_once(" does not exist"));
+        match missing {
+            Some((property, _)) => PlantError::Undefined {
+                aircraft: aircraft.clone(),
+                property: property.trim().to_owned(),
+                place,
+            },
+            None => PlantError::Jsbsim { doing: "setting the start", source },
+        }
+    }
 }

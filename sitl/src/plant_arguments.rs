@@ -30,7 +30,8 @@ struct AircraftArgs {
     #[arg(long, value_name = "NAME")]
     aircraft: Option<String>,
     /// Name a property of the aircraft (may be repeated): KEY is aileron_command, elevator_command,
-    /// throttle_command, rudder_command, or the same with _position.
+    /// throttle_command, rudder_command, or the same with _position. NAME may be several, with signs and scales:
+    /// -NAME*SCALE,NAME.
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
     /// Hold a property of the aircraft at a value (may be repeated): flaps, say, by fcs/flap-cmd-norm=0.5.

@@ -3,7 +3,7 @@
 mod check;
 mod export;
 mod import;
-mod import_avl;
+mod import_derivatives;
 #[cfg(feature = "sitl")]
 mod import_jsbsim;
 mod new;

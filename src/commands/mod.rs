@@ -171,7 +171,8 @@ pub fn main() -> ExitCode {
     bar::silence(quiet);
     let level = match (quiet, verbose) {
         (true, _) => "error",
-        (_, 0) => "warn",
+        // what the port of JSBSim says of an aircraft's XML is said once more, in our words
+        (_, 0) => "warn,jsbsim=off",
         (_, 1) => "info",
         (_, 2..) => "debug",
     };

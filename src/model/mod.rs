@@ -1,8 +1,8 @@
 //! The grey box: a prior made of physical effects, its integrators, trim and linearisation.
 
-pub mod avl;
 pub mod block;
 pub mod data_envelope;
+pub mod derivatives;
 mod draw;
 pub mod edit;
 mod file;

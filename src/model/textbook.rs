@@ -8,6 +8,7 @@ mod derivatives;
 
 use std::fmt::Write;
 
+use super::derivatives::widths::{self, Tool};
 use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 use derivatives::{induced, rudder};
 
@@ -189,6 +190,10 @@ impl Measures {
         ];
         if self.rudder.is_some() {
             effects.push(("rudder_linear", rudder()));
+        }
+        // how far these formulas were from measured derivatives; the widths beside them stand where nothing is known
+        for (name, _, width, _) in effects.iter_mut().flat_map(|(_, all)| all.iter_mut()) {
+            *width = widths::of(Tool::Textbook, name).unwrap_or(*width);
         }
         effects
     }

@@ -89,6 +89,11 @@ impl Nodes {
         self.steering.is_glider()
     }
 
+    /// Whether a property is moved by more than one control.
+    pub(super) fn is_shared(&self) -> bool {
+        self.steering.is_shared()
+    }
+
     /// Starts every engine that can stand still; the number of the first that does not run then.
     /// JSBSim starts them at full power, from where they follow the throttle.
     pub(super) fn start_engines(&self, fdm: &mut Fdm, step_s: f64) -> Result<Option<usize>, Error> {

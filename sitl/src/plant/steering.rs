@@ -2,6 +2,7 @@
 
 use jsbsim::{Error, Fdm, NodeId};
 
+use super::linked::Linked;
 use super::lookup::{look, needed};
 use super::mixing::Mixing;
 use super::options::THROTTLE_COMMAND;
@@ -16,12 +17,12 @@ pub(super) enum Steering {
 }
 
 pub(super) struct Usual {
-    surfaces: [NodeId; 2],
+    surfaces: [Linked; 2],
     /// Command and position of the rudder.
-    rudder: Option<[NodeId; 2]>,
+    rudder: Option<[Linked; 2]>,
     /// One a throttle; none on a glider.
     throttles: Vec<NodeId>,
-    positions: [NodeId; 2],
+    positions: [Linked; 2],
     throttle_position: Option<NodeId>,
 }
 
@@ -63,13 +64,15 @@ impl Steering {
         if throttles.is_empty() && !is_glider {
             node(&p.throttle_command)?;
         }
+        let linked = |text: &str| Linked::find(fdm, &options.aircraft, text);
         Ok(Steering::Usual(Usual {
-            surfaces: [node(&p.aileron_command)?, node(&p.elevator_command)?],
-            rudder: rudder(&look, &node, p)?,
+            surfaces: [linked(&p.aileron_command)?, linked(&p.elevator_command)?],
+            rudder: rudder(fdm, &options.aircraft, p)?,
             throttles,
             positions: [
-                look(&p.aileron_position).map_or_else(|| node(p.aileron_fallback()), Ok)?,
-                node(&p.elevator_position)?,
+                Linked::look(fdm, &p.aileron_position)
+                    .map_or_else(|| linked(p.aileron_fallback()), Ok)?,
+                linked(&p.elevator_position)?,
             ],
             throttle_position: (!is_glider).then(|| node(&p.throttle_position)).transpose()?,
         }))
@@ -77,18 +80,27 @@ impl Steering {
 
     /// Writes the commands.
     pub(super) fn command(&self, fdm: &mut Fdm, inputs: &Inputs) -> Result<(), Error> {
-        let (throttles, surfaces) = match self {
+        let values = [inputs.aileron, inputs.elevator, inputs.rudder];
+        let throttles = match self {
             Steering::Usual(usual) => {
-                let [aileron, elevator] = usual.surfaces.map(Some);
-                (&usual.throttles, [aileron, elevator, usual.rudder.map(|[command, _]| command)])
+                let rudder = usual.rudder.as_ref().map(|[command, _]| command);
+                let surfaces = usual.surfaces.iter().chain(rudder);
+                let mut written = Vec::with_capacity(4);
+                surfaces.zip(values).for_each(|(linked, value)| linked.add(value, &mut written));
+                for (node, value) in written {
+                    fdm.write_node(node, value)?;
+                }
+                &usual.throttles
             }
-            Steering::Mixed(mixed) => (&mixed.throttles, mixed.usual),
+            Steering::Mixed(mixed) => {
+                for (node, value) in mixed.usual.iter().zip(values) {
+                    if let Some(node) = node {
+                        fdm.write_node(*node, value)?;
+                    }
+                }
+                &mixed.throttles
+            }
         };
-        for (node, value) in surfaces.iter().zip([inputs.aileron, inputs.elevator, inputs.rudder]) {
-            if let Some(node) = node {
-                fdm.write_node(*node, value)?;
-            }
-        }
         for throttle in throttles {
             fdm.write_node(*throttle, inputs.throttle)?;
         }
@@ -106,16 +118,29 @@ impl Steering {
     pub(super) fn positions(&self, fdm: &mut Fdm) -> Result<[f64; 4], Error> {
         match self {
             Steering::Usual(usual) => {
-                let [aileron, elevator] = usual.positions;
+                let [aileron, elevator] = &usual.positions;
                 let throttle = usual.throttle_position.map_or(Ok(0.0), |n| fdm.read_node(n));
-                let rudder = usual.rudder.map_or(Ok(0.0), |[_, node]| fdm.read_node(node));
-                Ok([fdm.read_node(aileron)?, fdm.read_node(elevator)?, rudder?, throttle?])
+                let rudder = usual.rudder.as_ref().map_or(Ok(0.0), |[_, place]| place.read(fdm));
+                Ok([aileron.read(fdm)?, elevator.read(fdm)?, rudder?, throttle?])
             }
             Steering::Mixed(mixed) => {
                 let positions: Result<Vec<f64>, Error> =
                     mixed.positions.iter().map(|node| fdm.read_node(*node)).collect();
                 Ok(mixed.mixing.controls(&positions?))
             }
+        }
+    }
+
+    /// Whether a property is moved by more than one control, so that the controls can be commanded in full one by one only.
+    pub(super) fn is_shared(&self) -> bool {
+        match self {
+            Steering::Usual(usual) => {
+                let [aileron, elevator] = &usual.surfaces;
+                let rudder = usual.rudder.as_ref().map(|[command, _]| command);
+                aileron.shares(elevator)
+                    || rudder.is_some_and(|r| r.shares(aileron) || r.shares(elevator))
+            }
+            Steering::Mixed(_) => true,
         }
     }
 
@@ -130,16 +155,18 @@ impl Steering {
 
 /// Command and position of the rudder; one that is named must be there.
 fn rudder(
-    look: &impl Fn(&str) -> Option<NodeId>,
-    node: &impl Fn(&str) -> Result<NodeId, PlantError>,
+    fdm: &Fdm,
+    aircraft: &str,
     names: &Properties,
-) -> Result<Option<[NodeId; 2]>, PlantError> {
+) -> Result<Option<[Linked; 2]>, PlantError> {
     let Properties { rudder_command, rudder_position, .. } = names;
     let usual = Properties::default();
     if (rudder_command, rudder_position) == (&usual.rudder_command, &usual.rudder_position) {
-        return Ok(look(rudder_command).zip(look(rudder_position)).map(|(c, p)| [c, p]));
+        let both = Linked::look(fdm, rudder_command).zip(Linked::look(fdm, rudder_position));
+        return Ok(both.map(|(c, p)| [c, p]));
     }
-    Ok(Some([node(rudder_command)?, node(rudder_position)?]))
+    let find = |text: &str| Linked::find(fdm, aircraft, text);
+    Ok(Some([find(rudder_command)?, find(rudder_position)?]))
 }
 
 /// The nodes `NAME`, `NAME[1]`, … up to the first that is not there.

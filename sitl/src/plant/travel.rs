@@ -111,7 +111,7 @@ impl Plant {
     /// would reach their stops before, so there each control is commanded alone.
     fn stops(&mut self, command: f64) -> Result<[f64; 3], PlantError> {
         let [aileron, elevator, rudder] = [command; 3];
-        if self.options.mixing.is_none() {
+        if !self.nodes.is_shared() {
             return self.rest(&Inputs { aileron, elevator, throttle: 0.0, rudder });
         }
         let none = Inputs::default();

@@ -14,8 +14,9 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum From {
-    /// From stability derivatives as AVL writes them (ST, SB), with textbook estimates for the rest.
-    Avl(super::import_avl::Avl),
+    /// From stability derivatives of AVL, XFLR5, OptVL or AeroSandbox, with textbook estimates for the rest.
+    #[command(visible_alias = "avl")]
+    Derivatives(super::import_derivatives::Derivatives),
     /// From a JSBSim aircraft, by central differences of its loads.
     #[cfg(feature = "sitl")]
     Jsbsim(super::import_jsbsim::Jsbsim),
@@ -24,7 +25,7 @@ enum From {
 /// Imports, writes, says what is left out.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.from {
-        From::Avl(avl) => super::import_avl::run(avl),
+        From::Derivatives(file) => super::import_derivatives::run(file),
         #[cfg(feature = "sitl")]
         From::Jsbsim(jsbsim) => super::import_jsbsim::run(jsbsim),
     }

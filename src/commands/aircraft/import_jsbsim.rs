@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use greylag_sitl::plant::{Plant, PlantOptions, Start};
+use greylag_sitl::plant::discovery::steered;
+use greylag_sitl::plant::{PlantOptions, Start};
 use greylag_sitl::plant_arguments::{held, property};
 
 use crate::commands::files::{self, Overwrite};
@@ -29,7 +30,8 @@ pub struct Jsbsim {
     /// Altitude at which it is taken, above mean sea level.
     #[arg(long, value_name = "M", default_value_t = 600.0)]
     altitude_m: f64,
-    /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does.
+    /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does; without any, commands and surfaces of
+    /// their own names are found by trying all. NAME may be -NAME*SCALE,NAME,….
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
     /// Hold a property at a value (may be repeated): flaps, say. The airframe file keeps it.
@@ -56,7 +58,12 @@ pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     if model.exists() {
         bail!("{} exists; name another folder with --out", model.display());
     }
-    let mut plant = Plant::new(&options)?;
+    let (mut plant, steering) = steered(&options)?;
+    if let Some(steering) = &steering {
+        println!("found by trying: {}", steering.arguments().join(" "));
+        println!("give these to `greylag evaluate` and `greylag-sitl`, which fly it");
+        steering.notes.iter().for_each(|note| println!("note: {note}"));
+    }
     let mut found = import(&mut plant, &jsbsim.name, jsbsim.cruise_mps, jsbsim.altitude_m)?;
     found.hold(&jsbsim.set);
     let read = read_back(&found)?;

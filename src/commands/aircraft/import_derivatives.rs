@@ -1,4 +1,4 @@
-//! `greylag aircraft import avl`: stability derivatives of a vortex lattice as airframe and model.
+//! `greylag aircraft import derivatives`: what an aerodynamic tool computed, as airframe and model.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -7,7 +7,8 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 
 use super::new::{self, Common};
-use crate::model::avl::{self, Beside};
+use crate::commands::status;
+use crate::model::derivatives::{self, Beside};
 
 /// The unit of the control derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -18,10 +19,11 @@ enum Angle {
     Rad,
 }
 
-/// The arguments of `greylag aircraft import avl`.
+/// The arguments of `greylag aircraft import derivatives`.
 #[derive(Args)]
-pub struct Avl {
-    /// Text that AVL's command ST or SB writes; OptVL, AeroSandbox and XFLR5 write the same names.
+pub struct Derivatives {
+    /// Text of AVL's command ST or SB, XFLR5's log with Sref, Cref and Bref added, or JSON of what OptVL or AeroSandbox
+    /// return in Python.
     file: PathBuf,
     /// Folder to make, with airframe.toml and model.toml.
     #[arg(long, value_name = "FOLDER")]
@@ -31,26 +33,30 @@ pub struct Avl {
     /// Metres in the file's unit of length: 0.3048 for feet.
     #[arg(long, value_name = "M", default_value_t = 1.0)]
     unit_m: f64,
-    /// Unit of the control derivatives.
+    /// Unit of the control derivatives; XFLR5's are by a radian always.
     #[arg(long, value_enum, default_value = "deg")]
     control_unit: Angle,
 }
 
-/// Reads, writes, says what is not of the file.
-pub fn run(arguments: &Avl) -> Result<ExitCode> {
-    let Avl { file, out, common, unit_m, control_unit } = arguments;
+/// Reads, writes, says what is not of the file and what is not believed; the exit status is 3 for the latter.
+pub fn run(arguments: &Derivatives) -> Result<ExitCode> {
+    let Derivatives { file, out, common, unit_m, control_unit } = arguments;
     if !(*unit_m > 0.0 && *unit_m < 1e3) {
         bail!("--unit-m {unit_m} is not physical: give the metres in a unit of length");
     }
     let bytes = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
     let text = String::from_utf8_lossy(&bytes);
-    let [area, _, span] = avl::reference(&text).with_context(|| format!("{}", file.display()))?;
+    let reference = derivatives::reference(&text);
+    let [area, _, span] = reference.with_context(|| format!("{}", file.display()))?;
     let beside = Beside {
         measures: new::measures(common, out, span * unit_m, area * unit_m * unit_m)?,
         metres: *unit_m,
         radians: if *control_unit == Angle::Deg { 1f64.to_radians() } else { 1.0 },
     };
-    let read = avl::read(&text, &beside).with_context(|| format!("{}", file.display()))?;
+    let read = derivatives::read(&text, &beside).with_context(|| format!("{}", file.display()))?;
+    println!("read as {}", read.tool);
     read.notes.iter().for_each(|note| println!("note: {note}"));
-    new::write(out, &read.airframe, &read.model)
+    read.warnings.iter().for_each(|warning| println!("warning: {warning}"));
+    let written = new::write(out, &read.airframe, &read.model)?;
+    Ok(if read.warnings.is_empty() { written } else { ExitCode::from(status::IN_DOUBT) })
 }

@@ -1,0 +1,262 @@
+//! Which property of an aircraft commands which surface: found by trying all.
+//!
+//! Commands are what the aircraft's systems read and nothing of them writes. Each is commanded in full, to both sides where its domain
+//! has two (a negative command to flaps may give no number), while the aircraft stands still in its state, for as long as lags,
+//! delays and hysteresis need. What rolls most without pitching or yawing is the aileron, alone or as a pair with the other side's;
+//! elevator and rudder likewise. The surface's position is a property that the aerodynamics read and the command moves.
+
+mod document;
+mod roles;
+
+use std::path::Path;
+
+use jsbsim::{Fdm, NodeId, Snapshot};
+
+use super::lookup::look;
+use super::settling::STILL_S;
+use super::{PlantError, PlantOptions, Properties, jsbsim};
+use crate::aircraft;
+use document::Names;
+use roles::{Tried, choose};
+
+/// Frames that a command is given to come to rest: 20 s in frames of 10 ms.
+const FRAMES: usize = 2000;
+/// Frames without movement after which it is at rest: longer than any delay of an actuator.
+const AT_REST: usize = 60;
+/// Movement that is none, as a share of what moved so far.
+const STILL: f64 = 1e-9;
+/// Airspeed at which commands are tried, m/s: any at which the air has a pressure will do.
+const AIRSPEED_FPS: f64 = 150.0;
+/// Moments of the air, body axes, lbf ft.
+const MOMENTS: [&str; 3] = ["moments/l-aero-lbsft", "moments/m-aero-lbsft", "moments/n-aero-lbsft"];
+/// Lengths by which they are compared.
+const LENGTHS: [&str; 3] = ["metrics/bw-ft", "metrics/cbarw-ft", "metrics/bw-ft"];
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The properties through which the aircraft flies.
+    pub properties: Properties,
+    /// What was assumed, one sentence each.
+    pub notes: Vec<String>,
+}
+
+impl Found {
+    /// The properties that are not the usual ones, as `--property` takes them.
+    pub fn arguments(&self) -> Vec<String> {
+        let (mut own, mut usual) = (self.properties.clone(), Properties::default());
+        let named = |key: &&str| {
+            let name = own.name_mut(key).map(|n| n.clone())?;
+            let differs = usual.name_mut(key).is_some_and(|n| *n != name);
+            differs.then(|| format!("--property '{key}={name}'"))
+        };
+        Properties::KEYS.iter().filter_map(named).collect()
+    }
+}
+
+/// Finds the commands and surfaces of the aircraft of `options`; `Err` names the axis that no command moves.
+///
+/// # Errors
+/// If the aircraft cannot be loaded, or no command rolls or pitches it.
+pub fn discover(options: &PlantOptions) -> Result<Found, PlantError> {
+    let names =
+        Names::read(options.aircraft_dir.as_deref().unwrap_or(Path::new("")), &options.aircraft);
+    let mut bench = Bench::new(options, &names)?;
+    let mut tried = Vec::new();
+    for command in &names.commands {
+        if let Some(found) = bench.attempt(command)? {
+            tried.push(found);
+        }
+    }
+    let throttle = bench.throttle(&names)?;
+    choose(&tried, &names, &options.aircraft).map(|mut found| {
+        if let Some(command) = throttle {
+            found.properties.throttle_command = command;
+        }
+        found
+    })
+}
+
+/// A loaded aircraft that stands still in the air.
+struct Bench {
+    fdm: Fdm,
+    start: Snapshot,
+    /// Properties that the aerodynamics read, which may be positions.
+    positions: Vec<(String, NodeId)>,
+    lengths: [f64; 3],
+}
+
+/// Moments (by their lengths) and positions.
+#[derive(Clone)]
+struct Seen {
+    moments: [f64; 3],
+    positions: Vec<f64>,
+}
+
+impl Bench {
+    fn new(options: &PlantOptions, names: &Names) -> Result<Bench, PlantError> {
+        let mut fdm = Fdm::new().map_err(jsbsim("starting"))?;
+        fdm.set_dt(options.step_s);
+        let PlantOptions { aircraft_dir, aircraft, properties, held, .. } = options;
+        aircraft::load(&mut fdm, aircraft_dir.as_deref(), aircraft, properties, &[], held)?;
+        let go = |fdm: &mut Fdm| -> Result<[f64; 3], jsbsim::Error> {
+            for (name, value) in [("h-sl-ft", 2000.0), ("u-fps", AIRSPEED_FPS)] {
+                fdm.set_property(&format!("ic/{name}"), value)?;
+            }
+            fdm.run_ic()?;
+            fdm.set_dt(STILL_S);
+            for (name, value) in held {
+                fdm.set_property(name, *value)?;
+            }
+            let mut lengths = [1.0; 3];
+            for (length, name) in lengths.iter_mut().zip(LENGTHS) {
+                *length = fdm.get_property(name)?.max(1e-6);
+            }
+            Ok(lengths)
+        };
+        let lengths = go(&mut fdm).map_err(super::starting(aircraft))?;
+        let positions =
+            names.read.iter().filter_map(|n| Some((n.clone(), look(&fdm, n)?))).collect();
+        let mut start = Snapshot::new();
+        fdm.snapshot_into(&mut start).map_err(jsbsim("saving the loaded aircraft"))?;
+        Ok(Bench { fdm, start, positions, lengths })
+    }
+
+    fn see(&mut self) -> Result<Seen, jsbsim::Error> {
+        let mut moments = [0.0; 3];
+        for ((moment, name), length) in moments.iter_mut().zip(MOMENTS).zip(self.lengths) {
+            *moment = self.fdm.get_property(name)? / length;
+        }
+        let mut positions = Vec::with_capacity(self.positions.len());
+        for (_, node) in &self.positions {
+            positions.push(self.fdm.read_node(*node)?);
+        }
+        Ok(Seen { moments, positions })
+    }
+
+    /// What is seen once all stands where `command` puts it; `None` where that gives no number.
+    fn at(&mut self, command: Option<NodeId>, value: f64) -> Result<Option<Seen>, PlantError> {
+        self.fdm.restore(&self.start).map_err(jsbsim("going back to the loaded aircraft"))?;
+        self.fdm.set_dt(STILL_S);
+        let (mut last, mut at_rest, mut moved) = (None::<Seen>, 0, 0.0_f64);
+        for _ in 0..FRAMES {
+            let frame = |bench: &mut Bench| -> Result<Seen, jsbsim::Error> {
+                if let Some(node) = command {
+                    bench.fdm.write_node(node, value)?;
+                }
+                bench.fdm.run()?;
+                bench.see()
+            };
+            // an aircraft that cannot bear a command throws at it
+            let Ok(seen) = frame(self) else { return Ok(None) };
+            if !seen.moments.iter().chain(&seen.positions).all(|x| x.is_finite()) {
+                return Ok(None);
+            }
+            if let Some(last) = &last {
+                let pairs = last.positions.iter().zip(&seen.positions);
+                let step = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                moved = moved.max(step);
+                at_rest = if step <= STILL * moved.max(1.0) { at_rest + 1 } else { 0 };
+            }
+            last = Some(seen);
+            if at_rest >= AT_REST {
+                break;
+            }
+        }
+        Ok(last)
+    }
+
+    /// What `command` does in full; `None` of one that does nothing, or is not there.
+    fn attempt(&mut self, command: &str) -> Result<Option<Tried>, PlantError> {
+        let Some(node) = look(&self.fdm, command) else { return Ok(None) };
+        let Some(none) = self.at(Some(node), 0.0)? else { return Ok(None) };
+        let Some(full) = self.at(Some(node), 1.0)? else { return Ok(None) };
+        let other = self.at(Some(node), -1.0)?;
+        let moments = std::array::from_fn(|k| full.moments[k] - none.moments[k]);
+        let moved: Vec<(String, [f64; 2])> = (0..self.positions.len())
+            .map(|k| {
+                let back = other.as_ref().map_or(0.0, |o| o.positions[k] - none.positions[k]);
+                (self.positions[k].0.clone(), [back, full.positions[k] - none.positions[k]])
+            })
+            .filter(|(_, [back, ahead])| back.abs().max(ahead.abs()) > 1e-3)
+            .collect();
+        if moved.is_empty() && moments.iter().all(|m: &f64| m.abs() < 1e-9) {
+            return Ok(None);
+        }
+        let full_at = self.full_at(node, &none, &full)?;
+        Ok(Some(Tried {
+            command: command.to_owned(),
+            moments,
+            moved,
+            full_at,
+            two_sided: other.is_some(),
+        }))
+    }
+
+    /// The least command that does what one does: an actuator's stop may come before.
+    fn full_at(&mut self, node: NodeId, none: &Seen, full: &Seen) -> Result<f64, PlantError> {
+        let reach = |seen: &Seen| -> f64 {
+            let pairs = seen.positions.iter().zip(&none.positions);
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        let whole = reach(full);
+        let (mut least, mut most) = (0.0, 1.0);
+        // most of a half: a command in its domain
+        match self.at(Some(node), 0.9)? {
+            Some(seen) if reach(&seen) > (1.0 - 1e-6) * whole => {}
+            _ => return Ok(1.0),
+        }
+        for _ in 0..14 {
+            let middle = 0.5 * (least + most);
+            match self.at(Some(node), middle)? {
+                Some(seen) if reach(&seen) > (1.0 - 1e-6) * whole => most = middle,
+                _ => least = middle,
+            }
+        }
+        Ok(most)
+    }
+
+    /// The command that moves the throttle, where the usual one does not.
+    fn throttle(&mut self, names: &Names) -> Result<Option<String>, PlantError> {
+        let Some(place) = look(&self.fdm, "fcs/throttle-pos-norm") else { return Ok(None) };
+        let usual = super::options::THROTTLE_COMMAND.to_owned();
+        for command in std::iter::once(&usual).chain(&names.commands) {
+            let Some(node) = look(&self.fdm, command) else { continue };
+            if self.at(Some(node), 1.0)?.is_none() {
+                continue;
+            }
+            let open = self.fdm.read_node(place).map_err(jsbsim("reading the throttle"))?;
+            if open > 0.5 {
+                return Ok((*command != usual).then(|| command.clone()));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// The aircraft of `options`, steered by the usual properties or those that are named, and if they do not steer it, by those that are
+/// found; what was found stands beside it.
+///
+/// # Errors
+/// If it cannot be loaded or nothing steers it. Names that were given are not replaced.
+pub fn steered(options: &PlantOptions) -> Result<(super::Plant, Option<Found>), PlantError> {
+    let as_it_is = super::Plant::new(options).and_then(|mut plant| {
+        let travel = plant.travel()?;
+        let turned = |s: &super::Stops| s.least_rad >= 0.0 || s.most_rad <= 0.0;
+        let all = [Some(travel.aileron), Some(travel.elevator), travel.rudder];
+        Ok((plant, all.iter().flatten().any(turned)))
+    });
+    let is_own = options.properties != Properties::default() || options.mixing.is_some();
+    match as_it_is {
+        Ok((plant, turned)) if !turned || is_own => Ok((plant, None)),
+        Err(PlantError::Property { .. } | PlantError::Travel { .. }) | Ok(_) if !is_own => {
+            let found = discover(options)?;
+            let options = PlantOptions { properties: found.properties.clone(), ..options.clone() };
+            let mut plant = super::Plant::new(&options)?;
+            plant.travel()?;
+            Ok((plant, Some(found)))
+        }
+        Ok((plant, _)) => Ok((plant, None)),
+        Err(error) => Err(error),
+    }
+}

@@ -1,0 +1,202 @@
+//! Which of the commands that were tried is the aileron, the elevator, the rudder.
+
+use super::Found;
+use super::document::Names;
+use crate::plant::{PlantError, Properties};
+
+/// What a command did.
+#[derive(Clone, Debug)]
+pub(super) struct Tried {
+    pub command: String,
+    /// Rolling, pitching, yawing moment by their lengths at the command 1, less those at 0.
+    pub moments: [f64; 3],
+    /// Positions that moved: at the command −1 (0 where it has no other side) and 1.
+    pub moved: Vec<(String, [f64; 2])>,
+    /// The command at which all is at its stop.
+    pub full_at: f64,
+    /// Whether it has two sides.
+    pub two_sided: bool,
+}
+
+/// Full deflection where only a share of it is known, rad: 20°.
+const SHARE_RAD: f64 = 0.349;
+/// Least share of a moment beside the largest of its axis.
+const LEAST: f64 = 0.05;
+
+/// A control: the aileron is one of these with the axis 0.
+struct Role {
+    name: &'static str,
+    axis: usize,
+    /// Sign of the moment of a positive command.
+    sense: f64,
+    words: [&'static str; 3],
+    does: &'static str,
+}
+
+const ROLES: [Role; 3] = [
+    Role { name: "aileron", axis: 0, sense: 1.0, words: ["ail", "elevon", "roll"], does: "rolls" },
+    Role {
+        name: "elevator",
+        axis: 1,
+        sense: -1.0,
+        words: ["elev", "elevon", "stab"],
+        does: "pitches",
+    },
+    Role { name: "rudder", axis: 2, sense: -1.0, words: ["rud", "rud", "yaw"], does: "yaws" },
+];
+/// Words of commands that move the aircraft, and do not steer it.
+const OTHERS: [&str; 7] = ["flap", "spoil", "brake", "trim", "slat", "gear", "gain"];
+
+/// One command, or two with a sign for the second.
+struct Choice<'a> {
+    parts: Vec<(&'a Tried, f64)>,
+    score: f64,
+}
+
+/// Assigns the roles; the error names the axis that nothing moves, and what was tried.
+pub(super) fn choose(tried: &[Tried], names: &Names, aircraft: &str) -> Result<Found, PlantError> {
+    let mut properties = Properties::default();
+    let mut notes = Vec::new();
+    for role in &ROLES {
+        let Some(choice) = best(tried, role) else {
+            if role.name == "rudder" {
+                notes.push("no command yaws the aircraft: it is flown without a rudder".to_owned());
+                continue;
+            }
+            return Err(PlantError::Unmoved {
+                aircraft: aircraft.to_owned(),
+                does: role.does,
+                tried: listed(tried, names),
+            });
+        };
+        let (command, position) = named(&choice, role, &mut notes);
+        let keys = [format!("{}_command", role.name), format!("{}_position", role.name)];
+        for (key, name) in keys.iter().zip([command, position]) {
+            if let (Some(place), Some(name)) = (properties.name_mut(key), name) {
+                *place = name;
+            }
+        }
+    }
+    Ok(Found { properties, notes })
+}
+
+/// Commands with what they move most, in short.
+fn listed(tried: &[Tried], names: &Names) -> String {
+    if tried.is_empty() {
+        return format!("{} commands were tried, none moves anything", names.commands.len());
+    }
+    let axes = ["rolls", "pitches", "yaws"];
+    let one = |t: &Tried| {
+        let most = (0..3).max_by(|a, b| t.moments[*a].abs().total_cmp(&t.moments[*b].abs()));
+        match most.filter(|k| t.moments[*k].abs() > 1e-9) {
+            Some(k) => format!("{} {}", t.command, axes[k]),
+            None => format!("{} makes no moment", t.command),
+        }
+    };
+    tried.iter().take(8).map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// The command or pair that moves the axis most and the others least.
+fn best<'a>(tried: &'a [Tried], role: &Role) -> Option<Choice<'a>> {
+    let largest = tried.iter().map(|t| t.moments[role.axis].abs()).fold(0.0, f64::max);
+    let mut all: Vec<Choice<'a>> = Vec::new();
+    for (k, one) in tried.iter().enumerate() {
+        all.push(Choice { parts: vec![(one, 1.0)], score: 0.0 });
+        for other in tried[k + 1..].iter().filter(|other| are_sides(&one.command, &other.command)) {
+            all.push(Choice { parts: vec![(one, 1.0), (other, 1.0)], score: 0.0 });
+            all.push(Choice { parts: vec![(one, 1.0), (other, -1.0)], score: 0.0 });
+        }
+    }
+    for choice in &mut all {
+        choice.score = score(&choice.parts, role, largest);
+    }
+    all.into_iter().max_by(|a, b| a.score.total_cmp(&b.score)).filter(|c| c.score > 0.0)
+}
+
+fn score(parts: &[(&Tried, f64)], role: &Role, largest: f64) -> f64 {
+    let sum = |axis: usize| parts.iter().map(|(t, sign)| sign * t.moments[axis]).sum::<f64>().abs();
+    let own = sum(role.axis);
+    // roll and yaw go together in every aircraft; pitch stands apart
+    let beside: f64 = (0..3).filter(|k| *k != role.axis).map(sum).sum();
+    if !(own > LEAST * largest && own > 1e-9) || parts.iter().any(|(t, _)| !t.two_sided) {
+        return 0.0;
+    }
+    let name = |words: &[&str]| {
+        parts.iter().all(|(t, _)| words.iter().any(|w| t.command.to_lowercase().contains(w)))
+    };
+    let words = if name(&role.words) { 4.0 } else { 1.0 };
+    let others = if name(&OTHERS) { 0.1 } else { 1.0 };
+    let moves = if parts.iter().all(|(t, _)| position(t).is_some()) { 1.0 } else { 0.3 };
+    (own / (own + beside)).powi(2) * (own / largest).min(2.0).sqrt() * words * others * moves
+}
+
+/// Whether two names are those of the left and the right side.
+fn are_sides(a: &str, b: &str) -> bool {
+    let swapped = a.replace("left", "right") == b.replace("left", "right") && a != b;
+    let differ: Vec<(char, char)> = a.chars().zip(b.chars()).filter(|(x, y)| x != y).collect();
+    let letters = differ.first().is_some_and(|(x, y)| {
+        matches!((x.to_ascii_lowercase(), y.to_ascii_lowercase()), ('l', 'r') | ('r', 'l'))
+    });
+    swapped || (a.len() == b.len() && differ.len() == 1 && letters)
+}
+
+/// The position that a command moves: in radians, and most.
+fn position(tried: &Tried) -> Option<&(String, [f64; 2])> {
+    let kind = |name: &str| match name {
+        _ if name.contains("deg") => 0,
+        _ if name.contains("norm") => 1,
+        _ => 2,
+    };
+    let size = |m: &[f64; 2]| m[0].abs().max(m[1].abs());
+    let usable = tried.moved.iter().filter(|(name, m)| kind(name) > 0 && size(m) < 3.0);
+    usable.max_by(|a, b| kind(&a.0).cmp(&kind(&b.0)).then(size(&a.1).total_cmp(&size(&b.1))))
+}
+
+/// Command and position as `--property` takes them.
+fn named(
+    choice: &Choice,
+    role: &Role,
+    notes: &mut Vec<String>,
+) -> (Option<String>, Option<String>) {
+    let moment: f64 = choice.parts.iter().map(|(t, sign)| sign * t.moments[role.axis]).sum();
+    let turn = if moment * role.sense < 0.0 { -1.0 } else { 1.0 };
+    let (mut commands, mut positions) = (Vec::new(), Vec::new());
+    for (tried, sign) in &choice.parts {
+        let sign = sign * turn;
+        commands.push(linked(&tried.command, sign, tried.full_at));
+        if let Some((name, [back, ahead])) = position(tried) {
+            let rises = if ahead - back >= 0.0 { sign } else { -sign };
+            let is_share = name.contains("norm");
+            if is_share {
+                notes.push(format!(
+                    "{name} is a share of a deflection that the file does not tell: {SHARE_RAD} rad are assumed, and only the \
+                     {}'s effect at full command is known", role.name
+                ));
+            }
+            positions.push(linked(name, rises, if is_share { SHARE_RAD } else { 1.0 }));
+        }
+    }
+    let text = |parts: Vec<String>| (!parts.is_empty()).then(|| parts.join(","));
+    (text(commands), text(positions))
+}
+
+fn linked(name: &str, sign: f64, scale: f64) -> String {
+    let minus = if sign < 0.0 { "-" } else { "" };
+    match (scale - 1.0).abs() < 1e-3 {
+        true => format!("{minus}{name}"),
+        false => format!("{minus}{name}*{scale:.4}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_are_known_by_their_names() {
+        assert!(are_sides("fcs/cmdAilL_rad", "fcs/cmdAilR_rad"));
+        assert!(are_sides("fcs/left-elevon-cmd", "fcs/right-elevon-cmd"));
+        assert!(!are_sides("fcs/cmdAilL_rad", "fcs/cmdFlapR_rad"));
+        assert!(!are_sides("fcs/a1", "fcs/a2"));
+    }
+}

@@ -1,0 +1,86 @@
+//! Derivatives that no aircraft has: what a tool did not compute is zero in its table, and is not taken from it.
+
+use super::{Tool, Value};
+use crate::model::textbook::{Measures, Tail};
+
+/// Least rolling damping beside a lift slope: elliptic wings have 1/8 of it, very short ones 1/12.
+const ROLL_DAMPING: f64 = 0.02;
+/// Least damping in pitch of an aircraft with a tail; textbook ones have −5 and more.
+const PITCH_DAMPING: f64 = 1.0;
+/// Least damping in yaw; a fin alone has −0.02 and more.
+const YAW_DAMPING: f64 = 3e-3;
+/// Least moment of a control by a radian.
+const CONTROL: f64 = 5e-3;
+/// Lift slopes of whole aircraft, 1/rad.
+const SLOPES: std::ops::RangeInclusive<f64> = 1.0..=8.0;
+
+/// Takes the values out that `tool` cannot have computed, and says which, and what is odd besides.
+pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>) -> Vec<String> {
+    let of = |name: &str| values.iter().find(|(full, _)| full.ends_with(name)).map(|(_, x)| *x);
+    let slope = of(".CLalpha").unwrap_or(0.0);
+    let mut said = Vec::new();
+    let mut out: Vec<&str> = Vec::new();
+    for (control, moment, all) in CONTROLS {
+        if of(moment).is_some_and(|x| x.abs() < CONTROL) {
+            let name = &moment[1..];
+            said.push(format!("{name} is 0 in the file: {}", tool.of_controls(control)));
+            out.extend(all);
+        }
+    }
+    let damping = |name: &str, least: f64, rates: &[&'static str]| {
+        let x = of(name)?;
+        (x > -least).then(|| {
+            let text = format!(
+                "{} = {x:.4} beside CLalpha = {slope:.2}: {}; {} are textbook estimates",
+                &name[1..],
+                tool.of_damping(),
+                rates.iter().map(|r| &r[1..]).collect::<Vec<_>>().join(", ")
+            );
+            (text, rates.to_vec())
+        })
+    };
+    let tailed = measures.tail == Tail::Conventional;
+    let pitch = if tailed { PITCH_DAMPING } else { 0.0 };
+    for found in [
+        damping(".Clp", ROLL_DAMPING * slope, &[".CYp", ".Clp", ".Cnp"]),
+        damping(".Cmq", pitch, &[".CLq", ".Cmq"]),
+        damping(".Cnr", YAW_DAMPING, &[".CYr", ".Clr", ".Cnr"]),
+    ]
+    .into_iter()
+    .flatten()
+    {
+        said.push(found.0);
+        out.extend(found.1);
+    }
+    odd(&of, slope, &mut said);
+    values.retain(|(full, _)| !out.iter().any(|name| full.ends_with(name)));
+    said
+}
+
+/// Controls with the moment that they are there for, and all that they make.
+const CONTROLS: [(&str, &str, &[&str]); 3] = [
+    ("aileron", ".Clda", &[".CYda", ".Clda", ".Cnda"]),
+    ("elevator", ".Cmde", &[".CLde", ".Cmde"]),
+    ("rudder", ".Cndr", &[".CYdr", ".Cldr", ".Cndr"]),
+];
+
+/// What is taken, and is odd.
+fn odd(of: &dyn Fn(&str) -> Option<f64>, slope: f64, said: &mut Vec<String>) {
+    if !SLOPES.contains(&slope) {
+        said.push(format!(
+            "CLalpha = {slope:.3} by a radian is of no whole aircraft: see that alpha is in degrees there and the reference \
+             area is the wing's"
+        ));
+    }
+    if let Some(x) = of(".Cmalpha").filter(|x| *x >= 0.0) {
+        said.push(format!(
+            "Cmalpha = {x:.3} makes the aircraft unstable: see that moments are about the centre of gravity"
+        ));
+    }
+    if let Some(x) = of(".Cnbeta").filter(|x| *x <= 0.0) {
+        said.push(format!(
+            "Cnbeta = {x:.4} turns the nose away from the wind: see that the fin is in the geometry and sideslip is positive \
+             with wind from the right"
+        ));
+    }
+}

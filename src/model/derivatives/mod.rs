@@ -1,0 +1,325 @@
+//! Stability derivatives that aerodynamic tools compute, as airframe and model.
+//!
+//! Each tool has its axes, units and names; they end here in body axes, by a radian, by pb/2V, qc/2V, rb/2V. Each
+//! derivative has the width of its tool ([`widths`]), and what a tool cannot compute is named and not taken ([`checks`]).
+
+mod avl;
+mod checks;
+mod json;
+mod numbers;
+pub mod widths;
+mod xflr5;
+
+use numbers::Numbers;
+pub use widths::Tool;
+
+use super::textbook::{Estimate, Measures, Section};
+
+/// What is known of an aircraft beside the derivatives.
+#[derive(Clone, Debug)]
+pub struct Beside {
+    /// Name, mass, tail, travel and thrust; span and area are those of the file.
+    pub measures: Measures,
+    /// Metres in the unit of length of the file.
+    pub metres: f64,
+    /// Radians in the unit of the control derivatives: AVL has degrees times the control's gain.
+    pub radians: f64,
+}
+
+/// What was made of a file.
+#[derive(Clone, Debug)]
+pub struct Read {
+    /// The tool that wrote it.
+    pub tool: Tool,
+    /// The airframe file.
+    pub airframe: String,
+    /// The model file, beside `airframe.toml`.
+    pub model: String,
+    /// What is not of the file, and what was turned round, one sentence each.
+    pub notes: Vec<String>,
+    /// What is not believed, by name, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Why a file is of no use.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DerivativesError {
+    /// A number is missing.
+    #[error("the file has no {name}: {tool}")]
+    Missing {
+        /// The number.
+        name: String,
+        /// Where it comes from.
+        tool: &'static str,
+    },
+    /// A number is none.
+    #[error("{name} = {text} in line {line} is not a number; run the case again")]
+    Number {
+        /// The number's name.
+        name: String,
+        /// What stands there.
+        text: String,
+        /// Where, from 1.
+        line: usize,
+    },
+    /// The JSON cannot be read.
+    #[error(
+        "the JSON cannot be read: {what}; write it as docs/how-to/add-an-aircraft.md does, without NaN"
+    )]
+    Json {
+        /// What is wrong.
+        what: String,
+    },
+    /// The tool is none that is known.
+    #[error(
+        "the tool '{said}' is not known: name AeroSandbox's method, as \"tool\": \"AeroBuildup\", \"VortexLatticeMethod\" or \"LiftingLine\""
+    )]
+    Tool {
+        /// What the file says.
+        said: String,
+    },
+    /// The tool is not named, and the names do not tell it.
+    #[error(
+        "the JSON does not say which method computed it, and its errors depend on it: add \"tool\": \"AeroBuildup\", \"VortexLatticeMethod\" or \"LiftingLine\""
+    )]
+    NoTool,
+    /// The reference area or span is not positive.
+    #[error("Sref, Cref and Bref must be positive; check the geometry's reference")]
+    Reference,
+}
+
+/// Derivatives of side force, lift, rolling, pitching, yawing moment by one variable, body axes.
+type Column = [f64; 5];
+
+/// A control with its derivatives by a radian, in the tool's sense of turning.
+#[derive(Clone, Debug)]
+struct Control {
+    name: String,
+    column: Column,
+}
+
+/// The derivatives of a file: body axes, by a radian.
+struct Derivatives {
+    tool: Tool,
+    /// Reference area, chord, span in the file's unit.
+    reference: [f64; 3],
+    /// Point about which moments are taken, x and z in the file's axes.
+    point: Option<[f64; 2]>,
+    /// Incidence of the run, rad.
+    alpha: f64,
+    /// Lift and pitching moment of the run.
+    totals: [f64; 2],
+    by_alpha: Column,
+    by_beta: Column,
+    by_rates: [Column; 3],
+    controls: Vec<Control>,
+    /// What the reader assumed.
+    notes: Vec<String>,
+}
+
+impl Derivatives {
+    fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesError> {
+        match text {
+            _ if is_json(text) => json::read(text, radians),
+            _ if xflr5::is_here(text) => xflr5::read(text),
+            _ => avl::read(text, radians),
+        }
+    }
+}
+
+fn is_json(text: &str) -> bool {
+    text.trim_start().starts_with('{')
+}
+
+/// Moments about stability axes turned into those about body axes.
+fn to_body([side, lift, roll, pitch, yaw]: Column, alpha: f64) -> Column {
+    let (sin, cos) = alpha.sin_cos();
+    [side, lift, roll * cos - yaw * sin, pitch, roll * sin + yaw * cos]
+}
+
+/// Derivatives by body rates of those by rates about stability axes: p' = p cos α + r sin α, r' = r cos α − p sin α.
+fn about_body([p, q, r]: [Column; 3], alpha: f64) -> [Column; 3] {
+    let (sin, cos) = alpha.sin_cos();
+    let both = |a: f64, b: f64| std::array::from_fn(|i| a * p[i] + b * r[i]);
+    [both(cos, -sin), q, both(sin, cos)]
+}
+
+fn positive(all: [f64; 3]) -> Result<[f64; 3], DerivativesError> {
+    if all.iter().all(|x| *x > 0.0) { Ok(all) } else { Err(DerivativesError::Reference) }
+}
+
+/// Reference area, chord and span of the `text` of a file, in its unit of length.
+///
+/// # Errors
+/// If one is missing or not positive.
+pub fn reference(text: &str) -> Result<[f64; 3], DerivativesError> {
+    match is_json(text) {
+        true => json::reference(text),
+        false => Numbers::read(text)?.reference(
+            "AVL's commands ST and SB write it; on top of XFLR5's log it is to be added, as Sref = 0.45, Cref = 0.25, \
+             Bref = 1.8",
+        ),
+    }
+}
+
+/// Reads the `text` of AVL, XFLR5, or what OptVL and AeroSandbox return as JSON, with what is known `beside` it.
+///
+/// # Errors
+/// If a number that is needed is missing or is none.
+pub fn read(text: &str, beside: &Beside) -> Result<Read, DerivativesError> {
+    let mut found = Derivatives::read(text, beside.radians)?;
+    let [area, chord, span] = found.reference;
+    let measures = Measures {
+        area: area * beside.metres * beside.metres,
+        span: span * beside.metres,
+        ..beside.measures.clone()
+    };
+    let mut notes = std::mem::take(&mut found.notes);
+    notes.push(
+        "drag, inertia and thrust are textbook estimates: the file does not have them".into(),
+    );
+    notes.push(about(&found));
+    let mut values = longitudinal(&found);
+    values.extend(lateral(&found));
+    values.extend(controls(&found, &measures, &mut notes));
+    let warnings = checks::doubtful(found.tool, &measures, &mut values);
+    let mut sections = measures.sections();
+    for (full, value) in values {
+        let Some((effect, name)) = full.split_once('.') else { continue };
+        let own = sections.iter_mut().find(|(id, _)| *id == effect);
+        let own = own.and_then(|(_, all)| all.iter_mut().find(|e: &&mut Estimate| e.0 == name));
+        if let Some(estimate) = own {
+            let width = widths::of(found.tool, name).unwrap_or(estimate.2);
+            (estimate.1, estimate.2, estimate.3) = (value, width, found.tool.source());
+        }
+    }
+    trimmed(&mut sections, &measures);
+    let description = format!("Derivatives by {}; drag and inertia by the textbook.", found.tool);
+    Ok(Read {
+        tool: found.tool,
+        airframe: measures.airframe_with_chord(chord * beside.metres, slope_and_zero(&sections)),
+        model: measures.model_of(&sections, &description),
+        notes,
+        warnings,
+    })
+}
+
+/// About which point the moments are.
+fn about(d: &Derivatives) -> String {
+    match d.point {
+        Some([x, z]) => format!(
+            "moments are about x = {x:.4}, z = {z:.4} of the file's axes: that must be the centre of gravity as flown, or Cmalpha \
+             and Cmq are of another aircraft"
+        ),
+        None => "the file does not say about which point its moments are: it must be the centre of gravity as flown".into(),
+    }
+}
+
+/// Full name and value of a coefficient.
+type Value = (&'static str, f64);
+
+fn longitudinal(d: &Derivatives) -> Vec<Value> {
+    let [total_lift, total_pitch] = d.totals;
+    let (slope, stiffness) = (d.by_alpha[1], d.by_alpha[3]);
+    vec![
+        ("lift_linear.CL0", total_lift - slope * d.alpha),
+        ("lift_linear.CLalpha", slope),
+        ("lift_linear.CLq", d.by_rates[1][1]),
+        ("pitch_linear.Cm0", total_pitch - stiffness * d.alpha),
+        ("pitch_linear.Cmalpha", stiffness),
+        ("pitch_linear.Cmq", d.by_rates[1][3]),
+    ]
+}
+
+fn lateral(d: &Derivatives) -> Vec<Value> {
+    let [p, _, r] = d.by_rates;
+    vec![
+        ("side_force_linear.CYbeta", d.by_beta[0]),
+        ("side_force_linear.CYp", p[0]),
+        ("side_force_linear.CYr", r[0]),
+        ("roll_linear.Clbeta", d.by_beta[2]),
+        ("roll_linear.Clp", p[2]),
+        ("roll_linear.Clr", r[2]),
+        ("yaw_linear.Cnbeta", d.by_beta[4]),
+        ("yaw_linear.Cnp", p[4]),
+        ("yaw_linear.Cnr", r[4]),
+    ]
+}
+
+/// Derivatives by aileron, elevator and rudder, each with our sign; what the file lacks stays the textbook's.
+fn controls(d: &Derivatives, measures: &Measures, notes: &mut Vec<String>) -> Vec<Value> {
+    let mut out = Vec::new();
+    let mut used = Vec::new();
+    // the place in a column, and its sign for a positive deflection
+    for (control, word, place, sign) in
+        [("aileron", "ail", 2, 1.0), ("elevator", "elev", 3, -1.0), ("rudder", "rud", 4, -1.0)]
+    {
+        if control == "rudder" && measures.rudder.is_none() {
+            continue;
+        }
+        let named = d.controls.iter().filter(|c| c.name.to_lowercase().contains(word));
+        let Some(Control { name, column }) =
+            named.max_by(|a, b| a.column[place].abs().total_cmp(&b.column[place].abs()))
+        else {
+            notes.push(format!(
+                "no control of the file is called {control}: its coefficients are textbook estimates"
+            ));
+            continue;
+        };
+        used.push(name.as_str());
+        let turn = if column[place] * sign < 0.0 { -1.0 } else { 1.0 };
+        if turn < 0.0 {
+            notes.push(format!("{name} of the file is turned round: {}", SENSE[place - 2]));
+        }
+        let [side, lift, roll, pitch, yaw] = column.map(|x| turn * x);
+        out.extend(match control {
+            "aileron" => vec![
+                ("side_force_linear.CYda", side),
+                ("roll_linear.Clda", roll),
+                ("yaw_linear.Cnda", yaw),
+            ],
+            "elevator" => vec![("lift_linear.CLde", lift), ("pitch_linear.Cmde", pitch)],
+            _ => vec![
+                ("rudder_linear.CYdr", side),
+                ("rudder_linear.Cldr", roll),
+                ("rudder_linear.Cndr", yaw),
+            ],
+        });
+    }
+    for control in d.controls.iter().filter(|c| !used.contains(&c.name.as_str())) {
+        notes.push(format!("the control {} is left out", control.name));
+    }
+    out
+}
+
+/// What a positive deflection does here.
+const SENSE: [&str; 3] = [
+    "a positive aileron rolls right here",
+    "a positive elevator pitches down here",
+    "a positive rudder yaws left here",
+];
+
+fn value(sections: &[Section], effect: &str, name: &str) -> f64 {
+    let own = sections.iter().find(|(id, _)| *id == effect);
+    own.and_then(|(_, all)| all.iter().find(|e| e.0 == name)).map_or(0.0, |e| e.1)
+}
+
+/// Slope of the lift (1/rad) and lift at α = 0.
+fn slope_and_zero(sections: &[Section]) -> [f64; 2] {
+    [value(sections, "lift_linear", "CLalpha"), value(sections, "lift_linear", "CL0")]
+}
+
+/// The induced drag goes by the file's lift.
+fn trimmed(sections: &mut [Section], measures: &Measures) {
+    let [slope, zero] = slope_and_zero(sections);
+    let [linear, square] = measures.induced_by(slope, zero);
+    for (id, all) in sections.iter_mut() {
+        for estimate in all.iter_mut() {
+            match (*id, estimate.0) {
+                ("drag_linear", "CDalpha") => estimate.1 = linear,
+                ("drag_alpha2", "CDalpha2") => estimate.1 = square,
+                _ => {}
+            }
+        }
+    }
+}

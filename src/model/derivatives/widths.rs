@@ -1,0 +1,117 @@
+//! How far the derivatives of a tool are from those that were measured: standard deviations as shares of the value.
+//!
+//! `params/widths/widths.csv` holds them: the tool's errors beside aircraft whose derivatives were identified in flight or
+//! measured in a wind tunnel (`params/widths/measured.csv`, with sources), drawn together with a guess that counts as two
+//! aircraft, since few were measured: w² = (2 g² + Σ e²) / (2 + n). `cargo run --example derivative_widths` computes them.
+
+use std::fmt;
+use std::sync::LazyLock;
+
+/// A tool that computes derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Tool {
+    /// Formulas from mass, span and area (`greylag aircraft new`).
+    Textbook,
+    /// AVL's text.
+    Avl,
+    /// OptVL, which has AVL's lattice.
+    OptVl,
+    /// AeroSandbox's `VortexLatticeMethod`.
+    AeroSandboxLattice,
+    /// AeroSandbox's `AeroBuildup`.
+    AeroBuildup,
+    /// AeroSandbox's `LiftingLine`.
+    LiftingLine,
+    /// XFLR5's stability analysis.
+    Xflr5,
+}
+
+impl Tool {
+    /// All of them.
+    pub const ALL: [Tool; 7] = [
+        Tool::Textbook,
+        Tool::Avl,
+        Tool::OptVl,
+        Tool::AeroSandboxLattice,
+        Tool::AeroBuildup,
+        Tool::LiftingLine,
+        Tool::Xflr5,
+    ];
+
+    /// Its name in the tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Tool::Textbook => "textbook",
+            Tool::Avl => "avl",
+            Tool::OptVl => "optvl",
+            Tool::AeroSandboxLattice => "aerosandbox-lattice",
+            Tool::AeroBuildup => "aerobuildup",
+            Tool::LiftingLine => "lifting-line",
+            Tool::Xflr5 => "xflr5",
+        }
+    }
+
+    /// The tool whose errors stand for it: lattices err alike, but for what they leave out.
+    pub fn family(self) -> &'static str {
+        match self {
+            Tool::Avl | Tool::OptVl | Tool::Xflr5 => "lattice",
+            other => other.name(),
+        }
+    }
+
+    /// What a coefficient's source says.
+    pub(super) fn source(self) -> &'static str {
+        match self {
+            Tool::Textbook => "textbook",
+            Tool::Avl => "vortex lattice (AVL)",
+            Tool::OptVl => "vortex lattice (OptVL)",
+            Tool::AeroSandboxLattice => "vortex lattice (AeroSandbox)",
+            Tool::AeroBuildup => "AeroSandbox's AeroBuildup",
+            Tool::LiftingLine => "AeroSandbox's lifting line",
+            Tool::Xflr5 => "XFLR5",
+        }
+    }
+
+    /// Why a control's derivatives may be zero, and what is done.
+    pub(super) fn of_controls(self, control: &str) -> String {
+        match self {
+            Tool::AeroSandboxLattice => format!(
+                "AeroSandbox's lattice ignores deflected surfaces; the {control}'s coefficients are textbook estimates. Take controls from AeroBuildup or OptVL"
+            ),
+            _ => format!(
+                "see that the {control} has a gain in the geometry; its coefficients are textbook estimates"
+            ),
+        }
+    }
+
+    /// Why a damping may be missing.
+    pub(super) fn of_damping(self) -> &'static str {
+        match self {
+            Tool::LiftingLine => "AeroSandbox's lifting line does not see rotation",
+            _ => "the run did not see rotation, or its reference lengths are wrong",
+        }
+    }
+}
+
+impl fmt::Display for Tool {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.source())
+    }
+}
+
+/// Tool (or family), derivative, width.
+static WIDTHS: LazyLock<Vec<(&str, &str, f64)>> = LazyLock::new(|| {
+    let lines = include_str!("../../../params/widths/widths.csv").lines();
+    let columns = |line: &'static str| {
+        let mut parts = line.split(',');
+        Some((parts.next()?, parts.next()?, parts.next()?.parse().ok()?))
+    };
+    lines.filter(|line| !line.starts_with('#')).skip(1).filter_map(columns).collect()
+});
+
+/// Standard deviation of the derivative called `name` (`CLalpha`) by `tool`, as a share of its value; `None` of one that is in no
+/// table.
+pub fn of(tool: Tool, name: &str) -> Option<f64> {
+    let by = |tool: &str| WIDTHS.iter().find(|w| w.0 == tool && w.1 == name).map(|w| w.2);
+    by(tool.name()).or_else(|| by(tool.family()))
+}
