@@ -1,7 +1,7 @@
 //! Derivatives that no aircraft has: what a tool did not compute is zero in its table, and is not taken from it.
 
 use super::{Tool, Value};
-use crate::model::textbook::{Measures, Tail};
+use crate::textbook::{Measures, Tail};
 
 /// Least rolling damping beside a lift slope: elliptic wings have 1/8 of it, very short ones 1/12.
 const ROLL_DAMPING: f64 = 0.02;

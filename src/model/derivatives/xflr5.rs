@@ -5,7 +5,7 @@
 
 use super::numbers::Numbers;
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, to_body};
-use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
+use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
 const FROM: &str = "it stands in the log of XFLR5's stability analysis (\"Longitudinal derivatives\" and below), and \
                     Sref, Cref and Bref are to be added on top as \"Sref = 0.45\"";
