@@ -1,7 +1,7 @@
 //! Prints how far textbook and aerodynamic tools are from measured derivatives, and the widths that follow.
 //!
 //! ```text
-//! cargo run --ignore-rust-version --no-default-features --example derivative_widths [-- --write]
+//! cargo run --ignore-rust-version -p greylag-model --example derivative_widths [-- --write]
 //! ```
 //!
 //! An error is counted as a share of the computed value, as a width is: (computed − measured) / |computed|. A guess counts as two
@@ -10,10 +10,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
-use greylag::model::derivatives::widths::Tool;
-use greylag::model::derivatives::{Beside, read, reference};
-use greylag::model::textbook::{Measures, Tail};
+use greylag_model::derivatives::widths::Tool;
+use greylag_model::derivatives::{Beside, read, reference};
+use greylag_model::textbook::{Measures, Tail};
+
+/// What may go wrong: a file, a number.
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// How many aircraft a guess counts as.
 const GUESS: f64 = 2.0;
@@ -38,7 +40,7 @@ type Row = Vec<String>;
 type Computed = BTreeMap<(String, String, String), f64>;
 
 fn main() -> Result<()> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let folder = root.join("params/widths");
     let measured = table(&folder.join("measured.csv"))?;
     let computed = computed(root)?;
@@ -49,7 +51,7 @@ fn main() -> Result<()> {
     println!("|---|---|---|---|---|---|---|---|");
     for row in &measured {
         let [aircraft, kind, name, value, ..] = row.as_slice() else { continue };
-        let truth: f64 = value.parse().with_context(|| format!("{value} of {name}"))?;
+        let truth: f64 = value.parse()?;
         let mut cells = Vec::new();
         for family in FAMILIES {
             let key = (aircraft.clone(), family.to_owned(), name.clone());
@@ -118,7 +120,7 @@ fn computed(root: &Path) -> Result<Computed> {
     let mut all = Computed::new();
     for row in table(&root.join("params/widths/computed.csv"))? {
         let [aircraft, tool, name, value, ..] = row.as_slice() else { continue };
-        let tool = Tool::ALL.into_iter().find(|t| t.name() == tool).context("unknown tool")?;
+        let tool = Tool::ALL.into_iter().find(|t| t.name() == tool).ok_or("unknown tool")?;
         all.insert((aircraft.clone(), tool.family().into(), name.clone()), value.parse()?);
     }
     for (aircraft, mass, span, area, tail) in AIRCRAFT {
@@ -180,7 +182,7 @@ fn coefficients(model: &str) -> Result<Vec<(String, f64)>> {
 
 /// The rows of a file but its first; lines that begin with # are notes.
 fn table(path: &PathBuf) -> Result<Vec<Row>> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let lines = text.lines().filter(|line| !line.starts_with('#')).skip(1);
     Ok(lines.map(|line| line.split(',').map(str::to_owned).collect()).collect())
 }
