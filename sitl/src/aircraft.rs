@@ -135,7 +135,7 @@ fn declared(document: &str, held: &[(String, f64)]) -> String {
         .filter(|(name, _)| {
             plain(name)
                 && !document.contains(&format!("<output>{name}<"))
-                && !name.starts_with("fcs/")
+                && !name.ends_with("-cmd-norm")
         })
         .map(|(name, value)| format!("<property value=\"{value}\">{name}</property>"))
         .collect();

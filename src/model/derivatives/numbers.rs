@@ -14,6 +14,8 @@ impl Numbers {
             let parts: Vec<&str> = line.split('=').collect();
             for pair in parts.windows(2) {
                 let name = pair[0].split_whitespace().next_back().unwrap_or_default();
+                // XFLR5 writes "…the weight...VInf = 8.6"
+                let name = name.rsplit("...").next().unwrap_or_default();
                 let value = pair[1].split_whitespace().next().unwrap_or_default();
                 // words of a title may stand around a sign of equality
                 if !name.starts_with(|c: char| c.is_ascii_alphabetic()) || value.is_empty() {
