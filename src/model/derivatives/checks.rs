@@ -7,8 +7,8 @@ use crate::textbook::{Measures, Tail};
 const ROLL_DAMPING: f64 = 0.02;
 /// Least damping in pitch of an aircraft with a tail; textbook ones have −5 and more.
 const PITCH_DAMPING: f64 = 1.0;
-/// Least damping in yaw; a fin alone has −0.02 and more.
-const YAW_DAMPING: f64 = 3e-3;
+/// Least damping in yaw of an aircraft with a tail; a fin alone has −0.02 and more.
+const YAW_DAMPING: f64 = 8e-3;
 /// Least moment of a control by a radian.
 const CONTROL: f64 = 5e-3;
 /// Lift slopes of whole aircraft, 1/rad.
@@ -40,11 +40,11 @@ pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>)
         })
     };
     let tailed = measures.tail == Tail::Conventional;
-    let pitch = if tailed { PITCH_DAMPING } else { 0.0 };
+    let [pitch, yaw] = if tailed { [PITCH_DAMPING, YAW_DAMPING] } else { [0.0; 2] };
     for found in [
         damping(".Clp", ROLL_DAMPING * slope, &[".CYp", ".Clp", ".Cnp"]),
         damping(".Cmq", pitch, &[".CLq", ".Cmq"]),
-        damping(".Cnr", YAW_DAMPING, &[".CYr", ".Clr", ".Cnr"]),
+        damping(".Cnr", yaw, &[".CYr", ".Clr", ".Cnr"]),
     ]
     .into_iter()
     .flatten()
