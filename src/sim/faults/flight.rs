@@ -2,14 +2,15 @@
 
 mod client;
 mod disk;
+mod error;
 mod faulty;
+mod monitored;
 mod traced;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use greylag_sitl::plant::{Inputs, PlantOptions};
-use greylag_sitl::shim::ShimError;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -19,9 +20,9 @@ use super::mix::{Fault, FaultKind};
 use super::policies::Sample;
 use super::scenario::{Asking, Scenario, Setting};
 use super::wire::Wire;
-use crate::control::{Controller, ControllerKind, SetupError, build};
+use crate::control::{Controller, ControllerKind, build};
 use crate::flight::desk::Desk;
-use crate::flight::pilot::{ConfigError, Pilot};
+use crate::flight::pilot::Pilot;
 use crate::flight::recorder::Recorder;
 use crate::flight::runtime::Companion;
 use crate::link::autopilot::{Autopilot, ParameterValue, Verdict};
@@ -29,6 +30,8 @@ use crate::link::vehicle::Vehicle;
 use crate::model::GreyBox;
 use crate::physics::airframe::Envelope;
 use disk::Disk;
+pub use error::FaultsError;
+pub use monitored::{ATTITUDE_DEG, FAILS_S, Failure, Watched};
 use traced::Follower;
 
 /// Steps of a flight: 60 s.
@@ -38,33 +41,6 @@ const HAND_BACK_S: f64 = 0.5;
 
 /// Stream of the random numbers of a starved processor.
 const STARVED: u64 = 20;
-
-/// Why a flight cannot be flown.
-#[derive(Debug, thiserror::Error)]
-pub enum FaultsError {
-    /// The aircraft cannot be made.
-    #[error(transparent)]
-    Aircraft(#[from] ShimError),
-    /// The fallback cannot be built.
-    #[error(transparent)]
-    Fallback(#[from] SetupError),
-    /// The pilot refuses its settings.
-    #[error(transparent)]
-    Pilot(#[from] ConfigError),
-    /// A scenario has a parameter that the companion refuses.
-    #[error("setting {name} to {times} times its default: {why}")]
-    Parameter {
-        /// Its name.
-        name: String,
-        /// Its value as a multiple of the default.
-        times: f64,
-        /// Why.
-        why: String,
-    },
-    /// The recorder's thread cannot be started.
-    #[error("starting the recorder of a flight: {0}; close other programs and try again")]
-    Recorder(#[from] std::io::Error),
-}
 
 /// A flight to be flown.
 #[derive(Clone, Copy, Debug)]
