@@ -3,11 +3,11 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use crate::control::{Controller, Observation, Target};
-use crate::flight::pilot::TICK_S;
-use crate::model::{GreyBox, Trim, Twin};
-use crate::physics::actuators::Actuators;
-use crate::physics::{Command, Time};
+use crate::pilot::TICK_S;
+use greylag_control::{Controller, Observation, Target};
+use greylag_model::{GreyBox, Trim, Twin};
+use greylag_physics::actuators::Actuators;
+use greylag_physics::{Command, Time};
 
 /// Delays that are tried, ms: a loop that bears the last bears enough.
 const STEP_MS: usize = 4;
@@ -130,7 +130,7 @@ fn slewed(before: Command, wanted: Command, step: f64) -> Command {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::{ControllerKind, build};
+    use greylag_control::{ControllerKind, build};
     use std::path::Path;
 
     #[test]

@@ -8,14 +8,14 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::physics::mixer::Mixer;
-use crate::physics::{Sensors, State};
+use crate::mixer::Mixer;
+use crate::{Sensors, State};
 
 pub use controls::Yaw;
 use controls::{Alike, Each};
 use effectors::{MotorFile, SurfaceFile};
 
-pub use crate::physics::servos::ActuatorFigures;
+pub use crate::servos::ActuatorFigures;
 
 /// Wing area in m², span and mean chord in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -270,7 +270,7 @@ impl Airframe {
     /// If the file cannot be read, is no such TOML, or holds a number that no aircraft has.
     pub fn load(path: &Path) -> Result<Airframe, FileError> {
         let what = "airframe file";
-        let text = crate::physics::text_file::read(path).map_err(|why| FileError::Read {
+        let text = crate::text_file::read(path).map_err(|why| FileError::Read {
             what,
             path: path.into(),
             why,

@@ -3,8 +3,8 @@
 use super::Pilot;
 use super::estimate::within;
 use super::telemetry::LATE_AIR;
-use crate::link::autopilot::Severity;
-use crate::physics::Time;
+use greylag_link::autopilot::Severity;
+use greylag_physics::Time;
 
 /// Least time between two lines about the same kind of trouble, s.
 const COMPLAINT_INTERVAL_S: f64 = 5.0;

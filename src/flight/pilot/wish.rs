@@ -1,9 +1,9 @@
 //! What is wished for: the target of the schedule, of the mode, or level.
 
 use super::{Pilot, ThrustSource, due};
-use crate::control::Target;
-use crate::link::autopilot::{Mode, Severity};
-use crate::physics::Time;
+use greylag_control::Target;
+use greylag_link::autopilot::{Mode, Severity};
+use greylag_physics::Time;
 
 /// A cut of less than half a degree is not worth a line, rad.
 const TOLD: f64 = 0.5 * std::f64::consts::PI / 180.0;

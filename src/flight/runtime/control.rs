@@ -17,14 +17,14 @@ use super::stamps::Stamps;
 use super::summary::Summary;
 use super::timing::Timing;
 use super::{Event, FlightOptions};
-use crate::flight::pilot::Pilot;
-use crate::flight::recorder::{Call, Recorder};
-use crate::link::autopilot::Severity;
-use crate::link::client::{Clients, Now};
-use crate::link::framing::Source;
-use crate::link::routing::Router;
-use crate::link::transport::{Arrival, Remark};
-use crate::link::vehicle::{Outputs, Real, Sitl, Vehicle};
+use crate::pilot::Pilot;
+use crate::recorder::{Call, Recorder};
+use greylag_link::autopilot::Severity;
+use greylag_link::client::{Clients, Now};
+use greylag_link::framing::Source;
+use greylag_link::routing::Router;
+use greylag_link::transport::{Arrival, Remark};
+use greylag_link::vehicle::{Outputs, Real, Sitl, Vehicle};
 
 /// Between two looks at what is due: heartbeats, streams, lost links.
 const POLL: Duration = Duration::from_millis(10);

@@ -30,9 +30,9 @@ use super::columns::index;
 use super::derive;
 use super::format::Format;
 use super::topics::Topics;
-use crate::physics::Sensors;
-use crate::physics::mixer::Mixer;
-use crate::physics::sensors::CONSTANTS;
+use greylag_physics::Sensors;
+use greylag_physics::mixer::Mixer;
+use greylag_physics::sensors::CONSTANTS;
 use rule::Rule;
 
 /// The topic name by which a mapping means the columns of a CSV file.
@@ -136,7 +136,7 @@ impl Mapping {
     /// # Errors
     /// The file cannot be read, or is no mapping.
     pub fn load(path: &Path) -> Result<Mapping, MappingError> {
-        let text = crate::physics::text_file::read(path)
+        let text = greylag_physics::text_file::read(path)
             .map_err(|source| MappingError::File { path: path.to_owned(), source })?;
         Mapping::parse(&text, path)
     }

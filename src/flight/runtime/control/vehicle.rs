@@ -3,15 +3,15 @@
 use std::time::{Duration, Instant};
 
 use super::{CYCLE, Control, LOAD_WEIGHT};
-use crate::flight::pilot::{Decision, Plan};
-use crate::flight::recorder::call::Planned;
-use crate::flight::recorder::{Call, Row};
-use crate::flight::runtime::stamps::unix_us;
-use crate::flight::runtime::{Event, Pace};
-use crate::link::autopilot::{Autopilot, Severity};
-use crate::link::peer::PeerId;
-use crate::link::transport::Arrival;
-use crate::link::vehicle::{Notice, Order, Telemetry};
+use crate::pilot::{Decision, Plan};
+use crate::recorder::call::Planned;
+use crate::recorder::{Call, Row};
+use crate::runtime::stamps::unix_us;
+use crate::runtime::{Event, Pace};
+use greylag_link::autopilot::{Autopilot, Severity};
+use greylag_link::peer::PeerId;
+use greylag_link::transport::Arrival;
+use greylag_link::vehicle::{Notice, Order, Telemetry};
 
 /// States in one packet at most: a TCP chunk of 1024 bytes holds four.
 const STATES_PER_PACKET: usize = 8;

@@ -2,8 +2,8 @@
 
 use greylag_sitl::shim::ShimError;
 
-use crate::control::SetupError;
-use crate::flight::pilot::ConfigError;
+use greylag_control::SetupError;
+use greylag_flight::pilot::ConfigError;
 
 /// Why a flight cannot be flown.
 #[derive(Debug, thiserror::Error)]

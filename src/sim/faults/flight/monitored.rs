@@ -10,11 +10,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{CompanionFactory, FaultsError};
-use crate::flight::desk::Desk;
-use crate::flight::monitor::Monitor;
-use crate::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
-use crate::sim::faults::Counterpart;
-use crate::sim::faults::scenario::Scenario;
+use crate::faults::Counterpart;
+use crate::faults::scenario::Scenario;
+use greylag_flight::desk::Desk;
+use greylag_flight::monitor::Monitor;
+use greylag_link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 
 /// Stream of the random numbers of attitude errors and winds.
 const DRAWN: u64 = 30;
