@@ -231,6 +231,7 @@ fn through_sockets(model: &GreyBox, hours: f64) -> Result<()> {
         controller: None,
         travels: model.airframe.actuators.travels(),
         mixer: model.airframe.mixer.clone(),
+        delay_margin: None,
         signing: None,
     };
     // The aircraft's minute is half a second of the client's.

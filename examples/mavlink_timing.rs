@@ -266,6 +266,7 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<FlightOptions> 
         duration: None,
         plan_deadline: FlightOptions::PLAN_DEADLINE,
         controller: None,
+        delay_margin: None,
         signing: None,
         travels: model.airframe.actuators.travels(),
         mixer: model.airframe.mixer.clone(),

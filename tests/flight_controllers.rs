@@ -234,8 +234,8 @@ fn px4_is_engaged_by_what_its_heartbeat_shows() {
 }
 
 #[test]
-fn a_dead_companion_leaves_ardupilot_in_manual_when_a_radio_is_bound() {
-    for (no_radio, left) in [(1.0, Mode::Circle), (0.0, Mode::Manual)] {
+fn a_dead_companion_leaves_ardupilot_on_a_radios_sticks_until_its_failsafe_acts() {
+    for (no_radio, left) in [(1.0, Mode::Circle), (0.0, Mode::Return)] {
         let mut bench = Bench::new(Ardupilot, Surfaces, |options| {
             options.parameters = vec![("SIM_RC_FAIL".into(), no_radio)];
         });
@@ -249,8 +249,23 @@ fn a_dead_companion_leaves_ardupilot_in_manual_when_a_radio_is_bound() {
         assert_eq!(bench.controller.mode(), Mode::Manual);
         let throttle = bench.controller.inputs().throttle;
         assert_eq!(throttle == 0.0, no_radio == 0.0, "{throttle}");
-        bench.run(1.0);
+        // The throttle's failsafe acts 1.2 s after the last stick, the ground station's 2 s after the last heartbeat.
+        bench.run(if no_radio == 1.0 { 1.0 } else { 2.0 });
         assert_eq!(bench.controller.mode(), left);
+    }
+}
+
+#[test]
+fn a_radio_without_a_failsafe_that_ends_manual_is_an_obstacle_by_surfaces_alone() {
+    for (authority, refused) in [(Surfaces, true), (Attitude, false)] {
+        let mut bench = Bench::new(Ardupilot, authority, |options| {
+            options.parameters = vec![("SIM_RC_FAIL".into(), 0.0), ("FS_GCS_ENABL".into(), 0.0)];
+        });
+        bench.run(6.0);
+        let obstacle = bench.desk.vehicle().obstacle();
+        let said = obstacle.as_deref().unwrap_or("");
+        assert_eq!(said.contains("FS_GCS_ENABL is 0: set it to 1"), refused, "{obstacle:?}");
+        assert_eq!(obstacle.is_some(), refused, "{obstacle:?}");
     }
 }
 

@@ -297,7 +297,63 @@ fn a_lost_vehicle_is_flagged_after_half_a_second_and_offboard_does_not_come_back
     // The first command after the gap starts from the last one sent: checked in every tick.
     let decision = flight.tick();
     assert_eq!((decision.mode, decision.failsafe, decision.target.roll), (Mode::Hold, false, 0.0));
-    assert!(flight.texts().contains("vehicle link back"));
+    // It is said once the link has stayed for as long as it must be gone to be lost.
+    flight.fly(49);
+    assert!(!flight.texts().contains("vehicle link back"));
+    flight.fly(2);
+    assert!(flight.texts().contains("vehicle link back: flying in HOLD"));
+}
+
+/// A stall: for so long nothing was heard, then the newest state.
+fn stall(flight: &mut Flight, length: Duration) -> Decision {
+    flight.pilot.excuse(length);
+    flight.now = flight.now.plus(length);
+    flight.tick()
+}
+
+#[test]
+fn a_companion_that_stood_still_flies_on_in_offboard_on_the_newest_state() {
+    for ms in [100, 600, 1200, 5000] {
+        let mut flight = Flight::offboard();
+        flight.fly(30);
+        let decision = stall(&mut flight, Duration::from_millis(ms));
+        assert_eq!((decision.mode, decision.source), (Mode::Offboard, Source::Planned), "{ms} ms");
+        assert!((decision.target.roll, decision.failsafe) == (0.2, false), "{ms} ms");
+        let texts = flight.texts();
+        assert!(!texts.contains("lost") && !texts.contains("back"), "{ms} ms: {texts}");
+        // The setpoint is as old as it was: 0.3 s, so that it lasts for 0.7 s more.
+        assert_eq!(flight.fly(69).mode, Mode::Offboard, "{ms} ms");
+        assert_eq!(flight.fly(1).mode, Mode::Hold, "{ms} ms");
+    }
+}
+
+#[test]
+fn a_vehicle_that_died_during_a_stall_is_lost_half_a_second_after_it() {
+    let mut flight = Flight::offboard();
+    flight.tick();
+    flight.pilot.excuse(Duration::from_millis(1200));
+    let resumed = flight.now.plus(Duration::from_millis(1200));
+    flight.pilot.advance(resumed.plus(Duration::from_millis(500)));
+    assert!(!flight.texts().contains("lost"));
+    flight.pilot.advance(resumed.plus(Duration::from_millis(501)));
+    assert!(flight.texts().contains("vehicle link lost: level, HOLD"));
+}
+
+#[test]
+fn a_link_that_comes_and_goes_is_one_loss_and_one_return() {
+    let mut flight = Flight::offboard();
+    let mut texts = String::new();
+    for _ in 0..20 {
+        // 0.6 s of nothing, then five states.
+        flight.now = flight.now.plus(Duration::from_millis(600));
+        flight.pilot.advance(flight.now);
+        flight.fly(5);
+        texts += &flight.texts();
+    }
+    flight.fly(100);
+    texts += &flight.texts();
+    assert_eq!(texts.matches("vehicle link lost").count(), 1, "{texts}");
+    assert_eq!(texts.matches("vehicle link back").count(), 1, "{texts}");
 }
 
 /// Frames of which only the time advances.

@@ -838,3 +838,69 @@ fn the_survey_counts_bytes_and_keeps_a_rate_that_is_granted() {
     let traffic = *played.real.survey().messages().find(|(id, _)| *id == 31).unwrap().1;
     assert_eq!((traffic.frames, traffic.hz), (0, 50.0));
 }
+
+#[test]
+fn what_the_gyros_filter_and_the_loop_leave_of_the_delay_is_judged_by_surfaces() {
+    use std::time::Duration;
+    // `lqi` on the X8 swings by itself from 46 ms on. √2/2π of a period of the filter, a period of the loop, 20 ms between two looks
+    // at the channels: 11 + 5 + 20, 22.5 + 5 + 20, 2.8 + 4 + 20.
+    for (filter, rate, refused, warned) in [
+        (20.0, 200.0, false, true),
+        (10.0, 200.0, true, true),
+        (80.0, 250.0, false, false),
+        (4.0, 200.0, true, true),
+    ] {
+        let mut played = Played::new(Stack::Ardupilot, Authority::Surfaces);
+        played.real.bear(Some(Duration::from_millis(46)));
+        played.run(2000);
+        played.parameter("INS_GYRO_FILTER", filter);
+        played.parameter("SCHED_LOOP_RATE", rate);
+        let words = played.real.delay_words().unwrap();
+        assert!(words.contains(&format!("INS_GYRO_FILTER {filter}")), "{words}");
+        assert!(words.contains("of the 46 ms at which its loop swings by itself"), "{words}");
+        let obstacle = played.real.delay_obstacle();
+        assert_eq!(obstacle.is_some(), refused, "{filter} Hz, {rate} Hz: {obstacle:?}");
+        if refused {
+            assert!(obstacle.unwrap().contains("set INS_GYRO_FILTER 80"));
+            continue;
+        }
+        played.engage();
+        let said = played.notices.iter().any(|notice| {
+            matches!(notice, Notice::Text(_, words) if words.starts_with("little delay is left"))
+        });
+        assert_eq!(said, warned, "{filter} Hz, {rate} Hz: {:?}", played.notices);
+    }
+    // By attitude the controller's own loops fly.
+    let mut played = Played::new(Stack::Ardupilot, Authority::Attitude);
+    played.real.bear(Some(Duration::from_millis(1)));
+    played.run(2000);
+    assert_eq!((played.real.delay_words(), played.real.delay_obstacle()), (None, None));
+}
+
+#[test]
+fn a_stall_of_this_computer_is_no_silence_of_the_controller() {
+    for (ms, kept) in [(400, true), (600, false)] {
+        let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+        played.engage();
+        played.run(1000);
+        // Nothing is heard or done for so long; then everybody goes on.
+        let missed = std::time::Duration::from_millis(ms);
+        played.ms += ms;
+        played.real.excuse(missed);
+        let host = played.host();
+        played.real.due(host);
+        played.notices.extend(std::iter::from_fn(|| played.real.take_notice()));
+        let released: Vec<_> = played
+            .notices
+            .iter()
+            .filter_map(|notice| match notice {
+                Notice::Released(words) => Some(words.clone()),
+                _ => None,
+            })
+            .collect();
+        match kept {
+            true => assert_eq!(released, [""; 0], "{ms} ms"),
+            false => assert_eq!(released, ["this computer was late by 0.6 s"], "{ms} ms"),
+        }
+    }
+}

@@ -98,7 +98,8 @@ fn what_is_chosen_is_flown_and_its_command_flies_the_same() {
 }
 
 #[test]
-fn a_killed_companion_engages_no_more_unasked_and_a_radio_keeps_ardupilot_in_manual() {
+fn a_killed_companion_engages_no_more_unasked_and_a_radio_keeps_ardupilot_in_manual_until_its_failsafe()
+ {
     let scratch = tempfile::tempdir().unwrap();
     let bench = Bench::open(&scratch.path().join("session"), &["--model", MODEL]);
     let (_, killed) = page(&bench, "fault=killed&for_s=10&request=none");
@@ -115,12 +116,8 @@ fn a_killed_companion_engages_no_more_unasked_and_a_radio_keeps_ardupilot_in_man
     assert!(verdict(&without).contains("ArduPilot changed to CIRCLE"), "{}", verdict(&without));
     let (_, radio) = page(&bench, &format!("{channels}&radio=yes"));
     assert!(radio.contains("a radio is bound"), "{}", verdict(&radio));
-    assert!(
-        verdict(&radio).contains("nobody flies it, ArduPilot stays in MANUAL"),
-        "{}",
-        verdict(&radio)
-    );
-    let end = "At the end nobody flies: ArduPilot is in MANUAL, the companion disarmed";
+    assert!(verdict(&radio).contains("ArduPilot changed to RTL"), "{}", verdict(&radio));
+    let end = "At the end ArduPilot flies RTL, the companion is disarmed";
     assert!(verdict(&radio).contains(end), "{}", verdict(&radio));
     let scenario: Scenario = serde_json::from_str(&text(&radio, "scenario")).unwrap();
     assert_eq!(scenario.counterpart, Counterpart::Ardupilot);

@@ -45,6 +45,9 @@ pub struct SensorArgs {
     /// Constant error of the accelerometers.
     #[arg(long, value_name = "X,Y,Z", default_value = "0,0,0", allow_hyphen_values = true)]
     bias_accelerometer_mps2: Numbers<3>,
+    /// Constant error of roll, pitch and yaw.
+    #[arg(long, value_name = "R,P,Y", default_value = "0,0,0", allow_hyphen_values = true)]
+    bias_attitude_deg: Numbers<3>,
     /// Constant error of the angle of attack.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     bias_alpha_deg: f64,
@@ -100,6 +103,7 @@ impl SensorArgs {
         Bias {
             gyro_radps: self.bias_gyro_radps.0,
             accelerometer_mps2: self.bias_accelerometer_mps2.0,
+            attitude_rad: self.bias_attitude_deg.0.map(f64::to_radians),
             alpha_rad: self.bias_alpha_deg.to_radians(),
             beta_rad: self.bias_beta_deg.to_radians(),
             airspeed_scale: self.airspeed_scale,

@@ -124,7 +124,7 @@ impl CampaignFile {
     /// # Errors
     /// If it cannot be read, is no campaign, or names what there is not.
     pub fn load(path: &Path) -> Result<CampaignFile, CampaignError> {
-        let text = std::fs::read_to_string(path)
+        let text = greylag_physics::text_file::read(path)
             .map_err(|source| CampaignError::Read { path: path.into(), source })?;
         CampaignFile::parse(&text).map_err(|why| CampaignError::File { path: path.into(), why })
     }

@@ -1,6 +1,7 @@
 //! `greylag faults`: a campaign of seeded flights under faults, judged automatically.
 
 mod ledger;
+mod monitor;
 mod search;
 
 use std::collections::BTreeMap;
@@ -70,6 +71,10 @@ pub struct Arguments {
     /// Fly the scenario in this file (JSON, as `--search` prints it) and show how far each rule is from being broken.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["flights", "resume", "show", "search", "json"])]
     scenario: Option<PathBuf>,
+    /// Fly so many flights, healthy and with each failure, that the model monitor watches, beside a played ArduPlane whose attitude
+    /// is off by errors drawn for each flight: false alarms and delays. `--first` is the first seed.
+    #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show", "search", "scenario", "json"])]
+    monitor: Option<u64>,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -115,6 +120,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         let factory = factory(controller, &model, &plant)?;
         if let Some(file) = &arguments.scenario {
             return search::fly(&factory, file);
+        }
+        if let Some(flights) = arguments.monitor {
+            return monitor::run(&factory, arguments.first, flights);
         }
         if let Some(flights) = arguments.search {
             return search::run(&Search {

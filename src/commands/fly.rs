@@ -13,9 +13,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::commands::choices;
 use crate::commands::controllers::{POLICY, check_changes, controller};
+use crate::commands::exposure::{self, Asked};
 use crate::commands::files::shipped;
 use crate::commands::flown_with::{Chosen, FlownWith};
 use crate::commands::watchdog;
+use crate::commands::{margin, punctual};
 use crate::control::cem::Change;
 use crate::control::{self, Controller, ControllerKind, build};
 use crate::flight::monitor::Monitor;
@@ -49,8 +51,8 @@ pub struct Arguments {
     /// What a real flight controller is commanded: surfaces (MANUAL), or attitude (OFFBOARD, GUIDED).
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
-    /// Link to clients; may be given several times.
-    #[arg(long = "client", value_name = "ADDRESS", default_values = ["udpin:0.0.0.0:14550", "udpout:127.0.0.1:14540"])]
+    /// Link to clients; may be given several times. One that other machines reach needs --sign, or --insecure.
+    #[arg(long = "client", value_name = "ADDRESS", default_values = ["udpin:127.0.0.1:14550", "udpout:127.0.0.1:14540"])]
     clients: Vec<Address>,
     /// Sign what is sent to clients, and refuse what is not signed, with the key in this file: 64
     /// hexadecimal digits, readable by its owner alone.
@@ -62,6 +64,9 @@ pub struct Arguments {
     /// A further link to clients, declared local: nothing is signed on it; may be given several times.
     #[arg(long, value_name = "ADDRESS", requires = "sign")]
     local: Vec<Address>,
+    /// Let whoever reaches an unsigned link steer the aircraft, from other machines too.
+    #[arg(long)]
+    insecure: bool,
     /// Controller.
     #[arg(long, value_name = "NAME", default_value = CONTROLLER, value_parser = choices::controller())]
     controller: ControllerKind,
@@ -92,6 +97,9 @@ pub struct Arguments {
     /// Time after a state frame at which a plan is late, in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = FlightOptions::PLAN_DEADLINE.as_millis() as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
     plan_deadline_ms: u64,
+    /// Run before all other programs (SCHED_FIFO), where the system permits it.
+    #[arg(long)]
+    realtime: bool,
     /// End after this many seconds instead of at Ctrl-C.
     #[arg(long, value_name = "S", value_parser = seconds)]
     duration_s: Option<Duration>,
@@ -146,6 +154,12 @@ impl Arguments {
         self.clients.iter().chain(&self.local)
     }
 
+    /// The links to clients on which nothing is signed.
+    fn unsigned(&self) -> impl Iterator<Item = &Address> {
+        let signed = self.sign.is_some();
+        self.clients.iter().filter(move |_| !signed).chain(&self.local)
+    }
+
     fn signing(&self) -> Option<Signing> {
         let vehicle = if self.sign_vehicle { VehicleLink::Signed } else { VehicleLink::Open };
         self.sign.clone().map(|key| Signing { key, vehicle, local: self.local.clone() })
@@ -186,6 +200,8 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// If a file cannot be used, a link cannot be opened or a recording cannot be created; nothing
 /// has been started then.
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let asked = if arguments.insecure { Asked::Insecure } else { Asked::Nothing };
+    let exposed = exposure::check(arguments.unsigned(), asked)?;
     let mut model = model(&arguments.model, arguments.airframe.as_deref())?;
     if arguments.profile.stack().is_some() {
         model = model.leaving_rudder();
@@ -196,12 +212,22 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         companion.pilot.follow(Schedule::load(path)?);
     }
     companion.pilot.monitor_with(Monitor::new(model.clone()));
-    let options = options(arguments, &model);
+    if let Some(words) = exposed {
+        companion.pilot.tell(Severity::Warning, &words);
+    }
+    let mut options = options(arguments, &model);
+    if options.controller.is_some_and(|profile| profile.authority == Authority::Surfaces) {
+        options.delay_margin = margin::of(*controller, &model)?;
+    }
     let stop = Arc::new(AtomicBool::new(false));
     let asked = stop.clone();
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
         .context("setting the handler of Ctrl-C")?;
+    let class = punctual::class(arguments.realtime);
     let flight = Flight::start(&options, companion, stop)?;
+    if !arguments.lockstep {
+        punctual::tell(class);
+    }
     if let Some(folder) = &flight.recording {
         // the flight goes on: the recording is whole without it
         if let Err(why) = FlownWith::write(folder, &arguments.chosen(), &model) {
@@ -233,6 +259,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> FlightOptions {
         travels: model.airframe.actuators.travels(),
         mixer: model.airframe.mixer.clone(),
         controller: arguments.controller_profile(model),
+        delay_margin: None,
         signing: arguments.signing(),
     }
 }

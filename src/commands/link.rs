@@ -1,5 +1,8 @@
 //! `greylag link`: what a link to a flight controller carries, and what it lacks.
 
+mod key;
+mod shown;
+
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -14,12 +17,14 @@ use serde::Serialize;
 
 use crate::commands::files::{JsonArgument, Overwrite};
 use crate::commands::fly::{self, CommandName, ProfileName};
+use crate::commands::{choices, margin};
+use crate::control::ControllerKind;
 use crate::link::address::Address;
 use crate::link::peer::LinkId;
 use crate::link::transport::{Arrival, Link, Network};
-use crate::link::vehicle::real::parameters::Standing;
-use crate::link::vehicle::{Profile, Real, Stack};
+use crate::link::vehicle::{Authority, Profile, Real, Stack};
 use crate::physics::airframe::ActuatorFigures;
+use shown::{delay, latency, parameters};
 
 /// Writes a line; a reader that is gone is no error.
 macro_rules! say {
@@ -27,6 +32,7 @@ macro_rules! say {
         let _ = writeln!($out, $($words)*);
     }};
 }
+use say;
 
 /// How long a controller has to be heard.
 const PATIENCE: Duration = Duration::from_secs(4);
@@ -46,6 +52,8 @@ pub struct Arguments {
 enum Command {
     /// Measure rates, loss, jitter, latency; say what is missing, which parameters to set.
     Check(Check),
+    /// Make a key that signs links.
+    Key(key::Make),
 }
 
 /// The arguments of `greylag link check`.
@@ -63,6 +71,9 @@ struct Check {
     /// What it shall be commanded.
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
+    /// Controller whose share of the delay is judged, by surfaces.
+    #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
+    controller: ControllerKind,
     /// How long to measure.
     #[arg(long, value_name = "S", default_value_t = 8, value_parser = clap::value_parser!(u64).range(4..=3600))]
     seconds: u64,
@@ -75,7 +86,13 @@ struct Check {
 /// # Errors
 /// If the link cannot be opened, or nobody answers on it.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let Command::Check(check) = &arguments.command;
+    match &arguments.command {
+        Command::Check(check) => run_check(check),
+        Command::Key(make) => key::run(make),
+    }
+}
+
+fn run_check(check: &Check) -> Result<ExitCode> {
     check.json.writable(Overwrite::Never)?;
     let mut out: Box<dyn Write> =
         if check.json.takes_stdout() { Box::new(io::sink()) } else { Box::new(io::stdout()) };
@@ -89,7 +106,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     };
     let profile = Profile { stack, authority: check.command.authority(), actuators };
     say!(out, "measuring {} for {} s …", check.vehicle, check.seconds);
-    let real = ear.listen(Real::new(profile), Duration::from_secs(check.seconds));
+    let mut real = Real::new(profile);
+    if profile.authority == Authority::Surfaces {
+        real.bear(margin::of(check.controller, &model)?);
+    }
+    let real = ear.listen(real, Duration::from_secs(check.seconds));
     report(check, &real, &mut out)
 }
 
@@ -231,6 +252,7 @@ fn report(check: &Check, real: &Real, out: &mut dyn Write) -> Result<ExitCode> {
     } else {
         streams(real, &mut missing, out);
         parameters(real, &mut missing, out);
+        delay(real, &mut missing, out);
         if let Some(words) = real.radio_warning() {
             say!(out, "\nwarning: {words}");
         }
@@ -286,25 +308,6 @@ fn traffic(check: &Check, real: &Real, missing: &mut Vec<String>, out: &mut dyn 
     }
 }
 
-fn latency(real: &Real, out: &mut dyn Write) {
-    let trips = real.survey().round_trips();
-    let at = |share: f64| {
-        let index = ((trips.len() - 1) as f64 * share).round() as usize;
-        trips[index].as_secs_f64() * 1e3
-    };
-    match trips.is_empty() {
-        true => say!(out, "latency     TIMESYNC is not answered"),
-        false => say!(
-            out,
-            "latency     TIMESYNC there and back: median {:.1}, 95 % {:.1}, longest {:.1} ms ({} trips)",
-            at(0.5),
-            at(0.95),
-            at(1.0),
-            trips.len()
-        ),
-    }
-}
-
 fn streams(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
     let mut table = Table::new();
     table.load_style(NOTHING).set_header(["message", "wanted", "received", "jitter", ""]);
@@ -357,15 +360,5 @@ fn remedy(stack: Stack) -> &'static str {
     match stack {
         Stack::Px4 => "raise the port's data rate (MAV_1_RATE) or its baud rate",
         Stack::Ardupilot => "raise the port's baud rate, or SCHED_LOOP_RATE (then reboot)",
-    }
-}
-
-fn parameters(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
-    say!(out, "\nparameters");
-    for (_, standing, words) in real.parameter_report() {
-        say!(out, "  {words}");
-        if !matches!(standing, Standing::Good(_) | Standing::Absent) {
-            missing.push(words);
-        }
     }
 }

@@ -20,6 +20,7 @@ mod diagnose;
 pub mod distinct;
 #[cfg(feature = "sitl")]
 mod evaluate;
+mod exposure;
 #[cfg(feature = "sitl")]
 mod faults;
 mod files;
@@ -33,10 +34,12 @@ mod link;
 mod log_once;
 mod logs;
 mod man;
+mod margin;
 #[cfg(feature = "sitl")]
 mod mystery;
 mod per_flight;
 mod propose;
+mod punctual;
 #[cfg(feature = "sitl")]
 mod recording_report;
 mod replay;

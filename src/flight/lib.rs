@@ -1,6 +1,7 @@
 //! The flight: the pilot that decides, the runtime that keeps time, the recorder that remembers, the
 //! desk on which it is tested.
 
+mod delay_margin;
 pub mod desk;
 pub mod monitor;
 pub mod pilot;
@@ -8,3 +9,5 @@ pub mod recorder;
 pub mod replay;
 pub mod runtime;
 mod threads;
+
+pub use delay_margin::delay_margin;

@@ -209,6 +209,7 @@ impl Replayed<'_, '_> {
         let pilot = &mut self.companion.pilot;
         match *call {
             Call::Advance(now) => pilot.advance(now),
+            Call::Excuse(missed) => pilot.excuse(missed),
             Call::Arm(now, force) => drop(pilot.arm(now, force)),
             Call::Disarm(now, force) => drop(pilot.disarm(now, force)),
             Call::Engaged(now) => pilot.engaged(now),

@@ -88,6 +88,19 @@ impl HostPort {
     }
 }
 
+impl Address {
+    /// Whether only this machine reaches the link: at or towards an address of loopback, or by a wire. A name that
+    /// cannot be looked up does not stay here.
+    pub fn stays_here(&self) -> bool {
+        match self {
+            Address::UdpIn(at) | Address::UdpOut(at) | Address::TcpIn(at) | Address::TcpOut(at) => {
+                at.resolve().is_ok_and(|address| address.ip().is_loopback())
+            }
+            Address::Serial { .. } => true,
+        }
+    }
+}
+
 impl FromStr for Address {
     type Err = AddressError;
 
@@ -164,5 +177,27 @@ mod tests {
         assert!(complaint("serial:/dev/ttyACM0").contains("baud"));
         assert!(complaint("serial:/dev/ttyACM0:fast").contains("`fast`"));
         assert!(complaint("serial::57600").contains("HOST:PORT"));
+    }
+
+    #[test]
+    fn loopback_and_wires_stay_here_and_everything_else_does_not() {
+        let stays = |text: &str| text.parse::<Address>().unwrap().stays_here();
+        for here in [
+            "udpin:127.0.0.1:14550",
+            "udpout:localhost:1",
+            "tcpin:[::1]:5",
+            "serial:/dev/ttyACM0:57600",
+        ] {
+            assert!(stays(here), "{here}");
+        }
+        for out in [
+            "udpin:0.0.0.0:14550",
+            "udpin:[::]:1",
+            "udpout:192.0.2.7:14550",
+            "tcpin:10.0.0.1:5",
+            "tcpout:no.such.host.invalid:5",
+        ] {
+            assert!(!stays(out), "{out}");
+        }
     }
 }

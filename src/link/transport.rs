@@ -5,6 +5,7 @@
 //! vehicle's traffic can be served before the clients'. What is sent goes into a bounded channel
 //! of the link. A full channel drops and counts; nothing here ever blocks its caller.
 
+mod flood;
 mod serial;
 mod tcp;
 mod udp;
@@ -26,6 +27,8 @@ pub use serial::SerialFault;
 
 /// Frames that may wait to be sent on one link.
 const OUTBOX: usize = 1024;
+/// Between two rounds of the thread that are counted.
+const ROUND: Duration = Duration::from_millis(10);
 
 /// Bytes from a peer: one datagram, or whole frames from a stream.
 #[derive(Clone, Debug)]
@@ -124,6 +127,7 @@ struct Counters {
     outbox_full: AtomicU64,
     send_failed: AtomicU64,
     oversize: AtomicU64,
+    flooded: AtomicU64,
 }
 
 /// A link's traffic since it was opened.
@@ -141,6 +145,8 @@ pub struct LinkCounts {
     pub send_failed: u64,
     /// Datagrams dropped for their size.
     pub oversize: u64,
+    /// Datagrams dropped because their sender sends more than anybody has to say.
+    pub flooded: u64,
 }
 
 fn count(counter: &AtomicU64) {
@@ -182,6 +188,7 @@ impl Port {
 /// The thread that owns every socket. Dropping it closes them all.
 pub struct Network {
     handle: Handle,
+    rounds: Arc<AtomicU64>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -193,6 +200,8 @@ impl Network {
             Builder::new_current_thread().enable_all().build().map_err(TransportError::Thread)?;
         let handle = runtime.handle().clone();
         let (stop, stopped) = oneshot::channel::<()>();
+        let rounds = Arc::new(AtomicU64::new(0));
+        runtime.spawn(go_rounds(rounds.clone()));
         let thread = std::thread::Builder::new()
             .name("network".into())
             .spawn(move || {
@@ -200,7 +209,12 @@ impl Network {
                 let _ = runtime.block_on(stopped);
             })
             .map_err(TransportError::Thread)?;
-        Ok(Network { handle, stop: Some(stop), thread: Some(thread) })
+        Ok(Network { handle, rounds, stop: Some(stop), thread: Some(thread) })
+    }
+
+    /// How many rounds the thread has gone, one in 10 ms while it runs: between two of them every socket was looked at.
+    pub fn rounds(&self) -> u64 {
+        self.rounds.load(Ordering::Relaxed)
     }
 
     /// Opens a link whose arrivals go to `inbox`. Sockets are bound before this returns, so that
@@ -253,6 +267,16 @@ impl Network {
         };
         let target = target.map(|address| PeerId { link: id, address });
         Ok(Link { id, local, target, outbox, counters })
+    }
+}
+
+async fn go_rounds(rounds: Arc<AtomicU64>) {
+    let mut due = tokio::time::interval(ROUND);
+    // After a stall the rounds that were missed stay missed.
+    due.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    loop {
+        due.tick().await;
+        count(&rounds);
     }
 }
 
@@ -309,6 +333,7 @@ impl Link {
             outbox_full: read(&self.counters.outbox_full),
             send_failed: read(&self.counters.send_failed),
             oversize: read(&self.counters.oversize),
+            flooded: read(&self.counters.flooded),
         }
     }
 }

@@ -20,8 +20,8 @@ pub use sitl::{Sitl, VehicleCounts};
 
 pub use super::wire::sitl::Outputs;
 
-/// Standard deviation of angles of attack and sideslip by vanes, rad: customary for small aircraft.
-pub const VANE_SD: f64 = 0.3 * std::f64::consts::PI / 180.0;
+/// Standard deviations of angles of attack and sideslip by vanes, rad: customary for small aircraft.
+pub const VANE_SD: [f64; 2] = [0.3 * std::f64::consts::PI / 180.0; 2];
 
 /// The vehicle's state at one instant, complete and in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,8 +35,8 @@ pub struct Telemetry {
     pub faults: Faults,
     /// The eight variables of flight.
     pub state: State,
-    /// Standard deviation of the flow angles in `state`, rad: of the angle of attack and of the sideslip alike.
-    pub incidence_sd: f64,
+    /// Standard deviations of the flow angles in `state`, rad: of the angle of attack, of the sideslip.
+    pub incidence_sd: [f64; 2],
     /// Yaw, rad.
     pub yaw: f64,
     /// Time for which a simulator holds the body rates from this instant, s; 0 where they are sampled.
@@ -150,6 +150,15 @@ impl Vehicle {
         match self {
             Vehicle::Sitl(sitl) => sitl.heartbeat(host, outputs),
             Vehicle::Real(real) => real.due(host),
+        }
+    }
+
+    /// This computer did not listen for `missed`: what the vehicle said meanwhile may still come, and silence
+    /// proves nothing.
+    pub fn excuse(&mut self, missed: Duration) {
+        match self {
+            Vehicle::Sitl(_) => {}
+            Vehicle::Real(real) => real.excuse(missed),
         }
     }
 

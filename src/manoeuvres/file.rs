@@ -82,7 +82,7 @@ impl Schedule {
     /// # Errors
     /// If the file cannot be read, is no such TOML, or asks for what no schedule may.
     pub fn load(path: &Path) -> Result<Schedule, ScheduleError> {
-        let text = std::fs::read_to_string(path)
+        let text = greylag_physics::text_file::read(path)
             .map_err(|why| ScheduleError::Read { path: path.into(), why })?;
         Self::parse(&text).map_err(|why| ScheduleError::Content { path: path.into(), why })
     }

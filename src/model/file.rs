@@ -99,7 +99,7 @@ impl GreyBox {
     /// one, or holds a number that is not physical.
     pub fn load(path: &Path) -> Result<GreyBox, FileError> {
         let what = "model file";
-        let text = std::fs::read_to_string(path).map_err(|why| FileError::Read {
+        let text = greylag_physics::text_file::read(path).map_err(|why| FileError::Read {
             what,
             path: path.into(),
             why,

@@ -270,7 +270,7 @@ impl Airframe {
     /// If the file cannot be read, is no such TOML, or holds a number that no aircraft has.
     pub fn load(path: &Path) -> Result<Airframe, FileError> {
         let what = "airframe file";
-        let text = std::fs::read_to_string(path).map_err(|why| FileError::Read {
+        let text = crate::text_file::read(path).map_err(|why| FileError::Read {
             what,
             path: path.into(),
             why,

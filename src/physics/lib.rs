@@ -16,6 +16,7 @@ pub mod sensors;
 pub mod servos;
 pub mod size;
 mod state;
+pub mod text_file;
 mod time;
 mod wrench;
 

@@ -123,6 +123,14 @@ class Bench:
         self.client.mav.command_long_send(1, 191, ARM, 0, 0, FORCE, 0, 0, 0, 0, 0)
         return self.until_mode([self.stack.hold], 5.0)
 
+    def fresh(self):
+        """A companion that lives and steers nothing, beside a firmware that flies by itself with its radio and its link."""
+        self.client.target = None
+        self.stack.relay.cut = False
+        if self.companion.process.poll() is not None:
+            self.start_companion()
+        self.give_back()
+
     def level(self):
         """A gentle flight of the firmware's own, high enough for the next check."""
         self.stack.to_mode(self.stack.hold)
@@ -181,9 +189,15 @@ def targets(bench):
     bench.level()
     bench.take(*TARGETS[0])
     results = []
+    line = len(bench.companion.lines)
     for roll, pitch in TARGETS:
         bench.client.target = (roll, pitch)
         seen = bench.both(12.0)
+        if bench.station.mode() != bench.stack.steered[bench.authority]:
+            # What is flown now is the firmware's own: no error of the companion's.
+            said = " | ".join(bench.said(line)[-3:])
+            done = f"{len(results)} of {len(TARGETS)} targets flown"
+            return {"holds": False, "words": f"handed back at {roll} / {pitch} deg ({done}): {said}", "each": results, "said": bench.said(line)}
         late = [(r, p) for at, r, p, _ in seen if at > seen[-1][0] - 3.0]
         error = [statistics.fmean(x[i] for x in late) - (roll, pitch)[i] for i in (0, 1)]
         results.append({"target_deg": [roll, pitch], "error_deg": error})
@@ -207,7 +221,8 @@ def watched(bench, seconds):
 
 
 def killed(bench):
-    """The companion dies in a turn (SIGKILL); by surfaces with a radio whose sticks are released, and without one."""
+    """The companion dies in a turn (SIGKILL); by surfaces with a radio whose sticks are released, and without one: in either case
+    the firmware leaves the mode in which it was steered, where that is MANUAL."""
     results = []
     for radio in bench.stack.radios(bench.authority):
         bench.level()
@@ -221,7 +236,8 @@ def killed(bench):
         bench.stack.radio(True)
         bench.stack.to_mode(bench.stack.hold)
         bench.start_companion()
-        holds = seen["lowest_m"] > LOWEST_M and seen["last_mode"] != bench.stack.steered["surfaces"]
+        manual = bench.authority == "surfaces" and seen["last_mode"] == bench.stack.steered["surfaces"]
+        holds = seen["lowest_m"] > LOWEST_M and not manual
         results.append({"radio": radio, **seen, "holds": holds})
     words = "; ".join(
         f"{'radio' if r['radio'] else 'no radio'}: {r['lowest_m']:.0f} m, bank {r['bank_deg']:.0f} deg, modes {r['modes']}"
@@ -308,16 +324,15 @@ def fly(arguments, authority, report):
         bench.stack.take_off()
         bench.start_companion()
         for name in arguments.only or CHECKS:
+            # Each check is judged by itself: what one leaves behind is cleared away before the next.
             try:
+                bench.fresh()
                 result = CHECKS[name](bench)
             except Failure as failure:
                 result = {"holds": False, "words": str(failure), "each": [], "said": bench.companion.lines[-8:]}
             report.append({"authority": authority, "check": name, **result})
             say(f"== {authority}, {name}: {'holds' if result['holds'] else 'MISSED'}: {result['words']}")
             (arguments.out / "acceptance.json").write_text(json.dumps(report, indent=1))
-            bench.client.target = None
-            if bench.companion.process.poll() is not None:
-                bench.start_companion()
     finally:
         bench.end()
 

@@ -11,21 +11,22 @@ from relay import TcpRelay, UdpRelay
 mavlink = mavutil.mavlink
 COMMAND_SECONDS = 3.0
 
-# docs/how-to/ardupilot-sitl-on-jsbsim.md and docs/tutorials/fly-with-px4-and-ardupilot.md
+# What the aircraft and the companion need is shipped once; what a simulation without a pilot needs besides stands here.
+SHIPPED = pathlib.Path(__file__).resolve().parents[2] / "params" / "x8"
+
+
+def shipped(name):
+    """The parameters of a shipped file: a name and a value a line."""
+    lines = (line.split("#")[0].split() for line in (SHIPPED / name).read_text().splitlines())
+    return {words[0]: float(words[1]) for words in lines if words}
+
+
 ARDUPLANE = {
-    "SERVO1_FUNCTION": 4, "SERVO2_FUNCTION": 19, "SERVO3_FUNCTION": 70, "SERVO4_FUNCTION": 21,
-    **{f"SERVO{n}_{end}": us for n in (1, 2, 3) for end, us in (("MIN", 1000), ("MAX", 2000))},
-    "SERVO3_TRIM": 1000,
-    "SCHED_LOOP_RATE": 250, "INS_GYRO_FILTER": 80,
-    "RLL_RATE_P": 0.08, "RLL_RATE_D": 0, "RLL_RATE_FF": 0.21,
-    "PTCH_RATE_P": 0.12, "PTCH_RATE_D": 0, "PTCH_RATE_FF": 0.35,
+    **shipped("arduplane.parm"),
+    "SERVO1_FUNCTION": 4, "SERVO2_FUNCTION": 19, "SERVO3_FUNCTION": 70, "SERVO4_FUNCTION": 21, "SERVO3_TRIM": 1000,
     "ARSPD_TYPE": 100, "ARSPD_USE": 1, "ARSPD_PIN": 1,
-    "AIRSPEED_CRUISE": 20, "AIRSPEED_MIN": 14, "AIRSPEED_MAX": 28, "TRIM_THROTTLE": 16,
     "TKOFF_ALT": 100, "TKOFF_LVL_ALT": 10, "TKOFF_THR_MINACC": 0, "TKOFF_THR_DELAY": 0,
-    "RC_OVERRIDE_TIME": 0.5, "MAN_EXPO_ROLL": 0, "MAN_EXPO_PITCH": 0,
-    "THR_FAILSAFE": 1, "FS_SHORT_ACTN": 0, "FS_LONG_ACTN": 1, "RC_FS_TIMEOUT": 1,
-    "GUIDED_TIMEOUT": 0.5, "MAV_GCS_SYSID": 1, "MAV_GCS_SYSID_HI": 255,
-    "ARMING_SKIPCHK": -1, "ARMING_CHECK": 0, "LOG_DISARMED": 0, "LOG_BITMASK": 65535, "WP_LOITER_RAD": 120,
+    "ARMING_SKIPCHK": -1, "ARMING_CHECK": 0, "LOG_DISARMED": 0, "LOG_BITMASK": 65535,
 }  # fmt: skip
 
 
@@ -149,7 +150,7 @@ class ArduPlane:
         )
         home = self.simulator.wait_for("--home", 20.0).split("--home")[1].split()[0].strip("`,;)")
         file = room / "acceptance.parm"
-        file.write_text("".join(f"{k} {v}\n" for k, v in {**ARDUPLANE, **parameters}.items()))
+        file.write_text("".join(f"{k} {v:g}\n" for k, v in {**ARDUPLANE, **parameters}.items()))
         command = [pathlib.Path(arguments.firmware).resolve(), "--wipe", "--model", "JSON:127.0.0.1"]
         self.firmware = Program(
             "arduplane", [*command, "--home", home, "--defaults", file, "--speedup", 1], cwd=room
@@ -204,13 +205,7 @@ class Px4:
     steered = {"attitude": 6 << 16, "surfaces": 1 << 16}
     hold, other = 4 << 16 | 3 << 24, 4 << 16 | 5 << 24
     log_names = ("**/*.ulg",)
-    settings = {
-        "FW_THR_TRIM": 0.16, "FW_AIRSPD_TRIM": 18, "FW_AIRSPD_MIN": 14, "FW_AIRSPD_MAX": 28,
-        "FW_AIRSPD_STALL": 11, "FW_T_SINK_MIN": 1.3, "FW_T_CLMB_MAX": 8, "NAV_LOITER_RAD": 120,
-        "SDLOG_PROFILE": 155, "COM_RC_IN_MODE": 1, "COM_RC_LOSS_T": 0.5, "NAV_RCL_ACT": 1,
-        "FW_MAN_R_SC": 1, "FW_MAN_P_SC": 1, "COM_OF_LOSS_T": 0.5, "COM_OBL_RC_ACT": 5,
-        "RWTO_TKOFF": 0, "MIS_TAKEOFF_ALT": 150,
-    }  # fmt: skip
+    settings = {**shipped("px4.parm"), "SDLOG_PROFILE": 155, "RWTO_TKOFF": 0, "MIS_TAKEOFF_ALT": 150}
 
     def __init__(self):
         self.simulator = self.firmware = self.station = self.relay = None
@@ -222,7 +217,7 @@ class Px4:
         )
         self.simulator.wait_for("4560", 20.0)
         build = pathlib.Path(arguments.firmware).resolve()
-        environment = {f"PX4_PARAM_{k}": str(v) for k, v in {**self.settings, **parameters}.items()}
+        environment = {f"PX4_PARAM_{k}": f"{v:g}" for k, v in {**self.settings, **parameters}.items()}
         environment |= {"PX4_SYS_AUTOSTART": "1036", "PX4_SIM_MODEL": "jsbsim_malolo", "PATH": "/usr/bin:/bin"}
         self.firmware = Program(
             "px4", [build / "bin/px4", "-d", build / "etc", "-w", room], cwd=room, env=environment

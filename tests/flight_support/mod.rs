@@ -42,6 +42,7 @@ pub fn options(pace: Pace) -> FlightOptions {
         travels: x8().airframe.actuators.travels(),
         mixer: None,
         controller: None,
+        delay_margin: None,
         signing: None,
     }
 }
@@ -239,6 +240,21 @@ impl Vehicle {
         answer
     }
 
+    /// Lets 10 ms pass until `end`, whether or not the companion answers: flies on the newest answer there is.
+    pub fn step_on(&mut self, end: Instant) {
+        self.time_us += 10_000;
+        self.socket.send(&self.frames(Trouble::None).concat()).unwrap();
+        let mut buffer = [0; 2048];
+        while let Some(left) =
+            end.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())
+        {
+            self.socket.set_read_timeout(Some(left)).unwrap();
+            let Ok(len) = self.socket.recv(&mut buffer) else { continue };
+            self.answers.extend(messages(&buffer[..len]).into_iter().filter_map(answer));
+        }
+        self.fly(self.answers.last().copied());
+    }
+
     /// Stands still until the first armed answer.
     fn fly(&mut self, answer: Option<Answer>) {
         self.flying |= answer.is_some_and(|a| a.armed);
@@ -283,6 +299,21 @@ impl Vehicle {
             }
             let _ = self.socket.send(&bytes);
         }
+    }
+
+    /// Flies on a thread of its own, a frame every 10 ms by the wall, whether or not it is answered.
+    pub fn unanswered(mut self) -> WallVehicle {
+        let shared = Arc::new((AtomicBool::new(false), AtomicU8::new(Trouble::None as u8)));
+        let told = shared.clone();
+        let thread = std::thread::spawn(move || {
+            let mut next = Instant::now();
+            while !told.0.load(Ordering::Relaxed) {
+                next = (next + Duration::from_millis(10)).max(Instant::now());
+                self.step_on(next);
+            }
+            self
+        });
+        WallVehicle { shared, thread }
     }
 
     /// Flies on a thread of its own, a frame every 10 ms by the wall.

@@ -103,6 +103,8 @@ pub struct Bias {
     pub gyro_radps: [f64; 3],
     /// Added to the specific force, body axes, m/s².
     pub accelerometer_mps2: [f64; 3],
+    /// Added to roll, pitch and yaw, rad: alignment, compass.
+    pub attitude_rad: [f64; 3],
     /// Added to the angle of attack, rad.
     pub alpha_rad: f64,
     /// Added to the sideslip, rad.
@@ -116,6 +118,7 @@ impl Default for Bias {
         Bias {
             gyro_radps: [0.0; 3],
             accelerometer_mps2: [0.0; 3],
+            attitude_rad: [0.0; 3],
             alpha_rad: 0.0,
             beta_rad: 0.0,
             airspeed_scale: 1.0,

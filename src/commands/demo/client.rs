@@ -169,7 +169,10 @@ impl Client {
         let _ = self.socket.send(bytes);
     }
 
+    /// The last thing that it said beside that a request was done.
     fn last_words(&self) -> &str {
-        self.texts.last().map_or("it says nothing", |(_, words)| words)
+        let done = |words: &str| words.starts_with("mode ") || words.starts_with("armed");
+        let last = self.texts.iter().rev().find(|(_, words)| !done(words));
+        last.map_or("it says no reason", |(_, words)| words)
     }
 }

@@ -99,13 +99,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     FlownWith::write(&folder, &chosen(arguments), &model)?;
     let companion = flight.clients.first().copied().flatten().context("no client link")?;
     let vehicle = flight.vehicle.context("no vehicle link")?;
-    println!(
-        "companion: controller {controller}, model {}, clients on udp {companion}",
-        model.name
-    );
-    println!("model: {}", model.description);
-    println!("shim: aircraft {} in JSBSim, real time, towards udp {vehicle}", plant.aircraft);
-    let simulator = simulate(arguments, plant.clone(), &format!("udpout:{vehicle}"), stop.clone())?;
+    announce(*controller, &model, companion, &plant, vehicle);
+    let simulator = simulate(arguments, plant.clone(), vehicle, stop.clone())?;
     let flown = as_client(arguments, companion, &legs);
     stop.store(true, Ordering::Relaxed);
     let summary =
@@ -113,6 +108,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let simulated = simulator.join().map_err(|_| anyhow!("the shim's thread has died"))?;
     println!("{summary}");
     println!("{}", simulated?);
+    let trouble = summary.timing.trouble();
+    let texts = flown.map_err(|why| excused(why, trouble.as_deref()))?;
     let sights = match controller.pace() {
         control::Pace::Planned => sights(&folder, set_up()?, schedule, &model),
         _ => Vec::new(),
@@ -127,14 +124,37 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         seed: Some(arguments.seed.into()),
         model: &model,
         segments: tracked.iter().map(segment).collect(),
-        texts: flown?,
+        texts,
         sights,
     };
     let report = reporter.report(&folder, &recorded)?;
     let page = folder.join("report.html");
     files::write(&page, &report.page().render(), Overwrite::Never)?;
     println!("report: {}", page.display());
-    Ok(verdict(&report))
+    Ok(verdict(&report, trouble.as_deref()))
+}
+
+/// Why the flight ended early; a computer that was too slow is the cause that is known.
+fn excused(why: anyhow::Error, trouble: Option<&str>) -> anyhow::Error {
+    match trouble {
+        Some(trouble) => why.context(trouble.to_owned()),
+        None => why,
+    }
+}
+
+fn announce(
+    controller: ControllerKind,
+    model: &GreyBox,
+    companion: SocketAddr,
+    plant: &PlantOptions,
+    vehicle: SocketAddr,
+) {
+    println!(
+        "companion: controller {controller}, model {}, clients on udp {companion}",
+        model.name
+    );
+    println!("model: {}", model.description);
+    println!("shim: aircraft {} in JSBSim, real time, towards udp {vehicle}", plant.aircraft);
 }
 
 /// What was chosen, as the recording keeps it.
@@ -202,6 +222,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Result<FlightOptions> {
         travels: model.airframe.actuators.travels(),
         mixer: model.airframe.mixer.clone(),
         controller: None,
+        delay_margin: None,
         signing: None,
     })
 }
@@ -219,10 +240,10 @@ fn plant(arguments: &Arguments, model: &GreyBox) -> Result<PlantOptions> {
 fn simulate(
     arguments: &Arguments,
     plant: PlantOptions,
-    link: &str,
+    vehicle: SocketAddr,
     stop: Arc<AtomicBool>,
 ) -> Result<thread::JoinHandle<Result<shim::Summary, shim::ShimError>>> {
-    let link = link.parse()?;
+    let link = format!("udpout:{vehicle}").parse()?;
     let start = plant.start;
     let options = ShimOptions {
         link,
@@ -295,7 +316,8 @@ impl Live<'_> {
     }
 }
 
-fn verdict(report: &FlightReport<'_>) -> ExitCode {
+/// Prints how each target was tracked and, where one was not, what this computer has to do with it.
+fn verdict(report: &FlightReport<'_>, trouble: Option<&str>) -> ExitCode {
     let (tracked, all) = (report.tracked(), report.segments.len());
     for s in &report.segments {
         println!(
@@ -310,5 +332,9 @@ fn verdict(report: &FlightReport<'_>) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     println!("tracked {tracked} of {all} targets within {TOLERANCE_DEG} deg");
-    if tracked == all { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    if tracked == all {
+        return ExitCode::SUCCESS;
+    }
+    trouble.iter().for_each(|trouble| println!("{trouble}"));
+    ExitCode::FAILURE
 }

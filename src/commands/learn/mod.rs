@@ -245,12 +245,36 @@ impl Arguments {
         let folder = self.out.join(controller::CONTROLLER);
         println!("reports: {}/training.html, {}/policy.html", model.display(), policy.display());
         println!("controller in {}", folder.display());
-        println!("fly it: greylag demo {}", options(&folder));
+        println!("{}", worth(&reached, &options(&folder)));
         println!(
             "score it in JSBSim: greylag evaluate --controller policy hybrid-lqi {}",
             options(&folder)
         );
         Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Share of the targets that a controller may lose and still be called ready to fly: the LQI loses none.
+const LOST: f64 = 0.02;
+
+/// What the best controller of a learning is worth, in words, with how it is flown.
+fn worth(reached: &[Reached], options: &str) -> String {
+    let lost = |name: &str| {
+        let row = reached.iter().find(|r| r.controller == name)?;
+        Some(100.0 * row.divergence_rate)
+    };
+    match (lost("policy"), lost("hybrid-lqi")) {
+        (Some(policy), hybrid) if policy > 100.0 * LOST => {
+            let beside = hybrid.map_or_else(
+                || "not flown in the model by this budget".to_owned(),
+                |hybrid| format!("loses {hybrid:.0} %"),
+            );
+            format!(
+                "not ready to fly: the policy loses {policy:.0} % of its targets in the model (hybrid-lqi with it: {beside}); \
+                 train longer with a larger --budget, or look at it: greylag demo {options}"
+            )
+        }
+        _ => format!("fly it: greylag demo {options}"),
     }
 }
 
@@ -304,4 +328,25 @@ fn times(record: &Record) -> Table {
     let all: f64 = record.done().iter().map(|done| done.seconds).sum();
     table.add_row(["all stages".into(), format!("{all:.0}")]);
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reached(controller: &str, divergence_rate: f64) -> Reached {
+        let (easy_deg, hard_deg) = (0.2, 1.0);
+        Reached { controller: controller.into(), targets: 40, easy_deg, hard_deg, divergence_rate }
+    }
+
+    #[test]
+    fn a_policy_that_loses_targets_is_not_called_ready_to_fly() {
+        let good = worth(&[reached("policy", 0.0), reached("lqi", 0.0)], "--policy x");
+        assert_eq!(good, "fly it: greylag demo --policy x");
+        let lossy = worth(&[reached("policy", 0.2), reached("lqi", 0.0)], "--policy x");
+        assert!(lossy.starts_with("not ready to fly: the policy loses 20 %"), "{lossy}");
+        assert!(lossy.contains("not flown in the model by this budget"), "{lossy}");
+        let beside = worth(&[reached("policy", 0.2), reached("hybrid-lqi", 0.0)], "");
+        assert!(beside.contains("loses 0 %"), "{beside}");
+    }
 }

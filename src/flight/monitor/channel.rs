@@ -31,6 +31,16 @@ impl Channel {
     ];
 }
 
+impl Channel {
+    /// What one cause commonly moves together: 0 along the plane of symmetry, 1 across it.
+    pub(super) fn plane(self) -> usize {
+        match self {
+            Channel::Forward | Channel::Normal | Channel::Pitch => 0,
+            Channel::Side | Channel::Roll | Channel::Yaw => 1,
+        }
+    }
+}
+
 impl fmt::Display for Channel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -71,10 +81,14 @@ impl Warning {
                 "ice or damage, a failing motor, a wrong airspeed"
             }
             (Channel::Forward, _) => "a wrong airspeed or throttle, a lighter load",
-            (Channel::Side, _) => "a wrong sideslip, damage on one side",
+            (Channel::Side, _) => {
+                "a sideslip that is wrong (compass, alignment), or damage on one side"
+            }
             (Channel::Roll, _) => "a load shifted sideways, ice on one wing, a stuck aileron",
             (Channel::Pitch, _) => "a load shifted fore or aft, ice, a stuck elevator",
-            (Channel::Yaw, _) => "thrust or drag on one side, a wrong sideslip, a stuck rudder",
+            (Channel::Yaw, _) => {
+                "a sideslip that is wrong (compass, alignment), thrust or drag on one side, a stuck rudder"
+            }
         }
     }
 }

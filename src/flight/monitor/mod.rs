@@ -3,7 +3,8 @@
 //! For each channel, specific force and angular acceleration, the residual is what is measured less what the model
 //! predicts at the measured state and surfaces. Its band is two standard deviations of the prediction: of the model's
 //! coefficients by the widths that its file states (15 % where it states none) and of the measured inputs. A channel that
-//! leaves its band for 2 s departs; that is reported once, until it has been well inside for 5 s.
+//! leaves its band for 2 s departs; that is reported once, until it has been well inside for 5 s. What departs in the same
+//! plane within 20 s has the same cause, as far as anybody can tell in flight, and is not reported again.
 //!
 //! The monitor decides nothing: no command depends on it.
 
@@ -21,6 +22,8 @@ use greylag_physics::{State, Time};
 
 /// Steps from which angular acceleration is taken, s.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
+/// Departures in one plane within this time have one cause, s.
+const ONE_CAUSE_S: f64 = 20.0;
 /// Below this share of the least airspeed of the envelope the model is not asked.
 const SLOWEST: f64 = 0.8;
 
@@ -46,6 +49,8 @@ pub struct Monitor {
     /// Measured and predicted in the last state that could be compared.
     values: [[f64; 2]; 6],
     watches: [Watch; 6],
+    /// When something was last reported along the plane of symmetry, and across it.
+    said: [Option<Time>; 2],
 }
 
 /// The sample before.
@@ -68,6 +73,7 @@ impl Monitor {
             compared: [false; 6],
             values: [[f64::NAN; 2]; 6],
             watches: [Watch::default(); 6],
+            said: [None; 2],
         }
     }
 
@@ -90,13 +96,14 @@ impl Monitor {
             return None;
         }
         self.compare(frame, &before, &predicted, dt);
-        self.due()
+        self.due(now.time)
     }
 
     /// Forgets all, as when somebody else takes the aircraft.
     pub fn forget(&mut self) {
         (self.last, self.compared) = (None, [false; 6]);
         self.watches = [Watch::default(); 6];
+        self.said = [None; 2];
     }
 
     /// Residuals divided by the half widths of their bands (two standard deviations), in the order of
@@ -144,13 +151,18 @@ impl Monitor {
         }
     }
 
-    fn due(&mut self) -> Option<Warning> {
+    fn due(&mut self, now: Time) -> Option<Warning> {
         let size = |watch: &Watch| watch.share().abs();
         let due = self.watches.iter().enumerate().filter(|(k, w)| self.compared[*k] && w.is_due());
         let (k, _) = due.max_by(|(_, a), (_, b)| size(a).total_cmp(&size(b)))?;
         let watch = &mut self.watches[k];
         watch.report();
         let (channel, share) = (Channel::ALL[k], watch.share());
+        let said = &mut self.said[channel.plane()];
+        if said.is_some_and(|said| now.since(said).as_secs_f64() < ONE_CAUSE_S) {
+            return None;
+        }
+        *said = Some(now);
         Some(Warning { channel, share, follows_surface: watch.follows_surface() })
     }
 }

@@ -45,14 +45,14 @@ type Change = fn(&mut Asked, &Deviations);
 #[derive(Clone, Copy, Debug)]
 struct Deviations {
     /// α and β, rad.
-    incidence: f64,
+    incidence: [f64; 2],
     /// Rotation of the air, rad/s.
     air_rotation: f64,
 }
 
 const CHANGES: [Change; 10] = [
-    |a, sd| a.state.alpha += sd.incidence,
-    |a, sd| a.state.beta += sd.incidence,
+    |a, sd| a.state.alpha += sd.incidence[0],
+    |a, sd| a.state.beta += sd.incidence[1],
     |a, _| a.state.airspeed *= 1.0 + AIRSPEED_SD,
     |a, _| a.controls.aileron += SURFACE_SD,
     |a, _| a.controls.elevator += SURFACE_SD,

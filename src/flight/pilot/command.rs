@@ -20,14 +20,16 @@ const EASED_S: f64 = 5.0;
 const UPSET: [f64; 2] = [FRAC_PI_2, FRAC_PI_3];
 
 impl Pilot {
-    /// Eases deflections from `time` on, because the loop about `axis` swings.
-    pub(super) fn ease(&mut self, axis: Axis, time: Time) {
+    /// Eases deflections from `time` on, because the loop about `axis` has swung for `lasted_s`, s.
+    pub(super) fn ease(&mut self, axis: Axis, lasted_s: f64, time: Time) {
         self.eased = Some(time);
         let axis = match axis {
             Axis::Roll => "roll",
             Axis::Pitch => "pitch",
         };
-        let words = format!("oscillates in {axis}: a third of the deflections for {EASED_S} s");
+        let words = format!(
+            "oscillates in {axis} since {lasted_s:.1} s: a third of the deflections for the next {EASED_S} s"
+        );
         self.texts.say(Severity::Error, words);
     }
 

@@ -66,6 +66,13 @@ impl Estimate {
         }
     }
 
+    /// Nobody listened for `missed`: what came before is not older for it.
+    pub(super) fn excuse(&mut self, missed: Duration) {
+        for at in [&mut self.usable_at, &mut self.fresh_at].into_iter().flatten() {
+            *at = at.plus(missed);
+        }
+    }
+
     /// Whether the last believable frame was equal to the one before.
     pub(super) fn is_frozen(&self) -> bool {
         self.frozen

@@ -1,6 +1,8 @@
 //! What is lost, what comes back: the vehicle, the setpoints, the sticks, the vehicle's clock.
 
-use super::estimate::{Estimate, Frame};
+use std::time::Duration;
+
+use super::estimate::{Estimate, Frame, within};
 use super::oscillation::Oscillation;
 use super::{Complaints, Pilot};
 use greylag_link::autopilot::{Mode, Severity};
@@ -13,6 +15,9 @@ const UNFELT_TRAVEL: f64 = 0.005;
 /// Sensors that stand still under commands that move are lost after this time, s: an aircraft that
 /// rolls as fast as it may rolls on by 20° meanwhile, and real sensors do not repeat to the bit.
 const FROZEN_LOSS_S: f64 = 0.2;
+
+/// A vehicle that is back has to stay for this long before it is said, s: as long as one must be silent to be lost.
+const STEADY_S: f64 = 0.5;
 
 impl Pilot {
     /// A state that stands still while nothing asks it to move is no fault: the vehicle waits for
@@ -39,26 +44,50 @@ impl Pilot {
         self.estimate.fresh_within(self.clock, limit)
     }
 
+    /// This computer did not listen for `missed`: no state, setpoint or stick that came before is older for it. What is
+    /// flown is what was flown before, on the next state.
+    pub fn excuse(&mut self, missed: Duration) {
+        self.estimate.excuse(missed);
+        let later = |at: &mut Time| *at = at.plus(missed);
+        self.setpoint.iter_mut().for_each(|(at, _)| later(at));
+        self.sticks.iter_mut().for_each(|(at, _)| later(at));
+        self.vehicle_back.iter_mut().for_each(later);
+    }
+
+    /// Finds a lost vehicle, and says that one is back once it has stayed for a while: a link that comes and goes is one loss.
     pub(super) fn watch_vehicle(&mut self) {
-        let fresh = self.state_fresh();
-        if fresh != Some(false) || self.vehicle_lost {
-            return;
+        if self.state_fresh() == Some(false) && !self.vehicle_lost {
+            self.lose_vehicle();
         }
+        if self.loss_told && !self.vehicle_lost && !within(self.vehicle_back, self.clock, STEADY_S)
+        {
+            self.loss_told = false;
+            let words = match self.armed && self.mode == Mode::Hold {
+                true => "vehicle link back: flying in HOLD",
+                false => "vehicle link back",
+            };
+            self.texts.say(Severity::Notice, words);
+        }
+    }
+
+    fn lose_vehicle(&mut self) {
         self.vehicle_lost = true;
+        let news = !self.loss_told || (self.armed && self.mode != Mode::Hold);
+        self.loss_told = true;
         if self.armed {
-            self.texts.say(Severity::Critical, "vehicle link lost: level, HOLD");
             self.mode = Mode::Hold;
-        } else {
-            self.texts.say(Severity::Warning, "vehicle link lost");
+        }
+        match (news, self.armed) {
+            (true, true) => self.texts.say(Severity::Critical, "vehicle link lost: level, HOLD"),
+            (true, false) => self.texts.say(Severity::Warning, "vehicle link lost"),
+            (false, _) => {}
         }
     }
 
     pub(super) fn watch_return(&mut self) {
         if self.vehicle_lost && self.state_fresh() == Some(true) {
             self.vehicle_lost = false;
-            let words =
-                if self.armed { "vehicle link back: flying in HOLD" } else { "vehicle link back" };
-            self.texts.say(Severity::Notice, words);
+            self.vehicle_back = Some(self.clock);
         }
     }
 
@@ -85,6 +114,7 @@ impl Pilot {
         self.setpoint = None;
         self.sticks = None;
         self.vehicle_lost = false;
+        (self.loss_told, self.vehicle_back) = (false, None);
         self.complaints = Complaints::default();
         self.oscillation = Oscillation::default();
         self.eased = None;

@@ -10,6 +10,7 @@
 //! ```
 
 mod command;
+mod complaints;
 mod config;
 mod decision;
 mod estimate;
@@ -33,6 +34,7 @@ pub use modes::mode_name;
 pub use polarity::Answers;
 
 use crate::monitor::Monitor;
+use complaints::{Complaints, due};
 use estimate::{Estimate, Frame, RESTART, within};
 use greylag_control::{Controller, Observation, Target};
 use greylag_link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
@@ -43,9 +45,6 @@ use oscillation::Oscillation;
 use polarity::Check;
 use programme::Programme;
 use texts::Texts;
-
-/// Least time between two lines about the same kind of trouble, s.
-const COMPLAINT_INTERVAL_S: f64 = 5.0;
 
 /// A loop that swings again within this time does not only swing for once, s.
 const SWINGS_AGAIN_S: f64 = 20.0;
@@ -68,6 +67,14 @@ pub struct Pilot {
     sticks: Option<(Time, Sticks)>,
     setpoint_lost: bool,
     vehicle_lost: bool,
+    /// Whether a loss was said of which the end was not.
+    loss_told: bool,
+    /// When the vehicle last came back from a loss.
+    vehicle_back: Option<Time>,
+    /// Since when airspeed and altitude are late.
+    air_late: Option<Time>,
+    /// The setpoint of which it was said that the limits cut it: roll and pitch, rad.
+    cut: Option<[f64; 2]>,
     /// The command in force.
     in_force: Command,
     /// The command that was in force before it; repeated states do not count.
@@ -113,14 +120,6 @@ enum Pending {
     Fly { seen: Observation, throttle: Option<f64> },
 }
 
-/// When each kind of trouble was last reported.
-#[derive(Debug, Default)]
-struct Complaints {
-    defect: Option<Time>,
-    plan: Option<Time>,
-    fallback: Option<Time>,
-}
-
 impl Pilot {
     /// A pilot, disarmed and in HOLD, that flies by `config` and falls back on `fallback`.
     ///
@@ -148,6 +147,10 @@ impl Pilot {
             sticks: None,
             setpoint_lost: false,
             vehicle_lost: false,
+            loss_told: false,
+            vehicle_back: None,
+            air_late: None,
+            cut: None,
             in_force: Command::IDLE,
             before: Command::IDLE,
             last_moved: Command::IDLE,
@@ -277,12 +280,12 @@ impl Pilot {
         }
         let (time, step) = (seen.time, self.limits.surface_step);
         let found = self.oscillation.see(time, &seen.state, &self.before, &self.in_force, step);
-        let Some(axis) = found else { return };
+        let Some((axis, lasted_s)) = found else { return };
         self.oscillation = Oscillation::default();
         if self.hands_back && within(self.eased, time, SWINGS_AGAIN_S) {
             self.refused = Some(Fault::Oscillation(axis));
         } else {
-            self.ease(axis, time);
+            self.ease(axis, lasted_s, time);
         }
     }
 
@@ -339,8 +342,9 @@ impl Pilot {
         if quality == Frame::Repeated {
             return if self.armed { Pending::Repeated } else { Pending::Disarmed };
         }
-        if let Frame::Defective(reason) = quality {
-            self.complain_of_state(reason);
+        match quality {
+            Frame::Defective(reason) => self.complain_of_state(reason),
+            _ => self.air_late = None,
         }
         self.target = nobody;
         if !self.armed {
@@ -359,6 +363,7 @@ impl Pilot {
         };
         let (wish, throttle) = self.scheduled_wish(frame.time).unwrap_or_else(|| self.wish());
         self.target = self.limits.limit(wish, frame.state.airspeed);
+        self.tell_of_limits(&wish);
         let Telemetry { time, mut state, actuators, altitude, .. } = frame;
         // Noise of a sensor at rest.
         state.airspeed = state.airspeed.max(0.0);
@@ -373,19 +378,4 @@ impl Pilot {
             throttle,
         }
     }
-
-    fn complain_of_state(&mut self, reason: &'static str) {
-        if due(&mut self.complaints.defect, self.clock) {
-            self.texts.say(Severity::Error, format!("vehicle state refused: {reason}"));
-        }
-    }
-}
-
-/// Whether a complaint may be made again at `now`; notes it if so.
-fn due(last: &mut Option<Time>, now: Time) -> bool {
-    let silent = within(*last, now, COMPLAINT_INTERVAL_S);
-    if !silent {
-        *last = Some(now);
-    }
-    !silent
 }

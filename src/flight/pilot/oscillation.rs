@@ -67,7 +67,7 @@ pub(super) struct Oscillation {
 
 impl Oscillation {
     /// Takes in a tick: its time and state, the commands before and after it, and the largest change of a
-    /// surface in a tick. The axis that oscillates, if one does. A starved processor leaves ticks out, so time counts, not ticks.
+    /// surface in a tick. The axis that oscillates, if one does, and for how long, s. A starved processor leaves ticks out, so time counts, not ticks.
     pub(super) fn see(
         &mut self,
         time: Time,
@@ -75,7 +75,7 @@ impl Oscillation {
         before: &Command,
         now: &Command,
         step: f64,
-    ) -> Option<Axis> {
+    ) -> Option<(Axis, f64)> {
         let limited =
             |before: f64, now: f64| (now - before).abs() >= ALL * step || now.abs() >= ALL;
         let passed = self.last.map_or(TICK_S, |last| time.since(last).as_secs_f64()).max(TICK_S);
@@ -84,18 +84,16 @@ impl Oscillation {
         let rolls = roll.see(passed, state.p, now.aileron, limited(before.aileron, now.aileron));
         let pitches =
             pitch.see(passed, state.q, now.elevator, limited(before.elevator, now.elevator));
-        match (rolls, pitches) {
-            (_, true) => Some(Axis::Pitch),
-            (true, false) => Some(Axis::Roll),
-            (false, false) => None,
-        }
+        let pitches = pitches.map(|lasted_s| (Axis::Pitch, lasted_s));
+        pitches.or(rolls.map(|lasted_s| (Axis::Roll, lasted_s)))
     }
 }
 
 impl Swings {
-    fn see(&mut self, passed: f64, rate: f64, command: f64, limited: bool) -> bool {
+    /// How long it has swung, s, if it does.
+    fn see(&mut self, passed: f64, rate: f64, command: f64, limited: bool) -> Option<f64> {
         if !rate.is_finite() {
-            return false;
+            return None;
         }
         let mean = self.mean.get_or_insert(rate);
         *mean += (rate - *mean) * (passed / SLOW_S).min(1.0);
@@ -108,7 +106,7 @@ impl Swings {
         self.limited += if limited { passed } else { 0.0 };
         self.range = [self.range[0].min(command), self.range[1].max(command)];
         self.peak = self.peak.max(swing.abs());
-        self.row >= SWINGS && self.row_s >= LONG_S
+        (self.row >= SWINGS && self.row_s >= LONG_S).then_some(self.row_s)
     }
 
     /// A half swing has ended: whether it was one decides on the row.
@@ -144,8 +142,11 @@ mod tests {
             let state = State { q: rate(at), ..State::NEUTRAL };
             let axis = guard.see(Time::from_micros((1e6 * at) as u64), &state, &before, &now, STEP);
             before = now;
-            axis.map(|axis| {
-                assert_eq!(axis, Axis::Pitch);
+            axis.map(|(axis, lasted_s)| {
+                assert!(
+                    axis == Axis::Pitch && (LONG_S..=at).contains(&lasted_s),
+                    "{lasted_s} at {at}"
+                );
                 at
             })
         })

@@ -4,13 +4,17 @@ use greylag_link::vehicle::limits;
 use greylag_link::vehicle::{Faults, Telemetry};
 
 /// The faults that make a state unusable. Specific force is recorded, not flown on.
-const STATE_FAULTS: [(Faults, &str); 5] = [
+const STATE_FAULTS: [(Faults, &str); 6] = [
     (Faults::ATTITUDE, "attitude"),
     (Faults::RATES, "body rates"),
+    (Faults::LATE_AIR, LATE_AIR),
     (Faults::AIR, "airspeed or altitude"),
     (Faults::INCIDENCE, "incidence"),
     (Faults::ACTUATORS, "actuators"),
 ];
+
+/// The reason that ends by itself: after a gap the first airspeed is still to come.
+pub(super) const LATE_AIR: &str = "airspeed and altitude are late";
 
 /// What of this frame cannot be flown on, if anything: what the link has found, and what is not
 /// finite or beyond any aircraft all the same.

@@ -1,9 +1,12 @@
 //! What is wished for: the target of the schedule, of the mode, or level.
 
-use super::{Pilot, ThrustSource};
+use super::{Pilot, ThrustSource, due};
 use greylag_control::Target;
-use greylag_link::autopilot::Mode;
+use greylag_link::autopilot::{Mode, Severity};
 use greylag_physics::Time;
+
+/// A cut of less than half a degree is not worth a line, rad.
+const TOLD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 impl Pilot {
     /// The target of the schedule, if one is flown at `now`.
@@ -36,6 +39,34 @@ impl Pilot {
             }
             _ => (self.level_target(), None),
         }
+    }
+
+    /// Says that a client's attitude is cut by the envelope; once for each that it asks for, and no oftener than other complaints.
+    pub(super) fn tell_of_limits(&mut self, wish: &Target) {
+        let cut = |wanted: f64, flown: f64| (wanted - flown).abs() > TOLD;
+        let (roll, pitch) = (cut(wish.roll, self.target.roll), cut(wish.pitch, self.target.pitch));
+        if self.mode != Mode::Offboard || !(roll || pitch) {
+            self.cut = None;
+            return;
+        }
+        let asked = [wish.roll, wish.pitch];
+        let known = |cut: [f64; 2]| cut.iter().zip(asked).all(|(a, b)| (a - b).abs() <= TOLD);
+        if self.cut.is_some_and(known) || !due(&mut self.complaints.limits, self.clock) {
+            return;
+        }
+        self.cut = Some(asked);
+        let said = |name: &str, wanted: f64, flown: f64| {
+            format!("{name} {:.0} deg is flown as {:.0}", wanted.to_degrees(), flown.to_degrees())
+        };
+        let words: Vec<String> = [
+            roll.then(|| said("roll", wish.roll, self.target.roll)),
+            pitch.then(|| said("pitch", wish.pitch, self.target.pitch)),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        self.texts
+            .say(Severity::Warning, format!("setpoint beyond the limits: {}", words.join(", ")));
     }
 
     pub(super) fn level_target(&self) -> Target {

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::str::FromStr;
+use std::time::Duration;
 
 use crate::pilot::mode_name;
 use greylag_link::autopilot::{AttitudeSetpoint, Mode, ParameterValue, Sticks};
@@ -28,6 +29,8 @@ pub enum Planned {
 pub enum Call {
     /// Time passed to this moment.
     Advance(Time),
+    /// This computer had not listened for this long.
+    Excuse(Duration),
     /// The state of this time was observed, with this plan, and answered by this command.
     Tick(Time, Planned, Command),
     /// Arming was asked for, by force or not.
@@ -54,6 +57,7 @@ impl fmt::Display for Call {
         let us = |time: &Time| time.as_micros();
         match self {
             Call::Advance(now) => write!(f, "advance {}", us(now)),
+            Call::Excuse(missed) => write!(f, "excuse {}", missed.as_micros()),
             Call::Tick(time, planned, c) => {
                 write!(f, "tick {} {}", us(time), Words(c))?;
                 match planned {
@@ -141,6 +145,7 @@ fn read(line: &str) -> Option<Call> {
     };
     Some(match *words.first()? {
         "advance" => Call::Advance(time(1)?),
+        "excuse" => Call::Excuse(Duration::from_micros(words.get(1)?.parse().ok()?)),
         "tick" => {
             let (given, next) = command(2)?;
             let planned = match *words.get(next)? {
@@ -192,6 +197,7 @@ mod tests {
         let setpoint = AttitudeSetpoint { roll: 0.3, pitch: -0.0, thrust: None };
         for call in [
             Call::Advance(now),
+            Call::Excuse(Duration::from_micros(1_190_001)),
             Call::Tick(now, Planned::Ready(odd), odd),
             Call::Tick(now, Planned::Ready(Command::IDLE), odd),
             Call::Tick(now, Planned::Ready(yawing), yawing),

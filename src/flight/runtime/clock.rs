@@ -7,7 +7,7 @@ use greylag_physics::Time;
 /// How the vehicle's time passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// As on the wall: between frames it goes on with the host's clock.
+    /// As on the wall: between frames it goes on with the host's clock, as long as somebody listens.
     RealTime,
     /// In steps of the answers: it stands between frames, until the vehicle has been silent for
     /// [`PATIENCE`]. So a flight does not depend on the speed of the machine.
@@ -26,7 +26,8 @@ const LISTENED: Duration = Duration::from_millis(100);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clock {
     pace: Pace,
-    anchor: Option<(Instant, Time)>,
+    /// Time of the newest state.
+    anchor: Option<Time>,
     /// Silence since the anchor that was listened to, and until when.
     listened: (Duration, Option<Instant>),
 }
@@ -43,7 +44,7 @@ impl Clock {
 
     /// A state of vehicle time `time` arrived at `arrived`.
     pub(super) fn set(&mut self, arrived: Instant, time: Time) {
-        self.anchor = Some((arrived, time));
+        self.anchor = Some(time);
         self.listened = (Duration::ZERO, Some(arrived));
     }
 
@@ -54,11 +55,11 @@ impl Clock {
 
     /// Vehicle time at `host`; zero before the first state.
     pub(super) fn at(&self, host: Instant) -> Time {
-        let Some((arrived, time)) = self.anchor else {
+        let Some(time) = self.anchor else {
             return Time::default();
         };
         match self.pace {
-            Pace::RealTime => time.plus(host.saturating_duration_since(arrived)),
+            Pace::RealTime => time.plus(self.silence(host)),
             Pace::Lockstep => time.plus(self.silence(host).saturating_sub(PATIENCE)),
         }
     }
@@ -80,11 +81,16 @@ mod tests {
         let start = Instant::now();
         let time = |ms: u64| Time::from_micros(1000 * ms);
         let later = |ms: u64| start + Duration::from_millis(ms);
-        for (pace, after_a_second) in [(Pace::RealTime, 6000), (Pace::Lockstep, 5000)] {
+        // A second in which the link was looked at, then four in which nobody was there to look.
+        for (pace, after_a_second, after_five) in
+            [(Pace::RealTime, 6000, 6100), (Pace::Lockstep, 5000, 5000)]
+        {
             let mut clock = Clock::new(pace);
             assert_eq!(clock.at(later(1)), time(0));
             clock.set(start, time(5000));
+            (1..=100).for_each(|look| clock.listen(later(10 * look)));
             assert_eq!(clock.at(later(1000)), time(after_a_second));
+            assert_eq!(clock.at(later(5000)), time(after_five));
         }
         let mut clock = Clock::new(Pace::Lockstep);
         clock.set(start, time(5000));

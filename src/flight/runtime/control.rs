@@ -1,29 +1,30 @@
 //! The control thread: one loop that answers state frames, then serves clients.
 
 mod clients;
+mod vehicle;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Sender, select_biased};
 
-use super::clock::{Clock, Pace};
+use super::clock::Clock;
+use super::lateness::{Attention, Behind, Cause, Reports, Waited, lateness};
 use super::planner::Planner;
 use super::ports::Ports;
 use super::recording_autopilot::RecordingAutopilot;
-use super::stamps::{Stamps, unix_us};
+use super::stamps::Stamps;
 use super::summary::Summary;
 use super::timing::Timing;
 use super::{Event, FlightOptions};
-use crate::pilot::{Decision, Pilot, Plan};
-use crate::recorder::call::Planned;
-use crate::recorder::{Call, Recorder, Row};
-use greylag_link::autopilot::{Autopilot, Severity};
+use crate::pilot::Pilot;
+use crate::recorder::{Call, Recorder};
+use greylag_link::autopilot::Severity;
 use greylag_link::client::{Clients, Now};
 use greylag_link::framing::Source;
 use greylag_link::routing::Router;
-use greylag_link::transport::{Arrival, Packet, Remark};
-use greylag_link::vehicle::{Notice, Order, Outputs, Real, Sitl, Telemetry, Vehicle};
+use greylag_link::transport::{Arrival, Remark};
+use greylag_link::vehicle::{Outputs, Real, Sitl, Vehicle};
 
 /// Between two looks at what is due: heartbeats, streams, lost links.
 const POLL: Duration = Duration::from_millis(10);
@@ -35,6 +36,17 @@ const NO_VEHICLE: Duration = Duration::from_secs(2);
 const LOAD_WEIGHT: f64 = 0.02;
 /// The autopilot identity.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
+
+/// After a stall the network's thread has this long to hand over what came meanwhile; a thread that does not is dead.
+const HAND_OVER: Duration = Duration::from_secs(2);
+/// Between two looks at how long this thread was kept from running.
+const WAITED: Duration = Duration::from_secs(1);
+
+/// Who sent what is taken.
+enum Arrived {
+    Vehicle(Arrival),
+    Client(Arrival),
+}
 
 /// All that the control thread owns.
 pub(super) struct Control {
@@ -50,6 +62,11 @@ pub(super) struct Control {
     events: Sender<Event>,
     clock: Clock,
     timing: Timing,
+    attention: Attention,
+    /// What the scheduler had counted when it was last asked, and when to ask again.
+    waited: Waited,
+    next_waited: Instant,
+    reports: Reports,
     started: Instant,
     duration: Option<Duration>,
     last_arrival: Option<Instant>,
@@ -72,7 +89,11 @@ impl Control {
             None => Vehicle::Sitl(
                 Sitl::new(AUTOPILOT.system, options.travels).with_mixer(options.mixer.clone()),
             ),
-            Some(profile) => Vehicle::Real(Box::new(Real::new(profile))),
+            Some(profile) => {
+                let mut real = Real::new(profile);
+                real.bear(options.delay_margin);
+                Vehicle::Real(Box::new(real))
+            }
         };
         pilot.take_on(&vehicle);
         let started = Instant::now();
@@ -91,6 +112,10 @@ impl Control {
             events,
             clock: Clock::new(options.pace),
             timing: Timing::default(),
+            attention: Attention::new(started),
+            waited: Waited::default(),
+            next_waited: started,
+            reports: Reports::default(),
             started,
             duration: options.duration,
             last_arrival: None,
@@ -103,6 +128,7 @@ impl Control {
 
     pub(super) fn run(mut self, stop: &AtomicBool, rounds: &AtomicU64) -> Summary {
         self.welcome_targets();
+        self.attention.resume(Instant::now(), self.ports.rounds());
         let mut next_poll = self.started;
         while !stop.load(Ordering::Relaxed) && !self.is_over() {
             self.take_one(next_poll);
@@ -121,141 +147,49 @@ impl Control {
         self.duration.is_some_and(|duration| self.started.elapsed() >= duration)
     }
 
-    /// Takes one arrival, the vehicle's before a client's, or waits until `until`.
+    /// Takes what has arrived, the vehicle's before a client's, or waits until `until`.
     fn take_one(&mut self, until: Instant) {
         let wait = until.saturating_duration_since(Instant::now());
-        select_biased! {
-            recv(self.ports.from_vehicle) -> arrival => if let Ok(arrival) = arrival { self.take_vehicle(arrival) },
-            recv(self.ports.from_clients) -> arrival => if let Ok(arrival) = arrival { self.take_client(arrival) },
-            default(wait) => {}
-        }
-    }
-
-    fn take_vehicle(&mut self, arrival: Arrival) {
-        let packet = match arrival {
-            Arrival::Packet(mut packet) => {
-                self.ports.sift(unix_us(), &mut packet);
-                packet
-            }
-            Arrival::Remark(remark) => return self.remark(&remark),
-            Arrival::Opened(_) | Arrival::Closed(_) => return,
+        let arrived = select_biased! {
+            recv(self.ports.from_vehicle) -> arrival => arrival.ok().map(Arrived::Vehicle),
+            recv(self.ports.from_clients) -> arrival => arrival.ok().map(Arrived::Client),
+            default(wait) => None,
         };
-        self.record(packet.arrived, &packet.bytes);
-        // The vehicle is taken out for the time of the call, since each tick answers through it.
-        let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
-        let mut places = states.iter_mut();
-        self.vehicle.handle(
-            packet.arrived.saturating_duration_since(self.started),
-            packet.peer,
-            &packet.bytes,
-            |state| {
-                if let Some(place) = places.next() {
-                    *place = Some(state);
-                }
-            },
-        );
-        for state in states.iter().flatten() {
-            self.tick(state, &packet);
-        }
-        self.heed_vehicle();
-        if let Some(router) = &self.router {
-            for peer in self.clients.peers() {
-                let frames = router.to_client(&packet.bytes, peer);
-                if !frames.is_empty() {
-                    self.ports.send_to_client(unix_us(), peer, frames);
-                }
-            }
+        self.attend();
+        match arrived {
+            Some(Arrived::Vehicle(arrival)) => self.take_vehicles(arrival),
+            Some(Arrived::Client(arrival)) => self.take_client(arrival),
+            None => {}
         }
     }
 
-    fn tick(&mut self, state: &Telemetry, packet: &Packet) {
-        if state.order == Order::Late {
-            return;
+    /// Finds that this computer has not listened, waits until the network's thread has handed over what came
+    /// meanwhile, and excuses everybody for the time: silence that nobody listened to is no loss.
+    fn attend(&mut self) {
+        let host = Instant::now();
+        let Some((behind, since)) = self.attention.look(host, self.ports.rounds()) else { return };
+        // One round may end what the stall began; the next has looked at every socket.
+        let handed_over = self.ports.rounds() + 2;
+        while self.ports.rounds() < handed_over && host.elapsed() < HAND_OVER {
+            std::thread::sleep(CYCLE / 5);
         }
-        self.clock.set(packet.arrived, state.time);
-        let request = self.pilot.observe(state.time, state);
-        let plan =
-            request.map_or(Plan::None, |request| self.planner.plan(&request, packet.arrived));
-        let decision = self.pilot.decide(plan);
-        let demand = decision.demand();
-        self.outputs = demand.outputs;
-        let host = packet.arrived.saturating_duration_since(self.started);
-        let frame = self.vehicle.answer(host, state.time, &demand);
-        let copy = (self.recorder.is_some() && !frame.is_empty()).then(|| frame.clone());
-        if !frame.is_empty() {
-            self.ports.send_to_vehicle(unix_us(), packet.peer, frame);
-        }
-        let latency = packet.arrived.elapsed();
-        if let Some(frame) = copy {
-            self.record(Instant::now(), &frame);
-        }
-        let planned = match plan {
-            Plan::Ready(command) => Planned::Ready(command),
-            Plan::Late => Planned::Late,
-            Plan::Busy => Planned::Busy,
-            Plan::None => Planned::None,
+        let now = Instant::now();
+        self.attention.resume(now, self.ports.rounds());
+        let missed = lateness(since, now);
+        self.note(Call::Excuse(missed));
+        self.pilot.excuse(missed);
+        self.vehicle.excuse(missed);
+        self.clock.listen(now);
+        self.timing.stalls += 1;
+        self.timing.longest_stall = self.timing.longest_stall.max(missed);
+        let waited = Waited::now();
+        let cause = match behind {
+            Behind::Control => self.waited.cause(waited, missed),
+            Behind::Network => Cause::Busy,
         };
-        self.note(Call::Tick(state.time, planned, decision.command));
-        self.account(state, &decision, plan, packet, latency);
-    }
-
-    /// Notes timing and the row of a tick, after its command is out.
-    fn account(
-        &mut self,
-        state: &Telemetry,
-        decision: &Decision,
-        plan: Plan,
-        packet: &Packet,
-        latency: Duration,
-    ) {
-        if self.last_arrival.is_none() {
-            self.say(Event::VehicleFound(packet.peer));
-        }
-        if let Some(last) = self.last_arrival.replace(packet.arrived) {
-            self.timing.interval.note(packet.arrived.saturating_duration_since(last));
-        }
-        self.timing.latency.note(latency);
-        self.timing.missed += u64::from(match self.clock.pace() {
-            Pace::RealTime => latency > CYCLE,
-            Pace::Lockstep => state.order == Order::Repeated,
-        });
-        self.timing.late_plans += u64::from(matches!(plan, Plan::Late | Plan::Busy));
-        let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
-        self.load += LOAD_WEIGHT * (share - self.load);
-        // What surfaces do that were not commanded by us is not known.
-        match self.vehicle.moves_surfaces() {
-            true => self.pilot.monitor(state),
-            false => self.pilot.forget_residuals(),
-        }
-        let shown = self.vehicle.flies_surfaces();
-        if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {
-            let latency_us = latency.as_secs_f64() * 1e6;
-            let mut row = Row::new(state, decision, latency_us);
-            row.residuals = self.pilot.residual_shares();
-            recorder.row(if shown { row } else { row.without_surfaces() });
-        }
-    }
-
-    /// Does what the vehicle has to tell.
-    fn heed_vehicle(&mut self) {
-        while let Some(notice) = self.vehicle.take_notice() {
-            if let Some(words) = notice.ending() {
-                let now = self.clock.at(Instant::now());
-                self.note(Call::Disarm(now, true));
-                // Its verdict cannot be a refusal: it is forced.
-                let _ = self.pilot.disarm(now, true);
-                self.pilot.tell(Severity::Critical, &words);
-            }
-            match notice {
-                Notice::Text(severity, words) => self.pilot.tell(severity, &words),
-                Notice::System(system) => self.clients.adopt(system),
-                Notice::Engaged => {
-                    let now = self.clock.at(Instant::now());
-                    self.note(Call::Engaged(now));
-                    self.pilot.engaged(now);
-                }
-                Notice::Released(_) | Notice::HandedBack(_) => {}
-            }
+        self.waited = waited;
+        if let Some(words) = self.reports.note(now, missed, cause) {
+            self.pilot.tell(Severity::Warning, &words);
         }
     }
 
@@ -271,6 +205,12 @@ impl Control {
         self.note(Call::Advance(now.vehicle));
         self.pilot.advance(now.vehicle);
         self.pilot.note_load(self.load);
+        if host >= self.next_waited {
+            (self.waited, self.next_waited) = (Waited::now(), host + WAITED);
+        }
+        if let Some(words) = self.reports.due(host) {
+            self.pilot.tell(Severity::Warning, &words);
+        }
         if let Some(trouble) = self.recorder.as_ref().and_then(Recorder::trouble) {
             self.pilot.tell(Severity::Warning, &trouble);
         }
@@ -287,17 +227,6 @@ impl Control {
         if self.last_arrival.is_none() && now.host > NO_VEHICLE && !self.told_no_vehicle {
             self.told_no_vehicle = true;
             self.say(Event::NoVehicle);
-        }
-    }
-
-    /// Sends what is due on the vehicle's link, when there is somebody to hear it.
-    fn greet_vehicle(&mut self, host: Duration) {
-        let Some(peer) = self.vehicle.peer().or(self.ports.vehicle_target()) else {
-            return;
-        };
-        if let Some(frame) = self.vehicle.due(host, self.outputs) {
-            self.record(Instant::now(), &frame);
-            self.ports.send_to_vehicle(unix_us(), peer, frame);
         }
     }
 
@@ -338,6 +267,3 @@ impl Control {
         summary
     }
 }
-
-/// States in one packet at most: a TCP chunk of 1024 bytes holds four.
-const STATES_PER_PACKET: usize = 8;

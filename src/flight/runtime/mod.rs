@@ -11,8 +11,10 @@
 mod clock;
 mod control;
 mod guard;
+mod lateness;
 mod planner;
 mod ports;
+mod scheduling;
 mod stamps;
 mod summary;
 mod timing;
@@ -28,6 +30,7 @@ use crossbeam_channel::{Receiver, bounded};
 
 pub use clock::{PATIENCE, Pace};
 pub use guard::{Signing, SigningError, VehicleLink};
+pub use scheduling::{Class, Punctuality, take_real_time};
 pub use summary::Summary;
 pub use timing::{Histogram, Timing};
 
@@ -69,6 +72,8 @@ pub struct FlightOptions {
     pub mixer: Option<Mixer>,
     /// How a real flight controller is flown; `None` is the simulator's shim.
     pub controller: Option<Profile>,
+    /// The least delay at which the loop through a real controller's surfaces swings by itself, where it is known.
+    pub delay_margin: Option<Duration>,
     /// How links are signed, if at all.
     pub signing: Option<Signing>,
 }

@@ -23,7 +23,7 @@ pub(super) struct Ports {
     pub(super) from_vehicle: Receiver<Arrival>,
     pub(super) from_clients: Receiver<Arrival>,
     // Dropped last: it closes the sockets.
-    _network: Network,
+    network: Network,
 }
 
 impl Ports {
@@ -38,7 +38,7 @@ impl Ports {
             network.open(LinkId(1 + i as u16), address, "--client", to_clients.clone())
         };
         let clients = options.clients.iter().enumerate().map(open).collect::<Result<_, _>>()?;
-        Ok(Ports { vehicle, clients, guard, from_vehicle, from_clients, _network: network })
+        Ok(Ports { vehicle, clients, guard, from_vehicle, from_clients, network })
     }
 
     pub(super) fn vehicle_address(&self) -> Option<SocketAddr> {
@@ -47,6 +47,11 @@ impl Ports {
 
     pub(super) fn client_addresses(&self) -> Vec<Option<SocketAddr>> {
         self.clients.iter().map(Link::local).collect()
+    }
+
+    /// How many rounds the network's thread has gone.
+    pub(super) fn rounds(&self) -> u64 {
+        self.network.rounds()
     }
 
     /// The vehicle when it may be spoken to unasked.

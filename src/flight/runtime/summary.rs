@@ -69,6 +69,15 @@ impl fmt::Display for Summary {
                 t.late_plans
             )?;
         }
+        if t.stalls > 0 {
+            writeln!(
+                f,
+                "this computer was late {} times, by {:.1} s at most; {} states overtaken by newer ones",
+                t.stalls,
+                t.longest_stall.as_secs_f64(),
+                t.overtaken
+            )?;
+        }
         write!(
             f,
             "clients: {} frames, {} bad, {} setpoints refused, {} for others",

@@ -65,7 +65,34 @@ pub struct Timing {
     pub missed: u64,
     /// Ticks without a plan in time: it came after its deadline, or the planner was still at an earlier request.
     pub late_plans: u64,
+    /// States that nobody flew on, because newer ones had come before it was their turn.
+    pub overtaken: u64,
+    /// Times that this computer did not listen for more than 0.1 s.
+    pub stalls: u64,
+    /// The longest of them.
+    pub longest_stall: Duration,
 }
+
+impl Timing {
+    /// Why this computer was too slow to fly in real time, in one sentence with the cure; nothing if it was not.
+    pub fn trouble(&self) -> Option<String> {
+        let cycles = self.latency.count().max(1) as f64;
+        let missed = self.missed as f64 / cycles;
+        if self.stalls == 0 && missed < TOO_MANY {
+            return None;
+        }
+        Some(format!(
+            "this computer was too slow for real time: late by more than 0.1 s {} times, by {:.1} s at most, and {:.0} % of the \
+             commands came more than 10 ms after their state; close other programs and fly again",
+            self.stalls,
+            self.longest_stall.as_secs_f64(),
+            100.0 * missed
+        ))
+    }
+}
+
+/// Share of the cycles whose command may come late before the computer is called slow.
+const TOO_MANY: f64 = 0.02;
 
 #[cfg(test)]
 mod tests {
@@ -91,5 +118,17 @@ mod tests {
         assert_eq!(histogram.max_us(), 3e6);
         assert_eq!(histogram.quantile_us(0.5), 50_001.0);
         assert!(Histogram::default().quantile_us(0.5).is_nan());
+    }
+
+    #[test]
+    fn a_computer_is_called_slow_for_a_stall_or_for_many_late_commands() {
+        let mut timing = Timing::default();
+        (0..1000).for_each(|_| timing.latency.note(Duration::from_micros(300)));
+        timing.missed = 19;
+        assert_eq!(timing.trouble(), None);
+        timing.missed = 20;
+        assert!(timing.trouble().unwrap().contains("2 % of the commands"));
+        (timing.missed, timing.stalls, timing.longest_stall) = (0, 1, Duration::from_millis(1190));
+        assert!(timing.trouble().unwrap().contains("1 times, by 1.2 s at most"));
     }
 }

@@ -2,8 +2,10 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
 
 /// A key's bytes.
 const LENGTH: usize = 32;
@@ -24,7 +26,7 @@ impl fmt::Debug for Key {
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The file cannot be read.
-    #[error("cannot read key file {}: {why}; make one: (umask 077; openssl rand -hex 32 > FILE)", path.display())]
+    #[error("cannot read key file {}: {why}; make one: greylag link key FILE", path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -39,10 +41,18 @@ pub enum KeyError {
         /// Its permissions.
         mode: u32,
     },
+    /// It cannot be written.
+    #[error("cannot write key file {}: {why}; give the name of a file that does not exist", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        why: std::io::Error,
+    },
     /// It holds something else.
     #[error(
-        "key file {} does not hold 64 hexadecimal digits: make one with `openssl rand -hex 32`, or \
-         of a passphrase as MAVProxy does, with `printf %s PASSPHRASE | sha256sum | cut -c1-64`",
+        "key file {} does not hold 64 hexadecimal digits: make one with `greylag link key FILE`, or, of a \
+         passphrase as MAVProxy does, with `greylag link key --passphrase FILE`",
         path.display()
     )]
     Content {
@@ -55,6 +65,26 @@ impl Key {
     /// A key of these bytes.
     pub fn from_bytes(bytes: [u8; LENGTH]) -> Self {
         Key(bytes)
+    }
+
+    /// The key that QGroundControl and MAVProxy make of a passphrase: its SHA-256.
+    pub fn of_passphrase(passphrase: &str) -> Self {
+        Key(Sha256::digest(passphrase.as_bytes()).into())
+    }
+
+    /// Writes it to a new file that its owner alone may read.
+    ///
+    /// # Errors
+    /// If the file exists, or cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), KeyError> {
+        let failed = |why| KeyError::Write { path: path.into(), why };
+        let mut options = File::options();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let mut file = options.open(path).map_err(failed)?;
+        let digits: String = self.0.iter().map(|byte| format!("{byte:02x}")).collect();
+        writeln!(file, "{digits}").map_err(failed)
     }
 
     pub(super) fn bytes(&self) -> &[u8; LENGTH] {
@@ -118,6 +148,20 @@ mod tests {
         std::fs::write(&path, text).unwrap();
         std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
         (folder, path)
+    }
+
+    #[test]
+    fn a_key_that_is_made_is_its_owners_alone_and_overwrites_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new");
+        // SHA-256 of "abc", FIPS 180-2.
+        let key = Key::of_passphrase("abc");
+        key.save(&path).unwrap();
+        assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        assert_eq!(Key::load(&path).unwrap().bytes()[..4], [0xba, 0x78, 0x16, 0xbf]);
+        let again = Key::from_bytes([1; 32]).save(&path).unwrap_err().to_string();
+        assert!(again.contains("does not exist"), "{again}");
+        assert_eq!(Key::load(&path).unwrap().bytes()[0], 0xba);
     }
 
     #[test]

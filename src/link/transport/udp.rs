@@ -6,11 +6,12 @@
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::net::UdpSocket;
 use tokio::sync::mpsc::Receiver;
 
+use super::flood::Senders;
 use super::{Port, count};
 
 /// MAVLink senders stay within an Ethernet frame; this leaves room for jumbo frames.
@@ -61,8 +62,10 @@ fn serve(
 async fn receive(port: Port, socket: Arc<UdpSocket>) {
     // One byte more than the longest that is taken, to tell a longer one.
     let mut buffer = vec![0; MAX_DATAGRAM + 1];
+    let mut senders = Senders::default();
     loop {
         match socket.recv_from(&mut buffer).await {
+            Ok((_, from)) if !senders.may(from, Instant::now()) => count(&port.counters.flooded),
             Ok((len, _)) if len > MAX_DATAGRAM => count(&port.counters.oversize),
             Ok((len, from)) => port.deliver(from, buffer[..len].to_vec()),
             Err(_) => tokio::time::sleep(PAUSE).await,

@@ -65,11 +65,11 @@ impl Fault {
                     faster(stack)
                 )
             }
-            Fault::SignsUnknown => {
-                "the surfaces' signs could not be determined: engage in level flight, \
-                                    in calmer air"
-                    .into()
-            }
+            Fault::SignsUnknown => format!(
+                "the surfaces' signs could not be determined: engage in level flight; in calm air the answer comes too late or too \
+                 weak: see the delays of `greylag link check`{}",
+                faster(stack)
+            ),
         }
     }
 }

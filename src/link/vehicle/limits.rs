@@ -24,14 +24,17 @@ impl Faults {
     pub const SPECIFIC_FORCE: Faults = Faults(16);
     /// The actuators.
     pub const ACTUATORS: Faults = Faults(32);
+    /// Airspeed and altitude, which are old: right or wrong, nobody knows.
+    pub const LATE_AIR: Faults = Faults(64);
 
-    const NAMES: [(Faults, &'static str); 6] = [
+    const NAMES: [(Faults, &'static str); 7] = [
         (Faults::ATTITUDE, "attitude"),
         (Faults::RATES, "body rates"),
         (Faults::AIR, "airspeed or altitude"),
         (Faults::INCIDENCE, "incidence"),
         (Faults::SPECIFIC_FORCE, "specific force"),
         (Faults::ACTUATORS, "actuators"),
+        (Faults::LATE_AIR, "airspeed and altitude late"),
     ];
 
     /// Whether nothing is wrong.

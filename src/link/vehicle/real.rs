@@ -8,6 +8,7 @@ pub mod air_data;
 mod assembly;
 mod attitude_ramp;
 mod attitude_trim;
+mod delay;
 mod duties;
 mod engagement;
 mod hearing;
@@ -73,6 +74,8 @@ pub struct Real {
     signs: bool,
     /// Whether the controller hears a radio, as far as it has shown while it flew itself.
     radio: Option<bool>,
+    /// The delay at which the loop through the surfaces swings by itself, where it is known.
+    bears: Option<Duration>,
     assembly: Assembly,
     engagement: Engagement,
     sticks: Sticks,
@@ -104,6 +107,7 @@ impl Real {
             requests: Requests::default(),
             signs: false,
             radio: None,
+            bears: None,
             assembly: Assembly::new(profile.actuators),
             engagement: Engagement::new(profile.stack.lead()),
             sticks: Sticks::default(),
@@ -148,7 +152,11 @@ impl Real {
             self.hand_back(fault.words(self.profile.stack));
         }
         if self.controller.is_some() && self.engagement.begin(host) {
-            self.radio_warning().into_iter().for_each(|words| self.say(Severity::Warning, words));
+            let warnings = self.radio_warning().into_iter().chain(self.delay_warning());
+            warnings
+                .collect::<Vec<_>>()
+                .into_iter()
+                .for_each(|words| self.say(Severity::Warning, words));
         }
         self.states += 1;
         if command.is_finite() {
@@ -230,7 +238,7 @@ impl Real {
 
     /// How each parameter stands.
     pub fn parameter_report(&self) -> Vec<(&'static str, Standing, String)> {
-        self.parameters.report(self.system().unwrap_or(1))
+        self.parameters.report(self.system().unwrap_or(1), self.radio == Some(true))
     }
 
     /// The profile it is flown by.

@@ -99,7 +99,7 @@ pub fn message(id: u32, status: &Status, scene: &Scene) -> Option<Message> {
         33 => global_position(status, scene)?,
         36 => servo_output(status, scene),
         74 => vfr_hud(status),
-        83 => attitude_target(status, scene)?,
+        83 => attitude_target(status, scene),
         147 => battery(),
         245 => MavMessage::EXTENDED_SYS_STATE(EXTENDED_SYS_STATE_DATA {
             landed_state: landed(status),
@@ -152,17 +152,25 @@ fn attitude_quaternion(status: &Status, scene: &Scene) -> Option<MavMessage> {
     }))
 }
 
-fn attitude_target(status: &Status, scene: &Scene) -> Option<MavMessage> {
-    let [roll, pitch] = finite(status.target)?;
+/// Where there is no target, the mask says so: attitude and rates are to be ignored.
+fn attitude_target(status: &Status, scene: &Scene) -> MavMessage {
     let yaw = if status.attitude[2].is_finite() { status.attitude[2] } else { 0.0 };
-    Some(MavMessage::ATTITUDE_TARGET(ATTITUDE_TARGET_DATA {
+    let (attitude, mask) = match finite(status.target) {
+        Some([roll, pitch]) => ([roll, pitch, yaw], RATES_IGNORED),
+        None => ([0.0, 0.0, yaw], RATES_IGNORED | ATTITUDE_IGNORED),
+    };
+    MavMessage::ATTITUDE_TARGET(ATTITUDE_TARGET_DATA {
         time_boot_ms: boot_ms(scene.now),
-        q: setpoint::quaternion([roll, pitch, yaw]).map(|x| x as f32),
+        q: setpoint::quaternion(attitude).map(|x| x as f32),
         thrust: status.command.throttle as f32,
-        type_mask: AttitudeTargetTypemask::from_bits_retain(0b111),
+        type_mask: AttitudeTargetTypemask::from_bits_retain(mask),
         ..ATTITUDE_TARGET_DATA::DEFAULT
-    }))
+    })
 }
+
+/// Bits of ATTITUDE_TARGET_TYPEMASK.
+const RATES_IGNORED: u8 = 0b111;
+const ATTITUDE_IGNORED: u8 = 1 << 7;
 
 fn vfr_hud(status: &Status) -> MavMessage {
     let [north, east, down] = status.velocity;

@@ -136,7 +136,7 @@ impl Mapping {
     /// # Errors
     /// The file cannot be read, or is no mapping.
     pub fn load(path: &Path) -> Result<Mapping, MappingError> {
-        let text = std::fs::read_to_string(path)
+        let text = greylag_physics::text_file::read(path)
             .map_err(|source| MappingError::File { path: path.to_owned(), source })?;
         Mapping::parse(&text, path)
     }

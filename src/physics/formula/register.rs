@@ -71,7 +71,7 @@ pub fn load(path: &Path) -> Result<Vec<&'static Written>, FileError> {
         files.sort();
     }
     let one = |path: &PathBuf| {
-        let text = std::fs::read_to_string(path).map_err(|why| unread(path, why))?;
+        let text = crate::text_file::read(path).map_err(|why| unread(path, why))?;
         read(&text).map_err(|why| FileError::Content { what, path: path.clone(), why })
     };
     files.iter().map(one).collect()

@@ -2,14 +2,15 @@
 
 mod client;
 mod disk;
+mod error;
 mod faulty;
+mod monitored;
 mod traced;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use greylag_sitl::plant::{Inputs, PlantOptions};
-use greylag_sitl::shim::ShimError;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -20,15 +21,17 @@ use super::policies::Sample;
 use super::scenario::{Asking, Scenario, Setting};
 use super::wire::Wire;
 use disk::Disk;
-use greylag_control::{Controller, ControllerKind, SetupError, build};
+pub use error::FaultsError;
+use greylag_control::{Controller, ControllerKind, build};
 use greylag_flight::desk::Desk;
-use greylag_flight::pilot::{ConfigError, Pilot};
+use greylag_flight::pilot::Pilot;
 use greylag_flight::recorder::Recorder;
 use greylag_flight::runtime::Companion;
 use greylag_link::autopilot::{Autopilot, ParameterValue, Verdict};
 use greylag_link::vehicle::Vehicle;
 use greylag_model::GreyBox;
 use greylag_physics::airframe::Envelope;
+pub use monitored::{ATTITUDE_DEG, FAILS_S, Failure, Watched};
 use traced::Follower;
 
 /// Steps of a flight: 60 s.
@@ -38,33 +41,6 @@ const HAND_BACK_S: f64 = 0.5;
 
 /// Stream of the random numbers of a starved processor.
 const STARVED: u64 = 20;
-
-/// Why a flight cannot be flown.
-#[derive(Debug, thiserror::Error)]
-pub enum FaultsError {
-    /// The aircraft cannot be made.
-    #[error(transparent)]
-    Aircraft(#[from] ShimError),
-    /// The fallback cannot be built.
-    #[error(transparent)]
-    Fallback(#[from] SetupError),
-    /// The pilot refuses its settings.
-    #[error(transparent)]
-    Pilot(#[from] ConfigError),
-    /// A scenario has a parameter that the companion refuses.
-    #[error("setting {name} to {times} times its default: {why}")]
-    Parameter {
-        /// Its name.
-        name: String,
-        /// Its value as a multiple of the default.
-        times: f64,
-        /// Why.
-        why: String,
-    },
-    /// The recorder's thread cannot be started.
-    #[error("starting the recorder of a flight: {0}; close other programs and try again")]
-    Recorder(#[from] std::io::Error),
-}
 
 /// A flight to be flown.
 #[derive(Clone, Copy, Debug)]

@@ -14,7 +14,9 @@ pub mod temporal;
 mod wire;
 
 pub use counterpart::{ControllerMode, Counterpart};
-pub use flight::{Case, CompanionFactory, FaultsError, Report, Witnessed};
+pub use flight::{
+    ATTITUDE_DEG, Case, CompanionFactory, FAILS_S, Failure, FaultsError, Report, Watched, Witnessed,
+};
 pub use judge::{Cause, Finding, Found};
 pub use mix::{Fault, FaultKind, draw};
 pub use scenario::{Asked, Asking, ControllerSetting, Leg, Scenario, Setting};

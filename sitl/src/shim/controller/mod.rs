@@ -97,6 +97,9 @@ struct Wish {
     thrust: Option<f64>,
 }
 
+/// HEARTBEAT.
+const HEARTBEAT: u32 = 0;
+
 /// The played flight controller with the aircraft it flies.
 pub struct FlightController {
     personality: Personality,
@@ -109,6 +112,10 @@ pub struct FlightController {
     lag: Lag,
     distorter: Distorter,
     sticks: Sticks,
+    /// When the last heartbeat of the system came that ArduPilot takes for its ground station, µs.
+    station_us: Option<u64>,
+    /// Where aileron and elevator stick, if they do.
+    jammed: [Option<f64>; 2],
     wish: Option<Wish>,
     mode: Mode,
     armed: bool,
@@ -158,6 +165,8 @@ impl FlightController {
             lag: Lag::default(),
             distorter: Distorter::default(),
             sticks: Sticks::default(),
+            station_us: None,
+            jammed: [None; 2],
             wish: None,
             mode: Mode::Hold,
             armed: true,
@@ -222,6 +231,11 @@ impl FlightController {
         self.commanded = self.command();
         // PX4 has no such parameter: NaN, and no delay.
         let inputs = self.lag.delayed(self.commanded, self.parameters.get("SIM_SERVO_DELAY"));
+        let inputs = Inputs {
+            aileron: self.jammed[0].unwrap_or(inputs.aileron),
+            elevator: self.jammed[1].unwrap_or(inputs.elevator),
+            ..inputs
+        };
         self.inputs = if self.armed { inputs } else { Inputs::default() };
         self.flight.advance(self.inputs)
     }
@@ -249,6 +263,16 @@ impl FlightController {
     /// Changes a parameter, as a pilot at the ground station would.
     pub fn set_parameter(&mut self, name: &str, value: f64) {
         self.parameters.put(name, value);
+    }
+
+    /// The aileron sticks where it is, from now on.
+    pub fn jam_aileron(&mut self) {
+        self.jammed[0] = Some(self.inputs.aileron);
+    }
+
+    /// The elevator sticks where it is, from now on.
+    pub fn jam_elevator(&mut self) {
+        self.jammed[1] = Some(self.inputs.elevator);
     }
 
     /// Disarms or arms, as a pilot at the controller would.
@@ -294,6 +318,10 @@ impl FlightController {
         let for_us = |system: u8, component: u8| {
             matches!(system, 0 | SYSTEM) && matches!(component, 0 | COMPONENT)
         };
+        if frame.id == HEARTBEAT && f64::from(frame.system) == self.parameters.get("MAV_GCS_SYSID")
+        {
+            self.station_us = Some(self.now_us);
+        }
         if let Some(m) =
             frame.decode::<CommandLong>().filter(|m| for_us(m.target_system, m.target_component))
         {
@@ -501,8 +529,15 @@ impl FlightController {
         Some((mode, b"Manual control lost"))
     }
 
-    /// ArduPilot's, in MANUAL: with a radio there is none, since the radio's sticks are there.
+    /// ArduPilot's, in MANUAL. That of the throttle acts without a radio alone, since a radio's sticks are there; that of the
+    /// ground station, by its heartbeats, acts in either case.
     fn ardupilot_failsafe(&mut self) -> Option<(Mode, &'static [u8])> {
+        let age = |at: u64| (self.now_us - at) as f64 * 1e-6;
+        let alone =
+            self.station_us.is_some_and(|at| age(at) > self.parameters.get("FS_LONG_TIMEOUT"));
+        if self.mode == Mode::Manual && alone && self.parameters.get("FS_GCS_ENABL") > 0.0 {
+            return Some((Mode::Return, b"GCS failsafe on"));
+        }
         let patience = self.parameters.get("RC_FS_TIMEOUT") + FAILSAFE_LAG_S;
         let lost = self.sticks.age_s(self.now_us).is_none_or(|age| age > patience);
         let acts = self.parameters.get("THR_FAILSAFE") == 1.0

@@ -27,7 +27,7 @@ const PX4: [(&str, f64, u8); 14] = [
 ];
 
 /// ArduPilot's are of one radio's calibration, with a reversed pitch channel.
-const ARDUPILOT: [(&str, f64, u8); 35] = [
+const ARDUPILOT: [(&str, f64, u8); 37] = [
     ("SERVO1_REVERSED", 0.0, INT),
     ("SERVO2_REVERSED", 0.0, INT),
     ("SYSID_THISMAV", 1.0, INT),
@@ -39,6 +39,8 @@ const ARDUPILOT: [(&str, f64, u8); 35] = [
     ("FS_SHORT_ACTN", 0.0, INT),
     ("FS_LONG_ACTN", 1.0, INT),
     ("RC_FS_TIMEOUT", 1.0, REAL),
+    ("FS_GCS_ENABL", 1.0, INT),
+    ("FS_LONG_TIMEOUT", 2.0, REAL),
     ("RC_OPTIONS", 32.0, INT),
     // Of ArduPilot's own simulator: 1 is no radio, 0 one with its sticks released.
     ("SIM_RC_FAIL", 1.0, INT),

@@ -26,9 +26,12 @@ const CLIMB: f64 = 0.5;
 /// Standard deviation of a sideways velocity taken to be zero at every step, m/s: held against the
 /// process it draws the sideslip to zero within a few seconds, so that drifts end and turns show.
 const SIDEWAYS: f64 = 5.0;
-/// Standard deviation of the angles that come out, rad: 0.2° and 0.3 to 0.5° beside real ArduPlane, 0.1° and 0.2° beside real
-/// PX4, in calm air (`tests/firmware/angles.py`); gusts add to it.
-pub const DEVIATION: f64 = 0.5 * std::f64::consts::PI / 180.0;
+/// Standard deviations of the angles that come out, angle of attack and sideslip, rad. Of a right attitude 0.5°: 0.2° and 0.3 to
+/// 0.5° beside real ArduPlane, 0.1° and 0.2° beside real PX4, in calm air (`tests/firmware/angles.py`); gusts add to it. An
+/// error of pitch is one of the angle of attack, an error of heading one of the sideslip: the attitude may be 1° off in pitch and 2° in
+/// heading (ArduPlane's own was by 0.7° and 0.9°, a compass may be by more), taken as two standard deviations.
+pub const DEVIATION: [f64; 2] = [0.71 * DEGREE, 1.12 * DEGREE];
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Slowest airspeed at which angles mean anything, m/s.
 const SLOWEST: f64 = 3.0;
 

@@ -186,7 +186,7 @@ impl Assembly {
     /// True airspeed and altitude; gives the climb rate.
     fn fill_air(&self, host: Duration, next: &mut Telemetry) -> f64 {
         let Some([equivalent, altitude, climb]) = fresh(self.air, host) else {
-            next.faults.insert(Faults::AIR);
+            next.faults.insert(Faults::LATE_AIR);
             return f64::NAN;
         };
         let standard = || standard_density(altitude);
@@ -339,7 +339,9 @@ mod tests {
         assert!(state.faults.is_empty(), "{}", state.faults);
         let late = host + STALE + Duration::from_millis(1);
         let state = assembly.take(late, &attitude(30), &Command::IDLE).unwrap();
-        assert!(state.faults.contains(Faults::AIR) && state.faults.contains(Faults::INCIDENCE));
+        assert!(
+            state.faults.contains(Faults::LATE_AIR) && state.faults.contains(Faults::INCIDENCE)
+        );
     }
 
     #[test]

@@ -13,6 +13,8 @@ const HEARTBEAT: Duration = Duration::from_secs(1);
 const TIME_SYNC: Duration = Duration::from_millis(200);
 /// Without a new state for this long the aircraft is handed back.
 const BLIND: Duration = Duration::from_millis(300);
+/// A companion that sends nothing for this long is dead to its controller (COM_RC_LOSS_T, RC_OVERRIDE_TIME, …).
+const DEAD: Duration = Duration::from_millis(500);
 
 impl Real {
     /// What is due at `host` besides answers: heartbeat, requests, the hand-back.
@@ -29,6 +31,19 @@ impl Real {
             self.request_mode(host, to, &mut bytes);
         }
         (!bytes.is_empty()).then_some(bytes)
+    }
+
+    /// See [`crate::vehicle::Vehicle::excuse`]. A controller that got nothing for longer than it waits has begun its own
+    /// failsafe: it keeps the aircraft.
+    pub fn excuse(&mut self, missed: Duration) {
+        if self.engagement.steers() && missed > DEAD {
+            self.hand_back(format!("this computer was late by {:.1} s", missed.as_secs_f64()));
+        }
+        self.last_state = self.last_state.map(|at| at + missed);
+        if let Some(controller) = &mut self.controller {
+            controller.heard += missed;
+        }
+        self.pulse.rest();
     }
 
     /// The watchdog.

@@ -9,15 +9,17 @@ const SHUT_OUT: &str = "the controller signs its frames and ignores ours, which 
                         signature: give its key with --sign and add --sign-vehicle";
 
 impl Real {
-    /// What a radio means for a flight by surfaces. ArduPlane goes on with the radio's sticks when
-    /// our overrides end, and stays in MANUAL: no failsafe of its own acts.
+    /// What a radio means for a flight by surfaces. ArduPlane goes on with the radio's sticks when our overrides end, and
+    /// stays in MANUAL until its failsafe of the ground station acts, whose place the companion takes.
     pub fn radio_warning(&self) -> Option<String> {
         let by_channels =
             (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);
         (by_channels && self.radio == Some(true)).then(|| {
-            "a radio is bound: if this computer dies, ArduPilot stays in MANUAL on the radio's \
-             sticks. Put its throttle at cruise and be ready to fly"
-                .to_owned()
+            let patience = self.parameters.get("FS_LONG_TIMEOUT").unwrap_or(f64::NAN);
+            format!(
+                "a radio is bound: if this computer dies, ArduPilot flies on the radio's sticks in MANUAL for {patience} s, \
+                 then returns. Put its throttle at cruise and be ready to fly"
+            )
         })
     }
 
@@ -53,7 +55,9 @@ impl Real {
         if self.is_shut_out() {
             return Some(SHUT_OUT.into());
         }
-        self.parameters.obstacle(controller.system).or_else(|| self.thin_stream())
+        let radio = self.radio == Some(true);
+        let parameters = self.parameters.obstacle(controller.system, radio);
+        parameters.or_else(|| self.delay_obstacle()).or_else(|| self.thin_stream())
     }
 
     /// A stream that comes too seldom.

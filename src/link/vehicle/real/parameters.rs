@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use super::profile::{Need, Presence, Rule};
+use super::profile::{Matters, Need, Presence, Rule};
 
 /// Between two requests for the same parameter.
 const AGAIN: Duration = Duration::from_millis(400);
@@ -95,15 +95,16 @@ impl Parameters {
         entry.value.map(|(_, value)| value)
     }
 
-    /// Each parameter by the name that the controller knows it by, with how it stands and the words
-    /// that say what to do.
-    pub fn report(&self, system: u8) -> Vec<(&'static str, Standing, String)> {
-        self.entries.iter().map(|entry| entry.report(system)).collect()
+    /// Each parameter that matters by the name that the controller knows it by, with how it stands and the words
+    /// that say what to do. `radio`: whether the controller hears one.
+    pub fn report(&self, system: u8, radio: bool) -> Vec<(&'static str, Standing, String)> {
+        let matters = |entry: &&Entry| radio || entry.rule.matters == Matters::Always;
+        self.entries.iter().filter(matters).map(|entry| entry.report(system)).collect()
     }
 
     /// Why the profile cannot be flown with these parameters, each mismatch with its remedy.
-    pub(super) fn obstacle(&self, system: u8) -> Option<String> {
-        let report = self.report(system);
+    pub(super) fn obstacle(&self, system: u8, radio: bool) -> Option<String> {
+        let report = self.report(system, radio);
         let unread = report.iter().filter(|(_, standing, _)| *standing == Standing::Unread).count();
         if unread > 0 {
             return Some(format!("still reading {unread} parameters from the controller"));
@@ -153,7 +154,8 @@ impl Entry {
 }
 
 impl Need {
-    fn allows(self, value: f64, system: u8) -> bool {
+    /// Whether a parameter may have this value at the controller of system `system`.
+    pub fn allows(self, value: f64, system: u8) -> bool {
         match self {
             Need::OneOf(values) => values.contains(&value),
             Need::Between(low, high) => (low - 1e-6..=high + 1e-6).contains(&value),
@@ -188,16 +190,16 @@ mod tests {
     #[test]
     fn the_remedies_themselves_are_accepted_by_an_older_name_too() {
         let parameters = answered(|_| None);
-        assert_eq!(parameters.obstacle(1), None);
+        assert_eq!(parameters.obstacle(1, false), None);
         assert_eq!(parameters.get("MAV_GCS_SYSID"), Some(1.0));
     }
 
     #[test]
     fn a_mismatch_is_said_with_the_value_to_set() {
         let parameters = answered(|name| (name == "RC_OVERRIDE_TIME").then_some(3.0));
-        let words = parameters.obstacle(1).unwrap();
+        let words = parameters.obstacle(1, false).unwrap();
         assert!(words.contains("RC_OVERRIDE_TIME is 3: set it to 0.5"), "{words}");
-        let words = parameters.obstacle(7).unwrap();
+        let words = parameters.obstacle(7, false).unwrap();
         assert!(words.contains("SYSID_MYGCS is 1: set it to 7"), "{words}");
     }
 
@@ -210,27 +212,41 @@ mod tests {
         };
         let mut old = attitude();
         old.take("SCHED_LOOP_RATE", 200.0);
-        assert_eq!(asked(old).obstacle(1), None);
+        assert_eq!(asked(old).obstacle(1, false), None);
         let mut new = attitude();
         new.take("SCHED_LOOP_RATE", 200.0);
         new.take("GUIDED_TIMEOUT", 3.0);
-        let words = asked(new).obstacle(1).unwrap();
+        let words = asked(new).obstacle(1, false).unwrap();
         assert!(words.contains("GUIDED_TIMEOUT is 3: set it to 0.5"), "{words}");
+    }
+
+    #[test]
+    fn what_a_radio_asks_for_matters_while_one_is_bound() {
+        let parameters = answered(|name| match name {
+            "FS_GCS_ENABL" => Some(0.0),
+            "MAV_GCS_SYSID_HI" => Some(255.0),
+            _ => None,
+        });
+        assert_eq!(parameters.obstacle(1, false), None);
+        let words = parameters.obstacle(1, true).unwrap();
+        assert!(words.contains("FS_GCS_ENABL is 0: set it to 1 (a radio is bound"), "{words}");
+        assert!(words.contains("MAV_GCS_SYSID_HI is 255: set it to 0"), "{words}");
+        assert_eq!(answered(|_| None).obstacle(1, true), None);
     }
 
     #[test]
     fn a_bit_that_must_be_clear_is_said_with_the_rest_kept() {
         let parameters = answered(|name| (name == "RC_OPTIONS").then_some(34.0));
-        let words = parameters.obstacle(1).unwrap();
+        let words = parameters.obstacle(1, false).unwrap();
         assert!(words.contains("RC_OPTIONS is 34: set it to 32"), "{words}");
     }
 
     #[test]
     fn a_controller_that_does_not_answer_is_named() {
         let mut parameters = Parameters::new(Stack::Px4.rules(Authority::Attitude));
-        assert!(parameters.obstacle(1).unwrap().contains("still reading 2"));
+        assert!(parameters.obstacle(1, false).unwrap().contains("still reading 2"));
         (0..100).for_each(|step| drop(parameters.due(AGAIN * step)));
-        assert!(parameters.obstacle(1).unwrap().contains("COM_OF_LOSS_T is unknown"));
+        assert!(parameters.obstacle(1, false).unwrap().contains("COM_OF_LOSS_T is unknown"));
     }
 
     #[test]
@@ -254,14 +270,14 @@ mod tests {
         parameters.take("COM_OBL_RC_ACT", 5.0);
         for (value, good) in [(0.1, true), (0.5, true), (0.0999, false), (0.5001, false)] {
             parameters.take("COM_OF_LOSS_T", value);
-            assert_eq!(parameters.obstacle(1).is_none(), good, "{value}");
+            assert_eq!(parameters.obstacle(1, false).is_none(), good, "{value}");
         }
     }
 
     #[test]
     fn only_the_forbidden_bits_are_to_be_cleared() {
         let parameters = answered(|name| (name == "RC_OPTIONS").then_some(42.0));
-        let words = parameters.obstacle(1).unwrap();
+        let words = parameters.obstacle(1, false).unwrap();
         assert!(words.contains("RC_OPTIONS is 42: set it to 40"), "{words}");
     }
 }

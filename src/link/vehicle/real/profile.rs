@@ -124,10 +124,26 @@ pub struct Rule {
     pub why: &'static str,
     /// Whether it may be missing.
     pub presence: Presence,
+    /// When it matters.
+    pub matters: Matters,
+}
+
+/// When a parameter matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Matters {
+    /// Always.
+    Always,
+    /// While the controller hears a radio.
+    WithRadio,
 }
 
 const fn rule(names: &'static [&'static str], need: Need, remedy: f64, why: &'static str) -> Rule {
-    Rule { names, need, remedy, why, presence: Presence::Required }
+    let (presence, matters) = (Presence::Required, Matters::Always);
+    Rule { names, need, remedy, why, presence, matters }
+}
+
+const fn with_radio(rule: Rule) -> Rule {
+    Rule { matters: Matters::WithRadio, ..rule }
 }
 
 const fn optional(rule: Rule) -> Rule {
@@ -137,7 +153,7 @@ const fn optional(rule: Rule) -> Rule {
 const ONE: &[f64] = &[1.0];
 const ZERO: &[f64] = &[0.0];
 
-const PX4_SURFACES: [Rule; 7] = [
+const PX4_SURFACES: [Rule; 8] = [
     rule(
         &["COM_RC_IN_MODE"],
         Need::OneOf(&[1.0, 2.0, 3.0, 5.0, 6.0, 7.0, 8.0]),
@@ -160,6 +176,7 @@ const PX4_SURFACES: [Rule; 7] = [
     rule(&["FW_MAN_P_SC"], Need::OneOf(ONE), 1.0, "full stick must be full elevator"),
     rule(&["TRIM_ROLL"], Need::Between(-0.25, 0.25), 0.0, "it is added to the aileron"),
     rule(&["TRIM_PITCH"], Need::Between(-0.25, 0.25), 0.0, "it is added to the elevator"),
+    optional(rule(&["IMU_GYRO_CUTOFF"], Need::Between(0.0, 2000.0), 40.0, FILTER)),
 ];
 
 const PX4_ATTITUDE: [Rule; 2] = [
@@ -172,7 +189,7 @@ const PX4_ATTITUDE: [Rule; 2] = [
     rule(&["COM_OBL_RC_ACT"], Need::OneOf(&[5.0]), 5.0, "it must hold, not wait for a radio"),
 ];
 
-const ARDUPILOT_SURFACES: [Rule; 24] = [
+const ARDUPILOT_SURFACES: [Rule; 28] = [
     rule(
         &["RC_OVERRIDE_TIME"],
         Need::Between(0.1, 0.5),
@@ -185,11 +202,20 @@ const ARDUPILOT_SURFACES: [Rule; 24] = [
         1.0,
         "overrides of other systems are ignored",
     ),
-    rule(&["SCHED_LOOP_RATE"], LOOP_RATE, 200.0, "a stream is sent at 0.8 of it at most"),
+    rule(
+        &["SCHED_LOOP_RATE"],
+        LOOP_RATE,
+        250.0,
+        "a stream is sent at 0.8 of it at most, and the loop is late by it",
+    ),
+    rule(&["INS_GYRO_FILTER"], Need::Between(0.0, 2000.0), 80.0, FILTER),
     rule(&["THR_FAILSAFE"], Need::OneOf(ONE), 1.0, NO_RADIO),
     rule(&["FS_SHORT_ACTN"], Need::OneOf(&[0.0, 1.0]), 0.0, NO_RADIO),
     rule(&["FS_LONG_ACTN"], Need::OneOf(&[0.0, 1.0]), 1.0, NO_RADIO),
     optional(rule(&["RC_FS_TIMEOUT"], Need::Between(0.1, 1.0), 1.0, NO_RADIO)),
+    with_radio(rule(&["FS_GCS_ENABL"], Need::OneOf(&[1.0, 2.0]), 1.0, RADIO)),
+    with_radio(rule(&["FS_LONG_TIMEOUT"], Need::Between(1.5, 3.0), 2.0, RADIO)),
+    optional(with_radio(rule(&["MAV_GCS_SYSID_HI"], Need::OneOf(ZERO), 0.0, STATION))),
     rule(&["RC_OPTIONS"], Need::Without(2), 32.0, "bit 1 makes it ignore overrides"),
     rule(&["RCMAP_ROLL"], Need::OneOf(ONE), 1.0, "channel 1 is sent as roll"),
     rule(&["RCMAP_PITCH"], Need::OneOf(&[2.0]), 2.0, "channel 2 is sent as pitch"),
@@ -209,9 +235,13 @@ const ARDUPILOT_SURFACES: [Rule; 24] = [
     rule(&["RC3_REVERSED"], Need::OneOf(&[0.0, 1.0]), 0.0, SCALE),
 ];
 const NO_RADIO: &str = "without a radio the controller must act when the companion is dead";
+const RADIO: &str = "a radio is bound: nothing else makes ArduPlane leave MANUAL when the companion dies; or fly with --command attitude";
+const STATION: &str =
+    "a radio is bound: a ground station's heartbeats would hide that the companion is dead";
+const FILTER: &str = "a low-pass of the gyros makes the loop late";
 const SCALE: &str = "the pulses are scaled by it";
-/// 100 Hz of state at 0.8 of the loop's rate.
-const LOOP_RATE: Need = Need::Between(125.0, 2000.0);
+/// 100 Hz of state are 0.8 of 125 Hz; below 200 Hz nothing was flown.
+const LOOP_RATE: Need = Need::Between(200.0, 2000.0);
 
 const ARDUPILOT_ATTITUDE: [Rule; 2] = [
     rule(&["SCHED_LOOP_RATE"], LOOP_RATE, 200.0, "a stream is sent at 0.8 of it at most"),

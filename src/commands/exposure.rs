@@ -1,0 +1,60 @@
+//! Who can reach the clients' links: this machine alone, whoever has the key, or, said aloud, anybody.
+
+use anyhow::{Result, bail};
+
+use crate::link::address::Address;
+
+/// Refuses links that other machines reach without a signature, unless they are to be. What is to be said of them then.
+///
+/// # Errors
+/// If there are such links and nobody has asked for them.
+pub fn check<'a>(
+    unsigned: impl Iterator<Item = &'a Address>,
+    asked: Asked,
+) -> Result<Option<String>> {
+    let open: Vec<String> =
+        unsigned.filter(|address| !address.stays_here()).map(Address::to_string).collect();
+    if open.is_empty() {
+        return Ok(None);
+    }
+    let links = open.join(", ");
+    if asked == Asked::Nothing {
+        bail!(
+            "other machines reach {links}, and whoever reaches it steers the aircraft: sign it (`greylag link key FILE`, \
+             then --sign FILE), or say --insecure"
+        );
+    }
+    Ok(Some(format!("INSECURE: whoever reaches {links} steers the aircraft")))
+}
+
+/// What the user has asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// Nothing beyond what is safe.
+    Nothing,
+    /// Links that anybody may use.
+    Insecure,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_leaves_this_machine_unsigned_is_refused_until_it_is_asked_for_and_then_said() {
+        let addresses = |texts: &[&str]| -> Vec<Address> {
+            texts.iter().map(|text| text.parse().unwrap()).collect()
+        };
+        let here = addresses(&["udpin:127.0.0.1:14550", "udpout:127.0.0.1:14540"]);
+        assert_eq!(check(here.iter(), Asked::Nothing).unwrap(), None);
+        let open = addresses(&["udpin:127.0.0.1:14550", "udpin:0.0.0.0:14550"]);
+        let refused = check(open.iter(), Asked::Nothing).unwrap_err().to_string();
+        assert!(
+            refused.contains("udpin:0.0.0.0:14550") && refused.contains("greylag link key"),
+            "{refused}"
+        );
+        assert!(!refused.contains("127.0.0.1"), "{refused}");
+        let said = check(open.iter(), Asked::Insecure).unwrap().unwrap();
+        assert!(said.contains("INSECURE: whoever reaches udpin:0.0.0.0:14550"), "{said}");
+    }
+}

@@ -1,0 +1,74 @@
+//! `greylag faults --monitor`: how often the model monitor is wrong, and how soon it is right.
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use comfy_table::Table;
+use comfy_table::presets::NOTHING;
+use rayon::prelude::*;
+
+use crate::sim::faults::{ATTITUDE_DEG, CompanionFactory, FAILS_S, Failure, Watched};
+
+/// Share of healthy flights that may be accused: one in forty.
+const FALSE_ALARMS: f64 = 1.0 / 40.0;
+
+/// Flies and prints a table; the exit status tells whether too many healthy flights were accused.
+///
+/// # Errors
+/// If the aircraft cannot be made.
+pub fn run(factory: &CompanionFactory, first: u64, flights: u64) -> Result<ExitCode> {
+    let [roll, pitch, heading] = ATTITUDE_DEG;
+    println!(
+        "{flights} flights of 60 s each beside a played ArduPlane, attitude off by up to {roll} deg in roll, {pitch} in pitch, \
+         {heading} in heading; surfaces stick at {FAILS_S} s"
+    );
+    let mut table = Table::new();
+    table.load_style(NOTHING);
+    table.set_header(["aircraft", "engaged", "false alarms", "found", "delay, median", "90 %"]);
+    let mut accused = 0;
+    for failure in Failure::ALL {
+        let watched: Result<Vec<Watched>, _> = (first..first + flights)
+            .into_par_iter()
+            .map(|seed| factory.watched(seed, failure))
+            .collect();
+        let watched = watched?;
+        let alarms: usize = watched.iter().map(|w| w.false_alarms(failure)).sum();
+        if failure == Failure::None {
+            accused = watched.iter().filter(|w| w.false_alarms(failure) > 0).count();
+        }
+        table.add_row(row(failure, &watched, alarms));
+        for (seed, flight) in (first..).zip(&watched) {
+            for (at, words) in flight.said.iter().filter(|_| flight.false_alarms(failure) > 0) {
+                let [r, p, y] = flight.attitude_error_deg;
+                println!(
+                    "seed {seed}, {} ({r:+.1}, {p:+.1}, {y:+.1} deg off): {at:.1} s: {words}",
+                    failure.name()
+                );
+            }
+        }
+    }
+    println!("{table}");
+    let bound = FALSE_ALARMS * flights as f64;
+    println!("healthy flights accused: {accused} of {flights} (at most 1 in 40)");
+    Ok(if accused as f64 <= bound.max(0.0) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn row(failure: Failure, watched: &[Watched], alarms: usize) -> Vec<String> {
+    let engaged = watched.iter().filter(|w| w.since_s.is_some()).count();
+    let mut delays: Vec<f64> = watched.iter().filter_map(Watched::delay_s).collect();
+    delays.sort_by(f64::total_cmp);
+    let at = |share: f64| {
+        // Those that were never found count as later than all.
+        let index = (share * engaged.max(1) as f64).ceil() as usize;
+        delays.get(index.saturating_sub(1)).map_or("-".into(), |s| format!("{s:.1} s"))
+    };
+    let found = |words: String| if failure == Failure::None { "-".into() } else { words };
+    vec![
+        failure.name().into(),
+        engaged.to_string(),
+        alarms.to_string(),
+        found(format!("{} of {engaged}", delays.len())),
+        found(at(0.5)),
+        found(at(0.9)),
+    ]
+}

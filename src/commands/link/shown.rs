@@ -1,0 +1,44 @@
+//! What was found of latency, delay and parameters, in lines.
+
+use std::io::Write;
+
+use super::say;
+use crate::link::vehicle::Real;
+use crate::link::vehicle::real::parameters::Standing;
+
+pub(super) fn latency(real: &Real, out: &mut dyn Write) {
+    let trips = real.survey().round_trips();
+    let at = |share: f64| {
+        let index = ((trips.len() - 1) as f64 * share).round() as usize;
+        trips[index].as_secs_f64() * 1e3
+    };
+    match trips.is_empty() {
+        true => say!(out, "latency     TIMESYNC is not answered"),
+        false => say!(
+            out,
+            "latency     TIMESYNC there and back: median {:.1}, 95 % {:.1}, longest {:.1} ms ({} trips)",
+            at(0.5),
+            at(0.95),
+            at(1.0),
+            trips.len()
+        ),
+    }
+}
+
+/// What of the delay that the controller bears is left.
+pub(super) fn delay(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
+    if let Some(words) = real.delay_words() {
+        say!(out, "\ndelay       {words}");
+    }
+    missing.extend(real.delay_obstacle());
+}
+
+pub(super) fn parameters(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
+    say!(out, "\nparameters");
+    for (_, standing, words) in real.parameter_report() {
+        say!(out, "  {words}");
+        if !matches!(standing, Standing::Good(_) | Standing::Absent) {
+            missing.push(words);
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! The delay that a controller bears, for whoever flies through a flight controller's channels.
+
+use std::time::Duration;
+
+use anyhow::Result;
+
+use crate::control::{ControllerKind, Pace, build};
+use crate::flight::delay_margin;
+use crate::model::GreyBox;
+
+/// The least delay at which the loop of `kind` on `model` swings by itself. For a planner, which takes too long to ask, and for a
+/// policy, which has no design, it is that of the LQI: their fallback.
+///
+/// # Errors
+/// If the controller cannot be built.
+pub fn of(kind: ControllerKind, model: &GreyBox) -> Result<Option<Duration>> {
+    let designed = matches!(
+        kind,
+        ControllerKind::Lqi
+            | ControllerKind::LqiDamped
+            | ControllerKind::Pid
+            | ControllerKind::PidRetuned
+    );
+    let kind = if designed && kind.pace() != Pace::Planned { kind } else { ControllerKind::Lqi };
+    match build(kind, model) {
+        Ok(controller) => Ok(delay_margin(controller.as_ref(), model)),
+        // No LQI: what flies then was said already, and nothing is known of its delay.
+        Err(_) if !designed => Ok(None),
+        Err(why) => Err(why.into()),
+    }
+}

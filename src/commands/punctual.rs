@@ -1,0 +1,40 @@
+//! Whether this computer is on time: measured at the start of a flight, with what can be done about it.
+
+use std::time::Duration;
+
+use crate::flight::runtime::{Class, Punctuality, take_real_time};
+
+/// How long is measured: two hundred cycles.
+const MEASURED: Duration = Duration::from_secs(2);
+
+/// The scheduler's class of the flight: that of real time if `wanted` and permitted. Threads started later inherit it.
+pub fn class(wanted: bool) -> Class {
+    if !wanted {
+        return Class::Usual;
+    }
+    match take_real_time() {
+        Ok(()) => Class::RealTime,
+        Err(why) => {
+            eprintln!(
+                "greylag: --realtime: SCHED_FIFO is refused ({why}); flying without it. Permit it with \
+                 `sudo setcap cap_sys_nice+ep \"$(command -v greylag)\"`, or start as the service of the package"
+            );
+            Class::Usual
+        }
+    }
+}
+
+/// Measures for two seconds beside the flight, then says on the console how punctual this computer is.
+pub fn tell(class: Class) {
+    let measured = move || {
+        let punctuality = Punctuality::measure(MEASURED);
+        let class_words = if class == Class::RealTime { "SCHED_FIFO, " } else { "" };
+        println!("timing     {class_words}{punctuality}");
+        for line in punctuality.advice(class) {
+            println!("timing     advice: {line}");
+        }
+    };
+    if let Err(why) = std::thread::Builder::new().name("timing".into()).spawn(measured) {
+        eprintln!("greylag: the punctuality of this computer is not measured: {why}");
+    }
+}

@@ -1,0 +1,149 @@
+//! How much delay a loop bears: the least at which it swings by itself, on the model.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use crate::pilot::TICK_S;
+use greylag_control::{Controller, Observation, Target};
+use greylag_model::{GreyBox, Trim, Twin};
+use greylag_physics::actuators::Actuators;
+use greylag_physics::{Command, Time};
+
+/// Delays that are tried, ms: a loop that bears the last bears enough.
+const STEP_MS: usize = 4;
+const LONGEST_MS: usize = 120;
+/// A flight of so many ticks, with a pulse of full deflection in these; its end shows whether the loop swings on.
+const TICKS: usize = 700;
+const PULSE: std::ops::Range<usize> = 100..110;
+const END: usize = 500;
+/// Swing of a rate, from peak to peak at the end of a flight, that counts as swinging, rad/s (10 °/s).
+const SWING: f64 = 0.17;
+/// A cycle, ms.
+const TICK_MS: usize = 10;
+
+/// The least delay at which `controller` makes the pitch or the roll loop of `model` swing by itself after a pulse of full
+/// deflection, in level flight at the cruise airspeed; `None` if it bears 0.12 s.
+///
+/// The surfaces are thought of as undelayed, as beside a real flight controller, which does not report them. It
+/// takes a second for a controller that needs microseconds.
+pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Duration> {
+    let mut delays = (0..=LONGEST_MS).step_by(STEP_MS);
+    let swings = |delay: usize| {
+        [Axis::Pitch, Axis::Roll].into_iter().any(|axis| swings(controller, model, axis, delay))
+    };
+    delays.find(|delay| swings(*delay)).map(|ms| Duration::from_millis(ms as u64))
+}
+
+/// The axis whose surface is late.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Axis {
+    Pitch,
+    Roll,
+}
+
+/// Whether the loop swings on after the pulse.
+fn swings(controller: &dyn Controller, model: &GreyBox, axis: Axis, delay_ms: usize) -> bool {
+    let envelope = &model.airframe.envelope;
+    let airspeed = envelope.airspeed_cruise_mps;
+    let Ok(trim) = Trim::straight(model, airspeed, ALTITUDE_M) else { return false };
+    let mut controller = controller.boxed_clone();
+    controller.reset(0);
+    let mut twin = Twin::at_rest(trim.state, &trim.controls, ALTITUDE_M);
+    let figures = &model.airframe.actuators;
+    let level = {
+        let [aileron, elevator] = [figures.aileron, figures.elevator].map(|s| s.travel.largest());
+        Command {
+            aileron: trim.controls.aileron / aileron,
+            elevator: trim.controls.elevator / elevator,
+            throttle: trim.controls.throttle,
+            rudder: 0.0,
+        }
+    };
+    let mut thought = Actuators::at_rest(&trim.controls);
+    let step = envelope.surface_slew_per_s * TICK_S;
+    let target = Target { roll: 0.0, pitch: trim.state.pitch, airspeed };
+    let mut late = VecDeque::from(vec![level; delay_ms / TICK_MS + 2]);
+    let mut previous = [level; 2];
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+    for tick in 0..TICKS {
+        let seen = Observation {
+            time: Time::from_micros(10_000 * tick as u64),
+            state: twin.state,
+            actuators: thought.observed(figures),
+            altitude: twin.altitude,
+            previous,
+        };
+        let wanted = controller.command(&seen, &target).clamped();
+        let now = slewed(previous[0], wanted, step);
+        previous = [now, previous[0]];
+        thought.step(&now, figures);
+        late.pop_front();
+        late.push_back(now);
+        let mut flown = delayed(&late, now, axis, delay_ms);
+        if PULSE.contains(&tick) {
+            let surface = surface(&mut flown, axis);
+            *surface = (*surface + 1.0).clamp(-1.0, 1.0);
+        }
+        twin.step(model, &flown);
+        let rate = if axis == Axis::Pitch { twin.state.q } else { twin.state.p };
+        if !rate.is_finite() {
+            return true;
+        }
+        if tick >= END {
+            range = [range[0].min(rate), range[1].max(rate)];
+        }
+    }
+    range[1] - range[0] > SWING
+}
+
+/// Altitude of the flights, m.
+const ALTITUDE_M: f64 = 600.0;
+
+fn surface(command: &mut Command, axis: Axis) -> &mut f64 {
+    match axis {
+        Axis::Pitch => &mut command.elevator,
+        Axis::Roll => &mut command.aileron,
+    }
+}
+
+/// What the actuators get: one surface late, by whole cycles and the share of one, in which the older command acts.
+fn delayed(late: &VecDeque<Command>, now: Command, axis: Axis, delay_ms: usize) -> Command {
+    let (whole, share) = (delay_ms / TICK_MS, (delay_ms % TICK_MS) as f64 / TICK_MS as f64);
+    let newest = late.len() - 1;
+    let at = |back: usize| *surface(&mut { late[newest - back] }, axis);
+    let value = share * at(whole + 1) + (1.0 - share) * at(whole);
+    let mut flown = now;
+    *surface(&mut flown, axis) = value;
+    flown
+}
+
+fn slewed(before: Command, wanted: Command, step: f64) -> Command {
+    let near = |from: f64, to: f64| to.clamp(from - step, from + step);
+    Command {
+        aileron: near(before.aileron, wanted.aileron),
+        elevator: near(before.elevator, wanted.elevator),
+        rudder: near(before.rudder, wanted.rudder),
+        throttle: wanted.throttle,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use greylag_control::{ControllerKind, build};
+    use std::path::Path;
+
+    #[test]
+    fn the_model_says_of_delay_what_the_official_simulator_does() {
+        // Swinging by itself in JSBSim's steps of 1 ms, after a pulse of full deflection: `lqi` from 46 ms in pitch on, `lqi-damped`
+        // from 104 ms (`examples/delay_margin.rs`).
+        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let margin = |kind| {
+            delay_margin(build(kind, &model).unwrap().as_ref(), &model)
+                .map_or(120, |d| d.as_millis())
+        };
+        let (lqi, damped) = (margin(ControllerKind::Lqi), margin(ControllerKind::LqiDamped));
+        assert!((36..=56).contains(&lqi), "{lqi}");
+        assert!(damped >= 90, "{damped}");
+    }
+}

@@ -1,0 +1,45 @@
+//! Complaints: what goes on being wrong is said now and then, not at every tick.
+
+use super::Pilot;
+use super::estimate::within;
+use super::telemetry::LATE_AIR;
+use greylag_link::autopilot::Severity;
+use greylag_physics::Time;
+
+/// Least time between two lines about the same kind of trouble, s.
+const COMPLAINT_INTERVAL_S: f64 = 5.0;
+
+/// Airspeed and altitude that are late for this time are said to be, s: after a gap the first is 20 ms away.
+const LATE_AIR_S: f64 = 0.5;
+
+/// When each kind of trouble was last reported.
+#[derive(Debug, Default)]
+pub(super) struct Complaints {
+    pub(super) defect: Option<Time>,
+    pub(super) plan: Option<Time>,
+    pub(super) fallback: Option<Time>,
+    pub(super) limits: Option<Time>,
+}
+
+impl Pilot {
+    pub(super) fn complain_of_state(&mut self, reason: &'static str) {
+        if reason == LATE_AIR {
+            let since = *self.air_late.get_or_insert(self.clock);
+            if within(Some(since), self.clock, LATE_AIR_S) {
+                return;
+            }
+        }
+        if due(&mut self.complaints.defect, self.clock) {
+            self.texts.say(Severity::Error, format!("vehicle state refused: {reason}"));
+        }
+    }
+}
+
+/// Whether a complaint may be made again at `now`; notes it if so.
+pub(super) fn due(last: &mut Option<Time>, now: Time) -> bool {
+    let silent = within(*last, now, COMPLAINT_INTERVAL_S);
+    if !silent {
+        *last = Some(now);
+    }
+    !silent
+}

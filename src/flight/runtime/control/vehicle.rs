@@ -1,0 +1,184 @@
+//! The side of the vehicle: the newest state is flown on, those that it has overtaken are history.
+
+use std::time::{Duration, Instant};
+
+use super::{CYCLE, Control, LOAD_WEIGHT};
+use crate::pilot::{Decision, Plan};
+use crate::recorder::call::Planned;
+use crate::recorder::{Call, Row};
+use crate::runtime::stamps::unix_us;
+use crate::runtime::{Event, Pace};
+use greylag_link::autopilot::{Autopilot, Severity};
+use greylag_link::peer::PeerId;
+use greylag_link::transport::Arrival;
+use greylag_link::vehicle::{Notice, Order, Telemetry};
+
+/// States in one packet at most: a TCP chunk of 1024 bytes holds four.
+const STATES_PER_PACKET: usize = 8;
+
+/// A state with the packet that completed it.
+#[derive(Clone, Copy)]
+struct Heard {
+    state: Telemetry,
+    peer: PeerId,
+    arrived: Instant,
+}
+
+impl Control {
+    /// Takes `arrival` and all that waits behind it. In real time only the newest state is answered: what an aircraft did
+    /// before it is history. In lockstep the vehicle waits for each answer.
+    pub(super) fn take_vehicles(&mut self, arrival: Arrival) {
+        let mut newest = self.take_vehicle(arrival, None);
+        if self.clock.pace() == Pace::RealTime {
+            // What comes meanwhile is for the next turn.
+            for _ in 0..self.ports.from_vehicle.len() {
+                let Ok(arrival) = self.ports.from_vehicle.try_recv() else { break };
+                newest = self.take_vehicle(arrival, newest);
+            }
+        }
+        if let Some(heard) = newest {
+            self.tick(&heard);
+        }
+        self.heed_vehicle();
+    }
+
+    /// Takes one arrival; the newest state now, `newest` or one that came with it.
+    fn take_vehicle(&mut self, arrival: Arrival, newest: Option<Heard>) -> Option<Heard> {
+        let packet = match arrival {
+            Arrival::Packet(mut packet) => {
+                self.ports.sift(unix_us(), &mut packet);
+                packet
+            }
+            Arrival::Remark(remark) => {
+                self.remark(&remark);
+                return newest;
+            }
+            Arrival::Opened(_) | Arrival::Closed(_) => return newest,
+        };
+        self.record(packet.arrived, &packet.bytes);
+        // The vehicle is taken out for the time of the call, since each tick answers through it.
+        let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
+        let mut places = states.iter_mut();
+        self.vehicle.handle(
+            packet.arrived.saturating_duration_since(self.started),
+            packet.peer,
+            &packet.bytes,
+            |state| {
+                if let Some(place) = places.next() {
+                    *place = Some(state);
+                }
+            },
+        );
+        if let Some(router) = &self.router {
+            for peer in self.clients.peers() {
+                let frames = router.to_client(&packet.bytes, peer);
+                if !frames.is_empty() {
+                    self.ports.send_to_client(unix_us(), peer, frames);
+                }
+            }
+        }
+        let mut newest = newest;
+        for state in states.into_iter().flatten().filter(|state| state.order != Order::Late) {
+            let heard = Heard { state, peer: packet.peer, arrived: packet.arrived };
+            match (newest.replace(heard), self.clock.pace()) {
+                (Some(_), Pace::RealTime) => self.timing.overtaken += 1,
+                (Some(before), Pace::Lockstep) => self.tick(&before),
+                (None, _) => {}
+            }
+        }
+        newest
+    }
+
+    fn tick(&mut self, heard: &Heard) {
+        let Heard { state, peer, arrived } = heard;
+        self.clock.set(*arrived, state.time);
+        let request = self.pilot.observe(state.time, state);
+        let plan = request.map_or(Plan::None, |request| self.planner.plan(&request, *arrived));
+        let decision = self.pilot.decide(plan);
+        let demand = decision.demand();
+        self.outputs = demand.outputs;
+        let host = arrived.saturating_duration_since(self.started);
+        let frame = self.vehicle.answer(host, state.time, &demand);
+        let copy = (self.recorder.is_some() && !frame.is_empty()).then(|| frame.clone());
+        if !frame.is_empty() {
+            self.ports.send_to_vehicle(unix_us(), *peer, frame);
+        }
+        let latency = arrived.elapsed();
+        if let Some(frame) = copy {
+            self.record(Instant::now(), &frame);
+        }
+        let planned = match plan {
+            Plan::Ready(command) => Planned::Ready(command),
+            Plan::Late => Planned::Late,
+            Plan::Busy => Planned::Busy,
+            Plan::None => Planned::None,
+        };
+        self.note(Call::Tick(state.time, planned, decision.command));
+        self.account(heard, &decision, plan, latency);
+    }
+
+    /// Notes timing and the row of a tick, after its command is out.
+    fn account(&mut self, heard: &Heard, decision: &Decision, plan: Plan, latency: Duration) {
+        let Heard { state, peer, arrived } = heard;
+        if self.last_arrival.is_none() {
+            self.say(Event::VehicleFound(*peer));
+        }
+        if let Some(last) = self.last_arrival.replace(*arrived) {
+            self.timing.interval.note(arrived.saturating_duration_since(last));
+        }
+        self.timing.latency.note(latency);
+        self.timing.missed += u64::from(match self.clock.pace() {
+            Pace::RealTime => latency > CYCLE,
+            Pace::Lockstep => state.order == Order::Repeated,
+        });
+        self.timing.late_plans += u64::from(matches!(plan, Plan::Late | Plan::Busy));
+        let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
+        self.load += LOAD_WEIGHT * (share - self.load);
+        // What surfaces do that were not commanded by us is not known.
+        match self.vehicle.moves_surfaces() {
+            true => self.pilot.monitor(state),
+            false => self.pilot.forget_residuals(),
+        }
+        let shown = self.vehicle.flies_surfaces();
+        if let Some(recorder) = self.recorder.as_ref().filter(|_| state.order != Order::Repeated) {
+            let latency_us = latency.as_secs_f64() * 1e6;
+            let mut row = Row::new(state, decision, latency_us);
+            row.residuals = self.pilot.residual_shares();
+            recorder.row(if shown { row } else { row.without_surfaces() });
+        }
+    }
+
+    /// Does what the vehicle has to tell.
+    pub(super) fn heed_vehicle(&mut self) {
+        while let Some(notice) = self.vehicle.take_notice() {
+            if let Some(words) = notice.ending() {
+                let now = self.clock.at(Instant::now());
+                self.note(Call::Disarm(now, true));
+                // Its verdict cannot be a refusal: it is forced.
+                let _ = self.pilot.disarm(now, true);
+                self.pilot.tell(Severity::Critical, &words);
+            }
+            match notice {
+                Notice::Text(severity, words) => self.pilot.tell(severity, &words),
+                Notice::System(system) => self.clients.adopt(system),
+                Notice::Engaged => {
+                    let now = self.clock.at(Instant::now());
+                    self.note(Call::Engaged(now));
+                    self.pilot.engaged(now);
+                }
+                Notice::Released(_) | Notice::HandedBack(_) => {}
+            }
+        }
+    }
+
+    /// Sends what is due on the vehicle's link, when there is somebody to hear it.
+    pub(super) fn greet_vehicle(&mut self, host: Duration) {
+        let Some(peer) = self.vehicle.peer().or(self.ports.vehicle_target()) else {
+            return;
+        };
+        if let Some(frame) = self.vehicle.due(host, self.outputs) {
+            self.record(Instant::now(), &frame);
+            self.ports.send_to_vehicle(unix_us(), peer, frame);
+        }
+    }
+}

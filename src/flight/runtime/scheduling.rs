@@ -1,0 +1,152 @@
+//! How punctually this computer wakes a thread, and the scheduler's class for those that must be on time.
+
+use std::fmt;
+use std::io;
+use std::time::{Duration, Instant};
+
+use super::timing::Histogram;
+
+/// Priority among the real-time threads, 1..99: above most, below the kernel's own (50 where interrupts have threads).
+const PRIORITY: i32 = 40;
+/// The cycle that is measured.
+const CYCLE: Duration = Duration::from_millis(10);
+/// A share of 0.01 of the wakings may be later than this, and none than that: a plan has 8 ms of a cycle of 10 ms.
+const LATE: (Duration, Duration) = (Duration::from_millis(2), Duration::from_millis(5));
+
+/// Puts this thread, and all that it starts, into the scheduler's class SCHED_FIFO: it runs before everything that is not.
+///
+/// # Errors
+/// If the system does not permit it, or has no such class.
+pub fn take_real_time() -> io::Result<()> {
+    #[cfg(target_os = "linux")]
+    {
+        let parameters = libc::sched_param { sched_priority: PRIORITY };
+        // SAFETY: the call reads the structure, which lives to its end, and changes this thread alone.
+        let result =
+            unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) };
+        if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+    }
+    #[cfg(not(target_os = "linux"))]
+    Err(io::Error::from(io::ErrorKind::Unsupported))
+}
+
+/// How late a thread wakes that sleeps until each 10 ms.
+#[derive(Clone, Debug, Default)]
+pub struct Punctuality {
+    late: Histogram,
+}
+
+impl Punctuality {
+    /// Measures for `length`, on the calling thread.
+    pub fn measure(length: Duration) -> Self {
+        let mut late = Histogram::default();
+        let start = Instant::now();
+        let mut due = start;
+        while start.elapsed() < length {
+            due += CYCLE;
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+            let woken = Instant::now();
+            late.note(woken.saturating_duration_since(due));
+            // A waking that was missed is not made up for.
+            due = due.max(woken.checked_sub(CYCLE).unwrap_or(woken));
+        }
+        Punctuality { late }
+    }
+
+    /// Takes one waking that was `late`.
+    pub fn note(&mut self, late: Duration) {
+        self.late.note(late);
+    }
+
+    /// Whether a companion can fly by it.
+    pub fn is_good(&self) -> bool {
+        let us = |limit: Duration| limit.as_secs_f64() * 1e6;
+        self.late.quantile_us(0.99) <= us(LATE.0) && self.late.max_us() <= us(LATE.1)
+    }
+
+    /// What can be done about it here, each a sentence.
+    pub fn advice(&self, class: Class) -> Vec<String> {
+        if self.is_good() {
+            return Vec::new();
+        }
+        let mut advice = vec![format!("close other programs{}", load())];
+        if class == Class::Usual && cfg!(target_os = "linux") {
+            advice.push("fly with --realtime, which puts the companion before them".into());
+        }
+        advice.extend(governor());
+        advice
+    }
+}
+
+impl fmt::Display for Punctuality {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "wakes from 10 ms of sleep {:.1} ms late (median), {:.1} ms (1 in 100), {:.1} ms (longest)",
+            self.late.quantile_us(0.5) / 1000.0,
+            self.late.quantile_us(0.99) / 1000.0,
+            self.late.max_us() / 1000.0
+        )
+    }
+}
+
+/// The scheduler's class of the companion's threads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// That of all programs.
+    Usual,
+    /// SCHED_FIFO.
+    RealTime,
+}
+
+fn load() -> String {
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    load.split(' ')
+        .next()
+        .filter(|load| !load.is_empty())
+        .map_or_else(String::new, |load| format!(" (load {load} on {processors} processors)"))
+}
+
+/// The governor of the processor's clock, when it is one that saves power.
+fn governor() -> Option<String> {
+    let path = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor";
+    let governor = std::fs::read_to_string(path).ok()?;
+    let governor = governor.trim();
+    (governor != "performance").then(|| {
+        format!("let the processor run at full clock: sudo cpupower frequency-set -g performance (now {governor})")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn woken(late_ms: &[u64]) -> Punctuality {
+        let mut punctuality = Punctuality::default();
+        late_ms.iter().for_each(|ms| punctuality.note(Duration::from_millis(*ms)));
+        punctuality
+    }
+
+    #[test]
+    fn a_computer_that_wakes_within_two_milliseconds_gets_no_advice() {
+        let good = woken(&[1; 200]);
+        assert!(good.is_good() && good.advice(Class::Usual).is_empty());
+        assert!(!woken(&[&[1; 199][..], &[6]].concat()).is_good(), "one of 6 ms");
+        assert!(!woken(&[&[0; 190][..], &[3; 10]].concat()).is_good(), "one in twenty of 3 ms");
+    }
+
+    #[test]
+    fn real_time_is_advised_to_whoever_does_not_have_it() {
+        let bad = woken(&[&[1; 199][..], &[30]].concat());
+        let names = |class| bad.advice(class).iter().any(|line| line.contains("--realtime"));
+        assert!(names(Class::Usual) && !names(Class::RealTime));
+        assert!(bad.to_string().contains("30.0 ms (longest)"), "{bad}");
+    }
+
+    #[test]
+    fn two_tenths_of_a_second_are_twenty_wakings_at_most() {
+        let measured = Punctuality::measure(Duration::from_millis(200));
+        assert!((1..=20).contains(&measured.late.count()), "{}", measured.late.count());
+    }
+}

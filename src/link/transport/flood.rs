@@ -1,0 +1,127 @@
+//! How much one sender of datagrams is listened to: a flood costs its sender's packets, nobody else's.
+
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+/// Datagrams a second of one sender that are taken: a flight controller that packs each message by itself sends 500, a
+/// parameter list or a log at full speed 1000.
+const PER_SECOND: f64 = 4000.0;
+/// Datagrams in a row: what piles up while this computer stands still for some seconds.
+const BURST: f64 = 1000.0;
+/// Senders that are told apart; all others share one allowance.
+const SENDERS: usize = 64;
+/// A sender that was silent for this long gives its place up.
+const GONE: Duration = Duration::from_secs(1);
+
+/// What each sender may still send.
+#[derive(Debug, Default)]
+pub(super) struct Senders {
+    known: Vec<(SocketAddr, Allowance)>,
+    /// The one that sent last, most probably the next one too.
+    last: usize,
+    strangers: Allowance,
+}
+
+/// What may still be sent, and when that was so.
+#[derive(Clone, Copy, Debug)]
+struct Allowance {
+    left: f64,
+    at: Option<Instant>,
+}
+
+impl Default for Allowance {
+    fn default() -> Self {
+        Allowance { left: BURST, at: None }
+    }
+}
+
+impl Allowance {
+    /// Takes a datagram at `now`, if there is anything left.
+    fn take(&mut self, now: Instant) -> bool {
+        let passed =
+            self.at.replace(now).map_or(Duration::ZERO, |at| now.saturating_duration_since(at));
+        self.left = (self.left + PER_SECOND * passed.as_secs_f64()).min(BURST);
+        let taken = self.left >= 1.0;
+        if taken {
+            self.left -= 1.0;
+        }
+        taken
+    }
+}
+
+impl Senders {
+    /// Whether a datagram of `sender` that came at `now` is taken.
+    pub(super) fn may(&mut self, sender: SocketAddr, now: Instant) -> bool {
+        let known = self.known.get(self.last).is_some_and(|(known, _)| *known == sender);
+        let place = if known { Some(self.last) } else { self.place(sender, now) };
+        match place {
+            Some(at) => {
+                self.last = at;
+                self.known[at].1.take(now)
+            }
+            None => self.strangers.take(now),
+        }
+    }
+
+    /// The place of `sender`: its own, a free one, or that of one that is gone.
+    fn place(&mut self, sender: SocketAddr, now: Instant) -> Option<usize> {
+        let own = self.known.iter().position(|(known, _)| *known == sender);
+        if own.is_some() {
+            return own;
+        }
+        let fresh = (sender, Allowance::default());
+        if self.known.len() < SENDERS {
+            self.known.push(fresh);
+            return Some(self.known.len() - 1);
+        }
+        let gone =
+            |at: Option<Instant>| at.is_none_or(|at| now.saturating_duration_since(at) >= GONE);
+        let at = self.known.iter().position(|(_, allowance)| gone(allowance.at))?;
+        self.known[at] = fresh;
+        Some(at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sender(port: u16) -> SocketAddr {
+        ([127, 0, 0, 1], port).into()
+    }
+
+    #[test]
+    fn a_flood_of_one_sender_is_cut_and_the_other_is_heard_whole() {
+        let start = Instant::now();
+        let mut senders = Senders::default();
+        let mut taken = [0; 2];
+        // Ten seconds of 40,000 datagrams a second, beside a client of 20.
+        for i in 0..400_000u64 {
+            let now = start + Duration::from_micros(25 * i);
+            taken[0] += u32::from(senders.may(sender(1), now));
+            if i % 2000 == 0 {
+                taken[1] += u32::from(senders.may(sender(2), now));
+            }
+        }
+        // 4000 a second and the first burst.
+        assert!((40_900..=41_000).contains(&taken[0]), "{taken:?}");
+        assert_eq!(taken[1], 200);
+    }
+
+    #[test]
+    fn a_flood_of_many_invented_senders_does_not_displace_one_that_speaks() {
+        let start = Instant::now();
+        let mut senders = Senders::default();
+        let (mut taken, mut own) = (0, 0);
+        for i in 0..400_000u64 {
+            let now = start + Duration::from_micros(25 * i);
+            if i % 2000 == 0 {
+                own += u32::from(senders.may(sender(1), now));
+            }
+            taken += u32::from(senders.may(sender(2 + (i % 60_000) as u16), now));
+        }
+        assert_eq!(own, 200);
+        // 4000 a second and the first burst for all strangers, one for each place and second.
+        assert!(taken < 41_000 + 10 * 64, "{taken}");
+    }
+}

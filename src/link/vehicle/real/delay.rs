@@ -1,0 +1,113 @@
+//! How late the loop through the surfaces is by the controller's parameters, and how much of what it bears that leaves.
+
+use std::fmt;
+use std::time::Duration;
+
+use super::Real;
+use super::profile::{Authority, Stack};
+
+/// Delay of a second-order Butterworth low-pass at low frequencies, in cycles of its cut-off: √2 / 2π.
+const LOW_PASS: f64 = 0.225;
+/// ArduPilot looks at its channels every 20 ms; PX4 at MANUAL_CONTROL as it comes, 10 ms apart.
+const CHANNELS_S: [f64; 2] = [0.02, 0.01];
+/// Link, states and what else is known roughly: less left than this is said, s.
+const SCARCE_S: f64 = 0.015;
+
+/// What makes the loop late, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Delays {
+    stack: Stack,
+    /// Cut-off of the gyros' low-pass, Hz, and what it takes, s.
+    gyros: (f64, f64),
+    /// Rate of the controller's loop, Hz, and one of its periods, s; none where it is as fast as the streams.
+    cycle: Option<(f64, f64)>,
+    /// Between two looks at the channels, s.
+    channels_s: f64,
+}
+
+impl Delays {
+    /// All of it, s.
+    pub fn sum_s(&self) -> f64 {
+        self.gyros.1 + self.cycle.map_or(0.0, |(_, s)| s) + self.channels_s
+    }
+}
+
+impl fmt::Display for Delays {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ms = |s: f64| 1e3 * s;
+        let filter = match self.stack {
+            Stack::Px4 => "IMU_GYRO_CUTOFF",
+            Stack::Ardupilot => "INS_GYRO_FILTER",
+        };
+        write!(f, "gyros {:.0} ms ({filter} {:.0})", ms(self.gyros.1), self.gyros.0)?;
+        if let Some((hz, s)) = self.cycle {
+            write!(f, ", loop {:.0} ms (SCHED_LOOP_RATE {hz:.0})", ms(s))?;
+        }
+        write!(f, ", channels {:.0} ms", ms(self.channels_s))
+    }
+}
+
+impl Real {
+    /// Says at which delay the loop through the surfaces swings by itself.
+    pub fn bear(&mut self, least: Option<Duration>) {
+        self.bears = least;
+    }
+
+    /// What makes the loop through the surfaces late, once its parameters are read; nothing by attitude.
+    pub fn delays(&self) -> Option<Delays> {
+        if self.profile.authority == Authority::Attitude {
+            return None;
+        }
+        let stack = self.profile.stack;
+        let (filter, cycle, channels_s) = match stack {
+            Stack::Ardupilot => {
+                let hz = self.parameters.get("SCHED_LOOP_RATE")?;
+                ("INS_GYRO_FILTER", Some((hz, 1.0 / hz.max(1.0))), CHANNELS_S[0])
+            }
+            Stack::Px4 => ("IMU_GYRO_CUTOFF", None, CHANNELS_S[1]),
+        };
+        let hz = self.parameters.get(filter)?;
+        // 0 switches the filter off.
+        let low_pass = if hz > 0.0 { LOW_PASS / hz } else { 0.0 };
+        Some(Delays { stack, gyros: (hz, low_pass), cycle, channels_s })
+    }
+
+    /// What is left of the delay that the loop bears, s, with what takes the rest.
+    fn left(&self) -> Option<(f64, String)> {
+        let (delays, bears) = (self.delays()?, self.bears?.as_secs_f64());
+        let left = bears - delays.sum_s();
+        let words = format!(
+            "{delays}: {:.0} of the {:.0} ms at which its loop swings by itself, {:.0} ms are left",
+            1e3 * delays.sum_s(),
+            1e3 * bears,
+            1e3 * left
+        );
+        Some((left, words))
+    }
+
+    /// The delay that is left, in words; nothing where it is not known.
+    pub fn delay_words(&self) -> Option<String> {
+        self.left().map(|(_, words)| words)
+    }
+
+    /// Why the controller cannot be flown by surfaces for its delay, with the remedy.
+    pub fn delay_obstacle(&self) -> Option<String> {
+        let (left, words) = self.left()?;
+        (left <= 0.0)
+            .then(|| format!("the controller bears no such delay: {words}; {}", self.shorter()))
+    }
+
+    pub(super) fn delay_warning(&self) -> Option<String> {
+        let (left, words) = self.left()?;
+        (left < SCARCE_S).then(|| format!("little delay is left: {words}; {}", self.shorter()))
+    }
+
+    fn shorter(&self) -> &'static str {
+        match self.profile.stack {
+            Stack::Ardupilot => {
+                "set INS_GYRO_FILTER 80 and SCHED_LOOP_RATE 250 (then reboot), or fly --controller lqi-damped"
+            }
+            Stack::Px4 => "raise IMU_GYRO_CUTOFF, or fly --controller lqi-damped",
+        }
+    }
+}

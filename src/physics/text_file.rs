@@ -1,0 +1,39 @@
+//! Text files that a person wrote: read whole, unless they are too long to be that.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Bytes of the longest file that is read: a hundred times the longest that is shipped. What a parser makes of text takes up to
+/// eighty times its length in memory.
+pub const LONGEST: u64 = 1 << 20;
+
+/// The text of the file at `path`.
+///
+/// # Errors
+/// If it cannot be read, is no UTF-8, or is longer than [`LONGEST`].
+pub fn read(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    File::open(path)?.take(LONGEST + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > LONGEST {
+        let words = format!("it is longer than {} KiB, which no such file is", LONGEST >> 10);
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, words));
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_ten_megabytes_is_refused_before_it_is_taken_in() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("long.toml");
+        std::fs::write(&path, "x = [0]\n".repeat(1_250_000)).unwrap();
+        let refused = read(&path).unwrap_err().to_string();
+        assert!(refused.contains("longer than 1024 KiB"), "{refused}");
+        std::fs::write(&path, " ".repeat(LONGEST as usize)).unwrap();
+        assert_eq!(read(&path).unwrap().len() as u64, LONGEST);
+    }
+}

@@ -1,0 +1,203 @@
+//! Flights that the model monitor watches, beside a played ArduPlane whose attitude errs: what it says of a healthy aircraft,
+//! and when it says it of one that fails.
+
+use std::time::Duration;
+
+use greylag_sitl::hidden::Hidden;
+use greylag_sitl::shim::controller::FlightController;
+use greylag_sitl::shim::{Launch, Noise, Personality, ShimOptions};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{CompanionFactory, FaultsError};
+use crate::faults::Counterpart;
+use crate::faults::scenario::Scenario;
+use greylag_flight::desk::Desk;
+use greylag_flight::monitor::Monitor;
+use greylag_link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
+
+/// Stream of the random numbers of attitude errors and winds.
+const DRAWN: u64 = 30;
+/// Errors of roll, pitch and heading are drawn evenly up to these, degrees: alignment, compass.
+pub const ATTITUDE_DEG: [f64; 3] = [1.0, 1.0, 2.0];
+/// Each component of the wind is drawn evenly up to this, m/s.
+const WIND_MPS: f64 = 4.0;
+/// A flight, and the moment of a failure in it, s.
+const FLIGHT_S: f64 = 60.0;
+/// When a surface sticks, s: the aircraft is engaged within ten.
+pub const FAILS_S: f64 = 25.0;
+/// Roll and pitch of the legs, degrees, and how long each is flown, s.
+const LEGS: [[f64; 2]; 6] =
+    [[0.0, 2.0], [25.0, 3.0], [-20.0, 5.0], [0.0, 0.0], [-35.0, 4.0], [15.0, 6.0]];
+const LEG_S: f64 = 5.0;
+
+/// What is wrong with the aircraft.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// Nothing.
+    None,
+    /// The elevator sticks in flight.
+    StuckElevator,
+    /// The aileron sticks in flight.
+    StuckAileron,
+    /// Ice: the drag of the simulator's effect `drag_alpha2=100`, twice the aircraft's at cruise.
+    Ice,
+    /// A centre of gravity 4 cm aft.
+    ShiftedLoad,
+}
+
+impl Failure {
+    /// All of them.
+    pub const ALL: [Failure; 5] = [
+        Failure::None,
+        Failure::StuckElevator,
+        Failure::StuckAileron,
+        Failure::Ice,
+        Failure::ShiftedLoad,
+    ];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Failure::None => "healthy",
+            Failure::StuckElevator => "elevator sticks",
+            Failure::StuckAileron => "aileron sticks",
+            Failure::Ice => "ice: twice the drag",
+            Failure::ShiftedLoad => "load 4 cm aft",
+        }
+    }
+
+    /// The simulator's effect that makes it, from the start.
+    fn effect(self) -> Option<&'static str> {
+        match self {
+            Failure::Ice => Some("drag_alpha2=100"),
+            Failure::ShiftedLoad => Some("cg_shift=0.04"),
+            Failure::None | Failure::StuckElevator | Failure::StuckAileron => None,
+        }
+    }
+}
+
+/// What the monitor said of one flight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Watched {
+    /// Error of roll, pitch and yaw, degrees.
+    pub attitude_error_deg: [f64; 3],
+    /// When the aircraft failed as far as the companion could see: the failure, or being engaged with it, s; nothing
+    /// where it was never engaged.
+    pub since_s: Option<f64>,
+    /// When it said what, s.
+    pub said: Vec<(f64, String)>,
+}
+
+impl CompanionFactory {
+    /// Flies for a minute, watched; everything random follows from `seed`.
+    ///
+    /// # Errors
+    /// If the aircraft cannot be loaded.
+    pub fn watched(&self, seed: u64, failure: Failure) -> Result<Watched, FaultsError> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(DRAWN);
+        let attitude_error_deg = ATTITUDE_DEG.map(|most| random.random_range(-most..most));
+        let [north, east] = [(); 2].map(|()| random.random_range(-WIND_MPS..WIND_MPS));
+        let mut plant = self.plant.clone();
+        if let Some(effect) = failure.effect() {
+            plant.hidden.push(effect.parse::<Hidden>()?);
+        }
+        let scenario = Scenario {
+            wind_ned_mps: [north, east, 0.0],
+            turbulence: 1 + (seed % 3) as u8,
+            ..Scenario::of_seed(Counterpart::Ardupilot, seed)
+        };
+        let mut options = ShimOptions::new(scenario.air(&plant), plant.start);
+        options.seed = seed;
+        options.noise = Noise::REALISTIC;
+        options.bias.attitude_rad = attitude_error_deg.map(f64::to_radians);
+        options.launch = Launch::Immediate;
+        let mut desk = self.desk(Counterpart::Ardupilot)?;
+        desk.pilot().monitor_with(Monitor::new(self.model.clone()));
+        let mut bench = Bench {
+            controller: FlightController::new(Personality::Ardupilot, &options)?,
+            desk,
+            armed: false,
+            watched: Watched { attitude_error_deg, since_s: None, said: Vec::new() },
+        };
+        for step in 0..(100.0 * FLIGHT_S) as u64 {
+            if step == (100.0 * FAILS_S) as u64 {
+                bench.fail(failure);
+            }
+            if !bench.step(step) {
+                break;
+            }
+        }
+        Ok(bench.watched)
+    }
+}
+
+/// A companion and its client at a played controller.
+struct Bench {
+    controller: FlightController,
+    desk: Desk,
+    armed: bool,
+    watched: Watched,
+}
+
+impl Bench {
+    fn fail(&mut self, failure: Failure) {
+        match failure {
+            Failure::StuckAileron => self.controller.jam_aileron(),
+            Failure::StuckElevator => self.controller.jam_elevator(),
+            Failure::None | Failure::Ice | Failure::ShiftedLoad => return,
+        }
+        self.watched.since_s = self.watched.since_s.map(|_| FAILS_S);
+    }
+
+    /// 10 ms; `false` when the flight has ended on the ground or outside the numbers.
+    fn step(&mut self, step: u64) -> bool {
+        let (at_s, host) = (step as f64 * 0.01, Duration::from_millis(1000 + 10 * step));
+        let (mut down, mut up) = (Vec::new(), Vec::new());
+        self.controller.show(&mut down);
+        self.desk.hear(host, &down, &mut up, |_, _| {});
+        self.client(step, at_s, host);
+        self.desk.poll(host, &mut up);
+        for text in self.desk.texts.drain(..) {
+            if text.words.starts_with("engaged") {
+                self.watched.since_s.get_or_insert(at_s);
+            }
+            if text.words.contains("is not the model's") {
+                self.watched.said.push((at_s, text.words));
+            }
+        }
+        self.controller.hear(&up);
+        matches!(self.controller.fly(), Ok(None))
+    }
+
+    /// The client: arms when it can, and sends its legs.
+    fn client(&mut self, step: u64, at_s: f64, host: Duration) {
+        let [roll, pitch] = LEGS[(at_s / LEG_S) as usize % LEGS.len()].map(f64::to_radians);
+        let setpoint = AttitudeSetpoint { roll, pitch, thrust: None };
+        let now = self.desk.now(host);
+        self.desk.pilot().attitude_setpoint(now, setpoint);
+        if !self.armed && step.is_multiple_of(10) {
+            self.armed = self.desk.arm(host) == Verdict::Accepted;
+            if self.armed {
+                // Refused at most because something is lost at this very moment: HOLD is flown.
+                let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
+            }
+        }
+    }
+}
+
+impl Watched {
+    /// How long after the failure something was said of it, s.
+    pub fn delay_s(&self) -> Option<f64> {
+        let since = self.since_s?;
+        self.said.iter().map(|(at, _)| at - since).find(|delay| *delay >= 0.0)
+    }
+
+    /// What was said before there was anything to say.
+    pub fn false_alarms(&self, failure: Failure) -> usize {
+        let healthy =
+            |at: f64| failure == Failure::None || self.since_s.is_none_or(|since| at < since);
+        self.said.iter().filter(|(at, _)| healthy(*at)).count()
+    }
+}
