@@ -82,8 +82,7 @@ pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) 
         .filter(|p| p.kind == PhaseKind::Flight)
         .map(|p| (p.from_s, p.to_s))
         .collect();
-    let in_flight =
-        |(from, to): &(f64, f64)| flights.iter().any(|(a, b)| from < b && to > a);
+    let in_flight = |(from, to): &(f64, f64)| flights.iter().any(|(a, b)| from < b && to > a);
     let mut out = Vec::new();
     for channel in channels {
         let spans: Vec<(f64, f64)> =
@@ -113,7 +112,8 @@ const OF_A_ROW: [&str; 5] = ["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_r
 /// Whether a row lies where a channel hangs without which it is no sample.
 pub(super) fn hangs(row: &Sample, channels: &[Channel]) -> bool {
     let hanging = channels.iter().filter(|c| !c.quality.frozen.is_empty());
-    hanging.flat_map(|c| &c.columns).filter(|c| OF_A_ROW.contains(&c.as_str())).any(|column| {
-        index(column).is_some_and(|i| COLUMNS[i].1(row).is_nan())
-    })
+    hanging
+        .flat_map(|c| &c.columns)
+        .filter(|c| OF_A_ROW.contains(&c.as_str()))
+        .any(|column| index(column).is_some_and(|i| COLUMNS[i].1(row).is_nan()))
 }

@@ -32,7 +32,8 @@ pub(super) fn read(
     let rules = o.mapping.rules(format, &topics);
     let mut table = table::build(&topics, &rules, &o.sources);
     table.missing.retain(|missing| !o.mapping.makes(missing.column));
-    findings.extend(lacking(&table, &topics, path, to).map(|f| f.into_iter().filter(|_| !no_wings))?);
+    findings
+        .extend(lacking(&table, &topics, path, to).map(|f| f.into_iter().filter(|_| !no_wings))?);
     findings.extend(std::mem::take(&mut table.findings));
     findings.extend(grounded(&mut table.rows, &hovers, vehicle.as_ref()));
     findings.extend(assess::freeze(&mut table.rows, &table.channels, &o.flies));
@@ -93,11 +94,7 @@ pub(super) fn read(
 const NEVER_ON_WINGS: &str = "there is no flight in this log: the vehicle never flies on its wings alone; give a log with forward flight";
 
 /// That the vehicle has no wings; an error where the log is to be computed with.
-fn refused(
-    vehicle: Option<&Vehicle>,
-    path: &Path,
-    to: Use,
-) -> Result<Vec<Finding>, LogError> {
+fn refused(vehicle: Option<&Vehicle>, path: &Path, to: Use) -> Result<Vec<Finding>, LogError> {
     match vehicle.and_then(Vehicle::refusal) {
         Some(why) if to == Use::Compute => Err(LogError::Vehicle { path: path.to_owned(), why }),
         why => Ok(why.map(Finding::problem).into_iter().collect()),
@@ -158,7 +155,8 @@ fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
 /// The rows fit to compute with, and those fit to be looked at where that is asked.
 fn sorted_out(samples: Vec<Sample>, to: Use) -> (rows::Rows, rows::Rows) {
     let frozen = samples.iter().any(|s| s.airspeed_mps.is_nan());
-    let mut kept = if frozen { rows::Rows::with_sparse_columns_of(&samples) } else { rows::Rows::default() };
+    let mut kept =
+        if frozen { rows::Rows::with_sparse_columns_of(&samples) } else { rows::Rows::default() };
     let mut looked_at = rows::Rows::default();
     for (i, sample) in samples.into_iter().enumerate() {
         kept.take(i + 1, Some(sample));

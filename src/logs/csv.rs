@@ -164,7 +164,9 @@ impl Raw {
         for i in 1..times.len() {
             let whole = i - bounds[bounds.len() - 1] >= RECORDING && times.len() - i >= RECORDING;
             let goes_back = times[i] < times[i - 1] - back;
-            if whole && goes_back && times[i..i + RECORDING].iter().all(|t| *t < times[i - 1] - 0.5 * back)
+            if whole
+                && goes_back
+                && times[i..i + RECORDING].iter().all(|t| *t < times[i - 1] - 0.5 * back)
             {
                 bounds.push(i);
             }
@@ -209,7 +211,11 @@ fn separator(header: &[u8]) -> u8 {
     if count(b',') > 0 && count(b';') <= count(b',') {
         return b',';
     }
-    [b';', b'\t'].into_iter().max_by_key(|by| count(*by)).filter(|by| count(*by) > 0).unwrap_or(b',')
+    [b';', b'\t']
+        .into_iter()
+        .max_by_key(|by| count(*by))
+        .filter(|by| count(*by) > 0)
+        .unwrap_or(b',')
 }
 
 /// Reads the rows, taking columns under other names or in other units where `mapping` says so.
@@ -364,9 +370,10 @@ fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
         targets.push((COLUMNS[i].2, 1.0, 0.0, Part::Whole));
     }
     let under_other_names = dialect.found.iter().filter(|f| f.field == name);
-    targets.extend(under_other_names.filter_map(|f| {
-        Some((COLUMNS[index(&f.column)?].2, f.scale, f.offset, Part::Whole))
-    }));
+    targets.extend(
+        under_other_names
+            .filter_map(|f| Some((COLUMNS[index(&f.column)?].2, f.scale, f.offset, Part::Whole))),
+    );
     targets
 }
 
@@ -388,11 +395,7 @@ fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvE
 }
 
 /// The sample of a record; `None` when a field is no number.
-fn sample(
-    record: &::csv::ByteRecord,
-    targets: &[Vec<Target>],
-    decimal: Decimal,
-) -> Option<Sample> {
+fn sample(record: &::csv::ByteRecord, targets: &[Vec<Target>], decimal: Decimal) -> Option<Sample> {
     let mut sample = Sample::default();
     for (field, targets) in record.iter().zip(targets).filter(|(_, t)| !t.is_empty()) {
         let x = number(field, decimal)?;

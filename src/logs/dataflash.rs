@@ -242,7 +242,8 @@ impl Reader {
         }
         self.lives.push(self.out);
         if self.lives.len() > 1 {
-            let named = |(k, life): (usize, &mut Topics)| life.life = Some(format!("log {}", k + 1));
+            let named =
+                |(k, life): (usize, &mut Topics)| life.life = Some(format!("log {}", k + 1));
             self.lives.iter_mut().enumerate().for_each(named);
         }
         self.lives

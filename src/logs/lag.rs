@@ -7,8 +7,8 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::Sample;
 use super::finding::Finding;
-use crate::num::statistics::mean;
-use crate::physics::atmosphere::STANDARD_GRAVITY;
+use greylag_num::statistics::mean;
+use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
 /// Step of the shifts and of the series that are shifted, s.
 const STEP_S: f64 = 0.05;
@@ -82,7 +82,8 @@ impl Grid {
                 start = i;
             }
         }
-        let (first, last) = (rows.get(best.start)?.time_s, rows.get(best.end.checked_sub(1)?)?.time_s);
+        let (first, last) =
+            (rows.get(best.start)?.time_s, rows.get(best.end.checked_sub(1)?)?.time_s);
         let length = (last - first).min(LONGEST_S);
         let count = (length / STEP_S) as usize;
         let times = (0..count).map(|k| first + k as f64 * STEP_S).collect();
@@ -114,7 +115,8 @@ impl Grid {
 
     /// Acceleration along the body axis at the even times, m/s².
     fn along(&self) -> Vec<f64> {
-        let along = |s: &Sample| s.specific_force_mps2[0] - STANDARD_GRAVITY * s.attitude_rad[1].sin();
+        let along =
+            |s: &Sample| s.specific_force_mps2[0] - STANDARD_GRAVITY * s.attitude_rad[1].sin();
         self.series(along).unwrap_or_default()
     }
 }

@@ -7,7 +7,7 @@
 use serde::Serialize;
 
 use super::topics::period_s;
-use crate::num::statistics::quantile;
+use greylag_num::statistics::quantile;
 
 /// What the samples of a channel are worth.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -192,7 +192,8 @@ mod tests {
             let (k, f) = (i / 25, (i % 25) as f64 / 25.0);
             rounded(noise(k) * (1.0 - f) + noise(k + 1) * f)
         };
-        let found = Quality::of("airspeed_mps", &times(2000), &(0..2000).map(line).collect::<Vec<_>>());
+        let found =
+            Quality::of("airspeed_mps", &times(2000), &(0..2000).map(line).collect::<Vec<_>>());
         assert!(found.interpolated && (found.native_hz - 4.0).abs() < 0.2, "{found:?}");
     }
 
@@ -204,7 +205,8 @@ mod tests {
         let steps = |i: usize| if (i / 150).is_multiple_of(2) { 0.3 } else { -0.2 };
         let waves: [&dyn Fn(usize) -> f64; 4] = [&smooth, &coarse, &noisy, &steps];
         for (k, wave) in waves.iter().enumerate() {
-            let found = Quality::of("airspeed_mps", &times(2000), &(0..2000).map(wave).collect::<Vec<_>>());
+            let found =
+                Quality::of("airspeed_mps", &times(2000), &(0..2000).map(wave).collect::<Vec<_>>());
             assert!(!found.interpolated, "wave {k}: {found:?}");
         }
     }
@@ -212,10 +214,13 @@ mod tests {
     #[test]
     fn a_held_sensor_has_its_own_rate_and_a_stuck_one_is_frozen() {
         let held = |i: usize| rounded(15.0 + noise(i / 20));
-        let found = Quality::of("airspeed_mps", &times(2000), &(0..2000).map(held).collect::<Vec<_>>());
+        let found =
+            Quality::of("airspeed_mps", &times(2000), &(0..2000).map(held).collect::<Vec<_>>());
         assert!((found.native_hz - 5.0).abs() < 0.3 && found.frozen.is_empty(), "{found:?}");
-        let stuck = |i: usize| if (500..1000).contains(&i) { 15.5 } else { rounded(15.0 + noise(i)) };
-        let found = Quality::of("airspeed_mps", &times(2000), &(0..2000).map(stuck).collect::<Vec<_>>());
+        let stuck =
+            |i: usize| if (500..1000).contains(&i) { 15.5 } else { rounded(15.0 + noise(i)) };
+        let found =
+            Quality::of("airspeed_mps", &times(2000), &(0..2000).map(stuck).collect::<Vec<_>>());
         let [(from, to)] = found.frozen[..] else { panic!("{found:?}") };
         assert!((from - 5.0).abs() < 0.02 && (to - 9.99).abs() < 0.02, "{found:?}");
     }
@@ -223,10 +228,12 @@ mod tests {
     #[test]
     fn spikes_are_counted() {
         let spiky = |i: usize| if i % 400 == 7 { 95.0 } else { 17.0 + 0.3 * noise(i) };
-        let found = Quality::of("airspeed_mps", &times(2000), &(0..2000).map(spiky).collect::<Vec<_>>());
+        let found =
+            Quality::of("airspeed_mps", &times(2000), &(0..2000).map(spiky).collect::<Vec<_>>());
         assert_eq!((found.spikes, found.largest_spike), (5, 95.0));
         let gusty = |i: usize| 17.0 + 3.0 * (i as f64 * 0.01).sin() + 0.3 * noise(i);
-        let found = Quality::of("airspeed_mps", &times(2000), &(0..2000).map(gusty).collect::<Vec<_>>());
+        let found =
+            Quality::of("airspeed_mps", &times(2000), &(0..2000).map(gusty).collect::<Vec<_>>());
         assert_eq!(found.spikes, 0);
     }
 }

@@ -25,7 +25,9 @@ impl std::str::FromStr for Asked {
 
     fn from_str(text: &str) -> Result<Asked, String> {
         let wrong = || {
-            format!("\"{text}\" is not TOPIC=INSTANCE, such as airspeed=1, or ATTITUDE=2/1 (system/component)")
+            format!(
+                "\"{text}\" is not TOPIC=INSTANCE, such as airspeed=1, or ATTITUDE=2/1 (system/component)"
+            )
         };
         let (topic, instance) = text.split_once('=').ok_or_else(wrong)?;
         let number = |text: &str| text.trim().parse().ok();
@@ -145,7 +147,9 @@ fn said(name: &str, sources: &[Source], asked: bool) -> Option<Finding> {
     // That a second sensor is absent or dead is no matter as long as the first one is read.
     let usual = sources.first().is_some_and(|s| s.read);
     match (asked, dead.is_empty() || usual) {
-        (true, _) => Some(Finding::note(format!("{name}: instance {instance} is read, as asked{other}"))),
+        (true, _) => {
+            Some(Finding::note(format!("{name}: instance {instance} is read, as asked{other}")))
+        }
         (_, false) => Some(Finding::warning(format!(
             "{name}: instance {instance} is read, for {} never changes{other}",
             dead.join(", ")

@@ -18,7 +18,7 @@ use super::quality::Quality;
 use super::resample::{Reader, SAME_S};
 use super::sources::{Asked, Choice, Source};
 use super::topics::{Topics, period_s};
-use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
+use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 
 /// The longest time that a fast channel is carried over, s.
 const GAP_S: f64 = 0.1;
@@ -193,10 +193,8 @@ fn choose(topics: &Topics, rules: &[Rule], choice: &Choice) -> (Vec<Track>, Vec<
                     && track.rate_hz > 5.0 * old.rate_hz
                     && track.finite_share >= GOOD_SHARE;
                 let rests = rule.columns()[0].ends_with("_cmd");
-                let alive = !rests
-                    && old.is_dead()
-                    && !track.is_dead()
-                    && track.finite_share >= GOOD_SHARE;
+                let alive =
+                    !rests && old.is_dead() && !track.is_dead() && track.finite_share >= GOOD_SHARE;
                 if alive {
                     findings.push(Finding::warning(format!(
                         "{}: {} is read, for {} never changes",

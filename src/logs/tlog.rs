@@ -19,8 +19,8 @@ use super::finding::Finding;
 use super::format::MAVLINK_MARKERS;
 use super::topics::{Naming, Topic, Topics};
 use super::window::Window;
-use crate::link::framing::{FrameCounts, Frames, MAX_FRAME, frame_len};
-use crate::link::logged::{self, Logged, Own};
+use greylag_link::framing::{FrameCounts, Frames, MAX_FRAME, frame_len};
+use greylag_link::logged::{self, Logged, Own};
 
 /// Bytes of the host's time.
 const STAMP: usize = 8;
@@ -168,7 +168,9 @@ impl Reader {
         match &lives[..] {
             [] => vec![self.life(None, 0..usize::MAX, &clocks)],
             [(system, _)] => vec![self.life(Some(*system), 0..usize::MAX, &clocks)],
-            several => several.iter().map(|(s, at)| self.life(Some(*s), at.clone(), &clocks)).collect(),
+            several => {
+                several.iter().map(|(s, at)| self.life(Some(*s), at.clone(), &clocks)).collect()
+            }
         }
     }
 
@@ -189,7 +191,12 @@ impl Reader {
     }
 
     /// What the records `at` say of `system`; its vehicle and its life are named where the file holds several.
-    fn life(&self, system: Option<u8>, at: Range<usize>, clocks: &BTreeMap<u8, Vec<Tick>>) -> Topics {
+    fn life(
+        &self,
+        system: Option<u8>,
+        at: Range<usize>,
+        clocks: &BTreeMap<u8, Vec<Tick>>,
+    ) -> Topics {
         let whole = at == (0..usize::MAX);
         let mut out = Topics { system, ..self.out.clone() };
         out.life = system.filter(|_| self.lives(clocks).len() > 1).map(|system| match whole {

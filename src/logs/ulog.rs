@@ -260,7 +260,8 @@ impl Reader {
 
     /// Whether a data record of `len` bytes has the size of the topic that it names.
     fn fits(&self, view: &[u8], len: usize) -> bool {
-        let number = view.get(RECORD..).and_then(|b| b.first_chunk()).map(|b| u16::from_le_bytes(*b));
+        let number =
+            view.get(RECORD..).and_then(|b| b.first_chunk()).map(|b| u16::from_le_bytes(*b));
         let layout = number.and_then(|n| self.subscriptions.get(&n)).map(|s| &s.layout);
         layout.is_some_and(|l| {
             l.size > 0 && (RECORD + 2 + l.size..=RECORD + 2 + l.padded).contains(&len)
@@ -322,8 +323,9 @@ impl Reader {
         let wanted = wanted(&name);
         let number = u16::from_le_bytes([*low, *high]);
         let key = (name, u16::from(*instance));
-        let old =
-            self.subscriptions.insert(number, Subscription { key, layout, wanted, topic: None, count: 0 });
+        let old = self
+            .subscriptions
+            .insert(number, Subscription { key, layout, wanted, topic: None, count: 0 });
         if let Some(old) = old {
             self.keep(old);
         }

@@ -135,7 +135,8 @@ fn telemetry(topics: &Topics) -> Option<Vehicle> {
     let own = topics.instances("HEARTBEAT").filter(|(i, _)| i.to_be_bytes()[0] == system);
     let mut kinds: Vec<(Kind, f64)> = Vec::new();
     for (_, topic) in own {
-        let (Some(types), Some(autopilots)) = (topic.field("type"), topic.field("autopilot")) else {
+        let (Some(types), Some(autopilots)) = (topic.field("type"), topic.field("autopilot"))
+        else {
             continue;
         };
         // MAV_AUTOPILOT_INVALID: a camera, a gimbal, a companion.
@@ -147,7 +148,10 @@ fn telemetry(topics: &Topics) -> Option<Vehicle> {
     }
     let has = |kind: Kind| kinds.iter().find(|(k, _)| *k == kind).map(|(_, number)| *number);
     if has(Kind::FixedWing).is_some() && has(Kind::Multicopter).is_some() {
-        return found(Kind::Vtol, "HEARTBEAT.type is that of an aeroplane and that of a multicopter");
+        return found(
+            Kind::Vtol,
+            "HEARTBEAT.type is that of an aeroplane and that of a multicopter",
+        );
     }
     let (kind, number) = kinds.last()?;
     found(*kind, format!("HEARTBEAT.type {number}"))
@@ -174,7 +178,9 @@ pub(super) fn hovers(format: Format, topics: &Topics) -> Vec<(f64, f64)> {
             if spans.is_empty() {
                 let kind = topics.series("vehicle_status", "vehicle_type");
                 spans = held(kind, |x| x == 1.0);
-                spans.extend(held(topics.series("vehicle_status", "in_transition_mode"), |x| x != 0.0));
+                spans.extend(held(topics.series("vehicle_status", "in_transition_mode"), |x| {
+                    x != 0.0
+                }));
             }
         }
         Format::Dataflash => {
@@ -251,7 +257,7 @@ fn merged(mut spans: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::logs::topics::Topic;
+    use crate::topics::Topic;
 
     fn topics(name: &str, field: &str, values: &[(f64, f64)]) -> Topics {
         let mut topic = Topic::new([field]);

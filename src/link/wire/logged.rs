@@ -92,11 +92,7 @@ pub fn read(frame: &Frame<'_>) -> Option<Logged> {
             "HEARTBEAT",
             Own::None,
             &["type", "autopilot", "custom_mode"],
-            &[
-                f64::from(m.mavtype as u32),
-                f64::from(m.autopilot as u32),
-                f64::from(m.custom_mode),
-            ],
+            &[f64::from(m.mavtype as u32), f64::from(m.autopilot as u32), f64::from(m.custom_mode)],
         ),
         MavMessage::EXTENDED_SYS_STATE(m) => values(
             "EXTENDED_SYS_STATE",

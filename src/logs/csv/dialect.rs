@@ -3,9 +3,9 @@
 //! Sources: `FGOutputTextFile.cpp` of JSBSim (output sections and property names), the topics of PX4 as ulog2csv writes
 //! them, the records of ArduPilot as `mavlogdump --format csv` writes them (TYPE.field).
 
-use crate::logs::Format;
-use crate::logs::mapping::{Mapping, format_rules};
-use crate::logs::topics::Topics;
+use crate::Format;
+use crate::mapping::{Mapping, format_rules};
+use crate::topics::Topics;
 
 /// One name for a column: the column, the name, factor and offset.
 struct Alias(&'static str, &'static str, f64);

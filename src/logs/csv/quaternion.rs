@@ -2,7 +2,7 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::logs::Sample;
+use crate::Sample;
 
 /// Which part comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,12 +5,13 @@
 
 use super::rule::Rule;
 use super::servos;
-use crate::logs::topics::Topics;
-use crate::physics::mixer::Mixer;
+use crate::topics::Topics;
+use greylag_physics::mixer::Mixer;
 
 /// The record types that the rules use.
 pub const TOPICS: [&str; 13] = [
-    "ATT", "IMU", "ARSP", "AOA", "BARO", "XKF1", "NKF1", "POS", "RCOU", "AETR", "CTUN", "MODE", "QTUN",
+    "ATT", "IMU", "ARSP", "AOA", "BARO", "XKF1", "NKF1", "POS", "RCOU", "AETR", "CTUN", "MODE",
+    "QTUN",
 ];
 
 /// AETR's full deflection, centidegrees.

@@ -34,9 +34,9 @@ use super::csv::Order;
 use super::derive;
 use super::format::Format;
 use super::topics::Topics;
-use crate::physics::Sensors;
-use crate::physics::mixer::Mixer;
-use crate::physics::sensors::CONSTANTS;
+use greylag_physics::Sensors;
+use greylag_physics::mixer::Mixer;
+use greylag_physics::sensors::CONSTANTS;
 use rule::Rule;
 
 /// The topic name by which a mapping means the columns of a CSV file.

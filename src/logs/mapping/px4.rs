@@ -5,9 +5,9 @@
 //! (the first counts), and `wind`, which the log format has no column for.
 
 use super::rule::{Rule, Shape, Term, Tilt};
-use crate::logs::Format;
-use crate::logs::topics::Topics;
-use crate::logs::vehicle::{self, Kind};
+use crate::Format;
+use crate::topics::Topics;
+use crate::vehicle::{self, Kind};
 
 /// The topics that the rules use.
 pub const TOPICS: [&str; 20] = [
@@ -89,9 +89,14 @@ fn commands(topics: &Topics) -> Vec<Rule> {
         ("elevator_cmd", "xyz[1]", -1.0),
         ("rudder_cmd", "xyz[2]", -1.0),
     ] {
-        out.push(Rule::linear(column, "vehicle_torque_setpoint", field, gain).preferring(fixed_wing));
+        out.push(
+            Rule::linear(column, "vehicle_torque_setpoint", field, gain).preferring(fixed_wing),
+        );
     }
-    out.push(Rule::linear("throttle_cmd", "vehicle_thrust_setpoint", "xyz[0]", 1.0).preferring(fixed_wing));
+    out.push(
+        Rule::linear("throttle_cmd", "vehicle_thrust_setpoint", "xyz[0]", 1.0)
+            .preferring(fixed_wing),
+    );
     let moves = |group: &str| {
         let fields = ["control[0]", "control[1]", "control[2]"];
         topics.first(group).is_some_and(|t| fields.iter().any(|f| t.moves(f)))

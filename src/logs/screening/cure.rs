@@ -1,8 +1,8 @@
 //! Cures are tried before they are printed: the column is rescaled and looked at again.
 
-use crate::logs::Sample;
-use crate::logs::columns::{COLUMNS, index};
-use crate::logs::finding::{Cure, Finding};
+use crate::Sample;
+use crate::columns::{COLUMNS, index};
+use crate::finding::{Cure, Finding};
 
 /// Columns of which a cure of the first one speaks likewise.
 const LIKEWISE: [&[&str]; 3] = [
@@ -70,6 +70,9 @@ mod tests {
         let helped = tried(vec![found.clone()], &rows, large(2.0));
         assert_eq!(helped, [found.clone()]);
         let [useless] = &tried(vec![found.clone()], &rows, large(1.0))[..] else { panic!() };
-        assert!(useless.cure.is_none() && !useless.text.contains("--mapping FILE, in"), "{useless}");
+        assert!(
+            useless.cure.is_none() && !useless.text.contains("--mapping FILE, in"),
+            "{useless}"
+        );
     }
 }

@@ -1,9 +1,9 @@
 //! Whether the flights move what a diagnosis needs moved.
 
-use crate::logs::rudder::MOVES_RAD;
-use crate::sysid::diagnose::error::DiagnoseError;
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::diagnose::error::DiagnoseError;
+use crate::flight_path::reconstruction::Instant;
+use crate::weak_form::prepared::Prepared;
+use greylag_logs::rudder::MOVES_RAD;
 
 /// Least flight time, s.
 const LEAST_S: f64 = 10.0;
@@ -47,7 +47,9 @@ pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
 /// How little something moves; what never moves is another channel's fault, not the pilot's.
 fn small(name: &str, moved: f64, unit: &str) -> String {
     match moved == 0.0 {
-        true => format!("{name} never moves in the log: look whether this is the channel that flies the aircraft"),
+        true => format!(
+            "{name} never moves in the log: look whether this is the channel that flies the aircraft"
+        ),
         false => format!("{name} moves by {moved:.2}{unit} only"),
     }
 }

@@ -35,9 +35,9 @@ mod ulog;
 pub mod vehicle;
 mod window;
 
+pub use error::LogError;
 pub use flight::{Flight, FlowAngles, Sample, Sampling};
 pub use format::Format;
 pub use growing::Growing;
-pub use error::LogError;
 pub use load::{Channel, Log, Options, flights, inspect, inspect_all, load, parse};
 pub use names::names;
