@@ -99,6 +99,7 @@ impl Reading {
             mapping: self.mapping.clone(),
             tolerance: self.tolerance(),
             despite_problems: self.despite_problems,
+            sources: self.source.clone(),
         }
     }
 

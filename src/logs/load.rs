@@ -1,7 +1,7 @@
 //! A log file of any format read onto the one table.
 
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 

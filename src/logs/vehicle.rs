@@ -153,6 +153,9 @@ fn telemetry(topics: &Topics) -> Option<Vehicle> {
             "HEARTBEAT.type is that of an aeroplane and that of a multicopter",
         );
     }
+    if let Some(number) = has(Kind::Vtol) {
+        return found(Kind::Vtol, format!("HEARTBEAT.type {number}"));
+    }
     let (kind, number) = kinds.last()?;
     found(*kind, format!("HEARTBEAT.type {number}"))
 }

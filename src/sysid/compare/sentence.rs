@@ -284,6 +284,24 @@ mod tests {
     }
 
     #[test]
+    fn a_quiet_axis_gets_no_percentage() {
+        let of = |unexplained: f64| {
+            sentence(&Subject {
+                channel: ChannelId::Roll,
+                unexplained,
+                within_doubt: false,
+                finding: None,
+                follows: None,
+                mass: 3.364,
+                flights: 1,
+            })
+        };
+        let quiet = of(4232.66);
+        assert!(quiet.contains("rolling moment hardly varies") && !quiet.contains('%'), "{quiet}");
+        assert!(of(7.18).contains("718 % of its variation is unexplained"), "{}", of(7.18));
+    }
+
+    #[test]
     fn the_sentence_of_the_issue() {
         // measured 25 N, model 32 N: the residual is −7 ± 1 N, the model 28 ± 4 % too high
         let mut at = regime(RegimeVariable::Alpha, 9.0, f64::NAN, -7.0, 1.0);
