@@ -136,3 +136,14 @@ fn a_slow_channel_counts_once_a_sample() {
         assert!(found < 0.01, "{found}");
     }
 }
+
+#[test]
+fn a_log_without_altitude_is_compared_with_the_air_of_sea_level() {
+    let mut rows = flown();
+    for s in &mut rows {
+        (s.altitude_m, s.air_density_kgpm3) = (f64::NAN, f64::NAN);
+    }
+    let flight = rebuilt(&csv(&rows));
+    assert!(flight.notes.iter().any(|n| n.contains("sea level")), "{:?}", flight.notes);
+    assert!(compared(&flight).models[0].free_run.iter().all(|run| run.runs > 0));
+}

@@ -4,6 +4,7 @@ mod logs_support;
 
 use std::path::Path;
 
+use greylag::logs::vehicle::Kind;
 use greylag::logs::{Log, Options, Sample, parse};
 use logs_support::*;
 use mavlink::dialects::ardupilotmega::*;
@@ -110,8 +111,12 @@ fn elevon_pulses_become_commands() {
 }
 
 fn written(stamp: u64, component_id: u8, message: &MavMessage, out: &mut Vec<u8>) {
+    sent(stamp, [1, component_id], message, out);
+}
+
+fn sent(stamp: u64, [system_id, component_id]: [u8; 2], message: &MavMessage, out: &mut Vec<u8>) {
     out.extend(stamp.to_be_bytes());
-    let header = mavlink::MavHeader { system_id: 1, component_id, sequence: 0 };
+    let header = mavlink::MavHeader { system_id, component_id, sequence: 0 };
     mavlink::write_v2_msg(out, header, message).unwrap();
 }
 
@@ -211,4 +216,87 @@ fn a_clock_of_32_bits_may_wrap() {
         assert!(worst(&truth, rows, |s| s.aileron_cmd) < quantum);
         assert!(worst(&truth, rows, |s| s.elevator_cmd) < quantum);
     }
+}
+
+/// Attitudes of a second vehicle that stands still, twice as often as those of the one that flies.
+fn beside_one_that_stands(flight: Vec<u8>, rows: usize) -> Vec<u8> {
+    let mut out = Vec::new();
+    for i in 0..2 * rows {
+        let message = MavMessage::ATTITUDE(ATTITUDE_DATA {
+            time_boot_ms: 5 * i as u32,
+            ..Default::default()
+        });
+        sent(1_760_000_000_000_000 + 5_000 * i as u64, [2, 1], &message, &mut out);
+    }
+    out.extend(flight);
+    out
+}
+
+#[test]
+fn of_two_vehicles_in_a_file_the_one_that_flies_is_read() {
+    let truth = samples(1000);
+    let bytes = beside_one_that_stands(ardupilot(&truth, 1000), 1000);
+    let log = read(&bytes);
+    assert_eq!(log.life.as_deref(), Some("system 1"));
+    assert_eq!(log.flight.samples.len(), 1000);
+    let said = log.findings.iter().any(|f| f.text.contains("the file holds 2 flights"));
+    assert!(said, "{:?}", log.findings);
+}
+
+/// The same telemetry from a vehicle of another type.
+fn of_type(mavtype: MavType) -> Vec<u8> {
+    let mut out = ardupilot(&samples(1000), 1000);
+    let heartbeat = HEARTBEAT_DATA {
+        autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        mavtype,
+        ..Default::default()
+    };
+    written(1_760_000_000_000_000 + 20_000_000, 1, &MavMessage::HEARTBEAT(heartbeat), &mut out);
+    out
+}
+
+#[test]
+fn a_multicopter_is_named_and_asked_for_nothing() {
+    // Both types in one log are those of a quadplane: the copter's alone makes a copter.
+    let quadplane = read(&of_type(MavType::MAV_TYPE_QUADROTOR));
+    assert_eq!(quadplane.vehicle.map(|v| v.kind), Some(Kind::Vtol));
+    let mut copter = Vec::new();
+    let heartbeat = HEARTBEAT_DATA {
+        autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        mavtype: MavType::MAV_TYPE_HEXAROTOR,
+        ..Default::default()
+    };
+    written(1_760_000_000_000_000, 1, &MavMessage::HEARTBEAT(heartbeat), &mut copter);
+    for i in 0..500u32 {
+        let message =
+            MavMessage::ATTITUDE(ATTITUDE_DATA { time_boot_ms: 10 * i, ..Default::default() });
+        written(1_760_000_000_000_000 + 10_000 * u64::from(i), 1, &message, &mut copter);
+    }
+    let path = Path::new("copter.tlog");
+    let error = greylag::logs::parse(&copter, path, &Options::default()).unwrap_err().to_string();
+    assert!(error.contains("the vehicle is a multicopter (HEARTBEAT.type 13)"), "{error}");
+    assert!(!error.contains("HIL_ACTUATOR_CONTROLS"), "{error}");
+}
+
+#[test]
+fn a_quadplane_is_cut_to_flight_on_its_wings() {
+    let mut out = Vec::new();
+    let mode = |custom_mode: u32| {
+        MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+            custom_mode,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+            mavtype: MavType::MAV_TYPE_VTOL_TILTROTOR,
+            ..Default::default()
+        })
+    };
+    let start = 1_760_000_000_000_000;
+    // QHOVER until 4 s, FBWA after.
+    written(start, 1, &mode(18), &mut out);
+    written(start + 4_000_000, 1, &mode(5), &mut out);
+    out.extend(ardupilot(&samples(1000), 1000));
+    let log = read(&out);
+    assert_eq!(log.vehicle.map(|v| v.kind), Some(Kind::Vtol));
+    let first = log.flight.samples[0].time_s;
+    assert!((first - 5.0).abs() < 0.05, "1 s of boot and 4 s of hover: {first}");
+    assert!(log.findings.iter().any(|f| f.text.contains("rows are left out: the vehicle hovers")));
 }

@@ -167,14 +167,14 @@ fn foreign_axes_are_named_as_such() {
 }
 
 #[test]
-fn rows_that_go_back_and_semicolons_are_said() {
+fn rows_that_go_back_are_said_and_semicolons_are_read() {
     let mut back = FLIGHT.samples.clone();
     back[2000..2600].iter_mut().for_each(|s| s.time_s -= 8.0);
     let said = found(&text(&back), "");
     assert!(said.contains("600 are not later than the row before"), "{said}");
     let with_commas = String::from_utf8(spoiled(|_| {})).unwrap();
     let said = found(with_commas.replace(',', ";").as_bytes(), "");
-    assert!(said.contains("separated by semicolons"), "{said}");
+    assert_eq!(said, "");
 }
 
 #[test]

@@ -7,7 +7,8 @@ use anyhow::{Context, Result, bail};
 use crate::logs::finding::{Finding, Severity};
 use crate::logs::mapping::Mapping;
 use crate::logs::phases::Flying;
-use crate::logs::{self, csv::Tolerance};
+use crate::logs::sources::Asked;
+use crate::logs::{self, Log, csv::Tolerance};
 use crate::model::GreyBox;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
@@ -35,6 +36,10 @@ pub struct Reading {
     /// Use logs in which wrong units, signs or axes were found.
     #[arg(long)]
     despite_problems: bool,
+    /// The instance of a topic to read instead of the one that the reader chooses: airspeed=1, or
+    /// ATTITUDE=2/1 (system/component).
+    #[arg(long, value_name = "TOPIC=INSTANCE")]
+    source: Vec<Asked>,
 }
 
 /// What the logs gave.
@@ -46,6 +51,20 @@ pub struct Intake {
     pub notes: Vec<String>,
     /// Whether a log was left out or holds what makes the figures wrong.
     pub in_doubt: bool,
+}
+
+impl Intake {
+    fn add(&mut self, flight: Reconstruction, name: &str, findings: &[Finding]) {
+        self.flights.push(flight);
+        self.in_doubt |= findings.iter().any(|f| f.severity == Severity::Problem);
+        self.notes.extend(findings.iter().map(|f| format!("{name}: {f}")));
+    }
+
+    fn leave_out(&mut self, error: &anyhow::Error) {
+        eprintln!("greylag: {error:#}");
+        self.in_doubt = true;
+        self.notes.push(format!("left out: {error:#}"));
+    }
 }
 
 impl LogArguments {
@@ -70,7 +89,8 @@ impl Reading {
     /// If the mapping cannot be read.
     pub fn options(&self) -> Result<logs::Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
-        Ok(logs::Options { tolerance: self.tolerance(), mapping, flies: Flying::default() })
+        let (tolerance, sources) = (self.tolerance(), self.source.clone());
+        Ok(logs::Options { tolerance, mapping, flies: Flying::default(), sources })
     }
 
     /// The same for a workbench.
@@ -79,6 +99,7 @@ impl Reading {
             mapping: self.mapping.clone(),
             tolerance: self.tolerance(),
             despite_problems: self.despite_problems,
+            sources: self.source.clone(),
         }
     }
 
@@ -102,16 +123,21 @@ impl Reading {
         let mut intake = Intake::default();
         for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {
             eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
-            match self.reconstruct_one(path, &name, &reading, model, clock) {
-                Ok((flight, findings)) => {
-                    intake.flights.push(flight);
-                    intake.in_doubt |= findings.iter().any(|f| f.severity == Severity::Problem);
-                    intake.notes.extend(findings.iter().map(|f| format!("{name}: {f}")));
-                }
+            let logs = match logs::flights(path, &reading) {
+                Ok(logs) => logs,
                 Err(error) => {
-                    eprintln!("greylag: {error:#}");
-                    intake.in_doubt = true;
-                    intake.notes.push(format!("left out: {error:#}"));
+                    intake.leave_out(&error.into());
+                    continue;
+                }
+            };
+            let several = logs.len() > 1;
+            for (k, log) in logs.into_iter().enumerate() {
+                let number = log.flight.name.rsplit_once('#').map(|(_, n)| n.to_owned());
+                let number = number.unwrap_or_else(|| (k + 1).to_string());
+                let name = if several { format!("{name}#{number}") } else { name.clone() };
+                match self.reconstruct_one(path, &name, log, model, clock) {
+                    Ok((flight, findings)) => intake.add(flight, &name, &findings),
+                    Err(error) => intake.leave_out(&error),
                 }
             }
         }
@@ -126,11 +152,10 @@ impl Reading {
         &self,
         path: &Path,
         name: &str,
-        reading: &logs::Options,
+        log: Log,
         model: &GreyBox,
         clock: ActuatorClock,
     ) -> Result<(Reconstruction, Vec<Finding>)> {
-        let log = logs::load(path, reading)?;
         if let Some(problems) = log.problems().filter(|_| !self.despite_problems) {
             bail!(
                 "flight log {}: {problems}. Every figure would be wrong. If the log is right all the same, use it with --despite-problems",

@@ -12,6 +12,7 @@ use crate::logs::finding::Severity;
 use crate::logs::info::Info;
 use crate::logs::mapping::Mapping;
 use crate::logs::phases::{Flying, PhaseKind};
+use crate::logs::sources::Asked;
 use crate::logs::{Flight, Log, Options, csv};
 use crate::model::GreyBox;
 use crate::physics::Airframe;
@@ -88,6 +89,10 @@ struct Reading {
     /// Read the log however many of its rows are unusable.
     #[arg(long)]
     lenient: bool,
+    /// The instance of a topic to read instead of the one that the reader chooses: airspeed=1, or
+    /// ATTITUDE=2/1 (system/component).
+    #[arg(long, value_name = "TOPIC=INSTANCE")]
+    source: Vec<Asked>,
 }
 
 impl Reading {
@@ -100,7 +105,8 @@ impl Reading {
             mapping.with_mixer(own.or_else(|| model.and_then(|m| m.airframe.mixer.clone())));
         let tolerance = if self.lenient { csv::Tolerance::Lenient } else { csv::Tolerance::Strict };
         let flies = model.map(|m| Flying::from(m.airframe.envelope.flying_from_mps()));
-        Ok(Options { tolerance, mapping, flies: flies.unwrap_or_default() })
+        let sources = self.source.clone();
+        Ok(Options { tolerance, mapping, flies: flies.unwrap_or_default(), sources })
     }
 }
 
@@ -111,8 +117,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             let model =
                 model.as_deref().map(|path| GreyBox::load(&files::shipped(path))).transpose()?;
             let options = reading.options(model.as_ref())?;
-            let of = |file: &PathBuf| Ok(Info::of(&crate::logs::inspect(file, &options)?));
-            let all = files.iter().map(of).collect::<Result<Vec<Info>>>()?;
+            let of = |file: &PathBuf| Ok(crate::logs::inspect_all(file, &options)?);
+            let all = files.iter().map(of).collect::<Result<Vec<Vec<Log>>>>()?;
+            let all: Vec<Info> = all.iter().flatten().map(Info::of).collect();
             match (json, &all[..]) {
                 (true, [only]) => println!("{}", serde_json::to_string_pretty(only)?),
                 (true, all) => println!("{}", serde_json::to_string_pretty(all)?),
@@ -193,7 +200,11 @@ fn print_all(all: &[Info]) {
 }
 
 fn print(info: &Info) {
-    println!("{}: {}", info.name, info.format.name());
+    let life = info.life.as_ref().map(|life| format!(" ({life})")).unwrap_or_default();
+    println!("{}{life}: {}", info.name, info.format.name());
+    if let Some(vehicle) = &info.vehicle {
+        println!("{}, by {}", vehicle.kind.name(), vehicle.by);
+    }
     println!(
         "{} rows, {:.3} to {:.3} s ({:.1} s), {:.1} Hz; {:.1} s in flight; {} rows dropped",
         info.rows,
@@ -210,6 +221,10 @@ fn print(info: &Info) {
         println!("  {:>10.2} to {:>10.2} s  {kind}  {} rows", phase.from_s, phase.to_s, phase.rows);
     }
     more(info.phases.len());
+    for (from, to) in info.hovers.iter().take(SHOWN) {
+        println!("  {from:>10.2} to {to:>10.2} s  hover or transition, left out");
+    }
+    more(info.hovers.len());
     if !info.gaps.is_empty() {
         println!("\nGaps");
         for (start, length) in info.gaps.iter().take(SHOWN) {
@@ -217,6 +232,7 @@ fn print(info: &Info) {
         }
         more(info.gaps.len());
     }
+    print_sources(info);
     println!("\nChannels");
     let mut table = comfy_table::Table::new();
     table.load_style(comfy_table::presets::NOTHING);
@@ -232,9 +248,10 @@ fn print(info: &Info) {
     }
     println!("{table}\n\nServes for");
     for purpose in &info.purposes {
-        let verdict = match purpose.missing.is_empty() {
-            true => "yes".to_owned(),
-            false => format!("no, for want of {}", purpose.missing.join(", ")),
+        let verdict = match (&purpose.missing[..], &purpose.slow[..]) {
+            ([], []) => "yes".to_owned(),
+            ([], slow) => format!("no: {}", slow.join(", ")),
+            (missing, _) => format!("no, for want of {}", missing.join(", ")),
         };
         println!("  {}: {verdict}", purpose.name);
         purpose.instead.iter().for_each(|x| println!("      with {x}"));
@@ -242,6 +259,26 @@ fn print(info: &Info) {
     if !info.findings.is_empty() {
         println!("\nTo know");
         info.findings.iter().for_each(|finding| println!("  {finding}"));
+    }
+}
+
+/// The instances of topics of which there are several.
+fn print_sources(info: &Info) {
+    if info.sources.is_empty() {
+        return;
+    }
+    println!("\nSources");
+    for source in &info.sources {
+        println!(
+            "  {} {}: {:.1} Hz, {:.2} to {:.2} s, {}{}",
+            source.topic,
+            source.instance,
+            source.rate_hz,
+            source.from_s,
+            source.to_s,
+            if source.moves { "moves" } else { "never changes" },
+            if source.read { ", read" } else { "" }
+        );
     }
 }
 

@@ -1,8 +1,13 @@
 //! The CSV form of a flight log: one row a sample, a header row, SI units.
 
+mod dialect;
+mod quaternion;
+mod raw;
 mod write;
 
 pub use super::rows::Tolerance;
+pub use quaternion::Order;
+pub(crate) use raw::{Raw, raw};
 pub use write::Rows;
 pub use write::save;
 pub use write::write;
@@ -10,9 +15,8 @@ pub use write::write;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::columns::{COLUMNS, EITHER, NEEDED, Place, index};
-use super::mapping::{Mapping, TEXT};
-use super::{Flight, Sample, mixed, rows};
+use super::mapping::Mapping;
+use super::{Flight, rows};
 
 /// Why a CSV flight log cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -101,76 +105,6 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
     settle(raw, path, tolerance)
 }
 
-/// A table as it stands in the file, before any row is judged.
-pub(super) struct Raw {
-    /// The rows that could be read and have a time.
-    pub rows: Vec<Sample>,
-    /// How many of the file's rows stand before each of them.
-    places: Vec<usize>,
-    /// Rows in the file.
-    total: usize,
-    /// The needed columns that it lacks.
-    pub missing: Vec<CsvError>,
-    unknown_columns: Vec<String>,
-    cut_short: bool,
-}
-
-impl Raw {
-    /// The rows, those that could not be read included, as `take` judges them.
-    fn judged(&self, take: impl Fn(&mut rows::Rows, usize, Option<Sample>)) -> rows::Rows {
-        let mut rows = rows::Rows::with_sparse_columns_of(&self.rows);
-        let mut next = self.rows.iter().zip(&self.places).peekable();
-        for i in 0..self.total {
-            let own = next.next_if(|(_, place)| **place == i).map(|(sample, _)| *sample);
-            // The header is row 1.
-            take(&mut rows, i + 2, own);
-        }
-        rows
-    }
-}
-
-/// Where a field goes: place, scale, offset; whether it is one part of a sum.
-type Target = (Place, f64, f64, Part);
-
-/// Whether a field is a column, or one of several surfaces that make one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
-    Whole,
-    OneOfSeveral,
-}
-
-/// Reads the rows, taking columns under other names or in other units where `mapping` says so.
-pub(super) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, CsvError> {
-    let text = |source| CsvError::Text { path: path.to_owned(), source };
-    // A row without its line end may miss digits: it is left out.
-    let end = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
-    let mut reader = ::csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..end]);
-    let header = reader.byte_headers().map_err(text)?.clone();
-    let names: Vec<String> =
-        header.iter().map(|h| String::from_utf8_lossy(h).trim().to_owned()).collect();
-    let mut targets: Vec<Vec<Target>> = names.iter().map(|name| targets(name, mapping)).collect();
-    let mixed = mixed::columns(&names, mapping);
-    for part in &mixed {
-        targets[part.field].push((part.place, part.share, 0.0, Part::OneOfSeveral));
-    }
-    let made: Vec<String> = mixed.iter().map(|part| part.column.to_owned()).collect();
-    let missing = missing_columns(&[names.clone(), made].concat(), mapping, path);
-    let unknown = names.iter().zip(&targets).filter(|(_, targets)| targets.is_empty());
-    let unknown_columns = unknown.map(|(name, _)| name.clone()).collect();
-    let (mut rows, mut places, mut total) = (Vec::new(), Vec::new(), 0);
-    for record in reader.byte_records() {
-        let record = record.map_err(text)?;
-        // A row that lacks fields is damaged, and would take many times its size.
-        let whole = record.len() >= targets.len();
-        if let Some(sample) = sample(&record, &targets).filter(|s| whole && s.time_s.is_finite()) {
-            rows.push(sample);
-            places.push(total);
-        }
-        total += 1;
-    }
-    Ok(Raw { rows, places, total, missing, unknown_columns, cut_short: end < bytes.len() })
-}
-
 /// What [`settle`] would say against a table.
 pub(super) fn poor(raw: &Raw, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
     refusal(&raw.judged(rows::Rows::take), path, tolerance)
@@ -222,62 +156,11 @@ fn reading(raw: Raw, rows: rows::Rows, path: &Path) -> Reading {
     }
 }
 
-/// Where the file's column `name` goes.
-fn targets(name: &str, mapping: &Mapping) -> Vec<Target> {
-    let mut targets: Vec<Target> = mapping
-        .of_topic(TEXT)
-        .filter(|(_, entry)| entry.field == name)
-        .filter_map(|(column, e)| Some((COLUMNS[index(column)?].2, e.scale, e.offset, Part::Whole)))
-        .collect();
-    if mapping.get(name).is_none()
-        && let Some(i) = index(name)
-    {
-        targets.push((COLUMNS[i].2, 1.0, 0.0, Part::Whole));
-    }
-    targets
-}
-
-/// The needed columns that are not among `names`, each with what would satisfy it.
-fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvError> {
-    let has = |column: &str| {
-        let name = mapping.get(column).map_or(column, |entry| &entry.field);
-        names.iter().any(|n| n == name)
-    };
-    let missing = |column, remedy| CsvError::Column { path: path.to_owned(), column, remedy };
-    let alone = NEEDED.into_iter().filter(|column| !has(column) && !mapping.makes(column));
-    let alone =
-        alone.map(|column| missing(column, "add it, in the unit its name ends with".into()));
-    let either = EITHER.into_iter().filter(|(command, position)| !has(command) && !has(position));
-    let either = either.map(|(command, position)| {
-        missing(command, format!("add it, or the position `{position}`"))
-    });
-    alone.chain(either).collect()
-}
-
-/// The sample of a record; `None` when a field is no number.
-fn sample(record: &::csv::ByteRecord, targets: &[Vec<Target>]) -> Option<Sample> {
-    let mut sample = Sample::default();
-    for (field, targets) in record.iter().zip(targets) {
-        if targets.is_empty() {
-            continue;
-        }
-        let field = std::str::from_utf8(field).ok()?.trim();
-        if !field.is_empty() {
-            let x: f64 = field.parse().ok()?;
-            for (place, scale, offset, part) in targets {
-                let value = if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
-                let place = place(&mut sample);
-                let sums = *part == Part::OneOfSeveral && !place.is_nan();
-                *place = if sums { *place + value } else { value };
-            }
-        }
-    }
-    Some(sample)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Sample;
+    use crate::columns::COLUMNS;
 
     fn flown(rows: usize) -> Flight {
         let sample = |i: usize| {

@@ -5,20 +5,31 @@
 //! so that a truncated log looks like a whole one, allocates a name and a list for every record,
 //! and knows no instances. The independent check is pymavlink (`tests/logs_crosscheck.py`).
 //!
-//! Not read: texts, arrays (`a`), units and multipliers of FMTU and MULT (the format letters `c C e
+//! Where the time of the attitude or of the gyros begins again, another flight begins: a card that is read whole holds
+//! one log after the other.
+//!
+//! Not read: texts but the firmware's name, arrays (`a`), units and multipliers of FMTU and MULT (the format letters `c C e
 //! E L` carry their own scale, which is what pymavlink applies, too).
 
 use std::collections::BTreeMap;
+use std::io::Read;
 
 use super::finding::Finding;
 use super::format::DATAFLASH_MAGIC;
 use super::topics::{Topic, Topics};
+use super::ulog::damage;
+use super::window::Window;
 
 /// Magic and type.
 const HEADER: usize = 3;
 /// The type of the record that declares types, its length, and that of its texts.
 const FMT: u8 = 128;
 const FMT_LEN: usize = 89;
+/// The longest record; its length has one byte.
+const LONGEST: usize = 255;
+/// Records whose time tells where another flight begins, and how far back it must go, s.
+const CLOCKS: [&str; 2] = ["ATT", "IMU"];
+const BACK_S: f64 = 1.0;
 
 /// A declared record type.
 struct Declared {
@@ -106,47 +117,60 @@ struct Reader {
     topics: BTreeMap<(u8, u16), Topic>,
     counts: BTreeMap<(u8, u16), usize>,
     out: Topics,
+    /// The flights before the present one.
+    lives: Vec<Topics>,
+    /// Bytes that belong to no record, and the seconds lost at each place of them.
+    skipped: usize,
+    holes: Vec<f64>,
+    in_step: bool,
+    last_s: f64,
 }
 
 /// Reads what `wanted` names; everything else is counted.
-pub(super) fn read(bytes: &[u8], wanted: &dyn Fn(&str) -> bool) -> Topics {
+pub(super) fn read<'a>(
+    source: &'a mut dyn Read,
+    wanted: &dyn Fn(&str) -> bool,
+) -> (Vec<Topics>, Window<'a>) {
+    let mut window = Window::new(source);
     let mut reader = Reader::default();
-    let mut at = 0;
-    let mut skipped = 0usize;
-    let mut cut = 0usize;
-    while at < bytes.len() {
-        let kind = match &bytes[at..] {
-            [a, b, kind, ..] if [*a, *b] == DATAFLASH_MAGIC => *kind,
-            rest => {
-                if rest.len() < HEADER {
-                    cut = rest.len();
-                    break;
-                }
-                skipped += 1;
-                at += 1;
-                continue;
+    let cut = loop {
+        let view = window.view(LONGEST);
+        let kind = match view {
+            [a, b, kind, ..] if [*a, *b] == DATAFLASH_MAGIC => Some(*kind),
+            rest if rest.len() < HEADER => {
+                break rest.len();
             }
+            _ => None,
         };
-        let len = match (kind, reader.declared.get(&kind)) {
-            (FMT, _) => FMT_LEN,
-            (_, Some(declared)) => declared.len,
-            (_, None) => {
-                skipped += 1;
-                at += 1;
-                continue;
-            }
+        let len = kind.and_then(|kind| match kind {
+            FMT => Some(FMT_LEN),
+            _ => reader.declared.get(&kind).map(|declared| declared.len),
+        });
+        let (Some(kind), Some(len)) = (kind, len) else {
+            reader.damaged();
+            window.skip(1);
+            continue;
         };
-        let Some(body) = bytes.get(at + HEADER..at + len) else {
-            cut = bytes.len() - at;
-            break;
+        let Some(body) = view.get(HEADER..len) else {
+            break view.len();
         };
+        reader.in_step = true;
         reader.record(kind, body, wanted);
-        at += len;
-    }
-    reader.finish(skipped, cut)
+        window.skip(len);
+    };
+    (reader.finish(cut), window)
 }
 
 impl Reader {
+    /// Counts a byte that belongs to no record.
+    fn damaged(&mut self) {
+        if self.in_step {
+            self.holes.push(f64::NAN);
+        }
+        self.in_step = false;
+        self.skipped += 1;
+    }
+
     fn record(&mut self, kind: u8, body: &[u8], wanted: &dyn Fn(&str) -> bool) {
         if kind == FMT {
             if let Some((kind, declared)) = declaration(body, wanted) {
@@ -165,40 +189,76 @@ impl Reader {
             }
             return;
         }
+        if declared.name == "MSG" && self.out.firmware.is_empty() {
+            let message = declared.fields.iter().find(|f| f.0 == "Message");
+            let said = message.map(|f| text(body.get(f.2..).unwrap_or_default()));
+            let firmware = said.filter(|t| t.contains("Ardu") || t.contains("APM:"));
+            self.out.firmware = firmware.unwrap_or_default();
+        }
         let instance = declared.instance.map_or(0, |(letter, at)| number(letter, body, at) as u16);
         *self.counts.entry((kind, instance)).or_default() += 1;
-        let Some((letter, at, unit)) = declared.time.filter(|_| declared.wanted) else { return };
+        let Some((letter, at, unit)) = declared.time else { return };
+        let time_s = number(letter, body, at) * unit;
+        if let Some(hole) = self.holes.last_mut().filter(|hole| hole.is_nan()) {
+            *hole = (time_s - self.last_s).max(0.0);
+        }
+        self.last_s = time_s;
+        if !declared.wanted {
+            return;
+        }
+        let last = self.topics.get(&(kind, instance)).and_then(|t| t.time_s.last());
+        if CLOCKS.contains(&&*declared.name) && last.is_some_and(|last| time_s < last - BACK_S) {
+            let life = gathered(&self.declared, std::mem::take(&mut self.topics));
+            let parameters = self.out.parameters.clone();
+            let firmware = std::mem::take(&mut self.out.firmware);
+            self.lives.push(Topics { topics: life, parameters, firmware, ..Topics::default() });
+        }
         let topic = self
             .topics
             .entry((kind, instance))
             .or_insert_with(|| Topic::new(declared.fields.iter().map(|f| f.0.clone())));
-        topic.time_s.push(number(letter, body, at) * unit);
+        topic.time_s.push(time_s);
         for ((_, letter, offset), values) in declared.fields.iter().zip(&mut topic.values) {
             values.push(number(*letter, body, *offset));
         }
     }
 
-    fn finish(mut self, skipped: usize, cut: usize) -> Topics {
-        let key = |declared: &BTreeMap<u8, Declared>, kind: u8, instance: u16| {
-            (declared.get(&kind).map(|d| d.name.clone()).unwrap_or_default(), instance)
-        };
+    fn finish(mut self, cut: usize) -> Vec<Topics> {
         for ((kind, instance), count) in self.counts {
-            *self.out.counts.entry(key(&self.declared, kind, instance)).or_default() += count;
+            let name = self.declared.get(&kind).map(|d| d.name.clone()).unwrap_or_default();
+            *self.out.counts.entry((name, instance)).or_default() += count;
         }
-        for ((kind, instance), topic) in self.topics {
-            self.out.topics.entry(key(&self.declared, kind, instance)).or_insert(topic);
-        }
-        if skipped > 0 {
-            self.out.findings.push(Finding::warning(format!(
-                "{skipped} bytes of the file belong to no record and were skipped: it is damaged there"
-            )));
-        }
+        self.out.topics = gathered(&self.declared, self.topics);
+        self.out.findings.extend(damage(self.skipped, &self.holes));
         // The card's last block is padded, so that a cut record at the end is the rule.
         if cut > 0 {
             self.out.findings.push(Finding::warning(format!(
                 "the file ends in the middle of a record, {cut} bytes of which are left out"
             )));
         }
-        self.out
+        for life in &mut self.lives {
+            life.counts = self.out.counts.clone();
+            life.findings = self.out.findings.clone();
+        }
+        self.lives.push(self.out);
+        if self.lives.len() > 1 {
+            let named =
+                |(k, life): (usize, &mut Topics)| life.life = Some(format!("log {}", k + 1));
+            self.lives.iter_mut().enumerate().for_each(named);
+        }
+        self.lives
     }
+}
+
+/// The samples by the names of their types.
+fn gathered(
+    declared: &BTreeMap<u8, Declared>,
+    topics: BTreeMap<(u8, u16), Topic>,
+) -> BTreeMap<(String, u16), Topic> {
+    let mut out = BTreeMap::new();
+    for ((kind, instance), topic) in topics {
+        let name = declared.get(&kind).map(|d| d.name.clone()).unwrap_or_default();
+        out.entry((name, instance)).or_insert(topic);
+    }
+    out
 }

@@ -40,7 +40,8 @@ impl Format {
         let header = start.split(|b| *b == b'\n').next().unwrap_or_default();
         let text =
             !header.is_empty() && header.iter().all(|b| *b >= b' ' || *b == b'\t' || *b == b'\r');
-        (text && header.contains(&b',')).then_some(Format::Csv)
+        let separated = header.iter().any(|b| b",;\t".contains(b));
+        (text && separated).then_some(Format::Csv)
     }
 
     /// The format's name for people.

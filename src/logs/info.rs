@@ -6,7 +6,9 @@ use super::columns::COLUMNS;
 use super::finding::{Finding, Severity};
 use super::phases::{self, Phase, PhaseKind};
 use super::rudder::RudderMotion;
-use super::{Channel, Format, Log, Sample};
+use super::sources::Source;
+use super::vehicle::Vehicle;
+use super::{Channel, Format, Log, Sample, assess};
 
 /// What `greylag logs info` says of a log.
 #[derive(Clone, Debug, Serialize)]
@@ -33,6 +35,14 @@ pub struct Info {
     pub flight_s: f64,
     /// What the aircraft does when.
     pub phases: Vec<Phase>,
+    /// The vehicle, where the log names it.
+    pub vehicle: Option<Vehicle>,
+    /// When it did not fly on its wings alone, s: left out.
+    pub hovers: Vec<(f64, f64)>,
+    /// Which vehicle and which life of it this is, where the file holds several.
+    pub life: Option<String>,
+    /// The instances of topics of which there are several.
+    pub sources: Vec<Source>,
     /// What fills the table.
     pub channels: Vec<Channel>,
     /// What the log serves for.
@@ -50,6 +60,8 @@ pub struct Purpose {
     pub name: &'static str,
     /// What the log lacks for it; nothing if it serves.
     pub missing: Vec<String>,
+    /// What is there, but too slow.
+    pub slow: Vec<String>,
     /// What takes the place of what is absent.
     pub instead: Vec<String>,
 }
@@ -77,8 +89,12 @@ impl Info {
             gaps: gaps.collect(),
             flight_s: flown.fold(0.0, |sum, x| sum + x),
             phases,
+            vehicle: log.vehicle.clone(),
+            hovers: log.hovers.clone(),
+            life: log.life.clone(),
+            sources: log.sources.clone(),
             channels: log.channels.clone(),
-            purposes: purposes(log),
+            purposes: purposes(log).into_iter().map(|p| weighed(log, p)).collect(),
             topics: log.topics.clone(),
             findings: rudder(log).into_iter().chain(log.findings.iter().cloned()).collect(),
         }
@@ -128,6 +144,33 @@ fn actuators(has: impl Fn(&str) -> bool) -> (Vec<String>, Vec<String>) {
     (missing, instead)
 }
 
+/// The purpose with what stands against it beside absent columns: no wings, no flight, slow channels.
+fn weighed(log: &Log, mut purpose: Purpose) -> Purpose {
+    let wings = log.vehicle.as_ref().is_none_or(|v| v.refusal().is_none());
+    if !wings {
+        purpose.missing = vec!["wings".into()];
+        return purpose;
+    }
+    if log.flight.samples.is_empty() && !log.hovers.is_empty() {
+        purpose.missing = vec!["a flight on its wings".into()];
+        return purpose;
+    }
+    if log.flown_s() == 0.0 && purpose.missing.is_empty() {
+        purpose.missing.push("a flight".into());
+    }
+    let moments = purpose.name != INCIDENCE;
+    for channel in log.channels.iter().filter(|_| moments) {
+        let slow = channel.columns.iter().filter_map(|c| Some((c, assess::too_slow(channel, c)?)));
+        purpose.slow.extend(slow.map(|(column, wanted)| {
+            format!("{column} {:.1} Hz; wanted ≥ {wanted}", assess::real_hz(channel))
+        }));
+    }
+    purpose
+}
+
+/// The purpose that slow channels serve as well.
+const INCIDENCE: &str = "alpha, beta";
+
 fn purposes(log: &Log) -> Vec<Purpose> {
     let samples = &log.flight.samples;
     let has = |column: &str| has(log, column);
@@ -139,6 +182,7 @@ fn purposes(log: &Log) -> Vec<Purpose> {
         lacking(&["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"]);
     let join = |a: &[String], b: &[String]| [a, b].concat();
     let incidence = lacking(&["alpha_rad", "beta_rad"]);
+    let airspeed = lacking(&["airspeed_mps"]);
     let velocity = lacking(&["vn_mps", "ve_mps", "vd_mps"]);
     let mut forces = lacking(&["ax_mps2", "ay_mps2", "az_mps2"]);
     let dense = |get: fn(&Sample) -> f64| {
@@ -164,8 +208,10 @@ fn purposes(log: &Log) -> Vec<Purpose> {
     } else {
         vec!["alpha and beta from wind-corrected velocity, at a loss of power".to_owned()]
     };
-    let no_incidence = if incidence.is_empty() || velocity.is_empty() {
+    let no_incidence = if incidence.is_empty() {
         Vec::new()
+    } else if velocity.is_empty() {
+        airspeed
     } else {
         join(&incidence, &velocity)
     };
@@ -173,18 +219,21 @@ fn purposes(log: &Log) -> Vec<Purpose> {
         Purpose {
             name: "comparison in free run",
             missing: [&states[..], &actuators, &no_incidence].concat(),
+            slow: Vec::new(),
             instead: [&instead[..], &rebuilt].concat(),
         },
         Purpose {
             name: "moments l, m, n",
             missing: [&states[..], &actuators].concat(),
+            slow: Vec::new(),
             instead: [&instead[..], &density].concat(),
         },
         Purpose {
             name: "forces D, Y, L",
             missing: [&states[..], &actuators, &forces].concat(),
+            slow: Vec::new(),
             instead: [&instead[..], &path, &density].concat(),
         },
-        Purpose { name: "alpha, beta", missing: no_incidence, instead: rebuilt },
+        Purpose { name: INCIDENCE, missing: no_incidence, slow: Vec::new(), instead: rebuilt },
     ]
 }

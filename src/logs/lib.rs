@@ -2,7 +2,11 @@
 //!
 //! [`load`] reads any of the four formats, distinguished by their first bytes, onto one table.
 
+mod assess;
+mod binary;
 pub mod csv;
+mod door;
+mod error;
 pub mod finding;
 mod columns;
 mod dataflash;
@@ -11,22 +15,29 @@ mod flight;
 mod format;
 mod growing;
 pub mod info;
+mod lag;
 mod load;
 pub mod mapping;
 mod mixed;
 mod names;
+pub mod quality;
 pub mod phases;
 pub mod rudder;
 mod resample;
 mod rows;
 mod screening;
+pub mod sources;
 mod table;
+mod text;
 mod tlog;
 mod topics;
 mod ulog;
+pub mod vehicle;
+mod window;
 
+pub use error::LogError;
 pub use flight::{Flight, FlowAngles, Sample, Sampling};
 pub use format::Format;
 pub use growing::Growing;
-pub use load::{Channel, Log, LogError, Options, inspect, load, parse};
+pub use load::{Channel, Log, Options, flights, inspect, inspect_all, load, parse};
 pub use names::names;

@@ -11,9 +11,12 @@
 
 use super::Sample;
 use super::columns::{COLUMNS, EITHER, NEEDED, index};
+use super::finding::Finding;
 use super::load::Channel;
 use super::mapping::rule::Rule;
+use super::quality::Quality;
 use super::resample::{Reader, SAME_S};
+use super::sources::{Asked, Choice, Source};
 use super::topics::{Topics, period_s};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 
@@ -52,6 +55,11 @@ struct Track {
 }
 
 impl Track {
+    /// Whether it shows one and the same value all the time.
+    fn is_dead(&self) -> bool {
+        self.series.iter().all(|s| s.iter().all(|x| *x == s[0]))
+    }
+
     fn limit_s(&self) -> f64 {
         if self.rate_hz > 0.0 { GAP_S.max(GAP_PERIODS / self.rate_hz) } else { GAP_S }
     }
@@ -74,6 +82,10 @@ impl Track {
             samples: self.times.len(),
             rate_hz: self.rate_hz,
             largest_gap_s: gap,
+            quality: match &self.series[..] {
+                [one] => Quality::of(self.rule.columns()[0], &self.times, one),
+                _ => Quality::default(),
+            },
         }
     }
 }
@@ -85,6 +97,12 @@ pub(super) struct Table {
     pub notes: Vec<String>,
     /// The needed columns that nothing fills.
     pub missing: Vec<Missing>,
+    /// The instances of topics of which there are several.
+    pub sources: Vec<Source>,
+    /// What was read instead of what is usual.
+    pub findings: Vec<Finding>,
+    /// The rule by which each column is filled.
+    pub rules: Vec<Rule>,
 }
 
 /// A needed column that nothing fills.
@@ -96,8 +114,10 @@ pub(super) struct Missing {
 }
 
 /// Puts what the rules find onto one table.
-pub(super) fn build(topics: &Topics, rules: &[Rule]) -> Table {
-    let tracks = choose(topics, rules);
+pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
+    let mut choice = Choice::of(topics, rules, asked);
+    let (tracks, replaced) = choose(topics, rules, &choice);
+    choice.findings.extend(replaced);
     let filled = |column: &str| tracks.iter().any(|t| t.rule.columns().contains(&column));
     // The time comes with any channel.
     let missing = |column: &'static str, or: Option<&'static str>| {
@@ -144,14 +164,22 @@ pub(super) fn build(topics: &Topics, rules: &[Rule]) -> Table {
     if missing.is_empty() {
         cut_ends(&mut rows, &mut notes);
     }
-    Table { rows, channels: tracks.iter().map(Track::channel).collect(), notes, missing }
+    Table {
+        rows,
+        channels: tracks.iter().map(Track::channel).collect(),
+        notes,
+        missing,
+        sources: choice.sources,
+        findings: choice.findings,
+        rules: tracks.into_iter().map(|t| t.rule).collect(),
+    }
 }
 
 /// For each column the best rule that has data.
-fn choose(topics: &Topics, rules: &[Rule]) -> Vec<Track> {
-    let mut chosen: Vec<Track> = Vec::new();
+fn choose(topics: &Topics, rules: &[Rule], choice: &Choice) -> (Vec<Track>, Vec<Finding>) {
+    let (mut chosen, mut findings): (Vec<Track>, Vec<Finding>) = (Vec::new(), Vec::new());
     for rule in rules {
-        let Some(track) = track(topics, rule) else { continue };
+        let Some(track) = track(topics, rule, choice.instance(rule)) else { continue };
         let same = |t: &&mut Track| t.rule.columns()[0] == rule.columns()[0];
         let filled = |t: &Track| t.rule.columns().iter().any(|c| rule.columns().contains(c));
         let taken = chosen.iter().any(filled);
@@ -164,22 +192,30 @@ fn choose(topics: &Topics, rules: &[Rule]) -> Vec<Track> {
                 let much_faster = old.rate_hz < SLOW_HZ
                     && track.rate_hz > 5.0 * old.rate_hz
                     && track.finite_share >= GOOD_SHARE;
-                if better || much_faster {
+                let rests = rule.columns()[0].ends_with("_cmd");
+                let alive =
+                    !rests && old.is_dead() && !track.is_dead() && track.finite_share >= GOOD_SHARE;
+                if alive {
+                    findings.push(Finding::warning(format!(
+                        "{}: {} is read, for {} never changes",
+                        rule.columns().join(", "),
+                        track.origin,
+                        old.origin
+                    )));
+                }
+                if better || much_faster || alive {
                     *old = track;
                 }
             }
         }
     }
-    chosen
+    (chosen, findings)
 }
 
 /// The data of a rule: finite values at increasing times.
-fn track(topics: &Topics, rule: &Rule) -> Option<Track> {
-    let instance = match rule.instance {
-        Some(i) => topics.topics.get(&(rule.topic.clone(), i)).map(|t| (i, t)),
-        None => topics.instances(&rule.topic).next(),
-    };
-    let (instance, topic) = instance?;
+fn track(topics: &Topics, rule: &Rule, instance: Option<u16>) -> Option<Track> {
+    let instance = instance?;
+    let topic = topics.topics.get(&(rule.topic.clone(), instance))?;
     let all = rule.series(topic)?;
     let mut times = Vec::with_capacity(topic.time_s.len());
     let mut series = vec![Vec::with_capacity(topic.time_s.len()); all.len()];
@@ -196,7 +232,7 @@ fn track(topics: &Topics, rule: &Rule) -> Option<Track> {
     let finite_share = times.len() as f64 / topic.time_s.len() as f64;
     let origin = match instance {
         0 => rule.origin(),
-        i => format!("{} [{i}]", rule.origin()),
+        i => format!("{} [{}]", rule.origin(), topics.naming.written(i)),
     };
     let period = period_s(&times);
     let rate_hz = if period > 0.0 { 1.0 / period } else { 0.0 };
@@ -272,6 +308,7 @@ fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
         notes.push(format!(
             "{cut} rows before all needed channels have begun or after one has ended are left out"
         ));
-        *rows = rows[first..end].to_vec();
+        rows.truncate(end);
+        rows.drain(..first);
     }
 }

@@ -7,12 +7,18 @@
 //! own time that belongs to its host time, by linear interpolation between the messages around it:
 //! in lockstep, where the host's clock says nothing about the flight's, this is still right.
 //! The instance of a topic is system × 256 + component.
+//!
+//! A vehicle that starts again counts its time from zero again. Each life of each vehicle is a flight of its own, for
+//! its times mean nothing in another one.
 
 use std::collections::BTreeMap;
+use std::io::Read;
+use std::ops::Range;
 
 use super::finding::Finding;
 use super::format::MAVLINK_MARKERS;
-use super::topics::{Topic, Topics};
+use super::topics::{Naming, Topic, Topics};
+use super::window::Window;
 use greylag_link::framing::{FrameCounts, Frames, MAX_FRAME, frame_len};
 use greylag_link::logged::{self, Logged, Own};
 
@@ -23,64 +29,83 @@ const SAME_CLOCK_S: f64 = 5.0;
 /// Wrap of `time_boot_ms`, of `time_usec` where it has 32 bits, s.
 const WRAP_MS_S: f64 = 4_294_967.296;
 
+/// How far back the time of a vehicle goes that has started again, s.
+const BACK_S: f64 = 5.0;
+/// Messages in a row that show it; one alone may be late or wrong.
+const BACK_FOR: usize = 5;
+
 /// A message before its time is known.
 struct Entry {
+    /// The number of its record in the file.
+    at: usize,
     host_s: f64,
     own_s: Option<f64>,
+}
+
+/// The host's time against the sender's own, s, in record number `at`.
+#[derive(Clone, Copy)]
+struct Tick {
+    host_s: f64,
+    own_s: f64,
+    at: usize,
 }
 
 #[derive(Default)]
 struct Reader {
     entries: BTreeMap<(&'static str, u16), (Vec<Entry>, Topic)>,
-    /// Host time against own time in whole frames, by system with component.
-    clocks: BTreeMap<u16, Vec<(f64, f64)>>,
+    /// Times in whole frames, by system with component.
+    clocks: BTreeMap<u16, Vec<Tick>>,
+    records: usize,
     out: Topics,
     others: BTreeMap<u32, usize>,
 }
 
 /// Reads what `wanted` names; everything else is counted.
-pub(super) fn read(bytes: &[u8], wanted: &dyn Fn(&str) -> bool) -> Topics {
+pub(super) fn read<'a>(
+    source: &'a mut dyn Read,
+    wanted: &dyn Fn(&str) -> bool,
+) -> (Vec<Topics>, Window<'a>) {
+    let mut window = Window::new(source);
     let mut reader = Reader::default();
     let mut counts = FrameCounts::default();
-    let (mut at, mut skipped) = (0usize, 0usize);
-    let mut cut = 0;
-    while at < bytes.len() {
-        let Some(frame) = bytes.get(at + STAMP..).filter(|f| !f.is_empty()) else {
-            cut = bytes.len() - at;
-            break;
+    let mut skipped = 0usize;
+    let cut = loop {
+        let view = window.view(STAMP + MAX_FRAME);
+        let Some(frame) = view.get(STAMP..).filter(|f| !f.is_empty()) else {
+            break view.len();
         };
-        if bytes[at] != 0 || !MAVLINK_MARKERS.contains(&frame[0]) {
-            at += 1;
+        if view[0] != 0 || !MAVLINK_MARKERS.contains(&frame[0]) {
+            window.skip(1);
             skipped += 1;
             continue;
         }
         let Some(len) = frame_len(frame).filter(|len| *len <= frame.len()) else {
             if frame.len() < MAX_FRAME {
-                cut = bytes.len() - at;
-                break;
+                break view.len();
             }
-            at += 1;
+            window.skip(1);
             skipped += 1;
             continue;
         };
         let before = counts;
         let found = Frames::new(&frame[..len], &mut counts).next().filter(|f| f.bytes.len() == len);
         if let Some(found) = found {
-            let stamp = bytes[at..].first_chunk().map_or(0, |b| u64::from_be_bytes(*b));
+            let stamp = view.first_chunk().map_or(0, |b| u64::from_be_bytes(*b));
             let source = u16::from_be_bytes([found.source.system, found.source.component]);
+            reader.records += 1;
             match logged::read(&found) {
                 Some(message) => reader.take(message, stamp as f64 * 1e-6, source, wanted),
                 None => *reader.others.entry(found.id).or_default() += 1,
             }
-            at += STAMP + len;
+            window.skip(STAMP + len);
         } else if counts.unknown > before.unknown {
-            at += STAMP + len;
+            window.skip(STAMP + len);
         } else {
-            at += 1;
+            window.skip(1);
             skipped += 1;
         }
-    }
-    reader.finish(skipped, cut)
+    };
+    (reader.finish(skipped, cut), window)
 }
 
 impl Reader {
@@ -97,9 +122,9 @@ impl Reader {
         let own_s = match values.own {
             Own::BootMs(ms) => {
                 let clock = self.clocks.entry(source).or_default();
-                let own = unwrapped(f64::from(ms) * 1e-3, clock.last().map(|c| c.1));
-                clock.push((host_s, own));
-                Some(own)
+                let own_s = unwrapped(f64::from(ms) * 1e-3, clock.last().map(|c| c.own_s));
+                clock.push(Tick { host_s, own_s, at: self.records });
+                Some(own_s)
             }
             Own::Micros(us) => Some(us as f64 * 1e-6),
             Own::None => None,
@@ -110,30 +135,25 @@ impl Reader {
         let (entries, topic) = self.entries.entry(key).or_insert_with(|| {
             (Vec::new(), Topic::new(values.fields.iter().map(|f| (*f).to_owned())))
         });
-        entries.push(Entry { host_s, own_s });
+        entries.push(Entry { at: self.records, host_s, own_s });
         for (x, column) in values.values.iter().zip(&mut topic.values) {
             column.push(*x);
         }
     }
 
-    fn finish(mut self, skipped: usize, cut: usize) -> Topics {
+    fn finish(mut self, skipped: usize, cut: usize) -> Vec<Topics> {
         // Components of one system share its clock; the one with the most messages tells it best.
-        let mut clocks: BTreeMap<u8, Vec<(f64, f64)>> = BTreeMap::new();
-        for (source, clock) in self.clocks {
+        let mut clocks: BTreeMap<u8, Vec<Tick>> = BTreeMap::new();
+        for (source, clock) in std::mem::take(&mut self.clocks) {
             let best = clocks.entry(source.to_be_bytes()[0]).or_default();
             if clock.len() > best.len() {
                 *best = clock;
             }
         }
-        clocks.values_mut().for_each(|clock| clock.sort_by(|a, b| a.0.total_cmp(&b.0)));
-        for ((name, source), (entries, mut topic)) in self.entries {
-            let clock = clocks.get(&source.to_be_bytes()[0]).map_or(&[][..], Vec::as_slice);
-            topic.time_s = entries.iter().map(|entry| time(entry, clock)).collect();
-            self.out.topics.insert((name.to_owned(), source), topic);
-        }
-        for (id, count) in self.others {
+        for (id, count) in &self.others {
             *self.out.counts.entry((format!("message {id}"), 0)).or_default() += count;
         }
+        self.out.naming = Naming::Sender;
         if skipped > 0 {
             self.out.findings.push(Finding::warning(format!(
                 "{skipped} bytes of the file belong to no record and were skipped: it is damaged there"
@@ -144,8 +164,77 @@ impl Reader {
                 "the file ends in the middle of a record, {cut} bytes of which are left out"
             )));
         }
-        self.out
+        let lives = self.lives(&clocks);
+        match &lives[..] {
+            [] => vec![self.life(None, 0..usize::MAX, &clocks)],
+            [(system, _)] => vec![self.life(Some(*system), 0..usize::MAX, &clocks)],
+            several => {
+                several.iter().map(|(s, at)| self.life(Some(*s), at.clone(), &clocks)).collect()
+            }
+        }
     }
+
+    /// The lives of the systems that send an attitude: the system with its records.
+    fn lives(&self, clocks: &BTreeMap<u8, Vec<Tick>>) -> Vec<(u8, Range<usize>)> {
+        let attitudes = self.entries.keys().filter(|(name, _)| name.starts_with("ATTITUDE"));
+        let mut systems: Vec<u8> = attitudes.map(|(_, source)| source.to_be_bytes()[0]).collect();
+        systems.sort_unstable();
+        systems.dedup();
+        let of = |system: u8| {
+            let mut bounds = vec![0];
+            bounds.extend(clocks.get(&system).map(|c| starts(c)).unwrap_or_default());
+            bounds.push(usize::MAX);
+            let lives: Vec<_> = bounds.windows(2).map(|w| (system, w[0]..w[1])).collect();
+            lives
+        };
+        systems.into_iter().flat_map(of).collect()
+    }
+
+    /// What the records `at` say of `system`; its vehicle and its life are named where the file holds several.
+    fn life(
+        &self,
+        system: Option<u8>,
+        at: Range<usize>,
+        clocks: &BTreeMap<u8, Vec<Tick>>,
+    ) -> Topics {
+        let whole = at == (0..usize::MAX);
+        let mut out = Topics { system, ..self.out.clone() };
+        out.life = system.filter(|_| self.lives(clocks).len() > 1).map(|system| match whole {
+            true => format!("system {system}"),
+            false => format!("system {system} from record {}", at.start.max(1)),
+        });
+        let mut ticks: BTreeMap<u8, Vec<Tick>> = BTreeMap::new();
+        for (system, clock) in clocks {
+            let mut own: Vec<Tick> = clock.iter().filter(|t| at.contains(&t.at)).copied().collect();
+            own.sort_by(|a, b| a.host_s.total_cmp(&b.host_s));
+            ticks.insert(*system, own);
+        }
+        for ((name, source), (entries, topic)) in &self.entries {
+            let from = entries.partition_point(|e| e.at < at.start);
+            let to = entries.partition_point(|e| e.at < at.end);
+            if from == to {
+                continue;
+            }
+            let clock = ticks.get(&source.to_be_bytes()[0]).map_or(&[][..], Vec::as_slice);
+            let topic = Topic {
+                time_s: entries[from..to].iter().map(|entry| time(entry, clock)).collect(),
+                fields: topic.fields.clone(),
+                values: topic.values.iter().map(|v| v[from..to].to_vec()).collect(),
+            };
+            out.topics.insert(((*name).to_owned(), *source), topic);
+        }
+        out
+    }
+}
+
+/// The records in which a vehicle has started again.
+fn starts(clock: &[Tick]) -> Vec<usize> {
+    let back = |i: &usize| {
+        let before = clock[i - 1].own_s - BACK_S;
+        let after = &clock[*i..clock.len().min(i + BACK_FOR)];
+        after.len() == BACK_FOR && after.iter().all(|t| t.own_s < before)
+    };
+    (1..clock.len()).filter(back).map(|i| clock[i].at).collect()
 }
 
 /// An own time with the wraps of its 32 bits undone.
@@ -155,7 +244,7 @@ fn unwrapped(own: f64, last: Option<f64>) -> f64 {
 }
 
 /// The time of a message on its system's clock, s; the host's where the system shows none.
-fn time(entry: &Entry, clock: &[(f64, f64)]) -> f64 {
+fn time(entry: &Entry, clock: &[Tick]) -> f64 {
     let Some(own) = interpolate(clock, entry.host_s) else {
         return entry.own_s.unwrap_or(entry.host_s);
     };
@@ -165,14 +254,14 @@ fn time(entry: &Entry, clock: &[(f64, f64)]) -> f64 {
     }
 }
 
-fn interpolate(clock: &[(f64, f64)], host: f64) -> Option<f64> {
-    let after = clock.partition_point(|c| c.0 < host);
+fn interpolate(clock: &[Tick], host: f64) -> Option<f64> {
+    let after = clock.partition_point(|c| c.host_s < host);
     match (after.checked_sub(1).map(|i| clock[i]), clock.get(after)) {
-        (Some(a), Some(b)) if b.0 > a.0 && b.0 > host => {
-            Some(a.1 + (b.1 - a.1) * (host - a.0) / (b.0 - a.0))
+        (Some(a), Some(b)) if b.host_s > a.host_s && b.host_s > host => {
+            Some(a.own_s + (b.own_s - a.own_s) * (host - a.host_s) / (b.host_s - a.host_s))
         }
-        (_, Some(b)) => Some(b.1),
-        (Some(a), None) => Some(a.1 + (host - a.0)),
+        (_, Some(b)) => Some(b.own_s),
+        (Some(a), None) => Some(a.own_s + (host - a.host_s)),
         (None, None) => None,
     }
 }

@@ -23,6 +23,14 @@ impl Topic {
         Topic { time_s: Vec::new(), fields, values }
     }
 
+    /// Whether a field is there and takes at least two finite values.
+    pub fn moves(&self, name: &str) -> bool {
+        let Some(values) = self.field(name) else { return false };
+        let mut finite = values.iter().filter(|x| x.is_finite());
+        let first = finite.next();
+        first.is_some_and(|first| finite.any(|x| x != first))
+    }
+
     /// The values of a field.
     pub fn field(&self, name: &str) -> Option<&[f64]> {
         let i = self.fields.iter().position(|f| f == name)?;
@@ -41,9 +49,38 @@ pub(super) fn period_s(times: &[f64]) -> f64 {
     *steps.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// The content of a binary log.
-#[derive(Debug, Default)]
+/// How the instances of a topic are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Naming {
+    /// By a number from 0 on.
+    #[default]
+    Number,
+    /// MAVLink's system/component, of which the number is system × 256 + component.
+    Sender,
+}
+
+impl Naming {
+    /// An instance as it is written in a mapping.
+    pub fn written(self, instance: u16) -> String {
+        let [system, component] = instance.to_be_bytes();
+        match self {
+            Naming::Number => instance.to_string(),
+            Naming::Sender => format!("{system}/{component}"),
+        }
+    }
+}
+
+/// The content of a binary log, or of one life of a vehicle in it.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Topics {
+    /// Which vehicle and which life of it this is, where the file holds several.
+    pub life: Option<String>,
+    /// The MAVLink system whose life it is.
+    pub system: Option<u8>,
+    /// How instances are written.
+    pub naming: Naming,
+    /// What the firmware calls itself; empty if it does not.
+    pub firmware: String,
     /// The topics that were asked for, by name with instance.
     pub topics: BTreeMap<(String, u16), Topic>,
     /// How many records each topic of the file has, asked for or not.
@@ -65,5 +102,16 @@ impl Topics {
     /// The first instance of a topic.
     pub fn first(&self, name: &str) -> Option<&Topic> {
         self.instances(name).next().map(|(_, topic)| topic)
+    }
+
+    /// A field of the first instance of a topic, with its times.
+    pub fn series(&self, name: &str, field: &str) -> Option<(&[f64], &[f64])> {
+        let topic = self.first(name)?;
+        Some((&topic.time_s, topic.field(field)?))
+    }
+
+    /// The last value of a parameter.
+    pub fn parameter(&self, name: &str) -> Option<f64> {
+        self.parameters.get(name).copied()
     }
 }

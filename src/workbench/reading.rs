@@ -10,6 +10,7 @@ use super::mapping::FILE;
 use greylag_logs as logs;
 use greylag_logs::csv::Tolerance;
 use greylag_logs::mapping::Mapping;
+use greylag_logs::sources::Asked;
 
 /// How logs are read, as a command line says it.
 #[derive(Clone, Debug, Default)]
@@ -20,6 +21,8 @@ pub struct Reading {
     pub tolerance: Tolerance,
     /// Whether logs are used in which wrong units, signs or axes were found.
     pub despite_problems: bool,
+    /// Instances to read instead of those that the reader would choose.
+    pub sources: Vec<Asked>,
 }
 
 /// The mapping that logs are read by.
@@ -57,7 +60,8 @@ impl Inner {
 
     /// The settings of the readers of logs.
     pub fn options_of(given: &Reading) -> logs::Options {
-        logs::Options { tolerance: given.tolerance, ..Default::default() }
+        let sources = given.sources.clone();
+        logs::Options { tolerance: given.tolerance, sources, ..Default::default() }
     }
 
     /// Reads all logs again.

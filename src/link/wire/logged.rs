@@ -91,8 +91,14 @@ pub fn read(frame: &Frame<'_>) -> Option<Logged> {
         MavMessage::HEARTBEAT(m) => values(
             "HEARTBEAT",
             Own::None,
-            &["type", "autopilot"],
-            &[f64::from(m.mavtype as u32), f64::from(m.autopilot as u32)],
+            &["type", "autopilot", "custom_mode"],
+            &[f64::from(m.mavtype as u32), f64::from(m.autopilot as u32), f64::from(m.custom_mode)],
+        ),
+        MavMessage::EXTENDED_SYS_STATE(m) => values(
+            "EXTENDED_SYS_STATE",
+            Own::None,
+            &["vtol_state", "landed_state"],
+            &[f64::from(m.vtol_state as u32), f64::from(m.landed_state as u32)],
         ),
         MavMessage::ATTITUDE_QUATERNION(m) => floats(
             "ATTITUDE_QUATERNION",

@@ -9,8 +9,10 @@ use crate::topics::Topics;
 use greylag_physics::mixer::Mixer;
 
 /// The record types that the rules use.
-pub const TOPICS: [&str; 11] =
-    ["ATT", "IMU", "ARSP", "AOA", "BARO", "XKF1", "NKF1", "POS", "RCOU", "AETR", "CTUN"];
+pub const TOPICS: [&str; 13] = [
+    "ATT", "IMU", "ARSP", "AOA", "BARO", "XKF1", "NKF1", "POS", "RCOU", "AETR", "CTUN", "MODE",
+    "QTUN",
+];
 
 /// AETR's full deflection, centidegrees.
 const FULL: f64 = 4500.0;

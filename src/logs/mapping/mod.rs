@@ -10,6 +10,9 @@
 //! roll_rad = { from = "csv.roll_deg", scale = 0.0174533 }         # another column of a CSV
 //! ```
 //!
+//! `[attitude] quaternion = ["csv.qx", "csv.qy", "csv.qz", "csv.qw"]` makes roll, pitch and yaw of a quaternion from
+//! earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` says which part stands first.
+//!
 //! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash)
 //! or system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field, by a
 //! parabola through so many seconds of rows. `[derive] body_rates_over_s` makes p, q, r from roll, pitch and
@@ -27,6 +30,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::columns::index;
+use super::csv::Order;
 use super::derive;
 use super::format::Format;
 use super::topics::Topics;
@@ -85,8 +89,21 @@ pub struct Mapping {
     body_rates_over_s: Option<f64>,
     /// What is known of sensors and wind.
     sensors: Sensors,
+    /// Where the attitude comes from as a quaternion.
+    quaternion: Option<Turn>,
     /// The mixer of the aircraft.
     mixer: Option<Mixer>,
+}
+
+/// Where a quaternion comes from, earth NED to body FRD.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Turn {
+    /// The topic, message or record type.
+    pub topic: String,
+    /// The fields of its parts, as they are written.
+    pub fields: [String; 4],
+    /// Which part comes first; found by the rates and gravity where it is not said.
+    pub order: Option<Order>,
 }
 
 #[derive(Deserialize)]
@@ -95,10 +112,25 @@ struct Written {
     schema: u32,
     #[serde(default)]
     columns: BTreeMap<String, WrittenEntry>,
+    attitude: Option<WrittenTurn>,
     #[serde(default)]
     derive: Derive,
     #[serde(default)]
     sensors: Sensors,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenTurn {
+    quaternion: [String; 4],
+    order: Option<WrittenOrder>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum WrittenOrder {
+    Wxyz,
+    Xyzw,
 }
 
 #[derive(Deserialize, Default)]
@@ -164,7 +196,8 @@ impl Mapping {
             let gyros = CONSTANTS.iter().filter(|(name, _)| name.starts_with("gyro_"));
             gyros.for_each(|(name, _)| sensors.hold(name, 0.0));
         }
-        Ok(Mapping { entries, body_rates_over_s, sensors, mixer: None })
+        let quaternion = written.attitude.map(turn).transpose().map_err(wrong)?;
+        Ok(Mapping { entries, body_rates_over_s, sensors, quaternion, mixer: None })
     }
 
     /// What is known of sensors and wind.
@@ -206,6 +239,11 @@ impl Mapping {
         Mapping { mixer, ..self }
     }
 
+    /// Where the attitude comes from as a quaternion, if the mapping says so.
+    pub(super) fn quaternion(&self) -> Option<&Turn> {
+        self.quaternion.as_ref()
+    }
+
     /// The mixer of the aircraft.
     pub(super) fn mixer(&self) -> Option<&Mixer> {
         self.mixer.as_ref()
@@ -226,7 +264,8 @@ impl Mapping {
 
     /// Whether a topic is used.
     pub(super) fn uses(&self, topic: &str) -> bool {
-        self.entries.values().any(|e| e.topic == topic)
+        let turn = self.quaternion.as_ref().is_some_and(|q| q.topic == topic);
+        turn || self.entries.values().any(|e| e.topic == topic)
     }
 
     /// The mapping's rules followed by the format's own for the other columns.
@@ -240,9 +279,17 @@ impl Mapping {
             Format::Dataflash => ardupilot::rules(topics, self.mixer()),
             Format::Tlog => telemetry::rules(topics, self.mixer()),
         };
-        let free =
-            others.into_iter().filter_map(|rule| rule.without(|c| self.entries.contains_key(c)));
-        own.chain(free).collect()
+        let turn = self.quaternion.as_ref().map(|q| {
+            let [a, b, c, d] = q.fields.each_ref().map(String::as_str);
+            match q.order {
+                Some(Order::Xyzw) => Rule::quaternion(&q.topic, [d, a, b, c]),
+                _ => Rule::quaternion(&q.topic, [a, b, c, d]),
+            }
+        });
+        let turned = |c: &str| turn.as_ref().is_some_and(|rule| rule.columns().contains(&c));
+        let taken = |c: &str| self.entries.contains_key(c) || turned(c);
+        let free: Vec<Rule> = others.into_iter().filter_map(|rule| rule.without(taken)).collect();
+        own.chain(turn.clone()).chain(free).collect()
     }
 
     /// Whether a topic of a format is needed for any rule.
@@ -255,6 +302,27 @@ impl Mapping {
         };
         own.contains(&topic) || self.uses(topic)
     }
+}
+
+/// The rules of a format without a mapping.
+pub(super) fn format_rules(format: Format, topics: &Topics) -> Vec<Rule> {
+    Mapping::default().rules(format, topics)
+}
+
+fn turn(written: WrittenTurn) -> Result<Turn, String> {
+    let split = |part: &String| part.split_once('.').map(|(a, b)| (a.to_owned(), b.to_owned()));
+    let parts = written.quaternion.each_ref().map(split);
+    let [Some(a), Some(b), Some(c), Some(d)] = parts else {
+        return Err("attitude.quaternion names four of \"topic.field\"".into());
+    };
+    if [&b, &c, &d].iter().any(|other| other.0 != a.0) {
+        return Err("attitude.quaternion names fields of one topic".into());
+    }
+    let order = written.order.map(|order| match order {
+        WrittenOrder::Wxyz => Order::Wxyz,
+        WrittenOrder::Xyzw => Order::Xyzw,
+    });
+    Ok(Turn { topic: a.0, fields: [a.1, b.1, c.1, d.1], order })
 }
 
 fn entry(column: &str, e: WrittenEntry) -> Result<Entry, String> {

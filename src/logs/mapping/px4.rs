@@ -5,10 +5,12 @@
 //! (the first counts), and `wind`, which the log format has no column for.
 
 use super::rule::{Rule, Shape, Term, Tilt};
+use crate::Format;
 use crate::topics::Topics;
+use crate::vehicle::{self, Kind};
 
 /// The topics that the rules use.
-pub const TOPICS: [&str; 19] = [
+pub const TOPICS: [&str; 20] = [
     "vehicle_attitude",
     "vehicle_angular_velocity",
     "vehicle_acceleration",
@@ -20,6 +22,7 @@ pub const TOPICS: [&str; 19] = [
     "vehicle_air_data",
     "vehicle_local_position",
     "vehicle_global_position",
+    "vehicle_status",
     "vtol_vehicle_status",
     "actuator_servos",
     "actuator_motors",
@@ -78,17 +81,29 @@ fn commands(topics: &Topics) -> Vec<Rule> {
     let mut out = allocated(topics);
     out.extend(motor(topics));
     // The three torques, then thrust, of the controller that flies the wings.
-    let vtol = topics.first("vtol_vehicle_status").is_some();
+    let kind = vehicle::vehicle(Format::Ulog, topics).map(|v| v.kind);
+    let vtol = kind == Some(Kind::Vtol);
     let fixed_wing = if vtol { Some(1) } else { None };
     for (column, field, gain) in [
         ("aileron_cmd", "xyz[0]", 1.0),
         ("elevator_cmd", "xyz[1]", -1.0),
         ("rudder_cmd", "xyz[2]", -1.0),
     ] {
-        out.push(Rule::linear(column, "vehicle_torque_setpoint", field, gain).of(fixed_wing));
+        out.push(
+            Rule::linear(column, "vehicle_torque_setpoint", field, gain).preferring(fixed_wing),
+        );
     }
-    out.push(Rule::linear("throttle_cmd", "vehicle_thrust_setpoint", "xyz[0]", 1.0).of(fixed_wing));
-    let group = if vtol { "actuator_controls_1" } else { "actuator_controls_0" };
+    out.push(
+        Rule::linear("throttle_cmd", "vehicle_thrust_setpoint", "xyz[0]", 1.0)
+            .preferring(fixed_wing),
+    );
+    let moves = |group: &str| {
+        let fields = ["control[0]", "control[1]", "control[2]"];
+        topics.first(group).is_some_and(|t| fields.iter().any(|f| t.moves(f)))
+    };
+    let [hover, wings] = ["actuator_controls_0", "actuator_controls_1"];
+    let second = vtol || !moves(hover) && moves(wings);
+    let group = if second { wings } else { hover };
     for (column, i, gain) in [
         ("aileron_cmd", 0, 1.0),
         ("elevator_cmd", 1, -1.0),

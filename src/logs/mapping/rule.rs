@@ -96,7 +96,7 @@ pub enum Fill {
         offset: f64,
     },
     /// Roll, pitch and yaw from a quaternion NED→FRD, w first.
-    Quaternion([&'static str; 4]),
+    Quaternion([String; 4]),
     /// One column: the roll or the pitch of a quaternion NED→FRD, w first.
     Tilt {
         /// The column.
@@ -120,8 +120,10 @@ pub enum Fill {
 pub struct Rule {
     /// The topic.
     pub topic: String,
-    /// Its instance; the first if none is named.
+    /// Its instance, where no other one will do.
     pub instance: Option<u16>,
+    /// The instance that is usual for the vehicle's type, if it moves.
+    pub preferred: Option<u16>,
     /// What it fills.
     pub fill: Fill,
     /// What the user should know if this rule is used.
@@ -135,7 +137,14 @@ const R_AIR: f64 = 287.053;
 
 impl Rule {
     fn new(topic: &str, fill: Fill) -> Rule {
-        Rule { topic: topic.into(), instance: None, fill, note: None, equivalent: false }
+        Rule {
+            topic: topic.into(),
+            instance: None,
+            preferred: None,
+            fill,
+            note: None,
+            equivalent: false,
+        }
     }
 
     /// One field times a factor.
@@ -150,8 +159,8 @@ impl Rule {
     }
 
     /// A quaternion's fields.
-    pub fn quaternion(topic: &str, fields: [&'static str; 4]) -> Rule {
-        Rule::new(topic, Fill::Quaternion(fields))
+    pub fn quaternion(topic: &str, fields: [&str; 4]) -> Rule {
+        Rule::new(topic, Fill::Quaternion(fields.map(str::to_owned)))
     }
 
     /// The roll or the pitch of a quaternion's fields.
@@ -181,6 +190,11 @@ impl Rule {
         Rule { instance, ..self }
     }
 
+    /// Of an instance, if it moves; else of one that does.
+    pub fn preferring(self, preferred: Option<u16>) -> Rule {
+        Rule { preferred, ..self }
+    }
+
     /// With something to know.
     pub fn noting(self, note: impl Into<String>) -> Rule {
         Rule { note: Some(note.into()), ..self }
@@ -207,14 +221,30 @@ impl Rule {
         free.then_some(self)
     }
 
+    /// The fields that it reads.
+    pub fn fields(&self) -> Vec<&str> {
+        match &self.fill {
+            Fill::Sum { terms, .. } => terms.iter().map(|t| t.field.as_str()).collect(),
+            Fill::Quaternion(fields) => fields.iter().map(String::as_str).collect(),
+            Fill::Tilt { fields, .. } => fields.to_vec(),
+            Fill::Density { pressure, temperature } => vec![pressure.0, temperature.0],
+        }
+    }
+
     /// Where the value comes from, for people.
     pub fn origin(&self) -> String {
-        let fields = match &self.fill {
-            Fill::Sum { terms, .. } => terms.iter().map(|t| t.field.as_str()).collect(),
-            Fill::Quaternion(fields) | Fill::Tilt { fields, .. } => fields.to_vec(),
-            Fill::Density { pressure, temperature } => vec![pressure.0, temperature.0],
-        };
-        format!("{}.{}", self.topic, fields.join("+"))
+        format!("{}.{}", self.topic, self.fields().join("+"))
+    }
+
+    /// Its only field with the factor, where there is no more to it than that.
+    pub fn factor(&self) -> Option<(&str, f64)> {
+        match &self.fill {
+            Fill::Sum { terms, offset: 0.0, .. } => match &terms[..] {
+                [Term { field, gain, shape: Shape::Linear }] => Some((field, *gain)),
+                _ => None,
+            },
+            _ => None,
+        }
     }
 
     /// The series that are interpolated, at the topic's own times: one, or a quaternion's four.

@@ -11,8 +11,9 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::mixer::Mixer;
 
 /// The messages that the rules use.
-pub const TOPICS: [&str; 15] = [
+pub const TOPICS: [&str; 16] = [
     "HEARTBEAT",
+    "EXTENDED_SYS_STATE",
     "ATTITUDE_QUATERNION",
     "ATTITUDE",
     "HIGHRES_IMU",
@@ -52,9 +53,14 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
         rule.instance = if has(vehicle) { Some(vehicle) } else { other.or(Some(vehicle)) };
     }
     let mut commands = Vec::new();
-    for (column, field) in
-        [("aileron_cmd", "controls0"), ("elevator_cmd", "controls1"), ("throttle_cmd", "controls2")]
-    {
+    let of_sitl = [
+        ("aileron_cmd", "controls0"),
+        ("elevator_cmd", "controls1"),
+        ("throttle_cmd", "controls2"),
+    ];
+    // A real autopilot sends it to a simulator at most, and in an order of its own.
+    let real = autopilots(topics, system).any(|a| EQUIVALENT.contains(&a));
+    for (column, field) in of_sitl.into_iter().filter(|_| !real) {
         commands.push(
             Rule::linear(column, "HIL_ACTUATOR_CONTROLS", field, 1.0)
                 .noting("commands are HIL_ACTUATOR_CONTROLS in the order of the sitl profile"),
@@ -73,19 +79,24 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     out
 }
 
-/// The instance that sends most attitudes.
+/// The instance that sends most attitudes, of the system whose life this is.
 fn vehicle(topics: &Topics) -> Option<u16> {
     let both = topics.instances("ATTITUDE_QUATERNION").chain(topics.instances("ATTITUDE"));
-    both.max_by_key(|(_, t)| t.time_s.len()).map(|(i, _)| i)
+    let own = both.filter(|(i, _)| topics.system.is_none_or(|s| i.to_be_bytes()[0] == s));
+    own.max_by_key(|(_, t)| t.time_s.len()).map(|(i, _)| i)
+}
+
+/// The MAV_AUTOPILOT numbers that a system sends.
+fn autopilots(topics: &Topics, system: u8) -> impl Iterator<Item = f64> {
+    let of_system = move |(i, topic): (u16, &Topic)| {
+        (i.to_be_bytes()[0] == system).then(|| topic.field("autopilot")?.last().copied())?
+    };
+    topics.instances("HEARTBEAT").filter_map(of_system)
 }
 
 fn airspeed(topics: &Topics, system: u8) -> Rule {
-    let of_system = |(i, topic): (u16, &Topic)| {
-        (i.to_be_bytes()[0] == system).then(|| topic.field("autopilot")?.last().copied())?
-    };
-    let autopilot = topics.instances("HEARTBEAT").filter_map(of_system);
     let rule = Rule::linear("airspeed_mps", "VFR_HUD", "airspeed", 1.0);
-    if autopilot.into_iter().any(|a| EQUIVALENT.contains(&a)) {
+    if autopilots(topics, system).any(|a| EQUIVALENT.contains(&a)) {
         rule.equivalent().noting(
             "airspeed is VFR_HUD's of a real autopilot: equivalent airspeed, made true by the air's density",
         )

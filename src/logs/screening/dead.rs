@@ -25,6 +25,31 @@ fn dead(rows: &[Sample], name: &'static str, get: fn(&Sample) -> f64) -> Option<
     Some(if needed { Finding::problem(text) } else { Finding::warning(text) })
 }
 
+/// Commands that rest all through a flight: another channel or instance holds what flies the aircraft.
+pub fn commands(flown: &[Sample]) -> Option<Finding> {
+    let rests = |name: &str| {
+        let get = COLUMNS.iter().find(|c| c.0 == name).map(|c| c.1)?;
+        let seen = values(flown, get);
+        let first = *seen.first()?;
+        let rests = seen.len() >= 2 * ENOUGH && seen.iter().all(|x| *x == first);
+        rests.then_some((name.to_owned(), first))
+    };
+    let moves = |name: &str| {
+        let get = COLUMNS.iter().find(|c| c.0 == name).map(|c| c.1);
+        let seen = get.map(|get| values(flown, get)).unwrap_or_default();
+        seen.iter().any(|x| *x != seen[0])
+    };
+    let (aileron, elevator) = (rests("aileron_cmd")?, rests("elevator_cmd")?);
+    if moves("aileron_rad") || moves("elevator_rad") {
+        return None;
+    }
+    Some(Finding::problem(format!(
+        "{} is constantly {} and {} is constantly {} all through the flight: this is not what flies the aircraft; \
+         name another channel in a mapping, or another instance with --source",
+        aileron.0, aileron.1, elevator.0, elevator.1
+    )))
+}
+
 /// Commands rest, rudders are often absent, targets and a declared sampling hold.
 fn may_rest(name: &str) -> bool {
     name.ends_with("_cmd")

@@ -8,13 +8,15 @@
 mod air;
 mod angles;
 mod clock;
+mod cure;
 mod dead;
 mod force;
 mod relation;
 mod surfaces;
 
 use super::Sample;
-use super::finding::{Cure, Finding};
+use super::finding::{Cure, Finding, Severity};
+use super::lag;
 use super::phases::{self, Flying, PhaseKind};
 
 /// Rows below which nothing is said about units.
@@ -27,20 +29,37 @@ pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     }
     let mut out = Vec::new();
     if rows.len() >= ENOUGH {
-        let clock = clock::check(rows);
-        let clock_is_right = clock.is_none();
-        out.extend(clock);
-        if clock_is_right {
-            out.extend(angles::check(rows));
-            out.extend(force::check(rows));
-            let axes_are_right = out.is_empty();
-            out.extend(air::check(rows));
-            out.extend(surfaces::check(rows, axes_are_right, flies));
-        }
+        out = cure::tried(checks(rows, flies), rows, |rows| checks(rows, flies));
         out.extend(dead::check(rows));
+        out.extend(dead::commands(&in_flight(rows, flies)));
+        let right = out.iter().all(|f| f.severity != Severity::Problem);
+        out.extend(right.then(|| lag::check(&in_flight(rows, flies))).unwrap_or_default());
     }
     out.extend(flight(rows, flies));
     out
+}
+
+/// Units, signs and axes, in flight: what hangs from its lift motors or stands on the ground obeys other relations.
+fn checks(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
+    if let Some(clock) = clock::check(rows) {
+        return vec![clock];
+    }
+    let flown = in_flight(rows, flies);
+    let rows = if flown.len() >= ENOUGH { &flown } else { rows };
+    let mut out = angles::check(rows);
+    out.extend(force::check(rows));
+    let axes_are_right = out.is_empty();
+    out.extend(air::check(rows));
+    out.extend(surfaces::check(rows, axes_are_right, flies));
+    out
+}
+
+/// The rows in flight.
+fn in_flight(rows: &[Sample], flies: &Flying) -> Vec<Sample> {
+    let phases = phases::phases(rows, flies);
+    let flights: Vec<_> = phases.iter().filter(|p| p.kind == PhaseKind::Flight).collect();
+    let flies = |s: &&Sample| flights.iter().any(|p| (p.from_s..=p.to_s).contains(&s.time_s));
+    rows.iter().filter(flies).copied().collect()
 }
 
 /// Whether there is a flight, and one that is long enough.

@@ -27,6 +27,9 @@ pub struct Subject<'a> {
     pub flights: usize,
 }
 
+/// Unexplained share of a variation beyond which the axis is quiet, and a percentage says nothing.
+const QUIET: f64 = 9.995;
+
 /// The sentence, without a full stop, beginning in lower case.
 pub fn sentence(subject: &Subject) -> String {
     let noun = noun(subject.channel);
@@ -52,6 +55,12 @@ pub fn sentence(subject: &Subject) -> String {
             ),
             None => "with no regime in which the model is surely off".into(),
         };
+        if subject.unexplained > QUIET {
+            return format!(
+                "{noun} hardly varies in these flights (a quiet axis): the model leaves over more than ten times \
+                 what there is, {why}"
+            );
+        }
         return format!("{noun}: {share} of its variation is unexplained, {why}");
     };
     let what = error(subject, &finding.regime);
@@ -272,6 +281,24 @@ mod tests {
             mass: 3.364,
             flights: 2,
         })
+    }
+
+    #[test]
+    fn a_quiet_axis_gets_no_percentage() {
+        let of = |unexplained: f64| {
+            sentence(&Subject {
+                channel: ChannelId::Roll,
+                unexplained,
+                within_doubt: false,
+                finding: None,
+                follows: None,
+                mass: 3.364,
+                flights: 1,
+            })
+        };
+        let quiet = of(4232.66);
+        assert!(quiet.contains("rolling moment hardly varies") && !quiet.contains('%'), "{quiet}");
+        assert!(of(7.18).contains("718 % of its variation is unexplained"), "{}", of(7.18));
     }
 
     #[test]

@@ -175,7 +175,8 @@ fn segment(
             controls: track.controls[k],
             command: track.commands[k],
             specific_force: std::array::from_fn(|i| force[k][i] - values[FORCE + i]),
-            altitude: track.altitude[k],
+            // Without an altitude the air is that of sea level, as the notes say.
+            altitude: Some(track.altitude[k]).filter(|h| h.is_finite()).unwrap_or(0.0),
             density: track.density[k],
         }
     };

@@ -23,7 +23,7 @@ const NEEDS: [Need; 4] = [
 /// # Errors
 /// If there is too little flight, or aileron, elevator and angle of attack all hardly move.
 pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
-    let seconds: f64 = flights.iter().map(|f| f.sample_count() as f64 * f.dt).sum();
+    let seconds = flights.iter().fold(0.0, |sum, f| sum + f.sample_count() as f64 * f.dt);
     if seconds < LEAST_S {
         return Err(DiagnoseError::TooLittle { seconds, least: LEAST_S });
     }
@@ -31,7 +31,7 @@ pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
     for (name, of, least, factor, unit, fly) in NEEDS {
         let moved = factor * deviation(flights, of);
         if moved < least {
-            still.push((format!("{name} moves by {moved:.2}{unit} only"), fly));
+            still.push((small(name, moved, unit), fly));
         }
     }
     if still.len() >= 3 {
@@ -42,6 +42,16 @@ pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
         .into_iter()
         .map(|(text, fly)| format!("{text}: what depends on it is not seen; fly {fly}"))
         .collect())
+}
+
+/// How little something moves; what never moves is another channel's fault, not the pilot's.
+fn small(name: &str, moved: f64, unit: &str) -> String {
+    match moved == 0.0 {
+        true => format!(
+            "{name} never moves in the log: look whether this is the channel that flies the aircraft"
+        ),
+        false => format!("{name} moves by {moved:.2}{unit} only"),
+    }
 }
 
 /// Whether the rudder moves in `flights`, so that its effects can be searched for.
@@ -59,4 +69,21 @@ fn deviation(flights: &[Prepared], of: fn(&Instant) -> f64) -> f64 {
         count += values.len() as f64;
     }
     (square / count.max(1.0)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_never_moves_is_called_another_channel() {
+        assert!(small("the aileron", 0.0, "°").contains("look whether this is the channel"));
+        assert_eq!(small("the aileron", 0.12, "°"), "the aileron moves by 0.12° only");
+    }
+
+    #[test]
+    fn no_flight_lasts_zero_seconds_and_not_minus_zero() {
+        let said = check(&[]).unwrap_err().to_string();
+        assert!(said.contains("from 0 s of flight"), "{said}");
+    }
 }

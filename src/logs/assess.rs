@@ -1,0 +1,119 @@
+//! What the quality of the channels means for a log: what counts as missing, and what is said.
+
+use super::Sample;
+use super::columns::{COLUMNS, index};
+use super::finding::Finding;
+use super::load::Channel;
+use super::phases::{self, Flying, PhaseKind};
+
+/// Rate of the body rates and of the commands that a study wants, Hz.
+pub(super) const WANTED_HZ: f64 = 10.0;
+/// Below this part of it a log cannot serve: 10 Hz of a clock that is not quite even stays 10 Hz.
+const SLACK: f64 = 0.8;
+/// Rate of attitude that a study wants, and of the airspeed, Hz.
+const ATTITUDE_HZ: f64 = 5.0;
+const AIRSPEED_HZ: f64 = 1.0;
+
+/// The rate that a study wants of a column, Hz; `None` of one that may be slow.
+pub(super) fn wanted_hz(column: &str) -> Option<f64> {
+    match column {
+        "p_radps" | "q_radps" | "r_radps" => Some(WANTED_HZ),
+        "aileron_cmd" | "elevator_cmd" | "aileron_rad" | "elevator_rad" => Some(WANTED_HZ),
+        "roll_rad" | "pitch_rad" => Some(ATTITUDE_HZ),
+        "airspeed_mps" => Some(AIRSPEED_HZ),
+        _ => None,
+    }
+}
+
+/// How often a channel really brings something new, Hz.
+pub(super) fn real_hz(channel: &Channel) -> f64 {
+    match channel.quality.interpolated {
+        true => channel.quality.native_hz.min(channel.rate_hz),
+        false => channel.rate_hz,
+    }
+}
+
+/// Whether a channel is too slow for a study, with the rate that is wanted, Hz.
+pub(super) fn too_slow(channel: &Channel, column: &str) -> Option<f64> {
+    wanted_hz(column).filter(|wanted| real_hz(channel) < SLACK * wanted)
+}
+
+/// What there is to say of the channels: made-up samples, and spikes.
+pub(super) fn channels(channels: &[Channel]) -> Vec<Finding> {
+    let lines = |wrong: bool| -> Vec<String> {
+        let lines = channels.iter().filter(|c| c.quality.interpolated);
+        let of = lines.filter(|c| c.columns.iter().any(|x| too_slow(c, x).is_some()) == wrong);
+        of.map(|c| format!("{} ({:.1} Hz)", c.columns.join(", "), c.quality.native_hz)).collect()
+    };
+    let text = |list: &[String]| {
+        format!(
+            "straight lines between slower samples, so that most rows are no measurements: {}",
+            list.join("; ")
+        )
+    };
+    let (wrong, slow) = (lines(true), lines(false));
+    let mut out = Vec::new();
+    if !wrong.is_empty() {
+        out.push(Finding::problem(format!(
+            "{}; give the log with its own samples, empty fields between them",
+            text(&wrong)
+        )));
+    }
+    if !slow.is_empty() {
+        out.push(Finding::warning(text(&slow)));
+    }
+    let spiky = channels.iter().filter(|c| c.quality.spikes > 0);
+    out.extend(spiky.map(|c| {
+        let quality = &c.quality;
+        Finding::warning(format!(
+            "{}: {} spikes, the largest to {:.1}",
+            c.columns.join(", "),
+            quality.spikes,
+            quality.largest_spike
+        ))
+    }));
+    out
+}
+
+/// Empties the rows of a channel that hangs in flight; says which.
+pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) -> Vec<Finding> {
+    let flights: Vec<(f64, f64)> = phases::phases(rows, flies)
+        .into_iter()
+        .filter(|p| p.kind == PhaseKind::Flight)
+        .map(|p| (p.from_s, p.to_s))
+        .collect();
+    let in_flight = |(from, to): &(f64, f64)| flights.iter().any(|(a, b)| from < b && to > a);
+    let mut out = Vec::new();
+    for channel in channels {
+        let spans: Vec<(f64, f64)> =
+            channel.quality.frozen.iter().copied().filter(|span| in_flight(span)).collect();
+        if spans.is_empty() {
+            continue;
+        }
+        for column in channel.columns.iter().filter_map(|c| index(c)) {
+            let hangs = |t: f64| spans.iter().any(|(from, to)| t > *from && t <= *to);
+            let hanging = rows.iter_mut().filter(|row| hangs(row.time_s));
+            hanging.for_each(|row| *COLUMNS[column].2(row) = f64::NAN);
+        }
+        let list: Vec<String> =
+            spans.iter().map(|(a, b)| format!("{:.1} s from {a:.2} s on", b - a)).collect();
+        out.push(Finding::warning(format!(
+            "{} repeats one value in flight ({}): counted as missing there",
+            channel.columns.join(", "),
+            list.join(", ")
+        )));
+    }
+    out
+}
+
+/// Columns without which a row is no sample, should they hang; the airspeed may be slow or stay out for a while.
+const OF_A_ROW: [&str; 5] = ["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps"];
+
+/// Whether a row lies where a channel hangs without which it is no sample.
+pub(super) fn hangs(row: &Sample, channels: &[Channel]) -> bool {
+    let hanging = channels.iter().filter(|c| !c.quality.frozen.is_empty());
+    hanging
+        .flat_map(|c| &c.columns)
+        .filter(|c| OF_A_ROW.contains(&c.as_str()))
+        .any(|column| index(column).is_some_and(|i| COLUMNS[i].1(row).is_nan()))
+}

@@ -1,0 +1,189 @@
+//! The topics of a binary log put onto the one table, and judged.
+
+use std::path::Path;
+
+use super::error::LogError;
+use super::finding::Finding;
+use super::load::{Log, Options, Use, dropped, hint};
+use super::mapping::rule::Rule;
+use super::topics::{Naming, Topics};
+use super::vehicle::{self, Kind, Vehicle};
+use super::{Flight, FlowAngles, Format, Sample, assess, derive, rows, screening, table};
+
+/// The log that `topics` make; `path` is what errors call it, `name` what the flight is called.
+///
+/// # Errors
+/// It lacks a needed column, has too many unusable rows, or is of a vehicle without wings.
+pub(super) fn read(
+    format: Format,
+    topics: Topics,
+    name: &str,
+    path: &Path,
+    o: &Options,
+    to: Use,
+) -> Result<Log, LogError> {
+    let vehicle = vehicle::vehicle(format, &topics);
+    let hovers = match vehicle.as_ref().map(|v| v.kind) {
+        Some(Kind::Vtol) => vehicle::hovers(format, &topics),
+        _ => Vec::new(),
+    };
+    let mut findings = refused(vehicle.as_ref(), path, to)?;
+    let no_wings = !findings.is_empty();
+    let rules = o.mapping.rules(format, &topics);
+    let mut table = table::build(&topics, &rules, &o.sources);
+    table.missing.retain(|missing| !o.mapping.makes(missing.column));
+    findings
+        .extend(lacking(&table, &topics, path, to).map(|f| f.into_iter().filter(|_| !no_wings))?);
+    findings.extend(std::mem::take(&mut table.findings));
+    findings.extend(grounded(&mut table.rows, &hovers, vehicle.as_ref()));
+    findings.extend(assess::freeze(&mut table.rows, &table.channels, &o.flies));
+    table.rows.retain(|row| !assess::hangs(row, &table.channels));
+    table.notes.extend(derive::apply(&mut table.rows, &o.mapping));
+    findings.extend(topics.findings);
+    if !no_wings {
+        findings.extend(assess::channels(&table.channels));
+        let found = match table.rows.is_empty() && !hovers.is_empty() {
+            true => vec![Finding::problem(NEVER_ON_WINGS)],
+            false => screening::screen(&table.rows, &o.flies),
+        };
+        findings.extend(found.into_iter().map(|f| named(f, &table.rules, o)));
+    }
+    let (mut kept, looked_at) = sorted_out(std::mem::take(&mut table.rows), to);
+    if !table.missing.is_empty() {
+        kept = looked_at;
+    } else if let Some(first) = kept.refused(o.tolerance) {
+        let (dropped, rows, hint) = (kept.dropped, kept.total, hint(&findings));
+        let (path, reasons) = (path.to_owned(), kept.reasons());
+        let error = LogError::Unusable { path, dropped, rows, reasons, first, hint };
+        if to == Use::Compute {
+            return Err(error);
+        }
+        findings.push(Finding::problem(error.to_string()));
+        kept = looked_at;
+    }
+    findings.extend(dropped(kept.dropped, &kept.dropped_rows));
+    findings.extend(table.notes.iter().map(Finding::note));
+    Ok(Log {
+        format,
+        flight: Flight {
+            name: name.to_owned(),
+            samples: kept.samples,
+            flow_angles: match format {
+                // AOA.AOA and AOA.SSA are estimates unless a mapping names them as sensors
+                Format::Dataflash if o.mapping.get("alpha_rad").is_none() => FlowAngles::Estimated,
+                _ => FlowAngles::Measured,
+            },
+            sensors: o.mapping.sensors().clone(),
+            unknown_columns: Vec::new(),
+            notes: table.notes,
+        },
+        channels: table.channels,
+        topics: topics.counts.into_iter().map(|((name, i), n)| (name, i, n)).collect(),
+        dropped: kept.dropped,
+        dropped_rows: kept.dropped_rows,
+        findings,
+        flies: o.flies,
+        vehicle,
+        hovers,
+        sources: table.sources,
+        life: topics.life,
+    })
+}
+
+/// What is said of a log that holds hover only.
+const NEVER_ON_WINGS: &str = "there is no flight in this log: the vehicle never flies on its wings alone; give a log with forward flight";
+
+/// That the vehicle has no wings; an error where the log is to be computed with.
+fn refused(vehicle: Option<&Vehicle>, path: &Path, to: Use) -> Result<Vec<Finding>, LogError> {
+    match vehicle.and_then(Vehicle::refusal) {
+        Some(why) if to == Use::Compute => Err(LogError::Vehicle { path: path.to_owned(), why }),
+        why => Ok(why.map(Finding::problem).into_iter().collect()),
+    }
+}
+
+/// The needed columns that nothing fills; the first is an error where the log is to be computed with.
+fn lacking(
+    table: &table::Table,
+    topics: &Topics,
+    path: &Path,
+    to: Use,
+) -> Result<Vec<Finding>, LogError> {
+    let errors = table.missing.iter().map(|missing| missing_column(path, topics, missing));
+    let one = |error: LogError| match to {
+        Use::Compute => Err(error),
+        Use::Look => Ok(Finding::problem(error.to_string())),
+    };
+    errors.map(one).collect()
+}
+
+/// Takes out the rows in which the vehicle did not fly on its wings alone.
+fn grounded(
+    rows: &mut Vec<Sample>,
+    hovers: &[(f64, f64)],
+    vehicle: Option<&Vehicle>,
+) -> Option<Finding> {
+    let before = rows.len();
+    rows.retain(|s| !hovers.iter().any(|(from, to)| (*from..*to).contains(&s.time_s)));
+    let out = before - rows.len();
+    let by = vehicle.map(|v| v.by.as_str()).unwrap_or_default();
+    match (out, vehicle.map(|v| v.kind)) {
+        (0, Some(Kind::Vtol)) if hovers.is_empty() => Some(Finding::warning(format!(
+            "the vehicle hovers as well ({by}), and the log does not say when: hover is taken for flight above the flying airspeed"
+        ))),
+        (0, _) => None,
+        (out, _) => Some(Finding::warning(format!(
+            "{out} of {before} rows are left out: the vehicle hovers as well ({by}), and its lift motors carry or it changes over there"
+        ))),
+    }
+}
+
+/// A finding whose cure names the topic and the factor that the reader uses in place of the table's column.
+fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
+    let Some(cure) = &finding.cure else { return finding };
+    let rule = rules.iter().find(|r| r.columns()[0] == cure.column && r.factor().is_some());
+    let own = o.mapping.get(&cure.column).is_some();
+    let Some(rule) = rule.filter(|_| !own) else { return finding };
+    let Some((field, gain)) = rule.factor() else { return finding };
+    let scale = gain * cure.scale;
+    let better = format!(
+        "read it with --mapping FILE, in which [columns] has {} = {{ from = \"{}.{field}\", scale = {scale} }}",
+        cure.column, rule.topic
+    );
+    Finding { text: finding.text.replace(&cure.to_string(), &better), ..finding }
+}
+
+/// The rows fit to compute with, and those fit to be looked at where that is asked.
+fn sorted_out(samples: Vec<Sample>, to: Use) -> (rows::Rows, rows::Rows) {
+    let frozen = samples.iter().any(|s| s.airspeed_mps.is_nan());
+    let mut kept =
+        if frozen { rows::Rows::with_sparse_columns_of(&samples) } else { rows::Rows::default() };
+    let mut looked_at = rows::Rows::default();
+    for (i, sample) in samples.into_iter().enumerate() {
+        kept.take(i + 1, Some(sample));
+        if to == Use::Look {
+            looked_at.take_incomplete(i + 1, sample);
+        }
+    }
+    (kept, looked_at)
+}
+
+fn missing_column(path: &Path, topics: &Topics, missing: &table::Missing) -> LogError {
+    let or = missing.or.map(|p| format!(" (or of `{p}`)")).unwrap_or_default();
+    let mut has: Vec<&str> = topics.counts.keys().map(|(name, _)| name.as_str()).collect();
+    has.dedup();
+    let has = match has.len() {
+        0 => "nothing that could be decoded".to_owned(),
+        1..=40 => has.join(", "),
+        n => format!("{n} topics, the first of them {}", has[..40].join(", ")),
+    };
+    let looked = match (missing.looked_for.is_empty(), topics.naming) {
+        (true, Naming::Sender) => format!(
+            "record SERVO_OUTPUT_RAW with the parameters SERVOn_FUNCTION, which say what each output moves{or}"
+        ),
+        (true, _) => "no topic of this format is known for it".to_owned(),
+        (false, _) => format!("log {}{or}", missing.looked_for.join(" or ")),
+    };
+    let remedy =
+        format!("{looked}, or name another source in a mapping (--mapping); the file holds {has}");
+    LogError::Missing { path: path.to_owned(), column: missing.column, remedy }
+}

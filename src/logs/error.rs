@@ -1,0 +1,82 @@
+//! Why a log cannot be read.
+
+use std::path::PathBuf;
+
+use super::csv::CsvError;
+
+/// Why a log cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The file cannot be read.
+    #[error("cannot read flight log {}: {source}: check the path and its permissions", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is empty.
+    #[error("flight log {} is empty: the logger wrote nothing, or the copy failed", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is none of the formats.
+    #[error("{} is no flight log: it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or a MAVLink .tlog", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file has no flight of that number.
+    #[error("flight log {} holds {there} flights: there is no #{asked} in it", path.display())]
+    Part {
+        /// The file.
+        path: PathBuf,
+        /// The number asked for.
+        asked: usize,
+        /// How many there are.
+        there: usize,
+    },
+    /// The vehicle has no wings.
+    #[error("flight log {}: {why}", path.display())]
+    Vehicle {
+        /// The file.
+        path: PathBuf,
+        /// What it is, and what to do.
+        why: String,
+    },
+    /// The CSV is wrong.
+    #[error("{error}{hint}")]
+    Csv {
+        /// What is wrong.
+        error: CsvError,
+        /// What it looks like.
+        hint: String,
+    },
+    /// A needed column is filled by nothing in the file.
+    #[error("flight log {} has nothing for column `{column}`: {remedy}", path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: &'static str,
+        /// What would satisfy it.
+        remedy: String,
+    },
+    /// Too many rows cannot be used.
+    #[error("flight log {}: {dropped} of {rows} rows are unusable ({reasons}; first: row {first}), above 5 %: repair it or read it leniently{hint}", path.display())]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// Rows dropped.
+        dropped: usize,
+        /// Rows of the table.
+        rows: usize,
+        /// Why, with counts.
+        reasons: String,
+        /// The first of those dropped.
+        first: usize,
+        /// What it looks like.
+        hint: String,
+    },
+}

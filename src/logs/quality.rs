@@ -1,0 +1,239 @@
+//! How good the samples of a channel are: how often something new comes, what was made up, what hangs.
+//!
+//! A table that was brought to one clock shows a sample for every row, whoever made it. Between the samples of a slow
+//! sensor a straight line was drawn, or the last value was held: the second differences are zero, or all differences
+//! are. Such rows are no measurements.
+
+use serde::Serialize;
+
+use super::topics::period_s;
+use greylag_num::statistics::quantile;
+
+/// What the samples of a channel are worth.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Quality {
+    /// How often something new comes, Hz; 0 where too little changes to tell.
+    pub native_hz: f64,
+    /// Whether most samples lie on straight lines between others.
+    pub interpolated: bool,
+    /// Smallest decimal step of the values; 0 where they have none.
+    pub quantum: f64,
+    /// Where one value stays for much longer than usual: from, to, s.
+    pub frozen: Vec<(f64, f64)>,
+    /// Short excursions far beyond the neighbours.
+    pub spikes: usize,
+    /// The largest of them.
+    pub largest_spike: f64,
+}
+
+/// Fewest samples that anything is said of.
+const ENOUGH: usize = 100;
+/// Share of the moving samples on straight lines from which they count as interpolated.
+const STRAIGHT: f64 = 0.7;
+/// A kink counts if it is so many times what rounding makes.
+const KINK: f64 = 10.0;
+/// Fewest samples from kink to kink.
+const APART: f64 = 3.0;
+/// Shortest time that one value must stay to be called frozen, s; and in usual times between changes.
+const FROZEN_S: f64 = 1.0;
+const FROZEN_STEPS: f64 = 20.0;
+/// Samples on both sides whose median a spike is compared with.
+const AROUND: usize = 4;
+/// How far a spike lies out, in robust standard deviations, and in parts of the usual value.
+const FAR_SD: f64 = 10.0;
+const FAR_PART: f64 = 0.4;
+
+impl Quality {
+    /// The quality of a column's samples at increasing times (s), all finite.
+    pub fn of(column: &str, times: &[f64], values: &[f64]) -> Quality {
+        let period = period_s(times);
+        if values.len() < ENOUGH || period <= 0.0 {
+            return Quality::default();
+        }
+        let quantum = quantum(values);
+        let kinks = kinks(times, values, period, quantum);
+        let changes = changes(times, values);
+        let (spikes, largest_spike) = if column == SPIKY { spikes(values) } else { (0, 0.0) };
+        let by_changes = quantile(&steps(&changes), 0.25);
+        let native_hz = match kinks {
+            Some(hz) => hz,
+            None if by_changes > 0.0 => 1.0 / by_changes,
+            None => 0.0,
+        };
+        Quality {
+            native_hz,
+            interpolated: kinks.is_some(),
+            quantum,
+            frozen: if hangs(column) { frozen(times, values, &changes) } else { Vec::new() },
+            spikes,
+            largest_spike,
+        }
+    }
+}
+
+/// The column in which spikes are looked for: water in a pitot, a loose hose.
+const SPIKY: &str = "airspeed_mps";
+
+/// Whether a column is a sensor's, which never rests in flight.
+fn hangs(column: &str) -> bool {
+    let inertial = ["roll_rad", "pitch_rad", "yaw_rad", "p_radps", "q_radps", "r_radps"];
+    let air = ["airspeed_mps", "alpha_rad", "beta_rad"];
+    let path = ["ax_mps2", "ay_mps2", "az_mps2", "vn_mps", "ve_mps", "vd_mps"];
+    [&inertial[..], &air, &path].iter().any(|group| group.contains(&column))
+}
+
+/// The decimal step of the values, down to 1e-9; 0 of values that have none.
+fn quantum(values: &[f64]) -> f64 {
+    let few: Vec<f64> = values.iter().step_by(1 + values.len() / 500).copied().collect();
+    let whole = |k: &i32| {
+        let scale = 10f64.powi(*k);
+        few.iter().all(|x| (x * scale - (x * scale).round()).abs() < 1e-4)
+    };
+    (0..=9).find(whole).map_or(0.0, |k| 10f64.powi(-k))
+}
+
+/// How often straight lines meet, Hz, where the values are straight lines; `None` of anything else.
+fn kinks(times: &[f64], values: &[f64], period: f64, quantum: f64) -> Option<f64> {
+    let span = |f: fn(f64, f64) -> f64| values.iter().copied().reduce(f).unwrap_or(0.0);
+    let range = span(f64::max) - span(f64::min);
+    let rounding = (2.01 * quantum).max(1e-9 * range);
+    let even = |i: usize| {
+        let near = |step: f64| (step / period - 1.0).abs() < 0.05;
+        near(times[i] - times[i - 1]) && near(times[i + 1] - times[i])
+    };
+    let (mut moving, mut straight) = (0usize, 0usize);
+    let mut bent: Vec<(usize, f64)> = Vec::new();
+    for i in (1..values.len() - 1).filter(|i| even(*i)) {
+        let bend = (values[i - 1] - 2.0 * values[i] + values[i + 1]).abs();
+        let moves = (values[i + 1] - values[i - 1]).abs() > 2.0 * rounding;
+        moving += usize::from(moves);
+        straight += usize::from(moves && bend <= rounding);
+        if bend > rounding {
+            bent.push((i, bend));
+        }
+    }
+    let sizes: Vec<f64> = bent.iter().map(|(_, bend)| *bend).collect();
+    let gaps: Vec<f64> = bent.windows(2).map(|w| (w[1].0 - w[0].0) as f64).collect();
+    let lines = 2 * moving >= ENOUGH && straight as f64 > STRAIGHT * moving as f64;
+    let sharp = quantile(&sizes, 0.5) > KINK * rounding;
+    // One kink of a held command is none of a line: there must be lines on both sides of several.
+    let apart = bent.len() >= 2 && quantile(&gaps, 0.5) >= APART;
+    (lines && sharp && apart).then(|| 1.0 / (quantile(&gaps, 0.5) * period))
+}
+
+/// The times at which the value changes.
+fn changes(times: &[f64], values: &[f64]) -> Vec<f64> {
+    (1..values.len()).filter(|i| values[*i] != values[*i - 1]).map(|i| times[i]).collect()
+}
+
+fn steps(times: &[f64]) -> Vec<f64> {
+    times.windows(2).map(|w| w[1] - w[0]).collect()
+}
+
+/// Where one value other than zero stays for much longer than is usual.
+fn frozen(times: &[f64], values: &[f64], changes: &[f64]) -> Vec<(f64, f64)> {
+    let usual = quantile(&steps(changes), 0.9);
+    if changes.len() < ENOUGH / 2 || usual.is_nan() {
+        return Vec::new();
+    }
+    let limit = FROZEN_S.max(FROZEN_STEPS * usual);
+    let mut out = Vec::new();
+    let mut start = 0;
+    for i in 1..=values.len() {
+        if i < values.len() && values[i] == values[start] {
+            continue;
+        }
+        let long = times[i - 1] - times[start] > limit;
+        if long && values[start] != 0.0 {
+            out.push((times[start], times[i - 1]));
+        }
+        start = i;
+    }
+    out
+}
+
+/// Excursions far beyond the neighbours: how many, and the largest.
+fn spikes(values: &[f64]) -> (usize, f64) {
+    let usual = quantile(&values.iter().map(|x| x.abs()).collect::<Vec<_>>(), 0.5);
+    let middle = |i: usize| {
+        let window = &values[i.saturating_sub(AROUND)..(i + AROUND + 1).min(values.len())];
+        quantile(window, 0.5)
+    };
+    let out: Vec<f64> = (0..values.len()).map(|i| values[i] - middle(i)).collect();
+    let sd = 1.4826 * quantile(&out.iter().map(|x| x.abs()).collect::<Vec<_>>(), 0.5);
+    let far = |i: &usize| out[*i].abs() > FAR_SD * sd && out[*i].abs() > FAR_PART * usual;
+    let all: Vec<usize> = (0..values.len()).filter(far).collect();
+    let apart = all.iter().enumerate().filter(|(k, i)| *k == 0 || **i > all[*k - 1] + 1).count();
+    let largest = all.iter().map(|i| values[*i]).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+    (apart, largest.unwrap_or(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Noise that no rounding makes, from a fixed sequence.
+    fn noise(i: usize) -> f64 {
+        ((i as f64 * 12.9898).sin() * 43758.5453).fract()
+    }
+
+    fn times(n: usize) -> Vec<f64> {
+        (0..n).map(|i| i as f64 * 0.01).collect()
+    }
+
+    fn rounded(x: f64) -> f64 {
+        (x * 1e5).round() * 1e-5
+    }
+
+    #[test]
+    fn lines_between_slow_samples_are_found_with_the_rate_of_the_samples() {
+        // A sample each 0.25 s, a straight line between, five decimals.
+        let line = |i: usize| {
+            let (k, f) = (i / 25, (i % 25) as f64 / 25.0);
+            rounded(noise(k) * (1.0 - f) + noise(k + 1) * f)
+        };
+        let found =
+            Quality::of("airspeed_mps", &times(2000), &(0..2000).map(line).collect::<Vec<_>>());
+        assert!(found.interpolated && (found.native_hz - 4.0).abs() < 0.2, "{found:?}");
+    }
+
+    #[test]
+    fn smooth_motion_noise_and_steps_are_not_lines() {
+        let smooth = |i: usize| rounded((i as f64 * 0.02).sin());
+        let coarse = |i: usize| ((i as f64 * 0.01).sin() * 10.0 * 100.0).round() / 100.0;
+        let noisy = |i: usize| rounded(noise(i));
+        let steps = |i: usize| if (i / 150).is_multiple_of(2) { 0.3 } else { -0.2 };
+        let waves: [&dyn Fn(usize) -> f64; 4] = [&smooth, &coarse, &noisy, &steps];
+        for (k, wave) in waves.iter().enumerate() {
+            let found =
+                Quality::of("airspeed_mps", &times(2000), &(0..2000).map(wave).collect::<Vec<_>>());
+            assert!(!found.interpolated, "wave {k}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_held_sensor_has_its_own_rate_and_a_stuck_one_is_frozen() {
+        let held = |i: usize| rounded(15.0 + noise(i / 20));
+        let found =
+            Quality::of("airspeed_mps", &times(2000), &(0..2000).map(held).collect::<Vec<_>>());
+        assert!((found.native_hz - 5.0).abs() < 0.3 && found.frozen.is_empty(), "{found:?}");
+        let stuck =
+            |i: usize| if (500..1000).contains(&i) { 15.5 } else { rounded(15.0 + noise(i)) };
+        let found =
+            Quality::of("airspeed_mps", &times(2000), &(0..2000).map(stuck).collect::<Vec<_>>());
+        let [(from, to)] = found.frozen[..] else { panic!("{found:?}") };
+        assert!((from - 5.0).abs() < 0.02 && (to - 9.99).abs() < 0.02, "{found:?}");
+    }
+
+    #[test]
+    fn spikes_are_counted() {
+        let spiky = |i: usize| if i % 400 == 7 { 95.0 } else { 17.0 + 0.3 * noise(i) };
+        let found =
+            Quality::of("airspeed_mps", &times(2000), &(0..2000).map(spiky).collect::<Vec<_>>());
+        assert_eq!((found.spikes, found.largest_spike), (5, 95.0));
+        let gusty = |i: usize| 17.0 + 3.0 * (i as f64 * 0.01).sin() + 0.3 * noise(i);
+        let found =
+            Quality::of("airspeed_mps", &times(2000), &(0..2000).map(gusty).collect::<Vec<_>>());
+        assert_eq!(found.spikes, 0);
+    }
+}

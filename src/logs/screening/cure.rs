@@ -1,0 +1,78 @@
+//! Cures are tried before they are printed: the column is rescaled and looked at again.
+
+use crate::Sample;
+use crate::columns::{COLUMNS, index};
+use crate::finding::{Cure, Finding};
+
+/// Columns of which a cure of the first one speaks likewise.
+const LIKEWISE: [&[&str]; 3] = [
+    &["roll_rad", "pitch_rad", "yaw_rad"],
+    &["p_radps", "q_radps", "r_radps"],
+    &["ax_mps2", "ay_mps2", "az_mps2"],
+];
+/// Text between the problem and its cure.
+const BETWEEN: &str = ": ";
+
+/// The findings, without the cures that do not cure: those after which the same column is found wrong again.
+pub fn tried(
+    findings: Vec<Finding>,
+    rows: &[Sample],
+    check: impl Fn(&[Sample]) -> Vec<Finding>,
+) -> Vec<Finding> {
+    let cures = |cure: &Cure| {
+        let mended = mended(rows, cure);
+        let same = |f: &Finding| f.cure.as_ref().is_some_and(|c| c.column == cure.column);
+        !check(&mended).iter().any(same)
+    };
+    let one = |finding: Finding| match &finding.cure {
+        Some(cure) if !cures(cure) => {
+            let said = format!("{BETWEEN}{cure}");
+            let why = ". No factor puts it right: look at the flight at these times, or name another source in a mapping";
+            let text = finding.text.replace(&said, why);
+            Finding { text, cure: None, ..finding }
+        }
+        _ => finding,
+    };
+    findings.into_iter().map(one).collect()
+}
+
+/// The rows as the cure would have them.
+fn mended(rows: &[Sample], cure: &Cure) -> Vec<Sample> {
+    let group = LIKEWISE.iter().find(|group| group[0] == cure.column && cure.scale > 0.0);
+    let own = [cure.column.as_str()];
+    let columns: Vec<usize> =
+        group.copied().unwrap_or(&own).iter().filter_map(|column| index(column)).collect();
+    let mut rows = rows.to_vec();
+    for row in &mut rows {
+        columns.iter().for_each(|i| *COLUMNS[*i].2(row) *= cure.scale);
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cure_after_which_the_column_is_wrong_again_is_not_printed() {
+        let cure = Cure { column: "alpha_rad".into(), scale: 0.0174533 };
+        let found = Finding {
+            cure: Some(cure.clone()),
+            ..Finding::problem(format!("alpha_rad looks like degrees: {cure}"))
+        };
+        let rows = [Sample { alpha_rad: 90.0, ..Sample::default() }];
+        let large = |limit: f64| {
+            let found = found.clone();
+            move |rows: &[Sample]| {
+                if rows[0].alpha_rad > limit { vec![found.clone()] } else { Vec::new() }
+            }
+        };
+        let helped = tried(vec![found.clone()], &rows, large(2.0));
+        assert_eq!(helped, [found.clone()]);
+        let [useless] = &tried(vec![found.clone()], &rows, large(1.0))[..] else { panic!() };
+        assert!(
+            useless.cure.is_none() && !useless.text.contains("--mapping FILE, in"),
+            "{useless}"
+        );
+    }
+}

@@ -1,0 +1,160 @@
+//! The sources of a log: which instance of a topic is read, and what else there is.
+//!
+//! A vehicle may carry two pitots, a VTOL has one controller for its lift and one for its wings. The reader takes the
+//! first instance that moves, the one that the vehicle's type calls for before that, and says what it took.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::finding::Finding;
+use super::mapping::rule::Rule;
+use super::topics::{Topic, Topics, period_s};
+
+/// An instance that the user asks for, of a topic: `--source airspeed=1`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Asked {
+    /// The topic.
+    pub topic: String,
+    /// Its instance: a number, or system × 256 + component.
+    pub instance: u16,
+}
+
+impl std::str::FromStr for Asked {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Asked, String> {
+        let wrong = || {
+            format!(
+                "\"{text}\" is not TOPIC=INSTANCE, such as airspeed=1, or ATTITUDE=2/1 (system/component)"
+            )
+        };
+        let (topic, instance) = text.split_once('=').ok_or_else(wrong)?;
+        let number = |text: &str| text.trim().parse().ok();
+        let instance = match instance.split_once('/') {
+            None => instance.trim().parse::<u16>().map_err(|_| wrong())?,
+            Some((system, component)) => {
+                let both = number(system).zip(number(component)).ok_or_else(wrong)?;
+                u16::from_be_bytes([both.0, both.1])
+            }
+        };
+        Ok(Asked { topic: topic.trim().to_owned(), instance })
+    }
+}
+
+/// One instance of a topic that could fill columns.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Source {
+    /// The topic.
+    pub topic: String,
+    /// The instance as a mapping writes it.
+    pub instance: String,
+    /// Samples a second, by the median period.
+    pub rate_hz: f64,
+    /// Time of the first sample, s.
+    pub from_s: f64,
+    /// Time of the last one, s.
+    pub to_s: f64,
+    /// Whether any of the fields that are wanted of it changes.
+    pub moves: bool,
+    /// Whether it is read.
+    pub read: bool,
+}
+
+/// The instance of each topic that is read, by the topic's name.
+#[derive(Debug, Default)]
+pub(super) struct Choice {
+    read: BTreeMap<String, u16>,
+    /// All instances of topics of which there are several.
+    pub sources: Vec<Source>,
+    /// What was taken instead of what is usual.
+    pub findings: Vec<Finding>,
+}
+
+impl Choice {
+    /// Chooses for the topics of `rules`; what the user has `asked` for comes first.
+    pub fn of(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Choice {
+        let mut choice = Choice::default();
+        let mut names: Vec<&str> = rules.iter().map(|r| r.topic.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        for name in names {
+            choice.topic(topics, name, rules, asked);
+        }
+        choice
+    }
+
+    /// The instance of the topic of `rule`, unless the rule names one itself.
+    pub fn instance(&self, rule: &Rule) -> Option<u16> {
+        rule.instance.or_else(|| self.read.get(&rule.topic).copied())
+    }
+
+    fn topic(&mut self, topics: &Topics, name: &str, rules: &[Rule], asked: &[Asked]) {
+        let of_topic: Vec<&Rule> = rules.iter().filter(|r| r.topic == name).collect();
+        let all: Vec<(u16, &Topic)> = topics.instances(name).collect();
+        let fields: Vec<&str> = of_topic.iter().flat_map(|r| r.fields()).collect();
+        let moves = |topic: &Topic| fields.iter().any(|f| topic.moves(f));
+        let named = asked.iter().find(|a| a.topic == name).map(|a| a.instance);
+        let fixed = of_topic.iter().find_map(|r| r.instance);
+        let preferred = of_topic.iter().find_map(|r| r.preferred);
+        let there = |i: &u16| all.iter().any(|(instance, _)| instance == i);
+        let alive = |i: &u16| all.iter().any(|(instance, t)| instance == i && moves(t));
+        let usual = preferred.filter(there).or(all.first().map(|(i, _)| *i));
+        let first_alive = || all.iter().find(|(_, t)| moves(t)).map(|(i, _)| *i);
+        let read = named.or(fixed).or_else(|| usual.filter(alive).or_else(first_alive).or(usual));
+        let Some(read) = read else { return };
+        self.read.insert(name.to_owned(), read);
+        if let Some(named) = named.filter(|i| !there(i)) {
+            let has: Vec<String> = all.iter().map(|(i, _)| topics.naming.written(*i)).collect();
+            self.findings.push(Finding::problem(format!(
+                "{name} has no instance {}; it has {}",
+                topics.naming.written(named),
+                if has.is_empty() { "none".to_owned() } else { has.join(", ") }
+            )));
+        }
+        if all.len() < 2 {
+            return;
+        }
+        let source = |(i, t): &(u16, &Topic)| Source {
+            topic: name.to_owned(),
+            instance: topics.naming.written(*i),
+            rate_hz: Some(period_s(&t.time_s)).filter(|p| *p > 0.0).map_or(0.0, |p| 1.0 / p),
+            from_s: t.time_s.first().copied().unwrap_or(0.0),
+            to_s: t.time_s.last().copied().unwrap_or(0.0),
+            moves: moves(t),
+            read: *i == read,
+        };
+        let sources: Vec<Source> = all.iter().map(source).collect();
+        if fixed.is_none() {
+            self.findings.extend(said(name, &sources, named.is_some()));
+        }
+        self.sources.extend(sources);
+    }
+}
+
+/// What there is to say of the choice among the sources of a topic.
+fn said(name: &str, sources: &[Source], asked: bool) -> Option<Finding> {
+    let read = sources.iter().find(|s| s.read)?;
+    let list = |of: &dyn Fn(&&Source) -> bool| -> Vec<&str> {
+        sources.iter().filter(|s| !s.read).filter(|s| of(s)).map(|s| s.instance.as_str()).collect()
+    };
+    let (dead, others) = (list(&|s| !s.moves), list(&|s| s.moves));
+    let instance = &read.instance;
+    let other = others.first().map(|other| {
+        format!("; {} moves too: --source {name}={other} reads it", others.join(", "))
+    });
+    let other = other.unwrap_or_default();
+    // That a second sensor is absent or dead is no matter as long as the first one is read.
+    let usual = sources.first().is_some_and(|s| s.read);
+    match (asked, dead.is_empty() || usual) {
+        (true, _) => {
+            Some(Finding::note(format!("{name}: instance {instance} is read, as asked{other}")))
+        }
+        (_, false) => Some(Finding::warning(format!(
+            "{name}: instance {instance} is read, for {} never changes{other}",
+            dead.join(", ")
+        ))),
+        (_, true) if others.is_empty() && usual => None,
+        (_, true) => Some(Finding::note(format!("{name}: instance {instance} is read{other}"))),
+    }
+}

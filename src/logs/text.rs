@@ -1,0 +1,111 @@
+//! A CSV table read as flights, and judged.
+
+use std::path::Path;
+
+use super::columns::COLUMNS;
+use super::csv::{self, CsvError, Raw, Tolerance};
+use super::error::LogError;
+use super::finding::Finding;
+use super::load::{Channel, Log, Options, Use, dropped, hint, name};
+use super::mapping::Mapping;
+use super::quality::Quality;
+use super::topics::period_s;
+use super::{Flight, Format, Sample, assess, derive, screening};
+
+/// The flights of a table: each recording that stands in it.
+///
+/// # Errors
+/// The text is no table. Of each flight: it lacks a needed column, or has too many unusable rows.
+pub(super) fn read(
+    bytes: &[u8],
+    path: &Path,
+    options: &Options,
+    to: Use,
+) -> Result<Vec<Result<Log, LogError>>, LogError> {
+    let bare = |error| LogError::Csv { error, hint: String::new() };
+    let recordings = csv::raw(bytes, path, &options.mapping).map_err(bare)?.recordings();
+    let several = recordings.len() > 1;
+    let one = |(k, raw): (usize, Raw)| {
+        let life = several.then(|| format!("recording {}", k + 1));
+        let name = if several { format!("{}#{}", name(path), k + 1) } else { name(path) };
+        recording(raw, path, options, to).map(|mut log| {
+            log.flight.name = name;
+            log.life = life;
+            log
+        })
+    };
+    Ok(recordings.into_iter().enumerate().map(one).collect())
+}
+
+fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Log, LogError> {
+    let bare = |error: CsvError| LogError::Csv { error, hint: String::new() };
+    let missing = std::mem::take(&mut raw.missing);
+    let lacking = !missing.is_empty();
+    let mut findings: Vec<Finding> = Vec::new();
+    for source in missing {
+        if to == Use::Compute {
+            return Err(bare(source));
+        }
+        findings.push(Finding::problem(source.to_string()));
+    }
+    let mut made = std::mem::take(&mut raw.notes);
+    let channels = channels(&raw.rows, &options.mapping);
+    findings.extend(assess::freeze(&mut raw.rows, &channels, &options.flies));
+    raw.leave_out(|row| assess::hangs(row, &channels));
+    made.extend(derive::apply(&mut raw.rows, &options.mapping));
+    findings.extend(assess::channels(&channels));
+    findings.extend(screening::screen(&raw.rows, &options.flies));
+    findings.extend(made.iter().map(Finding::note));
+    let reading = if lacking {
+        csv::keep_all(raw, path)
+    } else {
+        let poor = csv::poor(&raw, path, options.tolerance);
+        if let (Some(source), Use::Look) = (&poor, to) {
+            findings.push(Finding::problem(source.to_string()));
+        }
+        let tolerance = if to == Use::Look { Tolerance::Lenient } else { options.tolerance };
+        csv::settle(raw, path, tolerance)
+            .map_err(|error| LogError::Csv { error, hint: hint(&findings) })?
+    };
+    if reading.cut_short {
+        findings.push(Finding::warning("the file ends in the middle of a row, which is left out"));
+    }
+    if !reading.unknown_columns.is_empty() {
+        let names = reading.unknown_columns.join(", ");
+        findings.push(Finding::note(format!("columns that the log format does not name: {names}")));
+    }
+    findings.extend(dropped(reading.dropped, &reading.dropped_rows));
+    let (sensors, notes) = (options.mapping.sensors().clone(), made);
+    Ok(Log {
+        format: Format::Csv,
+        channels,
+        topics: Vec::new(),
+        flight: Flight { sensors, notes, ..reading.flight },
+        dropped: reading.dropped,
+        dropped_rows: reading.dropped_rows,
+        findings,
+        flies: options.flies,
+        vehicle: None,
+        hovers: Vec::new(),
+        sources: Vec::new(),
+        life: None,
+    })
+}
+
+/// The columns of a CSV that hold anything.
+fn channels(rows: &[Sample], mapping: &Mapping) -> Vec<Channel> {
+    let channel = |(name, get, _): &(&str, fn(&Sample) -> f64, _)| {
+        let seen = rows.iter().map(|s| (s.time_s, get(s))).filter(|(_, x)| x.is_finite());
+        let (times, values): (Vec<f64>, Vec<f64>) = seen.unzip();
+        let period = period_s(&times);
+        (!times.is_empty()).then(|| Channel {
+            columns: vec![(*name).to_owned()],
+            origin: mapping.origin(name),
+            samples: times.len(),
+            rate_hz: if period > 0.0 { 1.0 / period } else { 0.0 },
+            largest_gap_s: times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max),
+            quality: Quality::of(name, &times, &values),
+        })
+    };
+    COLUMNS.iter().skip(1).filter_map(channel).collect()
+}
