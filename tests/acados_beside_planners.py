@@ -199,7 +199,7 @@ class Rti:
 
     STEPS, LAST = 50, 20.0
     ATTITUDE, RATE, SIDESLIP, MOVE = 0.05, 2.0, 0.3, 0.3
-    TIME_CONSTANT_S = 0.3
+    TIME_CONSTANT_S, TURN_S = 0.3, 1.0
 
     def __init__(self, box, folder, limits):
         acados_home(folder)
@@ -250,7 +250,7 @@ class Rti:
         c.lh, c.uh = np.array([limits["load"][0]]), np.array([limits["load"][1]])
         c.lh_e, c.uh_e = c.lh, c.uh
         c.idxsbx, c.idxsh, c.idxsbx_e, c.idxsh_e = (np.array([0]) for _ in range(4))
-        linear, square = np.array([200.0, 20.0]), np.array([5e3, 200.0])
+        linear, square = np.array([500.0, 300.0]), np.array([5e3, 1e3])
         ocp.cost.zl = ocp.cost.zu = linear
         ocp.cost.Zl = ocp.cost.Zu = square
         ocp.cost.zl_e, ocp.cost.zu_e, ocp.cost.Zl_e, ocp.cost.Zu_e = linear, linear, square, square
@@ -258,6 +258,7 @@ class Rti:
         o.integrator_type, o.nlp_solver_type, o.hessian_approx = "DISCRETE", "SQP_RTI", "GAUSS_NEWTON"
         o.qp_solver, o.qp_solver_cond_N, o.tf = "PARTIAL_CONDENSING_HPIPM", limits["blocks"], self.STEPS * DT
         o.qp_solver_iter_max, o.qp_solver_warm_start = 50, 1
+        o.hpipm_mode = "SPEED"
         o.regularize_method, o.levenberg_marquardt = "NO_REGULARIZE", 1e-3
         o.ext_fun_compile_flags = "-O2 -march=native"
         ocp.code_export_directory = str(folder / "generated")
@@ -265,7 +266,7 @@ class Rti:
         self.reset()
 
     def reset(self):
-        self.d, self.last, self.planned, self.speed = np.zeros(8), None, False, 0.0
+        self.d, self.beside, self.last, self.planned, self.speed = np.zeros(8), np.zeros(2), None, False, 0.0
 
     def command(self, seen, target):
         """The command of this tick, and the time that it took, s: preparation and feedback together."""
@@ -312,11 +313,16 @@ class Rti:
                 put(k, "u", get(k + 1, "u"))
 
     def goal(self, seen, target):
-        """States of the steady turn at the attitude wanted."""
+        """States of the steady turn at the attitude wanted; what the turn is beside it is followed slowly, so that nothing
+        pulls at a steady attitude."""
         roll, pitch, airspeed = target
-        turn = self.box.g * math.tan(roll) / max(seen[2], 5.0)
+        speed = max(seen[2], 5.0)
+        turning = (seen[4] * math.sin(seen[0]) + seen[5] * math.cos(seen[0])) / math.cos(seen[1])
+        now = np.array([turning - self.box.g * math.tan(seen[0]) / speed, seen[7]])
+        self.beside += DT / self.TURN_S * (now - self.beside)
+        turn = self.box.g * math.tan(roll) / speed + self.beside[0]
         rates = [-turn * math.sin(pitch), turn * math.sin(roll) * math.cos(pitch), turn * math.cos(roll) * math.cos(pitch)]
-        return np.array([roll, pitch, airspeed, *rates, 0.0, 0.0])
+        return np.array([roll, pitch, airspeed, *rates, 0.0, self.beside[1]])
 
 
 class Plant:
@@ -462,7 +468,7 @@ def main():
     parser.add_argument("--controllers", nargs="+", default=["lqi", "ilqr", "hybrid-lqi"])
     parser.add_argument("--every", type=int, default=7)
     parser.add_argument("--steps", type=int, default=50)
-    parser.add_argument("--blocks", type=int, default=5, help="blocks after partial condensing")
+    parser.add_argument("--blocks", type=int, default=25, help="blocks after partial condensing")
     parser.add_argument("--margin", type=float, default=0.9, help="share of the load factor's and the stall's limit that is planned to")
     parser.add_argument("--out", type=pathlib.Path)
     arguments = parser.parse_args()
