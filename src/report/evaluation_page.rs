@@ -8,12 +8,12 @@ use super::{
     Band, Choice, ChoiceOption, Figure, Page, Panel, Scale, Section, Series, Style, Table,
     TimeFigure, Whisker, Whiskers,
 };
-use crate::control::Target;
-use crate::model::STEP;
-use crate::report::kit::numbers::number;
-use crate::sim::evaluation::{Evaluation, Score};
-use crate::sim::published::{Published, Value, published};
-use crate::sim::tracking::{Tracking, seconds};
+use crate::kit::numbers::number;
+use greylag_control::Target;
+use greylag_model::STEP;
+use greylag_sim::evaluation::{Evaluation, Score};
+use greylag_sim::published::{Published, Value, published};
+use greylag_sim::tracking::{Tracking, seconds};
 
 /// An evaluation's story, with where it came from.
 #[derive(Clone, Debug)]
@@ -213,19 +213,20 @@ fn whisker(label: String, style: Style, Value { value, ci95 }: Value) -> Whisker
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::insight::Insight;
-    use crate::control::quality::{Limits, Moment, Track};
-    use crate::physics::{Airframe, Command};
-    use crate::sim::evaluation::courses;
-    use crate::sim::targets::Row;
-    use crate::sim::{Group, Outcome};
+    use greylag_control::insight::Insight;
+    use greylag_control::quality::{Limits, Moment, Track};
+    use greylag_physics::{Airframe, Command};
+    use greylag_sim::evaluation::courses;
+    use greylag_sim::targets::Row;
+    use greylag_sim::{Group, Outcome};
     use std::time::Duration;
 
     fn evaluated(controller: &str, settled_deg: f64) -> Evaluation {
         let groups = [Group::Easy, Group::HardCorners];
         let row = |(n, group)| Row { number: n, group, roll_deg: 10.0, pitch_deg: 5.0 };
         let rows: Vec<Row> = (1..).zip(groups.into_iter().cycle()).take(8).map(row).collect();
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/airframe.toml");
+        let path =
+            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/airframe.toml");
         let limits = Limits::of(&Airframe::load(&path).unwrap());
         let target = Target { roll: 0.2, pitch: 0.1, airspeed: 16.67 };
         let moment = |k: u32| Moment {

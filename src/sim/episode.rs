@@ -2,13 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use crate::control::quality::{Moment, Track};
-use crate::control::{Controller, Observation, Target};
-use crate::model::STEP;
-use crate::physics::Command;
-use crate::sim::{Environment, Trouble};
+use crate::{Environment, Trouble};
+use greylag_control::quality::{Moment, Track};
+use greylag_control::{Controller, Observation, Target};
+use greylag_model::STEP;
+use greylag_physics::Command;
 
-pub use crate::control::quality::{REACHED_DEG, attitude_error_deg};
+pub use greylag_control::quality::{REACHED_DEG, attitude_error_deg};
 
 /// Steps of an episode (section V-E of \[GSFM26\]).
 pub const STEPS: usize = 1000;
@@ -152,7 +152,7 @@ pub fn settled_error_deg(errors: &[[f64; 2]]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::{ActuatorState, State, Time};
+    use greylag_physics::{ActuatorState, State, Time};
 
     const TARGET: Target = Target { roll: 0.0, pitch: 0.0, airspeed: 16.67 };
 

@@ -8,17 +8,17 @@ use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::control::quality::{Limits, Quality};
-use crate::control::{Controller, Target};
-use crate::model::GreyBox;
-use crate::num::statistics::{interquartile_mean, mean, quantile};
-use crate::num::{bootstrap, stream};
 #[cfg(feature = "sitl")]
-use crate::sim::Simulator;
-use crate::sim::episode::{DIVERGED_DEG, Leg, STEPS};
-use crate::sim::summary::{Spreads, spreads};
-use crate::sim::targets::Row;
-use crate::sim::{Environment, Episode, Group, Imagined, Outcome, Trouble};
+use crate::Simulator;
+use crate::episode::{DIVERGED_DEG, Leg, STEPS};
+use crate::summary::{Spreads, spreads};
+use crate::targets::Row;
+use crate::{Environment, Episode, Group, Imagined, Outcome, Trouble};
+use greylag_control::quality::{Limits, Quality};
+use greylag_control::{Controller, Target};
+use greylag_model::GreyBox;
+use greylag_num::statistics::{interquartile_mean, mean, quantile};
+use greylag_num::{bootstrap, stream};
 
 /// Seed of the intervals' resamples: the same scores have the same intervals.
 const SEED: u64 = 95;
@@ -87,7 +87,7 @@ pub struct Score {
     /// Its 95 % interval.
     pub divergence_ci95: [f64; 2],
     /// Share of the flights that kept to load factor and angle of attack but for a transient, see
-    /// [`TRANSIENT`](crate::control::quality::TRANSIENT); NaN where it was not measured.
+    /// [`TRANSIENT`](greylag_control::quality::TRANSIENT); NaN where it was not measured.
     pub kept_rate: f64,
     /// Share of the flights that overshoot roll and pitch by at most 1° or 3 % of the step, whichever is more.
     pub little_overshoot_rate: f64,

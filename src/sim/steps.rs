@@ -2,11 +2,11 @@
 
 use rand::RngExt;
 
-use crate::control::Target;
-use crate::num::stream;
-use crate::physics::Airframe;
-use crate::sim::episode::Leg;
-use crate::sim::evaluation::Course;
+use crate::episode::Leg;
+use crate::evaluation::Course;
+use greylag_control::Target;
+use greylag_num::stream;
+use greylag_physics::Airframe;
 
 /// Purpose of the random stream.
 const STREAM: u64 = 242;
@@ -39,7 +39,8 @@ mod tests {
 
     #[test]
     fn steps_fill_the_envelope_and_are_the_same_whatever_their_number() {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/airframe.toml");
+        let path =
+            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/airframe.toml");
         let airframe = Airframe::load(&path).unwrap();
         let all = steps(7, 400, &airframe);
         assert_eq!(steps(7, 10, &airframe), all[..10]);

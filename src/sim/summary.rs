@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::control::quality::{MEASURES, Quality};
-use crate::num::bootstrap;
-use crate::num::statistics::quantile;
+use greylag_control::quality::{MEASURES, Quality};
+use greylag_num::bootstrap;
+use greylag_num::statistics::quantile;
 
 /// Seed of the intervals' resamples: the same flights have the same intervals.
 const SEED: u64 = 96;
@@ -27,7 +27,7 @@ pub type Spreads = BTreeMap<&'static str, Spread>;
 
 /// Every measure over these flights; those of which no flight knows anything are left out.
 pub fn spreads(flights: &[&Quality]) -> Spreads {
-    let of = |measure: &crate::control::quality::Measure| {
+    let of = |measure: &greylag_control::quality::Measure| {
         let values = flights.iter().map(|q| (measure.get)(q));
         let values: Vec<f64> = values.filter(|x| x.is_finite()).collect();
         let median = |values: &[f64]| quantile(values, 0.5);

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{Moment, Track};
-use crate::physics::Airframe;
+use greylag_physics::Airframe;
 
 /// How far load factor and angle of attack may pass their limits in a transient: a twentieth of the limit.
 pub const TRANSIENT: f64 = 0.05;

@@ -8,8 +8,8 @@ mod measures;
 
 use serde::Serialize;
 
-use crate::control::{Observation, Target};
-use crate::physics::Command;
+use crate::{Observation, Target};
+use greylag_physics::Command;
 
 pub use limits::{Limits, OutsideS, TRANSIENT};
 pub use measures::{MEASURES, Measure, Worse, measure};

@@ -1,8 +1,8 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::*;
-use crate::model::STEP;
-use crate::physics::Airframe;
+use greylag_model::STEP;
+use greylag_physics::Airframe;
 
 const LIMITS: Limits = Limits {
     bank_deg: 60.0,
@@ -195,7 +195,8 @@ fn airspeed_and_stops_are_measured_over_the_ticks() {
 
 #[test]
 fn a_file_that_states_no_stall_has_no_limit_of_it() {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/a430/airframe.toml");
+    let path =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/a430/airframe.toml");
     let limits = Limits::of(&Airframe::load(&path).unwrap());
     assert_eq!([limits.stall_deg, limits.sideslip_deg], [f64::INFINITY; 2]);
     assert_eq!(limits.load_factor[0], f64::NEG_INFINITY);

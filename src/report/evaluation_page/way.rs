@@ -1,13 +1,11 @@
 //! What happened on the way to the targets: error against surface travel, every measure, their definitions.
 
 use super::{EvaluationReport, Left, Right, label, with_interval};
-use crate::control::quality::{MEASURES, Measure};
-use crate::report::kit::numbers::number;
-use crate::report::{
-    Choice, ChoiceOption, Figure, Section, Style, Table, XyFigure, XyMark, XySeries,
-};
-use crate::sim::evaluation::{Evaluation, Score};
-use crate::sim::summary::Spread;
+use crate::kit::numbers::number;
+use crate::{Choice, ChoiceOption, Figure, Section, Style, Table, XyFigure, XyMark, XySeries};
+use greylag_control::quality::{MEASURES, Measure};
+use greylag_sim::evaluation::{Evaluation, Score};
+use greylag_sim::summary::Spread;
 
 /// Controllers that colours tell apart; beyond, lines are wide.
 const COLOURS: usize = 4;

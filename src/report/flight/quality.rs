@@ -1,21 +1,21 @@
 //! What happened on the way to each target of a recorded flight, and how it kept to the envelope.
 
-use crate::control::Target;
-use crate::control::quality::{Limits, Moment, OutsideS, Quality, Track};
-use crate::logs::Sample;
-use crate::physics::Command;
-use crate::physics::atmosphere::STANDARD_GRAVITY;
-use crate::report::flight::verdict::signed;
-use crate::report::flight::{EnvelopeFlown, FlightReport, Segment};
-use crate::report::kit::numbers::number;
-use crate::report::{Align, Figure, Row, Section, Table};
+use crate::flight::verdict::signed;
+use crate::flight::{EnvelopeFlown, FlightReport, Segment};
+use crate::kit::numbers::number;
+use crate::{Align, Figure, Row, Section, Table};
+use greylag_control::Target;
+use greylag_control::quality::{Limits, Moment, OutsideS, Quality, Track};
+use greylag_logs::Sample;
+use greylag_physics::Command;
+use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
 /// A pause longer than this parts a flight, s.
 const GAP_S: f64 = 0.1;
 
 /// A whole flight against its envelope.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::report) struct Kept {
+pub(crate) struct Kept {
     /// Least and largest load factor.
     pub load_factor: [f64; 2],
     /// Largest angle of attack, degrees.
@@ -57,7 +57,7 @@ pub(super) fn of_segment(samples: &[Sample], segment: &Segment, limits: &Limits)
 }
 
 /// The whole flight, from the airspeed on that counts as one.
-pub(in crate::report) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
+pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     let flying = |s: &Sample| !(s.airspeed_mps < envelope.flying_from_mps);
     let together = |a: &Sample, b: &Sample| flying(a) && flying(b) && b.time_s - a.time_s <= GAP_S;
     let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: f64::NAN };
@@ -110,7 +110,7 @@ pub(super) fn most(qualities: &[Quality], of: impl Fn(&Quality) -> f64) -> f64 {
 }
 
 /// The section of what happened on the way to each target.
-pub(in crate::report) fn section(report: &FlightReport) -> Option<Section> {
+pub(crate) fn section(report: &FlightReport) -> Option<Section> {
     let qualities = report.qualities().filter(|all| !all.is_empty())?;
     let limits = report.envelope?.limits;
     let columns = [
