@@ -53,6 +53,44 @@ fn evaluate_writes_scores_as_json_and_never_over_a_file() {
     refuses(&arguments, &["scores.json", "--force"]);
 }
 
+/// What happened on the way stands in the terminal within a hundred columns, and in JSON for every flight; the steps of
+/// a seed are the same ones.
+#[test]
+fn evaluate_measures_the_way_to_targets_and_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let fly = |name: &str, more: &[&str]| {
+        let json = folder.path().join(name);
+        let out = json.to_str().unwrap();
+        let mut arguments = vec!["evaluate", "--controller", "lqi", "--steps", "3", "--json", out];
+        arguments.extend(more);
+        let output = greylag(&arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let scores: serde_json::Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
+        (String::from_utf8(output.stdout).unwrap(), scores["controllers"][0].clone())
+    };
+    let (said, lqi) = fly("some.json", &["--every", "70", "--group", "easy"]);
+    assert!(said.lines().all(|line| line.chars().count() <= 100), "{said}");
+    for part in
+        ["integral of error, ° s", "load factor, largest", "envelope kept, %", "steps, n = 3"]
+    {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    // the 70th and the 140th target are easy
+    let groups: Vec<_> = lqi["groups"].as_array().unwrap().iter().map(|g| &g["count"]).collect();
+    assert_eq!(groups, [2, 3]);
+    let flights = lqi["flights"].as_array().unwrap();
+    assert_eq!(flights.len(), 5);
+    let integral = flights[0]["quality"]["error_integral_deg_s"].as_f64().unwrap();
+    assert!((1.0..100.0).contains(&integral), "{integral}");
+    assert!(flights[0]["from_deg"].is_null() && flights[4]["from_deg"][0].is_number());
+    let (_, alone) = fly("steps.json", &["--no-targets"]);
+    assert_eq!(alone["flights"][2], flights[4]);
+    let (_, drawn) = fly("drawn.json", &["--no-targets", "--draws", "2"]);
+    assert_eq!(drawn["all"]["flights"].as_array().unwrap().len(), 6);
+    refuses(&["evaluate", "--controller", "lqi", "--no-targets"], &["--steps"]);
+    refuses(&["evaluate", "--controller", "lqi", "--every", "900"], &["--every 900", "smaller"]);
+}
+
 #[test]
 fn evaluate_refuses_what_it_cannot_fly() {
     refuses(&["evaluate", "--controller", "autopilot"], &["autopilot", "lqi"]);

@@ -2,10 +2,12 @@
 
 mod report_synthetic;
 
+use std::path::Path;
+
 use greylag::logs::{Flight, Sample};
 use greylag::report::{
-    Cycle, Difficulty, Event, EventKind, Figure, FlightReport, Outcome, Page, Panel, Section,
-    Segment, Series, Style, TimeFigure, WriteError, write_new, write_over,
+    Cycle, Difficulty, EnvelopeFlown, Event, EventKind, Figure, FlightReport, Outcome, Page, Panel,
+    Section, Segment, Series, Style, TimeFigure, WriteError, write_new, write_over,
 };
 use serde_json::Value;
 
@@ -131,6 +133,41 @@ fn settled(difficulty: Difficulty, error_deg: f64) -> Segment {
         difficulty,
         settled_error_rad: error_deg.to_radians(),
     }
+}
+
+/// The page leads with what the flight did to the aircraft: a flight within its limits, then one beyond the load factor.
+#[test]
+fn the_first_sentence_says_how_the_envelope_was_kept() {
+    let mut flight = report_synthetic::flight();
+    for (k, sample) in flight.samples.iter_mut().enumerate() {
+        let load_factor = if (1000..1050).contains(&k) { 3.0 } else { 1.5 };
+        sample.specific_force_mps2 = [0.0, 0.0, -load_factor * 9.80665];
+    }
+    let airframe = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/airframe.toml");
+    let airframe = greylag::physics::Airframe::load(&airframe).unwrap();
+    let mut limits = greylag::control::quality::Limits::of(&airframe);
+    // the made-up flight is slow, and its commands tremble
+    (limits.airspeed_mps, limits.slew_per_s) = ([5.0, 45.0], 1e3);
+    let mut report = report_synthetic::report(&flight);
+    report.envelope = Some(EnvelopeFlown { limits, flying_from_mps: 6.0 });
+    let (outcome, sentence) = verdict(&report);
+    assert_eq!(outcome, Outcome::Missed);
+    for part in
+        ["outside the envelope for 0.500 s (load factor 0.500 s)", "to 3.00 of 2.20", "latency"]
+    {
+        assert!(sentence.contains(part), "{part}: {sentence}");
+    }
+    report.envelope = Some(EnvelopeFlown {
+        limits: greylag::control::quality::Limits { load_factor: [-1.0, 2.9], ..limits },
+        flying_from_mps: 6.0,
+    });
+    // 3.0 is beyond 2.9 by less than a twentieth: outside for as long, and yet kept
+    let all = report.segments.len();
+    let (outcome, sentence) = verdict(&report);
+    assert!(sentence.starts_with(&format!("Tracked {} of {all}", report.tracked())), "{sentence}");
+    assert_eq!(outcome == Outcome::Missed, report.tracked() < all);
+    let html = report.page().render();
+    assert!(html.contains("Integral of error (° s)") && html.contains("2.90"));
 }
 
 #[test]

@@ -62,8 +62,30 @@ fn evaluated(document: &Value) -> Vec<(String, f64)> {
             let group = score["targets"].as_str().unwrap_or_default();
             let quantity =
                 |key: &str| Some((format!("{before}{group}.{key}"), score[key].as_f64()?));
-            let keys = ["count", "mean_deg", "min_deg", "max_deg", "divergence_rate", "settling_s"];
+            let keys = [
+                "count",
+                "mean_deg",
+                "min_deg",
+                "max_deg",
+                "divergence_rate",
+                "settling_s",
+                "kept_rate",
+                "little_overshoot_rate",
+            ];
             all.extend(keys.into_iter().filter_map(quantity));
+            all.extend(measured(&score["measures"], &format!("{before}{group}")));
+        }
+    }
+    all
+}
+
+/// What happened on the way: `easy.surface_travel` for the median over the targets, `easy.load_factor_max.worst` for
+/// the worst.
+fn measured(measures: &Value, before: &str) -> Vec<(String, f64)> {
+    let mut all = Vec::new();
+    for (id, spread) in measures.as_object().into_iter().flatten() {
+        for (key, end) in [("median", ""), ("worst", ".worst")] {
+            all.extend(spread[key].as_f64().map(|x| (format!("{before}.{id}{end}"), x)));
         }
     }
     all

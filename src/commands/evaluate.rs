@@ -1,13 +1,14 @@
 //! `greylag evaluate`: score controllers on the target file.
 
 mod draws;
+mod tables;
+mod targets;
 
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
-use comfy_table::Table;
+use anyhow::{Context, Result};
 use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::plant_arguments::PlantArgs;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -17,16 +18,14 @@ use crate::commands::files::{self, shipped};
 use crate::commands::start::{self, StartArguments};
 use crate::commands::{bar, choices, controllers, fly};
 use crate::control::cem::Change;
+use crate::control::quality::Limits;
 use crate::control::{Controller, ControllerKind, Needs, Source, Target, build};
 use crate::model::GreyBox;
-use crate::physics::Airframe;
-use crate::physics::airframe::Envelope;
 use crate::report::EvaluationReport;
 use crate::sim::episode::STEPS;
-use crate::sim::evaluation::{Evaluation, evaluate};
-use crate::sim::published::published;
+use crate::sim::evaluation::{Course, Evaluation, evaluate_courses};
 use crate::sim::tracking::{Tracking, track};
-use crate::sim::{Group, Simulator, TargetFile};
+use crate::sim::{Group, Simulator};
 use draws::over_draws;
 
 /// Options that a flight in a drawn model has no use for.
@@ -65,6 +64,16 @@ pub struct Arguments {
     /// Only these groups of targets.
     #[arg(long = "group", num_args = 1.., value_parser = choices::group())]
     groups: Vec<Group>,
+    /// Only the Nth of every N targets.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    every: u32,
+    /// Fly steps between random attitudes of the envelope too, so many: the first attitude is held for 5 s at the cruise
+    /// airspeed, then the second is flown for 8 s and scored. The same --seed draws the same steps.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=10_000))]
+    steps: u32,
+    /// Fly the steps alone.
+    #[arg(long, requires = "steps", conflicts_with_all = ["targets", "groups", "every"])]
+    no_targets: bool,
     /// Fly targets beyond the bank and pitch of the airframe's envelope too.
     #[arg(long)]
     beyond_envelope: bool,
@@ -82,7 +91,8 @@ pub struct Arguments {
     /// Write the scores as JSON; `-` for standard output, with nothing else there.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Write the scores beside the paper's, single flights and what the planners saw as an HTML page.
+    /// Write what happened on the way, the scores beside the paper's, single flights and what the planners saw as an HTML
+    /// page.
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
     /// Replace the JSON file and the page if they exist.
@@ -109,31 +119,29 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::writable(path, overwrite)?;
     }
     controllers::check_changes(&arguments.controllers, &arguments.changes)?;
-    let mut targets = targets(arguments)?;
+    let rows = targets::rows(arguments)?;
     let mut plant = arguments.plant.options(arguments.seed);
     // everything that can be wrong is found before the first flight
     let load = |path: &PathBuf| GreyBox::load(&shipped(path));
     let models = arguments.models.iter().map(load).collect::<Result<Vec<_>, _>>()?;
-    if !arguments.beyond_envelope {
-        within_envelope(&mut targets, &models[0].airframe)?;
-    }
+    let rows = targets::within_envelope(rows, arguments, &models[0].airframe)?;
     if let Some(draws) = arguments.draws {
-        return over_draws(arguments, draws, &models, &targets);
+        return over_draws(arguments, draws, &models, &rows);
     }
     start::describe(&mut plant, &models)?;
     plant.start = arguments.start.start(&plant.aircraft, &models)?;
     let entrants = entrants(arguments, &models)?;
     start::introduce(&plant, &models)
         .with_context(|| format!("cannot fly aircraft {}", plant.aircraft))?;
+    let airframe = &models[0].airframe;
+    let courses = targets::courses(arguments, &rows, plant.start.airspeed_mps, airframe);
+    let limits = Limits::of(airframe);
     let evaluations = entrants
         .iter()
-        .map(|e| one(arguments.seed, e, &targets, &plant))
+        .map(|e| one(arguments.seed, e, &courses, &limits, &plant))
         .collect::<Result<Vec<_>>>()?;
     if !files::is_stdout(arguments.json.as_deref()) {
-        println!("{}", table(&evaluations));
-        println!("all: easy with hard_corners, the targets of the paper's Table II");
-        println!("paper's mean: Table XI, true frozen prior, ten policies");
-        println!("to 1°: median time after which roll and pitch stay within 1° of the target");
+        tables::print(&evaluations);
     }
     if let Some(path) = &arguments.json {
         let document = Document {
@@ -185,7 +193,7 @@ fn page(
         ("program", concat!("greylag ", env!("CARGO_PKG_VERSION")).into()),
     ];
     let report = EvaluationReport {
-        subtitle: format!("Flown in JSBSim, targets of {}", arguments.targets.display()),
+        subtitle: subtitle(arguments),
         evaluations,
         flights,
         provenance: provenance.map(|(k, v)| (k.into(), v)).to_vec(),
@@ -193,34 +201,17 @@ fn page(
     report.page().render()
 }
 
-fn targets(arguments: &Arguments) -> Result<TargetFile> {
-    let mut targets = TargetFile::load(&shipped(&arguments.targets))?;
-    if !arguments.groups.is_empty() {
-        targets.rows.retain(|row| arguments.groups.contains(&row.group));
-    }
-    if targets.rows.is_empty() {
-        bail!("{} has no targets of that group; leave --group out", arguments.targets.display());
-    }
-    Ok(targets)
-}
-
-/// Leaves the targets that the airframe's envelope allows, and says how many it does not.
-fn within_envelope(targets: &mut TargetFile, airframe: &Airframe) -> Result<()> {
-    let Envelope { bank_max_deg: bank, pitch_min_deg: low, pitch_max_deg: high, .. } =
-        airframe.envelope;
-    let all = targets.rows.len();
-    targets.rows.retain(|row| row.roll_deg.abs() <= bank && (low..=high).contains(&row.pitch_deg));
-    let limits =
-        format!("the envelope of {} (bank {bank}°, pitch {low} to {high}°)", airframe.name);
-    match targets.rows.len() {
-        0 => bail!("all targets lie beyond {limits}: give others, or --beyond-envelope"),
-        left if left < all => eprintln!(
-            "{} of {all} targets lie beyond {limits} and are not flown; --beyond-envelope flies them",
-            all - left
-        ),
-        _ => {}
-    }
-    Ok(())
+/// What was flown, in a line.
+fn subtitle(arguments: &Arguments) -> String {
+    let targets = match (arguments.no_targets, arguments.every) {
+        (true, _) => Vec::new(),
+        (false, 1) => vec![format!("targets of {}", arguments.targets.display())],
+        (false, n) => vec![format!("targets of {}, one in {n}", arguments.targets.display())],
+    };
+    let steps =
+        (arguments.steps > 0).then(|| format!("{} steps between attitudes", arguments.steps));
+    let flown: Vec<String> = targets.into_iter().chain(steps).collect();
+    format!("Flown in JSBSim: {}", flown.join("; "))
 }
 
 /// A controller ready to fly, with the name of its model, or the folder of its policy.
@@ -267,17 +258,18 @@ fn entrants(arguments: &Arguments, models: &[GreyBox]) -> Result<Vec<Entrant>> {
 fn one(
     seed: u32,
     entrant: &Entrant,
-    targets: &TargetFile,
+    courses: &[Course],
+    limits: &Limits,
     plant: &PlantOptions,
 ) -> Result<Evaluation> {
     let Entrant { kind, model, controller } = entrant;
     let what = format!("{kind}, model {model}");
-    let progress = progress(targets.rows.len() as u64, "targets", &what);
+    let progress = progress(courses.len() as u64, "targets", &what);
     let make = || controller.boxed_clone();
-    let outcomes = evaluate(plant, &make, &targets.rows, seed, &|| progress.inc(1))
+    let outcomes = evaluate_courses(plant, &make, courses, seed, &|| progress.inc(1))
         .with_context(|| format!("cannot fly aircraft {}", plant.aircraft))?;
     progress.finish_and_clear();
-    Ok(Evaluation::new(kind.name(), model, &targets.rows, &outcomes))
+    Ok(Evaluation::measured([kind.name(), model], courses, &outcomes, limits))
 }
 
 /// A bar on a terminal, one plain line elsewhere.
@@ -294,44 +286,4 @@ fn progress(length: u64, of: &str, what: &str) -> ProgressBar {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,
     }
-}
-
-fn table(evaluations: &[Evaluation]) -> Table {
-    let mut table = Table::new();
-    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header([
-        "controller",
-        "model",
-        "targets",
-        "n",
-        "mean ° [95 %]",
-        "paper's mean °",
-        "median °",
-        "IQM ° [95 %]",
-        "max °",
-        "to 1°, s",
-        "diverged %",
-        "ms/step p50",
-        "p99",
-        "p99.9",
-    ]);
-    for e in evaluations {
-        for s in &e.groups {
-            let cost = [e.ms_per_step.p50, e.ms_per_step.p99, e.ms_per_step.p999];
-            let mut row =
-                vec![e.controller.clone(), e.model.clone(), s.targets.clone(), s.count.to_string()];
-            let interval = |x: f64, [low, high]: [f64; 2]| format!("{x:.3} [{low:.3}, {high:.3}]");
-            row.push(interval(s.mean_deg, s.mean_ci95_deg));
-            let paper = published(&e.controller, &s.targets);
-            row.push(paper.map_or_else(|| "–".into(), |p| format!("{:.2}", p.mean_deg.value)));
-            row.push(format!("{:.3}", s.median_deg));
-            row.push(interval(s.iqm_deg, s.iqm_ci95_deg));
-            row.push(format!("{:.3}", s.max_deg));
-            row.push(format!("{:.2}", s.settling_s));
-            row.push(format!("{:.1}", 100.0 * s.divergence_rate));
-            row.extend(cost.map(|x| format!("{x:.4}")));
-            table.add_row(row);
-        }
-    }
-    table
 }

@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 
 use crate::commands::files;
 use crate::control::Target;
+use crate::control::quality::Limits;
 use crate::flight::replay::replay_watched;
 use crate::flight::runtime::Companion;
 use crate::link::vehicle::Vehicle;
@@ -13,7 +14,8 @@ use crate::logs::csv::{self, Tolerance};
 use crate::logs::{Flight, Sample};
 use crate::model::GreyBox;
 use crate::report::{
-    Cycle, Difficulty, Event, EventKind, FlightReport, LoopTiming, Segment, Sight, SurfaceTravel,
+    Cycle, Difficulty, EnvelopeFlown, Event, EventKind, FlightReport, LoopTiming, Segment, Sight,
+    SurfaceTravel,
 };
 use crate::sim::Group;
 use crate::sim::episode::{attitude_error_deg, settled_error_deg};
@@ -56,6 +58,10 @@ impl Reporter<'_> {
             versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
             segments: self.segments.clone(),
             tolerance_rad: TOLERANCE_DEG.to_radians(),
+            envelope: Some(EnvelopeFlown {
+                limits: Limits::of(&self.model.airframe),
+                flying_from_mps: self.model.airframe.envelope.flying_from_mps(),
+            }),
             travel: SurfaceTravel {
                 aileron_rad: travels.aileron.largest(),
                 elevator_rad: travels.elevator.largest(),

@@ -244,4 +244,22 @@ impl Twin {
         self.altitude += climb * STEP;
         self.actuators.step(command, &model.airframe.actuators);
     }
+
+    /// Specific force at the centre of gravity, body axes, m/s²: what an accelerometer there reads. About −9.81 on z
+    /// in level flight.
+    pub fn specific_force(&self, model: &GreyBox) -> Vector<f64> {
+        let air = model.air(&self.state, self.altitude);
+        let measured = self.actuators.controls();
+        let mut inputs = self.inputs.clone().unwrap_or_else(|| model.at_rest(&measured));
+        let controls = model.act(&measured, &mut inputs);
+        let wrench = model.wrench(&self.state, &controls, &air);
+        let mut force = rigid_body::body_force(&wrench, &air, model.axes)
+            .map(|newton| newton / model.body.mass);
+        if let Some(residual) = &model.residual {
+            let learned = residual.rate(&self.state, &controls);
+            let push = rigid_body::acceleration_of(&self.state, &air, &learned);
+            force.iter_mut().zip(push).for_each(|(sum, part)| *sum += part);
+        }
+        force
+    }
 }

@@ -70,7 +70,8 @@ pub fn incidence_limits(cruise: f64, stall: f64) -> String {
     let up_to = |share: f64| (cruise + share * (stall - cruise)).max(0.01);
     format!(
         "# Cruise is flown at {cruise:.3} rad; the wing stalls at {stall:.3} rad.\n[incidence]\ncomfortable_rad = \
-         {:.3}\ntolerable_rad = {:.3}\npush_from_rad = {:.3}\npush_gain = 3.0\n\n",
+         {:.3}\ntolerable_rad = {:.3}\npush_from_rad = {:.3}\npush_gain = 3.0\n\
+         stall_rad = {stall:.3}\n\n",
         up_to(0.2),
         up_to(0.5),
         up_to(0.8)

@@ -40,6 +40,10 @@ pub struct Envelope {
     pub pitch_min_deg: f64,
     /// Largest load factor.
     pub load_factor_max: f64,
+    /// Least load factor, where the file states one.
+    pub load_factor_min: Option<f64>,
+    /// Largest sideslip, degrees, where the file states one.
+    pub sideslip_max_deg: Option<f64>,
     /// Smallest airspeed, m/s.
     pub airspeed_min_mps: f64,
     /// Largest airspeed, m/s.
@@ -87,15 +91,28 @@ pub struct Incidence {
     pub push_from: f64,
     /// Elevator deflection, nose down, added per rad of angle of attack beyond `push_from`, rad/rad.
     pub push_gain: f64,
+    /// Angle of attack at which the wing stalls, rad, where the file states it.
+    #[serde(rename = "stall_rad")]
+    pub stall: Option<f64>,
 }
 
 impl Incidence {
     /// For a wing that stalls at about 12°.
-    pub const DEFAULT: Incidence =
-        Incidence { comfortable: 0.05, tolerable: 0.09, push_from: 0.16, push_gain: 3.0 };
+    pub const DEFAULT: Incidence = Incidence {
+        comfortable: 0.05,
+        tolerable: 0.09,
+        push_from: 0.16,
+        push_gain: 3.0,
+        stall: None,
+    };
 
     fn checked(self) -> Result<Self, String> {
-        let Incidence { comfortable, tolerable, push_from, push_gain } = self;
+        let Incidence { comfortable, tolerable, push_from, push_gain, stall } = self;
+        if stall.is_some_and(|stall| !(push_from <= stall && stall < 1.0)) {
+            return Err(
+                "incidence.stall_rad must lie between push_from_rad and 1; correct it there".into(),
+            );
+        }
         if 0.0 < comfortable
             && comfortable < tolerable
             && tolerable < push_from
@@ -325,6 +342,14 @@ impl Envelope {
             (
                 self.load_factor_max > 1.0 && self.load_factor_max <= 20.0,
                 "load_factor_max must lie between 1 and 20",
+            ),
+            (
+                self.load_factor_min.is_none_or(|least| (-20.0..1.0).contains(&least)),
+                "load_factor_min must lie between -20 and 1",
+            ),
+            (
+                self.sideslip_max_deg.is_none_or(|most| most > 0.0 && most < 90.0),
+                "sideslip_max_deg must lie in 0..90",
             ),
             (
                 0.0 < self.airspeed_min_mps && self.airspeed_min_mps < self.airspeed_cruise_mps,

@@ -36,7 +36,9 @@ pub use diagnosis::page::diagnosis_page;
 pub use effect_page::{EffectReport, facts as effect_facts};
 #[cfg(feature = "sitl")]
 pub use evaluation_page::EvaluationReport;
-pub use flight::{Difficulty, Event, EventKind, FlightReport, Segment, SurfaceTravel};
+pub use flight::{
+    Difficulty, EnvelopeFlown, Event, EventKind, FlightReport, Segment, SurfaceTravel,
+};
 pub use kit::bars::{BarGroup, Bars};
 pub use kit::choice::{Choice, ChoiceOption};
 pub use kit::curves::{Curves, Range};

@@ -5,6 +5,7 @@ use greylag_sitl::plant::PlantError;
 
 use greylag_control::Observation;
 use greylag_model::{GreyBox, Twin};
+use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Command, Time};
 
 /// Why an environment cannot go on.
@@ -37,6 +38,8 @@ pub trait Environment {
     /// # Errors
     /// If the aircraft has left the numbers.
     fn step(&mut self, command: Command) -> Result<Observation, Trouble>;
+    /// Load factor where it stands: the specific force along body z, upwards, divided by the standard gravity.
+    fn load_factor(&self) -> f64;
     /// The seed of what is random in it from the next reset on; a world without chance has none.
     fn reseed(&mut self, _seed: u32) {}
 }
@@ -89,5 +92,9 @@ impl Environment for Imagined {
             return Ok(self.observe());
         }
         Err(Trouble::Diverged(self.model.name.clone()))
+    }
+
+    fn load_factor(&self) -> f64 {
+        -self.twin.specific_force(&self.model)[2] / STANDARD_GRAVITY
     }
 }

@@ -3,9 +3,12 @@
 use std::time::{Duration, Instant};
 
 use crate::{Environment, Trouble};
+use greylag_control::quality::{Moment, Track};
 use greylag_control::{Controller, Observation, Target};
 use greylag_model::STEP;
 use greylag_physics::Command;
+
+pub use greylag_control::quality::{REACHED_DEG, attitude_error_deg};
 
 /// Steps of an episode (section V-E of \[GSFM26\]).
 pub const STEPS: usize = 1000;
@@ -15,9 +18,6 @@ pub const SETTLED: usize = 200;
 
 /// Settled error above which an episode counts as diverged, degrees (Table VIII).
 pub const DIVERGED_DEG: f64 = 10.0;
-
-/// Attitude error within which a target counts as reached, degrees.
-pub const REACHED_DEG: f64 = 1.0;
 
 /// What came of an episode.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +29,8 @@ pub struct Outcome {
     pub settling_s: f64,
     /// Time that the controller needed for each step.
     pub cost: Vec<Duration>,
+    /// What was flown.
+    pub track: Track,
 }
 
 /// An episode to fly.
@@ -41,6 +43,15 @@ pub struct Episode<'a> {
     pub seed: u64,
 }
 
+/// A target with the steps for which it is flown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leg {
+    /// Where to.
+    pub target: Target,
+    /// For how many steps.
+    pub steps: usize,
+}
+
 impl Episode<'_> {
     /// Flies towards `target` and scores it; `watch` sees every step.
     ///
@@ -49,33 +60,78 @@ impl Episode<'_> {
     pub fn fly(
         self,
         target: &Target,
+        watch: impl FnMut(&Observation, &Command),
+    ) -> Result<Outcome, Trouble> {
+        self.fly_leg(None, Leg { target: *target, steps: STEPS }, watch)
+    }
+
+    /// Flies `leg` and scores it, from the start or from where `first` ends, which is flown and not scored; `watch` sees
+    /// every step.
+    ///
+    /// # Errors
+    /// As for [`fly`](Episode::fly).
+    pub fn fly_leg(
+        self,
+        first: Option<Leg>,
+        leg: Leg,
         mut watch: impl FnMut(&Observation, &Command),
     ) -> Result<Outcome, Trouble> {
-        let mut seen = self.environment.reset()?;
-        self.controller.reset(self.seed);
-        let mut cost = Vec::with_capacity(STEPS);
-        let mut errors = Vec::with_capacity(SETTLED);
-        let mut away = 0;
-        for step in 0..STEPS {
-            let start = Instant::now();
-            let command = self.controller.command(&seen, target);
-            cost.push(start.elapsed());
-            watch(&seen, &command);
-            seen = match self.environment.step(command) {
-                Ok(seen) => seen,
-                Err(_) => {
-                    return Ok(Outcome { settled_deg: 180.0, settling_s: seconds(STEPS), cost });
+        let Episode { environment, controller, seed } = self;
+        let mut seen = environment.reset()?;
+        controller.reset(seed);
+        let (mut cost, mut before) = (Vec::with_capacity(leg.steps), None);
+        let mut moments = Vec::with_capacity(leg.steps + 1);
+        let target = leg.target;
+        let flown = first.into_iter().map(|first| (first, false)).chain([(leg, true)]);
+        for (Leg { target: wanted, steps }, scored) in flown {
+            for step in 0..steps {
+                let start = Instant::now();
+                let command = controller.command(&seen, &wanted);
+                let took = start.elapsed();
+                watch(&seen, &command);
+                if scored {
+                    cost.push(took);
+                    moments.push(Moment::new(&seen, environment.load_factor(), &command.clamped()));
+                } else {
+                    before = Some(command.clamped());
                 }
-            };
-            let error = attitude_error_deg([seen.state.roll, seen.state.pitch], target);
-            if !error.iter().all(|e| e.abs() <= REACHED_DEG) {
-                away = step + 1;
-            }
-            if step >= STEPS - SETTLED {
-                errors.push(error);
+                seen = match environment.step(command) {
+                    Ok(seen) => seen,
+                    Err(_) => {
+                        let lost_s = seconds(if scored { steps - step } else { leg.steps });
+                        return Ok(Outcome::lost(
+                            Track { moments, target, before, lost_s },
+                            leg,
+                            cost,
+                        ));
+                    }
+                };
             }
         }
-        Ok(Outcome { settled_deg: settled_error_deg(&errors), settling_s: seconds(away), cost })
+        moments.push(Moment::new(&seen, environment.load_factor(), &seen.previous[0]));
+        Ok(Outcome::flown(Track { moments, target, before, lost_s: 0.0 }, cost))
+    }
+}
+
+impl Outcome {
+    fn lost(track: Track, leg: Leg, cost: Vec<Duration>) -> Outcome {
+        Outcome { settled_deg: 180.0, settling_s: seconds(leg.steps), cost, track }
+    }
+
+    fn flown(track: Track, cost: Vec<Duration>) -> Outcome {
+        // what is seen at the start comes before the first step
+        let errors: Vec<[f64; 2]> = track.moments[1..]
+            .iter()
+            .map(|m| attitude_error_deg(m.attitude, &track.target))
+            .collect();
+        let last = errors.len() - errors.len() * SETTLED / STEPS;
+        let away = errors.iter().rposition(|e| !e.iter().all(|e| e.abs() <= REACHED_DEG));
+        Outcome {
+            settled_deg: settled_error_deg(&errors[last..]),
+            settling_s: seconds(away.map_or(0, |step| step + 1)),
+            cost,
+            track,
+        }
     }
 }
 
@@ -91,12 +147,6 @@ pub fn settled_error_deg(errors: &[[f64; 2]]) -> f64 {
         (squares / errors.len() as f64).sqrt()
     };
     (rmse(0) + rmse(1)) / 2.0
-}
-
-/// Roll and pitch (rad) less their commands, degrees, the shorter way round.
-pub fn attitude_error_deg([roll, pitch]: [f64; 2], target: &Target) -> [f64; 2] {
-    let wrap = |x: f64| (x + 180.0).rem_euclid(360.0) - 180.0;
-    [wrap((roll - target.roll).to_degrees()), wrap((pitch - target.pitch).to_degrees())]
 }
 
 #[cfg(test)]
@@ -135,6 +185,9 @@ mod tests {
         fn step(&mut self, _: Command) -> Result<Observation, Trouble> {
             self.step += 1;
             if self.step == self.lost_at { Err(Trouble::Command) } else { Ok(self.see()) }
+        }
+        fn load_factor(&self) -> f64 {
+            1.0
         }
     }
 
@@ -176,6 +229,27 @@ mod tests {
         let episode = Episode { environment: &mut environment, controller: &mut Idle, seed: 0 };
         let outcome = episode.fly(&TARGET, |_, _| ()).unwrap();
         assert!((outcome.settling_s - seconds(STEPS - SETTLED)).abs() < 1e-9);
+    }
+
+    /// A leg begins where the one before it ends: its track, its cost and its first change are its own.
+    #[test]
+    fn a_leg_is_scored_from_where_the_first_one_ends() {
+        let mut environment = Fake { step: 0, settled: [0.5, -0.5], lost_at: usize::MAX };
+        let episode = Episode { environment: &mut environment, controller: &mut Idle, seed: 0 };
+        let first = Leg { target: Target { roll: 1.0, ..TARGET }, steps: 500 };
+        let leg = Leg { target: TARGET, steps: 400 };
+        let mut steps = 0;
+        let outcome = episode.fly_leg(Some(first), leg, |_, _| steps += 1).unwrap();
+        assert_eq!((steps, outcome.cost.len(), outcome.track.moments.len()), (900, 400, 401));
+        assert_eq!((outcome.track.target, outcome.track.before), (TARGET, Some(Command::IDLE)));
+        // away up to step 800 of the episode, which is 300 of the leg
+        assert!(
+            (outcome.settling_s - 3.0).abs() < 1e-9 && (outcome.settled_deg - 0.5).abs() < 1e-9
+        );
+        let mut environment = Fake { step: 0, settled: [0.0; 2], lost_at: 200 };
+        let episode = Episode { environment: &mut environment, controller: &mut Idle, seed: 0 };
+        let lost = episode.fly_leg(Some(first), leg, |_, _| ()).unwrap();
+        assert!((lost.track.lost_s - 4.0).abs() < 1e-9 && lost.settled_deg == 180.0);
     }
 
     #[test]

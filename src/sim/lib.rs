@@ -29,6 +29,8 @@ pub mod one_step;
 mod simulator;
 #[cfg(feature = "sitl")]
 pub mod starting_model;
+pub mod steps;
+pub mod summary;
 #[cfg(feature = "sitl")]
 pub mod published;
 pub mod targets;

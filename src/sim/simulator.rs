@@ -4,6 +4,7 @@ use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start, Truth};
 
 use crate::{Environment, Trouble};
 use greylag_control::Observation;
+use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{ActuatorState, Command, State, Time};
 
 /// JSBSim.
@@ -74,6 +75,10 @@ impl Environment for Simulator {
         let truth = self.plant.step(Inputs { aileron, elevator, throttle, rudder })?;
         self.previous = [command, self.previous[0]];
         Ok(self.observe(&truth))
+    }
+
+    fn load_factor(&self) -> f64 {
+        -self.truth().specific_force_mps2[2] / STANDARD_GRAVITY
     }
 
     fn reseed(&mut self, seed: u32) {

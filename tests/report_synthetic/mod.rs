@@ -94,6 +94,7 @@ pub fn report(flight: &Flight) -> FlightReport<'_> {
         versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
         segments: (0..TARGETS_DEG.len()).map(|i| segment(flight, i)).collect(),
         tolerance_rad: 0.5f64.to_radians(),
+        envelope: None,
         travel: SurfaceTravel { aileron_rad: 0.52, elevator_rad: 0.52 },
         timing: Some(timing(flight)),
         events: events(),

@@ -319,22 +319,33 @@ impl Live<'_> {
 /// Prints how each target was tracked and, where one was not, what this computer has to do with it.
 fn verdict(report: &FlightReport<'_>, trouble: Option<&str>) -> ExitCode {
     let (tracked, all) = (report.tracked(), report.segments.len());
-    for s in &report.segments {
+    let qualities = report.qualities().unwrap_or_default();
+    if all > 0 {
         println!(
-            "{:>4} {:>4.0}/{:>3.0} deg: settled error {:.3} deg",
+            "   target roll/pitch  settled  integral  overshoot  load factor      alpha    outside"
+        );
+    }
+    for (s, q) in report.segments.iter().zip(&qualities) {
+        let ([roll, pitch], [least, most]) = (q.overshoot_deg, q.load_factor);
+        println!(
+            "{:>4} {:>4.0}/{:>3.0} deg: {:>6.3} deg {:>5.0} deg s  {roll:>4.1}/{pitch:.1} deg  {least:>4.1} to {most:>4.1} \
+             {:>6.1} deg {:>6.2} s",
             s.difficulty.name(),
             s.roll_target_rad.to_degrees(),
             s.pitch_target_rad.to_degrees(),
-            s.settled_error_rad.to_degrees()
+            s.settled_error_rad.to_degrees(),
+            q.error_integral_deg_s,
+            q.alpha_deg[1],
+            q.outside_s.any
         );
     }
-    if all == 0 {
-        return ExitCode::SUCCESS;
+    if all > 0 {
+        println!("tracked {tracked} of {all} targets within {TOLERANCE_DEG} deg");
     }
-    println!("tracked {tracked} of {all} targets within {TOLERANCE_DEG} deg");
-    if tracked == all {
-        return ExitCode::SUCCESS;
+    if tracked != all {
+        trouble.iter().for_each(|trouble| println!("{trouble}"));
     }
-    trouble.iter().for_each(|trouble| println!("{trouble}"));
-    ExitCode::FAILURE
+    // last, for the workbench shows a program's last words
+    println!("{}", report.page_sentence());
+    if tracked == all { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

@@ -6,12 +6,12 @@ use anyhow::Result;
 use comfy_table::Table;
 use serde::Serialize;
 
-use super::{Arguments, Entrant, entrants, progress, table};
-use crate::commands::files::{self};
+use super::{Arguments, Entrant, entrants, progress, tables, targets};
+use crate::commands::files;
 use crate::model::GreyBox;
 use crate::num::statistics::quantile;
-use crate::sim::TargetFile;
 use crate::sim::evaluation::{Evaluation, Robustness};
+use crate::sim::targets::Row;
 
 /// The JSON document of flights in drawn models.
 #[derive(Serialize)]
@@ -30,22 +30,23 @@ pub(super) fn over_draws(
     arguments: &Arguments,
     draws: u32,
     models: &[GreyBox],
-    targets: &TargetFile,
+    rows: &[Row],
 ) -> Result<ExitCode> {
+    let airframe = &models[0].airframe;
+    let courses = targets::courses(arguments, rows, airframe.reference.airspeed, airframe);
     let fly = |e: &Entrant| {
         let progress = progress(draws.into(), "draws", &format!("{}, model {}", e.kind, e.model));
         let make = || e.controller.boxed_clone();
         let names = [e.kind.name(), e.model.as_str()];
         let seeds = [arguments.seed, draws];
-        let flown =
-            Robustness::of(names, &make, &models[0], &targets.rows, seeds, &|| progress.inc(1))?;
+        let flown = Robustness::of(names, &make, &models[0], &courses, seeds, &|| progress.inc(1))?;
         progress.finish_and_clear();
         Ok(flown)
     };
     let flown = entrants(arguments, models)?.iter().map(fly).collect::<Result<Vec<_>>>()?;
     let all: Vec<Evaluation> = flown.iter().map(|r| r.all.clone()).collect();
     if !files::is_stdout(arguments.json.as_deref()) {
-        println!("{}", table(&all));
+        tables::print(&all);
         println!("{}", draws_table(&flown));
         println!("flown in draws of model {} from the widths of its coefficients", models[0].name);
         println!(

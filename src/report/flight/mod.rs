@@ -1,11 +1,13 @@
 //! What a flight report is made from.
 
 pub(super) mod page;
+pub(super) mod quality;
 pub(super) mod targets;
 pub(super) mod verdict;
 
 use crate::Sight;
 use crate::{LoopTiming, Page};
+use greylag_control::quality::{Limits, Quality};
 use greylag_logs::Flight;
 use greylag_sysid::compare::Comparison;
 
@@ -30,6 +32,8 @@ pub struct FlightReport<'a> {
     pub segments: Vec<Segment>,
     /// Largest settled error that counts as tracked, rad.
     pub tolerance_rad: f64,
+    /// The envelope that the flight is measured against; `None` when the aircraft is not known.
+    pub envelope: Option<EnvelopeFlown>,
     /// Deflections at full command, which turn commands into the unit of what acts.
     pub travel: SurfaceTravel,
     /// Durations of the control cycles; `None` when they were not recorded.
@@ -40,6 +44,15 @@ pub struct FlightReport<'a> {
     pub comparison: Option<Comparison>,
     /// What the planner saw at some ticks; empty when none flew.
     pub sights: Vec<Sight>,
+}
+
+/// What a flight is measured against.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvelopeFlown {
+    /// The limits of the aircraft.
+    pub limits: Limits,
+    /// Airspeed from which a sample counts as flight, m/s.
+    pub flying_from_mps: f64,
 }
 
 /// Deflections at a command of +1.
@@ -132,6 +145,19 @@ impl FlightReport<'_> {
     /// Number of segments that were tracked.
     pub fn tracked(&self) -> usize {
         self.segments.iter().filter(|s| s.tracked(self.tolerance_rad)).count()
+    }
+
+    /// What happened on the way to each target, in the order of the segments; `None` where the aircraft's limits are
+    /// not known.
+    pub fn qualities(&self) -> Option<Vec<Quality>> {
+        let limits = self.envelope?.limits;
+        let of = |segment: &Segment| quality::of_segment(&self.flight.samples, segment, &limits);
+        Some(self.segments.iter().map(of).collect())
+    }
+
+    /// What happened, in the sentence that leads the page.
+    pub fn page_sentence(&self) -> String {
+        verdict::verdict(self).sentence
     }
 
     /// The page of the flight.

@@ -2,8 +2,8 @@
 
 use crate::comparison;
 use crate::flight::FlightReport;
-use crate::flight::targets;
 use crate::flight::verdict::{degrees, duration_s, verdict};
+use crate::flight::{quality, targets};
 use crate::{
     Align, Band, Choice, ChoiceOption, Figure, Histogram, LoopTiming, Mark, Page, Panel, Rule,
     Scale, Section, Series, Sight, Style, Table, TimeFigure, sight,
@@ -16,8 +16,9 @@ const GAP_S: f64 = 0.1;
 const MARKED_EVENTS: usize = 40;
 
 pub(crate) fn page(report: &FlightReport) -> Page {
-    let mut sections = vec![Section::verdict(verdict(report)), attitude(report)];
-    sections.extend([air_data(report), surfaces(report)]);
+    let mut sections = vec![Section::verdict(verdict(report))];
+    sections.extend(quality::section(report));
+    sections.extend([attitude(report), air_data(report), surfaces(report)]);
     sections.extend(report.timing.as_ref().map(|t| loop_timing(report, t)));
     if !report.segments.is_empty() {
         sections.push(targets::section(report));

@@ -1,7 +1,10 @@
 //! The sentence that says what happened in a flight, with what bears it out.
 
+use crate::flight::quality::{clause, kept, most};
 use crate::flight::{Difficulty, FlightReport, Segment};
+use crate::kit::numbers::number;
 use crate::{LoopTiming, Outcome, Verdict};
+use greylag_control::quality::TRANSIENT;
 use greylag_logs::Sample;
 
 /// Targets that were not tracked up to this number are listed under the sentence.
@@ -24,8 +27,16 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
         parts.push(format!("Flew {:.1} s without a target", duration_s(&report.flight.samples)));
     } else {
         parts.push(format!("Tracked {tracked} of {all} targets"));
-        parts.extend(settled_by_difficulty(&report.segments));
     }
+    let envelope = report.envelope.map(|e| (kept(&report.flight.samples, &e), e.limits));
+    parts.extend(envelope.map(|(kept, limits)| clause(&kept, &limits)));
+    parts.extend(on_the_way(report));
+    parts.extend(settled_by_difficulty(&report.segments));
+    let timed = report.timing.as_ref().filter(|_| report.envelope.is_some());
+    parts.extend(timed.map(|timing| {
+        let [p50, p999] = timing.percentiles_us([0.5, 0.999]).map(|us| us / 1e3);
+        format!("latency {} ms, {} ms at p99.9", number(p50), number(p999))
+    }));
     parts.push(match late {
         None => "loop timing was not recorded".into(),
         Some(0) => "no late cycle".into(),
@@ -34,11 +45,21 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     });
     let outcome = match (all, late) {
         _ if tracked < all => Outcome::Missed,
+        _ if envelope.is_some_and(|(kept, _)| !kept.kept) => Outcome::Missed,
         (_, Some(1..)) => Outcome::Missed,
         (0, _) | (_, None) => Outcome::Open,
         _ => Outcome::Reached,
     };
     Verdict { outcome, sentence: format!("{}.", parts.join("; ")), details: details(report) }
+}
+
+/// The worst integral of error and overshoot, where the flight was measured.
+fn on_the_way(report: &FlightReport) -> Option<String> {
+    let qualities = report.qualities().filter(|all| !all.is_empty())?;
+    let integral = most(&qualities, |q| q.error_integral_deg_s);
+    let overshoot = most(&qualities, |q| q.overshoot_deg[0].max(q.overshoot_deg[1]));
+    let (integral, overshoot) = (number(integral), number(overshoot));
+    Some(format!("integral of error up to {integral}° s, overshoot up to {overshoot}°"))
 }
 
 fn settled_by_difficulty(segments: &[Segment]) -> Option<String> {
@@ -59,6 +80,12 @@ fn details(report: &FlightReport) -> Vec<String> {
         let tolerance = degrees(report.tolerance_rad);
         details.push(format!(
             "A target counts as tracked when its settled error is at most {tolerance}."
+        ));
+    }
+    if report.envelope.is_some() {
+        details.push(format!(
+            "The envelope counts as kept when load factor and angle of attack pass their limits by at most {} %.",
+            100.0 * TRANSIENT
         ));
     }
     if let Some(timing) = &report.timing {

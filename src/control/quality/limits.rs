@@ -1,0 +1,164 @@
+//! The limits of an aircraft's envelope, and how long a flight was outside of them.
+
+use serde::Serialize;
+
+use super::{Moment, Track};
+use greylag_physics::Airframe;
+
+/// How far load factor and angle of attack may pass their limits in a transient: a twentieth of the limit.
+pub const TRANSIENT: f64 = 0.05;
+
+/// Rounding of a command's rate, as a part of the limit.
+const ROUNDING: f64 = 1e-9;
+
+/// Limits to measure against; infinite where the airframe file states none.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Limits {
+    /// Largest bank, degrees.
+    pub bank_deg: f64,
+    /// Least and largest pitch, degrees.
+    pub pitch_deg: [f64; 2],
+    /// Least and largest load factor.
+    pub load_factor: [f64; 2],
+    /// Angle of attack at which the wing stalls, degrees.
+    pub stall_deg: f64,
+    /// Largest |sideslip|, degrees.
+    pub sideslip_deg: f64,
+    /// Least and largest airspeed, m/s.
+    pub airspeed_mps: [f64; 2],
+    /// Fastest change of a surface command, in the command's unit a second.
+    pub slew_per_s: f64,
+}
+
+/// Seconds outside each limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct OutsideS {
+    /// Bank.
+    pub bank: f64,
+    /// Pitch, up or down.
+    pub pitch: f64,
+    /// Load factor above its largest.
+    pub load_factor: f64,
+    /// Load factor below its least.
+    pub load_factor_low: f64,
+    /// Angle of attack beyond the stall.
+    pub stall: f64,
+    /// Sideslip.
+    pub sideslip: f64,
+    /// Airspeed below its least.
+    pub slow: f64,
+    /// Airspeed above its largest.
+    pub fast: f64,
+    /// A surface command that changes too fast.
+    pub slew: f64,
+    /// Any of these.
+    pub any: f64,
+}
+
+impl OutsideS {
+    /// The limits that were passed, in words, with the seconds beyond each.
+    pub fn passed(&self) -> Vec<(&'static str, f64)> {
+        let all = [
+            ("bank", self.bank),
+            ("pitch", self.pitch),
+            ("load factor", self.load_factor),
+            ("least load factor", self.load_factor_low),
+            ("stall", self.stall),
+            ("sideslip", self.sideslip),
+            ("least airspeed", self.slow),
+            ("largest airspeed", self.fast),
+            ("surface rate", self.slew),
+        ];
+        all.into_iter().filter(|(_, seconds)| *seconds > 0.0).collect()
+    }
+}
+
+impl Limits {
+    /// Those of an airframe file.
+    pub fn of(airframe: &Airframe) -> Limits {
+        let e = &airframe.envelope;
+        Limits {
+            bank_deg: e.bank_max_deg,
+            pitch_deg: [e.pitch_min_deg, e.pitch_max_deg],
+            load_factor: [e.load_factor_min.unwrap_or(f64::NEG_INFINITY), e.load_factor_max],
+            stall_deg: airframe.incidence.stall.map_or(f64::INFINITY, f64::to_degrees),
+            sideslip_deg: e.sideslip_max_deg.unwrap_or(f64::INFINITY),
+            airspeed_mps: [e.airspeed_min_mps, e.airspeed_max_mps],
+            slew_per_s: e.surface_slew_per_s,
+        }
+    }
+
+    /// Whether a flight with these least and largest values kept to load factor and angle of attack but for a
+    /// [`TRANSIENT`].
+    pub fn kept(&self, load_factor: [f64; 2], alpha_deg: [f64; 2]) -> bool {
+        let room = |limit: f64| limit.abs() * TRANSIENT;
+        let [least, most] = self.load_factor;
+        // what is not known has passed no limit
+        !(load_factor[0] < least - room(least)
+            || load_factor[1] > most + room(most)
+            || alpha_deg[1] > self.stall_deg + room(self.stall_deg))
+    }
+
+    /// Seconds of a flight outside each limit: each tick counts as long as it lasts.
+    pub(super) fn outside(&self, track: &Track) -> OutsideS {
+        let mut total = OutsideS::default();
+        for (moment, before, length) in track.ticks() {
+            let moved = before.map_or(0.0, |old| {
+                let new = &moment.command;
+                let by = [
+                    new.aileron - old.aileron,
+                    new.elevator - old.elevator,
+                    new.rudder - old.rudder,
+                ];
+                by.iter().fold(0.0, |most: f64, by| most.max(by.abs()))
+            });
+            total.add(self.beyond(moment, moved / length), length);
+        }
+        total
+    }
+
+    /// Whether a moment lies beyond each limit, in the order of [`OutsideS::each`].
+    fn beyond(&self, m: &Moment, slew: f64) -> [bool; 9] {
+        let [roll, pitch] = m.attitude.map(f64::to_degrees);
+        [
+            roll.abs() > self.bank_deg,
+            pitch < self.pitch_deg[0] || pitch > self.pitch_deg[1],
+            m.load_factor > self.load_factor[1],
+            m.load_factor < self.load_factor[0],
+            m.alpha.to_degrees() > self.stall_deg,
+            m.beta.to_degrees().abs() > self.sideslip_deg,
+            m.airspeed < self.airspeed_mps[0],
+            m.airspeed > self.airspeed_mps[1],
+            slew > self.slew_per_s * (1.0 + ROUNDING),
+        ]
+    }
+}
+
+impl OutsideS {
+    fn each(&mut self) -> [&mut f64; 9] {
+        [
+            &mut self.bank,
+            &mut self.pitch,
+            &mut self.load_factor,
+            &mut self.load_factor_low,
+            &mut self.stall,
+            &mut self.sideslip,
+            &mut self.slow,
+            &mut self.fast,
+            &mut self.slew,
+        ]
+    }
+
+    fn add(&mut self, beyond: [bool; 9], length: f64) {
+        let seconds = |out: bool| if out { length } else { 0.0 };
+        self.each().into_iter().zip(beyond).for_each(|(total, out)| *total += seconds(out));
+        self.any += seconds(beyond.contains(&true));
+    }
+
+    /// The seconds of several flights together.
+    pub fn plus(mut self, mut other: OutsideS) -> OutsideS {
+        self.each().into_iter().zip(other.each()).for_each(|(total, more)| *total += *more);
+        self.any += other.any;
+        self
+    }
+}

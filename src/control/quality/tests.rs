@@ -1,0 +1,203 @@
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use super::*;
+use greylag_model::STEP;
+use greylag_physics::Airframe;
+
+const LIMITS: Limits = Limits {
+    bank_deg: 60.0,
+    pitch_deg: [-30.0, 30.0],
+    load_factor: [-1.0, 2.0],
+    stall_deg: 12.0,
+    sideslip_deg: 20.0,
+    airspeed_mps: [10.0, 40.0],
+    slew_per_s: 20.0,
+};
+
+/// Level flight at the airspeed wanted, from which each test departs.
+fn level(time_s: f64) -> Moment {
+    Moment {
+        time_s,
+        attitude: [0.0; 2],
+        airspeed: 20.0,
+        alpha: 0.05,
+        beta: 0.0,
+        load_factor: 1.0,
+        command: Command::IDLE,
+    }
+}
+
+/// `seconds` of flight at 100 Hz towards a roll and pitch in degrees.
+fn track(seconds: f64, [roll, pitch]: [f64; 2], moment: impl Fn(f64) -> Moment) -> Track {
+    let count = (seconds / STEP).round() as usize;
+    let target = Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 20.0 };
+    let moments = (0..=count).map(|k| moment(k as f64 * STEP)).collect();
+    Track { moments, target, before: None, lost_s: 0.0 }
+}
+
+/// A first-order approach to a roll of 40°, time constant 0.5 s: integral, times and overshoot have closed forms.
+#[test]
+fn an_exponential_approach_has_the_integral_and_times_of_its_formula() {
+    let tau = 0.5;
+    let roll = |t: f64| 40.0 * (1.0 - (-t / tau).exp());
+    let flight =
+        track(8.0, [40.0, 0.0], |t| Moment { attitude: [roll(t).to_radians(), 0.0], ..level(t) });
+    let q = flight.quality(&LIMITS);
+    // ∫ 40 e^(−t/τ) = 40 τ; the trapezoids of 0.01 s add (dt/τ)²/12 of it
+    assert!((q.error_integral_deg_s - 20.0).abs() < 20.0 * 4e-5, "{q:?}");
+    // to the last tick outside: within one tick of τ ln(40/1) and τ ln(20)
+    assert!((q.to_one_deg_s - tau * 40f64.ln()).abs() <= STEP);
+    assert!((q.to_five_percent_s - tau * 20f64.ln()).abs() <= STEP);
+    assert_eq!(q.overshoot_deg, [0.0, 0.0]);
+    assert!((q.step_deg[0] - 40.0).abs() < 1e-9 && q.step_deg[1].abs() < 1e-9);
+}
+
+/// A second-order step of damping ζ overshoots by exp(−πζ/√(1 − ζ²)) of the step, whichever way it goes.
+#[test]
+fn a_second_order_step_overshoots_as_its_damping_says() {
+    let (zeta, omega) = (0.4_f64, 4.0);
+    let damped = (1.0 - zeta * zeta).sqrt();
+    let part = |t: f64| {
+        let phase = omega * damped * t;
+        1.0 - (-zeta * omega * t).exp() * (phase.cos() + zeta / damped * phase.sin())
+    };
+    let flight = track(6.0, [-50.0, 20.0], |t| Moment {
+        attitude: [-50.0 * part(t), 20.0 * part(t)].map(f64::to_radians),
+        ..level(t)
+    });
+    let expected = (-std::f64::consts::PI * zeta / damped).exp();
+    let q = flight.quality(&LIMITS);
+    // the peak is flat: a tick beside it is off by (ωd dt)²/8 of the overshoot
+    assert!((q.overshoot_deg[0] / 50.0 - expected).abs() < 3e-4 * expected, "{q:?}");
+    assert!((q.overshoot_deg[1] / 20.0 - expected).abs() < 3e-4 * expected, "{q:?}");
+}
+
+#[test]
+fn an_error_that_only_shrinks_from_the_other_side_is_no_overshoot() {
+    let flight = track(1.0, [0.0, 10.0], |t| Moment {
+        attitude: [0.0, (20.0 - t).to_radians()],
+        ..level(t)
+    });
+    assert_eq!(flight.quality(&LIMITS).overshoot_deg[1], 0.0);
+    // without a step every departure is one
+    let still = track(1.0, [0.0, 0.0], |t| Moment { attitude: [0.0, -0.1 * t], ..level(t) });
+    assert!((still.quality(&LIMITS).overshoot_deg[1] - 0.1_f64.to_degrees()).abs() < 1e-9);
+}
+
+#[test]
+fn what_never_stays_takes_the_whole_flight_and_a_lost_one_counts_as_upside_down() {
+    let flight = track(2.0, [30.0, 0.0], level);
+    let q = flight.quality(&LIMITS);
+    assert!((q.to_one_deg_s - 2.0).abs() < 1e-9 && (q.error_integral_deg_s - 60.0).abs() < 1e-9);
+    let lost = Track { lost_s: 3.0, ..flight }.quality(&LIMITS);
+    assert!((lost.error_integral_deg_s - (60.0 + 360.0 * 3.0)).abs() < 1e-9);
+    assert!(lost.lost && !lost.kept && (lost.to_one_deg_s - 5.0).abs() < 1e-9);
+}
+
+/// A sine of amplitude A and frequency f over whole periods travels 4 A f T, and its rate has the mean square
+/// (2π f A)²/2.
+#[test]
+fn a_sine_of_a_surface_travels_four_amplitudes_a_period() {
+    let (amplitude, hertz, seconds) = (0.3, 0.5, 8.0);
+    let wave = |t: f64| amplitude * (TAU * hertz * t).sin();
+    let flight = track(seconds, [0.0; 2], |t| Moment {
+        command: Command { elevator: wave(t), throttle: 0.4, ..Command::IDLE },
+        ..level(t)
+    });
+    let q = flight.quality(&LIMITS);
+    let travel = 4.0 * amplitude * hertz * seconds;
+    assert!((q.travel.elevator - travel).abs() < 0.01 * travel, "{q:?}");
+    assert_eq!(
+        [q.travel.aileron, q.travel.throttle, q.travel.surfaces() - q.travel.elevator],
+        [0.0; 3]
+    );
+    let square = (TAU * hertz * amplitude).powi(2) / 2.0;
+    assert!((q.mean_square_rate.elevator - square).abs() < 0.01 * square, "{q:?}");
+    assert_eq!([q.surface_saturated, q.saturated.throttle], [0.0; 2]);
+}
+
+/// The jump with which a new target is answered counts where the flight went on before it.
+#[test]
+fn the_first_change_counts_from_the_command_before() {
+    let command = Command { aileron: 0.5, ..Command::IDLE };
+    let flight = track(1.0, [0.0; 2], |t| Moment { command, ..level(t) });
+    assert_eq!(flight.quality(&LIMITS).travel.aileron, 0.0);
+    let after = Track { before: Some(Command::IDLE), ..flight }.quality(&LIMITS);
+    assert_eq!(after.travel.aileron, 0.5);
+    // 0.5 in a tick of 0.01 s is 50 a second
+    assert!((after.outside_s.slew - STEP).abs() < 1e-9);
+}
+
+/// A load factor of 1 + 2 sin is above 2 for a third of each period, and below −1 never.
+#[test]
+fn seconds_outside_are_those_of_the_sine_above_the_limit() {
+    let flight = track(12.0, [0.0; 2], |t| {
+        let sine = (TAU * t / 3.0).sin();
+        Moment { load_factor: 1.0 + 2.0 * sine, alpha: 0.1 + 0.2 * sine, ..level(t) }
+    });
+    let q = flight.quality(&LIMITS);
+    assert!((q.outside_s.load_factor - 4.0).abs() <= 8.0 * STEP, "{q:?}");
+    assert_eq!(q.outside_s.load_factor_low, 0.0);
+    assert!((q.load_factor[1] - 3.0).abs() < 1e-3 && (q.load_factor[0] + 1.0).abs() < 1e-3);
+    let above = 1.0 - 2.0 * ((12f64.to_radians() - 0.1) / 0.2).asin() / std::f64::consts::PI;
+    assert!((q.outside_s.stall - 6.0 * above).abs() <= 8.0 * STEP, "{q:?}");
+    assert!(!q.kept);
+    assert!((q.outside_s.any - q.outside_s.load_factor.max(q.outside_s.stall)).abs() < 1e-9);
+}
+
+#[test]
+fn every_limit_is_judged_by_its_own_quantity() {
+    let outside = |departs: &dyn Fn(&mut Moment)| {
+        let flight = track(1.0, [0.0; 2], |t| {
+            let mut moment = level(t);
+            departs(&mut moment);
+            moment
+        });
+        let outside = flight.quality(&LIMITS).outside_s;
+        outside
+            .passed()
+            .into_iter()
+            .map(|(name, s)| (name, (s * 100.0).round()))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(outside(&|_| ()), []);
+    assert_eq!(outside(&|m| m.attitude[0] = -1.1), [("bank", 100.0)]);
+    assert_eq!(outside(&|m| m.attitude[1] = -0.6), [("pitch", 100.0)]);
+    assert_eq!(outside(&|m| m.load_factor = -1.1), [("least load factor", 100.0)]);
+    assert_eq!(outside(&|m| m.load_factor = 2.1), [("load factor", 100.0)]);
+    assert_eq!(outside(&|m| m.alpha = 0.22), [("stall", 100.0)]);
+    assert_eq!(outside(&|m| m.beta = -0.4), [("sideslip", 100.0)]);
+    assert_eq!(outside(&|m| m.airspeed = 9.0), [("least airspeed", 100.0)]);
+    assert_eq!(outside(&|m| m.airspeed = 41.0), [("largest airspeed", 100.0)]);
+    assert_eq!(outside(&|m| m.alpha = f64::NAN), []);
+}
+
+/// A twentieth of the limit is a transient's room, more is not.
+#[test]
+fn a_transient_may_pass_load_factor_and_stall_by_a_twentieth() {
+    assert!(LIMITS.kept([-1.04, 2.09], [-5.0, 12.5]));
+    assert!(!LIMITS.kept([-1.06, 1.0], [0.0; 2]) && !LIMITS.kept([1.0, 2.11], [0.0; 2]));
+    assert!(!LIMITS.kept([1.0; 2], [0.0, 12.7]));
+    assert!(LIMITS.kept([f64::NAN; 2], [f64::NAN; 2]));
+}
+
+#[test]
+fn airspeed_and_stops_are_measured_over_the_ticks() {
+    let flight = track(1.0, [0.0; 2], |t| {
+        let stop = if t < 0.25 - 1e-9 { 1.0 } else { 0.0 };
+        let command = Command { aileron: -stop, throttle: 1.0, ..Command::IDLE };
+        Moment { airspeed: 20.0 - 3.0 * (t * FRAC_PI_2).sin().signum(), command, ..level(t) }
+    });
+    let q = flight.quality(&LIMITS);
+    assert!((q.surface_saturated - 0.25).abs() < 1e-9 && q.saturated.throttle == 1.0, "{q:?}");
+    assert!((q.airspeed_rms_mps - 3.0).abs() < 0.01 && q.airspeed_mps == [17.0, 17.0], "{q:?}");
+}
+
+#[test]
+fn a_file_that_states_no_stall_has_no_limit_of_it() {
+    let path =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/a430/airframe.toml");
+    let limits = Limits::of(&Airframe::load(&path).unwrap());
+    assert_eq!([limits.stall_deg, limits.sideslip_deg], [f64::INFINITY; 2]);
+    assert_eq!(limits.load_factor[0], f64::NEG_INFINITY);
+}

@@ -1,0 +1,147 @@
+//! What happened on the way to the targets: error against surface travel, every measure, their definitions.
+
+use super::{EvaluationReport, Left, Right, label, with_interval};
+use crate::kit::numbers::number;
+use crate::{Choice, ChoiceOption, Figure, Section, Style, Table, XyFigure, XyMark, XySeries};
+use greylag_control::quality::{MEASURES, Measure};
+use greylag_sim::evaluation::{Evaluation, Score};
+use greylag_sim::summary::Spread;
+
+/// Controllers that colours tell apart; beyond, lines are wide.
+const COLOURS: usize = 4;
+
+/// The sections; none of an evaluation that was not measured.
+pub(super) fn sections(report: &EvaluationReport) -> Vec<Section> {
+    let measured =
+        report.evaluations.iter().any(|e| e.groups.iter().any(|g| !g.measures.is_empty()));
+    if !measured {
+        return Vec::new();
+    }
+    vec![picture(report), measures(report)]
+}
+
+fn by_group(report: &EvaluationReport, anchor: &str, figure: &dyn Fn(&str) -> Figure) -> Figure {
+    let option =
+        |group: &str| ChoiceOption { name: group.replace('_', " "), figures: vec![figure(group)] };
+    let groups = report.groups();
+    // the whole of Table II first, then its parts
+    let (all, parts): (Vec<&str>, Vec<&str>) = groups.into_iter().partition(|g| *g == "all");
+    Figure::Choice(Choice {
+        anchor: anchor.into(),
+        label: "Targets".into(),
+        options: all.into_iter().chain(parts).map(option).collect(),
+    })
+}
+
+/// One cross a controller: integral of error against surface travel.
+fn picture(report: &EvaluationReport) -> Section {
+    let figure = |group: &str| {
+        let crosses = report.evaluations.iter().enumerate().filter_map(|(k, e)| {
+            let score = e.score(group)?;
+            let [x, y] =
+                ["surface_travel", "error_integral_deg_s"].map(|id| score.measures.get(id));
+            Some(cross(label(e), k, x?, y?))
+        });
+        Figure::Xy(XyFigure {
+            title: format!("Error against surface travel, {}", group.replace('_', " ")),
+            x_label: "Surface travel, median".into(),
+            y_label: "Integral of error, median (° s)".into(),
+            bands: Vec::new(),
+            series: crosses.collect(),
+        })
+    };
+    let note = "Down and left is better. A controller is where its cross meets: the medians over the targets; the arms are \
+                their 95 % bootstrap intervals.";
+    Section::new("Error against surface travel", note, vec![by_group(report, "travel", &figure)])
+}
+
+fn cross(label: String, k: usize, x: &Spread, y: &Spread) -> XySeries {
+    let ([left, right], [low, high]) = (x.median_ci95, y.median_ci95);
+    XySeries {
+        label,
+        style: Style::nth(k),
+        mark: if k < COLOURS { XyMark::Path } else { XyMark::Line },
+        x: vec![left, x.median, right, f64::NAN, x.median, x.median, x.median],
+        y: vec![y.median, y.median, y.median, f64::NAN, low, y.median, high],
+    }
+}
+
+/// Every measure of every controller.
+fn measures(report: &EvaluationReport) -> Section {
+    let figure = |group: &str| {
+        let scored: Vec<(&Evaluation, &Score)> =
+            report.evaluations.iter().filter_map(|e| Some((e, e.score(group)?))).collect();
+        let names: Vec<String> = scored.iter().map(|(e, _)| label(e)).collect();
+        let mut columns = vec![("Measure", Left)];
+        columns.extend(names.iter().map(|name| (name.as_str(), Right)));
+        let mut table = Table::new("Measures", &columns);
+        let kept = |score: &Score| format!("{} %", number(100.0 * score.kept_rate));
+        let little = |score: &Score| format!("{} %", number(100.0 * score.little_overshoot_rate));
+        push(&mut table, "Envelope kept".into(), &scored, &kept);
+        for m in MEASURES.iter().filter(|m| moves(&scored, m)) {
+            push(&mut table, titled(m), &scored, &|score| cell(score, m));
+            if m.id == "overshoot_pitch_deg" {
+                push(&mut table, "Overshoot at most 1° or 3 %".into(), &scored, &little);
+            }
+        }
+        Figure::Table(table)
+    };
+    let mut definitions = Table::new("Definitions", &[("Measure", Left), ("Definition", Left)]);
+    let envelope = "Share of the flights whose load factor and angle of attack pass the airframe file's limits by at most \
+                    5 % (a transient).";
+    definitions.push(["Envelope kept".into(), envelope.into()]);
+    MEASURES.iter().for_each(|m| definitions.push([titled(m), m.definition.into()]));
+    let figures = vec![by_group(report, "measures", &figure), Figure::Table(definitions)];
+    let note = format!(
+        "Median over the targets with its 95 % bootstrap interval, then the worst of all. {}",
+        limits(report)
+    );
+    Section::new("On the way", &note, figures)
+}
+
+fn push(
+    table: &mut Table,
+    title: String,
+    scored: &[(&Evaluation, &Score)],
+    cell: &dyn Fn(&Score) -> String,
+) {
+    let cells = scored.iter().map(|(_, score)| cell(score));
+    table.push(std::iter::once(title).chain(cells).collect::<Vec<_>>());
+}
+
+/// Whether a measure says anything: a rudder that there is not moves nowhere.
+fn moves(scored: &[(&Evaluation, &Score)], m: &Measure) -> bool {
+    scored.iter().any(|(_, score)| score.measures.get(m.id).is_some_and(|s| s.worst != 0.0))
+}
+
+fn cell(score: &Score, m: &Measure) -> String {
+    score.measures.get(m.id).map_or_else(
+        || "–".into(),
+        |s| format!("{}, worst {}", with_interval(s.median, s.median_ci95), number(s.worst)),
+    )
+}
+
+fn titled(m: &Measure) -> String {
+    let unit = if m.unit.is_empty() { String::new() } else { format!(" ({})", m.unit) };
+    let mut letters = m.title.chars();
+    let first: String = letters.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
+    format!("{first}{}{unit}", letters.as_str())
+}
+
+/// The limits that the flights are measured against, in words.
+fn limits(report: &EvaluationReport) -> String {
+    let Some(limits) = report.evaluations.iter().find_map(|e| e.limits) else {
+        return String::new();
+    };
+    let [slow, fast] = limits.airspeed_mps;
+    format!(
+        "Limits of the airframe file: load factor {}, stall {}°, airspeed {} to {} m/s, bank {}°, surface rate {} a second; \
+         – where none is stated.",
+        number(limits.load_factor[1]),
+        number(limits.stall_deg),
+        number(slow),
+        number(fast),
+        number(limits.bank_deg),
+        number(limits.slew_per_s)
+    )
+}

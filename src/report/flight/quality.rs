@@ -1,0 +1,164 @@
+//! What happened on the way to each target of a recorded flight, and how it kept to the envelope.
+
+use crate::flight::verdict::signed;
+use crate::flight::{EnvelopeFlown, FlightReport, Segment};
+use crate::kit::numbers::number;
+use crate::{Align, Figure, Row, Section, Table};
+use greylag_control::Target;
+use greylag_control::quality::{Limits, Moment, OutsideS, Quality, Track};
+use greylag_logs::Sample;
+use greylag_physics::Command;
+use greylag_physics::atmosphere::STANDARD_GRAVITY;
+
+/// A pause longer than this parts a flight, s.
+const GAP_S: f64 = 0.1;
+
+/// A whole flight against its envelope.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Kept {
+    /// Least and largest load factor.
+    pub load_factor: [f64; 2],
+    /// Largest angle of attack, degrees.
+    pub alpha_deg: f64,
+    /// Seconds outside each limit.
+    pub outside_s: OutsideS,
+    /// Whether load factor and angle of attack kept to their limits but for a transient.
+    pub kept: bool,
+}
+
+fn moment(s: &Sample) -> Moment {
+    let command = Command {
+        aileron: s.aileron_cmd,
+        elevator: s.elevator_cmd,
+        throttle: s.throttle_cmd,
+        rudder: s.rudder_cmd,
+    };
+    Moment {
+        time_s: s.time_s,
+        attitude: [s.attitude_rad[0], s.attitude_rad[1]],
+        airspeed: s.airspeed_mps,
+        alpha: s.alpha_rad,
+        beta: s.beta_rad,
+        load_factor: -s.specific_force_mps2[2] / STANDARD_GRAVITY,
+        command,
+    }
+}
+
+/// What happened between the ends of a segment.
+pub(super) fn of_segment(samples: &[Sample], segment: &Segment, limits: &Limits) -> Quality {
+    let first = samples.partition_point(|s| s.time_s < segment.start_s);
+    let end = samples.partition_point(|s| s.time_s <= segment.end_s).max(first);
+    let before = first.checked_sub(1).map(|k| moment(&samples[k]).command);
+    let (roll, pitch) = (segment.roll_target_rad, segment.pitch_target_rad);
+    // the airspeed wanted is no column of the log format
+    let target = Target { roll, pitch, airspeed: f64::NAN };
+    let moments = samples[first..end].iter().map(moment).collect();
+    Track { moments, target, before, lost_s: 0.0 }.quality(limits)
+}
+
+/// The whole flight, from the airspeed on that counts as one.
+pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
+    let flying = |s: &Sample| !(s.airspeed_mps < envelope.flying_from_mps);
+    let together = |a: &Sample, b: &Sample| flying(a) && flying(b) && b.time_s - a.time_s <= GAP_S;
+    let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: f64::NAN };
+    let parts = samples.chunk_by(together).filter(|part| part.len() > 1);
+    let mut all = Kept {
+        load_factor: [f64::NAN; 2],
+        alpha_deg: f64::NAN,
+        outside_s: OutsideS::default(),
+        kept: true,
+    };
+    for part in parts {
+        let moments = part.iter().map(moment).collect();
+        let track = Track { moments, target: nobody, before: None, lost_s: 0.0 };
+        let Quality { load_factor: [least, most], alpha_deg, outside_s, kept, .. } =
+            track.quality(&envelope.limits);
+        all.load_factor = [all.load_factor[0].min(least), all.load_factor[1].max(most)];
+        all.alpha_deg = all.alpha_deg.max(alpha_deg[1]);
+        all.outside_s = all.outside_s.plus(outside_s);
+        all.kept &= kept;
+    }
+    all
+}
+
+/// How the flight kept to its envelope, in a part of a sentence.
+pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
+    let of = |value: f64, limit: f64, unit: &str| {
+        let stated =
+            if limit.is_finite() { format!(" of {}{unit}", number(limit)) } else { String::new() };
+        format!("{}{unit}{stated}", number(value))
+    };
+    let seconds = kept.outside_s.any;
+    let outside = match seconds {
+        0.0 => "inside the envelope".to_owned(),
+        _ => {
+            let passed = kept.outside_s.passed();
+            let names: Vec<String> =
+                passed.iter().map(|(name, s)| format!("{name} {} s", number(*s))).collect();
+            format!("outside the envelope for {} s ({})", number(seconds), names.join(", "))
+        }
+    };
+    let [least, most] = kept.load_factor;
+    let load = format!("load factor {} to {}", number(least), of(most, limits.load_factor[1], ""));
+    let alpha = format!("angle of attack up to {}", of(kept.alpha_deg, limits.stall_deg, "°"));
+    format!("{outside}: {load}, {alpha}")
+}
+
+/// The largest of a measure over the segments.
+pub(super) fn most(qualities: &[Quality], of: impl Fn(&Quality) -> f64) -> f64 {
+    qualities.iter().map(of).fold(f64::NAN, f64::max)
+}
+
+/// The section of what happened on the way to each target.
+pub(crate) fn section(report: &FlightReport) -> Option<Section> {
+    let qualities = report.qualities().filter(|all| !all.is_empty())?;
+    let limits = report.envelope?.limits;
+    let columns = [
+        ("Target: roll, pitch (°)", Align::Left),
+        ("Integral of error (° s)", Align::Right),
+        ("To 1° (s)", Align::Right),
+        ("To 5 % (s)", Align::Right),
+        ("Overshoot: roll, pitch (°)", Align::Right),
+        ("Load factor", Align::Right),
+        ("Angle of attack (°)", Align::Right),
+        ("Sideslip (°)", Align::Right),
+        ("Least airspeed (m/s)", Align::Right),
+        ("Surface travel", Align::Right),
+        ("At a stop (%)", Align::Right),
+        ("Outside (s)", Align::Right),
+    ];
+    let mut table = Table::new("On the way", &columns);
+    let range = |[least, most]: [f64; 2]| format!("{} to {}", number(least), number(most));
+    for (segment, q) in report.segments.iter().zip(&qualities) {
+        let to = [segment.roll_target_rad, segment.pitch_target_rad].map(signed);
+        table.rows.push(Row {
+            cells: vec![
+                to.join(", "),
+                number(q.error_integral_deg_s),
+                number(q.to_one_deg_s),
+                number(q.to_five_percent_s),
+                q.overshoot_deg.map(number).join(", "),
+                range(q.load_factor),
+                range(q.alpha_deg),
+                number(q.sideslip_deg),
+                number(q.airspeed_mps[0]),
+                number(q.travel.surfaces()),
+                number(100.0 * q.surface_saturated),
+                number(q.outside_s.any),
+            ],
+            span_s: Some([segment.start_s, segment.end_s]),
+            ..Row::default()
+        });
+    }
+    let note = format!(
+        "Limits of the aircraft: load factor {}, stall {}°, airspeed {} m/s, bank {}°, pitch {}°; – where none is stated. \
+         Load factor: specific force along body z, upwards, over the standard gravity. Integral of |roll error| + |pitch \
+         error|. Surface travel: sum of |changes| of the commands, −1..1. Select a target to see its time in every plot.",
+        number(limits.load_factor[1]),
+        number(limits.stall_deg),
+        range(limits.airspeed_mps),
+        number(limits.bank_deg),
+        range(limits.pitch_deg),
+    );
+    Some(Section::new("On the way", &note, vec![Figure::Table(table)]))
+}
