@@ -7,7 +7,7 @@ use crate::physics::effects::Description;
 use crate::sysid::compare::ChannelId;
 use crate::sysid::diagnose::answer::curves;
 use crate::sysid::diagnose::answer::detectable::detectable;
-use crate::sysid::diagnose::answer::result::{Candidate, FlightEstimate, Parameter};
+use crate::sysid::diagnose::answer::result::{Candidate, FlightEstimate, Parameter, Status};
 use crate::sysid::diagnose::options::{Detail, Options};
 use crate::sysid::diagnose::regression::columns::Ready;
 use crate::sysid::diagnose::regression::rank::{Score, Trial};
@@ -58,6 +58,19 @@ pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
     list
 }
 
+/// Ids of asserted effects each of whose constants may be zero (95 %) once all effects have settled: what another effect took
+/// over. Shape constants are no amounts.
+pub fn void(candidates: &[Candidate]) -> Vec<String> {
+    let may_be_zero = |c: &&Candidate| {
+        let amounts = describe(&c.id).map_or(0, |about| about.coefficients.len() - about.shape);
+        let own = c.parameters.iter().take(amounts.max(1));
+        c.asserted
+            && own.clone().count() > 0
+            && own.clone().all(|p| p.ci95[0] < 0.0 && 0.0 < p.ci95[1])
+    };
+    candidates.iter().filter(may_be_zero).map(|c| c.id.clone()).collect()
+}
+
 /// The smallest amounts that would have shown, of those that have joined the model before they did.
 fn least(found: &Found) -> BTreeMap<&'static str, f64> {
     let mut least = detectable(&found.first, found.threshold);
@@ -96,6 +109,12 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
         id: s.id.into(),
         description: about.description,
         asserted: s.refused.is_empty(),
+        status: match (s.refused.is_empty(), s.class.is_empty()) {
+            (true, true) => Status::Missing,
+            (true, false) => Status::Indistinguishable,
+            _ if s.trace.is_some() => Status::Small,
+            _ => Status::Refused,
+        },
         evidence: s.score.evidence,
         threshold: s.threshold,
         parameters,
@@ -141,6 +160,10 @@ fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Can
         id: trial.id.into(),
         description: about.description,
         asserted: false,
+        status: match score.evidence > found.threshold {
+            true => Status::Refused,
+            false => Status::NotShown,
+        },
         evidence: score.evidence,
         threshold: found.threshold,
         parameters,

@@ -2,13 +2,16 @@
 
 use crate::model::{GreyBox, RUDDER};
 use crate::physics;
+use crate::sysid::compare::{self, ChannelId};
 use crate::sysid::diagnose::answer::advice;
 use crate::sysid::diagnose::answer::decoys;
+use crate::sysid::diagnose::answer::impossible::impossible;
 use crate::sysid::diagnose::answer::measurement;
 use crate::sysid::diagnose::answer::per_flight;
 use crate::sysid::diagnose::answer::ranking;
 use crate::sysid::diagnose::answer::result::{Diagnosis, Nulls, Settings, Verdict};
-use crate::sysid::diagnose::answer::sentences;
+use crate::sysid::diagnose::answer::rival::against_axes;
+use crate::sysid::diagnose::answer::sentences::{self, Said};
 use crate::sysid::diagnose::answer::shares;
 use crate::sysid::diagnose::error::DiagnoseError;
 use crate::sysid::diagnose::options::{Detail, Options};
@@ -26,6 +29,13 @@ use crate::sysid::weak_form::prepared::Prepared;
 /// Least share of the error beyond noise that must be learnable before something is said to be missing:
 /// what the reconstruction leaves is no effect.
 const WORTH_SAYING: f64 = 0.1;
+/// The same where an effect of the catalogue was refused for its shape or its flights.
+const REFUSED: f64 = 0.01;
+/// What is refused beside a figure that cannot be.
+const CANNOT_BE: &str =
+    "a figure of these flights cannot be, so that nothing is said about forces and moments";
+/// What is refused of an effect whose amount another one took over.
+const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have settled";
 
 /// Says which effects of the catalogue `model` lacks according to `flights`, which must have been
 /// reconstructed with their deflections as recorded; `progress` hears what is being done.
@@ -43,18 +53,35 @@ pub fn diagnose(
     known(&options.with)?;
     let (problem, used, mut notes) = problem(model, flights, options)?;
     notes.extend(excitation::check(&problem.flights)?);
-    let mut found = search(&problem, model, options, progress)?;
+    let found = search(&problem, model, options, progress)?;
+    let mut found = against_axes(problem, model, options, progress, found)?;
     say(progress, "what is left", 0.95)?;
     let rudder = rudder::unmodelled(flights, model);
     if let Some(motion) = rudder {
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
     }
+    let abstained = abstained(model, &used, options.seed);
+    found.refuse_where_abstained(&abstained);
+    let void = ranking::void(&ranking::candidates(
+        &found,
+        &Options { detail: Detail::Lean, ..options.clone() },
+    ));
+    found.refuse(&void, MAY_BE_ZERO);
+    let tuned = shares::tuned(&found, model);
+    let doubtful = impossible(&used, &tuned);
+    if !doubtful.is_empty() {
+        found.refuse_all(CANNOT_BE);
+    }
     let effects = ranking::candidates(&found, options);
-    let channels = shares::channels(&found);
+    let channels = shares::channels(&found, &abstained);
     let mut measurement = measurement::measurement(&used);
     measurement.extend(per_flight::angles(found.round()));
     let trims = per_flight::trims(found.round());
-    let verdict = verdict(&found);
+    let verdict = match verdict(&found) {
+        _ if !doubtful.is_empty() => Verdict::Unknown,
+        Verdict::Unexplained if channels.iter().all(|c| c.abstained) => Verdict::Unknown,
+        verdict => verdict,
+    };
     notes.extend(sentences::notes(&found, model, options));
     let decoys = match options.detail {
         Detail::Full => decoys::decoys(&found, options.seed),
@@ -68,15 +95,23 @@ pub fn diagnose(
         sentences: rudder
             .map(rudder::warning)
             .into_iter()
-            .chain(sentences::sentences(&found, verdict, &effects, &channels, &measurement))
-            .chain(per_flight::sentences(&measurement, &trims))
+            .chain(sentences::sentences(&Said {
+                found: &found,
+                verdict,
+                doubtful: &doubtful,
+                effects: &effects,
+                channels: &channels,
+                measurement: &measurement,
+                trims: &trims,
+            }))
             .collect(),
+        doubtful,
         advice: advice::advice(&found, verdict, &effects, &channels),
         effects,
         channels,
         measurement,
         trims,
-        tuned: shares::tuned(&found, model),
+        tuned,
         nulls: Nulls { count: options.nulls, best: found.nulls.clone(), level: options.level },
         decoys,
         learnable_remainder: found.learnable(),
@@ -88,6 +123,16 @@ pub fn diagnose(
             without: options.without.clone(),
             per_flight: options.per_flight,
         },
+    })
+}
+
+/// Why these flights cannot judge `model` as given in a channel, as `compare` has it.
+fn abstained(model: &GreyBox, flights: &[&Reconstruction], seed: u64) -> [Option<String>; 6] {
+    let flights: Vec<Reconstruction> = flights.iter().map(|f| (*f).clone()).collect();
+    let all = compare::abstentions(model, &flights, seed).unwrap_or_default();
+    std::array::from_fn(|k| {
+        let own = all.iter().find(|(id, _)| *id == ChannelId::ALL[k]);
+        own.and_then(|(_, why)| *why).map(str::to_owned)
     })
 }
 
@@ -143,7 +188,8 @@ pub fn verdict(found: &Found) -> Verdict {
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;
     if found.selected.iter().any(|s| s.refused.is_empty()) {
         Verdict::Effect
-    } else if found.selected.iter().any(|s| !s.slight && s.trace.is_none())
+    } else if (found.selected.iter().any(|s| !s.slight && s.trace.is_none())
+        && (found.leaves_something() || found.learnable() > REFUSED))
         || (found.leaves_something() && (significant || found.has_shape()))
     {
         Verdict::Unexplained
