@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use rand::RngExt;
 
-use crate::logs::{Flight, Sample};
-use crate::num::stream::stream;
+use greylag_logs::{Flight, Sample};
+use greylag_num::stream::stream;
 
 /// Random stream of an installation.
 const DRAW: u64 = 73;

@@ -5,8 +5,8 @@
 //! a prior is clearly not zero (a score test with the path and all other constants fitted along; Klein and Morelli, Aircraft
 //! System Identification, section 5.3.3) and large enough to matter.
 
-use crate::sysid::flight_path::equations::{Found, Problem};
-use crate::sysid::flight_path::nuisance::{
+use crate::flight_path::equations::{Found, Problem};
+use crate::flight_path::nuisance::{
     self, AIRSPEED_OFFSET, COUNT, HEADING, SKEW_ATTITUDE, SKEW_FORCE, SKEW_VELOCITY,
 };
 

@@ -1,9 +1,9 @@
 //! Figures of a flight that cannot be: where there is one, no sentence about forces is worth anything.
 
-use crate::num::statistics::mean;
-use crate::sysid::diagnose::answer::result::Tuned;
-use crate::sysid::diagnose::answer::sentences::with_interval;
-use crate::sysid::flight_path::reconstruction::{Nuisance, Reconstruction};
+use crate::diagnose::answer::result::Tuned;
+use crate::diagnose::answer::sentences::with_interval;
+use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
+use greylag_num::statistics::mean;
 
 /// Airspeed scales (measured by true) that a working pitot has: a static port in a bad place gives 10 to 15 %.
 const SCALES: [f64; 2] = [0.8, 1.25];

@@ -5,17 +5,17 @@
 //! effects were found, the flights are explained anew with the angles of their axes free, under the same noise, and both
 //! explanations are compared by what they leave and by how many constants they need (Bayesian information criterion).
 
-use crate::model::GreyBox;
-use crate::sysid::diagnose::answer::result::Verdict;
-use crate::sysid::diagnose::answer::run::verdict;
-use crate::sysid::diagnose::error::DiagnoseError;
-use crate::sysid::diagnose::options::Options;
-use crate::sysid::diagnose::search::checks::CLOSE;
-use crate::sysid::diagnose::search::round::{Beside, Problem, Round};
-use crate::sysid::diagnose::search::settling::{SETTLING, settled};
-use crate::sysid::diagnose::search::stepwise::{Found, search};
-use crate::sysid::per_flight::{PerFlight, askew};
-use crate::sysid::progress::{Progress, part, say};
+use crate::diagnose::answer::result::Verdict;
+use crate::diagnose::answer::run::verdict;
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::options::Options;
+use crate::diagnose::search::checks::CLOSE;
+use crate::diagnose::search::round::{Beside, Problem, Round};
+use crate::diagnose::search::settling::{SETTLING, settled};
+use crate::diagnose::search::stepwise::{Found, search};
+use crate::per_flight::{PerFlight, askew};
+use crate::progress::{Progress, part, say};
+use greylag_model::GreyBox;
 
 /// Standard deviation of each angle before the flights are seen, °: a board mounted by eye.
 const MOUNTED_DEG: f64 = 3.0;
