@@ -60,15 +60,16 @@ pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
 
 /// Ids of asserted effects each of whose constants may be zero (95 %) once all effects have settled: what another effect took
 /// over. Shape constants are no amounts.
-pub fn void(candidates: &[Candidate]) -> Vec<String> {
-    let may_be_zero = |c: &&Candidate| {
+pub fn void(found: &Found, options: &Options) -> Vec<String> {
+    let lean = Options { detail: Detail::Lean, ..options.clone() };
+    let asserted = found.selected.iter().filter(|s| s.refused.is_empty());
+    let candidates = asserted.filter_map(|s| selected(found, s, &lean));
+    let may_be_zero = |c: &Candidate| {
         let amounts = describe(&c.id).map_or(0, |about| about.coefficients.len() - about.shape);
-        let own = c.parameters.iter().take(amounts.max(1));
-        c.asserted
-            && own.clone().count() > 0
-            && own.clone().all(|p| p.ci95[0] < 0.0 && 0.0 < p.ci95[1])
+        let mut own = c.parameters.iter().take(amounts.max(1)).peekable();
+        own.peek().is_some() && own.all(|p| p.ci95[0] < 0.0 && 0.0 < p.ci95[1])
     };
-    candidates.iter().filter(may_be_zero).map(|c| c.id.clone()).collect()
+    candidates.filter(may_be_zero).map(|c| c.id).collect()
 }
 
 /// The smallest amounts that would have shown, of those that have joined the model before they did.

@@ -7,7 +7,7 @@ use crate::diagnose::answer::impossible::impossible;
 use crate::diagnose::answer::measurement;
 use crate::diagnose::answer::per_flight;
 use crate::diagnose::answer::ranking;
-use crate::diagnose::answer::result::{Diagnosis, Nulls, Settings, Verdict};
+use crate::diagnose::answer::result::{ChannelLeft, Diagnosis, Nulls, Settings, Tuned, Verdict};
 use crate::diagnose::answer::rival::against_axes;
 use crate::diagnose::answer::sentences::{self, Said};
 use crate::diagnose::answer::shares;
@@ -60,51 +60,33 @@ pub fn diagnose(
     if let Some(motion) = rudder {
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
     }
-    let abstained = abstained(model, &used, options.seed);
-    found.refuse_where_abstained(&abstained);
-    let void = ranking::void(&ranking::candidates(
-        &found,
-        &Options { detail: Detail::Lean, ..options.clone() },
-    ));
-    found.refuse(&void, MAY_BE_ZERO);
-    let tuned = shares::tuned(&found, model);
-    let doubtful = impossible(&used, &tuned);
-    if !doubtful.is_empty() {
-        found.refuse_all(CANNOT_BE);
-    }
+    let Judged { abstained, tuned, doubtful } = judge(&mut found, model, &used, options);
     let effects = ranking::candidates(&found, options);
     let channels = shares::channels(&found, &abstained);
     let mut measurement = measurement::measurement(&used);
     measurement.extend(per_flight::angles(found.round()));
     let trims = per_flight::trims(found.round());
-    let verdict = match verdict(&found) {
-        _ if !doubtful.is_empty() => Verdict::Unknown,
-        Verdict::Unexplained if channels.iter().all(|c| c.abstained) => Verdict::Unknown,
-        verdict => verdict,
-    };
+    let verdict = spoken(&found, &doubtful, &channels);
     notes.extend(sentences::notes(&found, model, options));
     let decoys = match options.detail {
         Detail::Full => decoys::decoys(&found, options.seed),
         Detail::Lean => Vec::new(),
     };
+    let said = sentences::sentences(&Said {
+        found: &found,
+        verdict,
+        doubtful: &doubtful,
+        effects: &effects,
+        channels: &channels,
+        measurement: &measurement,
+        trims: &trims,
+    });
     Ok(Diagnosis {
         schema: "greylag.diagnosis/1",
         version: env!("CARGO_PKG_VERSION"),
         model: model.name.clone(),
         verdict,
-        sentences: rudder
-            .map(rudder::warning)
-            .into_iter()
-            .chain(sentences::sentences(&Said {
-                found: &found,
-                verdict,
-                doubtful: &doubtful,
-                effects: &effects,
-                channels: &channels,
-                measurement: &measurement,
-                trims: &trims,
-            }))
-            .collect(),
+        sentences: rudder.map(rudder::warning).into_iter().chain(said).collect(),
         doubtful,
         advice: advice::advice(&found, verdict, &effects, &channels),
         effects,
@@ -116,14 +98,53 @@ pub fn diagnose(
         decoys,
         learnable_remainder: found.learnable(),
         notes,
-        settings: Settings {
-            seed: options.seed,
-            nulls: options.nulls,
-            bootstraps: options.bootstraps,
-            without: options.without.clone(),
-            per_flight: options.per_flight,
-        },
+        settings: settings(options),
     })
+}
+
+fn settings(options: &Options) -> Settings {
+    Settings {
+        seed: options.seed,
+        nulls: options.nulls,
+        bootstraps: options.bootstraps,
+        without: options.without.clone(),
+        per_flight: options.per_flight,
+    }
+}
+
+/// What speaks against effects beside the search's own checks.
+struct Judged {
+    abstained: [Option<String>; 6],
+    tuned: Vec<Tuned>,
+    doubtful: Vec<String>,
+}
+
+/// Refuses effects where the flights cannot judge, whose amount may be zero, or beside figures that cannot be.
+fn judge(
+    found: &mut Found,
+    model: &GreyBox,
+    flights: &[&Reconstruction],
+    options: &Options,
+) -> Judged {
+    let abstained = abstained(model, flights, options.seed);
+    found.refuse_where_abstained(&abstained);
+    let void = ranking::void(found, options);
+    found.refuse(&void, MAY_BE_ZERO);
+    let tuned = shares::tuned(found, model);
+    let doubtful = impossible(flights, &tuned);
+    if !doubtful.is_empty() {
+        found.refuse_all(CANNOT_BE);
+    }
+    Judged { abstained, tuned, doubtful }
+}
+
+/// The verdict as it is spoken: nothing is said beside what cannot be, or where no channel can be judged.
+fn spoken(found: &Found, doubtful: &[String], channels: &[ChannelLeft]) -> Verdict {
+    match verdict(found) {
+        _ if !doubtful.is_empty() => Verdict::Unknown,
+        Verdict::Unexplained if channels.iter().all(|c| c.abstained) => Verdict::Unknown,
+        verdict => verdict,
+    }
 }
 
 /// Why these flights cannot judge `model` as given in a channel, as `compare` has it.
