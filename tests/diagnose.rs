@@ -1,6 +1,8 @@
 //! Effects hidden inside JSBSim are named, nothing is named where nothing is missing.
 #![cfg(feature = "sitl")]
 
+mod diagnosis_support;
+
 use std::path::Path;
 
 use greylag::control::{self, ControllerKind};
@@ -79,6 +81,7 @@ fn asked(seed: u64, flights: &[Reconstruction], options: &Options) -> Diagnosis 
     let found =
         diagnose(&wrong(seed), flights, options, &greylag::sysid::progress::unheard).unwrap();
     println!("{:?} {:#?}", found.verdict, found.sentences);
+    diagnosis_support::agree(&found);
     found
 }
 

@@ -50,6 +50,7 @@ impl Answer {
         record.verdict = format!("{:?}", self.said.verdict).to_lowercase();
         record.ranked = effects.iter().take(KEPT).map(id).collect();
         record.asserted = effects.iter().filter(|c| c.asserted).map(id).collect();
+        record.instruments = seldom(&self.said);
         record.refused = effects.first().map_or_else(Vec::new, |c| c.refused.clone());
         let refused = effects.iter().filter(|c| !c.refused.is_empty());
         record.refusals = refused.map(|c| (id(c), c.refused.clone())).collect();
@@ -63,6 +64,21 @@ impl Answer {
         record.minimum_detectable = effects.iter().filter_map(least).collect();
         record.reached = reached(record);
     }
+}
+
+/// Errors of installation and calibration that are asserted; of delays those beyond two samples.
+fn seldom(said: &Diagnosis) -> Vec<String> {
+    const LATE_S: f64 = 0.02;
+    const IDS: [&str; 5] =
+        ["axes_askew", "imu_gain", "vane_gain", "airspeed_offset", "heading_offset"];
+    let is = |m: &&greylag::sysid::diagnose::Measurement| {
+        IDS.contains(&m.id.as_str()) || (m.id == "clock_skew" && m.value.abs() > LATE_S)
+    };
+    let mut ids: Vec<String> =
+        said.measurement.iter().filter(|m| m.asserted).filter(is).map(|m| m.id.clone()).collect();
+    ids.sort();
+    ids.dedup();
+    ids
 }
 
 /// Amplitude as a multiple of what the diagnosis says that these flights would have shown, the smaller one of a

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use greylag::num::statistics::quantile;
 use greylag::num::stream::stream;
+use greylag::sim::installation::Installation;
 use greylag::sim::missing::{Craft, Missing, MissingKind};
 use rand::RngExt;
 
@@ -21,7 +22,7 @@ const ASSUMED: f64 = 0.1;
 /// One case.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// `nulls`, `probes`, `effects`, `without` or `pairs`.
+    /// `nulls`, `installed`, `probes`, `effects`, `without` or `pairs`.
     pub part: &'static str,
     /// What is missing.
     pub missing: Vec<Missing>,
@@ -40,6 +41,11 @@ impl Case {
     pub fn key(&self) -> String {
         let ids: Vec<&str> = self.missing.iter().map(|m| m.id).collect();
         format!("{}/{}/x{}/{}", self.part, ids.join("+"), self.factor, self.seed)
+    }
+
+    /// How the instruments are installed, with the name of what is wrong with them; `None` if nothing is.
+    pub fn installed(&self) -> Option<(&'static str, Installation)> {
+        (self.part == "installed").then(|| Installation::one(self.seed))
     }
 
     /// The ids that are to be found.
@@ -109,6 +115,11 @@ pub fn nulls(craft: &Craft, seeds: Range<u64>) -> Vec<Case> {
             nothing("nulls", seed, if even { None } else { absent("drag_elevator_abs") })
         })
         .collect()
+}
+
+/// Flights on which nothing of the aircraft is missing, and one instrument is installed or calibrated wrong.
+pub fn installed(seeds: Range<u64>) -> Vec<Case> {
+    seeds.map(|seed| nothing("installed", seed, None)).collect()
 }
 
 /// Flights that tell how much of `drag_beta2` could have been seen. They are no nulls: the part of it that

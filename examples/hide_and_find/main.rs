@@ -84,6 +84,8 @@ struct Arguments {
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
     Nulls,
+    /// Nulls whose instruments are installed or calibrated wrong.
+    Installed,
     Probes,
     Effects,
     Without,
@@ -111,9 +113,10 @@ fn main() -> Result<()> {
     if !arguments.table {
         let bench = Bench::new(&arguments.model, &arguments.aircraft, arguments.simulated_nulls)?;
         // amplitudes of the other parts hang on what the nulls could have seen
-        for parts in
-            [[Part::Nulls, Part::Probes].as_slice(), &[Part::Effects, Part::Without, Part::Pairs]]
-        {
+        for parts in [
+            [Part::Nulls, Part::Installed, Part::Probes].as_slice(),
+            &[Part::Effects, Part::Without, Part::Pairs],
+        ] {
             let done = record::load(&arguments.results)?;
             let seen = Seen::of(&done, bench.craft());
             let mut cases: Vec<Case> =
@@ -139,6 +142,7 @@ fn list(arguments: &Arguments, part: Part, seen: &Seen, craft: &Craft) -> Vec<Ca
     match part {
         // the nulls' seeds are apart from all others
         Part::Nulls => cases::nulls(craft, first..first + arguments.nulls),
+        Part::Installed => cases::installed(first..first + arguments.nulls),
         Part::Probes => cases::probes(craft, first..first + PROBES),
         Part::Effects => cases::effects(seeds, &arguments.factors, seen, wanted),
         Part::Without => cases::without(seeds, seen, wanted),

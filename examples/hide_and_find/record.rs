@@ -66,6 +66,12 @@ pub struct Record {
     pub ranked: Vec<String>,
     /// Those that it asserts.
     pub asserted: Vec<String>,
+    /// What is wrong with the instruments' installation, if something is.
+    #[serde(default)]
+    pub installed: Option<String>,
+    /// Errors of the instruments that the diagnosis asserts, beyond biases, wind and clocks within a sample.
+    #[serde(default)]
+    pub instruments: Vec<String>,
     /// For each of those, and for the first, what cannot be distinguished from it.
     pub alike: BTreeMap<String, Vec<String>>,
     /// Why the first is not asserted; empty if it is.
@@ -102,6 +108,7 @@ impl Record {
             amplitudes: case.missing.iter().map(|m| m.amplitude).collect(),
             factor: case.factor,
             reached: case.reached,
+            installed: case.installed().map(|(name, _)| name.to_owned()),
             ..Record::default()
         }
     }

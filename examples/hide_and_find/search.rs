@@ -87,6 +87,7 @@ impl Bench {
             seed: *seed,
             missing: missing.clone(),
             turbulence: None,
+            installed: case.installed().map(|(_, of)| of).unwrap_or_default(),
         };
         let logs = trial.fly(self.controller.as_ref())?;
         let testing = if case.factor == 0.0 { &[][..] } else { &logs.testing };

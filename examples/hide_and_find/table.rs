@@ -105,6 +105,33 @@ fn summary(records: &[Record]) -> Table {
         share(clear.iter().copied(), near),
     );
     row("nulls with any assertion", "≤ 5 %", "≤ 1 %", share(nulls, |r| !r.asserted.is_empty()));
+    let installed = || records.iter().filter(part("installed"));
+    row(
+        "one instrument wrong, nothing of the aircraft: an effect of it asserted",
+        "≤ 2 %",
+        "≤ 0.5 %",
+        share(installed(), |r| !r.asserted.is_empty()),
+    );
+    row(
+        "the same: something said to be missing",
+        "≤ 3 %",
+        "≤ 1 %",
+        share(installed(), |r| ["effect", "unexplained"].contains(&r.verdict.as_str())),
+    );
+    row(
+        "the same: the instrument named",
+        "85 %",
+        "95 %",
+        share(installed(), |r| {
+            r.installed.as_ref().is_some_and(|name| r.instruments.contains(name))
+        }),
+    );
+    row(
+        "nulls with an error of installation asserted",
+        "≤ 3 %",
+        "≤ 1 %",
+        share(records.iter().filter(part("nulls")), |r| !r.instruments.is_empty()),
+    );
     row(
         "wrong assertion, truth in the catalogue",
         "≤ 3 %",

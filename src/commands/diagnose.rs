@@ -16,7 +16,7 @@ use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::report::DiagnosisReport;
 use crate::sysid::compare::{self, compare};
-use crate::sysid::diagnose::{Candidate, Diagnosis, Options, diagnose};
+use crate::sysid::diagnose::{Candidate, Diagnosis, Options, Status, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::per_flight::askew;
@@ -28,7 +28,7 @@ const ROWS: usize = 12;
 /// Options of `greylag diagnose`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit status: 0 done, whatever was found; 1 nothing could be diagnosed; 3 done, but a log was left out or holds what makes the figures wrong. The verdict is in the output: effect, adequate or unexplained."
+    after_help = "Exit status: 0 done, whatever was found; 1 nothing could be diagnosed; 3 done, but a log was left out or holds what makes the figures wrong, or a figure was found that cannot be. The verdict is in the output: effect, adequate, unexplained or unknown."
 )]
 pub struct Arguments {
     /// The model file.
@@ -105,6 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some((path, page)) = drawn {
         files::write(path, &page, overwrite)?;
     }
+    let in_doubt = in_doubt || !diagnosis.doubtful.is_empty();
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
@@ -158,10 +159,12 @@ fn effects(diagnosis: &Diagnosis) -> Table {
         column.set_cell_alignment(CellAlignment::Right);
     }
     for c in diagnosis.effects.iter().take(ROWS) {
-        let verdict = match (c.asserted, c.refused.is_empty()) {
-            (true, _) => " (missing)",
-            (false, true) => "",
-            (false, false) => " (refused)",
+        let verdict = match c.status {
+            Status::Missing => " (missing)",
+            Status::Indistinguishable => " (missing, or what it cannot be told from)",
+            Status::Small => " (seen, small)",
+            Status::Refused if !c.refused.is_empty() => " (refused)",
+            Status::Refused | Status::NotShown => "",
         };
         table.add_row([
             format!("{}{verdict}", c.id),

@@ -15,6 +15,7 @@ use crate::logs::csv;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::physics::formula::register;
+use crate::sim::installation::Installation;
 use crate::sim::missing::{Craft, Missing, MissingKind};
 use crate::sim::starting_model::starting_model;
 use crate::sim::trial::{Subject, Trial};
@@ -102,6 +103,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
         seed,
         missing: vec![missing.clone()],
         turbulence: arguments.turbulence_severity,
+        installed: Installation::TRUE,
     };
     // written beside it first: the folder is there complete, or not at all
     let beside = tempfile::Builder::new().prefix(".mystery").tempdir_in(parent);

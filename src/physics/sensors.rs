@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 /// The constants of sensors and wind that a flight-path reconstruction estimates, with their units.
-pub const CONSTANTS: [(&str, &str); 20] = [
+pub const CONSTANTS: [(&str, &str); 30] = [
     ("alpha_bias", "rad"),
     ("beta_bias", "rad"),
     ("airspeed_scale", ""),
@@ -27,6 +27,10 @@ pub const CONSTANTS: [(&str, &str); 20] = [
     ("skew_airspeed", "s"),
     ("skew_vanes", "s"),
     ("skew_velocity", "s"),
+    ("alpha_gain", ""),
+    ("beta_gain", ""),
+    ("airspeed_offset", "m/s"),
+    ("heading_offset", "rad"),
     ("gyro_bias_p", "rad/s"),
     ("gyro_bias_q", "rad/s"),
     ("gyro_bias_r", "rad/s"),
@@ -37,6 +41,12 @@ pub const CONSTANTS: [(&str, &str); 20] = [
     ("gyro_drift_p", "rad/s²"),
     ("gyro_drift_q", "rad/s²"),
     ("gyro_drift_r", "rad/s²"),
+    ("gyro_gain_p", ""),
+    ("gyro_gain_q", ""),
+    ("gyro_gain_r", ""),
+    ("accelerometer_gain_x", ""),
+    ("accelerometer_gain_y", ""),
+    ("accelerometer_gain_z", ""),
 ];
 
 /// Keys of the noise of sensors, standard deviations.

@@ -20,6 +20,7 @@ mod hidden_formula;
 pub mod imagined;
 #[cfg(feature = "sitl")]
 pub mod import;
+pub mod installation;
 #[cfg(feature = "sitl")]
 pub mod instruments;
 #[cfg(feature = "sitl")]

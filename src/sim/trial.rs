@@ -8,6 +8,7 @@ use rand::RngExt;
 
 use crate::described::describe;
 use crate::flight_test::{FlightTestError, fly_within_bounds};
+use crate::installation::Installation;
 use crate::instruments::Instruments;
 use crate::missing::Missing;
 use greylag_control::Controller;
@@ -76,6 +77,8 @@ pub struct Trial {
     pub missing: Vec<Missing>,
     /// Severity of the turbulence, 1 to 7, if there is any.
     pub turbulence: Option<u8>,
+    /// How the instruments are installed, the same in all flights.
+    pub installed: Installation,
 }
 
 /// The logs of a trial.
@@ -121,7 +124,9 @@ impl Trial {
         let schedule = &self.subject.scaled(schedule, self.seed);
         let flown = fly_within_bounds(&self.plant(k), controller, schedule)?;
         let seed = stream(self.seed, &[WIND, k as u64, 1]).random();
-        Ok(Instruments::drawn(seed).log(&flown, &format!("{}.csv", schedule.name), seed))
+        let mut log = Instruments::drawn(seed).log(&flown, &format!("{}.csv", schedule.name), seed);
+        self.installed.apply(&mut log);
+        Ok(log)
     }
 
     /// The aircraft in the air of the `k`-th flight.

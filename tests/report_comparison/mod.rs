@@ -195,6 +195,7 @@ fn channel(id: ChannelId, index: usize, size: f64) -> ChannelResult {
 
 fn plain(id: ChannelId, index: usize, size: f64, scale: f64) -> ChannelResult {
     ChannelResult {
+        abstained: None,
         channel: id,
         name: id.name(),
         unit: id.unit(),

@@ -4,7 +4,7 @@
 use greylag::sysid::compare::Comparison;
 use greylag::sysid::diagnose::{
     Advice, Candidate, ChannelLeft, Curve, Decoy, Diagnosis, FlightEstimate, Measurement, Nulls,
-    Parameter, Settings, Tuned, Verdict,
+    Parameter, Settings, Status, Tuned, Verdict,
 };
 
 const FLIGHTS: [&str; 3] = ["train-1.csv", "train-2.csv", "train-3.ulg"];
@@ -152,6 +152,11 @@ fn candidate(
         id: id.into(),
         description,
         asserted,
+        status: match id {
+            "drag_alpha2" => Status::Refused,
+            _ if asserted => Status::Indistinguishable,
+            _ => Status::NotShown,
+        },
         evidence,
         threshold,
         parameters,
@@ -217,6 +222,8 @@ pub fn diagnosis() -> Diagnosis {
             _ => None,
         },
         left_with: (channel == "L").then(|| "α²".into()),
+        abstained: channel == "n",
+        why_abstained: (channel == "n").then(|| "these flights do not move it".into()),
     };
     let measured = |flight: &str, id: &str, value, sd, unit: &str, asserted| Measurement {
         flight: flight.into(),
@@ -258,6 +265,7 @@ pub fn diagnosis() -> Diagnosis {
             "drag_alpha2 stands above chance and is refused, for the flights disagree on it.".into(),
             "All else in the catalogue shows no more than chance.".into(),
         ],
+        doubtful: Vec::new(),
         effects: CANDIDATES.iter().map(candidate).collect(),
         channels: [
             ("D", 0.031, 0.024),

@@ -43,6 +43,7 @@ fn subtitle(report: &DiagnosisReport) -> String {
     let verdict = match d.verdict {
         Verdict::Effect => "an effect is missing",
         Verdict::Adequate => "nothing is seen to be missing",
+        Verdict::Unknown => "these flights cannot say",
         Verdict::Unexplained => "something is missing that the catalogue does not hold",
     };
     format!("{} with {}: {verdict}.", d.model, report.log_files.join(", "))

@@ -25,4 +25,4 @@ pub use result::{
     HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, Regime, RegimeBins,
     Settings, StateScore,
 };
-pub use run::{Options, compare};
+pub use run::{Options, abstentions, compare};

@@ -180,7 +180,9 @@ pub struct ChannelResult {
     pub offset_share: f64,
     /// The worst regime in one sentence.
     pub worst_regime: String,
-    /// The same as numbers; `None` if no supported regime differs from zero.
+    /// Why these flights cannot judge the model here; `None` where they can.
+    pub abstained: Option<&'static str>,
+    /// The worst regime as numbers; `None` if no supported regime differs from zero.
     pub regime: Option<Regime>,
     /// Mean residual over each regime variable.
     pub bins: Vec<RegimeBins>,

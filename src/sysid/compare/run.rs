@@ -14,7 +14,7 @@ use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
 use super::result::{
     ChannelResult, ChannelTrace, Comparison, ModelResult, ModelTrace, RegimeBins, Settings,
 };
-use super::sentence::{Subject, sentence};
+use super::sentence::{NOTHING_LEFT, Subject, sentence};
 use super::verdict;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::progress::{Progress, say};
@@ -24,6 +24,10 @@ use crate::weak_form::kernel::KERNEL_S;
 use crate::weak_form::prepared::Prepared;
 use crate::weak_form::windows::{self, Series};
 use greylag_model::GreyBox;
+
+/// Why a channel is abstained from.
+const UNMOVED: &str = "these flights do not move it above the sensors' noise";
+const DOUBTFUL: &str = "the remaining errors of the sensors may account for all that is left";
 
 /// The channel's variance, less noise, must be at least this part of itself for a share to mean
 /// something.
@@ -168,13 +172,7 @@ fn one_model(
     options: &Options,
 ) -> ModelResult {
     let (runs, paths) = free_run::fly(model, flights, &options.horizons_s);
-    let series: Vec<Vec<Series>> =
-        flights.par_iter().map(|f| windows::channels(model, f)).collect();
-    let shifts: Vec<Vec<[Shift; ChannelId::ALL.len()]>> = flights
-        .par_iter()
-        .zip(from)
-        .map(|(flight, from)| doubt::shifts(model, flight, &from.nuisances))
-        .collect();
+    let (series, shifts) = seen(model, flights, from);
     let seen = Seen { flights, series: &series, shifts: &shifts };
     let channels = all_channels(model, &seen, options.seed);
     let traces = paths.into_iter().zip(flights).zip(&series);
@@ -193,6 +191,31 @@ fn one_model(
             })
             .collect(),
     }
+}
+
+/// Why `flights` cannot judge `model`, channel by channel; `None` where they can, or where a channel was not measured.
+///
+/// # Errors
+/// No flight can be compared.
+pub fn abstentions(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    seed: u64,
+) -> Result<Vec<(ChannelId, Option<&'static str>)>, CompareError> {
+    let (used, prepared, _) = usable(flights, model.airframe.envelope.flying_from_mps())?;
+    let (series, shifts) = seen(model, &prepared, &used);
+    let seen = Seen { flights: &prepared, series: &series, shifts: &shifts };
+    Ok(all_channels(model, &seen, seed).into_iter().map(|c| (c.channel, c.abstained)).collect())
+}
+
+type Measured = (Vec<Vec<Series>>, Vec<Vec<[Shift; ChannelId::ALL.len()]>>);
+
+/// What `flights` measure in every channel, and what the doubts of their sensors do there.
+fn seen(model: &GreyBox, flights: &[Prepared], from: &[&Reconstruction]) -> Measured {
+    let series = flights.par_iter().map(|f| windows::channels(model, f)).collect();
+    let pairs = flights.par_iter().zip(from);
+    let shifts = pairs.map(|(flight, from)| doubt::shifts(model, flight, &from.nuisances));
+    (series, shifts.collect())
 }
 
 /// The flights as one model sees them, a list a flight.
@@ -231,13 +254,20 @@ fn channel(
     let (id, number) = (ChannelId::ALL[place], place as u64);
     let power = Power::of(residuals, noise(id, series));
     let found = finding::worst(residuals, &bins, flights, seed, number);
+    let within_doubt = (power.residual - power.noise).max(0.0).sqrt()
+        < doubt::NORMAL_95 * doubt::level(residuals.iter().map(|r| &r.shift));
+    let unexplained = power.unexplained();
+    let abstained = match found {
+        _ if unexplained.is_nan() => Some(UNMOVED),
+        None if within_doubt && unexplained >= NOTHING_LEFT => Some(DOUBTFUL),
+        _ => None,
+    };
     let worst_regime = sentence(&Subject {
         channel: id,
-        unexplained: power.unexplained(),
+        unexplained,
         finding: found.as_ref(),
         follows: finding::follows(&bins),
-        within_doubt: (power.residual - power.noise).max(0.0).sqrt()
-            < doubt::NORMAL_95 * doubt::level(residuals.iter().map(|r| &r.shift)),
+        within_doubt,
         mass: model.body.mass,
         flights: flights.len(),
     });
@@ -249,10 +279,11 @@ fn channel(
         measured_sd: power.measured.sqrt(),
         residual_rms: power.residual.sqrt(),
         noise_sd: power.noise.sqrt(),
-        unexplained_fraction: power.unexplained(),
+        unexplained_fraction: unexplained,
         effect_per_s: (power.residual - power.noise).max(0.0).sqrt() * leverage(model, id),
         offset_share: power.offset,
         worst_regime,
+        abstained,
         regime: found.map(|f| f.regime),
         bins,
         map: bins::map(residuals),

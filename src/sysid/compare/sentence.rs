@@ -7,7 +7,7 @@ use crate::weak_form::channels::{ChannelId, RegimeVariable};
 /// A channel that the model explains but for less than this is said to be explained.
 const EXPLAINED: f64 = 0.01;
 /// Below this no regime is worth naming.
-const NOTHING_LEFT: f64 = 0.001;
+pub const NOTHING_LEFT: f64 = 0.001;
 
 /// What a sentence about a channel is made from.
 pub struct Subject<'a> {

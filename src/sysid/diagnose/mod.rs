@@ -15,7 +15,7 @@ pub(crate) mod search;
 pub use answer::curves::over_the_best;
 pub use answer::result::{
     Advice, Candidate, ChannelLeft, Curve, Decoy, Diagnosis, FlightEstimate, FlightTrim,
-    Measurement, Nulls, Parameter, Settings, Tuned, Verdict,
+    Measurement, Nulls, Parameter, Settings, Status, Tuned, Verdict,
 };
 pub use answer::run::{diagnose, searched};
 pub use error::DiagnoseError;

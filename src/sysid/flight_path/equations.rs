@@ -29,6 +29,8 @@ pub struct Found {
     pub values: Values,
     /// Their standard deviations.
     pub deviations: Values,
+    /// Their standard deviations before the data was seen, wider for those that it showed beyond doubt.
+    pub widths: Values,
     /// Noise levels.
     pub levels: Levels,
 }
@@ -160,6 +162,34 @@ impl Problem<'_> {
         }))
     }
 
+    /// What `place` would be, were nothing known of it before the data, with its standard deviation, for each of `places`
+    /// alone; NaN where the data cannot tell.
+    pub fn unbound(&self, found: &Found, bound: f64, places: &[usize]) -> Option<Vec<[f64; 2]>> {
+        let (_, _, left) = self.eliminate::<MOTION, WIDTH, AT, BETWEEN>(found, bound, None)?;
+        let bound = self.information(&left)?;
+        let pull = self.pull(found, &left);
+        let of = |place: &usize| {
+            let (mut information, mut right) = (bound, pull);
+            information[(*place, *place)] = left.corner[*place][*place];
+            right[*place] = left.corner[*place][WIDTH - 1];
+            information.cholesky().map_or([f64::NAN; 2], |factor| {
+                let variance = factor.inverse()[(*place, *place)];
+                let value = found.values[*place] + factor.solve(&right)[*place];
+                [value, variance.max(0.0).sqrt()]
+            })
+        };
+        Some(places.iter().map(of).collect())
+    }
+
+    /// Where the data and what was known before pull the constants.
+    fn pull<const W: usize>(&self, found: &Found, left: &Left<W>) -> SVector<f64, COUNT> {
+        SVector::<f64, COUNT>::from_fn(|i, _| {
+            let data =
+                if nuisance::unseeable(i, &self.log.has) { 0.0 } else { left.corner[i][W - 1] };
+            data - (found.values[i] - self.means[i]) / self.widths[i].powi(2)
+        })
+    }
+
     fn solve<const N: usize, const W: usize, const M: usize, const D: usize>(
         &self,
         found: &Found,
@@ -170,11 +200,7 @@ impl Problem<'_> {
         let mut by = [0.0; W];
         by[W - 1] = 1.0;
         if W == WIDTH {
-            let right = SVector::<f64, COUNT>::from_fn(|i, _| {
-                let data =
-                    if nuisance::unseeable(i, &self.log.has) { 0.0 } else { left.corner[i][W - 1] };
-                data - (found.values[i] - self.means[i]) / self.widths[i].powi(2)
-            });
+            let right = self.pull(found, &left);
             let factor = self.information(&left)?.cholesky()?;
             constants = factor.solve(&right).into();
             let covariance = factor.inverse();

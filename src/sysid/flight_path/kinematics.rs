@@ -5,7 +5,9 @@ use nalgebra::{Matrix3, Vector3};
 use crate::flight_path::band::{Block, Wide};
 use crate::flight_path::channel::cubic;
 use crate::flight_path::intake::{Span, Track};
-use crate::flight_path::nuisance::{self, EARTH, FORCE, INERTIAL, SKEW_FORCE, Values};
+use crate::flight_path::nuisance::{
+    self, EARTH, FORCE, FORCE_GAIN, GYRO_GAIN, INERTIAL, SKEW_FORCE, Values,
+};
 use crate::flight_path::path::Path;
 use crate::flight_path::rotation::{self, cross, exp, log};
 use greylag_logs::Sampling;
@@ -77,10 +79,12 @@ impl Drive {
     ) -> Drive {
         let n = track.len();
         let gyro = |k: usize| {
-            Vector3::from(track.rates[k])
+            Vector3::from(nuisance::without_gain(values, GYRO_GAIN, track.rates[k]))
                 - Vector3::from(nuisance::gyro_bias(values, track.time(k, step), &track.span))
         };
-        let (force, slope) = shifted(&track.force, values[SKEW_FORCE] / step);
+        let scaled: Vec<[f64; 3]> =
+            track.force.iter().map(|f| nuisance::without_gain(values, FORCE_GAIN, *f)).collect();
+        let (force, slope) = shifted(&scaled, values[SKEW_FORCE] / step);
         let has_force = track.force.first().is_some_and(|f| f[0].is_finite());
         let (start, span) = (track.start, track.span);
         let mut drive = Drive { rate: vec![], force: vec![], force_by_skew: vec![], start, span };
@@ -155,6 +159,8 @@ impl Drive {
             }
             put(&mut link.rest, (3, FORCE - INERTIAL), &(one * step));
             for i in 0..3 {
+                link.rest[i][GYRO_GAIN + i - INERTIAL] = self.rate[k][i] * step;
+                link.rest[3 + i][FORCE_GAIN + i - INERTIAL] = self.force[k][i] * step;
                 link.rest[3 + i][SKEW_FORCE - INERTIAL] = self.force_by_skew[k][i] * -step;
             }
             for (place, axis) in [(EARTH, Vector3::x()), (EARTH + 1, Vector3::z())] {

@@ -9,8 +9,8 @@ use crate::flight_path::intake::Track;
 use crate::flight_path::kinematics::MOTION_AND_GUST;
 use crate::flight_path::lever_arm::air_at;
 use crate::flight_path::nuisance::{
-    ALPHA, BETA, INERTIAL, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_VANES, SKEW_VELOCITY, Values,
-    WIND,
+    AIRSPEED_OFFSET, ALPHA, BETA, HEADING, INERTIAL, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE,
+    SKEW_VANES, SKEW_VELOCITY, VANE_GAIN, Values, WIND,
 };
 use crate::flight_path::path::{CHANNELS, Path, SLOW, flow_angles};
 use crate::flight_path::rotation::{cross, euler_by_turn, to_euler};
@@ -82,10 +82,17 @@ fn shown(path: &Path, k: usize, rates: &[f64; 3], vanes_at: Option<[f64; 3]>) ->
     [roll, pitch, yaw, u.norm(), alpha, beta, ground.x, ground.y, ground.z]
 }
 
+/// Turns the slopes of what is true into those of what its sensors show.
+fn scale(slopes: &mut Matrix3<f64>, values: &Values) {
+    for (row, place) in [SCALE, VANE_GAIN, VANE_GAIN + 1].into_iter().enumerate() {
+        slopes.row_mut(row).scale_mut(1.0 + values[place]);
+    }
+}
+
 /// How airspeed, α and β as measured change with a gust at sample `k`, earth axes.
 pub fn by_gust(path: &Path, k: usize, values: &Values) -> Option<Matrix3<f64>> {
     let mut slopes = air_slopes(&path.air_velocity(k))?;
-    slopes.row_mut(0).scale_mut(1.0 + values[SCALE]);
+    scale(&mut slopes, values);
     Some(slopes * -path.attitude[k].transpose())
 }
 
@@ -148,9 +155,10 @@ fn turn(channel: usize, x: f64) -> f64 {
 /// What a sensor with its errors shows where one without shows `h`, and the gain from one to the other.
 fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
     match channel {
-        3 => (h * (1.0 + values[SCALE]), 1.0 + values[SCALE]),
-        4 => (h + values[ALPHA], 1.0),
-        5 => (h + values[BETA], 1.0),
+        2 => (h + values[HEADING], 1.0),
+        3 => (h * (1.0 + values[SCALE]) + values[AIRSPEED_OFFSET], 1.0 + values[SCALE]),
+        4 => (h * (1.0 + values[VANE_GAIN]) + values[ALPHA], 1.0 + values[VANE_GAIN]),
+        5 => (h * (1.0 + values[VANE_GAIN + 1]) + values[BETA], 1.0 + values[VANE_GAIN + 1]),
         _ => (h, 1.0),
     }
 }
@@ -228,7 +236,7 @@ fn slopes<const N: usize, const M: usize>(
         }
     }
     if let Some(mut slopes) = air_slopes(&u) {
-        slopes.row_mut(0).scale_mut(1.0 + values[SCALE]);
+        scale(&mut slopes, values);
         let (by_turn, by_velocity) = (slopes * cross(&u), slopes * body);
         for i in 0..3 {
             let mut row = [0.0; N];
@@ -246,7 +254,11 @@ fn slopes<const N: usize, const M: usize>(
         }
         if M > 1 {
             constants[3][from + SCALE] = u.norm();
+            constants[3][from + AIRSPEED_OFFSET] = 1.0;
             (constants[4][from + ALPHA], constants[5][from + BETA]) = (1.0, 1.0);
+            let [alpha, beta] = flow_angles(&u);
+            constants[4][from + VANE_GAIN] = alpha;
+            constants[5][from + VANE_GAIN + 1] = beta;
         }
     }
     for (channel, node) in nodes.iter_mut().enumerate().skip(6) {
@@ -255,6 +267,7 @@ fn slopes<const N: usize, const M: usize>(
         *node = Some(row);
     }
     if M > 1 {
+        constants[2][from + HEADING] = 1.0;
         for (channel, row) in constants.iter_mut().enumerate() {
             row[from + skew_of(channel)] = reading.by_late[channel];
         }

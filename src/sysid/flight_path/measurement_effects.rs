@@ -10,7 +10,7 @@ const PATH: &str = "kinematics of a rigid body, which hold no aerodynamics; Klei
                     Identification, section 10.2";
 
 /// Every measurement effect there is.
-pub const MEASUREMENT_EFFECTS: [Description; 6] = [
+pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     Description {
         id: "steady_wind",
         description: "The air moves over the ground.",
@@ -86,6 +86,65 @@ pub const MEASUREMENT_EFFECTS: [Description; 6] = [
         })
     },
     Description {
+        id: "vane_gain",
+        description: "A vane turns more or less than the flow: upwash of the wing or the body, or its calibration.",
+        formula: "α_measured = (1 + g) α + b",
+        source: PATH,
+        coefficients: &[
+            coefficient("alpha_gain", "measured by true, less 1, of α", "", (-0.5, 0.5)),
+            coefficient("beta_gain", "measured by true, less 1, of β", "", (-0.5, 0.5)),
+        ],
+        ..measured(&Entry {
+            channels: &[],
+            look_alikes: &["lift_linear.CLalpha", "drag_alpha2", "pitch_linear.Cmalpha"],
+            separated_by: "slow flight and pull-ups with the velocity over ground logged",
+            example: &[],
+            starts: &[],
+        })
+    },
+    Description {
+        id: "imu_gain",
+        description: "Gyros or accelerometers show more or less than there is, by a share.",
+        formula: "ω_measured = (1 + g) (ω + b), f_measured = (1 + g) (f + b)",
+        source: PATH,
+        coefficients: &GAINS,
+        ..measured(&Entry {
+            channels: &[],
+            look_alikes: &["mass_error", "inertia_xz", "roll_linear.Clp", "pitch_linear.Cmq"],
+            separated_by: "steep banks held and fast rolls with attitude and velocity over ground logged",
+            example: &[],
+            starts: &[],
+        })
+    },
+    Description {
+        id: "airspeed_offset",
+        description: "The airspeed reads too high or too low by a constant.",
+        formula: "V_measured = (1 + s) V + b",
+        source: PATH,
+        coefficients: &[coefficient("airspeed_offset", "measured less true", "m/s", (-10.0, 10.0))],
+        ..measured(&Entry {
+            channels: &[],
+            look_alikes: &["airspeed_scale", "steady_wind"],
+            separated_by: "slow and fast flight on several headings with the velocity over ground logged",
+            example: &[],
+            starts: &[],
+        })
+    },
+    Description {
+        id: "heading_offset",
+        description: "The measured heading stands askew against the velocity over ground.",
+        formula: "ψ_measured = ψ + b",
+        source: PATH,
+        coefficients: &[coefficient("heading_offset", "measured less true", "rad", (-0.5, 0.5))],
+        ..measured(&Entry {
+            channels: &[],
+            look_alikes: &["steady_wind", "beta_bias", "asymmetry"],
+            separated_by: "turns to both sides through all headings",
+            example: &[],
+            starts: &[],
+        })
+    },
+    Description {
         id: "clock_skew",
         description: "A group of sensors is logged late.",
         formula: "x_measured(t) = x(t − T), a T for each group; the gyros set the clock",
@@ -123,12 +182,21 @@ const IMU: [Coefficient; 9] = [
     coefficient("accelerometer_bias_z", "of the downward accelerometer", "m/s²", (-5.0, 5.0)),
 ];
 
+const GAINS: [Coefficient; 6] = [
+    coefficient("gyro_gain_p", "of the roll gyro, less 1", "", (-0.5, 0.5)),
+    coefficient("gyro_gain_q", "of the pitch gyro, less 1", "", (-0.5, 0.5)),
+    coefficient("gyro_gain_r", "of the yaw gyro, less 1", "", (-0.5, 0.5)),
+    coefficient("accelerometer_gain_x", "of the forward accelerometer, less 1", "", (-0.5, 0.5)),
+    coefficient("accelerometer_gain_y", "of the rightward accelerometer, less 1", "", (-0.5, 0.5)),
+    coefficient("accelerometer_gain_z", "of the downward accelerometer, less 1", "", (-0.5, 0.5)),
+];
+
 const SKEW: [Coefficient; 5] = [
-    coefficient("skew_attitude", "delay of the attitude behind the gyros", "s", (-0.1, 0.1)),
-    coefficient("skew_accelerometer", "delay of the accelerometers", "s", (-0.1, 0.1)),
-    coefficient("skew_airspeed", "delay of the airspeed", "s", (-0.1, 0.1)),
-    coefficient("skew_vanes", "delay of the vanes", "s", (-0.1, 0.1)),
-    coefficient("skew_velocity", "delay of the velocity over ground", "s", (-0.1, 0.1)),
+    coefficient("skew_attitude", "delay of the attitude behind the gyros", "s", (-2.0, 2.0)),
+    coefficient("skew_accelerometer", "delay of the accelerometers", "s", (-2.0, 2.0)),
+    coefficient("skew_airspeed", "delay of the airspeed", "s", (-2.0, 2.0)),
+    coefficient("skew_vanes", "delay of the vanes", "s", (-2.0, 2.0)),
+    coefficient("skew_velocity", "delay of the velocity over ground", "s", (-2.0, 2.0)),
 ];
 
 /// What all of them share: no shape constants, no table.

@@ -8,6 +8,7 @@ pub mod reconstruction;
 
 mod actuator_skew;
 mod band;
+mod calibration;
 mod channel;
 mod equations;
 mod gusts;
@@ -174,7 +175,8 @@ pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction,
     let declared = options.sampling.or_else(|| flight.declared_sampling());
     let problem = Problem { log: &log, options, sampling: Sampling::Instants, means, widths };
     let Chosen { sampling, found, note } = sampling::choose(&problem, declared)?;
-    let mut outcome = outcome::assemble(&Problem { sampling, ..problem }, &found)?;
+    let widths = found.widths;
+    let mut outcome = outcome::assemble(&Problem { sampling, widths, ..problem }, &found)?;
     outcome.notes.extend(note);
     Ok(outcome)
 }

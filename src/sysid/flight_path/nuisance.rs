@@ -5,7 +5,7 @@ use crate::flight_path::intake::{Log, Present, Span};
 use greylag_physics::sensors::CONSTANTS;
 
 /// Number of constants.
-pub const COUNT: usize = 31;
+pub const COUNT: usize = 41;
 /// Place of the bias of the angle-of-attack vane.
 pub const ALPHA: usize = 0;
 /// Place of the bias of the sideslip vane.
@@ -22,29 +22,42 @@ pub const SKEW_AIRSPEED: usize = 7;
 pub const SKEW_VANES: usize = 8;
 /// Place of the delay of the velocity over ground.
 pub const SKEW_VELOCITY: usize = 9;
+/// Place of the gains of the vanes of α and β less one: upwash of a wing or a body.
+pub const VANE_GAIN: usize = 10;
+const BETA_GAIN: usize = VANE_GAIN + 1;
+/// Place of the offset of the airspeed: measured = (1 + scale) · true + offset.
+pub const AIRSPEED_OFFSET: usize = 12;
+/// Place of the offset of the measured heading against the velocity over ground.
+pub const HEADING: usize = 13;
 /// The first of the constants that act between instants; those before it act at instants.
-pub const INERTIAL: usize = 10;
+pub const INERTIAL: usize = 14;
 /// Place of the gyro biases p, q, r in the middle of the flight.
-pub const GYRO: usize = 10;
+pub const GYRO: usize = 14;
 /// Place of the accelerometer biases x, y, z.
-pub const FORCE: usize = 13;
+pub const FORCE: usize = 17;
 /// Place of the delay of the accelerometers.
-pub const SKEW_FORCE: usize = 16;
+pub const SKEW_FORCE: usize = 20;
 /// Place of the drifts of the gyro biases p, q, r: their change with time, rad/s². A gyro that warms up drifts
 /// by 0.05°/s a minute (so does ArduPilot's SITL): held constant, its bias turned the heading by 1.5° in four minutes.
-pub const DRIFT: usize = 17;
+pub const DRIFT: usize = 21;
+/// Place of the gains of the gyros p, q, r less one.
+pub const GYRO_GAIN: usize = 24;
+/// Place of the gains of the accelerometers x, y, z less one.
+pub const FORCE_GAIN: usize = 27;
 /// Place of what bends the drifts, rad/s²: their changes at the inner knots of the flight, p, q, r of each. The drift of
 /// ArduPilot's SITL turns back after five minutes.
-pub const BEND: usize = 20;
+pub const BEND: usize = 30;
 /// Number of inner knots, as far from one another as from the ends of the flight.
 const KNOTS: usize = 3;
 /// Place of the Earth's rate north and down, rad/s: a log without a latitude does not say them, and
 /// their Coriolis acceleration, 0.003 m/s² at 20 m/s, is twice what a minute's accelerometer bias is known to.
-pub const EARTH: usize = 29;
+pub const EARTH: usize = 39;
 
 /// The constants in the order in which they are handed out.
-pub const ORDER: [usize; BEND] =
-    [10, 11, 12, 17, 18, 19, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 16, 7, 8, 9];
+pub const ORDER: [usize; BEND] = [
+    14, 15, 16, 21, 22, 23, 24, 25, 26, 17, 18, 19, 27, 28, 29, 0, 1, 10, 11, 2, 12, 13, 3, 4, 5,
+    6, 20, 7, 8, 9,
+];
 
 /// Prior width of a clock skew, samples: ±1.5 samples are its 95 % interval.
 pub const SKEW_SAMPLES: f64 = 0.77;
@@ -86,12 +99,41 @@ impl Span {
 /// Part of its usual width to which a constant is held that is known exactly: the equations stay regular.
 const HELD: f64 = 1e-4;
 
+/// Errors that an instrument has seldom: held at zero until a flight shows them beyond doubt (see `calibration`), with how
+/// wide each is then.
+const SELDOM: [(usize, f64); 10] = [
+    (VANE_GAIN, 0.2),
+    (VANE_GAIN + 1, 0.2),
+    (AIRSPEED_OFFSET, 2.0),
+    (HEADING, 10.0 * std::f64::consts::PI / 180.0),
+    (GYRO_GAIN, 0.1),
+    (GYRO_GAIN + 1, 0.1),
+    (GYRO_GAIN + 2, 0.1),
+    (FORCE_GAIN, 0.1),
+    (FORCE_GAIN + 1, 0.1),
+    (FORCE_GAIN + 2, 0.1),
+];
+/// Standard deviation of a delay that is beyond its usual width, s.
+const LATE: f64 = 0.5;
+
+/// How wide a constant is once a flight has shown it beyond doubt; `None` of one that is free anyway.
+pub fn wide(place: usize) -> Option<f64> {
+    let late = matches!(place, SKEW_ATTITUDE..=SKEW_VELOCITY | SKEW_FORCE);
+    SELDOM.iter().find(|(of, _)| *of == place).map(|(_, width)| *width).or(late.then_some(LATE))
+}
+
+/// Whether a constant of the prior width `width` is one of those that a flight has to show first, and is held.
+pub fn held(place: usize, width: f64) -> bool {
+    SELDOM.iter().any(|(of, wide)| *of == place && width <= 2.0 * HELD * wide)
+}
+
 /// Standard deviations before the data of `log` is seen: those of its sensors, else the usual ones.
 pub fn prior_widths(log: &Log) -> Values {
     let mut widths = usual_widths(log);
-    for (width, (name, _)) in widths.iter_mut().zip(NAMES) {
+    for (place, (width, (name, _))) in widths.iter_mut().zip(NAMES).enumerate() {
         if let Some(known) = log.sensors.known(name) {
-            *width = known.sd.max(HELD * *width);
+            let least = if held(place, *width) { *width } else { HELD * *width };
+            *width = known.sd.max(least);
         }
     }
     widths
@@ -118,6 +160,9 @@ fn usual_widths(log: &Log) -> Values {
         let drift = log.sensors.known(NAMES[DRIFT + (place - BEND) % 3].0);
         let sd = drift.map_or(DRIFTING, |known| known.sd.max(HELD * DRIFTING));
         width[place] = sd * (apart / STEADY).sqrt().max(HELD);
+    }
+    for (place, wide) in SELDOM {
+        width[place] = HELD * wide;
     }
     width[EARTH..EARTH + 2].copy_from_slice(&[1.3e-5, 4.2e-5]);
     width
@@ -162,6 +207,11 @@ pub fn gyro_bias(values: &Values, time: f64, span: &Span) -> [f64; 3] {
     })
 }
 
+/// `measured` on three axes without their gains, which stand from `first` on: measured = (1 + gain) · (true + bias).
+pub fn without_gain(values: &Values, first: usize, measured: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|axis| measured[axis] / (1.0 + values[first + axis]))
+}
+
 /// What is added to a constant where it is handed out: the airspeed scale is a factor there.
 pub fn offset(place: usize) -> f64 {
     if place == SCALE { 1.0 } else { 0.0 }
@@ -170,11 +220,13 @@ pub fn offset(place: usize) -> f64 {
 /// Whether the log has the sensor that a constant belongs to.
 pub fn concerned(place: usize, has: &Present) -> bool {
     match place {
-        ALPHA => has.alpha,
-        BETA => has.beta,
+        ALPHA | VANE_GAIN => has.alpha,
+        BETA | BETA_GAIN => has.beta,
         SKEW_VANES => has.alpha || has.beta,
         FORCE..=SKEW_FORCE => has.force,
         SKEW_VELOCITY => has.velocity,
+        HEADING => has.yaw && has.velocity,
+        FORCE_GAIN..BEND => has.force,
         BEND.. => false,
         _ => true,
     }
@@ -184,7 +236,9 @@ pub fn concerned(place: usize, has: &Present) -> bool {
 /// sensor of the air meets another one: only the smoothness of the path is left, and that favours whatever
 /// makes the aircraft slower (an airspeed scale of four in a flight without any error).
 pub fn unseeable(place: usize, has: &Present) -> bool {
-    let of_the_air = place < SKEW_ATTITUDE || place == SKEW_AIRSPEED || place == SKEW_VANES;
+    let of_the_air = place < SKEW_ATTITUDE
+        || place == SKEW_AIRSPEED
+        || (SKEW_VANES..=AIRSPEED_OFFSET).contains(&place) && place != SKEW_VELOCITY;
     of_the_air && !has.force && !has.velocity
 }
 

@@ -7,7 +7,9 @@ use crate::flight_path::channel::wrap;
 use crate::flight_path::equations::{Found, Problem, no_path};
 use crate::flight_path::intake::{Log, Track};
 use crate::flight_path::kinematics::shifted;
-use crate::flight_path::nuisance::{self, BEND, COUNT, DRIFT, FORCE, SKEW_FORCE, Values, WIND};
+use crate::flight_path::nuisance::{
+    self, BEND, COUNT, DRIFT, FORCE, FORCE_GAIN, GYRO_GAIN, SKEW_FORCE, Values, WIND,
+};
 use crate::flight_path::path::{Path, flow_angles};
 use crate::flight_path::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
 use crate::flight_path::rotation::to_euler;
@@ -167,14 +169,18 @@ fn segment(
         let [alpha, beta] = flow_angles(&air);
         let noise = gyro.map_or([0.0; 3], |g| g[k]);
         let bias = nuisance::gyro_bias(values, track.time(k, log.step), &track.span);
-        let [p, q, r] = std::array::from_fn(|i| track.rates[k][i] - bias[i] + noise[i]);
+        let rates = nuisance::without_gain(values, GYRO_GAIN, track.rates[k]);
+        let [p, q, r] = std::array::from_fn(|i| rates[i] - bias[i] + noise[i]);
         Instant {
             time_s: track.start + k as f64 * log.step,
             state: State { roll, pitch, airspeed: air.norm(), p, q, r, alpha, beta },
             yaw: if log.has.yaw { yaw } else { f64::NAN },
             controls: track.controls[k],
             command: track.commands[k],
-            specific_force: std::array::from_fn(|i| force[k][i] - values[FORCE + i]),
+            specific_force: std::array::from_fn(|i| {
+                let gain = if log.has.force { 1.0 + values[FORCE_GAIN + i] } else { 1.0 };
+                force[k][i] / gain - values[FORCE + i]
+            }),
             // Without an altitude the air is that of sea level, as the notes say.
             altitude: Some(track.altitude[k]).filter(|h| h.is_finite()).unwrap_or(0.0),
             density: track.density[k],
@@ -230,6 +236,7 @@ fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
     nuisance::ORDER
         .into_iter()
         .filter(|place| nuisance::concerned(*place, &problem.log.has))
+        .filter(|place| !nuisance::held(*place, problem.widths[*place]))
         .map(|place| {
             let (name, unit) = nuisance::NAMES[place];
             let offset = nuisance::offset(place);
@@ -304,6 +311,7 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
         let stated = log.sensors.known(nuisance::NAMES[*place].0).is_some();
         // a drift that a flight is too short to show does it no harm
         !stated
+            && !nuisance::held(*place, problem.widths[*place])
             && !(DRIFT..BEND).contains(place)
             && smoothed.deviations[*place] > UNSEEN * problem.widths[*place]
     };

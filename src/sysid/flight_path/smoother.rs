@@ -8,6 +8,7 @@
 use nalgebra::Vector3;
 
 use crate::flight_path::ReconstructError;
+use crate::flight_path::calibration;
 use crate::flight_path::equations::{Found, Problem, Solved, no_path};
 use crate::flight_path::gusts;
 use crate::flight_path::kinematics::MOTION;
@@ -43,24 +44,39 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
         paths: log.tracks.iter().map(Path::guess).collect(),
         values: means,
         deviations: widths,
+        widths,
         levels: Levels::first(log),
     };
     start(&mut found, problem);
-    for iteration in 0..LAST {
+    calm(problem, &mut found, 0)?;
+    let problem = &mut problem.clone();
+    while let Some((place, width)) = calibration::next(problem, &found, BOUND) {
+        problem.widths[place] = width;
+        found.widths = problem.widths;
+        calm(problem, &mut found, FIRST)?;
+    }
+    gusty(problem, &mut found, &singular)?;
+    Ok(found)
+}
+
+/// Fits motion and constants as if the air were calm, from iteration `from` on.
+fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), ReconstructError> {
+    let Problem { log, options, .. } = *problem;
+    let singular = || no_path(&options.name, "the equations became singular");
+    for iteration in from..LAST {
         let bound = if iteration < FIRST { f64::INFINITY } else { BOUND };
-        let solved = problem.calm(&found, bound).ok_or_else(singular)?;
-        let moved = search(problem, &mut found, &solved, bound)?;
+        let solved = problem.calm(found, bound).ok_or_else(singular)?;
+        let moved = search(problem, found, &solved, bound)?;
         if iteration < FIRST {
             continue;
         }
         let change = found.levels.renew(&solved.readings, log.step);
-        let change = change.max(found.levels.loosen(&problem.strain(&found)));
-        if iteration > FIRST && moved < SETTLED && change < LEVEL_SETTLED {
+        let change = change.max(found.levels.loosen(&problem.strain(found)));
+        if iteration > from.max(FIRST) && moved < SETTLED && change < LEVEL_SETTLED {
             break;
         }
     }
-    gusty(problem, &mut found, &singular)?;
-    Ok(found)
+    Ok(())
 }
 
 /// Goes the step, or the largest part of it (halved from try to try) that fits the data better; none if there is none.

@@ -3,17 +3,24 @@
 use crate::diagnose::answer::result::Measurement;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 
-/// A constant's prefix, its id in the catalogue, its nominal value, what its kind allows.
-const KINDS: [(&str, &str, f64, f64); 9] = [
-    ("gyro_bias", "imu_bias", 0.0, 0.02),
+/// A constant's prefix, its id in the catalogue, its nominal value, and how far from it the constant changes nothing that
+/// anybody would notice: what the filters' own errors leave, or a trim.
+const KINDS: [(&str, &str, f64, f64); 15] = [
+    ("gyro_bias", "imu_bias", 0.0, 0.005),
     ("gyro_drift", "imu_bias", 0.0, 5e-5),
-    ("accelerometer_bias", "imu_bias", 0.0, 0.3),
-    ("alpha_bias", "alpha_bias", 0.0, 0.026),
-    ("beta_bias", "beta_bias", 0.0, 0.026),
-    ("airspeed_scale", "airspeed_scale", 1.0, 0.05),
-    ("wind_", "steady_wind", 0.0, 1.0),
+    ("accelerometer_bias", "imu_bias", 0.0, 0.1),
+    ("alpha_bias", "alpha_bias", 0.0, 0.005),
+    ("beta_bias", "beta_bias", 0.0, 0.005),
+    ("alpha_gain", "vane_gain", 0.0, 0.01),
+    ("beta_gain", "vane_gain", 0.0, 0.01),
+    ("gyro_gain", "imu_gain", 0.0, 0.01),
+    ("accelerometer_gain", "imu_gain", 0.0, 0.01),
+    ("airspeed_offset", "airspeed_offset", 0.0, 0.3),
+    ("heading_offset", "heading_offset", 0.0, 0.026),
+    ("airspeed_scale", "airspeed_scale", 1.0, 0.01),
+    ("wind_", "steady_wind", 0.0, 0.5),
     ("skew_actuators", "actuators_late", 0.0, 0.015),
-    ("skew_", "clock_skew", 0.0, 0.015),
+    ("skew_", "clock_skew", 0.0, 0.005),
 ];
 /// Standard deviations beyond which a constant is clearly not zero.
 const CLEARLY: f64 = 4.0;

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use crate::diagnose::answer::result::{FlightTrim, Measurement};
-use crate::diagnose::answer::sentences::figures;
+use crate::diagnose::answer::sentences::{INTERVAL, figures};
 use crate::diagnose::search::round::Round;
 use crate::per_flight::{Constant, askew};
 
@@ -131,34 +131,38 @@ fn misfit(round: &Round, flight: usize) -> f64 {
     (square / rows.max(1) as f64).max(1.0).sqrt()
 }
 
-/// What is clearly so, a sentence for each flight.
-pub fn sentences(measurement: &[Measurement], trims: &[FlightTrim]) -> Vec<String> {
-    let mut said: Vec<String> = Vec::new();
+/// Axes that clearly stand askew, a sentence for each flight.
+pub fn askew_sentences(measurement: &[Measurement]) -> Vec<String> {
     let turned = measurement.iter().filter(|m| m.id == askew::ID && m.asserted).map(|m| {
         let about = m.name.trim_start_matches("askew_");
-        let [value, sd] = [m.value, m.sd].map(f64::to_degrees);
-        (m.flight.as_str(), format!("{about} {value:.1} ± {sd:.1}°"))
+        let [value, half] = [m.value, INTERVAL * m.sd].map(f64::to_degrees);
+        (m.flight.as_str(), format!("{about} {value:.2} ± {half:.2}°"))
     });
-    for (flight, all) in by_flight(turned) {
-        said.push(format!(
-            "{flight}: the measured axes stand askew, {all} ({}), fitted beside the aerodynamics.",
+    let one = |(flight, all): (&str, String)| {
+        format!(
+            "{flight}: the measured axes stand askew, {all} (95 %; {}), fitted beside the aerodynamics.",
             askew::ID
-        ));
-    }
+        )
+    };
+    by_flight(turned).into_iter().map(one).collect()
+}
+
+/// Trims that clearly differ, a sentence for each flight.
+pub fn trim_sentences(trims: &[FlightTrim]) -> Vec<String> {
     let trims = trims.iter().filter(|t| t.asserted).filter_map(|t| {
         let [by, sd] = t.beside_mean?;
         let sign = if by < 0.0 { "−" } else { "+" };
         Some((
             t.flight.as_str(),
-            format!("{} {sign}{} ± {}", t.name, figures(by.abs()), figures(sd)),
+            format!("{} {sign}{} ± {}", t.name, figures(by.abs()), figures(INTERVAL * sd)),
         ))
     });
-    for (flight, all) in by_flight(trims) {
-        said.push(format!(
-            "{flight}: its trim differs from the mean of the flights, {all} (flight_trims)."
-        ));
-    }
-    said
+    let one = |(flight, all): (&str, String)| {
+        format!(
+            "{flight}: its trim differs from the mean of the flights, {all} (95 %; flight_trims)."
+        )
+    };
+    by_flight(trims).into_iter().map(one).collect()
 }
 
 /// Neighbours of one flight joined.

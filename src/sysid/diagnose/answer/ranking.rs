@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::compare::ChannelId;
 use crate::diagnose::answer::curves;
 use crate::diagnose::answer::detectable::detectable;
-use crate::diagnose::answer::result::{Candidate, FlightEstimate, Parameter};
+use crate::diagnose::answer::result::{Candidate, FlightEstimate, Parameter, Status};
 use crate::diagnose::options::{Detail, Options};
 use crate::diagnose::regression::columns::Ready;
 use crate::diagnose::regression::rank::{Score, Trial};
@@ -58,6 +58,20 @@ pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
     list
 }
 
+/// Ids of asserted effects each of whose constants may be zero (95 %) once all effects have settled: what another effect took
+/// over. Shape constants are no amounts.
+pub fn void(found: &Found, options: &Options) -> Vec<String> {
+    let lean = Options { detail: Detail::Lean, ..options.clone() };
+    let asserted = found.selected.iter().filter(|s| s.refused.is_empty());
+    let candidates = asserted.filter_map(|s| selected(found, s, &lean));
+    let may_be_zero = |c: &Candidate| {
+        let amounts = describe(&c.id).map_or(0, |about| about.coefficients.len() - about.shape);
+        let mut own = c.parameters.iter().take(amounts.max(1)).peekable();
+        own.peek().is_some() && own.all(|p| p.ci95[0] < 0.0 && 0.0 < p.ci95[1])
+    };
+    candidates.filter(may_be_zero).map(|c| c.id).collect()
+}
+
 /// The smallest amounts that would have shown, of those that have joined the model before they did.
 fn least(found: &Found) -> BTreeMap<&'static str, f64> {
     let mut least = detectable(&found.first, found.threshold);
@@ -96,6 +110,12 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
         id: s.id.into(),
         description: about.description,
         asserted: s.refused.is_empty(),
+        status: match (s.refused.is_empty(), s.class.is_empty()) {
+            (true, true) => Status::Missing,
+            (true, false) => Status::Indistinguishable,
+            _ if s.trace.is_some() => Status::Small,
+            _ => Status::Refused,
+        },
         evidence: s.score.evidence,
         threshold: s.threshold,
         parameters,
@@ -141,6 +161,10 @@ fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Can
         id: trial.id.into(),
         description: about.description,
         asserted: false,
+        status: match score.evidence > found.threshold {
+            true => Status::Refused,
+            false => Status::NotShown,
+        },
         evidence: score.evidence,
         threshold: found.threshold,
         parameters,

@@ -14,6 +14,9 @@ pub enum Verdict {
     Adequate,
     /// Something is missing, and none of the catalogue's effects is it.
     Unexplained,
+    /// These flights cannot say: a figure of theirs cannot be, or what their sensors may still have wrong accounts for
+    /// all that is left.
+    Unknown,
 }
 
 /// A diagnosis.
@@ -29,6 +32,8 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// The answer in plain sentences, the most important first.
     pub sentences: Vec<String>,
+    /// Figures that cannot be, in words: where there is one, nothing is said about forces and moments.
+    pub doubtful: Vec<String>,
     /// Every candidate, asserted ones first in the order of their selection, then by evidence.
     pub effects: Vec<Candidate>,
     /// What the tuned model with the asserted effects leaves unexplained, by channel.
@@ -65,6 +70,8 @@ pub struct Candidate {
     pub description: &'static str,
     /// Whether the data say that it is missing.
     pub asserted: bool,
+    /// What the data say of it, in one word.
+    pub status: Status,
     /// The smaller of its penalised gain and its block-robust Wald statistic, in the step in which
     /// it was selected, or in the last one.
     pub evidence: f64,
@@ -89,6 +96,22 @@ pub struct Candidate {
     pub refused: Vec<String>,
     /// Its contribution over the regime variable that shows it best.
     pub curve: Option<Curve>,
+}
+
+/// What the data say of a candidate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// It is missing.
+    Missing,
+    /// It, or one of those that these flights cannot tell from it, is missing.
+    Indistinguishable,
+    /// It is significant and too small to matter in these flights.
+    Small,
+    /// Its evidence is more than chance, and something speaks against it.
+    Refused,
+    /// These flights do not show it: they would have shown its smallest detectable amount.
+    NotShown,
 }
 
 /// A fitted parameter.
@@ -147,6 +170,10 @@ pub struct ChannelLeft {
     pub worst_regime: Option<String>,
     /// The product of states that what is left goes with most, where more is left than chance leaves.
     pub left_with: Option<String>,
+    /// Whether these flights cannot judge the model as given in this channel.
+    pub abstained: bool,
+    /// Why not.
+    pub why_abstained: Option<String>,
 }
 
 /// A sensor's error or the wind in one flight.

@@ -1,12 +1,15 @@
 //! The diagnosis itself: flights in, answer out.
 
+use crate::compare::{self, ChannelId};
 use crate::diagnose::answer::advice;
 use crate::diagnose::answer::decoys;
+use crate::diagnose::answer::impossible::impossible;
 use crate::diagnose::answer::measurement;
 use crate::diagnose::answer::per_flight;
 use crate::diagnose::answer::ranking;
-use crate::diagnose::answer::result::{Diagnosis, Nulls, Settings, Verdict};
-use crate::diagnose::answer::sentences;
+use crate::diagnose::answer::result::{ChannelLeft, Diagnosis, Nulls, Settings, Tuned, Verdict};
+use crate::diagnose::answer::rival::against_axes;
+use crate::diagnose::answer::sentences::{self, Said};
 use crate::diagnose::answer::shares;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::options::{Detail, Options};
@@ -26,6 +29,13 @@ use greylag_physics as physics;
 /// Least share of the error beyond noise that must be learnable before something is said to be missing:
 /// what the reconstruction leaves is no effect.
 const WORTH_SAYING: f64 = 0.1;
+/// The same where an effect of the catalogue was refused for its shape or its flights.
+const REFUSED: f64 = 0.01;
+/// What is refused beside a figure that cannot be.
+const CANNOT_BE: &str =
+    "a figure of these flights cannot be, so that nothing is said about forces and moments";
+/// What is refused of an effect whose amount another one took over.
+const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have settled";
 
 /// Says which effects of the catalogue `model` lacks according to `flights`, which must have been
 /// reconstructed with their deflections as recorded; `progress` hears what is being done.
@@ -43,51 +53,107 @@ pub fn diagnose(
     known(&options.with)?;
     let (problem, used, mut notes) = problem(model, flights, options)?;
     notes.extend(excitation::check(&problem.flights)?);
-    let mut found = search(&problem, model, options, progress)?;
+    let found = search(&problem, model, options, progress)?;
+    let mut found = against_axes(problem, model, options, progress, found)?;
     say(progress, "what is left", 0.95)?;
     let rudder = rudder::unmodelled(flights, model);
     if let Some(motion) = rudder {
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
     }
+    let Judged { abstained, tuned, doubtful } = judge(&mut found, model, &used, options);
     let effects = ranking::candidates(&found, options);
-    let channels = shares::channels(&found);
+    let channels = shares::channels(&found, &abstained);
     let mut measurement = measurement::measurement(&used);
     measurement.extend(per_flight::angles(found.round()));
     let trims = per_flight::trims(found.round());
-    let verdict = verdict(&found);
+    let verdict = spoken(&found, &doubtful, &channels);
     notes.extend(sentences::notes(&found, model, options));
     let decoys = match options.detail {
         Detail::Full => decoys::decoys(&found, options.seed),
         Detail::Lean => Vec::new(),
     };
+    let said = sentences::sentences(&Said {
+        found: &found,
+        verdict,
+        doubtful: &doubtful,
+        effects: &effects,
+        channels: &channels,
+        measurement: &measurement,
+        trims: &trims,
+    });
     Ok(Diagnosis {
         schema: "greylag.diagnosis/1",
         version: env!("CARGO_PKG_VERSION"),
         model: model.name.clone(),
         verdict,
-        sentences: rudder
-            .map(rudder::warning)
-            .into_iter()
-            .chain(sentences::sentences(&found, verdict, &effects, &channels, &measurement))
-            .chain(per_flight::sentences(&measurement, &trims))
-            .collect(),
+        sentences: rudder.map(rudder::warning).into_iter().chain(said).collect(),
+        doubtful,
         advice: advice::advice(&found, verdict, &effects, &channels),
         effects,
         channels,
         measurement,
         trims,
-        tuned: shares::tuned(&found, model),
+        tuned,
         nulls: Nulls { count: options.nulls, best: found.nulls.clone(), level: options.level },
         decoys,
         learnable_remainder: found.learnable(),
         notes,
-        settings: Settings {
-            seed: options.seed,
-            nulls: options.nulls,
-            bootstraps: options.bootstraps,
-            without: options.without.clone(),
-            per_flight: options.per_flight,
-        },
+        settings: settings(options),
+    })
+}
+
+fn settings(options: &Options) -> Settings {
+    Settings {
+        seed: options.seed,
+        nulls: options.nulls,
+        bootstraps: options.bootstraps,
+        without: options.without.clone(),
+        per_flight: options.per_flight,
+    }
+}
+
+/// What speaks against effects beside the search's own checks.
+struct Judged {
+    abstained: [Option<String>; 6],
+    tuned: Vec<Tuned>,
+    doubtful: Vec<String>,
+}
+
+/// Refuses effects where the flights cannot judge, whose amount may be zero, or beside figures that cannot be.
+fn judge(
+    found: &mut Found,
+    model: &GreyBox,
+    flights: &[&Reconstruction],
+    options: &Options,
+) -> Judged {
+    let abstained = abstained(model, flights, options.seed);
+    found.refuse_where_abstained(&abstained);
+    let void = ranking::void(found, options);
+    found.refuse(&void, MAY_BE_ZERO);
+    let tuned = shares::tuned(found, model);
+    let doubtful = impossible(flights, &tuned);
+    if !doubtful.is_empty() {
+        found.refuse_all(CANNOT_BE);
+    }
+    Judged { abstained, tuned, doubtful }
+}
+
+/// The verdict as it is spoken: nothing is said beside what cannot be, or where no channel can be judged.
+fn spoken(found: &Found, doubtful: &[String], channels: &[ChannelLeft]) -> Verdict {
+    match verdict(found) {
+        _ if !doubtful.is_empty() => Verdict::Unknown,
+        Verdict::Unexplained if channels.iter().all(|c| c.abstained) => Verdict::Unknown,
+        verdict => verdict,
+    }
+}
+
+/// Why these flights cannot judge `model` as given in a channel, as `compare` has it.
+fn abstained(model: &GreyBox, flights: &[&Reconstruction], seed: u64) -> [Option<String>; 6] {
+    let flights: Vec<Reconstruction> = flights.iter().map(|f| (*f).clone()).collect();
+    let all = compare::abstentions(model, &flights, seed).unwrap_or_default();
+    std::array::from_fn(|k| {
+        let own = all.iter().find(|(id, _)| *id == ChannelId::ALL[k]);
+        own.and_then(|(_, why)| *why).map(str::to_owned)
     })
 }
 
@@ -143,7 +209,8 @@ pub fn verdict(found: &Found) -> Verdict {
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;
     if found.selected.iter().any(|s| s.refused.is_empty()) {
         Verdict::Effect
-    } else if found.selected.iter().any(|s| !s.slight && s.trace.is_none())
+    } else if (found.selected.iter().any(|s| !s.slight && s.trace.is_none())
+        && (found.leaves_something() || found.learnable() > REFUSED))
         || (found.leaves_something() && (significant || found.has_shape()))
     {
         Verdict::Unexplained

@@ -1,6 +1,8 @@
 //! The answer in plain sentences.
 
-use crate::diagnose::answer::result::{Candidate, ChannelLeft, Measurement, Parameter, Verdict};
+use crate::diagnose::answer::result::{
+    Candidate, ChannelLeft, FlightTrim, Measurement, Parameter, Status, Verdict,
+};
 use crate::diagnose::answer::{per_flight, shares};
 use crate::diagnose::options::Options;
 use crate::diagnose::search::stepwise::Found;
@@ -10,86 +12,210 @@ use greylag_physics::catalogue::describe;
 
 /// Prior standard deviations beyond which a tuned coefficient is worth a note.
 const FAR: f64 = 3.0;
+/// Least share that is said: less is printed as nothing.
+const SHOWN: f64 = 0.005;
+/// Half of a 95 % interval in standard deviations.
+pub const INTERVAL: f64 = 1.96;
+/// Share of the error on segments not fitted from which a refused effect is called the closest shape.
+const CLOSEST: f64 = 0.5;
+/// What is asked for where axes stand askew.
+const AXES: &str = "amend with --axes-askew 3, or mount the board anew";
 
-/// The sentences, the most important first.
-pub fn sentences(
-    found: &Found,
-    verdict: Verdict,
-    effects: &[Candidate],
-    channels: &[ChannelLeft],
-    measurement: &[Measurement],
-) -> Vec<String> {
-    let mut said: Vec<String> = effects.iter().filter(|c| c.asserted).map(asserted).collect();
+/// What the sentences are made of.
+pub struct Said<'a> {
+    /// How the search ended.
+    pub found: &'a Found,
+    /// The answer in one word.
+    pub verdict: Verdict,
+    /// Figures that cannot be.
+    pub doubtful: &'a [String],
+    /// Every candidate.
+    pub effects: &'a [Candidate],
+    /// What is left of each channel.
+    pub channels: &'a [ChannelLeft],
+    /// Errors of the sensors.
+    pub measurement: &'a [Measurement],
+    /// The flights' own trims.
+    pub trims: &'a [FlightTrim],
+}
+
+/// The sentences, the most important first: what cannot be, the instruments where they explain the flights, the aircraft.
+pub fn sentences(said: &Said) -> Vec<String> {
+    let Said { verdict, doubtful, effects, channels, measurement, .. } = *said;
+    let mut all: Vec<String> = doubtful.to_vec();
+    let askew = per_flight::askew_sentences(measurement);
+    if !askew.is_empty() {
+        all.extend(askew.into_iter().map(|s| format!("{s} To keep it out of the model, {AXES}.")));
+    }
+    all.extend(effects.iter().filter(|c| c.asserted).map(asserted));
+    all.extend(answer(said));
+    all.extend(effects.iter().filter(|c| c.status == Status::Small).map(small));
+    if verdict != Verdict::Unknown {
+        all.extend(beyond(said));
+    }
+    let refused = |c: &&Candidate| c.status == Status::Refused && c.evidence > c.threshold;
+    all.extend(effects.iter().filter(refused).filter(|c| !c.refused.is_empty()).map(|c| {
+        format!(
+            "{} is not asserted although its evidence is {:.0}: {}.",
+            c.id,
+            c.evidence,
+            c.refused.join("; ")
+        )
+    }));
+    if verdict == Verdict::Unexplained {
+        let open = channels.iter().filter(|c| !c.abstained);
+        let worst = open.max_by(|a, b| a.unexplained_fraction.total_cmp(&b.unexplained_fraction));
+        all.extend(worst.and_then(|c| {
+            let regime = c.worst_regime.as_ref()?;
+            Some(format!("Most is left in {}: {regime}.", c.channel))
+        }));
+    }
+    all.extend(abstained(channels));
+    all.extend(sensors(measurement));
+    all.extend(per_flight::trim_sentences(said.trims));
+    all
+}
+
+/// The sentence of the verdict; none where effects are asserted, which speak for themselves.
+fn answer(said: &Said) -> Option<String> {
+    let Said { found, verdict, doubtful, effects, .. } = *said;
     match verdict {
-        Verdict::Effect => {}
-        Verdict::Adequate => said.push(format!(
+        Verdict::Effect => None,
+        Verdict::Adequate => Some(format!(
             "Nothing is missing that these flights could show: the tuned model explains them as well as \
              chance allows{}.",
             best_of(effects)
         )),
-        Verdict::Unexplained => said.push(format!(
+        Verdict::Unexplained => Some(unexplained(found, effects)),
+        Verdict::Unknown if doubtful.is_empty() => Some(
+            "These flights cannot say whether the model lacks anything: in every channel the remaining errors of the \
+             sensors may account for all that is left; log what is noted below, or fly with better sensors."
+                .into(),
+        ),
+        Verdict::Unknown => Some(
+            "So nothing is said about forces and moments: put that right first, or leave this flight out.".into(),
+        ),
+    }
+}
+
+/// Something is missing: with the closest effect of the catalogue where one explains most of it.
+fn unexplained(found: &Found, effects: &[Candidate]) -> String {
+    let close = |c: &&Candidate| c.status == Status::Refused && c.heldout_error_reduction > CLOSEST;
+    match effects.iter().find(close) {
+        Some(c) => format!(
+            "Something is missing. The closest effect of the catalogue is {} ({}): {}; it takes {:.0} % of the error on \
+             segments that it was not fitted on, and it is not all of it{}.",
+            c.description.trim_end_matches('.'),
+            c.id,
+            values(c),
+            100.0 * c.heldout_error_reduction,
+            removable(found)
+        ),
+        None => format!(
             "Something is missing, and no effect of the catalogue is it{}{}.",
             removable(found),
             best_of(effects)
-        )),
+        ),
     }
-    said.extend(channels.iter().filter_map(|c| {
+}
+
+/// What is left beside what was found.
+fn beyond(said: &Said) -> Vec<String> {
+    let Said { found, verdict, channels, .. } = *said;
+    let left = channels.iter().filter(|c| !c.abstained).filter_map(|c| {
         let term = c.left_with.as_ref()?;
         Some(format!("More than noise is left in {}: it goes with {term} above all.", c.channel))
-    }));
-    if verdict == Verdict::Effect && found.remainder.total > found.remainder.total_threshold {
-        said.push(format!(
+    });
+    let mut all: Vec<String> = left.collect();
+    let more = found.remainder.total > found.remainder.total_threshold;
+    if verdict == Verdict::Effect && more && found.learnable() >= SHOWN {
+        all.push(format!(
             "Beside that, a flexible model could remove {:.1} % of what the tuned model left beyond noise, \
              more than by chance.",
             100.0 * found.learnable()
         ));
     }
-    said.extend(effects.iter().filter(|c| !c.refused.is_empty() && c.evidence > c.threshold).map(
-        |c| {
-            format!(
-                "{} is not asserted although its evidence is {:.0}: {}.",
-                c.id,
-                c.evidence,
-                c.refused.join("; ")
-            )
-        },
-    ));
-    if verdict == Verdict::Unexplained {
-        let worst = channels
-            .iter()
-            .max_by(|a, b| a.unexplained_fraction.total_cmp(&b.unexplained_fraction));
-        said.extend(worst.and_then(|c| {
-            let regime = c.worst_regime.as_ref()?;
-            Some(format!("Most is left in {}: {regime}.", c.channel))
-        }));
+    all
+}
+
+/// The channels in which these flights cannot judge the model, by reason.
+fn abstained(channels: &[ChannelLeft]) -> Vec<String> {
+    let mut by_reason: Vec<(&str, Vec<&str>)> = Vec::new();
+    for c in channels {
+        let Some(why) = c.why_abstained.as_deref() else { continue };
+        match by_reason.iter_mut().find(|(reason, _)| *reason == why) {
+            Some((_, names)) => names.push(&c.channel),
+            None => by_reason.push((why, vec![&c.channel])),
+        }
     }
-    let before = |m: &&Measurement| m.asserted && m.id != askew::ID;
-    said.extend(measurement.iter().filter(before).map(|m| {
+    let one =
+        |(why, names): (&str, Vec<&str>)| format!("No judgement in {}: {why}.", names.join(", "));
+    by_reason.into_iter().map(one).collect()
+}
+
+/// The sensors' errors that are clearly not zero, a sentence a flight.
+fn sensors(measurement: &[Measurement]) -> Vec<String> {
+    let before = measurement.iter().filter(|m| m.asserted && m.id != askew::ID);
+    let mut flights: Vec<(&str, Vec<String>)> = Vec::new();
+    for m in before {
+        let words = format!("{} {} ({})", m.name, with_interval(m.value, m.sd, &m.unit), m.id);
+        match flights.last_mut() {
+            Some((flight, all)) if *flight == m.flight => all.push(words),
+            _ => flights.push((&m.flight, vec![words])),
+        }
+    }
+    let one = |(flight, all): (&str, Vec<String>)| {
         format!(
-            "{}: {} is {:.4} ± {:.4} {} ({}), taken out before any aerodynamics.",
-            m.flight, m.name, m.value, m.sd, m.unit, m.id
+            "{flight}: errors of the sensors and the wind, taken out before any aerodynamics (95 %): {}.",
+            all.join(", ")
         )
-    }));
-    said
+    };
+    flights.into_iter().map(one).collect()
+}
+
+/// A value with the half width of its 95 % interval and its unit.
+pub fn with_interval(value: f64, sd: f64, unit: &str) -> String {
+    format!("{} ± {} {unit}", figures(value), figures(INTERVAL * sd)).trim_end().to_owned()
+}
+
+/// The parameters with their 95 % intervals.
+fn values(c: &Candidate) -> String {
+    let of = |p: &Parameter| {
+        let sd = (p.ci95[1] - p.ci95[0]) / (2.0 * INTERVAL);
+        let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
+        match sd > 0.0 {
+            true => format!("{} = {}", p.name, with_interval(p.value, sd, &p.unit)),
+            false => format!("{} = {}{unit}", p.name, figures(p.value)),
+        }
+    };
+    c.parameters.iter().map(of).collect::<Vec<_>>().join(", ")
+}
+
+/// An effect that is significant and small.
+fn small(c: &Candidate) -> String {
+    format!(
+        "Seen, and small in these flights: {} ({}): {} (95 %); evidence {:.0} against {:.0} by chance. {}.",
+        c.description.trim_end_matches('.'),
+        c.id,
+        values(c),
+        c.evidence,
+        c.threshold,
+        capital(&c.refused.join("; "))
+    )
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect())
 }
 
 fn asserted(c: &Candidate) -> String {
-    let of = |p: &Parameter| {
-        let sd = (p.ci95[1] - p.ci95[0]) / (2.0 * 1.96);
-        let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
-        if sd > 0.0 {
-            format!("{} = {} ± {}{unit}", p.name, figures(p.value), figures(sd))
-        } else {
-            format!("{} = {}{unit}", p.name, figures(p.value))
-        }
-    };
-    let parameters: Vec<String> = c.parameters.iter().map(of).collect();
     let formula = describe(&c.id).map_or("", |about| about.formula);
     let mut text = format!(
-        "Missing: {} ({}; {formula}): {}; evidence {:.0} against {:.0} by chance.",
+        "Missing: {} ({}; {formula}): {} (95 %); evidence {:.0} against {:.0} by chance.",
         c.description.trim_end_matches('.'),
         c.id,
-        parameters.join(", "),
+        values(c),
         c.evidence,
         c.threshold
     );
@@ -105,7 +231,8 @@ fn asserted(c: &Candidate) -> String {
 
 /// What a flexible model could remove, if it is more than chance.
 fn removable(found: &Found) -> String {
-    match found.remainder.total > found.remainder.total_threshold {
+    let more = found.remainder.total > found.remainder.total_threshold;
+    match more && found.learnable() >= SHOWN {
         true => format!(
             ": a flexible model could remove {:.0} % of the error beyond noise on flights that it was not \
              fitted on",

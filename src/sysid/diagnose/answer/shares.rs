@@ -15,7 +15,7 @@ const WORTH: f64 = 4.0;
 const SYMBOLS: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
 
 /// Every channel that the flights allow.
-pub fn channels(found: &Found) -> Vec<ChannelLeft> {
+pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLeft> {
     let (before, after) = (found.unexplained, found.left());
     let residual = found.round().tuned_residual();
     let of = |k: usize| ChannelLeft {
@@ -24,6 +24,8 @@ pub fn channels(found: &Found) -> Vec<ChannelLeft> {
         unexplained_fraction: after[k],
         worst_regime: worst(found.round(), &residual, k),
         left_with: found.shape.as_ref().and_then(|shape| shape.term(k)),
+        abstained: abstained[k].is_some(),
+        why_abstained: abstained[k].clone(),
     };
     (0..SYMBOLS.len()).filter(|k| before[*k].is_finite()).map(of).collect()
 }

@@ -191,6 +191,10 @@ fn beyond_library(
 fn settled(found: &Found, verdict: Verdict) -> Option<String> {
     match verdict {
         Verdict::Unexplained => None,
+        Verdict::Unknown => Some(
+            "These flights cannot say whether anything is missing, so no formula is proposed."
+                .into(),
+        ),
         Verdict::Adequate => Some(
             "Nothing is missing that these flights could show, so no formula is proposed.".into(),
         ),

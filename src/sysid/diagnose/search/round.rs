@@ -31,6 +31,7 @@ const CLOSE: f64 = 40.0;
 const NOTHING: f64 = 1e3;
 
 /// What all rounds share.
+#[derive(Clone)]
 pub struct Problem {
     /// The flights.
     pub flights: Vec<Prepared>,

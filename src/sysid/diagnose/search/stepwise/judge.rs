@@ -78,6 +78,29 @@ impl Found {
         self.refuse_companions();
     }
 
+    /// Refuses every effect all of whose channels are `abstained` from, for the reason that stands there.
+    pub fn refuse_where_abstained(&mut self, abstained: &[Option<String>; 6]) {
+        for effect in self.selected.iter_mut().filter(|s| s.refused.is_empty()) {
+            let whys: Option<Vec<&String>> =
+                effect.channels.iter().map(|c| abstained[*c].as_ref()).collect();
+            if let Some(why) = whys.and_then(|whys| whys.first().map(|why| (*why).clone())) {
+                effect.refused.push(format!("these flights cannot judge its channels: {why}"));
+            }
+        }
+    }
+
+    /// Refuses every effect for `reason`.
+    pub fn refuse_all(&mut self, reason: &str) {
+        self.selected.iter_mut().for_each(|effect| effect.refused.push(reason.to_owned()));
+    }
+
+    /// Refuses the asserted effects called `ids`, for `reason`.
+    pub fn refuse(&mut self, ids: &[String], reason: &str) {
+        for effect in self.selected.iter_mut().filter(|s| ids.iter().any(|id| id == s.id)) {
+            effect.refused.push(reason.to_owned());
+        }
+    }
+
     /// Refuses what was found beside an effect that is refused: it is no more sure than that.
     fn refuse_companions(&mut self) {
         let refused = |s: &Selected| !s.refused.is_empty() && s.trace.is_none();

@@ -1,0 +1,130 @@
+//! Figures of a flight that cannot be: where there is one, no sentence about forces is worth anything.
+
+use crate::diagnose::answer::result::Tuned;
+use crate::diagnose::answer::sentences::with_interval;
+use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
+use greylag_num::statistics::mean;
+
+/// Airspeed scales (measured by true) that a working pitot has: a static port in a bad place gives 10 to 15 %.
+const SCALES: [f64; 2] = [0.8, 1.25];
+/// Mean vertical wind that no air has for the length of a flight, m/s: thermals sink and rise.
+const VERTICAL_MPS: f64 = 3.0;
+/// Standard deviations of what was known before beyond which a constant is not believed.
+const BELIEVED: f64 = 6.0;
+/// Standard deviations beyond which a coefficient surely has its sign.
+const SURELY: f64 = 4.0;
+/// Part of its prior under which the slope of lift is no wing's.
+const NO_WING: f64 = 0.2;
+
+/// What cannot be, a sentence each, with what to look at.
+pub fn impossible(flights: &[&Reconstruction], tuned: &[Tuned]) -> Vec<String> {
+    let of_flight = |flight: &&Reconstruction| {
+        let speeds: Vec<f64> = flight
+            .segments
+            .iter()
+            .flat_map(|s| s.instants.iter().map(|i| i.state.airspeed))
+            .collect();
+        let airspeed = mean(&speeds);
+        let wind = wind(flight, airspeed);
+        let all = flight.nuisances.iter().filter_map(move |n| Some((n, why(n)?)));
+        let all = all.map(|(n, why)| said(&flight.name, n, why)).chain(wind);
+        all.collect::<Vec<_>>()
+    };
+    flights.iter().flat_map(of_flight).chain(tuned.iter().filter_map(coefficient)).collect()
+}
+
+fn said(flight: &str, n: &Nuisance, why: &str) -> String {
+    format!("{flight}: {} is found at {}: {why}.", n.name, with_interval(n.value, n.sd, n.unit))
+}
+
+/// Why a constant cannot be what it is found at, with what to look at.
+fn why(n: &Nuisance) -> Option<&'static str> {
+    let name = n.name.as_str();
+    let beyond =
+        |low: f64, high: f64| n.value + SURELY * n.sd < low || n.value - SURELY * n.sd > high;
+    match name {
+        _ if !(n.value.is_finite() && n.sd.is_finite()) => {
+            Some("no number; look at that sensor's column")
+        }
+        "airspeed_scale" if beyond(SCALES[0], SCALES[1]) => Some(
+            "no pitot errs by so much; look for a frozen or blocked airspeed, a wrong unit, or a velocity over ground that \
+             is late",
+        ),
+        "wind_down" if beyond(-VERTICAL_MPS, VERTICAL_MPS) => Some(
+            "no air sinks or rises so fast for the length of a flight; look at airspeed, vanes and velocity over ground",
+        ),
+        _ if n.moved().abs() > BELIEVED => Some(
+            "it lies more than six standard deviations from what was known of it; look at that sensor, or at what \
+             [sensors] says of it",
+        ),
+        _ => None,
+    }
+}
+
+/// A mean wind faster than the aircraft flies.
+fn wind(flight: &Reconstruction, airspeed: f64) -> Option<String> {
+    let of = |name: &str| {
+        flight.nuisances.iter().find(|n| n.name == name).filter(|n| n.moved().abs() > 0.0)
+    };
+    let (north, east) = (of("wind_north")?, of("wind_east")?);
+    let (speed, sd) = (north.value.hypot(east.value), north.sd.hypot(east.sd));
+    (speed - SURELY * sd > airspeed).then(|| {
+        format!(
+            "{}: the wind is found at {}, faster than the aircraft flies ({airspeed:.1} m/s): look at airspeed, heading and \
+             velocity over ground, or for hovering.",
+            flight.name,
+            with_interval(speed, sd, "m/s")
+        )
+    })
+}
+
+/// A coefficient that no aircraft that flies has.
+fn coefficient(t: &Tuned) -> Option<String> {
+    let own = t.name.rsplit('.').next()?;
+    let damps = ["Cmq", "Clp", "Cnr"].contains(&own);
+    let drives = damps && t.prior < 0.0 && t.value - SURELY * t.sd > 0.0;
+    let no_wing = own == "CLalpha" && t.value + SURELY * t.sd < NO_WING * t.prior;
+    let why = match (drives, no_wing) {
+        (true, _) => {
+            "a damping that drives; look for a hover, a wrong axis or sign, or a clock that is off"
+        }
+        (_, true) => {
+            "a wing that hardly lifts; look at airspeed and angle of attack, or for a hover"
+        }
+        _ => return None,
+    };
+    Some(format!("{} is tuned to {}: {why}.", t.name, with_interval(t.value, t.sd, "")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn constant(name: &str, value: f64, sd: f64) -> Nuisance {
+        Nuisance { name: name.into(), value, sd, unit: "", prior: None }
+    }
+
+    #[test]
+    fn what_no_sensor_and_no_air_does_is_said() {
+        assert!(why(&constant("airspeed_scale", 0.717, 0.02)).is_some());
+        assert!(why(&constant("airspeed_scale", 0.717, 0.2)).is_none());
+        assert!(why(&constant("airspeed_scale", 1.1, 0.01)).is_none());
+        assert!(why(&constant("wind_down", -7.0, 0.5)).is_some());
+        assert!(why(&constant("gyro_bias_p", f64::NAN, 0.5)).is_some());
+    }
+
+    #[test]
+    fn a_damping_that_drives_and_a_wing_that_does_not_lift_are_said() {
+        let of = |name: &str, prior, value| Tuned {
+            name: name.into(),
+            prior,
+            prior_sd: 0.1,
+            value,
+            sd: 0.05,
+        };
+        assert!(coefficient(&of("pitch_linear.Cmq", -1.0, 1.6)).is_some());
+        assert!(coefficient(&of("pitch_linear.Cmq", -1.0, 0.1)).is_none());
+        assert!(coefficient(&of("lift_linear.CLalpha", 5.3, 0.24)).is_some());
+        assert!(coefficient(&of("lift_linear.CLalpha", 5.3, 4.0)).is_none());
+    }
+}
