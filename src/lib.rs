@@ -2,7 +2,7 @@
 //!
 //! It turns commanded roll and pitch into actuator outputs with a grey-box model of the
 //! aircraft. The modules below are declared in the order of their layers: each may use those
-//! above it, never those below (`tests/architecture.rs` holds them to it), so this list is the map.
+//! above it, never those below (`tests/architecture.rs` holds them to it), so this list is the map. Each is a crate of its own, `greylag-num` to `greylag-workbench`.
 //!
 //! ```text
 //! in flight   link ──► flight ──► link           flight ⇄ control ──► model ──► physics ──► num
@@ -72,8 +72,9 @@ pub use greylag_model as model;
 pub use greylag_num as num;
 pub use greylag_physics as physics;
 pub use greylag_report as report;
-#[cfg(any(feature = "sitl", feature = "learn"))]
+#[cfg(any(feature = "demo", feature = "learn"))]
 pub use greylag_sim as sim;
 pub use greylag_sysid as sysid;
+#[cfg(feature = "study")]
 pub use greylag_workbench as workbench;
 pub mod commands;

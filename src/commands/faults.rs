@@ -171,6 +171,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 ///
 /// # Errors
 /// If the model or the policy that are shipped cannot be used.
+#[cfg(feature = "study")]
 pub fn shipped(kind: ControllerKind) -> Result<CompanionFactory> {
     let model = fly::model(fly::MODEL.as_ref(), None)?;
     let plant = plant(AIRCRAFT, &model)?;

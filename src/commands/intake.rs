@@ -12,6 +12,7 @@ use crate::logs::{self, Log, csv::Tolerance};
 use crate::model::GreyBox;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
+#[cfg(feature = "study")]
 use crate::workbench;
 
 /// Which logs, read how.
@@ -69,6 +70,7 @@ impl Intake {
 
 impl LogArguments {
     /// Other logs, read in the same way.
+    #[cfg(feature = "study")]
     pub fn of(&self, paths: Vec<PathBuf>) -> LogArguments {
         LogArguments { paths, ..self.clone() }
     }
@@ -94,6 +96,7 @@ impl Reading {
     }
 
     /// The same for a workbench.
+    #[cfg(feature = "study")]
     pub fn of_workbench(&self) -> workbench::Reading {
         workbench::Reading {
             mapping: self.mapping.clone(),

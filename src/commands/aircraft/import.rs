@@ -18,7 +18,7 @@ enum From {
     #[command(visible_alias = "avl")]
     Derivatives(super::import_derivatives::Derivatives),
     /// From a JSBSim aircraft, by central differences of its loads.
-    #[cfg(feature = "sitl")]
+    #[cfg(feature = "demo")]
     Jsbsim(super::import_jsbsim::Jsbsim),
 }
 
@@ -26,7 +26,7 @@ enum From {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.from {
         From::Derivatives(file) => super::import_derivatives::run(file),
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         From::Jsbsim(jsbsim) => super::import_jsbsim::run(jsbsim),
     }
 }
