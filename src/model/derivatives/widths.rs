@@ -2,7 +2,7 @@
 //!
 //! `params/widths/widths.csv` holds them: the tool's errors beside aircraft whose derivatives were identified in flight or
 //! measured in a wind tunnel (`params/widths/measured.csv`, with sources), drawn together with a guess that counts as two
-//! aircraft, since few were measured: w² = (2 g² + Σ e²) / (2 + n). `cargo run -p greylag-model --example derivative_widths` computes them.
+//! aircraft, since few were measured: w² = (2 g² + Σ e²) / (2 + n). `cargo run --no-default-features --example derivative_widths` computes them.
 
 use std::fmt;
 use std::sync::LazyLock;

@@ -1,10 +1,10 @@
 //! Derivatives of AVL, OptVL, AeroSandbox and XFLR5 become a model: values, signs, axes, widths, what is refused and what is not
 //! believed.
 
-use greylag_model::GreyBox;
-use greylag_model::derivatives::widths::{self, Tool};
-use greylag_model::derivatives::{Beside, DerivativesError, Read, read, reference};
-use greylag_model::textbook::{Measures, Tail};
+use greylag::model::GreyBox;
+use greylag::model::derivatives::widths::{self, Tool};
+use greylag::model::derivatives::{Beside, DerivativesError, Read, read, reference};
+use greylag::model::textbook::{Measures, Tail};
 
 /// What AVL's ST writes of an aircraft of the size of the Aerosonde, at `alpha` (degrees).
 fn text(alpha: f64) -> String {
@@ -176,7 +176,7 @@ fn what_is_missing_or_no_number_is_named() {
 
 /// What OptVL 2.5.0 and AeroSandbox 4.2.10 computed (tests/derivatives/tools.py).
 fn computed(name: &str) -> String {
-    let path = format!("{}/../../tests/data/derivatives/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/tests/data/derivatives/{name}.json", env!("CARGO_MANIFEST_DIR"));
     std::fs::read_to_string(path).unwrap()
 }
 

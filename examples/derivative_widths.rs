@@ -1,7 +1,7 @@
 //! Prints how far textbook and aerodynamic tools are from measured derivatives, and the widths that follow.
 //!
 //! ```text
-//! cargo run --ignore-rust-version -p greylag-model --example derivative_widths [-- --write]
+//! cargo run --ignore-rust-version --no-default-features --example derivative_widths [-- --write]
 //! ```
 //!
 //! An error is counted as a share of the computed value, as a width is: (computed − measured) / |computed|. A guess counts as two
@@ -10,22 +10,15 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use greylag_model::derivatives::widths::Tool;
-use greylag_model::derivatives::{Beside, read, reference};
-use greylag_model::textbook::{Measures, Tail};
+use greylag::model::derivatives::widths::Tool;
+use greylag::model::derivatives::{Beside, read, reference};
+use greylag::model::textbook::{Measures, Tail};
 
 /// What may go wrong: a file, a number.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// How many aircraft a guess counts as.
 const GUESS: f64 = 2.0;
-/// Aircraft with mass (kg), span (m), area (m²) and tail.
-const AIRCRAFT: [(&str, f64, f64, f64, Tail); 4] = [
-    ("navion", 1337.0, 10.174, 17.094, Tail::Conventional),
-    ("babyshark", 12.14, 2.5, 0.6617, Tail::Conventional),
-    ("a430", 0.1, 0.43, 0.0408, Tail::Conventional),
-    ("x8", 3.364, 2.1, 0.75, Tail::FlyingWing),
-];
 /// JSON files of one aircraft, by tool.
 const FILES: [(&str, Tool); 4] = [
     ("optvl", Tool::OptVl),
@@ -40,7 +33,7 @@ type Row = Vec<String>;
 type Computed = BTreeMap<(String, String, String), f64>;
 
 fn main() -> Result<()> {
-    let root = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = root.join("params/widths");
     let measured = table(&folder.join("measured.csv"))?;
     let computed = computed(root)?;
@@ -123,8 +116,11 @@ fn computed(root: &Path) -> Result<Computed> {
         let tool = Tool::ALL.into_iter().find(|t| t.name() == tool).ok_or("unknown tool")?;
         all.insert((aircraft.clone(), tool.family().into(), name.clone()), value.parse()?);
     }
-    for (aircraft, mass, span, area, tail) in AIRCRAFT {
-        let measures = measures(aircraft, mass, span, area, tail);
+    for row in table(&root.join("params/widths/aircraft.csv"))? {
+        let [aircraft, mass, span, area, tail] = row.as_slice() else { continue };
+        let wing = tail == "flying-wing";
+        let tail = if wing { Tail::FlyingWing } else { Tail::Conventional };
+        let measures = measures(aircraft, mass.parse()?, span.parse()?, area.parse()?, tail);
         let tuned = |name: &str| aircraft == "x8" && TUNED.contains(&name);
         for (name, value) in coefficients(&measures.model())? {
             if !tuned(&name) {
