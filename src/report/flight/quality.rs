@@ -58,7 +58,7 @@ pub(super) fn of_segment(samples: &[Sample], segment: &Segment, limits: &Limits)
 
 /// The whole flight, from the airspeed on that counts as one.
 pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
-    let flying = |s: &Sample| !(s.airspeed_mps < envelope.flying_from_mps);
+    let flying = |s: &Sample| s.airspeed_mps.is_nan() || s.airspeed_mps >= envelope.flying_from_mps;
     let together = |a: &Sample, b: &Sample| flying(a) && flying(b) && b.time_s - a.time_s <= GAP_S;
     let nobody = Target { roll: f64::NAN, pitch: f64::NAN, airspeed: f64::NAN };
     let parts = samples.chunk_by(together).filter(|part| part.len() > 1);
