@@ -131,10 +131,6 @@ fn code(text: &str) -> String {
     code.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
 }
 
-fn room(file: &str) -> &str {
-    file.split(['/', '.']).next().unwrap_or(file)
-}
-
 fn layer(room: &str) -> Option<usize> {
     LAYERS.iter().position(|l| *l == room)
 }
