@@ -249,7 +249,8 @@ fn text_as_a_spreadsheet_writes_it_is_read() {
         [("utf16.csv", &wide[..]), ("de.csv", german.as_bytes()), ("t.csv", tabs.as_bytes())]
     {
         let samples = through_file(name, bytes, read).flight.samples;
-        assert_eq!(samples, truth, "{name}");
+        // What is missing is no number, which equals nothing.
+        assert_eq!(format!("{samples:?}"), format!("{truth:?}"), "{name}");
     }
 }
 

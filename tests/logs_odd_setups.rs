@@ -116,7 +116,7 @@ fn written(stamp: u64, component_id: u8, message: &MavMessage, out: &mut Vec<u8>
 
 fn sent(stamp: u64, [system_id, component_id]: [u8; 2], message: &MavMessage, out: &mut Vec<u8>) {
     out.extend(stamp.to_be_bytes());
-    let header = mavlink::MavHeader { system_id, component_id, sequence: 0 };
+    let header = mavlink::MavHeader { system_id: system_id.into(), component_id, sequence: 0 };
     mavlink::write_v2_msg(out, header, message).unwrap();
 }
 

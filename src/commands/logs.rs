@@ -246,7 +246,17 @@ fn print(info: &Info) {
             format!("{:.2} s", channel.largest_gap_s),
         ]);
     }
-    println!("{table}\n\nServes for");
+    println!("{table}");
+    print_purposes(info);
+    if !info.findings.is_empty() {
+        println!("\nTo know");
+        info.findings.iter().for_each(|finding| println!("  {finding}"));
+    }
+}
+
+/// What the log serves for.
+fn print_purposes(info: &Info) {
+    println!("\nServes for");
     for purpose in &info.purposes {
         let verdict = match (&purpose.missing[..], &purpose.slow[..]) {
             ([], []) => "yes".to_owned(),
@@ -255,10 +265,6 @@ fn print(info: &Info) {
         };
         println!("  {}: {verdict}", purpose.name);
         purpose.instead.iter().for_each(|x| println!("      with {x}"));
-    }
-    if !info.findings.is_empty() {
-        println!("\nTo know");
-        info.findings.iter().for_each(|finding| println!("  {finding}"));
     }
 }
 

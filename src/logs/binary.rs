@@ -16,21 +16,20 @@ use super::{Flight, FlowAngles, Format, Sample, assess, derive, rows, screening,
 /// It lacks a needed column, has too many unusable rows, or is of a vehicle without wings.
 pub(super) fn read(
     format: Format,
-    topics: Topics,
+    mut topics: Topics,
     name: &str,
     path: &Path,
     o: &Options,
     to: Use,
 ) -> Result<Log, LogError> {
     let vehicle = vehicle::vehicle(format, &topics);
-    let hovers = match vehicle.as_ref().map(|v| v.kind) {
-        Some(Kind::Vtol) => vehicle::hovers(format, &topics),
-        _ => Vec::new(),
-    };
+    let hovers = hovers(vehicle.as_ref(), format, &topics);
     let mut findings = refused(vehicle.as_ref(), path, to)?;
     let no_wings = !findings.is_empty();
     let rules = o.mapping.rules(format, &topics);
     let mut table = table::build(&topics, &rules, &o.sources);
+    // A long log need not stand in memory twice.
+    topics.topics.clear();
     table.missing.retain(|missing| !o.mapping.makes(missing.column));
     findings
         .extend(lacking(&table, &topics, path, to).map(|f| f.into_iter().filter(|_| !no_wings))?);
@@ -48,19 +47,8 @@ pub(super) fn read(
         };
         findings.extend(found.into_iter().map(|f| named(f, &table.rules, o)));
     }
-    let (mut kept, looked_at) = sorted_out(std::mem::take(&mut table.rows), to);
-    if !table.missing.is_empty() {
-        kept = looked_at;
-    } else if let Some(first) = kept.refused(o.tolerance) {
-        let (dropped, rows, hint) = (kept.dropped, kept.total, hint(&findings));
-        let (path, reasons) = (path.to_owned(), kept.reasons());
-        let error = LogError::Unusable { path, dropped, rows, reasons, first, hint };
-        if to == Use::Compute {
-            return Err(error);
-        }
-        findings.push(Finding::problem(error.to_string()));
-        kept = looked_at;
-    }
+    let kept = kept(&table, path, o, to, &mut findings)?;
+    drop(std::mem::take(&mut table.rows));
     findings.extend(dropped(kept.dropped, &kept.dropped_rows));
     findings.extend(table.notes.iter().map(Finding::note));
     Ok(Log {
@@ -68,11 +56,7 @@ pub(super) fn read(
         flight: Flight {
             name: name.to_owned(),
             samples: kept.samples,
-            flow_angles: match format {
-                // AOA.AOA and AOA.SSA are estimates unless a mapping names them as sensors
-                Format::Dataflash if o.mapping.get("alpha_rad").is_none() => FlowAngles::Estimated,
-                _ => FlowAngles::Measured,
-            },
+            flow_angles: flow_angles(format, o),
             sensors: o.mapping.sensors().clone(),
             unknown_columns: Vec::new(),
             notes: table.notes,
@@ -152,19 +136,61 @@ fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
     Finding { text: finding.text.replace(&cure.to_string(), &better), ..finding }
 }
 
-/// The rows fit to compute with, and those fit to be looked at where that is asked.
-fn sorted_out(samples: Vec<Sample>, to: Use) -> (rows::Rows, rows::Rows) {
-    let frozen = samples.iter().any(|s| s.airspeed_mps.is_nan());
-    let mut kept =
-        if frozen { rows::Rows::with_sparse_columns_of(&samples) } else { rows::Rows::default() };
-    let mut looked_at = rows::Rows::default();
-    for (i, sample) in samples.into_iter().enumerate() {
-        kept.take(i + 1, Some(sample));
-        if to == Use::Look {
-            looked_at.take_incomplete(i + 1, sample);
-        }
+/// When a VTOL did not fly on its wings alone.
+fn hovers(vehicle: Option<&Vehicle>, format: Format, topics: &Topics) -> Vec<(f64, f64)> {
+    match vehicle.map(|v| v.kind) {
+        Some(Kind::Vtol) => vehicle::hovers(format, topics),
+        _ => Vec::new(),
     }
-    (kept, looked_at)
+}
+
+/// AOA.AOA and AOA.SSA are estimates unless a mapping names them as sensors.
+fn flow_angles(format: Format, o: &Options) -> FlowAngles {
+    match format {
+        Format::Dataflash if o.mapping.get("alpha_rad").is_none() => FlowAngles::Estimated,
+        _ => FlowAngles::Measured,
+    }
+}
+
+/// The rows that make the flight; an error or a finding where too few are usable.
+fn kept(
+    table: &table::Table,
+    path: &Path,
+    o: &Options,
+    to: Use,
+    findings: &mut Vec<Finding>,
+) -> Result<rows::Rows, LogError> {
+    let kept = usable(&table.rows);
+    if !table.missing.is_empty() {
+        return Ok(visible(&table.rows));
+    }
+    let Some(first) = kept.refused(o.tolerance) else { return Ok(kept) };
+    let (dropped, rows, hint) = (kept.dropped, kept.total, hint(findings));
+    let (path, reasons) = (path.to_owned(), kept.reasons());
+    let error = LogError::Unusable { path, dropped, rows, reasons, first, hint };
+    if to == Use::Compute {
+        return Err(error);
+    }
+    findings.push(Finding::problem(error.to_string()));
+    Ok(visible(&table.rows))
+}
+
+/// The rows fit to compute with.
+fn usable(samples: &[Sample]) -> rows::Rows {
+    let hangs = samples.iter().any(|s| s.airspeed_mps.is_nan());
+    let mut kept = match hangs {
+        true => rows::Rows::with_sparse_columns_of(samples),
+        false => rows::Rows::default(),
+    };
+    samples.iter().enumerate().for_each(|(i, sample)| kept.take(i + 1, Some(*sample)));
+    kept
+}
+
+/// The rows fit to be looked at.
+fn visible(samples: &[Sample]) -> rows::Rows {
+    let mut kept = rows::Rows::default();
+    samples.iter().enumerate().for_each(|(i, sample)| kept.take_incomplete(i + 1, *sample));
+    kept
 }
 
 fn missing_column(path: &Path, topics: &Topics, missing: &table::Missing) -> LogError {

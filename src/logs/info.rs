@@ -168,6 +168,17 @@ fn weighed(log: &Log, mut purpose: Purpose) -> Purpose {
     purpose
 }
 
+/// What stands in for a logged air density.
+fn density(has: impl Fn(&str) -> bool) -> Vec<String> {
+    match (has("air_density_kgpm3"), has("altitude_m")) {
+        (true, _) => Vec::new(),
+        (false, true) => {
+            vec!["air density of the standard atmosphere at the logged altitude".to_owned()]
+        }
+        (false, false) => vec!["air density of the standard atmosphere at sea level".to_owned()],
+    }
+}
+
 /// The purpose that slow channels serve as well.
 const INCIDENCE: &str = "alpha, beta";
 
@@ -196,13 +207,7 @@ fn purposes(log: &Log) -> Vec<Purpose> {
         .then(|| "specific force of the reconstructed path".to_owned())
         .into_iter()
         .collect();
-    let density: Vec<String> = match (has("air_density_kgpm3"), has("altitude_m")) {
-        (true, _) => Vec::new(),
-        (false, true) => {
-            vec!["air density of the standard atmosphere at the logged altitude".to_owned()]
-        }
-        (false, false) => vec!["air density of the standard atmosphere at sea level".to_owned()],
-    };
+    let density = density(has);
     let rebuilt = if incidence.is_empty() || !velocity.is_empty() {
         Vec::new()
     } else {

@@ -69,7 +69,9 @@ impl Grid {
         let complete = |s: &&Sample| {
             s.specific_force_mps2.iter().chain(&s.attitude_rad).all(|x| x.is_finite())
         };
-        let rows: Vec<Sample> = rows.iter().filter(complete).copied().collect();
+        let until = rows.first()?.time_s + 3.0 * LONGEST_S;
+        let looked_at = rows.iter().take_while(|s| s.time_s < until);
+        let rows: Vec<Sample> = looked_at.filter(complete).copied().collect();
         let mut best = 0..0;
         let mut start = 0;
         for i in 1..=rows.len() {

@@ -228,7 +228,8 @@ fn read(
     let wanted = |topic: &str| options.mapping.wants(format, topic);
     let (lives, window): (Vec<Topics>, _) = match format {
         Format::Ulog => {
-            let (topics, window) = ulog::read(&mut source, &wanted);
+            let fields = |topic: &str, field: &str| options.mapping.wants_of_px4(topic, field);
+            let (topics, window) = ulog::read(&mut source, &fields);
             (vec![topics], window)
         }
         Format::Dataflash => dataflash::read(&mut source, &wanted),

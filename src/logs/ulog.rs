@@ -25,8 +25,8 @@ use layout::{Kind, Layout};
 const HEADER: usize = 16;
 /// Size and kind of a record.
 const RECORD: usize = 3;
-/// The longest record with the header of the next one.
-const LONGEST: usize = RECORD + u16::MAX as usize + RECORD;
+/// The longest record with the beginning of those after it.
+const LONGEST: usize = RECORD + u16::MAX as usize + 1024;
 /// Records in a row that show the place where a damaged file goes on.
 const IN_STEP: usize = 3;
 /// The kinds of records.
@@ -36,8 +36,6 @@ const KINDS: &[u8] = b"BFIMPQARDCLSO";
 struct Subscription {
     key: (String, u16),
     layout: Rc<Layout>,
-    /// Whether the topic was asked for.
-    wanted: bool,
     /// Its records, from the first one on.
     topic: Option<Topic>,
     count: usize,
@@ -65,6 +63,13 @@ struct Reader {
     last_s: f64,
 }
 
+/// Whether data of a topic that the file does not declare may stand among records that are believed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Undeclared {
+    Allowed,
+    Refused,
+}
+
 /// What stands at a place of the file.
 enum Place {
     /// A record of so many bytes, its header included.
@@ -75,10 +80,10 @@ enum Place {
     Damage,
 }
 
-/// Reads what `wanted` names; everything else is counted.
+/// Reads the topics with their fields that `wanted` names; everything else is counted.
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
-    wanted: &dyn Fn(&str) -> bool,
+    wanted: &dyn Fn(&str, &str) -> bool,
 ) -> (Topics, Window<'a>) {
     let mut window = Window::new(source);
     let mut reader = Reader::default();
@@ -134,23 +139,26 @@ impl Reader {
             let believed = self.in_step && (kind != b'D' || exact);
             return if believed { Place::Cut } else { Place::Damage };
         }
-        let next = &view[len..];
-        let followed = next.len() < RECORD || header(next).is_some();
         let fits = match self.in_step {
-            true => exact || followed,
-            false => self.is_in_step(view),
+            true => exact || self.is_in_step(&view[len..], Undeclared::Allowed),
+            false => self.is_in_step(view, Undeclared::Refused),
         };
         if fits { Place::Record(len) } else { Place::Damage }
     }
 
     /// Whether the records at the beginning of `view` follow each other, each of the size of its topic.
-    fn is_in_step(&self, mut view: &[u8]) -> bool {
+    fn is_in_step(&self, mut view: &[u8], undeclared: Undeclared) -> bool {
         for _ in 0..IN_STEP {
             let Some((len, kind)) = header(view) else { return view.len() < RECORD };
-            if kind == b'D' && !self.fits(view, len) {
+            let known = view.get(RECORD..).and_then(|b| b.first_chunk::<2>());
+            let known =
+                known.is_some_and(|n| self.subscriptions.contains_key(&u16::from_le_bytes(*n)));
+            let excused = undeclared == Undeclared::Allowed && !known;
+            if kind == b'D' && !excused && !self.fits(view, len) {
                 return false;
             }
-            let Some(rest) = view.get(len..) else { return false };
+            // What the window or the file cuts off is judged by its beginning.
+            let Some(rest) = view.get(len..) else { return undeclared == Undeclared::Allowed };
             view = rest;
         }
         true
@@ -175,7 +183,7 @@ impl Reader {
         self.skipped += 1;
     }
 
-    fn record(&mut self, kind: u8, body: &[u8], wanted: &dyn Fn(&str) -> bool) {
+    fn record(&mut self, kind: u8, body: &[u8], wanted: &dyn Fn(&str, &str) -> bool) {
         match kind {
             b'F' => self.format(body),
             b'A' => self.subscribe(body, wanted),
@@ -210,20 +218,24 @@ impl Reader {
         }
     }
 
-    fn subscribe(&mut self, body: &[u8], wanted: &dyn Fn(&str) -> bool) {
+    fn subscribe(&mut self, body: &[u8], wanted: &dyn Fn(&str, &str) -> bool) {
         let [instance, low, high, name @ ..] = body else { return };
         let name = String::from_utf8_lossy(name).into_owned();
         if !self.formats.contains_key(&name) {
             self.bad_fields += 1;
         }
         let known = self.layouts.entry(name.clone());
-        let layout = known.or_insert_with(|| Rc::new(Layout::of(&self.formats, &name))).clone();
-        let wanted = wanted(&name);
+        let layout = known.or_insert_with(|| {
+            let mut layout = Layout::of(&self.formats, &name);
+            layout.fields.retain(|f| wanted(&name, &f.name));
+            layout.fields.shrink_to_fit();
+            Rc::new(layout)
+        });
+        let layout = layout.clone();
         let number = u16::from_le_bytes([*low, *high]);
         let key = (name, u16::from(*instance));
-        let old = self
-            .subscriptions
-            .insert(number, Subscription { key, layout, wanted, topic: None, count: 0 });
+        let old =
+            self.subscriptions.insert(number, Subscription { key, layout, topic: None, count: 0 });
         if let Some(old) = old {
             self.keep(old);
         }
@@ -243,7 +255,7 @@ impl Reader {
             *hole = (stamp_s - self.last_s).max(0.0);
         }
         self.last_s = stamp_s;
-        if !subscription.wanted {
+        if layout.fields.is_empty() {
             return;
         }
         // A record that is too short would be filled up with nothing at many times its size.

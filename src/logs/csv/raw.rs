@@ -40,7 +40,10 @@ const RECORDING: usize = 50;
 
 impl Raw {
     /// The rows, those that could not be read included, as `take` judges them.
-    pub(super) fn judged(&self, take: impl Fn(&mut rows::Rows, usize, Option<Sample>)) -> rows::Rows {
+    pub(super) fn judged(
+        &self,
+        take: impl Fn(&mut rows::Rows, usize, Option<Sample>),
+    ) -> rows::Rows {
         let mut rows = rows::Rows::with_sparse_columns_of(&self.rows);
         let mut next = self.rows.iter().zip(&self.places).peekable();
         for i in self.range.clone().filter(|i| !self.left_out.contains(i)) {

@@ -292,6 +292,16 @@ impl Mapping {
         own.chain(turn.clone()).chain(free).collect()
     }
 
+    /// Whether a field of a topic of PX4 is needed for any rule.
+    pub(super) fn wants_of_px4(&self, topic: &str, field: &str) -> bool {
+        let entry = || self.entries.values().any(|e| e.topic == topic && e.field == field);
+        let turn = || {
+            let of_topic = self.quaternion.as_ref().filter(|q| q.topic == topic);
+            of_topic.is_some_and(|q| q.fields.iter().any(|f| f == field))
+        };
+        px4::TOPICS.contains(&topic) && px4::uses(field) || entry() || turn()
+    }
+
     /// Whether a topic of a format is needed for any rule.
     pub(super) fn wants(&self, format: Format, topic: &str) -> bool {
         let own: &[&str] = match format {

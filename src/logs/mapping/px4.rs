@@ -33,6 +33,40 @@ pub const TOPICS: [&str; 20] = [
     "vehicle_attitude_setpoint",
 ];
 
+/// The fields that the rules use; what ends with a bracket stands for all elements.
+const FIELDS: [&str; 25] = [
+    "q[",
+    "q_d[",
+    "xyz[",
+    "gyro_rad[",
+    "accelerometer_m_s2[",
+    "control[",
+    "true_airspeed_m_s",
+    "aoa_rad",
+    "slip_rad",
+    "vx",
+    "vy",
+    "vz",
+    "alt",
+    "baro_alt_meter",
+    "rho",
+    "roll_body",
+    "pitch_body",
+    "is_vtol",
+    "system_type",
+    "vehicle_type",
+    "is_rotary_wing",
+    "in_transition_mode",
+    "vehicle_vtol_state",
+    "vtol_in_rw_mode",
+    "vtol_in_trans_mode",
+];
+
+/// Whether the rules use a field.
+pub fn uses(field: &str) -> bool {
+    FIELDS.iter().any(|f| if f.ends_with('[') { field.starts_with(f) } else { field == *f })
+}
+
 /// The rules, preferred ones first.
 pub fn rules(topics: &Topics) -> Vec<Rule> {
     let mut out = vec![Rule::quaternion("vehicle_attitude", ["q[0]", "q[1]", "q[2]", "q[3]"])];

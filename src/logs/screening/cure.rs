@@ -68,7 +68,7 @@ mod tests {
             }
         };
         let helped = tried(vec![found.clone()], &rows, large(2.0));
-        assert_eq!(helped, [found.clone()]);
+        assert_eq!(helped, std::slice::from_ref(&found));
         let [useless] = &tried(vec![found.clone()], &rows, large(1.0))[..] else { panic!() };
         assert!(
             useless.cure.is_none() && !useless.text.contains("--mapping FILE, in"),

@@ -29,23 +29,26 @@ pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     }
     let mut out = Vec::new();
     if rows.len() >= ENOUGH {
-        out = cure::tried(checks(rows, flies), rows, |rows| checks(rows, flies));
+        let flown = in_flight(rows, flies);
+        let of = |rows: &[Sample]| checks(rows, &in_flight(rows, flies), flies);
+        out = cure::tried(checks(rows, &flown, flies), rows, of);
         out.extend(dead::check(rows));
-        out.extend(dead::commands(&in_flight(rows, flies)));
+        out.extend(dead::commands(&flown));
         let right = out.iter().all(|f| f.severity != Severity::Problem);
-        out.extend(right.then(|| lag::check(&in_flight(rows, flies))).unwrap_or_default());
+        if right {
+            out.extend(lag::check(&flown));
+        }
     }
     out.extend(flight(rows, flies));
     out
 }
 
 /// Units, signs and axes, in flight: what hangs from its lift motors or stands on the ground obeys other relations.
-fn checks(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
+fn checks(rows: &[Sample], flown: &[Sample], flies: &Flying) -> Vec<Finding> {
     if let Some(clock) = clock::check(rows) {
         return vec![clock];
     }
-    let flown = in_flight(rows, flies);
-    let rows = if flown.len() >= ENOUGH { &flown } else { rows };
+    let rows = if flown.len() >= ENOUGH { flown } else { rows };
     let mut out = angles::check(rows);
     out.extend(force::check(rows));
     let axes_are_right = out.is_empty();

@@ -79,6 +79,7 @@ pub(super) struct Field {
 
 /// Where the fields of a message stand.
 pub(super) struct Layout {
+    /// The fields that are read.
     pub fields: Vec<Field>,
     /// Where `timestamp` and `timestamp_sample` stand.
     pub stamp: Option<(Kind, usize)>,
