@@ -1,4 +1,4 @@
-"""acados beside the planners: the learned model, ilqr's horizon and cost, hard envelope, real-time iteration.
+"""acados beside the planners: the learned model, ilqr's horizon and weights, constrained, real-time iteration.
 
     python3 -m venv target/acados-venv && target/acados-venv/bin/pip install -q comma-deps-acados jsbsim numpy
     cargo build --release --ignore-rust-version --no-default-features --features sitl --bin greylag --example model_rates
@@ -6,7 +6,7 @@
 
 Needs a C compiler. The grey box is written anew in CasADi from `params/x8/learned`, and its rates and their derivatives
 are compared with those of the Rust model first. acados flies official JSBSim (PyPI); the planners are flown by
-`greylag evaluate` in the same run, to the same targets and steps, which the page of measures defines. One core, one run.
+`greylag evaluate` in the same run, to the same targets and steps; the measures are those of `src/control/quality`. One core, one run.
 """
 
 import argparse
@@ -29,7 +29,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 MODEL = ROOT / "params" / "x8" / "learned"
 G0 = 9.80665
 DT = 0.01
-FOOT, SLUG_FOOT = 0.3048, 0.3048
+FOOT = 0.3048
 STATES = ("roll", "pitch", "V", "p", "q", "r", "alpha", "beta")
 
 

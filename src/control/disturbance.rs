@@ -23,7 +23,7 @@ const MEMORY_S: f64 = 0.5;
 /// Time over which what was missed is compared with what was predicted, s: gusts average out.
 const SLOPE_MEMORY_S: f64 = 2.0;
 /// Slope of what was missed over what was predicted from which the model is wrong: near 0 in gusts, −1 where nothing came true of
-/// what was predicted. What it gives, right and wrong models: `docs/validation/controllers-in-turbulence.md`.
+/// what was predicted. What it gives, right and wrong models: `docs/validation/controllers.md`, in turbulence.
 const SLOPE: f64 = 0.7;
 /// Accelerations below which nothing is compared, in x_c a second: calm flight shows no model to be wrong.
 const CALM: f64 = 0.02;
