@@ -65,7 +65,8 @@ fn pages_and_checks_name_the_files() {
         assert!(text.contains("arduplane.parm"), "{page}");
         // What a file sets is not set again with other values.
         for (name, value) in shipped("arduplane.parm").iter().filter(|_| page.ends_with(".md")) {
-            let other = text.split(&format!("`{name}` ")).skip(1).filter_map(|rest| {
+            let named = format!("`{name}` ");
+            let other = text.split(&named).skip(1).filter_map(|rest| {
                 let word: String =
                     rest.chars().take_while(|c| c.is_ascii_digit() || *c == '.').collect();
                 word.trim_end_matches('.').parse::<f64>().ok()
