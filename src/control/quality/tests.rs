@@ -1,3 +1,5 @@
+//! The measures on signals whose answers have closed forms.
+
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::*;
