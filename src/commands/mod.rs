@@ -36,6 +36,7 @@ mod man;
 #[cfg(feature = "sitl")]
 mod mystery;
 mod per_flight;
+mod predictions;
 mod propose;
 #[cfg(feature = "sitl")]
 mod recording_report;

@@ -38,6 +38,12 @@ def read(path):
     return np.array([file[e][n]["value"] for e, n in NAMES])
 
 
+def write(path, c):
+    """A model file with these coefficients."""
+    parts = {e: {n: float(v) for (e2, n), v in zip(NAMES, c) if e2 == e} for e, _ in NAMES}
+    Path(path).write_text(text("plain", parts))
+
+
 def rates(x, z, c):
     """Rates of the states `x` (8 x shots) under `z`, with the coefficients `c`."""
     roll, pitch, v, p, q, r, alpha, beta = x
@@ -162,9 +168,7 @@ def main():
         print(*(f"{judge(first, read(path)):.6f}" for path in rest))
         return
     flights = [table(p) for p in sorted(Path(first).glob("train-*.csv"))]
-    c = fit(flights, read(Path(first) / "model.toml"))
-    parts = {e: {n: float(v) for (e2, n), v in zip(NAMES, c) if e2 == e} for e, _ in NAMES}
-    Path(rest[0]).write_text(text("plain", parts))
+    write(rest[0], fit(flights, read(Path(first) / "model.toml")))
 
 
 if __name__ == "__main__":
