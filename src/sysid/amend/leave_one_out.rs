@@ -9,12 +9,12 @@ use super::flight::Flight;
 use super::judge::{IMPROVED, Judge, judged, judged_at};
 use super::output_error::{self, FitOptions};
 use super::parameters;
-use crate::model::GreyBox;
-use crate::sysid::compare::forecast;
-use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::per_flight::PerFlight;
-use crate::sysid::progress::{Progress, say, unheard};
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::compare::forecast;
+use crate::flight_path::reconstruction::Reconstruction;
+use crate::per_flight::PerFlight;
+use crate::progress::{Progress, say, unheard};
+use crate::weak_form::prepared::Prepared;
+use greylag_model::GreyBox;
 
 /// Least number of flights of which one can be left out.
 pub const LEAST_FLIGHTS: usize = 3;
@@ -126,7 +126,7 @@ fn scores(
     model: &GreyBox,
     test: &[Flight],
     horizons_s: &[f64],
-) -> Vec<crate::sysid::compare::HorizonScore> {
+) -> Vec<crate::compare::HorizonScore> {
     Judge { test, horizons_s }.scores(model)
 }
 

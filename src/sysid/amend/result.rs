@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::conventions::Tried;
 use super::flight::SENSORS;
 use super::judge::{judged, judged_at};
-use crate::sysid::compare::HorizonScore;
-use crate::sysid::per_flight::{Constant, PerFlight};
+use crate::compare::HorizonScore;
+use crate::per_flight::{Constant, PerFlight};
 
 /// Share by which the error of unseen flights must rise for a fit to be worse than the model as given.
 const WORSE: f64 = 0.01;

@@ -1,9 +1,9 @@
 //! How much each state, each shot and each start counts in a search.
 
 use super::Search;
-use crate::num::statistics::{correlation_length, quantile};
-use crate::sysid::amend::normal::Place;
-use crate::sysid::amend::shooting;
+use crate::amend::normal::Place;
+use crate::amend::shooting;
+use greylag_num::statistics::{correlation_length, quantile};
 
 /// Least standard deviations of residuals, in the units of the state: what the models' steps and the
 /// interpolation of deflections leave even without noise.
@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn one_state_that_drifts_makes_all_count_less() {
-        let mut random = crate::num::stream::stream(5, &[]);
+        let mut random = greylag_num::stream::stream(5, &[]);
         let mut white = || rand::RngExt::random_range(&mut random, -1.0..1.0);
         let shots: Vec<Vec<[f64; 8]>> =
             (0..20).map(|_| (0..200).map(|_| std::array::from_fn(|_| white())).collect()).collect();
