@@ -4,7 +4,7 @@ mod check;
 mod export;
 mod import;
 mod import_avl;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod import_jsbsim;
 mod new;
 

@@ -11,6 +11,7 @@ use crate::logs::{self, csv::Tolerance};
 use crate::model::GreyBox;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
+#[cfg(feature = "study")]
 use crate::workbench;
 
 /// Which logs, read how.
@@ -50,6 +51,7 @@ pub struct Intake {
 
 impl LogArguments {
     /// Other logs, read in the same way.
+    #[cfg(feature = "study")]
     pub fn of(&self, paths: Vec<PathBuf>) -> LogArguments {
         LogArguments { paths, ..self.clone() }
     }
@@ -74,6 +76,7 @@ impl Reading {
     }
 
     /// The same for a workbench.
+    #[cfg(feature = "study")]
     pub fn of_workbench(&self) -> workbench::Reading {
         workbench::Reading {
             mapping: self.mapping.clone(),

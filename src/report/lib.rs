@@ -11,10 +11,13 @@
 //!
 //! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
 
+#[cfg(feature = "study")]
 mod amendment;
 mod campaign_page;
 mod comparison;
+#[cfg(feature = "study")]
 mod effect_page;
+#[cfg(feature = "study")]
 mod diagnosis;
 mod kit;
 #[cfg(feature = "sitl")]
@@ -26,13 +29,18 @@ mod sight;
 #[cfg(feature = "learn")]
 mod training_page;
 
+#[cfg(feature = "study")]
 pub use amendment::AmendmentReport;
+#[cfg(feature = "study")]
 pub use amendment::page::amendment_page;
 pub use campaign_page::CampaignReport;
 pub use comparison::ComparisonReport;
 pub use comparison::page::comparison_page;
+#[cfg(feature = "study")]
 pub use diagnosis::DiagnosisReport;
+#[cfg(feature = "study")]
 pub use diagnosis::page::diagnosis_page;
+#[cfg(feature = "study")]
 pub use effect_page::{EffectReport, facts as effect_facts};
 #[cfg(feature = "sitl")]
 pub use evaluation_page::EvaluationReport;
@@ -47,7 +55,7 @@ pub use kit::grid::{Grid, GridCell, GridRow};
 pub use kit::heat_map::{HeatCell, HeatMap};
 pub use kit::histogram::Histogram;
 #[cfg(feature = "sitl")]
-pub(crate) use kit::html::escape;
+pub use kit::html::escape;
 pub use kit::intervals::{IntervalBins, IntervalPanel, Intervals};
 pub use kit::loop_timing::{Cycle, LoopTiming};
 pub use kit::page::{Page, Section};
