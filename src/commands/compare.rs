@@ -9,6 +9,7 @@ use comfy_table::{CellAlignment, Table};
 use crate::commands::bar::Bar;
 use crate::commands::files::{self, shipped};
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::predictions;
 use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
@@ -35,6 +36,10 @@ pub struct Arguments {
     /// Write the report, one HTML page.
     #[arg(long)]
     report: Option<PathBuf>,
+    /// Write every free run as CSV: model, flight, start, horizon, each state predicted and measured, and the 95 % interval
+    /// of the prediction by the errors of the other runs.
+    #[arg(long, value_name = "CSV")]
+    predictions: Option<PathBuf>,
     /// Take the deflections at the times that the log has for them, as `diagnose`, `amend` and the workbench do;
     /// without it a delay of the log's actuator clock that is beyond doubt is put right.
     #[arg(long)]
@@ -50,7 +55,7 @@ pub struct Arguments {
 /// Reads, reconstructs, compares; prints the sentences and the tables; writes JSON and report.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    for path in arguments.json.iter().chain(&arguments.report) {
+    for path in arguments.json.iter().chain(&arguments.report).chain(&arguments.predictions) {
         files::writable(path, overwrite)?;
     }
     let models = arguments
@@ -77,6 +82,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.json {
         let text = serde_json::to_string_pretty(&comparison.document())? + "\n";
         files::write(path, &text, overwrite)?;
+    }
+    if let Some(path) = &arguments.predictions {
+        let table = predictions::table(&models, &flights, &arguments.horizons)?;
+        files::write(path, &table, overwrite)?;
     }
     if let Some(path) = &arguments.report {
         files::write(path, &page(arguments, &comparison), overwrite)?;

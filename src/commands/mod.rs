@@ -44,6 +44,7 @@ mod margin;
 #[cfg(feature = "demo")]
 mod mystery;
 mod per_flight;
+mod predictions;
 #[cfg(feature = "study")]
 mod propose;
 mod punctual;

@@ -25,6 +25,8 @@ pub struct Number {
     pub value: f64,
     /// Its standard deviation, in the unit of the value.
     pub sd: Option<f64>,
+    /// Its bounds, in the unit of the value, where they are its own.
+    pub bounds: Option<[f64; 2]>,
 }
 
 /// What changes in a model file.
@@ -115,6 +117,10 @@ impl Edit {
         if let Some(sd) = number.sd {
             table.insert("sd", Item::Value(sd.into()));
         }
+        if let Some(bounds) = number.bounds {
+            let both: toml_edit::Array = bounds.into_iter().collect();
+            table.insert("bounds", Item::Value(both.into()));
+        }
         if let Some(inline) = item.as_inline_table_mut() {
             inline.fmt();
         }
@@ -190,7 +196,7 @@ CLq = { value = 3.87, sd = 0.1, source = "Gryte" } # damps
 "#;
 
     fn number(name: &str, value: f64, sd: Option<f64>) -> Number {
-        Number { name: name.into(), value, sd }
+        Number { name: name.into(), value, sd, bounds: None }
     }
 
     fn edit() -> Edit {

@@ -14,7 +14,7 @@ use greylag_physics::airframe::{
     FileError, Sourced, check_schema, named, positive, toml_error, within,
 };
 use greylag_physics::atmosphere::{Atmosphere, Density};
-use greylag_physics::effects::{Description, Kind};
+use greylag_physics::effects::{Coefficient, Description, Kind};
 use greylag_physics::formula::{Written, register};
 use greylag_physics::rigid_body::{ForceAxes, RigidBody};
 use greylag_physics::size::Size;
@@ -147,7 +147,11 @@ fn inertia(field: &str, number: &Sourced) -> Result<f64, String> {
 impl File {
     fn into_model(self, airframe: Airframe) -> Result<GreyBox, String> {
         let body = self.rigid_body.checked()?;
-        let size = Size::new(&body, &airframe.geometry);
+        let size = Size::new(&body, &airframe.geometry).lifted_at(
+            airframe.envelope.airspeed_min_mps,
+            &body,
+            &airframe.geometry,
+        );
         let mut terms = Vec::new();
         let (mut coefficients, mut acting) = (Vec::new(), Vec::new());
         for (id, content) in &self.effects {
@@ -280,17 +284,7 @@ fn effect(
                 format!("effects.{id}.{}: {why}", c.name)
             })?,
         };
-        let (low, high) = size.bounds(c);
-        if !(low..=high).contains(&number.value) {
-            return Err(format!(
-                "effects.{id}.{} = {} is not physical: {} lies in {low}..{high} {}",
-                c.name, number.value, c.meaning, c.unit
-            ));
-        }
-        if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
-            return Err(format!("effects.{id}.{}.sd must be a positive number", c.name));
-        }
-        named.push(Named { name: format!("{id}.{}", c.name), value: number.value, sd: number.sd });
+        named.push(checked(id, c, &number, size)?);
     }
     let at = |key: &str, why: String| format!("effects.{id}.{key}: {why}");
     let table = |key: &str| -> Result<Table, String> {
@@ -307,6 +301,27 @@ fn effect(
         grid: about.grid.map(grid).transpose()?,
     };
     Ok((named, points))
+}
+
+/// The coefficient of the effect `id` that `about` describes, within its bounds.
+fn checked(id: &str, about: &Coefficient, number: &Sourced, size: &Size) -> Result<Named, String> {
+    let name = about.name;
+    let own = number.bounds.map(|[low, high]| (low, high));
+    if own.is_some_and(|(low, high)| !(low < high && (high - low).is_finite())) {
+        return Err(format!("effects.{id}.{name}.bounds must be [least, most]"));
+    }
+    let (low, high) = own.unwrap_or_else(|| size.bounds(about));
+    if !(low..=high).contains(&number.value) {
+        return Err(format!(
+            "effects.{id}.{name} = {} is not physical: {} lies in {low}..{high} {}",
+            number.value, about.meaning, about.unit
+        ));
+    }
+    if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
+        return Err(format!("effects.{id}.{name}.sd must be a positive number"));
+    }
+    let (value, sd, bounds) = (number.value, number.sd, number.bounds);
+    Ok(Named { name: format!("{id}.{name}"), value, sd, bounds })
 }
 
 fn points<T: serde::de::DeserializeOwned>(content: toml::Value) -> Result<T, String> {

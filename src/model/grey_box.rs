@@ -4,7 +4,7 @@ use crate::{Integrator, Residual};
 use greylag_num::{Grid, Real, Table};
 use greylag_physics::actuators::LAGS;
 use greylag_physics::atmosphere::Atmosphere;
-use greylag_physics::effects::{Description, Kind, Needs, Own};
+use greylag_physics::effects::{Coefficient, Description, Kind, Needs, Own};
 use greylag_physics::formula::{Memory, Status, Written};
 use greylag_physics::inputs::{self, InputMemory};
 use greylag_physics::rigid_body::{ForceAxes, RigidBody};
@@ -20,6 +20,9 @@ pub struct Named {
     pub value: f64,
     /// Its standard deviation as a prior, where the file states one.
     pub sd: Option<f64>,
+    /// The least and the most that it can be, where the file or a user says so; else what the catalogue has for an
+    /// aircraft of this size.
+    pub bounds: Option<[f64; 2]>,
 }
 
 /// The effect that holds a rudder's forces and moments.
@@ -172,6 +175,18 @@ impl GreyBox {
         self
     }
 
+    /// The model with bounds of its own for the coefficient `name` (`effect.coefficient`); whether it has that.
+    pub fn set_bounds(&mut self, name: &str, bounds: [f64; 2]) -> bool {
+        let found = self.coefficients.iter_mut().find(|c| c.name == name);
+        found.map(|c| c.bounds = Some(bounds)).is_some()
+    }
+
+    /// The least and the most that the coefficient number `place` can be, of which the catalogue knows `about`.
+    pub fn bounds(&self, place: usize, about: &Coefficient) -> (f64, f64) {
+        let own = self.coefficients[place].bounds;
+        own.map_or_else(|| self.size().bounds(about), |[low, high]| (low, high))
+    }
+
     /// The same aircraft flown through a link that carries no command for a rudder: it stays where it is.
     pub fn leaving_rudder(mut self) -> GreyBox {
         self.rudder_is_left = true;
@@ -288,7 +303,11 @@ impl GreyBox {
 
     /// What the physical bounds of its coefficients go by.
     pub fn size(&self) -> Size {
-        Size::new(&self.bare_body, &self.airframe.geometry)
+        Size::new(&self.bare_body, &self.airframe.geometry).lifted_at(
+            self.airframe.envelope.airspeed_min_mps,
+            &self.bare_body,
+            &self.airframe.geometry,
+        )
     }
 
     /// The reference scale x_c, eq. (21): \[1, 1, V0, 2V0/b, 2V0/c, 2V0/b, 1, 1\], V0 in m/s.

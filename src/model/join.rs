@@ -106,6 +106,7 @@ impl GreyBox {
             Err(kind) => self.inputs.push((kind, first)),
         }
         self.coefficients.extend(about.coefficients.iter().zip(values).map(|(c, value)| Named {
+            bounds: None,
             name: format!("{id}.{}", c.name),
             value: *value,
             sd: None,

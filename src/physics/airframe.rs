@@ -162,6 +162,8 @@ pub struct Sourced {
     pub source: String,
     /// Its standard deviation as a prior, in the same unit, where one is known.
     pub sd: Option<f64>,
+    /// The least and the most that it can be, in the same unit, where the file says so.
+    pub bounds: Option<[f64; 2]>,
 }
 
 /// Why an airframe or model file could not be used.

@@ -7,18 +7,37 @@ use super::rigid_body::RigidBody;
 /// Mass (kg) and span (m) up to which bounds hold as the catalogue has them.
 const WRITTEN_FOR: [f64; 2] = [25.0, 5.0];
 
+/// The coefficient that carries the weight of an aircraft in slow flight.
+const LIFT: &str = "CL0";
+/// Load factor of a gentle pull-up in slow flight.
+const PULL: f64 = 1.5;
+/// Density of the standard atmosphere at sea level, kg/m³ (ISO 2533).
+const SEA_LEVEL: f64 = 1.225;
+/// Standard gravity, m/s² (ISO 80000-3).
+const GRAVITY: f64 = 9.80665;
+
 /// How many times heavier and wider an aircraft is than one of 25 kg and 5 m; at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     mass: f64,
     length: f64,
+    lift: f64,
 }
 
 impl Size {
     /// That of an aircraft of `body` and `geometry`.
     pub fn new(body: &RigidBody, geometry: &Geometry) -> Size {
         let [mass, span] = WRITTEN_FOR;
-        Size { mass: (body.mass / mass).max(1.0), length: (geometry.span / span).max(1.0) }
+        let length = (geometry.span / span).max(1.0);
+        Size { mass: (body.mass / mass).max(1.0), length, lift: 1.0 }
+    }
+
+    /// With the lift that an aircraft of `body` and `geometry` needs at the least `airspeed` (m/s) it flies at: a wing
+    /// must be able to carry the weight there, and [`PULL`] times that when it pulls up.
+    pub fn lifted_at(self, airspeed: f64, body: &RigidBody, geometry: &Geometry) -> Size {
+        let pressure = 0.5 * SEA_LEVEL * airspeed * airspeed;
+        let level = body.mass * GRAVITY / (pressure * geometry.area);
+        Size { lift: (PULL * level).max(1.0), ..self }
     }
 
     /// The physically possible values of `coefficient`: those of the catalogue, which are without unit or per angle,
@@ -27,7 +46,8 @@ impl Size {
         if !coefficient.grows {
             return coefficient.bounds;
         }
-        let factor = self.factor(coefficient.unit).unwrap_or(1.0);
+        let of_unit = || self.factor(coefficient.unit).unwrap_or(1.0);
+        let factor = if coefficient.name == LIFT { self.lift } else { of_unit() };
         let (least, most) = coefficient.bounds;
         (factor * least, factor * most)
     }
@@ -44,7 +64,7 @@ impl Size {
 
     /// Whether bounds in `unit` grow with an aircraft.
     pub fn scales(unit: &str) -> bool {
-        Size { mass: 1.0, length: 1.0 }.factor(unit).is_some()
+        Size { mass: 1.0, length: 1.0, lift: 1.0 }.factor(unit).is_some()
     }
 }
 
@@ -64,6 +84,12 @@ mod tests {
         let large = Size::new(&body(250.0), &geometry(10.0));
         assert_eq!(large.bounds(&torque), (-1000.0, 1000.0));
         assert_eq!(large.bounds(&coefficient("k", "", "", (-1.0, 1.0))), (-1.0, 1.0));
+        // 100 N/m² at 6 m/s: CL = 4.5 in level flight, so that a CL0 of 2 must be allowed
+        let slow = Geometry { area: 0.1, span: 1.0, chord: 0.1 };
+        let lift = coefficient("CL0", "", "", (-1.0, 1.0));
+        let at = |airspeed| Size::new(&body(1.0), &slow).lifted_at(airspeed, &body(1.0), &slow);
+        assert!(at(6.0).bounds(&lift).1 > 2.0, "{:?}", at(6.0));
+        assert_eq!(at(30.0).bounds(&lift), (-1.0, 1.0));
         let written = Coefficient { grows: false, ..torque };
         assert_eq!(large.bounds(&written), (-50.0, 50.0));
     }

@@ -1,6 +1,8 @@
 //! `greylag amend`: a model refitted to flights, missing effects added.
 
+mod bounds;
 mod given;
+mod leave_one_out;
 mod places;
 mod tables;
 
@@ -22,7 +24,7 @@ use crate::commands::status::IN_DOUBT;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::report::AmendmentReport;
-use crate::sysid::amend::{self, Added, Amended, Prior, Refused};
+use crate::sysid::amend::{self, Added, Amended, Amendment, Prior, Refused};
 use crate::sysid::compare::{self, compare};
 use crate::sysid::diagnose::{self, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
@@ -33,7 +35,7 @@ use crate::sysid::progress::{Progress, Stage, part};
 #[derive(clap::Args)]
 #[command(
     group = clap::ArgGroup::new("what").required(true).multiple(true),
-    after_help = "Exit status: 0 done, 1 nothing was written, 3 written, but an effect was refused, a log was left out or flights contradict one another."
+    after_help = "Exit status: 0 done, 1 nothing was written, 3 not written, for the fit flies the flights held out worse than the model as given, or written, but an effect was refused, a coefficient ended at a bound, a log was left out or flights contradict one another."
 )]
 pub struct Arguments {
     /// Model file to start from; it stays as it is.
@@ -68,10 +70,22 @@ pub struct Arguments {
     from_scratch: bool,
     #[command(flatten)]
     per_flight: PerFlightArguments,
-    /// Write effects into the model that the data refuse.
+    /// Let a coefficient be from LEAST to MOST in place of what is usual for an aircraft of this size, such as
+    /// lift_linear.CL0=-2..2; the amended model's file says so too.
+    #[arg(long = "bound", value_name = "NAME=LEAST..MOST", num_args = 1.., value_parser = bounds::bound)]
+    bounds: Vec<bounds::Bound>,
+    /// Write effects into the model that the data refuse, and a model that flies the flights held out worse.
     #[arg(long)]
     accept_anyway: bool,
-    /// Folder for model.toml, the airframe and amend.json; made if there is none.
+    /// Fit to all logs: nothing is held out, so that the errors are those of the flights that were fitted.
+    #[arg(long, conflicts_with = "hold_out")]
+    fit_all: bool,
+    /// Write no model: predict each log by a fit to all others, for the model as given, tuned, with trims and axes of each
+    /// flight, from scratch and with each effect, and say which of these is the simplest within one standard error of
+    /// the best.
+    #[arg(long, conflicts_with_all = ["hold_out", "fit_all", "conventions", "from_scratch", "report", "accept_anyway"])]
+    leave_one_out: bool,
+    /// Folder for model.toml, the airframe and amend.json, or for leave-one-out.json; made if there is none.
     #[arg(long)]
     out: PathBuf,
     /// Write the report, one HTML page.
@@ -86,7 +100,10 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let path = shipped(&arguments.model);
     let overwrite = arguments.force.into();
-    let model = GreyBox::load(&path)?;
+    let model = bounds::given(GreyBox::load(&path)?, &arguments.bounds)?;
+    if arguments.leave_one_out {
+        return structures(arguments, &model);
+    }
     if let Some(path) = &arguments.report {
         files::writable(path, overwrite)?;
     }
@@ -94,32 +111,28 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     distinct(&arguments.logs.paths, &arguments.hold_out)?;
     let effects = named_effects(&arguments.effects)?;
     check_new(&effects, &model)?;
-    let (paths, held) = divided(&arguments.logs.paths, &arguments.hold_out);
+    let (paths, held) = match arguments.fit_all {
+        true => (arguments.logs.paths.clone(), arguments.logs.paths.clone()),
+        false => divided(&arguments.logs.paths, &arguments.hold_out),
+    };
     let (logs, hold_out) = (hashed(&paths)?, hashed(&held)?);
     let mut taken = arguments.logs.of(paths).take_in(&model, ActuatorClock::AsRecorded)?;
     let tests = tests(arguments, held, &model, &mut taken)?;
     let Intake { flights, notes, mut in_doubt } = taken;
-    let options = amend::Options {
-        effects: wanted(arguments, &effects, &model, &flights)?,
-        conventions: arguments.conventions,
-        prior: if arguments.from_scratch { Prior::Bounds } else { Prior::File },
-        refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
-        per_flight: arguments.per_flight.asked(),
-        ..amend::Options::default()
-    };
+    let options = options(arguments, wanted(arguments, &effects, &model, &flights)?);
     let bar = Bar::new();
     let hear = |stage: Stage<'_>| bar.hear(stage);
     let [fitting, drawing] = shares(arguments.report.as_deref());
     let mut amended = amend::amend(&model, &flights, &tests, &options, &part(&hear, fitting))?;
     let story = &mut amended.amendment;
     story.notes.splice(0..0, notes);
-    in_doubt |= story.effects.iter().any(|e| !e.refused.is_empty());
-    in_doubt |= !amend::contradictions(&story.parameters).is_empty();
+    in_doubt |= doubtful(story);
     let all_refused = story.all_refused();
+    let worse = story.worse().filter(|_| !arguments.accept_anyway);
     // drawn before anything is written, so that Ctrl-C leaves nothing behind
     let draw = || page(arguments, &model, &amended, &tests, &places, &part(&hear, drawing));
     let drawn = match &arguments.report {
-        Some(path) if !all_refused => Some((path, draw()?)),
+        Some(path) if !all_refused && worse.is_none() => Some((path, draw()?)),
         _ => None,
     };
     bar.go_on()?;
@@ -131,11 +144,50 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
              --accept-anyway writes a refused effect"
         );
     }
+    if let Some(why) = worse {
+        println!("{why} Nothing was written; --accept-anyway writes the fit.");
+        return Ok(ExitCode::from(IN_DOUBT));
+    }
     places.write(&model, &amended, [&logs, &hold_out], overwrite)?;
     if let Some((path, page)) = drawn {
         files::write(path, &page, overwrite)?;
     }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+/// What the amendment is asked for, `effects` to be added.
+fn options(arguments: &Arguments, effects: Vec<Added>) -> amend::Options {
+    amend::Options {
+        effects,
+        conventions: arguments.conventions,
+        prior: if arguments.from_scratch { Prior::Bounds } else { Prior::File },
+        refused: if arguments.accept_anyway { Refused::Kept } else { Refused::Left },
+        per_flight: arguments.per_flight.asked(),
+        ..amend::Options::default()
+    }
+}
+
+/// Whether an effect was refused, a coefficient ended at a bound, or flights contradict one another.
+fn doubtful(story: &Amendment) -> bool {
+    story.effects.iter().any(|e| !e.refused.is_empty())
+        || story.parameters.iter().any(|p| p.at_bound)
+        || !amend::contradictions(&story.parameters).is_empty()
+}
+
+/// `--leave-one-out`: a table of structures in place of a model.
+fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
+    let overwrite = arguments.force.into();
+    std::fs::create_dir_all(&arguments.out)?;
+    let json = arguments.out.join("leave-one-out.json");
+    files::writable(&json, overwrite)?;
+    let effects = named_effects(&arguments.effects)?;
+    check_new(&effects, model)?;
+    let taken = arguments.logs.take_in(model, ActuatorClock::AsRecorded)?;
+    let effects = wanted(arguments, &effects, model, &taken.flights)?;
+    let all = leave_one_out::structures(&effects, arguments.per_flight.asked());
+    let done = leave_one_out::run(model, &taken.flights, &all, Some(&json), overwrite)?;
+    taken.notes.iter().for_each(|note| println!("note: {note}"));
+    Ok(if taken.in_doubt { ExitCode::from(IN_DOUBT) } else { done })
 }
 
 /// Refuses effects that the program does not know or the model has already.
@@ -163,6 +215,12 @@ fn tests(
     model: &GreyBox,
     taken: &mut Intake,
 ) -> Result<Vec<Reconstruction>> {
+    if arguments.fit_all {
+        taken.notes.push(
+            "fitted to all logs: the errors are those of flights that the fit has seen".into(),
+        );
+        return Ok(taken.flights.clone());
+    }
     if held.is_empty() {
         taken.notes.push(format!(
             "{}: fitted to its first two thirds, judged by the last",

@@ -73,6 +73,7 @@ impl Written {
     /// The value of a coefficient as the file gives it.
     pub fn number(&self, coefficient: usize) -> Sourced {
         Sourced {
+            bounds: None,
             value: self.values[coefficient],
             source: self.about.source.into(),
             sd: Some(self.widths[coefficient]),

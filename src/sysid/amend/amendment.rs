@@ -228,6 +228,8 @@ fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
         ));
     }
     notes.extend(judge::contradictions(&fit.parameters));
+    notes.extend(judge::at_bounds(&fit.parameters));
+    notes.extend(judge::against_prior(&fit.parameters));
     notes
 }
 

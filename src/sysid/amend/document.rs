@@ -136,7 +136,7 @@ fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) 
     let known = before.coefficients().len();
     let number = |c: &greylag_model::Named| {
         let sd = fitted.iter().find(|p| p.name == c.name).map(|p| p.sd);
-        Number { name: c.name.clone(), value: c.value, sd }
+        Number { name: c.name.clone(), value: c.value, sd, bounds: c.bounds }
     };
     let new = |name: &str| !before.coefficients().iter().any(|c| c.name == name);
     let source = |name: &str| {

@@ -26,6 +26,17 @@ pub enum AmendError {
         /// Seconds needed.
         needed_s: f64,
     },
+    /// There are too few flights to leave one out.
+    #[error(
+        "cannot leave out one flight after the other: there are {flights}, and {needed} are the least; name more logs, \
+         or cut one into parts with `greylag logs convert`"
+    )]
+    TooFewFlights {
+        /// Flights that there are.
+        flights: usize,
+        /// Flights needed.
+        needed: usize,
+    },
     /// Nothing may be changed.
     #[error(
         "cannot fit {model}: every coefficient is zero without a stated sd, so none may change; give \

@@ -12,7 +12,7 @@ use greylag_model::GreyBox;
 /// Horizon at which improvement is judged, s.
 pub const JUDGED_AT_S: f64 = 5.0;
 /// Least share by which an effect must lower the error of unseen flights.
-const IMPROVED: f64 = 0.01;
+pub(super) const IMPROVED: f64 = 0.01;
 /// An effect that lowers it to less than this share joins though the search has not settled with it: others may be
 /// needed for that.
 pub const SETTLED_OR_NOT: f64 = 0.5;
@@ -181,6 +181,55 @@ pub fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
         }
     }
     objections
+}
+
+/// What to do about coefficients of the model itself that end at a bound, in words.
+pub fn at_bounds(parameters: &[Parameter]) -> Vec<String> {
+    let ended = parameters.iter().filter(|p| p.at_bound && !p.added);
+    ended
+        .map(|p| {
+            let cure = match p.value == 0.0 {
+                true => format!(
+                    "the flights want the other sign or do not tell it from the rest; check the sign of that control in \
+                     the mapping, or hold {} by a smaller sd in the model file",
+                    p.name
+                ),
+                false => format!(
+                    "the others make up for what it lacks, and its interval is none; lift it with --bound {}={}",
+                    p.name,
+                    wider(p.value)
+                ),
+            };
+            format!("{} ends at its bound {}: {cure}", p.name, p.value)
+        })
+        .collect()
+}
+
+/// A range that reaches to twice a bound.
+fn wider(bound: f64) -> String {
+    let far = 2.0 * bound.abs();
+    format!("-{far}..{far}")
+}
+
+/// Coefficients whose fitted sign is that of the prior no more, by more than its width and beyond doubt, in words.
+pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {
+    let turned = |p: &&Parameter| {
+        !p.added
+            && p.value * p.prior < 0.0
+            && (p.value - p.prior).abs() > p.prior_sd
+            && p.value.abs() > CLEAR * p.sd
+    };
+    parameters
+        .iter()
+        .filter(turned)
+        .map(|p| {
+            format!(
+                "{} has come out as {:.4} where the model file has {:.4} ± {:.4}: a control or a sensor of the other sign \
+                 looks like this; check the mapping of the logs",
+                p.name, p.value, p.prior, p.prior_sd
+            )
+        })
+        .collect()
 }
 
 /// A flight whose own estimate cannot be that of all.

@@ -2,11 +2,12 @@
 //!
 //! Each shot starts from a reconstructed state whose error is an unknown of its own, eliminated from
 //! the normal equations; the sensors' remaining biases and the actuators' delay are unknowns of each
-//! flight. Residuals are weighted by their own variance and by how long they hang together, both
-//! estimated along. Priors are Gaussian, with [`Named::width`](greylag_model::Named::width).
+//! flight. Residuals are weighted by their own variance and, all alike, by how long they hang together,
+//! both estimated along. Priors are Gaussian, with [`Named::width`](greylag_model::Named::width).
 
 mod estimates;
 mod gauss_newton;
+mod weights;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -22,7 +23,7 @@ use crate::diagnose::search::clocks::{self, Clocks};
 use crate::per_flight::{PerFlight, trims};
 use crate::progress::{Cancelled, Progress, say};
 use greylag_model::GreyBox;
-use greylag_num::statistics::{correlation_length, quantile};
+use greylag_num::statistics::quantile;
 
 /// Shortest flight to fit to, s.
 pub const LEAST_S: f64 = 10.0;
@@ -34,15 +35,10 @@ const RENEWED: f64 = 0.1;
 const NEAR: f64 = 5.0;
 /// Most steps under the same derivatives.
 const INNER: usize = 6;
-/// Least standard deviations of residuals, in the units of the state: what the models' steps and the
-/// interpolation of deflections leave even without noise.
-const FLOOR: [f64; 8] = [5e-4, 5e-4, 0.01, 2e-3, 2e-3, 2e-3, 5e-4, 5e-4];
 /// Standard deviations of residuals assumed before any are known.
 const COARSE: [f64; 8] = [0.02, 0.02, 0.4, 0.05, 0.05, 0.05, 0.02, 0.02];
 /// Standard deviations of a reconstructed state's errors, at least.
 const START: [f64; 8] = [3e-3, 3e-3, 0.15, 5e-3, 5e-3, 5e-3, 3e-3, 3e-3];
-/// A shot whose mean square residual exceeds the typical one by this factor counts less.
-const OUTLYING: f64 = 6.0;
 
 /// What a fit is asked for.
 #[derive(Clone, Debug)]
@@ -134,6 +130,7 @@ pub fn fit(
         None => equation_error::start(model, &free, flights),
     };
     let asked = options.per_flight;
+    let given = values(model, &free);
     let flown = if asked.has_trims() { trims::joined(model)? } else { model.clone() };
     let mut search = Search::new(&flown, flights, free, theta, asked);
     if let Some(clocks) = clocks {
@@ -145,6 +142,9 @@ pub fn fit(
         let from = 0.1 + share * k as f64;
         let step = |share_done: f64| say(progress, &doing, from + share * share_done);
         step(0.0)?;
+        if k == 0 {
+            search.start_from_the_closer(&given, *length_s);
+        }
         search.shots_of(*length_s)?;
         // only the last length decides the figures
         match k + 1 == options.lengths_s.len() {
@@ -327,32 +327,6 @@ impl<'a> Search<'a> {
             normal::jacobian(&around, self.flights, shot, index, &self.place)
         };
         self.jacobians = self.shots.par_iter().enumerate().map(one).collect();
-    }
-
-    /// Sets the weights by the present residuals.
-    fn reweigh(&mut self) {
-        let residuals = self.residuals();
-        let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
-        for (k, floor) in FLOOR.iter().enumerate() {
-            let (mut sum, mut count) = (0.0, 0.0);
-            for (shot, r) in self.shots.iter().zip(&residuals) {
-                sum += shot.weight * square(r, k);
-                count += shot.weight * r.len() as f64;
-            }
-            let variance = (sum / count).max(floor.powi(2));
-            let of_state = |r: &Vec<[f64; 8]>| r.iter().map(|x| x[k]).collect();
-            let together = correlation_length(&residuals.iter().map(of_state).collect::<Vec<_>>());
-            self.weights.output[k] = 1.0 / (variance * together);
-        }
-        let mean = |r: &Vec<[f64; 8]>| {
-            let w = &self.weights.output;
-            (0..8).map(|k| w[k] * square(r, k)).sum::<f64>() / r.len() as f64
-        };
-        let means: Vec<f64> = residuals.iter().map(mean).collect();
-        let usual = OUTLYING * quantile(&means, 0.5);
-        for (shot, mean) in self.shots.iter_mut().zip(means) {
-            shot.weight = (usual / mean).min(1.0);
-        }
     }
 
     fn residuals(&self) -> Vec<Vec<[f64; 8]>> {

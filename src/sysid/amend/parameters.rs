@@ -74,7 +74,7 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
             let (about, input) = describe(id)?;
             let coefficient = about.coefficients.iter().find(|k| k.name == short)?;
             let added = added.contains(&id);
-            let (low, high) = model.size().bounds(coefficient);
+            let (low, high) = model.bounds(index, coefficient);
             let share = if SLIGHT.contains(&id) { SLIGHT_SHARE } else { 1.0 };
             let width = if added { share * (high - low) } else { c.width() };
             let taken_over = taken_over(model).any(|(of, _)| of == id);
@@ -119,7 +119,7 @@ pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
         let (id, short) = c.name.split_once('.').filter(|_| linear[place])?;
         let (about, _) = describe(id)?;
         let coefficient = about.coefficients.iter().find(|k| k.name == short)?;
-        let (low, high) = model.size().bounds(coefficient);
+        let (low, high) = model.bounds(place, coefficient);
         Some(high - low)
     };
     model.clone().with_widths(range)

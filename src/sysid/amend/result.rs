@@ -4,8 +4,12 @@ use serde::Serialize;
 
 use super::conventions::Tried;
 use super::flight::SENSORS;
+use super::judge::{judged, judged_at};
 use crate::compare::HorizonScore;
 use crate::per_flight::{Constant, PerFlight};
+
+/// Share by which the error of unseen flights must rise for a fit to be worse than the model as given.
+const WORSE: f64 = 0.01;
 
 /// A fitted coefficient.
 #[derive(Clone, Debug, Serialize)]
@@ -172,6 +176,18 @@ pub struct Amendment {
 }
 
 impl Amendment {
+    /// Why the model as given is to be kept, in a sentence: the fit flies flights that it did not see worse.
+    pub fn worse(&self) -> Option<String> {
+        let (given, after) = (judged(&self.given)?, judged(&self.after)?);
+        (after > (1.0 + WORSE) * given || after.is_nan()).then(|| {
+            format!(
+                "The model as given is kept, for the fit flies the flights that it did not see worse: {given:.5} became \
+                 {after:.5} of the reference scale in free runs of {} s.",
+                judged_at(&self.given).unwrap_or_default()
+            )
+        })
+    }
+
     /// Whether effects were asked for and none of them joined the model.
     pub fn all_refused(&self) -> bool {
         !self.effects.is_empty() && !self.effects.iter().any(|e| e.joined)

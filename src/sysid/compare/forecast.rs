@@ -110,10 +110,31 @@ fn linear(flights: &[Prepared]) -> Option<DMatrix<f64>> {
     slopes.iter().all(|x| x.is_finite()).then_some(slopes)
 }
 
-/// The errors of all forecasts at the `horizons` (s), states over `scale`.
+/// The errors of all forecasts at the `horizons` (s), states over `scale`, the linear one fitted to the same flights.
 pub fn forecasts(flights: &[Prepared], scale: [f64; 8], horizons: &[f64]) -> Vec<ForecastResult> {
     let linear = linear(flights).map(Forecast::Linear);
     let all = [Forecast::Hold, Forecast::Straight].into_iter().chain(linear);
+    results(all, flights, scale, horizons)
+}
+
+/// The same on flights that the linear one, fitted to `seen`, has not seen.
+pub fn on_unseen(
+    seen: &[Prepared],
+    flights: &[Prepared],
+    scale: [f64; 8],
+    horizons: &[f64],
+) -> Vec<ForecastResult> {
+    let linear = linear(seen).map(Forecast::Linear);
+    let all = [Forecast::Hold, Forecast::Straight].into_iter().chain(linear);
+    results(all, flights, scale, horizons)
+}
+
+fn results(
+    all: impl Iterator<Item = Forecast>,
+    flights: &[Prepared],
+    scale: [f64; 8],
+    horizons: &[f64],
+) -> Vec<ForecastResult> {
     all.map(|forecast| {
         let runs = flights.iter().flat_map(|f| flown(&forecast, f, scale, horizons)).collect();
         let runs = Runs::new(horizons.to_vec(), runs, scale);

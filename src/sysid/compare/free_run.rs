@@ -155,7 +155,7 @@ fn run(
 }
 
 /// Predicted − measured; roll the short way round. Weak form and report take the opposite sign.
-pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
+pub fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
     error

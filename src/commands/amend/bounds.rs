@@ -1,0 +1,67 @@
+//! Bounds of coefficients that a user gives.
+
+use anyhow::{Result, bail};
+
+use crate::model::GreyBox;
+
+/// A coefficient with the least and the most that it can be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bound {
+    name: String,
+    bounds: [f64; 2],
+}
+
+/// `NAME=LEAST..MOST`.
+pub fn bound(text: &str) -> Result<Bound, String> {
+    let parts =
+        text.split_once('=').and_then(|(name, range)| Some((name, range.split_once("..")?)));
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+    let read = parts.and_then(|(name, (low, high))| Some((name, number(low)?, number(high)?)));
+    match read {
+        Some((name, low, high)) if low < high => {
+            Ok(Bound { name: name.trim().into(), bounds: [low, high] })
+        }
+        _ => Err("give a coefficient with the least and the most that it can be, such as \
+                  lift_linear.CL0=-2..2"
+            .into()),
+    }
+}
+
+/// `model` with `all` these bounds.
+///
+/// # Errors
+/// It has no such coefficient, or one that lies outside of them.
+pub fn given(mut model: GreyBox, all: &[Bound]) -> Result<GreyBox> {
+    for Bound { name, bounds: [low, high] } in all {
+        let Some(c) = model.coefficients().iter().find(|c| c.name == *name) else {
+            let names: Vec<&str> = model.coefficients().iter().map(|c| c.name.as_str()).collect();
+            bail!(
+                "--bound {name}: model {} has no such coefficient; it has {}",
+                model.name,
+                names.join(", ")
+            );
+        };
+        if !(*low..=*high).contains(&c.value) {
+            bail!(
+                "--bound {name}={low}..{high}: the model file has {}, which lies outside",
+                c.value
+            );
+        }
+        model.set_bounds(name, [*low, *high]);
+    }
+    Ok(model)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bound_is_a_name_and_a_range() {
+        let read = bound("lift_linear.CL0=-2..2.5").unwrap();
+        assert_eq!(read, Bound { name: "lift_linear.CL0".into(), bounds: [-2.0, 2.5] });
+        for wrong in ["CL0", "CL0=1", "CL0=2..1", "CL0=a..1", "CL0=1..inf"] {
+            assert!(bound(wrong).unwrap_err().contains("lift_linear.CL0=-2..2"), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! `greylag amend --leave-one-out`: a table of structures, each judged on flights that its fit did not see.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use comfy_table::{CellAlignment, Table};
+
+use crate::commands::bar::Bar;
+use crate::commands::files::{self, Overwrite};
+use crate::model::GreyBox;
+use crate::sysid::amend::leave_one_out::{Fitted, Scored, Structure, leave_one_out};
+use crate::sysid::amend::{Added, Options};
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::per_flight::PerFlight;
+
+/// Standard deviation of the measured axes where no other is asked for, °: what eyes and tape leave.
+const ASKEW_DEG: f64 = 3.0;
+
+/// The structures that are tried: the model as given, its coefficients fitted, these with trims and with axes of each
+/// flight, with each of `effects` and with all, and from what is physically possible alone.
+pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
+    let of = |name: String, effects: &[Added], per_flight: PerFlight| Structure {
+        name,
+        fitted: Fitted::Coefficients { effects: effects.to_vec(), per_flight },
+    };
+    let none = PerFlight::default();
+    let trims = PerFlight { trims: Some(asked.trims.unwrap_or(1.0)), ..none };
+    let axes = PerFlight { askew_deg: Some(asked.askew_deg.unwrap_or(ASKEW_DEG)), ..none };
+    let both = PerFlight { trims: trims.trims, askew_deg: axes.askew_deg };
+    let mut all = vec![
+        Structure { name: "as given".into(), fitted: Fitted::Nothing },
+        of("--tune-only".into(), &[], none),
+        of("--tune-only --flight-trims".into(), &[], trims),
+        of(format!("--tune-only --axes-askew {}", ASKEW_DEG), &[], axes),
+        of(format!("--tune-only --flight-trims --axes-askew {}", ASKEW_DEG), &[], both),
+        Structure { name: "--tune-only --from-scratch".into(), fitted: Fitted::FromScratch },
+    ];
+    let alone =
+        effects.iter().map(|e| of(format!("--effect {}", e.id), std::slice::from_ref(e), asked));
+    all.extend(alone);
+    if effects.len() > 1 {
+        let ids: Vec<&str> = effects.iter().map(|e| e.id.as_str()).collect();
+        all.push(of(format!("--effect {}", ids.join(" ")), effects, asked));
+    }
+    all
+}
+
+/// Tries `structures` of `model` on `flights`, prints the table and writes it as JSON to `json` if there is one.
+pub fn run(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    structures: &[Structure],
+    json: Option<&PathBuf>,
+    overwrite: Overwrite,
+) -> Result<ExitCode> {
+    let bar = Bar::new();
+    let horizons_s = Options::default().horizons_s;
+    let scored = leave_one_out(model, flights, structures, &horizons_s, &|s| bar.hear(s))?;
+    bar.go_on()?;
+    drop(bar);
+    println!("{}", table(&scored));
+    for s in &scored {
+        let by: Vec<String> =
+            flights.iter().zip(&s.errors).map(|(f, e)| format!("{} {e:.4}", f.name)).collect();
+        println!("{}: {}", s.structure, by.join(", "));
+    }
+    match scored.iter().find(|s| s.chosen) {
+        Some(s) if s.free == 0 => {
+            println!("The model as given predicts flights left out as well as any fit: keep it.");
+        }
+        Some(s) => println!(
+            "The simplest within one standard error of the best is {}; fit it to all flights with --fit-all.",
+            s.structure
+        ),
+        None => println!("No structure could be fitted with every flight left out once."),
+    }
+    if let Some(path) = json {
+        files::write(path, &(serde_json::to_string_pretty(&scored)? + "\n"), overwrite)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn table(scored: &[Scored]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header([
+        "structure",
+        "free",
+        "error on the flight left out",
+        "± standard error",
+        "± beside the best",
+        "",
+    ]);
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    let number = |x: f64| if x.is_finite() { format!("{x:.4}") } else { "–".into() };
+    for s in scored {
+        let remark = if s.chosen { "chosen" } else { "" };
+        let free = s.free.to_string();
+        let [a, b, c] = [s.mean, s.standard_error, s.beside_best].map(number);
+        table.add_row([s.structure.clone(), free, a, b, c, remark.into()]);
+    }
+    table
+}

@@ -1,0 +1,112 @@
+//! Free runs as a table: what a model predicts from every start of a flight.
+
+use std::fmt::Write;
+
+use anyhow::{Result, bail};
+
+use crate::model::GreyBox;
+use crate::physics::State;
+use crate::sysid::compare::free_run::{self, START_EVERY_S};
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::sysid::weak_form::prepared::Prepared;
+
+/// Two-sided 95 % point of the normal distribution.
+const NORMAL_95: f64 = 1.96;
+
+/// A prediction beside what was measured.
+struct Row<'a> {
+    model: &'a str,
+    flight: String,
+    start_s: f64,
+    /// Which of the horizons.
+    horizon: usize,
+    predicted: [f64; 8],
+    measured: [f64; 8],
+}
+
+/// The predictions of `models` for `flights` at `horizons_s` after every start, as CSV: a row a model, flight, start
+/// and horizon. A run that has diverged has no row. The 95 % interval of a state is by the errors of the same model
+/// at the same horizon over all other starts.
+pub fn table(models: &[GreyBox], flights: &[Reconstruction], horizons_s: &[f64]) -> Result<String> {
+    let longest = horizons_s.iter().copied().fold(0.0, f64::max);
+    let mut text = header();
+    for model in models {
+        let mut rows = Vec::new();
+        for flight in flights {
+            let flight = Prepared::new(flight, model.airframe.envelope.flying_from_mps())?;
+            for start_s in starts(&flight) {
+                rows.extend(run(model, &flight, start_s, horizons_s, longest));
+            }
+        }
+        rows.iter().for_each(|row| write_row(&mut text, row, &rows, horizons_s));
+    }
+    if text.lines().nth(1).is_none() {
+        bail!(
+            "no free run reaches the shortest horizon, so there is nothing to write; give a shorter --horizon"
+        );
+    }
+    Ok(text)
+}
+
+fn header() -> String {
+    let mut names: Vec<String> =
+        ["model", "flight", "start_s", "horizon_s"].map(String::from).to_vec();
+    for name in State::NAMES {
+        let all = ["", "_measured", "_from", "_to"].map(|what| format!("{name}{what}"));
+        names.extend(all);
+    }
+    names.join(",") + "\n"
+}
+
+/// Moments at which free runs start, as `compare` has them.
+fn starts(flight: &Prepared) -> Vec<f64> {
+    let every = ((START_EVERY_S / flight.dt).round() as usize).max(1);
+    let of = flight.segments.iter().flat_map(|s| s.iter().take(s.len() - 1).step_by(every));
+    of.map(|i| i.time_s).collect()
+}
+
+fn run<'a>(
+    model: &'a GreyBox,
+    flight: &Prepared,
+    start_s: f64,
+    horizons_s: &[f64],
+    longest: f64,
+) -> Vec<Row<'a>> {
+    let Some(path) = free_run::from_moment(model, flight, start_s, longest) else {
+        return Vec::new();
+    };
+    let inside = flight.segments.iter().find(|s| s.iter().any(|i| i.time_s == start_s));
+    let first = inside.and_then(|s| s.iter().position(|i| i.time_s == start_s));
+    let Some((segment, first)) = inside.zip(first) else { return Vec::new() };
+    let at = |(horizon, seconds): (usize, &f64)| {
+        let steps = ((seconds / flight.dt).round() as usize).max(1);
+        (steps < path.time_s.len()).then(|| Row {
+            model: &model.name,
+            flight: flight.name.clone(),
+            start_s,
+            horizon,
+            predicted: std::array::from_fn(|k| path.states[k][steps]),
+            measured: segment[first + steps].state.to_array(),
+        })
+    };
+    horizons_s.iter().enumerate().filter_map(at).collect()
+}
+
+fn write_row(text: &mut String, row: &Row, all: &[Row], horizons_s: &[f64]) {
+    let same = |r: &&Row| r.horizon == row.horizon && !std::ptr::eq::<Row>(*r, row);
+    let (mut squares, mut count) = ([0.0; 8], 0.0);
+    for other in all.iter().filter(same) {
+        let error = free_run::error(&other.measured, &other.predicted);
+        squares.iter_mut().zip(error).for_each(|(s, e)| *s += e * e);
+        count += 1.0;
+    }
+    let horizon = horizons_s[row.horizon];
+    // to a String nothing can fail
+    let _ = write!(text, "{},{},{},{horizon}", row.model, row.flight, row.start_s);
+    for k in 0..8 {
+        let (x, half) = (row.predicted[k], NORMAL_95 * (squares[k] / count).sqrt());
+        let bound = |x: f64| if x.is_finite() { format!("{x}") } else { String::new() };
+        let _ = write!(text, ",{x},{},{},{}", row.measured[k], bound(x - half), bound(x + half));
+    }
+    text.push('\n');
+}

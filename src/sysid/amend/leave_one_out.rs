@@ -1,0 +1,237 @@
+//! Which structure of a model the flights bear out: each flight predicted by a fit to all others.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::amendment::{Added, joined};
+use super::error::AmendError;
+use super::flight::Flight;
+use super::judge::{IMPROVED, Judge, judged, judged_at};
+use super::output_error::{self, FitOptions};
+use super::parameters;
+use crate::compare::forecast;
+use crate::flight_path::reconstruction::Reconstruction;
+use crate::per_flight::PerFlight;
+use crate::progress::{Progress, say, unheard};
+use crate::weak_form::prepared::Prepared;
+use greylag_model::GreyBox;
+
+/// Least number of flights of which one can be left out.
+pub const LEAST_FLIGHTS: usize = 3;
+
+/// A structure that is tried.
+#[derive(Clone, Debug)]
+pub struct Structure {
+    /// What it is, as the user would ask for it.
+    pub name: String,
+    /// What is fitted of it.
+    pub fitted: Fitted,
+}
+
+/// What is fitted of a structure.
+#[derive(Clone, Debug)]
+pub enum Fitted {
+    /// Nothing: the model as given.
+    Nothing,
+    /// The model's coefficients, with effects added and what each flight has of its own.
+    Coefficients {
+        /// The effects.
+        effects: Vec<Added>,
+        /// What each flight has of its own.
+        per_flight: PerFlight,
+    },
+    /// The same from what is physically possible alone, zeros too.
+    FromScratch,
+}
+
+/// What leaving out one flight after the other says of a structure.
+#[derive(Clone, Debug, Serialize)]
+pub struct Scored {
+    /// The structure.
+    pub structure: String,
+    /// Coefficients that are free, and constants of a flight of its own.
+    pub free: usize,
+    /// Free-run error of each flight, of the reference scale, by the fit to the others; NaN where that failed.
+    pub errors: Vec<f64>,
+    /// Their mean; infinite where a fit failed.
+    pub mean: f64,
+    /// Standard error of the mean over the flights.
+    pub standard_error: f64,
+    /// Standard error of the mean difference to the best structure, flight by flight.
+    pub beside_best: f64,
+    /// Whether it is the simplest within that of the best.
+    pub chosen: bool,
+}
+
+/// Leaves out one of `flights` after the other and scores each of `structures` of `model` on it; behind them stand, not to
+/// be chosen, what knows no aerodynamics.
+///
+/// The one chosen has the fewest free coefficients among those whose mean error exceeds the best one's by at most one
+/// standard error of the difference, taken flight by flight, or by 1 % (the rule of Breiman et al., Classification and Regression
+/// Trees, 1984, section 3.4.3, in pairs).
+///
+/// # Errors
+/// There are fewer than [`LEAST_FLIGHTS`], an effect cannot join the model, or `progress` ended it.
+pub fn leave_one_out(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    structures: &[Structure],
+    horizons_s: &[f64],
+    progress: &Progress,
+) -> Result<Vec<Scored>, AmendError> {
+    if flights.len() < LEAST_FLIGHTS {
+        return Err(AmendError::TooFewFlights { flights: flights.len(), needed: LEAST_FLIGHTS });
+    }
+    let slowest = model.airframe.envelope.flying_from_mps();
+    let ready: Vec<Flight> =
+        flights.par_iter().map(|f| Flight::new(f, slowest)).collect::<Result<_, _>>()?;
+    // every structure is judged at the same horizon: the longest that all flights reach
+    let reached = |f: &Flight| judged_at(&scores(model, std::slice::from_ref(f), horizons_s));
+    let at = ready.iter().filter_map(reached).fold(f64::INFINITY, f64::min);
+    let mut all = Vec::new();
+    for (k, structure) in structures.iter().enumerate() {
+        let doing = format!("{}: leaving out one flight after the other", structure.name);
+        say(progress, &doing, k as f64 / structures.len() as f64)?;
+        let one = |left: usize| error_of(model, &ready, left, &structure.fitted, at);
+        let errors: Vec<f64> =
+            (0..ready.len()).into_par_iter().map(one).collect::<Result<_, _>>()?;
+        all.push(scored(structure, free(model, &structure.fitted)?, errors));
+    }
+    choose(&mut all);
+    all.extend(black_boxes(model, &ready, at));
+    Ok(all)
+}
+
+/// What a structure must beat: the state held, straight flight, and a linear model fitted to the other flights.
+fn black_boxes(model: &GreyBox, flights: &[Flight], at: f64) -> Vec<Scored> {
+    let prepared: Vec<Prepared> = flights.iter().map(|f| f.prepared.clone()).collect();
+    let names = ["hold the state", "fly straight on", "linear (ARX), fitted to the others"];
+    let mut errors = vec![Vec::new(); names.len()];
+    for left in 0..prepared.len() {
+        let others = prepared.iter().enumerate().filter(|(k, _)| *k != left);
+        let others: Vec<Prepared> = others.map(|(_, f)| f.clone()).collect();
+        let one = std::slice::from_ref(&prepared[left]);
+        let results = forecast::on_unseen(&others, one, model.scale(), &[at]);
+        for (k, list) in errors.iter_mut().enumerate() {
+            list.push(results.get(k).map_or(f64::NAN, |r| r.free_run[0].rmse_scaled));
+        }
+    }
+    let of = |(name, errors): (&str, Vec<f64>)| {
+        scored(&Structure { name: name.into(), fitted: Fitted::Nothing }, 0, errors)
+    };
+    names.into_iter().zip(errors).map(of).collect()
+}
+
+fn scores(
+    model: &GreyBox,
+    test: &[Flight],
+    horizons_s: &[f64],
+) -> Vec<crate::compare::HorizonScore> {
+    Judge { test, horizons_s }.scores(model)
+}
+
+/// Error of the flight number `left` at the horizon `at` (s) by the fit to the others; NaN where that fails.
+fn error_of(
+    model: &GreyBox,
+    flights: &[Flight],
+    left: usize,
+    fitted: &Fitted,
+    at: f64,
+) -> Result<f64, AmendError> {
+    let others = flights.iter().enumerate().filter(|(k, _)| *k != left);
+    let others: Vec<Flight> = others.map(|(_, f)| f.clone()).collect();
+    let test = std::slice::from_ref(&flights[left]);
+    let error = |model: &GreyBox| judged(&scores(model, test, &[at])).unwrap_or(f64::NAN);
+    let (start, options) = match fitted {
+        Fitted::Nothing => return Ok(error(model)),
+        Fitted::FromScratch => (parameters::from_scratch(model), FitOptions::default()),
+        Fitted::Coefficients { effects, per_flight } => {
+            let added = effects.iter().map(|a| a.id.clone()).collect();
+            let options = FitOptions { added, per_flight: *per_flight, ..FitOptions::default() };
+            (with(model, effects)?, options)
+        }
+    };
+    match output_error::fit(&start, &others, &options, &unheard) {
+        Ok(fit) => Ok(error(&fit.model)),
+        Err(_) => Ok(f64::NAN),
+    }
+}
+
+fn with(model: &GreyBox, effects: &[Added]) -> Result<GreyBox, AmendError> {
+    let mut with = model.clone();
+    effects.iter().try_for_each(|added| joined(&mut with, added))?;
+    Ok(with)
+}
+
+/// How many numbers a structure lets the flights decide.
+fn free(model: &GreyBox, fitted: &Fitted) -> Result<usize, AmendError> {
+    Ok(match fitted {
+        Fitted::Nothing => 0,
+        Fitted::FromScratch => parameters::free(&parameters::from_scratch(model), &[]).len(),
+        Fitted::Coefficients { effects, per_flight } => {
+            let ids: Vec<&str> = effects.iter().map(|a| a.id.as_str()).collect();
+            parameters::free(&with(model, effects)?, &ids).len() + per_flight.constants().len()
+        }
+    })
+}
+
+fn scored(structure: &Structure, free: usize, errors: Vec<f64>) -> Scored {
+    let [mean, standard_error] = mean_with_error(&errors);
+    let mean = if mean.is_nan() { f64::INFINITY } else { mean };
+    let structure = structure.name.clone();
+    Scored { structure, free, errors, mean, standard_error, beside_best: f64::NAN, chosen: false }
+}
+
+/// Mean and its standard error.
+fn mean_with_error(x: &[f64]) -> [f64; 2] {
+    let n = x.len() as f64;
+    let mean = x.iter().sum::<f64>() / n;
+    let variance = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    [mean, (variance / n).sqrt()]
+}
+
+/// Marks the simplest within one standard error of the best, or so near that no effect would join for it.
+fn choose(all: &mut [Scored]) {
+    let best = all.iter().min_by(|a, b| a.mean.total_cmp(&b.mean)).cloned();
+    let Some(best) = best.filter(|b| b.mean.is_finite()) else { return };
+    let mut simplest: Option<(usize, usize)> = None;
+    for (k, s) in all.iter_mut().enumerate() {
+        let more: Vec<f64> = s.errors.iter().zip(&best.errors).map(|(a, b)| a - b).collect();
+        let [difference, error] = mean_with_error(&more);
+        s.beside_best = error;
+        let within = difference <= error.max(IMPROVED * best.mean);
+        if within && simplest.is_none_or(|(_, free)| s.free < free) {
+            simplest = Some((k, s.free));
+        }
+    }
+    if let Some((k, _)) = simplest {
+        all[k].chosen = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(name: &str, free: usize, errors: &[f64]) -> Scored {
+        let structure = Structure { name: name.into(), fitted: Fitted::Nothing };
+        scored(&structure, free, errors.to_vec())
+    }
+
+    #[test]
+    fn the_simplest_within_one_standard_error_is_chosen() {
+        let mut all = [
+            of("given", 0, &[0.5, 0.6, 0.4]),
+            of("tuned", 20, &[0.20, 0.31, 0.24]),
+            of("more", 30, &[0.21, 0.28, 0.25]),
+            of("failed", 5, &[0.1, f64::NAN, 0.1]),
+        ];
+        choose(&mut all);
+        // 0.2500 beside 0.2467: the difference, 0.003 on average, has a standard error of 0.014
+        assert_eq!(all.map(|s| s.chosen), [false, true, false, false]);
+        // clearly better, flight by flight, though the flights differ much more from one another
+        let mut all = [of("tuned", 20, &[0.20, 0.30, 0.40]), of("more", 30, &[0.10, 0.21, 0.29])];
+        choose(&mut all);
+        assert_eq!(all.map(|s| s.chosen), [false, true]);
+    }
+}

@@ -1,0 +1,94 @@
+//! How much each state, each shot and each start counts in a search.
+
+use super::Search;
+use crate::amend::normal::Place;
+use crate::amend::shooting;
+use greylag_num::statistics::{correlation_length, quantile};
+
+/// Least standard deviations of residuals, in the units of the state: what the models' steps and the
+/// interpolation of deflections leave even without noise.
+const FLOOR: [f64; 8] = [5e-4, 5e-4, 0.01, 2e-3, 2e-3, 2e-3, 5e-4, 5e-4];
+/// A shot whose mean square residual exceeds the typical one by this factor counts less.
+const OUTLYING: f64 = 6.0;
+
+impl Search<'_> {
+    /// Sets the weights by the present residuals: the inverse variance of each state, all over one correlation length.
+    ///
+    /// With a length of its own for each state the weights have no fixed point worth having: a state that drifts hangs
+    /// together for longer, counts less for it, and drifts more, until the fit lets it go.
+    pub(super) fn reweigh(&mut self) {
+        let residuals = self.residuals();
+        let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
+        let together = common_length(&residuals);
+        for (k, floor) in FLOOR.iter().enumerate() {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (shot, r) in self.shots.iter().zip(&residuals) {
+                sum += shot.weight * square(r, k);
+                count += shot.weight * r.len() as f64;
+            }
+            let variance = (sum / count).max(floor.powi(2));
+            self.weights.output[k] = 1.0 / (variance * together);
+        }
+        let mean = |r: &Vec<[f64; 8]>| {
+            let w = &self.weights.output;
+            (0..8).map(|k| w[k] * square(r, k)).sum::<f64>() / r.len() as f64
+        };
+        let means: Vec<f64> = residuals.iter().map(mean).collect();
+        let usual = OUTLYING * quantile(&means, 0.5);
+        for (shot, mean) in self.shots.iter_mut().zip(means) {
+            shot.weight = (usual / mean).min(1.0);
+        }
+    }
+
+    /// Begins at `given`, the model's own coefficients, if its shots of `length_s` stay closer to the flights than those
+    /// of the start from equation error, which a kink of a table or a late sensor can lead astray.
+    pub(super) fn start_from_the_closer(&mut self, given: &[f64], length_s: f64) {
+        self.shots = shooting::cut(self.flights, length_s);
+        self.place.starts = vec![[0.0; 8]; self.shots.len()];
+        let other = Place { theta: given.to_vec(), ..self.place.clone() };
+        if self.distance(&other) < self.distance(&self.place) {
+            self.place.theta = other.theta;
+        }
+    }
+
+    /// The sum over the shots of the root of their mean square residual: no shot that is lost rules it.
+    fn distance(&self, place: &Place) -> f64 {
+        let square =
+            |r: &[f64; 8]| (0..8).map(|k| self.weights.output[k] * r[k] * r[k]).sum::<f64>();
+        let root = |r: &Vec<[f64; 8]>| (r.iter().map(square).sum::<f64>() / r.len() as f64).sqrt();
+        self.residuals_at(place).iter().map(root).sum()
+    }
+}
+
+/// The geometric mean of the states' correlation lengths, samples.
+fn common_length(residuals: &[Vec<[f64; 8]>]) -> f64 {
+    let of_state = |k: usize| -> Vec<Vec<f64>> {
+        residuals.iter().map(|r| r.iter().map(|x| x[k]).collect()).collect()
+    };
+    let logarithms = (0..8).map(|k| correlation_length(&of_state(k)).ln());
+    (logarithms.sum::<f64>() / 8.0).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_state_that_drifts_makes_all_count_less() {
+        let mut random = greylag_num::stream::stream(5, &[]);
+        let mut white = || rand::RngExt::random_range(&mut random, -1.0..1.0);
+        let shots: Vec<Vec<[f64; 8]>> =
+            (0..20).map(|_| (0..200).map(|_| std::array::from_fn(|_| white())).collect()).collect();
+        let alone = common_length(&shots);
+        assert!((alone - 1.0).abs() < 0.5, "{alone}");
+        let mut drifting = shots;
+        for shot in &mut drifting {
+            for (k, row) in shot.iter_mut().enumerate() {
+                row[2] = k as f64;
+            }
+        }
+        // its own would be in the hundreds; the geometric mean of eight takes the eighth root
+        let all = common_length(&drifting);
+        assert!((1.3..3.0).contains(&all), "{all}");
+    }
+}
